@@ -1,0 +1,234 @@
+"""A Bota SensONE in the role of force sensor.
+
+``start`` resets the sensor, because only then does it say who it is, takes it to configuration mode, sets binary
+frames and the filter that gives the rate, and lets it run. The reset also makes a session that was left running safe to
+take over.
+"""
+
+import contextlib
+import math
+import select
+import time
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+from drivers.bota.codec import (
+    BAUD_CODES,
+    CONFIG_MODE,
+    CONVERTER_HZ,
+    DEFAULT_BAUD,
+    HARD_RESET,
+    RUN_MODE,
+    BootText,
+    Decoder,
+    Frame,
+    Status,
+    encode_communication,
+    encode_filter,
+    find_ack,
+    find_boot_text,
+    line_rate_Hz,
+    rate_Hz,
+    sinc_for,
+)
+from drivers.ports import Port, read_until
+from drivers.roles import Identity, LinkCounters
+from rig.channels import ForceSample
+from rig.config.wiring import Force
+from rig.errors import DeviceError, UsageError
+from rig.timing import ClockMap, Unwrapper
+
+PRODUCT = "bota-sensone"
+NAME_PREFIX = "BFT"
+UNUSABLE = int(Status.OVERRANGE | Status.INVALID | Status.RAW)
+# The maker's driver allows 2 s for the settings and 2 s for the rest of the text after a reset.
+BOOT_S = 4.0
+# A command and its answer are 30 characters, 31 ms at 9600 baud; the rest is for the host.
+ACK_S = 1.0
+# A sensor that has just printed its text may still drop a character, so the first command is repeated.
+CONFIG_TRIES = 3
+# The filter settles within a few frames; the rest is for the host.
+FIRST_FRAMES = 20
+FIRST_FRAMES_S = 1.0
+
+
+class BotaSensOne:
+    """Owns ``port`` until ``close``. ``now`` is the monotonic clock in ns.
+
+    Raises UsageError, with the port closed, where the configured rate or baud cannot be had.
+    """
+
+    DEFAULT_BAUD: ClassVar = DEFAULT_BAUD
+
+    def __init__(self, port: Port, config: Force, now: Callable[[], int] = time.monotonic_ns) -> None:
+        self.counters = LinkCounters()
+        self._port = port
+        self._now = now
+        try:
+            self._baud, self._sinc = _line_settings(config)
+        except UsageError:
+            port.close()
+            raise
+        self._period_ns = round(self._sinc * 1e9 / CONVERTER_HZ)
+        self._identity = Identity(PRODUCT, "", "")
+        self._latency_ns = round(config.latency_ms * 1e6)
+        self._seq = 0
+        self._early: list[ForceSample] = []
+        self._forget_clock()
+
+    @property
+    def identity(self) -> Identity:
+        """Known after ``start``."""
+        return self._identity
+
+    @property
+    def period_ns(self) -> int:
+        """Nominal time between samples at the filter length chosen."""
+        return self._period_ns
+
+    def fileno(self) -> int:
+        """Descriptor that turns readable when a sample may have come."""
+        return self._port.fileno()
+
+    def start(self) -> None:
+        """Resets, identifies, configures and runs the sensor; raises DeviceError with one sentence."""
+        boot = self._reset()
+        self._forget_clock()
+        self._enter_config_mode()
+        self._command(encode_communication(temperature_compensation=False, calibrated=True, baud=self._baud))
+        self._command(encode_filter(self._sinc))
+        self._await_frames(self._command(RUN_MODE))
+        settings = {"rate": f"{rate_Hz(self._sinc):.1f} Hz", "sinc": str(self._sinc), "baud": str(self._baud)}
+        self._identity = Identity(boot.name, boot.serial, boot.firmware, settings)
+
+    def poll(self, now_ns: int) -> Sequence[ForceSample]:
+        """Samples since the last call."""
+        samples, self._early = self._early, []
+        data = self._port.read()
+        if data:
+            samples += [self._sample(frame, now_ns) for frame in self._decoder.feed(data)]
+        return samples
+
+    def close(self) -> None:
+        """Takes the sensor out of run mode and gives the port back."""
+        with contextlib.suppress(DeviceError):
+            self._port.write(CONFIG_MODE)
+        self._port.close()
+
+    def _forget_clock(self) -> None:
+        """The sensor's clock starts anew with every reset."""
+        self._decoder = Decoder(self.counters)
+        self._unwrap = Unwrapper(32)
+        self._clock = ClockMap(self._latency_ns)
+        self._last_us: int | None = None
+
+    def _reset(self) -> BootText:
+        self._port.read()
+        self._port.write(HARD_RESET)
+        text = read_until(self._port, lambda data: find_boot_text(data) is not None, BOOT_S)
+        boot = find_boot_text(text)
+        if boot is None:
+            raise self._error(f"no boot text within {BOOT_S:g} s of a reset, {_came(text)}; {self._advice(text)}")
+        if not boot.name.startswith(NAME_PREFIX):
+            raise self._error(
+                f"is a {boot.name!r}, not a Bota sensor ({NAME_PREFIX}...); check force.port and force.product"
+            )
+        return boot
+
+    def _advice(self, text: bytes) -> str:
+        if text:
+            return f"check force.port and that the sensor is set to {self._baud} baud"
+        return "check power, cable and force.port"
+
+    def _enter_config_mode(self) -> None:
+        for _ in range(CONFIG_TRIES - 1):
+            with contextlib.suppress(_NoAnswer):
+                self._command(CONFIG_MODE)
+                return
+        self._command(CONFIG_MODE)
+
+    def _command(self, command: bytes) -> bytes:
+        """Sends ``command`` and waits for its acknowledgement; returns what came behind it."""
+        self._port.write(command)
+        text = read_until(self._port, lambda data: find_ack(data, command) is not None, ACK_S)
+        ack = find_ack(text, command)
+        if ack is None:
+            raise _NoAnswer(
+                self._about(f"no answer to {command!r} within {ACK_S:g} s, {_came(text)}; run `rig doctor`")
+            )
+        if ack.code:
+            raise self._error(f"refused {command!r} with code {ack.code}, expected 0; check its firmware")
+        return text[ack.end :]
+
+    def _await_frames(self, data: bytes) -> None:
+        """Waits for the first sample that the sensor vouches for; samples until then are kept for ``poll``."""
+        timeout_s = FIRST_FRAMES_S + FIRST_FRAMES * self._period_ns / 1e9
+        deadline_ns = self._now() + round(timeout_s * 1e9)
+        while True:
+            self._early += [self._sample(frame, self._now()) for frame in self._decoder.feed(data)]
+            if any(sample.valid for sample in self._early):
+                self.counters.discarded_bytes = 0  # the rest of the last answer, not a loss
+                return
+            left_s = (deadline_ns - self._now()) / 1e9
+            if left_s <= 0:
+                raise self._error(self._no_valid_frame(timeout_s))
+            select.select([self._port.fileno()], [], [], left_s)
+            data = self._port.read()
+
+    def _no_valid_frame(self, timeout_s: float) -> str:
+        if not self._early:
+            return (
+                f"no frame within {timeout_s:.1f} s of run mode, {self.counters.discarded_bytes} bytes without "
+                "a good checksum; check cable and baud"
+            )
+        status = Status(self._early[-1].status)
+        return f"no valid reading within {timeout_s:.1f} s of run mode, status {status!r}; unload it and check power"
+
+    def _sample(self, frame: Frame, now_ns: int) -> ForceSample:
+        device_us = self._unwrap(frame.time_us)
+        self._count_lost(device_us)
+        capture_ns = self._clock(device_us * 1000, now_ns)
+        readings = frame[1:7]
+        valid = not frame.status & UNUSABLE and math.isfinite(sum(readings))
+        self._seq += 1
+        return ForceSample(
+            self._seq - 1, capture_ns, now_ns, device_us, *readings, frame.temperature_C, frame.status, int(valid)
+        )
+
+    def _count_lost(self, device_us: int) -> None:
+        if self._last_us is not None:
+            step_us = device_us - self._last_us
+            if step_us <= 0:
+                raise self._error(
+                    f"its clock went back by {-step_us / 1e3:.1f} ms: it restarted by itself; check power, start again"
+                )
+            self.counters.device_lost += max(round(step_us * 1000 / self._period_ns) - 1, 0)
+        self._last_us = device_us
+
+    def _error(self, what: str) -> DeviceError:
+        return DeviceError(self._about(what))
+
+    def _about(self, what: str) -> str:
+        return f"{PRODUCT} at {self._port.address}: {what}"
+
+
+class _NoAnswer(DeviceError):
+    """A command was not acknowledged in time."""
+
+
+def _line_settings(config: Force) -> tuple[int, int]:
+    """Baud and filter length; raises UsageError where one is unknown or the line too slow for the other."""
+    baud = config.baud or DEFAULT_BAUD
+    if baud not in BAUD_CODES:
+        raise UsageError(f"force.baud {baud}: a {PRODUCT} takes {', '.join(map(str, BAUD_CODES))}; write one of these")
+    sinc = sinc_for(config.rate_Hz)
+    if rate_Hz(sinc) > line_rate_Hz(baud):
+        raise UsageError(
+            f"force.rate_Hz {rate_Hz(sinc):.0f}: {baud} baud carries at most {line_rate_Hz(baud):.0f} frames/s; "
+            "lower rate_Hz or raise baud"
+        )
+    return baud, sinc
+
+
+def _came(text: bytes) -> str:
+    return f"{len(text)} bytes came ({text[:16]!r}...)" if text else "nothing came"

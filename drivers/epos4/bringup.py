@@ -1,0 +1,58 @@
+"""Bringing a drive up: who it is, its limits and PDOs written and read back, and the step to operational."""
+
+from collections.abc import Callable
+
+from drivers.canopen.nmt import NmtCommand, NmtState
+from drivers.epos4 import objects, setup
+from drivers.epos4.node import Node
+from drivers.roles import Identity
+from rig.config.wiring import Axis, Limits
+from rig.errors import DeviceError
+
+VENDOR, PRODUCT_FAMILY = 0xFB, 0x6150
+PROFILE_POSITION, HOMING, CYCLIC_POSITION = 1, 6, 8
+NEEDED_MODES = (PROFILE_POSITION, HOMING, CYCLIC_POSITION)
+START_S = 1.0
+
+
+def identify(node: Node) -> Identity:
+    """Who the node says it is; raises DeviceError where it is silent, no EPOS4, or without a mode that is needed."""
+    vendor, product = node.probe(objects.VENDOR), node.read(objects.PRODUCT)
+    if vendor != VENDOR or product >> 16 != PRODUCT_FAMILY:
+        raise DeviceError(
+            f"{node.name}: is not a maxon EPOS4: its identity (object 1018) is vendor {vendor:#x}, product "
+            f"{product:#010x} instead of 0xfb, 0x6150xxxx; check axis.port and axis.node"
+        )
+    modes = node.read(objects.SUPPORTED_MODES)
+    missing = [mode for mode in NEEDED_MODES if not modes >> (mode - 1) & 1]
+    if missing:
+        raise DeviceError(f"{node.name}: lacks modes {missing} (object 6502 is {modes:#x}); update its firmware")
+    return Identity(
+        product=f"maxon {node.read_text(objects.DEVICE_NAME)} {product:08X}",
+        serial=f"{node.read(objects.SERIAL):08X}",
+        firmware=f"{node.read(objects.REVISION) >> 16:04X}",
+        settings={"node": str(node.number), "modes": f"{modes:#x}"},
+    )
+
+
+def configure(node: Node, config: Axis, limits: Limits) -> None:
+    """Writes limits, stops, heartbeats and PDOs, then reads all of it back; raises DeviceError where one differs."""
+    writes = setup.parameters(config, limits) + setup.process_data(config)
+    for entry, value in writes:
+        node.write(entry, value)
+    for entry, value in setup.expected(writes).items():
+        got = node.read(entry)
+        if not setup.agrees(entry, value, got):
+            raise DeviceError(f"{node.name}: {entry} was set to {value} and reads back as {got}; restart the drive")
+
+
+def go_operational(node: Node, config: Axis, now: Callable[[], int]) -> None:
+    """Starts the node and waits until its heartbeat says so; raises DeviceError where it does not."""
+    node.state = None
+    node.order(NmtCommand.START)
+    deadline_ns = now() + round(START_S * 1e9) + setup.drive_heartbeat_limit_ns(config)
+    while not node.is_in(NmtState.OPERATIONAL):
+        left_ns = deadline_ns - now()
+        if left_ns <= 0:
+            raise DeviceError(f"{node.name}: sends no heartbeat of an operational node; restart the drive")
+        node.pump(left_ns / 1e9)

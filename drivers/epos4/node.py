@@ -1,0 +1,147 @@
+"""The conversation with one CANopen node: SDO transfers with a deadline, heartbeats both ways, emergencies."""
+
+import time
+from collections.abc import Callable
+
+from drivers.can.bus import CanLink
+from drivers.can.slcan import CanFrame
+from drivers.canopen.nmt import (
+    EMERGENCY_ID,
+    HEARTBEAT_ID,
+    SDO_REQUEST_ID,
+    SDO_RESPONSE_ID,
+    Emergency,
+    NmtCommand,
+    NmtState,
+    decode_emergency,
+    decode_heartbeat,
+    encode_heartbeat,
+    encode_nmt,
+)
+from drivers.canopen.sdo import ABORT_TEXTS, Download, Transfer, Upload
+from drivers.epos4.objects import Entry
+from rig.errors import DeviceError
+
+SDO_TIMEOUT_S = 1.0
+BOOT_TIMEOUT_S = 3.0
+REPEAT_S = 0.2
+NEVER_S = 1e6
+Handler = Callable[[bytes, int], None]
+
+
+class Node:
+    """``handlers`` take data and time of arrival by identifier; the host's heartbeat starts with ``beat``."""
+
+    def __init__(
+        self, link: CanLink, number: int, host: int, beat_ms: int, name: str, now: Callable[[], int] = time.monotonic_ns
+    ) -> None:
+        self.link = link
+        self.name = name
+        self.number = number
+        self.timeout_s = SDO_TIMEOUT_S
+        self.state: NmtState | None = None
+        self.heard_ns = now()
+        self.restarted = False
+        self.emergency = Emergency(0, 0, b"")
+        self.handlers: dict[int, Handler] = {
+            SDO_RESPONSE_ID + number: self._take_sdo,
+            EMERGENCY_ID + number: self._take_emergency,
+            HEARTBEAT_ID + number: self._take_heartbeat,
+        }
+        self._now = now
+        self._transfer: Transfer | None = None
+        self._heartbeat = encode_heartbeat(host, NmtState.OPERATIONAL)
+        self._beat_ns = beat_ms * 1_000_000
+        self._beat_due_ns: int | None = None
+
+    def is_in(self, state: NmtState) -> bool:
+        """Whether the node's last heartbeat said ``state``."""
+        return self.state is state
+
+    def receive(self, now_ns: int) -> None:
+        """Hands everything that has arrived to its handler."""
+        for can_id, data, extended, remote in self.link.read():
+            handler = self.handlers.get(can_id)
+            if handler and not (extended or remote):
+                handler(data, now_ns)
+
+    def beat(self, now_ns: int) -> None:
+        """Sends the host's heartbeat if it is due; the first call starts it, and with it the drive's watch."""
+        if self._beat_due_ns is None or now_ns >= self._beat_due_ns:
+            self._beat_due_ns = now_ns + self._beat_ns
+            self.link.send(self._heartbeat)
+
+    def pump(self, timeout_s: float) -> None:
+        """Waits until something arrives or the time is over, and keeps the heartbeat going if it was started."""
+        if self._beat_due_ns is not None:
+            self.beat(self._now())
+            timeout_s = min(timeout_s, (self._beat_due_ns - self._now()) / 1e9)
+        self.link.wait(timeout_s)
+        self.receive(self._now())
+
+    def order(self, command: NmtCommand) -> None:
+        """Sends an NMT command."""
+        self.link.send(encode_nmt(command, self.number))
+
+    def read(self, entry: Entry) -> int:
+        """The object's value; raises DeviceError."""
+        return self._value(entry, self._run(Upload(entry.index, entry.sub), f"reading {entry}", self.timeout_s))
+
+    def probe(self, entry: Entry) -> int:
+        """The object's value from a node that may still be booting: asks again until it answers."""
+        data = self._run(Upload(entry.index, entry.sub), f"reading {entry}", BOOT_TIMEOUT_S, REPEAT_S)
+        return self._value(entry, data)
+
+    def read_text(self, entry: Entry) -> str:
+        """The object's text; raises DeviceError."""
+        return (
+            self._run(Upload(entry.index, entry.sub), f"reading {entry}", self.timeout_s).decode("latin-1").strip("\0 ")
+        )
+
+    def write(self, entry: Entry, value: int) -> None:
+        """Writes the object; raises DeviceError."""
+        self._run(Download(entry.index, entry.sub, entry.pack(value)), f"writing {value} to {entry}", self.timeout_s)
+
+    def _value(self, entry: Entry, data: bytes) -> int:
+        value = entry.unpack(data)
+        if value is None:
+            raise DeviceError(f"{self.name}: reading {entry} gave {len(data)} bytes instead of {entry.size}")
+        return value
+
+    def _run(self, transfer: Transfer, what: str, timeout_s: float, repeat_s: float = NEVER_S) -> bytes:
+        self._transfer = transfer
+        begun_ns = self._now()
+        asked_ns = begun_ns - round(repeat_s * 1e9)
+        while not transfer.ended:
+            now_ns = self._now()
+            if now_ns - begun_ns >= timeout_s * 1e9:
+                raise DeviceError(
+                    f"{self.name}: does not answer: {what} took longer than {timeout_s:g} s; "
+                    "check its power, the CAN cable, axis.node and axis.bitrate"
+                )
+            if now_ns - asked_ns >= repeat_s * 1e9:
+                asked_ns = now_ns
+                self._request(transfer)
+            self.pump(min(timeout_s - (now_ns - begun_ns) / 1e9, repeat_s))
+        if transfer.abort is not None:
+            reason = ABORT_TEXTS.get(transfer.abort, "no text for this code")
+            raise DeviceError(f"{self.name}: refused {what}: {transfer.abort:08X} {reason}")
+        return transfer.data
+
+    def _request(self, transfer: Transfer) -> None:
+        self.link.send(CanFrame(SDO_REQUEST_ID + self.number, transfer.request))
+
+    def _take_sdo(self, data: bytes, _now_ns: int) -> None:
+        if self._transfer and self._transfer.feed(data):
+            self._request(self._transfer)
+
+    def _take_emergency(self, data: bytes, _now_ns: int) -> None:
+        self.emergency = decode_emergency(data) or self.emergency
+
+    def _take_heartbeat(self, data: bytes, now_ns: int) -> None:
+        state = decode_heartbeat(data)
+        if state is None:
+            return
+        self.restarted |= state is NmtState.BOOT_UP
+        self.state = state
+        self.heard_ns = now_ns

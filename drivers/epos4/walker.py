@@ -1,0 +1,117 @@
+"""Controlword and statusword through SDO: the state walk, modes, waiting for bits, each with a deadline."""
+
+from collections.abc import Callable
+
+from drivers.epos4 import objects
+from drivers.epos4.cia402 import Control, Goal, State, Status, decode_state, next_controlword, obstacle, reached
+from drivers.epos4.faults import describe
+from drivers.epos4.node import Node
+from rig.errors import DeviceError
+
+REACTION_S = 1.0
+"""How long a drive may take to do what takes no way: change state or mode, acknowledge a set-point."""
+POLL_S = 0.002
+STANDSTILL_RPM = 1
+
+
+class Walker:
+    """Leads one drive; ``braking_s`` is the longest its ramp takes, by which waits for a state are longer."""
+
+    def __init__(self, node: Node, now: Callable[[], int], braking_s: float) -> None:
+        self.node = node
+        self.status = 0
+        self.mode = 0
+        self.controlword = int(Control.DISABLE_VOLTAGE)
+        self._now = now
+        self._braking_s = braking_s
+
+    @property
+    def state(self) -> State:
+        """State of the drive as last heard."""
+        return decode_state(self.status)
+
+    @property
+    def fault(self) -> str:
+        """Error code and meaning, empty if the drive reports none."""
+        code = self.node.emergency.code
+        if code:
+            return describe(code)
+        return "fault without an emergency message" if self.status & Status.FAULT else ""
+
+    def read_status(self) -> int:
+        """The statusword now."""
+        self.status = self.node.read(objects.STATUSWORD)
+        return self.status
+
+    def control(self, word: int) -> None:
+        """Writes the controlword; set-points that follow repeat it."""
+        self.node.write(objects.CONTROLWORD, int(word))
+        self.controlword = int(word)
+
+    def set_mode(self, mode: int) -> None:
+        """Changes the mode of operation; raises DeviceError where the drive does not show it."""
+        self.node.write(objects.MODE, mode)
+        self.mode = mode
+        deadline_ns = self._deadline_ns(REACTION_S)
+        while (shown := self.node.read(objects.MODE_DISPLAY)) != mode:
+            if self._now() >= deadline_ns:
+                raise DeviceError(f"{self.node.name}: does not take mode {mode}, it shows {shown}; restart the drive")
+            self.node.pump(POLL_S)
+
+    def walk(self, goal: Goal) -> None:
+        """Goes to ``goal`` state by state; raises DeviceError with the reason where it cannot."""
+        deadline_ns = self._deadline_ns(REACTION_S + self._braking_s)
+        while not reached(status := self.read_status(), goal):
+            why = obstacle(status, goal)
+            if why or self._now() >= deadline_ns:
+                why = why or f"it stays in {decode_state(status).value}"
+                raise DeviceError(f"{self.node.name}: is not {goal.value}: {why} ({self.fault or 'no fault'})")
+            self.control(next_controlword(status, goal))
+            self.node.pump(POLL_S)
+
+    def make_safe(self) -> None:
+        """From wherever it is: stopped by its ramp, then without torque."""
+        self.walk(Goal.STOPPED)
+        deadline_ns = self._deadline_ns(REACTION_S + self._braking_s)
+        while abs(self.node.read(objects.VELOCITY)) > STANDSTILL_RPM and self._now() < deadline_ns:
+            self.node.pump(POLL_S)
+        self.walk(Goal.DISABLED)
+
+    def watch(self, timeout_s: float, done: Callable[[int], bool]) -> bool:
+        """Reads the statusword until it is ``done``; whether it was, in time."""
+        deadline_ns = self._deadline_ns(timeout_s)
+        while not done(self.read_status()):
+            if self._now() >= deadline_ns:
+                return False
+            self.node.pump(POLL_S)
+        return True
+
+    def require(self, timeout_s: float, bit: Status, value: bool, otherwise: str) -> None:
+        """Waits for a statusword bit while enabled; raises DeviceError, beginning ``otherwise``, where it fails to."""
+
+        def over(status: int) -> bool:
+            return bool(status & bit) is value or decode_state(status) is not State.ENABLED
+
+        in_time = self.watch(timeout_s, over)
+        if not in_time or self.state is not State.ENABLED:
+            why = self.fault or (f"in {self.state.value}" if in_time else f"within {timeout_s:.1f} s")
+            raise DeviceError(f"{self.node.name}: {otherwise}: {why}; see what hinders the axis")
+
+    def reset_fault(self) -> None:
+        """One rising edge of the reset bit, then without torque; raises DeviceError where the fault is still there."""
+        for word in (Control.DISABLE_VOLTAGE, Control.FAULT_RESET, Control.DISABLE_VOLTAGE):
+            self.control(word)
+        gone = self.watch(REACTION_S, lambda status: not status & Status.FAULT)
+        if not gone or self.node.read(objects.ERROR_REGISTER):
+            code = self.node.read(objects.ERROR_CODE)
+            raise DeviceError(f"{self.node.name}: the fault is still there: {describe(code)}; remove its cause first")
+        self.node.emergency = self.node.emergency._replace(code=0)
+        self.walk(Goal.DISABLED)
+
+    def note_old_fault(self) -> None:
+        """Takes over a fault that was there before anyone listened."""
+        if self.read_status() & Status.FAULT:
+            self.node.emergency = self.node.emergency._replace(code=self.node.read(objects.ERROR_CODE))
+
+    def _deadline_ns(self, timeout_s: float) -> int:
+        return self._now() + round(timeout_s * 1e9)

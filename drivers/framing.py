@@ -1,0 +1,68 @@
+"""Cuts frames of one size out of a byte stream: the part that every streaming force sensor shares.
+
+A frame is known by its first bytes and its checksum. Frame starts also occur inside frames, so only a good checksum
+makes a frame; after a bad one the search goes on one byte later, and no good frame behind it is lost.
+"""
+
+from collections.abc import Callable
+
+from drivers.roles import LinkCounters
+
+
+class FixedFrames:
+    """Holds less than one frame of bytes between calls, whatever comes.
+
+    ``is_good`` gets ``size`` bytes that begin with ``start`` and says whether their checksum is right. A checksum error
+    is counted where a frame was due, that is behind another one; every byte outside a good frame is counted as
+    discarded.
+    """
+
+    def __init__(self, start: bytes, size: int, is_good: Callable[[bytes], bool], counters: LinkCounters) -> None:
+        self._start = start
+        self._size = size
+        self._is_good = is_good
+        self._counters = counters
+        self._rest = b""
+        self._due = -1
+
+    @property
+    def held(self) -> int:
+        """Bytes kept for the next call; always less than ``size``."""
+        return len(self._rest)
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """The good frames completed by ``data``, oldest first."""
+        buffer = self._rest + data
+        frames = []
+        at = self._candidate(buffer, 0)
+        while at + self._size <= len(buffer):
+            frame = buffer[at : at + self._size]
+            if self._is_good(frame):
+                frames.append(frame)
+                self._due = following = at + self._size
+            else:
+                self._miss(at)
+                following = at + 1
+            at = self._candidate(buffer, following)
+        self._counters.frames += len(frames)
+        self._rest = buffer[at:]
+        self._due -= at
+        return frames
+
+    def _candidate(self, buffer: bytes, at: int) -> int:
+        """Where the next frame may begin at or behind ``at``; what lies before is discarded."""
+        found = buffer.find(self._start, at)
+        if found < 0:
+            found = len(buffer) - self._partial_start(buffer, at)
+        self._counters.discarded_bytes += found - at
+        return found
+
+    def _partial_start(self, buffer: bytes, at: int) -> int:
+        tail = buffer[max(at, len(buffer) - len(self._start) + 1) :]
+        return next((size for size in range(len(tail), 0, -1) if self._start.startswith(tail[-size:])), 0)
+
+    def _miss(self, at: int) -> None:
+        self._counters.discarded_bytes += 1
+        if at == self._due:
+            self._counters.checksum_errors += 1
+            self._due += self._size
