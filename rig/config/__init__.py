@@ -1,0 +1,1 @@
+"""The three configuration files: wiring, protocol, calibration."""

@@ -1,0 +1,84 @@
+"""Strict TOML tables: an unknown key is an error that names the nearest valid one, a bad value says where and why."""
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
+
+from rig.errors import UsageError
+
+
+class Table(BaseModel):
+    """A TOML table: frozen, no unknown keys, no NaN or infinity, no silent conversion between text and number."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
+
+
+AnyTable = TypeVar("AnyTable", bound=Table)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The file's table; a missing or malformed file is one sentence."""
+    try:
+        return tomllib.loads(path.read_text())
+    except FileNotFoundError as error:
+        raise UsageError(f"{path}: no such file; give the path of a TOML file") from error
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise UsageError(f"{path}: cannot be read as TOML: {error}") from error
+
+
+def parse(kind: type[AnyTable], values: Mapping[str, Any], where: str) -> AnyTable:
+    """``values`` as a ``kind``; raises UsageError naming ``where``, the key, the bound and the nearest valid key."""
+    try:
+        return kind.model_validate(values)
+    except ValidationError as error:
+        raise UsageError(f"{where}: " + "; ".join(_sentence(kind, detail) for detail in error.errors())) from error
+
+
+def load(kind: type[AnyTable], path: Path, overrides: Iterable[str] = ()) -> AnyTable:
+    """The table in ``path`` with ``section.key=value`` overrides on top."""
+    return parse(kind, merged(read_toml(path), overrides), str(path))
+
+
+def merged(values: dict[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
+    """``values`` with each ``section.key=value`` set; the value is TOML, or text where it is not."""
+    for override in overrides:
+        name, separator, text = override.partition("=")
+        if not separator or not name:
+            raise UsageError(f"--set {override}: write section.key=value, for example --set force.port=/dev/ttyUSB0")
+        *sections, key = name.strip().split(".")
+        table = values
+        for section in sections:
+            table = table.setdefault(section, {})
+        table[key] = _value(text.strip())
+    return values
+
+
+def _value(text: str) -> object:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _sentence(kind: type[BaseModel], detail: ErrorDetails) -> str:
+    location = [str(part) for part in detail["loc"]]
+    place = ".".join(location) or "table"
+    if detail["type"] == "extra_forbidden":
+        keys = _keys(kind, location[:-1])
+        near = difflib.get_close_matches(location[-1], keys, n=1, cutoff=0.0)
+        return f"unknown key {place}; nearest valid key: {near[0] if near else ', '.join(keys)}"
+    got = "" if isinstance(detail["input"], dict | BaseModel) else f" (got {detail['input']!r})"
+    return f"{place}: {detail['msg'].removeprefix('Value error, ')}{got}"
+
+
+def _keys(kind: type[BaseModel], sections: list[str]) -> list[str]:
+    for section in sections:
+        annotation = kind.model_fields[section].annotation
+        choices = [annotation, *get_args(annotation)]
+        kind = next(choice for choice in choices if isinstance(choice, type) and issubclass(choice, BaseModel))
+    return sorted(kind.model_fields)

@@ -1,0 +1,167 @@
+"""`rig.toml`: which products stand on the bench, where they are plugged in, and what must never be exceeded."""
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from rig.config.table import Table
+
+Positive = Annotated[float, Field(gt=0)]
+MOCK_PORT = "mock"
+
+
+class Force(Table):
+    """The force sensor. ``product`` is the one line that chooses it."""
+
+    product: Literal["bota-sensone", "robotiq-ft300"] = "bota-sensone"
+    port: str = MOCK_PORT
+    baud: int = Field(default=0, ge=0, description="0: the product's own default")
+    rate_Hz: float = Field(default=1000, ge=10, le=1010)
+    axis: Literal["fx", "fy", "fz"] = "fz"
+    compression: Literal["positive", "negative"] = Field(
+        default="negative", description="sign the sensor gives to compression"
+    )
+    latency_ms: float = Field(default=0.0, ge=0, le=100, description="known smallest delay from capture to arrival")
+
+
+class Axis(Table):
+    """The servo axis behind a CAN adapter."""
+
+    product: Literal["maxon-epos4"] = "maxon-epos4"
+    port: str = MOCK_PORT
+    interface: Literal["slcan"] = "slcan"
+    bitrate: int = 1_000_000
+    node: int = Field(default=1, ge=1, le=127)
+    increments_per_mm: Positive = 2000.0
+    increments_per_rev: Positive = Field(default=10_000.0, description="four times the encoder's lines; scales rpm")
+    direction: Literal[1, -1] = Field(default=1, description="1: increments grow into the tissue")
+    homing_method: Literal[-4, -3, -2, -1, 1, 2, 7, 11, 17, 18, 23, 27, 33, 34, 37] = 17
+    homing_speed_mm_s: Positive = 20.0
+    heartbeat_ms: int = Field(default=50, ge=5, le=1000, description="period of the heartbeat each side sends")
+    following_error_mm: Positive = 2.0
+    current_limit_A: Positive = 5.0
+    acceleration_mm_s2: Positive = 2000.0
+    bandwidth_Hz: Positive = Field(default=34.0, description="-3 dB of the drive's position loop, for the gains")
+    delay_ms: float = Field(default=4.0, ge=0, description="from command to motion, sensor included")
+
+
+class Tracker(Table):
+    """The marker tracker; leave the table out where there is none."""
+
+    product: Literal["ndi-polaris"] = "ndi-polaris"
+    port: str = MOCK_PORT
+    reply: Literal["BX", "TX"] = "BX"
+    tools: tuple[str, ...] = Field(default=("tip", "arm"), min_length=1)
+    roms: tuple[Path, ...] = Field(default=(), description="one .rom file a tool; empty: tools already in ports")
+    rate_Hz: Positive = 60.0
+    latency_ms: float = Field(default=0.0, ge=0, le=200)
+
+
+class Loop(Table):
+    """The cyclic executive."""
+
+    rate_Hz: float = Field(default=1000.0, ge=50, le=2000)
+    priority: int = Field(default=50, ge=0, le=98, description="SCHED_FIFO priority asked for; 0: none")
+    stale_force_ms: Positive = Field(default=50.0, description="age at which a force sample no longer counts")
+    stale_axis_ms: Positive = Field(default=50.0, description="age at which an axis sample no longer counts")
+    stale_marker_ms: Positive = Field(default=200.0, description="age at which a tracker frame no longer counts")
+    missed_periods: int = Field(
+        default=0, ge=0, description="samples of force or axis that may be missing before they count as lost; 0: by age"
+    )
+    lease_s: float = Field(
+        default=3.0, ge=0, description="the operator's program must show itself this often; 0: not asked"
+    )
+    overrun_ms: Positive = Field(default=100.0, description="a wake-up later than this stops motion")
+    gains: Literal["tangent", "secant", "constant", "admittance"] = "tangent"
+    crossover_Hz: Positive = 10.0
+    phase_margin_deg: float = Field(default=55.0, gt=20, lt=90)
+    drift_Hz: float = Field(
+        default=1.5, ge=0, description="corner of the second integral, for a moving surface; 0: none"
+    )
+    adapt: bool = Field(default=False, description="follow the tissue's stiffness while force moves")
+
+
+class Limits(Table):
+    """What stops motion; checked before it and during it."""
+
+    force_N: Positive = 20.0
+    force_rate_N_s: Positive = 1000.0
+    depth_mm: Positive = 15.0
+    position_min_mm: float = 0.0
+    position_max_mm: float = 60.0
+    patient_mm: Positive = Field(default=10.0, description="how far the limb may move against the robot in a program")
+    speed_mm_s: Positive = 60.0
+    retract_speed_mm_s: Positive = 20.0
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        if self.position_min_mm >= self.position_max_mm:
+            raise ValueError(
+                f"position_min_mm {self.position_min_mm:g} is not below position_max_mm {self.position_max_mm:g}"
+            )
+        if self.retract_speed_mm_s > self.speed_mm_s:
+            raise ValueError(f"retract_speed_mm_s {self.retract_speed_mm_s:g} is above speed_mm_s {self.speed_mm_s:g}")
+        return self
+
+
+class Subject(Table):
+    """Who lies under the tip."""
+
+    id: str = "phantom"
+    site: str = "forearm"
+    pain_threshold_N: Positive = 15.0
+
+
+class Mock(Table):
+    """Where ports are ``mock``: what the simulated bench is made of."""
+
+    parameters: Path | None = None
+    hide: tuple[str, ...] = ()
+
+
+class Wiring(Table):
+    """The whole of `rig.toml`."""
+
+    force: Force = Force()
+    axis: Axis = Axis()
+    tracker: Tracker | None = Tracker()
+    loop: Loop = Loop()
+    limits: Limits = Limits()
+    subject: Subject = Subject()
+    mock: Mock = Mock()
+
+    @model_validator(mode="after")
+    def _loop_within_axis(self) -> Self:
+        if self.loop.crossover_Hz >= self.axis.bandwidth_Hz:
+            raise ValueError(
+                f"loop.crossover_Hz {self.loop.crossover_Hz:g} must stay below"
+                f" axis.bandwidth_Hz {self.axis.bandwidth_Hz:g}"
+            )
+        return self
+
+    @property
+    def force_limit_N(self) -> float:
+        """The lower of machine limit and subject's pain threshold."""
+        return min(self.limits.force_N, self.subject.pain_threshold_N)
+
+    @property
+    def stale_force_ms(self) -> float:
+        """Age at which a force sample no longer counts."""
+        return self._stale(self.loop.stale_force_ms, self.force.rate_Hz)
+
+    @property
+    def stale_axis_ms(self) -> float:
+        """Age at which an axis sample no longer counts."""
+        return self._stale(self.loop.stale_axis_ms, self.loop.rate_Hz)
+
+    def _stale(self, limit_ms: float, rate_Hz: float) -> float:
+        """A sample just in time is up to two periods old: one until the next is due, one on its way."""
+        missed = self.loop.missed_periods
+        return min(limit_ms, (missed + 2) * 1000 / rate_Hz) if missed else limit_ms
+
+    @property
+    def uses_mock(self) -> bool:
+        """Whether any device is to be served by the mock bench."""
+        ports = [self.force.port, self.axis.port, *([self.tracker.port] if self.tracker else [])]
+        return MOCK_PORT in ports

@@ -1,0 +1,267 @@
+"""From evidence to words and numbers: verdict, findings with intervals and gains, what could have been seen."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from scipy.stats import t as student
+
+from rig.diagnosis.evidence import Tangents, held_out_square_error, information, is_alias
+from rig.diagnosis.fit import Fit, least_squares
+from rig.diagnosis.gates import Finding
+from rig.diagnosis.omnibus import Leftover, judged_leftover
+from rig.diagnosis.problem import Effect, Par, Problem
+from rig.diagnosis.search import Named, Search, imitated, testable
+from rig.diagnosis.simulated import Simulated
+
+Verdict = Literal["adequate", "explained", "unexplained"]
+POWER_SD = 0.84  # 80 % power
+LEAVING_OUT_NATS = 1.0
+DRAWS = 1000
+LARGEST_LOG = 20.0
+# A model whose noise and scatter are this large against the signal explains nothing, however white its residual.
+MOST_CHANCE = 0.25
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def as_json(self) -> dict[str, float]:
+        """For the file."""
+        return {"value": self.value, "low": self.low, "high": self.high}
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Error on recordings left out, before and after, and the relative reduction with its interval."""
+
+    unit: str
+    before: float
+    after: float
+    reduction: Interval
+
+    def as_json(self) -> dict[str, float]:
+        """For the file."""
+        return {
+            f"rmse_before_{self.unit}": self.before,
+            f"rmse_after_{self.unit}": self.after,
+            "reduction": self.reduction.value,
+            "low": self.reduction.low,
+            "high": self.reduction.high,
+        }
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One named cause (or a set that the data cannot tell apart)."""
+
+    effects: tuple[str, ...]
+    statement: str
+    confidence: float
+    parameters: Mapping[str, Interval]
+    gain: Gain
+    nats: float
+    p_value: float
+    repair: str
+    provisional: bool
+
+    def as_json(self) -> dict[str, object]:
+        """For the file."""
+        return {
+            "effects": list(self.effects),
+            "statement": self.statement,
+            "confidence": self.confidence,
+            "parameters": {name: interval.as_json() for name, interval in self.parameters.items()},
+            "gain": self.gain.as_json(),
+            "evidence_nats": self.nats,
+            "p_value": self.p_value,
+            "repair": self.repair,
+            "provisional": self.provisional,
+        }
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything `rig diagnose` says."""
+
+    session: str
+    simulation: str
+    recordings: int
+    verdict: Verdict
+    statement: str
+    findings: tuple[Answer, ...]
+    depends_on: tuple[str, ...]
+    leftover_p: float | None
+    detectable: Mapping[str, tuple[float, str]]
+    not_testable: Mapping[str, str]
+    next_experiment: Mapping[str, object] | None
+    quality: tuple[Finding, ...]
+    base: Mapping[str, Interval] = field(default_factory=dict)
+    search: Search | None = None
+    before: Leftover | None = None
+    after: Leftover | None = None
+    simulated: tuple[Simulated, ...] = ()
+
+    def with_simulated(self, simulated: tuple[Simulated, ...]) -> "Diagnosis":
+        """The same with errors of whole simulations."""
+        return replace(self, simulated=simulated)
+
+    def as_json(self) -> dict[str, object]:
+        """What the file holds."""
+        unexplained = {"depends_on": list(self.depends_on), "p_value": self.leftover_p} if self.depends_on else None
+        return {
+            "verdict": self.verdict,
+            "statement": self.statement,
+            "simulation": self.simulation,
+            "session": self.session,
+            "recordings": self.recordings,
+            "findings": [finding.as_json() for finding in self.findings],
+            "unexplained": unexplained,
+            "detectable": {name: {"minimum": size, "unit": unit} for name, (size, unit) in self.detectable.items()},
+            "not_testable": dict(self.not_testable),
+            "next_experiment": self.next_experiment,
+            "data_quality": [finding._asdict() for finding in self.quality],
+            "parameters": {name: interval.as_json() for name, interval in self.base.items()},
+            "simulation_error": [item._asdict() for item in self.simulated],
+        }
+
+
+def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Interval]:
+    """95 % intervals from the joint fit's covariance with Student's t on recordings; a pair becomes its amplitude."""
+    wide = float(student.ppf(0.975, max(fit.problem.recordings - 1, 1)))
+    place = {par.name: k for k, par in enumerate(fit.free)}
+    found: dict[str, Interval] = {}
+    for par in wanted:
+        value = fit.values[par.name]
+        if par.name not in place:
+            found[par.name] = Interval(value, par.low, par.high)
+        elif par.name.endswith("_sin_mm"):
+            found[par.name.replace("_sin_mm", "_mm")] = _amplitude(fit, par.name, place, wide)
+        elif not par.name.endswith("_cos_mm"):
+            k = place[par.name]
+            half = wide * float(np.sqrt(fit.covariance[k, k]))
+            half = min(half, LARGEST_LOG) if par.log else half
+            low, high = (value / np.exp(half), value * np.exp(half)) if par.log else (value - half, value + half)
+            found[par.name] = Interval(value, max(low, par.low), min(high, par.high))
+    return found
+
+
+def _amplitude(fit: Fit, sine: str, place: Mapping[str, int], wide: float) -> Interval:
+    pair = np.array([fit.values[sine], fit.values[sine.replace("_sin_", "_cos_")]])
+    index = [place[sine], place[sine.replace("_sin_", "_cos_")]]
+    size = float(np.hypot(*pair))
+    variance = float(pair @ fit.covariance[np.ix_(index, index)] @ pair) / max(size**2, 1e-300)
+    half = wide * float(np.sqrt(variance))
+    return Interval(size, max(size - half, 0.0), size + half)
+
+
+def gain_of(before: Fit, after: Fit) -> Gain:
+    """Held-out error of two models, each at its least-squares best, with a bootstrap over recordings."""
+    old, new = (held_out_square_error(least_squares(model)) for model in (before, after))
+    picks = np.random.default_rng(0).integers(0, len(old), size=(DRAWS, len(old)))
+    reductions = 1 - np.sqrt(new[picks].mean(axis=1) / np.maximum(old[picks].mean(axis=1), 1e-300))
+    low, high = np.percentile(reductions, [2.5, 97.5])
+    rmse = float(np.sqrt(old.mean())), float(np.sqrt(new.mean()))
+    reduction = Interval(1 - rmse[1] / max(rmse[0], 1e-300), float(low), float(high))
+    return Gain(before.problem.channels[0].unit, *rmse, reduction)
+
+
+def sentence(effect: Effect, values: Mapping[str, float]) -> str:
+    """The effect's statement with its numbers."""
+    pair = [values[par.name] for par in effect.amplitudes]
+    return effect.statement.format(**values, amplitude=float(np.hypot.reduce(pair)))
+
+
+def answer(named: Named, after: Fit, provisional: bool) -> Answer:
+    """One finding of the final model."""
+    effect = named.effect
+    return Answer(
+        (effect.name, *named.rivals),
+        sentence(effect, after.values),
+        named.share,
+        intervals(after, effect.pars),
+        gain_of(named.without, after),
+        float(named.gains.sum()),
+        named.p_value,
+        effect.repair,
+        provisional,
+    )
+
+
+def smallest_visible(t: Tangents, threshold: float) -> dict[str, tuple[float, str]]:
+    """Amplitude that would have been named with 80 % probability, by effect; the median over its shapes."""
+    needed = np.sqrt(2 * (threshold + LEAVING_OUT_NATS)) + POWER_SD
+    sizes: dict[str, list[float]] = {}
+    for direction in t.directions:
+        if is_alias(t, direction):
+            continue
+        _, left = information(t, direction)
+        weakest = float(np.linalg.eigvalsh(left).min())
+        sizes.setdefault(direction.effect.name, []).append(needed / np.sqrt(max(weakest, 1e-300)))
+    effects = {direction.effect.name: direction.effect for direction in t.directions}
+    result = {}
+    for name, found in sizes.items():
+        par = effects[name].amplitudes[0]
+        result[name] = (max(float(np.median(found)), par.worth), par.unit)
+    return result
+
+
+def limits(problem: Problem, search: Search) -> tuple[dict[str, tuple[float, str]], dict[str, str]]:
+    """What could have been seen, and what not and why."""
+    reasons = {
+        effect.name: problem.offers[need]
+        for effect in problem.effects
+        for need in sorted(effect.needs)
+        if need in problem.offers
+    }
+    level = max(float(np.quantile(maxima, 0.95)) for maxima in search.maxima if maxima.size)
+    visible = smallest_visible(search.tangents, max(level, 0.0))
+    for effect in testable(problem):
+        par = effect.amplitudes[0]
+        if effect.name in search.after.names:
+            continue
+        if effect.name not in visible:
+            reasons[effect.name] = "the simulation's own parameters imitate it completely in this experiment"
+        elif visible[effect.name][0] > par.high - par.null:
+            size, unit = visible.pop(effect.name)
+            reasons[effect.name] = f"only {size:.2g} {unit} or more would have shown in this experiment"
+    return visible, reasons
+
+
+def verdict_of(search: Search, after: Leftover) -> tuple[Verdict, tuple[str, ...]]:
+    """Adequate, explained or unexplained, and what a leftover depends on."""
+    named = sum(float(found.gains.sum()) for found in search.named)
+    depends = judged_leftover(after, named)
+    if not depends:
+        depends = imitated([found.effect for found in search.named])
+    if not depends and left_to_chance(search.after) > MOST_CHANCE:
+        depends = ("recording",)
+    if depends:
+        return "unexplained", depends
+    return ("explained" if search.named else "adequate"), ()
+
+
+def left_to_chance(fit: Fit) -> float:
+    """Error on recordings left out as a share of the signal's own spread."""
+    spread = float(np.std(fit.problem.channels[0].observed))
+    return float(np.sqrt(held_out_square_error(least_squares(fit)).mean())) / max(spread, 1e-300)
+
+
+def summary(verdict: Verdict, findings: Sequence[Answer], depends_on: Sequence[str], simulation: str) -> str:
+    """One sentence for a person."""
+    if verdict == "adequate":
+        return f"The {simulation} simulation explains these recordings to within their noise; nothing else is needed."
+    causes = "; ".join(
+        finding.statement + (f" (or {', '.join(finding.effects[1:])})" if finding.effects[1:] else "")
+        for finding in findings
+    )
+    if verdict == "explained":
+        return f"The {simulation} simulation is wrong because {causes}."
+    hint = f" Provisionally: {causes}." if causes else ""
+    return f"Something is left that no known cause explains; it depends on {', '.join(depends_on)}.{hint}"

@@ -1,0 +1,178 @@
+"""Causes that lie in the bench: kinematics, environment, guide, sensor, time stamps."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rig.diagnosis.effects.scan import PEAKS, peaks
+from rig.diagnosis.problem import Array, Effect, Par, Problem, Values
+
+LOWEST_HZ, HIGHEST_HZ = 0.08, 3.0
+PITCHES_1_MM = np.linspace(1 / 10, 1 / 0.5, 60)
+NUDGE_MM = 0.02
+FEWEST_PERIODS = 2.5
+
+
+def _match(problem: Problem, values: Values, residual: Array) -> tuple[Array, float]:
+    """Residual times its sensitivity to the surface, per sample, and the sensitivity's energy."""
+    ahead = problem.predict({**values, "surface_mm": values["surface_mm"] + NUDGE_MM})[0]
+    sensitivity = (ahead - problem.predict(values)[0]) / NUDGE_MM
+    return residual * sensitivity, float(sensitivity @ sensitivity)
+
+
+def _frequencies(problem: Problem) -> Array:
+    time_s = problem.variables()["session time"]
+    span_s = float(np.ptp(time_s))
+    return np.arange(LOWEST_HZ, HIGHEST_HZ, 0.5 / max(span_s, 5.0))
+
+
+def _surface_starts(problem: Problem, values: Values, residual: Array) -> Sequence[Values]:
+    time_s = problem.variables()["session time"]
+    found = peaks(time_s, *_match(problem, values, residual), _frequencies(problem))
+    return [{"surface_motion_Hz": f} for f in found]
+
+
+def _ripple_starts(problem: Problem, values: Values, residual: Array) -> Sequence[Values]:
+    position = problem.variables()["depth"]
+    match, energy = _match(problem, values, residual)
+    touching = np.abs(match) > 0
+    if not touching.any():
+        return [{"ripple_pitch_mm": pitch} for pitch in (1.0, 2.0)]
+    longest = np.ptp(position[touching]) / FEWEST_PERIODS
+    found = peaks(position, match, energy, PITCHES_1_MM[1 / max(longest, 0.5) <= PITCHES_1_MM])
+    return [{"ripple_pitch_mm": 1 / f} for f in found]
+
+
+def _surface_tries(problem: Problem) -> float:
+    return max(1.0, len(_frequencies(problem)) / 2 / PEAKS)
+
+
+def _ripple_tries(_: Problem) -> float:
+    return max(1.0, len(PITCHES_1_MM) / 3 / PEAKS)
+
+
+def _pair(stem: str, meaning: str) -> tuple[Par, Par]:
+    return (
+        Par(f"{stem}_sin_mm", "mm", 0.0, -10.0, 10.0, 0.02, worth=0.003, meaning=meaning),
+        Par(f"{stem}_cos_mm", "mm", 0.0, -10.0, 10.0, 0.02, worth=0.003, meaning=meaning),
+    )
+
+
+BACKLASH = Effect(
+    "backlash",
+    "the tip follows the encoder with a dead band of {backlash_mm:.3g} mm",
+    (Par("backlash_mm", "mm", 0.0, 0.0, 3.0, 0.03, worth=0.005, meaning="dead band"),),
+    one_sided=True,
+    needs=frozenset({"unloading"}),
+    repair="preload or replace the nut; or measure the tip itself",
+)
+FRAME_COMPLIANCE = Effect(
+    "frame_compliance",
+    "the frame gives way by {frame_compliance_mm_N:.3g} mm per newton between encoder and tip",
+    (Par("frame_compliance_mm_N", "mm/N", 0.0, 0.0, 0.8, 0.005, worth=0.001, meaning="tip behind encoder per force"),),
+    one_sided=True,
+    needs=frozenset({"tracker", "depth"}),
+    aliases=("stiffness_N_mm", "stiffening_1_mm"),
+    repair="brace the frame, measure the tip itself, or keep the compliance in the model",
+)
+POSITION_RIPPLE = Effect(
+    "position_ripple",
+    "the screw has a periodic error of {amplitude:.3g} mm every {ripple_pitch_mm:.3g} mm",
+    _pair("ripple", "periodic error of the screw"),
+    (Par("ripple_pitch_mm", "mm", 2.0, 0.2, 20.0, 0.02, meaning="period along the axis"),),
+    _ripple_starts,
+    _ripple_tries,
+    needs=frozenset({"depth"}),
+    through="depth",
+    repair="calibrate the screw error, or use an encoder on the carriage",
+)
+CONTACT_OFFSET = Effect(
+    "contact_offset",
+    "the surface lies {contact_offset_mm:+.3g} mm from where it was stated",
+    (Par("contact_offset_mm", "mm", 0.0, -8.0, 8.0, 0.05, worth=0.02, meaning="true surface minus stated surface"),),
+    between=True,
+    needs=frozenset({"surface", "depth"}),
+    repair="find the contact again, or correct the stated surface",
+)
+SURFACE_MOTION = Effect(
+    "surface_motion",
+    "the surface moves by {amplitude:.3g} mm at {surface_motion_Hz:.3g} Hz (breathing or pulse)",
+    _pair("surface_motion", "motion of the surface"),
+    (Par("surface_motion_Hz", "Hz", 0.25, 0.05, 5.0, 0.002, meaning="frequency"),),
+    _surface_starts,
+    _surface_tries,
+    needs=frozenset({"depth"}),
+    repair="ask for held breath, or measure the limb with a marker and subtract it",
+)
+FRICTION = Effect(
+    "friction",
+    "the guide in front of the sensor rubs with {friction_N:.3g} N",
+    (Par("friction_N", "N", 0.0, 0.0, 20.0, 0.02, worth=0.005, meaning="Coulomb level"),),
+    (
+        Par(
+            "friction_length_mm",
+            "mm",
+            0.1,
+            2e-3,
+            5.0,
+            1.0,
+            log=True,
+            may_end=True,
+            meaning="travel over which it builds up",
+        ),
+    ),
+    lambda *_: [{"friction_length_mm": length} for length in (0.005, 0.03, 0.15, 0.6)],
+    one_sided=True,
+    needs=frozenset({"unloading"}),
+    repair="clean and align the guide, or put the sensor at the tip",
+)
+TIP_INERTIA = Effect(
+    "tip_inertia",
+    "a mass of {tip_inertia_kg:.3g} kg moves in front of the sensor",
+    (Par("tip_inertia_kg", "kg", 0.0, 0.0, 5.0, 0.02, worth=0.005, meaning="mass in front of the sensor"),),
+    one_sided=True,
+    needs=frozenset({"fast"}),
+    repair="weigh what is mounted on the sensor and enter it in the calibration",
+)
+FILTER_LAG = Effect(
+    "filter_lag",
+    "the force is low-passed with a time constant of {filter_lag_s:.3g} s",
+    (Par("filter_lag_s", "s", 0.0, 0.0, 0.5, 0.002, worth=0.0007, meaning="time constant of a first-order filter"),),
+    one_sided=True,
+    needs=frozenset({"fast"}),
+    repair="raise the sensor's filter frequency, or filter the position alike",
+)
+TIME_OFFSET = Effect(
+    "time_offset",
+    "the force's time stamps are late by {time_offset_s:.3g} s against the position's",
+    (Par("time_offset_s", "s", 0.0, -0.3, 0.3, 0.002, worth=0.0007, meaning="force stamps late"),),
+    needs=frozenset({"fast"}),
+    repair="correct the sensor's latency in rig.toml, or stamp both in hardware",
+)
+TRACKER_LATENCY = Effect(
+    "tracker_latency",
+    "the tracker shows the tip {tracker_latency_s:.3g} s late",
+    (Par("tracker_latency_s", "s", 0.0, -0.3, 0.5, 0.005, worth=0.001, meaning="tracker stamps late"),),
+    needs=frozenset({"tracker"}),
+    repair="set the tracker's latency_ms in rig.toml",
+)
+ZERO_DRIFT = Effect(
+    "zero_drift",
+    "the force zero drifts by {zero_drift_N_h:.3g} N per hour",
+    (Par("zero_drift_N_h", "N/h", 0.0, -500.0, 500.0, 0.3, worth=0.1, meaning="drift of the zero"),),
+    between=True,
+    needs=frozenset({"strokes"}),
+    repair="let the sensor warm up and take the zero in the air before every stroke",
+)
+GAIN_ERROR = Effect(
+    "gain_error",
+    "the force reads {gain_error_1:.2%} too high",
+    (Par("gain_error_1", "1", 0.0, -0.5, 0.5, 0.01, worth=0.005, meaning="relative error of the force gain"),),
+    needs=frozenset({"weight"}),
+    aliases=("stiffness_N_mm", "viscosity_N_s_mm"),
+    repair="calibrate with a known weight",
+)
+BENCH_EFFECTS = (
+    BACKLASH, FRAME_COMPLIANCE, POSITION_RIPPLE, CONTACT_OFFSET, SURFACE_MOTION, FRICTION, TIP_INERTIA, FILTER_LAG,
+    TIME_OFFSET, TRACKER_LATENCY, ZERO_DRIFT, GAIN_ERROR,
+)  # fmt: skip

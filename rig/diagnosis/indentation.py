@@ -1,0 +1,185 @@
+"""The indentation rig as a problem: index or constant simulation, the bench's and the tissue's possible causes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.diagnosis.effects.bench import BENCH_EFFECTS
+from rig.diagnosis.effects.tissue import STIFFENING, STIFFENING_EFFECT, TISSUE_EFFECTS
+from rig.diagnosis.observations import Observations
+from rig.diagnosis.problem import Array, Channel, Effect, Fields, Par, Scatter, Values
+from rig.simulation.chain import NULLS, respond
+from rig.simulation.drive import SETTLE_MM_S, Drive
+
+STIFFNESS = Par("stiffness_N_mm", "N/mm", 0.5, 1e-5, 1e3, 0.1, log=True, meaning="stiffness at contact")
+VISCOSITY = Par("viscosity_N_s_mm", "N s/mm", 0.0, -1.0, 10.0, 0.005, meaning="damping")
+SURFACE = Par("surface_mm", "mm", 0.0, -1e4, 1e4, 0.05, meaning="axis position of the surface")
+ZERO = Par("zero_N", "N", 0.0, -1e3, 1e3, 0.02, meaning="force zero")
+TIP_ZERO = Par("tip_zero_mm", "mm", 0.0, -1e4, 1e4, 0.05, meaning="tracker zero along the axis")
+START_SAMPLES = 4000
+BLIND_MM = 0.12
+MEMORY_S = 1.0
+FEWEST_WAY_OUT = 0.2
+BLIND_SAMPLES = 2.5
+Simulation = Literal["index", "constant"]
+
+
+def library(simulation: Simulation) -> tuple[Effect, ...]:
+    """All causes; ``stiffening`` only where the simulation has none."""
+    return (*TISSUE_EFFECTS, *BENCH_EFFECTS, *([STIFFENING_EFFECT] if simulation == "constant" else []))
+
+
+@dataclass(frozen=True)
+class Indentation:
+    """Observations judged against the index or the constant-stiffness simulation."""
+
+    data: Observations
+    simulation: Simulation = "index"
+
+    @property
+    def title(self) -> str:
+        """Which simulation is judged."""
+        return self.simulation
+
+    @cached_property
+    def channels(self) -> tuple[Channel, ...]:
+        """Force [N], and the tip [mm] where a tracker was there."""
+        memory = MEMORY_S / self.data.drive.period_s
+        force = Channel("force", "N", self.data.force_N, self.data.drive.recording, memory)
+        if not self.data.has_tracker:
+            return (force,)
+        return force, Channel("tip", "mm", self.data.tip_mm, self.data.drive.tip_recording)
+
+    @property
+    def recordings(self) -> int:
+        """Recordings of the session."""
+        return self.data.drive.recordings
+
+    @cached_property
+    def base(self) -> tuple[Par, ...]:
+        """What the simulation itself has free; a stated surface is taken at its word."""
+        pars = [STIFFNESS, *([STIFFENING] if self.simulation == "index" else []), VISCOSITY]
+        pars += [] if self.data.surface_mm is not None else [SURFACE]
+        return (*pars, ZERO, *([TIP_ZERO] if self.data.has_tracker else []))
+
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """The library for this simulation."""
+        return library(self.simulation)
+
+    @cached_property
+    def scatter(self) -> tuple[Scatter, ...]:
+        """Stiffness, place of contact and zero differ by chance from recording to recording."""
+        return (
+            Scatter("stiffness", "1", 0.02, _scaled),
+            Scatter("touch", "mm", 0.03, lambda v, s: {**v, "surface_mm": v["surface_mm"] + s}),
+            Scatter("zero", "N", 0.005, lambda v, s: {**v, "zero_N": v["zero_N"] + s}),
+        )
+
+    @cached_property
+    def offers(self) -> Mapping[str, str]:
+        """Why a need of an effect is not met, by need."""
+        return missing(self.data)
+
+    def start(self) -> Values:
+        """Best of a coarse grid of surface and stiffening, the rest by linear least squares."""
+        values = coarse_start(self.data, stiffening=self.simulation == "index")
+        if self.data.has_tracker:
+            return {**values, "tip_zero_mm": float(np.median(self.data.tip_mm - self._encoder))}
+        return values
+
+    @property
+    def _encoder(self) -> Array:
+        return self.data.drive.at_tracker(self.data.drive.position_mm)
+
+    def predict(self, values: Fields) -> tuple[Array, ...]:
+        """Force, and tip where it was measured."""
+        response = respond(self.data.drive, values)
+        return response if self.data.has_tracker else (response.force_N,)
+
+    def blind(self, values: Fields) -> NDArray[np.bool_]:
+        """Samples about the instant of contact: the damper's force jumps there between two samples."""
+        drive = self.data.drive
+        surface = values["surface_mm"] + values["contact_offset_mm"]
+        reach = np.maximum(BLIND_MM, BLIND_SAMPLES * np.abs(drive.velocity_mm_s) * drive.period_s)
+        moving = np.abs(drive.velocity_mm_s) > SETTLE_MM_S
+        return np.asarray((np.abs(drive.position_mm - surface) < reach) & moving)
+
+    def variables(self) -> Mapping[str, Array]:
+        """What a leftover may depend on; ``depth`` counts from an arbitrary zero."""
+        drive = self.data.drive
+        given = {
+            "depth": drive.position_mm,
+            "velocity": drive.velocity_mm_s,
+            "acceleration": drive.acceleration_mm_s2,
+            "time in recording": drive.in_recording_s,
+            "time since reversal": drive.since_reversal_s,
+            "session time": drive.time_s,
+            "stroke number": drive.stroke,
+            "speed": drive.speed_mm_s,
+        }
+        return given if drive.temperature_C is None else {**given, "temperature": drive.temperature_C}
+
+
+def _scaled(values: Fields, share: Array) -> Fields:
+    return {**values, "stiffness_N_mm": values["stiffness_N_mm"] * np.exp(np.clip(share, -2.0, 2.0))}
+
+
+def missing(data: Observations) -> dict[str, str]:
+    """Needs that the data cannot meet, each with its reason in words."""
+    drive, reasons = data.drive, {"weight": "a gain error looks exactly like another stiffness; hang a known weight"}
+    if not data.has_tracker:
+        reasons["tracker"] = "no tip tracker: without an independent tip position this looks like softer tissue"
+    if data.surface_mm is None:
+        reasons["surface"] = "nobody stated where the surface is, so it is fitted"
+    if drive.temperature_C is None or np.ptp(drive.temperature_C) < 0.5:
+        reasons["temperature"] = "no temperature was recorded, or it changed by less than 0.5 K"
+    if data.rate_Hz < 99:
+        reasons["fast"] = f"force at {data.rate_Hz:.0f} Hz is too slow; 200 Hz or more shows it"
+    if drive.recordings < 4:
+        reasons["strokes"] = f"{drive.recordings} recordings are too few strokes; at least 4"
+    if way_out(drive) < FEWEST_WAY_OUT:
+        reasons["unloading"] = "the recordings do not show the way out; record the retraction too"
+    loading = drive.speed_mm_s[drive.starts[:-1]]
+    if loading.max() < 1.5 * max(float(loading.min()), 1e-9):
+        reasons["speeds"] = "all strokes have about one speed; use at least three, from slow to fast"
+    return reasons
+
+
+def way_out(drive: Drive) -> float:
+    """How far the tip comes back from its deepest place, as a share of the stroke: the median recording's."""
+    shares = []
+    for i, j in pairwise(drive.starts):
+        place = drive.position_mm[i:j]
+        deepest = int(place.argmax())
+        shares.append((place[deepest] - place[deepest:].min()) / max(float(np.ptp(place)), 1e-9))
+    return float(np.median(shares))
+
+
+def coarse_start(data: Observations, stiffening: bool) -> dict[str, float]:
+    """Values near the optimum, from a grid on at most 4000 samples."""
+    stride = max(1, data.drive.size // START_SAMPLES)
+    x, v, force = (a[::stride] for a in (data.drive.position_mm, data.drive.velocity_mm_s, data.force_N))
+    low, high = np.percentile(x, [0.5, 99.5])
+    surfaces = [data.surface_mm] if data.surface_mm is not None else np.linspace(low, high, 42)[:-3]
+    best: tuple[float, dict[str, float]] = (np.inf, dict(NULLS))
+    for surface in surfaces:
+        depth = np.maximum(x - surface, 0.0)
+        for growth in _growths(depth, stiffening):
+            columns = np.stack([depth * np.exp(growth * depth), v * (depth > 0), np.ones_like(x)], axis=1)
+            solution, *_ = np.linalg.lstsq(columns, force, rcond=None)
+            error = float(np.sum((force - columns @ solution) ** 2))
+            if error < best[0] and solution[0] > 0:
+                found = dict(zip(("stiffness_N_mm", "viscosity_N_s_mm", "zero_N"), map(float, solution), strict=True))
+                best = error, {**NULLS, **found, "stiffening_1_mm": growth, "surface_mm": float(surface)}
+    return best[1]
+
+
+def _growths(depth_mm: Array, stiffening: bool) -> Sequence[float]:
+    deepest = max(float(depth_mm.max()), 1e-3)
+    return tuple(np.array([0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0]) / deepest) if stiffening else (0.0,)

@@ -1,0 +1,232 @@
+"""The diagnosis' view of a session: every recording on one grid, force and motion averaged over the same short windows.
+
+The force's own time stamps set the grid: the motion is interpolated there by a cubic spline. Where the force is sampled
+faster than the working rate, force and motion are averaged over the same samples, so that thinning the data low-passes
+both sides alike and cannot be mistaken for a lag of one of them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import savgol_filter
+
+from rig.diagnosis.gates import Finding, inspect_stream
+from rig.errors import DataError
+from rig.simulation.drive import Array, Drive
+
+WORKING_RATE_HZ = 250.0
+LOWEST_RATE_HZ = 100.0
+MOST_SAMPLES = 60_000
+FEWEST_SAMPLES = 20
+DERIVATIVE_SPANS_S = (0.008, 0.016)
+
+
+@dataclass(frozen=True)
+class Streams:
+    """Raw streams of one recording on one clock [s]; force positive in compression, position into the tissue.
+
+    ``marker_mm`` has shape (frames, 3), NaN where the tool was hidden; ``temperature_C`` goes with ``force_s``.
+    """
+
+    name: str
+    force_s: Array
+    force_N: Array
+    axis_s: Array
+    axis_mm: Array
+    marker_s: Array | None = None
+    marker_mm: Array | None = None
+    temperature_C: Array | None = None
+
+
+@dataclass(frozen=True)
+class Session:
+    """What is to be judged: recordings in the order they were made, and the surface where somebody stated it."""
+
+    name: str
+    recordings: tuple[Streams, ...]
+    surface_mm: float | None = None
+    findings: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Drive and readings on the working grid: force shape (n,), tip at the tracker's frames shape (m,)."""
+
+    name: str
+    names: tuple[str, ...]
+    drive: Drive
+    force_N: Array
+    tip_mm: Array
+    surface_mm: float | None
+    findings: tuple[Finding, ...] = field(default=())
+
+    @property
+    def rate_Hz(self) -> float:
+        """Samples per second of the working grid."""
+        return 1 / self.drive.period_s
+
+    @property
+    def has_tracker(self) -> bool:
+        """Whether an independent tip position was recorded."""
+        return self.tip_mm.size > FEWEST_SAMPLES
+
+
+@dataclass(frozen=True)
+class _Gridded:
+    name: str
+    time_s: Array
+    columns: tuple[Array, Array, Array, Array]  # force, position, velocity, acceleration
+    temperature_C: Array | None
+    marker_s: Array
+    marker_mm: Array
+
+
+def observe(session: Session) -> Observations:
+    """The session on its working grid; raises DataError where no recording can be used at all."""
+    findings = [*session.findings, *(finding for streams in session.recordings for finding in _inspect(streams))]
+    usable = [clean for streams in session.recordings if (clean := _cleaned(streams)) is not None]
+    if not usable:
+        raise DataError(
+            f"{session.name}: no recording has at least {FEWEST_SAMPLES} samples of force and axis over a common time; "
+            "run `rig verify` on it"
+        )
+    period_s = working_period(usable)
+    parts = [_on_grid(streams, period_s) for streams in usable]
+    parts.sort(key=lambda part: float(part.time_s[0]))
+    drive, force, tip = _joined(parts)
+    return Observations(
+        session.name, tuple(part.name for part in parts), drive, force, tip, session.surface_mm, _merged(findings)
+    )
+
+
+def working_period(recordings: Sequence[Streams]) -> float:
+    """Grid period [s]: a whole number of force periods, near 250 Hz, coarser only for very long sessions."""
+    native_s = float(np.median([np.median(np.diff(streams.force_s)) for streams in recordings]))
+    total_s = float(sum(streams.force_s[-1] - streams.force_s[0] for streams in recordings))
+    wanted_Hz = float(np.clip(MOST_SAMPLES / max(total_s, 1e-9), LOWEST_RATE_HZ, WORKING_RATE_HZ))
+    return native_s * max(1, round(1 / wanted_Hz / native_s))
+
+
+def _inspect(streams: Streams) -> list[Finding]:
+    found = inspect_stream(streams.name, "force", streams.force_s, streams.force_N)
+    found += inspect_stream(streams.name, "axis", streams.axis_s, streams.axis_mm)
+    if streams.marker_s is not None and streams.marker_mm is not None:
+        found += inspect_stream(streams.name, "marker", streams.marker_s, streams.marker_mm[:, 0])
+    return found
+
+
+def _merged(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """One finding a stream and kind: the first, with the number of recordings it was seen in."""
+    groups: dict[tuple[str, str], list[Finding]] = {}
+    for finding in findings:
+        groups.setdefault((finding.stream, finding.kind), []).append(finding)
+    return tuple(
+        Finding(group[0].recording, group[0].stream, group[0].kind, group[0].text, len(group))
+        for group in groups.values()
+    )
+
+
+def ordered(time_s: Array, *columns: Array) -> tuple[Array, ...]:
+    """Rows with finite values whose time lies after every earlier one: a clock that steps back loses those rows."""
+    finite = np.isfinite(time_s) & np.all([np.isfinite(c) for c in columns], axis=0)
+    time_s, columns = time_s[finite], tuple(c[finite] for c in columns)
+    if time_s.size == 0:
+        return (time_s, *columns)
+    ahead = np.maximum.accumulate(time_s)
+    keep = np.concatenate([[True], time_s[1:] > ahead[:-1]])
+    return (time_s[keep], *(c[keep] for c in columns))
+
+
+def _cleaned(streams: Streams) -> Streams | None:
+    """The recording with ordered clocks, cut to the time both force and axis cover; None where too little is left."""
+    temperature = streams.temperature_C
+    extra = () if temperature is None or not np.isfinite(temperature).all() else (temperature,)
+    force = ordered(streams.force_s, streams.force_N, *extra)
+    axis = ordered(streams.axis_s, streams.axis_mm)
+    if min(force[0].size, axis[0].size) < FEWEST_SAMPLES:
+        return None
+    inside = (force[0] >= axis[0][0]) & (force[0] <= axis[0][-1])
+    if np.count_nonzero(inside) < FEWEST_SAMPLES:
+        return None
+    return Streams(
+        streams.name, force[0][inside], force[1][inside], axis[0], axis[1], streams.marker_s, streams.marker_mm,
+        force[2][inside] if extra else None,
+    )  # fmt: skip
+
+
+def _on_grid(streams: Streams, period_s: float) -> _Gridded:
+    """Force and motion at the force's stamps, then the same samples of all of them averaged window by window."""
+    native_s = float(np.median(np.diff(streams.force_s)))
+    columns = [
+        streams.force_s, streams.force_N, *_motion(streams, streams.force_s),
+        *([streams.temperature_C] if streams.temperature_C is not None else []),
+    ]  # fmt: skip
+    window = np.floor((streams.force_s - streams.force_s[0]) / period_s + 0.5 * native_s / period_s).astype(np.int64)
+    count = np.bincount(window)
+    full = count >= max(1, round(0.5 * period_s / native_s))
+    means = [np.bincount(window, column)[full] / count[full] for column in columns]
+    time_s, temperature = means[0], means[5] if len(means) > 5 else None
+    marker_s, marker_mm = np.empty(0), np.empty((0, 3))
+    if streams.marker_s is not None and streams.marker_mm is not None:
+        marker_s, *xyz = ordered(streams.marker_s, *streams.marker_mm.T)
+        inside = (marker_s >= time_s[0]) & (marker_s <= time_s[-1])
+        marker_s, marker_mm = marker_s[inside], np.array(xyz).T[inside]
+    return _Gridded(streams.name, time_s, (means[1], means[2], means[3], means[4]), temperature, marker_s, marker_mm)
+
+
+def _motion(streams: Streams, at_s: Array) -> tuple[Array, Array, Array]:
+    """Position, velocity, acceleration at the given times.
+
+    Derivatives come from local quartics over 8 and 16 ms (Savitzky and Golay 1964): differences of an encoder's steps
+    would put noise into the simulation that no noise model of the force accounts for.
+    """
+    motion = CubicSpline(streams.axis_s, streams.axis_mm)
+    period_s = float(np.median(np.diff(streams.axis_s)))
+    even_s = np.arange(streams.axis_s[0], streams.axis_s[-1], period_s)
+    lengths = [max(5, 2 * round(0.5 * span_s / period_s) + 1) for span_s in DERIVATIVE_SPANS_S]
+    if len(even_s) <= max(lengths):
+        return motion(at_s), motion(at_s, 1), motion(at_s, 2)
+    even = motion(even_s)
+    slopes = (savgol_filter(even, n, 4, deriv=k, delta=period_s) for k, n in enumerate(lengths, start=1))
+    velocity, acceleration = (np.asarray(CubicSpline(even_s, slope)(at_s)) for slope in slopes)
+    return np.asarray(motion(at_s)), velocity, acceleration
+
+
+def _joined(parts: Sequence[_Gridded]) -> tuple[Drive, Array, Array]:
+    recording = np.concatenate([np.full(len(part.time_s), i, np.int64) for i, part in enumerate(parts)])
+    force, position, velocity, acceleration = (np.concatenate([part.columns[k] for part in parts]) for k in range(4))
+    temperatures = [part.temperature_C for part in parts if part.temperature_C is not None]
+    tip_mm, tip_at, tip_recording = _tips(parts, position)
+    drive = Drive(
+        time_s=np.concatenate([part.time_s for part in parts]),
+        period_s=float(np.median(np.concatenate([np.diff(part.time_s) for part in parts]))),
+        recording=recording,
+        position_mm=position,
+        velocity_mm_s=velocity,
+        acceleration_mm_s2=acceleration,
+        stroke=recording.astype(float),
+        temperature_C=np.concatenate(temperatures) if len(temperatures) == len(parts) else None,
+        tip_at=tip_at,
+        tip_recording=tip_recording,
+    )
+    return drive, force, tip_mm
+
+
+def _tips(parts: Sequence[_Gridded], position_mm: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+    """The tip along the axis: marker positions projected on the direction they move in with the encoder."""
+    at, recording, start = [], [], 0
+    for i, part in enumerate(parts):
+        at.append(start + np.interp(part.marker_s, part.time_s, np.arange(len(part.time_s))))
+        recording.append(np.full(len(part.marker_s), i, np.int64))
+        start += len(part.time_s)
+    flat_at, xyz = np.concatenate(at), np.concatenate([part.marker_mm for part in parts])
+    if len(flat_at) <= FEWEST_SAMPLES:
+        return np.empty(0), np.empty(0), np.empty(0, np.int64)
+    encoder = np.interp(flat_at, np.arange(len(position_mm)), position_mm)
+    direction = (encoder - encoder.mean()) @ (xyz - xyz.mean(axis=0))
+    direction = direction / max(float(np.linalg.norm(direction)), 1e-12)
+    along = (xyz - xyz.mean(axis=0)) @ direction
+    return along + encoder.mean(), flat_at, np.concatenate(recording)

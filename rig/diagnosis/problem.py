@@ -1,0 +1,137 @@
+"""What the engine knows of a system: channels, a predictor, parameters, and effects as ways to leave a null value."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Values = Mapping[str, float]
+Fields = Mapping[str, float | Array]
+
+
+@dataclass(frozen=True)
+class Par:
+    """A parameter: null value (where its effect vanishes), bounds, and the step that is small but visible.
+
+    ``worth`` is the smallest distance from null anyone would act on: less is never named, however significant.
+    ``may_end`` allows a shape to stand on its bound, where that is a limiting case and no failure.
+    """
+
+    name: str
+    unit: str
+    null: float
+    low: float
+    high: float
+    scale: float
+    log: bool = False
+    worth: float = 0.0
+    may_end: bool = False
+    meaning: str = ""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A cause that can be switched on.
+
+    ``amplitudes`` leave their null linearly; ``shapes`` (time constants, lengths, frequencies) mean nothing without
+    them. ``shape_starts(problem, values, residual)`` gives the shapes to try; where it picks them from a scan of the
+    residual, ``tries`` is how many independent ones it scanned, and their logarithm is taken off the evidence.
+    ``begin`` is a second place to start from, far from null, where the way from null leads into a wrong valley.
+    ``one_sided`` effects exist only above their null. ``between`` effects differ between recordings rather than inside
+    them, so that without them they pass for scatter: they are always tried with a scatter of their own. ``through``
+    names the one variable an effect acts through, if it is one: two such together may imitate a third that is unknown.
+    """
+
+    name: str
+    statement: str
+    amplitudes: tuple[Par, ...]
+    shapes: tuple[Par, ...] = ()
+    shape_starts: Callable[["Problem", Values, Array], Sequence[Values]] = lambda *_: ({},)
+    tries: Callable[["Problem"], float] = lambda _: 1.0
+    begin: Values = field(default_factory=dict)
+    one_sided: bool = False
+    between: bool = False
+    through: str = ""
+    needs: frozenset[str] = frozenset()
+    aliases: tuple[str, ...] = ()
+    repair: str = ""
+
+    @property
+    def key(self) -> str:
+        """Unlike the name different for the variants of one cause."""
+        return self.amplitudes[0].name
+
+    @property
+    def pars(self) -> tuple[Par, ...]:
+        """Amplitudes, then shapes."""
+        return self.amplitudes + self.shapes
+
+
+class Channel(NamedTuple):
+    """One measured signal: name, unit, readings and the recording of each, shape (n,).
+
+    Noise may remember at most ``memory`` samples; what lasts longer is an error to be explained.
+    """
+
+    name: str
+    unit: str
+    observed: Array
+    recording: Index
+    memory: float = float("inf")
+
+
+class Scatter(NamedTuple):
+    """A quantity that differs by chance from recording to recording: how values change with a shift per sample."""
+
+    name: str
+    unit: str
+    step: float
+    nudge: Callable[[Fields, Array], Fields]
+
+
+class Problem(Protocol):
+    """A system under criticism."""
+
+    @property
+    def title(self) -> str:
+        """Name of the simulation that is judged."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The first channel is the one whose prediction error is reported."""
+
+    @property
+    def recordings(self) -> int:
+        """Units that can be left out."""
+
+    @property
+    def base(self) -> tuple[Par, ...]:
+        """Parameters of the simulation as it is."""
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Causes that may be named."""
+
+    @property
+    def scatter(self) -> tuple[Scatter, ...]:
+        """What varies by recording, on the first channel."""
+
+    @property
+    def offers(self) -> Mapping[str, str]:
+        """Needs of effects this data cannot meet, each with the reason."""
+
+    def start(self) -> Values:
+        """First guess of the base parameters."""
+
+    def predict(self, values: Fields) -> tuple[Array, ...]:
+        """One array per channel; parameters not given are at their null."""
+
+    def blind(self, values: Fields) -> NDArray[np.bool_]:
+        """Rows of the first channel that cannot be judged at its sampling rate (``values`` may hold arrays)."""
+
+    def variables(self) -> Mapping[str, Array]:
+        """What a leftover may depend on, each on the first channel, shape (n,)."""

@@ -1,0 +1,114 @@
+"""One call from observations to a diagnosis."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rig.diagnosis.answers import Diagnosis, answer, intervals, limits, summary, verdict_of
+from rig.diagnosis.design import next_experiment
+from rig.diagnosis.fit import first_fit, refreshed
+from rig.diagnosis.gates import Finding
+from rig.diagnosis.indentation import Indentation, Simulation, library
+from rig.diagnosis.observations import Observations, Session, observe
+from rig.diagnosis.omnibus import leftover
+from rig.diagnosis.problem import Problem
+from rig.diagnosis.search import Progress, search
+from rig.errors import DataError
+
+
+def silent(_: str, __: float) -> None:
+    """Progress nobody watches."""
+
+
+def diagnose(
+    data: Observations, simulation: Simulation = "index", seed: int = 1, progress: Progress = silent
+) -> Diagnosis:
+    """What the simulation gets wrong on these recordings; never raises on data that merely say nothing."""
+    problem = Indentation(data, simulation)
+    reason = unusable(data)
+    if reason is not None:
+        return cannot(simulation, data.name, data.drive.recordings, reason, data.findings)
+    result = judge(problem, data.name, data.findings, seed, progress)
+    return replace(result, next_experiment=next_experiment(result))
+
+
+def judge(
+    problem: Problem, name: str, quality: tuple[Finding, ...], seed: int = 1, progress: Progress = silent
+) -> Diagnosis:
+    """The same for any system under criticism."""
+    rng = np.random.default_rng(seed)
+    progress("fit of the simulation as it is", 0.02)
+    before = refreshed(first_fit(problem))
+    found_before = leftover(before, rng)
+    search_result = search(problem, before, rng, progress)
+    progress("what is left", 0.95)
+    found_after = leftover(search_result.after, rng) if search_result.named else found_before
+    verdict, depends = verdict_of(search_result, found_after)
+    findings = tuple(
+        sorted(
+            (answer(named, search_result.after, verdict == "unexplained") for named in search_result.named),
+            key=lambda found: -found.nats,
+        )
+    )
+    visible, reasons = limits(problem, search_result)
+    progress("done", 1.0)
+    return Diagnosis(
+        session=name,
+        simulation=problem.title,
+        recordings=problem.recordings,
+        verdict=verdict,
+        statement=summary(verdict, findings, depends, problem.title),
+        findings=findings,
+        depends_on=depends,
+        leftover_p=min(found_after.p_value, found_after.between_p),
+        detectable=visible,
+        not_testable=reasons,
+        next_experiment=None,
+        quality=quality,
+        base=intervals(search_result.after, problem.base),
+        search=search_result,
+        before=found_before,
+        after=found_after,
+    )
+
+
+def unusable(data: Observations) -> str | None:
+    """Why nothing can be tested with these data; None where something can."""
+    force, position = data.force_N, data.drive.position_mm
+    if data.drive.recordings < 4:
+        count = data.drive.recordings
+        return f"{count} recording{'s' * (count > 1)}: a cause is judged on recordings left out, which takes at least 4"
+    if np.ptp(force) == 0 or np.ptp(position) == 0:
+        still = "force" if np.ptp(force) == 0 else "position"
+        return f"the {still} never changes, so the recordings carry no experiment"
+    deep = position >= np.quantile(position, 0.9)
+    high = position <= np.quantile(position, 0.1)
+    noise = float(np.std(np.diff(force))) / np.sqrt(2)
+    rise = float(np.median(force[deep]) - np.median(force[high]))
+    if rise < 0 and -rise > 5 * noise:
+        return (
+            "force falls as the tip goes in: force or position has the wrong sign; correct force_positive or "
+            "position_positive in session.toml and diagnose again"
+        )
+    if rise < 5 * noise:
+        return f"the force rises by {rise:.3g} N from above to below, no more than its noise: no contact was recorded"
+    return None
+
+
+def cannot(simulation: Simulation, name: str, recordings: int, reason: str, quality: tuple[Finding, ...]) -> Diagnosis:
+    """The answer where nothing can be tested: no cause is named, and every one is listed with the reason."""
+    return Diagnosis(
+        session=name, simulation=simulation, recordings=recordings, verdict="adequate",
+        statement=f"Nothing could be tested: {reason}.", findings=(), depends_on=(), leftover_p=None, detectable={},
+        not_testable={effect.name: reason for effect in library(simulation)},
+        next_experiment={"do": reason, "nats_per_minute": None}, quality=quality,
+    )  # fmt: skip
+
+
+def diagnose_session(session: Session, simulation: Simulation = "index", progress: Progress = silent) -> Diagnosis:
+    """A session as it was read; one without a usable recording gets an answer too."""
+    try:
+        data = observe(session)
+    except DataError as error:
+        return cannot(simulation, session.name, 0, str(error), session.findings)
+    return diagnose(data, simulation, progress=progress)

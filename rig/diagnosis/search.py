@@ -1,0 +1,261 @@
+"""From nothing to a set of named causes: forward steps, backward drop, swap pass, rivals of the final model."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig.diagnosis.evidence import (
+    Direction,
+    Tangents,
+    amplitudes_of,
+    chance,
+    chance_maxima,
+    held_out_log_density,
+    is_alias,
+    linear_gains,
+    tangents,
+)
+from rig.diagnosis.fit import Fit, best_fit, bold_fit, bold_view, fit, level_of, on_bound, refreshed
+from rig.diagnosis.noise import Array
+from rig.diagnosis.omnibus import LEVEL, leftover
+from rig.diagnosis.problem import Effect, Problem, Values
+
+ALPHA = 0.03
+SHORT_LIST = 5
+MOST_EFFECTS = 3
+RIVAL_SE = 2.0
+KEEP_NATS = 3.0
+START_SCALES = 0.05
+BETWEEN_NATS = 0.3
+STANDS_OUT_NATS = 3.0
+GIVEN_UP_NATS = 300.0
+REACH_NATS = 20.0
+REACH_SHARE = 0.5
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Named:
+    """One effect of the final model: its rivals, held-out gain by recording over the best model without it."""
+
+    effect: Effect
+    rivals: tuple[str, ...]
+    gains: Array
+    p_value: float
+    without: Fit
+    share: float
+
+
+@dataclass(frozen=True)
+class Search:
+    """What was found: the simulation as it was, the final model, its effects, and the last step's view of the rest."""
+
+    before: Fit
+    after: Fit
+    named: tuple[Named, ...]
+    tangents: Tangents
+    maxima: tuple[Array, Array]
+    bars: dict[str, float]
+
+
+def testable(problem: Problem) -> list[Effect]:
+    """Effects whose needs the data meet."""
+    return [effect for effect in problem.effects if not effect.needs & problem.offers.keys()]
+
+
+def penalty(effect: Effect, problem: Problem) -> float:
+    """Nats taken off for having scanned many shapes."""
+    return float(np.log(effect.tries(problem)))
+
+
+def screened(t: Tangents, problem: Problem) -> list[tuple[float, Direction]]:
+    """Best direction of each effect by linear held-out gain, best effect first; structural aliases left out."""
+    gains = linear_gains(t, t.gradient[None])[0]
+    best: dict[str, tuple[float, Direction]] = {}
+    for gain, direction in zip(gains, t.directions, strict=True):
+        name = direction.effect.key
+        if np.isfinite(gain) and not is_alias(t, direction) and gain > best.get(name, (-np.inf, direction))[0]:
+            best[name] = (float(gain), direction)
+    ranked = [(gain - penalty(direction.effect, problem), direction) for gain, direction in best.values()]
+    return sorted(ranked, key=lambda item: -item[0])
+
+
+def started(current: Fit, direction: Direction, t: Tangents) -> dict[str, float]:
+    """Values with one more effect just off its null, to the side the data ask for.
+
+    A start at the linear estimate with all else unmoved would be a worse model than the current one, and noise
+    estimated there would hide the effect.
+    """
+    start = {**current.values, **direction.shape}
+    for par, value in zip(direction.effect.amplitudes, amplitudes_of(t, direction), strict=True):
+        start[par.name] = par.null + float(np.clip(value, -START_SCALES * par.scale, START_SCALES * par.scale))
+    return start
+
+
+def score(model: Fit) -> Array:
+    """Held-out log density by recording, less what scans cost, shape (recordings,)."""
+    cost = sum(penalty(effect, model.problem) for effect in model.effects)
+    return held_out_log_density(model) - cost / model.problem.recordings
+
+
+def candidates(current: Fit, t: Tangents) -> list[Fit]:
+    """Effects that may be next, jointly refitted, best first.
+
+    Tried are those within reach of the best by the linear gain, whatever passes for scatter where it has any gain, and,
+    where anything stands out, the best of a second look under noise too small to have swallowed them.
+    """
+    problem, ranked = current.problem, screened(t, current.problem)
+    top = ranked[0][0] if ranked else 0.0
+    reach = max(within_reach(top), 0.0)
+    near = [d for gain, d in ranked[:SHORT_LIST] if gain > reach]
+    near += [d for gain, d in ranked if d.effect.between and gain > BETWEEN_NATS and d not in near]
+    fits = [best_fit(problem, (*current.effects, d.effect), started(current, d, t), current.whitener) for d in near]
+    if top > STANDS_OUT_NATS or leftover(current, np.random.default_rng(0)).p_value <= LEVEL:
+        fits += second_look(current, t, ranked, {d.effect.key for d in near})
+    living = [c for c in fits if c is not None and alive(c.effects[-1], c.values)]
+    gains = [float((score(c) - score(current)).sum()) for c in living]
+    best = max(gains, default=0.0)
+    polished = [
+        fit(c.problem, c.effects, c.values, c.whitener) if gain > within_reach(best) else c
+        for c, gain in zip(living, gains, strict=True)
+    ]
+    polished = [c for c in polished if alive(c.effects[-1], c.values)]
+    return sorted(polished, key=lambda candidate: -float(score(candidate).sum()))
+
+
+def second_look(
+    current: Fit, t: Tangents, ranked: Sequence[tuple[float, Direction]], tried: set[str]
+) -> list[Fit | None]:
+    """Fits from noise too small to have swallowed an effect: the best, every peak of a scan, second beginnings."""
+    problem, bold = current.problem, bold_view(current)
+    bold_t = tangents(bold, [d.effect for _, d in ranked] + aliased(t, ranked))
+    best = [d for gain, d in screened(bold_t, problem)[:SHORT_LIST] if gain > 0 and d.effect.key not in tried]
+    # Strokes that repeat alias one frequency into another: every peak is followed to its end.
+    best += [d for d in bold_t.directions if d.effect.tries(problem) > 1 and d not in best]
+    starts = [(d.effect, started(bold, d, bold_t)) for d in best]
+    free = {par.name for par in problem.base}
+    for effect in {d.effect.key: d.effect for d in t.directions if d.effect.begin}.values():
+        own = free | {par.name for par in effect.pars}
+        begin = {name: value for name, value in effect.begin.items() if name in own}
+        starts.append((effect, {**current.values, **begin}))
+    fits, floor = list[Fit | None](), level_of(current) - GIVEN_UP_NATS
+    for effect, start in starts:
+        found = bold_fit(problem, (*current.effects, effect), start, current.whitener, floor)
+        floor = max(floor, level_of(found) - GIVEN_UP_NATS) if found is not None else floor
+        fits.append(found)
+    return fits
+
+
+def within_reach(best: float) -> float:
+    """Gain above which a candidate might still be as good as the best."""
+    return best - max(REACH_NATS, REACH_SHARE * best)
+
+
+def aliased(t: Tangents, ranked: Sequence[tuple[float, Direction]]) -> list[Effect]:
+    """Effects that have a direction but no rank: wrong sign or imitated, under the present noise."""
+    keys = {direction.effect.key for _, direction in ranked}
+    return list({d.effect.key: d.effect for d in t.directions if d.effect.key not in keys}.values())
+
+
+def alive(effect: Effect, values: Values) -> bool:
+    """Whether the effect is worth naming and inside its bounds."""
+    size = float(np.hypot.reduce([values[p.name] - p.null for p in effect.amplitudes]))
+    ended = any(on_bound(p, values[p.name]) and not p.may_end for p in effect.pars)
+    return size >= effect.amplitudes[0].worth and not ended
+
+
+def search(problem: Problem, before: Fit, rng: np.random.Generator, progress: Progress) -> Search:
+    """Forward steps while the best gain beats chance at 0.05 / 2^k, then drop and swap, then rivals."""
+    current, bars, p_values, alone = before, dict[str, float](), dict[str, float](), True
+    library = testable(problem)
+    for step in range(MOST_EFFECTS + 1):
+        progress(f"step {step + 1}: {len(library) - len(current.effects)} causes", 0.15 + 0.15 * step)
+        t = tangents(current, [effect for effect in library if effect.name not in current.names])
+        maxima = chance_maxima(t, rng)
+        # What two causes through one variable leave, a third cannot name.
+        found = [] if imitated(current.effects) else candidates(current, t)
+        # Best first, so that of several beginnings of one cause the best stands in the table.
+        gains = {c.names[-1]: float((score(c) - score(current)).sum()) for c in reversed(found)}
+        bars = bars or gains
+        if not found or step == MOST_EFFECTS:
+            break
+        p = chance(maxima, gains[found[0].names[-1]])
+        if p > ALPHA / 2**step:
+            break
+        p_values[found[0].names[-1]] = p
+        best = max(gains.values())
+        alone = alone and sum(gain > within_reach(best) for gain in gains.values()) == 1
+        current = refreshed(found[0])
+    progress("drop and swap", 0.8)
+    current = dropped(current)
+    # A single cause that left all others far behind has no rivals; with more than one the order of naming may mislead.
+    named, current = swapped(current, library if len(current.effects) > 1 or not alone else (), p_values)
+    if current.names != tuple(p_values):
+        t = tangents(current, [effect for effect in library if effect.name not in current.names])
+        maxima = chance_maxima(t, rng)
+    return Search(before, current, named, t, maxima, bars)
+
+
+def imitated(effects: Sequence[Effect]) -> tuple[str, ...]:
+    """Variables two or more of the effects act through alone: together they fit any curve, so they name nothing."""
+    variables = [effect.through for effect in effects if effect.through]
+    return tuple(dict.fromkeys(name for name in variables if variables.count(name) > 1))
+
+
+def without(model: Fit, name: str) -> Fit:
+    """The model refitted with one effect less."""
+    kept = tuple(effect for effect in model.effects if effect.name != name)
+    gone = next(effect for effect in model.effects if effect.name == name)
+    start = {**model.values, **{par.name: par.null for par in gone.pars}}
+    return best_fit(model.problem, kept, start, model.whitener) or fit(model.problem, kept, start, model.whitener)
+
+
+def dropped(model: Fit) -> Fit:
+    """Without the effects that stopped earning their place, or shrank below it, once others had joined."""
+    for effect in model.effects:
+        smaller = without(model, effect.name)
+        if not alive(effect, model.values) or float((score(model) - score(smaller)).sum()) < KEEP_NATS:
+            return dropped(smaller)
+    return model
+
+
+def swapped(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:
+    """Every effect against all others in its place; a better one takes it, an equal one is a rival."""
+    for _ in range(2):
+        named, better = [], None
+        for effect in model.effects:
+            smaller = without(model, effect.name)
+            t = tangents(smaller, [e for e in library if e.name not in smaller.names])
+            others = [c for c in candidates(smaller, t) if c.effects[-1].key != effect.key]
+            p = p_values.get(effect.name, 1 / 401)
+            named.append(_named(model, effect, smaller, others, p))
+            if others and float((score(others[0]) - score(model)).sum()) > KEEP_NATS:
+                better = others[0]
+        if better is None:
+            return tuple(named), model
+        model = better
+    return tuple(named), model
+
+
+def _named(model: Fit, effect: Effect, smaller: Fit, others: Sequence[Fit], p_value: float) -> Named:
+    mine = score(model)
+    rivals = [c for c in others if _equal(mine - score(c)) and float((score(c) - score(smaller)).sum()) > 0]
+    table = np.stack([mine, *[score(c) for c in rivals]])
+    names = dict.fromkeys(c.names[-1] for c in rivals if c.names[-1] != effect.name)
+    named = Named(effect, tuple(names), mine - score(smaller), p_value, smaller, 1.0)
+    return replace(named, share=wins(table) * (1 - p_value))
+
+
+def _equal(loss: Array) -> bool:
+    """Whether the paired loss of a rival is within two standard errors of nothing."""
+    spread = float(np.std(loss, ddof=1)) * np.sqrt(len(loss))
+    return bool(loss.sum() < max(RIVAL_SE * spread, 1.0) and loss.sum() < 0.5 * np.inf)
+
+
+def wins(table: Array, draws: int = 400) -> float:
+    """Share of bootstrap samples of recordings in which the first row of (models, recordings) has the largest sum."""
+    rng = np.random.default_rng(0)
+    picks = rng.integers(0, table.shape[1], size=(draws, table.shape[1]))
+    return float(np.mean(table[:, picks].sum(axis=2).argmax(axis=0) == 0))

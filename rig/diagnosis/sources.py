@@ -1,0 +1,129 @@
+"""Where a session to be judged comes from: a session folder, or a folder of CSV files as `rig import` reads it.
+
+Unlike the import, which refuses a folder with anything wrong in it, the diagnosis takes what can be used and says what
+was left out: data that are wrong in part are the very data somebody wants to understand.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from rig.config.table import load
+from rig.diagnosis.gates import Finding
+from rig.diagnosis.observations import Session, Streams
+from rig.errors import DataError, RigError
+from rig.recording.import_format import FIELDS, SessionTable, TrialTable, column_names
+from rig.recording.reader import Recording
+from rig.recording.sessions import open_session
+from rig.recording.tables import compression_N
+from rig.simulation.drive import Array
+
+TIP_TOOL = 0
+NS = 1e-9
+
+
+def read_source(folder: Path, columns: tuple[str, ...] = ()) -> Session:
+    """The session in ``folder``; raises DataError where it is neither kind of folder."""
+    if not folder.is_dir():
+        raise DataError(f"{folder}: no such folder; give a session, or a folder with session.toml and trial_*/")
+    if any(folder.glob("*.mcap")):
+        return from_session(folder)
+    if any(folder.glob("trial_*")):
+        return from_csv(folder, columns)
+    raise DataError(f"{folder}: neither recordings (*.mcap) nor trial folders (trial_*) are in it")
+
+
+def from_session(folder: Path) -> Session:
+    """Every trial of a session whose recording opens, on the clock of the first of them."""
+    session = open_session(folder)
+    recordings, findings = [], [Finding("", "session", "incomplete", remark) for remark in session.remarks]
+    for trial in session.trials:
+        try:
+            recordings.append((trial.name, session.recording(trial.name)))
+        except RigError as error:
+            findings.append(Finding(trial.name, "recording", "unreadable", str(error)))
+    starts = [int(r.tables["force"]["capture_ns"][0]) for _, r in recordings if len(r.tables["force"])]
+    streams = [streams_of(name, recording, min(starts, default=0)) for name, recording in recordings]
+    stated = {r.metadata.get("calibration", {}).get("surface_mm", "") for _, r in recordings}
+    surface = float(stated.pop()) if len(stated) == 1 and "" not in stated else None
+    return Session(folder.name, tuple(streams), surface, findings=tuple(findings))
+
+
+def streams_of(name: str, recording: Recording, start_ns: int) -> Streams:
+    """The raw streams of a recording, samples the devices vouch for; the tip is tool 0 of the tracker."""
+    force, axis, marker = (recording.tables[stream] for stream in ("force", "axis", "marker"))
+    sound, moving = force["valid"] != 0, axis["valid"] != 0
+    seen = (marker["tool"] == TIP_TOOL) & (marker["valid"] != 0)
+    temperature = force["temperature_C"][sound]
+    return Streams(
+        name,
+        (force["capture_ns"][sound] - start_ns) * NS,
+        compression_N(recording)[sound],
+        (axis["capture_ns"][moving] - start_ns) * NS,
+        axis["position_mm"][moving],
+        (marker["capture_ns"][seen] - start_ns) * NS,
+        np.stack([marker[field][seen] for field in ("x_mm", "y_mm", "z_mm")], axis=1),
+        temperature if temperature.size and np.isfinite(temperature).all() else None,
+    )
+
+
+def from_csv(folder: Path, columns: tuple[str, ...] = ()) -> Session:
+    """Trials of a CSV folder in the senses of its ``session.toml``; what cannot be read is left out and said."""
+    names = column_names(columns)
+    table = load(SessionTable, folder / "session.toml") if (folder / "session.toml").exists() else SessionTable()
+    streams, findings = [], []
+    for path in sorted(path for path in folder.glob("trial_*") if path.is_dir()):
+        read: dict[str, dict[str, Array]] = {}
+        for stream in FIELDS:
+            try:
+                read[stream] = read_table(path / f"{stream}.csv", names[stream])
+            except DataError as error:
+                if stream != "marker" or (path / "marker.csv").exists():
+                    findings.append(Finding(path.name, stream, "unreadable", str(error)))
+        if "force" in read and "axis" in read:
+            streams.append(_csv_streams(path, read, table))
+    surface = None if table.surface_mm is None else table.position_positive * table.surface_mm
+    return Session(folder.name, tuple(streams), surface, findings=tuple(findings))
+
+
+def _csv_streams(path: Path, read: dict[str, dict[str, Array]], table: SessionTable) -> Streams:
+    force, axis, marker = read["force"], read["axis"], read.get("marker")
+    trial = load(TrialTable, path / "trial.toml") if (path / "trial.toml").exists() else None
+    kelvin = None if trial is None else trial.temperature_C
+    return Streams(
+        path.name,
+        force["time_s"],
+        table.force_positive * force["force_N"],
+        axis["time_s"],
+        table.position_positive * axis["position_mm"],
+        None if marker is None else marker["time_s"],
+        None if marker is None else np.stack([marker[field] for field in ("x_mm", "y_mm", "z_mm")], axis=1),
+        None if kelvin is None else np.full(force["time_s"].shape, kelvin),
+    )
+
+
+def read_table(path: Path, names: dict[str, str]) -> dict[str, Array]:
+    """The named columns of a CSV file; fields that are no number become NaN. Raises DataError naming file and cause."""
+    try:
+        with path.open() as file:
+            header = [name.strip() for name in file.readline().split(",")]
+            rows = _numbers(path, file.readlines())
+    except FileNotFoundError as error:
+        raise DataError(f"{path}: no such file, so this stream is missing") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"{path}: cannot be read: {error}") from error
+    lacking = [name for name in names.values() if name not in header]
+    if lacking:
+        raise DataError(f"{path}: no column {lacking[0]}; it has {', '.join(header)}; name it with --columns")
+    if rows.shape[1] != len(header):
+        raise DataError(f"{path}: rows of {rows.shape[1]} values under a header of {len(header)}")
+    return {field: rows[:, header.index(name)] for field, name in names.items()}
+
+
+def _numbers(path: Path, lines: list[str]) -> Array:
+    if not lines:
+        raise DataError(f"{path}: holds a header and nothing else")
+    try:
+        return np.atleast_2d(np.loadtxt(lines, delimiter=",", ndmin=2))
+    except ValueError:
+        return np.atleast_2d(np.genfromtxt(lines, delimiter=",", invalid_raise=False, loose=True))

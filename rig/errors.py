@@ -1,0 +1,34 @@
+"""One root error; subclasses say what the caller can do.
+
+A message is one sentence group for a person: what failed, where, what came, the limit with its unit, the next step.
+"""
+
+
+class RigError(Exception):
+    """Root of every failure this project raises on purpose; ``exit_code`` is what the command line ends with."""
+
+    exit_code = 1
+
+
+class UsageError(RigError):
+    """The request itself is wrong (configuration, protocol, file, option): correct it and call again."""
+
+    exit_code = 2
+
+
+class DataError(UsageError):
+    """Given data cannot be used (NaN, gap, wrong unit, wrong order): the message names file, place and bound."""
+
+
+class DeviceError(RigError):
+    """A device is absent, silent, wrong or in fault: check wiring and power, then `rig doctor`."""
+
+
+class CheckFailed(RigError):
+    """A check ran and its answer is no (`rig verify`, `rig doctor`)."""
+
+
+class SafetyStop(RigError):
+    """Motion was stopped by a limit, a person or a lost input; acknowledge the cause before moving again."""
+
+    exit_code = 3

@@ -1,0 +1,1 @@
+"""Sessions and recordings: one MCAP file a recording, every sample with its sequence number."""

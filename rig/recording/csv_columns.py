@@ -1,0 +1,169 @@
+"""Measured columns from a CSV file nobody here wrote: all of it good, or one sentence naming file, line and column.
+
+Arrow reads the file in one go; only where something is wrong is it read again, cell by cell, to say what and where.
+"""
+
+import csv
+import io
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as arrow_csv
+from numpy.typing import NDArray
+
+from rig.errors import DataError
+
+TIME = "time_s"
+# Beyond this, nanoseconds do not fit 64 bits: the column is not in seconds.
+TIME_LIMIT_S = 9e9
+# Units people write behind a name; used only to tell a wrong unit from a wrong name.
+UNITS = frozenset("s ms us ns min N kN mN cN kg g lb lbf kgf V mV mm m cm um nm in inch mil".split())  # noqa: SIM905
+_MISSING = ("", "nan", "NaN", "NAN", "MISSING")
+
+
+def read_columns(path: Path, names: Mapping[str, str], gaps: bool = False) -> dict[str, NDArray[np.float64]]:
+    """Columns of ``path`` by field; ``names`` says which header each field (``time_s`` first) stands under.
+
+    Times are finite and strictly increasing, all values finite, rows at least two. With ``gaps`` a row may lack all its
+    values (empty or NaN), but not its time. Raises DataError with file, line, column and what was found there.
+    """
+    header = _header(path)
+    for field, name in names.items():
+        _check_name(path, header, field, name)
+    try:
+        table = _read(path, header, names)
+    except pa.ArrowInvalid as error:
+        _explain(path, header, names, gaps)
+        raise DataError(f"{path}: not readable as CSV: {error}") from error
+    if not _is_good(table, gaps):
+        _explain(path, header, names, gaps)
+    return table
+
+
+def _header(path: Path) -> list[str]:
+    try:
+        with path.open("rb") as file:
+            line = file.readline(100_000).decode("utf-8-sig")
+    except FileNotFoundError as error:
+        raise DataError(f"{path}: no such file") from error
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path} line 1: not UTF-8 text; save the file as UTF-8") from error
+    return [name.strip() for name in next(csv.reader([line]), [])]
+
+
+def _check_name(path: Path, header: list[str], field: str, name: str) -> None:
+    shown = ",".join(header)
+    if name not in header:
+        if len(header) == 1 and any(separator in shown for separator in ";\t|"):
+            raise DataError(
+                f"{path} line 1: the header is {shown!r}; separate columns by commas and write decimals with points"
+            )
+        raise DataError(f"{path} line 1: no column {name} in the header {shown!r}; {_advice(header, path, field)}")
+    if header.count(name) > 1:
+        raise DataError(f"{path} line 1: column {name} stands {header.count(name)} times in the header {shown!r}")
+    if (unit := unit_of(name)) and unit != unit_of(field):
+        raise DataError(f"{path} line 1: column {name} is in {unit} by its name; {field} is needed, convert the file")
+
+
+def _advice(header: list[str], path: Path, field: str) -> str:
+    base, _, unit = field.rpartition("_")
+    for name in header:
+        if name.lower().startswith(base) and unit_of(name) not in ("", unit):
+            return f"{name} is in {unit_of(name)}, {unit} is needed: convert the file"
+    return f"if it is there under another name, say --columns {path.stem}.{field}=NAME"
+
+
+def unit_of(name: str) -> str:
+    """The unit a column's name ends in (``force_kN``, ``Force [kN]``, ``x (mm)``); empty if it names none."""
+    last = name.replace("[", " ").replace("]", " ").replace("(", " ").replace(")", " ").replace("_", " ").split()
+    return last[-1] if len(last) > 1 and last[-1] in UNITS else ""
+
+
+def _read(path: Path, header: list[str], names: Mapping[str, str]) -> dict[str, NDArray[np.float64]]:
+    unique = [f"{number}:{name}" for number, name in enumerate(header)]
+    chosen = {field: unique[header.index(name)] for field, name in names.items()}
+    table = arrow_csv.read_csv(
+        path,
+        read_options=arrow_csv.ReadOptions(skip_rows=1, column_names=unique),
+        convert_options=arrow_csv.ConvertOptions(
+            include_columns=list(chosen.values()),
+            column_types=dict.fromkeys(chosen.values(), pa.float64()),
+            null_values=list(_MISSING),
+        ),
+    )
+    return {field: table[name].to_numpy().astype(np.float64) for field, name in chosen.items()}
+
+
+def _is_good(table: Mapping[str, NDArray[np.float64]], gaps: bool) -> bool:
+    time_s, *values = table.values()
+    finite = np.array([np.isfinite(value) for value in values])
+    whole = finite.all(axis=0) | (np.isnan(np.array(values)).all(axis=0) & gaps)
+    return bool(
+        time_s.size >= 2 and (np.abs(time_s) < TIME_LIMIT_S).all() and (np.diff(time_s) > 0).all() and whole.all()
+    )
+
+
+def _explain(path: Path, header: list[str], names: Mapping[str, str], gaps: bool) -> None:
+    """Raises the sentence for the first thing wrong in the file, line by line."""
+    before: float | None = None
+    rows = 0
+    reader = csv.reader(io.StringIO(_text(path), newline=""))
+    try:
+        next(reader)
+        for cells in filter(None, reader):
+            before, rows = _check_row(f"{path} line {reader.line_num}", cells, header, names, before, gaps), rows + 1
+    except csv.Error as error:
+        raise DataError(f"{path} line {reader.line_num}: {error}") from error
+    if rows < 2:
+        found = "no row" if rows == 0 else "only one row"
+        raise DataError(f"{path}: {found} under the header; a stream needs at least 2")
+
+
+def _text(path: Path) -> str:
+    data = path.read_bytes()
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise DataError(f"{path} line {line}: not UTF-8 text; save the file as UTF-8") from error
+
+
+def _check_row(
+    place: str, cells: list[str], header: list[str], names: Mapping[str, str], before: float | None, gaps: bool
+) -> float:
+    """Checks one row and returns its time."""
+    if len(cells) != len(header):
+        raise DataError(f"{place}: {len(cells)} cells where the header has {len(header)}")
+    named = [(name, cells[header.index(name)].strip()) for name in names.values()]
+    time_s, *values = [_number(place, name, text) for name, text in named]
+    bad = [not math.isfinite(time_s), *(not math.isfinite(value) for value in values)]
+    if gaps and all(math.isnan(value) for value in values):
+        bad = bad[:1]
+    for (name, text), is_bad in zip(named, bad, strict=False):
+        if is_bad:
+            raise DataError(f"{place}, column {name}: {text or 'nothing'} where a number is needed")
+    _check_time(f"{place}, column {named[0][0]}", time_s, before)
+    return time_s
+
+
+def _check_time(place: str, time_s: float, before: float | None) -> None:
+    if abs(time_s) >= TIME_LIMIT_S:
+        raise DataError(f"{place}: {time_s:g} s is beyond {TIME_LIMIT_S:g} s; is it in s?")
+    if before is not None and time_s <= before:
+        raise DataError(f"{place}: {time_s!r} s follows {before!r} s; time must increase from row to row")
+
+
+def _number(place: str, name: str, text: str) -> float:
+    if text in _MISSING:
+        return math.nan
+    try:
+        if "_" in text:
+            raise ValueError
+        return float(text)
+    except ValueError as error:
+        raise DataError(f"{place}, column {name}: {text!r} is not a number") from error

@@ -1,0 +1,188 @@
+"""Sessions for other programs: CSV and Parquet folders, one HDF5 or one MAT file. Whole or not at all."""
+
+import json
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Literal, get_args
+
+import h5py
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as arrow_csv
+import scipy.io
+from numpy.typing import NDArray
+
+from rig.channels import FORCE, STREAMS
+from rig.errors import UsageError
+from rig.recording.files import whole_file, whole_folder, write_text
+from rig.recording.sessions import Session, TrialInfo, plain
+from rig.recording.tables import Column, arrow_table, compression_N, filled, write_parquet
+
+Format = Literal["csv", "parquet", "hdf5", "mat"]
+FORMATS: tuple[Format, ...] = get_args(Format)
+COLUMNS_FILE = "columns.csv"
+# MATLAB's own limits: names of at most 63 characters, files of version 5 below 2 GiB a variable.
+MAT_NAME = 63
+MAT_LIMIT = 1 << 31
+
+
+def export(session: Session, format: Format, out: Path) -> Path:
+    """Writes every stream that has rows of every trial to ``out``: a folder for csv and parquet, else one file.
+
+    Raises UsageError where ``out`` exists or the format cannot hold the session, WriteFailed where the disk is full.
+    """
+    if not session.trials:
+        raise UsageError(f"{session.folder}: no recording to export")
+    writers: dict[Format, Callable[[Session, Path], None]] = {
+        "csv": _csv,
+        "parquet": _parquet,
+        "hdf5": _hdf5,
+        "mat": _mat,
+    }
+    writers[format](session, out)
+    return out
+
+
+def _information(session: Session) -> str:
+    return json.dumps(plain(asdict(session.info)), indent=2, ensure_ascii=False) + "\n"
+
+
+def _csv(session: Session, out: Path) -> None:
+    """The layout `rig import` reads: ``session.toml``, ``trial_NAME/trial.toml`` and ``trial_NAME/STREAM.csv``.
+
+    Each table begins with ``time_s`` (capture, host's monotonic clock), force also with ``force_N`` in compression.
+    Units and meanings stand in ``columns.csv``, the session's facts in ``session.json``.
+    """
+    with whole_folder(out) as folder:
+        for trial in session.trials:
+            _csv_trial(folder / f"trial_{trial.name.removeprefix('trial_')}", session, trial)
+        write_text(folder / "session.toml", _toml({"id": session.info.id, "subject": session.info.subject}))
+        write_text(folder / COLUMNS_FILE, _legend())
+        write_text(folder / "session.json", _information(session))
+
+
+def _csv_trial(folder: Path, session: Session, trial: TrialInfo) -> None:
+    folder.mkdir()
+    recording = session.recording(trial.name)
+    for stream, columns in filled(recording):
+        table = arrow_table(recording, stream)
+        if stream is FORCE:
+            table = table.add_column(0, "force_N", pa.array(compression_N(recording)))
+        table = table.add_column(0, "time_s", pa.array(np.asarray(columns["capture_ns"]) / 1e9))
+        arrow_csv.write_csv(table, folder / f"{stream.name}.csv")
+    facts = {"name": trial.name, "speed_mm_s": trial.speed_mm_s, "depth_mm": trial.depth_mm, "outcome": trial.outcome}
+    surface = recording.metadata.get("calibration", {}).get("surface_mm")
+    write_text(folder / "trial.toml", _toml(facts | ({"surface_mm": float(surface)} if surface else {})))
+
+
+def _toml(values: Mapping[str, object]) -> str:
+    """A TOML table of texts and numbers; lists become texts in JSON, unknown numbers are left out."""
+    lines, tables = [], []
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            tables.append(f"\n[{json.dumps(key)}]\n{_toml(value)}")
+        elif plain(value) is not None:
+            simple = isinstance(value, str | int | float)
+            lines.append(
+                f"{json.dumps(key)} = {json.dumps(value if simple else json.dumps(value), ensure_ascii=False)}\n"
+            )
+    return "".join(lines + tables)
+
+
+def _legend() -> str:
+    extra = [
+        'force,force_N,N,"force in compression, by the calibration, before any zero"',
+        '*,time_s,s,"capture_ns in seconds"',
+    ]
+    lines = [
+        f'{stream.name},{name},{unit},"{meaning}"'
+        for stream in STREAMS
+        for name, (unit, meaning) in stream.units.items()
+    ]
+    return "\n".join(["stream,column,unit,meaning", *extra, *lines]) + "\n"
+
+
+def _parquet(session: Session, out: Path) -> None:
+    """``TRIAL.STREAM.parquet`` with units in the metadata of each field."""
+    with whole_folder(out) as folder:
+        for trial in session.trials:
+            write_parquet(session.recording(trial.name), folder, trial.name)
+        write_text(folder / "session.json", _information(session))
+
+
+def _hdf5(session: Session, out: Path) -> None:
+    """``/TRIAL/STREAM/FIELD`` with attributes ``unit`` and ``meaning``; facts as JSON in attributes of the groups."""
+    # In memory first: the HDF5 library crashes the process when the disk is full on close.
+    # libver: what is newer cannot be opened by the HDF5 of current Debian, R and Octave.
+    with (
+        whole_file(out) as scratch,
+        h5py.File(scratch, "w", driver="core", backing_store=False, libver=("earliest", "v110")) as file,
+    ):
+        file.attrs["session"] = _information(session)
+        for trial in session.trials:
+            _group(file.create_group(trial.name), session, trial)
+        file.flush()
+        scratch.write_bytes(file.id.get_file_image())
+
+
+def _group(group: "h5py.Group", session: Session, trial: TrialInfo) -> None:
+    recording = session.recording(trial.name)
+    group.attrs["metadata"] = json.dumps(recording.metadata)
+    group.attrs["speed_mm_s"], group.attrs["depth_mm"] = trial.speed_mm_s, trial.depth_mm
+    for stream, table in filled(recording):
+        for name, column in table.items():
+            _dataset(group, f"{stream.name}/{name}", column, stream.units[name])
+
+
+def _dataset(group: "h5py.Group", name: str, column: Column, unit: tuple[str, str]) -> None:
+    if isinstance(column, list):
+        data = group.create_dataset(name, data=column, dtype=h5py.string_dtype())
+    else:
+        data = group.create_dataset(name, data=column, compression="gzip", compression_opts=4, shuffle=True)
+    data.attrs["unit"], data.attrs["meaning"] = unit
+
+
+def _mat(session: Session, out: Path) -> None:
+    """One struct a trial (``trial_01.force.fz_N``), ``units.force.fz_N``, and ``session`` as JSON text."""
+    size = sum(
+        stream.dtype.itemsize * trial.samples.get(stream.name, 0) for trial in session.trials for stream in STREAMS
+    )
+    if size >= MAT_LIMIT:
+        raise UsageError(
+            f"{out}: {size >> 20} MiB are more than a MAT file holds; export hdf5, which MATLAB also reads"
+        )
+    content: dict[str, object] = {"session": _information(session), "units": _units()}
+    for trial in session.trials:
+        content[_variable(trial.name, content)] = _struct(session, trial)
+    with whole_file(out) as scratch:
+        scipy.io.savemat(str(scratch), content, appendmat=False, long_field_names=True, do_compression=True)
+
+
+def _struct(session: Session, trial: TrialInfo) -> dict[str, object]:
+    recording = session.recording(trial.name)
+    streams = {
+        stream.name: {name: _mat_column(column) for name, column in table.items()}
+        for stream, table in filled(recording)
+    }
+    facts = {"speed_mm_s": trial.speed_mm_s, "depth_mm": trial.depth_mm, "outcome": trial.outcome}
+    return {**streams, **facts, "metadata": json.dumps(recording.metadata)}
+
+
+def _mat_column(column: Column) -> NDArray[np.generic]:
+    """The column as MATLAB has it: n x 1, texts as a cell array."""
+    values: NDArray[np.generic] = np.array(column, dtype=object) if isinstance(column, list) else column
+    return values.reshape(-1, 1)
+
+
+def _units() -> dict[str, dict[str, str]]:
+    return {stream.name: {name: unit for name, (unit, _) in stream.units.items()} for stream in STREAMS}
+
+
+def _variable(name: str, taken: dict[str, object]) -> str:
+    """``name`` as a MATLAB name that is not taken: letters, digits and underscores, a letter first."""
+    base = re.sub(r"\W", "_", name, flags=re.ASCII)
+    base = (base if base[:1].isalpha() else f"trial_{base}")[: MAT_NAME - 4]
+    names = [base, *(f"{base}_{number}" for number in range(2, 1000))]
+    return next(item for item in names if item not in taken)

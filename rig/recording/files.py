@@ -1,0 +1,73 @@
+"""Files and folders that appear whole or not at all: built under another name next to the place, then renamed."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rig.errors import RigError, UsageError
+
+
+class WriteFailed(RigError):
+    """The disk did not take a result; nothing half-written was left behind."""
+
+
+@contextmanager
+def whole_file(path: Path, overwrite: bool = False) -> Iterator[Path]:
+    """A scratch path that becomes ``path`` when the block ends well; raises UsageError where ``path`` may not."""
+    _check(path, overwrite)
+    scratch = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        yield scratch
+        _sync(scratch)
+        scratch.replace(path)
+    except OSError as error:
+        raise WriteFailed(f"{path}: cannot be written: {error.strerror or error}; nothing was left behind") from error
+    finally:
+        scratch.unlink(missing_ok=True)
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """A scratch folder that becomes ``path`` when the block ends well; an empty folder at ``path`` is replaced."""
+    if not (path.is_dir() and not any(path.iterdir())):
+        _check(path, overwrite=False)
+    scratch = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        scratch.mkdir(parents=True)
+        yield scratch
+        scratch.replace(path)
+    except OSError as error:
+        raise WriteFailed(f"{path}: cannot be written: {error.strerror or error}; nothing was left behind") from error
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+def make_folder(path: Path) -> None:
+    """Makes the folder and those above it where they are missing."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WriteFailed(f"{path}: cannot be made: {error.strerror}; give another place") from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Replaces the content of ``path`` in one step."""
+    with whole_file(path, overwrite=True) as scratch:
+        scratch.write_text(text, encoding="utf-8")
+
+
+def _check(path: Path, overwrite: bool) -> None:
+    if path.exists() and not overwrite:
+        raise UsageError(f"{path}: exists already and is not overwritten; give a new name")
+    if overwrite and path.is_dir():
+        raise UsageError(f"{path}: is a folder; give the name of a file")
+
+
+def _sync(path: Path) -> None:
+    fd = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(fd)
+    finally:
+        os.close(fd)

@@ -1,0 +1,172 @@
+"""One recording: one MCAP file (https://mcap.dev/spec), written by the stock writer so that any MCAP reader opens it.
+
+A channel a stream, message encoding ``cdr`` with the ``ros2msg`` schema of ``rig.channels``; log time is arrival,
+publish time is capture, the sequence is the low half of the sample's own number. Metadata stand at the start, so that
+a prefix has them, and carry a checksum of their own, since MCAP checks only chunks. The record ``summary`` at the end
+says that the recording was finished.
+"""
+
+import io
+import json
+import os
+import struct
+import zlib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from mcap.writer import CompressionType, Writer
+
+from rig.channels import CDR_HEADER, STREAMS, Stream
+from rig.errors import RigError, UsageError
+
+SUMMARY = "summary"
+CHECKSUM = "crc32"
+# Small pieces: on some kernels one large write stalls even processes of real-time priority.
+PIECE = 65_536
+CHUNK_SIZE = 1 << 20
+_STAMP = struct.Struct("<qqq")
+
+
+class RecordingFailed(RigError):
+    """The disk did not take the recording; what was written before stays and opens."""
+
+
+def schema_name(stream: Stream) -> str:
+    """Name of the stream's message type, as ROS 2 tools want it."""
+    return f"tissue_rig/msg/{stream.name.capitalize()}"
+
+
+def checksum(values: Iterable[tuple[str, str]]) -> str:
+    """CRC-32 over the sorted pairs but the checksum's own, eight hexadecimal digits."""
+    pairs = sorted((key, value) for key, value in values if key != CHECKSUM)
+    return f"{zlib.crc32(json.dumps(pairs).encode()):08x}"
+
+
+class RecordingWriter:
+    """A recording being written. The first failure of the disk ends it; every later call repeats that cause."""
+
+    def __init__(self, path: Path, metadata: Mapping[str, Mapping[str, str]]) -> None:
+        """Creates ``path`` with its metadata on disk; raises UsageError if it exists, RecordingFailed on a bad disk."""
+        self.path = path
+        self._failure = ""
+        self._batch = _Batch()
+        self._fd = self._create()
+        self._writer = Writer(
+            self._batch, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD, enable_data_crcs=True
+        )
+        self._writer.start(profile="ros2", library="tissue-rig")
+        self._channels = {stream.id: self._register(stream) for stream in STREAMS}
+        for name, values in metadata.items():
+            self._add_metadata(name, values)
+        self._write_batch()
+        self._sync()
+        _sync_folder(path.parent)
+
+    def _create(self) -> int:
+        try:
+            return os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
+        except FileExistsError as error:
+            raise UsageError(f"{self.path}: exists already and is not overwritten; give a new name") from error
+        except OSError as error:
+            raise RecordingFailed(f"{self.path}: cannot be created: {error.strerror}; check the folder") from error
+
+    def _register(self, stream: Stream) -> int:
+        schema = self._writer.register_schema(schema_name(stream), "ros2msg", stream.schema().encode())
+        return self._writer.register_channel(stream.name, "cdr", schema)
+
+    def _add_metadata(self, name: str, values: Mapping[str, str]) -> None:
+        self._writer.add_metadata(name, {**values, CHECKSUM: checksum(values.items())})
+
+    def add(self, stream_id: int, body: bytes) -> None:
+        """Appends one sample, ``body`` as packed by its stream; nothing reaches the disk before ``flush``."""
+        seq, capture_ns, arrival_ns = _STAMP.unpack_from(body)
+        # MCAP's own times are unsigned; the true ones are in the body.
+        self._writer.add_message(
+            self._channels[stream_id],
+            log_time=max(arrival_ns, 0),
+            data=CDR_HEADER + body,
+            publish_time=max(capture_ns, 0),
+            sequence=seq & 0xFFFFFFFF,
+        )
+
+    def flush(self, sync: bool = False) -> None:
+        """Closes the chunk in progress and hands it to the system; with ``sync`` waits until the disk has it."""
+        self._writer.flush()
+        self._write_batch()
+        if sync:
+            self._sync()
+
+    def finish(self, summary: Mapping[str, str]) -> None:
+        """Writes ``summary``, index and footer and closes the file."""
+        self._writer.flush()
+        self._add_metadata(SUMMARY, summary)
+        self._writer.finish()
+        self._write_batch()
+        self._sync()
+        self.close()
+
+    def close(self) -> None:
+        """Lets go of the file as it is; without ``finish`` it stays a prefix. May be called twice."""
+        if self._fd >= 0:
+            os.close(self._fd)
+        self._fd = -1
+
+    def _write_batch(self) -> None:
+        if self._failure:
+            raise RecordingFailed(self._failure)
+        start, data = self._batch.take()
+        try:
+            view = memoryview(data)
+            while view:
+                view = view[os.write(self._fd, view[:PIECE]) :]
+        except OSError as error:
+            self._fail(start, error)
+
+    def _sync(self) -> None:
+        try:
+            os.fdatasync(self._fd)
+        except OSError as error:
+            self._fail(self._batch.tell(), error)
+
+    def _fail(self, good: int, error: OSError) -> None:
+        """Cuts the file back to its last whole batch."""
+        self._failure = (
+            f"{self.path}: the disk took no more after {good} bytes: {error.strerror}; "
+            "what was recorded before is kept; free some space and record again"
+        )
+        _cut(self._fd, good)
+        self.close()
+        raise RecordingFailed(self._failure) from error
+
+
+def _cut(fd: int, size: int) -> None:
+    """Cuts the open file to ``size`` bytes where the system still allows it; a ragged end can be read as well."""
+    try:
+        os.ftruncate(fd, size)
+    except OSError:
+        return
+
+
+class _Batch(io.BytesIO):
+    """What the stock writer produced since the last batch; its offsets go on through the whole file."""
+
+    _start = 0
+
+    def tell(self) -> int:
+        return self._start + super().tell()
+
+    def take(self) -> tuple[int, bytes]:
+        """Offset and bytes of the batch, which begins anew."""
+        start, data = self._start, self.getvalue()
+        self.seek(0)
+        self.truncate(0)
+        self._start += len(data)
+        return start, data
+
+
+def _sync_folder(folder: Path) -> None:
+    fd = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(fd)
+    finally:
+        os.close(fd)

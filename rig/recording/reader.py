@@ -1,0 +1,99 @@
+"""A recording as numpy tables: opens a finished file, any prefix of one, and what a damaged one still holds."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.channels import BY_ID, BY_NAME, EVENT, STREAMS, EventSample, Stream
+from rig.errors import DataError
+from rig.recording.mcap_file import SUMMARY
+from rig.recording.scan import MAGIC, Chunk, Definition, Scan, scan
+
+NUMERIC = tuple(stream for stream in STREAMS if not stream.has_text)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What one file holds.
+
+    ``tables`` has every numeric stream by name, rows in file order with the stream's own dtype (read-only, possibly no
+    rows). ``complete``: the recorder finished the file. ``cut`` says where a file ends that was not finished,
+    ``damage`` what is bad in it; both are sentences, empty where there is nothing to say.
+    """
+
+    path: Path
+    metadata: dict[str, dict[str, str]]
+    tables: dict[str, NDArray[np.void]]
+    events: tuple[EventSample, ...]
+    complete: bool
+    damage: tuple[str, ...]
+    cut: str = ""
+
+
+def read_recording(path: Path) -> Recording:
+    """The recording at ``path``; raises DataError only where there is no file or it never was a recording."""
+    found = scan(read_bytes(path))
+    bodies: dict[str, list[bytes]] = {stream.name: [] for stream in STREAMS}
+    for stream, body in samples(path, found):
+        bodies[stream.name].append(body)
+    return Recording(
+        path,
+        found.metadata,
+        {stream.name: np.frombuffer(b"".join(bodies[stream.name]), stream.dtype) for stream in NUMERIC},
+        tuple(EventSample(*EVENT.unpack(body)) for body in bodies[EVENT.name]),
+        found.footer and SUMMARY in found.metadata,
+        tuple(found.damage),
+        found.cut,
+    )
+
+
+def read_bytes(path: Path) -> bytes:
+    """The file's bytes; raises DataError where it cannot be read or is no recording in any state."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError as error:
+        raise DataError(f"{path}: no such recording; `rig verify FOLDER` lists what a session holds") from error
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
+    if not data.startswith(MAGIC[: len(data)]) and not scan(data).chunks:
+        raise DataError(f"{path}: not a recording (no MCAP file)")
+    return data
+
+
+def samples(path: Path, found: Scan) -> Iterator[tuple[Stream, bytes]]:
+    """Every good sample as (stream, body), in file order; raises DataError for a file of another layout."""
+    streams = _streams(path, found.chunks)
+    for chunk in found.chunks:
+        for channel, body in chunk.messages:
+            stream = streams.get(channel)
+            if stream is None:
+                continue
+            if not stream.has_text and len(body) != stream.fixed.size:
+                raise DataError(f"{path}: a {stream.name} row of {len(body)} bytes; its layout has {stream.fixed.size}")
+            yield stream, body
+
+
+def _streams(path: Path, chunks: Iterable[Chunk]) -> Mapping[int, Stream]:
+    """Channel number to stream; the numbers of our own writer where the chunk with the definitions is lost."""
+    definitions: dict[int, Definition] = {}
+    for chunk in chunks:
+        definitions |= chunk.definitions
+    for definition in definitions.values():
+        stream = BY_NAME.get(definition.topic)
+        if stream is not None and layout(definition.schema) != layout(stream.schema()):
+            raise DataError(
+                f"{path}: stream {stream.name} has other fields than this version of the program; "
+                "read it with the version named in its metadata"
+            )
+    known = {number: BY_NAME[item.topic] for number, item in definitions.items() if item.topic in BY_NAME}
+    if definitions and not known:
+        raise DataError(f"{path}: an MCAP file, but with no stream of this bench")
+    return known or BY_ID
+
+
+def layout(schema: str) -> list[list[str]]:
+    """Types and names of a ``ros2msg`` text, without comments."""
+    return [line.split("#")[0].split() for line in schema.splitlines() if line.split("#")[0].strip()]

@@ -1,0 +1,243 @@
+"""The recorder process: drains the ring and does all the waiting for the disk, so that the loop never has to.
+
+Started as ``python -m rig.recording.recorder RING``; commands come as JSON lines on standard input, replies go to
+standard output::
+
+    {"open": "trial.mcap", "metadata": {...}}   -> {"opened": "trial.mcap", "unrecorded": 17}
+    {"close": {"outcome": "done"}}              -> {"closed": "trial.mcap", "samples": {...}, "dropped": {...}, ...}
+    {"quit": true}                              -> {"quit": true}
+
+A command that fails is answered by ``{"failed": sentence, "to": command}``; a disk that fails meanwhile is reported
+at once, ``"to": "recording"``, and again on close. Slots are given back to the loop only after their chunk has been
+handed to the system: a successor of a killed recorder (``--resume``) starts with the batch that was lost. When standard
+input ends, the supervisor is dead: the recorder goes on while the loop still writes, then finishes file and itself.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import signal
+import struct
+import sys
+import time
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import cast
+
+from rig.channels import BY_ID
+from rig.errors import RigError
+from rig.recording.lines import Lines, encode, parse
+from rig.recording.mcap_file import RecordingFailed, RecordingWriter
+from rig.recording.ring import RingReader
+
+DRAIN_PERIOD_S = 0.02
+FLUSH_PERIOD_NS = 200_000_000
+SYNC_PERIOD_NS = 1_000_000_000
+SILENCE_NS = 2_000_000_000
+BATCH = 8192
+_SEQ = struct.Struct("<q")
+
+
+class Tally:
+    """What one recording got: samples and gaps in their numbers, per stream."""
+
+    def __init__(self) -> None:
+        self.samples: Counter[str] = Counter()
+        self.missing: Counter[str] = Counter()
+        self.unreadable = 0
+        self._last: dict[int, int] = {}
+
+    def accepts(self, stream_id: int, body: bytes) -> bool:
+        """Counts the sample; False if it has not the layout of its stream and would spoil the file."""
+        stream = BY_ID.get(stream_id)
+        try:
+            if stream is None or (not stream.has_text and len(body) != stream.fixed.size):
+                raise IndexError
+            seq = int(stream.unpack(body)[0]) if stream.has_text else int(_SEQ.unpack_from(body)[0])
+        except (struct.error, IndexError):
+            self.unreadable += 1
+            return False
+        self.missing[stream.name] += max(seq - self._last.get(stream_id, seq) - 1, 0)
+        self.samples[stream.name] += 1
+        self._last[stream_id] = seq
+        return True
+
+
+class Recorder:
+    """Ring to files. Time and commands are given; ``step`` is to be called every 20 ms or so."""
+
+    def __init__(self, ring: RingReader, resume: bool = False) -> None:
+        """With ``resume`` what a predecessor left in the ring stays there for the first recording."""
+        self._ring = ring
+        self._hold = resume
+        self._writer: RecordingWriter | None = None
+        self._failure = ""
+        self._tally = Tally()
+        self._dropped, self._damaged = ring.dropped, ring.damaged
+        self._flushed_ns = self._synced_ns = 0
+        self.unrecorded = 0
+
+    @property
+    def recording(self) -> bool:
+        """Whether a recording was opened and not closed, be it a failed one."""
+        return self._writer is not None
+
+    def handle(self, command: Mapping[str, object]) -> dict[str, object]:
+        """Does what one command asks and says how it went."""
+        name = next((name for name in ("open", "close", "quit") if name in command), "")
+        try:
+            if name == "open":
+                return self._open(Path(str(command["open"])), _texts(command.get("metadata")))
+            if name == "close":
+                return self._close(_strings(command["close"]))
+            if name == "quit":
+                return self.end("recorder told to quit") | {"quit": True}
+        except RigError as error:
+            return {"failed": str(error), "to": name}
+        return {"failed": f"unknown command {json.dumps(dict(command))[:200]}", "to": "line"}
+
+    def step(self, now_ns: int) -> dict[str, object]:
+        """Drains the ring and flushes when it is time; returns the news if the disk failed just now, else nothing."""
+        self._ring.touch(now_ns)
+        try:
+            self._drain(BATCH)
+            if self._writer and not self._failure and now_ns - self._flushed_ns >= FLUSH_PERIOD_NS:
+                self._flush(now_ns)
+        except RecordingFailed as error:
+            self._failure = str(error)
+            self._ring.commit()
+            return {"failed": self._failure, "to": "recording"}
+        return {}
+
+    def end(self, outcome: str) -> dict[str, object]:
+        """Finishes a recording that is still open."""
+        return self._close({"outcome": outcome}) if self._writer else {}
+
+    def _open(self, path: Path, metadata: dict[str, dict[str, str]]) -> dict[str, object]:
+        if self._writer and not self._failure:
+            raise RecordingFailed(f"{path}: {self._writer.path} is still being recorded; close it first")
+        self._writer = None
+        if not self._hold:
+            self._drain_to(self._ring.head)
+            self._dropped, self._damaged = self._ring.dropped, self._ring.damaged
+        self._writer = RecordingWriter(path, metadata)
+        self._hold, self._failure, self._tally = False, "", Tally()
+        unrecorded, self.unrecorded = self.unrecorded, 0
+        return {"opened": str(path), "unrecorded": unrecorded}
+
+    def _close(self, summary: dict[str, str]) -> dict[str, object]:
+        if self._writer is None:
+            raise RecordingFailed("nothing is being recorded; open a recording first")
+        writer = self._writer
+        try:
+            self._drain_to(self._ring.head)
+            if self._failure:
+                raise RecordingFailed(self._failure)
+            counts = self._counts()
+            writer.finish({**summary, **{name: json.dumps(value) for name, value in counts.items()}})
+        finally:
+            self._writer, self._failure = None, ""
+            writer.close()
+            self._ring.commit()
+        return {"closed": str(writer.path), **counts}
+
+    def _counts(self) -> dict[str, object]:
+        dropped = Counter(self._ring.dropped)
+        dropped.subtract(self._dropped)
+        return {
+            "samples": dict(self._tally.samples),
+            "dropped": {BY_ID[number].name: count for number, count in dropped.items() if count and number in BY_ID},
+            "missing": {name: count for name, count in self._tally.missing.items() if count},
+            "unreadable": self._tally.unreadable + self._ring.damaged - self._damaged,
+        }
+
+    def _drain_to(self, head: int) -> None:
+        while self._ring.position < head:
+            self._drain(min(BATCH, head - self._ring.position))
+
+    def _drain(self, limit: int) -> None:
+        if self._hold:
+            return
+        writing = self._writer is not None and not self._failure
+        for _, stream_id, body in self._ring.drain(limit, commit=not writing):
+            if not writing or self._writer is None:
+                self.unrecorded += 1
+            elif self._tally.accepts(stream_id, body):
+                self._writer.add(stream_id, body)
+
+    def _flush(self, now_ns: int) -> None:
+        if self._writer is None:
+            return
+        sync = now_ns - self._synced_ns >= SYNC_PERIOD_NS
+        self._writer.flush(sync)
+        self._ring.commit()
+        self._flushed_ns = now_ns
+        self._synced_ns = now_ns if sync else self._synced_ns
+
+
+def _strings(value: object) -> dict[str, str]:
+    if not isinstance(value, dict):
+        return {}
+    return {str(key): item if isinstance(item, str) else json.dumps(item) for key, item in value.items()}
+
+
+def _texts(value: object) -> dict[str, dict[str, str]]:
+    records = value if isinstance(value, dict) else {}
+    return {str(name): _strings(items) for name, items in records.items()}
+
+
+def run(ring: RingReader, recorder: Recorder, commands: Lines, reply_fd: int) -> None:
+    """Serves commands until told to quit, or until supervisor and loop are both gone."""
+    while not commands.ended:
+        for line in commands.wait(DRAIN_PERIOD_S):
+            reply = recorder.handle(parse(line))
+            _reply(reply_fd, reply)
+            if "quit" in reply:
+                return
+        _reply(reply_fd, recorder.step(time.monotonic_ns()))
+    _outlive(ring, recorder)
+
+
+def _outlive(ring: RingReader, recorder: Recorder) -> None:
+    """The supervisor is dead: records while the loop still writes, then closes the file and removes the ring."""
+    head, moved_ns = ring.head, time.monotonic_ns()
+    while time.monotonic_ns() - moved_ns < SILENCE_NS:
+        time.sleep(DRAIN_PERIOD_S)
+        recorder.step(time.monotonic_ns())
+        if ring.head != head:
+            head, moved_ns = ring.head, time.monotonic_ns()
+    with contextlib.suppress(RecordingFailed):
+        recorder.end("supervisor lost")
+    ring.path.unlink(missing_ok=True)
+
+
+def _reply(fd: int, message: dict[str, object]) -> None:
+    if message:
+        with contextlib.suppress(BrokenPipeError):
+            os.write(fd, encode(message))
+
+
+def main(arguments: list[str]) -> int:
+    """The process: attaches to the ring and runs; exit code 2 where there is no ring."""
+    parser = argparse.ArgumentParser(prog="python -m rig.recording.recorder", description=__doc__)
+    parser.add_argument("ring", type=Path)
+    parser.add_argument("--resume", action="store_true", help="keep what a predecessor left for the first recording")
+    options = parser.parse_args(arguments)
+    # Ctrl-C goes to the whole group of processes; the recorder ends when its supervisor says so or is gone.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        ring = RingReader.open(cast(Path, options.ring))
+    except RigError as error:
+        _reply(sys.stdout.fileno(), {"failed": str(error), "to": "start"})
+        return error.exit_code
+    ring.touch(time.monotonic_ns())
+    _reply(sys.stdout.fileno(), {"ready": os.getpid()})
+    run(ring, Recorder(ring, options.resume), Lines(sys.stdin.fileno()), sys.stdout.fileno())
+    ring.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

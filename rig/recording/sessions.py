@@ -1,0 +1,204 @@
+"""A session: a folder of recordings, with ``session.json`` as its list of contents.
+
+The recordings are the truth. ``session.json`` is rewritten in one step after each trial; where it is missing, broken or
+behind (a crash), the recordings in the folder stand in for it. ``parquet/`` is derived and can always be rebuilt.
+"""
+
+import json
+import math
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, TypeAdapter, ValidationError
+
+from rig.errors import DataError, UsageError
+from rig.recording.files import write_text
+from rig.recording.reader import Recording, read_recording
+from rig.recording.tables import write_parquet
+
+SESSION_FILE = "session.json"
+PARQUET_FOLDER = "parquet"
+# JSON has no NaN: an unknown number is null in the file and NaN here.
+Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
+
+
+@dataclass(frozen=True)
+class TrialInfo:
+    """One trial. ``file`` stands in the session's folder; unknown numbers are NaN."""
+
+    name: str
+    file: str
+    speed_mm_s: Number
+    depth_mm: Number
+    outcome: str
+    peak_force_N: Number = math.nan
+    samples: dict[str, int] = field(default_factory=dict)
+    dropped: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class SessionInfo:
+    """What ``session.json`` holds. ``created`` is ISO 8601 wall-clock time."""
+
+    id: str
+    kind: Literal["capture", "import", "track"]
+    created: str
+    software: str
+    protocol: dict[str, object] = field(default_factory=dict)
+    wiring: dict[str, object] = field(default_factory=dict)
+    subject: dict[str, object] = field(default_factory=dict)
+    notes: dict[str, object] = field(default_factory=dict)
+    trials: tuple[TrialInfo, ...] = ()
+
+
+@dataclass(frozen=True)
+class Session:
+    """An opened session. ``remarks`` are sentences on what was not as it should be, empty if all was."""
+
+    folder: Path
+    info: SessionInfo
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def trials(self) -> tuple[TrialInfo, ...]:
+        """Trials whose recording is there, in order."""
+        return self.info.trials
+
+    def trial(self, name: str) -> TrialInfo:
+        """The trial called ``name``; raises UsageError with the names there are."""
+        for trial in self.trials:
+            if trial.name == name:
+                return trial
+        raise UsageError(f"{self.folder}: no trial {name}; there are {', '.join(item.name for item in self.trials)}")
+
+    def path(self, name: str) -> Path:
+        """The recording of a trial."""
+        return self.folder / self.trial(name).file
+
+    def recording(self, name: str) -> Recording:
+        """Reads the recording of a trial."""
+        return read_recording(self.path(name))
+
+
+_INFO = TypeAdapter(SessionInfo)
+
+
+def write_session(folder: Path, info: SessionInfo) -> None:
+    """Replaces ``session.json`` in one step."""
+    write_text(folder / SESSION_FILE, json.dumps(plain(asdict(info)), indent=2, ensure_ascii=False) + "\n")
+
+
+def plain(value: object) -> object:
+    """``value`` as JSON can hold it: NaN and infinities as null, tuples as lists, other objects as text."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return value if value is None or isinstance(value, str | int) else str(value)
+
+
+def open_session(folder: Path) -> Session:
+    """The session in ``folder``; raises DataError where there is none."""
+    if not folder.exists():
+        raise DataError(f"{folder}: no such session folder; `rig capture` and `rig import` make one")
+    if not folder.is_dir():
+        raise DataError(f"{folder}: a file; give the session folder that holds it")
+    files = sorted(path.name for path in folder.glob("*.mcap") if not path.name.startswith("."))
+    info, remarks = _read_info(folder)
+    listed = {trial.file for trial in info.trials} if info else set()
+    found, unreadable = _read_all(folder, [name for name in files if name not in listed])
+    if info is None and not found:
+        raise DataError(f"{folder}: no session here: neither {SESSION_FILE} nor a recording (*.mcap) that opens")
+    info = info or _info_from(found[0])
+    kept = [trial for trial in info.trials if trial.file in files]
+    remarks += [
+        f"trial {trial.name}: its recording {trial.file} is missing" for trial in info.trials if trial.file not in files
+    ]
+    remarks += [f"{item.path.name}: not listed in {SESSION_FILE}, taken from the file itself" for item in found]
+    return Session(folder, replace(info, trials=(*kept, *map(_trial_from, found))), (*remarks, *unreadable))
+
+
+def derive(folder: Path, names: Collection[str] | None = None) -> list[Path]:
+    """Rebuilds ``parquet/NAME.STREAM.parquet`` of all trials, or of those in ``names``; the paths written."""
+    session = open_session(folder)
+    target = folder / PARQUET_FOLDER
+    target.mkdir(exist_ok=True)
+    chosen = [trial for trial in session.trials if names is None or trial.name in names]
+    return [path for trial in chosen for path in write_parquet(session.recording(trial.name), target, trial.name)]
+
+
+def _read_info(folder: Path) -> tuple[SessionInfo | None, list[str]]:
+    path = folder / SESSION_FILE
+    try:
+        return _INFO.validate_json(path.read_bytes()), []
+    except FileNotFoundError:
+        return None, [f"{SESSION_FILE} is missing: the session is taken from its recordings"]
+    except (OSError, ValidationError):
+        return None, [f"{SESSION_FILE} cannot be read: the session is taken from its recordings"]
+
+
+def _read_all(folder: Path, files: Iterable[str]) -> tuple[list[Recording], list[str]]:
+    """The recordings that open, and a sentence for each that does not."""
+    found, unreadable = [], []
+    for name in files:
+        try:
+            found.append(read_recording(folder / name))
+        except DataError as error:
+            unreadable.append(str(error))
+    return found, unreadable
+
+
+def _info_from(first: Recording) -> SessionInfo:
+    recording = first.metadata.get("recording", {})
+    tables = {name: _nested(first.metadata.get(name, {})) for name in ("protocol", "wiring", "subject", "notes")}
+    return SessionInfo(
+        id=recording.get("session", first.path.parent.name),
+        kind="import" if recording.get("kind") == "import" else "capture",
+        created=recording.get("wall_start_iso", ""),
+        software=recording.get("software", ""),
+        protocol=tables["protocol"],
+        wiring=tables["wiring"],
+        subject=tables["subject"],
+        notes=tables["notes"],
+    )
+
+
+def _nested(values: Mapping[str, str]) -> dict[str, object]:
+    """A metadata record with its JSON texts as values; a lone key ``json`` is the whole table."""
+    found = {name: _value(text) for name, text in values.items()}
+    whole = found.get("json")
+    return {str(key): item for key, item in whole.items()} if isinstance(whole, dict) and len(found) == 1 else found
+
+
+def _value(text: str) -> object:
+    # Only tables and lists are JSON; a subject called 7 stays a text.
+    if not text.startswith(("{", "[")):
+        return text
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
+
+
+def _trial_from(recording: Recording) -> TrialInfo:
+    trial, summary = recording.metadata.get("trial", {}), recording.metadata.get("summary", {})
+    samples = {name: len(table) for name, table in recording.tables.items() if len(table)}
+    return TrialInfo(
+        recording.path.stem,
+        recording.path.name,
+        _number(trial.get("speed_mm_s", "")),
+        _number(trial.get("depth_mm", "")),
+        summary.get("outcome", "recording not finished"),
+        samples=samples,
+    )
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

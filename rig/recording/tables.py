@@ -1,0 +1,66 @@
+"""Streams as Arrow tables with their units: what Parquet, CSV, HDF5 and MAT are made of."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from rig.channels import EVENT, FORCE, STREAMS, Stream
+from rig.recording.files import whole_file
+from rig.recording.reader import Recording
+
+Column = NDArray[np.int64] | NDArray[np.float64] | list[str]
+
+
+def columns(recording: Recording, stream: Stream) -> dict[str, Column]:
+    """Fields of the stream by name, in wire order; texts as lists."""
+    if not stream.has_text:
+        table = recording.tables[stream.name]
+        return {name: np.ascontiguousarray(table[name]) for name in stream.kinds}
+    found: dict[str, Column] = {}
+    for index, (name, kind) in enumerate(EVENT.kinds.items()):
+        values = [event[index] for event in recording.events]
+        found[name] = [str(value) for value in values] if kind is str else np.array(values, dtype=np.int64)
+    return found
+
+
+def filled(recording: Recording) -> Iterator[tuple[Stream, dict[str, Column]]]:
+    """Every stream that has rows."""
+    for stream in STREAMS:
+        table = columns(recording, stream)
+        if len(next(iter(table.values()))):
+            yield stream, table
+
+
+def arrow_table(recording: Recording, stream: Stream) -> pa.Table:
+    """The stream with ``unit`` and ``meaning`` on each field and the recording's metadata, as JSON, on the whole."""
+    table = columns(recording, stream)
+    kinds = {int: pa.int64(), float: pa.float64(), str: pa.string()}
+    fields = [
+        pa.field(name, kinds[kind], metadata=dict(zip(("unit", "meaning"), stream.units[name], strict=True)))
+        for name, kind in stream.kinds.items()
+    ]
+    schema = pa.schema(fields, {name: json.dumps(values) for name, values in recording.metadata.items()})
+    return pa.table([pa.array(table[field.name], field.type) for field in fields], schema=schema)
+
+
+def compression_N(recording: Recording) -> NDArray[np.float64]:
+    """Compressive force of every force row [N], by the recording's calibration; no zero is taken off."""
+    calibration = recording.metadata.get("calibration", {})
+    force = recording.tables[FORCE.name][f"{calibration.get('force_axis', 'fz')}_N"]
+    return np.array(force if calibration.get("compression", "negative") == "positive" else -force, dtype=np.float64)
+
+
+def write_parquet(recording: Recording, folder: Path, name: str) -> list[Path]:
+    """``NAME.STREAM.parquet`` in ``folder`` for every stream with rows, each replaced in one step; their paths."""
+    paths = []
+    for stream, _ in filled(recording):
+        path = folder / f"{name}.{stream.name}.parquet"
+        with whole_file(path, overwrite=True) as scratch:
+            pq.write_table(arrow_table(recording, stream), scratch, compression="zstd")
+        paths.append(path)
+    return paths

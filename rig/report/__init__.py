@@ -1,0 +1,1 @@
+"""Recordings and results as pictures, tables and one self-contained HTML page."""

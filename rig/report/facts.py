@@ -1,0 +1,160 @@
+"""What a session has to tell, read from its recordings; a part that is missing is a sentence in place of the part."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from rig.errors import DataError, RigError
+from rig.recording.reader import Recording
+from rig.recording.sessions import Session, TrialInfo, open_session
+from rig.recording.verify import Verdict, verify
+from rig.report.figures import Tracked
+from rig.tissue.laws import FloatArray
+from rig.tissue.study import TRACKING, Study, study_session
+
+TRACK_FILE = "track.json"
+AGES = {"force": "force_age_ns", "axis": "axis_age_ns", "marker": "marker_age_ns"}
+# An input that never came has no age; the loop says so with a number no age can be.
+OLDEST_NS = 3_600_000_000_000
+
+Part = TypeVar("Part")
+
+
+@dataclass(frozen=True)
+class TrialFacts:
+    """One recording of the session with its verdict."""
+
+    info: TrialInfo
+    verdict: Verdict | str
+    samples: int
+    dropped: int
+
+
+@dataclass(frozen=True)
+class LoopFacts:
+    """The loop over all recordings: times in microseconds a tick, shape (n,); ages by input."""
+
+    wake_us: FloatArray
+    execution_us: FloatArray
+    period_us: float
+    ages_us: Mapping[str, FloatArray]
+    ticks: int
+    missed: int
+
+
+@dataclass(frozen=True)
+class TrackingFacts:
+    """A force-tracking run: its columns, and what `rig track` said of it."""
+
+    run: Tracked
+    result: Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Everything the report shows. A text in place of a part says why the part is missing."""
+
+    session: Session
+    trials: tuple[TrialFacts, ...]
+    study: Study | str
+    tracking: TrackingFacts | str
+    loop: LoopFacts | str
+    devices: Mapping[str, Mapping[str, object]]
+    realtime: Mapping[str, str]
+    metadata: Mapping[str, Mapping[str, str]]
+
+
+def gather(folder: Path) -> Facts:
+    """Reads the session in ``folder``; raises DataError only where there is none."""
+    session = open_session(folder)
+    recordings = _recordings(session)
+    metadata = next((recording.metadata for recording in recordings.values() if recording.metadata), {})
+    return Facts(
+        session=session,
+        trials=tuple(_trial(session, info) for info in session.trials),
+        study=_study(session),
+        tracking=_tracking(session, recordings),
+        loop=_loop(list(recordings.values())),
+        devices={role: json_table(text) for role, text in metadata.get("devices", {}).items() if role != "crc32"},
+        realtime=metadata.get("realtime", {}),
+        metadata=metadata,
+    )
+
+
+def _recordings(session: Session) -> dict[str, Recording]:
+    found = {}
+    for trial in session.trials:
+        try:
+            found[trial.name] = session.recording(trial.name)
+        except DataError:
+            continue
+    return found
+
+
+def _trial(session: Session, info: TrialInfo) -> TrialFacts:
+    try:
+        verdict = verify(session.path(info.name))
+    except RigError as error:
+        return TrialFacts(info, str(error), sum(info.samples.values()), sum(info.dropped.values()))
+    samples = sum(stream.samples for stream in verdict.streams.values())
+    return TrialFacts(info, verdict, samples, sum(stream.dropped for stream in verdict.streams.values()))
+
+
+def _study(session: Session) -> Study | str:
+    try:
+        return study_session(session)
+    except DataError as error:
+        return f"No fit: {error}."
+
+
+def _tracking(session: Session, recordings: Mapping[str, Recording]) -> TrackingFacts | str:
+    runs = [
+        name for name, recording in recordings.items() if recording.metadata.get("trial", {}).get("kind") == TRACKING
+    ]
+    if not runs:
+        return "No force was tracked in this session; `rig track --model MODEL --force 5 --out SESSION` adds a run."
+    loop = recordings[runs[-1]].tables["loop"]
+    loop = loop[np.isfinite(loop["reference_N"])]
+    if not len(loop):
+        return f"The tracking run {runs[-1]} never came into contact."
+    time_s = (loop["capture_ns"] - loop["capture_ns"][0]) * 1e-9
+    return TrackingFacts(Tracked(time_s, loop["reference_N"], loop["force_N"]), _result(session.folder / TRACK_FILE))
+
+
+def _result(path: Path) -> Mapping[str, object]:
+    try:
+        return json_table(path.read_text())
+    except OSError:
+        return {}
+
+
+def _loop(recordings: Sequence[Recording]) -> LoopFacts | str:
+    tables = [recording.tables["loop"] for recording in recordings if len(recording.tables["loop"]) > 1]
+    if not tables:
+        return "No loop ran in this session (it was imported), so there is no timing to show."
+    rows = np.concatenate(tables)
+    return LoopFacts(
+        wake_us=rows["wake_latency_ns"] * 1e-3,
+        execution_us=rows["execution_ns"] * 1e-3,
+        period_us=float(np.median(np.concatenate([np.diff(table["scheduled_ns"]) for table in tables]))) * 1e-3,
+        ages_us={name: ages for name, field in AGES.items() if len(ages := _ages(rows[field]))},
+        ticks=len(rows),
+        missed=sum(int(table["missed"][-1] - table["missed"][0]) for table in tables),
+    )
+
+
+def _ages(ages_ns: FloatArray) -> FloatArray:
+    return np.asarray(ages_ns[(ages_ns >= 0) & (ages_ns < OLDEST_NS)] * 1e-3)
+
+
+def json_table(text: str) -> Mapping[str, object]:
+    """The JSON object in ``text``; other text is the value of an empty name."""
+    try:
+        value = json.loads(text)
+    except ValueError:
+        return {"": text}
+    return value if isinstance(value, dict) else {"": value}

@@ -1,0 +1,38 @@
+"""One self-contained page about a session: everything a person would be shown, nothing loaded from outside."""
+
+from pathlib import Path
+from string import Template
+
+import rig
+from rig.errors import UsageError
+from rig.recording.files import write_text
+from rig.report.facts import Facts, gather
+from rig.report.markup import paragraph, text
+from rig.report.sections import headline, key_figures, sections, simulated
+
+TEMPLATE = Path(__file__).with_name("page.html")
+
+
+def write_report(session: Path, out: Path) -> None:
+    """Writes the report on the session in folder ``session`` to ``out``, whole or not at all.
+
+    Raises DataError where there is no session, UsageError where ``out`` lies in no folder.
+    """
+    if not out.parent.is_dir():
+        raise UsageError(f"{out}: its folder does not exist; make it, or give another --out")
+    write_text(out, page(gather(session)))
+
+
+def page(facts: Facts) -> str:
+    """The whole page as HTML."""
+    info = facts.session.info
+    subject = ", ".join(str(value) for value in (info.subject.get("id"), info.subject.get("site")) if value)
+    head = [
+        paragraph(" · ".join(part for part in (info.id, info.created[:16].replace("T", " "), subject) if part), "over"),
+        f"<h1>{text(headline(facts))}</h1>",
+        simulated(facts),
+        key_figures(facts),
+    ]
+    foot = f"<footer>{text(f'Recorded by {info.software}; report by tissue-rig {rig.__version__}.')}</footer>"
+    body = "\n".join([*head, *sections(facts), foot])
+    return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(title=text(f"{info.id}: report"), body=body)

@@ -1,0 +1,226 @@
+"""The chain: measured motion -> kinematics -> environment -> tissue -> guide -> sensor -> time stamps.
+
+Every cause is one operator that vanishes at its null value, so to extend the simulation is to move one number off its
+null. Operators are pure and vectorised over all recordings of a session.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from rig.simulation.drive import Array, Drive
+from rig.simulation.scans import dahl, high_pass, low_pass, play
+
+NULLS: dict[str, float] = {
+    "stiffness_N_mm": 0.5,
+    "stiffening_1_mm": 0.0,
+    "viscosity_N_s_mm": 0.0,
+    "surface_mm": 0.0,
+    "zero_N": 0.0,
+    "tip_zero_mm": 0.0,
+    "elastic_exponent_1": 1.0,
+    "elastic_quadratic_1_mm": 0.0,
+    "substrate_1_mm3": 0.0,
+    "rate_exponent_1": 1.0,
+    "relaxation_1": 0.0,
+    "relaxation_tau_s": 1.0,
+    "preconditioning_1": 0.0,
+    "preconditioning_strokes_1": 3.0,
+    "adhesion_N": 0.0,
+    "adhesion_length_mm": 1.0,
+    "temperature_1_K": 0.0,
+    "contact_offset_mm": 0.0,
+    "surface_motion_sin_mm": 0.0,
+    "surface_motion_cos_mm": 0.0,
+    "surface_motion_Hz": 0.25,
+    "backlash_mm": 0.0,
+    "frame_compliance_mm_N": 0.0,
+    "ripple_sin_mm": 0.0,
+    "ripple_cos_mm": 0.0,
+    "ripple_pitch_mm": 2.0,
+    "friction_N": 0.0,
+    "friction_length_mm": 0.1,
+    "tip_inertia_kg": 0.0,
+    "filter_lag_s": 0.0,
+    "gain_error_1": 0.0,
+    "zero_drift_N_h": 0.0,
+    "time_offset_s": 0.0,
+    "tracker_latency_s": 0.0,
+}
+# A parameter is one number, or one number a sample where it differs between recordings.
+Fields = Mapping[str, float | Array]
+REFERENCE_SPEED_MM_S = 10.0
+REFERENCE_DEPTH_MM = 5.0
+LARGEST_EXPONENT = 30.0
+COMPLIANCE_ITERATIONS = 4
+
+
+class Response(NamedTuple):
+    """What the sensors would read: force on the grid, shape (n,), and the tip at the tracker's frames, shape (m,)."""
+
+    force_N: Array
+    tip_mm: Array
+
+
+class Tip(NamedTuple):
+    """The tip's motion, each shape (n,)."""
+
+    position_mm: Array
+    velocity_mm_s: Array
+    acceleration_mm_s2: Array
+
+
+def one(v: Fields, name: str) -> float:
+    """A parameter that is the same for all recordings."""
+    return float(v[name])
+
+
+def respond(drive: Drive, values: Fields) -> Response:
+    """Sensor readings for the measured motion; parameters not in ``values`` are at their null."""
+    v = {**NULLS, **values}
+    carriage = _moved(drive, ripple(drive, v) + backlash(drive, v))
+    tip = compressed_frame(drive, carriage, v) if one(v, "frame_compliance_mm_N") else carriage
+    force = time_stamps(drive, sensor(drive, on_sensor(drive, tip, v), v), v)
+    seen = drive.at_tracker(tip.position_mm, one(v, "tracker_latency_s")) + v["tip_zero_mm"]
+    return Response(force, seen)
+
+
+def _moved(drive: Drive, offset: Array | float) -> Tip:
+    if isinstance(offset, float):
+        return Tip(drive.position_mm, drive.velocity_mm_s, drive.acceleration_mm_s2)
+    rate = drive.rate(offset)
+    return Tip(drive.position_mm + offset, drive.velocity_mm_s + rate, drive.acceleration_mm_s2 + drive.rate(rate))
+
+
+def ripple(drive: Drive, v: Fields) -> Array | float:
+    """Periodic error of the screw: carriage minus encoder [mm]."""
+    if not (v["ripple_sin_mm"] or v["ripple_cos_mm"]):
+        return 0.0
+    phase = 2 * np.pi * drive.position_mm / v["ripple_pitch_mm"]
+    return np.asarray(v["ripple_sin_mm"] * np.sin(phase) + v["ripple_cos_mm"] * np.cos(phase))
+
+
+def backlash(drive: Drive, v: Fields) -> Array | float:
+    """Lost motion: carriage minus encoder [mm], 0 in forward motion, the width when retracting."""
+    if one(v, "backlash_mm") <= 0:
+        return 0.0
+    return play(drive.position_mm, drive.first, one(v, "backlash_mm")) - drive.position_mm
+
+
+def compressed_frame(drive: Drive, carriage: Tip, v: Fields) -> Tip:
+    """The tip stays behind the carriage by compliance times force: Newton with the elastic tangent, per sample."""
+    compliance, tip = one(v, "frame_compliance_mm_N"), carriage
+    for _ in range(COMPLIANCE_ITERATIONS):
+        lag = carriage.position_mm - tip.position_mm
+        tangent = _tangent(depth_of(drive, tip, v), v)
+        force = tissue(drive, tip, v) + friction(drive, tip, v)
+        lag = lag + (compliance * force - lag) / (1 + compliance * tangent)
+        rate = drive.rate(lag)
+        tip = Tip(
+            carriage.position_mm - lag, carriage.velocity_mm_s - rate, carriage.acceleration_mm_s2 - drive.rate(rate)
+        )
+    return tip
+
+
+def depth_of(drive: Drive, tip: Tip, v: Fields) -> Array:
+    """Signed distance of the tip below the surface [mm]."""
+    surface = v["surface_mm"] + v["contact_offset_mm"] + surface_motion(drive, v)
+    return tip.position_mm - surface
+
+
+def surface_motion(drive: Drive, v: Fields) -> Array | float:
+    """Breathing or pulse: displacement of the surface along the axis [mm] at session time."""
+    if not (v["surface_motion_sin_mm"] or v["surface_motion_cos_mm"]):
+        return 0.0
+    phase = 2 * np.pi * v["surface_motion_Hz"] * drive.time_s
+    return np.asarray(v["surface_motion_sin_mm"] * np.sin(phase) + v["surface_motion_cos_mm"] * np.cos(phase))
+
+
+def contact(depth_mm: Array, travel_mm: Array) -> tuple[Array, Array]:
+    """Mean depth inside and share of time in contact while the tip travels by ``travel_mm`` in one sample."""
+    half = np.maximum(0.5 * np.abs(travel_mm), 1e-9)
+    share = np.clip(0.5 + 0.5 * depth_mm / half, 0.0, 1.0)
+    crossing = (depth_mm > -half) & (depth_mm < half)
+    return np.where(crossing, (depth_mm + half) ** 2 / (4 * half), np.maximum(depth_mm, 0.0)), share
+
+
+def elastic(depth_mm: Array, v: Fields) -> Array:
+    """Index law a x exp(b x), times (x / 5 mm)^(n-1), 1 + q x and 1 + s x^3 where these are off their null [N]."""
+    inside = np.maximum(depth_mm, 0.0)
+    growth = np.minimum(v["stiffening_1_mm"] * inside, LARGEST_EXPONENT)
+    force = v["stiffness_N_mm"] * inside * np.exp(growth)
+    if v["elastic_exponent_1"] != 1:
+        force = force * (np.maximum(inside, 1e-6) / REFERENCE_DEPTH_MM) ** (v["elastic_exponent_1"] - 1)
+    if v["elastic_quadratic_1_mm"]:
+        force = force * (1 + v["elastic_quadratic_1_mm"] * inside)
+    if v["substrate_1_mm3"]:
+        force = force * (1 + v["substrate_1_mm3"] * inside**3)
+    return np.asarray(force)
+
+
+def _tangent(depth_mm: Array, v: Fields) -> Array:
+    step = 1e-3
+    return (elastic(depth_mm + step, v) - elastic(depth_mm - step, v)) / (2 * step)
+
+
+def viscous(velocity_mm_s: Array, v: Fields) -> Array:
+    """Rate term: B v, or B v0 |v/v0|^n with v0 = 10 mm/s for an exponent off its null [N]."""
+    if v["rate_exponent_1"] == 1:
+        return np.asarray(v["viscosity_N_s_mm"] * velocity_mm_s)
+    ratio = np.abs(velocity_mm_s) / REFERENCE_SPEED_MM_S
+    law = np.sign(velocity_mm_s) * np.maximum(ratio, 1e-9) ** v["rate_exponent_1"]
+    return np.asarray(v["viscosity_N_s_mm"] * REFERENCE_SPEED_MM_S * law)
+
+
+def tissue(drive: Drive, tip: Tip, v: Fields) -> Array:
+    """Force of the tissue on the tip [N]."""
+    depth = depth_of(drive, tip, v)
+    moving = surface_motion(drive, v)
+    velocity = tip.velocity_mm_s if isinstance(moving, float) else tip.velocity_mm_s - drive.rate(moving)
+    inside, touching = contact(depth, velocity * drive.period_s)
+    force = elastic(inside, v)
+    if v["preconditioning_1"]:
+        force = force * (1 + v["preconditioning_1"] * np.exp(-drive.stroke / v["preconditioning_strokes_1"]))
+    if v["temperature_1_K"] and drive.temperature_C is not None:
+        force = force * (1 + v["temperature_1_K"] * (drive.temperature_C - drive.temperature_C.mean()))
+    if one(v, "relaxation_1"):
+        force = force + one(v, "relaxation_1") * high_pass(force, drive.time_s, drive.first, one(v, "relaxation_tau_s"))
+    force = force + touching * viscous(velocity, v)
+    # Nothing holds tip and tissue together but adhesion: the rest can only push.
+    return np.maximum(force, 0.0) + adhesion(tip, depth, drive, v)
+
+
+def adhesion(tip: Tip, depth_mm: Array, drive: Drive, v: Fields) -> Array | float:
+    """Pull on the way out, once the tip has touched: -Fad exp(-(d/l)^2) [N]."""
+    if not one(v, "adhesion_N"):
+        return 0.0
+    touched = np.maximum.accumulate(np.where(depth_mm > 0, drive.recording + 1, 0)) == drive.recording + 1
+    leaving = touched & (tip.velocity_mm_s < 0)
+    return np.asarray(-one(v, "adhesion_N") * np.exp(-((depth_mm / one(v, "adhesion_length_mm")) ** 2)) * leaving)
+
+
+def friction(drive: Drive, tip: Tip, v: Fields) -> Array | float:
+    """Guide in front of the sensor: Dahl friction [N]."""
+    if not one(v, "friction_N"):
+        return 0.0
+    return one(v, "friction_N") * dahl(tip.position_mm, drive.first, one(v, "friction_length_mm"))
+
+
+def on_sensor(drive: Drive, tip: Tip, v: Fields) -> Array:
+    """Force that reaches the sensor [N]: tissue, guide and the inertia of what moves in front of it."""
+    return tissue(drive, tip, v) + friction(drive, tip, v) + 1e-3 * one(v, "tip_inertia_kg") * tip.acceleration_mm_s2
+
+
+def sensor(drive: Drive, force_N: Array, v: Fields) -> Array:
+    """Filter lag, gain, zero and its drift."""
+    if one(v, "filter_lag_s") > 0:
+        force_N = low_pass(force_N, drive.time_s, drive.first, one(v, "filter_lag_s"))
+    middle_s = 0.5 * (drive.time_s[0] + drive.time_s[-1])
+    drift = one(v, "zero_drift_N_h") * (drive.time_s - middle_s) / 3600
+    return np.asarray(force_N * (1 + one(v, "gain_error_1")) + v["zero_N"] + drift)
+
+
+def time_stamps(drive: Drive, force_N: Array, v: Fields) -> Array:
+    """The force as it carries its time stamps: late by the offset."""
+    return drive.shifted(force_N, one(v, "time_offset_s")) if one(v, "time_offset_s") else force_N

@@ -1,0 +1,1 @@
+"""Elastic, viscous and memory laws of tissue, and fitting them to recordings."""

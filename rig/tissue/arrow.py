@@ -1,0 +1,131 @@
+"""Least squares for many curves at once: some parameters common to all, one of its own for each.
+
+The normal equations are an arrow: a small corner for the common parameters, a diagonal for the own ones, and a border
+between them. Eliminating the diagonal leaves a system as small as the law, so a step costs no more than evaluating
+residuals, and no threaded linear algebra runs beside a real-time loop. Steps are damped as Marquardt's (1963), and
+parameters stay inside their bounds: one that is pushed against a bound is held there for the step.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.tissue.laws import FloatArray
+
+TOLERANCE = 1e-12
+FIRST_DAMPING = 1e-3
+LARGEST_DAMPING = 1e10
+
+
+class Values(NamedTuple):
+    """Common parameters, shape (p,), and own parameters, shape (n,)."""
+
+    common: FloatArray
+    own: FloatArray
+
+
+class Slopes(NamedTuple):
+    """Derivatives of the residuals: by common parameter, shape (m, p), and by their curve's own one, shape (m,)."""
+
+    common: FloatArray
+    own: FloatArray
+
+
+class Arrow(NamedTuple):
+    """J'J in blocks: corner (p, p), border (p, n), diagonal (n,)."""
+
+    corner: FloatArray
+    border: FloatArray
+    diagonal: FloatArray
+
+    def dense(self) -> FloatArray:
+        """The whole matrix, common parameters first."""
+        return np.block([[self.corner, self.border], [self.border.T, np.diag(self.diagonal)]])
+
+
+class Problem(NamedTuple):
+    """``residuals`` gives shape (m,); ``curve_of``, shape (m,), says of each which curve it is of.
+
+    ``holds``, shape (n,), are weights that pull the own parameters to zero: each adds hold * own^2 to the sum.
+    """
+
+    residuals: Callable[[Values], FloatArray]
+    slopes: Callable[[Values], Slopes]
+    curve_of: NDArray[np.intp]
+    lower: Values
+    upper: Values
+    holds: FloatArray
+
+
+def minimise(problem: Problem, start: Values, evaluations: int) -> Values | None:
+    """The values of least squares near ``start``; None where they are not reached in so many evaluations."""
+    values = _clipped(problem, start)
+    residuals, damping = problem.residuals(values), FIRST_DAMPING
+    cost = _cost(problem, values, residuals)
+    slopes = problem.slopes(values)
+    for _ in range(evaluations):
+        trial = _step(problem, values, residuals, slopes, damping)
+        trial_residuals = problem.residuals(trial)
+        trial_cost = _cost(problem, trial, trial_residuals)
+        if trial_cost < cost:
+            gained, cost = cost - trial_cost, trial_cost
+            values, residuals, slopes = trial, trial_residuals, problem.slopes(trial)
+            damping = max(damping / 10, TOLERANCE)
+            if gained <= TOLERANCE * cost:
+                return values
+        else:
+            damping *= 4
+            # No step however short goes down any more: a minimum, smooth or at a kink.
+            if damping > LARGEST_DAMPING or trial_cost <= cost * (1 + TOLERANCE):
+                return values
+    return None
+
+
+def normal_equations(problem: Problem, slopes: Slopes) -> Arrow:
+    """J'J with the holds, in blocks."""
+    count = len(problem.holds)
+    border = [np.bincount(problem.curve_of, column * slopes.own, count) for column in slopes.common.T]
+    diagonal = np.bincount(problem.curve_of, slopes.own**2, count) + problem.holds
+    return Arrow(np.einsum("ij,ik->jk", slopes.common, slopes.common), np.array(border), diagonal)
+
+
+def _step(problem: Problem, values: Values, residuals: FloatArray, slopes: Slopes, damping: float) -> Values:
+    count = len(problem.holds)
+    downhill = Values(
+        -np.einsum("ij,i->j", slopes.common, residuals),
+        -np.bincount(problem.curve_of, slopes.own * residuals, count) - problem.holds * values.own,
+    )
+    arrow = normal_equations(problem, slopes)
+    free = [_free(v, d, low, up) for v, d, low, up in zip(values, downhill, problem.lower, problem.upper, strict=True)]
+    return _clipped(
+        problem, Values(*(v + s for v, s in zip(values, _solve(arrow, downhill, free, damping), strict=True)))
+    )
+
+
+def _solve(arrow: Arrow, downhill: Values, free: list[NDArray[np.bool_]], damping: float) -> Values:
+    """The damped step over the free parameters, zero for the held ones."""
+    common, own = free
+    diagonal = np.where(own, arrow.diagonal * (1 + damping), np.inf)
+    diagonal = np.where(diagonal > 0, diagonal, np.inf)
+    scale = np.diag(arrow.corner)
+    corner = arrow.corner + np.diag(damping * np.where(scale > 0, scale, 1.0))
+    reduced = corner - np.einsum("jn,kn->jk", arrow.border / diagonal, arrow.border)
+    wanted = downhill.common - np.einsum("jn,n->j", arrow.border / diagonal, downhill.own)
+    step = np.zeros(len(common))
+    if common.any():
+        step[common] = np.linalg.lstsq(reduced[np.ix_(common, common)], wanted[common], rcond=None)[0]
+    return Values(step, (downhill.own - np.einsum("jn,j->n", arrow.border, step)) / diagonal)
+
+
+def _free(values: FloatArray, downhill: FloatArray, lower: FloatArray, upper: FloatArray) -> NDArray[np.bool_]:
+    return np.asarray(~(((values <= lower) & (downhill < 0)) | ((values >= upper) & (downhill > 0))))
+
+
+def _clipped(problem: Problem, values: Values) -> Values:
+    return Values(*(np.clip(v, low, up) for v, low, up in zip(values, problem.lower, problem.upper, strict=True)))
+
+
+def _cost(problem: Problem, values: Values, residuals: FloatArray) -> float:
+    return float(np.sum(residuals**2) + np.sum(problem.holds * values.own**2))

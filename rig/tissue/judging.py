@@ -1,0 +1,206 @@
+"""How wrong a fitted law is, in the study's terms: displacement at given forces, on fitted and on left-out curves."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.special import stdtrit
+
+from rig.errors import DataError
+from rig.tissue.curves import Curve
+from rig.tissue.fitting import LawFit, early_offset, fit_law, residual_force
+from rig.tissue.laws import FloatArray, Law
+
+ROWS = 10
+LEVEL = 0.95
+JACKKNIFE_TRIALS = 5
+SMOOTH_MM = 0.5
+LEAST_SMOOTHED = 5
+LEAST_MEASURED_MM = 0.1
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Displacement of n curves at r given forces, measured and predicted; NaN where a curve did not reach the force.
+
+    The error of a row is |predicted - measured| in mm, and the same in percent of measured; rows measured below 0.1 mm
+    have no percentage. ``rmse_N`` is the root mean square of predicted minus measured force beyond contact.
+    """
+
+    force_N: FloatArray
+    measured_mm: FloatArray
+    predicted_mm: FloatArray
+    rmse_N: float
+
+    @property
+    def error_mm(self) -> FloatArray:
+        """Shape (n, r)."""
+        return np.abs(self.predicted_mm - self.measured_mm)
+
+    @property
+    def error_percent(self) -> FloatArray:
+        """Shape (n, r)."""
+        measured = np.where(self.measured_mm >= LEAST_MEASURED_MM, self.measured_mm, np.nan)
+        return np.asarray(100 * self.error_mm / measured)
+
+    @property
+    def max_error_mm(self) -> float:
+        """Worst of all rows and curves."""
+        return _largest(self.error_mm)
+
+    @property
+    def max_error_percent(self) -> float:
+        """Worst of all rows and curves."""
+        return _largest(self.error_percent)
+
+
+def _largest(errors: FloatArray) -> float:
+    known = errors[np.isfinite(errors)]
+    if not len(known):
+        raise DataError("no trial crosses a given force between two of its samples; record more samples a trial")
+    return float(known.max())
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A fitted law, its covariance, intervals and errors; left-out errors are None where nothing can be left out."""
+
+    fit: LawFit
+    covariance: FloatArray
+    intervals: dict[str, tuple[float, float]]
+    interval_method: str
+    fitted: Errors
+    trials_left_out: Errors | None
+    speeds_left_out: Errors | None
+
+    @property
+    def law(self) -> Law:
+        """The law fitted to all curves."""
+        return self.fit.law
+
+
+def given_forces(curves: Sequence[Curve], rows: int = ROWS) -> FloatArray:
+    """Evenly spaced forces, shape (rows,), up to one that all trials reach but those that ended early.
+
+    Early means a largest force below 80 % of the median trial's.
+    """
+    largest = np.array([curve.max_force_N for curve in curves])
+    top_N = largest[largest >= 0.8 * np.median(largest)].min()
+    return np.asarray(top_N * np.arange(1, rows + 1) / rows)
+
+
+def displacement_at(curve: Curve, force_N: FloatArray) -> FloatArray:
+    """Depth [mm] at which the curve first reaches each force; NaN where it does not.
+
+    Dense samples: where the parabola of least squares through the samples within a quarter of a millimetre has that
+    force. Sparse ones: by a monotone cubic (Fritsch and Carlson 1980) through the samples.
+    """
+    inside = curve.depth_mm > 0
+    depth, force = curve.depth_mm[inside], curve.force_N[inside]
+    higher = np.concatenate([[True], force[1:] > np.maximum.accumulate(force)[:-1]])
+    if np.count_nonzero(higher) < 2:
+        return np.full_like(force_N, np.nan)
+    nodes_N, nodes_mm = force[higher], depth[higher]
+    if np.ptp(depth) / len(depth) > SMOOTH_MM / LEAST_SMOOTHED:
+        return np.asarray(PchipInterpolator(nodes_N, nodes_mm, extrapolate=False)(force_N))
+    first_mm = np.interp(force_N, nodes_N, nodes_mm, left=np.nan, right=np.nan)
+    return np.array([_smoothed(depth, force, at, float(given)) for at, given in zip(first_mm, force_N, strict=True)])
+
+
+def _smoothed(depth_mm: FloatArray, force_N: FloatArray, first_mm: float, given_N: float) -> float:
+    """Depth near ``first_mm`` at which the local parabola has the given force."""
+    near = np.abs(depth_mm - first_mm) <= SMOOTH_MM / 2
+    if np.count_nonzero(near) < LEAST_SMOOTHED:
+        return first_mm
+    bend, slope, level = np.polyfit(depth_mm[near] - first_mm, force_N[near], 2)
+    step_mm = (given_N - level) / slope
+    # One more round of Newton's method puts the bend in.
+    step_mm += (given_N - level - slope * step_mm - bend * step_mm**2) / (slope + 2 * bend * step_mm)
+    return float(first_mm + np.clip(step_mm, -SMOOTH_MM / 2, SMOOTH_MM / 2))
+
+
+class Prediction(NamedTuple):
+    """A law applied to a curve: where the law puts contact, and where displacement is measured from, both in mm."""
+
+    curve: Curve
+    law: Law
+    offset_mm: float
+    origin_mm: float
+
+
+def errors_of(predictions: Sequence[Prediction], force_N: FloatArray) -> Errors:
+    """Errors of displacement at given forces; depths count from each prediction's origin."""
+    measured = [displacement_at(p.curve, force_N) - p.origin_mm for p in predictions]
+    predicted = [
+        p.law.depth(force_N, float(np.median(p.curve.rate_mm_s))) + p.offset_mm - p.origin_mm for p in predictions
+    ]
+    residuals = np.concatenate([residual_force(p.law, p.curve, p.offset_mm)[1] for p in predictions])
+    return Errors(force_N, np.array(measured), np.array(predicted), float(np.sqrt(np.mean(residuals**2))))
+
+
+def judge(fit: LawFit, curves: Sequence[Curve], force_N: FloatArray, origins_mm: FloatArray) -> Judged:
+    """Judges the fit, and fits of its law to all but one trial and to all but one speed in turn.
+
+    ``origins_mm``, shape (n,), is where displacement is measured from, relative to the contact found: the same for all
+    laws that are compared.
+    """
+    origin = {curve.name: float(origin) for curve, origin in zip(curves, origins_mm, strict=True)}
+    here = [
+        Prediction(curve, fit.law, float(offset), origin[curve.name])
+        for curve, offset in zip(curves, fit.offsets_mm, strict=True)
+    ]
+    trials = _without_each(curves, fit, lambda curve: curve.name)
+    speeds = _without_each(curves, fit, lambda curve: curve.speed_mm_s)
+    covariance, method = _covariance(fit, [law for _, law in trials])
+    return Judged(
+        fit=fit,
+        covariance=covariance,
+        intervals=_intervals(fit.law, covariance, len(curves)),
+        interval_method=method,
+        fitted=errors_of(here, force_N),
+        trials_left_out=_left_out(trials, origin, force_N),
+        speeds_left_out=_left_out(speeds, origin, force_N),
+    )
+
+
+def _without_each(
+    curves: Sequence[Curve], fit: LawFit, group: Callable[[Curve], str | float]
+) -> list[tuple[Curve, Law]]:
+    """Each curve with the law fitted to the curves of all other groups; empty where there is but one group."""
+    pairs: list[tuple[Curve, Law]] = []
+    names = list(dict.fromkeys(group(curve) for curve in curves))
+    for name in names if len(names) > 1 else ():
+        kept = np.array([group(curve) != name for curve in curves])
+        start = replace(fit, offsets_mm=fit.offsets_mm[kept], holds_N2_mm2=fit.holds_N2_mm2[kept])
+        law = fit_law(type(fit.law), [c for c, keep in zip(curves, kept, strict=True) if keep], start).law
+        pairs += [(c, law) for c, keep in zip(curves, kept, strict=True) if not keep]
+    return pairs
+
+
+def _left_out(pairs: Sequence[tuple[Curve, Law]], origin: Mapping[str, float], force_N: FloatArray) -> Errors | None:
+    if not pairs:
+        return None
+    return errors_of([Prediction(c, law, early_offset(law, c), origin[c.name]) for c, law in pairs], force_N)
+
+
+def _covariance(fit: LawFit, laws: Sequence[Law]) -> tuple[FloatArray, str]:
+    """Of the parameters, shape (p, p): by leaving trials out where there are enough, else from the residuals."""
+    if len(laws) >= JACKKNIFE_TRIALS:
+        values = np.array([law.values for law in laws])
+        centred = values - values.mean(axis=0)
+        share = (len(laws) - 1) / len(laws)
+        return np.asarray(share * centred.T @ centred), "jackknife over trials"
+    size = len(fit.law.values)
+    covariance = np.linalg.pinv(fit.information) * fit.variance_N2
+    return np.asarray(covariance[:size, :size], float), "least squares, residuals correlated along depth"
+
+
+def _intervals(law: Law, covariance: FloatArray, trials: int) -> dict[str, tuple[float, float]]:
+    """Student's intervals at ``LEVEL``, kept inside each parameter's bounds."""
+    reach = float(stdtrit(max(trials - 1, 1), (1 + LEVEL) / 2)) * np.sqrt(np.diag(covariance))
+    return {
+        p.name: (max(p.value - r, p.lower), min(p.value + r, p.upper))
+        for p, r in zip(law.parameters, map(float, reach), strict=True)
+    }

@@ -1,0 +1,292 @@
+"""The study's "k value calculation": one lattice stiffness per force, then an exponential through them.
+
+For each force: simulate with a guessed k, compare the depth with the measured one, adjust, repeat. Because the
+equilibrium depends on F/k only, one sweep phi(d) = R/k gives the same answer without a search: k_i = F_i / phi(d_i).
+Both are here, so they can be compared.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.stats import t as student
+
+from rig.errors import DataError, UsageError
+from rig.tissue.lattice.fire import NotConverged, relax
+from rig.tissue.lattice.springs import Springs
+from rig.tissue.lattice.state import Loaded
+from rig.tissue.lattice.sweep import RELATIVE_TOLERANCE, Sweep
+from rig.tissue.laws import DAMPING, Bounds, FloatArray, Law
+
+LEVEL = 0.95
+_LEAST_POINTS = 4
+_MOST_SIMULATIONS = 30
+_FORCE_TOLERANCE = 1e-4
+
+
+@dataclass(frozen=True)
+class KPoint:
+    """One force of the study's table; ``k_loop_N_mm`` is None where the search was not run."""
+
+    force_N: float
+    depth_mm: float
+    k_exact_N_mm: float
+    k_loop_N_mm: float | None = None
+    simulations: int = 0
+
+
+@dataclass(frozen=True)
+class IndexFit:
+    """k(x) = a exp(b x) through the points (least squares on ln k), with Student's intervals."""
+
+    a_N_mm: float
+    b_per_mm: float
+    a_interval: tuple[float, float]
+    b_interval: tuple[float, float]
+    r_squared: float
+
+    def __call__(self, depth_mm: FloatArray) -> FloatArray:
+        """k(x) in N/mm."""
+        return np.asarray(self.a_N_mm * np.exp(self.b_per_mm * depth_mm))
+
+
+def check_points(force_N: FloatArray, depth_mm: FloatArray) -> None:
+    """Raise DataError unless forces and depths are finite, above zero, rising together, and at least four."""
+    if len(force_N) != len(depth_mm) or len(force_N) < _LEAST_POINTS:
+        raise DataError(
+            f"{len(force_N)} forces and {len(depth_mm)} depths; at least {_LEAST_POINTS} of each are needed for a and b"
+        )
+    for name, unit, values in (("force", "N", force_N), ("depth", "mm", depth_mm)):
+        if not np.all(np.isfinite(values)):
+            raise DataError(
+                f"{name} number {int(np.argmin(np.isfinite(values))) + 1} is not a number; remove it from the curve"
+            )
+        if values.min() <= 0.0:
+            raise DataError(
+                f"{name} number {int(np.argmin(values)) + 1} is {values.min():.4g} {unit}; it must be above 0 {unit}"
+            )
+        falls = np.flatnonzero(np.diff(values) <= 0.0)
+        if len(falls):
+            raise DataError(
+                f"{name} falls from {values[falls[0]]:.4g} to {values[falls[0] + 1]:.4g} {unit} at number "
+                f"{falls[0] + 2}; "
+                "the calculation needs a curve that only rises: average or smooth it first"
+            )
+
+
+def exact_k(sweep: Sweep, force_N: FloatArray, depth_mm: FloatArray) -> list[KPoint]:
+    """k_i = F_i / phi(d_i); raises DataError for unusable points and UsageError for depths past collapse."""
+    check_points(force_N, depth_mm)
+    phi = sweep.phi_mm(depth_mm)
+    return [KPoint(float(f), float(d), float(f / p)) for f, d, p in zip(force_N, depth_mm, phi, strict=True)]
+
+
+class Simulator:
+    """Force in, depth out, for the lattice of a sweep with any k: what the study ran once per guess."""
+
+    def __init__(self, sweep: Sweep) -> None:
+        if sweep.block.contact == "pressure":
+            raise UsageError('the search needs a rigid tip: use the contact "bonded" or "frictionless"')
+        self._block = sweep.block.as_quarter()
+        self._ratio = sweep.springs.cell_ratio
+        self._lattice = Loaded(self._block, sweep.springs)
+
+    def depth_mm(self, force_N: float, k_N_mm: float, near_mm: float) -> float:
+        """Depth at which the lattice carries the force: the tip is moved from ``near_mm`` until R = F within 1e-4.
+
+        Half as deep again as ``near_mm`` is the deepest it looks; a k that needs more is far too small, and that is all
+        the search asks.
+        """
+        self._lattice.springs = Springs(k_N_mm, self._lattice.springs.b, self._ratio)
+        self._lattice.law = self._lattice.springs.for_kernels(self._block.spacing_mm)
+        deepest = 1.5 * near_mm
+        low, high = (0.0, 0.0), (0.0, 0.0)
+        depth = near_mm
+        for _ in range(_MOST_SIMULATIONS):
+            reaction = self._react(depth)
+            if abs(reaction - force_N) < _FORCE_TOLERANCE * force_N:
+                return depth
+            if reaction < force_N and depth >= deepest:
+                return deepest
+            if reaction < force_N:
+                low = (depth, reaction)
+            else:
+                high = (depth, reaction)
+            if high[0] == 0.0:
+                depth = min(deepest, depth * max(1.02, force_N / reaction))
+            else:
+                share = (force_N - low[1]) / (high[1] - low[1])
+                depth = low[0] + float(np.clip(share, 0.02, 0.98)) * (high[0] - low[0])
+        raise NotConverged(
+            f"no depth carries {force_N:.4g} N with k = {k_N_mm:.4g} N/mm within {_MOST_SIMULATIONS} simulations"
+        )
+
+    def _react(self, depth_mm: float) -> float:
+        """Scale the last displacement field to the new depth and relax."""
+        lattice = self._lattice
+        before = lattice.depth_mm
+        if before > 0.0:
+            lattice.x += (lattice.x - lattice.rest) * (depth_mm / before - 1.0)
+        for target in self._stages(before, depth_mm):
+            lattice.press(target)
+            relax(lattice, RELATIVE_TOLERANCE * lattice.springs.k_N_mm * self._block.spacing_mm)
+        return lattice.reaction_N()
+
+    def _stages(self, before_mm: float, depth_mm: float) -> FloatArray:
+        """From rest the tip goes in by at most half a cell at a time."""
+        if before_mm > 0.0:
+            return np.array([depth_mm])
+        count = int(np.ceil(depth_mm / (0.5 * self._block.spacing_mm)))
+        return np.linspace(0.0, depth_mm, count + 1)[1:]
+
+
+def search_k(
+    simulate: Callable[[float, float, float], float],
+    force_N: float,
+    depth_mm: float,
+    guess_N_mm: float,
+    tolerance_mm: float = 0.005,
+) -> tuple[float, int]:
+    """The study's loop for one force: simulate, compare, adjust, until the depths differ by less than ``tolerance_mm``.
+
+    Returns k and the number of simulations. ``simulate(force, k, near)`` gives a depth; a depth that is too large asks
+    for more k, in proportion to the local power of depth over k found so far.
+    """
+    k, power = guess_N_mm, 1.0
+    last: tuple[float, float] | None = None
+    for count in range(1, _MOST_SIMULATIONS + 1):
+        simulated = simulate(force_N, k, depth_mm)
+        if abs(simulated - depth_mm) < tolerance_mm:
+            return k, count
+        if last is not None and simulated != last[1]:
+            power = float(np.clip(np.log(k / last[0]) / np.log(last[1] / simulated), 0.2, 5.0))
+        last = (k, simulated)
+        k *= (simulated / depth_mm) ** power
+    raise NotConverged(
+        f"the search for k at {force_N:.4g} N stopped after {_MOST_SIMULATIONS} simulations at {simulated:.4g} mm, "
+        f"asked for {depth_mm:.4g} mm within {tolerance_mm:g} mm; allow a larger difference"
+    )
+
+
+def study_loop(points: list[KPoint], sweep: Sweep, progress: Callable[[int], None] | None = None) -> list[KPoint]:
+    """Run the search for every point, each starting from the k of the one before, as a person would."""
+    simulator = Simulator(sweep)
+    found: list[KPoint] = []
+    for index, point in enumerate(points):
+        guess = found[-1].k_loop_N_mm if found and found[-1].k_loop_N_mm else point.force_N / point.depth_mm / 16.0
+        k, count = search_k(simulator.depth_mm, point.force_N, point.depth_mm, guess)
+        found.append(KPoint(point.force_N, point.depth_mm, point.k_exact_N_mm, k, count))
+        if progress is not None:
+            progress(index + 1)
+    return found
+
+
+def fit_index(points: list[KPoint]) -> IndexFit:
+    """a and b by least squares on ln k against depth."""
+    x, y = np.array([p.depth_mm for p in points]), np.log([p.k_exact_N_mm for p in points])
+    design = np.column_stack([np.ones_like(x), x])
+    (level, b), *_ = np.linalg.lstsq(design, y, rcond=None)
+    residual = y - design @ np.array([level, b])
+    freedom = max(len(x) - 2, 1)
+    covariance = np.linalg.inv(design.T @ design) * float(residual @ residual) / freedom
+    reach = float(student.ppf((1.0 + LEVEL) / 2.0, freedom)) * np.sqrt(np.diag(covariance))
+    spread = float(np.sum((y - y.mean()) ** 2))
+    return IndexFit(
+        float(np.exp(level)),
+        float(b),
+        (float(np.exp(level - reach[0])), float(np.exp(level + reach[0]))),
+        (float(b - reach[1]), float(b + reach[1])),
+        1.0 - float(residual @ residual) / spread if spread > 0.0 else 1.0,
+    )
+
+
+def lattice_laws(sweep: Sweep) -> tuple[type[Law], type[Law]]:
+    """The lattice with constant k and with the study's global k(x), as laws to fit and judge like any other.
+
+    F = k phi(x) + B v and F = a exp(b x) phi(x) + B v; phi goes on straight past the sweep's end, which covers the
+    fit's small offsets only.
+    """
+    depth, phi = sweep.depth_mm[sweep.intact], sweep.force_over_k_mm[sweep.intact]
+    if len(depth) < _LEAST_POINTS:
+        raise UsageError(
+            f"the sweep has {len(depth)} intact depths ({sweep.collapse()}); {_LEAST_POINTS} are needed: use "
+            f"smaller steps"
+        )
+    curve = sweep.interpolant()
+    slope = curve.derivative()
+    end, top, last = float(depth[-1]), float(phi[-1]), float(slope(depth[-1]))
+
+    def shape(x: FloatArray) -> FloatArray:
+        return np.where(x <= end, curve(np.minimum(x, end)), top + last * (x - end))
+
+    def rise(x: FloatArray) -> FloatArray:
+        return np.where(x <= end, slope(np.minimum(x, end)), last)
+
+    class _Lattice(Law):
+        def elastic_inverse(self, force_N: FloatArray) -> FloatArray:
+            """Bisection on the rising force, to 1e-9 of the sweep's end."""
+            low, high = np.zeros_like(force_N), np.full_like(force_N, 1.5 * end)
+            for _ in range(50):
+                middle = 0.5 * (low + high)
+                above = self.elastic(middle) > force_N
+                low, high = np.where(above, low, middle), np.where(above, middle, high)
+            return np.asarray(0.5 * (low + high))
+
+    @dataclass(frozen=True, kw_only=True)
+    class LatticeConstant(_Lattice):
+        """The lattice with one stiffness."""
+
+        name: ClassVar[str] = "lattice constant"
+        formula: ClassVar[str] = "F = k phi(x) + B v"
+        bounds: ClassVar[Mapping[str, Bounds]] = {
+            "k_N_mm": Bounds("N/mm", 1e-8, 1e3, "spring stiffness"),
+            "B_N_s_mm": DAMPING,
+        }
+
+        k_N_mm: float
+
+        @classmethod
+        def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> "LatticeConstant":
+            """Linear least squares."""
+            carried = shape(depth_mm)
+            return cls(k_N_mm=float(carried @ force_N / (carried @ carried)), B_N_s_mm=0.0)
+
+        def elastic(self, depth_mm: FloatArray) -> FloatArray:
+            """k phi."""
+            return self.k_N_mm * shape(depth_mm)
+
+        def slope(self, depth_mm: FloatArray) -> FloatArray:
+            """k phi'."""
+            return self.k_N_mm * rise(depth_mm)
+
+    @dataclass(frozen=True, kw_only=True)
+    class LatticeIndex(_Lattice):
+        """The lattice with the study's k(x) = a exp(b x), x the depth of the tip."""
+
+        name: ClassVar[str] = "lattice index"
+        formula: ClassVar[str] = "F = a exp(b x) phi(x) + B v"
+        bounds: ClassVar[Mapping[str, Bounds]] = {
+            "a_N_mm": Bounds("N/mm", 1e-8, 1e3, "spring stiffness at contact"),
+            "b_per_mm": Bounds("1/mm", -2.0, 5.0, "stiffening per depth"),
+            "B_N_s_mm": DAMPING,
+        }
+
+        a_N_mm: float
+        b_per_mm: float
+
+        @classmethod
+        def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> "LatticeIndex":
+            """The straight line ln(F/phi) = ln a + b x, weighted with force."""
+            b, level = np.polyfit(depth_mm, np.log(force_N / shape(depth_mm)), 1, w=force_N)
+            return cls(a_N_mm=float(np.exp(level)), b_per_mm=float(np.clip(b, -2.0, 5.0)), B_N_s_mm=0.0)
+
+        def elastic(self, depth_mm: FloatArray) -> FloatArray:
+            """a exp(b x) phi."""
+            return self.a_N_mm * np.exp(self.b_per_mm * depth_mm) * shape(depth_mm)
+
+        def slope(self, depth_mm: FloatArray) -> FloatArray:
+            """a exp(b x) (phi' + b phi): the tangent the loop sees."""
+            return self.a_N_mm * np.exp(self.b_per_mm * depth_mm) * (rise(depth_mm) + self.b_per_mm * shape(depth_mm))
+
+    return LatticeConstant, LatticeIndex

@@ -1,0 +1,112 @@
+"""The study's whole argument on a session's curves, with the lattice: k per force, constant against index model,
+rivals, K and B for control.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from rig.errors import DataError
+from rig.tissue.fitting import fit_law
+from rig.tissue.judging import Judged, judge
+from rig.tissue.k_calculation import IndexFit, KPoint, exact_k, fit_index, lattice_laws, study_loop
+from rig.tissue.lattice.block import Block
+from rig.tissue.lattice.springs import Mode, Springs
+from rig.tissue.lattice.sweep import DEFAULT_STEP_MM, Sweep, sweep
+from rig.tissue.laws_rivals import RIVALS
+from rig.tissue.rates import RateTest, rate_test
+from rig.tissue.study import Study, rows
+
+Progress = Callable[[str, float], None]
+_DEPTH_MARGIN = 1.02
+_DEEPEST_SHARE = 0.85
+
+
+class ControlRow(NamedTuple):
+    """What a force controller reads: the loop gain is the tangent, not the secant the study lists as K."""
+
+    force_N: float
+    depth_mm: float
+    secant_N_mm: float
+    tangent_N_mm: float
+    damping_N_s_mm: float
+    damping_low_N_s_mm: float
+    damping_high_N_s_mm: float
+
+
+@dataclass(frozen=True)
+class LatticeStudy:
+    """Results; ``judged`` holds lattice laws and lumped rivals by name, on the same curves, rows and origins."""
+
+    sweep: Sweep
+    points: tuple[KPoint, ...]
+    index: IndexFit
+    judged: Mapping[str, Judged]
+    rate: RateTest | None
+    control: tuple[ControlRow, ...]
+
+
+def lattice_study(
+    study: Study, block: Block, mode: Mode = "stabilised", search: bool = True, progress: Progress | None = None
+) -> LatticeStudy:
+    """Sweep the block once, then everything else from phi; ``search`` also runs the study's loop for each force.
+
+    ``progress(stage, share)`` is called as it goes. Raises UsageError where the block cannot carry the depths (with the
+    bound).
+    """
+    tell = progress or _silent
+    curve = _sweep(study, block, mode, tell)
+    table = rows(study.judged[study.closest].fitted)
+    points = exact_k(curve, np.array([row.force_N for row in table]), np.array([row.measured_mm for row in table]))
+    if search:
+        points = study_loop(points, curve, lambda done: tell("search for k per force", done / len(table)))
+    judged = dict(study.judged)
+    for kind in (*lattice_laws(curve), *RIVALS):
+        judged[kind.name] = judge(fit_law(kind, study.curves), study.curves, study.force_N, study.origins_mm)
+    return LatticeStudy(
+        curve, tuple(points), fit_index(points), judged, _rate(study), control_rows(judged["lattice index"], study)
+    )
+
+
+def _sweep(study: Study, block: Block, mode: Mode, tell: Progress) -> Sweep:
+    deepest = _DEPTH_MARGIN * max(curve.max_depth_mm + max(0.0, -curve.offset_bounds_mm[0]) for curve in study.curves)
+    limit = _DEEPEST_SHARE * block.height_mm
+    if deepest > limit:
+        raise DataError(
+            f"{study.session}: the curves go {deepest:.3g} mm deep; a block {block.height_mm:g} mm high is "
+            f"simulated to {limit:.3g} mm at most: "
+            "give a block with more vertices in z"
+        )
+    return sweep(
+        block.as_quarter(),
+        Springs.for_mode(mode),
+        deepest,
+        DEFAULT_STEP_MM * block.spacing_mm,
+        lambda d: tell("sweep of phi", d / deepest),
+    )
+
+
+def _silent(_stage: str, _share: float) -> None:
+    """Nobody watches."""
+
+
+def _rate(study: Study) -> RateTest | None:
+    try:
+        return rate_test(study.curves)
+    except DataError:
+        return None
+
+
+def control_rows(judged: Judged, study: Study) -> tuple[ControlRow, ...]:
+    """K and B at each given force, B with its interval."""
+    low, high = judged.intervals["B_N_s_mm"]
+    law = judged.law
+    depths = law.depth(study.force_N)
+    return tuple(
+        ControlRow(
+            float(f), float(d), float(law.secant_stiffness(d)), float(law.tangent_stiffness(d)), law.B_N_s_mm, low, high
+        )
+        for f, d in zip(study.force_N, depths, strict=True)
+    )

@@ -1,0 +1,195 @@
+"""A fitted law and what must be known to use it: how sure its parameters are, where it holds, what data it is from."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from rig.config.table import Table, parse
+from rig.errors import DataError, UsageError
+from rig.recording.files import write_text
+from rig.tissue.laws import FloatArray, Law, law_named
+
+FORMAT: Literal["tissue-rig model"] = "tissue-rig model"
+VERSION: Literal[1] = 1
+
+NotNegative = Annotated[float, Field(ge=0)]
+
+
+class ValidRange(Table):
+    """What the fitted data covered; beyond it the law is a guess."""
+
+    depth_mm: Annotated[float, Field(gt=0)]
+    force_N: Annotated[float, Field(gt=0)]
+    speeds_mm_s: tuple[NotNegative, ...] = Field(min_length=1)
+
+
+class Provenance(Table):
+    """Which data the law was fitted to and by what; ``sha256`` covers the fitted curves themselves."""
+
+    session: str
+    trials: tuple[str, ...] = Field(min_length=1)
+    sha256: str = Field(pattern="^[0-9a-f]{64}$")
+    subject: str = ""
+    site: str = ""
+    software: str = ""
+
+
+class Quality(Table):
+    """How well the law does, on the fitted curves and on trials and speeds left out."""
+
+    rmse_N: NotNegative
+    max_error_mm: NotNegative
+    max_error_percent: NotNegative
+    held_out_max_error_mm: NotNegative | None = None
+    held_out_max_error_percent: NotNegative | None = None
+
+
+class _File(Table):
+    """`model.json` as it stands on disk."""
+
+    format: Literal["tissue-rig model"]
+    version: Literal[1]
+    law: str
+    formula: str
+    parameters: dict[str, float]
+    units: dict[str, str]
+    standard_errors: dict[str, NotNegative]
+    intervals: dict[str, tuple[float, float]]
+    interval_level: Annotated[float, Field(gt=0, lt=1)]
+    interval_method: str
+    covariance: tuple[tuple[float, ...], ...]
+    valid: ValidRange
+    data: Provenance
+    quality: Quality
+
+
+@dataclass(frozen=True)
+class Model:
+    """A law fitted to data.
+
+    ``covariance`` has the order of ``law.parameters``; ``intervals`` are per parameter, at ``interval_level``.
+    """
+
+    law: Law
+    covariance: FloatArray
+    intervals: Mapping[str, tuple[float, float]]
+    interval_level: float
+    interval_method: str
+    valid: ValidRange
+    data: Provenance
+    quality: Quality
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Square roots of the covariance's diagonal, by parameter."""
+        deviations = np.sqrt(np.diag(self.covariance))
+        return {p.name: float(s) for p, s in zip(self.law.parameters, deviations, strict=True)}
+
+    @property
+    def damping_N_s_mm(self) -> float:
+        """B."""
+        return self.law.B_N_s_mm
+
+    def force_N(self, depth_mm: float) -> float:
+        """Force at rest."""
+        return float(self.law.force(depth_mm))
+
+    def tangent_N_mm(self, depth_mm: float) -> float:
+        """Stiffness a force loop sees."""
+        return float(self.law.tangent_stiffness(depth_mm))
+
+    def depth_mm(self, force_N: float) -> float:
+        """Depth at rest at which the force is reached."""
+        return float(self.law.depth(force_N))
+
+    def check_force(self, force_N: float) -> None:
+        """Raises DataError where the model was not fitted up to this force."""
+        if not 0 <= force_N <= self.valid.force_N:
+            raise DataError(
+                f"{force_N:g} N is outside what the model was fitted to, 0 to {self.valid.force_N:.3g} N "
+                f"(depth up to {self.valid.depth_mm:.3g} mm): ask for less, or fit a session that goes deeper"
+            )
+
+    def save(self, path: Path) -> None:
+        """Writes `model.json`, whole or not at all."""
+        write_text(path, json.dumps(self._file().model_dump(), indent=2) + "\n")
+
+    def _file(self) -> _File:
+        return _File(
+            format=FORMAT,
+            version=VERSION,
+            law=self.law.name,
+            formula=self.law.formula,
+            parameters={p.name: p.value for p in self.law.parameters},
+            units={p.name: p.unit for p in self.law.parameters},
+            standard_errors=self.standard_errors,
+            intervals=dict(self.intervals),
+            interval_level=self.interval_level,
+            interval_method=self.interval_method,
+            covariance=tuple(tuple(map(float, row)) for row in self.covariance),
+            valid=self.valid,
+            data=self.data,
+            quality=self.quality,
+        )
+
+
+def load_model(path: Path) -> Model:
+    """The model in ``path``; raises UsageError in one sentence where the file is not one."""
+    try:
+        values = json.loads(path.read_text())
+    except FileNotFoundError as error:
+        raise UsageError(f"{path}: no such file; `rig fit SESSION` writes a model.json") from error
+    except (OSError, ValueError) as error:
+        raise UsageError(f"{path}: cannot be read as JSON: {error}; fit the session again") from error
+    if not isinstance(values, dict) or values.get("format") != FORMAT:
+        raise UsageError(f"{path}: is not a tissue model (no format {FORMAT!r}); `rig fit SESSION` writes one")
+    if values.get("version") != VERSION:
+        raise UsageError(
+            f"{path}: model version {values.get('version')!r} is not the {VERSION} read here; fit the session again"
+        )
+    file = parse(_File, values, str(path))
+    try:
+        return _model(file)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
+def _model(file: _File) -> Model:
+    kind = law_named(file.law)
+    for table, given in (
+        ("parameters", file.parameters),
+        ("standard_errors", file.standard_errors),
+        ("intervals", file.intervals),
+        ("units", file.units),
+    ):
+        if set(given) != set(kind.bounds):
+            raise UsageError(
+                f"{table} of the {file.law} law are {', '.join(kind.bounds)}; the file has {', '.join(given) or 'none'}"
+            )
+    for name, bounds in kind.bounds.items():
+        if file.units[name] != bounds.unit:
+            raise UsageError(f"{name} must be in {bounds.unit}; the file has it in {file.units[name]!r}")
+    return Model(
+        law=kind(**file.parameters),
+        covariance=_covariance(file, len(kind.bounds)),
+        intervals=file.intervals,
+        interval_level=file.interval_level,
+        interval_method=file.interval_method,
+        valid=file.valid,
+        data=file.data,
+        quality=file.quality,
+    )
+
+
+def _covariance(file: _File, size: int) -> FloatArray:
+    if len(file.covariance) != size or any(len(row) != size for row in file.covariance):
+        raise UsageError(f"covariance must be {size} x {size} for the {file.law} law")
+    covariance = np.array(file.covariance)
+    if not np.allclose(covariance, covariance.T) or np.any(np.diag(covariance) < 0):
+        raise UsageError("covariance must be symmetric with a diagonal of at least 0")
+    return covariance

@@ -1,0 +1,183 @@
+"""The study's question put to a session: constant stiffness or index model, judged on the same curves and rows."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+import rig
+from rig.errors import DataError
+from rig.recording.sessions import Session
+from rig.tissue.curves import Curve, loading_curve
+from rig.tissue.fitting import fit_law
+from rig.tissue.judging import LEVEL, Errors, Judged, given_forces, judge
+from rig.tissue.laws import Constant, FloatArray, Index
+from rig.tissue.model import Model, Provenance, Quality, ValidRange
+from rig.tissue.strokes import stroke_of
+
+COMPARED = (Constant, Index)
+TRACKING = "tracking"
+
+
+class Skipped(NamedTuple):
+    """A trial that gave no curve, and the sentence that says why."""
+
+    trial: str
+    reason: str
+
+
+class SpeedSummary(NamedTuple):
+    """What was measured at one speed; depth and force are the largest of its trials."""
+
+    speed_mm_s: float
+    trials: int
+    max_depth_mm: float
+    max_force_N: float
+
+
+@dataclass(frozen=True)
+class Study:
+    """Curves of a session and the laws fitted to them, by name; ``force_N`` are the rows at which errors are taken.
+
+    Displacement is measured from the contact that the law with the smallest residual, ``closest``, puts into each
+    trial, for all laws alike.
+    """
+
+    session: str
+    curves: tuple[Curve, ...]
+    skipped: tuple[Skipped, ...]
+    force_N: FloatArray
+    judged: Mapping[str, Judged]
+    closest: str
+
+    @property
+    def speeds(self) -> tuple[SpeedSummary, ...]:
+        """One summary a speed, slowest first."""
+        found = []
+        for speed_mm_s in sorted({curve.speed_mm_s for curve in self.curves}):
+            group = [curve for curve in self.curves if curve.speed_mm_s == speed_mm_s]
+            depth_mm, force_N = (max(c.max_depth_mm for c in group), max(c.max_force_N for c in group))
+            found.append(SpeedSummary(speed_mm_s, len(group), depth_mm, force_N))
+        return tuple(found)
+
+    @property
+    def origins_mm(self) -> FloatArray:
+        """Where displacement is measured from, relative to the contact found, shape (n,)."""
+        return self.judged[self.closest].fit.offsets_mm
+
+
+def study_session(session: Session) -> Study:
+    """Reads every trial of ``session``, fits and judges; trials without a usable curve are skipped with their reason.
+
+    Raises DataError where no trial gives a curve.
+    """
+    curves, skipped = curves_of(session)
+    if not curves:
+        reasons = skipped[0].reason if skipped else "there is no trial"
+        raise DataError(f"{session.folder}: no trial gives a curve ({len(skipped)} skipped); first: {reasons}")
+    return study_curves(session.info.id, curves, skipped)
+
+
+def curves_of(session: Session) -> tuple[list[Curve], list[Skipped]]:
+    """The loading curves of a session's trials, and the trials that have none; force-tracking runs are neither."""
+    curves: list[Curve] = []
+    skipped: list[Skipped] = []
+    for trial in session.trials:
+        try:
+            recording = session.recording(trial.name)
+            if recording.metadata.get("trial", {}).get("kind") != TRACKING:
+                curves.append(loading_curve(stroke_of(trial.name, recording)))
+        except DataError as error:
+            skipped.append(Skipped(trial.name, str(error)))
+    return curves, skipped
+
+
+def study_curves(session: str, curves: Sequence[Curve], skipped: Sequence[Skipped] = ()) -> Study:
+    """Fits and judges the laws compared on the same curves and rows."""
+    fits = {law.name: fit_law(law, curves) for law in COMPARED}
+    closest = min(fits, key=lambda name: fits[name].rmse_N)
+    force_N = given_forces(curves)
+    judged = {name: judge(fit, curves, force_N, fits[closest].offsets_mm) for name, fit in fits.items()}
+    return Study(session, tuple(curves), tuple(skipped), force_N, judged, closest)
+
+
+def model_of(study: Study, law: str, subject: Mapping[str, object]) -> Model:
+    """The fitted law as a model to save and to control with."""
+    judged = study.judged[law]
+    return Model(
+        law=judged.law,
+        covariance=judged.covariance,
+        intervals=judged.intervals,
+        interval_level=LEVEL,
+        interval_method=judged.interval_method,
+        valid=ValidRange(
+            depth_mm=max(curve.max_depth_mm for curve in study.curves),
+            force_N=max(curve.max_force_N for curve in study.curves),
+            speeds_mm_s=tuple(speed.speed_mm_s for speed in study.speeds),
+        ),
+        data=Provenance(
+            session=study.session,
+            trials=tuple(curve.name for curve in study.curves),
+            sha256=fingerprint(study.curves),
+            subject=str(subject.get("id", "")),
+            site=str(subject.get("site", "")),
+            software=f"tissue-rig {rig.__version__}",
+        ),
+        quality=_quality(judged),
+    )
+
+
+def _quality(judged: Judged) -> Quality:
+    out = judged.trials_left_out
+    return Quality(
+        rmse_N=judged.fitted.rmse_N,
+        max_error_mm=judged.fitted.max_error_mm,
+        max_error_percent=judged.fitted.max_error_percent,
+        held_out_max_error_mm=out.max_error_mm if out else None,
+        held_out_max_error_percent=out.max_error_percent if out else None,
+    )
+
+
+def fingerprint(curves: Sequence[Curve]) -> str:
+    """SHA-256 over the curves' names, depths and forces: the id of the data a model was fitted to."""
+    digest = hashlib.sha256()
+    for curve in curves:
+        digest.update(curve.name.encode())
+        digest.update(np.ascontiguousarray(curve.depth_mm, "<f8").tobytes())
+        digest.update(np.ascontiguousarray(curve.force_N, "<f8").tobytes())
+    return digest.hexdigest()
+
+
+class Row(NamedTuple):
+    """One given force in the study's table: means over the trials that reached it, and the worst trial's error."""
+
+    force_N: float
+    measured_mm: float
+    measured_spread_mm: float
+    predicted_mm: float
+    error_mm: float
+    error_percent: float
+
+
+def rows(errors: Errors) -> list[Row]:
+    """One row a given force; spread is the standard deviation over trials."""
+    found = []
+    for index, force_N in enumerate(errors.force_N):
+        measured, predicted = errors.measured_mm[:, index], errors.predicted_mm[:, index]
+        reached = np.isfinite(measured)
+        if not reached.any():
+            continue
+        percent = errors.error_percent[reached, index]
+        found.append(
+            Row(
+                float(force_N),
+                float(measured[reached].mean()),
+                float(measured[reached].std()),
+                float(predicted[reached].mean()),
+                float(errors.error_mm[reached, index].max()),
+                float(np.nanmax(percent)) if np.isfinite(percent).any() else float("nan"),
+            )
+        )
+    return found
