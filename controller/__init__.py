@@ -1,0 +1,1 @@
+"""What moves: the loop, the control law, gains, safety and experiments."""

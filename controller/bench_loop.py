@@ -1,0 +1,312 @@
+"""One turn of the loop: poll inputs, decide, command, publish. Nothing in it waits."""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from typing import Protocol
+
+from controller.devices import Devices
+from controller.health import StreamHealth
+from controller.link import Link, Message
+from controller.loop import Slot
+from controller.machine import Machine
+from controller.modes import Mode
+from controller.registration import Point, Registration
+from controller.safety import Action, Incident, Watch
+from controller.steps import Program
+from controller.world import World
+from rig.channels import (
+    AXIS,
+    EVENT,
+    FORCE,
+    LOOP,
+    MARKER,
+    AxisSample,
+    EventSample,
+    ForceSample,
+    LoopSample,
+    MarkerSample,
+)
+from rig.config.wiring import Wiring
+from rig.errors import DeviceError
+
+STATUS_EVERY_S = 0.05
+TEXT_BYTES = 160
+RATE_WINDOW_NS = 10_000_000
+TIP, ARM = 0, 1
+# A sample this many periods old is not acted on; when it counts as lost is for the safety table to say.
+LATE_PERIODS = 5
+
+
+class Ring(Protocol):
+    """Where rows go."""
+
+    def put(self, stream_id: int, body: bytes) -> None:
+        """Publishes one row."""
+
+    @property
+    def fill(self) -> float:
+        """Share of the ring not yet read."""
+
+    def reader_age_ns(self, now_ns: int) -> int:
+        """Since the reader's last sign of life."""
+
+
+class BenchLoop:
+    """Owns devices, world and machine; ``tick`` is called once a slot and returns False when it is time to go."""
+
+    def __init__(
+        self, wiring: Wiring, devices: Devices, ring: Ring, link: Link, commands: "Commands", now: Callable[[], int]
+    ) -> None:
+        self.wiring, self.devices, self._ring, self._link, self._now = wiring, devices, ring, link, now
+        self._commands = commands
+        period_s = 1.0 / wiring.loop.rate_Hz
+        self.world = World(dt_s=period_s, acceleration_mm_s2=wiring.axis.acceleration_mm_s2)
+        self.machine = Machine(wiring, self.world, self._finished)
+        self.watch = Watch()
+        self._registration = Registration()
+        self._health = {
+            "force": StreamHealth(devices.force.period_ns, round(wiring.stale_force_ms * 1e6)),
+            "axis": StreamHealth(devices.axis.period_ns, round(wiring.stale_axis_ms * 1e6)),
+            "marker": StreamHealth(
+                devices.tracker.period_ns if devices.tracker else 1, round(wiring.loop.stale_marker_ms * 1e6)
+            ),
+        }
+        self._status_every = max(1, round(STATUS_EVERY_S / period_s))
+        self._ticks = self._events = 0
+        self._recent: deque[tuple[int, float]] = deque()
+        self._signs = 1.0 if wiring.force.compression == "positive" else -1.0
+        self._force_field = ForceSample._fields.index(f"{wiring.force.axis}_N")
+        self._pulled = False
+        self._limb_seen_ns = 0
+
+    def tick(self, slot: Slot) -> bool:
+        """One turn."""
+        now_ns = slot.wake_ns
+        self._poll(now_ns)
+        self.watch.requests = self._commands.collect(self)
+        self._look(now_ns, slot)
+        incident = self.machine.update(self.watch)
+        if incident:
+            self._report(incident, now_ns)
+        self._command(now_ns)
+        self._publish(slot, now_ns)
+        self._ticks += 1
+        return self._commands.more(self)
+
+    def _poll(self, now_ns: int) -> None:
+        self._poll_force(now_ns)
+        self._poll_axis(now_ns)
+        if self.devices.tracker and not self.watch.marker_lost:
+            try:
+                for sample in self.devices.tracker.poll(now_ns):
+                    self._take_marker(sample)
+            except DeviceError as error:
+                self.watch.marker_lost = str(error)
+
+    def _poll_force(self, now_ns: int) -> None:
+        if self.watch.force_lost:
+            return
+        try:
+            for sample in self.devices.force.poll(now_ns):
+                self._ring.put(FORCE.id, FORCE.pack(sample))
+                self._take_force(sample)
+        except DeviceError as error:
+            self.watch.force_lost = str(error)
+
+    def _poll_axis(self, now_ns: int) -> None:
+        if self.watch.axis_lost:
+            return
+        try:
+            for sample in self.devices.axis.poll(now_ns):
+                self._ring.put(AXIS.id, AXIS.pack(sample))
+                self._take_axis(sample)
+        except DeviceError as error:
+            self.watch.axis_lost = str(error)
+
+    def _take_force(self, sample: ForceSample) -> None:
+        raw_N = self._signs * float(sample[self._force_field])
+        self.world.raw_N = raw_N
+        self.world.force_samples += 1
+        self._health["force"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample[4:10])
+        self._recent.append((sample.capture_ns, raw_N))
+        while sample.capture_ns - self._recent[0][0] > RATE_WINDOW_NS and len(self._recent) > 2:
+            self._recent.popleft()
+
+    def _take_axis(self, sample: AxisSample) -> None:
+        world = self.world
+        world.position_mm, world.velocity_mm_s = sample.position_mm, sample.velocity_mm_s
+        if self.devices.tracker:
+            self._registration.axis(sample.capture_ns, sample.position_mm)
+        self._health["axis"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample.seq)
+
+    def _take_marker(self, sample: MarkerSample) -> None:
+        self._ring.put(MARKER.id, MARKER.pack(sample))
+        if sample.tool == 0:
+            self._health["marker"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample.frame)
+        if sample.valid:
+            at = Point(sample.x_mm, sample.y_mm, sample.z_mm)
+            if sample.tool == TIP:
+                self._registration.tip(sample.frame, sample.capture_ns, at)
+            elif sample.tool == ARM:
+                self._limb_seen_ns = sample.capture_ns
+                self._registration.arm(sample.frame, at)
+        self.world.patient_mm = self._registration.moved_mm
+
+    def _look(self, now_ns: int, slot: Slot) -> None:
+        world, watch, health = self.world, self.watch, self._health
+        world.now_ns = now_ns
+        world.force_N = world.raw_N - world.zero_N
+        world.force_rate_N_s = self._force_rate()
+        world.force_late = health["force"].age_ns(now_ns) > LATE_PERIODS * health["force"].period_ns
+        world.following_mm = world.setpoint.position_mm - world.position_mm if self.machine.busy else 0.0
+        watch.force_valid, watch.force_frozen = health["force"].valid, health["force"].frozen
+        watch.force_age_ms = health["force"].age_ns(now_ns) * 1e-6
+        watch.axis_age_ms = health["axis"].age_ns(now_ns) * 1e-6
+        watch.marker_age_ms = health["marker"].age_ns(now_ns) * 1e-6
+        # Only a marker that was there can be lost: not every bench has one on the limb.
+        watch.limb_age_ms = (now_ns - self._limb_seen_ns) * 1e-6 if self._limb_seen_ns else 0.0
+        watch.drive_fault = self.devices.axis.fault
+        watch.wake_latency_ms = (slot.wake_ns - slot.scheduled_ns) * 1e-6
+        watch.recorder_fill = self._ring.fill
+        watch.recorder_silent_s = self._ring.reader_age_ns(now_ns) * 1e-9
+        watch.supervisor_lost = self._link.lost
+        watch.operator_silent_s = (now_ns - self._commands.heard_ns) * 1e-9 if self._commands.heard_ns else 0.0
+
+    def _force_rate(self) -> float:
+        first, last = (self._recent[0], self._recent[-1]) if len(self._recent) > 2 else ((0, 0.0), (0, 0.0))
+        span_ns = last[0] - first[0]
+        return (last[1] - first[1]) / span_ns * 1e9 if span_ns > RATE_WINDOW_NS // 2 else 0.0
+
+    def _command(self, now_ns: int) -> None:
+        if self.watch.axis_lost:
+            return
+        try:
+            if self.devices.axis.enabled and not self._pulled:
+                self.devices.axis.command(self.world.setpoint.position_mm, now_ns)
+            else:
+                self.devices.axis.request(now_ns)
+        except DeviceError as error:
+            self.watch.axis_lost = str(error)
+
+    def _report(self, incident: Incident, now_ns: int) -> None:
+        self.event(incident.action, incident.code, incident.text, now_ns)
+        self._link.send({"incident": {"code": incident.code, "text": incident.text, "action": incident.action.name}})
+        if incident.action is Action.IMMEDIATE and not self.watch.axis_lost:
+            self._pulled = True
+            try:
+                self.devices.axis.quick_stop()
+            except DeviceError as error:
+                self.watch.axis_lost = str(error)
+
+    def start(self, program: Program) -> None:
+        """Begins a program; where the limb is now is where it should stay."""
+        self._registration.begin()
+        self.machine.start(program)
+
+    def release(self) -> None:
+        """After a reset: the axis is enabled anew at its present position and takes commands again."""
+        if self._pulled or not self.devices.axis.enabled:
+            self.devices.axis.reset_fault()
+            self.devices.axis.enable()
+        self._pulled = False
+        self.machine.acknowledge()
+
+    def event(self, level: int, code: str, text: str, now_ns: int) -> None:
+        """One row of the event stream; the text is cut to what a ring slot takes."""
+        short = text.encode()[:TEXT_BYTES].decode(errors="ignore")
+        row = EventSample(self._events, now_ns, now_ns, int(level), code[:20], short)
+        self._ring.put(EVENT.id, EVENT.pack(row))
+        self._events += 1
+
+    def _finished(self, outcome: str, incident: Incident | None) -> None:
+        world = self.world
+        self.event(Action.NOTE, "program_end", outcome, world.now_ns)
+        self._link.send(
+            {
+                "finished": {
+                    "outcome": outcome,
+                    "cause": incident.text if incident else "",
+                    "peak_force_N": world.peak_force_N,
+                    "surface_mm": None if math.isnan(world.surface_mm) else world.surface_mm,
+                    "zero_N": None if math.isnan(world.zero_N) else world.zero_N,
+                }
+            }
+        )
+
+    def _publish(self, slot: Slot, now_ns: int) -> None:
+        world, health, machine = self.world, self._health, self.machine
+        bits = health["force"].bits(now_ns) | health["axis"].bits(now_ns) << 3 | health["marker"].bits(now_ns) << 6
+        row = LoopSample(
+            self._ticks,
+            now_ns,
+            now_ns,
+            slot.number,
+            slot.missed,
+            slot.scheduled_ns,
+            slot.wake_ns - slot.scheduled_ns,
+            self._now() - slot.wake_ns,
+            health["force"].age_ns(now_ns),
+            health["axis"].age_ns(now_ns),
+            health["marker"].age_ns(now_ns),
+            bits,
+            machine.mode,
+            machine.step_index,
+            world.force_N,
+            world.reference_N,
+            world.position_mm,
+            world.setpoint.position_mm,
+            world.surface_mm,
+            world.depth_mm,
+            world.tangent_N_mm,
+        )
+        self._ring.put(LOOP.id, LOOP.pack(row))
+        if self._ticks % self._status_every == 0:
+            self._link.send_status({"status": self._status(row)})
+        else:
+            self._link.flush()
+
+    def _status(self, row: LoopSample) -> Message:
+        latched = self.machine.latched
+        return {
+            "time_ns": row.capture_ns,
+            "mode": Mode(row.mode).name.lower(),
+            "busy": self.machine.busy,
+            "step": row.step,
+            "health": row.health,
+            "missed": row.missed,
+            "ticks": row.seq + 1,
+            "force_N": _finite(row.force_N),
+            "reference_N": _finite(row.reference_N),
+            "position_mm": _finite(row.position_mm),
+            "depth_mm": _finite(row.depth_mm),
+            "rates_Hz": {name: round(stream.rate_Hz, 1) for name, stream in self._health.items()},
+            "lost": {
+                name: cause
+                for name, cause in (
+                    ("force", self.watch.force_lost),
+                    ("axis", self.watch.axis_lost),
+                    ("marker", self.watch.marker_lost),
+                )
+                if cause
+            },
+            "latched": {"code": latched.code, "text": latched.text} if latched else None,
+        }
+
+
+class Commands(Protocol):
+    """What the supervisor asks of the loop."""
+
+    @property
+    def heard_ns(self) -> int:
+        """When the other end last said anything; 0 before that."""
+
+    def collect(self, loop: BenchLoop) -> frozenset[str]:
+        """Takes what has come, acts on it, and returns the stop requests among it."""
+
+    def more(self, loop: BenchLoop) -> bool:
+        """Whether the loop goes on."""
+
+
+def _finite(value: float) -> float | None:
+    return round(value, 4) if math.isfinite(value) else None

@@ -1,0 +1,116 @@
+"""Looks at each device by itself, without moving anything: who it is, what rate, noise, latency and range it has."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from controller.devices import open_axis, open_force, open_tracker
+from drivers.roles import Device, ForceSensor, Identity, MarkerTracker, ServoAxis
+from rig.channels import AxisSample, ForceSample, MarkerSample
+from rig.config.wiring import Wiring
+from rig.errors import RigError
+
+LISTEN_S = 2.0
+PERIOD_S = 0.001
+RATE_TOLERANCE = 0.1
+
+AnySample = ForceSample | AxisSample | MarkerSample
+Samples = Sequence[AnySample]
+AnyDevice = TypeVar("AnyDevice", bound=Device)
+Listen = Callable[[AnyDevice, float], Samples]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was seen of one device; ``problem`` is empty if it is fit for use."""
+
+    role: str
+    product: str = ""
+    serial: str = ""
+    firmware: str = ""
+    rate_Hz: float = 0.0
+    noise: str = ""
+    latency_ms: float = 0.0
+    range: str = ""
+    problem: str = ""
+
+
+def examine(wiring: Wiring, seconds: float = LISTEN_S) -> tuple[Finding, ...]:
+    """One finding a configured device; a device that fails is a finding with a problem, not an error."""
+    findings = [
+        _look("force", lambda: open_force(wiring.force), _poll_force, seconds),
+        _look("axis", lambda: open_axis(wiring.axis, wiring.limits, 1 / PERIOD_S), _poll_axis, seconds),
+    ]
+    tracker = wiring.tracker
+    if tracker:
+        findings.append(_look("tracker", lambda: open_tracker(tracker), _poll_tracker, seconds))
+    return tuple(findings)
+
+
+def _look(role: str, opener: Callable[[], AnyDevice], listen: Listen[AnyDevice], seconds: float) -> Finding:
+    try:
+        device = opener()
+        try:
+            device.start()
+            samples = listen(device, seconds)
+        finally:
+            device.close()
+    except RigError as error:
+        return Finding(role, problem=str(error))
+    return _finding(role, device.identity, 1e9 / device.period_ns, samples)
+
+
+def _listen(poll: Callable[[int], Samples], seconds: float) -> Samples:
+    found: list[AnySample] = []
+    end_ns = time.monotonic_ns() + round(seconds * 1e9)
+    while (now_ns := time.monotonic_ns()) < end_ns:
+        found.extend(poll(now_ns))
+        time.sleep(PERIOD_S)
+    return found
+
+
+def _poll_force(device: ForceSensor, seconds: float) -> Samples:
+    return _listen(device.poll, seconds)
+
+
+def _poll_tracker(device: MarkerTracker, seconds: float) -> Samples:
+    return _listen(device.poll, seconds)
+
+
+def _poll_axis(device: ServoAxis, seconds: float) -> Samples:
+    def ask(now_ns: int) -> Samples:
+        device.request(now_ns)
+        return device.poll(now_ns)
+
+    return _listen(ask, seconds)
+
+
+def _finding(role: str, identity: Identity, nominal_Hz: float, samples: Samples) -> Finding:
+    about = Finding(role, identity.product, identity.serial, identity.firmware)
+    valid = [sample for sample in samples if sample.valid]
+    if len(valid) < 2:
+        return replace(about, problem=f"{len(samples)} samples came, {len(valid)} of them valid")
+    captures = np.unique([sample.capture_ns for sample in samples])
+    rate_Hz = (len(captures) - 1) / ((captures[-1] - captures[0]) * 1e-9)
+    latency_ms = float(np.median([sample.arrival_ns - sample.capture_ns for sample in samples])) * 1e-6
+    noise, extent = _spread(valid)
+    slow = role != "axis" and abs(rate_Hz - nominal_Hz) > RATE_TOLERANCE * nominal_Hz
+    problem = f"rate {rate_Hz:.1f} Hz is not the {nominal_Hz:.1f} Hz asked for" if slow else ""
+    return replace(about, rate_Hz=rate_Hz, latency_ms=latency_ms, noise=noise, range=extent, problem=problem)
+
+
+def _spread(samples: Samples) -> tuple[str, str]:
+    """Noise and range in words: force along z, position, or the first tool's depth axis."""
+    first = samples[0]
+    if isinstance(first, ForceSample):
+        values, unit = np.array([s.fz_N for s in samples if isinstance(s, ForceSample)]), "N"
+    elif isinstance(first, AxisSample):
+        values, unit = np.array([s.position_mm for s in samples if isinstance(s, AxisSample)]), "mm"
+    else:
+        values, unit = np.array([s.z_mm for s in samples if isinstance(s, MarkerSample) and s.tool == first.tool]), "mm"
+    # Successive differences: a slow drift of what is measured is not noise of the device.
+    noise = float(np.std(np.diff(values)) / np.sqrt(2)) if len(values) > 2 else 0.0
+    return f"{noise:.4f} {unit}", f"{values.min():.3f} to {values.max():.3f} {unit}"

@@ -1,0 +1,103 @@
+"""A session of trials: each into its own recording, the session's index rewritten after each."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Literal
+
+import rig
+from controller.checks import refuse_beyond_limits
+from controller.experiments.indentation import Trial, longest_s, trials
+from controller.experiments.recorded import metadata, record
+from controller.operation import Operation
+from controller.supervisor import Supervisor
+from rig.config.protocol import Indentation
+from rig.config.wiring import Wiring
+from rig.errors import RigError, SafetyStop, UsageError
+from rig.recording.sessions import SessionInfo, TrialInfo, write_session
+
+Report = Callable[[TrialInfo], None]
+
+
+def check(protocol: Indentation, wiring: Wiring) -> None:
+    """Raises UsageError, before anything moves or is opened, where the protocol goes beyond the limits."""
+    if protocol.deepest_mm > wiring.limits.depth_mm:
+        raise UsageError(
+            f"protocol {protocol.name} goes {protocol.deepest_mm:g} mm deep, above limits.depth_mm"
+            f" {wiring.limits.depth_mm:g} mm: lower the protocol's depth or raise the limit"
+        )
+    for trial in trials(protocol):
+        refuse_beyond_limits(trial.program, wiring)
+
+
+def new_session(
+    folder: Path, kind: Literal["capture", "track"], protocol: Mapping[str, object], wiring: Wiring
+) -> SessionInfo:
+    """An empty session in ``folder``; raises UsageError where there is one already."""
+    if folder.exists() and any(folder.iterdir()):
+        raise UsageError(f"{folder}: is not empty; give a new folder, recordings are never overwritten")
+    folder.mkdir(parents=True, exist_ok=True)
+    info = SessionInfo(
+        id=folder.resolve().name,
+        kind=kind,
+        created=datetime.now(UTC).isoformat(),
+        software=f"tissue-rig {rig.__version__}",
+        protocol=dict(protocol),
+        wiring=wiring.model_dump(mode="json"),
+        subject=wiring.subject.model_dump(mode="json"),
+    )
+    write_session(folder, info)
+    return info
+
+
+def capture(
+    bench: Supervisor, protocol: Indentation, folder: Path, operation: Operation, report: Report
+) -> SessionInfo:
+    """Runs all trials; raises SafetyStop, with everything recorded kept, where a trial was stopped."""
+    check(protocol, bench.wiring)
+    info = new_session(folder, "capture", protocol.model_dump(mode="json"), bench.wiring)
+    planned = trials(protocol)
+    for trial in planned:
+        operation.advance(trial.index - 1, f"{trial.name}, {trial.speed_mm_s:g} mm/s")
+        result, cause = _run(bench, trial, protocol, folder, info)
+        info = replace(info, trials=(*info.trials, result))
+        write_session(folder, info)
+        report(result)
+        if cause is not None:
+            raise cause
+        if operation.stopping:
+            raise SafetyStop(f"stopped by the operator after {trial.index} of {len(planned)} trials")
+    operation.advance(len(planned), "done")
+    return info
+
+
+def _run(
+    bench: Supervisor, trial: Trial, protocol: Indentation, folder: Path, info: SessionInfo
+) -> tuple[TrialInfo, RigError | None]:
+    about = {
+        "trial": {"index": trial.index, "speed_mm_s": trial.speed_mm_s, "depth_mm": protocol.depth_mm},
+        "protocol": protocol.model_dump(mode="json"),
+    }
+    file = folder / f"{trial.name}.mcap"
+    planned = TrialInfo(
+        name=trial.name,
+        file=file.name,
+        speed_mm_s=trial.speed_mm_s,
+        depth_mm=protocol.depth_mm,
+        outcome="failed",
+    )
+    longest = longest_s(protocol, trial.speed_mm_s, bench.wiring.limits.position_max_mm)
+    try:
+        done = record(bench, trial.program, file, metadata(bench, info.id, trial.name, about), longest)
+    except RigError as error:
+        return planned, error
+    outcome = done.outcome
+    result = replace(
+        planned,
+        outcome=outcome.outcome,
+        peak_force_N=outcome.peak_force_N,
+        samples=done.samples,
+        dropped=done.dropped,
+    )
+    return result, SafetyStop(f"stopped: {outcome.cause}") if outcome.stopped else None

@@ -1,0 +1,140 @@
+"""Gain choices compared on jumps of the reference: error, overshoot and settling of each, and the worst of a run.
+
+The force judged is the mean of SMOOTH_S around each sample, so that it is the tissue's load and not the sensor's noise.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.gains import Choice
+from controller.modes import Mode
+from rig.errors import DataError, UsageError
+
+Column = NDArray[np.float64]
+
+CHOICES: tuple[Choice, ...] = ("tangent", "secant", "constant", "admittance")
+SMOOTH_S = 0.011
+SETTLED_SHARE = 0.02
+STEADY_S = 0.5
+REMAINS_S = 0.2
+LEAST_JUMP_N = 0.2
+
+
+@dataclass(frozen=True)
+class Jump:
+    """One jump of the reference; shares are of its height, ``error_percent`` of the force given.
+
+    ``error_N`` is the mean and ``largest_error_N`` the largest error over the last STEADY_S; ``settling_s`` is None
+    where force is not within 2 % of the jump for the last REMAINS_S.
+    """
+
+    from_N: float
+    to_N: float
+    actual_N: float
+    error_N: float
+    error_percent: float
+    largest_error_N: float
+    overshoot_percent: float
+    settling_s: float | None
+
+
+@dataclass(frozen=True)
+class Run:
+    """All jumps of one choice on one subject; ``stopped`` is the sentence of what ended it early, if anything did."""
+
+    subject: str
+    gains: str
+    jumps: tuple[Jump, ...]
+    stopped: str = ""
+
+    @property
+    def worst(self) -> dict[str, float | None]:
+        """The largest of each figure; settling None where any jump did not settle."""
+        settling = [jump.settling_s for jump in self.jumps]
+        return {
+            "error_N": max((abs(jump.error_N) for jump in self.jumps), default=None),
+            "error_percent": max((abs(jump.error_percent) for jump in self.jumps), default=None),
+            "largest_error_N": max((jump.largest_error_N for jump in self.jumps), default=None),
+            "overshoot_percent": max((jump.overshoot_percent for jump in self.jumps), default=None),
+            "settling_s": None
+            if None in settling or not settling
+            else max(settled for settled in settling if settled is not None),
+        }
+
+    def as_json(self) -> dict[str, object]:
+        """Everything, for `rig track --table --json`."""
+        jumps = [asdict(jump) for jump in self.jumps]
+        return {
+            "subject": self.subject, "gains": self.gains, "stopped": self.stopped, "worst": self.worst, "jumps": jumps
+        }  # fmt: skip
+
+
+def jumps(time_s: Column, reference_N: Column, force_N: Column, mode: NDArray[np.int64]) -> tuple[Jump, ...]:
+    """Every jump of the reference in contact, from columns of the loop stream; raises DataError where there is none."""
+    on = mode == Mode.CONTACT
+    time_s, reference_N, force_N = time_s[on], reference_N[on], force_N[on]
+    edges = [int(at) + 1 for at in np.flatnonzero(np.abs(np.diff(reference_N)) > LEAST_JUMP_N)]
+    if not edges:
+        raise DataError("the recording has no jump of the reference force")
+    half = round(SMOOTH_S / float(np.median(np.diff(time_s)))) // 2
+    return tuple(
+        _jump(
+            time_s[start : end - half],
+            float(reference_N[start - 1]),
+            float(reference_N[start]),
+            # Whole windows only, and none that reaches into what the next jump does.
+            np.convolve(force_N[start - half : end], np.full(2 * half + 1, 1.0 / (2 * half + 1)), mode="valid"),
+        )
+        for start, end in pairwise([*edges, len(time_s)])
+    )
+
+
+def _jump(time_s: Column, from_N: float, to_N: float, force_N: Column) -> Jump:
+    height_N, error_N = to_N - from_N, force_N - to_N
+    outside = np.flatnonzero(np.abs(error_N) > SETTLED_SHARE * abs(height_N))
+    settled = len(outside) == 0 or time_s[outside[-1]] < time_s[-1] - REMAINS_S
+    steady = error_N[time_s > time_s[-1] - STEADY_S]
+    return Jump(
+        from_N=from_N,
+        to_N=to_N,
+        actual_N=to_N + float(np.mean(steady)),
+        error_N=float(np.mean(steady)),
+        error_percent=100 * float(np.mean(steady)) / to_N,
+        largest_error_N=float(np.max(np.abs(steady))),
+        overshoot_percent=100 * max(0.0, float(np.max(error_N * np.sign(height_N)))) / abs(height_N),
+        settling_s=(float(time_s[outside[-1] + 1] - time_s[0]) if len(outside) else 0.0) if settled else None,
+    )
+
+
+def choices_from(text: str) -> tuple[Choice, ...]:
+    """``tangent,constant`` as choices; raises UsageError naming those there are."""
+    found: list[Choice] = []
+    for part in text.split(","):
+        matching: list[Choice] = [choice for choice in CHOICES if choice == part.strip()]
+        if not matching:
+            raise UsageError(f"--gains {part}: choose among {', '.join(CHOICES)}")
+        found += matching
+    return tuple(found)
+
+
+HEADER = ("subject", "gains", "error N", "error %", "largest N", "overshoot %", "settling s", "")
+
+
+def rows(runs: Sequence[Run]) -> list[tuple[str, ...]]:
+    """The worst of each run, for people."""
+    return [_row(run) for run in runs]
+
+
+def _row(run: Run) -> tuple[str, ...]:
+    worst = run.worst
+    digits = {"error_N": 4, "error_percent": 2, "largest_error_N": 3, "overshoot_percent": 1, "settling_s": 2}
+    cells = [_figure(worst[name], places) for name, places in digits.items()]
+    return (run.subject, run.gains, *cells, run.stopped)
+
+
+def _figure(value: float | None, places: int) -> str:
+    return "--" if value is None else f"{value:.{places}f}"

@@ -1,0 +1,128 @@
+"""One program into one recording: metadata before, summary after, and the recording kept whatever happens."""
+
+import json
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import rig
+from controller.steps import Program
+from controller.supervisor import Outcome, Supervisor
+from rig.config.wiring import Wiring
+from rig.errors import DeviceError, RigError
+from rig.recording.mcap_file import RecordingFailed
+
+Metadata = Mapping[str, Mapping[str, str]]
+LOOK_S = 0.1
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What came of it: how the program ended, and how many samples the recording holds and lost, per stream."""
+
+    file: Path
+    outcome: Outcome
+    samples: dict[str, int]
+    dropped: dict[str, int]
+
+
+def metadata(bench: Supervisor, session: str, trial: str, about: Mapping[str, object]) -> dict[str, dict[str, str]]:
+    """The metadata of one recording; nested values are JSON text."""
+    wiring = bench.wiring
+    return {
+        "recording": {
+            "session": session,
+            "trial": trial,
+            "software": f"tissue-rig {rig.__version__}",
+            "wall_start_iso": datetime.now(UTC).isoformat(),
+            "wall_start_ns": str(time.time_ns()),
+            "monotonic_start_ns": str(time.monotonic_ns()),
+        },
+        "devices": {role: json.dumps(identity) for role, identity in bench.ready.devices.items()},
+        "realtime": dict(bench.ready.realtime),
+        "wiring": {name: json.dumps(table) for name, table in wiring.model_dump(mode="json").items()},
+        "calibration": _calibration(wiring),
+        "subject": {name: str(value) for name, value in wiring.subject.model_dump().items()},
+        **{name: _texts(value) for name, value in about.items()},
+    }
+
+
+def _calibration(wiring: Wiring) -> dict[str, str]:
+    return {"force_axis": wiring.force.axis, "compression": wiring.force.compression}
+
+
+def _texts(value: object) -> dict[str, str]:
+    items = value.items() if isinstance(value, Mapping) else [("value", value)]
+    return {str(key): item if isinstance(item, str) else json.dumps(item) for key, item in items}
+
+
+def record(bench: Supervisor, program: Program, file: Path, about: Metadata, timeout_s: float) -> Recorded:
+    """Runs ``program`` while everything is recorded into ``file``.
+
+    A recorder that fails stops the motion. The recording is closed with the outcome, also where the loop is lost; the
+    error is raised after that.
+    """
+    recorder = bench.recorder
+    if recorder is None:
+        raise DeviceError("the bench is not running")
+    recorder.open(file, about)
+    try:
+        outcome = _run_watched(bench, program, timeout_s)
+    except RigError as error:
+        _close(bench, {"outcome": "failed", "cause": str(error)})
+        raise
+    reply = _close(bench, _summary(outcome))
+    return Recorded(file, outcome, _counts(reply, "samples"), _counts(reply, "dropped"))
+
+
+def _run_watched(bench: Supervisor, program: Program, timeout_s: float) -> Outcome:
+    over = threading.Event()
+    failures: list[str] = []
+    watcher = threading.Thread(target=_watch, args=(bench, over, failures), name="recorder-watch", daemon=True)
+    watcher.start()
+    try:
+        outcome = bench.run(program, timeout_s)
+        bench.wait_at_rest()
+    finally:
+        over.set()
+        watcher.join()
+    if failures:
+        raise RecordingFailed(failures[0])
+    return outcome
+
+
+def _watch(bench: Supervisor, over: threading.Event, failures: list[str]) -> None:
+    """Stops the motion as soon as the recorder fails: nothing moves unrecorded."""
+    while not over.wait(LOOK_S):
+        failure = bench.recorder.failure if bench.recorder else "the recorder is gone"
+        if failure:
+            failures.append(failure)
+            bench.stop()
+            return
+
+
+def _close(bench: Supervisor, summary: dict[str, str]) -> Mapping[str, object]:
+    try:
+        return bench.recorder.close(summary) if bench.recorder else {}
+    except RecordingFailed:
+        if summary["outcome"] == "failed":
+            return {}
+        raise
+
+
+def _summary(outcome: Outcome) -> dict[str, str]:
+    return {
+        "outcome": outcome.outcome,
+        "cause": outcome.cause,
+        "peak_force_N": repr(outcome.peak_force_N),
+        "surface_mm": "" if outcome.surface_mm is None else repr(outcome.surface_mm),
+        "force_zero_N": "" if outcome.zero_N is None else repr(outcome.zero_N),
+    }
+
+
+def _counts(reply: Mapping[str, object], kind: str) -> dict[str, int]:
+    counts = reply.get(kind)
+    return {str(name): int(number) for name, number in counts.items()} if isinstance(counts, Mapping) else {}

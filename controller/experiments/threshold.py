@@ -1,0 +1,54 @@
+"""The subject's pain threshold: force rises slowly until the subject stops it; the force then is the answer."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from controller.experiments import tracked
+from controller.experiments.recorded import Recorded
+from controller.experiments.references import Ramp
+from controller.steps import Program
+from controller.supervisor import Supervisor
+from rig.config.wiring import Wiring
+from rig.errors import SafetyStop
+from rig.recording.reader import read_recording
+from rig.tissue.model import Model
+
+PAIN = "pain_stop"
+BASE_N = 0.5
+BEFORE_NS = 50_000_000
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """Where the subject stopped the ramp; ``force_N`` is None where it ended at ``up_to_N`` without a stop."""
+
+    force_N: float | None
+    up_to_N: float
+    recording: str
+
+
+def plan(up_to_N: float, rate_N_s: float, model: Model, wiring: Wiring) -> Program:
+    """The ramp, checked against model and limits: the present pain threshold is never passed to find a new one."""
+    ramp = Ramp(force_N=up_to_N, base_N=BASE_N, rate_N_s=rate_N_s, hold_s=0.5).reference()
+    return tracked.plan_reference(ramp, model, wiring)
+
+
+def run(bench: Supervisor, program: Program, up_to_N: float, folder: Path, model: str) -> Threshold:
+    """Plays the ramp into a recording; any stop but the subject's own raises SafetyStop."""
+    done = tracked.recorded_run(bench, program, folder, model)
+    if done.outcome.stopped and done.outcome.outcome != PAIN:
+        raise SafetyStop(f"stopped: {done.outcome.cause}")
+    return Threshold(force_at_stop(done), up_to_N, done.file.name)
+
+
+def force_at_stop(done: Recorded) -> float | None:
+    """Mean force [N] over the 50 ms before the subject's stop; None without one."""
+    recording = read_recording(done.file)
+    stops = [event.capture_ns for event in recording.events if event.code == PAIN]
+    if not stops:
+        return None
+    loop = recording.tables["loop"]
+    before = (loop["capture_ns"] <= stops[0]) & (loop["capture_ns"] > stops[0] - BEFORE_NS)
+    return float(np.mean(loop["force_N"][before]))

@@ -1,0 +1,189 @@
+"""A run of force tracking into a recording, and what it says of the loop."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from controller.checks import refuse_beyond_limits
+from controller.experiments import tracking
+from controller.experiments.capture import new_session
+from controller.experiments.recorded import Recorded, metadata, record
+from controller.experiments.references import Reference
+from controller.experiments.tracking import Followed, Plateau
+from controller.gains import Choice
+from controller.operation import Operation
+from controller.steps import Program, TrackForce
+from controller.supervisor import Supervisor
+from rig.channels import LoopSample
+from rig.config.wiring import Wiring
+from rig.errors import SafetyStop, UsageError
+from rig.recording.reader import read_recording
+from rig.recording.sessions import SESSION_FILE, TrialInfo, open_session, write_session
+from rig.tissue.model import Model
+
+RESULT = "track.json"
+MARGIN_S = 60.0
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """Given and actual force, level by level, and where it is recorded."""
+
+    recording: str
+    model: str
+    levels: tuple[Plateau, ...]
+    followed: Followed
+    samples: int
+    dropped: int
+    ticks: int
+    missed: int
+
+
+def forces(text: str) -> tuple[float, ...]:
+    """``1,2,5`` as forces in N; raises UsageError for anything else."""
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError as error:
+        raise UsageError(f"--force {text}: write one force in N, or several with commas, for example 1,2,5") from error
+
+
+def plan(forces_N: Sequence[float], seconds: float, model: Model, wiring: Wiring) -> Program:
+    """The program, checked against model and limits before anything is opened."""
+    program = tracking.program(forces_N, seconds, model, wiring)
+    refuse_beyond_limits(program, wiring)
+    return program
+
+
+def plan_reference(
+    reference: Reference, model: Model, wiring: Wiring, choice: Choice | None = None, adapt: bool | None = None
+) -> Program:
+    """The same for any reference and choice of gains; what is not given is as the wiring says."""
+    program = tracking.following(reference, model, wiring, choice, adapt)
+    refuse_beyond_limits(program, wiring)
+    return program
+
+
+def run(bench: Supervisor, program: Program, folder: Path, model: str, operation: Operation) -> Tracked:
+    """Tracks, records into ``folder`` (an existing session or a new one), and reads the result from the recording.
+
+    Raises SafetyStop, with the recording kept, where the run was stopped.
+    """
+    operation.advance(0, program.name)
+    done = recorded_run(bench, program, folder, model)
+    if done.outcome.stopped:
+        raise SafetyStop(f"stopped: {done.outcome.cause}")
+    result = evaluate(done, model)
+    write_result(folder, result)
+    operation.advance(1, "done")
+    return result
+
+
+def recorded_run(bench: Supervisor, program: Program, folder: Path, model: str) -> Recorded:
+    """One run into the session in ``folder``, a new one where there is none; listed there however it ended."""
+    if not (folder / SESSION_FILE).exists():
+        new_session(folder, "track", {"name": program.name, "kind": "tracking"}, bench.wiring)
+    name = _free_name(folder)
+    about = {"trial": {"kind": "tracking", "name": program.name}, "model": {"file": model}}
+    done = record(
+        bench, program, folder / f"{name}.mcap", metadata(bench, folder.name, name, about), _longest_s(program)
+    )
+    _enter(folder, name, done)
+    return done
+
+
+def _enter(folder: Path, name: str, done: Recorded) -> None:
+    """Lists the run in the session; it has neither one speed nor one depth."""
+    info = open_session(folder).info
+    entry = TrialInfo(
+        name,
+        done.file.name,
+        speed_mm_s=math.nan,
+        depth_mm=math.nan,
+        outcome=done.outcome.outcome,
+        peak_force_N=done.outcome.peak_force_N,
+        samples=done.samples,
+        dropped=done.dropped,
+    )
+    kept = tuple(trial for trial in info.trials if trial.name != name)
+    write_session(folder, replace(info, trials=(*kept, entry)))
+
+
+def _longest_s(program: Program) -> float:
+    return MARGIN_S + sum(step.times_s[-1] * step.repeats for step in program.steps if isinstance(step, TrackForce))
+
+
+def _free_name(folder: Path) -> str:
+    number = 1
+    while (folder / f"track_{number:03d}.mcap").exists():
+        number += 1
+    return f"track_{number:03d}"
+
+
+def evaluate(done: Recorded, model: str) -> Tracked:
+    """The levels of a finished run, from its loop stream."""
+    loop = read_recording(done.file).tables["loop"]
+    columns = (loop["capture_ns"] * 1e-9, loop["reference_N"], loop["force_N"], loop["mode"])
+    first, last = (LoopSample(*row) for row in (loop[0].tolist(), loop[-1].tolist()))
+    return Tracked(
+        recording=done.file.name,
+        model=model,
+        levels=tracking.plateaus(*columns),
+        followed=tracking.followed(*columns),
+        samples=sum(done.samples.values()),
+        dropped=sum(done.dropped.values()),
+        ticks=last.seq - first.seq + 1,
+        missed=last.missed - first.missed,
+    )
+
+
+def as_json(result: Tracked) -> dict[str, object]:
+    """The result as `rig track --json` and `track.json` hold it."""
+    return {
+        "recording": result.recording,
+        "model": result.model,
+        **tracking.summary(result.levels),
+        "followed": asdict(result.followed),
+        "samples": result.samples,
+        "dropped": result.dropped,
+        "loop": {"ticks": result.ticks, "missed": result.missed},
+    }
+
+
+def write_result(folder: Path, result: Tracked) -> None:
+    """`track.json` beside the recording, whole or not at all."""
+    partial = folder / (RESULT + ".part")
+    partial.write_text(json.dumps(as_json(result), indent=2) + "\n")
+    partial.replace(folder / RESULT)
+
+
+def table(result: Tracked) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows of given and actual force, for people."""
+    header = ("given N", "actual N", "error N", "error %", "largest error N", "rms N", "overshoot %", "settling s")
+    return header, [_row(level) for level in result.levels]
+
+
+def sentence(result: Tracked) -> str:
+    """The whole run in one line, for references that do not rest."""
+    whole = result.followed
+    moving = (
+        ""
+        if whole.amplitude_ratio is None or whole.lag_s is None
+        else f", amplitude {100 * whole.amplitude_ratio:.1f} % of the reference, {1000 * whole.lag_s:.0f} ms late"
+    )
+    return f"error of the whole run: rms {whole.rms_error_N:.3f} N, largest {whole.largest_error_N:.3f} N{moving}"
+
+
+def _row(level: Plateau) -> tuple[str, ...]:
+    settling = "--" if level.settling_s is None else f"{level.settling_s:.2f}"
+    return (
+        f"{level.given_N:.2f}",
+        f"{level.actual_N:.3f}",
+        f"{level.error_N:+.3f}",
+        f"{level.error_percent:+.2f}",
+        f"{level.max_error_N:.3f}",
+        f"{level.rms_error_N:.3f}",
+        f"{level.overshoot_percent:.1f}",
+        settling,
+    )

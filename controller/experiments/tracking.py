@@ -1,0 +1,261 @@
+"""Force tracking: approach, follow a force with gains from a tissue model, retract; and how well it went."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.experiments.references import Reference
+from controller.gains import Choice, Design, schedule
+from controller.modes import Mode
+from controller.steps import Approach, Hold, Program, Retract, TrackForce, Zero
+from rig.config.wiring import Wiring
+from rig.errors import DataError, UsageError
+from rig.tissue.model import Model
+
+LEAD_N_S, LEAD_HOLD_S = 2.0, 0.5
+TRACK_MM_S = 30.0
+# The inverse model leaves this share of the speed to it, the rest to feedback.
+AHEAD_SHARE = 0.8
+FORGETTING = 0.998
+LINE_PARTS = 8
+# Products whose rate is fixed, whatever rate is asked for.
+SENSOR_HZ = {"robotiq-ft300": 100.0}
+LEAST_HZ, LEAST_AMPLITUDE_N = 0.2, 0.05
+SETTLE_S = 1.0
+SMOOTH_S = 0.05
+GAIN_ROWS = 40
+APPROACH_MM_S = 5.0
+CONTACT_N = 0.05
+
+Column = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Plateau:
+    """Given and actual force on one level of the reference; the first ``SETTLE_S`` of it are not counted."""
+
+    given_N: float
+    actual_N: float
+    error_N: float
+    error_percent: float
+    max_error_N: float
+    max_error_percent: float
+    rms_error_N: float
+    overshoot_percent: float
+    settling_s: float | None
+
+
+def program(forces_N: Sequence[float], seconds: float, model: Model, wiring: Wiring) -> Program:
+    """Jumps through ``forces_N``, ``seconds`` each; raises UsageError beyond the model."""
+    if not forces_N or min(forces_N) <= CONTACT_N or seconds <= SETTLE_S:
+        raise UsageError(
+            f"tracking needs forces above {CONTACT_N:g} N for more than {SETTLE_S:g} s each,"
+            f" not {', '.join(f'{force:g}' for force in forces_N) or 'none'} N for {seconds:g} s"
+        )
+    name = ", ".join(f"{force:g}" for force in forces_N) + " N"
+    return following(Reference(name, *_levels(forces_N, seconds)), model, wiring)
+
+
+def following(
+    reference: Reference, model: Model, wiring: Wiring, choice: Choice | None = None, adapt: bool | None = None
+) -> Program:
+    """Approach, follow ``reference`` with gains of ``choice``, retract; raises UsageError beyond model or limits."""
+    refuse_unreachable(reference, model, wiring)
+    law = force_law(model, wiring, choice or wiring.loop.gains, wiring.loop.adapt if adapt is None else adapt)
+    lead = (CONTACT_N, reference.forces_N[0])
+    lead_s = abs(lead[1] - lead[0]) / LEAD_N_S
+    tracks = []
+    if lead_s > 0:
+        tracks.append(
+            law.model_copy(update={"times_s": (0.0, lead_s, lead_s + LEAD_HOLD_S), "forces_N": (*lead, lead[1])})
+        )
+    played = {"times_s": reference.times_s, "forces_N": reference.forces_N, "repeats": reference.repeats}
+    tracks.append(law.model_copy(update=played))
+    return Program(
+        name="force tracking " + reference.name,
+        steps=(
+            Zero(duration_s=0.5),
+            Approach(
+                speed_mm_s=min(APPROACH_MM_S, wiring.limits.speed_mm_s),
+                contact_force_N=CONTACT_N,
+                search_to_mm=wiring.limits.position_max_mm,
+            ),
+            *tracks,
+            Retract(clearance_mm=5.0, speed_mm_s=min(10.0, wiring.limits.retract_speed_mm_s)),
+            Hold(duration_s=0.2),
+        ),
+    )
+
+
+def design_for(wiring: Wiring) -> Design:
+    """What the gains are designed for on this bench."""
+    axis, loop = wiring.axis, wiring.loop
+    # Known for a sensor as fast as the loop; a slower one holds each sample for longer, on average this much.
+    slower_s = max(0.0, 1 / SENSOR_HZ.get(wiring.force.product, wiring.force.rate_Hz) - 1 / loop.rate_Hz)
+    return Design(
+        axis.bandwidth_Hz,
+        axis.delay_ms * 1e-3 + slower_s,
+        loop.crossover_Hz,
+        loop.phase_margin_deg,
+        drift_Hz=loop.drift_Hz,
+    )
+
+
+def force_law(model: Model, wiring: Wiring, choice: Choice, adapt: bool) -> TrackForce:
+    """A track step with its gains, without a reference of its own yet."""
+    design = design_for(wiring)
+    if choice == "admittance":  # plain: one integral and nothing else
+        design = replace(design, drift_Hz=0.0)
+    deepest_mm = model.valid.depth_mm
+    depths = [float(depth) for depth in np.linspace(0.0, deepest_mm, GAIN_ROWS)]
+    speed_mm_s = min(TRACK_MM_S, wiring.limits.speed_mm_s)
+    ahead = choice != "admittance"
+    return TrackForce(
+        times_s=(0.0, 1.0),
+        forces_N=(CONTACT_N, CONTACT_N),
+        gains=schedule(model, design, depths, choice),
+        damping_N_s_mm=model.damping_N_s_mm,
+        lag_s=design.lag_s if ahead else 0.0,
+        ahead_mm_s=AHEAD_SHARE * speed_mm_s if ahead else 0.0,
+        forgetting=FORGETTING if adapt else 0.0,
+        drift_Hz=design.drift_Hz,
+        speed_limit_mm_s=speed_mm_s,
+        search_speed_mm_s=min(APPROACH_MM_S, wiring.limits.speed_mm_s),
+        contact_force_N=CONTACT_N,
+    )
+
+
+def refuse_unreachable(reference: Reference, model: Model, wiring: Wiring) -> None:
+    """Raises UsageError where the reference leaves contact or model, or asks more of the axis than it can."""
+    least_N = min(reference.forces_N)
+    if least_N < CONTACT_N:
+        raise UsageError(f"reference {reference.name} falls to {least_N:g} N, below the contact force {CONTACT_N:g} N")
+    model.check_force(max(reference.forces_N))
+    highest_Hz = 0.5 * wiring.axis.bandwidth_Hz
+    if reference.frequency_Hz > highest_Hz:
+        raise UsageError(
+            f"reference {reference.name}: {reference.frequency_Hz:g} Hz is above half the axis' bandwidth,"
+            f" {highest_Hz:g} Hz"
+        )
+    if not reference.duration_s > 0:
+        raise UsageError(f"reference {reference.name} lasts {reference.duration_s:g} s; it must last longer than 0 s")
+    _refuse_fast(reference, model, AHEAD_SHARE * min(TRACK_MM_S, wiring.limits.speed_mm_s))
+
+
+def _refuse_fast(reference: Reference, model: Model, limit_mm_s: float) -> None:
+    """Lines, not jumps: a jump is spread at the speed there is, a line is meant to be followed."""
+    lines = zip(pairwise(reference.times_s), pairwise(reference.forces_N), strict=True)
+    fastest = max((_speed(model, a, b, t1 - t0) for (t0, t1), (a, b) in lines if t1 > t0 and a != b), default=0.0)
+    if fastest > limit_mm_s:
+        raise UsageError(
+            f"reference {reference.name} needs {fastest:.1f} mm/s on this tissue, above the {limit_mm_s:g} mm/s of the"
+            " force loop: make it slower or smaller"
+        )
+
+
+def _speed(model: Model, from_N: float, to_N: float, duration_s: float) -> float:
+    """Largest speed [mm/s] along a straight line of force; soft tissue near contact needs the most."""
+    depths = [model.depth_mm(float(force_N)) for force_N in np.linspace(from_N, to_N, LINE_PARTS + 1)]
+    return max(abs(b - a) for a, b in pairwise(depths)) * LINE_PARTS / duration_s
+
+
+def _levels(forces_N: Sequence[float], seconds: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    times = tuple(at * seconds for level in range(len(forces_N)) for at in (level, level + 1))
+    return times, tuple(force_N for force_N in forces_N for _ in range(2))
+
+
+def plateaus(time_s: Column, reference_N: Column, force_N: Column, mode: NDArray[np.int64]) -> tuple[Plateau, ...]:
+    """Given and actual force per level of the reference, from columns of the loop stream.
+
+    The actual force is the mean over SMOOTH_S, so that what counts is the tissue's load and not the sensor's noise.
+    Raises DataError where the recording has no force tracking.
+    """
+    on = mode == Mode.CONTACT
+    if not on.any():
+        raise DataError("the recording has no force tracking: no row is in contact mode")
+    time_s, reference_N, force_N = time_s[on], reference_N[on], force_N[on]
+    period_s = float(np.median(np.diff(time_s)))
+    smooth_N = _moving_mean(force_N, max(1, round(SMOOTH_S / period_s)))
+    edges = [0, *(np.flatnonzero(np.abs(np.diff(reference_N)) > 0) + 1), len(time_s)]
+    spans = [(start, end) for start, end in pairwise(edges) if time_s[end - 1] - time_s[start] > SETTLE_S]
+    return tuple(_plateau(time_s[a:b], float(reference_N[a]), smooth_N[a:b]) for a, b in spans)
+
+
+@dataclass(frozen=True)
+class Followed:
+    """How well force followed a moving reference, over all contact after LEAD_HOLD_S.
+
+    ``amplitude_ratio`` and ``lag_s`` are those at the reference's strongest frequency; None where it has none.
+    """
+
+    rms_error_N: float
+    largest_error_N: float
+    amplitude_ratio: float | None
+    lag_s: float | None
+
+
+def followed(time_s: Column, reference_N: Column, force_N: Column, mode: NDArray[np.int64]) -> Followed:
+    """The whole run at once, from columns of the loop stream; raises DataError where the recording has no tracking."""
+    on = (mode == Mode.CONTACT) & np.isfinite(reference_N)
+    if not on.any():
+        raise DataError("the recording has no force tracking: no row is in contact mode")
+    time_s, reference_N, force_N = time_s[on], reference_N[on], force_N[on]
+    error_N = (force_N - reference_N)[time_s > time_s[0] + LEAD_HOLD_S]
+    ratio = _ratio(time_s[len(time_s) // 3 :], reference_N[len(time_s) // 3 :], force_N[len(time_s) // 3 :])
+    return Followed(float(np.sqrt(np.mean(error_N**2))), float(np.max(np.abs(error_N))), *ratio)
+
+
+def _ratio(time_s: Column, reference_N: Column, force_N: Column) -> tuple[float | None, float | None]:
+    """Amplitude ratio and lag [s] at the strongest frequency of the reference above LEAST_HZ."""
+    grid_s = np.arange(time_s[0], time_s[-1], 1e-3)
+    window = np.hanning(len(grid_s))
+    given, actual = (np.interp(grid_s, time_s, signal) for signal in (reference_N, force_N))
+    spectra = [np.fft.rfft((signal - np.mean(signal)) * window) for signal in (given, actual)]
+    frequency_Hz = np.fft.rfftfreq(len(grid_s), 1e-3)
+    strength = np.where(frequency_Hz > LEAST_HZ, np.abs(spectra[0]), 0.0)
+    at = int(np.argmax(strength))
+    if strength[at] * 4 / len(grid_s) < LEAST_AMPLITUDE_N:
+        return None, None
+    transfer = complex(spectra[1][at] / spectra[0][at])
+    return abs(transfer), float(-np.angle(transfer) / (2 * np.pi * frequency_Hz[at]))
+
+
+def _plateau(time_s: Column, given_N: float, force_N: Column) -> Plateau:
+    steady = force_N[time_s - time_s[0] >= SETTLE_S]
+    error_N = steady - given_N
+    largest_N = float(np.max(np.abs(error_N)))
+    return Plateau(
+        given_N=given_N,
+        actual_N=float(np.mean(steady)),
+        error_N=float(np.mean(error_N)),
+        error_percent=100 * float(np.mean(error_N)) / given_N,
+        max_error_N=largest_N,
+        max_error_percent=100 * largest_N / given_N,
+        rms_error_N=float(np.sqrt(np.mean(error_N**2))),
+        overshoot_percent=100 * max(0.0, float(np.max(force_N)) / given_N - 1),
+        settling_s=_settling(time_s, np.abs(force_N - given_N) <= max(0.02 * given_N, 0.02)),
+    )
+
+
+def _settling(time_s: Column, inside: NDArray[np.bool_]) -> float | None:
+    outside = np.flatnonzero(~inside)
+    if len(outside) == 0:
+        return 0.0
+    return None if outside[-1] == len(inside) - 1 else float(time_s[outside[-1] + 1] - time_s[0])
+
+
+def _moving_mean(values: Column, width: int) -> Column:
+    padded = np.concatenate([np.full(width - 1, values[0]), values])
+    return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
+
+
+def summary(levels: Sequence[Plateau]) -> dict[str, object]:
+    """The tracking result as JSON: overall figures and one row a level."""
+    return {
+        "max_error_percent": max((level.max_error_percent for level in levels), default=None),
+        "rms_error_N": float(np.sqrt(np.mean([level.rms_error_N**2 for level in levels]))) if levels else None,
+        "levels": [asdict(level) for level in levels],
+    }

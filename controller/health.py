@@ -1,0 +1,56 @@
+"""Health of one stream in three bits: alive (young enough), valid (the device vouches for it), on rate."""
+
+from dataclasses import dataclass
+
+NEVER_NS = 1 << 62
+ALIVE, VALID, ON_RATE = 1, 2, 4
+FROZEN_SAMPLES = 100
+RATE_TOLERANCE = 0.2
+
+
+@dataclass(slots=True)
+class StreamHealth:
+    """Watches one stream; ``update`` is called once a sample, the rest once a tick."""
+
+    period_ns: int
+    stale_ns: int
+    valid: bool = False
+    identical: int = 0
+    _last_arrival_ns: int = -NEVER_NS
+    _last_capture_ns: int = -NEVER_NS
+    _mean_period_ns: float = 0.0
+    _last_value: object = None
+
+    def update(self, capture_ns: int, arrival_ns: int, valid: bool, value: object) -> None:
+        """Takes note of one sample; ``value`` is what must not stay the same for ever."""
+        if self._last_capture_ns > -NEVER_NS:
+            step_ns = capture_ns - self._last_capture_ns
+            self._mean_period_ns += 0.02 * (step_ns - self._mean_period_ns)
+        else:
+            self._mean_period_ns = self.period_ns
+        self._last_capture_ns, self._last_arrival_ns, self.valid = capture_ns, arrival_ns, valid
+        self.identical = self.identical + 1 if value == self._last_value else 0
+        self._last_value = value
+
+    def age_ns(self, now_ns: int) -> int:
+        """Since the newest sample was taken; a huge number before the first."""
+        return now_ns - self._last_capture_ns
+
+    def alive(self, now_ns: int) -> bool:
+        """Whether the newest sample still counts."""
+        return self.age_ns(now_ns) < self.stale_ns
+
+    @property
+    def frozen(self) -> bool:
+        """The same value too often in a row for a converter with noise."""
+        return self.identical >= FROZEN_SAMPLES
+
+    @property
+    def rate_Hz(self) -> float:
+        """Mean rate of the last fifty samples or so."""
+        return 1e9 / self._mean_period_ns if self._mean_period_ns > 0 else 0.0
+
+    def bits(self, now_ns: int) -> int:
+        """The three bits."""
+        on_rate = abs(self._mean_period_ns - self.period_ns) < RATE_TOLERANCE * self.period_ns
+        return ALIVE * self.alive(now_ns) | VALID * self.valid | ON_RATE * on_rate

@@ -1,0 +1,67 @@
+"""The loop's own process: ``python -m controller.loop_process WIRING_JSON RING_PATH SOCKET_FD``.
+
+It owns the devices, says ``ready`` with their identities (or ``failed`` with one sentence), then runs until it is told
+to leave or left alone. Whatever happens, the devices are closed, which stops the axis.
+"""
+
+import signal
+import socket
+import sys
+import time
+from dataclasses import asdict
+from pathlib import Path
+
+from controller import realtime
+from controller.bench_loop import BenchLoop
+from controller.commands import Inbox
+from controller.devices import Devices, start_devices
+from controller.link import Link
+from controller.loop import Executive
+from rig.config.wiring import Wiring
+from rig.errors import RigError
+from rig.recording.ring import RingWriter
+
+
+def main(arguments: list[str]) -> int:
+    """Runs the loop; 0 after an orderly end, 1 after a failure that was reported over the link."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    wiring = Wiring.model_validate_json(arguments[0])
+    link = Link(socket.socket(fileno=int(arguments[2])))
+    try:
+        _serve(wiring, Path(arguments[1]), link)
+    except RigError as error:
+        link.send({"failed": str(error)})
+        return 1
+    except Exception as error:  # the last word of a dying process: named, sent, and the devices are closed by then
+        link.send({"failed": f"the loop met an error of its own: {type(error).__name__}: {error}"})
+        raise
+    finally:
+        link.close()
+    return 0
+
+
+def _serve(wiring: Wiring, ring_path: Path, link: Link) -> None:
+    # Memory and privileges first: from the axis' start on, the drive counts the time between our heartbeats.
+    ring = RingWriter.create(ring_path)
+    try:
+        granted = realtime.acquire(wiring.loop.priority)
+        devices = start_devices(wiring)
+        try:
+            devices.axis.home()
+            devices.axis.enable()
+            _run(wiring, devices, ring, link, granted)
+        finally:
+            devices.close()
+    finally:
+        ring.close()
+
+
+def _run(wiring: Wiring, devices: Devices, ring: RingWriter, link: Link, granted: dict[str, str]) -> None:
+    identities = {role: asdict(device.identity) for role, device in devices.by_role().items()}
+    link.send({"ready": {"devices": identities, "realtime": granted, "ring": str(ring.path)}})
+    loop = BenchLoop(wiring, devices, ring, link, Inbox(link), time.monotonic_ns)
+    Executive(round(1e9 / wiring.loop.rate_Hz)).run(loop.tick)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

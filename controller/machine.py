@@ -1,0 +1,143 @@
+"""The state machine of one tick: run the program's step, or be safe. Pure but for the world it owns.
+
+IDLE -> (program) -> FREE / APPROACH / COMPRESS / CONTACT / RETRACT -> IDLE
+any  -> (soft stop) -> RETRACT -> SAFE;   any -> (immediate stop) -> SAFE;   SAFE -> (reset) -> IDLE
+"""
+
+import math
+from collections.abc import Callable
+
+from controller.modes import Mode
+from controller.motion import Setpoint, arrived, toward
+from controller.safety import Action, Incident, Watch, judge
+from controller.steps import Program, Run
+from controller.world import World
+from rig.config.wiring import Wiring
+from rig.errors import SafetyStop
+
+SAFE_CLEARANCE_MM = 10.0
+MOVING = (Mode.FREE, Mode.APPROACH, Mode.COMPRESS, Mode.CONTACT, Mode.RETRACT)
+
+
+class Machine:
+    """Decides mode and set-point every tick; ``finished`` is called once a program with its outcome."""
+
+    def __init__(self, wiring: Wiring, world: World, finished: Callable[[str, Incident | None], None]) -> None:
+        self._wiring, self.world, self._finished = wiring, world, finished
+        self.mode = Mode.IDLE
+        self.latched: Incident | None = None
+        self.step_index = -1
+        self._program: Program | None = None
+        self._run: Run | None = None
+        self._step_start_ns = 0
+        self._escape_mm = math.nan
+
+    @property
+    def busy(self) -> bool:
+        """Whether a program or a retraction is under way."""
+        return self._program is not None or self.mode in MOVING
+
+    def start(self, program: Program) -> None:
+        """Begins a program at the present position."""
+        world = self.world
+        world.setpoint = self._here()
+        world.surface_mm = world.reference_N = world.tangent_N_mm = math.nan
+        world.peak_force_N, world.outcome, world.memory = 0.0, "", None
+        self._program = program
+        self._enter(0)
+
+    def acknowledge(self) -> None:
+        """Leaves SAFE once the cause was looked at."""
+        if self.mode is Mode.SAFE:
+            self.mode, self.latched = Mode.IDLE, None
+            self.world.setpoint = self._here()
+
+    def _here(self) -> Setpoint:
+        """The present position; at the end of the workspace the encoder's last count may lie beyond it."""
+        limits = self._wiring.limits
+        return Setpoint(min(max(self.world.position_mm, limits.position_min_mm), limits.position_max_mm), 0.0)
+
+    def update(self, watch: Watch) -> Incident | None:
+        """One tick; returns the incident that has just stopped motion, if any."""
+        watch.mode = self.mode
+        incident = self._judge(watch)
+        if incident:
+            self._stop(incident)
+        elif self.latched:
+            self._escape()
+        elif self._run:
+            incident = self._advance()
+        return incident
+
+    def _judge(self, watch: Watch) -> Incident | None:
+        if self.mode not in MOVING and "estop" not in watch.requests:
+            return None
+        least = Action.IMMEDIATE if self.latched else Action.SOFT
+        return judge(self.world, watch, self._wiring, least)
+
+    def _stop(self, incident: Incident) -> None:
+        self.latched = incident
+        self._end(incident.code, incident)
+        if incident.action is Action.IMMEDIATE:
+            self.mode = Mode.SAFE
+            return
+        self.mode = Mode.RETRACT
+        world = self.world
+        outermost_mm = world.setpoint.position_mm if math.isnan(world.surface_mm) else world.surface_mm
+        nearer_mm = min(outermost_mm, world.setpoint.position_mm)
+        self._escape_mm = max(nearer_mm - SAFE_CLEARANCE_MM, self._wiring.limits.position_min_mm)
+
+    def _escape(self) -> None:
+        if self.mode is not Mode.RETRACT:
+            return
+        world, limits = self.world, self._wiring.limits
+        world.reference_N = world.tangent_N_mm = math.nan
+        world.setpoint = toward(
+            world.setpoint, self._escape_mm, limits.retract_speed_mm_s, world.acceleration_mm_s2, world.dt_s
+        )
+        if arrived(world.setpoint, self._escape_mm):
+            self.mode = Mode.SAFE
+
+    def _advance(self) -> Incident | None:
+        world = self.world
+        world.peak_force_N = max(world.peak_force_N, world.force_N)
+        assert self._run and self._program
+        try:
+            over = self._run.advance(world, (world.now_ns - self._step_start_ns) * 1e-9)
+        except SafetyStop as stop:
+            refused = Incident(Action.SOFT, "protocol", str(stop))
+            self._stop(refused)
+            return refused
+        incident = self._outside()
+        if incident:
+            self._stop(incident)
+        elif over:
+            self._enter(self.step_index + 1)
+        return incident
+
+    def _outside(self) -> Incident | None:
+        """A step that leads out of the workspace is stopped before the drive is asked to go there."""
+        wanted_mm = self.world.setpoint.position_mm
+        low_mm, high_mm = self._wiring.limits.position_min_mm, self._wiring.limits.position_max_mm
+        if low_mm <= wanted_mm <= high_mm:
+            return None
+        self.world.setpoint = Setpoint(min(max(wanted_mm, low_mm), high_mm), 0.0)
+        text = f"the program leads to {wanted_mm:.2f} mm, outside {low_mm:g} to {high_mm:g} mm"
+        return Incident(Action.SOFT, "workspace", text)
+
+    def _enter(self, index: int) -> None:
+        assert self._program
+        if index == len(self._program.steps):
+            self.mode = Mode.IDLE
+            self._end(self.world.outcome or "complete", None)
+            return
+        step = self._program.steps[index]
+        self._run, self.mode, self.step_index = step.begin(), step.mode, index
+        self._step_start_ns = self.world.now_ns
+
+    def _end(self, outcome: str, incident: Incident | None) -> None:
+        had_program = self._program is not None
+        self._program = self._run = None
+        self.step_index = -1
+        if had_program:
+            self._finished(outcome, incident)

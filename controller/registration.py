@@ -1,0 +1,91 @@
+"""Where the limb is in the robot's frame, from the tracker: tool 0 rides on the tip, tool 1 on the limb.
+
+While the axis travels its first millimetres, the tip's marker draws a line in the tracker's frame; least squares of
+marker on axis position give its direction n. Then arm - tip + n x stays the same as long as the limb does not move
+against the robot, wherever the axis is and however the camera is carried (its rotation apart).
+"""
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+LEAST_TRAVEL_MM = 8.0
+LEAST_FRAMES = 20
+SMOOTH_FRAMES = 6
+HISTORY = 1000
+
+
+class Point(NamedTuple):
+    """A place in the tracker's frame."""
+
+    x_mm: float
+    y_mm: float
+    z_mm: float
+
+
+class Registration:
+    """Fed with axis samples and tracker frames; ``moved_mm`` is NaN until the axis has travelled far enough."""
+
+    def __init__(self) -> None:
+        self._axis: deque[tuple[int, float]] = deque(maxlen=HISTORY)
+        self.begin()
+
+    def begin(self) -> None:
+        """A new program: where the limb is from now on is where it should be."""
+        self.moved_mm = math.nan
+        self._count = 0
+        self._mean_mm = 0.0
+        self._means = [0.0, 0.0, 0.0]
+        self._spread = 0.0
+        self._with = [0.0, 0.0, 0.0]
+        self._low_mm, self._high_mm = math.inf, -math.inf
+        self._tip: tuple[int, Point, float] | None = None
+        self._home: Point | None = None
+        self._recent: deque[Point] = deque(maxlen=SMOOTH_FRAMES)
+
+    def axis(self, capture_ns: int, position_mm: float) -> None:
+        """One sample of the axis."""
+        self._axis.append((capture_ns, position_mm))
+
+    def tip(self, frame: int, capture_ns: int, at: Point) -> None:
+        """The tip's marker in one frame."""
+        position_mm = self._position(capture_ns)
+        if position_mm is None:
+            return
+        self._tip = (frame, at, position_mm)
+        if self.registered:  # what comes after may be a camera that was pushed
+            return
+        self._count += 1
+        change_mm = position_mm - self._mean_mm
+        self._mean_mm += change_mm / self._count
+        rest_mm = position_mm - self._mean_mm
+        self._spread += change_mm * rest_mm
+        for axis, value in enumerate(at):
+            self._means[axis] += (value - self._means[axis]) / self._count
+            self._with[axis] += change_mm * (value - self._means[axis])
+        self._low_mm, self._high_mm = min(self._low_mm, position_mm), max(self._high_mm, position_mm)
+
+    def arm(self, frame: int, at: Point) -> None:
+        """The limb's marker in the same frame."""
+        if self._tip is None or self._tip[0] != frame or not self.registered:
+            return
+        _, tip, position_mm = self._tip
+        relative = (a - t + w / self._spread * position_mm for a, t, w in zip(at, tip, self._with, strict=True))
+        self._recent.append(Point(*relative))
+        if len(self._recent) < SMOOTH_FRAMES:
+            return
+        now = Point(*(sum(axis) / SMOOTH_FRAMES for axis in zip(*self._recent, strict=True)))
+        self._home = self._home or now
+        self.moved_mm = math.dist(now, self._home)
+
+    @property
+    def registered(self) -> bool:
+        """Whether the axis' direction is known."""
+        return self._count >= LEAST_FRAMES and self._high_mm - self._low_mm >= LEAST_TRAVEL_MM
+
+    def _position(self, capture_ns: int) -> float | None:
+        """The axis when the frame was taken: the last sample at or before it."""
+        for sampled_ns, position_mm in reversed(self._axis):
+            if sampled_ns <= capture_ns:
+                return position_mm
+        return None

@@ -1,0 +1,301 @@
+"""The steps a protocol is made of: data that can be checked before anything moves, and executed one tick at a time.
+
+``advance(world, elapsed_s)`` sets the next set-point and says whether the step is over; it never waits.
+"""
+
+import math
+from statistics import fmean, pstdev
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from controller import force_position
+from controller.force_position import GainRow, Settings
+from controller.modes import Mode
+from controller.motion import Setpoint, arrived, clamp, toward
+from controller.world import World
+from rig.config.table import Table
+from rig.errors import SafetyStop
+
+Positive = Annotated[float, Field(gt=0)]
+CONTACT_SAMPLES = 3
+CONTACT_NOISE = 4.0
+LARGEST_ZERO_SHIFT_N = 0.5
+
+
+class Zero(Table):
+    """Rests in the air and takes the mean force as zero; the first one of a session is the reference."""
+
+    step: Literal["zero"] = "zero"
+    mode: ClassVar[Mode] = Mode.FREE
+    duration_s: Positive
+
+    def begin(self) -> "ZeroRun":
+        """A run of this step."""
+        return ZeroRun(self)
+
+
+class ZeroRun:
+    """Collects the raw force while resting, each sample once however often the loop turns."""
+
+    def __init__(self, step: Zero) -> None:
+        self._step, self._seen = step, -1
+        self._values_N: list[float] = []
+
+    def advance(self, world: World, elapsed_s: float) -> bool:
+        """Stands still; at the end sets zero and noise, refusing a zero far from the first."""
+        if world.force_samples != self._seen:
+            self._seen = world.force_samples
+            self._values_N.append(world.raw_N)
+        if elapsed_s < self._step.duration_s:
+            return False
+        zero_N = fmean(self._values_N)
+        world.noise_N = pstdev(self._values_N, zero_N)
+        if math.isnan(world.first_zero_N):
+            world.first_zero_N = zero_N
+        elif abs(zero_N - world.first_zero_N) > LARGEST_ZERO_SHIFT_N:
+            raise SafetyStop(
+                f"force in the air moved by {zero_N - world.first_zero_N:+.2f} N since the first zero"
+                f" (limit {LARGEST_ZERO_SHIFT_N:g} N): is the tip touching, or the sensor drifting?"
+            )
+        world.zero_N = zero_N
+        return True
+
+
+class MoveTo(Table):
+    """Moves in the air to an axis position."""
+
+    step: Literal["move"] = "move"
+    mode: ClassVar[Mode] = Mode.FREE
+    position_mm: float
+    speed_mm_s: Positive
+
+    def begin(self) -> "MoveTo":
+        """Keeps nothing between ticks."""
+        return self
+
+    def advance(self, world: World, elapsed_s: float) -> bool:  # noqa: ARG002
+        """One tick of the move."""
+        return _go(world, self.position_mm, self.speed_mm_s)
+
+
+class Approach(Table):
+    """Moves down until the force says contact; the position there is the surface."""
+
+    step: Literal["approach"] = "approach"
+    mode: ClassVar[Mode] = Mode.APPROACH
+    speed_mm_s: Positive
+    contact_force_N: Positive
+    search_to_mm: float
+
+    def begin(self) -> "ApproachRun":
+        """A run of this step."""
+        return ApproachRun(self)
+
+
+class ApproachRun:
+    """Counts consecutive samples above the threshold: one spike is not contact, and neither is the sensor's noise."""
+
+    def __init__(self, step: Approach) -> None:
+        self._step, self._above, self._seen = step, 0, -1
+
+    def advance(self, world: World, elapsed_s: float) -> bool:  # noqa: ARG002
+        """One tick of the search; raises SafetyStop where it ends without contact."""
+        if world.force_samples != self._seen:
+            self._seen = world.force_samples
+            threshold_N = max(self._step.contact_force_N, CONTACT_NOISE * world.noise_N)
+            self._above = self._above + 1 if world.force_N > threshold_N else 0
+        if self._above >= CONTACT_SAMPLES:
+            world.surface_mm, world.memory = world.position_mm, None
+            world.setpoint = Setpoint(world.setpoint.position_mm, 0.0)
+            return True
+        if _go(world, self._step.search_to_mm, self._step.speed_mm_s):
+            raise SafetyStop(
+                f"no contact down to {self._step.search_to_mm:g} mm (threshold {self._step.contact_force_N:g} N):"
+                " is the limb under the tip? raise search_to_mm if the surface lies deeper"
+            )
+        return False
+
+
+class Compress(Table):
+    """Moves to a depth below the surface at constant speed; ends early at the force limit."""
+
+    step: Literal["compress"] = "compress"
+    mode: ClassVar[Mode] = Mode.COMPRESS
+    depth_mm: float
+    speed_mm_s: Positive
+    force_limit_N: Positive
+
+    def begin(self) -> "Compress":
+        """Keeps nothing between ticks."""
+        return self
+
+    def advance(self, world: World, elapsed_s: float) -> bool:  # noqa: ARG002
+        """One tick; the limit of force ends the step where it is."""
+        if world.force_N > self.force_limit_N:
+            world.outcome = "force limit"
+            world.setpoint = Setpoint(world.setpoint.position_mm, 0.0)
+            return True
+        return _go(world, world.surface_mm + self.depth_mm, self.speed_mm_s)
+
+
+class Hold(Table):
+    """Keeps the set-point."""
+
+    step: Literal["hold"] = "hold"
+    mode: ClassVar[Mode] = Mode.COMPRESS
+    duration_s: Annotated[float, Field(ge=0)]
+
+    def begin(self) -> "Hold":
+        """Keeps nothing between ticks."""
+        return self
+
+    def advance(self, world: World, elapsed_s: float) -> bool:  # noqa: ARG002
+        """Stands still."""
+        return elapsed_s >= self.duration_s
+
+
+class Dither(Table):
+    """A sine of position around the present set-point, whole periods, starting and ending without a jump."""
+
+    step: Literal["dither"] = "dither"
+    mode: ClassVar[Mode] = Mode.COMPRESS
+    amplitude_mm: Positive
+    frequency_Hz: Positive
+    duration_s: Positive
+
+    def begin(self) -> "DitherRun":
+        """A run of this step."""
+        return DitherRun(self)
+
+
+class DitherRun:
+    """Remembers the centre."""
+
+    def __init__(self, step: Dither) -> None:
+        self._step, self._centre_mm = step, math.nan
+        self._end_s = math.ceil(step.duration_s * step.frequency_Hz) / step.frequency_Hz
+
+    def advance(self, world: World, elapsed_s: float) -> bool:
+        """One tick of the sine."""
+        if math.isnan(self._centre_mm):
+            self._centre_mm = world.setpoint.position_mm
+        if elapsed_s >= self._end_s:
+            world.setpoint = Setpoint(self._centre_mm, 0.0)
+            return True
+        omega = 2 * math.pi * self._step.frequency_Hz
+        swing_mm = self._step.amplitude_mm * math.sin(omega * elapsed_s)
+        world.setpoint = Setpoint(self._centre_mm + swing_mm, 0.0)
+        return False
+
+
+class TrackForce(Table):
+    """Follows a force: a list of (seconds, newtons) joined by straight lines, played ``repeats`` times.
+
+    The law goes on where the track step before it ended.
+    """
+
+    step: Literal["track"] = "track"
+    mode: ClassVar[Mode] = Mode.CONTACT
+    times_s: tuple[Annotated[float, Field(ge=0)], ...] = Field(min_length=2)
+    forces_N: tuple[Annotated[float, Field(ge=0)], ...] = Field(min_length=2)
+    repeats: int = Field(default=1, ge=1)
+    gains: tuple[GainRow, ...] = Field(min_length=2)
+    damping_N_s_mm: Annotated[float, Field(ge=0)] = 0.0
+    lag_s: Annotated[float, Field(ge=0)] = 0.0
+    ahead_mm_s: float = Field(default=24.0, ge=0, description="speed of the inverse model; 0: it is not used")
+    forgetting: float = Field(default=0.0, ge=0, lt=1, description="0: stiffness is not adapted")
+    drift_Hz: float = Field(default=0.0, ge=0, description="corner of the second integral; 0: none")
+    speed_limit_mm_s: Positive = 30.0
+    search_speed_mm_s: Positive = 5.0
+    contact_force_N: Positive = 0.1
+
+    @property
+    def settings(self) -> Settings:
+        """What of this step the law wants to know; the surface is believed to move no faster than the search."""
+        drift_1_s = 2 * math.pi * self.drift_Hz
+        return Settings(
+            self.damping_N_s_mm, self.lag_s, self.ahead_mm_s, self.forgetting, drift_1_s, self.search_speed_mm_s
+        )
+
+    def begin(self) -> "TrackForceRun":
+        """A run of this step."""
+        return TrackForceRun(self)
+
+
+class TrackForceRun:
+    """The force loop; below the contact threshold it only searches, slowly."""
+
+    def __init__(self, step: TrackForce) -> None:
+        self._step, self._at, self._begun = step, 0, 0
+        self._table = force_position.columns(step.gains)
+        self._settings = step.settings
+
+    def advance(self, world: World, elapsed_s: float) -> bool:
+        """One tick of the force loop around the position loop."""
+        step = self._step
+        world.reference_N = self._reference(elapsed_s)
+        over = elapsed_s >= step.times_s[-1] * step.repeats
+        if world.force_late:  # an old force corrected again and again is how a stall becomes a push
+            world.setpoint = Setpoint(world.setpoint.position_mm, 0.0)
+            return over
+        if world.memory is None:
+            world.memory = force_position.begin(self._table, world.force_N, world.depth_mm)
+        delta_mm, world.memory = force_position.increment(
+            world.memory, self._table, self._settings, world.reference_N, world.force_N, world.depth_mm, world.dt_s
+        )
+        world.tangent_N_mm = world.memory.tangent_N_mm
+        lost = world.force_N < 0.5 * step.contact_force_N < world.reference_N
+        limit_mm = (step.search_speed_mm_s if lost else step.speed_limit_mm_s) * world.dt_s
+        delta_mm = clamp(delta_mm, 0.0, limit_mm)
+        world.setpoint = Setpoint(world.setpoint.position_mm + delta_mm, delta_mm / world.dt_s)
+        return over
+
+    def _reference(self, elapsed_s: float) -> float:
+        times, forces, length_s = self._step.times_s, self._step.forces_N, self._step.times_s[-1]
+        played = min(int(elapsed_s / length_s), self._step.repeats - 1)
+        if played != self._begun:
+            self._begun, self._at = played, 0
+        elapsed_s -= played * length_s
+        while self._at + 2 < len(times) and elapsed_s >= times[self._at + 1]:
+            self._at += 1
+        start_s, end_s = times[self._at], times[self._at + 1]
+        share = min(max((elapsed_s - start_s) / (end_s - start_s), 0.0), 1.0) if end_s > start_s else 1.0
+        return forces[self._at] + share * (forces[self._at + 1] - forces[self._at])
+
+
+class Retract(Table):
+    """Moves out to a clearance above the surface."""
+
+    step: Literal["retract"] = "retract"
+    mode: ClassVar[Mode] = Mode.RETRACT
+    clearance_mm: Positive
+    speed_mm_s: Positive
+    floor_mm: float = 0.0
+
+    def begin(self) -> "Retract":
+        """Keeps nothing between ticks."""
+        return self
+
+    def advance(self, world: World, elapsed_s: float) -> bool:  # noqa: ARG002
+        """One tick of the way out; without a surface it leaves from where it is."""
+        world.reference_N = world.tangent_N_mm = math.nan
+        world.memory = None
+        surface_mm = world.setpoint.position_mm if math.isnan(world.surface_mm) else world.surface_mm
+        return _go(world, max(surface_mm - self.clearance_mm, self.floor_mm), self.speed_mm_s)
+
+
+Step = Zero | MoveTo | Approach | Compress | Hold | Dither | TrackForce | Retract
+Run = ZeroRun | MoveTo | ApproachRun | Compress | Hold | DitherRun | TrackForceRun | Retract
+
+
+class Program(Table):
+    """Steps executed one after the other by the loop."""
+
+    name: str
+    steps: tuple[Annotated[Step, Field(discriminator="step")], ...] = Field(min_length=1)
+
+
+def _go(world: World, target_mm: float, speed_mm_s: float) -> bool:
+    world.setpoint = toward(world.setpoint, target_mm, speed_mm_s, world.acceleration_mm_s2, world.dt_s)
+    return arrived(world.setpoint, target_mm)
