@@ -1,0 +1,181 @@
+"""`rig simulate`: a reference on a tissue model, before anything real moves; `rig threshold`: the subject's limit."""
+
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from api.cli import live
+from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
+from api.cli.output import console, table, write_json
+from api.cli.stage import bench_for
+from controller import simulated
+from controller.experiments import comparison, tracked, tracking
+from controller.experiments import threshold as experiment
+from controller.experiments.references import named
+from controller.force_position import GainRow
+from controller.gains import Choice, margins
+from controller.modes import Mode
+from controller.operation import Operation
+from controller.simulated import SimulatedBench, Trace, limb_of
+from controller.steps import TrackForce
+from controller.supervisor import Supervisor
+from rig.config.wiring import Wiring
+from rig.errors import DataError
+from rig.report.drawing import png, svg
+from rig.tissue.model import Model, load_model
+
+SHOWN_N = (0.5, 1.0, 2.0, 5.0, 10.0)
+
+
+def simulate(
+    model: Annotated[Path, typer.Option("--model", help="model.json as `rig fit` writes it.")],
+    reference: Annotated[
+        str, typer.Option("--reference", help="step:5, ramp:5, stairs:10, sine:0.5, press:3, knead:3, csv:FILE, ...")
+    ],
+    gains: Annotated[
+        str, typer.Option("--gains", help="tangent, secant, constant or admittance; else loop.gains.")
+    ] = "",
+    stiffness: Annotated[
+        float, typer.Option("--stiffness", min=0.1, max=10.0, help="How much stiffer the tissue is than the model.")
+    ] = 1.0,
+    breathing: Annotated[
+        float, typer.Option("--breathing", min=0.0, max=10.0, help="Amplitude in mm of the surface, at 0.25 Hz.")
+    ] = 0.0,
+    out: Annotated[Path, typer.Option("--out", help="Folder for the figures.")] = Path("simulation"),
+    config: ConfigOption = None,
+    overrides: SetOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Plays a reference on a virtual clock with the loop's own code, and draws force, displacement and effort.
+
+    Example: rig simulate --model sessions/first/fit/model.json --reference step:5 --json simulation.json
+    """
+    wiring, fitted, asked = wiring_from(config, overrides), load_model(model), named(reference)
+    choice: Choice = comparison.choices_from(gains)[0] if gains else wiring.loop.gains
+    program = tracked.plan_reference(asked, fitted, wiring, choice)
+    bench = SimulatedBench(limb_of(fitted, stiffness, breathing))
+    simulated.run(program, wiring, bench)  # compiles
+    began = time.perf_counter()
+    trace = simulated.run(program, wiring, bench)
+    took_s = time.perf_counter() - began
+    loop = _margins(fitted, wiring, choice, stiffness)
+    on = (trace.mode == Mode.CONTACT) & np.isfinite(trace.reference_N)
+    result: dict[str, object] = {
+        "reference": asked.name,
+        "gains": choice,
+        "jumps": [asdict(jump) for jump in _jumps(trace)],
+        "duration_s": float(trace.time_s[-1]),
+        "times_real_time": float(trace.time_s[-1] / took_s),
+        "rms_error_N": float(np.sqrt(np.mean((trace.force_N[on] - trace.reference_N[on]) ** 2))),
+        "peak_force_N": float(np.max(trace.force_N)),
+        "largest_voltage_V": float(np.max(np.abs(trace.voltage_V[on]))),
+        "margins": loop,
+    }
+    console.print(table(("force N", "tangent N/mm", "crossover Hz", "phase margin deg", "gain margin"), _rows(loop)))
+    console.print(
+        f"{asked.name}: rms error {result['rms_error_N']:.3f} N, peak {result['peak_force_N']:.2f} N,"
+        f" {result['times_real_time']:.0f} times real time",
+        highlight=False,
+    )
+    _draw(trace, bench, out, f"{asked.name}, {choice} gains")
+    _draw_bode(fitted, wiring, choice, stiffness, out)
+    console.print(f"simulation.svg, simulation.png and bode.svg are in {out}", highlight=False)
+    write_json(json_file, result)
+
+
+def _jumps(trace: Trace) -> tuple[comparison.Jump, ...]:
+    """What a jump of the reference leads to; none where it has no jump."""
+    try:
+        return comparison.jumps(trace.time_s, trace.reference_N, trace.sensed_N, trace.mode)
+    except DataError:
+        return ()
+
+
+def _law(model: Model, wiring: Wiring, choice: Choice) -> TrackForce:
+    return tracking.force_law(model, wiring, choice, adapt=False)
+
+
+def _margins(model: Model, wiring: Wiring, choice: Choice, stiffness: float) -> list[dict[str, float]]:
+    """Margins with the gains of each force, on tissue ``stiffness`` times as stiff as the model."""
+    design, found = tracking.design_for(wiring), []
+    for row in _shown(model, wiring, choice):
+        tangent = stiffness * model.tangent_N_mm(model.depth_mm(row.force_N))
+        loop = margins((row.proportional_mm_N, row.integral_mm_N_s), tangent, model.damping_N_s_mm, design)
+        found.append({"force_N": row.force_N, "tangent_N_mm": tangent, **loop._asdict()})
+    return found
+
+
+def _shown(model: Model, wiring: Wiring, choice: Choice) -> list[GainRow]:
+    rows = _law(model, wiring, choice).gains
+    forces = [force for force in SHOWN_N if force <= model.valid.force_N]
+    return [min(rows, key=lambda row: abs(row.force_N - force)) for force in forces]
+
+
+def _rows(loop: list[dict[str, float]]) -> list[tuple[str, ...]]:
+    return [
+        (
+            f"{row['force_N']:.2f}", f"{row['tangent_N_mm']:.2f}", f"{row['crossover_Hz']:.1f}",
+            f"{row['phase_deg']:.0f}", f"{row['gain']:.1f}",
+        )
+        for row in loop
+    ]  # fmt: skip
+
+
+def _draw(trace: Trace, bench: SimulatedBench, out: Path, title: str) -> None:
+    from rig.report.control_figures import Signals, run_figure  # noqa: PLC0415 - drawing takes a second to load
+
+    on = trace.mode == Mode.CONTACT
+    time_s = trace.time_s[on]
+    figure = run_figure(
+        Signals(
+            time_s - time_s[0], trace.reference_N[on], trace.force_N[on],
+            trace.position_mm[on] - bench.limb.surface_mm, trace.current_A[on], trace.voltage_V[on],
+        ),
+        title,
+    )  # fmt: skip
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "simulation.svg").write_text(svg(figure))
+    (out / "simulation.png").write_bytes(png(figure))
+
+
+def _draw_bode(model: Model, wiring: Wiring, choice: Choice, stiffness: float, out: Path) -> None:
+    from controller import linear  # noqa: PLC0415 - python-control loads slowly
+    from rig.report.control_figures import bode_figure  # noqa: PLC0415
+
+    design, curves = tracking.design_for(wiring), {}
+    for row in _shown(model, wiring, choice):
+        tangent = stiffness * model.tangent_N_mm(model.depth_mm(row.force_N))
+        loop = linear.bode(linear.open_loop(row, tangent, model.damping_N_s_mm, design))
+        curves[f"{row.force_N:.1f} N"] = (loop.frequency_Hz, loop.gain, loop.phase_deg)
+    (out / "bode.svg").write_text(svg(bode_figure(curves)))
+
+
+def threshold(
+    model: Annotated[Path, typer.Option("--model", help="model.json as `rig fit` writes it.")],
+    up_to: Annotated[float, typer.Option("--up-to", help="Force in N at which the ramp ends.")],
+    rate: Annotated[float, typer.Option("--rate", help="How fast force rises, N/s.")] = 0.5,
+    out: Annotated[Path, typer.Option("--out", help="Session folder of the recording; new or existing.")] = Path(
+        "threshold"
+    ),
+    config: ConfigOption = None,
+    overrides: SetOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Raises force slowly until the subject presses p, and prints the line of `rig.toml` that keeps it.
+
+    Example: rig threshold --model sessions/first/fit/model.json --up-to 10
+    """
+    wiring, fitted = wiring_from(config, overrides), load_model(model)
+    program = experiment.plan(up_to, rate, fitted, wiring)
+    with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
+        operation = Operation("threshold", total=1, unit="ramps")
+        found = live.run(bench, operation, lambda: experiment.run(bench, program, up_to, out, str(model)))
+    if found.force_N is None:
+        console.print(f"no pain stop up to {up_to:g} N: the threshold lies above", highlight=False)
+    else:
+        console.print(f"[subject]\npain_threshold_N = {found.force_N:.1f}", highlight=False, markup=False)
+    write_json(json_file, asdict(found))

@@ -1,0 +1,133 @@
+"""`rig demo`: the whole job on the mock bench, from capture to report, in under three minutes."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from api.cli import live
+from api.cli.motion import captured, say_levels
+from api.cli.options import built_in
+from api.cli.output import console, write_json
+from api.cli.science import fit_session
+from api.cli.stage import bench_for
+from controller.experiments import capture as experiment
+from controller.experiments import tracked
+from controller.experiments.tracked import Tracked
+from controller.operation import Operation
+from controller.supervisor import Supervisor
+from rig.config.protocol import Indentation
+from rig.errors import CheckFailed, UsageError
+from rig.recording.sessions import derive, open_session
+from rig.recording.verify import verify
+from rig.report.page import write_report
+from rig.tissue.model import load_model
+
+PLAN = Indentation(
+    name="demonstration",
+    trials=3,
+    air_dwell_s=0.3,
+    approach_speed_mm_s=6.0,
+    hold_s=0.4,
+    dither_amplitude_mm=0.3,
+    dither_s=0.4,
+    retract_speed_mm_s=20.0,
+    clearance_mm=4.0,
+    rest_s=0.1,
+)
+FORCES_N = (1.0, 2.0, 3.0, 4.0, 5.0)
+SECONDS = 3.0
+MODEL = Path("fit") / "model.json"
+SUMMARY, REPORT, SESSION = "summary.json", "report.html", "session"
+TrialsOption = Annotated[int, typer.Option(min=1, max=5, help="Trials at each speed.")]
+OutOption = Annotated[Path, typer.Option("--out", help="Folder for session, report and summary.")]
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What all recordings of the session hold and lost."""
+
+    recordings: int
+    samples: int
+    dropped: int
+    missed: int
+    ticks: int
+
+
+def demo(out: OutOption = Path("demo"), trials: TrialsOption = PLAN.trials) -> None:
+    """Does the whole job on the mock bench: capture, verify, fit, track, report.
+
+    Example: rig demo --out demo
+    """
+    _clear(out)
+    session, wiring = out / SESSION, built_in()
+    plan = PLAN.model_copy(update={"trials": trials})
+    experiment.check(plan, wiring)
+    with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
+        console.rule(f"capture: {len(plan.speeds_mm_s)} speeds, {trials} trials each")
+        captured(bench, plan, session)
+        console.rule("fit: constant stiffness against the index law")
+        fitted = fit_session(session)
+        console.rule("track: gains from the tangent stiffness of the model")
+        result = _track(bench, session)
+    say_levels(result)
+    console.rule("verify and report")
+    counts = _verified(session)
+    derive(session)
+    write_report(session, out / REPORT)
+    write_json(out / SUMMARY, _summary(counts, fitted, result))
+    console.print(
+        f"{counts.recordings} recordings, {counts.samples} samples, {counts.dropped} dropped", highlight=False
+    )
+    console.print(f"{out / REPORT} shows it; {out / SUMMARY} has the figures", highlight=False)
+
+
+def _clear(out: Path) -> None:
+    """Removes an earlier demonstration, and nothing else."""
+    strangers = (
+        [path.name for path in out.iterdir() if path.name not in (SUMMARY, REPORT, SESSION)] if out.exists() else []
+    )
+    if strangers:
+        raise UsageError(
+            f"{out}: holds {', '.join(sorted(strangers))}, which no demonstration made; give another folder"
+        )
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir(parents=True)
+
+
+def _track(bench: Supervisor, session: Path) -> Tracked:
+    model = session / MODEL
+    program = tracked.plan(FORCES_N, SECONDS, load_model(model), bench.wiring)
+    operation = Operation("track", total=1, unit="runs")
+    return live.run(bench, operation, lambda: tracked.run(bench, program, session, str(MODEL), operation))
+
+
+def _verified(session: Path) -> Counts:
+    """Raises CheckFailed where a recording is not complete."""
+    opened = open_session(session)
+    verdicts = [verify(opened.path(trial.name)) for trial in opened.trials]
+    bad = [verdict.sentence for verdict in verdicts if not verdict.ok]
+    if bad:
+        raise CheckFailed("; ".join(bad))
+    loops = [opened.recording(trial.name).tables["loop"] for trial in opened.trials]
+    return Counts(
+        recordings=len(verdicts),
+        samples=sum(stream.samples for verdict in verdicts for stream in verdict.streams.values()),
+        dropped=sum(stream.dropped for verdict in verdicts for stream in verdict.streams.values()),
+        missed=sum(int(rows["missed"][-1] - rows["missed"][0]) for rows in loops),
+        ticks=sum(len(rows) for rows in loops),
+    )
+
+
+def _summary(counts: Counts, fitted: dict[str, object], result: Tracked) -> dict[str, object]:
+    tracking = tracked.as_json(result)
+    return {
+        "recordings": counts.recordings,
+        "samples": counts.samples,
+        "dropped": counts.dropped,
+        "loop": {"missed": counts.missed, "ticks": counts.ticks},
+        "fit": fitted,
+        "tracking": {key: tracking[key] for key in ("max_error_percent", "rms_error_N", "levels")},
+    }

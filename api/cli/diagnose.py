@@ -1,0 +1,131 @@
+"""Commands that criticise: what a session shows of the simulation's errors, and what a protocol could show."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from api.cli.options import JsonOption
+from api.cli.output import console, table, write_json
+from rig.config.protocol import Indentation
+from rig.config.table import load
+from rig.diagnosis.answers import Diagnosis
+from rig.diagnosis.design import check
+from rig.diagnosis.run import diagnose_session
+from rig.diagnosis.sources import read_source
+from rig.errors import UsageError
+from rig.recording.files import write_text
+
+# Janot, Gautier, Brunot, "Data Set and Reference Models of EMPS", 2019: symmetric model, closed-loop simulation.
+PUBLISHED = {"DATA_EMPS": "; published 5.85 %", "DATA_EMPS_PULSES": "; published 8.94 %"}
+Simulation = Literal["index", "constant", "axis"]
+
+
+def diagnose(
+    session: Annotated[Path, typer.Argument(help="Session folder, or a folder of CSV files as `rig import` reads it.")],
+    simulation: Annotated[Simulation, typer.Option(help="Which simulation is judged.")] = "index",
+    columns: Annotated[list[str] | None, typer.Option(help="[STREAM.]FIELD=HEADER for other column names.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for pictures and the extended model.")] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Says what the simulation gets wrong on a session, names the cause, extends the model and measures the gain.
+
+    Example: rig diagnose sessions/first --json diagnosis.json
+    """
+    result = run_diagnosis(session, simulation, tuple(columns or ()))
+    show(result)
+    write_json(json_file, result.as_json())
+    if out is not None:
+        save(result, out)
+
+
+def protocol(
+    action: Annotated[Literal["check"], typer.Argument(help="What to do with the protocol.")],  # noqa: ARG001 - a verb
+    file: Annotated[Path, typer.Argument(help="Protocol file, for example examples/diagnosis.toml.")],
+    tracker: Annotated[bool, typer.Option(help="Whether a tracker sees the tip.")] = True,
+    rate_hz: Annotated[float, typer.Option("--rate-Hz", help="Rate of the force sensor.")] = 1000.0,
+    json_file: JsonOption = None,
+) -> None:
+    """Says before any recording which causes a protocol can show, from what size, and which it cannot separate.
+
+    Example: rig protocol check examples/diagnosis.toml --json check.json
+    """
+    result = check(load(Indentation, file), tracker, rate_hz)
+    console.print(f"{result.strokes} strokes in {result.duration_s:.0f} s", highlight=False)
+    seen = [(name, f"{size:.3g} {unit}") for name, (size, unit) in sorted(result.detectable.items())]
+    console.print(table(("cause", "visible from"), seen, "On a limb and noise as the mock bench has them"))
+    for name, reason in sorted(result.not_testable.items()):
+        console.print(f"cannot be seen: {name}: {reason}", highlight=False, markup=False)
+    rows = [(one, other, f"{left:.1f}") for one, other, left in result.pairs]
+    if rows:
+        console.print(table(("cause", "imitated by", "nats left of 50"), rows, "Hard to separate (safe from 20)"))
+    write_json(json_file, result.as_json())
+
+
+def run_diagnosis(folder: Path, simulation: Simulation, columns: tuple[str, ...] = ()) -> Diagnosis:
+    """The diagnosis of a folder, with a progress bar on stderr."""
+    bar_columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    screen = Console(stderr=True)
+    with Progress(*bar_columns, console=screen, disable=not screen.is_terminal, transient=True) as bar:
+        task = bar.add_task("reading", total=1.0)
+
+        def progress(text: str, done: float) -> None:
+            bar.update(task, description=text, completed=done)
+
+        if simulation == "axis":
+            # The axis needs none of the tissue's machinery, and the tissue none of the axis'.
+            from rig.diagnosis.axis_run import diagnose_axis_folder  # noqa: PLC0415
+
+            return diagnose_axis_folder(folder, progress)
+        return diagnose_session(read_source(folder, columns), simulation, progress)
+
+
+def show(result: Diagnosis) -> None:
+    """The diagnosis for a person."""
+    console.print(f"{result.verdict}: {result.statement}", highlight=False, markup=False)
+    rows = [
+        (
+            " or ".join(finding.effects),
+            ", ".join(f"{name} {i.value:.4g} ({i.low:.4g} to {i.high:.4g})" for name, i in finding.parameters.items()),
+            f"{finding.gain.before:.4f} -> {finding.gain.after:.4f} {finding.gain.unit}",
+            f"{finding.nats:.0f}",
+            finding.repair,
+        )
+        for finding in result.findings
+    ]
+    if rows:
+        header = ("cause", "parameters, 95 % interval", "error on recordings left out", "nats", "repair")
+        console.print(table(header, rows, "Named" if result.verdict == "explained" else "Named provisionally"))
+    seen = [(name, f"{size:.3g} {unit}") for name, (size, unit) in sorted(result.detectable.items())]
+    if seen:
+        console.print(table(("cause", "would have been named from"), seen, "Not found"))
+    for name, reason in sorted(result.not_testable.items()):
+        console.print(f"cannot be tested: {name}: {reason}", highlight=False, markup=False)
+    for item in result.simulated:
+        which = "fitted" if item.fitted else "left out"
+        console.print(
+            f"closed-loop force error, {item.recording} ({which}): "
+            f"{item.before_percent:.2f} % -> {item.after_percent:.2f} %{PUBLISHED.get(item.recording, '')}",
+            highlight=False,
+        )
+    for finding in result.quality:
+        console.print(f"data: {finding.recording} {finding.text}", highlight=False, markup=False)
+    if result.next_experiment:
+        console.print(f"next experiment: {result.next_experiment}", highlight=False, markup=False)
+
+
+def save(result: Diagnosis, folder: Path) -> None:
+    """Pictures of the diagnosis in ``folder``."""
+    from rig.report.diagnosis_figures import pictures  # noqa: PLC0415 - matplotlib takes a second to load
+    from rig.report.drawing import png, svg  # noqa: PLC0415
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"{folder}: cannot be made: {error.strerror}; give another --out") from error
+    for name, picture in pictures(result).items():
+        (folder / f"{name}.png").write_bytes(png(picture))
+        write_text(folder / f"{name}.svg", svg(picture))
+    console.print(f"pictures are in {folder}", highlight=False)

@@ -1,0 +1,73 @@
+"""Commands about devices: mock and doctor."""
+
+import contextlib
+import json
+import sys
+from dataclasses import asdict
+from typing import Annotated, Any
+
+import typer
+
+from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
+from api.cli.output import console, table, write_json
+from api.cli.stage import bench_for, bench_process
+from controller import doctor as examination
+from rig.errors import CheckFailed
+
+
+def mock(
+    config: ConfigOption = None,
+    overrides: SetOption = None,
+    hide: Annotated[
+        list[str] | None, typer.Option("--hide", help="Hidden effect: effect.parameter=value; may be repeated.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="One line with every endpoint when ready.")] = False,
+    seed: Annotated[int | None, typer.Option(help="Seed of all noise.")] = None,
+) -> None:
+    """Serves the mock bench until Ctrl-C: every device's real protocol on a pseudo-terminal or TCP port.
+
+    Example: rig mock --json --hide friction.level_N=0.2
+    """
+    with bench_process(wiring_from(config, overrides), tuple(hide or ()), seed, both_sensors=True) as (
+        process,
+        endpoints,
+    ):
+        sys.stdout.write(json.dumps(endpoints) + "\n" if as_json else _lines(endpoints))
+        sys.stdout.flush()
+        with contextlib.suppress(KeyboardInterrupt):
+            process.wait()
+
+
+def _lines(endpoints: dict[str, Any]) -> str:
+    """Endpoints for a person, as the lines of a wiring file."""
+    return "\n".join(
+        [
+            "# the mock bench is ready; Ctrl-C ends it",
+            f'force.port = "{endpoints["force"]["serial"]}"            # bota-sensone',
+            f'force.port = "{endpoints["force_modbus"]["serial"]}"            # robotiq-ft300',
+            f'axis.port = "{endpoints["axis"]["slcan"]}"',
+            f'tracker.port = "tcp://{endpoints["tracker"]["tcp"]}"',
+            f"# control channel: {endpoints['control']}",
+            "",
+        ]
+    )
+
+
+def doctor(config: ConfigOption = None, overrides: SetOption = None, json_file: JsonOption = None) -> None:
+    """Looks at each device without moving anything: identity, measured rate, noise, latency, range.
+
+    Example: rig doctor --config rig.toml
+    """
+    wiring = wiring_from(config, overrides)
+    with bench_for(wiring) as (live_wiring, _):
+        findings = examination.examine(live_wiring)
+    rows = [
+        (f.role, f.product, f.serial, f.firmware, f"{f.rate_Hz:.1f}", f.noise, f"{f.latency_ms:.2f}", f.range)
+        for f in findings
+    ]
+    header = ("role", "product", "serial", "firmware", "rate Hz", "noise", "latency ms", "range seen")
+    console.print(table(header, rows, title="Devices"))
+    write_json(json_file, {"devices": [asdict(finding) for finding in findings]})
+    broken = [f"{finding.role}: {finding.problem}" for finding in findings if finding.problem]
+    if broken:
+        raise CheckFailed("; ".join(broken))

@@ -1,0 +1,149 @@
+"""Commands that move: capture and track."""
+
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from api.cli import live
+from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
+from api.cli.output import console, table, write_json
+from api.cli.stage import bench_for
+from controller.experiments import capture as experiment
+from controller.experiments import tracked
+from controller.experiments.comparison import CHOICES, choices_from
+from controller.experiments.references import named
+from controller.experiments.tracked import Tracked
+from controller.operation import Operation
+from controller.supervisor import Supervisor
+from rig.config.protocol import Indentation
+from rig.config.table import load
+from rig.config.wiring import Wiring
+from rig.errors import UsageError
+from rig.recording.sessions import SessionInfo, TrialInfo
+from rig.tissue.model import load_model
+
+Out = Annotated[Path, typer.Option("--out", help="New folder for the session.")]
+
+
+def capture(
+    protocol: Annotated[Path, typer.Argument(help="Protocol file, for example examples/indentation.toml.")],
+    out: Out,
+    config: ConfigOption = None,
+    overrides: SetOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Runs an indentation protocol and records every trial.
+
+    While it runs: p is the subject's pain stop, space the emergency stop, s or Ctrl-C stop and retract; what was
+    recorded is kept.
+
+    Example: rig capture examples/indentation.toml --config examples/forearm.toml --out sessions/first
+    """
+    wiring = wiring_from(config, overrides)
+    plan = load(Indentation, protocol)
+    experiment.check(plan, wiring)
+    with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
+        info = captured(bench, plan, out)
+    write_json(json_file, summary(info, out))
+
+
+def captured(bench: Supervisor, plan: Indentation, out: Path) -> SessionInfo:
+    """The session, with progress on the terminal and a summary line a trial."""
+    total = len(plan.speeds_mm_s) * plan.trials
+    operation = Operation("capture", total=total, unit="trials")
+    return live.run(bench, operation, lambda: experiment.capture(bench, plan, out, operation, _say))
+
+
+def _say(trial: TrialInfo) -> None:
+    samples, dropped = sum(trial.samples.values()), sum(trial.dropped.values())
+    console.print(
+        f"{trial.name}  {trial.speed_mm_s:5g} mm/s  peak {trial.peak_force_N:6.2f} N  {samples:7d} samples"
+        f"  {dropped} dropped  {trial.outcome}",
+        highlight=False,
+    )
+
+
+def summary(info: SessionInfo, folder: Path) -> dict[str, object]:
+    """The result of a capture as JSON."""
+    return {
+        "session": str(folder),
+        "recordings": len(info.trials),
+        "samples": sum(sum(trial.samples.values()) for trial in info.trials),
+        "dropped": sum(sum(trial.dropped.values()) for trial in info.trials),
+        "trials": [
+            {"name": t.name, "speed_mm_s": t.speed_mm_s, "outcome": t.outcome, "peak_force_N": t.peak_force_N}
+            for t in info.trials
+        ],
+    }
+
+
+def track(
+    model: Annotated[Path | None, typer.Option("--model", help="model.json as `rig fit` writes it.")] = None,
+    force: Annotated[str, typer.Option("--force", help="Force to track in N; several with commas.")] = "",
+    reference: Annotated[
+        str, typer.Option("--reference", help="Instead of --force: step:5, sine:0.5,mean_N=2, press:3, csv:FILE, ...")
+    ] = "",
+    seconds: Annotated[float | None, typer.Option("--seconds", help="Time on each force; else 10.")] = None,
+    gains: Annotated[
+        str, typer.Option("--gains", help="tangent, secant, constant or admittance; else loop.gains.")
+    ] = "",
+    compare: Annotated[
+        bool, typer.Option("--table", help="All gains on simulated subjects, 1 to 10 N; needs no model.")
+    ] = False,
+    subjects: Annotated[str, typer.Option("--subjects", help="With --table: which; else all.")] = "",
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for the recording; a new or existing session.")
+    ] = None,
+    config: ConfigOption = None,
+    overrides: SetOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Tracks a force with gains from a tissue model, and prints given and actual force.
+
+    Example: rig track --model sessions/first/fit/model.json --force 1,2,5 --seconds 5 --json track.json
+    """
+    wiring = wiring_from(config, overrides)
+    folder = out or Path("sessions") / f"track-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
+    if compare:
+        write_json(json_file, _compared(wiring, folder, gains, subjects, force, seconds))
+        return
+    if model is None or bool(force) == bool(reference):
+        raise UsageError("tracking needs --model, and either --force or --reference; or --table alone")
+    fitted = load_model(model)
+    choice = choices_from(gains)[0] if gains else None
+    if force:
+        wiring = wiring.model_copy(
+            update={"loop": wiring.loop.model_copy(update={"gains": choice or wiring.loop.gains})}
+        )
+        program = tracked.plan(tracked.forces(force), 10.0 if seconds is None else seconds, fitted, wiring)
+    else:
+        program = tracked.plan_reference(named(reference), fitted, wiring, choice)
+    with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
+        operation = Operation("track", total=1, unit="runs")
+        result = live.run(bench, operation, lambda: tracked.run(bench, program, folder, str(model), operation))
+    say_levels(result)
+    console.print(f"recorded in {folder}", highlight=False)
+    write_json(json_file, tracked.as_json(result))
+
+
+def _compared(
+    wiring: Wiring, folder: Path, gains: str, subjects: str, force: str, seconds: float | None
+) -> dict[str, object]:
+    from api.cli import comparison  # noqa: PLC0415 - fitting is loaded only where it is used
+
+    return comparison.compare(
+        wiring,
+        folder,
+        subjects.split(",") if subjects else comparison.ALL,
+        choices_from(gains) if gains else CHOICES,
+        comparison.stairs(force or "1,10", 1.5 if seconds is None else seconds),
+    )
+
+
+def say_levels(result: Tracked) -> None:
+    """The table of given and actual force."""
+    if result.levels:
+        console.print(table(*tracked.table(result), title="Given and actual force"))
+    console.print(tracked.sentence(result), highlight=False)

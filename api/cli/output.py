@@ -1,0 +1,32 @@
+"""What commands print and write: one console, one kind of table, JSON whole or not at all."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from rig.errors import UsageError
+
+console = Console()
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]], title: str = "") -> Table:
+    """A table for people."""
+    found = Table(*header, title=title, title_justify="left", show_edge=False)
+    for row in rows:
+        found.add_row(*row)
+    return found
+
+
+def write_json(path: Path | None, value: Mapping[str, object]) -> None:
+    """Writes ``value`` to ``path``, whole or not at all; without a path does nothing."""
+    if path is None:
+        return
+    partial = path.with_name(path.name + ".part")
+    try:
+        partial.write_text(json.dumps(value, indent=2) + "\n")
+        partial.replace(path)
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be written: {error.strerror}") from error

@@ -1,0 +1,178 @@
+"""Commands about what was recorded: verify, repair, import, export."""
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from api.cli.options import JsonOption
+from api.cli.output import console, table, write_json
+from rig.errors import CheckFailed, UsageError
+from rig.recording import verify as verification
+from rig.recording.export import FORMATS, Format, export
+from rig.recording.files import make_folder
+from rig.recording.import_format import FIELDS
+from rig.recording.importing import import_session
+from rig.recording.sessions import TrialInfo, open_session, plain
+from rig.recording.verify import Verdict
+
+SUFFIXES: Mapping[Format, str] = {"csv": "csv", "parquet": "parquet", "hdf5": "session.h5", "mat": "session.mat"}
+SessionArgument = Annotated[Path, typer.Argument(help="Session folder.")]
+
+
+def verify(
+    path: Annotated[Path, typer.Argument(help="Session folder, or one recording (.mcap).")],
+    json_file: JsonOption = None,
+) -> None:
+    """Reads every byte of a recording or session and says per stream what is complete, missing, dropped or damaged.
+
+    Exit code 1 if anything is.
+
+    Example: rig verify sessions/first
+    """
+    verdicts, remarks = _verdicts(path)
+    console.print(_verdict_table(verdicts))
+    for sentence in [*remarks, *(verdict.sentence for verdict in verdicts if not verdict.ok)]:
+        console.print(sentence, markup=False, highlight=False, soft_wrap=True)
+    bad = [verdict.path.stem for verdict in verdicts if not verdict.ok]
+    write_json(
+        json_file,
+        {
+            "ok": not bad and not remarks,
+            "remarks": list(remarks),
+            "recordings": {verdict.path.stem: _verdict_values(verdict) for verdict in verdicts},
+        },
+    )
+    if bad or remarks:
+        raise CheckFailed(
+            f"{path}: {len(bad)} of {len(verdicts)} recordings are not complete"
+            + (f" ({', '.join(bad)})" if bad else "")
+            + (f"; {remarks[0]}" if remarks else "")
+            + "; what is listed above is known, everything else is good"
+        )
+
+
+def _verdicts(path: Path) -> tuple[list[Verdict], tuple[str, ...]]:
+    if path.is_file():
+        return [verification.verify(path)], ()
+    session = open_session(path)
+    return [verification.verify(session.path(trial.name)) for trial in session.trials], session.remarks
+
+
+def _verdict_table(verdicts: list[Verdict]) -> object:
+    rows = [
+        [
+            verdict.path.stem,
+            verdict.state,
+            name,
+            str(stream.samples),
+            "" if math.isnan(stream.rate_Hz) else f"{stream.rate_Hz:.1f}",
+            ", ".join(f"{count} {fault}" for fault, count in stream.faults.items()) or "none",
+        ]
+        for verdict in verdicts
+        for name, stream in verdict.streams.items()
+        if stream.samples or stream.faults
+    ]
+    return table(["recording", "state", "stream", "samples", "rate Hz", "faults"], rows)
+
+
+def _verdict_values(verdict: Verdict) -> dict[str, object]:
+    streams = {name: plain(asdict(stream)) for name, stream in verdict.streams.items()}
+    return {
+        "state": verdict.state,
+        "ok": verdict.ok,
+        "sentence": verdict.sentence,
+        "damage": list(verdict.damage),
+        "streams": streams,
+    }
+
+
+def repair(
+    recording: Annotated[Path, typer.Argument(help="A recording that `rig verify` found incomplete or damaged.")],
+    out: Annotated[Path, typer.Option("--out", help="New recording to write; the old one is not touched.")],
+    json_file: JsonOption = None,
+) -> None:
+    """Saves every good sample of a cut or damaged recording as a new, valid one.
+
+    Example: rig repair sessions/first/trial-03.mcap --out trial-03-good.mcap
+    """
+    verdict = verification.repair(recording, out)
+    console.print(_verdict_table([verdict]))
+    console.print(verdict.sentence, markup=False, highlight=False, soft_wrap=True)
+    write_json(json_file, _verdict_values(verdict))
+
+
+def import_(
+    folder: Annotated[Path, typer.Argument(help="Folder with session.toml and trial_*/.")],
+    out: Annotated[Path, typer.Option("--out", help="New folder for the session.")],
+    columns: Annotated[
+        list[str] | None,
+        typer.Option("--columns", help="Other column name: [STREAM.]FIELD=HEADER; may be repeated or comma-separated."),
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Makes a session from measured CSV files; writes nothing if anything in them is wrong.
+
+    FOLDER holds session.toml (may be empty; keys force_positive "compression" or "tension", position_positive "into"
+    or "out", surface_mm, and anything under [subject] and [notes]) and folders trial_NAME with trial.toml (speed_mm_s,
+    depth_mm), force.csv (time_s,force_N), axis.csv (time_s,position_mm) and, where there is one, marker.csv
+    (time_s,x_mm,y_mm,z_mm). time_s runs through the whole session; each stream keeps its own rate and clock.
+
+    Example: rig import measured/ --out sessions/measured --columns force.force_N=Fz
+    """
+    chosen = [column for item in columns or [] for column in re.split(r",(?=[\w.]+=)", item)]
+    session = import_session(folder, out, chosen, datetime.now().astimezone())
+    console.print(_trial_table(session.trials))
+    for remark in session.remarks:
+        console.print(remark, markup=False, highlight=False, soft_wrap=True)
+    samples = {name: sum(trial.samples.get(name, 0) for trial in session.trials) for name in FIELDS}
+    write_json(
+        json_file,
+        {"session": str(out), "recordings": len(session.trials), "samples": samples, "remarks": list(session.remarks)},
+    )
+
+
+def _trial_table(trials: Iterable[TrialInfo]) -> object:
+    rows = [
+        [trial.name, *(f"{value:g}" for value in (trial.speed_mm_s, trial.depth_mm)), f"{trial.peak_force_N:.2f}"]
+        + [str(trial.samples.get(name, 0)) for name in FIELDS]
+        for trial in trials
+    ]
+    return table(["trial", "mm/s", "depth mm", "peak N", *FIELDS], rows)
+
+
+def export_(
+    session: SessionArgument,
+    out: Annotated[Path, typer.Option("--out", help="Folder to write to; made where it is missing.")],
+    formats: Annotated[
+        list[str] | None, typer.Option("--format", help="csv, parquet, hdf5 or mat; may be repeated; default all.")
+    ] = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Writes a session as CSV and Parquet folders, HDF5 and MAT files, with units.
+
+    OUT gets csv/ (which `rig import` reads again), parquet/, session.h5 and session.mat.
+
+    Example: rig export sessions/first --out exported --format hdf5
+    """
+    chosen = _formats(formats or list(FORMATS))
+    opened = open_session(session)
+    written: dict[str, object] = {}
+    make_folder(out)
+    for format in chosen:
+        written[format] = str(export(opened, format, out / SUFFIXES[format]))
+        console.print(f"{format:8s}{written[format]}", highlight=False, soft_wrap=True)
+    write_json(json_file, {"session": str(session), "written": written})
+
+
+def _formats(asked: list[str]) -> list[Format]:
+    names = [name.strip().lower() for item in asked for name in item.split(",")]
+    for name in names:
+        if name not in FORMATS:
+            raise UsageError(f"--format {name}: unknown; there are {', '.join(FORMATS)}")
+    return [format for format in FORMATS if format in names]

@@ -1,0 +1,49 @@
+"""`rig serve`: the HTTP service and its page over one bench."""
+
+import contextlib
+import socket
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import uvicorn
+
+from api.cli.options import ConfigOption, SetOption, wiring_from
+from api.cli.output import console
+from api.cli.stage import bench_for
+from api.http.app import LOCAL, build
+from api.http.service import Service
+from rig.errors import UsageError
+
+
+class Announced(uvicorn.Server):
+    """Prints its address once it listens."""
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Starts, then says where."""
+        await super().startup(sockets)
+        if self.started:
+            console.print(f"http://{self.config.host}:{self.config.port}/", highlight=False)
+
+
+def serve(
+    config: ConfigOption = None,
+    overrides: SetOption = None,
+    port: Annotated[int, typer.Option(min=1, max=65535, help="TCP port to listen on.")] = 8000,
+    host: Annotated[str, typer.Option(help="Address to listen on; only this computer's own.")] = "127.0.0.1",
+    sessions: Annotated[Path, typer.Option(help="Folder of the sessions.")] = Path("sessions"),
+    protocols: Annotated[Path, typer.Option(help="Folder of the protocols.")] = Path("examples"),
+) -> None:
+    """Serves the bench over HTTP, with a page at / and the interface described at /api/v1/openapi.json.
+
+    Example: rig serve --config rig.toml --port 8000
+    """
+    if host not in LOCAL:
+        raise UsageError(
+            f"--host {host}: the service has no log-in yet, so it listens on this computer only: {LOCAL[0]}"
+        )
+    with bench_for(wiring_from(config, overrides)) as (wiring, _):
+        application = build(Service(wiring, sessions, protocols))
+        # The server hands on the Ctrl-C that ended it, after an orderly end.
+        with contextlib.suppress(KeyboardInterrupt):
+            Announced(uvicorn.Config(application, host=host, port=port, log_level="warning")).run()

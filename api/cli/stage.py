@@ -1,0 +1,72 @@
+"""Starts the mock bench for ports that say `mock`, and puts its endpoints in their place."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rig.config.wiring import MOCK_PORT, Wiring
+from rig.errors import UsageError
+
+# Below the loop: a simulated device must not wait for the desktop either, but never keeps the loop waiting.
+BENCH_PRIORITY = 10
+
+
+def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, both_sensors: bool) -> list[str]:
+    command = [sys.executable, "-m", "mock_devices.serve", "--with-parent", "--priority", str(BENCH_PRIORITY)]
+    if wiring.mock.parameters:
+        command += ["--parameters", str(wiring.mock.parameters)]
+    if seed is not None:
+        command += ["--seed", str(seed)]
+    for effect in (*wiring.mock.hide, *hide):
+        command += ["--hide", effect]
+    return [*command, "--force", "both" if both_sensors else wiring.force.product]
+
+
+@contextmanager
+def bench_process(
+    wiring: Wiring, hide: tuple[str, ...] = (), seed: int | None = None, both_sensors: bool = False
+) -> Iterator[tuple["subprocess.Popen[str]", dict[str, Any]]]:
+    """The mock bench as a process, and its endpoints; it ends with the block, or with this process."""
+    process = subprocess.Popen(
+        _arguments(wiring, hide, seed, both_sensors),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,
+        text=True,
+    )
+    assert process.stdin and process.stdout
+    try:
+        line = process.stdout.readline()
+        if not line:
+            raise UsageError("the mock bench did not start; its reason stands above")
+        yield process, json.loads(line)
+    finally:
+        process.stdin.close()
+        process.wait(10)
+        process.stdout.close()
+
+
+@contextmanager
+def bench_for(wiring: Wiring, hide: tuple[str, ...] = ()) -> Iterator[tuple[Wiring, dict[str, Any]]]:
+    """``wiring`` with real endpoints, and what the mock bench said; without a port `mock` there is no mock bench."""
+    if not wiring.uses_mock:
+        yield wiring, {}
+        return
+    with bench_process(wiring, hide) as (_, endpoints):
+        yield plugged(wiring, endpoints), endpoints
+
+
+def plugged(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
+    """``wiring`` with each port `mock` replaced by the endpoint that serves it."""
+    force, axis, tracker = wiring.force, wiring.axis, wiring.tracker
+    if force.port == MOCK_PORT:
+        role = "force_modbus" if force.product == "robotiq-ft300" else "force"
+        force = force.model_copy(update={"port": endpoints[role]["serial"]})
+    if axis.port == MOCK_PORT:
+        axis = axis.model_copy(update={"port": endpoints["axis"]["slcan"]})
+    if tracker and tracker.port == MOCK_PORT:
+        tracker = tracker.model_copy(update={"port": "tcp://" + endpoints["tracker"]["tcp"]})
+    return wiring.model_copy(update={"force": force, "axis": axis, "tracker": tracker})

@@ -1,0 +1,118 @@
+"""What goes over the wire of the service; requests are strict: no unknown keys, no NaN, no silent conversion."""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
+
+
+class Request(BaseModel):
+    """Root of request bodies."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+
+class CaptureRequest(Request):
+    """Starts a protocol."""
+
+    kind: Literal["capture"]
+    protocol: Name = Field(description="name of a protocol as /protocols lists it")
+    session: Name = Field(description="name of the new session folder")
+
+
+class TrackRequest(Request):
+    """Tracks forces with gains from the model of a session."""
+
+    kind: Literal["track"]
+    session: Name = Field(description="session whose fitted model gives the gains; the run is recorded there")
+    forces_N: list[Annotated[float, Field(gt=0)]] = Field(min_length=1, max_length=20)
+    seconds: Annotated[float, Field(gt=1, le=600)] = 10.0
+
+
+class RetractRequest(Request):
+    """Moves out of the tissue, after a stop that was acknowledged."""
+
+    kind: Literal["retract"]
+
+
+class JobView(BaseModel):
+    """A piece of work."""
+
+    id: str
+    kind: str
+    name: str
+    state: Literal["running", "succeeded", "failed", "stopped"]
+    done: float
+    total: float
+    unit: str
+    message: str
+    result: dict[str, object]
+
+
+class Info(BaseModel):
+    """Who this service is."""
+
+    software: str
+    service_id: str = Field(description="changes with every start of the service")
+    monotonic_ns: int = Field(description="the clock of all samples, now")
+    sessions_folder: str
+
+
+class RigView(BaseModel):
+    """The bench as of now."""
+
+    state: Literal["disconnected", "idle", "running", "stopped"]
+    reason: str = Field(description="why it is disconnected or stopped; empty otherwise")
+    mode: str
+    time_ns: int
+    force_N: float | None
+    reference_N: float | None
+    position_mm: float | None
+    depth_mm: float | None
+    missed: int
+    ticks: int
+    rates_Hz: dict[str, float]
+    health: dict[str, dict[str, bool]] = Field(description="per stream: alive, valid, on_rate")
+    lost: dict[str, str]
+    devices: dict[str, dict[str, object]]
+    limits: dict[str, float]
+    job: JobView | None
+
+
+class ProtocolView(BaseModel):
+    """A protocol file."""
+
+    name: str
+    file: str
+    settings: dict[str, object]
+    refusal: str = Field(description="why it cannot be started on this bench; empty if it can")
+
+
+class RecordingView(BaseModel):
+    """A file of a session."""
+
+    session: str
+    file: str
+    bytes: int
+    href: str
+
+
+class SessionView(BaseModel):
+    """A session and its recordings."""
+
+    name: str
+    kind: str
+    created: str
+    trials: int
+    samples: int
+    dropped: int
+    recordings: list[RecordingView]
+
+
+class Done(BaseModel):
+    """A stop or a reset took effect."""
+
+    done: bool
+    mode: str
+    detail: str

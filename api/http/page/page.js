@@ -1,0 +1,137 @@
+"use strict";
+// Shows what the service says and asks it to act; keeps no state of its own beyond what is on the screen.
+const API = "/api/v1";
+const at = (id) => document.getElementById(id);
+const plot = new Plot(at("plot"));
+let lastState = "";
+let job = null;
+
+async function call(method, path, body) {
+  const options = { method, headers: body ? { "Content-Type": "application/json" } : {}, body: body && JSON.stringify(body) };
+  const response = await fetch(API + path, options);
+  const answer = await response.json();
+  if (!response.ok) throw new Error(answer.detail || response.statusText);
+  return answer;
+}
+
+async function attempt(action) {
+  try {
+    const said = await action();
+    at("message").textContent = typeof said === "string" ? said : "";
+  } catch (error) {
+    at("message").textContent = error.message;
+  }
+}
+
+const number = (value, digits) => (value === null || value === undefined ? "--" : value.toFixed(digits));
+
+function show(rig) {
+  at("state").textContent = rig.state;
+  at("reason").hidden = !rig.reason;
+  at("reason").textContent = rig.reason;
+  at("force").textContent = number(rig.force_N, 2);
+  at("depth").textContent = number(rig.depth_mm, 2);
+  at("position").textContent = number(rig.position_mm, 2);
+  at("mode").textContent = rig.mode || "--";
+  at("reset").hidden = rig.state !== "stopped";
+  at("retract").disabled = rig.state !== "idle";
+  at("connect").hidden = rig.state !== "disconnected";
+  at("loop").textContent = `loop: ${rig.ticks} turns, ${rig.missed} slots missed`;
+  showDevices(rig);
+  showJob(rig.job);
+  plot.add(rig.time_ns * 1e-9, rig.force_N, rig.depth_mm);
+  if (lastState === "running" && rig.state !== "running") loadRecordings();
+  lastState = rig.state;
+}
+
+function cell(text, kind) {
+  const element = document.createElement("td");
+  element.textContent = text;
+  if (kind) element.className = kind;
+  return element;
+}
+
+function showDevices(rig) {
+  const roles = { force: "force", axis: "axis", marker: "tracker" };
+  const rows = Object.entries(roles).filter(([, role]) => rig.devices[role]).map(([stream, role]) => {
+    const row = document.createElement("tr"), health = rig.health[stream];
+    row.append(cell(stream), cell(rig.devices[role].product));
+    for (const bit of ["alive", "valid", "on_rate"]) row.append(cell(health[bit] ? "yes" : "NO", health[bit] ? "yes" : "no"));
+    row.append(cell(number(rig.rates_Hz[stream], 0)));
+    return row;
+  });
+  at("devices").replaceChildren(...rows);
+}
+
+function showJob(now) {
+  job = now;
+  at("job").hidden = !now;
+  at("start").querySelector("button").disabled = Boolean(now) || lastState !== "idle";
+  if (!now) return;
+  at("job-text").textContent = `${now.name}: ${now.message} (${now.done} of ${now.total} ${now.unit})`;
+  at("job-bar").max = now.total;
+  at("job-bar").value = now.done;
+}
+
+async function loadProtocols() {
+  const options = (await call("GET", "/protocols")).map((protocol) => {
+    const option = document.createElement("option");
+    option.value = protocol.name;
+    option.textContent = protocol.refusal ? `${protocol.name} (refused: ${protocol.refusal})` : protocol.name;
+    option.disabled = Boolean(protocol.refusal);
+    return option;
+  });
+  at("protocol").replaceChildren(...options);
+}
+
+async function loadRecordings() {
+  const sessions = await call("GET", "/recordings");
+  if (!sessions.length) return;
+  at("recordings").replaceChildren(...sessions.map((session) => {
+    const details = document.createElement("details"), summary = document.createElement("summary");
+    summary.textContent = `${session.name}: ${session.trials} recordings, ${session.samples} samples, ${session.dropped} dropped`;
+    const list = document.createElement("ul");
+    list.append(...session.recordings.map((file) => {
+      const item = document.createElement("li"), link = document.createElement("a");
+      link.href = file.href;
+      link.textContent = `${file.file} (${(file.bytes / 1e6).toFixed(2)} MB)`;
+      item.append(link);
+      return item;
+    }));
+    details.append(summary, list);
+    return details;
+  }));
+}
+
+function listen() {
+  const source = new EventSource(`${API}/live`);
+  source.onmessage = (event) => show(JSON.parse(event.data));
+  source.onerror = () => {
+    at("state").textContent = "no connection to the service";
+    at("reason").hidden = false;
+    at("reason").textContent = "The service does not answer. What is shown is old. Use the hardware emergency stop if in doubt.";
+  };
+}
+
+function suggestSession() {
+  const now = new Date(), two = (n) => String(n).padStart(2, "0");
+  at("session").value = `${now.getFullYear()}${two(now.getMonth() + 1)}${two(now.getDate())}-${two(now.getHours())}${two(now.getMinutes())}${two(now.getSeconds())}`;
+}
+
+at("estop").addEventListener("click", () => attempt(async () => (await call("POST", "/estop")).detail));
+at("pain").addEventListener("click", () => attempt(async () => (await call("POST", "/pain")).detail));
+at("job-stop").addEventListener("click", () => attempt(() => call("POST", `/jobs/${job.id}/stop`)));
+at("reset").addEventListener("click", () => attempt(async () => (await call("POST", "/estop/reset")).detail));
+at("retract").addEventListener("click", () => attempt(async () => { await call("POST", "/jobs", { kind: "retract" }); return "retracting"; }));
+at("connect").addEventListener("click", () => attempt(() => call("POST", "/rig/connect")));
+at("start").addEventListener("submit", (event) => {
+  event.preventDefault();
+  const body = { kind: "capture", protocol: at("protocol").value, session: at("session").value };
+  attempt(async () => { await call("POST", "/jobs", body); suggestSession(); return "started"; });
+});
+
+(function frame() { plot.draw(); setTimeout(() => requestAnimationFrame(frame), 50); })();
+suggestSession();
+attempt(loadProtocols);
+attempt(loadRecordings);
+listen();

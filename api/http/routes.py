@@ -1,0 +1,151 @@
+"""The routes of the service, version 1. State is data, stops need nothing, motion is a job."""
+
+import asyncio
+import json
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+from fastapi import APIRouter, Response
+from fastapi.responses import FileResponse, StreamingResponse
+
+import rig
+from api.http import views
+from api.http.models import (
+    CaptureRequest,
+    Done,
+    Info,
+    JobView,
+    Name,
+    ProtocolView,
+    RetractRequest,
+    RigView,
+    SessionView,
+    TrackRequest,
+)
+from api.http.problems import Refused, responses
+from api.http.service import Service
+
+PREFIX = "/api/v1"
+LIVE_PERIOD_S = 0.05
+MEDIA_TYPES = {".mcap": "application/octet-stream", ".json": "application/json", ".html": "text/html"}
+
+
+def build(service: Service) -> APIRouter:
+    """All routes over ``service``."""
+    router = APIRouter(prefix=PREFIX)
+    _state(router, service)
+    _stops(router, service)
+    _jobs(router, service)
+    _recordings(router, service)
+    return router
+
+
+def _state(router: APIRouter, service: Service) -> None:
+    @router.get("/info", summary="Who this service is")
+    def info() -> Info:
+        return Info(
+            software=f"tissue-rig {rig.__version__}",
+            service_id=service.id,
+            monotonic_ns=time.monotonic_ns(),
+            sessions_folder=str(service.sessions),
+        )
+
+    @router.get("/rig", summary="The bench as of now")
+    def status() -> RigView:
+        return views.rig(service)
+
+    @router.post("/rig/connect", summary="Starts loop and devices where they are not running", responses=responses(409))
+    def connect() -> RigView:
+        if service.running:
+            raise Refused(409, "busy", "a job is under way")
+        service.connect()
+        return views.rig(service)
+
+    @router.get(
+        "/live",
+        summary="The bench twenty times a second as server-sent events; a slow reader gets the newest",
+        response_class=StreamingResponse,
+        responses={200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
+    )
+    async def live() -> StreamingResponse:
+        return StreamingResponse(_events(service), media_type="text/event-stream")
+
+    @router.get("/protocols", summary="Protocols that can be started")
+    def protocols() -> list[ProtocolView]:
+        return views.protocols(service)
+
+
+async def _events(service: Service) -> AsyncIterator[str]:
+    while True:
+        view = await asyncio.to_thread(views.rig, service)
+        yield f"data: {json.dumps(view.model_dump(mode='json'))}\n\n"
+        await asyncio.sleep(LIVE_PERIOD_S)
+
+
+def _stops(router: APIRouter, service: Service) -> None:
+    @router.post("/estop", summary="Software emergency stop: the drive's own quick stop", responses=responses(503, 504))
+    def emergency_stop() -> Done:
+        return _done(service, service.emergency_stop())
+
+    @router.post("/pain", summary="The subject's stop: retracts at safe speed", responses=responses(503, 504))
+    def pain() -> Done:
+        return _done(service, service.pain())
+
+    @router.post("/estop/reset", summary="Acknowledges a stop; moves nothing", responses=responses(409, 503))
+    def reset() -> Done:
+        service.reset()
+        return _done(service, "acknowledged")
+
+
+def _done(service: Service, detail: str) -> Done:
+    return Done(done=True, mode=views.rig(service).mode, detail=detail)
+
+
+def _jobs(router: APIRouter, service: Service) -> None:
+    @router.post(
+        "/jobs", status_code=202, summary="Starts a capture or a tracking run", responses=responses(404, 409, 503)
+    )
+    def start(request: CaptureRequest | TrackRequest | RetractRequest, response: Response) -> JobView:
+        if isinstance(request, CaptureRequest):
+            job = service.capture(request.protocol, request.session)
+        elif isinstance(request, RetractRequest):
+            job = service.retract()
+        else:
+            job = service.track(request.session, request.forces_N, request.seconds)
+        response.headers["Location"] = f"{PREFIX}/jobs/{job.id}"
+        return views.job(job)
+
+    @router.get("/jobs", summary="All jobs since the service started, oldest first")
+    def jobs() -> list[JobView]:
+        return [views.job(job) for job in service.jobs.values()]
+
+    @router.get("/jobs/{identifier}", summary="One job", responses=responses(404))
+    def job(identifier: str) -> JobView:
+        return views.job(service.job(identifier))
+
+    @router.post("/jobs/{identifier}/stop", summary="Stops this job and retracts", responses=responses(404, 503))
+    def stop(identifier: str) -> JobView:
+        return views.job(service.stop_job(identifier))
+
+
+def _recordings(router: APIRouter, service: Service) -> None:
+    @router.get("/recordings", summary="Sessions with their recordings, newest first")
+    def recordings() -> list[SessionView]:
+        return views.sessions(service)
+
+    @router.get(
+        "/recordings/{session}/{file}",
+        summary="One file of a session; ranges are served",
+        response_class=FileResponse,
+        responses={200: {"content": {"application/octet-stream": {}}}, **responses(404)},
+    )
+    def download(session: Name, file: Name) -> FileResponse:
+        path = service.session(session) / file
+        if not path.is_file():
+            raise Refused(404, "no-such-recording", f"session {session} has no file {file}")
+        return FileResponse(path, media_type=_media_type(path), filename=f"{session}-{file}")
+
+
+def _media_type(path: Path) -> str:
+    return MEDIA_TYPES.get(path.suffix, "application/octet-stream")

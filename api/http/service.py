@@ -1,0 +1,219 @@
+"""What the routes call: one bench, at most one job, stops that never wait for either."""
+
+import threading
+import time
+import uuid
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from api.http.problems import Refused
+from controller.experiments import capture as experiment
+from controller.experiments import tracked
+from controller.operation import Operation, Progress
+from controller.steps import Program, Retract
+from controller.supervisor import Supervisor
+from rig.config.protocol import Indentation
+from rig.config.table import load
+from rig.config.wiring import Wiring
+from rig.errors import DeviceError, RigError, SafetyStop, UsageError
+from rig.tissue.model import load_model
+
+MODEL = Path("fit") / "model.json"
+ACKNOWLEDGE_S = 1.0
+# A stop is taken within a tick or two; a status this much younger than the request knows of it.
+TAKEN_NS = 20_000_000
+RETRACT_MM = 20.0
+RETRACT_MM_S = 10.0
+RETRACT_TIMEOUT_S = 60.0
+
+
+@dataclass(frozen=True)
+class Job:
+    """A piece of work in a thread of its own; it runs on whether or not anyone looks."""
+
+    id: str
+    kind: str
+    operation: Operation
+
+    @property
+    def progress(self) -> Progress:
+        """How it stands."""
+        return self.operation.progress
+
+
+class Service:
+    """The bench behind the routes. Every method is safe from any thread."""
+
+    def __init__(self, wiring: Wiring, sessions: Path, protocols: Path) -> None:
+        self.wiring, self.sessions, self.protocols = wiring, sessions, protocols
+        self.id = uuid.uuid4().hex
+        self.reason = "not connected yet"
+        self.bench: Supervisor | None = None
+        self.jobs: dict[str, Job] = {}
+        self._starting = threading.Lock()
+
+    def connect(self) -> None:
+        """Starts loop and recorder; what fails is kept as ``reason`` and shown, the service goes on."""
+        with self._starting:
+            if self.bench and self.bench.alive:
+                return
+            self.disconnect()
+            bench = Supervisor(self.wiring)
+            try:
+                bench.start()
+            except RigError as error:
+                self.reason = str(error)
+                return
+            self.bench, self.reason = bench, ""
+
+    def disconnect(self) -> None:
+        """Ends loop and recorder."""
+        if self.bench:
+            self.bench.close()
+        self.bench = None
+
+    @property
+    def running(self) -> Job | None:
+        """The job under way."""
+        return next((job for job in self.jobs.values() if job.progress.state == "running"), None)
+
+    def the_bench(self) -> Supervisor:
+        """The bench, or Refused with why there is none."""
+        if self.bench is None:
+            raise Refused(503, "disconnected", f"the bench is not connected: {self.reason}")
+        if not self.bench.alive:
+            raise Refused(503, "disconnected", "the loop's process is gone; connect again")
+        return self.bench
+
+    def plan(self, name: str) -> Indentation:
+        """The protocol called ``name``."""
+        path = self.protocols / f"{name}.toml"
+        if not path.is_file():
+            raise Refused(404, "no-such-protocol", f"no protocol {name} in {self.protocols}")
+        return load(Indentation, path)
+
+    def capture(self, protocol: str, session: str) -> Job:
+        """Starts a capture; checks protocol, limits and folder first."""
+        plan, bench, folder = self.plan(protocol), self.the_bench(), self.sessions / session
+        experiment.check(plan, self.wiring)
+        if folder.exists():
+            raise Refused(409, "session-exists", f"session {session} exists; recordings are never overwritten")
+        operation = Operation(f"capture {plan.name}", total=len(plan.speeds_mm_s) * plan.trials, unit="trials")
+
+        def work() -> Mapping[str, object]:
+            info = experiment.capture(bench, plan, folder, operation, lambda _: None)
+            return {"session": session, "trials": len(info.trials)}
+
+        return self._start("capture", operation, work)
+
+    def track(self, session: str, forces_N: list[float], seconds: float) -> Job:
+        """Starts force tracking with the model of ``session``."""
+        bench, folder = self.the_bench(), self.session(session)
+        file = folder / MODEL
+        if not file.is_file():
+            raise Refused(409, "no-model", f"session {session} has no fitted model; run `rig fit {folder}` first")
+        program = tracked.plan(forces_N, seconds, load_model(file), self.wiring)
+        operation = Operation("track", total=1, unit="runs")
+        return self._start(
+            "track",
+            operation,
+            lambda: tracked.as_json(tracked.run(bench, program, folder, str(MODEL), operation)),
+        )
+
+    def retract(self) -> Job:
+        """Moves the tip out of wherever a stop left it."""
+        bench, limits = self.the_bench(), self.wiring.limits
+        leave = Retract(clearance_mm=RETRACT_MM, speed_mm_s=min(RETRACT_MM_S, limits.retract_speed_mm_s))
+        floored = leave.model_copy(update={"floor_mm": limits.position_min_mm})
+        program = Program(name="retract", steps=(floored,))
+        operation = Operation("retract", total=1, unit="moves")
+
+        def work() -> Mapping[str, object]:
+            outcome = bench.run(program, RETRACT_TIMEOUT_S)
+            if outcome.stopped:
+                raise SafetyStop(f"stopped: {outcome.cause}")
+            return {"outcome": outcome.outcome}
+
+        return self._start("retract", operation, work)
+
+    def _start(self, kind: str, operation: Operation, work: Callable[[], Mapping[str, object]]) -> Job:
+        with self._starting:
+            busy = self.running
+            if busy:
+                raise Refused(409, "busy", f"{busy.progress.name} is under way (job {busy.id}); stop it or wait")
+            job = Job(uuid.uuid4().hex[:12], kind, operation)
+            self.jobs[job.id] = job
+        threading.Thread(target=_work, args=(operation, work), name=f"job-{job.id}", daemon=True).start()
+        return job
+
+    def job(self, identifier: str) -> Job:
+        """The job called ``identifier``."""
+        if identifier not in self.jobs:
+            raise Refused(404, "no-such-job", f"no job {identifier} since this service started")
+        return self.jobs[identifier]
+
+    def session(self, name: str) -> Path:
+        """The folder of session ``name``."""
+        folder = self.sessions / name
+        if not folder.is_dir() or folder.resolve().parent != self.sessions.resolve():
+            raise Refused(404, "no-such-session", f"no session {name} in {self.sessions}")
+        return folder
+
+    def stop_job(self, identifier: str) -> Job:
+        """Soft stop of that job and no other; a job that has ended stays as it is."""
+        job = self.job(identifier)
+        if job.progress.state == "running":
+            job.operation.stop()
+            self.the_bench().stop()
+        return job
+
+    def pain(self) -> str:
+        """The subject's stop; returns once the loop has taken it."""
+        return self._stop(Supervisor.pain)
+
+    def emergency_stop(self) -> str:
+        """Immediate stop; returns once the loop has taken it, and raises 504 where it has not in time."""
+        return self._stop(Supervisor.estop)
+
+    def _stop(self, kind: Callable[[Supervisor], None]) -> str:
+        bench = self.the_bench()
+        seen = len(bench.incidents)
+        for job in self.jobs.values():
+            job.operation.stop()
+        kind(bench)
+        sent_ns = time.monotonic_ns()
+        deadline = time.monotonic() + ACKNOWLEDGE_S
+        while time.monotonic() < deadline:
+            if len(bench.incidents) > seen:
+                return str(bench.incidents[-1]["text"])
+            status = bench.status
+            taken = int(status.get("time_ns", 0)) > sent_ns + TAKEN_NS
+            if taken and not status.get("busy") and not status.get("latched"):
+                return "nothing was moving"
+            time.sleep(0.005)
+        raise Refused(504, "no-answer", "the loop did not confirm the stop: use the hardware emergency stop")
+
+    def reset(self) -> None:
+        """Acknowledges a stop; never restarts motion."""
+        bench = self.the_bench()
+        if self.running:
+            raise Refused(409, "busy", "a job is still ending; wait for it, then reset")
+        try:
+            bench.reset()
+        except UsageError as error:
+            raise Refused(409, "cause-not-cleared", str(error)) from error
+
+
+def _work(operation: Operation, work: Callable[[], Mapping[str, object]]) -> None:
+    try:
+        result = work()
+    except SafetyStop as stop:
+        operation.finish("stopped", str(stop))
+    except (DeviceError, RigError) as error:
+        operation.finish("failed", str(error))
+    except Exception as error:  # a job's thread has nobody above it: its failure is shown as the job's
+        operation.finish("failed", f"the job met an error of its own: {type(error).__name__}: {error}")
+        raise
+    else:
+        operation.finish("succeeded", "done", result)

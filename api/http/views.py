@@ -1,0 +1,135 @@
+"""What the service knows, as what goes over the wire."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Literal
+
+from api.http.models import JobView, ProtocolView, RecordingView, RigView, SessionView
+from api.http.service import Job, Service
+from controller.experiments.capture import check
+from controller.health import ALIVE, ON_RATE, VALID
+from controller.link import Message
+from rig.config.protocol import Indentation
+from rig.config.table import load
+from rig.errors import RigError
+from rig.recording.sessions import open_session
+
+State = Literal["disconnected", "idle", "running", "stopped"]
+STREAMS = ("force", "axis", "marker")
+SHOWN = (".mcap", ".json", ".html")
+
+
+def job(job: Job) -> JobView:
+    """One job."""
+    now = job.progress
+    return JobView(
+        id=job.id,
+        kind=job.kind,
+        name=now.name,
+        state=now.state,
+        done=now.done,
+        total=now.total,
+        unit=now.unit,
+        message=now.message,
+        result=dict(now.result),
+    )
+
+
+def rig(service: Service) -> RigView:
+    """The bench; a bench that is not there is a state, not an error."""
+    bench = service.bench
+    alive = bench is not None and bench.alive
+    status = bench.status if bench and alive else {}
+    running = service.running
+    limits = service.wiring.limits
+    state, reason = _state(service, status, alive)
+    return RigView(
+        state=state,
+        reason=reason,
+        mode=str(status.get("mode", "")),
+        time_ns=int(status.get("time_ns", 0)),
+        force_N=status.get("force_N"),
+        reference_N=status.get("reference_N"),
+        position_mm=status.get("position_mm"),
+        depth_mm=status.get("depth_mm"),
+        missed=int(status.get("missed", 0)),
+        ticks=int(status.get("ticks", 0)),
+        rates_Hz=status.get("rates_Hz", {}),
+        health=_health(int(status.get("health", 0))),
+        lost=status.get("lost", {}),
+        devices={role: dict(identity) for role, identity in bench.ready.devices.items()} if bench else {},
+        limits={
+            "force_N": service.wiring.force_limit_N,
+            "depth_mm": limits.depth_mm,
+            "speed_mm_s": limits.speed_mm_s,
+        },
+        job=job(running) if running else None,
+    )
+
+
+def _state(service: Service, status: Message, alive: bool) -> tuple[State, str]:
+    if not alive:
+        return "disconnected", service.reason or "the loop's process is gone"
+    latched = status.get("latched")
+    if latched:
+        return "stopped", str(latched["text"])
+    return ("running" if status.get("busy") or service.running else "idle"), ""
+
+
+def _health(bits: int) -> dict[str, dict[str, bool]]:
+    return {
+        name: {
+            "alive": bool(bits >> 3 * place & ALIVE),
+            "valid": bool(bits >> 3 * place & VALID),
+            "on_rate": bool(bits >> 3 * place & ON_RATE),
+        }
+        for place, name in enumerate(STREAMS)
+    }
+
+
+def protocols(service: Service) -> list[ProtocolView]:
+    """Every indentation protocol in the folder, also those this bench refuses."""
+    return [_protocol(service, path) for path in sorted(service.protocols.glob("*.toml")) if _is_protocol(path)]
+
+
+def _is_protocol(path: Path) -> bool:
+    return 'kind = "indentation"' in path.read_text(errors="replace")
+
+
+def _protocol(service: Service, path: Path) -> ProtocolView:
+    try:
+        plan = load(Indentation, path)
+        check(plan, service.wiring)
+    except RigError as error:
+        return ProtocolView(name=path.stem, file=path.name, settings={}, refusal=str(error))
+    return ProtocolView(name=path.stem, file=path.name, settings=plan.model_dump(mode="json"), refusal="")
+
+
+def sessions(service: Service) -> list[SessionView]:
+    """Sessions with at least one recording, newest first."""
+    if not service.sessions.is_dir():
+        return []
+    folders = [path for path in service.sessions.iterdir() if any(path.glob("*.mcap"))]
+    return [_session(path) for path in sorted(folders, key=lambda path: path.stat().st_mtime, reverse=True)]
+
+
+def _session(folder: Path) -> SessionView:
+    info = open_session(folder).info
+    files = sorted(path for path in folder.iterdir() if path.suffix in SHOWN)
+    return SessionView(
+        name=folder.name,
+        kind=info.kind,
+        created=info.created or datetime.fromtimestamp(folder.stat().st_mtime, UTC).isoformat(),
+        trials=len(info.trials),
+        samples=sum(sum(trial.samples.values()) for trial in info.trials),
+        dropped=sum(sum(trial.dropped.values()) for trial in info.trials),
+        recordings=[
+            RecordingView(
+                session=folder.name,
+                file=path.name,
+                bytes=path.stat().st_size,
+                href=f"/api/v1/recordings/{folder.name}/{path.name}",
+            )
+            for path in files
+        ],
+    )
