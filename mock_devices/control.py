@@ -1,0 +1,212 @@
+"""The bench's control channel: one JSON object a line over TCP on this machine, one line back.
+
+    {"set": {"surface.position_mm": 22.0, "tissue.present": false}}     {"set": {...as they are now}}
+    {"get": ["tip.force_N", "time_s"]}                                  {"get": {"tip.force_N": 1.2, "time_s": 8.0}}
+    {"dials": true}                                                     {"dials": {name: meaning}}
+    {"fault": {"device": "force", "kind": "drop", "value": 0.2}}        {"fault": {...}}; value may be left out
+    {"faults": true}                                                    {"faults": {device: {kind: meaning}}}
+    {"hide": {"friction.level_N": 0.2}}                                 {"hide": [names]}; {} none, null defaults
+    {"truth": true}                                                     {"truth": {effect: {parameter: value}}}
+
+A request that cannot be fulfilled is answered by {"error": sentence}.
+"""
+
+import contextlib
+import json
+import socket
+from collections.abc import Callable, Mapping, Sequence
+from types import TracebackType
+from typing import Any, Self
+
+from mock_devices import dials
+from mock_devices.bench import Bench
+from mock_devices.faults import Fault, Value
+from mock_devices.names import known
+from mock_devices.physics.effects import parse_hidden
+from rig.errors import DeviceError, RigError, UsageError
+
+LINE_BYTES_MAX = 65536
+CLIENT_TIMEOUT_S = 10.0
+
+Answer = dict[str, Any]
+Faults = Mapping[str, Sequence[Mapping[str, Fault]]]
+
+
+class Desk:
+    """Answers requests on ``bench`` and on the ``faults`` of its devices; knows no sockets."""
+
+    def __init__(self, bench: Bench, faults: Faults) -> None:
+        self._bench = bench
+        self._faults = faults
+        self._verbs: dict[str, Callable[[Any], Any]] = {
+            "set": self._set,
+            "get": self._get,
+            "dials": lambda _: {name: dial.meaning for name, dial in dials.DIALS.items()},
+            "fault": self._fault,
+            "faults": lambda _: self._list_faults(),
+            "hide": self._hide,
+            "truth": lambda _: self._bench.hidden,
+        }
+
+    def answer(self, line: bytes) -> bytes:
+        """The line to send back for ``line``; never raises."""
+        try:
+            request = json.loads(line)
+            if not isinstance(request, dict) or len(request) != 1:
+                raise UsageError('write one request a line, for example {"get": ["tip.force_N"]}')
+            ((verb, argument),) = request.items()
+            reply: Answer = {verb: self._verbs[known(verb, self._verbs, "request")](argument)}
+        except RigError as error:
+            reply = {"error": str(error)}
+        except ValueError:
+            reply = {"error": "the line is not JSON"}
+        return json.dumps(reply).encode() + b"\n"
+
+    def _set(self, values: object) -> dict[str, Value]:
+        wanted = _table(values, "set")
+        for name, value in wanted.items():
+            dials.turn(self._bench, name, value)
+        return self._get(list(wanted))
+
+    def _get(self, names: object) -> dict[str, Value]:
+        if not isinstance(names, list):
+            raise UsageError('get takes a list of names, for example {"get": ["tip.force_N"]}')
+        return {str(name): dials.get(self._bench, str(name)) for name in names}
+
+    def _hide(self, values: object) -> list[str]:
+        wanted = _table(values, "hide").items()
+        self._bench.hide(parse_hidden(name if value is None else f"{name}={value}" for name, value in wanted))
+        return list(self._bench.hidden)
+
+    def _fault(self, values: object) -> Answer:
+        request = _table(values, "fault")
+        device = known(str(request.get("device", "")), self._faults, "device")
+        kind = known(str(request.get("kind", "")), self._faults[device][0], f"fault of {device}")
+        value = request.get("value", self._faults[device][0][kind].default)
+        for faults in self._faults[device]:
+            faults[kind].apply(value)
+        return {"device": device, "kind": kind, "value": value}
+
+    def _list_faults(self) -> dict[str, dict[str, str]]:
+        return {
+            device: {kind: fault.meaning for kind, fault in lines[0].items()} for device, lines in self._faults.items()
+        }
+
+
+def _table(values: object, verb: str) -> dict[str, Any]:
+    if not isinstance(values, dict):
+        raise UsageError(f"{verb} takes an object of names and values, not {values!r}")
+    return values
+
+
+class ControlPort:
+    """The listening end, never blocking; several clients may be connected."""
+
+    def __init__(self, answer: Callable[[bytes], bytes]) -> None:
+        self._answer = answer
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._listener.setblocking(False)
+        self._clients: dict[socket.socket, bytes] = {}
+        self.endpoint = f"127.0.0.1:{self._listener.getsockname()[1]}"
+
+    def filenos(self) -> list[int]:
+        """Descriptors to wait on."""
+        return [self._listener.fileno(), *(client.fileno() for client in self._clients)]
+
+    def receive(self) -> None:
+        """Accepts who waits and answers what is complete."""
+        with contextlib.suppress(OSError):
+            client, _ = self._listener.accept()
+            client.setblocking(False)
+            self._clients[client] = b""
+        for client in list(self._clients):
+            self._serve(client)
+
+    def _serve(self, client: socket.socket) -> None:
+        try:
+            data = client.recv(LINE_BYTES_MAX)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        *lines, rest = (self._clients[client] + data).split(b"\n")
+        self._clients[client] = rest
+        try:
+            client.sendall(b"".join(self._answer(line) for line in lines))
+        except OSError:
+            data = b""
+        if not data or len(rest) > LINE_BYTES_MAX:
+            del self._clients[client]
+            client.close()
+
+    def close(self) -> None:
+        """Hangs up on everybody."""
+        for client in self._clients:
+            client.close()
+        self._clients.clear()
+        self._listener.close()
+
+
+class BenchControl:
+    """A client of the control channel at ``address`` (host:port); a refusal raises UsageError in the bench's words."""
+
+    def __init__(self, address: str) -> None:
+        host, _, port = address.rpartition(":")
+        try:
+            self._socket = socket.create_connection((host, int(port)), CLIENT_TIMEOUT_S)
+        except (OSError, ValueError) as error:
+            raise DeviceError(f"{address}: no bench answers there ({error}); is `rig mock` running?") from error
+        self._file = self._socket.makefile("rb")
+        self._address = address
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, _: type[BaseException] | None, __: BaseException | None, ___: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Hangs up."""
+        self._file.close()
+        self._socket.close()
+
+    def set(self, values: Mapping[str, Value]) -> dict[str, Value]:
+        """Turns dials; returns them as they are now."""
+        return dict(self._ask("set", dict(values)))
+
+    def get(self, *names: str) -> dict[str, Value]:
+        """Figures of the bench by name."""
+        return dict(self._ask("get", list(names)))
+
+    def number(self, name: str) -> float:
+        """One figure of the bench."""
+        return float(self.get(name)[name])
+
+    def fault(self, device: str, kind: str, value: Value | None = None) -> None:
+        """Brings about a fault; ``faults`` lists them."""
+        self._ask("fault", {"device": device, "kind": kind} | ({} if value is None else {"value": value}))
+
+    def faults(self) -> dict[str, dict[str, str]]:
+        """Meaning of each fault by device and kind."""
+        return dict(self._ask("faults", True))
+
+    def hide(self, effects: Mapping[str, float | None]) -> list[str]:
+        """Switches on exactly these effects (``friction.level_N``: 0.2, or ``friction``: None); returns their names."""
+        return list(self._ask("hide", dict(effects)))
+
+    def truth(self) -> dict[str, dict[str, float]]:
+        """Effects that are on, with all their parameters."""
+        return dict(self._ask("truth", True))
+
+    def _ask(self, verb: str, argument: object) -> Any:
+        try:
+            self._socket.sendall(json.dumps({verb: argument}).encode() + b"\n")
+            line = self._file.readline()
+        except OSError as error:
+            raise DeviceError(f"{self._address}: the bench does not answer {verb} ({error})") from error
+        if not line:
+            raise DeviceError(f"{self._address}: the bench hung up on {verb}; it has ended")
+        reply = json.loads(line)
+        if "error" in reply:
+            raise UsageError(reply["error"])
+        return reply[verb]

@@ -1,0 +1,93 @@
+"""All products of the bench on their wires: each mock with its plant, its wire and the faults either can have."""
+
+import random
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal, TypeVar
+
+from mock_devices.bench import Bench
+from mock_devices.bota import BotaMock
+from mock_devices.device_faults import BOTA_FAULTS, EPOS4_FAULTS, NDI_FAULTS, ROBOTIQ_FAULTS
+from mock_devices.epos4 import Epos4Mock
+from mock_devices.faults import WIRE_FAULTS, Fault, FaultyWire, Kind, faults_of
+from mock_devices.ndi import NdiMock
+from mock_devices.robotiq import RobotiqMock
+from mock_devices.stage import Mock
+from mock_devices.wire import PtyWire, TcpWire, Wire
+
+ForceProduct = Literal["bota-sensone", "robotiq-ft300"]
+AnyMock = TypeVar("AnyMock", bound=Mock)
+TOOLS = ("tip", "arm")
+FORCE_CHOICES: dict[str, tuple[ForceProduct, ...]] = {
+    "both": ("bota-sensone", "robotiq-ft300"),
+    "bota-sensone": ("bota-sensone",),
+    "robotiq-ft300": ("robotiq-ft300",),
+}
+
+
+@dataclass(frozen=True)
+class Device:
+    """One product on one wire; ``role`` is where its endpoint stands among the bench's."""
+
+    role: str
+    mock: Mock
+    wire: FaultyWire
+    faults: dict[str, Fault]
+
+
+class Workshop:
+    """Builds devices on ``bench``; ``clock_ns`` times delayed writes, ``seed`` draws what wire faults spoil."""
+
+    def __init__(self, bench: Bench, start_ns: int, clock_ns: Callable[[], int], seed: int) -> None:
+        self._bench = bench
+        self._start_ns = start_ns
+        self._clock_ns = clock_ns
+        self._rng = random.Random(seed)
+
+    def devices(self, products: tuple[ForceProduct, ...]) -> list[Device]:
+        """The force sensors in ``products``, the axis, and the camera on both of its wires."""
+        sensors = {"bota-sensone": self._bota, "robotiq-ft300": self._robotiq}
+        return [*(sensors[product]() for product in products), self._axis(), *self._camera()]
+
+    def _bota(self) -> Device:
+        wire = self._faulty(PtyWire())
+        drift_ppm = self._bench.parameters.force.counter_drift_ppm
+        mock = BotaMock(wire, self._bench.force, self._start_ns, drift_ppm)
+        return _device("force", mock, wire, BOTA_FAULTS)
+
+    def _robotiq(self) -> Device:
+        wire = self._faulty(PtyWire())
+        drift_ppm = self._bench.parameters.force_modbus.counter_drift_ppm
+        mock = RobotiqMock(wire, self._bench.force_modbus, self._start_ns, drift_ppm)
+        return _device("force_modbus", mock, wire, ROBOTIQ_FAULTS)
+
+    def _axis(self) -> Device:
+        wire = self._faulty(PtyWire())
+        axis = self._bench.parameters.axis
+        per_rev = abs(axis.increments_per_mm) * axis.lead_mm
+        mock = Epos4Mock(wire, self._bench.axis, self._start_ns, axis.node, axis.increments_per_mm, per_rev)
+        return _device("axis", mock, wire, EPOS4_FAULTS)
+
+    def _camera(self) -> list[Device]:
+        serial = self._faulty(PtyWire())
+        tcp = self._faulty(_listen(self._bench.parameters.tracker.tcp_port))
+        tracker = self._bench.tracker
+        return [
+            _device("tracker", NdiMock(serial, tracker, self._start_ns, TOOLS, "polaris"), serial, NDI_FAULTS),
+            _device("tracker", NdiMock(tcp, tracker, self._start_ns, TOOLS, "vega"), tcp, NDI_FAULTS),
+        ]
+
+    def _faulty(self, wire: Wire) -> FaultyWire:
+        return FaultyWire(wire, self._rng, self._clock_ns)
+
+
+def _device(role: str, mock: AnyMock, wire: FaultyWire, kinds: Mapping[str, Kind[AnyMock]]) -> Device:
+    return Device(role, mock, wire, faults_of(wire, WIRE_FAULTS) | faults_of(mock, kinds))
+
+
+def _listen(port: int) -> TcpWire:
+    """The camera's own port where it is free, any other where not."""
+    try:
+        return TcpWire(port)
+    except OSError:
+        return TcpWire()

@@ -1,0 +1,216 @@
+"""The process behind `rig mock`: every device of the bench on its wire, in real time, until it is told to end.
+
+It prints one JSON line with all endpoints when it is ready, and nothing else on that channel. One thread: it sleeps
+until the next mock is due or bytes have come, integrates physics exactly to that time, and lets the mock act.
+"""
+
+import argparse
+import contextlib
+import ctypes
+import gc
+import json
+import os
+import select
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Protocol
+
+from mock_devices.bench import Bench
+from mock_devices.control import ControlPort, Desk
+from mock_devices.devices import FORCE_CHOICES, Device, Workshop
+from mock_devices.faults import Fault
+from mock_devices.parameters import Parameters, load_parameters
+from mock_devices.physics.effects import EFFECTS, complete, knobs, parse_hidden, statement
+from rig.errors import RigError
+
+# A client's bytes that came during a stall were sent before its end: they are heard before time is caught up, or every
+# stall of this process would look like a lost heartbeat.
+LATE_NS = 5_000_000
+GIVE_UP_NS = 1_000_000_000
+NAP_S = 0.1
+# All devices have booted when the endpoints are printed.
+POWERED_BEFORE_NS = 500_000_000
+PR_SET_TIMERSLACK = 29
+
+
+class Timed(Protocol):
+    """What wants to act at a time of its own: a mock, or a wire that delays."""
+
+    @property
+    def due_ns(self) -> int:
+        """When ``tick`` is next to be called."""
+
+    def tick(self, now_ns: int) -> None:
+        """Does what is due."""
+
+
+class Server:
+    """Bench, devices and control channel on one clock."""
+
+    def __init__(self, bench: Bench, devices: Sequence[Device], clock_ns: Callable[[], int]) -> None:
+        self._bench = bench
+        self._mocks = [device.mock for device in devices]
+        self._timed: list[Timed] = [*self._mocks, *(device.wire for device in devices)]
+        self._devices = devices
+        self._clock_ns = clock_ns
+        self.control = ControlPort(Desk(bench, _by_role(devices)).answer)
+
+    def endpoints(self) -> dict[str, object]:
+        """Address of each device by role and kind of port, of the control channel, and this process' id."""
+        addresses: dict[str, dict[str, str]] = {}
+        for device in self._devices:
+            addresses.setdefault(device.role, {}).update(device.mock.endpoints())
+        return {**addresses, "control": self.control.endpoint, "pid": os.getpid()}
+
+    def serve(self, ended: Callable[[], bool], parent: int | None = None) -> None:
+        """Plays until ``ended``, or until the pipe ``parent`` is closed at its other end."""
+        while not ended():
+            ready = self._wait(parent)
+            if parent is not None and parent in ready and not os.read(parent, 4096):
+                return
+            self.turn(ready)
+
+    def turn(self, ready: Sequence[int]) -> None:
+        """Brings time up to now and hears what came on the descriptors ``ready``."""
+        now_ns = self._clock_ns()
+        late = bool(ready) and now_ns - self._due_ns() > LATE_NS
+        if late:
+            self._hear(ready, now_ns)
+        self._catch_up(now_ns)
+        if ready and not late:
+            self._bench.advance(now_ns)
+            self._hear(ready, now_ns)
+
+    def close(self) -> None:
+        """Cuts all wires."""
+        for mock in self._mocks:
+            mock.close()
+        self.control.close()
+
+    def _due_ns(self) -> int:
+        return min(item.due_ns for item in self._timed)
+
+    def _wait(self, parent: int | None) -> list[int]:
+        descriptors = [fileno for mock in self._mocks for fileno in mock.filenos()] + self.control.filenos()
+        if parent is not None:
+            descriptors.append(parent)
+        left_s = (self._due_ns() - self._clock_ns()) * 1e-9
+        return select.select(descriptors, [], [], min(max(left_s, 0.0), NAP_S))[0]
+
+    def _hear(self, ready: Sequence[int], now_ns: int) -> None:
+        heard = set(ready)
+        for mock in self._mocks:
+            if not heard.isdisjoint(mock.filenos()):
+                mock.receive(now_ns)
+        if not heard.isdisjoint(self.control.filenos()):
+            self.control.receive()
+
+    def _catch_up(self, now_ns: int) -> None:
+        gap_ns = now_ns - self._bench.now_ns
+        if gap_ns > GIVE_UP_NS:
+            sys.stderr.write(
+                f"bench: stopped for {gap_ns * 1e-9:.1f} s; physics goes on from now, not through the gap\n"
+            )
+            self._bench.skip(gap_ns)
+        while True:
+            first = min(self._timed, key=lambda item: item.due_ns)
+            if first.due_ns > now_ns:
+                return
+            self._bench.advance(first.due_ns)
+            first.tick(first.due_ns)
+
+
+def _by_role(devices: Sequence[Device]) -> dict[str, list[dict[str, Fault]]]:
+    roles: dict[str, list[dict[str, Fault]]] = {}
+    for device in devices:
+        roles.setdefault(device.role, []).append(dict(device.faults))
+    return roles
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Serves the bench until SIGTERM, SIGINT or the parent's end; 0, or 2 with one sentence for wrong use."""
+    options = _parser().parse_args(arguments)
+    if options.list_effects:
+        sys.stdout.write(effects_table())
+        return 0
+    ended: list[int] = []
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda received, _: ended.append(received))
+    try:
+        server = _server(options)
+    except RigError as error:
+        sys.stderr.write(f"{error}\n")
+        return error.exit_code
+    with contextlib.closing(server):
+        _be_prompt(options.priority)
+        server.turn([])
+        sys.stdout.write(json.dumps(server.endpoints()) + "\n")
+        sys.stdout.flush()
+        server.serve(lambda: bool(ended), sys.stdin.fileno() if options.with_parent else None)
+    return 0
+
+
+def effects_table() -> str:
+    """Every effect that can be hidden, its parameters, their defaults and bounds."""
+    lines = []
+    for effect in EFFECTS:
+        lines.append(f"{effect}: {statement(effect)}")
+        for name, knob in knobs(effect).items():
+            lines.append(f"    {effect}.{name}={knob.default:g}    {knob.low:g} to {knob.high:g}: {knob.meaning}")
+    return "\n".join(lines) + "\n"
+
+
+def _server(options: argparse.Namespace) -> Server:
+    parameters = _parameters(options)
+    start_ns = time.monotonic_ns() - POWERED_BEFORE_NS
+    bench = Bench(parameters, options.seed, start_ns)
+    workshop = Workshop(bench, start_ns, time.monotonic_ns, options.seed)
+    devices = workshop.devices(FORCE_CHOICES[options.force])
+    return Server(bench, devices, time.monotonic_ns)
+
+
+def _parameters(options: argparse.Namespace) -> Parameters:
+    parameters = load_parameters(options.parameters)
+    hidden = complete(parameters.hide) | parse_hidden(options.hide)
+    tracker = parameters.tracker
+    if options.tracker_tcp_port is not None:
+        tracker = tracker.model_copy(update={"tcp_port": options.tracker_tcp_port})
+    return parameters.model_copy(update={"hide": hidden, "tracker": tracker})
+
+
+def _be_prompt(priority: int) -> None:
+    """Asks for short timer slack and, where wanted, real-time priority; says so where it is not granted."""
+    gc.collect()
+    gc.freeze()
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    if not priority:
+        return
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except (OSError, AttributeError) as error:
+        sys.stderr.write(f"bench: runs without real-time priority {priority} ({error})\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m mock_devices.serve",
+        description=(__doc__ or "").partition("\n")[0],
+        epilog="example: python -m mock_devices.serve --hide friction.level_N=0.2 --seed 3",
+    )
+    parser.add_argument("--parameters", type=Path, metavar="FILE", help="TOML file, see mock_devices/default.toml")
+    parser.add_argument("--hide", action="append", default=[], metavar="EFFECT[.PARAMETER=VALUE]", help="repeatable")
+    parser.add_argument("--list-effects", action="store_true", help="print what --hide takes, and end")
+    parser.add_argument("--force", choices=tuple(FORCE_CHOICES), default="both")
+    parser.add_argument("--seed", type=int, default=0, help="of all noise")
+    parser.add_argument("--tracker-tcp-port", type=int, metavar="N", help="instead of 8765; 0: any")
+    parser.add_argument("--priority", type=int, default=0, metavar="N", help="SCHED_FIFO priority to ask for; 0: none")
+    parser.add_argument("--with-parent", action="store_true", help="end when standard input is closed")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())
