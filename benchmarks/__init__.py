@@ -1,0 +1,1 @@
+"""Speed checks, run by hand: ``python -m benchmarks.NAME``."""

@@ -1,0 +1,273 @@
+"""Every fault at random moments in contact: `python -m benchmarks.faults [--trials 20] [--only axis.cut ...]`.
+
+Each trial has a fresh bench and loop, presses 1 to 3 N with the force loop while recording, and brings one fault about
+at a random moment. Printed per fault: how long until the loop noticed, the largest true force and by how much it went
+over the limit, how it ended, and what the recording lost. A trial is unsafe if force went over the limit, or if the
+tip still moves afterwards.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import random
+import signal
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from api.cli.stage import plugged
+from controller.experiments import tracked
+from controller.experiments.references import named
+from controller.steps import Program
+from controller.supervisor import Supervisor
+from mock_devices.control import BenchControl
+from mock_devices.faults import Value
+from rig.config.wiring import Wiring
+from rig.errors import RigError, UsageError
+from rig.recording.reader import read_recording
+from tests.controller.models import index_model
+from tests.system.stage import Stage, children, stage
+
+MODEL = index_model(0.12, 0.22, 0.01, force_N=11.0)
+PRESSES = named("press:2,base_N=1,frequency_Hz=1,duration_s=5")
+LATEST_S = 2.5
+REST_S, STILL_MM = 0.3, 0.03
+ATTEMPTS = 5
+# Faults that need another value than their own default to show while the bench runs.
+VALUES: dict[str, Value] = {"axis.lasting_error": 0x2310, "axis.error": 0x2310, "tracker.missing": 1}
+START_ONLY = ("wrong_identity", "refuse", "mute_start", "refuse_stream", "deaf", "heal")
+
+Act = Callable[[Stage, Supervisor], None]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What one fault did once; times in s from the fault, forces are the tissue's own."""
+
+    fault: str
+    moment_s: float
+    detected_s: float | None
+    cause: str
+    peak_N: float
+    over_N: float
+    end: str
+    unsafe: str
+    dropped: int
+    complete: bool
+
+
+class Spoilt(RigError):
+    """The run had ended before its fault: the computer stalled, or the moment came too late."""
+
+
+class Watcher:
+    """Polls true force and position beside the run, over a connection of its own."""
+
+    def __init__(self, address: str) -> None:
+        self.peak_N = 0.0
+        self._over = threading.Event()
+        self._control = BenchControl(address)
+        self._thread = threading.Thread(target=self._watch)
+        self._thread.start()
+
+    def _watch(self) -> None:
+        while not self._over.wait(0.001):
+            self.peak_N = max(self.peak_N, self._control.number("tip.force_N"))
+
+    def close(self) -> None:
+        """Ends it."""
+        self._over.set()
+        self._thread.join()
+        self._control.close()
+
+
+def faults(control: BenchControl) -> dict[str, Act]:
+    """All faults of the bench that can happen while it runs, and those of our own processes, limb and computer."""
+    found: dict[str, Act] = {}
+    for device, kinds in control.faults().items():
+        if device == "force_modbus":
+            continue
+        for kind in kinds:
+            if kind not in START_ONLY:
+                found[f"{device}.{kind}"] = _device_fault(device, kind)
+    return found | {
+        "tracker.arm_hidden": lambda bench, _: _set(bench, "tracker.arm_in_view", False),
+        "limb.stiffens": lambda bench, _: _set(bench, "tissue.stiffness_scale", 5.0),
+        "limb.goes": lambda bench, _: _set(bench, "tissue.present", False),
+        "limb.moves": lambda bench, _: _set(bench, "surface.position_mm", 35.0),
+        "loop.killed": lambda _, rig: os.kill(rig.loop_pid, signal.SIGKILL),
+        "recorder.killed": lambda _, __: _kill_recorder(),
+        "operator.estop": lambda _, rig: rig.estop(),
+        "operator.stop": lambda _, rig: rig.stop(),
+        "operator.pain": lambda _, rig: rig.pain(),
+        "operator.silent": lambda _, rig: setattr(rig, "attended", lambda: False),
+    }  # fmt: skip
+
+
+def _device_fault(device: str, kind: str) -> Act:
+    value = VALUES.get(f"{device}.{kind}")
+    return lambda bench, _: bench.control.fault(device, kind, value)
+
+
+def _kill_recorder() -> None:
+    for pid in children(os.getpid(), "rig.recording.recorder"):
+        os.kill(pid, signal.SIGKILL)
+
+
+def _set(bench: Stage, name: str, value: Value) -> None:
+    bench.control.set({name: value})
+
+
+def trial(fault: str, act: Act, moment_s: float, seed: int, folder: Path) -> Trial:
+    """One run with one fault."""
+    with stage("--seed", str(seed)) as bench:
+        wiring = plugged(Wiring(), bench.endpoints)
+        program = tracked.plan_reference(PRESSES, MODEL, wiring)
+        with Supervisor(wiring) as rig, contextlib.closing(Watcher(bench.endpoints["control"])) as watcher:
+            ended: list[str] = []
+            runner = threading.Thread(target=_run, args=(rig, program, folder, ended))
+            runner.start()
+            _wait(lambda: rig.status.get("mode") == "contact" or bool(ended), 30)
+            time.sleep(moment_s)
+            spoilt = bool(ended)
+            happened_ns = time.monotonic_ns()
+            if not spoilt:
+                act(bench, rig)
+            runner.join()
+            end, unsafe = _end(bench)
+            peak_N = watcher.peak_N
+    if spoilt:
+        raise Spoilt(ended[0])
+    return _judged(fault, moment_s, happened_ns, folder, ended, end, unsafe, peak_N, wiring.force_limit_N)
+
+
+def _run(rig: Supervisor, program: Program, folder: Path, ended: list[str]) -> None:
+    try:
+        done = tracked.recorded_run(rig, program, folder, "")
+        ended.append(done.outcome.cause or "complete")
+    except RigError as error:
+        ended.append(str(error))
+
+
+def _wait(condition: Callable[[], bool], timeout_s: float) -> None:
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        if time.monotonic() > deadline:
+            raise UsageError(f"the bench was not in contact within {timeout_s:g} s")
+        time.sleep(0.005)
+
+
+def _end(bench: Stage) -> tuple[str, str]:
+    """Where it ended, and what is unsafe about it."""
+    time.sleep(0.2)
+    before_mm = bench.control.number("tip.position_mm")
+    time.sleep(REST_S)
+    now = bench.control.get("tip.position_mm", "tip.force_N", "axis.powered")
+    moved_mm = abs(float(now["tip.position_mm"]) - before_mm)
+    place = "free" if float(now["tip.force_N"]) == 0 else "stopped in contact"
+    place += ", powered" if now["axis.powered"] else ", braked"
+    return place, f"still moves, {moved_mm:.2f} mm in {REST_S:g} s" if moved_mm > STILL_MM else ""
+
+
+def _judged(
+    fault: str, moment_s: float, happened_ns: int, folder: Path, ended: list[str], end: str, unsafe: str,
+    peak_N: float, limit_N: float,
+) -> Trial:  # fmt: skip
+    recording = read_recording(folder / "track_001.mcap")
+    stops = [event for event in recording.events if event.level >= 30 and event.capture_ns > happened_ns]
+    over_N = max(0.0, peak_N - limit_N)
+    unsafe = "; ".join(part for part in (unsafe, f"{over_N:.2f} N over the limit" if over_N else "") if part)
+    loop = recording.tables["loop"]
+    lost = int(np.sum(np.diff(loop["seq"]) - 1)) if len(loop) > 1 else 0
+    return Trial(
+        fault=fault,
+        moment_s=round(moment_s, 3),
+        detected_s=(stops[0].capture_ns - happened_ns) * 1e-9 if stops else None,
+        cause=stops[0].code if stops else ended[0],
+        peak_N=peak_N,
+        over_N=over_N,
+        end=end,
+        unsafe=unsafe,
+        dropped=lost,
+        complete=recording.complete and not recording.damage,
+    )
+
+
+def campaign(wanted: Sequence[str], trials: int, seed: int) -> Iterator[list[Trial]]:
+    """The trials of one fault after another."""
+    with stage("--seed", str(seed)) as bench:
+        known = faults(bench.control)
+    unknown = [name for name in wanted if name not in known]
+    if unknown:
+        raise UsageError(f"--only {unknown[0]}: there are {', '.join(known)}")
+    rng = random.Random(seed)
+    for fault in wanted or known:
+        done = []
+        for number in range(trials):
+            done.append(_repeated(fault, known[fault], rng, seed + number))
+        yield done
+
+
+def _repeated(fault: str, act: Act, rng: random.Random, seed: int) -> Trial:
+    """A trial whose run lives to see its fault; those that do not are said on stderr and done again."""
+    for _ in range(ATTEMPTS):
+        try:
+            with tempfile.TemporaryDirectory() as name:
+                return trial(fault, act, rng.uniform(0.0, LATEST_S), seed, Path(name) / "session")
+        except Spoilt as cause:
+            print(f"{fault}: ended before its fault: {cause}", file=sys.stderr)
+    raise UsageError(f"{fault}: {ATTEMPTS} runs ended before their fault: is the computer busy?")
+
+
+HEADER = (
+    f"{'fault':22}{'trials':>7}{'noticed':>8}{'median s':>10}{'max s':>8}{'peak N':>8}{'over N':>8}{'lost':>6}  end"
+)
+
+
+def line(done: Sequence[Trial]) -> str:
+    """One row of the table."""
+    times = [one.detected_s for one in done if one.detected_s is not None]
+    middle, longest = (f"{np.median(times):.3f}", f"{max(times):.3f}") if times else ("--", "--")
+    ends = ", ".join(sorted({f"{one.cause}: {one.end}" for one in done}))
+    unsafe = [one.unsafe for one in done if one.unsafe]
+    marked = f"  UNSAFE {len(unsafe)}: {unsafe[0]}" if unsafe else ""
+    return (
+        f"{done[0].fault:22}{len(done):7}{len(times):8}{middle:>10}{longest:>8}{max(one.peak_N for one in done):8.2f}"
+        f"{max(one.over_N for one in done):8.2f}{sum(one.dropped for one in done):6}  {ends}{marked}"
+    )
+
+
+def main() -> int:
+    """Runs and prints; 1 where any trial ended unsafe. A recorder that was killed leaves an open, readable file."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.faults", description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--trials", type=int, default=20)
+    parser.add_argument("--only", nargs="*", default=[], help="faults by name, for example axis.cut")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    everything: list[Trial] = []
+    print(HEADER)
+    try:
+        for done in campaign(options.only, options.trials, options.seed):
+            everything += done
+            print(line(done), flush=True)
+    except RigError as error:
+        print(error, file=sys.stderr)
+        return error.exit_code
+    unsafe = [one for one in everything if one.unsafe]
+    broken = [one for one in everything if not one.complete]
+    print(f"{len(everything)} trials, {len(unsafe)} unsafe ends, {len(broken)} recordings not closed or damaged")
+    if options.json:
+        options.json.write_text(json.dumps([asdict(one) for one in everything], indent=2) + "\n")
+    return 1 if unsafe else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

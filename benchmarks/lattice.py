@@ -1,0 +1,225 @@
+"""Speed of the lattice, as ratios within one run: ``python -m benchmarks.lattice [--figure FILE] [--quick]``.
+
+Rivals taichi and warp-lang are timed if they are installed (``uv pip install taichi warp-lang``); numpy always is.
+Every ratio states
+what it compares; what is extrapolated says so.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.lattice_rivals import NumpySlices, taichi_force, warp_force
+from rig.tissue.lattice import euler, fire
+from rig.tissue.lattice.block import Block
+from rig.tissue.lattice.kernels import STEPS
+from rig.tissue.lattice.numba_types import Matrix
+from rig.tissue.lattice.springs import Springs
+from rig.tissue.lattice.state import Loaded
+from rig.tissue.lattice.sweep import RELATIVE_TOLERANCE, sweep
+
+EXPONENT = 4.0
+DEPTH_MM = 2.0
+TOLERANCE_N = RELATIVE_TOLERANCE * 0.1
+GUESSES_PER_FORCE, FORCES = 4, 10
+RIVALS: Mapping[str, Callable[[Matrix, float, float], Callable[[], Matrix] | None]] = {
+    "numpy slices": NumpySlices,
+    "taichi": taichi_force,
+    "warp": warp_force,
+}
+FLOPS = {"constant": 20, "exponential": 45}  # per spring, counting square root, division and both ends
+FIRST_CALL = (
+    "import time; t = time.perf_counter()\n"
+    "from rig.tissue.lattice.block import Block\nfrom rig.tissue.lattice.springs import Springs\n"
+    "from rig.tissue.lattice.state import Loaded\nLoaded(Block(), Springs()).force()\nprint(time.perf_counter() - t)"
+)
+
+
+def best(call: Callable[[], object], repeats: int) -> float:
+    """Least time of ``repeats`` calls in s: what the code takes when nothing else runs in between."""
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def best_of_rounds(calls: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
+    """Least time in s of each call, taken in turns: what else runs on the machine then meets all alike."""
+    found = dict.fromkeys(calls, float("inf"))
+    for _ in range(rounds):
+        for name, call in calls.items():
+            call()
+            found[name] = min(found[name], best(call, 2))
+    return found
+
+
+def shaken(block: Block, springs: Springs) -> Loaded:
+    """A lattice off its rest, so that no spring is special."""
+    lattice = Loaded(block, springs)
+    inner = block.inner(lattice.x)
+    inner += np.random.default_rng(0).normal(0.0, 0.05 * block.spacing_mm, inner.shape)
+    return lattice
+
+
+def springs_of(block: Block) -> int:
+    """Number of springs in the whole block."""
+    return sum(int(np.prod([n - abs(int(d)) for n, d in zip(block.nodes, step, strict=True)])) for step in STEPS)
+
+
+def force_table(rounds: int) -> tuple[dict[str, dict[str, float]], float]:
+    """ms per force evaluation of the study's full block, both laws, rivals where installed; and Gflop/s of a matrix
+    product."""
+    a = np.random.default_rng(0).normal(size=(1000, 1000))
+    found: dict[str, dict[str, float]] = {}
+    roof = 0.0
+    for law, b in (("constant", 0.0), ("exponential", EXPONENT)):
+        lattice, alone = shaken(Block(), Springs(0.1, b, 0.0)), shaken(Block(), Springs(0.1, b, 0.0))
+        alone.slabs = 1
+        with_cells = shaken(Block(), Springs(0.1, b, 1.0))
+        inner = np.ascontiguousarray(lattice.block.inner(lattice.x))
+        ours = lattice.block.inner(lattice.force()).copy()
+        calls: dict[str, Callable[[], object]] = {"ours": lattice.force}
+        for name, make in RIVALS.items():
+            rival = make(inner, 0.1, b)
+            if rival is not None:
+                np.testing.assert_allclose(rival(), ours, atol=1e-9)
+                calls[name] = rival
+        calls |= {"ours, 1 thread": alone.force, "ours, with cell volumes": with_cells.force, "product": lambda: a @ a}
+        times = best_of_rounds(calls, rounds)
+        roof = max(roof, 2e-9 * 1000**3 / times.pop("product"))
+        found[law] = {name: 1e3 * value for name, value in times.items()}
+    return found, roof
+
+
+def eased(block: Block, springs: Springs) -> Loaded:
+    """The tip at 2 mm over a smooth first guess: the same start for every solver, and a kind one for the study's."""
+    lattice = Loaded(block, springs)
+    x, y, z = lattice.rest
+    near = np.exp(-(x**2 + y**2) / 5.0**2) * (z / block.height_mm) ** 2
+    lattice.x[2] -= DEPTH_MM * near * lattice.free[2]
+    lattice.press(DEPTH_MM)
+    return lattice
+
+
+def equilibria() -> dict[str, tuple[float, int, float]]:
+    """Seconds, steps and reaction over k at 2 mm, springs only, all to the study's threshold on the force."""
+    springs = Springs.for_mode("study", 0.1)
+    found = {}
+    cases: tuple[tuple[str, Block, Callable[[Loaded], int]], ...] = (
+        ("study's scheme, full", Block(), lambda lattice: euler.run(lattice, euler.EulerScheme())),
+        ("fire, full", Block(), lambda lattice: fire.relax(lattice, TOLERANCE_N)),
+        ("study's scheme, quarter", Block(quarter=True), lambda lattice: euler.run(lattice, euler.EulerScheme())),
+        ("fire, quarter", Block(quarter=True), lambda lattice: fire.relax(lattice, TOLERANCE_N)),
+    )
+    for name, block, solve in cases:
+        lattice = eased(block, springs)
+        start = time.perf_counter()
+        steps = solve(lattice)
+        found[name] = (time.perf_counter() - start, steps, lattice.reaction_N() / 0.1)
+    return found
+
+
+def sweep_seconds() -> float:
+    """One sweep of phi to 8 mm, from which ten k follow by division."""
+    start = time.perf_counter()
+    sweep(Block(quarter=True), Springs.for_mode("stabilised"), 8.0)
+    return time.perf_counter() - start
+
+
+def first_call_seconds() -> tuple[float, float]:
+    """First force of a fresh process: without and with kernels on disk."""
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
+        runs = [
+            subprocess.run(
+                [sys.executable, "-c", FIRST_CALL], env=environment, capture_output=True, text=True, check=True
+            )
+            for _ in range(2)
+        ]
+    return float(runs[0].stdout), float(runs[1].stdout)
+
+
+def scaling(repeats: int) -> list[tuple[int, float, float]]:
+    """Vertices, ms per force (springs only) and bytes of state per vertex, from 10^4 to 10^6 vertices."""
+    found = []
+    for nodes in ((21, 21, 24), (31, 31, 32), (51, 51, 40), (71, 71, 56), (91, 91, 80), (121, 121, 72)):
+        lattice = shaken(Block(nodes), Springs(0.1, 0.0, 0.0))
+        arrays = 7  # positions, rest, force, free, and the solver's velocity, inverse mass and diagonal
+        found.append(
+            (
+                lattice.block.vertices,
+                1e3 * best(lattice.force, repeats),
+                arrays * lattice.x.nbytes / lattice.block.vertices,
+            )
+        )
+    return found
+
+
+def draw(points: Sequence[tuple[int, float, float]], file: Path) -> None:
+    """Cost against vertex count, as a picture."""
+    from rig.report.drawing import ACTUAL, dress, new_figure, png  # noqa: PLC0415
+
+    figure = new_figure(6.0, 4.0)
+    axes = figure.subplots()
+    dress(axes, "One force evaluation, springs only", "vertices", "ms")
+    axes.loglog([p[0] for p in points], [p[1] for p in points], "o-", color=ACTUAL)
+    file.write_bytes(png(figure, dpi=90))
+
+
+def main() -> None:
+    """Run everything and print the tables; a JSON line at the end."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--figure", type=Path, help="write cost against vertex count here (png)")
+    parser.add_argument("--quick", action="store_true", help="force table only")
+    options = parser.parse_args()
+    forces, roof = force_table(40)
+    count = springs_of(Block())
+    print(f"force of {count} springs, float64, ms (least of many)")
+    for law, column in forces.items():
+        for name, value in column.items():
+            print(f"  {law:12} {name:24} {value:8.3f}   ours is {value / column['ours']:5.1f} x as fast")
+        rate = FLOPS[law] * count / column["ours"] / 1e6
+        print(f"  {law:12} {rate:.0f} Gflop/s of {roof:.0f} in a matrix product: {100 * rate / roof:.0f} %")
+    result: dict[str, object] = {"force_ms": forces, "peak_gflops": roof}
+    if not options.quick:
+        result |= _slow_part(options.figure)
+    print(json.dumps(result))
+
+
+def _slow_part(figure: Path | None) -> dict[str, object]:
+    settled = equilibria()
+    slow = settled["study's scheme, full"][0]
+    print("equilibrium at 2 mm, springs only")
+    for name, (seconds, steps, reaction) in settled.items():
+        print(f"  {name:26} {seconds:7.2f} s  {steps:5d} steps  R/k {reaction:.4f} mm  {slow / seconds:5.1f} x")
+    swept = sweep_seconds()
+    loop = FORCES * GUESSES_PER_FORCE * slow
+    print(
+        f"ten-force fit: sweep to 8 mm {swept:.1f} s; study's loop {loop:.0f} s (extrapolated: {FORCES} forces x "
+        f"{GUESSES_PER_FORCE} simulations x {slow:.1f} s at 2 mm): {loop / swept:.0f} x"
+    )
+    cold, warm = first_call_seconds()
+    print(f"first force of a fresh process: {cold:.1f} s compiling once per machine, {warm:.1f} s from disk")
+    points = scaling(10)
+    for vertices, milliseconds, size in points:
+        print(
+            f"  {vertices:8d} vertices  {milliseconds:8.3f} ms  {1e6 * milliseconds / vertices:5.2f} ns/vertex  "
+            f"{size:.0f} B/vertex"
+        )
+    if figure is not None:
+        draw(points, figure)
+    return {"equilibrium": settled, "sweep_s": swept, "loop_s": loop, "first_call_s": [cold, warm], "scaling": points}
+
+
+if __name__ == "__main__":
+    main()
