@@ -1,0 +1,57 @@
+"""Every command explains itself with an example, and wrong use is one sentence with exit code 2."""
+
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from api.cli.app import COMMANDS, build
+from rig.errors import UsageError
+
+runner = CliRunner()
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_of_every_command_ends_with_an_example_of_that_command(name: str) -> None:
+    answer = runner.invoke(build(name), [name, "--help"], terminal_width=200)
+    assert answer.exit_code == 0
+    assert re.search(rf"Example:\s+rig {name} ?", answer.output), answer.output
+
+
+def test_help_of_the_whole_lists_every_command() -> None:
+    answer = runner.invoke(build(), ["--help"])
+    assert all(re.search(rf"^ *{name} ", answer.output, re.MULTILINE) for name in COMMANDS)
+
+
+@pytest.mark.parametrize(
+    "arguments", [["no-such-command"], ["verify"], ["fit", "a", "--no-such-option"], ["serve", "--port", "0"]]
+)
+def test_wrong_use_ends_with_code_2(arguments: list[str]) -> None:
+    assert runner.invoke(build(), arguments).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["fit", "no-such-session"], "no-such-session"),
+        (["report", "no-such-session"], "no-such-session"),
+        (["verify", "no-such-session"], "no-such-session"),
+        (["import", "no-such-folder", "--out", "x"], "no-such-folder"),
+        (["export", "no-such-session", "--out", "x"], "no-such-session"),
+        (["capture", "no-such.toml", "--out", "x"], "no-such.toml: no such file"),
+        (["doctor", "--config", "no-such.toml"], "no-such.toml: no such file"),
+        (["doctor", "--set", "force"], "write section.key=value"),
+        (["track", "--model", "no-such.json", "--force", "5"], "no-such.json: no such file"),
+        (["serve", "--host", "0.0.0.0"], "listens on this computer only"),
+    ],
+)
+def test_a_wrong_file_or_setting_is_one_sentence(
+    arguments: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    answer = runner.invoke(build(arguments[0]), arguments)
+    assert isinstance(answer.exception, UsageError)
+    assert words in str(answer.exception)
+    assert answer.exception.exit_code == 2
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,147 @@
+"""`rig verify`, `rig repair`, `rig import`, `rig export` as typed by a person."""
+
+import json
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner, Result
+
+from api.cli import records
+from rig.errors import CheckFailed, DataError, UsageError
+from rig.recording.files import WriteFailed
+from rig.recording.sessions import open_session
+from tests.rig.recording.measured import measured
+
+app = typer.Typer(rich_markup_mode=None)
+for name, command in (
+    ("verify", records.verify),
+    ("repair", records.repair),
+    ("import", records.import_),
+    ("export", records.export_),
+):
+    app.command(name)(command)
+
+
+def rig(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    return measured(tmp_path / "measured")
+
+
+@pytest.fixture
+def session(source: Path, tmp_path: Path) -> Path:
+    out = tmp_path / "session"
+    assert rig("import", source, "--out", out).exit_code == 0
+    return out
+
+
+@pytest.mark.parametrize("command", ["verify", "repair", "import", "export"])
+def test_help_ends_with_an_example(command: str) -> None:
+    result = rig(command, "--help")
+    assert result.exit_code == 0
+    assert f"Example: rig {command} " in result.output
+
+
+def test_import_prints_a_table_and_writes_its_result(source: Path, tmp_path: Path) -> None:
+    result = rig("import", source, "--out", tmp_path / "out", "--json", tmp_path / "result.json")
+    assert result.exit_code == 0
+    assert "trial_02" in result.output
+    assert json.loads((tmp_path / "result.json").read_text()) == {
+        "session": str(tmp_path / "out"),
+        "recordings": 2,
+        "samples": {"force": 6, "axis": 6, "marker": 3},
+        "remarks": [],
+    }
+
+
+@pytest.mark.parametrize(
+    "options",
+    [["--columns", "force.force_N=Fz, raw,time_s=t"], ["--columns", "force_N=Fz, raw", "--columns", "time_s=t"]],
+)
+def test_columns_come_one_by_one_or_with_commas(source: Path, tmp_path: Path, options: list[str]) -> None:
+    for path in source.rglob("*.csv"):
+        path.write_text(path.read_text().replace("time_s", "t").replace("force_N", '"Fz, raw"'))
+    assert rig("import", source, "--out", tmp_path / "out", *options).exit_code == 0
+    assert open_session(tmp_path / "out").trials[0].peak_force_N == 1.5
+
+
+def test_bad_files_are_wrong_use(source: Path, tmp_path: Path) -> None:
+    (source / "trial_01" / "force.csv").write_text("time_s,force_N\n0,1\n1,nan\n")
+    error = rig("import", source, "--out", tmp_path / "out").exception
+    assert isinstance(error, DataError)
+    assert error.exit_code == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_whole_session_verifies(session: Path, tmp_path: Path) -> None:
+    result = rig("verify", session, "--json", tmp_path / "result.json")
+    assert result.exit_code == 0
+    assert result.output.count("complete") == 5
+    values = json.loads((tmp_path / "result.json").read_text())
+    assert (values["ok"], values["remarks"]) == (True, [])
+    force = values["recordings"]["trial_01"]["streams"]["force"]
+    assert (force["samples"], force["missing"], force["dropped"]) == (3, 0, 0)
+    assert force["rate_Hz"] == pytest.approx(1000)
+    assert values["recordings"]["trial_01"]["streams"]["loop"]["rate_Hz"] is None
+
+
+def test_a_cut_recording_fails_the_check_and_the_result_is_written_all_the_same(session: Path, tmp_path: Path) -> None:
+    path = session / "trial_02.mcap"
+    path.write_bytes(path.read_bytes()[:-100])
+    result = rig("verify", session, "--json", tmp_path / "result.json")
+    assert isinstance(result.exception, CheckFailed)
+    assert "1 of 2 recordings are not complete (trial_02)" in str(result.exception)
+    assert "trial_02.mcap: incomplete" in result.output
+    values = json.loads((tmp_path / "result.json").read_text())
+    assert not values["ok"]
+    assert values["recordings"]["trial_02"]["state"] == "incomplete"
+    assert values["recordings"]["trial_01"]["ok"]
+
+
+def test_a_missing_recording_fails_the_check(session: Path) -> None:
+    (session / "trial_02.mcap").unlink()
+    error = rig("verify", session).exception
+    assert isinstance(error, CheckFailed)
+    assert "trial trial_02: its recording trial_02.mcap is missing" in str(error)
+
+
+def test_one_recording_can_be_verified(session: Path) -> None:
+    assert rig("verify", session / "trial_01.mcap").exit_code == 0
+
+
+def test_a_place_without_session_is_wrong_use(tmp_path: Path) -> None:
+    assert isinstance(rig("verify", tmp_path / "none").exception, UsageError)
+
+
+def test_repair_makes_a_recording_that_verifies(session: Path, tmp_path: Path) -> None:
+    path = session / "trial_02.mcap"
+    path.write_bytes(path.read_bytes()[:-100])
+    result = rig("repair", path, "--out", tmp_path / "good.mcap", "--json", tmp_path / "result.json")
+    assert result.exit_code == 0
+    assert "complete, as repaired from trial_02.mcap" in result.output
+    assert json.loads((tmp_path / "result.json").read_text())["state"] == "complete"
+    assert rig("verify", tmp_path / "good.mcap").exit_code == 0
+
+
+def test_export_writes_every_format_or_the_ones_asked_for(session: Path, tmp_path: Path) -> None:
+    result = rig("export", session, "--out", tmp_path / "all", "--json", tmp_path / "result.json")
+    assert result.exit_code == 0
+    assert sorted(path.name for path in (tmp_path / "all").iterdir()) == ["csv", "parquet", "session.h5", "session.mat"]
+    assert json.loads((tmp_path / "result.json").read_text())["written"]["hdf5"] == str(tmp_path / "all" / "session.h5")
+    assert rig("export", session, "--out", tmp_path / "some", "--format", "mat,CSV").exit_code == 0
+    assert sorted(path.name for path in (tmp_path / "some").iterdir()) == ["csv", "session.mat"]
+    error = rig("export", session, "--out", tmp_path / "more", "--format", "xlsx").exception
+    assert isinstance(error, UsageError)
+    assert str(error) == "--format xlsx: unknown; there are csv, parquet, hdf5, mat"
+    assert not (tmp_path / "more").exists()
+
+
+def test_export_into_a_file_is_one_sentence(session: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    error = rig("export", session, "--out", tmp_path / "file").exception
+    assert isinstance(error, WriteFailed)
+    assert "cannot be made: File exists" in str(error)

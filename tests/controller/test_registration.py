@@ -1,0 +1,64 @@
+"""The limb in the robot's frame, from markers, wherever the camera stands: only motion against the robot counts."""
+
+import math
+
+import numpy as np
+import pytest
+
+from controller.registration import Point, Registration
+
+DIRECTION = np.array([0.12, 0.25, -0.9608])
+TIP, ARM = np.array([35.0, -60.0, -1400.0]), np.array([95.0, -40.0, -1405.0])
+
+
+def frames(
+    registration: Registration, positions_mm: "np.ndarray[tuple[int], np.dtype[np.float64]]", start: int = 0,
+    limb: tuple[float, float, float] = (0.0, 0.0, 0.0), camera: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> None:  # fmt: skip
+    """Frames at 60 Hz with the tracker's noise: the axis at each position, limb and camera shifted."""
+    noise = np.random.default_rng(start)
+    for frame, position_mm in enumerate(positions_mm, start):
+        captured_ns = frame * 16_666_667
+        registration.axis(captured_ns, position_mm)
+        seen = -np.array(camera)
+        tip = TIP + DIRECTION * position_mm + seen + noise.normal(0, 0.06, 3)
+        registration.tip(frame, captured_ns, Point(*tip))
+        registration.arm(frame, Point(*(ARM + np.array(limb) + seen + noise.normal(0, 0.06, 3))))
+
+
+APPROACHING = np.linspace(0.0, 20.0, 240)
+
+
+def test_before_the_axis_has_travelled_nothing_is_said() -> None:
+    registration = Registration()
+    frames(registration, np.linspace(0.0, 4.0, 60))
+    assert math.isnan(registration.moved_mm)
+
+
+def test_a_limb_at_rest_has_not_moved_while_the_axis_goes_on() -> None:
+    registration = Registration()
+    frames(registration, APPROACHING)
+    frames(registration, np.linspace(20.0, 5.0, 240), start=240)
+    assert registration.moved_mm < 0.5
+
+
+def test_a_limb_that_moved_is_seen_by_how_much() -> None:
+    registration = Registration()
+    frames(registration, APPROACHING)
+    frames(registration, np.full(20, 20.0), start=240, limb=(3.0, 0.0, 4.0))
+    assert registration.moved_mm == pytest.approx(5.0, abs=0.5)
+
+
+def test_a_camera_that_is_pushed_does_not_count_as_a_limb_that_moved() -> None:
+    registration = Registration()
+    frames(registration, APPROACHING)
+    frames(registration, np.full(20, 20.0), start=240, camera=(0.0, 30.0, 0.0))
+    assert registration.moved_mm < 0.5
+
+
+def test_a_new_program_starts_from_where_the_limb_is() -> None:
+    registration = Registration()
+    frames(registration, APPROACHING)
+    registration.begin()
+    frames(registration, APPROACHING, start=240, limb=(20.0, 0.0, 0.0))
+    assert registration.moved_mm < 0.5

@@ -1,0 +1,23 @@
+"""What tests share: where the real recordings are, and properties without a time limit.
+
+The recordings stay outside the project: a test that needs one skips where it is absent.
+"""
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+ROOT = Path(__file__).resolve().parents[1]
+# How long an example takes says nothing on a machine that others use too.
+unhurried = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+
+
+def recording(name: str) -> Path:
+    """The file or folder ``name`` under TISSUE_RIG_DATA, or under shared/data beside the project; skips without it."""
+    folder = os.environ.get("TISSUE_RIG_DATA") or ROOT.parent / "shared" / "data"
+    path = Path(folder) / name
+    if not path.exists():
+        pytest.skip(f"no recording {name}: set TISSUE_RIG_DATA to the folder that holds it")
+    return path

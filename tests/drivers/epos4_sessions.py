@@ -1,0 +1,20 @@
+"""A servo axis on the stage, and one turn of a loop."""
+
+from typing import Any
+
+from drivers.epos4.device import Epos4Axis
+from rig.channels import AxisSample
+from rig.config.wiring import Axis, Limits
+from tests.epos4_stage import Stage
+
+
+def axis_on(stage: Stage, limits: Limits | None = None, **config: Any) -> Epos4Axis:
+    return Epos4Axis(Axis(port="memory", **config), limits or Limits(), stage.now, open_link=stage.open)
+
+
+def tick(stage: Stage, axis: Epos4Axis, position_mm: float) -> list[AxisSample]:
+    """One turn of a loop at 1 kHz."""
+    stage.run(0.001)
+    samples = axis.poll(stage.now())
+    axis.command(position_mm, stage.now())
+    return list(samples)

@@ -1,0 +1,223 @@
+"""Starting and leaving the tracker: the manual's order, and one clear sentence for each way it can fail."""
+
+import itertools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers.ndi.device import NdiTracker
+from rig.config.wiring import Tracker
+from rig.errors import DeviceError, UsageError
+from tests.ndi_stage import Stage, run, started
+
+
+@pytest.fixture
+def stage() -> Iterator[Stage]:
+    stage = Stage()
+    yield stage
+    stage.release()
+
+
+def test_start_over_tcp_follows_the_manual(stage: Stage) -> None:
+    started(stage)
+    assert stage.commands == [
+        b"INIT:E3A5\r",
+        b"VER:065EE\r",
+        b"GETINFO:Features.Firmware.Version0492\r",
+        b"PHSR:01E03E\r",
+        b"PHSR:02E17E\r",
+        b"PINIT:0131EA\r",
+        b"PINIT:0230AA\r",
+        b"PHSR:0321BF\r",
+        b"PENA:01D6D3B\r",
+        b"PENA:02D9D3B\r",
+        b"PHSR:04E3FE\r",
+        b"TSTART:5423\r",
+    ]
+
+
+def test_over_a_serial_line_the_speed_is_raised_and_given_back() -> None:
+    stage = Stage(address="/dev/memory")
+    device = started(stage)
+    assert stage.bauds == [9600, 115200]
+    assert b"COMM:500000048\r" in stage.commands
+    device.close()
+    assert stage.commands[-2:] == [b"TSTOP:2C14\r", b"COMM:000000084\r"]
+    stage.release()
+
+
+def test_the_tracker_tells_who_it_is(stage: Stage) -> None:
+    identity = started(stage).identity
+    assert identity.product == "Polaris Vega Control Firmware"
+    assert identity.serial == "P9-00001"
+    assert identity.firmware == "007.000.012"
+    assert identity.settings["freeze_tag"] == "Polaris Vega 024"
+
+
+def test_before_start_there_is_no_identity_and_no_port(stage: Stage) -> None:
+    device = NdiTracker(stage.open, Tracker())
+    for use in (lambda: device.identity, device.fileno, lambda: device.poll(0)):
+        with pytest.raises(DeviceError, match="not started; call start first"):
+            use()
+
+
+def test_tool_definitions_are_loaded_in_the_order_of_the_tools(stage: Stage, tmp_path: Path) -> None:
+    roms = []
+    for name in ("tip", "arm"):
+        path = tmp_path / f"{name}.rom"
+        path.write_bytes(b"NDI\0" + name.encode())
+        roms.append(path)
+    device = started(stage, roms=tuple(roms))
+    writes = [command for command in stage.commands if command.startswith(b"PVWR:")]
+    assert len(writes) == 2 * 16
+    assert writes[0].startswith(b"PVWR:0300004E44490074697000")
+    assert writes[16].startswith(b"PVWR:0400004E44490061726D00")
+    assert [sample.tool for sample in run(stage, device, 100, 130)[:2]] == [0, 1]
+    assert [sample.valid for sample in run(stage, device, 130, 160)[:2]] == [1, 1]
+
+
+def test_definitions_of_an_earlier_session_are_freed_first(stage: Stage, tmp_path: Path) -> None:
+    path = tmp_path / "tip.rom"
+    path.write_bytes(b"NDI\0")
+    for _ in range(30):
+        device = started(stage, tools=("tip",), roms=(path,))
+        device.close()
+    assert run(stage, started(stage, tools=("tip",), roms=(path,)), 100, 130)[0].valid == 1
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(None, "cannot be read: No such file"), (b"a picture", "not a tool definition")],
+)
+def test_a_bad_tool_definition_is_refused_before_the_port_is_opened(
+    stage: Stage, tmp_path: Path, content: bytes | None, message: str
+) -> None:
+    path = tmp_path / "tip.rom"
+    if content:
+        path.write_bytes(content)
+    with pytest.raises(UsageError, match=f"tip.rom: .*{message}"):
+        started(stage, tools=("tip",), roms=(path,))
+    assert stage.bauds == []
+
+
+def test_each_tool_needs_its_definition(stage: Stage, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"tracker.roms: 1 files for 2 tools \(tip, arm\)"):
+        started(stage, roms=(tmp_path / "tip.rom",))
+
+
+def test_more_tools_named_than_plugged_in_are_told(stage: Stage) -> None:
+    with pytest.raises(DeviceError, match="2 tools are enabled where the configuration names 3"):
+        started(stage, tools=("tip", "arm", "couch"))
+    assert stage.closed
+
+
+def test_another_device_behind_the_port_is_told(stage: Stage) -> None:
+    stage.canned = {"VER": "V1013"}
+    with pytest.raises(DeviceError, match="VER answered 'V1013', which is no NDI position sensor; check the port"):
+        started(stage)
+    assert stage.closed
+
+
+@pytest.mark.parametrize(
+    ("command", "answer", "message"),
+    [
+        ("INIT", "ERROR15", r"refused INIT \(ERROR15: the measurement system cannot be initialised\)"),
+        ("PENA", "ERROR0E", r"refused PENA \(ERROR0E: port handle not initialised\)"),
+        ("TSTART", "ERROR12", r"refused TSTART \(ERROR12: tracking cannot be started\)"),
+        ("PHSR", "OKAY", "PHSR:01 answered 'OKAY', which is no list of handles"),
+    ],
+)
+def test_a_refusal_during_start_is_told_and_closes_the_port(
+    stage: Stage, command: str, answer: str, message: str
+) -> None:
+    stage.canned = {command: answer}
+    with pytest.raises(DeviceError, match=message):
+        started(stage)
+    assert stage.closed
+
+
+def test_a_warning_during_start_is_kept(stage: Stage) -> None:
+    stage.canned = {"PHF": "WARNING"}
+    stage.mock.unplugged = {1}
+    device = started(stage, tools=("tip",))
+    assert device.identity.settings["warnings"] == "PHF:02"
+
+
+def test_old_firmware_without_information_is_known_by_its_freeze_tag(stage: Stage) -> None:
+    stage.canned = {"GETINFO": "ERROR01"}
+    assert started(stage).identity.firmware == "Polaris Vega 024"
+
+
+def leaping() -> Callable[[], int]:
+    """A clock on which every deadline is over at once."""
+    ticks = itertools.count(0, 10_000_000_000)
+    return lambda: next(ticks)
+
+
+@pytest.mark.parametrize("address", ["tcp://memory:1", "/dev/memory"])
+def test_a_silent_port_is_told(address: str) -> None:
+    stage = Stage(address=address)
+    stage.mock.silent = True
+    stage.heeds_break = False
+    device = NdiTracker(stage.open, Tracker(), now=leaping())
+    with pytest.raises(DeviceError, match=f"{address}: INIT brought no reply; check power, cable"):
+        device.start()
+    assert stage.closed
+    stage.release()
+
+
+def test_a_port_full_of_other_bytes_is_told(stage: Stage) -> None:
+    stage.canned = {"INIT": "z\r" * 300}
+    with pytest.raises(DeviceError, match="INIT brought 605 bytes but no reply of an NDI tracker"):
+        started(stage)
+
+
+def test_a_tracker_left_at_another_speed_is_brought_back_by_a_break() -> None:
+    stage = Stage(address="/dev/memory")
+    stage.speed = 115200
+    device = started(stage)
+    assert stage.commands[:3] == [b"INIT:E3A5\r", b"<break>", b"INIT:E3A5\r"]
+    assert stage.bauds == [9600, 115200]
+    device.close()
+    stage.release()
+
+
+def test_a_tracker_left_fast_is_found_where_the_line_loses_breaks() -> None:
+    stage = Stage(address="/dev/memory")
+    stage.speed = 115200
+    stage.heeds_break = False
+    device = started(stage)
+    assert run(stage, device, 100, 130)
+    device.close()
+    stage.release()
+
+
+def test_close_stops_tracking_once_and_may_be_called_twice(stage: Stage) -> None:
+    device = started(stage)
+    run(stage, device, 100, 200)
+    device.close()
+    device.close()
+    assert stage.commands[-1] == b"TSTOP:2C14\r"
+    assert stage.commands.count(b"TSTOP:2C14\r") == 1
+    assert stage.closed
+
+
+def test_close_does_not_raise_on_a_cut_cable(stage: Stage) -> None:
+    device = started(stage)
+    stage.cut = True
+    device.close()
+    assert stage.closed
+
+
+def test_it_can_be_started_again(stage: Stage) -> None:
+    device = started(stage)
+    run(stage, device, 100, 200)
+    device.close()
+    device.start()
+    assert run(stage, device, 200, 300)[0].seq == 0
+
+
+def test_a_tracker_left_tracking_by_a_host_that_died_is_taken_over(stage: Stage) -> None:
+    run(stage, started(stage), 100, 200)
+    assert run(stage, started(stage), 200, 300)[0].valid == 1

@@ -1,0 +1,258 @@
+"""The drive mock on a stage of its own: in this process on an injected clock, or in another one in real time.
+
+The other process is started as ``python -m tests.epos4_stage``. It prints its endpoint as one line of JSON; each line
+it reads sets or asks something: ``{"set": "silent", "value": true}``, ``{"fault": 9040}``, ``{"cut": true}``,
+``{"ask": true}``, and is answered by one line with the plant's state.
+"""
+
+import contextlib
+import json
+import math
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from drivers.can.slcan import CanFrame, SlcanDecoder, encode_frame
+from drivers.canopen.nmt import NmtState
+from drivers.ports import PortClosed
+from mock_devices.epos4 import Epos4Mock
+from mock_devices.stage import NEVER_NS
+from mock_devices.wire import PtyWire
+
+MS = 1_000_000
+TIME_CONSTANT_S = 1 / (2 * math.pi * 25)
+
+
+class LaggingPlant:
+    """A carriage that follows its target with one time constant; the reference switch is at and below 0 mm."""
+
+    def __init__(self, position_mm: float = 8.0) -> None:
+        self.position_mm = position_mm
+        self.velocity_mm_s = 0.0
+        self.current_A = 0.0
+        self.current_limit_A = 5.0
+        self.has_switch = True
+        self.powered = False
+        self.target_mm = position_mm
+        self.stop_mm = -1e9
+        self.at_reference = position_mm <= 0
+
+    def power(self, on: bool) -> None:
+        self.powered = on
+        self.target_mm = self.position_mm
+
+    def target(self, position_mm: float) -> None:
+        self.target_mm = position_mm
+
+    def advance(self, dt_s: float) -> None:
+        """Moves on; where the carriage meets ``stop_mm`` the current grows with the lag."""
+        before = self.position_mm
+        if self.powered:
+            self.position_mm += (self.target_mm - before) * (1 - math.exp(-dt_s / TIME_CONSTANT_S))
+            self.position_mm = max(self.position_mm, self.stop_mm)
+        self.velocity_mm_s = (self.position_mm - before) / dt_s
+        self.current_A = 2 * (self.target_mm - self.position_mm) if self.powered else 0.0
+        self.at_reference = self.has_switch and self.position_mm <= 0
+
+
+class MemoryWire:
+    """A wire without a kernel: the client's bytes wait in ``sent``, the mock's writes in ``replies``."""
+
+    endpoint = "memory"
+
+    def __init__(self) -> None:
+        self.sent = b""
+        self.replies: list[bytes] = []
+
+    def filenos(self) -> list[int]:
+        return []
+
+    def read(self) -> bytes:
+        data, self.sent = self.sent, b""
+        return data
+
+    def write(self, data: bytes) -> None:
+        self.replies.append(data)
+
+    def close(self) -> None:
+        self.replies.clear()
+
+
+class HostDied(Exception):
+    """The client's process is no more."""
+
+
+class Stage:
+    """A mock, its plant and the link to it in one process; time passes only in ``wait`` and ``run``.
+
+    Is itself the CanLink of the driver. ``cut`` is a cable pulled out; ``drop`` swallows that many answers to come;
+    from ``dies_at_ns`` on the client gets nothing done any more.
+    """
+
+    def __init__(self, position_mm: float = 8.0, booted: bool = True, **kind: Any) -> None:
+        self.clock_ns = 1_000_000_000
+        self.plant = LaggingPlant(position_mm)
+        self.wire = MemoryWire()
+        self.mock = Epos4Mock(self.wire, self.plant, self.clock_ns, **kind)
+        self.decoder = SlcanDecoder()
+        self.sent: list[CanFrame] = []
+        self.cut = False
+        self.closed = False
+        self.drop = 0
+        self.dies_at_ns = NEVER_NS
+        self.say(b"C\rS8\rO\r")
+        self.run(0.1 if booted else 0.0)
+        self.wire.replies.clear()
+
+    def open(self, path: str, bitrate: int, now: object) -> "Stage":
+        self.closed = False
+        return self
+
+    def now(self) -> int:
+        return self.clock_ns
+
+    def fileno(self) -> int:
+        return 99
+
+    def say(self, lines: bytes) -> None:
+        """Bytes from the client to the adapter."""
+        self.wire.sent += lines
+        self.mock.receive(self.clock_ns)
+
+    def heard(self) -> bytes:
+        """Bytes from the adapter to the client since the last call."""
+        data = b"".join(self.wire.replies)
+        self.wire.replies.clear()
+        return data
+
+    def send(self, *frames: CanFrame) -> None:
+        if self.clock_ns >= self.dies_at_ns:
+            raise HostDied
+        if self.cut:
+            raise PortClosed("memory: the CAN adapter is gone (hang-up); check its cable, then connect again")
+        self.sent += frames
+        self.say(b"".join(map(encode_frame, frames)))
+
+    def read(self) -> list[CanFrame]:
+        if self.cut:
+            raise PortClosed("memory: the CAN adapter is gone (hang-up); check its cable, then connect again")
+        frames = self.decoder.feed(self.heard())
+        while self.drop and frames:
+            frames.pop(0)
+            self.drop -= 1
+        return frames
+
+    def wait(self, timeout_s: float) -> None:
+        end_ns = self.clock_ns + round(timeout_s * 1e9)
+        while self.clock_ns < end_ns and not self.wire.replies:
+            self._step(end_ns)
+
+    def run(self, time_s: float) -> None:
+        """Lets time pass, whatever arrives."""
+        end_ns = self.clock_ns + round(time_s * 1e9)
+        while self.clock_ns < end_ns:
+            self._step(end_ns)
+
+    def close(self) -> None:
+        self.closed = True
+
+    def _step(self, end_ns: int) -> None:
+        until_ns = min(end_ns, self.clock_ns + MS, max(self.mock.due_ns, self.clock_ns + 1))
+        self.plant.advance((until_ns - self.clock_ns) / 1e9)
+        self.clock_ns = until_ns
+        if self.mock.due_ns <= until_ns:
+            self.mock.tick(until_ns)
+
+
+class RemoteMock:
+    """The mock in another process."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "tests.epos4_stage"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        self.port: str = self._answer()["slcan"]
+
+    def order(self, **order: object) -> dict[str, Any]:
+        """Sends an order and returns the plant's state after it."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps(order) + "\n")
+        self._process.stdin.flush()
+        return self._answer()
+
+    def _answer(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        answer: dict[str, Any] = json.loads(self._process.stdout.readline())
+        return answer
+
+    def close(self) -> None:
+        """Ends the process."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.close()
+        self._process.wait(10)
+        self._process.stdout.close()
+
+
+@contextlib.contextmanager
+def remote_mock() -> Iterator[RemoteMock]:
+    mock = RemoteMock()
+    try:
+        yield mock
+    finally:
+        mock.close()
+
+
+def _obey(mock: Epos4Mock, plant: LaggingPlant, order: dict[str, Any]) -> dict[str, object]:
+    match order:
+        case {"set": "silent", "value": value}:
+            mock.silent = value
+        case {"set": "frozen", "value": value}:
+            mock.frozen = value
+        case {"set": "wrong_identity", "value": value}:
+            mock.wrong_identity = value
+        case {"set": "has_switch", "value": value}:
+            plant.has_switch = value
+        case {"fault": code, **rest}:
+            mock.inject_fault(code, bool(rest.get("lasting")))
+        case {"cut": _}:
+            mock.close()
+    return {"position_mm": plant.position_mm, "powered": plant.powered, "limit_A": plant.current_limit_A}
+
+
+def serve() -> None:
+    """Physics in steps of at most 1 ms up to now, then whatever is due or was said."""
+    plant = LaggingPlant()
+    moved_ns = time.monotonic_ns()
+    mock = Epos4Mock(PtyWire(), plant, moved_ns)
+    while mock.nmt is NmtState.BOOT_UP:
+        mock.tick(mock.due_ns)
+    sys.stdout.write(json.dumps(mock.endpoints()) + "\n")
+    sys.stdout.flush()
+    while True:
+        wait_s = max(0.0, min(mock.due_ns - time.monotonic_ns(), 5 * MS) / 1e9)
+        ready, _, _ = select.select([sys.stdin.fileno(), *mock.filenos()], [], [], wait_s)
+        now_ns = time.monotonic_ns()
+        while moved_ns < now_ns:
+            step_ns = min(MS, now_ns - moved_ns)
+            plant.advance(step_ns / 1e9)
+            moved_ns += step_ns
+        if mock.due_ns <= now_ns:
+            mock.tick(now_ns)
+        if sys.stdin.fileno() in ready:
+            line = sys.stdin.readline()
+            if not line:
+                break
+            sys.stdout.write(json.dumps(_obey(mock, plant, json.loads(line))) + "\n")
+            sys.stdout.flush()
+        elif ready:
+            mock.receive(now_ns)
+    mock.close()
+
+
+if __name__ == "__main__":
+    serve()

@@ -1,0 +1,88 @@
+"""Which secret a seed hides, how large, and what the diagnosis must say of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.diagnosis.observations import Session, Streams
+from tests.hidden.truth import Bench, Hidden, Stroke, draw_bench, run
+
+Truth = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Secret:
+    """The cause's name, its numbers for the generator, and the parameters to be found, by their name in the answer."""
+
+    name: str
+    causes: Mapping[str, Mapping[str, float]]
+    expected: Truth
+
+
+def draw_secret(rng: np.random.Generator, name: str) -> Secret:
+    """Numbers of a cause, drawn over the range a lab meets."""
+    u = rng.uniform
+    drawn: dict[str, tuple[dict[str, float], dict[str, str]]] = {
+        "friction": ({"newton": u(0.03, 0.3), "mm": u(0.03, 0.2)}, {"friction_N": "newton"}),
+        "backlash": ({"mm": u(0.05, 0.4)}, {"backlash_mm": "mm"}),
+        "relaxation": (
+            {"share": u(0.05, 0.3), "tau_s": u(0.15, 1.5)}, {"relaxation_1": "share", "relaxation_tau_s": "tau_s"},
+        ),
+        "rate_law": ({"exponent": u(0.4, 0.75)}, {"rate_exponent_1": "exponent"}),
+        "frame_compliance": ({"mm_per_n": u(0.015, 0.06)}, {"frame_compliance_mm_N": "mm_per_n"}),
+        "contact_offset": ({"mm": u(0.15, 0.8)}, {"contact_offset_mm": "mm"}),
+        "substrate": ({"share_at_6mm": u(0.1, 0.5)}, {}),
+        "zero_drift": ({"n_per_h": u(2.5, 12)}, {"zero_drift_N_h": "n_per_h"}),
+        "time_offset": ({"s": u(0.002, 0.012)}, {"time_offset_s": "s"}),
+        "tracker_latency": ({"s": u(0.008, 0.05)}, {"tracker_latency_s": "s"}),
+        "filter_lag": ({"s": u(0.003, 0.015)}, {"filter_lag_s": "s"}),
+        "surface_motion": (
+            {"mm": u(0.05, 0.4), "hz": u(0.15, 0.4), "phase": u(0, 6)},
+            {"surface_motion_mm": "mm", "surface_motion_Hz": "hz"},
+        ),
+        "preconditioning": ({"share": u(0.15, 0.35), "strokes": u(1.5, 4)}, {"preconditioning_1": "share"}),
+        "adhesion": ({"newton": u(0.05, 0.3), "mm": u(0.5, 1.5)}, {"adhesion_N": "newton", "adhesion_length_mm": "mm"}),
+        "tip_inertia": ({"kg": u(0.05, 0.3)}, {"tip_inertia_kg": "kg"}),
+        "position_ripple": (
+            {"mm": u(0.02, 0.08), "pitch_mm": u(1.0, 2.5), "phase": u(0, 6)},
+            {"ripple_mm": "mm", "ripple_pitch_mm": "pitch_mm"},
+        ),
+        "temperature": ({"per_kelvin": u(0.04, 0.08)}, {"temperature_1_K": "per_kelvin"}),
+        "elastic_law": ({"quadratic": u(0.06, 0.15)}, {}),
+        "unknown_depth_bump": ({"newton": u(0.1, 0.3), "at_mm": u(2.5, 4)}, {}),
+        "unknown_speed_gain": ({"share": u(0.04, 0.1)}, {}),
+        "unknown_session_step": ({"share": u(0.06, 0.15)}, {}),
+    }  # fmt: skip
+    if name == "none":
+        return Secret(name, {}, {})
+    numbers, reported = drawn[name]
+    return Secret(name, {name: numbers}, {parameter: numbers[number] for parameter, number in reported.items()})
+
+
+KNOWN = (
+    "friction", "backlash", "relaxation", "rate_law", "frame_compliance", "contact_offset", "substrate", "zero_drift",
+    "time_offset", "tracker_latency", "filter_lag", "surface_motion", "preconditioning", "adhesion", "tip_inertia",
+    "position_ripple", "temperature", "elastic_law",
+)  # fmt: skip
+UNKNOWN: Mapping[str, tuple[str, ...]] = {
+    "unknown_depth_bump": ("depth", "force"),
+    "unknown_speed_gain": ("velocity", "speed", "force"),
+    "unknown_session_step": ("session time", "stroke number", "temperature"),
+}
+
+
+def recorded(seed: int, secret: Secret, strokes: int | None = None) -> tuple[Bench, list[Stroke]]:
+    """A session with the secret in it."""
+    rng = np.random.default_rng([seed, 77])
+    bench = draw_bench(rng, strokes)
+    return bench, run(bench, Hidden(secret.causes), rng)
+
+
+def session_of(bench: Bench, strokes: list[Stroke], stated: bool = False) -> Session:
+    """What the analysis is given: the devices' numbers and, where asked, the surface as somebody wrote it down."""
+    streams = [
+        Streams(f"trial_{k:02d}", s.time_s, s.force_n, s.axis_time_s, s.axis_mm, s.frame_time_s, s.marker_mm, s.kelvin)
+        for k, s in enumerate(strokes)
+    ]
+    return Session("hidden", tuple(streams), bench.surface if stated else None)

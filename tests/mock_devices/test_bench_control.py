@@ -1,0 +1,177 @@
+import json
+import random
+import select
+import socket
+import threading
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import mock_devices
+from mock_devices.control import BenchControl, ControlPort, Desk
+from mock_devices.faults import WIRE_FAULTS, FaultyWire, faults_of
+from mock_devices.parameters import Parameters, load_parameters
+from mock_devices.wire import PtyWire
+from rig.errors import DeviceError, UsageError
+from tests.mock_devices.playing import MS_NS, quiet_bench, settle
+
+
+@pytest.fixture
+def wire() -> Iterator[FaultyWire]:
+    wire = FaultyWire(PtyWire(), random.Random(0), lambda: 0)
+    yield wire
+    wire.close()
+
+
+@pytest.fixture
+def desk(wire: FaultyWire) -> Desk:
+    return Desk(quiet_bench(), {"force": [faults_of(wire, WIRE_FAULTS)]})
+
+
+def ask(desk: Desk, request: object) -> dict[str, Any]:
+    answer = desk.answer(json.dumps(request).encode())
+    assert answer.endswith(b"\n")
+    return dict(json.loads(answer))
+
+
+def test_figures_are_read_by_name(desk: Desk) -> None:
+    assert ask(desk, {"get": ["tip.force_N", "axis.position_mm", "time_s", "tissue.present"]}) == {
+        "get": {"tip.force_N": 0.0, "axis.position_mm": 5.0, "time_s": 0.0, "tissue.present": True}
+    }
+
+
+def test_the_limb_is_moved_stiffened_and_removed_while_running() -> None:
+    bench = quiet_bench()
+    desk = Desk(bench, {})
+    settle(bench, 25.0)
+    rest_N = bench.contact_N
+    ask(desk, {"set": {"tissue.stiffness_scale": 2.0}})
+    bench.advance(bench.now_ns + 1000 * MS_NS)
+    assert bench.contact_N == pytest.approx(2 * rest_N, rel=1e-3)
+    ask(desk, {"set": {"surface.position_mm": 23.0}})
+    bench.advance(bench.now_ns + 1000 * MS_NS)
+    assert ask(desk, {"get": ["surface.position_mm"]})["get"] == {"surface.position_mm": 23.0}
+    assert 0 < bench.contact_N < rest_N
+    assert ask(desk, {"set": {"tissue.present": False}}) == {"set": {"tissue.present": False}}
+    bench.advance(bench.now_ns + 10 * MS_NS)
+    assert ask(desk, {"get": ["tip.force_N"]})["get"] == {"tip.force_N": 0.0}
+
+
+def test_every_dial_can_be_read_and_says_what_it_is(desk: Desk) -> None:
+    meanings = ask(desk, {"dials": True})["dials"]
+    assert set(ask(desk, {"get": list(meanings)})["get"]) == set(meanings)
+    assert all(meanings.values())
+
+
+def test_truth_is_told_when_asked_and_effects_are_switched(desk: Desk) -> None:
+    assert ask(desk, {"truth": True}) == {"truth": {}}
+    assert ask(desk, {"hide": {"friction.level_N": 0.2, "backlash": None}}) == {"hide": ["backlash", "friction"]}
+    assert ask(desk, {"truth": True}) == {
+        "truth": {"backlash": {"gap_mm": 0.3}, "friction": {"level_N": 0.2, "slip_length_mm": 0.05}}
+    }
+    assert ask(desk, {"hide": {}}) == {"hide": []}
+
+
+def test_a_fault_takes_its_default_or_a_value(desk: Desk, wire: FaultyWire) -> None:
+    assert ask(desk, {"fault": {"device": "force", "kind": "drop"}}) == {
+        "fault": {"device": "force", "kind": "drop", "value": 0.1}
+    }
+    assert wire.drop_share == 0.1
+    ask(desk, {"fault": {"device": "force", "kind": "delay", "value": 0.5}})
+    assert wire.delay_s == 0.5
+    assert set(ask(desk, {"faults": True})["faults"]["force"]) == set(WIRE_FAULTS)
+
+
+@pytest.mark.parametrize(
+    ("request_", "sentence"),
+    [
+        ({"get": ["tip.force"]}, "unknown figure 'tip.force'; nearest valid figure: tip.force_N"),
+        ({"get": "time_s"}, "get takes a list of names"),
+        ({"set": {"tip.force_N": 1}}, "unknown settable figure 'tip.force_N'"),
+        ({"set": {"surface.position_mm": 900}}, "surface.position_mm = 900 is outside -50 to 150"),
+        ({"set": {"surface.position_mm": "up"}}, "takes a number, not 'up'"),
+        ({"set": {"surface.position_mm": float("nan")}}, "takes a number, not nan"),
+        ({"set": {"tissue.present": 1}}, "true or false"),
+        ({"set": [1]}, "set takes an object of names and values"),
+        ({"hide": {"fricton.level_N": 0.2}}, "nearest valid effect: friction"),
+        ({"fault": {"device": "force", "kind": "snip"}}, "unknown fault of force 'snip'"),
+        ({"fault": {"device": "laser", "kind": "cut"}}, "unknown device 'laser'; nearest valid device: force"),
+        ({"fault": {"device": "force", "kind": "drop", "value": 7}}, "a number from 0 to 1"),
+        ({"gett": []}, "unknown request 'gett'; nearest valid request: get"),
+        ({"get": [], "set": {}}, "one request a line"),
+        ([], "one request a line"),
+    ],
+)
+def test_a_wrong_request_is_answered_by_one_sentence(desk: Desk, request_: object, sentence: str) -> None:
+    assert sentence in ask(desk, request_)["error"]
+
+
+def test_what_is_not_json_is_answered_too(desk: Desk) -> None:
+    assert json.loads(desk.answer(b"\xff{")) == {"error": "the line is not JSON"}
+
+
+@contextmanager
+def answered(desk: Desk) -> Iterator[str]:
+    """The control port of ``desk``, waited on by another thread."""
+    port, ended = ControlPort(desk.answer), threading.Event()
+
+    def wait() -> None:
+        while not ended.is_set():
+            if select.select(port.filenos(), [], [], 0.02)[0]:
+                port.receive()
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    try:
+        yield port.endpoint
+    finally:
+        ended.set()
+        thread.join()
+        port.close()
+
+
+def test_the_client_sets_gets_and_raises_what_the_bench_says(desk: Desk, wire: FaultyWire) -> None:
+    with answered(desk) as address, BenchControl(address) as control, BenchControl(address) as other:
+        assert control.set({"tissue.stiffness_scale": 3.0}) == {"tissue.stiffness_scale": 3.0}
+        assert other.number("tissue.stiffness_scale") == 3.0
+        assert control.hide({"friction": None}) == ["friction"]
+        assert control.truth()["friction"]["level_N"] == 0.2
+        control.fault("force", "drop", 0.5)
+        assert wire.drop_share == 0.5
+        assert "cut" in control.faults()["force"]
+        with pytest.raises(UsageError, match="nearest valid figure: time_s"):
+            control.get("time")
+
+
+def test_a_request_may_come_in_pieces_and_a_client_that_talks_too_long_is_hung_up_on(desk: Desk) -> None:
+    with answered(desk) as address:
+        host, _, number = address.partition(":")
+        with socket.create_connection((host, int(number)), 5) as client:
+            client.sendall(b'{"get": ["tim')
+            client.sendall(b'e_s"]}\n{"truth"')
+            assert client.recv(1000) == b'{"get": {"time_s": 0.0}}\n'
+            with suppress(ConnectionResetError, BrokenPipeError):
+                client.sendall(b"x" * 200_000)
+                assert client.recv(1) == b""
+
+
+def test_no_bench_is_a_sentence() -> None:
+    with pytest.raises(DeviceError, match="no bench answers there"):
+        BenchControl("127.0.0.1:1")
+    with pytest.raises(DeviceError, match="no bench answers there"):
+        BenchControl("nowhere")
+
+
+def test_the_documented_file_is_complete_and_says_the_defaults() -> None:
+    path = Path(mock_devices.__file__).parent / "default.toml"
+    assert load_parameters(path) == Parameters()
+    written = tomllib.loads(path.read_text())
+    expected = Parameters().model_dump()
+    del expected["hide"]
+    assert {section: set(values) for section, values in written.items()} == {
+        section: set(values) for section, values in expected.items()
+    }

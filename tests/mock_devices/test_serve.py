@@ -1,0 +1,275 @@
+import json
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from drivers.bota.device import BotaSensOne
+from drivers.epos4.device import Epos4Axis
+from drivers.ports import Port, PortClosed, open_port, read_until
+from mock_devices.bench import Bench
+from mock_devices.control import BenchControl
+from mock_devices.devices import Workshop
+from mock_devices.parameters import Parameters
+from mock_devices.serve import Server, effects_table
+from rig.config.wiring import Axis, Force, Limits
+
+COMMAND = [sys.executable, "-m", "mock_devices.serve", "--tracker-tcp-port", "0"]
+FRAME = 37
+
+
+@contextmanager
+def started(*options: str) -> Iterator[tuple["subprocess.Popen[str]", dict[str, Any]]]:
+    """The bench in another process, and the line it printed."""
+    process = subprocess.Popen(
+        [*COMMAND, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdin and process.stdout and process.stderr
+    try:
+        yield process, json.loads(process.stdout.readline())
+    finally:
+        process.terminate()
+        process.communicate(timeout=20)
+
+
+@contextmanager
+def opened(address: str) -> Iterator[Port]:
+    port = open_port(address if address.startswith("/") else f"tcp://{address}", 115_200)
+    try:
+        yield port
+    finally:
+        port.close()
+
+
+def reply(address: str, request: bytes, enough: Callable[[bytes], bool]) -> bytes:
+    with opened(address) as port:
+        port.write(request)
+        return read_until(port, enough, 5.0)
+
+
+def configured(port: Port) -> bool:
+    """Asks for the configuration mode until the sensor has booted and agrees."""
+    for _ in range(50):
+        port.write(b"C")
+        if b"r,0,C,0" in read_until(port, lambda data: b"r,0,C,0" in data, 0.1):
+            return True
+    return False
+
+
+@pytest.mark.bench
+@pytest.mark.xdist_group("wire")
+def test_one_line_tells_where_everything_is_and_every_product_answers_there() -> None:
+    with started("--hide", "friction.level_N=0.2") as (process, endpoints):
+        assert set(endpoints) == {"force", "force_modbus", "axis", "tracker", "control", "pid"}
+        assert endpoints["pid"] == process.pid
+        assert "friction" not in json.dumps(endpoints)
+        with opened(endpoints["force"]["serial"]) as port:
+            assert configured(port)
+        forces = reply(
+            endpoints["force_modbus"]["serial"], bytes.fromhex("09 03 00 B4 00 06 84 A6"), lambda data: len(data) >= 17
+        )
+        assert forces[:3] == bytes.fromhex("09 03 0C")
+        assert len(forces) == 17
+        assert reply(endpoints["axis"]["slcan"], b"V\r", lambda data: data.endswith(b"\r"))[:1] == b"V"
+        for address in endpoints["tracker"].values():
+            assert reply(address, b"INIT \r", lambda data: data.endswith(b"\r")) == b"OKAYA896\r"
+
+
+@pytest.mark.bench
+@pytest.mark.xdist_group("wire")
+def test_a_running_bench_is_read_turned_and_broken_through_its_control_channel() -> None:
+    with (
+        started("--hide", "friction.level_N=0.3", "--seed", "5") as (_, endpoints),
+        BenchControl(endpoints["control"]) as control,
+        opened(endpoints["force"]["serial"]) as port,
+    ):
+        assert control.truth() == {"friction": {"level_N": 0.3, "slip_length_mm": 0.05}}
+        assert control.number("axis.position_mm") == 5.0
+        first_s = control.number("time_s")
+        control.set({"surface.position_mm": 4.0})
+        while control.number("surface.position_mm") != 4.0:
+            time.sleep(0.02)
+        assert control.number("tip.depth_mm") == pytest.approx(1.0, abs=1e-6)
+        assert control.number("tip.force_N") == pytest.approx(0.12 * 1.2461, abs=1e-3)
+        assert control.number("time_s") > first_s
+        control.fault("force", "cut")
+        with pytest.raises(PortClosed):
+            read_until(port, bool, 5.0)
+
+
+@pytest.mark.bench
+@pytest.mark.xdist_group("wire")
+def test_the_force_driver_gets_its_thousand_samples_a_second_from_the_bench() -> None:
+    with started() as (_, endpoints), opened(endpoints["force"]["serial"]) as port:
+        sensor = BotaSensOne(port, Force(port=endpoints["force"]["serial"]))
+        sensor.start()
+        samples: list[float] = []
+        until = time.monotonic() + 1.0
+        while time.monotonic() < until:
+            samples += [sample.fz_N for sample in sensor.poll(time.monotonic_ns())]
+            time.sleep(0.005)
+        sensor.close()
+    assert len(samples) > 500
+    assert sum(samples) / len(samples) == pytest.approx(0.8, abs=0.005)
+
+
+@pytest.mark.bench
+@pytest.mark.xdist_group("wire")
+def test_the_axis_driver_homes_and_moves_the_tip_into_the_tissue() -> None:
+    with started() as (_, endpoints), BenchControl(endpoints["control"]) as control:
+        axis = Epos4Axis(Axis(port=endpoints["axis"]["slcan"]), Limits())
+        try:
+            axis.start()
+            axis.home()
+            axis.move_to(24.0, 30.0)
+            assert control.number("axis.position_mm") == pytest.approx(24.0, abs=0.1)
+            assert control.number("tip.force_N") == pytest.approx(0.12 * 4 * 2.41, abs=0.15)
+            assert control.get("axis.powered") == {"axis.powered": True}
+        finally:
+            axis.close()
+        while control.get("axis.powered")["axis.powered"]:
+            time.sleep(0.02)
+
+
+@pytest.mark.bench
+@pytest.mark.xdist_group("wire")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_it_ends_cleanly_when_told_to(number: signal.Signals) -> None:
+    with started() as (process, endpoints):
+        process.send_signal(number)
+        assert process.wait(20) == 0
+        with pytest.raises(OSError, match="refused"):
+            socket.create_connection(("127.0.0.1", int(endpoints["control"].rpartition(":")[2])), 1)
+
+
+@pytest.mark.bench
+@pytest.mark.xdist_group("wire")
+def test_it_ends_when_its_parent_is_gone() -> None:
+    with started("--with-parent") as (process, _):
+        assert process.stdin
+        process.stdin.close()
+        assert process.wait(20) == 0
+        process.stdin = None
+
+
+@pytest.mark.bench
+@pytest.mark.xdist_group("wire")
+def test_one_force_product_alone_and_a_taken_tracker_port_are_both_said_in_the_line() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        number = taken.getsockname()[1]
+        with started("--force", "robotiq-ft300", "--tracker-tcp-port", str(number)) as (_, endpoints):
+            assert "force" not in endpoints
+            assert endpoints["force_modbus"]["serial"].startswith("/dev/")
+            assert endpoints["tracker"]["tcp"] != f"127.0.0.1:{number}"
+
+
+@pytest.mark.bench
+@pytest.mark.xdist_group("wire")
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--hide", "fricton.level_N=1"], "nearest valid effect: friction"),
+        (["--parameters", "no-such.toml"], "no-such.toml: no such file"),
+    ],
+)
+def test_wrong_use_ends_with_2_and_one_sentence(options: list[str], sentence: str) -> None:
+    ended = subprocess.run([*COMMAND, *options], capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode == 2
+    assert ended.stdout == ""
+    assert sentence in ended.stderr
+    assert ended.stderr.count("\n") == 1
+
+
+def test_the_list_of_effects_names_each_parameter_with_default_and_bounds() -> None:
+    assert "    friction.level_N=0.2    0 to 5: Coulomb level\n" in effects_table()
+
+
+class Clock:
+    now_ns = 0
+
+    def __call__(self) -> int:
+        return self.now_ns
+
+
+class Stage:
+    """A server on an injected clock, and the client's end of its force sensor's line."""
+
+    def __init__(self) -> None:
+        self.clock = Clock()
+        self.bench = Bench(Parameters.model_validate({"tracker": {"tcp_port": 0}, "force": {"counter_drift_ppm": 0.0}}))
+        devices = Workshop(self.bench, 0, self.clock, seed=0).devices(("bota-sensone",))
+        self.line = devices[0].wire
+        self.server = Server(self.bench, devices, self.clock)
+        self.port = open_port(self.line.endpoint, 460_800)
+
+    def pass_ms(self, milliseconds: int) -> None:
+        self.clock.now_ns += milliseconds * 1_000_000
+        self.server.turn([])
+
+    def say(self, data: bytes) -> bytes:
+        """The line the sensor answers."""
+        self.write(data)
+        self.server.turn(self.line.filenos())
+        return read_until(self.port, lambda answer: answer.endswith(b"\n"), 5.0)
+
+    def write(self, data: bytes) -> None:
+        self.port.write(data)
+        assert select.select(self.line.filenos(), [], [], 5.0)[0]
+
+    def frames(self, expected: int) -> int:
+        """Frames on the line since the last call, waiting for those ``expected``."""
+        data = read_until(self.port, lambda data: len(data) >= expected * FRAME, 5.0)
+        assert data[::FRAME] == b"\xaa" * (len(data) // FRAME)
+        return len(data) // FRAME
+
+
+@pytest.fixture
+def stage() -> Iterator[Stage]:
+    """Past its boot text, streaming at 100 Hz since 0.3 s."""
+    stage = Stage()
+    try:
+        stage.pass_ms(300)
+        stage.say(b"C")
+        stage.say(b"f,512,0,0,1")
+        assert stage.say(b"R") == b"r,0,R,0\r\n"
+        yield stage
+    finally:
+        stage.port.close()
+        stage.server.close()
+
+
+def test_each_mock_acts_at_its_own_time_after_physics_has_come_there(stage: Stage) -> None:
+    stage.pass_ms(105)
+    assert stage.frames(10) == 10
+    assert 0.400 <= stage.bench.time_s <= 0.405
+
+
+def test_a_short_stall_is_caught_up_sample_by_sample(stage: Stage) -> None:
+    stage.pass_ms(900)
+    assert stage.frames(90) == 90
+    assert stage.bench.time_s == pytest.approx(1.2, abs=0.01)
+
+
+def test_after_a_long_stall_physics_goes_on_from_now_and_says_so(
+    stage: Stage, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stage.pass_ms(5000)
+    assert stage.bench.time_s == pytest.approx(0.3)
+    assert stage.bench.now_ns == pytest.approx(stage.clock.now_ns, abs=250_000)
+    assert "stopped for 5.0 s" in capsys.readouterr().err
+    read_until(stage.port, lambda _: False, 0.2)
+    stage.pass_ms(100)
+    assert stage.frames(10) == 10
+    assert stage.bench.time_s == pytest.approx(0.4, abs=0.01)
+
+
+def test_bytes_that_came_during_a_stall_are_heard_before_time_is_caught_up(stage: Stage) -> None:
+    stage.clock.now_ns += 500_000_000
+    assert stage.say(b"C") == b"r,0,C,0\r\n"

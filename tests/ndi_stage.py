@@ -1,0 +1,247 @@
+"""The tracker mock on a stage of its own: in this process on an injected clock, or in another one in real time.
+
+The other process is started as ``python -m tests.ndi_stage serial|tcp polaris|vega``. It prints its endpoint as one
+line of JSON; each line it reads sets one fault: ``{"fault": "missing", "value": [0]}``; ``cut`` cuts the wire.
+"""
+
+import contextlib
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from drivers.ndi.codec import encode_text
+from drivers.ndi.device import NdiTracker
+from drivers.ports import PortClosed
+from drivers.roles import MarkerTracker
+from mock_devices.ndi import NdiMock
+from mock_devices.stage import MarkerPose
+from mock_devices.wire import PtyWire, TcpWire
+from rig.channels import MarkerSample
+from rig.config.wiring import Tracker
+
+MS = 1_000_000
+
+TIP = MarkerPose(12.25, -34.5, -1000.0, 0.5, -0.5, 0.5, -0.5, 0.125)
+ARM = MarkerPose(-250.0, 100.0, -1500.0, 1.0, 0.0, 0.0, 0.0, 0.25)
+
+
+class StillPlant:
+    """Two markers that stay where they are; their numbers are exact in TX and in BX."""
+
+    def __init__(self) -> None:
+        self.view: list[MarkerPose | None] = [TIP, ARM]
+
+    def markers(self, now_ns: int) -> list[MarkerPose | None]:
+        return self.view
+
+
+class MemoryWire:
+    """A wire without a kernel: the client's bytes wait in ``sent``, the mock's writes in ``replies``."""
+
+    endpoint = "memory"
+
+    def __init__(self) -> None:
+        self.sent = b""
+        self.replies: list[bytes] = []
+
+    def filenos(self) -> list[int]:
+        return []
+
+    def read(self) -> bytes:
+        data, self.sent = self.sent, b""
+        return data
+
+    def write(self, data: bytes) -> None:
+        self.replies.append(data)
+
+    def close(self) -> None:
+        self.replies.clear()
+
+
+class Stage:
+    """A mock and the port to it in one process; frames pass only by ``run_until``.
+
+    ``canned`` answers a command by another text than the mock's. On a serial address bytes at the wrong speed are lost;
+    ``speed`` is the tracker's own, and ``heeds_break`` says whether the line carries a break.
+    """
+
+    def __init__(self, address: str = "tcp://memory:1", **kind: Any) -> None:
+        self.address = address
+        self.plant = StillPlant()
+        self.wire = MemoryWire()
+        self.mock = NdiMock(self.wire, self.plant, start_ns=0, **kind)
+        self.canned: dict[str, str] = {}
+        self.commands: list[bytes] = []
+        self.bauds: list[int] = []
+        self.speed = 9600
+        self.heeds_break = True
+        self.closed = False
+        self.cut = False
+        self._readable = os.eventfd(0, os.EFD_NONBLOCK)
+
+    def open(self, baud: int) -> "Stage":
+        self.bauds.append(baud)
+        self.closed = False
+        return self
+
+    def run_until(self, now_ns: int) -> None:
+        while self.mock.due_ns <= now_ns:
+            self.mock.tick(self.mock.due_ns)
+
+    def fileno(self) -> int:
+        return self._readable
+
+    def read(self) -> bytes:
+        if self.cut:
+            raise PortClosed(f"{self.address}: the other end closed the connection")
+        with contextlib.suppress(BlockingIOError):
+            os.eventfd_read(self._readable)
+        data = b"".join(self.wire.replies)
+        self.wire.replies.clear()
+        return data
+
+    def write(self, data: bytes) -> None:
+        if self.cut:
+            raise PortClosed(f"{self.address}: the other end closed the connection")
+        self.commands.append(data)
+        if self.address.startswith("/") and self.bauds[-1] != self.speed:
+            return
+        name = data.partition(b":")[0].decode()
+        if name in self.canned:
+            self.wire.replies.append(encode_text(self.canned[name]))
+        else:
+            self.wire.sent += data
+            self.mock.receive(0)
+        if name == "COMM":
+            self.speed = 115200 if data.startswith(b"COMM:5") else 9600
+        os.eventfd_write(self._readable, 1)
+
+    def set_baud(self, baud: int) -> None:
+        self.bauds.append(baud)
+
+    def send_break(self) -> None:
+        self.commands.append(b"<break>")
+        if self.heeds_break:
+            self.speed = 9600
+            self.wire.replies.append(encode_text("RESET"))
+            os.eventfd_write(self._readable, 1)
+
+    def close(self) -> None:
+        self.closed = True
+
+    def release(self) -> None:
+        os.close(self._readable)
+
+
+def started(stage: Stage, **settings: Any) -> NdiTracker:
+    device = NdiTracker(stage.open, Tracker(**settings))
+    device.start()
+    return device
+
+
+def run(stage: Stage, device: MarkerTracker, start_ms: int, end_ms: int) -> list[MarkerSample]:
+    """Polls each millisecond, as the loop does."""
+    samples: list[MarkerSample] = []
+    for tick in range(start_ms, end_ms):
+        stage.run_until(tick * MS)
+        samples += device.poll(tick * MS)
+    return samples
+
+
+class RemoteMock:
+    """The mock in another process."""
+
+    def __init__(self, link: str, kind: str) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "tests.ndi_stage", link, kind],
+            cwd=Path(__file__).parents[1],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self._process.stdout is not None
+        self.endpoints: dict[str, str] = json.loads(self._process.stdout.readline())
+
+    @property
+    def address(self) -> str:
+        """As the drivers write it."""
+        return self.endpoints.get("serial") or f"tcp://{self.endpoints['tcp']}"
+
+    def fault(self, name: str, value: object = True) -> None:
+        """Sets a fault and waits until it is set."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(json.dumps({"fault": name, "value": value}) + "\n")
+        self._process.stdin.flush()
+        self._process.stdout.readline()
+
+    def close(self) -> None:
+        """Ends the process."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.close()
+        self._process.wait(10)
+        self._process.stdout.close()
+
+
+@contextlib.contextmanager
+def remote_mock(link: str = "serial", kind: str = "vega") -> Iterator[RemoteMock]:
+    mock = RemoteMock(link, kind)
+    try:
+        yield mock
+    finally:
+        mock.close()
+
+
+def _set_fault(mock: NdiMock, name: str, value: Any) -> None:
+    match name:
+        case "silent":
+            mock.silent = value
+        case "frozen":
+            mock.frozen = value
+        case "missing":
+            mock.missing = set(value)
+        case "unplugged":
+            mock.unplugged = set(value)
+        case "corrupt_every":
+            mock.corrupt_every = value
+        case "error_reply":
+            mock.error_reply = value
+        case "freeze_tag":
+            mock.freeze_tag = value
+        case "cut":
+            mock.close()
+
+
+def serve(link: str, kind: str) -> None:
+    wire = PtyWire() if link == "serial" else TcpWire()
+    mock = NdiMock(wire, StillPlant(), time.monotonic_ns(), kind="vega" if kind == "vega" else "polaris")
+    sys.stdout.write(json.dumps(mock.endpoints()) + "\n")
+    sys.stdout.flush()
+    while True:
+        wait_s = max(0.0, (mock.due_ns - time.monotonic_ns()) / 1e9)
+        ready, _, _ = select.select([sys.stdin.fileno(), *mock.filenos()], [], [], wait_s)
+        while mock.due_ns <= time.monotonic_ns():
+            mock.tick(mock.due_ns)
+        if sys.stdin.fileno() in ready:
+            line = sys.stdin.readline()
+            if not line:
+                break
+            order = json.loads(line)
+            _set_fault(mock, order["fault"], order["value"])
+            sys.stdout.write("set\n")
+            sys.stdout.flush()
+        elif ready:
+            mock.receive(time.monotonic_ns())
+    mock.close()
+
+
+if __name__ == "__main__":
+    serve(*sys.argv[1:3])

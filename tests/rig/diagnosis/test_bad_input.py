@@ -1,0 +1,124 @@
+"""Data that say little: the answer says what cannot be tested and why, names nothing by guess, and never fails."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rig.diagnosis.answers import Diagnosis
+from rig.diagnosis.observations import Session, Streams
+from rig.diagnosis.run import diagnose_session
+from rig.diagnosis.sources import read_source
+from rig.errors import DataError
+from tests.hidden.draw import draw_secret, recorded, session_of
+
+
+@pytest.fixture(scope="module")
+def clean() -> Session:
+    bench, strokes = recorded(811, draw_secret(np.random.default_rng(1), "none"), 6)
+    return session_of(bench, strokes)
+
+
+def changed(session: Session, **fields: object) -> Session:
+    return replace(session, recordings=tuple(replace(streams, **fields) for streams in session.recordings))  # type: ignore[arg-type]
+
+
+def nothing_named(result: Diagnosis, because: str) -> None:
+    assert result.findings == ()
+    assert result.as_json()["not_testable"]
+    assert because in result.statement, result.statement
+
+
+def test_one_recording_cannot_be_judged(clean: Session) -> None:
+    nothing_named(diagnose_session(replace(clean, recordings=clean.recordings[:1])), "takes at least 4")
+
+
+def test_a_wrong_sign_of_force_is_said(clean: Session) -> None:
+    turned = tuple(replace(streams, force_N=-streams.force_N) for streams in clean.recordings)
+    nothing_named(diagnose_session(replace(clean, recordings=turned)), "wrong sign")
+
+
+def test_a_wrong_sign_of_position_is_said(clean: Session) -> None:
+    turned = tuple(replace(streams, axis_mm=-streams.axis_mm) for streams in clean.recordings)
+    nothing_named(diagnose_session(replace(clean, recordings=turned)), "wrong sign")
+
+
+def test_constant_force_is_no_experiment(clean: Session) -> None:
+    flat = tuple(replace(streams, force_N=np.ones_like(streams.force_N)) for streams in clean.recordings)
+    nothing_named(diagnose_session(replace(clean, recordings=flat)), "never changes")
+
+
+def test_no_recordings_at_all_is_an_answer_too(clean: Session) -> None:
+    nothing_named(diagnose_session(replace(clean, recordings=())), "no recording")
+
+
+def test_without_a_tracker_what_needs_one_is_not_testable_and_the_rest_is(clean: Session) -> None:
+    result = diagnose_session(changed(clean, marker_s=None, marker_mm=None))
+    assert "tip tracker" in result.not_testable["frame_compliance"]
+    assert "friction" in result.detectable
+    assert result.findings == ()
+
+
+def test_at_10_Hz_what_is_fast_is_not_testable(clean: Session) -> None:
+    slow = tuple(_slowed(streams, 10.0) for streams in clean.recordings)
+    result = diagnose_session(replace(clean, recordings=slow))
+    assert {"time_offset", "filter_lag", "tip_inertia"} <= result.not_testable.keys()
+    assert result.findings == ()
+
+
+def test_without_the_way_out_what_needs_it_is_not_testable(clean: Session) -> None:
+    way_in = tuple(_cut_before_retraction(streams) for streams in clean.recordings)
+    result = diagnose_session(replace(clean, recordings=way_in))
+    assert {"friction", "backlash", "adhesion"} <= result.not_testable.keys()
+
+
+def test_a_clock_that_runs_backwards_is_said_and_its_samples_left_out(clean: Session) -> None:
+    first = clean.recordings[0]
+    time = first.force_s.copy()
+    time[500:520] -= 0.3
+    result = diagnose_session(replace(clean, recordings=(replace(first, force_s=time), *clean.recordings[1:])))
+    assert any(finding.kind == "clock" for finding in result.quality)
+    assert result.findings == ()
+
+
+def test_a_csv_folder_with_a_stream_missing_answers_with_the_rest(clean: Session, tmp_path: Path) -> None:
+    for k, streams in enumerate(clean.recordings[:5]):
+        _write(tmp_path / f"trial_{k}", streams)
+    (tmp_path / "trial_2" / "axis.csv").unlink()
+    session = read_source(tmp_path)
+    assert len(session.recordings) == 4
+    result = diagnose_session(session)
+    assert any("axis.csv" in finding.text for finding in result.quality)
+    assert result.recordings == 4
+
+
+def test_a_folder_with_nothing_in_it_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="neither recordings"):
+        read_source(tmp_path)
+
+
+def _slowed(streams: Streams, rate_Hz: float) -> Streams:
+    step = round(1 / rate_Hz / float(np.median(np.diff(streams.force_s))))
+    return replace(
+        streams, force_s=streams.force_s[::step], force_N=streams.force_N[::step], axis_s=streams.axis_s[::step],
+        axis_mm=streams.axis_mm[::step], temperature_C=None,
+    )  # fmt: skip
+
+
+def _cut_before_retraction(streams: Streams) -> Streams:
+    end = int(np.argmax(streams.axis_mm > streams.axis_mm.max() - 0.01)) + 50
+    return replace(
+        streams, force_s=streams.force_s[:end], force_N=streams.force_N[:end], axis_s=streams.axis_s[:end],
+        axis_mm=streams.axis_mm[:end], temperature_C=None,
+    )  # fmt: skip
+
+
+def _write(folder: Path, streams: Streams) -> None:
+    folder.mkdir()
+    for name, header, columns in (
+        ("force", "time_s,force_N", (streams.force_s, streams.force_N)),
+        ("axis", "time_s,position_mm", (streams.axis_s, streams.axis_mm)),
+    ):
+        rows = np.stack(columns, axis=1)
+        np.savetxt(folder / f"{name}.csv", rows, delimiter=",", header=header, comments="", fmt="%.6f")

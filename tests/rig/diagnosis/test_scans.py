@@ -1,0 +1,67 @@
+"""History operators as scans give what a loop over samples gives."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rig.simulation.scans import dahl, high_pass, low_pass, play, recurrence
+
+
+def two_recordings(seed: int, count: int = 60) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position, time and starts of two recordings."""
+    rng = np.random.default_rng(seed)
+    first = np.zeros(count, bool)
+    first[[0, count // 2]] = True
+    return np.cumsum(rng.normal(size=count)), np.arange(count) * 0.01, first
+
+
+@settings(deadline=None)
+@given(st.integers(0, 10_000))
+def test_a_recurrence_equals_its_loop(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    decay, source = rng.uniform(0, 1, 50), rng.normal(size=50)
+    decay[[0, 20]] = 0
+    state, looped = 0.0, []
+    for a, b in zip(decay, source, strict=True):
+        state = a * state + b
+        looped.append(state)
+    np.testing.assert_allclose(recurrence(decay, source), looped, atol=1e-12)
+
+
+@settings(deadline=None)
+@given(st.integers(0, 10_000), st.floats(0.01, 5))
+def test_play_equals_its_loop_and_never_leaves_the_dead_band(seed: int, width: float) -> None:
+    position, _, first = two_recordings(seed)
+    looped, follower = [], 0.0
+    for x, begins in zip(position, first, strict=True):
+        follower = x if begins else min(max(follower, x), x + width)
+        looped.append(follower)
+    tip = play(position, first, width)
+    np.testing.assert_allclose(tip, looped, atol=1e-12)
+    assert np.all(tip >= position - 1e-12)
+    assert np.all(tip <= position + width + 1e-12)
+
+
+def test_dahl_friction_builds_up_over_its_length_and_turns_after_a_reversal() -> None:
+    position = np.concatenate([np.linspace(0, 1, 101), np.linspace(1, 0, 101)[1:]])
+    first = np.zeros(201, bool)
+    first[0] = True
+    state = dahl(position, first, 0.1)
+    np.testing.assert_allclose(state[10], 1 - np.exp(-1), atol=1e-12)
+    assert state[100] > 0.999
+    assert state[200] < -0.999
+
+
+def test_relaxation_of_a_ramp_is_the_textbook_exponential() -> None:
+    time = np.arange(1000, dtype=float) * 1e-3
+    first = np.zeros(1000, bool)
+    first[0] = True
+    tau = 0.2
+    np.testing.assert_allclose(high_pass(time, time, first, tau), tau * (1 - np.exp(-time / tau)), atol=1e-12)
+
+
+def test_a_lag_plus_its_high_pass_is_the_signal() -> None:
+    position, time, first = two_recordings(3)
+    np.testing.assert_allclose(
+        low_pass(position, time, first, 0.05) + high_pass(position, time, first, 0.05), position, atol=1e-12
+    )

@@ -1,0 +1,116 @@
+"""A recording as others see it: the stock MCAP tools, a full disk, an existing file."""
+
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from mcap.records import McapRecord, Message
+from mcap.stream_reader import StreamReader
+from mcap_ros2.decoder import DecoderFactory
+
+from rig.channels import FORCE, STREAMS
+from rig.errors import UsageError
+from rig.recording.mcap_file import RecordingFailed, RecordingWriter
+from rig.recording.reader import read_recording
+from tests.rig.recording.conftest import METADATA, WriteRecording, event, force
+
+
+def test_the_stock_reader_accepts_every_checksum(write_recording: WriteRecording) -> None:
+    with write_recording(rows=250).open("rb") as file:
+        records: list[McapRecord] = list(StreamReader(file, validate_crcs=True).records)
+    assert sum(isinstance(record, Message) for record in records) == 250 + 250 + 3
+
+
+def test_the_stock_ros2_decoder_reads_our_rows(write_recording: WriteRecording) -> None:
+    with write_recording(rows=250).open("rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        rows = [(message, row) for _, _, message, row in reader.iter_decoded_messages(topics=["force"])]
+    message, row = rows[200]
+    assert (message.sequence, message.publish_time, message.log_time) == (200, 1_200_000_000, 1_200_700_000)
+    assert tuple(float(row.__getattribute__(name.lower())) for name in FORCE.kinds) == force(200)
+
+
+def test_the_stock_ros2_decoder_reads_our_texts(write_recording: WriteRecording) -> None:
+    with write_recording(rows=250).open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        texts = [(row.level, row.code, row.text) for *_, row in reader.iter_decoded_messages(topics=["event"])]
+    assert texts == [tuple(event(seq)[3:]) for seq in range(3)]
+
+
+def test_schemas_name_units_and_metadata_stand_before_the_samples(write_recording: WriteRecording) -> None:
+    with write_recording(rows=10).open("rb") as file:
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        names = [record.name for record in reader.iter_metadata()]
+    assert summary is not None
+    assert [channel.topic for channel in summary.channels.values()] == [stream.name for stream in STREAMS]
+    text = summary.schemas[1].data.decode()
+    assert "float64 fz_n  # fz_N [N] force along the sensor's z\n" in text
+    assert names == [*METADATA, "summary"]
+
+
+def test_times_before_zero_are_kept_in_the_row(tmp_path: Path) -> None:
+    sample = force(0)._replace(capture_ns=-5, arrival_ns=-3)
+    writer = RecordingWriter(tmp_path / "a.mcap", {})
+    writer.add(FORCE.id, FORCE.pack(sample))
+    writer.finish({})
+    assert read_recording(tmp_path / "a.mcap").tables["force"][0].item() == sample
+
+
+def test_an_existing_recording_is_never_overwritten(write_recording: WriteRecording) -> None:
+    path = write_recording(rows=10)
+    before = path.read_bytes()
+    with pytest.raises(UsageError, match="exists already"):
+        RecordingWriter(path, {})
+    assert path.read_bytes() == before
+
+
+def test_a_missing_folder_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(RecordingFailed, match="cannot be created: No such file or directory"):
+        RecordingWriter(tmp_path / "none" / "a.mcap", {})
+
+
+@contextmanager
+def disk_of(size: int) -> Iterator[None]:
+    """No file of this process can grow beyond ``size`` bytes (Python ignores SIGXFSZ, so writes fail with EFBIG)."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.parametrize("size", [8_000, 20_000, 31_000])
+def test_a_full_disk_keeps_every_whole_batch_and_says_so(tmp_path: Path, size: int) -> None:
+    path = tmp_path / "a.mcap"
+    flushed = 0
+    with disk_of(size), pytest.raises(RecordingFailed, match=r"the disk took no more after \d+ bytes: File too large"):
+        writer = RecordingWriter(path, METADATA)
+        for start in range(0, 10_000, 50):
+            for seq in range(start, start + 50):
+                writer.add(FORCE.id, FORCE.pack(force(seq)))
+            writer.flush()
+            flushed = start + 50
+    recording = read_recording(path)
+    assert [row.item() for row in recording.tables["force"]] == [force(seq) for seq in range(flushed)]
+    assert flushed > 0
+    assert (recording.complete, recording.damage) == (False, ())
+    assert recording.metadata == METADATA
+
+
+def test_after_a_full_disk_every_call_repeats_the_cause(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "a.mcap", {})
+    with disk_of(6_000):
+        for seq in range(200):
+            writer.add(FORCE.id, FORCE.pack(force(seq)))
+        with pytest.raises(RecordingFailed, match="File too large"):
+            writer.flush(sync=True)
+    with pytest.raises(RecordingFailed, match="File too large"):
+        writer.flush()
+    with pytest.raises(RecordingFailed, match="File too large"):
+        writer.finish({})
+    writer.close()

@@ -1,0 +1,217 @@
+"""What the recorder does with commands, samples and a bad disk; time is given, no process is started."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rig.channels import AXIS, EVENT, FORCE
+from rig.recording.reader import read_recording
+from rig.recording.recorder import FLUSH_PERIOD_NS, Recorder
+from rig.recording.ring import RingReader, RingWriter
+from tests.rig.recording.conftest import METADATA, axis, event, force
+from tests.rig.recording.test_mcap_file import disk_of
+
+MS = 1_000_000
+
+
+@pytest.fixture
+def ring(tmp_path: Path) -> Iterator[RingWriter]:
+    writer = RingWriter.create(tmp_path / "ring", slots=256)
+    yield writer
+    writer.close()
+
+
+@pytest.fixture
+def reader(ring: RingWriter) -> Iterator[RingReader]:
+    end = RingReader.open(ring.path)
+    yield end
+    end.close()
+
+
+@pytest.fixture
+def recorder(reader: RingReader) -> Recorder:
+    return Recorder(reader)
+
+
+def put_force(ring: RingWriter, *seqs: int) -> None:
+    for seq in seqs:
+        ring.put(FORCE.id, FORCE.pack(force(seq)))
+
+
+def seqs_in(path: Path) -> list[int]:
+    return [int(seq) for seq in read_recording(path).tables["force"]["seq"]]
+
+
+def test_a_recording_holds_what_was_published_between_open_and_close(
+    ring: RingWriter, recorder: Recorder, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.mcap"
+    put_force(ring, 0, 1)
+    assert recorder.handle({"open": str(path), "metadata": METADATA}) == {"opened": str(path), "unrecorded": 2}
+    put_force(ring, 2, 3)
+    ring.put(AXIS.id, AXIS.pack(axis(0)))
+    ring.put(EVENT.id, EVENT.pack(event(0)))
+    reply = recorder.handle({"close": {"outcome": "done"}})
+    put_force(ring, 4)
+    assert reply == {
+        "closed": str(path),
+        "samples": {"force": 2, "axis": 1, "event": 1},
+        "dropped": {},
+        "missing": {},
+        "unreadable": 0,
+    }
+    recording = read_recording(path)
+    assert seqs_in(path) == [2, 3]
+    assert recording.complete
+    assert {name: recording.metadata[name] for name in METADATA} == METADATA
+    assert recording.metadata["summary"]["outcome"] == "done"
+    assert json.loads(recording.metadata["summary"]["samples"]) == {"force": 2, "axis": 1, "event": 1}
+
+
+def test_samples_between_recordings_are_unrecorded_not_dropped(
+    ring: RingWriter, recorder: Recorder, tmp_path: Path
+) -> None:
+    for name in ("a", "b"):
+        recorder.handle({"open": str(tmp_path / f"{name}.mcap"), "metadata": {}})
+        reply = recorder.handle({"close": {}})
+        assert reply["dropped"] == reply["missing"] == {}
+        put_force(ring, *range(200))
+        recorder.step(0)
+        assert recorder.unrecorded == 200
+
+
+def test_gaps_in_the_numbers_are_counted_as_missing(ring: RingWriter, recorder: Recorder, tmp_path: Path) -> None:
+    recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
+    put_force(ring, 5, 6, 9, 10, 12)
+    assert recorder.handle({"close": {}})["missing"] == {"force": 3}
+
+
+def test_drops_during_a_recording_are_counted_per_stream(ring: RingWriter, recorder: Recorder, tmp_path: Path) -> None:
+    put_force(ring, *range(300))
+    recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
+    assert ring.dropped == {FORCE.id: 44}
+    put_force(ring, *range(300, 570))
+    ring.put(AXIS.id, AXIS.pack(axis(0)))
+    reply = recorder.handle({"close": {}})
+    assert reply["dropped"] == {"force": 14, "axis": 1}
+    assert reply["samples"] == {"force": 256}
+
+
+def test_slots_are_given_back_only_after_their_chunk_is_in_the_file(
+    ring: RingWriter, reader: RingReader, recorder: Recorder, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.mcap"
+    recorder.handle({"open": str(path), "metadata": {}})
+    now_ns = 10 * FLUSH_PERIOD_NS
+    recorder.step(now_ns)
+    put_force(ring, 0, 1, 2)
+    recorder.step(now_ns + FLUSH_PERIOD_NS - 1)
+    assert (reader.position, reader.tail, seqs_in(path)) == (3, 0, [])
+    recorder.step(now_ns + FLUSH_PERIOD_NS)
+    assert (reader.position, reader.tail, seqs_in(path)) == (3, 3, [0, 1, 2])
+
+
+def test_a_successor_starts_with_the_batch_its_predecessor_lost(ring: RingWriter, tmp_path: Path) -> None:
+    first = RingReader.open(ring.path)
+    doomed = Recorder(first)
+    doomed.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
+    put_force(ring, 0, 1)
+    doomed.step(FLUSH_PERIOD_NS)
+    put_force(ring, 2, 3)
+    doomed.step(FLUSH_PERIOD_NS + MS)
+    first.close()
+    second = RingReader.open(ring.path)
+    heir = Recorder(second, resume=True)
+    heir.step(0)
+    heir.handle({"open": str(tmp_path / "b.mcap"), "metadata": {}})
+    put_force(ring, 4)
+    heir.handle({"close": {}})
+    second.close()
+    assert (seqs_in(tmp_path / "a.mcap"), seqs_in(tmp_path / "b.mcap")) == ([0, 1], [2, 3, 4])
+
+
+def test_each_step_leaves_a_sign_of_life(ring: RingWriter, recorder: Recorder) -> None:
+    recorder.step(123 * MS)
+    assert ring.reader_age_ns(125 * MS) == 2 * MS
+
+
+def test_a_full_disk_is_told_at_once_and_again_on_close_and_the_next_recording_works(
+    ring: RingWriter, recorder: Recorder, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.mcap"
+    recorder.handle({"open": str(path), "metadata": METADATA})
+    now_ns, news = 0, {}
+    with disk_of(12_000):
+        for start in range(0, 10_000, 100):
+            put_force(ring, *range(start, start + 100))
+            now_ns += FLUSH_PERIOD_NS
+            news = recorder.step(now_ns)
+            if news:
+                break
+        assert news["to"] == "recording"
+        assert "File too large" in str(news["failed"])
+        assert recorder.step(now_ns + FLUSH_PERIOD_NS) == {}
+    assert recorder.handle({"close": {}}) == {"failed": news["failed"], "to": "close"}
+    kept = seqs_in(path)
+    assert kept == list(range(len(kept)))
+    assert len(kept) >= 100
+    assert "opened" in recorder.handle({"open": str(tmp_path / "b.mcap"), "metadata": {}})
+    put_force(ring, 1)
+    assert recorder.handle({"close": {}})["samples"] == {"force": 1}
+
+
+def test_a_disk_that_fills_up_on_close_is_a_failed_close(ring: RingWriter, recorder: Recorder, tmp_path: Path) -> None:
+    recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
+    put_force(ring, *range(200))
+    with disk_of(6_000):
+        reply = recorder.handle({"close": {}})
+    assert reply["to"] == "close"
+    assert not read_recording(tmp_path / "a.mcap").complete
+
+
+def test_samples_that_would_spoil_the_file_are_counted_and_left_out(
+    ring: RingWriter, recorder: Recorder, tmp_path: Path
+) -> None:
+    recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
+    ring.put(FORCE.id, b"short")
+    ring.put(AXIS.id, FORCE.pack(force(0)))
+    ring.put(EVENT.id, EVENT.pack(event(0))[:-30])
+    ring.put(63, b"")
+    put_force(ring, 0)
+    reply = recorder.handle({"close": {}})
+    assert (reply["unreadable"], reply["samples"]) == (4, {"force": 1})
+    assert seqs_in(tmp_path / "a.mcap") == [0]
+
+
+def test_opening_twice_is_refused_and_the_first_goes_on(ring: RingWriter, recorder: Recorder, tmp_path: Path) -> None:
+    recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
+    reply = recorder.handle({"open": str(tmp_path / "b.mcap"), "metadata": {}})
+    assert reply["to"] == "open"
+    assert "still being recorded" in str(reply["failed"])
+    put_force(ring, 0)
+    assert recorder.handle({"close": {}})["samples"] == {"force": 1}
+
+
+def test_an_existing_file_is_refused(recorder: Recorder, tmp_path: Path) -> None:
+    (tmp_path / "a.mcap").write_bytes(b"mine")
+    assert "exists already" in str(recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})["failed"])
+    assert not recorder.recording
+    assert (tmp_path / "a.mcap").read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize(
+    ("command", "to"), [({}, "line"), ({"dance": 1}, "line"), ({"close": {}}, "close"), ({"close": 7}, "close")]
+)
+def test_a_command_that_makes_no_sense_is_answered(recorder: Recorder, command: dict[str, object], to: str) -> None:
+    assert recorder.handle(command)["to"] == to
+
+
+def test_quitting_finishes_the_open_recording(ring: RingWriter, recorder: Recorder, tmp_path: Path) -> None:
+    recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
+    put_force(ring, 0)
+    reply = recorder.handle({"quit": True})
+    assert reply["quit"] is True
+    recording = read_recording(tmp_path / "a.mcap")
+    assert (recording.complete, recording.metadata["summary"]["outcome"]) == (True, "recorder told to quit")

@@ -1,0 +1,54 @@
+"""Device counters on the host's clock: wrap, drift, and delays that are never negative."""
+
+import random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rig.timing import ClockMap, Unwrapper
+
+MS = 1_000_000
+
+
+def test_a_counter_that_wraps_goes_on() -> None:
+    unwrap = Unwrapper(8)
+    assert [unwrap(count) for count in (250, 255, 3, 4, 2, 200)] == [250, 255, 259, 260, 258, 200]
+
+
+@given(start=st.integers(0, 2**32 - 1), steps=st.lists(st.integers(0, 2**30), max_size=30))
+def test_unwrapping_undoes_the_modulus(start: int, steps: list[int]) -> None:
+    unwrap, total = Unwrapper(32), start
+    first = unwrap(start)
+    for step in steps:
+        total += step
+        assert unwrap(total % 2**32) - first == total - start
+
+
+def test_capture_is_never_after_arrival_nor_before_an_earlier_capture() -> None:
+    clock, random_delay = ClockMap(), random.Random(1)
+    captures = []
+    for number in range(5000):
+        device_ns = number * MS
+        arrival_ns = 7_000 * MS + device_ns + random_delay.randrange(0, 8 * MS)
+        captures.append(clock(device_ns, arrival_ns))
+        assert captures[-1] <= arrival_ns
+    assert captures == sorted(captures)
+
+
+@pytest.mark.parametrize("drift_ppm", [-80.0, 0.0, 80.0])
+def test_drift_is_found_and_capture_times_are_right_to_a_tenth_of_a_millisecond(drift_ppm: float) -> None:
+    clock, delays = ClockMap(latency_ns=2 * MS), random.Random(2)
+    error_ns = 0
+    for number in range(40_000):
+        true_ns = 3_000 * MS + number * MS
+        device_ns = round(number * MS / (1 + drift_ppm * 1e-6))
+        arrival_ns = true_ns + 2 * MS + round(delays.expovariate(1 / (0.3 * MS)))
+        error_ns = clock(device_ns, arrival_ns) - true_ns
+    assert clock.drift_ppm == pytest.approx(drift_ppm, abs=2.0)
+    assert abs(error_ns) < 0.1 * MS
+
+
+def test_the_map_is_right_from_the_first_sample_on_where_delays_are_constant() -> None:
+    clock = ClockMap()
+    assert [clock(number * MS, 500 * MS + number * MS) for number in range(3)] == [500 * MS, 501 * MS, 502 * MS]

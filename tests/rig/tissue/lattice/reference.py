@@ -1,0 +1,48 @@
+"""The lattice written a second time, slowly and without any trick: loops over pairs of nodes and corners of cells."""
+
+from itertools import product
+
+import numpy as np
+
+from rig.tissue.lattice.block import Block
+from rig.tissue.lattice.numba_types import Floats
+from rig.tissue.lattice.springs import Springs
+
+STEPS = [s for s in product((-1, 0, 1), repeat=3) if 0 < sum(map(abs, s)) < 3 and s > (0, 0, 0)]
+
+
+def energy(inner: Floats, springs: Springs, block: Block) -> float:
+    """Energy of positions (3, nx, ny, nz) in N mm, by the formulas of the docstrings."""
+    return _springs(inner, springs, block.spacing_mm) + _cells(inner, springs, block.spacing_mm)
+
+
+def _springs(inner: Floats, springs: Springs, d: float) -> float:
+    total = 0.0
+    size = inner.shape[1:]
+    for here in np.ndindex(size):
+        for step in STEPS:
+            there = tuple(int(h + s) for h, s in zip(here, step, strict=True))
+            if any(not 0 <= t < n for t, n in zip(there, size, strict=True)):
+                continue
+            length = d * float(np.linalg.norm(step))
+            gap = inner[:, there[0], there[1], there[2]] - inner[:, here[0], here[1], here[2]]
+            e = abs(float(np.linalg.norm(gap)) / length - 1.0)
+            b = springs.b
+            shape = 0.5 * e * e if b == 0.0 else ((b * e - 1.0) * np.exp(b * e) + 1.0) / b**2
+            total += springs.k_N_mm * length**2 * shape
+    return float(total)
+
+
+def _cells(inner: Floats, springs: Springs, d: float) -> float:
+    total = 0.0
+    nx, ny, nz = inner.shape[1:]
+    for i, j, k in product(range(nx - 1), range(ny - 1), range(nz - 1)):
+        for a, b, c in product((0, 1), repeat=3):
+            edges = [
+                inner[:, i + 1, j + b, k + c] - inner[:, i, j + b, k + c],
+                inner[:, i + a, j + 1, k + c] - inner[:, i + a, j, k + c],
+                inner[:, i + a, j + b, k + 1] - inner[:, i + a, j + b, k],
+            ]
+            jacobian = np.linalg.det(np.array(edges)) / d**3
+            total += springs.cell_ratio * springs.k_N_mm * d**2 / 8.0 * (jacobian - 1.0 - np.log(jacobian))
+    return float(total)

@@ -1,0 +1,134 @@
+"""Force is the slope of the energy, the product the slope of the force, the energy that of a second, slow program."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rig.tissue.lattice import kernels
+from rig.tissue.lattice.block import Block
+from rig.tissue.lattice.numba_types import Matrix
+from rig.tissue.lattice.springs import Springs
+from rig.tissue.lattice.state import Loaded
+from tests.rig.tissue.lattice.reference import energy
+
+LAWS = [Springs(0.1, 0.0, 0.0), Springs(0.1, 6.0, 0.0), Springs(0.1, 0.0, 1.0), Springs(0.3, 3.0, 2.0)]
+
+
+def shaken(block: Block, springs: Springs, seed: int = 1, amount: float = 0.08) -> Loaded:
+    lattice = Loaded(block, springs)
+    inner = block.inner(lattice.x)
+    inner += np.random.default_rng(seed).normal(0.0, amount * block.spacing_mm, inner.shape)
+    return lattice
+
+
+def direction(block: Block, seed: int = 2) -> Matrix:
+    u = block.allocate()
+    block.inner(u)[:] = np.random.default_rng(seed).normal(size=block.inner(u).shape)
+    return u
+
+
+@pytest.mark.parametrize("springs", LAWS)
+@pytest.mark.parametrize("nodes", [(5, 5, 3), (7, 5, 9)])
+def test_energy_is_that_of_a_slow_second_program(springs: Springs, nodes: tuple[int, int, int]) -> None:
+    block = Block(nodes, spacing_mm=0.7, tip_diameter_mm=1.5)
+    lattice = shaken(block, springs)
+    assert lattice.energy_N_mm() == pytest.approx(energy(block.inner(lattice.x), springs, block), rel=1e-12)
+
+
+@pytest.mark.parametrize("springs", LAWS)
+def test_force_is_minus_the_slope_of_the_energy(block: Block, springs: Springs) -> None:
+    lattice, u = shaken(block, springs), direction(block)
+    slope = -float(np.vdot(lattice.force(), u))
+    start, h = lattice.x.copy(), 1e-5
+    lattice.x[:] = start + h * u
+    above = lattice.energy_N_mm()
+    lattice.x[:] = start - h * u
+    assert (above - lattice.energy_N_mm()) / (2 * h) == pytest.approx(slope, rel=1e-6)
+
+
+@pytest.mark.parametrize("springs", LAWS)
+def test_product_is_minus_the_slope_of_the_force(block: Block, springs: Springs) -> None:
+    lattice, u = shaken(block, springs), direction(block)
+    product = lattice.product(u, block.allocate())
+    start, h = lattice.x.copy(), 1e-5
+    lattice.x[:] = start + h * u
+    above = lattice.force().copy()
+    lattice.x[:] = start - h * u
+    slope = (lattice.force() - above) / (2 * h)
+    np.testing.assert_allclose(block.inner(product), block.inner(slope), atol=2e-6 * np.abs(product).max())
+
+
+@pytest.mark.parametrize("springs", LAWS)
+def test_diagonal_bounds_the_hessian_s_own(block: Block, springs: Springs) -> None:
+    lattice = shaken(block, springs, amount=0.03)
+    bound = block.inner(lattice.diagonal(block.allocate()))
+    for node in [(0, 0, 0), (5, 5, 7), (3, 6, 4)]:
+        for w in range(3):
+            unit = block.allocate()
+            block.inner(unit)[(w, *node)] = 1.0
+            own = block.inner(lattice.product(unit, block.allocate()))[(w, *node)]
+            assert 0.0 < own <= bound[(w, *node)] * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(("first", "stop"), [(0, 5), (5, 11), (4, 6), (10, 11)])
+def test_a_thread_touches_its_own_planes_only(block: Block, first: int, stop: int) -> None:
+    """Adding a zero to another thread's plane would lose what that thread adds meanwhile; -0.0 + 0.0 shows it."""
+    lattice = shaken(block, LAWS[2])
+    lattice.f[:] = -0.0
+    kernels._slab(kernels.DIAGONAL, lattice.x, lattice.x, lattice.f, lattice.shape, lattice.law, first, stop)
+    touched = ~np.signbit(block.inner(lattice.f)).all(axis=(0, 2, 3))
+    assert np.flatnonzero(touched).tolist() == list(range(first, stop))
+
+
+@pytest.mark.parametrize("slabs", [1, 2, 3, 11])
+def test_answers_do_not_depend_on_the_number_of_threads(block: Block, slabs: int) -> None:
+    lattice = shaken(block, LAWS[3])
+    one = lattice.force().copy()
+    lattice.slabs = slabs
+    np.testing.assert_allclose(lattice.force(), one, atol=1e-15)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000), st.sampled_from(LAWS))
+def test_a_rigid_motion_costs_nothing_and_pulls_nowhere(seed: int, springs: Springs) -> None:
+    block = Block((5, 5, 4), tip_diameter_mm=2.0)
+    lattice = Loaded(block, springs)
+    turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    turn *= np.sign(np.linalg.det(turn))
+    lattice.x[:] = turn @ lattice.x + 3.0
+    assert lattice.energy_N_mm() < 1e-12
+    assert np.abs(block.inner(lattice.force())).max() < 1e-12
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000), st.sampled_from(LAWS))
+def test_inner_forces_add_up_to_no_force_and_no_torque(seed: int, springs: Springs) -> None:
+    block = Block((5, 7, 4), tip_diameter_mm=2.0)
+    lattice = shaken(block, springs, seed)
+    force, place = block.inner(lattice.force()).reshape(3, -1), block.inner(lattice.x).reshape(3, -1)
+    assert np.abs(force.sum(axis=1)).max() < 1e-11
+    assert np.abs(np.cross(place, force, axis=0).sum(axis=1)).max() < 1e-10
+
+
+@pytest.mark.parametrize("springs", [LAWS[0], LAWS[2]])
+def test_patch_a_uniform_strain_leaves_inner_nodes_at_rest_with_the_stress_of_the_moduli(springs: Springs) -> None:
+    block = Block((7, 7, 7), tip_diameter_mm=2.0)
+    lattice = Loaded(block, springs)
+    strain = 1e-6
+    lattice.x[2] *= 1.0 + strain
+    force = block.inner(lattice.force())
+    assert np.abs(force[:, 1:-1, 1:-1, 1:-1]).max() < 1e-15
+    nu = springs.poisson_ratio
+    uniaxial = springs.young_modulus_MPa(1.0) * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+    # Inner nodes of the top face carry the stress of one cell face each.
+    assert -force[2, 3, 3, -1] == pytest.approx(uniaxial * strain, rel=1e-5)
+
+
+def test_two_nodes_in_one_place_give_a_finite_force() -> None:
+    block = Block((5, 5, 3), tip_diameter_mm=2.0)
+    lattice = Loaded(block, LAWS[1])
+    inner = block.inner(lattice.x)
+    inner[:, 2, 2, 2] = inner[:, 2, 2, 1]
+    assert np.all(np.isfinite(block.inner(lattice.force())))
+    assert np.isfinite(lattice.energy_N_mm())

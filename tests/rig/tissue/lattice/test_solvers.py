@@ -1,0 +1,174 @@
+"""Three solvers, one answer; reactions, mirror symmetry, contacts, and what is said when a solver cannot."""
+
+import numpy as np
+import pytest
+
+from rig.errors import RigError, UsageError
+from rig.tissue.hayes import punch_stiffness_N_mm
+from rig.tissue.lattice import euler, fire, newton
+from rig.tissue.lattice.block import Block, Contact
+from rig.tissue.lattice.health import examine
+from rig.tissue.lattice.springs import Mode, Springs
+from rig.tissue.lattice.state import Loaded
+
+TOLERANCE_N = 1e-8
+
+
+def pressed(block: Block, springs: Springs, depth_mm: float) -> Loaded:
+    lattice = Loaded(block, springs)
+    for depth in np.linspace(0.0, depth_mm, 4)[1:]:
+        lattice.press(depth)
+        fire.relax(lattice, TOLERANCE_N)
+    return lattice
+
+
+@pytest.mark.parametrize("mode", ["study", "stabilised"])
+@pytest.mark.parametrize("b", [0.0, 4.0])
+def test_fire_newton_and_the_study_s_euler_agree_to_four_digits(block: Block, mode: Mode, b: float) -> None:
+    springs = Springs.for_mode(mode, 0.1, b)
+    by_fire = pressed(block.as_quarter(), springs, 0.6).reaction_N()
+    with_newton = Loaded(block.as_quarter(), springs)
+    with_euler = Loaded(block.as_quarter(), springs)
+    for depth in (0.3, 0.6):
+        with_newton.press(depth)
+        newton.relax(with_newton, TOLERANCE_N)
+    with_euler.press(0.6)
+    euler.run(with_euler, euler.EulerScheme())
+    assert with_newton.reaction_N() == pytest.approx(by_fire, rel=2e-5)
+    assert with_euler.reaction_N() == pytest.approx(by_fire, rel=1e-4)
+
+
+@pytest.mark.parametrize("contact", ["bonded", "frictionless"])
+def test_a_quarter_gives_the_answer_of_the_whole(contact: Contact) -> None:
+    whole = Block((11, 13, 8), tip_diameter_mm=4.0, contact=contact)
+    one, four = pressed(whole, Springs(0.1), 0.8), pressed(whole.as_quarter(), Springs(0.1), 0.8)
+    assert four.reaction_N() == pytest.approx(one.reaction_N(), rel=1e-6)
+    assert four.energy_N_mm() == pytest.approx(one.energy_N_mm(), rel=1e-6)
+    np.testing.assert_allclose(four.block.inner(four.x), one.block.inner(one.x)[:, 5:, 6:], atol=1e-5)
+
+
+def test_a_whole_block_stays_symmetric(block: Block) -> None:
+    inner = block.inner(pressed(block, Springs(0.1), 1.0).x)
+    np.testing.assert_allclose(inner[2], inner[2, ::-1], atol=1e-6)
+    np.testing.assert_allclose(inner[2], inner[2].transpose(1, 0, 2), atol=1e-6)
+
+
+def test_the_reaction_is_the_slope_of_the_energy_over_depth(block: Block) -> None:
+    quarter, springs, h = block.as_quarter(), Springs(0.1, 2.0), 0.01
+    low, middle, high = (pressed(quarter, springs, d) for d in (0.7 - h, 0.7, 0.7 + h))
+    slope = (high.energy_N_mm() - low.energy_N_mm()) / (2 * h)
+    assert middle.reaction_N() == pytest.approx(slope, rel=1e-4)
+    tangent = (high.reaction_N() - low.reaction_N()) / (2 * h)
+    assert newton.tangent_stiffness_N_mm(middle) == pytest.approx(tangent, rel=1e-3)
+
+
+def test_tip_and_bone_carry_the_same_force(block: Block) -> None:
+    free_sides = Block(block.nodes, tip_diameter_mm=4.0, sides="free")
+    lattice = pressed(free_sides, Springs(0.1), 0.8)
+    assert -free_sides.inner(lattice.f)[2, :, :, 0].sum() == pytest.approx(lattice.reaction_N(), rel=1e-5)
+
+
+def test_the_pressure_contact_carries_what_it_is_given_and_dents_the_middle_most() -> None:
+    block = Block((11, 11, 8), tip_diameter_mm=4.0, contact="pressure", quarter=True)
+    lattice = Loaded(block, Springs(0.1))
+    lattice.load_N = 0.3
+    fire.relax(lattice, TOLERANCE_N)
+    bone = -4.0 * (block.inner(lattice.f)[2, :, :, 0]).sum()
+    sides = -4.0 * (block.inner(lattice.f)[2, -1, :, 1:].sum() + block.inner(lattice.f)[2, :-1, -1, 1:].sum())
+    assert bone + sides == pytest.approx(0.3, rel=1e-5)
+    sunk = lattice.rest[2, lattice.tip] - lattice.x[2, lattice.tip]
+    assert np.argmax(sunk) == np.argmin(np.hypot(*lattice.rest[:2, lattice.tip]))
+
+
+def test_friction_under_the_tip_makes_it_stiffer(block: Block) -> None:
+    smooth = Block(block.nodes, tip_diameter_mm=4.0, contact="frictionless", quarter=True)
+    assert pressed(smooth, Springs(0.1), 0.5).reaction_N() < pressed(block.as_quarter(), Springs(0.1), 0.5).reaction_N()
+
+
+@pytest.mark.parametrize("mode", ["study", "stabilised"])
+def test_small_depth_stiffness_is_that_of_the_flat_punch_on_a_layer(mode: Mode) -> None:
+    springs = Springs.for_mode(mode, 0.1)
+    block = Block((41, 41, 20), quarter=True)
+    stiffness = newton.tangent_stiffness_N_mm(Loaded(block, springs))
+    theory = punch_stiffness_N_mm(springs.young_modulus_MPa(1.0), springs.poisson_ratio, 3.0, block.height_mm)
+    # The tip is six cells wide, so its edge is known to half a cell.
+    assert stiffness == pytest.approx(theory, rel=0.1)
+
+
+def test_only_one_reading_of_the_study_s_parameters_is_stable() -> None:
+    growth = {name: scheme.growth_per_step(0.1) for name, scheme in euler.READINGS.items()}
+    assert growth["raw numbers, new velocity"] < 1.0
+    assert growth["raw numbers, old velocity"] == pytest.approx(1.056, abs=0.001)
+    assert growth["strict SI, new velocity"] == pytest.approx(1.2e5, rel=0.01)
+    assert growth["strict SI, old velocity"] == pytest.approx(346.4, abs=0.1)
+
+
+@pytest.mark.parametrize("reading", ["raw numbers, old velocity", "strict SI, new velocity", "strict SI, old velocity"])
+def test_an_unstable_reading_is_reported_with_the_largest_stable_step(block: Block, reading: str) -> None:
+    lattice = Loaded(block.as_quarter(), Springs.for_mode("study", 0.1))
+    lattice.press(0.3)
+    scheme = euler.READINGS[reading]
+    with pytest.raises(euler.Unstable, match=rf"must stay below {scheme.largest_step_s(0.1):.3g} s"):
+        euler.run(lattice, scheme)
+
+
+def test_the_stated_limit_of_the_time_step_is_the_limit() -> None:
+    limit = euler.EulerScheme().largest_step_s(0.1)
+    assert euler.EulerScheme(step_s=0.999 * limit).growth_per_step(0.1) < 1.0
+    assert euler.EulerScheme(step_s=1.01 * limit).growth_per_step(0.1) > 1.0
+
+
+def test_a_solver_out_of_steps_says_where_it_stood(block: Block) -> None:
+    lattice = Loaded(block, Springs(0.1))
+    lattice.press(0.5)
+    with pytest.raises(fire.NotConverged, match=r"stopped after 10 steps with .* N left"):
+        fire.relax(lattice, TOLERANCE_N, most_steps=10)
+
+
+def test_the_study_s_lattice_collapses_and_says_so_where_the_stabilised_one_does_not() -> None:
+    block = Block((15, 15, 12), quarter=True)
+    collapsed, kept = (pressed_far(block, mode) for mode in ("study", "stabilised"))
+    assert examine(collapsed).inverted_cells > 0
+    assert examine(kept).inverted_cells == 0
+    with pytest.raises(newton.NegativeCurvature, match="past a limit point"):
+        newton.tangent_stiffness_N_mm(at_limit(block))
+
+
+def pressed_far(block: Block, mode: Mode) -> Loaded:
+    lattice = Loaded(block, Springs.for_mode(mode, 1.0))
+    for depth in np.arange(0.5, 4.1, 0.5):
+        lattice.press(depth)
+        fire.relax(lattice, 1e-5)
+    return lattice
+
+
+def at_limit(block: Block) -> Loaded:
+    """A state squeezed evenly to half its height, which no springs-only lattice keeps."""
+    lattice = Loaded(block, Springs.for_mode("study", 1.0))
+    lattice.x[2] *= 0.5
+    return lattice
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Block((10, 11, 8)), "odd number"),
+        (lambda: Block((11, 11, 8), spacing_mm=float("nan")), "above 0 mm"),
+        (lambda: Block((11, 11, 8), tip_diameter_mm=12.0), "block 10.0 mm wide"),
+        (lambda: Block((11, 11, 400)), "limit is 336"),
+        (lambda: Block((501, 501, 100)), "limit of 4000000"),
+        (lambda: Springs(0.0), "above 0 N/mm"),
+        (lambda: Springs(-1.0), "k = -1.0 N/mm"),
+        (lambda: Springs(0.1, float("nan")), "b = nan"),
+        (lambda: Springs(0.1, 0.0, -1.0), "must lie between 0"),
+        (lambda: euler.EulerScheme(step_s=0.0), "time step of the Euler scheme is 0.0"),
+    ],
+)
+def test_bad_input_is_one_sentence_with_the_bound(make: "object", words: str) -> None:
+    assert callable(make)
+    with pytest.raises(UsageError, match=words):
+        make()
+
+
+def test_every_failure_of_a_solver_is_a_rig_error() -> None:
+    assert all(issubclass(kind, RigError) for kind in (euler.Unstable, fire.NotConverged, newton.NegativeCurvature))

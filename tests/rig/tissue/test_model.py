@@ -1,0 +1,126 @@
+"""`model.json`: what is written is what is read, and a file that is not one is refused in one sentence."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rig.errors import DataError, UsageError
+from rig.recording.files import WriteFailed
+from rig.tissue.laws import Index
+from rig.tissue.model import Model, Provenance, Quality, ValidRange, load_model
+
+MODEL = Model(
+    law=Index(a_N_mm=0.12, b_per_mm=0.22, B_N_s_mm=0.01),
+    covariance=np.diag([1e-6, 4e-6, 9e-8]),
+    intervals={"a_N_mm": (0.118, 0.122), "b_per_mm": (0.216, 0.224), "B_N_s_mm": (0.0094, 0.0106)},
+    interval_level=0.95,
+    interval_method="jackknife over trials",
+    valid=ValidRange(depth_mm=8.0, force_N=5.6, speeds_mm_s=(5.0, 30.0)),
+    data=Provenance(session="first", trials=("trial_001", "trial_002"), sha256="0" * 64, subject="7", site="forearm"),
+    quality=Quality(rmse_N=0.01, max_error_mm=0.03, max_error_percent=1.9, held_out_max_error_mm=0.04),
+)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """The model on disk."""
+    path = tmp_path / "model.json"
+    MODEL.save(path)
+    return path
+
+
+def test_a_model_survives_its_file(file: Path) -> None:
+    read = load_model(file)
+    assert read.law == MODEL.law
+    assert read.covariance == pytest.approx(MODEL.covariance)
+    assert (read.intervals, read.valid, read.data, read.quality) == (
+        MODEL.intervals, MODEL.valid, MODEL.data, MODEL.quality
+    )  # fmt: skip
+    assert read.standard_errors == pytest.approx({"a_N_mm": 1e-3, "b_per_mm": 2e-3, "B_N_s_mm": 3e-4})
+
+
+def test_a_model_answers_what_a_controller_asks() -> None:
+    assert MODEL.tangent_N_mm(0.0) == pytest.approx(0.12)
+    assert MODEL.force_N(5.0) == pytest.approx(0.6 * np.exp(1.1))
+    assert MODEL.depth_mm(MODEL.force_N(5.0)) == pytest.approx(5.0)
+    assert MODEL.damping_N_s_mm == 0.01
+
+
+def test_a_force_beyond_the_fitted_range_is_refused_with_that_range() -> None:
+    MODEL.check_force(5.6)
+    with pytest.raises(DataError, match=r"12 N is outside what the model was fitted to, 0 to 5.6 N .*8 mm"):
+        MODEL.check_force(12.0)
+    with pytest.raises(DataError, match=r"-1 N is outside"):
+        MODEL.check_force(-1.0)
+    with pytest.raises(DataError, match=r"nan N is outside"):
+        MODEL.check_force(float("nan"))
+
+
+def test_the_file_says_units_and_formula_for_readers_without_this_program(file: Path) -> None:
+    values = json.loads(file.read_text())
+    assert values["formula"] == "F = a x exp(b x) + B v"
+    assert values["units"] == {"a_N_mm": "N/mm", "b_per_mm": "1/mm", "B_N_s_mm": "N s/mm"}
+    assert (values["format"], values["version"]) == ("tissue-rig model", 1)
+
+
+def test_a_failed_write_leaves_no_half_file(tmp_path: Path) -> None:
+    with pytest.raises(WriteFailed):
+        MODEL.save(tmp_path / "missing" / "model.json")
+    assert list(tmp_path.iterdir()) == []
+
+
+Edit = Callable[[dict[str, Any]], object]
+BAD: list[tuple[str, Edit, str]] = [
+    ("unknown key", lambda v: v.update(quallity={}), r"unknown key quallity; nearest valid key: quality"),
+    (
+        "unknown inner key",
+        lambda v: v["valid"].update(depth=3),
+        r"unknown key valid.depth; nearest valid key: depth_mm",
+    ),
+    ("other format", lambda v: v.update(format="recipe"), r"is not a tissue model"),
+    ("other version", lambda v: v.update(version=2), r"model version 2 is not the 1 read here"),
+    ("no version", lambda v: v.pop("version"), r"model version None is not the 1"),
+    ("unknown law", lambda v: v.update(law="cubic"), r"no tissue law is called 'cubic'"),
+    (
+        "missing parameter",
+        lambda v: v["parameters"].pop("a_N_mm"),
+        r"parameters of the index law are a_N_mm, .*the file",
+    ),
+    ("extra parameter", lambda v: v["intervals"].update(c=[0, 1]), r"intervals of the index law are"),
+    ("wrong unit", lambda v: v["units"].update(a_N_mm="N/m"), r"a_N_mm must be in N/mm; the file has it in 'N/m'"),
+    ("bad value", lambda v: v["parameters"].update(a_N_mm=-3), r"a_N_mm = -3 N/mm is outside"),
+    ("NaN", lambda v: v["parameters"].update(a_N_mm=float("nan")), r"parameters.a_N_mm: .*finite"),
+    ("no range", lambda v: v.pop("valid"), r"valid: Field required"),
+    ("empty range", lambda v: v["valid"].update(force_N=0), r"valid.force_N: .*greater than 0"),
+    ("no data id", lambda v: v["data"].update(sha256="abc"), r"data.sha256"),
+    ("small covariance", lambda v: v.update(covariance=[[1.0]]), r"covariance must be 3 x 3"),
+    ("lopsided covariance", lambda v: v["covariance"][0].__setitem__(1, 5.0), r"symmetric"),
+    ("negative variance", lambda v: v["covariance"][0].__setitem__(0, -1.0), r"diagonal of at least 0"),
+]
+
+
+@pytest.mark.parametrize(("edit", "says"), [(edit, says) for _, edit, says in BAD], ids=[name for name, _, _ in BAD])
+def test_a_file_that_is_no_model_is_refused_in_one_sentence(file: Path, edit: Edit, says: str) -> None:
+    values = json.loads(file.read_text())
+    edit(values)
+    file.write_text(json.dumps(values))
+    with pytest.raises(UsageError, match=says) as caught:
+        load_model(file)
+    assert str(file) in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"\xff\xfe", b"[1, 2]", b"null"])
+def test_other_content_is_refused_with_the_files_name(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "model.json"
+    path.write_bytes(content)
+    with pytest.raises(UsageError, match=str(path)):
+        load_model(path)
+
+
+def test_a_missing_file_says_what_writes_one(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"no such file; `rig fit SESSION` writes a model.json"):
+        load_model(tmp_path / "model.json")

@@ -1,0 +1,51 @@
+"""The five-speed comparison finds the damping that is there and none where there is none."""
+
+import numpy as np
+import pytest
+
+from rig.errors import DataError
+from rig.tissue.contact import Contact
+from rig.tissue.curves import Curve
+from rig.tissue.rates import rate_test
+
+SPEEDS = (5.0, 10.0, 15.0, 20.0, 30.0)
+
+
+def curve(speed: float, damping: float, scatter: float, number: int) -> Curve:
+    depth = np.linspace(0.0, 8.0, 300)
+    force = (1.0 + scatter) * 0.1 * depth * np.exp(0.2 * depth) + damping * speed
+    contact = Contact(0.0, -0.05, 0.05, 0.01)
+    return Curve(f"trial_{number}", speed, depth, force, np.full_like(depth, speed), contact, 0.0, 0.01)
+
+
+def five_by_five(damping: float) -> list[Curve]:
+    generator = np.random.default_rng(4)
+    return [
+        curve(speed, damping, float(generator.normal(0.0, 0.03)), number) for number, speed in enumerate(SPEEDS * 5)
+    ]
+
+
+def test_damping_is_found_within_its_interval() -> None:
+    found = rate_test(five_by_five(0.01))
+    assert found.interval[0] < 0.01 < found.interval[1]
+    assert found.p_value < 0.05
+    assert found.excludes_study
+    assert found.study_effect_N == pytest.approx(32.5)
+
+
+def test_curves_that_agree_are_not_told_apart_and_still_exclude_the_study_s_value() -> None:
+    found = rate_test(five_by_five(0.0))
+    assert found.interval[0] < 0.0 < found.interval[1]
+    assert found.p_value > 0.05
+    assert found.excludes_study
+
+
+def test_the_study_s_damping_would_be_seen_at_once() -> None:
+    found = rate_test(five_by_five(1.3))
+    assert not found.excludes_study
+    assert found.effect_N == pytest.approx(32.5, rel=0.02)
+
+
+def test_one_speed_is_not_a_comparison() -> None:
+    with pytest.raises(DataError, match="2 speeds"):
+        rate_test([curve(5.0, 0.0, 0.0, number) for number in range(6)])

@@ -1,0 +1,154 @@
+"""From a session folder to tables, JSON and model: captured and imported sessions, and sessions with bad trials."""
+
+import csv
+import io
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rig.errors import DataError
+from rig.recording.importing import import_session
+from rig.recording.sessions import open_session
+from rig.tissue.model import load_model
+from rig.tissue.results import as_csv, as_json
+from rig.tissue.study import Study, fingerprint, model_of, rows, study_session
+from tests.rig.tissue.synthetic import Bench, index_force, metadata, tables, write_made_session, write_recording
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A session of two trials at three speeds, one trial in the air, and a run of force tracking."""
+    folder = tmp_path_factory.mktemp("made") / "session"
+    air = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).stroke(10.0, 999)
+    strokes = Bench(rate_Hz=500.0).strokes(trials=2, speeds_mm_s=(5.0, 10.0, 30.0))
+    write_made_session(folder, [*strokes, air], subject={"id": "7", "site": "forearm"})
+    run = Bench().stroke(10.0, 1)
+    write_recording(folder / "track_001.mcap", tables(run), metadata(run) | {"trial": {"kind": "tracking"}})
+    return folder
+
+
+@pytest.fixture(scope="module")
+def study(folder: Path) -> Study:
+    """The study of that session."""
+    return study_session(open_session(folder))
+
+
+def test_every_trial_with_a_curve_counts_and_the_others_say_why_not(study: Study) -> None:
+    assert [curve.name for curve in study.curves] == [
+        "trial_500", "trial_501", "trial_1000", "trial_1001", "trial_3000", "trial_3001"
+    ]  # fmt: skip
+    assert [trial for trial, _ in study.skipped] == ["trial_999"]
+    assert "no contact" in study.skipped[0].reason
+
+
+def test_the_index_law_is_closest_on_tissue_that_follows_it(study: Study) -> None:
+    assert study.closest == "index"
+    assert study.judged["index"].fitted.max_error_percent < 5
+    assert study.judged["constant"].fitted.max_error_percent > 30
+    assert [speed.speed_mm_s for speed in study.speeds] == [5.0, 10.0, 30.0]
+    assert [speed.trials for speed in study.speeds] == [2, 2, 2]
+
+
+def test_all_laws_are_judged_on_the_same_measured_displacements(study: Study) -> None:
+    constant, index = study.judged["constant"].fitted, study.judged["index"].fitted
+    assert constant.measured_mm == pytest.approx(index.measured_mm)
+
+
+def test_the_json_has_what_the_demonstration_quotes(study: Study) -> None:
+    values = json.loads(json.dumps(as_json(study), allow_nan=False))
+    assert values["constant"]["max_error_percent"] > values["index"]["max_error_percent"] > 0
+    assert set(values["index"]["parameters"]) == {"a_N_mm", "b_per_mm", "B_N_s_mm"}
+    assert values["index"]["parameters"]["a_N_mm"]["unit"] == "N/mm"
+    assert values["constant"]["parameters"]["B_N_s_mm"]["at_bound"] is True
+    assert values["index"]["held_out"]["trials"]["max_error_mm"] > 0
+    assert values["index"]["held_out"]["speeds"]["rmse_N"] > 0
+    assert len(values["index"]["rows"]) == len(values["force_N"]) == 10
+    assert values["skipped"][0]["trial"] == "trial_999"
+
+
+def test_the_json_says_null_where_nothing_could_be_left_out(tmp_path: Path) -> None:
+    study = study_session(open_session(write_made_session(tmp_path / "one", [Bench().stroke(10.0, 1)])))
+    assert as_json(study)["index"]["held_out"] == {"trials": None, "speeds": None}  # type: ignore[index]
+    table = list(csv.DictReader(io.StringIO(as_csv(study))))
+    assert table[0]["index_error_trial_left_out_mm"] == ""
+
+
+def test_the_csv_has_one_row_a_force_and_the_worst_trial_s_errors(study: Study) -> None:
+    table = list(csv.DictReader(io.StringIO(as_csv(study))))
+    found = rows(study.judged["index"].fitted)
+    assert [float(row["force_N"]) for row in table] == pytest.approx(study.force_N, rel=1e-5)
+    assert [float(row["index_error_mm"]) for row in table] == pytest.approx([row.error_mm for row in found], rel=1e-4)
+    worst = max(float(row["constant_error_percent"]) for row in table)
+    assert worst == pytest.approx(study.judged["constant"].fitted.max_error_percent, rel=1e-4)
+    assert {"constant_error_speed_left_out_percent", "measured_spread_mm"} <= set(table[0])
+
+
+def test_the_model_carries_range_data_and_quality(study: Study, tmp_path: Path) -> None:
+    model_of(study, "index", {"id": "7", "site": "forearm"}).save(tmp_path / "model.json")
+    model = load_model(tmp_path / "model.json")
+    assert model.law == study.judged["index"].law
+    assert 7.5 < model.valid.depth_mm < 8.1
+    assert model.valid.speeds_mm_s == (5.0, 10.0, 30.0)
+    assert model.data.trials == tuple(curve.name for curve in study.curves)
+    assert model.data.sha256 == fingerprint(study.curves)
+    assert (model.data.subject, model.data.site) == ("7", "forearm")
+    assert model.quality.held_out_max_error_mm is not None
+    model.check_force(model.valid.force_N)
+
+
+def test_the_fingerprint_is_of_the_data(study: Study) -> None:
+    assert fingerprint(study.curves) == fingerprint(list(study.curves))
+    assert fingerprint(study.curves) != fingerprint(study.curves[:-1])
+
+
+def test_a_session_without_a_usable_trial_is_refused_with_the_first_reason(tmp_path: Path) -> None:
+    air = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).stroke(10.0, 3)
+    session = open_session(write_made_session(tmp_path / "air", [air]))
+    with pytest.raises(DataError, match=r"no trial gives a curve \(1 skipped\); first: trial_003: no contact"):
+        study_session(session)
+
+
+def test_a_recording_that_was_never_finished_still_counts(tmp_path: Path) -> None:
+    stroke = Bench().stroke(10.0, 1)
+    folder = write_made_session(tmp_path / "cut", [Bench().stroke(10.0, 2)])
+    write_recording(folder / f"{stroke.name}.mcap", tables(stroke), metadata(stroke), finish=False)
+    study = study_session(open_session(folder))
+    assert {curve.name for curve in study.curves} == {"trial_001", "trial_002"}
+
+
+def write_csv(path: Path, header: str, columns: list[np.ndarray[tuple[int], np.dtype[np.float64]]]) -> None:
+    """A CSV file as a stranger's logger writes it."""
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.6f")
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_an_imported_session_of_streams_with_own_rates_and_clocks_is_fitted(tmp_path: Path, turned: bool) -> None:
+    source, sign = tmp_path / "measured", -1.0 if turned else 1.0
+    source.mkdir()
+    (source / "session.toml").write_text('force_positive = "tension"\nposition_positive = "out"\n' if turned else "")
+    bench, start_s = Bench(noise_N=0.02, quantum_N=0.0), 0.0
+    for number, speed_mm_s in enumerate((5.0, 10.0, 20.0) * 2):
+        stroke = bench.stroke(speed_mm_s, number)
+        trial = source / f"trial_{number:02d}"
+        trial.mkdir()
+        (trial / "trial.toml").write_text(f"speed_mm_s = {speed_mm_s}\ndepth_mm = 8.0\n")
+        force, axis = slice(None, None, 5), slice(3, None, 10)
+        write_csv(
+            trial / "force.csv",
+            "time_s,force_N",
+            [start_s + stroke.time_s[force] + 0.013, sign * stroke.force_N[force]],
+        )
+        write_csv(
+            trial / "axis.csv", "time_s,position_mm", [start_s + stroke.time_s[axis], sign * stroke.position_mm[axis]]
+        )
+        start_s += stroke.time_s[-1] + 5.0
+    session = import_session(source, tmp_path / "session", (), datetime(2026, 1, 2, tzinfo=UTC))
+    study = study_session(session)
+    assert len(study.curves) == 6
+    assert study.judged["index"].law.values == pytest.approx([0.12, 0.22, 0.01], rel=0.06)
+    for errors in (study.judged["index"].fitted, study.judged["index"].trials_left_out):
+        assert errors is not None
+        assert errors.max_error_mm < 0.25

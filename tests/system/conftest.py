@@ -1,0 +1,30 @@
+"""Every test here starts real processes: one worker runs them, one after another."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.system.stage import Running, Stage, stage
+
+
+@pytest.hookimpl(tryfirst=True)  # before the tests are dealt out to workers by group
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if "tests/system" in item.nodeid:
+            item.add_marker(pytest.mark.bench)
+            item.add_marker(pytest.mark.xdist_group("bench"))
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_running() -> Iterator[None]:
+    """A failed test leaves no command behind that would disturb the next."""
+    yield
+    while Running.started:
+        Running.started.pop().kill()
+
+
+@pytest.fixture
+def bench() -> Iterator[Stage]:
+    """A fresh mock bench."""
+    with stage("--seed", "1") as served:
+        yield served

@@ -1,0 +1,158 @@
+"""A mock bench in a process of its own, and the `rig` command run against it as a user runs it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+from mock_devices.control import BenchControl
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
+RIG = [sys.executable, "-c", "from api.cli.app import main; main()"]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Endpoints of a served bench and its control channel."""
+
+    endpoints: dict[str, Any]
+    control: BenchControl
+
+    def settings(self, *more: str) -> list[str]:
+        """Options that plug a command into this bench."""
+        force, axis, tracker = self.endpoints["force"], self.endpoints["axis"], self.endpoints["tracker"]
+        ports = (f"force.port={force['serial']}", f"axis.port={axis['slcan']}", f"tracker.port=tcp://{tracker['tcp']}")
+        return [part for setting in (*ports, *more) for part in ("--set", setting)]
+
+
+@contextmanager
+def stage(*options: str) -> Iterator[Stage]:
+    """A bench served with ``options`` until the block ends."""
+    command = [
+        sys.executable,
+        "-m",
+        "mock_devices.serve",
+        "--with-parent",
+        "--tracker-tcp-port",
+        "0",
+        "--priority",
+        "10",
+        *options,
+    ]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert process.stdin and process.stdout
+    try:
+        endpoints = json.loads(process.stdout.readline())
+        with BenchControl(endpoints["control"]) as control:
+            yield Stage(endpoints, control)
+    finally:
+        process.stdin.close()
+        process.wait(20)
+        process.stdout.close()
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a command ended with."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def sentence(self) -> str:
+        """The last line on stderr, where a failure is explained; there is never a traceback."""
+        assert "Traceback" not in self.err, self.err
+        lines = [line for line in self.err.splitlines() if line.startswith("rig: ")]
+        assert len(lines) == 1, self.err
+        return lines[0]
+
+
+class Running:
+    """A `rig` command under way; ``started`` lists all there were, so that none outlives its test."""
+
+    started: ClassVar[list["Running"]] = []
+
+    def __init__(self, arguments: Sequence[str | Path], folder: Path, stdin: int = subprocess.DEVNULL) -> None:
+        environment = os.environ | {"COLUMNS": "200", "PYTHONPATH": str(ROOT)}
+        self.process = subprocess.Popen(
+            [*RIG, *map(str, arguments)],
+            cwd=folder,
+            env=environment,
+            stdin=stdin,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.started.append(self)
+
+    def kill(self) -> None:
+        """Ends it without asking; nothing if it has ended."""
+        if self.process.returncode is None:
+            self.process.kill()
+            self.process.communicate()
+
+    def interrupt(self) -> None:
+        """Ctrl-C."""
+        self.process.send_signal(signal.SIGINT)
+
+    def end(self, timeout_s: float = 90.0) -> Said:
+        """Waits for its end."""
+        try:
+            out, err = self.process.communicate(timeout=timeout_s)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            out, err = self.process.communicate()
+            raise AssertionError(f"still running after {timeout_s} s\n{out}\n{err}") from None
+        return Said(self.process.returncode, out, err)
+
+
+def pressed(bench: Stage, force_N: float = 1.0) -> None:
+    """Waits until the tip presses with ``force_N``; a command that ended before that fails with what it said."""
+
+    def there() -> bool:
+        for running in Running.started:
+            assert running.process.poll() is None, running.end()
+        return bench.control.number("tip.force_N") > force_N
+
+    until(there, 40, f"the tip pressing with {force_N} N")
+
+
+def freed(bench: Stage) -> None:
+    """Waits until the tip is out of the tissue."""
+    until(lambda: bench.control.number("tip.force_N") == 0.0, 10, "the tip out of contact")
+
+
+def rig(*arguments: str | Path, folder: Path, timeout_s: float = 90.0) -> Said:
+    """Runs a `rig` command to its end."""
+    return Running(arguments, folder).end(timeout_s)
+
+
+def until(condition: Any, timeout_s: float, what: str) -> None:
+    """Waits for ``condition()``; fails with ``what``."""
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, f"not within {timeout_s} s: {what}"
+        time.sleep(0.01)
+
+
+def children(pid: int, module: str) -> list[int]:
+    """Process numbers of ``pid``'s children that run ``module``."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                status, command = (entry / "status").read_text(), (entry / "cmdline").read_text()
+            except OSError:
+                continue
+            if f"PPid:\t{pid}\n" in status and module in command:
+                found.append(int(entry.name))
+    return found

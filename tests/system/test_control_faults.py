@@ -1,0 +1,108 @@
+"""Force control through processes and wires: what stops it from outside, and how fast."""
+
+import os
+import signal
+import threading
+from pathlib import Path
+
+import pytest
+
+from api.cli.stage import plugged
+from controller.experiments import threshold
+from controller.supervisor import Supervisor
+from rig.config.table import merged, parse
+from rig.config.wiring import Wiring
+from rig.recording.reader import read_recording
+from tests.controller.models import index_model
+from tests.system.stage import Running, Stage, children, freed, pressed
+
+HEARTBEAT_S = 0.05
+# A shared computer pauses for longer than a lab's would be allowed to.
+PATIENT = ("loop.stale_force_ms=400", "loop.stale_axis_ms=400", "loop.stale_marker_ms=600", "loop.overrun_ms=400")
+
+
+@pytest.fixture
+def tracking(bench: Stage, tmp_path: Path) -> Running:
+    """A press of 1 to 3 N, over and over, so that the tip moves whenever something happens."""
+    model = tmp_path / "model.json"
+    index_model(0.12, 0.22, 0.01, force_N=11.0).save(model)
+    reference = "press:2,base_N=1,frequency_Hz=1,duration_s=30"
+    command: list[str | Path] = [
+        "track",
+        "--model",
+        model,
+        "--reference",
+        reference,
+        "--out",
+        tmp_path / "session",
+        *bench.settings(),
+    ]
+    return Running(command, tmp_path)
+
+
+def causes(tmp_path: Path) -> str:
+    events = read_recording(tmp_path / "session" / "track_001.mcap").events
+    return " ".join(f"{event.code}: {event.text}" for event in events)
+
+
+def positions(bench: Stage, for_s: float) -> list[tuple[float, float]]:
+    """Bench time and true axis position, as often as the bench answers."""
+    found: list[tuple[float, float]] = []
+    while not found or found[-1][0] < found[0][0] + for_s:
+        now = bench.control.get("time_s", "axis.position_mm")
+        found.append((float(now["time_s"]), float(now["axis.position_mm"])))
+    return found
+
+
+def test_a_killed_loop_in_contact_leaves_the_tip_stopped_within_two_heartbeats(
+    bench: Stage, tracking: Running, tmp_path: Path
+) -> None:
+    pressed(bench, 1.5)
+    (loop,) = children(tracking.process.pid, "controller.loop_process")
+    os.kill(loop, signal.SIGKILL)
+    after = positions(bench, 1.0)
+    killed_s, (_, final_mm) = after[0][0], after[-1]
+    late = [mm for time_s, mm in after if time_s > killed_s + 2 * HEARTBEAT_S]
+    assert max(abs(mm - final_mm) for mm in late) < 0.02
+    assert bench.control.get("axis.powered")["axis.powered"] is False
+    assert tracking.end().code == 1
+
+
+def test_a_command_that_is_suspended_loses_its_lease_and_the_tip_retracts(
+    bench: Stage, tracking: Running, tmp_path: Path
+) -> None:
+    pressed(bench)
+    tracking.process.send_signal(signal.SIGSTOP)
+    freed(bench)
+    tracking.process.send_signal(signal.SIGCONT)
+    said = tracking.end()
+    assert said.code == 3
+    assert "the operator's program is silent" in said.sentence
+    assert "operator_silent" in causes(tmp_path)
+
+
+def test_a_threshold_session_ends_where_the_subject_stops_it(bench: Stage, tmp_path: Path) -> None:
+    model = index_model(0.12, 0.22, 0.01, force_N=11.0)
+    wiring = plugged(parse(Wiring, merged({}, PATIENT), "PATIENT"), bench.endpoints)
+    program = threshold.plan(8.0, 1.0, model, wiring)
+
+    def press_the_key() -> None:
+        pressed(bench, 2.0)
+        rig.pain()
+
+    with Supervisor(wiring) as rig:
+        presses = threading.Thread(target=press_the_key)
+        presses.start()
+        found = threshold.run(rig, program, 8.0, tmp_path / "session", "")
+        presses.join()
+    assert found.force_N is not None
+    assert found.force_N == pytest.approx(2.0, abs=0.5)
+    freed(bench)
+
+
+def test_a_limb_that_is_pulled_away_ends_the_run(bench: Stage, tracking: Running, tmp_path: Path) -> None:
+    pressed(bench)
+    bench.control.set({"surface.position_mm": 34.0})
+    said = tracking.end()
+    assert said.code == 3
+    assert "against the robot (limit 10 mm)" in said.sentence

@@ -1,0 +1,56 @@
+"""The demonstration, with one trial a speed instead of three; its report in Chromium without the network."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, sync_playwright
+
+from tests.system.browser import find, launch
+from tests.system.stage import rig
+
+LARGEST_STEADY_ERROR_PERCENT = 5.0
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("demonstration")
+    said = rig("demo", "--out", "demo", "--trials", "1", folder=folder, timeout_s=240)
+    assert said.code == 0, said.err
+    return folder / "demo"
+
+
+@pytest.fixture
+def browser() -> Iterator[Browser]:
+    executable = find()
+    with sync_playwright() as playwright:
+        chromium = launch(playwright, executable)
+        yield chromium
+        chromium.close()
+
+
+@pytest.mark.timeout(300)
+def test_the_summary_holds_what_was_recorded_fitted_and_tracked(made: Path) -> None:
+    summary: dict[str, Any] = json.loads((made / "summary.json").read_text())
+    assert summary["recordings"] == 6
+    assert summary["samples"] > 50_000
+    assert summary["dropped"] == 0
+    assert summary["loop"]["missed"] < 0.05 * summary["loop"]["ticks"]
+    assert summary["fit"]["index"]["max_error_percent"] < 10 < summary["fit"]["constant"]["max_error_percent"]
+    assert summary["tracking"]["max_error_percent"] < LARGEST_STEADY_ERROR_PERCENT
+    assert summary["tracking"]["rms_error_N"] < 0.1
+
+
+def test_the_report_shows_its_pictures_without_the_network(made: Path, browser: Browser) -> None:
+    context = browser.new_context(offline=True)
+    page = context.new_page()
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto((made / "report.html").as_uri())
+    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
+    pictures = page.locator("svg").all()
+    assert len(pictures) >= 3
+    assert all((picture.bounding_box() or {"width": 0})["width"] > 100 for picture in pictures)
+    context.close()

@@ -1,0 +1,143 @@
+"""The service over a real mock bench: what a lab's UI does, in the order in which it does it."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.cli.options import built_in
+from api.cli.stage import plugged
+from api.http.app import build
+from api.http.service import Service
+from rig.recording.reader import read_recording
+from tests.system.stage import Stage, freed, pressed, stage, until
+
+SLOW = (
+    'kind = "indentation"\nspeeds_mm_s = [5]\ntrials = 1\ndepth_mm = 6\nair_dwell_s = 0.2\napproach_speed_mm_s = 20\n'
+    "hold_s = 30\nretract_speed_mm_s = 20\nclearance_mm = 4\nforce_limit_N = 12\n"
+)
+SHORT = SLOW.replace("hold_s = 30", "hold_s = 0.1").replace("speeds_mm_s = [5]", "speeds_mm_s = [20]")
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Stage, TestClient, Path]]:
+    folder = tmp_path_factory.mktemp("service")
+    (folder / "protocols").mkdir()
+    (folder / "protocols" / "slow.toml").write_text(SLOW)
+    (folder / "protocols" / "short.toml").write_text(SHORT)
+    with stage("--seed", "2") as bench:
+        service = Service(plugged(built_in(), bench.endpoints), folder / "sessions", folder / "protocols")
+        with TestClient(build(service), base_url="http://127.0.0.1:8000") as client:
+            yield bench, client, folder
+
+
+def start(client: TestClient, protocol: str, session: str) -> str:
+    answer = client.post("/api/v1/jobs", json={"kind": "capture", "protocol": protocol, "session": session})
+    assert answer.status_code == 202, answer.text
+    assert answer.headers["location"] == f"/api/v1/jobs/{answer.json()['id']}"
+    return str(answer.json()["id"])
+
+
+def ended(client: TestClient, job: str) -> dict[str, object]:
+    until(lambda: client.get(f"/api/v1/jobs/{job}").json()["state"] != "running", 60, "the job's end")
+    found: dict[str, object] = client.get(f"/api/v1/jobs/{job}").json()
+    return found
+
+
+def reset(client: TestClient) -> None:
+    until(lambda: client.post("/api/v1/estop/reset").status_code == 200, 10, "the reset")
+
+
+def test_the_bench_is_shown_with_its_devices_and_their_health(served: tuple[Stage, TestClient, Path]) -> None:
+    _, client, _ = served
+    until(lambda: client.get("/api/v1/rig").json()["ticks"] > 300, 20, "a running loop")
+    rig = client.get("/api/v1/rig").json()
+    assert rig["state"] == "idle"
+    assert set(rig["devices"]) == {"force", "axis", "tracker"}
+    assert all(health["alive"] and health["valid"] for health in rig["health"].values())
+
+
+def test_a_capture_runs_as_a_job_and_its_recording_can_be_downloaded(
+    served: tuple[Stage, TestClient, Path], tmp_path: Path
+) -> None:
+    _, client, _ = served
+    job = ended(client, start(client, "short", "first"))
+    assert job["state"] == "succeeded", job["message"]
+    session = client.get("/api/v1/recordings").json()[0]
+    assert (session["name"], session["trials"], session["dropped"]) == ("first", 1, 0)
+    href = next(item["href"] for item in session["recordings"] if item["file"].endswith(".mcap"))
+    file = tmp_path / "downloaded.mcap"
+    file.write_bytes(client.get(href).content)
+    assert read_recording(file).complete
+    part = client.get(href, headers={"Range": "bytes=0-7"})
+    assert (part.status_code, part.content) == (206, b"\x89MCAP0\r\n")
+
+
+def test_a_session_is_never_overwritten(served: tuple[Stage, TestClient, Path]) -> None:
+    _, client, _ = served
+    answer = client.post("/api/v1/jobs", json={"kind": "capture", "protocol": "short", "session": "first"})
+    assert (answer.status_code, answer.json()["code"]) == (409, "session-exists")
+
+
+def test_one_job_at_a_time_and_a_stop_names_its_job(served: tuple[Stage, TestClient, Path]) -> None:
+    bench, client, _ = served
+    job = start(client, "slow", "second")
+    pressed(bench)
+    second = client.post("/api/v1/jobs", json={"kind": "capture", "protocol": "short", "session": "third"})
+    assert (second.status_code, second.json()["code"]) == (409, "busy")
+    assert job in second.json()["detail"]
+    assert client.post("/api/v1/jobs/nobody/stop").status_code == 404
+    assert client.post(f"/api/v1/jobs/{job}/stop").status_code == 200
+    freed(bench)
+    assert ended(client, job)["state"] == "stopped"
+    assert client.get("/api/v1/rig").json()["state"] == "stopped"
+    reset(client)
+
+
+def test_the_emergency_stop_holds_until_acknowledged_and_moves_nothing_then(
+    served: tuple[Stage, TestClient, Path],
+) -> None:
+    bench, client, _ = served
+    job = start(client, "slow", "fourth")
+    pressed(bench)
+    answer = client.post("/api/v1/estop")
+    assert (answer.status_code, answer.json()["detail"]) == (200, "emergency stop pressed")
+    assert ended(client, job)["state"] == "stopped"
+    refused = client.post("/api/v1/jobs", json={"kind": "capture", "protocol": "short", "session": "fifth"})
+    assert ended(client, refused.json()["id"])["state"] == "failed"
+    before_mm = bench.control.number("axis.position_mm")
+    reset(client)
+    time.sleep(0.3)
+    assert bench.control.number("axis.position_mm") == pytest.approx(before_mm, abs=0.05)
+    assert client.get("/api/v1/rig").json()["state"] == "idle"
+    assert bench.control.number("tip.force_N") > 0.5
+    out = client.post("/api/v1/jobs", json={"kind": "retract"})
+    done = ended(client, out.json()["id"])
+    assert done["state"] == "succeeded", done["message"]
+    freed(bench)
+
+
+def test_the_subjects_pain_stop_retracts(served: tuple[Stage, TestClient, Path]) -> None:
+    bench, client, folder = served
+    bench.control.set({"tissue.present": False})
+    assert client.post("/api/v1/pain").json()["detail"] == "nothing was moving"
+    bench.control.set({"tissue.present": True})
+    job = start(client, "slow", "sixth")
+    pressed(bench)
+    assert client.post("/api/v1/pain").status_code == 200
+    freed(bench)
+    assert ended(client, job)["state"] == "stopped"
+    events = read_recording(folder / "sessions" / "sixth" / "trial_001.mcap").events
+    assert "pain_stop" in {event.code for event in events}
+    reset(client)
+
+
+def test_live_values_come_as_server_sent_events(served: tuple[Stage, TestClient, Path]) -> None:
+    _, client, _ = served
+    app = client.app
+    assert app is not None
+    schema = client.get("/api/v1/openapi.json").json()
+    assert "text/event-stream" in schema["paths"]["/api/v1/live"]["get"]["responses"]["200"]["content"]
+    until(lambda: client.get("/api/v1/rig").json()["mode"] == "idle", 5, "the loop's answer to the reset")
