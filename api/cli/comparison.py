@@ -7,14 +7,15 @@ from pathlib import Path
 import mock_devices
 from api.cli.output import console, table
 from api.cli.stage import bench_for
-from controller.experiments import capture, comparison, tracked
+from controller.experiments import capture, comparison, tracked, tracking
 from controller.experiments.comparison import HEADER, Jump, Run
 from controller.experiments.recorded import Recorded
 from controller.experiments.references import Reference, Stairs
-from controller.gains import Choice
+from controller.gains import Choice, pi_gains
 from controller.operation import Operation
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
+from rig.config.table import parse
 from rig.config.wiring import Wiring
 from rig.errors import DataError, UsageError
 from rig.recording.reader import read_recording
@@ -39,11 +40,7 @@ def compare(
     wiring: Wiring, out: Path, subjects: Sequence[str], choices: Sequence[Choice], reference: Reference
 ) -> dict[str, object]:
     """Runs all of it on mock benches, prints the table, and returns its JSON."""
-    if wiring.mock.parameters or wiring.mock.hide or not wiring.uses_mock:
-        raise UsageError("--table brings its own subjects: use it with ports `mock` and without mock parameters")
-    unknown = [name for name in subjects if name not in ALL]
-    if unknown:
-        raise UsageError(f"--subjects {unknown[0]}: there are {', '.join(ALL)}")
+    check(wiring, out, subjects, reference)
     runs: list[Run] = []
     models: dict[str, dict[str, float]] = {}
     for subject in subjects:
@@ -55,6 +52,42 @@ def compare(
     console.print(table(HEADER, comparison.rows(runs), title=f"Worst of {reference.name}"))
     _draw(runs, out)
     return {"reference": reference.name, "models": models, "runs": [run.as_json() for run in runs]}
+
+
+def check(wiring: Wiring, out: Path, subjects: Sequence[str], reference: Reference) -> None:
+    """Raises UsageError, before any bench is started, for what would only be refused once a subject is learnt."""
+    if wiring.mock.parameters or wiring.mock.hide or not wiring.uses_mock:
+        raise UsageError("--table brings its own subjects: use it with ports `mock` and without mock parameters")
+    unknown = [name for name in subjects if name not in ALL]
+    if unknown:
+        raise UsageError(f"--subjects {unknown[0]}: there are {', '.join(ALL)}")
+    _refuse_strong(max(reference.forces_N), wiring)
+    tracking.refuse_beyond_bench(reference, wiring)
+    # Without damping, which only helps, whether a law exists does not depend on stiffness: one tissue speaks for all.
+    pi_gains(1.0, 0.0, tracking.design_for(wiring))
+    capture.check(LEARNING, wiring)
+    for subject in subjects:
+        if not _model_file(out, subject).exists():
+            capture.refuse_used(_learning_folder(out, subject))
+
+
+def _refuse_strong(force_N: float, wiring: Wiring) -> None:
+    for limit_N, whose in ((LEARNT_N, "what the subjects are learnt to"), (wiring.force_limit_N, "the force limit")):
+        if force_N > limit_N:
+            raise UsageError(f"--force: {force_N:g} N is above {whose}, {limit_N:g} N")
+
+
+def _who(subject: str) -> str:
+    """Whose tissue it is: the breathing subject is the average one."""
+    return "average" if subject == BREATHING else subject
+
+
+def _model_file(out: Path, subject: str) -> Path:
+    return out / f"{_who(subject)}.json"
+
+
+def _learning_folder(out: Path, subject: str) -> Path:
+    return out / f"learn-{_who(subject)}"
 
 
 def _draw(runs: Sequence[Run], out: Path) -> None:
@@ -75,23 +108,17 @@ def _height(value: float | None) -> float:
 
 def bench_of(wiring: Wiring, subject: str) -> Wiring:
     """The mock bench with this subject on it; the breathing one is the average subject, whose surface moves."""
-    breathing = subject == BREATHING
-    mock = wiring.mock.model_copy(
-        update={
-            "parameters": SUBJECTS / f"{'average' if breathing else subject}.toml",
-            "hide": BREATHES if breathing else (),
-        }
-    )
+    hidden = BREATHES if subject == BREATHING else ()
+    mock = wiring.mock.model_copy(update={"parameters": SUBJECTS / f"{_who(subject)}.toml", "hide": hidden})
     return wiring.model_copy(update={"mock": mock})
 
 
 def learnt(wiring: Wiring, out: Path, subject: str) -> Model:
     """The model `rig fit` makes of an indentation of this subject, breath held; kept in ``out``."""
-    who = "average" if subject == BREATHING else subject
-    folder, file = out / f"learn-{who}", out / f"{who}.json"
+    folder, file = _learning_folder(out, subject), _model_file(out, subject)
     if file.exists():
         return load_model(file)
-    with bench_for(bench_of(wiring, who)) as (live, _), Supervisor(live) as bench:
+    with bench_for(bench_of(wiring, _who(subject))) as (live, _), Supervisor(live) as bench:
         capture.capture(bench, LEARNING, folder, Operation("learn"), lambda _: None)
     session = open_session(folder)
     model = model_of(study_session(session), "index", session.info.subject)
@@ -123,6 +150,15 @@ def _jumps(done: Recorded) -> tuple[Jump, ...]:
 
 
 def stairs(forces: str, each_s: float) -> Reference:
-    """``1,10`` as jumps of 1 N from the first to the last."""
+    """``1,10`` as jumps of 1 N from the first to the last; raises UsageError where that makes no jump to judge."""
     levels = tracked.forces(forces)
-    return Stairs(from_N=levels[0], to_N=levels[-1], each_s=each_s).reference()
+    if len(levels) != 2 or abs(levels[1] - levels[0]) < Stairs.model_fields["step_N"].default:
+        raise UsageError(
+            f"--force {forces}: --table compares jumps of 1 N; give the first and the last force, at least 1 N apart,"
+            " for example 1,10"
+        )
+    if not each_s > comparison.STEADY_S + comparison.REMAINS_S:
+        least_s = comparison.STEADY_S + comparison.REMAINS_S
+        raise UsageError(f"--seconds {each_s:g}: each jump needs more than {least_s:g} s to be judged")
+    values = {"from_N": levels[0], "to_N": levels[1], "each_s": each_s}
+    return parse(Stairs, values, f"--force {forces}").reference()

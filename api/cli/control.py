@@ -1,6 +1,7 @@
 """`rig simulate`: a reference on a tissue model, before anything real moves; `rig threshold`: the subject's limit."""
 
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -55,36 +56,47 @@ def simulate(
     Example: rig simulate --model sessions/first/fit/model.json --reference step:5 --json simulation.json
     """
     wiring, fitted, asked = wiring_from(config, overrides), load_model(model), named(reference)
-    choice: Choice = comparison.choices_from(gains)[0] if gains else wiring.loop.gains
+    choice = comparison.choice_from(gains) if gains else wiring.loop.gains
     program = tracked.plan_reference(asked, fitted, wiring, choice)
     bench = SimulatedBench(limb_of(fitted, stiffness, breathing))
-    simulated.run(program, wiring, bench)  # compiles
-    began = time.perf_counter()
-    trace = simulated.run(program, wiring, bench)
-    took_s = time.perf_counter() - began
+    trace, times_real_time = _timed(lambda: simulated.run(program, wiring, bench))
     loop = _margins(fitted, wiring, choice, stiffness)
-    on = (trace.mode == Mode.CONTACT) & np.isfinite(trace.reference_N)
-    result: dict[str, object] = {
-        "reference": asked.name,
-        "gains": choice,
-        "jumps": [asdict(jump) for jump in _jumps(trace)],
-        "duration_s": float(trace.time_s[-1]),
-        "times_real_time": float(trace.time_s[-1] / took_s),
-        "rms_error_N": float(np.sqrt(np.mean((trace.force_N[on] - trace.reference_N[on]) ** 2))),
-        "peak_force_N": float(np.max(trace.force_N)),
-        "largest_voltage_V": float(np.max(np.abs(trace.voltage_V[on]))),
-        "margins": loop,
-    }
-    console.print(table(("force N", "tangent N/mm", "crossover Hz", "phase margin deg", "gain margin"), _rows(loop)))
-    console.print(
-        f"{asked.name}: rms error {result['rms_error_N']:.3f} N, peak {result['peak_force_N']:.2f} N,"
-        f" {result['times_real_time']:.0f} times real time",
-        highlight=False,
-    )
+    result = {
+        "reference": asked.name, "gains": choice, "times_real_time": times_real_time, **_figures(trace), "margins": loop
+    }  # fmt: skip
+    _say(result, loop)
     _draw(trace, bench, out, f"{asked.name}, {choice} gains")
     _draw_bode(fitted, wiring, choice, stiffness, out)
     console.print(f"simulation.svg, simulation.png and bode.svg are in {out}", highlight=False)
     write_json(json_file, result)
+
+
+def _timed(play: Callable[[], Trace]) -> tuple[Trace, float]:
+    """The trace, and how many times faster than real time it was made, compilation not counted."""
+    play()
+    began = time.perf_counter()
+    trace = play()
+    return trace, float(trace.time_s[-1] / (time.perf_counter() - began))
+
+
+def _figures(trace: Trace) -> dict[str, object]:
+    on = (trace.mode == Mode.CONTACT) & np.isfinite(trace.reference_N)
+    return {
+        "jumps": [asdict(jump) for jump in _jumps(trace)],
+        "duration_s": float(trace.time_s[-1]),
+        "rms_error_N": float(np.sqrt(np.mean((trace.force_N[on] - trace.reference_N[on]) ** 2))),
+        "peak_force_N": float(np.max(trace.force_N)),
+        "largest_voltage_V": float(np.max(np.abs(trace.voltage_V[on]))),
+    }
+
+
+def _say(result: Mapping[str, object], loop: list[dict[str, float]]) -> None:
+    console.print(table(("force N", "tangent N/mm", "crossover Hz", "phase margin deg", "gain margin"), _rows(loop)))
+    console.print(
+        f"{result['reference']}: rms error {result['rms_error_N']:.3f} N, peak {result['peak_force_N']:.2f} N,"
+        f" {result['times_real_time']:.0f} times real time",
+        highlight=False,
+    )
 
 
 def _jumps(trace: Trace) -> tuple[comparison.Jump, ...]:
@@ -171,6 +183,7 @@ def threshold(
     """
     wiring, fitted = wiring_from(config, overrides), load_model(model)
     program = experiment.plan(up_to, rate, fitted, wiring)
+    tracked.refuse_foreign(out)
     with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
         operation = Operation("threshold", total=1, unit="ramps")
         found = live.run(bench, operation, lambda: experiment.run(bench, program, up_to, out, str(model)))

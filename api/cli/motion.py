@@ -2,7 +2,7 @@
 
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 
@@ -12,10 +12,11 @@ from api.cli.output import console, table, write_json
 from api.cli.stage import bench_for
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
-from controller.experiments.comparison import CHOICES, choices_from
+from controller.experiments.comparison import CHOICES, choice_from, choices_from
 from controller.experiments.references import named
 from controller.experiments.tracked import Tracked
 from controller.operation import Operation
+from controller.steps import Program
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
@@ -44,6 +45,7 @@ def capture(
     wiring = wiring_from(config, overrides)
     plan = load(Indentation, protocol)
     experiment.check(plan, wiring)
+    experiment.refuse_used(out)
     with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
         info = captured(bench, plan, out)
     write_json(json_file, summary(info, out))
@@ -105,21 +107,13 @@ def track(
     Example: rig track --model sessions/first/fit/model.json --force 1,2,5 --seconds 5 --json track.json
     """
     wiring = wiring_from(config, overrides)
+    asked = Asked(model, force, reference, seconds, gains, subjects)
     folder = out or Path("sessions") / f"track-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
     if compare:
-        write_json(json_file, _compared(wiring, folder, gains, subjects, force, seconds))
+        write_json(json_file, _compared(wiring, folder, asked))
         return
-    if model is None or bool(force) == bool(reference):
-        raise UsageError("tracking needs --model, and either --force or --reference; or --table alone")
-    fitted = load_model(model)
-    choice = choices_from(gains)[0] if gains else None
-    if force:
-        wiring = wiring.model_copy(
-            update={"loop": wiring.loop.model_copy(update={"gains": choice or wiring.loop.gains})}
-        )
-        program = tracked.plan(tracked.forces(force), 10.0 if seconds is None else seconds, fitted, wiring)
-    else:
-        program = tracked.plan_reference(named(reference), fitted, wiring, choice)
+    program = _planned(wiring, asked)
+    tracked.refuse_foreign(folder)
     with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
         operation = Operation("track", total=1, unit="runs")
         result = live.run(bench, operation, lambda: tracked.run(bench, program, folder, str(model), operation))
@@ -128,18 +122,42 @@ def track(
     write_json(json_file, tracked.as_json(result))
 
 
-def _compared(
-    wiring: Wiring, folder: Path, gains: str, subjects: str, force: str, seconds: float | None
-) -> dict[str, object]:
+class Asked(NamedTuple):
+    """What `rig track` was asked for."""
+
+    model: Path | None
+    force: str
+    reference: str
+    seconds: float | None
+    gains: str
+    subjects: str
+
+
+def _planned(wiring: Wiring, asked: Asked) -> Program:
+    """The program, checked before anything is opened."""
+    if asked.model is None or bool(asked.force) == bool(asked.reference) or asked.subjects:
+        raise UsageError("tracking needs --model, and either --force or --reference; or --table, which has --subjects")
+    fitted = load_model(asked.model)
+    choice = choice_from(asked.gains) if asked.gains else None
+    if asked.reference:
+        if asked.seconds is not None:
+            raise UsageError(
+                "--seconds goes with --force; a --reference has its own duration, as in step:5,duration_s=4"
+            )
+        return tracked.plan_reference(named(asked.reference), fitted, wiring, choice)
+    seconds = 10.0 if asked.seconds is None else asked.seconds
+    return tracked.plan(tracked.forces(asked.force), seconds, fitted, wiring, choice)
+
+
+def _compared(wiring: Wiring, folder: Path, asked: Asked) -> dict[str, object]:
     from api.cli import comparison  # noqa: PLC0415 - fitting is loaded only where it is used
 
-    return comparison.compare(
-        wiring,
-        folder,
-        subjects.split(",") if subjects else comparison.ALL,
-        choices_from(gains) if gains else CHOICES,
-        comparison.stairs(force or "1,10", 1.5 if seconds is None else seconds),
-    )
+    if asked.model or asked.reference:
+        raise UsageError("--table learns its own models and jumps by itself: leave out --model and --reference")
+    subjects = asked.subjects.split(",") if asked.subjects else comparison.ALL
+    choices = choices_from(asked.gains) if asked.gains else CHOICES
+    jumps = comparison.stairs(asked.force or "1,10", 1.5 if asked.seconds is None else asked.seconds)
+    return comparison.compare(wiring, folder, subjects, choices, jumps)
 
 
 def say_levels(result: Tracked) -> None:

@@ -31,12 +31,19 @@ def check(protocol: Indentation, wiring: Wiring) -> None:
         refuse_beyond_limits(trial.program, wiring)
 
 
+def refuse_used(folder: Path) -> None:
+    """Raises UsageError where a new session cannot begin in ``folder``."""
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"{folder}: is a file; give a new folder")
+    if folder.exists() and any(folder.iterdir()):
+        raise UsageError(f"{folder}: is not empty; give a new folder, recordings are never overwritten")
+
+
 def new_session(
     folder: Path, kind: Literal["capture", "track"], protocol: Mapping[str, object], wiring: Wiring
 ) -> SessionInfo:
     """An empty session in ``folder``; raises UsageError where there is one already."""
-    if folder.exists() and any(folder.iterdir()):
-        raise UsageError(f"{folder}: is not empty; give a new folder, recordings are never overwritten")
+    refuse_used(folder)
     folder.mkdir(parents=True, exist_ok=True)
     info = SessionInfo(
         id=folder.resolve().name,

@@ -121,6 +121,14 @@ def choices_from(text: str) -> tuple[Choice, ...]:
     return tuple(found)
 
 
+def choice_from(text: str) -> Choice:
+    """One choice; raises UsageError for none or several."""
+    found = choices_from(text)
+    if len(found) > 1:
+        raise UsageError(f"--gains {text}: one choice for one run; --table compares several")
+    return found[0]
+
+
 HEADER = ("subject", "gains", "error N", "error %", "largest N", "overshoot %", "settling s", "")
 
 

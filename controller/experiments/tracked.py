@@ -8,7 +8,7 @@ from pathlib import Path
 
 from controller.checks import refuse_beyond_limits
 from controller.experiments import tracking
-from controller.experiments.capture import new_session
+from controller.experiments.capture import new_session, refuse_used
 from controller.experiments.recorded import Recorded, metadata, record
 from controller.experiments.references import Reference
 from controller.experiments.tracking import Followed, Plateau
@@ -44,14 +44,26 @@ class Tracked:
 def forces(text: str) -> tuple[float, ...]:
     """``1,2,5`` as forces in N; raises UsageError for anything else."""
     try:
-        return tuple(float(part) for part in text.split(","))
+        values = tuple(float(part) for part in text.split(","))
     except ValueError as error:
         raise UsageError(f"--force {text}: write one force in N, or several with commas, for example 1,2,5") from error
+    wrong = [value for value in values if not 0 < value < math.inf]
+    if wrong:
+        raise UsageError(f"--force {text}: {wrong[0]:g} N is not a force to press with; it must be above 0 and finite")
+    return values
 
 
-def plan(forces_N: Sequence[float], seconds: float, model: Model, wiring: Wiring) -> Program:
+def refuse_foreign(folder: Path) -> None:
+    """Raises UsageError where a run can be recorded into ``folder`` neither as a new session nor as part of one."""
+    if not (folder / SESSION_FILE).exists():
+        refuse_used(folder)
+
+
+def plan(
+    forces_N: Sequence[float], seconds: float, model: Model, wiring: Wiring, choice: Choice | None = None
+) -> Program:
     """The program, checked against model and limits before anything is opened."""
-    program = tracking.program(forces_N, seconds, model, wiring)
+    program = tracking.program(forces_N, seconds, model, wiring, choice)
     refuse_beyond_limits(program, wiring)
     return program
 

@@ -1,5 +1,6 @@
 """Force tracking: approach, follow a force with gains from a tissue model, retract; and how well it went."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
@@ -48,15 +49,17 @@ class Plateau:
     settling_s: float | None
 
 
-def program(forces_N: Sequence[float], seconds: float, model: Model, wiring: Wiring) -> Program:
+def program(
+    forces_N: Sequence[float], seconds: float, model: Model, wiring: Wiring, choice: Choice | None = None
+) -> Program:
     """Jumps through ``forces_N``, ``seconds`` each; raises UsageError beyond the model."""
-    if not forces_N or min(forces_N) <= CONTACT_N or seconds <= SETTLE_S:
+    if not forces_N or not min(forces_N) > CONTACT_N or not SETTLE_S < seconds < math.inf:
         raise UsageError(
             f"tracking needs forces above {CONTACT_N:g} N for more than {SETTLE_S:g} s each,"
             f" not {', '.join(f'{force:g}' for force in forces_N) or 'none'} N for {seconds:g} s"
         )
     name = ", ".join(f"{force:g}" for force in forces_N) + " N"
-    return following(Reference(name, *_levels(forces_N, seconds)), model, wiring)
+    return following(Reference(name, *_levels(forces_N, seconds)), model, wiring, choice)
 
 
 def following(
@@ -130,10 +133,16 @@ def force_law(model: Model, wiring: Wiring, choice: Choice, adapt: bool) -> Trac
 
 def refuse_unreachable(reference: Reference, model: Model, wiring: Wiring) -> None:
     """Raises UsageError where the reference leaves contact or model, or asks more of the axis than it can."""
+    refuse_beyond_bench(reference, wiring)
+    model.check_force(max(reference.forces_N))
+    _refuse_fast(reference, model, AHEAD_SHARE * min(TRACK_MM_S, wiring.limits.speed_mm_s))
+
+
+def refuse_beyond_bench(reference: Reference, wiring: Wiring) -> None:
+    """Raises UsageError for what is wrong on any tissue: contact, frequency, duration."""
     least_N = min(reference.forces_N)
     if least_N < CONTACT_N:
         raise UsageError(f"reference {reference.name} falls to {least_N:g} N, below the contact force {CONTACT_N:g} N")
-    model.check_force(max(reference.forces_N))
     highest_Hz = 0.5 * wiring.axis.bandwidth_Hz
     if reference.frequency_Hz > highest_Hz:
         raise UsageError(
@@ -142,7 +151,6 @@ def refuse_unreachable(reference: Reference, model: Model, wiring: Wiring) -> No
         )
     if not reference.duration_s > 0:
         raise UsageError(f"reference {reference.name} lasts {reference.duration_s:g} s; it must last longer than 0 s")
-    _refuse_fast(reference, model, AHEAD_SHARE * min(TRACK_MM_S, wiring.limits.speed_mm_s))
 
 
 def _refuse_fast(reference: Reference, model: Model, limit_mm_s: float) -> None:

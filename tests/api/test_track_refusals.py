@@ -1,0 +1,76 @@
+"""`rig track` and `rig capture` refuse what cannot be before any device is opened: number, bound, next step."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from api.cli import motion
+from api.cli.app import build
+from rig.errors import UsageError
+from tests.controller.models import index_model
+
+runner = CliRunner()
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def opened(*_: object) -> None:
+        raise AssertionError("a bench was started")
+
+    monkeypatch.setattr(motion, "bench_for", opened)
+    monkeypatch.setattr("api.cli.comparison.bench_for", opened)
+    monkeypatch.chdir(tmp_path)
+    index_model(0.12, 0.22, 0.01, force_N=11.0).save(tmp_path / "model.json")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ("--table --force 1", "--force 1: --table compares jumps of 1 N; give the first and the last force"),
+        ("--table --force 1,2,5", "--force 1,2,5: --table compares jumps of 1 N"),
+        ("--table --force 1,1.5", "at least 1 N apart, for example 1,10"),
+        ("--table --force 1,12", "12 N is above what the subjects are learnt to, 10.3 N"),
+        ("--table --force 1,5 --set subject.pain_threshold_N=4", "5 N is above the force limit, 4 N"),
+        ("--table --force 0.01,3", "falls to 0.01 N, below the contact force 0.05 N"),
+        ("--table --force nan,3", "nan N is not a force to press with"),
+        ("--table --seconds 0.5", "--seconds 0.5: each jump needs more than 0.7 s to be judged"),
+        ("--table --seconds nan", "--seconds nan: each jump needs more than 0.7 s"),
+        ("--table --seconds inf", "each_s: Input should be a finite number"),
+        ("--table --subjects nobody", "--subjects nobody: there are average, firm"),
+        ("--table --gains fast", "--gains fast: choose among tangent"),
+        ("--table --set limits.depth_mm=5", "goes 14 mm deep, above limits.depth_mm 5 mm"),
+        ("--table --set loop.crossover_Hz=33 --set loop.phase_margin_deg=89", "no PI law reaches 33 Hz with 89 deg"),
+        ("--table --model model.json", "--table learns its own models"),
+        ("--force 1", "tracking needs --model"),
+        ("--model model.json", "either --force or --reference"),
+        ("--model model.json --force 1 --reference step:5", "either --force or --reference"),
+        ("--model model.json --force 1 --subjects firm", "--table, which has --subjects"),
+        ("--model model.json --force one", "--force one: write one force in N"),
+        ("--model model.json --force 0", "0 N is not a force to press with"),
+        ("--model model.json --force inf", "inf N is not a force to press with"),
+        ("--model model.json --force 1,12", "12 N is outside what the model was fitted to, 0 to 11 N"),
+        ("--model model.json --force 1 --seconds nan", "for more than 1 s each, not 1 N for nan s"),
+        ("--model model.json --reference step:5 --seconds 3", "--seconds goes with --force"),
+        ("--model model.json --force 1 --gains tangent,secant", "one choice for one run"),
+        ("--model model.json --force 1 --out model.json", "model.json: is a file; give a new folder"),
+        ("--model model.json --force 1 --out .", "is not empty; give a new folder"),
+    ],
+)
+def test_track_is_refused_before_any_device_is_opened(arguments: str, sentence: str) -> None:
+    answer = runner.invoke(build("track"), ["track", *arguments.split()])
+    assert isinstance(answer.exception, UsageError), answer.exception
+    assert sentence in str(answer.exception)
+
+
+def test_a_table_that_was_interrupted_while_learning_is_refused_with_the_folder_in_its_way(tmp_path: Path) -> None:
+    (tmp_path / "table" / "learn-firm").mkdir(parents=True)
+    (tmp_path / "table" / "learn-firm" / "trial_001.mcap").touch()
+    answer = runner.invoke(build("track"), ["track", "--table", "--out", "table"])
+    assert "learn-firm: is not empty" in str(answer.exception)
+
+
+def test_a_capture_into_a_used_folder_is_refused_before_any_device_is_opened(tmp_path: Path) -> None:
+    (tmp_path / "protocol.toml").write_text('kind = "indentation"\ndepth_mm = 5\n')
+    answer = runner.invoke(build("capture"), ["capture", "protocol.toml", "--out", "."])
+    assert "is not empty; give a new folder" in str(answer.exception)
