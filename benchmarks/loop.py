@@ -32,6 +32,7 @@ from tests.system.stage import RIG, ROOT, Stage, stage
 PORT = 8123
 CLIENTS = 4
 SETTLING_S = 1.0
+LEASE = {"holder": "benchmarks.loop", "ttl_s": 30.0}
 PROTOCOL = (
     'kind = "indentation"\nspeeds_mm_s = [20]\ntrials = 1\ndepth_mm = 6\nair_dwell_s = 0.2\napproach_speed_mm_s = 20\n'
     "hold_s = {hold_s}\nretract_speed_mm_s = 20\nclearance_mm = 4\nforce_limit_N = 12\n"
@@ -62,14 +63,15 @@ class Service:
                    str(folder / "protocols"), *bench.settings()]  # fmt: skip
         self._process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
         self.folder = folder
+        self._lease: dict[str, str] = {}
         assert self._process.stdout and self._process.stdout.readline()
-        self.ask("POST", "/rig/connect")
+        self._lease = {"X-Control-Lease": self.ask("POST", "/control/lease", LEASE)["lease_id"]}
 
     def ask(self, method: str, path: str, body: object = None) -> Any:
         """One request; its JSON."""
         connection = HTTPConnection("127.0.0.1", PORT, timeout=60)
         text = None if body is None else json.dumps(body)
-        connection.request(method, "/api/v1" + path, text, {"Content-Type": "application/json"})
+        connection.request(method, "/api/v1" + path, text, {"Content-Type": "application/json", **self._lease})
         reply = connection.getresponse()
         content = json.loads(reply.read())
         connection.close()
@@ -80,6 +82,7 @@ class Service:
         """Runs the protocol into session ``name`` to its end; the recording."""
         job = self.ask("POST", "/jobs", {"kind": "capture", "protocol": "hold", "session": name})["id"]
         while self.ask("GET", f"/jobs/{job}")["state"] == "running":
+            self.ask("PUT", "/control/lease")
             time.sleep(0.5)
         return self.folder / "sessions" / name / "trial_001.mcap"
 

@@ -41,9 +41,11 @@ class Inbox:
             case "program":
                 self._start(parse(Program, message["program"], "program"), loop)
             case "reset":
+                if loop.machine.latched and loop.machine.busy:
+                    raise UsageError("the tip still retracts: wait until it stands, then acknowledge the stop")
                 loop.release()
                 loop.event(Action.NOTE, "reset", "stop acknowledged", loop.world.now_ns)
-                self._link.send({"reset": True})
+                self._link.send({"reset": loop.world.now_ns})
             case "note":
                 loop.event(Action.NOTE, str(message["code"]), str(message["text"]), loop.world.now_ns)
             case "lease":

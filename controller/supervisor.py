@@ -148,7 +148,7 @@ class Supervisor:
                 mail.answers.append(message)
             mail.changed.notify_all()
 
-    def _answer(self, kind: str, timeout_s: float) -> Message:
+    def _answer(self, kind: str, timeout_s: float) -> Any:
         """The next answer of ``kind``; a refusal raises UsageError, a lost loop DeviceError."""
         deadline = time.monotonic() + timeout_s
         mail = self._mail
@@ -158,8 +158,7 @@ class Supervisor:
                     if kind in message or "refused" in message:
                         mail.answers.remove(message)
                         if kind in message:
-                            answer: Message = message[kind]
-                            return answer
+                            return message[kind]
                         raise UsageError(message["refused"]["text"])
                 if mail.failed or mail.gone:
                     raise DeviceError(mail.failed or f"the loop's process ended unasked ({self._exit_text()})")
@@ -228,9 +227,15 @@ class Supervisor:
         self._tell({"do": "estop"})
 
     def reset(self) -> None:
-        """Acknowledges a stop; raises where the cause is still there."""
+        """Acknowledges a stop and waits until the loop's status shows it; raises where the cause is still there."""
         self._tell({"do": "reset"})
         self._answer("reset", ANSWER_TIMEOUT_S)
+        mail = self._mail
+        with mail.changed:
+            if not mail.changed.wait_for(lambda: mail.gone or not mail.status.get("latched"), ANSWER_TIMEOUT_S):
+                raise DeviceError(
+                    f"the loop did not leave its safe state within {ANSWER_TIMEOUT_S:g} s after the reset"
+                )
 
     def note(self, code: str, text: str) -> None:
         """Writes a note into the event stream."""

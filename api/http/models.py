@@ -36,6 +36,31 @@ class RetractRequest(Request):
     kind: Literal["retract"]
 
 
+class LeaseRequest(Request):
+    """Takes control of the bench."""
+
+    holder: Annotated[str, Field(min_length=1, max_length=80, description="who this is, as others are told")]
+    ttl_s: float = Field(default=5.0, ge=0.5, le=30.0, description="how long it lasts after each renewal")
+
+
+class LeaseView(BaseModel):
+    """The lease, as its holder gets it."""
+
+    lease_id: str = Field(description="to be sent as X-Control-Lease with whatever moves")
+    holder: str
+    since: str
+    ttl_s: float
+    left_s: float
+
+
+class ControlView(BaseModel):
+    """Who is in control, as everybody may see it; empty where nobody is."""
+
+    holder: str
+    since: str
+    left_s: float
+
+
 class JobView(BaseModel):
     """A piece of work."""
 
@@ -77,6 +102,7 @@ class RigView(BaseModel):
     lost: dict[str, str]
     devices: dict[str, dict[str, object]]
     limits: dict[str, float]
+    control: ControlView
     job: JobView | None
 
 

@@ -5,17 +5,21 @@ import json
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Annotated
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Header, Response
 from fastapi.responses import FileResponse, StreamingResponse
 
 import rig
 from api.http import views
 from api.http.models import (
     CaptureRequest,
+    ControlView,
     Done,
     Info,
     JobView,
+    LeaseRequest,
+    LeaseView,
     Name,
     ProtocolView,
     RetractRequest,
@@ -30,11 +34,14 @@ PREFIX = "/api/v1"
 LIVE_PERIOD_S = 0.05
 MEDIA_TYPES = {".mcap": "application/octet-stream", ".json": "application/json", ".html": "text/html"}
 
+LeaseHeader = Annotated[str, Header(alias="X-Control-Lease", description="lease_id of the lease in force")]
+
 
 def build(service: Service) -> APIRouter:
     """All routes over ``service``."""
     router = APIRouter(prefix=PREFIX)
     _state(router, service)
+    _control(router, service)
     _stops(router, service)
     _jobs(router, service)
     _recordings(router, service)
@@ -56,7 +63,8 @@ def _state(router: APIRouter, service: Service) -> None:
         return views.rig(service)
 
     @router.post("/rig/connect", summary="Starts loop and devices where they are not running", responses=responses(409))
-    def connect() -> RigView:
+    def connect(lease: LeaseHeader = "") -> RigView:
+        service.control.check(lease)
         if service.running:
             raise Refused(409, "busy", "a job is under way")
         service.connect()
@@ -83,6 +91,25 @@ async def _events(service: Service) -> AsyncIterator[str]:
         await asyncio.sleep(LIVE_PERIOD_S)
 
 
+def _control(router: APIRouter, service: Service) -> None:
+    @router.get("/control/lease", summary="Who is in control")
+    def shown() -> ControlView:
+        return views.control(service)
+
+    @router.post("/control/lease", summary="Takes control, for as long as it is renewed", responses=responses(409))
+    def take(request: LeaseRequest) -> LeaseView:
+        return views.lease(service, service.control.take(request.holder, request.ttl_s))
+
+    @router.put("/control/lease", summary="Renews the lease", responses=responses(409))
+    def renew(lease: LeaseHeader = "") -> LeaseView:
+        return views.lease(service, service.control.renew(lease))
+
+    @router.delete("/control/lease", summary="Gives control back; what moves is stopped", responses=responses(409))
+    def release(lease: LeaseHeader = "") -> ControlView:
+        service.control.release(lease)
+        return views.control(service)
+
+
 def _stops(router: APIRouter, service: Service) -> None:
     @router.post("/estop", summary="Software emergency stop: the drive's own quick stop", responses=responses(503, 504))
     def emergency_stop() -> Done:
@@ -93,7 +120,8 @@ def _stops(router: APIRouter, service: Service) -> None:
         return _done(service, service.pain())
 
     @router.post("/estop/reset", summary="Acknowledges a stop; moves nothing", responses=responses(409, 503))
-    def reset() -> Done:
+    def reset(lease: LeaseHeader = "") -> Done:
+        service.control.check(lease)
         service.reset()
         return _done(service, "acknowledged")
 
@@ -106,13 +134,16 @@ def _jobs(router: APIRouter, service: Service) -> None:
     @router.post(
         "/jobs", status_code=202, summary="Starts a capture or a tracking run", responses=responses(404, 409, 503)
     )
-    def start(request: CaptureRequest | TrackRequest | RetractRequest, response: Response) -> JobView:
+    def start(
+        request: CaptureRequest | TrackRequest | RetractRequest, response: Response, lease: LeaseHeader = ""
+    ) -> JobView:
+        service.control.check(lease)
         if isinstance(request, CaptureRequest):
-            job = service.capture(request.protocol, request.session)
+            job = service.capture(lease, request.protocol, request.session)
         elif isinstance(request, RetractRequest):
-            job = service.retract()
+            job = service.retract(lease)
         else:
-            job = service.track(request.session, request.forces_N, request.seconds)
+            job = service.track(lease, request.session, request.forces_N, request.seconds)
         response.headers["Location"] = f"{PREFIX}/jobs/{job.id}"
         return views.job(job)
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from api.http.lease import Control
 from api.http.problems import Refused
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
@@ -34,6 +35,7 @@ class Job:
 
     id: str
     kind: str
+    lease: str
     operation: Operation
 
     @property
@@ -50,6 +52,7 @@ class Service:
         self.id = uuid.uuid4().hex
         self.reason = "not connected yet"
         self.bench: Supervisor | None = None
+        self.control = Control()
         self.jobs: dict[str, Job] = {}
         self._starting = threading.Lock()
 
@@ -60,6 +63,7 @@ class Service:
                 return
             self.disconnect()
             bench = Supervisor(self.wiring)
+            bench.attended = self.attended
             try:
                 bench.start()
             except RigError as error:
@@ -78,6 +82,11 @@ class Service:
         """The job under way."""
         return next((job for job in self.jobs.values() if job.progress.state == "running"), None)
 
+    def attended(self) -> bool:
+        """Whether whoever started what is under way still is in control; the loop stops motion where this stays no."""
+        job = self.running
+        return job is None or self.control.holds(job.lease)
+
     def the_bench(self) -> Supervisor:
         """The bench, or Refused with why there is none."""
         if self.bench is None:
@@ -93,7 +102,7 @@ class Service:
             raise Refused(404, "no-such-protocol", f"no protocol {name} in {self.protocols}")
         return load(Indentation, path)
 
-    def capture(self, protocol: str, session: str) -> Job:
+    def capture(self, lease: str, protocol: str, session: str) -> Job:
         """Starts a capture; checks protocol, limits and folder first."""
         plan, bench, folder = self.plan(protocol), self.the_bench(), self.sessions / session
         experiment.check(plan, self.wiring)
@@ -105,9 +114,9 @@ class Service:
             info = experiment.capture(bench, plan, folder, operation, lambda _: None)
             return {"session": session, "trials": len(info.trials)}
 
-        return self._start("capture", operation, work)
+        return self._start("capture", lease, operation, work)
 
-    def track(self, session: str, forces_N: list[float], seconds: float) -> Job:
+    def track(self, lease: str, session: str, forces_N: list[float], seconds: float) -> Job:
         """Starts force tracking with the model of ``session``."""
         bench, folder = self.the_bench(), self.session(session)
         file = folder / MODEL
@@ -117,11 +126,12 @@ class Service:
         operation = Operation("track", total=1, unit="runs")
         return self._start(
             "track",
+            lease,
             operation,
             lambda: tracked.as_json(tracked.run(bench, program, folder, str(MODEL), operation)),
         )
 
-    def retract(self) -> Job:
+    def retract(self, lease: str) -> Job:
         """Moves the tip out of wherever a stop left it."""
         bench, limits = self.the_bench(), self.wiring.limits
         leave = Retract(clearance_mm=RETRACT_MM, speed_mm_s=min(RETRACT_MM_S, limits.retract_speed_mm_s))
@@ -135,14 +145,14 @@ class Service:
                 raise SafetyStop(f"stopped: {outcome.cause}")
             return {"outcome": outcome.outcome}
 
-        return self._start("retract", operation, work)
+        return self._start("retract", lease, operation, work)
 
-    def _start(self, kind: str, operation: Operation, work: Callable[[], Mapping[str, object]]) -> Job:
+    def _start(self, kind: str, lease: str, operation: Operation, work: Callable[[], Mapping[str, object]]) -> Job:
         with self._starting:
             busy = self.running
             if busy:
                 raise Refused(409, "busy", f"{busy.progress.name} is under way (job {busy.id}); stop it or wait")
-            job = Job(uuid.uuid4().hex[:12], kind, operation)
+            job = Job(uuid.uuid4().hex[:12], kind, lease, operation)
             self.jobs[job.id] = job
         threading.Thread(target=_work, args=(operation, work), name=f"job-{job.id}", daemon=True).start()
         return job

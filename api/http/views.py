@@ -4,7 +4,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
-from api.http.models import JobView, ProtocolView, RecordingView, RigView, SessionView
+from api.http.lease import Lease
+from api.http.models import ControlView, JobView, LeaseView, ProtocolView, RecordingView, RigView, SessionView
 from api.http.service import Job, Service
 from controller.experiments.capture import check
 from controller.health import ALIVE, ON_RATE, VALID
@@ -63,8 +64,23 @@ def rig(service: Service) -> RigView:
             "depth_mm": limits.depth_mm,
             "speed_mm_s": limits.speed_mm_s,
         },
+        control=control(service),
         job=job(running) if running else None,
     )
+
+
+def control(service: Service) -> ControlView:
+    """Who is in control."""
+    held = service.control.lease
+    if held is None:
+        return ControlView(holder="", since="", left_s=0.0)
+    return ControlView(holder=held.holder, since=held.since, left_s=service.control.left_s(held))
+
+
+def lease(service: Service, held: Lease) -> LeaseView:
+    """The lease for its holder."""
+    left_s = service.control.left_s(held)
+    return LeaseView(lease_id=held.id, holder=held.holder, since=held.since, ttl_s=held.ttl_s, left_s=left_s)
 
 
 def _state(service: Service, status: Message, alive: bool) -> tuple[State, str]:

@@ -65,8 +65,9 @@ def test_a_body_that_is_not_exactly_right_is_refused_naming_the_field(
 
 def test_what_needs_the_bench_says_that_it_is_not_connected(client: TestClient) -> None:
     body = {"kind": "capture", "protocol": "indentation", "session": "a"}
+    lease = client.post("/api/v1/control/lease", json={"holder": "test"}).json()["lease_id"]
     for path, sent in (("/jobs", body), ("/estop", None), ("/pain", None), ("/estop/reset", None)):
-        answer = client.post(f"/api/v1{path}", json=sent)
+        answer = client.post(f"/api/v1{path}", json=sent, headers={"X-Control-Lease": lease})
         assert (answer.status_code, answer.json()["code"]) == (503, "disconnected")
         assert "/dev/no-such-sensor" in answer.json()["detail"]
 

@@ -62,6 +62,10 @@ def test_a_person_runs_a_protocol_stops_it_and_finds_the_recordings(page: Page, 
     state(page, "idle")
     expect(page.locator("#recordings")).to_contain_text("first: 1 recordings", timeout=10 * SECONDS)
 
+    expect(page.locator("#control")).to_contain_text("(this page)")
+    page.click("#release")
+    expect(page.locator("#control")).to_have_text("nobody is in control")
+
     page.select_option("#protocol", "slow")
     page.fill("#session", "second")
     page.click("text=Start capture")

@@ -28,9 +28,21 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Stage, Te
     (folder / "protocols" / "slow.toml").write_text(SLOW)
     (folder / "protocols" / "short.toml").write_text(SHORT)
     with stage("--seed", "2") as bench:
-        service = Service(plugged(built_in(), bench.endpoints), folder / "sessions", folder / "protocols")
+        service = Service(
+            plugged(built_in(["loop.lease_s=1"]), bench.endpoints), folder / "sessions", folder / "protocols"
+        )
         with TestClient(build(service), base_url="http://127.0.0.1:8000") as client:
             yield bench, client, folder
+
+
+@pytest.fixture(autouse=True)
+def in_control(served: tuple[Stage, TestClient, Path]) -> Iterator[None]:
+    """Every test takes the lease for as long as it may take, and gives it back."""
+    _, client, _ = served
+    taken = client.post("/api/v1/control/lease", json={"holder": "test", "ttl_s": 30.0})
+    client.headers["X-Control-Lease"] = taken.json()["lease_id"]
+    yield
+    client.delete("/api/v1/control/lease")
 
 
 def start(client: TestClient, protocol: str, session: str) -> str:
@@ -48,6 +60,7 @@ def ended(client: TestClient, job: str) -> dict[str, object]:
 
 def reset(client: TestClient) -> None:
     until(lambda: client.post("/api/v1/estop/reset").status_code == 200, 10, "the reset")
+    assert client.get("/api/v1/rig").json()["state"] == "idle"
 
 
 def test_the_bench_is_shown_with_its_devices_and_their_health(served: tuple[Stage, TestClient, Path]) -> None:
@@ -111,7 +124,6 @@ def test_the_emergency_stop_holds_until_acknowledged_and_moves_nothing_then(
     reset(client)
     time.sleep(0.3)
     assert bench.control.number("axis.position_mm") == pytest.approx(before_mm, abs=0.05)
-    assert client.get("/api/v1/rig").json()["state"] == "idle"
     assert bench.control.number("tip.force_N") > 0.5
     out = client.post("/api/v1/jobs", json={"kind": "retract"})
     done = ended(client, out.json()["id"])
@@ -134,10 +146,26 @@ def test_the_subjects_pain_stop_retracts(served: tuple[Stage, TestClient, Path])
     reset(client)
 
 
+def test_a_user_who_does_not_renew_the_lease_is_retracted_from(served: tuple[Stage, TestClient, Path]) -> None:
+    bench, client, folder = served
+    client.delete("/api/v1/control/lease")
+    taken = client.post("/api/v1/control/lease", json={"holder": "goes away", "ttl_s": 5.0})
+    client.headers["X-Control-Lease"] = taken.json()["lease_id"]
+    job = start(client, "slow", "seventh")
+    pressed(bench)
+    freed(bench)
+    assert ended(client, job)["state"] == "stopped"
+    events = read_recording(folder / "sessions" / "seventh" / "trial_001.mcap").events
+    assert "operator_silent" in {event.code for event in events}
+    taken = client.post("/api/v1/control/lease", json={"holder": "the next one", "ttl_s": 30.0})
+    client.headers["X-Control-Lease"] = taken.json()["lease_id"]
+    reset(client)
+
+
 def test_live_values_come_as_server_sent_events(served: tuple[Stage, TestClient, Path]) -> None:
     _, client, _ = served
     app = client.app
     assert app is not None
     schema = client.get("/api/v1/openapi.json").json()
     assert "text/event-stream" in schema["paths"]["/api/v1/live"]["get"]["responses"]["200"]["content"]
-    until(lambda: client.get("/api/v1/rig").json()["mode"] == "idle", 5, "the loop's answer to the reset")
+    assert client.get("/api/v1/rig").json()["mode"] == "idle"

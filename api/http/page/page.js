@@ -2,13 +2,17 @@
 // Shows what the service says and asks it to act; keeps no state of its own beyond what is on the screen.
 const API = "/api/v1";
 const at = (id) => document.getElementById(id);
+const opened = new Date().toLocaleTimeString();
 const plot = new Plot(at("plot"));
+const RENEW_MS = 1000;
 let lastState = "";
 let job = null;
+let lease = null;
+let renewed_ms = 0;
 
 async function call(method, path, body) {
-  const options = { method, headers: body ? { "Content-Type": "application/json" } : {}, body: body && JSON.stringify(body) };
-  const response = await fetch(API + path, options);
+  const headers = { ...(body && { "Content-Type": "application/json" }), ...(lease && { "X-Control-Lease": lease }) };
+  const response = await fetch(API + path, { method, headers, body: body && JSON.stringify(body) });
   const answer = await response.json();
   if (!response.ok) throw new Error(answer.detail || response.statusText);
   return answer;
@@ -21,6 +25,28 @@ async function attempt(action) {
   } catch (error) {
     at("message").textContent = error.message;
   }
+}
+
+// Whatever moves needs the lease: one page at a time, for as long as it shows itself.
+async function inControl(action) {
+  if (!lease) lease = (await call("POST", "/control/lease", { holder: `page opened ${opened}` })).lease_id;
+  return action();
+}
+
+async function renew() {
+  if (!lease || Date.now() - renewed_ms < RENEW_MS) return;
+  renewed_ms = Date.now();
+  try {
+    await call("PUT", "/control/lease");
+  } catch (error) {
+    lease = null;
+    at("message").textContent = error.message;
+  }
+}
+
+async function release() {
+  await call("DELETE", "/control/lease");
+  lease = null;
 }
 
 const number = (value, digits) => (value === null || value === undefined ? "--" : value.toFixed(digits));
@@ -37,6 +63,10 @@ function show(rig) {
   at("retract").disabled = rig.state !== "idle";
   at("connect").hidden = rig.state !== "disconnected";
   at("loop").textContent = `loop: ${rig.ticks} turns, ${rig.missed} slots missed`;
+  const mine = lease ? " (this page)" : "";
+  at("control").textContent = rig.control.holder ? `in control: ${rig.control.holder}${mine}` : "nobody is in control";
+  at("release").hidden = !lease || rig.state === "running";
+  renew();
   showDevices(rig);
   showJob(rig.job);
   plot.add(rig.time_ns * 1e-9, rig.force_N, rig.depth_mm);
@@ -121,13 +151,17 @@ function suggestSession() {
 at("estop").addEventListener("click", () => attempt(async () => (await call("POST", "/estop")).detail));
 at("pain").addEventListener("click", () => attempt(async () => (await call("POST", "/pain")).detail));
 at("job-stop").addEventListener("click", () => attempt(() => call("POST", `/jobs/${job.id}/stop`)));
-at("reset").addEventListener("click", () => attempt(async () => (await call("POST", "/estop/reset")).detail));
-at("retract").addEventListener("click", () => attempt(async () => { await call("POST", "/jobs", { kind: "retract" }); return "retracting"; }));
-at("connect").addEventListener("click", () => attempt(() => call("POST", "/rig/connect")));
+at("reset").addEventListener("click", () => attempt(() => inControl(async () => (await call("POST", "/estop/reset")).detail)));
+at("retract").addEventListener("click", () => attempt(() => inControl(async () => { await call("POST", "/jobs", { kind: "retract" }); return "retracting"; })));
+at("connect").addEventListener("click", () => attempt(() => inControl(() => call("POST", "/rig/connect"))));
+at("release").addEventListener("click", () => attempt(release));
+window.addEventListener("pagehide", () => {
+  if (lease) fetch(`${API}/control/lease`, { method: "DELETE", headers: { "X-Control-Lease": lease }, keepalive: true });
+});
 at("start").addEventListener("submit", (event) => {
   event.preventDefault();
   const body = { kind: "capture", protocol: at("protocol").value, session: at("session").value };
-  attempt(async () => { await call("POST", "/jobs", body); suggestSession(); return "started"; });
+  attempt(() => inControl(async () => { await call("POST", "/jobs", body); suggestSession(); return "started"; }));
 });
 
 (function frame() { plot.draw(); setTimeout(() => requestAnimationFrame(frame), 50); })();
