@@ -1,7 +1,6 @@
 """The control lease: one holder at a time, until it runs out; what moves needs it, looking and stopping do not."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
