@@ -170,14 +170,16 @@ def open_port(address: str, baud: int) -> Port:
 
 
 def read_until(port: Port, enough: Callable[[bytes], bool], timeout_s: float) -> bytes:
-    """What arrives until it is ``enough`` or the time is over; for set-up only, it waits."""
+    """What arrives until it is ``enough`` or the time is over; for set-up only, it waits.
+
+    The last look comes after the end of the time: what came while this process was paused is no silence.
+    """
     deadline = time.monotonic() + timeout_s
-    data = b""
-    while not enough(data):
+    data, over = b"", False
+    while not (over or enough(data)):
         left_s = deadline - time.monotonic()
-        if left_s <= 0:
-            break
-        select.select([port.fileno()], [], [], left_s)
+        over = left_s <= 0
+        select.select([port.fileno()], [], [], max(left_s, 0.0))
         data += port.read()
     return data
 

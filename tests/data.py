@@ -1,17 +1,11 @@
-"""What tests share: where the real recordings are, and properties without a time limit.
-
-The recordings stay outside the project: a test that needs one skips where it is absent.
-"""
+"""Where the real recordings are. They stay outside the project: a test that needs one skips where it is absent."""
 
 import os
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parents[1]
-# How long an example takes says nothing on a machine that others use too.
-unhurried = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 def recording(name: str) -> Path:

@@ -4,7 +4,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from controller.loop import Executive, Grid, Slot
@@ -26,7 +26,6 @@ def test_a_move_at_constant_speed_takes_distance_over_speed_plus_one_ramp() -> N
     assert path[-1] == Setpoint(10.0, 0.0)
 
 
-@settings(deadline=None)  # a shared computer pauses
 @given(
     target_mm=st.floats(-50, 50),
     speed_mm_s=st.floats(1, 60),

@@ -16,7 +16,6 @@ from drivers.canopen.nmt import (
     encode_heartbeat,
     encode_nmt,
 )
-from tests.data import unhurried
 
 
 def test_sync_is_an_empty_frame() -> None:
@@ -67,7 +66,6 @@ def test_an_emergency_carries_code_register_and_five_bytes() -> None:
     assert encode_emergency(1, emergency) == CanFrame(0x081, data)
 
 
-@unhurried
 @given(data=st.binary(max_size=8))
 def test_emergencies_of_other_lengths_are_none(data: bytes) -> None:
     assert (decode_emergency(data) is None) == (len(data) != 8)

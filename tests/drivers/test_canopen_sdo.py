@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 
 from drivers.canopen.sdo import Download, Transfer, Upload
 from mock_devices.sdo_server import SdoServer
-from tests.data import unhurried
 
 
 def bytes_of(text: str) -> bytes:
@@ -115,7 +114,6 @@ def test_a_segment_without_end_is_given_up() -> None:
     assert upload.abort == 0x05040001
 
 
-@unhurried
 @given(answers=st.lists(st.binary(max_size=9), max_size=30))
 def test_no_answer_whatever_raises(answers: list[bytes]) -> None:
     for transfer in (Upload(0x1008, 0), Download(0x1008, 0, b"123456789")):
@@ -123,7 +121,6 @@ def test_no_answer_whatever_raises(answers: list[bytes]) -> None:
             transfer.feed(answer)
 
 
-@unhurried
 @given(data=st.binary(max_size=100))
 def test_any_value_goes_there_and_back(data: bytes) -> None:
     stored: dict[tuple[int, int], bytes] = {}

@@ -15,7 +15,6 @@ from drivers.epos4.cia402 import (
     obstacle,
     reached,
 )
-from tests.data import unhurried
 
 SHUTDOWN, SWITCH_ON, ENABLE, STOP, OFF = 0x06, 0x07, 0x0F, 0x0B, 0x00
 NEXT = {
@@ -78,7 +77,6 @@ def test_the_states_are_read_as_cia_402_masks_them(word: int, state: State) -> N
     assert decode_state(word) is state
 
 
-@unhurried
 @given(state=st.sampled_from(sorted(STATE_WORDS, key=str)), other=OTHER_BITS)
 def test_no_other_bit_changes_the_state(state: State, other: int) -> None:
     assert decode_state(STATE_WORDS[state] | other) is state
@@ -89,13 +87,11 @@ def test_the_next_controlword_of_every_state_and_goal(goal: Goal, state: State) 
     assert next_controlword(STATE_WORDS[state], goal) == NEXT[goal][state]
 
 
-@unhurried
 @given(status=st.integers(0, 0xFFFF), goal=st.sampled_from(Goal))
 def test_no_status_whatever_makes_it_reset_a_fault(status: int, goal: Goal) -> None:
     assert not next_controlword(status, goal) & Control.FAULT_RESET
 
 
-@unhurried
 @given(goal=st.sampled_from(Goal), other=OTHER_BITS)
 def test_an_unknown_pattern_takes_the_torque_away_and_is_named(goal: Goal, other: int) -> None:
     status = 0x01 | other
@@ -139,7 +135,6 @@ class ModelDrive:
             self.state = to
 
 
-@unhurried
 @given(
     start=st.sampled_from(sorted(STATE_WORDS, key=str)),
     goal=st.sampled_from(Goal),
@@ -164,7 +159,6 @@ def test_a_drive_that_is_led_arrives_or_the_obstacle_is_named(
     pytest.fail(f"{goal} not reached from {start}, the drive is in {drive.state}")
 
 
-@unhurried
 @given(status=st.integers(0, 0xFFFF))
 def test_a_drive_that_is_where_it_should_be_is_kept_there(status: int) -> None:
     for goal in Goal:

@@ -26,7 +26,6 @@ from drivers.epos4.setup import (
     process_data,
 )
 from rig.config.wiring import Axis, Limits
-from tests.data import unhurried
 
 SCREW = Units(increments_per_mm=2000, increments_per_rev=10_000)
 
@@ -68,7 +67,6 @@ def test_an_axis_mounted_the_other_way_round_only_changes_signs() -> None:
     assert turned.rpm(5) == 60
 
 
-@unhurried
 @given(position_mm=st.floats(-1000, 1000), per_mm=st.floats(10, 1e5), direction=st.sampled_from((1, -1)))
 def test_a_position_comes_back_within_half_an_increment(position_mm: float, per_mm: float, direction: int) -> None:
     scale = Units(per_mm, 10_000, direction)

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from drivers.epos4.codec import Units
 from drivers.epos4.samples import SUSPICIONS, SampleBuilder, SyncMatcher
-from tests.data import unhurried
 
 MS = 1_000_000
 STATE = bytes.fromhex("37 16 20 4E 00 00")
@@ -80,7 +79,6 @@ def test_after_a_loss_the_times_are_right_again_within_fifty_samples() -> None:
     assert matcher.lost == 1
 
 
-@unhurried
 @given(delays_us=st.lists(st.integers(100, 900), min_size=100, max_size=300))
 def test_late_answers_alone_are_never_taken_for_a_loss(delays_us: list[int]) -> None:
     matcher = SyncMatcher()
@@ -97,7 +95,6 @@ def test_late_answers_alone_are_never_taken_for_a_loss(delays_us: list[int]) -> 
     assert matcher.lost == 0
 
 
-@unhurried
 @given(events=st.lists(st.sampled_from("sma"), max_size=200))
 def test_numbers_are_contiguous_and_times_never_go_back_whatever_comes(events: list[str]) -> None:
     builder = SampleBuilder(Units(2000, 10_000))

@@ -11,7 +11,6 @@ from drivers.epos4.device import Epos4Axis
 from mock_devices.sdo_server import SdoAbort
 from mock_devices.stage import NEVER_NS
 from rig.errors import DeviceError
-from tests.data import unhurried
 from tests.drivers.epos4_sessions import axis_on, tick
 from tests.epos4_stage import HostDied, Stage
 
@@ -330,7 +329,6 @@ def test_a_closed_or_unstarted_axis_says_so(stage: Stage, axis: Epos4Axis) -> No
 STRANGE = st.builds(CanFrame, st.sampled_from((0x081, 0x181, 0x281, 0x381, 0x581, 0x701, 0x123)), st.binary(max_size=8))
 
 
-@unhurried
 @given(frames=st.lists(STRANGE, max_size=30), noise=st.binary(max_size=30))
 def test_whatever_the_bus_brings_only_a_device_error_comes_out(frames: list[CanFrame], noise: bytes) -> None:
     stage = Stage()

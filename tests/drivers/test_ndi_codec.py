@@ -14,7 +14,6 @@ from drivers.ndi.codec import (
     encode_command,
     encode_text,
 )
-from tests.data import unhurried
 
 TX_REPLY = (
     b"0301+05000-05000+05000-05000+001225-003450-100000+0125000000031000001F4\n"
@@ -178,7 +177,6 @@ def test_what_will_not_be_completed_can_be_dropped() -> None:
     assert decoder.feed(BX_REPLY) == [BinaryReply(BX_BODY)]
 
 
-@unhurried
 @given(st.lists(replies, max_size=6), st.booleans(), st.data())
 def test_replies_survive_any_chunks(sent: list[Reply], extended: bool, data: st.DataObject) -> None:
     wire = b"".join(encoded(reply, extended) for reply in sent)
@@ -193,7 +191,6 @@ def test_replies_survive_any_chunks(sent: list[Reply], extended: bool, data: st.
     assert (decoder.pending, decoder.discarded_bytes, decoder.checksum_errors) == (0, 0, 0)
 
 
-@unhurried
 @given(st.lists(st.one_of(st.binary(max_size=60), replies.map(encoded), st.just(BX_REPLY[:30])), max_size=20))
 def test_any_bytes_are_accounted_for_and_never_raise(chunks: list[bytes]) -> None:
     decoder = ReplyDecoder()
@@ -209,7 +206,6 @@ def test_any_bytes_are_accounted_for_and_never_raise(chunks: list[bytes]) -> Non
     assert decoder.pending <= MAX_REPLY + 10
 
 
-@unhurried
 @given(st.binary(max_size=300))
 def test_after_any_bytes_and_a_reset_the_next_reply_is_read(garbage: bytes) -> None:
     decoder = ReplyDecoder()

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from drivers.ndi import replies
 from drivers.ndi.replies import DISABLED, MISSING, STRAYS, TRANSFORMS, Pose, ToolReading, TrackingReply
-from tests.data import unhurried
 from tests.drivers.test_ndi_codec import BX_BODY, TX_REPLY
 
 POSE = Pose(0.5, -0.5, 0.5, -0.5, 12.25, -34.5, -1000.0, 0.125)
@@ -165,21 +164,18 @@ def tools(poses: st.SearchStrategy[Pose]) -> st.SearchStrategy[list[ToolReading]
     return st.lists(st.one_of(seen, st.builds(ToolReading, st.integers(0, 255), st.just(DISABLED))), max_size=24)
 
 
-@unhurried
 @given(tools(tx_poses), st.integers(0, 0xFFFF), st.sampled_from([0x0001, 0x0801, 0x1001]))
 def test_tx_there_and_back(readings: list[ToolReading], status: int, options: int) -> None:
     text = replies.encode_tx(readings, status, options)
     assert replies.parse_tx(text, options) == TrackingReply(tuple(readings), status)
 
 
-@unhurried
 @given(tools(bx_poses), st.integers(0, 0xFFFF), st.sampled_from([0x0001, 0x0801, 0x1001]))
 def test_bx_there_and_back(readings: list[ToolReading], status: int, options: int) -> None:
     body = replies.encode_bx(readings, status, options)
     assert replies.parse_bx(body, options) == TrackingReply(tuple(readings), status)
 
 
-@unhurried
 @given(st.text(), st.binary(max_size=200), st.sampled_from([0x0001, 0x1001]))
 def test_no_reply_makes_a_parser_raise(text: str, body: bytes, options: int) -> None:
     replies.parse_tx(text, options)

@@ -5,7 +5,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.can.slcan import LONGEST, CanFrame, SlcanDecoder, decode_line, encode_frame
-from tests.data import unhurried
 
 VECTORS = {
     b"t0800\r": CanFrame(0x080),
@@ -55,7 +54,6 @@ def test_what_no_bus_can_carry_is_refused(frame: CanFrame) -> None:
         encode_frame(frame)
 
 
-@unhurried
 @given(
     can_id=st.integers(0, 0x7FF),
     data=st.binary(max_size=8),
@@ -109,7 +107,6 @@ def test_a_line_one_too_long_is_refused_as_a_whole() -> None:
     assert decoder.feed(b"t" + b"0" * LONGEST + b"\rt0800\r") == [CanFrame(0x080)]
 
 
-@unhurried
 @given(chunks=st.lists(st.binary(max_size=40)))
 def test_no_bytes_raise_and_after_two_ends_of_line_it_is_in_step_again(chunks: list[bytes]) -> None:
     decoder = SlcanDecoder()

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from drivers.can.slcan import CanFrame
 from drivers.epos4.objects import OBJECTS
-from tests.data import unhurried
 from tests.epos4_stage import Stage
 from tests.mock_devices.epos4_wire import exchange, status, upload
 
@@ -26,7 +25,6 @@ WORDS = st.sampled_from([0x06, 0x07, 0x0F, 0x1F, 0x3F, 0x5F, 0x10F, 0x0B, 0x00, 
 MODES = st.sampled_from([1, 3, 6, 8, 9]).map(lambda mode: (0x601, struct.pack("<BHBi", 0x2F, 0x6060, 0, mode)))
 
 
-@unhurried
 @given(frames=st.lists(st.one_of(FRAMES, ORDERS, WRITES, WORDS, MODES), max_size=60))
 def test_no_frames_whatever_break_the_drive_and_a_reset_makes_it_as_new(frames: list[tuple[int, bytes]]) -> None:
     stage = Stage()
@@ -40,7 +38,6 @@ def test_no_frames_whatever_break_the_drive_and_a_reset_makes_it_as_new(frames: 
     assert upload(stage, 0x6064) == 0
 
 
-@unhurried
 @given(chunks=st.lists(st.binary(max_size=60), max_size=20))
 def test_no_bytes_whatever_break_the_adapter(chunks: list[bytes]) -> None:
     stage = Stage()

@@ -1,7 +1,7 @@
 """History operators as scans give what a loop over samples gives."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.simulation.scans import dahl, high_pass, low_pass, play, recurrence
@@ -15,7 +15,6 @@ def two_recordings(seed: int, count: int = 60) -> tuple[np.ndarray, np.ndarray, 
     return np.cumsum(rng.normal(size=count)), np.arange(count) * 0.01, first
 
 
-@settings(deadline=None)
 @given(st.integers(0, 10_000))
 def test_a_recurrence_equals_its_loop(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -28,7 +27,6 @@ def test_a_recurrence_equals_its_loop(seed: int) -> None:
     np.testing.assert_allclose(recurrence(decay, source), looped, atol=1e-12)
 
 
-@settings(deadline=None)
 @given(st.integers(0, 10_000), st.floats(0.01, 5))
 def test_play_equals_its_loop_and_never_leaves_the_dead_band(seed: int, width: float) -> None:
     position, _, first = two_recordings(seed)

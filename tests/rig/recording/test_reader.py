@@ -222,7 +222,7 @@ def samples(draw: st.DrawFn) -> tuple[int, bytes]:
     return stream.id, stream.pack(tuple(draw(kinds[kind]) for kind in stream.kinds.values()))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(samples(), st.booleans()), max_size=30))
 def test_whatever_goes_into_the_ring_comes_out_of_the_file(
     tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[tuple[int, bytes], bool]]

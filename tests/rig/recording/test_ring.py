@@ -181,7 +181,7 @@ def test_new_paths_differ() -> None:
     assert new_path() != new_path()
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.tuples(st.booleans(), st.integers(0, 63), st.binary(max_size=BODY_LIMIT)), max_size=60))
 def test_whatever_is_put_is_read_or_counted(
     tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[bool, int, bytes]]

@@ -15,7 +15,6 @@ from rig.report.drawing import inline_svg, new_figure, png, speed_colors, svg, t
 from rig.report.figures import Tracked, fit_figure, loop_figure, quantiles, residual_figure, tracking_figure
 from rig.tissue.curves import loading_curve
 from rig.tissue.study import Study, study_curves
-from tests.data import unhurried
 from tests.rig.tissue.synthetic import Bench
 
 
@@ -27,7 +26,6 @@ def study() -> Study:
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=3000), st.sampled_from([10, 160, 300]))
-@unhurried
 def test_thinning_keeps_extremes_order_and_few_points(values: list[float], points: int) -> None:
     y = np.array(values)
     x = np.arange(len(y), dtype=float)

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rig.tissue.arrow import Problem, Slopes, Values, minimise, normal_equations
-from tests.data import unhurried
 
 Column = NDArray[np.float64]
 CURVES, POINTS = 4, 30
@@ -64,7 +63,6 @@ def dense(problem: Problem) -> Column:
 
 
 @given(st.integers(0, 10_000))
-@unhurried
 def test_it_finds_what_a_dense_solver_finds(seed: int) -> None:
     problem = Exponentials(seed).problem()
     found = minimise(problem, START, 100)

@@ -32,7 +32,7 @@ def test_a_thin_compressible_layer_is_squeezed_like_a_disc() -> None:
     assert confined < layer_factor(ratio, nu) < 1.3 * confined
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(0.01, 2.5), st.floats(0.0, 0.5))
 def test_thinner_layers_are_stiffer(ratio: float, nu: float) -> None:
     assert 1.0 < layer_factor(ratio, nu) < layer_factor(1.1 * ratio, nu)

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from rig.errors import UsageError
 from rig.tissue.laws import LAWS, Constant, Index, Law, law_named
-from tests.data import unhurried
 
 depths_mm = st.floats(0.001, 15.0)
 rates_mm_s = st.floats(0.0, 60.0)
@@ -43,7 +42,6 @@ def test_the_constant_law_has_one_stiffness() -> None:
 
 
 @given(laws, st.floats(-20, -1e-9), rates_mm_s)
-@unhurried
 def test_nothing_acts_outside_the_tissue(law: Law, depth_mm: float, rate_mm_s: float) -> None:
     assert law.force(depth_mm, rate_mm_s) == 0
     assert law.tangent_stiffness(depth_mm) == 0
@@ -51,20 +49,17 @@ def test_nothing_acts_outside_the_tissue(law: Law, depth_mm: float, rate_mm_s: f
 
 
 @given(laws, depths_mm, st.floats(0.001, 5.0), rates_mm_s)
-@unhurried
 def test_force_grows_with_depth_and_with_speed(law: Law, depth_mm: float, more_mm: float, rate_mm_s: float) -> None:
     assert law.force(depth_mm + more_mm, rate_mm_s) > law.force(depth_mm, rate_mm_s)
     assert law.force(depth_mm, rate_mm_s + 1) >= law.force(depth_mm, rate_mm_s)
 
 
 @given(laws, depths_mm, rates_mm_s)
-@unhurried
 def test_depth_is_the_inverse_of_force(law: Law, depth_mm: float, rate_mm_s: float) -> None:
     assert float(law.depth(law.force(depth_mm, rate_mm_s), rate_mm_s)) == pytest.approx(depth_mm, rel=1e-6)
 
 
 @given(laws, depths_mm)
-@unhurried
 def test_the_tangent_is_the_derivative(law: Law, depth_mm: float) -> None:
     h = 1e-4 * depth_mm
     slope = float(law.force(depth_mm + h) - law.force(depth_mm - h)) / (2 * h)
@@ -72,7 +67,6 @@ def test_the_tangent_is_the_derivative(law: Law, depth_mm: float) -> None:
 
 
 @given(laws, depths_mm)
-@unhurried
 def test_the_secant_times_depth_is_the_force_at_rest(law: Law, depth_mm: float) -> None:
     assert float(law.secant_stiffness(depth_mm)) * depth_mm == pytest.approx(float(law.force(depth_mm)))
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.tissue.laws import Law
@@ -16,7 +16,6 @@ LAWS: list[Law] = [
 
 
 @pytest.mark.parametrize("law", LAWS)
-@settings(deadline=None)
 @given(depth=st.floats(0.01, 12.0))
 def test_tangent_is_the_slope_and_depth_undoes_force(law: Law, depth: float) -> None:
     h = 1e-6

@@ -89,7 +89,7 @@ def test_answers_do_not_depend_on_the_number_of_threads(block: Block, slabs: int
     np.testing.assert_allclose(lattice.force(), one, atol=1e-15)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 10_000), st.sampled_from(LAWS))
 def test_a_rigid_motion_costs_nothing_and_pulls_nowhere(seed: int, springs: Springs) -> None:
     block = Block((5, 5, 4), tip_diameter_mm=2.0)
@@ -101,7 +101,7 @@ def test_a_rigid_motion_costs_nothing_and_pulls_nowhere(seed: int, springs: Spri
     assert np.abs(block.inner(lattice.force())).max() < 1e-12
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 10_000), st.sampled_from(LAWS))
 def test_inner_forces_add_up_to_no_force_and_no_torque(seed: int, springs: Springs) -> None:
     block = Block((5, 7, 4), tip_diameter_mm=2.0)
