@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import UsageError
-from rig.tissue.lattice.cells import LONGEST_ROW
 from rig.tissue.lattice.kernels import Shape
 from rig.tissue.lattice.numba_types import Floats, Matrix
-from rig.tissue.lattice.rows import PAD
+from rig.tissue.lattice.rows import FRONT, LONGEST_ROW, PAD
 
 Contact = Literal["bonded", "frictionless", "pressure"]
 Sides = Literal["free", "fixed"]
@@ -94,7 +93,7 @@ class Block:
     def allocate(self) -> Matrix:
         """Zeros of shape (3, N), rows on 64-byte lines, with room around the nodes for the kernels' reads."""
         shape = self.shape
-        used = PAD + shape.nx * shape.ny * shape.stride + shape.stride + PAD
+        used = FRONT + shape.nx * shape.ny * shape.stride + shape.stride + PAD
         length = -(-used // _LANES) * _LANES
         raw = np.zeros(3 * length + _LANES)
         start = (-raw.ctypes.data // raw.itemsize) % _LANES
@@ -103,7 +102,7 @@ class Block:
     def inner(self, flat: Matrix) -> NDArray[np.float64]:
         """View (3, nx, ny, nz) of the nodes inside a flat array."""
         shape = self.shape
-        rows = flat[:, PAD : PAD + shape.nx * shape.ny * shape.stride]
+        rows = flat[:, FRONT : FRONT + shape.nx * shape.ny * shape.stride]
         return rows.reshape(3, shape.nx, shape.ny, shape.stride)[..., : shape.nz]
 
     def rest(self) -> Matrix:
@@ -111,7 +110,7 @@ class Block:
         zero.
         """
         shape, flat = self.shape, self.allocate()
-        whole = flat[:, PAD : PAD + shape.nx * shape.ny * shape.stride].reshape(3, shape.nx, shape.ny, shape.stride)
+        whole = flat[:, FRONT : FRONT + shape.nx * shape.ny * shape.stride].reshape(3, shape.nx, shape.ny, shape.stride)
         middle = (0, 0) if self.quarter else (shape.nx // 2, shape.ny // 2)
         whole[0] = (np.arange(shape.nx)[:, None, None] - middle[0]) * self.spacing_mm
         whole[1] = (np.arange(shape.ny)[None, :, None] - middle[1]) * self.spacing_mm

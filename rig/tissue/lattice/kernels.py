@@ -1,22 +1,23 @@
 """Sums over all springs and cells of the lattice: force, Hessian-vector product, Hessian diagonal, energy.
 
-Nine springs start at each node (three edges, six face diagonals), the other nine arrive. Each thread owns a slab of x
-planes and computes the springs that cross into it from below a second time, so no two threads write one node. Inside a
-slab, blocks of ``ROWS`` rows keep all buffers in the first cache level.
+Nine springs start at each node (three edges, six face diagonals), the other nine arrive; eight corners of cells meet at
+it. Each thread owns a slab of x planes and computes what reaches into it from the planes beside a second time, so no
+two threads write one node. Inside a slab, blocks of rows keep all buffers in the nearest caches.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from rig.tissue.lattice import cells, rows
-from rig.tissue.lattice.numba_types import Floats, Matrix, driver
-from rig.tissue.lattice.rows import PAD
+from rig.tissue.lattice.numba_types import Floats, Matrix, RowKernel, driver, piece
+from rig.tissue.lattice.rows import FRONT, LONGEST_ROW, MASKS, PAD, WIDTH
 from rig.tissue.lattice.threads import cut, in_parts
 
-ROWS = 8
-CELL_NODES = 80  # nodes per block of cells: 24 buffer rows of this length stay in the first cache level
-FORCE, PRODUCT, DIAGONAL, ENERGY = 0, 1, 2, 3
+CELL_NODES = 160  # nodes per block of cells: 25 buffer rows of this length stay in the first cache level
+_ZEROS = MASKS + 27  # a buffer row nobody writes
+_BUFFER = (_ZEROS + 1) * WIDTH
 
 # Steps along x, y, z of the nine directions; near ends are summed in this order. Rows 0-3 stay in the plane, 4-8 go
 # to the next one.
@@ -45,97 +46,75 @@ class Stiffness(NamedTuple):
     spacing: float
 
 
-@driver
-def _spring_row(
-    op: int, x: Matrix, u: Matrix, p: int, q: int, n: int, k: float, length: float, b: float, t: Matrix
-) -> None:
-    if op == FORCE:
-        if b == 0.0:
-            rows.constant_force(x, p, q, n, k, length, t)
-        else:
-            rows.exponential_force(x, p, q, n, k, length, b, t)
-    elif op == PRODUCT:
-        rows.spring_product(x, u, p, q, n, k, length, b, t)
-    elif op == DIAGONAL:
-        rows.spring_diagonal(x, p, q, n, k, length, b, t)
-    else:
-        rows.spring_energy(x, p, q, n, k, length, b, t)
+class Sum(NamedTuple):
+    """What to sum: kernels for springs of constant and of growing stiffness and for cells; the sign at far ends."""
+
+    constant: Callable[[], RowKernel]
+    exponential: Callable[[], RowKernel]
+    cell: Callable[[], RowKernel]
+    far: float
 
 
-@driver
-def _scale(t: Matrix, components: int, start: int, stop: int, factor: float) -> None:
-    for w in range(components):
-        row = t[w][PAD + start : PAD + stop]
-        for c in range(stop - start):
-            row[c] = row[c] * factor if factor > 0.0 else 0.0
+FORCE = Sum(rows.constant_force, rows.exponential_force, cells.cell_force, -1.0)
+PRODUCT = Sum(rows.spring_product, rows.spring_product, cells.cell_product, -1.0)
+DIAGONAL = Sum(rows.spring_diagonal, rows.spring_diagonal, cells.cell_diagonal, 1.0)
+ENERGY = Sum(rows.spring_energy, rows.spring_energy, cells.cell_energy, 1.0)
 
 
-@driver
-def _trim(t: Matrix, components: int, shape: Shape, j: int, count: int, dj: int, dk: int) -> None:
-    """Zero the springs of a block that leave it in y or z; halve those that lie in the mirror plane y = 0."""
-    s = shape.stride
-    for row in range(count):
-        if dk < 0:
-            _scale(t, components, row * s, row * s + 1, 0.0)
-        top = shape.nz - 1 if dk > 0 else shape.nz
-        if top < s:
-            _scale(t, components, row * s + top, row * s + s, 0.0)
-    if dj > 0 and j + count == shape.ny:
-        _scale(t, components, (count - 1) * s, count * s, 0.0)
-    if dj < 0 and j == 0:
-        _scale(t, components, 0, s, 0.0)
-    if dj == 0 and j == 0 and shape.mirrored == 1:
-        _scale(t, components, 0, s, 0.5)
+@piece
+def _mask(t: Floats, shape: Shape, j: int, count: int) -> None:
+    """Fill the masks for rows j ... j+count-1 of a plane; springs in the mirror plane y = 0 count half."""
+    for row in range(MASKS):
+        dj, dk = row // 3 - 1, row % 3 - 1
+        for y in range(j, j + count):
+            weight = 0.5 if shape.mirrored == 1 and y == 0 and dj == 0 else 1.0
+            at = row * WIDTH + PAD + (y - j) * shape.stride
+            for z in range(shape.stride):
+                inside = z < shape.nz and 0 <= z + dk < shape.nz and 0 <= y + dj < shape.ny
+                t[at + z] = weight if inside else 0.0
 
 
-@driver
-def _total(row: Floats, n: int) -> float:
-    values = row[PAD : PAD + n]
-    total = 0.0
-    for c in range(n):
-        total += values[c]
-    return total
+@piece
+def _at(row: int) -> int:
+    return row * WIDTH + PAD
 
 
 @driver
 def _springs(
-    op: int,
+    spring: RowKernel,
+    add: RowKernel,
+    far: float,
     x: Matrix,
     u: Matrix,
     f: Matrix,
     shape: Shape,
     law: Stiffness,
-    i: int,
-    j: int,
-    count: int,
-    own: bool,
-    own_next: bool,
+    first: int,
+    stop: int,
     t: Floats,
-) -> float:
-    """All springs that start in rows j ... j+count-1 of plane i; returns their energy if asked for it."""
-    s, n = shape.stride, count * shape.stride
-    p = PAD + (i * shape.ny + j) * s
-    components = 1 if op == ENERGY else 3
-    last_plane = i + 1 == shape.nx
-    total = 0.0
-    for d in range(9):
-        di, dj, dk = STEPS[d, 0], STEPS[d, 1], STEPS[d, 2]
-        if (di == 0 and not own) or (di == 1 and last_plane):
-            continue
-        length = law.spacing if d in (0, 1, 4) else law.spacing * np.sqrt(2.0)
-        k = 0.5 * law.k if shape.mirrored == 1 and i == 0 and di == 0 else law.k
-        _spring_row(op, x, u, p, p + (di * shape.ny + dj) * s + dk, n, k, length, law.b, t[d])
-        _trim(t[d], components, shape, j, count, dj, dk)
-        if op == ENERGY and own:
-            total += _total(t[d, 0], n)
-    if op != ENERGY:
-        far = -1.0 if op != DIAGONAL else 1.0
-        _scatter_springs(f, shape, p, n, own, own_next, last_plane, j == 0, j + count == shape.ny, far, t)
-    return total
+) -> None:
+    """All springs that act on planes first ... stop-1."""
+    s, plane, most = shape.stride, shape.ny * shape.stride, LONGEST_ROW // shape.stride
+    for j in range(0, shape.ny, most):
+        count = min(most, shape.ny - j)
+        _mask(t, shape, j, count)
+        for i in range(max(first - 1, 0), stop):
+            own, own_next, last_plane = i >= first, first <= i + 1 < stop, i + 1 == shape.nx
+            p = FRONT + i * plane + j * s
+            for d in range(9):
+                di, dj, dk = STEPS[d, 0], STEPS[d, 1], STEPS[d, 2]
+                if (di == 1 and not last_plane) or (di == 0 and own):
+                    length = law.spacing if d in (0, 1, 4) else law.spacing * np.sqrt(2.0)
+                    k = 0.5 * law.k if shape.mirrored == 1 and i == 0 and di == 0 else law.k
+                    q = p + di * plane + dj * s + dk
+                    mask = _at(3 * (dj + 1) + dk + 1)
+                    spring(x, u, p, q, count * s, k, length, law.b, t, _at(MASKS + 3 * d), mask)
+            _scatter(add, f, shape, p, count * s, own, own_next, last_plane, j == 0, j + count == shape.ny, far, t)
 
 
-@driver
-def _scatter_springs(
+@piece
+def _scatter(
+    add: RowKernel,
     f: Matrix,
     shape: Shape,
     p: int,
@@ -156,86 +135,79 @@ def _scatter_springs(
     s, q = shape.stride, p + shape.ny * shape.stride
     up = n - s if highest else n
     down = s if lowest else 0
+    nil = _at(_ZEROS)
     for w in range(3):
-        fw = f[w]
+        t0, t1, t2 = _at(MASKS + w), _at(MASKS + 3 + w), _at(MASKS + 6 + w)
+        t3, t4, t5 = _at(MASKS + 9 + w), _at(MASKS + 12 + w), _at(MASKS + 15 + w)
+        t6, t7, t8 = _at(MASKS + 18 + w), _at(MASKS + 21 + w), _at(MASKS + 24 + w)
         if own:
-            rows.add_own(fw, p, n, t[1, w], far, t[0, w])
-            rows.add_sum(fw, p, n, t[0, w], t[2, w], t[3, w], t[9, w])
-            rows.add_far(fw, p + s, up, t[1, w], t[2, w], t[3, w], far)
-            if not last_plane:
-                rows.add_sum(fw, p, n, t[4, w], t[5, w], t[6, w], t[7, w])
-                rows.add_level(fw, p, n, t[8, w], 1.0)
+            add(f, w, p, n, t, t0, t1, t2, 1.0)
+            add(f, w, p, n, t, t0 - 1, nil, nil, far)
+            add(f, w, p + s, up, t, t1, t2 - 1, t3 + 1, far)
+        if own and last_plane:
+            add(f, w, p, n, t, t3, nil, nil, 1.0)
+        elif own:
+            add(f, w, p, n, t, t3, t4, t5, 1.0)
+            add(f, w, p, n, t, t6, t7, t8, 1.0)
         if own_next:
-            rows.add_far(fw, q, n, t[4, w], t[5, w], t[6, w], far)
-            rows.add_level(fw, q + s, up, t[7, w], far)
-            rows.add_level(fw, q - s + down, n - down, t[8, w][down:], far)
+            add(f, w, q, n, t, t4, t5 - 1, t6 + 1, far)
+            add(f, w, q + s, up, t, t7, nil, nil, far)
+            add(f, w, q - s + down, n - down, t, t8 + down, nil, nil, far)
 
 
 @driver
 def _cells(
-    op: int,
+    cell: RowKernel,
+    add: RowKernel,
     x: Matrix,
     u: Matrix,
     f: Matrix,
     shape: Shape,
     law: Stiffness,
-    i: int,
-    j: int,
-    count: int,
-    own: bool,
-    own_next: bool,
+    first: int,
+    stop: int,
     t: Floats,
-) -> float:
-    """All cells whose lowest corner lies in rows j ... j+count-1 of plane i; returns their energy if asked for it."""
-    s, plane, n = shape.stride, shape.ny * shape.stride, count * shape.stride
-    p = PAD + (i * shape.ny + j) * s
-    volume = law.spacing**3
-    if op == FORCE:
-        cells.cell_force(x, p, s, plane, n, law.cell, volume, t)
-    elif op == ENERGY:
-        cells.cell_energy(x, p, s, plane, n, law.cell, volume, t)
-    else:
-        cells.cell_second(op == PRODUCT, x, u, p, s, plane, n, law.cell, volume, t)
-    rows_of_t = t.reshape((24, cells.WIDTH))
-    for row in range(count):
-        _scale(rows_of_t, 24, row * s + shape.nz - 1, row * s + s, 0.0)
-    if op == ENERGY:
-        return _total(t, n) if own else 0.0
-    for column in range(4):
-        if own if column < 2 else own_next:
-            q = p + column // 2 * plane + column % 2 * s
+) -> None:
+    """All corners of cells that act on planes first ... stop-1."""
+    s, plane, most = shape.stride, shape.ny * shape.stride, max(1, CELL_NODES // shape.stride)
+    own, nil = _at(MASKS), _at(_ZEROS)
+    for j in range(0, shape.ny, most):
+        n = min(most, shape.ny - j) * s
+        _mask(t, shape, j, n // s)
+        up = n - s if j + n // s == shape.ny else n
+        down = s if j == 0 else 0
+        for i in range(max(first - 1, 0), min(stop + 1, shape.nx)):
+            p = FRONT + i * plane + j * s
+            low, kv_low = (p - plane, law.cell) if i > 0 else (p, 0.0)
+            high, kv_high = (p + plane, law.cell) if i + 1 < shape.nx else (p, 0.0)
+            cell(x, u, p, low, high, s, n, kv_low, kv_high, law.spacing**3, t)
             for w in range(3):
-                rows.add_own(f[w], q, n, rows_of_t[6 * column + w], 1.0, rows_of_t[6 * column + 3 + w])
-    return 0.0
+                r = own + w * WIDTH
+                if first <= i < stop:
+                    add(f, w, p, n, t, r, r + 15 * WIDTH + 1, r + 18 * WIDTH - 1, 1.0)
+                    add(f, w, p - s + down, n - down, t, r + 9 * WIDTH + down, nil, nil, 1.0)
+                    add(f, w, p + s, up, t, r + 12 * WIDTH, nil, nil, 1.0)
+                if first < i <= stop:
+                    add(f, w, low, n, t, r + 3 * WIDTH, nil, nil, 1.0)
+                if first <= i + 1 < stop:
+                    add(f, w, high, n, t, r + 6 * WIDTH, nil, nil, 1.0)
 
 
-@driver
-def _slab(op: int, x: Matrix, u: Matrix, f: Matrix, shape: Shape, law: Stiffness, first: int, stop: int) -> float:
+def _slab(what: Sum, x: Matrix, u: Matrix, f: Matrix, shape: Shape, law: Stiffness, first: int, stop: int) -> None:
     """Everything that acts on planes first ... stop-1."""
-    t = np.zeros((10, 3, shape.stride * ROWS + 2 * PAD))
-    corners = np.zeros(cells.BUFFER)
-    cell_rows = max(1, CELL_NODES // shape.stride)
-    total = 0.0
-    plane = shape.ny * shape.stride
-    for w in range(0 if op == ENERGY else 3):
-        out = f[w][PAD + first * plane : PAD + stop * plane]
-        for c in range((stop - first) * plane):
-            out[c] = 0.0
-    for i in range(max(first - 1, 0), stop):
-        own, own_next = i >= first, first <= i + 1 < stop
-        for j in range(0, shape.ny, ROWS):
-            total += _springs(op, x, u, f, shape, law, i, j, min(ROWS, shape.ny - j), own, own_next, t)
-        if law.cell > 0.0 and i + 1 < shape.nx:
-            for j in range(0, shape.ny - 1, cell_rows):
-                total += _cells(op, x, u, f, shape, law, i, j, min(cell_rows, shape.ny - 1 - j), own, own_next, corners)
-    return total
+    plane, add = shape.ny * shape.stride, rows.add_three()
+    f[:, FRONT + first * plane : FRONT + stop * plane] = 0.0
+    spring = what.constant() if law.b == 0.0 else what.exponential()
+    _springs(spring, add, what.far, x, u, f, shape, law, first, stop, np.zeros(_BUFFER))
+    if law.cell > 0.0:
+        _cells(what.cell(), add, x, u, f, shape, law, first, stop, np.zeros(_BUFFER))
 
 
-def assemble(op: int, x: Matrix, u: Matrix, f: Matrix, shape: Shape, law: Stiffness, slabs: int) -> float:
+def assemble(what: Sum, x: Matrix, u: Matrix, f: Matrix, shape: Shape, law: Stiffness, slabs: int) -> None:
     """Fill ``f`` (3, N): force in N, or minus Hessian times ``u``, or a positive bound of the Hessian's diagonal in
-    N/mm; with ``ENERGY`` leave it and return the energy in N mm.
+    N/mm, or in its first row twice the energy in N mm, shared among nodes.
 
     A mirrored block holds a quarter: nodes on one mirror plane carry half their springs, the corner line a quarter, so
     forces and energy are a quarter of the whole.
     """
-    return sum(in_parts(_slab, [(op, x, u, f, shape, law, first, stop) for first, stop in cut(shape.nx, slabs)]))
+    in_parts(_slab, [(what, x, u, f, shape, law, first, stop) for first, stop in cut(shape.nx, slabs)])

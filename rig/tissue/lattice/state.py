@@ -46,10 +46,9 @@ class Loaded:
 
     def energy_N_mm(self) -> float:
         """Elastic energy of the whole block."""
-        return float(
-            self.block.copies
-            * kernels.assemble(kernels.ENERGY, self.x, self.x, self.f, self.shape, self.law, self.slabs)
-        )
+        shared = self.block.allocate()
+        kernels.assemble(kernels.ENERGY, self.x, self.x, shared, self.shape, self.law, self.slabs)
+        return 0.5 * self.block.copies * float(np.sum(shared[0]))
 
     def press(self, depth_mm: float) -> None:
         """Put the rigid tip at ``depth_mm``; nothing else moves."""

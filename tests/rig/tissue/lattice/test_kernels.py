@@ -8,10 +8,12 @@ from hypothesis import strategies as st
 from rig.tissue.lattice import kernels
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.numba_types import Matrix
+from rig.tissue.lattice.rows import FRONT
 from rig.tissue.lattice.springs import Springs
 from rig.tissue.lattice.state import Loaded
 from tests.rig.tissue.lattice.reference import energy
 
+SIGNALLING_NAN = 0x7FF0000000000001
 LAWS = [Springs(0.1, 0.0, 0.0), Springs(0.1, 6.0, 0.0), Springs(0.1, 0.0, 1.0), Springs(0.3, 3.0, 2.0)]
 
 
@@ -71,14 +73,21 @@ def test_diagonal_bounds_the_hessian_s_own(block: Block, springs: Springs) -> No
             assert 0.0 < own <= bound[(w, *node)] * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize(("first", "stop"), [(0, 5), (5, 11), (4, 6), (10, 11)])
-def test_a_thread_touches_its_own_planes_only(block: Block, first: int, stop: int) -> None:
-    """Adding a zero to another thread's plane would lose what that thread adds meanwhile; -0.0 + 0.0 shows it."""
-    lattice = shaken(block, LAWS[2])
-    lattice.f[:] = -0.0
-    kernels._slab(kernels.DIAGONAL, lattice.x, lattice.x, lattice.f, lattice.shape, lattice.law, first, stop)
-    touched = ~np.signbit(block.inner(lattice.f)).all(axis=(0, 2, 3))
-    assert np.flatnonzero(touched).tolist() == list(range(first, stop))
+@pytest.mark.parametrize("quarter", [False, True])
+@pytest.mark.parametrize("springs", LAWS)
+@pytest.mark.parametrize("what", [kernels.FORCE, kernels.PRODUCT, kernels.DIAGONAL, kernels.ENERGY])
+def test_a_thread_touches_its_own_planes_only(block: Block, what: kernels.Sum, springs: Springs, quarter: bool) -> None:
+    """Adding even a zero to another thread's plane would lose what that thread adds meanwhile; a signalling NaN keeps
+    its bits only where nothing is added.
+    """
+    lattice = shaken(block.as_quarter() if quarter else block, springs)
+    shape, plane = lattice.shape, lattice.shape.ny * lattice.shape.stride
+    for first, stop in [(0, 3), (2, shape.nx), (3, 5), (shape.nx - 1, shape.nx)]:
+        bits = lattice.f.view(np.int64)
+        bits[:] = SIGNALLING_NAN
+        kernels._slab(what, lattice.x, lattice.x, lattice.f, shape, lattice.law, first, stop)
+        touched = np.flatnonzero((bits != SIGNALLING_NAN).any(axis=0))
+        assert (touched[0], touched[-1] + 1) == (FRONT + first * plane, FRONT + stop * plane)
 
 
 @pytest.mark.parametrize("slabs", [1, 2, 3, 11])
