@@ -150,7 +150,8 @@ def _follow(
     rows = np.empty((6, len(reference_N)))
     sensed = np.zeros(len(reference_N) + sensing.delay_ticks + 1)
     for tick in range(len(reference_N)):
-        force_N = reading(sensed[tick], noise[tick], sensing)
+        sampled = tick - tick % sensing.every_ticks
+        force_N = reading(sensed[sampled], noise[sampled], sensing)
         depth_mm = state.position_mm - limb.surface_mm
         delta_mm, memory = increment(memory, table, settings, reference_N[tick], force_N, depth_mm, dt_s)
         command_mm += min(max(delta_mm, -largest_mm), largest_mm)

@@ -24,6 +24,8 @@ FORGETTING = 0.998
 LINE_PARTS = 8
 # Products whose rate is fixed, whatever rate is asked for.
 SENSOR_HZ = {"robotiq-ft300": 100.0}
+# Samples in one turn of the crossover: with fewer the loop plays back more of the sensor's noise than it takes away.
+SAMPLES_A_TURN = 50.0
 LEAST_HZ, LEAST_AMPLITUDE_N = 0.2, 0.05
 SETTLE_S = 1.0
 SMOOTH_S = 0.05
@@ -94,16 +96,18 @@ def following(
 
 
 def design_for(wiring: Wiring) -> Design:
-    """What the gains are designed for on this bench."""
+    """What the gains are designed for on this bench; a slow sensor makes the loop slower than it was asked to be."""
     axis, loop = wiring.axis, wiring.loop
+    sensor_Hz = SENSOR_HZ.get(wiring.force.product, wiring.force.rate_Hz)
     # Known for a sensor as fast as the loop; a slower one holds each sample for longer, on average this much.
-    slower_s = max(0.0, 1 / SENSOR_HZ.get(wiring.force.product, wiring.force.rate_Hz) - 1 / loop.rate_Hz)
+    slower_s = max(0.0, 1 / sensor_Hz - 1 / loop.rate_Hz)
+    share = min(1.0, sensor_Hz / SAMPLES_A_TURN / loop.crossover_Hz)
     return Design(
         axis.bandwidth_Hz,
         axis.delay_ms * 1e-3 + slower_s,
-        loop.crossover_Hz,
+        share * loop.crossover_Hz,
         loop.phase_margin_deg,
-        drift_Hz=loop.drift_Hz,
+        drift_Hz=share * loop.drift_Hz,
     )
 
 

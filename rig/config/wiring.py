@@ -74,10 +74,10 @@ class Loop(Table):
     )
     overrun_ms: Positive = Field(default=100.0, description="a wake-up later than this stops motion")
     gains: Literal["tangent", "secant", "constant", "admittance"] = "tangent"
-    crossover_Hz: Positive = 10.0
+    crossover_Hz: Positive = Field(default=18.0, description="at most a fiftieth of the force sensor's rate is used")
     phase_margin_deg: float = Field(default=55.0, gt=20, lt=90)
     drift_Hz: float = Field(
-        default=1.5, ge=0, description="corner of the second integral, for a moving surface; 0: none"
+        default=3.0, ge=0, description="corner of the second integral, for a moving surface; 0: none"
     )
     adapt: bool = Field(default=False, description="follow the tissue's stiffness while force moves")
 

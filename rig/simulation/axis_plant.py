@@ -61,12 +61,13 @@ class Limb(NamedTuple):
 
 
 class Sensing(NamedTuple):
-    """The force channel: its filter, and whole ticks between capture and use."""
+    """The force channel: its filter, whole ticks between capture and use, and ticks for which a sample stands."""
 
     filter_s: float = 0.0005
     noise_N: float = 0.005
     quantum_N: float = 0.001
     delay_ticks: int = 1
+    every_ticks: int = 1
 
 
 class AxisState(NamedTuple):

@@ -40,7 +40,7 @@ def nothing_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         ("--table --subjects nobody", "--subjects nobody: there are average, firm"),
         ("--table --gains fast", "--gains fast: choose among tangent"),
         ("--table --set limits.depth_mm=5", "goes 14 mm deep, above limits.depth_mm 5 mm"),
-        ("--table --set loop.crossover_Hz=33 --set loop.phase_margin_deg=89", "no PI law reaches 33 Hz with 89 deg"),
+        ("--table --set axis.delay_ms=20 --set loop.phase_margin_deg=89", "no PI law reaches 18 Hz with 89 deg"),
         ("--table --model model.json", "--table learns its own models"),
         ("--force 1", "tracking needs --model"),
         ("--model model.json", "either --force or --reference"),

@@ -8,7 +8,7 @@ from controller.checks import refuse_beyond_limits
 from controller.experiments import tracking
 from controller.experiments.references import named
 from controller.steps import TrackForce
-from rig.config.wiring import Loop, Wiring
+from rig.config.wiring import Axis, Loop, Wiring
 from rig.errors import UsageError
 from tests.controller.models import index_model
 
@@ -120,9 +120,9 @@ def test_a_reference_beyond_the_pain_threshold_is_refused() -> None:
 
 
 def test_a_design_that_cannot_be_reached_is_refused() -> None:
-    wiring = Wiring(loop=Loop(crossover_Hz=33.0, phase_margin_deg=89.0))
+    wiring = Wiring(loop=Loop(crossover_Hz=20.0, phase_margin_deg=89.0), axis=Axis(delay_ms=20.0))
     stiff = index_model(2.0, 0.0, 0.0, force_N=11.0)
-    with pytest.raises(UsageError, match=r"no PI law reaches 33 Hz with 89 deg at 2 N/mm: lower loop\.crossover_Hz"):
+    with pytest.raises(UsageError, match=r"no PI law reaches 20 Hz with 89 deg at 2 N/mm: lower loop\.crossover_Hz"):
         tracking.following(named("step:5"), stiff, wiring)
 
 
@@ -131,6 +131,15 @@ def test_a_slower_sensor_is_designed_for_with_its_delay() -> None:
         Wiring.model_validate({"force": {"product": product}}) for product in ("bota-sensone", "robotiq-ft300")
     )
     assert tracking.design_for(slow).delay_s - tracking.design_for(fast).delay_s == pytest.approx(0.009)
+
+
+def test_a_sensor_of_100_Hz_gets_a_loop_of_a_fiftieth_of_that_and_a_fast_one_the_loop_asked_for() -> None:
+    fast, slow = (
+        tracking.design_for(Wiring.model_validate({"force": {"product": product}, "loop": {"crossover_Hz": 16.0}}))
+        for product in ("bota-sensone", "robotiq-ft300")
+    )
+    assert (fast.crossover_Hz, slow.crossover_Hz) == (16.0, 2.0)
+    assert slow.drift_Hz / slow.crossover_Hz == pytest.approx(fast.drift_Hz / fast.crossover_Hz)
 
 
 def test_a_loop_faster_than_its_axis_is_refused() -> None:

@@ -39,8 +39,8 @@ def subject(name: str) -> Model:
 SUBJECT_NAMES = ("soft", "average", "lean", "firm", "tense")
 
 
-def worst(step: TrackForce, bench: SimulatedBench) -> dict[str, float | None]:
-    trace = follow(step, STAIRS_N, bench)
+def worst(step: TrackForce, bench: SimulatedBench, rest_s: float = 0.0) -> dict[str, float | None]:
+    trace = follow(step, np.concatenate([np.full(round(1000 * rest_s), STAIRS_N[0]), STAIRS_N]), bench)
     jumps = comparison.jumps(trace.time_s, trace.reference_N, trace.sensed_N, trace.mode)
     return comparison.Run("", "", jumps).worst
 
@@ -77,6 +77,22 @@ def test_plain_admittance_is_at_least_twice_as_slow() -> None:
     bench = SimulatedBench(limb_of(subject("average")))
     ours, theirs = worst(law("average"), bench), worst(law("average", "admittance"), bench)
     assert (theirs["settling_s"] or math.inf) > 2 * (ours["settling_s"] or math.inf)
+
+
+@pytest.mark.parametrize("rest_s", [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5])
+def test_jumps_on_a_breathing_surface_settle_as_well_whenever_they_come(rest_s: float) -> None:
+    found = worst(law("average"), SimulatedBench(limb_of(subject("average"), breathing_mm=1.5)), rest_s)
+    assert within(found, error_N=0.02, error_percent=0.5, overshoot_percent=5.0, settling_s=0.4), found
+
+
+def test_a_sensor_of_100_Hz_is_followed_without_overshoot_and_its_noise_is_played_back_only_in_part() -> None:
+    sensing = SENSING._replace(filter_s=0.003, noise_N=0.05, quantum_N=0.01, delay_ticks=4, every_ticks=10)
+    slow = Wiring.model_validate({"force": {"product": "robotiq-ft300"}})
+    step = tracking.force_law(subject("average"), slow, "tangent", False)
+    quiet = SimulatedBench(limb_of(subject("average")), sensing=sensing._replace(noise_N=0.0))
+    assert within(worst(step, quiet), error_N=0.02, overshoot_percent=5.0, settling_s=0.4)
+    trace = follow(step, np.full(20_000, 5.0), SimulatedBench(limb_of(subject("average")), sensing=sensing))
+    assert np.std(trace.force_N[5000:]) < 0.5 * sensing.noise_N
 
 
 def test_the_second_integral_divides_what_breathing_leaves_of_error() -> None:
