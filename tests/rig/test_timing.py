@@ -52,3 +52,25 @@ def test_drift_is_found_and_capture_times_are_right_to_a_tenth_of_a_millisecond(
 def test_the_map_is_right_from_the_first_sample_on_where_delays_are_constant() -> None:
     clock = ClockMap()
     assert [clock(number * MS, 500 * MS + number * MS) for number in range(3)] == [500 * MS, 501 * MS, 502 * MS]
+
+
+@pytest.mark.parametrize("late_ms", [20, 400, 5_000])
+def test_samples_that_waited_for_a_busy_host_do_not_bend_the_map(late_ms: int) -> None:
+    """While an axis homes nobody reads the sensor; what waited on its line comes late, and all of it at once."""
+    clock, delays = ClockMap(), random.Random(3)
+    errors_ns = []
+    for number in (*range(110), *range(late_ms + 110, late_ms + 10_000)):
+        waited = number < 110
+        delay_ns = (late_ms + 110 - number) * MS if waited else round(delays.expovariate(1 / (0.3 * MS)))
+        capture_ns = clock(number * MS, number * MS + delay_ns)
+        errors_ns.append(abs(capture_ns - number * MS))
+    assert max(errors_ns[2000:]) < 0.5 * MS
+
+
+def test_one_late_window_in_the_middle_is_no_part_of_the_map() -> None:
+    clock, delays = ClockMap(), random.Random(4)
+    for number in range(20_000):
+        late_ns = 100 * MS if 9_000 <= number < 9_500 else 0
+        clock(number * MS, number * MS + late_ns + round(delays.expovariate(1 / (0.3 * MS))))
+    assert abs(clock(20_000 * MS, 20_001 * MS) - 20_000 * MS) < 0.1 * MS
+    assert clock.drift_ppm == pytest.approx(0.0, abs=2.0)
