@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from controller.devices import Devices
-from controller.health import StreamHealth
+from controller.health import IDENTICAL_LIMIT, StreamHealth
 from controller.link import Link, Message
 from controller.loop import Slot
 from controller.machine import Machine
@@ -66,8 +66,12 @@ class BenchLoop:
         self.watch = Watch()
         self._registration = Registration()
         self._health = {
-            "force": StreamHealth(devices.force.period_ns, round(wiring.stale_force_ms * 1e6)),
-            "axis": StreamHealth(devices.axis.period_ns, round(wiring.stale_axis_ms * 1e6)),
+            "force": StreamHealth(
+                devices.force.period_ns,
+                round(wiring.stale_force_ms * 1e6),
+                wiring.loop.missed_periods or IDENTICAL_LIMIT,
+            ),
+            "axis": StreamHealth(devices.axis.period_ns, round(wiring.loop.stale_axis_ms * 1e6)),
             "marker": StreamHealth(
                 devices.tracker.period_ns if devices.tracker else 1, round(wiring.loop.stale_marker_ms * 1e6)
             ),

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 NEVER_NS = 1 << 62
 ALIVE, VALID, ON_RATE = 1, 2, 4
-FROZEN_SAMPLES = 100
+IDENTICAL_LIMIT = 100
 RATE_TOLERANCE = 0.2
 
 
@@ -14,6 +14,7 @@ class StreamHealth:
 
     period_ns: int
     stale_ns: int
+    identical_limit: int = IDENTICAL_LIMIT
     valid: bool = False
     identical: int = 0
     _last_arrival_ns: int = -NEVER_NS
@@ -43,7 +44,7 @@ class StreamHealth:
     @property
     def frozen(self) -> bool:
         """The same value too often in a row for a converter with noise."""
-        return self.identical >= FROZEN_SAMPLES
+        return self.identical > self.identical_limit
 
     @property
     def rate_Hz(self) -> float:

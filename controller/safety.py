@@ -75,7 +75,7 @@ def _drive_fault(world: World, watch: Watch, wiring: Wiring) -> str:
 def _axis_lost(world: World, watch: Watch, wiring: Wiring) -> str:
     if watch.axis_lost:
         return f"axis lost: {watch.axis_lost}"
-    return _older("axis", watch.axis_age_ms, wiring.stale_axis_ms)
+    return _older("axis", watch.axis_age_ms, wiring.loop.stale_axis_ms)
 
 
 def _following_error(world: World, watch: Watch, wiring: Wiring) -> str:

@@ -14,7 +14,7 @@ ENVIRONMENT = "RIG_CONFIG"
 # A simulated device is one more process of a busy computer: it may come late where a real one does not. An axis that
 # stands still for 150 ms falls behind by 4.5 mm at the study's 30 mm/s.
 PATIENT = {
-    "loop": {"stale_force_ms": 150, "stale_axis_ms": 150, "overrun_ms": 150},
+    "loop": {"missed_periods": 0, "stale_force_ms": 150, "stale_axis_ms": 150, "overrun_ms": 150},
     "axis": {"heartbeat_ms": 100, "following_error_mm": 5},
 }
 

@@ -22,8 +22,6 @@ TRACK_MM_S = 30.0
 AHEAD_SHARE = 0.8
 FORGETTING = 0.998
 LINE_PARTS = 8
-# Products whose rate is fixed, whatever rate is asked for.
-SENSOR_HZ = {"robotiq-ft300": 100.0}
 # Samples in one turn of the crossover: with fewer the loop plays back more of the sensor's noise than it takes away.
 SAMPLES_A_TURN = 50.0
 LEAST_HZ, LEAST_AMPLITUDE_N = 0.2, 0.05
@@ -98,7 +96,7 @@ def following(
 def design_for(wiring: Wiring) -> Design:
     """What the gains are designed for on this bench; a slow sensor makes the loop slower than it was asked to be."""
     axis, loop = wiring.axis, wiring.loop
-    sensor_Hz = SENSOR_HZ.get(wiring.force.product, wiring.force.rate_Hz)
+    sensor_Hz = wiring.force.sampled_Hz
     # Known for a sensor as fast as the loop; a slower one holds each sample for longer, on average this much.
     slower_s = max(0.0, 1 / sensor_Hz - 1 / loop.rate_Hz)
     share = min(1.0, sensor_Hz / SAMPLES_A_TURN / loop.crossover_Hz)

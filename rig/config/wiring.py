@@ -9,6 +9,8 @@ from rig.config.table import Table
 
 Positive = Annotated[float, Field(gt=0)]
 MOCK_PORT = "mock"
+# Products whose rate is fixed, whatever rate is asked for.
+FIXED_HZ = {"robotiq-ft300": 100.0}
 
 
 class Force(Table):
@@ -23,6 +25,11 @@ class Force(Table):
         default="negative", description="sign the sensor gives to compression"
     )
     latency_ms: float = Field(default=0.0, ge=0, le=100, description="known smallest delay from capture to arrival")
+
+    @property
+    def sampled_Hz(self) -> float:
+        """Samples a second that really come."""
+        return min(self.rate_Hz, FIXED_HZ.get(self.product, self.rate_Hz))
 
 
 class Axis(Table):
@@ -67,7 +74,9 @@ class Loop(Table):
     stale_axis_ms: Positive = Field(default=50.0, description="age at which an axis sample no longer counts")
     stale_marker_ms: Positive = Field(default=200.0, description="age at which a tracker frame no longer counts")
     missed_periods: int = Field(
-        default=0, ge=0, description="samples of force or axis that may be missing before they count as lost; 0: by age"
+        default=2,
+        ge=0,
+        description="force samples that may be missing, or the same, one after another; 0: only by stale_force_ms",
     )
     lease_s: float = Field(
         default=3.0, ge=0, description="the operator's program must show itself this often; 0: not asked"
@@ -147,18 +156,12 @@ class Wiring(Table):
 
     @property
     def stale_force_ms(self) -> float:
-        """Age at which a force sample no longer counts."""
-        return self._stale(self.loop.stale_force_ms, self.force.rate_Hz)
+        """Age at which a force sample no longer counts.
 
-    @property
-    def stale_axis_ms(self) -> float:
-        """Age at which an axis sample no longer counts."""
-        return self._stale(self.loop.stale_axis_ms, self.loop.rate_Hz)
-
-    def _stale(self, limit_ms: float, rate_Hz: float) -> float:
-        """A sample just in time is up to two periods old: one until the next is due, one on its way."""
-        missed = self.loop.missed_periods
-        return min(limit_ms, (missed + 2) * 1000 / rate_Hz) if missed else limit_ms
+        A sample just in time is up to two periods old: one until the next is due, one on its way.
+        """
+        missed, limit_ms = self.loop.missed_periods, self.loop.stale_force_ms
+        return min(limit_ms, (missed + 2) * 1000 / self.force.sampled_Hz) if missed else limit_ms
 
     @property
     def uses_mock(self) -> bool:

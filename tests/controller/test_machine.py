@@ -10,6 +10,7 @@ import pytest
 from controller.checks import refuse_beyond_limits
 from controller.force_position import GainRow
 from controller.gains import pi_gains
+from controller.health import StreamHealth
 from controller.machine import Machine
 from controller.modes import Mode
 from controller.safety import TABLE, Action, Incident, Watch
@@ -241,15 +242,34 @@ def test_an_axis_faster_than_its_limit_is_stopped_at_once() -> None:
     assert "80 mm/s (limit 72 mm/s)" in incident.text
 
 
-def test_samples_may_be_counted_lost_by_missed_periods_instead_of_age() -> None:
-    two = WIRING.model_copy(update={"loop": WIRING.loop.model_copy(update={"missed_periods": 2})})
-    assert (WIRING.stale_force_ms, two.stale_force_ms, two.stale_axis_ms) == (50.0, 4.0, 4.0)
+@pytest.mark.parametrize(
+    ("force", "missed", "limit_ms"),
+    [({}, 2, 4.0), ({}, 0, 50.0), ({"rate_Hz": 500}, 2, 8.0), ({"product": "robotiq-ft300"}, 2, 40.0)],
+)
+def test_force_counts_as_lost_after_missed_periods_of_the_rate_the_sensor_really_has(
+    force: dict[str, object], missed: int, limit_ms: float
+) -> None:
+    wiring = Wiring.model_validate({"force": force, "loop": {"missed_periods": missed}})
+    assert wiring.stale_force_ms == limit_ms
+
+
+def test_a_force_sample_older_than_two_missed_periods_retracts() -> None:
+    two = Wiring()
     bench = SpringBench(wiring=two)
     bench.run(ZERO, APPROACH, PRESS, until=lambda: bench.world.force_N > 2.0)
     bench.watch.force_age_ms = 4.1
     incident = bench.tick()
     assert incident and incident.code == "force_lost"
     assert "4 ms old (limit 4 ms)" in incident.text
+
+
+def test_a_converter_that_repeats_itself_for_more_than_two_periods_is_frozen() -> None:
+    health = StreamHealth(1_000_000, 4_000_000, 2)
+    frozen = []
+    for number, value in enumerate([1.0, 1.0, 1.0, 1.1, 1.1, 1.1, 1.1]):
+        health.update(number * 1_000_000, number * 1_000_000, True, value)
+        frozen.append(health.frozen)
+    assert frozen == [False] * 6 + [True]
 
 
 def test_the_force_limit_counts_from_the_first_zero_so_a_wrong_tare_hides_nothing() -> None:

@@ -18,7 +18,13 @@ from tests.system.stage import Running, Stage, children, freed, pressed
 
 HEARTBEAT_S = 0.05
 # A shared computer pauses for longer than a lab's would be allowed to.
-PATIENT = ("loop.stale_force_ms=400", "loop.stale_axis_ms=400", "loop.stale_marker_ms=600", "loop.overrun_ms=400")
+PATIENT = (
+    "loop.missed_periods=0",
+    "loop.stale_force_ms=400",
+    "loop.stale_axis_ms=400",
+    "loop.stale_marker_ms=600",
+    "loop.overrun_ms=400",
+)
 
 
 @pytest.fixture
