@@ -1,6 +1,9 @@
 """What `rig fit` prints and writes."""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
 
 from api.cli.output import console, table
 from rig.errors import UsageError
@@ -8,24 +11,68 @@ from rig.recording.files import whole_file, write_text
 from rig.recording.sessions import Session, open_session
 from rig.report.drawing import png, svg
 from rig.report.figures import fit_figure, residual_figure
+from rig.tissue.control_table import ControlRow, control_rows
 from rig.tissue.judging import Errors, Judged
+from rig.tissue.laws import Law
+from rig.tissue.rates import STUDY_B_N_S_MM, RateTest
+from rig.tissue.registry import COMPARED, LAWS, law_named
 from rig.tissue.results import as_csv, as_json
-from rig.tissue.study import Study, model_of, rows, study_session
+from rig.tissue.study import Study, model_of, rows, study_sessions
 
 SAVED_LAW = "index"
 
 
-def fit_and_write(folder: Path, out: Path | None, lattice: bool = False) -> dict[str, object]:
-    """Fits the session in ``folder``, prints tables, writes to ``out`` or ``folder/fit``; the JSON of it all."""
-    session = open_session(folder)
+@dataclass(frozen=True)
+class Wanted:
+    """Laws to compare, parameters taken as known, and the law to save."""
+
+    laws: Sequence[type[Law]] = COMPARED
+    known: Mapping[str, float] = field(default_factory=dict)
+    saved: str = SAVED_LAW
+
+    @classmethod
+    def from_options(cls, laws: str, known: Sequence[str], saved: str) -> Self:
+        """From the command's options; raises UsageError for laws and parameters that are not."""
+        names = list(LAWS) if laws == "all" else [name.strip() for name in laws.split(",") if name.strip()]
+        chosen = list(dict.fromkeys([*COMPARED, *map(law_named, names), law_named(saved)]))
+        return cls(chosen, dict(_known(text, chosen) for text in known), law_named(saved).name)
+
+
+def _known(text: str, laws: Sequence[type[Law]]) -> tuple[str, float]:
+    name, _, number = text.partition("=")
+    names = dict.fromkeys(parameter for law in laws for parameter in law.bounds)
+    if name not in names:
+        raise UsageError(f"--known {text}: the laws compared have {', '.join(names)}; add --laws for others")
+    try:
+        value = float(number)
+    except ValueError:
+        raise UsageError(f"--known {text}: write {name}=NUMBER") from None
+    for law in laws:
+        bounds = law.bounds.get(name)
+        if bounds and not bounds.lower <= value <= bounds.upper:
+            raise UsageError(f"--known {text}: {law.name} takes {bounds.lower:g} to {bounds.upper:g} {bounds.unit}")
+    return name, value
+
+
+def fit_and_write(
+    folders: Sequence[Path], out: Path | None = None, wanted: Wanted | None = None, lattice: bool = False
+) -> dict[str, object]:
+    """Fits the sessions, prints tables, writes to ``out`` or the one session's fit/; the JSON of it all."""
+    wanted, target = wanted or Wanted(), _target(folders, out)
+    sessions = [open_session(folder) for folder in folders]
     with console.status("fitting"):
-        study = study_session(session)
-    target = out or folder / "fit"
-    _print(study)
-    _write(study, session, target)
+        study = study_sessions(sessions, wanted.laws, wanted.known)
+    _print(study, wanted.saved)
+    _write(study, sessions, target, wanted.saved)
     console.print(f"fit.png, fit.svg, residuals.png, table.csv and model.json are in {target}", highlight=False)
     result = as_json(study) | {"model": str(target / "model.json")}
     return result | {"lattice": _lattice(study, target)} if lattice else result
+
+
+def _target(folders: Sequence[Path], out: Path | None) -> Path:
+    if out is None and len(folders) > 1:
+        raise UsageError(f"{len(folders)} sessions have no one place for results: give a folder with --out")
+    return out or folders[0] / "fit"
 
 
 def _lattice(study: Study, target: Path) -> dict[str, object]:
@@ -34,7 +81,7 @@ def _lattice(study: Study, target: Path) -> dict[str, object]:
     return fit_lattice(study, target)
 
 
-def _write(study: Study, session: Session, target: Path) -> None:
+def _write(study: Study, sessions: Sequence[Session], target: Path, law: str) -> None:
     try:
         target.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -45,10 +92,10 @@ def _write(study: Study, session: Session, target: Path) -> None:
             scratch.write_bytes(data)
     write_text(target / "fit.svg", svg(picture))
     write_text(target / "table.csv", as_csv(study))
-    model_of(study, SAVED_LAW, session.info.subject).save(target / "model.json")
+    model_of(study, law, sessions[0].info.subject if len(sessions) == 1 else {}).save(target / "model.json")
 
 
-def _print(study: Study) -> None:
+def _print(study: Study, saved: str) -> None:
     speeds = [
         (f"{s.speed_mm_s:g}", f"{s.trials}", f"{s.max_depth_mm:.2f}", f"{s.max_force_N:.2f}") for s in study.speeds
     ]
@@ -58,10 +105,36 @@ def _print(study: Study) -> None:
     console.print(
         table(*_displacements(study), "Displacement in mm at given forces, and how far off the worst trial is")
     )
-    console.print(
-        table(*_worst(study), "Worst errors: on trials fitted, on each trial left out, on each speed left out")
-    )
+    console.print(table(*worst_errors(study.judged), "Worst errors: on trials fitted, and on what was left out"))
     console.print(table(*_parameters(study), "Parameters"))
+    print_control(control_rows(study.judged[saved], study.force_N), saved)
+    if study.rate:
+        console.print(rate_sentence(study.rate), highlight=False)
+
+
+def rate_sentence(rate: RateTest) -> str:
+    """What the comparison of speeds found, and what it says of the study's B."""
+    low, high = rate.effect_interval_N
+    return (
+        f"speed: B = {rate.B_N_s_mm:.4g} N s/mm (95 %: {rate.interval[0]:.4g} to {rate.interval[1]:.4g}, "
+        f"p = {rate.p_value:.3g}, {rate.trials} trials); slowest to fastest {rate.effect_N:.3g} N ({low:.3g} to "
+        f"{high:.3g} N), scatter of trials {rate.spread_N:.2g} N; the study's {STUDY_B_N_S_MM:g} N s/mm would be "
+        f"{rate.study_effect_N:.3g} N: {'excluded' if rate.excludes_study else 'not excluded'}"
+    )
+
+
+def print_control(found: Sequence[ControlRow], law: str) -> None:
+    """K and B at each force, as a force loop needs them."""
+    cells = [
+        (
+            f"{r.force_N:.2f}", f"{r.depth_mm:.2f}", f"{r.secant_N_mm:.3f}", f"{r.tangent_N_mm:.3f}",
+            f"{r.tangent_low_N_mm:.3f} to {r.tangent_high_N_mm:.3f}", f"{r.damping_N_s_mm:.4f}",
+            f"{r.damping_low_N_s_mm:.4f} to {r.damping_high_N_s_mm:.4f}",
+        )
+        for r in found
+    ]  # fmt: skip
+    header = ("force N", "depth mm", "secant K", "tangent K", "95 %", "B N s/mm", "95 %")
+    console.print(table(header, cells, f"K and B for control ({law})"))
 
 
 def _displacements(study: Study) -> tuple[list[str], list[list[str]]]:
@@ -79,15 +152,19 @@ def _displacements(study: Study) -> tuple[list[str], list[list[str]]]:
     return header, found
 
 
-def _worst(study: Study) -> tuple[list[str], list[list[str]]]:
-    header = ["model", "fitted mm", "%", "trial out mm", "%", "speed out mm", "%", "rms N"]
-    return header, [_worst_row(name, judged) for name, judged in study.judged.items()]
+def worst_errors(judged: Mapping[str, Judged]) -> tuple[list[str], list[list[str]]]:
+    """Header and one row a law: worst errors on what was fitted, and on trials, speeds and subjects left out."""
+    header = ["model", "fitted mm", "%", "trial out mm", "%", "speed out mm", "%"]
+    subjects = any(found.subjects_left_out for found in judged.values())
+    header += ["subject out mm", "%"] if subjects else []
+    return [*header, "rms N"], [_worst_row(name, found, subjects) for name, found in judged.items()]
 
 
-def _worst_row(name: str, judged: Judged) -> list[str]:
+def _worst_row(name: str, judged: Judged, subjects: bool) -> list[str]:
     cells = [name]
     for errors in (judged.fitted, judged.trials_left_out, judged.speeds_left_out):
         cells += _pair(errors)
+    cells += _pair(judged.subjects_left_out) if subjects else []
     return [*cells, f"{judged.fitted.rmse_N:.3f}"]
 
 
@@ -101,5 +178,6 @@ def _parameters(study: Study) -> tuple[list[str], list[list[str]]]:
         for p in judged.law.parameters:
             lower, upper = judged.intervals[p.name]
             interval = "at its bound" if p.name in judged.fit.at_bounds else f"{lower:.4g} to {upper:.4g}"
+            interval = "known" if p.name in judged.fit.known else interval
             found.append([name, p.name, f"{p.value:.4g}", interval, p.unit])
     return ["model", "parameter", "value", "95 % interval", "unit"], found

@@ -1,21 +1,24 @@
 """What `rig fit --lattice` adds: tables, picture and numbers of the mass-spring lattice."""
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 
 from rich.progress import Progress
 
+from api.cli.fitting import print_control, worst_errors
 from api.cli.output import console, table, write_json
 from rig.recording.files import whole_file
 from rig.report.drawing import png
 from rig.report.lattice_figures import lattice_figure
-from rig.tissue.judging import Errors
+from rig.tissue.judging import Judged
+from rig.tissue.k_calculation import IndexFit
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.springs import Mode
 from rig.tissue.lattice_study import LatticeStudy, lattice_study
 from rig.tissue.lattice_study import Progress as Tell
+from rig.tissue.results import errors_json
 from rig.tissue.study import Study
 
 
@@ -51,71 +54,32 @@ def _progress() -> Iterator[Tell]:
 
 
 def _print(found: LatticeStudy) -> None:
-    block = found.sweep.block
-    size = " x ".join(map(str, block.nodes))
-    points = [
-        (
-            f"{p.force_N:.2f}",
-            f"{p.depth_mm:.2f}",
-            f"{p.k_exact_N_mm:.5f}",
-            f"{p.k_loop_N_mm:.5f}" if p.k_loop_N_mm else "--",
-            f"{p.simulations}",
-        )
-        for p in found.points
-    ]
-    console.print(
-        table(
-            ("force N", "depth mm", "k exact N/mm", "k by search", "simulations"),
-            points,
-            f"Spring stiffness per force, {size} vertices",
-        )
-    )
-    fit = found.index
-    console.print(
-        f"k(x) = {fit.a_N_mm:.4g} exp({fit.b_per_mm:.4g} x) N/mm; 95 %: a {fit.a_interval[0]:.4g} to "
-        f"{fit.a_interval[1]:.4g}, "
-        f"b {fit.b_interval[0]:.4g} to {fit.b_interval[1]:.4g}; R2 {fit.r_squared:.4f}",
-        highlight=False,
-    )
+    size = " x ".join(map(str, found.sweep.block.nodes))
+    console.print(table(*_points(found), f"Spring stiffness per force, {size} vertices"))
+    console.print(_law(found.index), highlight=False)
     if found.sweep.collapse():
         console.print(f"the lattice collapses: {found.sweep.collapse()}", highlight=False)
-    header = ("model", "fitted mm", "%", "trial out mm", "%", "speed out mm", "%", "rms N")
-    worst = [
-        (name, *_pair(j.fitted), *_pair(j.trials_left_out), *_pair(j.speeds_left_out), f"{j.fitted.rmse_N:.3f}")
-        for name, j in found.judged.items()
-    ]
-    console.print(table(header, worst, "Worst displacement errors, lattice and rivals"))
-    control = [
+    console.print(table(*worst_errors(found.judged), "Worst displacement errors, lattice and rivals"))
+    print_control(found.control, "lattice index")
+
+
+def _points(found: LatticeStudy) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    header = ("force N", "depth mm", "k exact N/mm", "k by search", "simulations")
+    return header, [
         (
-            f"{r.force_N:.2f}",
-            f"{r.depth_mm:.2f}",
-            f"{r.secant_N_mm:.3f}",
-            f"{r.tangent_N_mm:.3f}",
-            f"{r.damping_N_s_mm:.4f}",
-            f"{r.damping_low_N_s_mm:.4f} to {r.damping_high_N_s_mm:.4f}",
+            f"{p.force_N:.2f}", f"{p.depth_mm:.2f}", f"{p.k_exact_N_mm:.5f}",
+            f"{p.k_loop_N_mm:.5f}" if p.k_loop_N_mm else "--", f"{p.simulations}",
         )
-        for r in found.control
-    ]
-    console.print(
-        table(
-            ("force N", "depth mm", "secant K", "tangent K", "B N s/mm", "95 %"),
-            control,
-            "K and B for control (lattice index)",
-        )
+        for p in found.points
+    ]  # fmt: skip
+
+
+def _law(fit: IndexFit) -> str:
+    (a_low, a_high), (b_low, b_high) = fit.a_interval, fit.b_interval
+    return (
+        f"k(x) = {fit.a_N_mm:.4g} exp({fit.b_per_mm:.4g} x) N/mm; 95 %: a {a_low:.4g} to {a_high:.4g}, "
+        f"b {b_low:.4g} to {b_high:.4g}; R2 {fit.r_squared:.4f}"
     )
-    if found.rate is not None:
-        rate = found.rate
-        console.print(
-            f"speed: B = {rate.B_N_s_mm:.4g} N s/mm (95 %: {rate.interval[0]:.4g} to {rate.interval[1]:.4g}, p "
-            f"= {rate.p_value:.3g}, {rate.trials} trials); "
-            f"slowest to fastest {rate.effect_N:.3g} N, scatter of trials {rate.spread_N:.2g} N; the study's "
-            f"1.3 N s/mm would be {rate.study_effect_N:.3g} N",
-            highlight=False,
-        )
-
-
-def _pair(errors: Errors | None) -> tuple[str, str]:
-    return (f"{errors.max_error_mm:.3f}", f"{errors.max_error_percent:.1f}") if errors else ("--", "--")
 
 
 def lattice_json(found: LatticeStudy) -> dict[str, object]:
@@ -135,41 +99,19 @@ def lattice_json(found: LatticeStudy) -> dict[str, object]:
             "intact": found.sweep.intact,
         },
         "points": [vars(point) for point in found.points],
-        "index": {
-            "a_N_mm": fit.a_N_mm,
-            "b_per_mm": fit.b_per_mm,
-            "a_interval": list(fit.a_interval),
-            "b_interval": list(fit.b_interval),
-            "r_squared": fit.r_squared,
-        },
-        "models": {
-            name: {
-                "formula": j.law.formula,
-                "parameters": {p.name: p.value for p in j.law.parameters},
-                "intervals": {key: list(value) for key, value in j.intervals.items()},
-                "fitted": _errors(j.fitted),
-                "trials_left_out": _errors(j.trials_left_out),
-                "speeds_left_out": _errors(j.speeds_left_out),
-            }
-            for name, j in found.judged.items()
-        },
-        "control": [row._asdict() for row in found.control],
-        "rate": None
-        if found.rate is None
-        else {
-            **vars(found.rate),
-            "study_effect_N": found.rate.study_effect_N,
-            "excludes_study": found.rate.excludes_study,
-        },
+        "index": asdict(fit),
+        "models": {name: _model(judged) for name, judged in found.judged.items()},
+        "control": [row.model_dump() for row in found.control],
     }
 
 
-def _errors(errors: Errors | None) -> dict[str, float | None] | None:
-    if errors is None:
-        return None
-    values = {
-        "max_error_mm": errors.max_error_mm,
-        "max_error_percent": errors.max_error_percent,
-        "rmse_N": errors.rmse_N,
+def _model(judged: Judged) -> dict[str, object]:
+    return {
+        "formula": judged.law.formula,
+        "parameters": {p.name: p.value for p in judged.law.parameters},
+        "intervals": {name: list(interval) for name, interval in judged.intervals.items()},
+        "fitted": errors_json(judged.fitted),
+        "trials_left_out": errors_json(judged.trials_left_out),
+        "speeds_left_out": errors_json(judged.speeds_left_out),
+        "subjects_left_out": errors_json(judged.subjects_left_out),
     }
-    return {name: value if math.isfinite(value) else None for name, value in values.items()}

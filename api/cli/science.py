@@ -8,30 +8,42 @@ import typer
 from api.cli.options import JsonOption
 from api.cli.output import console, write_json
 
-SessionArgument = Annotated[Path, typer.Argument(help="Session folder, as `rig capture` or `rig import` makes it.")]
+FOLDER = "Session folder, as `rig capture` or `rig import` makes it."
+SessionArgument = Annotated[Path, typer.Argument(help=FOLDER)]
+SessionsArgument = Annotated[list[Path], typer.Argument(help=f"{FOLDER} Several: subjects compared.")]
 
 
 def fit(
-    session: SessionArgument,
+    session: SessionsArgument,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the results; else SESSION/fit.")] = None,
+    laws: Annotated[
+        str, typer.Option("--laws", help="Further laws to compare, with commas; `all` for every one there is.")
+    ] = "",
+    known: Annotated[
+        list[str] | None,
+        typer.Option("--known", help="A parameter not to be fitted: thickness_mm=25; may be repeated."),
+    ] = None,
+    model: Annotated[str, typer.Option("--model", help="The law that model.json holds.")] = "index",
     lattice: Annotated[bool, typer.Option("--lattice", help="Also the mass-spring lattice, spring by spring.")] = False,
     json_file: JsonOption = None,
 ) -> None:
-    """Fits constant stiffness and the index model to a session, and says how wrong each is.
+    """Fits constant stiffness, the index model and other tissue laws to sessions, and says how wrong each is.
 
     Writes fit.png, fit.svg, residuals.png, table.csv and model.json. Errors are taken on the trials fitted and on
-    trials and speeds left out.
+    trials, speeds and, with several sessions, subjects left out.
 
-    Example: rig fit sessions/first --json fit.json
+    Example: rig fit sessions/first --laws fung,qlv --json fit.json
     """
-    write_json(json_file, fit_session(session, out, lattice))
+    from api.cli.fitting import Wanted, fit_and_write  # noqa: PLC0415
+
+    write_json(json_file, fit_and_write(session, out, Wanted.from_options(laws, known or [], model), lattice))
 
 
-def fit_session(session: Path, out: Path | None = None, lattice: bool = False) -> dict[str, object]:
+def fit_session(session: Path) -> dict[str, object]:
     """Fits, prints and writes; the result as `rig fit --json` gives it."""
     from api.cli.fitting import fit_and_write  # noqa: PLC0415
 
-    return fit_and_write(session, out, lattice)
+    return fit_and_write([session])
 
 
 def report(

@@ -46,6 +46,8 @@ class Curve:
     contact: Contact
     zero_N: float
     noise_N: float
+    time_s: FloatArray
+    subject: str = ""
 
     @property
     def max_force_N(self) -> float:
@@ -88,6 +90,7 @@ def loading_curve(stroke: Stroke) -> Curve:
         contact=contact,
         zero_N=float(stroke.force_N[0] - zeroed.force_N[0]),
         noise_N=noise_N,
+        time_s=zeroed.time_s[kept],
     )
 
 

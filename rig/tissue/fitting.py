@@ -10,16 +10,17 @@ found, in proportion: a penalty (offset / deviation of contact)^2 against residu
 (1 + r)/(1 - r) with r their correlation from step to step.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from rig.errors import DataError
+from rig.errors import DataError, UsageError
 from rig.tissue.arrow import Problem, Slopes, Values, minimise, normal_equations
 from rig.tissue.curves import Curve
+from rig.tissue.history import History
 from rig.tissue.laws import FloatArray, Law
 
 BINS = 100
@@ -35,7 +36,7 @@ class LawFit:
     """A law and the offset of contact found for each curve, with the residuals in force [N] of all fitted points.
 
     ``information`` is J'J over parameters, then offsets; ``curve_of`` says of each residual which curve it is of;
-    ``holds_N2_mm2`` is the weight that held each offset to the contact found.
+    ``holds_N2_mm2`` is the weight that held each offset to the contact found; ``known`` are the parameters not fitted.
     """
 
     law: Law
@@ -44,6 +45,7 @@ class LawFit:
     curve_of: NDArray[np.intp]
     information: FloatArray
     holds_N2_mm2: FloatArray
+    known: Mapping[str, float]
 
     @property
     def rmse_N(self) -> float:
@@ -63,7 +65,8 @@ class LawFit:
     @property
     def at_bounds(self) -> tuple[str, ...]:
         """Parameters that the fit pushed against a bound: their intervals say nothing."""
-        return tuple(p.name for p in self.law.parameters if min(p.value - p.lower, p.upper - p.value) < BOUND_REACH)
+        fitted = (p for p in self.law.parameters if p.name not in self.known)
+        return tuple(p.name for p in fitted if min(p.value - p.lower, p.upper - p.value) < BOUND_REACH)
 
 
 class Steps:
@@ -89,13 +92,16 @@ def _step_of(depth_mm: FloatArray) -> NDArray[np.intp]:
     return np.clip(np.searchsorted(edges, depth_mm, side="right") - 1, 0, BINS - 1)
 
 
-def fit_law(kind: type[Law], curves: Sequence[Curve], start: LawFit | None = None) -> LawFit:
+def fit_law(
+    kind: type[Law], curves: Sequence[Curve], start: LawFit | None = None, known: Mapping[str, float] | None = None
+) -> LawFit:
     """The law of least squares in force over all curves; ``start`` is a fit to the same curves to begin from.
 
-    Raises DataError where there are no curves, too few points for the parameters, or no convergence.
+    ``known`` gives parameters of the law that are not fitted, besides those the law knows itself. Raises DataError
+    where there are no curves, too few points for the parameters, or no convergence.
     """
-    data = _Data(kind, curves)
-    size = len(kind.bounds)
+    data = _Data(kind, curves, start.known if start else {**kind.known, **(known or {})})
+    size = len(kind.bounds) - len(data.known)
     if data.points_inside < size + len(curves):
         raise DataError(
             f"{data.points_inside} points in {len(curves)} trials are too few for the {size} parameters of the "
@@ -124,24 +130,26 @@ def _solve(data: "_Data", start: Values, holds_N2_mm2: FloatArray) -> LawFit:
         curve_of=data.steps.curve_of,
         information=normal_equations(problem, data.slopes(found)).dense(),
         holds_N2_mm2=holds_N2_mm2,
+        known=data.known,
     )
 
 
 class _Data:
     """All curves end to end, and a law's residuals on them as functions of its parameters and the offsets."""
 
-    def __init__(self, kind: type[Law], curves: Sequence[Curve]) -> None:
+    def __init__(self, kind: type[Law], curves: Sequence[Curve], known: Mapping[str, float]) -> None:
         if not curves:
             raise DataError(f"no curves to fit the {kind.name} law to")
-        self.kind = kind
+        self.kind, self.known = kind, known
+        self._history = History.at(*(curve.time_s for curve in curves))
         self.steps = Steps(curves)
         self._depth_mm = np.concatenate([curve.depth_mm for curve in curves])
         self._force_N = np.concatenate([curve.force_N for curve in curves])
         self._rate_mm_s = np.concatenate([curve.rate_mm_s for curve in curves])
         self._curve_of = np.repeat(np.arange(len(curves)), [len(curve.depth_mm) for curve in curves])
-        bounds, offsets = list(kind.bounds.values()), [curve.offset_bounds_mm for curve in curves]
-        self.lower = Values(np.array([b.lower for b in bounds]), np.array([lower for lower, _ in offsets]))
-        self.upper = Values(np.array([b.upper for b in bounds]), np.array([upper for _, upper in offsets]))
+        ranges, offsets = _ranges(kind, known), [curve.offset_bounds_mm for curve in curves]
+        self.lower = Values(np.array([lower for lower, _ in ranges]), np.array([lower for lower, _ in offsets]))
+        self.upper = Values(np.array([upper for _, upper in ranges]), np.array([upper for _, upper in offsets]))
 
     @property
     def points_inside(self) -> int:
@@ -157,7 +165,7 @@ class _Data:
         return depth_mm[inside], force_N[inside]
 
     def _forces(self, values: Values) -> FloatArray:
-        return self.kind.from_values(values.common).force(self._depths(values), self._rate_mm_s)
+        return self.kind.from_values(values.common).force(self._depths(values), self._rate_mm_s, self._history)
 
     def _depths(self, values: Values) -> FloatArray:
         return np.asarray(self._depth_mm - values.own[self._curve_of])
@@ -173,10 +181,19 @@ class _Data:
             step = 1e-7 * max(abs(value), 1e-3)
             step = step if value + step <= upper else -step
             shifted = values.common.copy()
-            shifted[column] += step
+            shifted[column] += 0.0 if list(self.kind.bounds)[column] in self.known else step
             columns.append(self.steps.mean((self._forces(Values(shifted, values.own)) - force_N) / step))
-        stiffness_N_mm = self.kind.from_values(values.common).tangent_stiffness(self._depths(values))
+        law = self.kind.from_values(values.common)
+        stiffness_N_mm = law.path_stiffness(self._depths(values), self._rate_mm_s, self._history)
         return Slopes(np.column_stack(columns), self.steps.mean(-stiffness_N_mm))
+
+
+def _ranges(kind: type[Law], known: Mapping[str, float]) -> list[tuple[float, float]]:
+    """Lowest and highest value of each parameter; a known one has one value. Raises UsageError for unknown names."""
+    strange = [name for name in known if name not in kind.bounds]
+    if strange:
+        raise UsageError(f"the {kind.name} law has no parameter {strange[0]}; it has {', '.join(kind.bounds)}")
+    return [(known.get(name, b.lower), known.get(name, b.upper)) for name, b in kind.bounds.items()]
 
 
 def early_offset(law: Law, curve: Curve) -> float:
@@ -185,10 +202,11 @@ def early_offset(law: Law, curve: Curve) -> float:
     So a left-out trial tells where it begins, as contact does on the bench, and nothing of how it goes on.
     """
     steps = Steps([curve])
+    history = History.at(curve.time_s)
     early = steps.mean(curve.force_N) <= EARLY_SHARE * curve.max_force_N
 
     def misfit(offset_mm: float) -> float:
-        modelled_N = law.force(curve.depth_mm - offset_mm, curve.rate_mm_s)
+        modelled_N = law.force(curve.depth_mm - offset_mm, curve.rate_mm_s, history)
         return float(np.sum(steps.mean(modelled_N - curve.force_N)[early] ** 2))
 
     return float(minimize_scalar(misfit, bounds=curve.offset_bounds_mm, method="bounded").x)
@@ -197,5 +215,6 @@ def early_offset(law: Law, curve: Curve) -> float:
 def residual_force(law: Law, curve: Curve, offset_mm: float) -> tuple[FloatArray, FloatArray]:
     """Depth from contact [mm] and modelled minus measured force [N], both averaged over steps beyond contact."""
     steps, depth_mm = Steps([curve]), curve.depth_mm - offset_mm
-    depths, residuals = steps.mean(depth_mm), steps.mean(law.force(depth_mm, curve.rate_mm_s) - curve.force_N)
+    modelled_N = law.force(depth_mm, curve.rate_mm_s, History.at(curve.time_s))
+    depths, residuals = steps.mean(depth_mm), steps.mean(modelled_N - curve.force_N)
     return depths[depths > 0], residuals[depths > 0]

@@ -15,7 +15,8 @@ from rig.tissue.laws import FloatArray, Law
 
 ROWS = 10
 LEVEL = 0.95
-JACKKNIFE_TRIALS = 5
+JACKKNIFE_GROUPS = 5
+OVER_TRIALS, OVER_SUBJECTS = "jackknife over trials", "jackknife over subjects"
 SMOOTH_MM = 0.5
 LEAST_SMOOTHED = 5
 LEAST_MEASURED_MM = 0.1
@@ -65,15 +66,20 @@ def _largest(errors: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class Judged:
-    """A fitted law, its covariance, intervals and errors; left-out errors are None where nothing can be left out."""
+    """A fitted law, its covariance, intervals and errors; left-out errors are None where nothing can be left out.
+
+    ``reach`` is how many standard errors an interval reaches from its middle.
+    """
 
     fit: LawFit
     covariance: FloatArray
+    reach: float
     intervals: dict[str, tuple[float, float]]
     interval_method: str
     fitted: Errors
     trials_left_out: Errors | None
     speeds_left_out: Errors | None
+    subjects_left_out: Errors | None
 
     @property
     def law(self) -> Law:
@@ -141,7 +147,7 @@ def errors_of(predictions: Sequence[Prediction], force_N: FloatArray) -> Errors:
 
 
 def judge(fit: LawFit, curves: Sequence[Curve], force_N: FloatArray, origins_mm: FloatArray) -> Judged:
-    """Judges the fit, and fits of its law to all but one trial and to all but one speed in turn.
+    """Judges the fit, and fits of its law to all but one trial, all but one speed and all but one subject in turn.
 
     ``origins_mm``, shape (n,), is where displacement is measured from, relative to the contact found: the same for all
     laws that are compared.
@@ -153,15 +159,20 @@ def judge(fit: LawFit, curves: Sequence[Curve], force_N: FloatArray, origins_mm:
     ]
     trials = _without_each(curves, fit, lambda curve: curve.name)
     speeds = _without_each(curves, fit, lambda curve: curve.speed_mm_s)
-    covariance, method = _covariance(fit, [law for _, law in trials])
+    subjects = _without_each(curves, fit, lambda curve: curve.subject)
+    by_subject = list({id(law): law for _, law in subjects}.values())
+    covariance, method = _covariance(fit, [law for _, law in trials], by_subject)
+    groups = len(by_subject) if method == OVER_SUBJECTS else len(curves)
     return Judged(
         fit=fit,
         covariance=covariance,
-        intervals=_intervals(fit.law, covariance, len(curves)),
+        reach=student_reach(groups),
+        intervals=_intervals(fit.law, covariance, groups),
         interval_method=method,
         fitted=errors_of(here, force_N),
         trials_left_out=_left_out(trials, origin, force_N),
         speeds_left_out=_left_out(speeds, origin, force_N),
+        subjects_left_out=_left_out(subjects, origin, force_N),
     )
 
 
@@ -185,21 +196,26 @@ def _left_out(pairs: Sequence[tuple[Curve, Law]], origin: Mapping[str, float], f
     return errors_of([Prediction(c, law, early_offset(law, c), origin[c.name]) for c, law in pairs], force_N)
 
 
-def _covariance(fit: LawFit, laws: Sequence[Law]) -> tuple[FloatArray, str]:
-    """Of the parameters, shape (p, p): by leaving trials out where there are enough, else from the residuals."""
-    if len(laws) >= JACKKNIFE_TRIALS:
-        values = np.array([law.values for law in laws])
-        centred = values - values.mean(axis=0)
-        share = (len(laws) - 1) / len(laws)
-        return np.asarray(share * centred.T @ centred), "jackknife over trials"
+def _covariance(fit: LawFit, by_trial: Sequence[Law], by_subject: Sequence[Law]) -> tuple[FloatArray, str]:
+    """Of the parameters, shape (p, p): by leaving out subjects or trials where there are enough, else residuals."""
+    for laws, method in ((by_subject, OVER_SUBJECTS), (by_trial, OVER_TRIALS)):
+        if len(laws) >= JACKKNIFE_GROUPS:
+            values = np.array([law.values for law in laws])
+            centred = values - values.mean(axis=0)
+            return np.asarray((len(laws) - 1) / len(laws) * centred.T @ centred), method
     size = len(fit.law.values)
     covariance = np.linalg.pinv(fit.information) * fit.variance_N2
     return np.asarray(covariance[:size, :size], float), "least squares, residuals correlated along depth"
 
 
-def _intervals(law: Law, covariance: FloatArray, trials: int) -> dict[str, tuple[float, float]]:
+def student_reach(groups: int) -> float:
+    """Standard errors from the middle of an interval at ``LEVEL`` to its end."""
+    return float(stdtrit(max(groups - 1, 1), (1 + LEVEL) / 2))
+
+
+def _intervals(law: Law, covariance: FloatArray, groups: int) -> dict[str, tuple[float, float]]:
     """Student's intervals at ``LEVEL``, kept inside each parameter's bounds."""
-    reach = float(stdtrit(max(trials - 1, 1), (1 + LEVEL) / 2)) * np.sqrt(np.diag(covariance))
+    reach = student_reach(groups) * np.sqrt(np.diag(covariance))
     return {
         p.name: (max(p.value - r, p.lower), min(p.value + r, p.upper))
         for p, r in zip(law.parameters, map(float, reach), strict=True)

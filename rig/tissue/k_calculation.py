@@ -5,9 +5,8 @@ equilibrium depends on F/k only, one sweep phi(d) = R/k gives the same answer wi
 Both are here, so they can be compared.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from scipy.stats import t as student
@@ -17,7 +16,7 @@ from rig.tissue.lattice.fire import NotConverged, relax
 from rig.tissue.lattice.springs import Springs
 from rig.tissue.lattice.state import Loaded
 from rig.tissue.lattice.sweep import RELATIVE_TOLERANCE, Sweep
-from rig.tissue.laws import DAMPING, Bounds, FloatArray, Law
+from rig.tissue.laws import FloatArray
 
 LEVEL = 0.95
 _LEAST_POINTS = 4
@@ -199,94 +198,3 @@ def fit_index(points: list[KPoint]) -> IndexFit:
         (float(b - reach[1]), float(b + reach[1])),
         1.0 - float(residual @ residual) / spread if spread > 0.0 else 1.0,
     )
-
-
-def lattice_laws(sweep: Sweep) -> tuple[type[Law], type[Law]]:
-    """The lattice with constant k and with the study's global k(x), as laws to fit and judge like any other.
-
-    F = k phi(x) + B v and F = a exp(b x) phi(x) + B v; phi goes on straight past the sweep's end, which covers the
-    fit's small offsets only.
-    """
-    depth, phi = sweep.depth_mm[sweep.intact], sweep.force_over_k_mm[sweep.intact]
-    if len(depth) < _LEAST_POINTS:
-        raise UsageError(
-            f"the sweep has {len(depth)} intact depths ({sweep.collapse()}); {_LEAST_POINTS} are needed: use "
-            f"smaller steps"
-        )
-    curve = sweep.interpolant()
-    slope = curve.derivative()
-    end, top, last = float(depth[-1]), float(phi[-1]), float(slope(depth[-1]))
-
-    def shape(x: FloatArray) -> FloatArray:
-        return np.where(x <= end, curve(np.minimum(x, end)), top + last * (x - end))
-
-    def rise(x: FloatArray) -> FloatArray:
-        return np.where(x <= end, slope(np.minimum(x, end)), last)
-
-    class _Lattice(Law):
-        def elastic_inverse(self, force_N: FloatArray) -> FloatArray:
-            """Bisection on the rising force, to 1e-9 of the sweep's end."""
-            low, high = np.zeros_like(force_N), np.full_like(force_N, 1.5 * end)
-            for _ in range(50):
-                middle = 0.5 * (low + high)
-                above = self.elastic(middle) > force_N
-                low, high = np.where(above, low, middle), np.where(above, middle, high)
-            return np.asarray(0.5 * (low + high))
-
-    @dataclass(frozen=True, kw_only=True)
-    class LatticeConstant(_Lattice):
-        """The lattice with one stiffness."""
-
-        name: ClassVar[str] = "lattice constant"
-        formula: ClassVar[str] = "F = k phi(x) + B v"
-        bounds: ClassVar[Mapping[str, Bounds]] = {
-            "k_N_mm": Bounds("N/mm", 1e-8, 1e3, "spring stiffness"),
-            "B_N_s_mm": DAMPING,
-        }
-
-        k_N_mm: float
-
-        @classmethod
-        def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> "LatticeConstant":
-            """Linear least squares."""
-            carried = shape(depth_mm)
-            return cls(k_N_mm=float(carried @ force_N / (carried @ carried)), B_N_s_mm=0.0)
-
-        def elastic(self, depth_mm: FloatArray) -> FloatArray:
-            """k phi."""
-            return self.k_N_mm * shape(depth_mm)
-
-        def slope(self, depth_mm: FloatArray) -> FloatArray:
-            """k phi'."""
-            return self.k_N_mm * rise(depth_mm)
-
-    @dataclass(frozen=True, kw_only=True)
-    class LatticeIndex(_Lattice):
-        """The lattice with the study's k(x) = a exp(b x), x the depth of the tip."""
-
-        name: ClassVar[str] = "lattice index"
-        formula: ClassVar[str] = "F = a exp(b x) phi(x) + B v"
-        bounds: ClassVar[Mapping[str, Bounds]] = {
-            "a_N_mm": Bounds("N/mm", 1e-8, 1e3, "spring stiffness at contact"),
-            "b_per_mm": Bounds("1/mm", -2.0, 5.0, "stiffening per depth"),
-            "B_N_s_mm": DAMPING,
-        }
-
-        a_N_mm: float
-        b_per_mm: float
-
-        @classmethod
-        def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> "LatticeIndex":
-            """The straight line ln(F/phi) = ln a + b x, weighted with force."""
-            b, level = np.polyfit(depth_mm, np.log(force_N / shape(depth_mm)), 1, w=force_N)
-            return cls(a_N_mm=float(np.exp(level)), b_per_mm=float(np.clip(b, -2.0, 5.0)), B_N_s_mm=0.0)
-
-        def elastic(self, depth_mm: FloatArray) -> FloatArray:
-            """a exp(b x) phi."""
-            return self.a_N_mm * np.exp(self.b_per_mm * depth_mm) * shape(depth_mm)
-
-        def slope(self, depth_mm: FloatArray) -> FloatArray:
-            """a exp(b x) (phi' + b phi): the tangent the loop sees."""
-            return self.a_N_mm * np.exp(self.b_per_mm * depth_mm) * (rise(depth_mm) + self.b_per_mm * shape(depth_mm))
-
-    return LatticeConstant, LatticeIndex

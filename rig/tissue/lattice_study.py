@@ -4,36 +4,24 @@ rivals, K and B for control.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from rig.errors import DataError
+from rig.tissue.control_table import ControlRow, control_rows
 from rig.tissue.fitting import fit_law
 from rig.tissue.judging import Judged, judge
-from rig.tissue.k_calculation import IndexFit, KPoint, exact_k, fit_index, lattice_laws, study_loop
+from rig.tissue.k_calculation import IndexFit, KPoint, exact_k, fit_index, study_loop
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.springs import Mode, Springs
 from rig.tissue.lattice.sweep import DEFAULT_STEP_MM, Sweep, sweep
-from rig.tissue.laws_rivals import RIVALS
-from rig.tissue.rates import RateTest, rate_test
+from rig.tissue.laws_lattice import lattice_laws
+from rig.tissue.registry import RIVALS
 from rig.tissue.study import Study, rows
 
 Progress = Callable[[str, float], None]
 _DEPTH_MARGIN = 1.02
 _DEEPEST_SHARE = 0.85
-
-
-class ControlRow(NamedTuple):
-    """What a force controller reads: the loop gain is the tangent, not the secant the study lists as K."""
-
-    force_N: float
-    depth_mm: float
-    secant_N_mm: float
-    tangent_N_mm: float
-    damping_N_s_mm: float
-    damping_low_N_s_mm: float
-    damping_high_N_s_mm: float
 
 
 @dataclass(frozen=True)
@@ -44,7 +32,6 @@ class LatticeStudy:
     points: tuple[KPoint, ...]
     index: IndexFit
     judged: Mapping[str, Judged]
-    rate: RateTest | None
     control: tuple[ControlRow, ...]
 
 
@@ -64,10 +51,10 @@ def lattice_study(
         points = study_loop(points, curve, lambda done: tell("search for k per force", done / len(table)))
     judged = dict(study.judged)
     for kind in (*lattice_laws(curve), *RIVALS):
-        judged[kind.name] = judge(fit_law(kind, study.curves), study.curves, study.force_N, study.origins_mm)
-    return LatticeStudy(
-        curve, tuple(points), fit_index(points), judged, _rate(study), control_rows(judged["lattice index"], study)
-    )
+        if kind.name not in judged:
+            judged[kind.name] = judge(fit_law(kind, study.curves), study.curves, study.force_N, study.origins_mm)
+    control = control_rows(judged["lattice index"], study.force_N)
+    return LatticeStudy(curve, tuple(points), fit_index(points), judged, control)
 
 
 def _sweep(study: Study, block: Block, mode: Mode, tell: Progress) -> Sweep:
@@ -90,23 +77,3 @@ def _sweep(study: Study, block: Block, mode: Mode, tell: Progress) -> Sweep:
 
 def _silent(_stage: str, _share: float) -> None:
     """Nobody watches."""
-
-
-def _rate(study: Study) -> RateTest | None:
-    try:
-        return rate_test(study.curves)
-    except DataError:
-        return None
-
-
-def control_rows(judged: Judged, study: Study) -> tuple[ControlRow, ...]:
-    """K and B at each given force, B with its interval."""
-    low, high = judged.intervals["B_N_s_mm"]
-    law = judged.law
-    depths = law.depth(study.force_N)
-    return tuple(
-        ControlRow(
-            float(f), float(d), float(law.secant_stiffness(d)), float(law.tangent_stiffness(d)), law.B_N_s_mm, low, high
-        )
-        for f, d in zip(study.force_N, depths, strict=True)
-    )

@@ -1,11 +1,11 @@
-"""What tissue answers to a tip that is pushed into it: small classes with one interface, chosen by name.
+"""What tissue answers to a tip that is pushed into it: small classes with one interface.
 
 Depth is the tip's displacement from contact, positive into the tissue; force is positive in compression. Nothing pulls:
-outside the tissue (depth below zero) force and stiffness are zero.
+outside the tissue (depth below zero) force and stiffness are zero. `registry` finds every law by name.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import ClassVar, NamedTuple, Self
 
@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import lambertw
 
 from rig.errors import UsageError
+from rig.tissue.history import SMALLEST, History, Term, ramped
 
 FloatArray = NDArray[np.float64]
-SMALLEST = np.finfo(float).tiny
+BISECTIONS = 60
 
 
 class Bounds(NamedTuple):
@@ -43,17 +44,18 @@ DAMPING = Bounds("N s/mm", 0.0, 10.0, "damping: force per speed of the tip")
 
 @dataclass(frozen=True, kw_only=True)
 class Law(ABC):
-    """An elastic law and a damping term: F(x, v) = elastic(x) + B v for x >= 0, and 0 for x < 0.
+    """Force at depth x and speed v: F = int (1 + sum r_i exp(-(t-s)/tau_i)) de(x(s)) + damping(x) v; 0 for x < 0.
 
-    Subclasses are frozen dataclasses whose fields are the parameters; they give the elastic part for x >= 0, its
-    derivative and its inverse. A parameter outside its bounds raises UsageError.
+    Subclasses are frozen dataclasses whose fields are the parameters; they give the elastic part e (what is left when
+    the tip rests) for x >= 0, its derivative and its inverse, and damping or the ``terms`` of memory where there are
+    any. A parameter outside its bounds raises UsageError. ``known`` are parameters that a fit takes as given, with the
+    value it takes unless told another.
     """
 
     name: ClassVar[str]
     formula: ClassVar[str]
     bounds: ClassVar[Mapping[str, Bounds]]
-
-    B_N_s_mm: float
+    known: ClassVar[Mapping[str, float]] = {}
 
     def __post_init__(self) -> None:
         for parameter in self.parameters:
@@ -80,6 +82,11 @@ class Law(ABC):
         return cls(**dict(zip(cls.bounds, map(float, values), strict=True)))
 
     @classmethod
+    def clipped(cls, **values: float) -> Self:
+        """The law with these parameters, each moved inside its bounds."""
+        return cls(**{name: float(np.clip(values[name], b.lower, b.upper)) for name, b in cls.bounds.items()})
+
+    @classmethod
     @abstractmethod
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """A law near the data, shape (n,), to start a fit from; depths and forces are above zero."""
@@ -96,16 +103,58 @@ class Law(ABC):
     def elastic_inverse(self, force_N: FloatArray) -> FloatArray:
         """Depth [mm] at which ``elastic`` is the force, for forces >= 0, same shape."""
 
-    def force(self, depth_mm: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
-        """Force [N] at depth [mm] and tip speed [mm/s], broadcast; zero outside the tissue."""
+    @abstractmethod
+    def damping(self, depth_mm: FloatArray) -> FloatArray:
+        """dF/dv [N s/mm] for depths >= 0, same shape; what memory gives is not counted."""
+
+    @abstractmethod
+    def depth(self, force_N: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
+        """Depth [mm] at which the force is reached at that speed, broadcast; 0 where contact alone gives more."""
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """What the tissue remembers; most laws remember nothing."""
+        return ()
+
+    @property
+    def sudden(self) -> float:
+        """Elastic force after a sudden move over that at rest: 1 + sum r_i."""
+        return 1.0 + sum(term.ratio for term in self.terms)
+
+    def damping_slope(self, depth_mm: FloatArray) -> FloatArray:
+        """Derivative of ``damping`` [N s/mm^2] for depths >= 0, same shape."""
+        return np.zeros_like(depth_mm)
+
+    def force(self, depth_mm: ArrayLike, rate_mm_s: ArrayLike = 0.0, history: History | None = None) -> FloatArray:
+        """Force [N] at depth [mm] and tip speed [mm/s], broadcast; zero outside the tissue.
+
+        ``history`` makes the depths one path through time. Without it the tip has come from contact at the speed given
+        (at speed 0, or on the way out: infinitely slowly). Laws without memory give the same for both.
+        """
         depth, rate = np.broadcast_arrays(np.asarray(depth_mm, float), np.asarray(rate_mm_s, float))
-        inside = self.elastic(np.maximum(depth, 0.0)) + self.B_N_s_mm * rate
-        return np.where(depth < 0, 0.0, inside)
+        reached = np.maximum(depth, 0.0)
+        elastic = self.elastic(reached)
+        if self.terms and history:
+            elastic = history.respond(elastic, self.terms)
+        elif self.terms:
+            elastic = elastic + ramped(self.slope, reached, rate, self.terms)
+        return np.where(depth < 0, 0.0, elastic + self.damping(reached) * rate)
+
+    def path_stiffness(self, depth_mm: FloatArray, rate_mm_s: FloatArray, history: History) -> FloatArray:
+        """How much each force of a path grows [N/mm] where the whole path lies deeper; arrays of shape (n,)."""
+        reached = np.maximum(depth_mm, 0.0)
+        slope = np.where(depth_mm < 0, 0.0, self.slope(reached))
+        kept = history.respond(slope, self.terms) if self.terms else slope
+        return np.where(depth_mm < 0, 0.0, kept + self.damping_slope(reached) * rate_mm_s)
 
     def tangent_stiffness(self, depth_mm: ArrayLike) -> FloatArray:
-        """dF/dx [N/mm] at constant speed, which is the plant's gain in a force loop; zero outside the tissue."""
+        """dF/dx [N/mm] in a quick small move from rest, the plant's gain in a force loop; zero outside the tissue.
+
+        With memory that is the instantaneous one, (1 + sum r_i) ``slope``: a loop sees it where its crossover is faster
+        than the times of relaxation. ``slope`` is what is left of it at rest.
+        """
         depth = np.asarray(depth_mm, float)
-        return np.where(depth < 0, 0.0, self.slope(np.maximum(depth, 0.0)))
+        return np.where(depth < 0, 0.0, self.sudden * self.slope(np.maximum(depth, 0.0)))
 
     def secant_stiffness(self, depth_mm: ArrayLike) -> FloatArray:
         """elastic(x)/x [N/mm], the study's k(x); its limit at contact is the tangent there; zero outside the tissue."""
@@ -114,15 +163,66 @@ class Law(ABC):
         secant = np.where(depth > SMALLEST, self.elastic(inside) / inside, self.slope(np.zeros_like(depth)))
         return np.where(depth < 0, 0.0, secant)
 
+
+@dataclass(frozen=True, kw_only=True)
+class Damped(Law):
+    """An elastic law and one damping for all depths: F = elastic(x) + B v."""
+
+    B_N_s_mm: float
+
+    def damping(self, depth_mm: FloatArray) -> FloatArray:
+        """B."""
+        return np.full_like(depth_mm, self.B_N_s_mm)
+
     def depth(self, force_N: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
-        """Depth [mm] at which the force is reached at that speed, broadcast; 0 where contact alone gives more."""
+        """The elastic inverse of F - B v."""
         force, rate = np.broadcast_arrays(np.asarray(force_N, float), np.asarray(rate_mm_s, float))
         return self.elastic_inverse(np.maximum(force - self.B_N_s_mm * rate, 0.0))
 
 
+class Linear(Law):
+    """A law whose force at rest is a stiffness times depth."""
+
+    @property
+    @abstractmethod
+    def stiffness_N_mm(self) -> float:
+        """Force per depth at rest."""
+
+    def elastic(self, depth_mm: FloatArray) -> FloatArray:
+        """k x."""
+        return self.stiffness_N_mm * depth_mm
+
+    def slope(self, depth_mm: FloatArray) -> FloatArray:
+        """k."""
+        return np.full_like(depth_mm, self.stiffness_N_mm)
+
+    def elastic_inverse(self, force_N: FloatArray) -> FloatArray:
+        """F/k."""
+        return force_N / self.stiffness_N_mm
+
+
+def straight(depth_mm: FloatArray, force_N: FloatArray) -> float:
+    """Stiffness [N/mm] of the line of least squares through contact."""
+    return float(depth_mm @ force_N / (depth_mm @ depth_mm))
+
+
+def bisect(
+    force_at: Callable[[FloatArray], FloatArray], force_N: FloatArray, low_mm: FloatArray, high_mm: FloatArray
+) -> FloatArray:
+    """The depths between ``low_mm`` and ``high_mm`` at which a rising ``force_at`` is ``force_N``, all one shape."""
+    for _ in range(BISECTIONS):
+        middle_mm = 0.5 * (low_mm + high_mm)
+        above = force_at(middle_mm) > force_N
+        low_mm, high_mm = np.where(above, low_mm, middle_mm), np.where(above, middle_mm, high_mm)
+    return np.asarray(0.5 * (low_mm + high_mm))
+
+
 @dataclass(frozen=True, kw_only=True)
-class Constant(Law):
-    """Kelvin-Voigt with one stiffness: F = k x + B v (equation 6 of the study)."""
+class Constant(Linear, Damped):
+    """Kelvin-Voigt, a spring beside a damper: F = k x + B v (equation 6 of the study); also called `kelvin_voigt`.
+
+    It jumps by B v at contact and would pull on the way out, which tissue does not; k is secant and tangent alike.
+    """
 
     name: ClassVar[str] = "constant"
     formula: ClassVar[str] = "F = k x + B v"
@@ -133,26 +233,19 @@ class Constant(Law):
 
     k_N_mm: float
 
+    @property
+    def stiffness_N_mm(self) -> float:
+        """k."""
+        return self.k_N_mm
+
     @classmethod
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """The line through contact and the data's centre of least squares, without damping."""
-        return cls(k_N_mm=float(depth_mm @ force_N / (depth_mm @ depth_mm)), B_N_s_mm=0.0)
-
-    def elastic(self, depth_mm: FloatArray) -> FloatArray:
-        """k x."""
-        return self.k_N_mm * depth_mm
-
-    def slope(self, depth_mm: FloatArray) -> FloatArray:
-        """k."""
-        return np.full_like(depth_mm, self.k_N_mm)
-
-    def elastic_inverse(self, force_N: FloatArray) -> FloatArray:
-        """F/k."""
-        return force_N / self.k_N_mm
+        return cls.clipped(k_N_mm=straight(depth_mm, force_N), B_N_s_mm=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Index(Law):
+class Index(Damped):
     """The study's index model: secant stiffness k(x) = a exp(b x) (equation 5), hence F = a x exp(b x) + B v.
 
     The tangent is a (1 + b x) exp(b x): a loop that takes the secant for it reads the plant's gain low by 1 + b x.
@@ -174,8 +267,7 @@ class Index(Law):
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """The straight line ln(F/x) = ln a + b x, weighted with force, without damping."""
         slope, level = np.polyfit(depth_mm, np.log(force_N / depth_mm), 1, w=force_N)
-        bound = cls.bounds["b_per_mm"]
-        return cls(a_N_mm=float(np.exp(level)), b_per_mm=float(np.clip(slope, bound.lower, bound.upper)), B_N_s_mm=0.0)
+        return cls.clipped(a_N_mm=float(np.exp(level)), b_per_mm=slope, B_N_s_mm=0.0)
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """a x exp(b x)."""
@@ -196,13 +288,3 @@ class Index(Law):
             # scipy's stubs leave out arrays whose number of axes is unknown.
             curved = np.real(lambertw(argument)) / self.b_per_mm  # type: ignore[call-overload]
         return np.where(argument < 1e-9, linear * (1 - argument), curved)
-
-
-LAWS: dict[str, type[Law]] = {law.name: law for law in (Constant, Index)}
-
-
-def law_named(name: str) -> type[Law]:
-    """The law's class; raises UsageError naming the laws there are."""
-    if name not in LAWS:
-        raise UsageError(f"no tissue law is called {name!r}; choose one of {', '.join(sorted(LAWS))}")
-    return LAWS[name]

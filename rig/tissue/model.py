@@ -12,7 +12,9 @@ from pydantic import Field
 from rig.config.table import Table, parse
 from rig.errors import DataError, UsageError
 from rig.recording.files import write_text
-from rig.tissue.laws import FloatArray, Law, law_named
+from rig.tissue.control_table import ControlRow
+from rig.tissue.laws import FloatArray, Law
+from rig.tissue.registry import law_named
 
 FORMAT: Literal["tissue-rig model"] = "tissue-rig model"
 VERSION: Literal[1] = 1
@@ -66,6 +68,7 @@ class _File(Table):
     valid: ValidRange
     data: Provenance
     quality: Quality
+    control: tuple[ControlRow, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,7 @@ class Model:
     """A law fitted to data.
 
     ``covariance`` has the order of ``law.parameters``; ``intervals`` are per parameter, at ``interval_level``.
+    ``control`` says what the law means to a force loop at each given force, for readers without this program.
     """
 
     law: Law
@@ -83,6 +87,7 @@ class Model:
     valid: ValidRange
     data: Provenance
     quality: Quality
+    control: tuple[ControlRow, ...] = ()
 
     @property
     def standard_errors(self) -> dict[str, float]:
@@ -92,8 +97,8 @@ class Model:
 
     @property
     def damping_N_s_mm(self) -> float:
-        """B."""
-        return self.law.B_N_s_mm
+        """Force per speed; of a law whose damping grows with depth, in the middle of the depths fitted."""
+        return float(self.law.damping(np.array(self.valid.depth_mm / 2)))
 
     def force_N(self, depth_mm: float) -> float:
         """Force at rest."""
@@ -135,6 +140,7 @@ class Model:
             valid=self.valid,
             data=self.data,
             quality=self.quality,
+            control=self.control,
         )
 
 
@@ -183,6 +189,7 @@ def _model(file: _File) -> Model:
         valid=file.valid,
         data=file.data,
         quality=file.quality,
+        control=file.control,
     )
 
 

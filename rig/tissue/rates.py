@@ -1,13 +1,14 @@
 """Do the curves at different speeds differ? The study says they do not, and uses B = 1.3 N s/mm; both cannot hold.
 
-The unit is the trial: its mean force above the mean of all trials, over common depths, is regressed on its speed. The
-slope is B.
+The unit is the trial: its mean force over common depths, above the mean of its subject's trials, is regressed on its
+speed. The slope is B.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from rig.errors import DataError
@@ -23,8 +24,9 @@ _DRAWS = 2000
 
 @dataclass(frozen=True)
 class RateTest:
-    """B in N s/mm with its interval over trials, the share of shuffled speed labels that give as large a slope, and
-    what it means in force.
+    """B in N s/mm with its interval over trials, and the share of shuffled speed labels that give as large a slope.
+
+    ``effect_N`` is the force that B makes between slowest and fastest speed; ``spread_N`` the scatter of trials.
     """
 
     B_N_s_mm: float
@@ -41,22 +43,43 @@ class RateTest:
         return STUDY_B_N_S_MM * (self.speeds_mm_s[-1] - self.speeds_mm_s[0])
 
     @property
+    def effect_interval_N(self) -> tuple[float, float]:
+        """Interval of ``effect_N``."""
+        range_mm_s = self.speeds_mm_s[-1] - self.speeds_mm_s[0]
+        return self.interval[0] * range_mm_s, self.interval[1] * range_mm_s
+
+    @property
     def excludes_study(self) -> bool:
         """The study's B lies outside the interval."""
         return not self.interval[0] <= STUDY_B_N_S_MM <= self.interval[1]
 
 
+def rate_of(curves: Sequence[Curve]) -> RateTest | None:
+    """The test, or None where trials or speeds are too few for it."""
+    try:
+        return rate_test(curves)
+    except DataError:
+        return None
+
+
 def rate_test(curves: Sequence[Curve], seed: int = 0) -> RateTest:
-    """Test for a difference between speeds; raises DataError below two speeds or four trials."""
+    """Test for a difference between speeds, each subject against itself.
+
+    Raises DataError below two speeds, or with fewer trials than three besides one a subject.
+    """
     speeds = np.array([curve.speed_mm_s for curve in curves])
-    if len(np.unique(speeds)) < 2 or len(curves) < 4:
+    _, subject = np.unique([curve.subject for curve in curves], return_inverse=True)
+    groups = int(subject.max()) + 1 if len(curves) else 0
+    inside = _centred(speeds, subject)
+    if not np.any(inside) or len(curves) < groups + 3:
         raise DataError(
-            f"{len(curves)} trials at {len(np.unique(speeds))} speeds; the test needs 4 trials at 2 speeds or more"
+            f"{len(curves)} trials at {len(np.unique(speeds))} speeds; the test needs {groups + 3} trials at 2 speeds "
+            "or more"
         )
-    level = _levels(curves)
-    slope, interval = _slope(speeds, level)
+    level = _centred(_levels(curves), subject)
+    slope, interval = _slope(inside, level, len(curves) - groups - 1)
     generator = np.random.default_rng(seed)
-    shuffled = np.array([_slope(generator.permutation(speeds), level)[0] for _ in range(_DRAWS)])
+    shuffled = np.array([_shuffled(inside, subject, generator) @ level for _ in range(_DRAWS)]) / (inside @ inside)
     return RateTest(
         slope,
         interval,
@@ -64,16 +87,28 @@ def rate_test(curves: Sequence[Curve], seed: int = 0) -> RateTest:
         len(curves),
         tuple(float(speed) for speed in np.unique(speeds)),
         slope * float(np.ptp(speeds)),
-        float(np.std(level, ddof=1)),
+        float(np.sqrt(level @ level / (len(curves) - groups))),
     )
 
 
+def _centred(values: FloatArray, group: NDArray[np.intp]) -> FloatArray:
+    """Less the mean of each group."""
+    return np.asarray(values - (np.bincount(group, values) / np.bincount(group))[group])
+
+
+def _shuffled(values: FloatArray, group: NDArray[np.intp], generator: np.random.Generator) -> FloatArray:
+    """The values in another order, each within its group."""
+    order = np.lexsort((generator.random(len(values)), group))
+    found = np.empty_like(values)
+    found[np.argsort(group, kind="stable")] = values[order]
+    return found
+
+
 def _levels(curves: Sequence[Curve]) -> FloatArray:
-    """Mean over common depths of each trial's force minus the mean of all trials, N."""
+    """Mean over common depths of each trial's force, N."""
     deepest = min(curve.max_depth_mm for curve in curves)
     depth = np.linspace(min(_SHALLOWEST_MM, 0.5 * deepest), deepest, _DEPTHS)
-    force = np.array([_force_at(curve, depth) for curve in curves])
-    return np.asarray((force - force.mean(axis=0)).mean(axis=1))
+    return np.array([float(_force_at(curve, depth).mean()) for curve in curves])
 
 
 def _force_at(curve: Curve, depth_mm: FloatArray) -> FloatArray:
@@ -81,10 +116,10 @@ def _force_at(curve: Curve, depth_mm: FloatArray) -> FloatArray:
     return np.interp(depth_mm, curve.depth_mm[order], curve.force_N[order])
 
 
-def _slope(x: FloatArray, y: FloatArray) -> tuple[float, tuple[float, float]]:
-    centred = x - x.mean()
-    slope = float(centred @ y / (centred @ centred))
-    residual = y - y.mean() - slope * centred
-    error = float(np.sqrt(residual @ residual / (len(x) - 2) / (centred @ centred)))
-    reach = float(student.ppf((1.0 + LEVEL) / 2.0, len(x) - 2)) * error
+def _slope(x: FloatArray, y: FloatArray, freedom: int) -> tuple[float, tuple[float, float]]:
+    """Of centred values."""
+    slope = float(x @ y / (x @ x))
+    residual = y - slope * x
+    error = float(np.sqrt(residual @ residual / freedom / (x @ x)))
+    reach = float(student.ppf((1.0 + LEVEL) / 2.0, freedom)) * error
     return slope, (slope - reach, slope + reach)

@@ -3,8 +3,11 @@
 import csv
 import io
 import math
+from dataclasses import asdict
 
+from rig.tissue.control_table import control_rows
 from rig.tissue.judging import LEVEL, Errors, Judged
+from rig.tissue.rates import RateTest
 from rig.tissue.study import Study, rows
 
 
@@ -12,8 +15,9 @@ def as_json(study: Study) -> dict[str, object]:
     """Everything `rig fit --json` writes; unknown numbers are null.
 
     ``max_error_mm`` and ``max_error_percent`` are the largest over all trials and given forces of
-    |predicted - measured displacement|, on the curves fitted; under ``held_out`` the same on trials and on speeds that
-    the law was not fitted to.
+    |predicted - measured displacement|, on the curves fitted; under ``held_out`` the same on trials, speeds and
+    subjects that the law was not fitted to. ``control`` is what the law means to a force loop; ``rate`` whether speeds
+    differ.
     """
     return {
         "session": study.session,
@@ -22,11 +26,12 @@ def as_json(study: Study) -> dict[str, object]:
         "speeds": [speed._asdict() for speed in study.speeds],
         "force_N": [float(force) for force in study.force_N],
         "closest": study.closest,
-        **{name: _judged(judged) for name, judged in study.judged.items()},
+        "rate": rate_json(study.rate) if study.rate else None,
+        **{name: _judged(judged, study) for name, judged in study.judged.items()},
     }
 
 
-def _judged(judged: Judged) -> dict[str, object]:
+def _judged(judged: Judged, study: Study) -> dict[str, object]:
     deviations = {p.name: math.sqrt(judged.covariance[i, i]) for i, p in enumerate(judged.law.parameters)}
     return {
         "formula": judged.law.formula,
@@ -37,21 +42,37 @@ def _judged(judged: Judged) -> dict[str, object]:
                 "standard_error": deviations[p.name],
                 "interval": list(judged.intervals[p.name]),
                 "at_bound": p.name in judged.fit.at_bounds,
+                "known": p.name in judged.fit.known,
             }
             for p in judged.law.parameters
         },
         "interval_level": LEVEL,
         "interval_method": judged.interval_method,
-        **_errors(judged.fitted),
+        **(errors_json(judged.fitted) or {}),
         "rows": [{k: _known(v) for k, v in row._asdict().items()} for row in rows(judged.fitted)],
         "held_out": {
-            "trials": _errors(judged.trials_left_out) if judged.trials_left_out else None,
-            "speeds": _errors(judged.speeds_left_out) if judged.speeds_left_out else None,
+            "trials": errors_json(judged.trials_left_out),
+            "speeds": errors_json(judged.speeds_left_out),
+            "subjects": errors_json(judged.subjects_left_out),
         },
+        "control": [row.model_dump() for row in control_rows(judged, study.force_N)],
     }
 
 
-def _errors(errors: Errors) -> dict[str, object]:
+def rate_json(rate: RateTest) -> dict[str, object]:
+    """The comparison of speeds, with what it says of the study's B."""
+    return {
+        **asdict(rate),
+        "effect_interval_N": rate.effect_interval_N,
+        "study_effect_N": rate.study_effect_N,
+        "excludes_study": rate.excludes_study,
+    }
+
+
+def errors_json(errors: Errors | None) -> dict[str, float | None] | None:
+    """The worst errors; null where nothing could be left out."""
+    if errors is None:
+        return None
     return {
         "max_error_mm": _known(errors.max_error_mm),
         "max_error_percent": _known(errors.max_error_percent),
@@ -88,6 +109,7 @@ def _columns(study: Study) -> dict[str, list[float]]:
             ("", judged.fitted),
             ("_trial_left_out", judged.trials_left_out),
             ("_speed_left_out", judged.speeds_left_out),
+            ("_subject_left_out", judged.subjects_left_out),
         ):
             found = rows(errors) if errors else []
             columns[f"{name}_error{kind}_mm"] = [row.error_mm for row in found]

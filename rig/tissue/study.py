@@ -2,23 +2,27 @@
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 import rig
-from rig.errors import DataError
+from rig.errors import DataError, UsageError
 from rig.recording.sessions import Session
+from rig.tissue.control_table import control_rows
 from rig.tissue.curves import Curve, loading_curve
 from rig.tissue.fitting import fit_law
 from rig.tissue.judging import LEVEL, Errors, Judged, given_forces, judge
-from rig.tissue.laws import Constant, FloatArray, Index
+from rig.tissue.laws import FloatArray, Law
 from rig.tissue.model import Model, Provenance, Quality, ValidRange
+from rig.tissue.rates import RateTest, rate_of
+from rig.tissue.registry import COMPARED
 from rig.tissue.strokes import stroke_of
 
-COMPARED = (Constant, Index)
 TRACKING = "tracking"
+Laws = Sequence[type[Law]]
+Known = Mapping[str, float]
 
 
 class Skipped(NamedTuple):
@@ -42,7 +46,7 @@ class Study:
     """Curves of a session and the laws fitted to them, by name; ``force_N`` are the rows at which errors are taken.
 
     Displacement is measured from the contact that the law with the smallest residual, ``closest``, puts into each
-    trial, for all laws alike.
+    trial, for all laws alike. ``rate`` says whether speeds differ; None where trials or speeds are too few to tell.
     """
 
     session: str
@@ -51,6 +55,7 @@ class Study:
     force_N: FloatArray
     judged: Mapping[str, Judged]
     closest: str
+    rate: RateTest | None
 
     @property
     def speeds(self) -> tuple[SpeedSummary, ...]:
@@ -68,16 +73,42 @@ class Study:
         return self.judged[self.closest].fit.offsets_mm
 
 
-def study_session(session: Session) -> Study:
+def study_session(session: Session, laws: Laws = COMPARED, known: Known | None = None) -> Study:
     """Reads every trial of ``session``, fits and judges; trials without a usable curve are skipped with their reason.
 
     Raises DataError where no trial gives a curve.
     """
+    curves, skipped = _curves_or_refusal(session)
+    return study_curves(session.info.id, curves, skipped, laws, known)
+
+
+def study_sessions(sessions: Sequence[Session], laws: Laws = COMPARED, known: Known | None = None) -> Study:
+    """As ``study_session``, for sessions of several subjects at once: each subject is also left out in turn.
+
+    A trial is then called by its session's folder and its own name.
+    """
+    if len(sessions) == 1:
+        return study_session(sessions[0], laws, known)
+    places = [session.folder.resolve() for session in sessions]
+    twice = [place for place in places if places.count(place) > 1]
+    if twice:
+        raise UsageError(f"{twice[0]} is given twice; give each session once")
+    curves: list[Curve] = []
+    skipped: list[Skipped] = []
+    for session in sessions:
+        place = str(session.folder)
+        found, missing = _curves_or_refusal(session)
+        curves += [replace(curve, name=f"{place}/{curve.name}") for curve in found]
+        skipped += [Skipped(f"{place}/{trial}", reason) for trial, reason in missing]
+    return study_curves(", ".join(session.info.id for session in sessions), curves, skipped, laws, known)
+
+
+def _curves_or_refusal(session: Session) -> tuple[list[Curve], list[Skipped]]:
     curves, skipped = curves_of(session)
     if not curves:
         reasons = skipped[0].reason if skipped else "there is no trial"
         raise DataError(f"{session.folder}: no trial gives a curve ({len(skipped)} skipped); first: {reasons}")
-    return study_curves(session.info.id, curves, skipped)
+    return curves, skipped
 
 
 def curves_of(session: Session) -> tuple[list[Curve], list[Skipped]]:
@@ -88,23 +119,34 @@ def curves_of(session: Session) -> tuple[list[Curve], list[Skipped]]:
         try:
             recording = session.recording(trial.name)
             if recording.metadata.get("trial", {}).get("kind") != TRACKING:
-                curves.append(loading_curve(stroke_of(trial.name, recording)))
+                curve = loading_curve(stroke_of(trial.name, recording))
+                curves.append(replace(curve, subject=str(session.info.subject.get("id", ""))))
         except DataError as error:
             skipped.append(Skipped(trial.name, str(error)))
     return curves, skipped
 
 
-def study_curves(session: str, curves: Sequence[Curve], skipped: Sequence[Skipped] = ()) -> Study:
-    """Fits and judges the laws compared on the same curves and rows."""
-    fits = {law.name: fit_law(law, curves) for law in COMPARED}
+def study_curves(
+    session: str,
+    curves: Sequence[Curve],
+    skipped: Sequence[Skipped] = (),
+    laws: Laws = COMPARED,
+    known: Known | None = None,
+) -> Study:
+    """Fits and judges ``laws`` on the same curves and rows, with parameters ``known`` where a law has them."""
+    fits = {law.name: fit_law(law, curves, known=_known(law, known or {})) for law in laws}
     closest = min(fits, key=lambda name: fits[name].rmse_N)
     force_N = given_forces(curves)
     judged = {name: judge(fit, curves, force_N, fits[closest].offsets_mm) for name, fit in fits.items()}
-    return Study(session, tuple(curves), tuple(skipped), force_N, judged, closest)
+    return Study(session, tuple(curves), tuple(skipped), force_N, judged, closest, rate_of(curves))
+
+
+def _known(law: type[Law], known: Known) -> Known:
+    return {name: value for name, value in known.items() if name in law.bounds}
 
 
 def model_of(study: Study, law: str, subject: Mapping[str, object]) -> Model:
-    """The fitted law as a model to save and to control with."""
+    """The fitted law as a model to save and to control with; of several subjects the model names none."""
     judged = study.judged[law]
     return Model(
         law=judged.law,
@@ -126,6 +168,7 @@ def model_of(study: Study, law: str, subject: Mapping[str, object]) -> Model:
             software=f"tissue-rig {rig.__version__}",
         ),
         quality=_quality(judged),
+        control=control_rows(judged, study.force_N),
     )
 
 

@@ -1,4 +1,4 @@
-"""Trials made by a program of its own: it shares no code with the laws and fits it tests.
+"""Trials made by a program of its own: but for ``along`` it shares no code with the laws and fits it tests.
 
 The tip moves with finite acceleration on a grid of 0.1 ms; force is computed there, filtered, then sampled on the
 sensor's own times, with noise, zero and steps of the converter.
@@ -15,6 +15,8 @@ from rig.channels import AXIS, FORCE, LOOP, AxisSample, ForceSample, LoopSample
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.reader import Recording
 from rig.recording.sessions import SessionInfo, TrialInfo, write_session
+from rig.tissue.history import History
+from rig.tissue.laws import Law
 from rig.tissue.strokes import Stroke
 
 Column = NDArray[np.float64]
@@ -36,6 +38,16 @@ def index_force(a_N_mm: float = 0.12, b_per_mm: float = 0.22, B_N_s_mm: float = 
 
 
 FOREARM = index_force()
+
+
+def along(law: Law) -> Force:
+    """Tissue that obeys a law with its memory, on the bench's own grid of time."""
+
+    def force(depth_mm: Column, rate_mm_s: Column) -> Column:
+        history = History.at(STEP_S * np.arange(len(depth_mm)))
+        return np.maximum(law.force(depth_mm, rate_mm_s, history), 0.0)
+
+    return force
 
 
 @dataclass(frozen=True)

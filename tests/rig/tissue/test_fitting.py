@@ -5,12 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.errors import DataError
+from rig.errors import DataError, UsageError
 from rig.tissue.curves import Curve, loading_curve
 from rig.tissue.fitting import BINS, Steps, early_offset, fit_law, residual_force
 from rig.tissue.judging import given_forces, judge
-from rig.tissue.laws import Constant, Index
-from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, index_force
+from rig.tissue.laws import Constant, Index, Law
+from rig.tissue.laws_elastic import Layer
+from rig.tissue.laws_viscous import HuntCrossley, QuasiLinear, StandardLinear
+from rig.tissue.registry import LAWS
+from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, along, index_force
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +134,46 @@ def test_residuals_are_modelled_minus_measured(curves: list[Curve]) -> None:
     depths, residuals = residual_force(law, higher, offset_mm)
     assert np.all(depths > 0)
     assert residuals[5:] == pytest.approx(-0.5, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("truth", "within"),
+    [
+        # Where force starts without a slope, contact is seen less sharply, and that moves force at 1 mm.
+        (HuntCrossley(a_N_mmn=0.1, n=1.7, lambda_N_s_mmn1=0.0015), 0.2),
+        (StandardLinear(k_N_mm=0.4, k1_N_mm=0.3, tau_s=0.2), 0.05),
+        (QuasiLinear(A_N=0.4, b_per_mm=0.3, r=0.5, tau_s=0.2), 0.1),
+    ],
+    ids=["hunt_crossley", "sls", "qlv"],
+)
+def test_damping_that_grows_and_memory_are_recovered_from_loading_at_five_speeds(truth: Law, within: float) -> None:
+    curves = [loading_curve(stroke) for stroke in Bench(force=along(truth), noise_N=0.002).strokes(trials=1)]
+    fit = fit_law(type(truth), curves)
+    assert fit.law.values == pytest.approx(truth.values, rel=within)
+    assert fit.rmse_N < 0.01
+
+
+def test_every_law_can_be_fitted(curves: list[Curve]) -> None:
+    for kind in LAWS.values():
+        fit = fit_law(kind, curves[::3])
+        assert fit.rmse_N < 0.8, kind.name
+        assert np.all(np.isfinite(fit.information))
+
+
+def test_a_known_parameter_keeps_its_value_and_has_no_interval(curves: list[Curve]) -> None:
+    fit = fit_law(Layer, curves, known={"thickness_mm": 20.0})
+    assert fit.law.values[1:4] == pytest.approx([3.0, 20.0, 0.45])
+    assert fit.at_bounds == ("B_N_s_mm",)
+    constant = fit_law(Constant, curves)
+    assert fit.law.tangent_stiffness(1.0) == pytest.approx(constant.law.tangent_stiffness(1.0), rel=1e-4)
+    judged = judge(fit, curves, given_forces(curves), fit.offsets_mm)
+    assert judged.intervals["thickness_mm"] == (20.0, 20.0)
+    assert judged.intervals["E_MPa"][0] < fit.law.values[0] < judged.intervals["E_MPa"][1]
+
+
+def test_a_parameter_the_law_has_not_cannot_be_known(curves: list[Curve]) -> None:
+    with pytest.raises(UsageError, match=r"the index law has no parameter k; it has a_N_mm, b_per_mm, B_N_s_mm"):
+        fit_law(Index, curves, known={"k": 1.0})
 
 
 def test_no_curves_are_refused() -> None:

@@ -1,11 +1,14 @@
 """kappa against values computed by an independent program, and against its limits."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.errors import UsageError
 from rig.tissue.hayes import layer_factor, punch_stiffness_N_mm
+from rig.tissue.laws_elastic import Layer
 
 TABLE = {
     0.25: (1.044, 1.092, 1.143, 1.198, 1.318, 1.451, 1.745, 2.398),
@@ -42,3 +45,17 @@ def test_thinner_layers_are_stiffer(ratio: float, nu: float) -> None:
 def test_outside_its_range_it_refuses(ratio: float, nu: float) -> None:
     with pytest.raises(UsageError, match="must lie"):
         layer_factor(ratio, nu)
+
+
+def test_the_layer_law_is_a_flat_punch_on_deep_tissue_where_the_layer_is_thick() -> None:
+    thick = Layer(E_MPa=0.05, radius_mm=3.0, thickness_mm=5000.0, poisson_ratio=0.3, B_N_s_mm=0.0)
+    assert thick.force(2.0) == pytest.approx(2 * 3.0 * 0.05 / (1 - 0.3**2) * 2.0, rel=2e-3)
+    thin = replace(thick, thickness_mm=15.0)
+    assert thin.tangent_stiffness(1.0) == pytest.approx(
+        thick.tangent_stiffness(1.0) * layer_factor(0.2, 0.3) / layer_factor(0.0006, 0.3)
+    )
+
+
+def test_a_tip_too_wide_for_its_layer_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"tip radius over tissue thickness is 4; .* not above 3"):
+        Layer(E_MPa=0.05, radius_mm=4.0, thickness_mm=1.0, poisson_ratio=0.3, B_N_s_mm=0.0)

@@ -19,8 +19,9 @@ def made_curve(depth_mm: list[float], force_N: list[float], name: str = "made", 
     """A curve of given points."""
     depth, force = np.array(depth_mm), np.array(force_N)
     return Curve(
-        name, speed_mm_s, depth, force, np.full(len(depth), speed_mm_s), Contact(20.0, 19.9, 20.1, 0.03), 0.0, 0.01
-    )
+        name, speed_mm_s, depth, force, np.full(len(depth), speed_mm_s), Contact(20.0, 19.9, 20.1, 0.03), 0.0, 0.01,
+        depth / speed_mm_s,
+    )  # fmt: skip
 
 
 def test_the_studys_own_numbers_come_out_of_the_studys_own_rows() -> None:

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.errors import UsageError
-from rig.tissue.laws import LAWS, Constant, Index, Law, law_named
+from rig.tissue.laws import Constant, Index, Law
+from rig.tissue.registry import LAWS, law_named
 
 depths_mm = st.floats(0.001, 15.0)
 rates_mm_s = st.floats(0.0, 60.0)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,9 @@ import pytest
 
 from rig.errors import DataError, UsageError
 from rig.recording.files import WriteFailed
-from rig.tissue.laws import Index
+from rig.tissue.laws import Index, Law
 from rig.tissue.model import Model, Provenance, Quality, ValidRange, load_model
+from tests.rig.tissue.examples import EXAMPLES
 
 MODEL = Model(
     law=Index(a_N_mm=0.12, b_per_mm=0.22, B_N_s_mm=0.01),
@@ -41,6 +43,18 @@ def test_a_model_survives_its_file(file: Path) -> None:
         MODEL.intervals, MODEL.valid, MODEL.data, MODEL.quality
     )  # fmt: skip
     assert read.standard_errors == pytest.approx({"a_N_mm": 1e-3, "b_per_mm": 2e-3, "B_N_s_mm": 3e-4})
+
+
+@pytest.mark.parametrize("law", EXAMPLES, ids=[law.name for law in EXAMPLES])
+def test_a_model_of_any_law_survives_its_file(law: Law, tmp_path: Path) -> None:
+    intervals = {p.name: (p.value, p.value) for p in law.parameters}
+    covariance = np.diag(np.arange(len(law.bounds)) * 1e-6)
+    replace(MODEL, law=law, covariance=covariance, intervals=intervals).save(tmp_path / "model.json")
+    read = load_model(tmp_path / "model.json")
+    assert read.law == law
+    assert read.force_N(4.0) == pytest.approx(float(law.force(4.0)))
+    assert read.tangent_N_mm(4.0) == pytest.approx(float(law.tangent_stiffness(4.0)))
+    assert read.damping_N_s_mm == pytest.approx(float(law.damping(np.array(4.0))))
 
 
 def test_a_model_answers_what_a_controller_asks() -> None:

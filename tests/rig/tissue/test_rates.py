@@ -15,7 +15,7 @@ def curve(speed: float, damping: float, scatter: float, number: int) -> Curve:
     depth = np.linspace(0.0, 8.0, 300)
     force = (1.0 + scatter) * 0.1 * depth * np.exp(0.2 * depth) + damping * speed
     contact = Contact(0.0, -0.05, 0.05, 0.01)
-    return Curve(f"trial_{number}", speed, depth, force, np.full_like(depth, speed), contact, 0.0, 0.01)
+    return Curve(f"trial_{number}", speed, depth, force, np.full_like(depth, speed), contact, 0.0, 0.01, depth / speed)
 
 
 def five_by_five(damping: float) -> list[Curve]:

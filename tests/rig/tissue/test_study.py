@@ -71,7 +71,7 @@ def test_the_json_has_what_the_demonstration_quotes(study: Study) -> None:
 
 def test_the_json_says_null_where_nothing_could_be_left_out(tmp_path: Path) -> None:
     study = study_session(open_session(write_made_session(tmp_path / "one", [Bench().stroke(10.0, 1)])))
-    assert as_json(study)["index"]["held_out"] == {"trials": None, "speeds": None}  # type: ignore[index]
+    assert as_json(study)["index"]["held_out"] == {"trials": None, "speeds": None, "subjects": None}  # type: ignore[index]
     table = list(csv.DictReader(io.StringIO(as_csv(study))))
     assert table[0]["index_error_trial_left_out_mm"] == ""
 

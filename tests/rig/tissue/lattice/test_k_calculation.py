@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from rig.errors import DataError
-from rig.tissue.k_calculation import check_points, exact_k, fit_index, lattice_laws, search_k, study_loop
+from rig.tissue.k_calculation import check_points, exact_k, fit_index, search_k, study_loop
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.springs import Springs
 from rig.tissue.lattice.sweep import Sweep, sweep
+from rig.tissue.laws_lattice import lattice_laws
 
 A, B = 0.04, 0.25
 DEPTH = np.array([0.6, 1.2, 1.8, 2.4])

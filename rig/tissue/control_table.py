@@ -1,0 +1,73 @@
+"""K and B for control: what a fitted law means to a force loop at each force, and how sure that is."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from rig.config.table import Table
+from rig.tissue.judging import Judged
+from rig.tissue.laws import FloatArray, Law
+
+NotNegative = Annotated[float, Field(ge=0)]
+STEP = 1e-6
+
+
+class ControlRow(Table):
+    """One force: the depth at rest, stiffness from contact (secant) and for a small move (tangent), and damping.
+
+    The gain of a force loop is the tangent, not the secant that the study lists as K.
+    """
+
+    force_N: NotNegative
+    depth_mm: NotNegative
+    secant_N_mm: NotNegative
+    tangent_N_mm: NotNegative
+    tangent_low_N_mm: NotNegative
+    tangent_high_N_mm: NotNegative
+    damping_N_s_mm: NotNegative
+    damping_low_N_s_mm: NotNegative
+    damping_high_N_s_mm: NotNegative
+
+
+def control_rows(judged: Judged, force_N: Sequence[float] | FloatArray) -> tuple[ControlRow, ...]:
+    """One row a force; intervals carry the parameters' covariance through (delta method), at their level."""
+    forces = np.asarray(force_N, float)
+    found = _table(judged.law, forces)
+    reach = judged.reach * _deviations(judged, forces)
+    low, high = np.maximum(found - reach, 0.0), found + reach
+    return tuple(
+        ControlRow(
+            force_N=float(force),
+            depth_mm=float(found[0, i]),
+            secant_N_mm=float(found[1, i]),
+            tangent_N_mm=float(found[2, i]),
+            tangent_low_N_mm=float(low[2, i]),
+            tangent_high_N_mm=float(high[2, i]),
+            damping_N_s_mm=float(found[3, i]),
+            damping_low_N_s_mm=float(low[3, i]),
+            damping_high_N_s_mm=float(high[3, i]),
+        )
+        for i, force in enumerate(forces)
+    )
+
+
+def _table(law: Law, force_N: FloatArray) -> FloatArray:
+    """Depth at rest, secant, tangent and damping at each force, shape (4, r)."""
+    depth_mm = law.depth(force_N)
+    return np.array([depth_mm, law.secant_stiffness(depth_mm), law.tangent_stiffness(depth_mm), law.damping(depth_mm)])
+
+
+def _deviations(judged: Judged, force_N: FloatArray) -> FloatArray:
+    """Standard deviations of the table, shape (4, r)."""
+    law, here = judged.law, _table(judged.law, force_N)
+    columns = []
+    for index, parameter in enumerate(law.parameters):
+        step = STEP * max(abs(parameter.value), 1e-3)
+        step = step if parameter.value + step <= parameter.upper else -step
+        values = law.values
+        values[index] += step
+        columns.append((_table(law.from_values(values), force_N) - here) / step)
+    slopes = np.array(columns)
+    return np.asarray(np.sqrt(np.maximum(np.einsum("pkr,pq,qkr->kr", slopes, judged.covariance, slopes), 0.0)))

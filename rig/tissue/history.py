@@ -1,0 +1,92 @@
+"""Memory of tissue: what a path of the tip through time leaves of earlier force (Fung's hereditary integral).
+
+With elastic force e(t) and relaxation 1 + sum r_i exp(-t/tau_i), force is F = e + sum r_i q_i with q_i the integral of
+exp(-(t-s)/tau_i) de(s). Where e goes straight from sample to sample that is exact in steps: q <- exp(-h/tau) q +
+(tau/h)(1 - exp(-h/tau)) (e_new - e_old), unconditionally stable (Taylor, Pister, Goudreau 1970; Simo, Hughes 1998, ch.
+10.3). Steps are chained by doubling (Hillis, Steele 1986), which numpy does in whole arrays.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rig.errors import UsageError
+
+FloatArray = NDArray[np.float64]
+SMALLEST = np.finfo(float).tiny
+FORGOTTEN = 40.0
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
+
+
+class Term(NamedTuple):
+    """One term of the relaxation: force it adds to the force at rest in a sudden move, as a ratio, and its time."""
+
+    ratio: float
+    tau_s: float
+
+
+@dataclass(frozen=True)
+class History:
+    """Makes depths given with it one path, or several end to end: seconds since the depth before, shape (n,).
+
+    A step of inf begins a path, with tissue that has been at rest. Between samples the elastic force runs straight.
+    """
+
+    step_s: FloatArray
+
+    def __post_init__(self) -> None:
+        if not np.all(self.step_s > 0):
+            at = int(np.argmin(self.step_s > 0))
+            raise UsageError(
+                f"a history needs times that rise: sample {at + 1} comes {self.step_s[at]:g} s after the one before; "
+                "sort or remove samples"
+            )
+
+    @classmethod
+    def at(cls, *times_s: ArrayLike) -> Self:
+        """The history of paths sampled at these times, each shape (n_i,)."""
+        return cls(np.concatenate([np.diff(np.asarray(time, float), prepend=-np.inf) for time in times_s]))
+
+    def respond(self, elastic_N: FloatArray, terms: Sequence[Term]) -> FloatArray:
+        """Force [N] with memory along the path, from the force at rest there, shape (n,)."""
+        if elastic_N.shape != self.step_s.shape:
+            raise UsageError(
+                f"{len(self.step_s)} times for {elastic_N.size} depths; a history has one time for each depth"
+            )
+        rise_N = np.diff(elastic_N, prepend=elastic_N[:1])
+        return elastic_N + sum((ratio * self._kept(rise_N, tau_s) for ratio, tau_s in terms), np.zeros_like(elastic_N))
+
+    def _kept(self, rise_N: FloatArray, tau_s: float) -> FloatArray:
+        """q of one term."""
+        lengths = self.step_s / tau_s
+        return _chained(np.exp(-lengths), -np.expm1(-lengths) / lengths * rise_N)
+
+
+def _chained(decay: FloatArray, gain: FloatArray) -> FloatArray:
+    """q[n] = decay[n] q[n-1] + gain[n], from q = 0."""
+    decay, total, reach = decay.copy(), gain.copy(), 1
+    while reach < len(total):
+        total[reach:] += decay[reach:] * total[:-reach]
+        decay[reach:] *= decay[:-reach]
+        reach *= 2
+    return total
+
+
+def ramped(
+    slope: Callable[[FloatArray], FloatArray], depth_mm: FloatArray, rate_mm_s: FloatArray, terms: Sequence[Term]
+) -> FloatArray:
+    """What memory adds [N] at depths reached from contact at one speed each; ``slope`` is that of elastic force.
+
+    sum r_i int_0^x exp(-u/(v tau_i)) slope(x-u) du, by Gauss and Legendre over what is not forgotten.
+    """
+    total = np.zeros_like(depth_mm)
+    for ratio, tau_s in terms:
+        length_mm = np.maximum(rate_mm_s * tau_s, SMALLEST)
+        back_mm = np.minimum(depth_mm, FORGOTTEN * length_mm)
+        ago_mm = 0.5 * back_mm[..., None] * (1.0 + _NODES)
+        kept = np.exp(-ago_mm / length_mm[..., None]) * slope(np.maximum(depth_mm[..., None] - ago_mm, 0.0))
+        total = total + 0.5 * ratio * back_mm * (kept @ _WEIGHTS)
+    return total

@@ -1,0 +1,123 @@
+"""The lattice as laws to fit and judge like any other: with one stiffness, and with the study's global k(x)."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from rig.errors import UsageError
+from rig.tissue.lattice.sweep import Sweep
+from rig.tissue.laws import DAMPING, Bounds, Damped, FloatArray, Law, bisect
+
+LEAST_DEPTHS = 4
+STIFFNESS = Bounds("N/mm", 1e-8, 1e3, "spring stiffness at contact")
+FURTHER = 1.5
+
+
+class Phi:
+    """phi(d) = R/k of a sweep and its slope; past the sweep's end straight on, which covers a fit's small offsets."""
+
+    def __init__(self, sweep: Sweep) -> None:
+        """Raises UsageError where too few depths of the sweep are intact."""
+        depth_mm, phi_mm = sweep.depth_mm[sweep.intact], sweep.force_over_k_mm[sweep.intact]
+        if len(depth_mm) < LEAST_DEPTHS:
+            raise UsageError(
+                f"the sweep has {len(depth_mm)} intact depths ({sweep.collapse()}); {LEAST_DEPTHS} are needed: use "
+                "smaller steps"
+            )
+        self._curve: PchipInterpolator = sweep.interpolant()
+        self._slope = self._curve.derivative()
+        self.end_mm, self._top_mm = float(depth_mm[-1]), float(phi_mm[-1])
+        self._last = float(self._slope(self.end_mm))
+
+    def __call__(self, depth_mm: FloatArray) -> FloatArray:
+        """phi in mm, same shape."""
+        inside_mm = self._curve(np.minimum(depth_mm, self.end_mm))
+        return np.where(depth_mm <= self.end_mm, inside_mm, self._top_mm + self._last * (depth_mm - self.end_mm))
+
+    def rise(self, depth_mm: FloatArray) -> FloatArray:
+        """dphi/dd, same shape."""
+        return np.where(depth_mm <= self.end_mm, self._slope(np.minimum(depth_mm, self.end_mm)), self._last)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LatticeLaw(Damped):
+    """F = k(x) phi(x) + B v."""
+
+    phi: ClassVar[Phi]
+
+    @abstractmethod
+    def spring_N_mm(self, depth_mm: FloatArray) -> FloatArray:
+        """k(x), same shape."""
+
+    def elastic(self, depth_mm: FloatArray) -> FloatArray:
+        """k(x) phi(x)."""
+        return self.spring_N_mm(depth_mm) * self.phi(depth_mm)
+
+    def elastic_inverse(self, force_N: FloatArray) -> FloatArray:
+        """By bisection to half as far again as the sweep went."""
+        return bisect(self.elastic, force_N, np.zeros_like(force_N), np.full_like(force_N, FURTHER * self.phi.end_mm))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LatticeConstant(LatticeLaw):
+    """The lattice with one stiffness."""
+
+    name: ClassVar[str] = "lattice constant"
+    formula: ClassVar[str] = "F = k phi(x) + B v"
+    bounds: ClassVar[Mapping[str, Bounds]] = {"k_N_mm": STIFFNESS, "B_N_s_mm": DAMPING}
+
+    k_N_mm: float
+
+    @classmethod
+    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+        """Linear least squares."""
+        carried_mm = cls.phi(depth_mm)
+        return cls.clipped(k_N_mm=float(carried_mm @ force_N / (carried_mm @ carried_mm)), B_N_s_mm=0.0)
+
+    def spring_N_mm(self, depth_mm: FloatArray) -> FloatArray:
+        """k."""
+        return np.full_like(depth_mm, self.k_N_mm)
+
+    def slope(self, depth_mm: FloatArray) -> FloatArray:
+        """k phi'."""
+        return self.k_N_mm * self.phi.rise(depth_mm)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LatticeIndex(LatticeLaw):
+    """The lattice with the study's k(x) = a exp(b x), x the depth of the tip."""
+
+    name: ClassVar[str] = "lattice index"
+    formula: ClassVar[str] = "F = a exp(b x) phi(x) + B v"
+    bounds: ClassVar[Mapping[str, Bounds]] = {
+        "a_N_mm": STIFFNESS,
+        "b_per_mm": Bounds("1/mm", -2.0, 5.0, "stiffening per depth"),
+        "B_N_s_mm": DAMPING,
+    }
+
+    a_N_mm: float
+    b_per_mm: float
+
+    @classmethod
+    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+        """The straight line ln(F/phi) = ln a + b x, weighted with force."""
+        b, level = np.polyfit(depth_mm, np.log(force_N / cls.phi(depth_mm)), 1, w=force_N)
+        return cls.clipped(a_N_mm=float(np.exp(level)), b_per_mm=b, B_N_s_mm=0.0)
+
+    def spring_N_mm(self, depth_mm: FloatArray) -> FloatArray:
+        """a exp(b x)."""
+        return self.a_N_mm * np.exp(self.b_per_mm * depth_mm)
+
+    def slope(self, depth_mm: FloatArray) -> FloatArray:
+        """a exp(b x) (phi' + b phi): the tangent the loop sees."""
+        return self.spring_N_mm(depth_mm) * (self.phi.rise(depth_mm) + self.b_per_mm * self.phi(depth_mm))
+
+
+def lattice_laws(sweep: Sweep) -> tuple[type[Law], type[Law]]:
+    """Both laws with the sweep's phi."""
+    shape = {"phi": Phi(sweep)}
+    return type("LatticeConstant", (LatticeConstant,), shape), type("LatticeIndex", (LatticeIndex,), shape)

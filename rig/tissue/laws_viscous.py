@@ -1,0 +1,178 @@
+"""Laws whose force depends on how the tip came to its depth: damping that grows with depth, and memory."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rig.tissue.history import Term
+from rig.tissue.laws import Bounds, FloatArray, Law, Linear, bisect, straight
+from rig.tissue.laws_elastic import (
+    EXPONENT,
+    FORCE_AT_1_MM,
+    FORCE_SCALE,
+    STIFFENING,
+    FungShape,
+    PowerShape,
+    fung_near,
+    power_near,
+)
+
+STIFFNESS = Bounds("N/mm", 1e-6, 1e4, "stiffness at rest")
+BRANCH = Bounds("N/mm", 0.0, 1e4, "stiffness that relaxes")
+RATIO = Bounds("1", 0.0, 100.0, "force that relaxes over force at rest")
+TAU = Bounds("s", 1e-3, 1e3, "time of relaxation")
+
+
+@dataclass(frozen=True, kw_only=True)
+class HuntCrossley(PowerShape):
+    """F = a x^n + lambda x^n v: damping grows with depth, so nothing jumps at contact and nothing pulls at its end.
+
+    Hunt and Crossley, "Coefficient of restitution interpreted as damping in vibroimpact", J. Appl. Mech. 42 (1975) 440.
+    """
+
+    name: ClassVar[str] = "hunt_crossley"
+    formula: ClassVar[str] = "F = a x^n + lambda x^n v"
+    bounds: ClassVar[Mapping[str, Bounds]] = {
+        "a_N_mmn": FORCE_AT_1_MM,
+        "n": EXPONENT,
+        "lambda_N_s_mmn1": Bounds("N s/mm^(n+1)", 0.0, 1e3, "damping at 1 mm"),
+    }
+
+    lambda_N_s_mmn1: float
+
+    @classmethod
+    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+        """The power law without damping."""
+        a, n = power_near(depth_mm, force_N)
+        return cls.clipped(a_N_mmn=a, n=n, lambda_N_s_mmn1=0.0)
+
+    def damping(self, depth_mm: FloatArray) -> FloatArray:
+        """lambda x^n."""
+        return np.asarray(self.lambda_N_s_mmn1 * depth_mm**self.n)
+
+    def damping_slope(self, depth_mm: FloatArray) -> FloatArray:
+        """n lambda x^(n-1)."""
+        return np.asarray(self.n * self.lambda_N_s_mmn1 * depth_mm ** (self.n - 1.0))
+
+    def depth(self, force_N: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
+        """(F / (a + lambda v))^(1/n); 0 where the tip leaves so fast that nothing presses on it."""
+        force, rate = np.broadcast_arrays(np.asarray(force_N, float), np.asarray(rate_mm_s, float))
+        factor = self.a_N_mmn + self.lambda_N_s_mmn1 * rate
+        reached = np.maximum(force, 0.0) / np.where(factor > 0, factor, np.inf)
+        return np.asarray(reached ** (1.0 / self.n))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Relaxing(Law):
+    """Quasi-linear viscoelasticity (Fung 1993, ch. 7): elastic force times a relaxation 1 + sum r_i exp(-t/tau_i).
+
+    Where a quick way back leaves the surface behind, force comes out negative: contact is lost there.
+    """
+
+    def damping(self, depth_mm: FloatArray) -> FloatArray:
+        """None besides memory."""
+        return np.zeros_like(depth_mm)
+
+    def depth(self, force_N: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
+        """By bisection between the depths at which the force is reached suddenly and at rest."""
+        force, rate = np.broadcast_arrays(np.asarray(force_N, float), np.asarray(rate_mm_s, float))
+        force = np.maximum(force, 0.0)
+        low_mm, high_mm = self.elastic_inverse(force / self.sudden), self.elastic_inverse(force)
+        return bisect(lambda depth_mm: self.force(depth_mm, rate), force, low_mm, high_mm)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StandardLinear(Linear, Relaxing):
+    """Standard linear solid: a spring k beside a spring k1 in series with a damper k1 tau (Zener 1948).
+
+    After a sudden depth x: F = (k + k1 exp(-t/tau)) x. At speed v: F = k x + k1 v tau (1 - exp(-x/(v tau))).
+    """
+
+    name: ClassVar[str] = "sls"
+    formula: ClassVar[str] = "F = k x + int k1 exp(-(t-s)/tau) dx(s)"
+    bounds: ClassVar[Mapping[str, Bounds]] = {"k_N_mm": STIFFNESS, "k1_N_mm": BRANCH, "tau_s": TAU}
+
+    k_N_mm: float
+    k1_N_mm: float
+    tau_s: float
+
+    @classmethod
+    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+        """The line through contact, a third of it relaxing."""
+        k = straight(depth_mm, force_N)
+        return cls.clipped(k_N_mm=0.75 * k, k1_N_mm=0.25 * k, tau_s=0.3)
+
+    @property
+    def stiffness_N_mm(self) -> float:
+        """k."""
+        return self.k_N_mm
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """k1/k over tau."""
+        return (Term(self.k1_N_mm / self.k_N_mm, self.tau_s),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prony(Linear, Relaxing):
+    """A Prony series of two terms, the generalised Maxwell solid: F(t) = int [k + sum k_i exp(-(t-s)/tau_i)] dx(s).
+
+    Residual limbs: Tonuk and Silver-Thorn fitted two terms, and found that they do not carry over between sites.
+    """
+
+    name: ClassVar[str] = "prony"
+    formula: ClassVar[str] = "F = k x + int (k1 exp(-(t-s)/tau1) + k2 exp(-(t-s)/tau2)) dx(s)"
+    bounds: ClassVar[Mapping[str, Bounds]] = {
+        "k_N_mm": STIFFNESS, "k1_N_mm": BRANCH, "tau1_s": TAU, "k2_N_mm": BRANCH, "tau2_s": TAU
+    }  # fmt: skip
+
+    k_N_mm: float
+    k1_N_mm: float
+    tau1_s: float
+    k2_N_mm: float
+    tau2_s: float
+
+    @classmethod
+    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+        """The line through contact, a third of it relaxing, half soon and half late."""
+        k = straight(depth_mm, force_N)
+        return cls.clipped(k_N_mm=0.75 * k, k1_N_mm=0.125 * k, tau1_s=0.1, k2_N_mm=0.125 * k, tau2_s=1.0)
+
+    @property
+    def stiffness_N_mm(self) -> float:
+        """k."""
+        return self.k_N_mm
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """k_i/k over tau_i."""
+        return (Term(self.k1_N_mm / self.k_N_mm, self.tau1_s), Term(self.k2_N_mm / self.k_N_mm, self.tau2_s))
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuasiLinear(FungShape, Relaxing):
+    """Fung's quasi-linear law with one term: elastic force A (exp(b x) - 1), relaxation 1 + r exp(-t/tau).
+
+    Zheng and Mak (1999, J. Biomech. Eng. 121, 330) use one term for limbs; their alpha is r/(1 + r): 0.03 to 0.28.
+    """
+
+    name: ClassVar[str] = "qlv"
+    formula: ClassVar[str] = "F = int (1 + r exp(-(t-s)/tau)) d[A (exp(b x(s)) - 1)]"
+    bounds: ClassVar[Mapping[str, Bounds]] = {"A_N": FORCE_SCALE, "b_per_mm": STIFFENING, "r": RATIO, "tau_s": TAU}
+
+    r: float
+    tau_s: float
+
+    @classmethod
+    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+        """The elastic law near the data, a fifth of its force relaxing."""
+        scale_N, b_per_mm = fung_near(depth_mm, force_N)
+        return cls.clipped(A_N=scale_N / 1.25, b_per_mm=b_per_mm, r=0.25, tau_s=0.3)
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """r over tau."""
+        return (Term(self.r, self.tau_s),)
