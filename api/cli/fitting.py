@@ -128,12 +128,12 @@ def print_control(found: Sequence[ControlRow], law: str) -> None:
     cells = [
         (
             f"{r.force_N:.2f}", f"{r.depth_mm:.2f}", f"{r.secant_N_mm:.3f}", f"{r.tangent_N_mm:.3f}",
-            f"{r.tangent_low_N_mm:.3f} to {r.tangent_high_N_mm:.3f}", f"{r.damping_N_s_mm:.4f}",
-            f"{r.damping_low_N_s_mm:.4f} to {r.damping_high_N_s_mm:.4f}",
+            f"{r.tangent_low_N_mm:.3f}-{r.tangent_high_N_mm:.3f}", f"{r.damping_N_s_mm:.4f}",
+            f"{r.damping_low_N_s_mm:.4f}-{r.damping_high_N_s_mm:.4f}",
         )
         for r in found
     ]  # fmt: skip
-    header = ("force N", "depth mm", "secant K", "tangent K", "95 %", "B N s/mm", "95 %")
+    header = ("force N", "depth mm", "secant", "tangent", "95 %", "B N s/mm", "95 %")
     console.print(table(header, cells, f"K and B for control ({law})"))
 
 

@@ -25,8 +25,23 @@ from rig.tissue.judging import Errors, Judged
 from rig.tissue.laws import FloatArray
 from rig.tissue.study import Study, rows
 
-COLORS = {"index": MODEL, "constant": RIVAL}
-STYLES = {"index": "-", "constant": (0, (5, 2))}
+Dashes = str | tuple[float, tuple[float, ...]]
+Look = tuple[str, Dashes]
+
+LOOKS: dict[str, Look] = {"index": (MODEL, "-"), "constant": (RIVAL, (0, (5, 2)))}
+OTHER_COLORS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+OTHER_STYLES: tuple[Dashes, ...] = ((0, (1, 1.5)), (0, (6, 2, 1, 2)))
+PANELS_A_ROW = 3
+MOST_LABELS = 4
+
+
+def look(name: str, study: Study) -> Look:
+    """Colour and dashes of a law: the study's two have their own, the others take turns."""
+    others = [law for law in study.judged if law not in LOOKS]
+    if name in LOOKS:
+        return LOOKS[name]
+    place = others.index(name)
+    return OTHER_COLORS[place % len(OTHER_COLORS)], OTHER_STYLES[place // len(OTHER_COLORS) % len(OTHER_STYLES)]
 
 
 def fit_figure(study: Study) -> Figure:
@@ -48,19 +63,25 @@ def _curves(axes: Axes, study: Study) -> None:
     deepest_mm = max(speed.max_depth_mm for speed in study.speeds)
     highest_N = max(speed.max_force_N for speed in study.speeds)
     for name, judged in study.judged.items():
-        _model_line(axes, name, judged, deepest_mm, (speeds[0], speeds[-1]))
+        end = _model_line(axes, look(name, study), judged, deepest_mm, (speeds[0], speeds[-1]))
+        if len(study.judged) <= MOST_LABELS:
+            label(axes, end, name, look(name, study)[0])
     _speed_key(axes, colors)
     axes.set_xlim(-0.06 * deepest_mm, deepest_mm * 1.16)
     axes.set_ylim(-0.04 * highest_N, highest_N * 1.12)
 
 
-def _model_line(axes: Axes, name: str, judged: Judged, deepest_mm: float, speeds_mm_s: tuple[float, float]) -> None:
+def _model_line(
+    axes: Axes, drawn: Look, judged: Judged, deepest_mm: float, speeds_mm_s: tuple[float, float]
+) -> tuple[float, float]:
+    """Draws the law between slowest and fastest speed; where its line ends."""
     depth = np.linspace(1e-9, deepest_mm, 200)
     slow, fast = (judged.law.force(depth, speed) for speed in speeds_mm_s)
     middle = (slow + fast) / 2
-    axes.fill_between(depth, slow, fast, color=COLORS[name], alpha=0.15, linewidth=0)
-    axes.plot(depth, middle, color=COLORS[name], linewidth=2.2, linestyle=STYLES[name], zorder=5)
-    label(axes, (deepest_mm, float(middle[-1])), name, COLORS[name])
+    color, style = drawn
+    axes.fill_between(depth, slow, fast, color=color, alpha=0.15, linewidth=0)
+    axes.plot(depth, middle, color=color, linewidth=2.2, linestyle=style, zorder=5)
+    return deepest_mm, float(middle[-1])
 
 
 def _speed_key(axes: Axes, colors: dict[float, str]) -> None:
@@ -73,13 +94,18 @@ def _speed_key(axes: Axes, colors: dict[float, str]) -> None:
 def _errors(axes: Axes, study: Study) -> None:
     dress(axes, "Worst error of predicted displacement", "given force, N", "error, % of measured displacement")
     for name, judged in study.judged.items():
+        color, style = look(name, study)
         x, y = _percent(judged.fitted)
-        axes.plot(x, y, color=COLORS[name], marker="o", markersize=5, linewidth=1.6, linestyle=STYLES[name])
+        worst = int(np.argmax(y))
+        told = f"{name}: {y[worst]:.3g} %"
+        axes.plot(x, y, color=color, marker="o", markersize=5, linewidth=1.6, linestyle=style, label=told)
         if judged.trials_left_out:
             left_x, left_y = _percent(judged.trials_left_out)
-            axes.plot(left_x, left_y, color=COLORS[name], marker="o", markersize=8, fillstyle="none", linewidth=0)
-        worst = int(np.argmax(y))
-        label(axes, (x[worst], y[worst]), f"{name}: {y[worst]:.3g} %", COLORS[name], beside="above right")
+            axes.plot(left_x, left_y, color=color, marker="o", markersize=8, fillstyle="none", linewidth=0)
+        if len(study.judged) <= MOST_LABELS:
+            label(axes, (x[worst], y[worst]), told, color, beside="above right")
+    if len(study.judged) > MOST_LABELS:
+        axes.legend(frameon=False, fontsize=SMALL_PT, labelcolor=INK, loc="upper right", bbox_to_anchor=(1.0, 0.92))
     axes.margins(x=0.08)
     axes.set_ylim(0, 1.18 * axes.get_ylim()[1])
     axes.text(
@@ -96,11 +122,15 @@ def _percent(errors: Errors) -> tuple[FloatArray, FloatArray]:
 
 def residual_figure(study: Study) -> Figure:
     """What each model leaves: modelled minus measured force over displacement, one line a trial."""
-    figure = new_figure(11.0, 3.6)
-    panels = figure.subplots(1, len(study.judged), sharey=True, squeeze=False)[0]
+    columns = min(len(study.judged), PANELS_A_ROW)
+    lines = -(-len(study.judged) // columns)
+    figure = new_figure(11.0, 3.6 * lines)
+    panels = figure.subplots(lines, columns, sharey=True, squeeze=False).ravel()
+    for axes in panels[len(study.judged) :]:
+        axes.remove()
     speeds = [speed.speed_mm_s for speed in study.speeds]
     colors = dict(zip(speeds, speed_colors(len(speeds)), strict=True))
-    for axes, (name, judged) in zip(panels, study.judged.items(), strict=True):
+    for axes, (name, judged) in zip(panels, study.judged.items(), strict=False):
         rmse_N = judged.fitted.rmse_N
         dress(axes, f"{name}: residual {rmse_N:.3g} N rms", "displacement from contact, mm", "modelled − measured, N")
         axes.axhline(0, color=INK, linewidth=0.8)

@@ -17,6 +17,7 @@ ROWS = 10
 LEVEL = 0.95
 JACKKNIFE_GROUPS = 5
 OVER_TRIALS, OVER_SUBJECTS = "jackknife over trials", "jackknife over subjects"
+UNKNOWN_SHARE = 0.3
 SMOOTH_MM = 0.5
 LEAST_SMOOTHED = 5
 LEAST_MEASURED_MM = 0.1
@@ -198,14 +199,37 @@ def _left_out(pairs: Sequence[tuple[Curve, Law]], origin: Mapping[str, float], f
 
 def _covariance(fit: LawFit, by_trial: Sequence[Law], by_subject: Sequence[Law]) -> tuple[FloatArray, str]:
     """Of the parameters, shape (p, p): by leaving out subjects or trials where there are enough, else residuals."""
+    from_residuals = _residual_covariance(fit)
     for laws, method in ((by_subject, OVER_SUBJECTS), (by_trial, OVER_TRIALS)):
         if len(laws) >= JACKKNIFE_GROUPS:
             values = np.array([law.values for law in laws])
             centred = values - values.mean(axis=0)
-            return np.asarray((len(laws) - 1) / len(laws) * centred.T @ centred), method
-    size = len(fit.law.values)
-    covariance = np.linalg.pinv(fit.information) * fit.variance_N2
-    return np.asarray(covariance[:size, :size], float), "least squares, residuals correlated along depth"
+            found = (len(laws) - 1) / len(laws) * centred.T @ centred
+            return _with_unknown(found, from_residuals, fit.law), method
+    return from_residuals, "least squares, residuals correlated along depth"
+
+
+def _residual_covariance(fit: LawFit) -> FloatArray:
+    """From the curvature of the sum of squares; a parameter the data say nothing of is uncertain by its whole range."""
+    ranges = np.array([0.0 if p.name in fit.known else p.upper - p.lower for p in fit.law.parameters])
+    free = np.flatnonzero(np.concatenate([ranges > 0, np.ones(len(fit.offsets_mm), bool)]))
+    weight = fit.information / max(fit.variance_N2, np.finfo(float).tiny)
+    fitted = np.flatnonzero(ranges)
+    weight[fitted, fitted] += ranges[fitted] ** -2
+    scale = 1.0 / np.sqrt(np.diag(weight)[free])
+    inverse = np.linalg.pinv(weight[np.ix_(free, free)] * np.outer(scale, scale), hermitian=True)
+    covariance = np.zeros((len(ranges), len(ranges)))
+    block = (inverse * np.outer(scale, scale))[: len(fitted), : len(fitted)]
+    covariance[np.ix_(fitted, fitted)] = block
+    return covariance
+
+
+def _with_unknown(covariance: FloatArray, from_residuals: FloatArray, law: Law) -> FloatArray:
+    """The covariance, but of parameters the data say nothing of as the residuals have it: they only stayed put."""
+    ranges = np.array([p.upper - p.lower for p in law.parameters])
+    unknown = np.sqrt(np.diag(from_residuals)) > UNKNOWN_SHARE * ranges
+    kept = np.where(unknown[:, None] | unknown, 0.0, covariance)
+    return np.asarray(kept + np.diag(np.where(unknown, np.diag(from_residuals), 0.0)))
 
 
 def student_reach(groups: int) -> float:
