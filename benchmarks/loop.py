@@ -2,19 +2,26 @@
 
 The real loop runs on the mock bench behind `rig serve`, pressing and recording; `cyclictest` (Debian: rt-tests) runs on
 the loop's core at the same rate and policy, one priority above, so that it sees the machine and not the loop. Phases
-alternate, idle and with the HTTP interface under load, in one run. What counts are the ratios.
+alternate, idle and with the HTTP interface under load (Debian: wrk), in one run. What counts are the
+ratios. The table and the JSON are written after every round: a run may be ended with Ctrl-C at any time.
+
+Loop to drive: from the loop's wake-up to the moment at which the mock drive's process has its SYNC and set-point, both
+on this computer's monotonic clock.
 """
 
 import argparse
+import contextlib
 import json
+import math
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from http.client import HTTPConnection
@@ -24,14 +31,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mock_devices.control import BenchControl
 from rig.channels import AXIS
 from rig.config.wiring import Loop
+from rig.recording.files import write_text
 from rig.recording.reader import read_recording
 from tests.system.stage import RIG, ROOT, Stage, stage
 
 PORT = 8123
 CLIENTS = 4
 SETTLING_S = 1.0
+# What a press takes besides its hold: homing is over, the rest is rest, approach and retraction.
+PRESS_S = 10.0
+COLLECT_S = 0.25
+Summary = dict[str, float | None]
 LEASE = {"holder": "benchmarks.loop", "ttl_s": 30.0}
 PROTOCOL = (
     'kind = "indentation"\nspeeds_mm_s = [20]\ntrials = 1\ndepth_mm = 6\nair_dwell_s = 0.2\napproach_speed_mm_s = 20\n'
@@ -45,12 +58,14 @@ class Load:
 
     wake_us: list[float] = field(default_factory=list)
     execution_us: list[float] = field(default_factory=list)
+    to_drive_us: list[float] = field(default_factory=list)
     answered_us: list[float] = field(default_factory=list)
     slots: int = 0
     missed: int = 0
     reference_us: list[float] = field(default_factory=list)
     requests: int = 0
     busy_s: float = 0.0
+    spoilt: int = 0
 
 
 class Service:
@@ -78,13 +93,18 @@ class Service:
         assert reply.status < 400, content
         return content
 
-    def press(self, name: str) -> Path:
-        """Runs the protocol into session ``name`` to its end; the recording."""
+    def press(self, name: str) -> Path | None:
+        """Runs the protocol into session ``name`` to its end; the recording, or None where it was stopped."""
         job = self.ask("POST", "/jobs", {"kind": "capture", "protocol": "hold", "session": name})["id"]
         while self.ask("GET", f"/jobs/{job}")["state"] == "running":
             self.ask("PUT", "/control/lease")
             time.sleep(0.5)
-        return self.folder / "sessions" / name / "trial_001.mcap"
+        ended = self.ask("GET", f"/jobs/{job}")
+        if ended["state"] == "succeeded":
+            return self.folder / "sessions" / name / "trial_001.mcap"
+        print(f"{name}: {ended['message']}", file=sys.stderr)
+        self.ask("POST", "/estop/reset")
+        return None
 
     def close(self) -> None:
         """Ends it."""
@@ -93,41 +113,65 @@ class Service:
 
 
 @contextmanager
-def hammered(load: Load, wanted: bool) -> Iterator[None]:
-    """CLIENTS connections that ask for the bench's state without pause, where ``wanted``."""
-    over = threading.Event()
-    counts = [0] * CLIENTS
-
-    def client(number: int) -> None:
-        connection = HTTPConnection("127.0.0.1", PORT, timeout=60)
-        while not over.is_set():
-            connection.request("GET", "/api/v1/rig")
-            connection.getresponse().read()
-            counts[number] += 1
-        connection.close()
-
-    threads = [threading.Thread(target=client, args=(number,)) for number in range(CLIENTS if wanted else 0)]
+def hammered(load: Load, seconds: float) -> Iterator[None]:
+    """CLIENTS connections that ask for the bench's state without pause for ``seconds``; 0: none."""
     began = time.monotonic()
-    for thread in threads:
-        thread.start()
+    command = ["wrk", "-t1", f"-c{CLIENTS}", f"-d{math.ceil(seconds)}s", f"http://127.0.0.1:{PORT}/api/v1/rig"]
+    client = subprocess.Popen(command, stdout=subprocess.PIPE, text=True) if seconds else None
     try:
         yield
     finally:
-        over.set()
-        for thread in threads:
-            thread.join()
-        load.requests += sum(counts)
-        load.busy_s += time.monotonic() - began
+        if client:
+            client.send_signal(signal.SIGINT)
+            out, _ = client.communicate(timeout=30)
+            load.requests += int(next(line for line in out.splitlines() if "requests in" in line).split()[0])
+            load.busy_s += time.monotonic() - began
 
 
-def take(load: Load, recording: Path) -> None:
-    """Adds what the recording's loop and axis streams say."""
+class Arrivals:
+    """Collects when the drive took its SYNCs, over a connection of its own."""
+
+    def __init__(self, address: str) -> None:
+        self.found_ns: list[int] = []
+        self._control = BenchControl(address)
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._collect)
+        self._thread.start()
+
+    def _collect(self) -> None:
+        while not self._over.wait(COLLECT_S):
+            self.found_ns += self._control.synced_ns()
+
+    def close(self) -> None:
+        """Ends it."""
+        self._over.set()
+        self._thread.join()
+        self._control.close()
+
+
+def delays_us(sent_ns: NDArray[np.int64], found_ns: list[int]) -> list[float]:
+    """Each SYNC with the first arrival after it that no earlier one has; both rise."""
+    delays, at = [], 0
+    for sent in sent_ns.tolist():
+        while at < len(found_ns) and found_ns[at] < sent:
+            at += 1
+        if at == len(found_ns):
+            break
+        delays.append((found_ns[at] - sent) / 1000)
+        at += 1
+    return delays
+
+
+def take(load: Load, recording: Path, found_ns: list[int]) -> None:
+    """Adds what the recording's loop and axis streams say, and when the drive heard of it."""
     tables = read_recording(recording).tables
     loop, axis = tables["loop"], tables[AXIS.name]
     loop = loop[loop["capture_ns"] > loop["capture_ns"][0] + SETTLING_S * 1e9]
+    axis = axis[axis["capture_ns"] >= loop["capture_ns"][0]]
     load.wake_us += (loop["wake_latency_ns"] / 1000).tolist()
     load.execution_us += (loop["execution_ns"] / 1000).tolist()
     load.answered_us += ((axis["arrival_ns"] - axis["capture_ns"]) / 1000).tolist()
+    load.to_drive_us += delays_us(axis["capture_ns"], found_ns)
     load.slots += int(loop["slot"][-1] - loop["slot"][0]) + 1
     load.missed += int(loop["missed"][-1] - loop["missed"][0])
 
@@ -143,7 +187,7 @@ def cyclictest(load: Load, seconds: float, core: int, priority: int, folder: Pat
         load.reference_us += [float(latency_us)] * int(count)
 
 
-def summary(load: Load, period_us: float) -> dict[str, float | None]:
+def summary(load: Load, period_us: float) -> Summary:
     """Percentiles, shares and ratios."""
 
     def at(values: list[float] | NDArray[np.float64], percent: float) -> float | None:
@@ -167,33 +211,55 @@ def summary(load: Load, period_us: float) -> dict[str, float | None]:
         "execution p50 us": at(load.execution_us, 50),
         "execution p99 us": execution,
         "execution p99 / slot": ratio(execution, period_us),
-        "command to drive's answer read p50 us": at(load.answered_us, 50),
-        "command to drive's answer read p99 us": at(load.answered_us, 99),
+        "loop to drive p50 us": at(load.to_drive_us, 50),
+        "loop to drive p99 us": at(load.to_drive_us, 99),
+        "loop to drive's answer read p50 us": at(load.answered_us, 50),
+        "loop to drive's answer read p99 us": at(load.answered_us, 99),
         "missed slots %": round(100 * load.missed / load.slots, 3) if load.slots else None,
         "cyclictest over a slot %": round(100 * len(late) / len(load.reference_us), 3) if load.reference_us else None,
+        "presses stopped by a stall": load.spoilt,
         "HTTP requests per s": round(load.requests / load.busy_s, 1) if load.busy_s else None,
     }
 
 
-def measure(seconds: float, rounds: int) -> dict[str, dict[str, float | None]]:
-    """Alternates loop and cyclictest, idle and under HTTP load."""
-    settings, loads = Loop(), {"idle": Load(), "http": Load()}
-    has_reference = shutil.which("cyclictest") is not None
-    if not has_reference:
+def measure(seconds: float, rounds: int, report: Callable[[dict[str, Summary]], None]) -> None:
+    """Alternates loop and cyclictest, idle and under HTTP load, and reports after every round."""
+    settings, loads = Loop(), {"idle": Load()}
+    if shutil.which("wrk"):
+        loads["http"] = Load()
+    else:
+        print("wrk is not here (Debian: apt install wrk): no load over HTTP", file=sys.stderr)
+    if shutil.which("cyclictest") is None:
         print("cyclictest is not here (Debian: apt install rt-tests): no ratios", file=sys.stderr)
-    core = max(os.sched_getaffinity(0))
-    with tempfile.TemporaryDirectory() as name, stage("--seed", "1") as bench:
-        service = Service(bench, Path(name), seconds)
-        try:
-            for turn in range(rounds):
-                for kind, load in loads.items():
-                    with hammered(load, kind == "http"):
-                        take(load, service.press(f"{kind}-{turn}"))
-                        if has_reference:
-                            cyclictest(load, seconds, core, settings.priority + 1, Path(name))
-        finally:
-            service.close()
-    return {kind: summary(load, 1e6 / settings.rate_Hz) for kind, load in loads.items()}
+    with (
+        tempfile.TemporaryDirectory() as name, stage("--seed", "1") as bench,
+        contextlib.closing(Service(bench, Path(name), seconds)) as service,
+    ):  # fmt: skip
+        for turn in range(rounds):
+            for kind, load in loads.items():
+                phase(bench, service, load, f"{kind}-{turn}", seconds, PRESS_S + seconds if kind == "http" else 0.0)
+            report({kind: summary(load, 1e6 / settings.rate_Hz) for kind, load in loads.items()})
+
+
+def phase(bench: Stage, service: Service, load: Load, name: str, seconds: float, hammered_s: float) -> None:
+    """One press with its recording, then cyclictest, under one load."""
+    with hammered(load, hammered_s), contextlib.closing(Arrivals(bench.endpoints["control"])) as arrivals:
+        recording = service.press(name)
+    if recording:
+        take(load, recording, arrivals.found_ns)
+    else:
+        load.spoilt += 1
+    if shutil.which("cyclictest"):
+        with hammered(load, seconds if hammered_s else 0.0):
+            cyclictest(load, seconds, max(os.sched_getaffinity(0)), Loop().priority + 1, service.folder)
+
+
+def say(found: dict[str, Summary]) -> None:
+    """The table, for people."""
+    print(f"{'':38}" + "".join(f"{kind:>12}" for kind in found))
+    for row in next(iter(found.values())):
+        cells = ("--" if value is None else f"{value:g}" for value in (column[row] for column in found.values()))
+        print(f"{row:38}" + "".join(f"{cell:>12}" for cell in cells), flush=True)
 
 
 def main() -> None:
@@ -203,13 +269,14 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=2)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    found = measure(options.seconds, options.rounds)
-    print(f"{'':38}" + "".join(f"{kind:>12}" for kind in found))
-    for row in next(iter(found.values())):
-        cells = ("--" if value is None else f"{value:g}" for value in (column[row] for column in found.values()))
-        print(f"{row:38}" + "".join(f"{cell:>12}" for cell in cells))
-    if options.json:
-        options.json.write_text(json.dumps(found, indent=2) + "\n")
+
+    def report(found: dict[str, Summary]) -> None:
+        say(found)
+        if options.json:
+            write_text(options.json, json.dumps(found, indent=2) + "\n")
+
+    with contextlib.suppress(KeyboardInterrupt):
+        measure(options.seconds, options.rounds, report)
 
 
 if __name__ == "__main__":

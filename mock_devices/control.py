@@ -7,6 +7,7 @@
     {"faults": true}                                                    {"faults": {device: {kind: meaning}}}
     {"hide": {"friction.level_N": 0.2}}                                 {"hide": [names]}; {} none, null defaults
     {"truth": true}                                                     {"truth": {effect: {parameter: value}}}
+    {"synced_ns": true}                                                 {"synced_ns": [times]}; each is said once
 
 A request that cannot be fulfilled is answered by {"error": sentence}.
 """
@@ -14,6 +15,7 @@ A request that cannot be fulfilled is answered by {"error": sentence}.
 import contextlib
 import json
 import socket
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Any, Self
@@ -27,6 +29,7 @@ from rig.errors import DeviceError, RigError, UsageError
 
 LINE_BYTES_MAX = 65536
 CLIENT_TIMEOUT_S = 10.0
+TIMES_A_LINE = 1000
 
 Answer = dict[str, Any]
 Faults = Mapping[str, Sequence[Mapping[str, Fault]]]
@@ -35,8 +38,9 @@ Faults = Mapping[str, Sequence[Mapping[str, Fault]]]
 class Desk:
     """Answers requests on ``bench`` and on the ``faults`` of its devices; knows no sockets."""
 
-    def __init__(self, bench: Bench, faults: Faults) -> None:
+    def __init__(self, bench: Bench, faults: Faults, synced_ns: deque[int] | None = None) -> None:
         self._bench = bench
+        self._synced_ns = deque[int]() if synced_ns is None else synced_ns
         self._faults = faults
         self._verbs: dict[str, Callable[[Any], Any]] = {
             "set": self._set,
@@ -46,6 +50,7 @@ class Desk:
             "faults": lambda _: self._list_faults(),
             "hide": self._hide,
             "truth": lambda _: self._bench.hidden,
+            "synced_ns": lambda _: [self._synced_ns.popleft() for _ in range(min(len(self._synced_ns), TIMES_A_LINE))],
         }
 
     def answer(self, line: bytes) -> bytes:
@@ -197,6 +202,10 @@ class BenchControl:
     def truth(self) -> dict[str, dict[str, float]]:
         """Effects that are on, with all their parameters."""
         return dict(self._ask("truth", True))
+
+    def synced_ns(self) -> list[int]:
+        """When the drive took SYNCs, on this computer's monotonic clock, those not asked for before; 1000 at most."""
+        return list(self._ask("synced_ns", True))
 
     def _ask(self, verb: str, argument: object) -> Any:
         try:

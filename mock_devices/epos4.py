@@ -5,6 +5,7 @@ and end in fault (object 6007), the node then leaves Operational (object 1029); 
 """
 
 import struct
+from collections import deque
 
 from drivers.can.slcan import CanFrame
 from drivers.canopen.nmt import EMERGENCY_ID, HEARTBEAT_ID, SDO_REQUEST_ID, SDO_RESPONSE_ID, SYNC, NmtCommand, NmtState
@@ -23,6 +24,7 @@ BOOT_NS = 50 * MS
 PROFILE_NS = MS
 WATCH_NS = 10 * MS
 LONGEST_STEP_NS = 20 * MS
+SYNCS_KEPT = 10_000
 HEARTBEAT_LOST = 0x8130
 STRANGE_VENDOR, STRANGE_PRODUCT = 0x0000_024A, 0x0001_0002
 
@@ -65,6 +67,8 @@ class Epos4Mock:
         self._moved_ns = start_ns
         self._now_ns = start_ns
         self._consumed: dict[int, int] = {}
+        self.synced_ns: deque[int] = deque(maxlen=SYNCS_KEPT)
+        """When SYNCs came, on the bench's clock; whoever wants them takes them out."""
         self._connect()
 
     @property
@@ -145,6 +149,7 @@ class Epos4Mock:
         can_id, data = frame.can_id, frame.data
         if can_id == SYNC.can_id:
             if self.nmt is NmtState.OPERATIONAL:
+                self.synced_ns.append(self._now_ns)
                 self._pdo.sync()
         elif can_id in self._pdo.rpdos:
             if self.nmt is NmtState.OPERATIONAL:

@@ -21,6 +21,7 @@ from typing import Protocol
 from mock_devices.bench import Bench
 from mock_devices.control import ControlPort, Desk
 from mock_devices.devices import FORCE_CHOICES, Device, Workshop
+from mock_devices.epos4 import Epos4Mock
 from mock_devices.faults import Fault
 from mock_devices.parameters import Parameters, load_parameters
 from mock_devices.physics.effects import EFFECTS, complete, knobs, parse_hidden, statement
@@ -56,7 +57,9 @@ class Server:
         self._timed: list[Timed] = [*self._mocks, *(device.wire for device in devices)]
         self._devices = devices
         self._clock_ns = clock_ns
-        self.control = ControlPort(Desk(bench, _by_role(devices)).answer)
+        drives = [mock for mock in self._mocks if isinstance(mock, Epos4Mock)]
+        synced_ns = drives[0].synced_ns if drives else None
+        self.control = ControlPort(Desk(bench, _by_role(devices), synced_ns).answer)
 
     def endpoints(self) -> dict[str, object]:
         """Address of each device by role and kind of port, of the control channel, and this process' id."""

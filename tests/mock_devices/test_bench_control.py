@@ -4,6 +4,7 @@ import select
 import socket
 import threading
 import tomllib
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -42,6 +43,13 @@ def test_figures_are_read_by_name(desk: Desk) -> None:
     assert ask(desk, {"get": ["tip.force_N", "axis.position_mm", "time_s", "tissue.present"]}) == {
         "get": {"tip.force_N": 0.0, "axis.position_mm": 5.0, "time_s": 0.0, "tissue.present": True}
     }
+
+
+def test_times_at_which_the_drive_was_synced_are_told_once() -> None:
+    desk = Desk(quiet_bench(), {}, deque(range(1200)))
+    assert ask(desk, {"synced_ns": True})["synced_ns"] == list(range(1000))
+    assert ask(desk, {"synced_ns": True})["synced_ns"] == list(range(1000, 1200))
+    assert ask(desk, {"synced_ns": True})["synced_ns"] == []
 
 
 def test_the_limb_is_moved_stiffened_and_removed_while_running() -> None:

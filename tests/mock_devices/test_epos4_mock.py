@@ -239,6 +239,14 @@ def test_a_pdo_is_mapped_while_it_is_off_and_comes_with_each_sync(stage: Stage) 
     assert exchange(stage, b"t0800\rt0800\r") == b"z\rz\r" + b"t1816500200000000\r" * 2
 
 
+def test_the_time_of_every_sync_that_is_obeyed_is_kept(stage: Stage) -> None:
+    exchange(stage, b"t0800\r")
+    assert list(stage.mock.synced_ns) == []
+    exchange(stage, b"t00020101\r")
+    exchange(stage, b"t0800\rt0800\r")
+    assert list(stage.mock.synced_ns) == [stage.now(), stage.now()]
+
+
 def test_a_pdo_of_type_3_comes_with_every_third_sync(stage: Stage) -> None:
     for index, sub, size, value in PDO_MAPPING[:-1]:
         download(stage, index, sub, size, value)
