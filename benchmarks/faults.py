@@ -1,14 +1,19 @@
 """Every fault at random moments in contact: `python -m benchmarks.faults [--trials 20] [--only axis.cut ...]`.
 
+With `--json FILE` every trial is written as soon as it is done, and trials that FILE holds already are not done again:
+a campaign may be ended at any time (or by `--minutes`) and gone on with later. Its moments depend on seed, fault and
+number alone.
+
 Each trial has a fresh bench and loop, presses 1 to 3 N with the force loop while recording, and brings one fault about
 at a random moment. Printed per fault: how long until the loop noticed, the largest true force and by how much it went
-over the limit, how it ended, and what the recording lost. A trial is unsafe if force went over the limit, or if the
-tip still moves afterwards.
+over the limit, how it ended, what the recording lost. Noticed is what comes first: the loop's own stop, or the drive
+taking its torque away by itself. A trial is unsafe if force went over the limit, or if the tip still moves afterwards.
 """
 
 import argparse
 import contextlib
 import json
+import math
 import os
 import random
 import signal
@@ -17,7 +22,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,8 +34,9 @@ from controller.steps import Program
 from controller.supervisor import Supervisor
 from mock_devices.control import BenchControl
 from mock_devices.faults import Value
-from rig.config.wiring import Wiring
-from rig.errors import RigError, UsageError
+from rig.config.wiring import Loop, Wiring
+from rig.errors import DeviceError, RigError, UsageError
+from rig.recording.files import write_text
 from rig.recording.reader import read_recording
 from tests.controller.models import index_model
 from tests.system.stage import Stage, children, stage
@@ -38,6 +44,8 @@ from tests.system.stage import Stage, children, stage
 MODEL = index_model(0.12, 0.22, 0.01, force_N=11.0)
 PRESSES = named("press:2,base_N=1,frequency_Hz=1,duration_s=5")
 LATEST_S = 2.5
+# The bench is a process of the same computer: samples are counted lost by age, see docs/control.md.
+WIRING = Wiring(loop=Loop(missed_periods=0))
 REST_S, STILL_MM = 0.3, 0.03
 ATTEMPTS = 5
 # Faults that need another value than their own default to show while the bench runs.
@@ -52,6 +60,7 @@ class Trial:
     """What one fault did once; times in s from the fault, forces are the tissue's own."""
 
     fault: str
+    number: int
     moment_s: float
     detected_s: float | None
     cause: str
@@ -68,10 +77,11 @@ class Spoilt(RigError):
 
 
 class Watcher:
-    """Polls true force and position beside the run, over a connection of its own."""
+    """Polls true force and the drive's torque beside the run, over a connection of its own."""
 
     def __init__(self, address: str) -> None:
         self.peak_N = 0.0
+        self.unpowered_ns: int | None = None
         self._over = threading.Event()
         self._control = BenchControl(address)
         self._thread = threading.Thread(target=self._watch)
@@ -79,7 +89,12 @@ class Watcher:
 
     def _watch(self) -> None:
         while not self._over.wait(0.001):
-            self.peak_N = max(self.peak_N, self._control.number("tip.force_N"))
+            now = self._control.get("tip.force_N", "axis.powered")
+            self.peak_N = max(self.peak_N, float(now["tip.force_N"]))
+            if now["axis.powered"]:
+                self.unpowered_ns = None
+            elif self.unpowered_ns is None:
+                self.unpowered_ns = time.monotonic_ns()
 
     def close(self) -> None:
         """Ends it."""
@@ -125,10 +140,11 @@ def _set(bench: Stage, name: str, value: Value) -> None:
     bench.control.set({name: value})
 
 
-def trial(fault: str, act: Act, moment_s: float, seed: int, folder: Path) -> Trial:
-    """One run with one fault."""
-    with stage("--seed", str(seed)) as bench:
-        wiring = plugged(Wiring(), bench.endpoints)
+def trial(fault: str, act: Act, number: int, seed: int, folder: Path) -> Trial:
+    """One run with one fault, at the moment that seed, fault and number say."""
+    moment_s = random.Random(f"{seed} {fault} {number}").uniform(0.0, LATEST_S)
+    with stage("--seed", str(seed + number)) as bench:
+        wiring = plugged(WIRING, bench.endpoints)
         program = tracked.plan_reference(PRESSES, MODEL, wiring)
         with Supervisor(wiring) as rig, contextlib.closing(Watcher(bench.endpoints["control"])) as watcher:
             ended: list[str] = []
@@ -142,10 +158,10 @@ def trial(fault: str, act: Act, moment_s: float, seed: int, folder: Path) -> Tri
                 act(bench, rig)
             runner.join()
             end, unsafe = _end(bench)
-            peak_N = watcher.peak_N
     if spoilt:
         raise Spoilt(ended[0])
-    return _judged(fault, moment_s, happened_ns, folder, ended, end, unsafe, peak_N, wiring.force_limit_N)
+    seen = Trial(fault, number, round(moment_s, 3), None, ended[0], watcher.peak_N, 0.0, end, unsafe, 0, True)
+    return _judged(seen, happened_ns, watcher.unpowered_ns, folder)
 
 
 def _run(rig: Supervisor, program: Program, folder: Path, ended: list[str]) -> None:
@@ -176,52 +192,46 @@ def _end(bench: Stage) -> tuple[str, str]:
     return place, f"still moves, {moved_mm:.2f} mm in {REST_S:g} s" if moved_mm > STILL_MM else ""
 
 
-def _judged(
-    fault: str, moment_s: float, happened_ns: int, folder: Path, ended: list[str], end: str, unsafe: str,
-    peak_N: float, limit_N: float,
-) -> Trial:  # fmt: skip
+def _judged(seen: Trial, happened_ns: int, unpowered_ns: int | None, folder: Path) -> Trial:
+    """What was seen from outside, with what the recording says of it."""
     recording = read_recording(folder / "track_001.mcap")
     stops = [event for event in recording.events if event.level >= 30 and event.capture_ns > happened_ns]
-    over_N = max(0.0, peak_N - limit_N)
-    unsafe = "; ".join(part for part in (unsafe, f"{over_N:.2f} N over the limit" if over_N else "") if part)
+    first_ns = [*(event.capture_ns for event in stops[:1]), *([unpowered_ns] if unpowered_ns else [])]
+    over_N = max(0.0, seen.peak_N - WIRING.force_limit_N)
+    unsafe = "; ".join(part for part in (seen.unsafe, f"{over_N:.2f} N over the limit" if over_N else "") if part)
     loop = recording.tables["loop"]
-    lost = int(np.sum(np.diff(loop["seq"]) - 1)) if len(loop) > 1 else 0
-    return Trial(
-        fault=fault,
-        moment_s=round(moment_s, 3),
-        detected_s=(stops[0].capture_ns - happened_ns) * 1e-9 if stops else None,
-        cause=stops[0].code if stops else ended[0],
-        peak_N=peak_N,
+    return replace(
+        seen,
+        detected_s=(min(first_ns) - happened_ns) * 1e-9 if first_ns else None,
+        cause=stops[0].code if stops else seen.cause,
         over_N=over_N,
-        end=end,
         unsafe=unsafe,
-        dropped=lost,
+        dropped=int(np.sum(np.diff(loop["seq"]) - 1)) if len(loop) > 1 else 0,
         complete=recording.complete and not recording.damage,
     )
 
 
-def campaign(wanted: Sequence[str], trials: int, seed: int) -> Iterator[list[Trial]]:
-    """The trials of one fault after another."""
-    with stage("--seed", str(seed)) as bench:
-        known = faults(bench.control)
-    unknown = [name for name in wanted if name not in known]
-    if unknown:
-        raise UsageError(f"--only {unknown[0]}: there are {', '.join(known)}")
-    rng = random.Random(seed)
-    for fault in wanted or known:
-        done = []
-        for number in range(trials):
-            done.append(_repeated(fault, known[fault], rng, seed + number))
-        yield done
+def known_faults() -> dict[str, Act]:
+    """All there are, asked of a bench."""
+    with stage("--seed", "1") as bench:
+        return faults(bench.control)
 
 
-def _repeated(fault: str, act: Act, rng: random.Random, seed: int) -> Trial:
+def missing(fault: str, act: Act, options: argparse.Namespace, done: Sequence[Trial]) -> Iterator[Trial]:
+    """The trials of one fault that are not among ``done``."""
+    over = {one.number for one in done if one.fault == fault}
+    for number in range(options.trials):
+        if number not in over:
+            yield _repeated(fault, act, number, options.seed)
+
+
+def _repeated(fault: str, act: Act, number: int, seed: int) -> Trial:
     """A trial whose run lives to see its fault; those that do not are said on stderr and done again."""
     for _ in range(ATTEMPTS):
         try:
             with tempfile.TemporaryDirectory() as name:
-                return trial(fault, act, rng.uniform(0.0, LATEST_S), seed, Path(name) / "session")
-        except Spoilt as cause:
+                return trial(fault, act, number, seed, Path(name) / "session")
+        except (Spoilt, DeviceError) as cause:
             print(f"{fault}: ended before its fault: {cause}", file=sys.stderr)
     raise UsageError(f"{fault}: {ATTEMPTS} runs ended before their fault: is the computer busy?")
 
@@ -244,28 +254,57 @@ def line(done: Sequence[Trial]) -> str:
     )
 
 
+def read(file: Path | None) -> list[Trial]:
+    """The trials in ``file``; raises UsageError where it holds something else."""
+    if file is None or not file.exists():
+        return []
+    try:
+        return [Trial(**one) for one in json.loads(file.read_text())]
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"{file}: holds no trials of this benchmark ({error}); give another file") from error
+
+
+def run(options: argparse.Namespace) -> list[Trial]:
+    """Runs what is missing, writes each trial, and prints the line of each fault once it is complete."""
+    done, known = read(options.json), known_faults()
+    unknown = [name for name in options.only if name not in known]
+    if unknown:
+        raise UsageError(f"--only {unknown[0]}: there are {', '.join(known)}")
+    acts = {name: act for name, act in known.items() if name in options.only or not options.only}
+    until_s = time.monotonic() + 60 * options.minutes
+    print(HEADER, flush=True)
+    for fault, act in acts.items():
+        for one in missing(fault, act, options, list(done)):
+            done.append(one)
+            if options.json:
+                write_text(options.json, json.dumps([asdict(each) for each in done], indent=2) + "\n")
+            if time.monotonic() > until_s:
+                break
+        mine = [one for one in done if one.fault == fault]
+        if mine:
+            print(line(mine), flush=True)
+        if time.monotonic() > until_s:
+            break
+    return done
+
+
 def main() -> int:
     """Runs and prints; 1 where any trial ended unsafe. A recorder that was killed leaves an open, readable file."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.faults", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--trials", type=int, default=20)
     parser.add_argument("--only", nargs="*", default=[], help="faults by name, for example axis.cut")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="ends after the trial under way then")
+    parser.add_argument("--json", type=Path, help="every trial; those it holds already are not done again")
     options = parser.parse_args()
-    everything: list[Trial] = []
-    print(HEADER)
     try:
-        for done in campaign(options.only, options.trials, options.seed):
-            everything += done
-            print(line(done), flush=True)
+        everything = run(options)
     except RigError as error:
         print(error, file=sys.stderr)
         return error.exit_code
     unsafe = [one for one in everything if one.unsafe]
     broken = [one for one in everything if not one.complete]
     print(f"{len(everything)} trials, {len(unsafe)} unsafe ends, {len(broken)} recordings not closed or damaged")
-    if options.json:
-        options.json.write_text(json.dumps([asdict(one) for one in everything], indent=2) + "\n")
     return 1 if unsafe else 0
 
 
