@@ -1,6 +1,6 @@
 """What `rig fit` prints and writes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
@@ -55,10 +55,17 @@ def _known(text: str, laws: Sequence[type[Law]]) -> tuple[str, float]:
 
 
 def fit_and_write(
-    folders: Sequence[Path], out: Path | None = None, wanted: Wanted | None = None, lattice: bool = False
+    folders: Sequence[Path],
+    out: Path | None = None,
+    wanted: Wanted | None = None,
+    lattice: tuple[str, str] | None = None,
 ) -> dict[str, object]:
-    """Fits the sessions, prints tables, writes to ``out`` or the one session's fit/; the JSON of it all."""
+    """Fits the sessions, prints tables, writes to ``out`` or the one session's fit/; the JSON of it all.
+
+    ``lattice`` are its block and springs as the command takes them; None leaves it out.
+    """
     wanted, target = wanted or Wanted(), _target(folders, out)
+    simulate = _lattice(*lattice) if lattice else None
     sessions = [open_session(folder) for folder in folders]
     with console.status("fitting"):
         study = study_sessions(sessions, wanted.laws, wanted.known)
@@ -66,7 +73,7 @@ def fit_and_write(
     _write(study, sessions, target, wanted.saved)
     console.print(f"fit.png, fit.svg, residuals.png, table.csv and model.json are in {target}", highlight=False)
     result = as_json(study) | {"model": str(target / "model.json")}
-    return result | {"lattice": _lattice(study, target)} if lattice else result
+    return result | {"lattice": simulate(study, target)} if simulate else result
 
 
 def _target(folders: Sequence[Path], out: Path | None) -> Path:
@@ -75,10 +82,11 @@ def _target(folders: Sequence[Path], out: Path | None) -> Path:
     return out or folders[0] / "fit"
 
 
-def _lattice(study: Study, target: Path) -> dict[str, object]:
-    from api.cli.lattice import fit_lattice  # noqa: PLC0415 - compiled kernels take seconds to load
+def _lattice(block: str, springs: str) -> Callable[[Study, Path], dict[str, object]]:
+    from api.cli.lattice import chosen, fit_lattice  # noqa: PLC0415 - compiled kernels take seconds to load
 
-    return fit_lattice(study, target)
+    size, mode = chosen(block, springs)
+    return lambda study, target: fit_lattice(study, target, size, mode)
 
 
 def _write(study: Study, sessions: Sequence[Session], target: Path, law: str) -> None:

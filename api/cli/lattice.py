@@ -1,14 +1,17 @@
 """What `rig fit --lattice` adds: tables, picture and numbers of the mass-spring lattice."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
+from typing import get_args
 
 from rich.progress import Progress
 
 from api.cli.fitting import print_control, worst_errors
 from api.cli.output import console, table, write_json
+from rig.errors import UsageError
 from rig.recording.files import whole_file
 from rig.report.drawing import png
 from rig.report.lattice_figures import lattice_figure
@@ -20,6 +23,20 @@ from rig.tissue.lattice_study import LatticeStudy, lattice_study
 from rig.tissue.lattice_study import Progress as Tell
 from rig.tissue.results import errors_json
 from rig.tissue.study import Study
+
+BLOCK = re.compile(r"(\d+)x(\d+)x(\d+)(?:@(\d+(?:\.\d*)?|\.\d+))?")
+
+
+def chosen(block: str, springs: str) -> tuple[Block, Mode]:
+    """Block and mode from the command's options; raises UsageError for what is neither."""
+    found = BLOCK.fullmatch(block.strip())
+    if not found:
+        raise UsageError(f"--block {block}: write vertices in x, y and z and their spacing in mm, like 51x51x40@1")
+    if springs not in get_args(Mode):
+        raise UsageError(f"--springs {springs}: choose {' or '.join(get_args(Mode))}")
+    nx, ny, nz = (int(number) for number in found.groups()[:3])
+    mode: Mode = "study" if springs == "study" else "stabilised"
+    return Block((nx, ny, nz), spacing_mm=float(found[4] or 1.0)), mode
 
 
 def fit_lattice(

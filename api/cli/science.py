@@ -25,6 +25,12 @@ def fit(
     ] = None,
     model: Annotated[str, typer.Option("--model", help="The law that model.json holds.")] = "index",
     lattice: Annotated[bool, typer.Option("--lattice", help="Also the mass-spring lattice, spring by spring.")] = False,
+    block: Annotated[
+        str, typer.Option("--block", help="Vertices of the lattice and their spacing in mm: 51x51x40@1, the study's.")
+    ] = "51x51x40@1",
+    springs: Annotated[
+        str, typer.Option("--springs", help="`stabilised` keeps cells from turning over; `study` is springs alone.")
+    ] = "stabilised",
     json_file: JsonOption = None,
 ) -> None:
     """Fits constant stiffness, the index model and other tissue laws to sessions, and says how wrong each is.
@@ -36,7 +42,8 @@ def fit(
     """
     from api.cli.fitting import Wanted, fit_and_write  # noqa: PLC0415
 
-    write_json(json_file, fit_and_write(session, out, Wanted.from_options(laws, known or [], model), lattice))
+    wanted = Wanted.from_options(laws, known or [], model)
+    write_json(json_file, fit_and_write(session, out, wanted, (block, springs) if lattice else None))
 
 
 def fit_session(session: Path) -> dict[str, object]:

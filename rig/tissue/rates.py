@@ -20,6 +20,7 @@ STUDY_B_N_S_MM = 1.3
 _DEPTHS = 40
 _SHALLOWEST_MM = 0.2
 _DRAWS = 2000
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ def rate_test(curves: Sequence[Curve], seed: int = 0) -> RateTest:
     return RateTest(
         slope,
         interval,
-        float((np.count_nonzero(np.abs(shuffled) >= abs(slope)) + 1) / (_DRAWS + 1)),
+        float((np.count_nonzero(np.abs(shuffled) >= abs(slope) * (1 - ROUNDING)) + 1) / (_DRAWS + 1)),
         len(curves),
         tuple(float(speed) for speed in np.unique(speeds)),
         slope * float(np.ptp(speeds)),

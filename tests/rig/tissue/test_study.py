@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rig.errors import DataError
+from rig.errors import DataError, UsageError
 from rig.recording.importing import import_session
-from rig.recording.sessions import open_session
+from rig.recording.sessions import Session, open_session
+from rig.tissue.laws_viscous import QuasiLinear
 from rig.tissue.model import load_model
+from rig.tissue.registry import COMPARED
 from rig.tissue.results import as_csv, as_json
-from rig.tissue.study import Study, fingerprint, model_of, rows, study_session
+from rig.tissue.study import Study, fingerprint, model_of, rows, study_curves, study_session, study_sessions
 from tests.rig.tissue.synthetic import Bench, index_force, metadata, tables, write_made_session, write_recording
 
 
@@ -97,6 +99,72 @@ def test_the_model_carries_range_data_and_quality(study: Study, tmp_path: Path) 
     assert (model.data.subject, model.data.site) == ("7", "forearm")
     assert model.quality.held_out_max_error_mm is not None
     model.check_force(model.valid.force_N)
+
+
+def test_the_table_a_controller_reads_is_in_the_json_and_in_the_model(study: Study, tmp_path: Path) -> None:
+    model_of(study, "index", {}).save(tmp_path / "model.json")
+    model = load_model(tmp_path / "model.json")
+    assert [row.force_N for row in model.control] == pytest.approx(study.force_N)
+    values = json.loads(json.dumps(as_json(study)))
+    assert values["index"]["control"] == [row.model_dump() for row in model.control]
+    law, low_B, high_B = model.law, *model.intervals["B_N_s_mm"]
+    for row in model.control:
+        assert float(law.force(row.depth_mm)) == pytest.approx(row.force_N)
+        assert row.secant_N_mm == pytest.approx(row.force_N / row.depth_mm)
+        assert row.tangent_N_mm == pytest.approx(model.tangent_N_mm(row.depth_mm))
+        assert row.tangent_low_N_mm < row.tangent_N_mm < row.tangent_high_N_mm
+        assert (row.damping_low_N_s_mm, row.damping_high_N_s_mm) == pytest.approx((low_B, high_B))
+
+
+def test_the_json_says_whether_speeds_differ(study: Study) -> None:
+    rate = json.loads(json.dumps(as_json(study)))["rate"]
+    assert rate["interval"][0] < 0.01 < rate["interval"][1]
+    assert rate["excludes_study"] is True
+    assert rate["effect_interval_N"][0] < rate["effect_N"] < rate["effect_interval_N"][1]
+
+
+def subject_session(folder: Path, subject: str, a_N_mm: float) -> Session:
+    """Three trials at two speeds on a subject of its own."""
+    bench = Bench(force=index_force(a_N_mm=a_N_mm), rate_Hz=500.0)
+    strokes = [bench.stroke(speed, number) for number, speed in enumerate((5.0, 20.0, 20.0))]
+    return open_session(write_made_session(folder / subject, strokes, subject={"id": subject}))
+
+
+def test_each_subject_is_left_out_where_there_are_several(tmp_path: Path) -> None:
+    sessions = [subject_session(tmp_path, name, a) for name, a in (("soft", 0.08), ("usual", 0.12), ("stiff", 0.16))]
+    study = study_sessions(sessions)
+    judged = study.judged["index"]
+    assert judged.subjects_left_out is not None
+    assert judged.trials_left_out is not None
+    assert judged.subjects_left_out.measured_mm.shape == (9, 10)
+    assert judged.subjects_left_out.rmse_N > 1.2 * judged.trials_left_out.rmse_N
+    assert as_json(study)["index"]["held_out"]["subjects"]["rmse_N"] == judged.subjects_left_out.rmse_N  # type: ignore[index]
+    assert study.curves[0].name == f"{tmp_path / 'soft'}/trial_000"
+    table = list(csv.DictReader(io.StringIO(as_csv(study))))
+    assert float(table[0]["index_error_subject_left_out_mm"]) > 0
+    assert study.rate is not None
+    assert study.rate.B_N_s_mm == pytest.approx(0.01, abs=0.003)
+
+
+def test_two_sessions_of_one_subject_leave_no_subject_out(tmp_path: Path) -> None:
+    sessions = [subject_session(tmp_path / day, "7", 0.12) for day in ("monday", "tuesday")]
+    study = study_sessions(sessions)
+    assert len(study.curves) == 6
+    assert study.judged["index"].subjects_left_out is None
+
+
+def test_a_session_given_twice_is_refused(tmp_path: Path) -> None:
+    session = subject_session(tmp_path, "7", 0.12)
+    with pytest.raises(UsageError, match=r"7 is given twice; give each session once"):
+        study_sessions([session, session])
+
+
+def test_other_laws_are_judged_beside_the_study_s_two(study: Study) -> None:
+    more = study_curves("made", study.curves, laws=[*COMPARED, QuasiLinear], known={"tau_s": 0.5})
+    assert list(more.judged) == ["constant", "index", "qlv"]
+    values = as_json(more)["qlv"]["parameters"]["tau_s"]  # type: ignore[index]
+    assert (values["value"], values["known"], values["standard_error"]) == (0.5, True, 0.0)
+    assert more.judged["index"].law == study.judged["index"].law
 
 
 def test_the_fingerprint_is_of_the_data(study: Study) -> None:
