@@ -10,7 +10,7 @@ from collections.abc import Callable
 from controller.modes import Mode
 from controller.motion import Setpoint, arrived, toward
 from controller.safety import Action, Incident, Watch, judge
-from controller.steps import Program, Run
+from controller.steps import Program, Run, Step
 from controller.world import World
 from rig.config.wiring import Wiring
 from rig.errors import SafetyStop
@@ -29,13 +29,18 @@ class Machine:
         self.step_index = -1
         self._program: Program | None = None
         self._run: Run | None = None
-        self._step_start_ns = 0
+        self.step_start_ns = 0
         self._escape_mm = math.nan
 
     @property
     def busy(self) -> bool:
         """Whether a program or a retraction is under way."""
         return self._program is not None or self.mode in MOVING
+
+    @property
+    def step(self) -> Step | None:
+        """The step under way."""
+        return self._program.steps[self.step_index] if self._program else None
 
     def start(self, program: Program) -> None:
         """Begins a program at the present position."""
@@ -103,7 +108,7 @@ class Machine:
         world.peak_force_N = max(world.peak_force_N, world.force_N)
         assert self._run and self._program
         try:
-            over = self._run.advance(world, (world.now_ns - self._step_start_ns) * 1e-9)
+            over = self._run.advance(world, (world.now_ns - self.step_start_ns) * 1e-9)
         except SafetyStop as stop:
             refused = Incident(Action.SOFT, "protocol", str(stop))
             self._stop(refused)
@@ -133,7 +138,7 @@ class Machine:
             return
         step = self._program.steps[index]
         self._run, self.mode, self.step_index = step.begin(), step.mode, index
-        self._step_start_ns = self.world.now_ns
+        self.step_start_ns = self.world.now_ns
 
     def _end(self, outcome: str, incident: Incident | None) -> None:
         had_program = self._program is not None

@@ -1,36 +1,37 @@
 """The bench on a virtual clock: the machine, its steps and the force law as they run on the bench, against the plant.
 
-``run`` plays a whole program through the machine. ``follow`` plays the force law alone, compiled together with the
-plant, for sweeps over subjects and gains; both call the same functions of `force_position`.
+``run`` plays a whole program through the machine; stretches of it in which nothing is to be decided are played by the
+same functions compiled together with the plant (`stretches`). ``follow`` plays the force law alone, for sweeps.
 """
 
-from collections import deque
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from controller import force_position
-from controller.compiled import compiled
-from controller.force_position import Columns, Settings
+from controller import force_position, stretches
+from controller.force_position import Columns
 from controller.machine import Machine
 from controller.modes import Mode
+from controller.motion import Setpoint
 from controller.safety import Incident, Watch
-from controller.steps import Program, TrackForce
+from controller.steps import Approach, Program, Retract, TrackForce
+from controller.stretches import Bench, Bounds, Clock, Move, Plant, Speeds, Stretch, Zeros, hold_compiled
 from controller.world import World
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed
 from rig.simulation import axis_plant
-from rig.simulation.axis_plant import AxisState, Limb, Motor, PositionLoop, Sensing, at_rest
+from rig.simulation.axis_plant import Limb, Motor, PositionLoop, Sensing, at_rest
 from rig.tissue.model import Model
 
 Column = NDArray[np.float64]
 CURVE_POINTS = 400
 BEYOND = 2.0
 LONGEST_S = 600.0
+LONGEST_STRETCH = 10_000
+DRAWN = 20_000
 MOTOR, POSITION_LOOP, SENSING = Motor(), PositionLoop(), Sensing()
 
 
@@ -66,102 +67,159 @@ def limb_of(model: Model, stiffness: float = 1.0, breathing_mm: float = 0.0, bre
     return Limb(depths, forces, model.damping_N_s_mm, breathing_mm=breathing_mm, breathing_Hz=breathing_Hz)
 
 
-@cache
-def _hold() -> Callable[..., AxisState]:
-    parts: dict[str, object] = {}
-    for function in (axis_plant.surface, axis_plant.tissue_force, axis_plant.wanted_current, axis_plant.dry):
-        parts[function.__name__] = compiled(function)
-    parts["step"] = compiled(axis_plant.step, parts)
-    return compiled(axis_plant.hold, parts)
+def run(program: Program, wiring: Wiring, bench: SimulatedBench, stretched: bool = True) -> Trace:
+    """Plays ``program`` to its end, safety table included; raises CheckFailed where a limit stops it.
+
+    Without ``stretched`` every tick goes through the state machine, with the same result.
+    """
+    return _Playback(program, wiring, bench).play(stretched)
 
 
-@cache
-def _law() -> Callable[..., tuple[float, force_position.Memory]]:
-    parts: dict[str, object] = {"interpolate": compiled(force_position.interpolate)}
-    parts["foresee"] = compiled(force_position.foresee, parts)
-    parts["adapt"] = compiled(force_position.adapt, parts)
-    return compiled(force_position.increment, parts)
+class _Playback:
+    """One run: the machine tick by tick, and stretches of ticks between in machine code."""
 
+    def __init__(self, program: Program, wiring: Wiring, bench: SimulatedBench) -> None:
+        self._wiring, self._period_s = wiring, 1.0 / wiring.loop.rate_Hz
+        self._plant = Plant(bench.motor, bench.loop, bench.limb, bench.sensing)
+        start_mm = wiring.limits.position_min_mm + 10.0
+        late = bench.sensing.delay_ticks + 1
+        self._now = Bench(at_rest(start_mm), np.zeros(late), 0.0, Setpoint(start_mm, 0.0))
+        self._tick, self._random, self._noise = 0, np.random.default_rng(bench.seed), np.empty(0)
+        self._parts: list[Column] = []
+        self._ended: list[Incident | None] = []
+        acceleration = wiring.axis.acceleration_mm_s2
+        self._world = World(dt_s=self._period_s, acceleration_mm_s2=acceleration, position_mm=start_mm)
+        self._machine = Machine(wiring, self._world, lambda _, incident: self._ended.append(incident))
+        self._machine.start(program)
+        self._law: tuple[TrackForce, Columns] | None = None
 
-def run(program: Program, wiring: Wiring, bench: SimulatedBench) -> Trace:
-    """Plays ``program`` to its end, safety table included; raises CheckFailed where a limit stops it."""
-    period_s = 1.0 / wiring.loop.rate_Hz
-    steps = round(period_s / axis_plant.STEP_S)
-    state = at_rest(wiring.limits.position_min_mm + 10.0)
-    world = World(dt_s=period_s, acceleration_mm_s2=wiring.axis.acceleration_mm_s2, position_mm=state.position_mm)
-    ended: list[Incident | None] = []
-    machine = Machine(wiring, world, lambda _, incident: ended.append(incident))
-    machine.start(program)
-    watch, rows = Watch(), []
-    noise = np.random.default_rng(bench.seed).standard_normal(round(LONGEST_S / period_s)).tolist()
-    sensed = deque([0.0] * (bench.sensing.delay_ticks + 1), maxlen=bench.sensing.delay_ticks + 1)
-    hold, plant = _hold(), (bench.motor, bench.loop, bench.limb, bench.sensing)
-    for tick, unit in enumerate(noise):
-        world.now_ns = round(tick * period_s * 1e9)
-        world.raw_N, world.force_samples = axis_plant.reading(sensed[0], unit, bench.sensing), tick
+    def play(self, stretched: bool) -> Trace:
+        steps, watch = round(self._period_s / axis_plant.STEP_S), Watch()
+        while self._tick * self._period_s < LONGEST_S and self._turn(watch, steps):
+            if stretched:
+                self._stretch(steps)
+        if not self._ended or self._ended[0]:
+            cause = self._ended[0].text if self._ended and self._ended[0] else "it has no end"
+            raise CheckFailed(f"the simulated run was stopped: {cause}")
+        table = np.concatenate(self._parts, axis=1)
+        return Trace(table[0], table[1].astype(np.int64), *table[2:])
+
+    def _turn(self, watch: Watch, steps: int) -> bool:
+        """One tick through the state machine; False once nothing moves any more."""
+        world, machine, (state, sensed, held_N, _) = self._world, self._machine, self._now
+        sensing = self._plant.sensing
+        if self._tick % sensing.every_ticks == 0:
+            held_N = axis_plant.reading(sensed[0], self._drawn(1)[0], sensing)
+        world.now_ns, world.raw_N, world.force_samples = round(self._tick * self._period_s * 1e9), held_N, self._tick
         world.force_N, world.position_mm = world.raw_N - world.zero_N, state.position_mm
         world.following_mm = world.setpoint.position_mm - world.position_mm
         machine.update(watch)
         command_mm = world.setpoint.position_mm
-        rows.append(
-            (world.now_ns * 1e-9, machine.mode, world.reference_N, state.force_N, world.force_N, command_mm,
-             state.position_mm, state.voltage_V, state.current_A)
+        row = (world.now_ns * 1e-9, machine.mode, world.reference_N, state.force_N, world.force_N, command_mm,
+               state.position_mm, state.voltage_V, state.current_A)  # fmt: skip
+        self._parts.append(np.array(row)[:, None])
+        if machine.busy:
+            state = hold_compiled()(state, *self._plant, command_mm, steps)
+            self._now = Bench(state, np.append(sensed[1:], state.sensed_N), held_N, world.setpoint)
+        self._tick += 1
+        return machine.busy
+
+    def _drawn(self, count: int) -> Column:
+        """Standard normals of the next ``count`` ticks."""
+        lacking = self._tick + count - len(self._noise)
+        if lacking > 0:
+            self._noise = np.append(self._noise, self._random.standard_normal(max(lacking, DRAWN)))
+        return self._noise[self._tick : self._tick + count]
+
+    def _stretch(self, steps: int) -> None:
+        """As many ticks as can be without the state machine; none where it has to decide."""
+        world, step = self._world, self._machine.step
+        if world.now_ns == self._machine.step_start_ns:  # its first tick may set more than the set-point
+            return
+        if isinstance(step, TrackForce) and world.memory is not None:
+            self._follow(step, steps)
+        elif isinstance(step, Approach):
+            self._travel(step.search_to_mm, step.speed_mm_s, step.threshold_N(world), steps)
+        elif isinstance(step, Retract):
+            self._travel(step.target_mm(world), step.speed_mm_s, math.inf, steps)
+
+    def _follow(self, step: TrackForce, steps: int) -> None:
+        world = self._world
+        assert world.memory
+        if self._law is None or self._law[0] is not step:
+            self._law = step, _columns(step)
+        elapsed_s = self._times_ns(LONGEST_STRETCH, self._machine.step_start_ns) * 1e-9
+        elapsed_s = elapsed_s[elapsed_s < step.times_s[-1] * step.repeats]
+        reference_N = reference_at(step, elapsed_s)
+        done, world.memory = stretches.track(
+            self._now, world.memory, self._law[1], step.settings, reference_N, self._drawn(len(reference_N)),
+            self._plant, Clock(self._tick, self._period_s, steps), self._zeros(), _speeds(step, self._period_s),
+            self._bounds(),
         )  # fmt: skip
-        if not machine.busy:
-            break
-        state = hold(state, *plant, command_mm, steps)
-        sensed.append(state.sensed_N)
-    if not ended or ended[0]:
-        raise CheckFailed(f"the simulated run was stopped: {ended[0].text if ended and ended[0] else 'it has no end'}")
-    table = np.array(rows)
-    return Trace(table[:, 0], table[:, 1].astype(np.int64), *(table[:, at] for at in range(2, table.shape[1])))
+        ticks = done.rows.shape[1]
+        if ticks:
+            world.reference_N, world.tangent_N_mm = float(reference_N[ticks - 1]), world.memory.tangent_N_mm
+        self._take(done, reference_N[:ticks])
+
+    def _travel(self, target_mm: float, speed_mm_s: float, until_N: float, steps: int) -> None:
+        move = Move(target_mm, speed_mm_s, self._world.acceleration_mm_s2, until_N)
+        clock = Clock(self._tick, self._period_s, steps)
+        noise = self._drawn(LONGEST_STRETCH)
+        done = stretches.travel(self._now, move, noise, self._plant, clock, self._zeros(), self._bounds())
+        self._take(done, np.full(done.rows.shape[1], self._world.reference_N))
+
+    def _take(self, done: Stretch, reference_N: Column) -> None:
+        ticks = done.rows.shape[1]
+        times_s, mode = self._times_ns(ticks) * 1e-9, np.full(ticks, float(self._machine.mode))
+        self._parts.append(np.vstack([times_s, mode, reference_N, done.rows]))
+        self._world.setpoint, self._now = done.bench.setpoint, done.bench
+        self._world.peak_force_N = max(self._world.peak_force_N, float(np.max(done.rows[1], initial=0.0)))
+        self._tick += ticks
+
+    def _times_ns(self, count: int, since_ns: int = 0) -> Column:
+        return np.round(np.arange(self._tick, self._tick + count) * self._period_s * 1e9) - since_ns
+
+    def _zeros(self) -> Zeros:
+        world = self._world
+        return Zeros(world.zero_N, 0.0 if math.isnan(world.first_zero_N) else world.first_zero_N, world.surface_mm)
+
+    def _bounds(self) -> Bounds:
+        limits, axis = self._wiring.limits, self._wiring.axis
+        return Bounds(
+            self._wiring.force_limit_N, limits.depth_mm, axis.following_error_mm,
+            limits.position_min_mm, limits.position_max_mm,
+        )  # fmt: skip
+
+
+def reference_at(step: TrackForce, elapsed_s: Column) -> Column:
+    """What `TrackForceRun` follows at each time, all at once."""
+    times, forces = np.array(step.times_s), np.array(step.forces_N)
+    played = np.minimum((elapsed_s / times[-1]).astype(np.int64), step.repeats - 1)
+    within_s = elapsed_s - played * times[-1]
+    at = np.clip(np.searchsorted(times, within_s, side="right") - 1, 0, len(times) - 2)
+    span_s = times[at + 1] - times[at]
+    share = np.clip(np.divide(within_s - times[at], span_s, out=np.ones_like(within_s), where=span_s > 0), 0.0, 1.0)
+    return np.asarray(forces[at] + share * (forces[at + 1] - forces[at]))
+
+
+def _columns(step: TrackForce) -> Columns:
+    return Columns(*map(np.array, force_position.columns(step.gains)))
+
+
+def _speeds(step: TrackForce, dt_s: float) -> Speeds:
+    return Speeds(step.speed_limit_mm_s * dt_s, step.search_speed_mm_s * dt_s, 0.5 * step.contact_force_N)
 
 
 def follow(step: TrackForce, reference_N: Column, bench: SimulatedBench, dt_s: float = 0.001) -> Trace:
     """The force law alone, from contact on, along ``reference_N`` of shape (ticks,); compiled."""
-    table = Columns(*map(np.array, force_position.columns(step.gains)))
-    settings = step.settings
+    table, surface_mm = _columns(step), bench.limb.surface_mm
     noise = np.random.default_rng(bench.seed).standard_normal(len(reference_N))
-    steps = round(dt_s / axis_plant.STEP_S)
-    plant = (bench.motor, bench.loop, bench.limb, bench.sensing)
-    rows = _follower()(table, settings, reference_N, noise, plant, step.speed_limit_mm_s * dt_s, dt_s, steps)
+    late = bench.sensing.delay_ticks + 1
+    start = Bench(at_rest(surface_mm), np.zeros(late), 0.0, Setpoint(surface_mm, 0.0))
+    done, _ = stretches.track(
+        start, force_position.begin(table, 0.0, 0.0), table, step.settings, reference_N, noise,
+        Plant(bench.motor, bench.loop, bench.limb, bench.sensing),
+        Clock(0, dt_s, round(dt_s / axis_plant.STEP_S)), Zeros(0.0, 0.0, surface_mm), _speeds(step, dt_s), Bounds(),
+    )  # fmt: skip
     time_s, mode = np.arange(len(reference_N), dtype=np.float64) * dt_s, np.full(len(reference_N), int(Mode.CONTACT))
-    return Trace(time_s, mode, reference_N, *rows)
-
-
-@cache
-def _follower() -> Callable[..., Column]:
-    parts: dict[str, object] = {
-        "increment": _law(), "hold": _hold(), "reading": compiled(axis_plant.reading),
-        "begin": compiled(force_position.begin, {"interpolate": compiled(force_position.interpolate)}),
-        "at_rest": compiled(axis_plant.at_rest), "np": np,
-    }  # fmt: skip
-    return compiled(_follow, parts)
-
-
-def _follow(
-    table: Columns, settings: Settings, reference_N: Column, noise: Column,
-    plant: tuple[Motor, PositionLoop, Limb, Sensing], largest_mm: float, dt_s: float, steps: int,
-) -> Column:  # fmt: skip
-    motor, loop, limb, sensing = plant
-    state = at_rest(limb.surface_mm)
-    command_mm = limb.surface_mm
-    memory = begin(table, 0.0, 0.0)
-    rows = np.empty((6, len(reference_N)))
-    sensed = np.zeros(len(reference_N) + sensing.delay_ticks + 1)
-    for tick in range(len(reference_N)):
-        sampled = tick - tick % sensing.every_ticks
-        force_N = reading(sensed[sampled], noise[sampled], sensing)
-        depth_mm = state.position_mm - limb.surface_mm
-        delta_mm, memory = increment(memory, table, settings, reference_N[tick], force_N, depth_mm, dt_s)
-        command_mm += min(max(delta_mm, -largest_mm), largest_mm)
-        rows[0, tick], rows[1, tick], rows[2, tick] = state.force_N, force_N, command_mm
-        rows[3, tick], rows[4, tick], rows[5, tick] = state.position_mm, state.voltage_V, state.current_A
-        state = hold(state, motor, loop, limb, sensing, command_mm, steps)
-        sensed[tick + sensing.delay_ticks + 1] = state.sensed_N
-    return rows
-
-
-# Names that `_follow` is bound to: the same functions, compiled where it is compiled.
-increment, begin = force_position.increment, force_position.begin
-hold, reading = axis_plant.hold, axis_plant.reading
+    return Trace(time_s, mode, reference_N, *done.rows)

@@ -92,6 +92,10 @@ class Approach(Table):
         """A run of this step."""
         return ApproachRun(self)
 
+    def threshold_N(self, world: World) -> float:
+        """Force that may be contact."""
+        return max(self.contact_force_N, CONTACT_NOISE * world.noise_N)
+
 
 class ApproachRun:
     """Counts consecutive samples above the threshold: one spike is not contact, and neither is the sensor's noise."""
@@ -103,7 +107,7 @@ class ApproachRun:
         """One tick of the search; raises SafetyStop where it ends without contact."""
         if world.force_samples != self._seen:
             self._seen = world.force_samples
-            threshold_N = max(self._step.contact_force_N, CONTACT_NOISE * world.noise_N)
+            threshold_N = self._step.threshold_N(world)
             self._above = self._above + 1 if world.force_N > threshold_N else 0
         if self._above >= CONTACT_SAMPLES:
             world.surface_mm, world.memory = world.position_mm, None
@@ -281,8 +285,12 @@ class Retract(Table):
         """One tick of the way out; without a surface it leaves from where it is."""
         world.reference_N = world.tangent_N_mm = math.nan
         world.memory = None
+        return _go(world, self.target_mm(world), self.speed_mm_s)
+
+    def target_mm(self, world: World) -> float:
+        """Where it ends."""
         surface_mm = world.setpoint.position_mm if math.isnan(world.surface_mm) else world.surface_mm
-        return _go(world, max(surface_mm - self.clearance_mm, self.floor_mm), self.speed_mm_s)
+        return max(surface_mm - self.clearance_mm, self.floor_mm)
 
 
 Step = Zero | MoveTo | Approach | Compress | Hold | Dither | TrackForce | Retract

@@ -13,6 +13,7 @@ from controller.gains import Choice, Design, margins, schedule
 from controller.modes import Mode
 from controller.simulated import MOTOR, POSITION_LOOP, SENSING, SimulatedBench, follow, limb_of
 from controller.steps import TrackForce
+from controller.stretches import hold_compiled
 from mock_devices.bench import Bench
 from mock_devices.parameters import Parameters, load_parameters
 from rig.config.wiring import Wiring
@@ -165,7 +166,7 @@ def test_the_plant_answers_as_the_mock_benchs_drive_and_as_the_design_assumes(fr
         mock.axis.target(25.0 + mm)
     depths = [0.0, 100.0]
     state, limb, ours = at_rest(25.0), Limb(depths, depths, 0.0), []
-    hold = simulated._hold()
+    hold = hold_compiled()
     for mm in swing:
         ours.append(state.sensed_N)
         state = hold(state, MOTOR, POSITION_LOOP, Limb(np.array(depths), np.array(depths), 0.0), SENSING, 25.0 + mm, 8)
@@ -203,6 +204,20 @@ def test_a_whole_program_runs_through_the_machine_and_tracks_as_the_law_alone_do
     ):
         assert a.settling_s == pytest.approx(b.settling_s, abs=0.02)
         assert a.error_N == pytest.approx(b.error_N, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("reference", "breathing_mm", "every_ticks"), [("stairs:3,each_s=0.5", 1.0, 1), ("knead:2,duration_s=3", 0.0, 10)]
+)
+def test_stretches_in_machine_code_change_nothing_of_a_run(
+    reference: str, breathing_mm: float, every_ticks: int
+) -> None:
+    model = subject("average")
+    program = tracking.following(named(reference), model, WIRING)
+    bench = SimulatedBench(limb_of(model, 1.3, breathing_mm), sensing=SENSING._replace(every_ticks=every_ticks))
+    stretched, ticked = (simulated.run(program, WIRING, bench, way) for way in (True, False))
+    for ours, theirs in zip(stretched, ticked, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-9)
 
 
 def test_a_limit_ends_the_simulation_with_its_sentence() -> None:
