@@ -9,7 +9,7 @@ from rig.errors import UsageError
 from rig.tissue.lattice.kernels import Stiffness
 
 Mode = Literal["study", "stabilised"]
-_LARGEST_EXPONENT = 40.0
+LARGEST_EXPONENT = 40.0
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class Springs:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.k_N_mm) and self.k_N_mm > 0.0):
             raise UsageError(f"spring stiffness k = {self.k_N_mm} N/mm must be a number above 0 N/mm")
-        if not 0.0 <= self.b <= _LARGEST_EXPONENT:
-            raise UsageError(f"spring exponent b = {self.b} must lie between 0 (constant) and {_LARGEST_EXPONENT:g}")
+        if not 0.0 <= self.b <= LARGEST_EXPONENT:
+            raise UsageError(f"spring exponent b = {self.b} must lie between 0 (constant) and {LARGEST_EXPONENT:g}")
         if not 0.0 <= self.cell_ratio <= 1000.0:
             raise UsageError(
                 f"cell stiffness over spring stiffness = {self.cell_ratio} must lie between 0 (study) and 1000"

@@ -127,12 +127,15 @@ def settle(lattice: Loaded, relative_tolerance: float = RELATIVE_TOLERANCE) -> E
 
 
 def push(
-    lattice: Loaded, levels: Iterable[float], relative_tolerance: float = RELATIVE_TOLERANCE
+    lattice: Loaded,
+    levels: Iterable[float],
+    relative_tolerance: float = RELATIVE_TOLERANCE,
+    disturb: Callable[[Loaded], None] | None = None,
 ) -> Iterator[Equilibrium]:
     """Yield one equilibrium per level, in order: depth in mm, or load in N for the contact "pressure".
 
-    Each starts from the displacement field extrapolated along the last step; a level that does not settle is approached
-    in halves.
+    Each starts from the displacement field extrapolated along the last step, after ``disturb``; a level that does not
+    settle is approached in halves.
     """
     past, last = 0.0, 0.0
     before, now = aligned_copy(lattice.block, lattice.x), aligned_copy(lattice.block, lattice.x)
@@ -143,6 +146,8 @@ def push(
                 while reached < level:
                     target = min(level, reached + (level - last) / 2**halving)
                     _extrapolate(lattice, before, now, (target - reached) / (reached - past) if reached > past else 0.0)
+                    if disturb is not None:
+                        disturb(lattice)
                     _impose(lattice, target)
                     result = settle(lattice, relative_tolerance)
                     before[:], now[:], past, reached = now, lattice.x, reached, target
