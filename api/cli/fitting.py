@@ -58,11 +58,12 @@ def fit_and_write(
     folders: Sequence[Path],
     out: Path | None = None,
     wanted: Wanted | None = None,
-    lattice: tuple[str, str] | None = None,
+    lattice: tuple[str, str, bool] | None = None,
 ) -> dict[str, object]:
     """Fits the sessions, prints tables, writes to ``out`` or the one session's fit/; the JSON of it all.
 
-    ``lattice`` are its block and springs as the command takes them; None leaves it out.
+    ``lattice`` are its block and springs as the command takes them, and whether each spring stiffens by itself; None
+    leaves it out.
     """
     wanted, target = wanted or Wanted(), _target(folders, out)
     simulate = _lattice(*lattice) if lattice else None
@@ -82,11 +83,11 @@ def _target(folders: Sequence[Path], out: Path | None) -> Path:
     return out or folders[0] / "fit"
 
 
-def _lattice(block: str, springs: str) -> Callable[[Study, Path], dict[str, object]]:
+def _lattice(block: str, springs: str, stiffen: bool) -> Callable[[Study, Path], dict[str, object]]:
     from api.cli.lattice import chosen, fit_lattice  # noqa: PLC0415 - compiled kernels take seconds to load
 
     size, mode = chosen(block, springs)
-    return lambda study, target: fit_lattice(study, target, size, mode)
+    return lambda study, target: fit_lattice(study, target, size, mode, stiffen=stiffen)
 
 
 def _write(study: Study, sessions: Sequence[Session], target: Path, law: str) -> None:

@@ -20,7 +20,8 @@ from rig.tissue.k_calculation import IndexFit
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.springs import Mode
 from rig.tissue.lattice_study import LatticeStudy, lattice_study
-from rig.tissue.lattice_study import Progress as Tell
+from rig.tissue.per_spring import PerSpring
+from rig.tissue.per_spring import Progress as Tell
 from rig.tissue.results import errors_json
 from rig.tissue.study import Study
 
@@ -40,14 +41,19 @@ def chosen(block: str, springs: str) -> tuple[Block, Mode]:
 
 
 def fit_lattice(
-    study: Study, target: Path, block: Block | None = None, mode: Mode = "stabilised", search: bool = True
+    study: Study,
+    target: Path,
+    block: Block | None = None,
+    mode: Mode = "stabilised",
+    search: bool = True,
+    stiffen: bool = False,
 ) -> dict[str, object]:
     """Runs the lattice on a fitted session, prints tables, writes lattice.png and lattice.json to ``target``; the JSON.
 
-    The first run on a machine compiles the kernels (about a quarter of a minute) and keeps them.
+    The first run on a machine compiles the kernels (a few seconds) and keeps them.
     """
     with _progress() as tell:
-        found = lattice_study(study, block or Block(), mode, search, tell)
+        found = lattice_study(study, block or Block(), mode, search, tell, stiffen)
     _print(found)
     with whole_file(target / "lattice.png", overwrite=True) as scratch:
         scratch.write_bytes(png(lattice_figure(study, found)))
@@ -77,7 +83,19 @@ def _print(found: LatticeStudy) -> None:
     if found.sweep.collapse():
         console.print(f"the lattice collapses: {found.sweep.collapse()}", highlight=False)
     console.print(table(*worst_errors(found.judged), "Worst displacement errors, lattice and rivals"))
+    if found.per_spring is not None:
+        console.print(_own(found.per_spring), highlight=False)
     print_control(found.control, "lattice index")
+
+
+def _own(found: PerSpring) -> str:
+    law, intervals = found.judged.law, found.judged.intervals
+    values = [
+        f"{p.name} = {p.value:.4g} {p.unit} ({intervals[p.name][0]:.4g} to {intervals[p.name][1]:.4g})"
+        for p in law.parameters
+    ]
+    check = found.doubt() or f"the whole block agrees with its quarter to {found.agrees_to_mm:.3g} mm"
+    return f"spring by spring: {', '.join(values)}; {check}"
 
 
 def _points(found: LatticeStudy) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -119,6 +137,17 @@ def lattice_json(found: LatticeStudy) -> dict[str, object]:
         "index": asdict(fit),
         "models": {name: _model(judged) for name, judged in found.judged.items()},
         "control": [row.model_dump() for row in found.control],
+        "per_spring": None if found.per_spring is None else _check(found.per_spring),
+    }
+
+
+def _check(found: PerSpring) -> dict[str, object]:
+    return {
+        "depth_mm": found.depth_mm.tolist(),
+        "quarter_force_over_k_mm": found.quarter_mm.tolist(),
+        "whole_force_over_k_mm": found.whole_mm.tolist(),
+        "agrees_to_mm": found.agrees_to_mm,
+        "doubt": found.doubt(),
     }
 
 

@@ -31,6 +31,9 @@ def fit(
     springs: Annotated[
         str, typer.Option("--springs", help="`stabilised` keeps cells from turning over; `study` is springs alone.")
     ] = "stabilised",
+    per_spring: Annotated[
+        bool, typer.Option("--per-spring", help="The lattice, and stiffness a exp(b |strain|) in each of its springs.")
+    ] = False,
     json_file: JsonOption = None,
 ) -> None:
     """Fits constant stiffness, the index model and other tissue laws to sessions, and says how wrong each is.
@@ -43,7 +46,8 @@ def fit(
     from api.cli.fitting import Wanted, fit_and_write  # noqa: PLC0415
 
     wanted = Wanted.from_options(laws, known or [], model)
-    write_json(json_file, fit_and_write(session, out, wanted, (block, springs) if lattice else None))
+    simulated = (block, springs, per_spring) if lattice or per_spring else None
+    write_json(json_file, fit_and_write(session, out, wanted, simulated))
 
 
 def fit_session(session: Path) -> dict[str, object]:

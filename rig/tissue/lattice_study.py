@@ -2,7 +2,7 @@
 rivals, K and B for control.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,10 +16,10 @@ from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.springs import Mode, Springs
 from rig.tissue.lattice.sweep import DEFAULT_STEP_MM, Sweep, sweep
 from rig.tissue.laws_lattice import lattice_laws
+from rig.tissue.per_spring import PerSpring, Progress, per_spring
 from rig.tissue.registry import RIVALS
 from rig.tissue.study import Study, rows
 
-Progress = Callable[[str, float], None]
 _DEPTH_MARGIN = 1.02
 _DEEPEST_SHARE = 0.85
 
@@ -33,18 +33,26 @@ class LatticeStudy:
     index: IndexFit
     judged: Mapping[str, Judged]
     control: tuple[ControlRow, ...]
+    per_spring: PerSpring | None = None
 
 
 def lattice_study(
-    study: Study, block: Block, mode: Mode = "stabilised", search: bool = True, progress: Progress | None = None
+    study: Study,
+    block: Block,
+    mode: Mode = "stabilised",
+    search: bool = True,
+    progress: Progress | None = None,
+    stiffen: bool = False,
 ) -> LatticeStudy:
-    """Sweep the block once, then everything else from phi; ``search`` also runs the study's loop for each force.
+    """Sweep the block once, then everything else from phi; ``search`` also runs the study's loop for each force,
+    ``stiffen`` also fits a and b of every spring.
 
     ``progress(stage, share)`` is called as it goes. Raises UsageError where the block cannot carry the depths (with the
     bound).
     """
     tell = progress or _silent
-    curve = _sweep(study, block, mode, tell)
+    deepest_mm = _deepest(study, block)
+    curve = _sweep(block, mode, deepest_mm, tell)
     table = rows(study.judged[study.closest].fitted)
     points = exact_k(curve, np.array([row.force_N for row in table]), np.array([row.measured_mm for row in table]))
     if search:
@@ -53,11 +61,14 @@ def lattice_study(
     for kind in (*lattice_laws(curve), *RIVALS):
         if kind.name not in judged:
             judged[kind.name] = judge(fit_law(kind, study.curves), study.curves, study.force_N, study.origins_mm)
+    own = per_spring(study, block, mode, deepest_mm, tell) if stiffen else None
+    if own is not None:
+        judged[own.judged.law.name] = own.judged
     control = control_rows(judged["lattice index"], study.force_N)
-    return LatticeStudy(curve, tuple(points), fit_index(points), judged, control)
+    return LatticeStudy(curve, tuple(points), fit_index(points), judged, control, own)
 
 
-def _sweep(study: Study, block: Block, mode: Mode, tell: Progress) -> Sweep:
+def _deepest(study: Study, block: Block) -> float:
     deepest = _DEPTH_MARGIN * max(curve.max_depth_mm + max(0.0, -curve.offset_bounds_mm[0]) for curve in study.curves)
     limit = _DEEPEST_SHARE * block.height_mm
     if deepest > limit:
@@ -66,12 +77,16 @@ def _sweep(study: Study, block: Block, mode: Mode, tell: Progress) -> Sweep:
             f"simulated to {limit:.3g} mm at most: "
             "give a block with more vertices in z"
         )
+    return deepest
+
+
+def _sweep(block: Block, mode: Mode, deepest_mm: float, tell: Progress) -> Sweep:
     return sweep(
         block.as_quarter(),
         Springs.for_mode(mode),
-        deepest,
+        deepest_mm,
         DEFAULT_STEP_MM * block.spacing_mm,
-        lambda d: tell("sweep of phi", d / deepest),
+        lambda d: tell("sweep of phi", d / deepest_mm),
     )
 
 

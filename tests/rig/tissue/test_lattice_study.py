@@ -57,9 +57,12 @@ def test_curves_deeper_than_the_block_are_refused_with_the_bound(study: Study) -
 
 
 def test_the_command_writes_picture_and_numbers(study: Study, tmp_path: Path) -> None:
-    result = fit_lattice(study, tmp_path, BLOCK, search=True)
+    result = fit_lattice(study, tmp_path, BLOCK, search=True, stiffen=True)
     assert (tmp_path / "lattice.png").read_bytes().startswith(b"\x89PNG")
     written = json.loads((tmp_path / "lattice.json").read_text())
     assert written == json.loads(json.dumps(result))
     for point in written["points"]:
         assert point["k_loop_N_mm"] == pytest.approx(point["k_exact_N_mm"], rel=0.01)
+    assert written["models"]["lattice springs"]["parameters"]["b"] > 0.0
+    assert written["per_spring"]["agrees_to_mm"] > 6.0
+    assert written["per_spring"]["doubt"] is None
