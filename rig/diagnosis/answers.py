@@ -7,9 +7,10 @@ from typing import Literal
 import numpy as np
 from scipy.stats import t as student
 
-from rig.diagnosis.evidence import Tangents, held_out_square_error, information, is_alias
+from rig.diagnosis.evidence import Tangents, held_out_square_error, information, is_alias, jackknife
 from rig.diagnosis.fit import Fit, least_squares
 from rig.diagnosis.gates import Finding
+from rig.diagnosis.noise import Array
 from rig.diagnosis.omnibus import Leftover, judged_leftover
 from rig.diagnosis.problem import Effect, Par, Problem
 from rig.diagnosis.search import Named, Search, imitated, testable
@@ -133,8 +134,9 @@ class Diagnosis:
 
 
 def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Interval]:
-    """95 % intervals from the joint fit's covariance with Student's t on recordings; a pair becomes its amplitude."""
+    """95 % intervals with Student's t on recordings, the wider of curvature and jackknife; a pair becomes its size."""
     wide = float(student.ppf(0.975, max(fit.problem.recordings - 1, 1)))
+    covariances = fit.covariance, jackknife(fit)
     place = {par.name: k for k, par in enumerate(fit.free)}
     found: dict[str, Interval] = {}
     for par in wanted:
@@ -142,21 +144,21 @@ def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Interval]:
         if par.name not in place:
             found[par.name] = Interval(value, par.low, par.high)
         elif par.name.endswith("_sin_mm"):
-            found[par.name.replace("_sin_mm", "_mm")] = _amplitude(fit, par.name, place, wide)
+            found[par.name.replace("_sin_mm", "_mm")] = _amplitude(fit, par.name, place, wide, covariances)
         elif not par.name.endswith("_cos_mm"):
             k = place[par.name]
-            half = wide * float(np.sqrt(fit.covariance[k, k]))
+            half = wide * max(float(np.sqrt(c[k, k])) for c in covariances)
             half = min(half, LARGEST_LOG) if par.log else half
             low, high = (value / np.exp(half), value * np.exp(half)) if par.log else (value - half, value + half)
             found[par.name] = Interval(value, max(low, par.low), min(high, par.high))
     return found
 
 
-def _amplitude(fit: Fit, sine: str, place: Mapping[str, int], wide: float) -> Interval:
+def _amplitude(fit: Fit, sine: str, place: Mapping[str, int], wide: float, covariances: Sequence[Array]) -> Interval:
     pair = np.array([fit.values[sine], fit.values[sine.replace("_sin_", "_cos_")]])
     index = [place[sine], place[sine.replace("_sin_", "_cos_")]]
     size = float(np.hypot(*pair))
-    variance = float(pair @ fit.covariance[np.ix_(index, index)] @ pair) / max(size**2, 1e-300)
+    variance = max(float(pair @ c[np.ix_(index, index)] @ pair) for c in covariances) / max(size**2, 1e-300)
     half = wide * float(np.sqrt(variance))
     return Interval(size, max(size - half, 0.0), size + half)
 

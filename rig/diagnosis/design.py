@@ -12,11 +12,12 @@ import numpy as np
 from rig.config.protocol import Indentation as Protocol
 from rig.diagnosis.answers import Diagnosis, smallest_visible
 from rig.diagnosis.evidence import Direction, Tangents, information, is_alias, tangents
-from rig.diagnosis.fit import Fit, Whitener, assemble, secants_of
+from rig.diagnosis.fit import Fit, assemble
 from rig.diagnosis.indentation import Indentation
 from rig.diagnosis.noise import Array, Colour, Noise, ScatterWhitener, starts_of
 from rig.diagnosis.observations import Observations, Session, Streams, observe
 from rig.diagnosis.search import testable
+from rig.diagnosis.whitening import Whitener, secants_of
 from rig.simulation.chain import NULLS, respond
 
 RATE_HZ = 1000.0

@@ -6,87 +6,15 @@ from functools import cached_property
 
 import numpy as np
 
-from rig.diagnosis.noise import (
-    LARGEST_ORDER,
-    Array,
-    Colour,
-    Mask,
-    Noise,
-    ScatterWhitener,
-    estimate_colour,
-    estimate_scatter,
-    judged,
-    starts_of,
-)
-from rig.diagnosis.problem import Effect, Fields, Par, Problem, Values
+from rig.diagnosis.descent import descend, jacobian, on_bound, prior_precision
+from rig.diagnosis.noise import Array, Colour, Noise, starts_of
+from rig.diagnosis.problem import Effect, Par, Problem, Values
+from rig.diagnosis.whitening import Whitener, estimate, optimistic, shifted
 
 LM_STEPS = 8
 NOISE_ROUNDS = 25
 QUICK_ROUNDS = 5
 SETTLED_NATS = 0.1
-CONVERGED_NATS = 0.03
-PRIOR_SCALES = 1e3
-SHIFT_ROUNDS = 6
-# Small: what a direction has beyond the scatter's own is judged to a thousandth of it and less.
-NUDGE = 1e-4
-
-
-@dataclass(frozen=True)
-class Whitener:
-    """What turns raw rows of all channels into unit white rows; ``blind`` rows of the first are not judged."""
-
-    problem: Problem
-    noise: Noise
-    scatter: ScatterWhitener | None
-    secants: Array
-    blind: Mask
-
-    def predict(self, values: Fields) -> tuple[Array, ...]:
-        """Prediction with every recording's own shifts in it."""
-        for k, scatter in enumerate(self.problem.scatter if self.noise.shifts.size else ()):
-            values = scatter.nudge(values, self.own_shifts[k])
-        return self.problem.predict(values)
-
-    @cached_property
-    def own_shifts(self) -> Array:
-        """Each quantity's shift at every sample of the first channel, shape (k, n)."""
-        return np.ascontiguousarray(self.noise.shifts[self.problem.channels[0].recording].T)
-
-    def residual(self, prediction: Sequence[Array]) -> Array:
-        """White rows of what is measured minus predicted, the shifts' own part given back to the scatter."""
-        rows = [c.observed - p for c, p in zip(self.problem.channels, prediction, strict=True)]
-        if self.noise.shifts.size:
-            rows[0] = rows[0] + np.einsum("nk,kn->n", self.secants, self.own_shifts)
-        return self(rows)
-
-    def __call__(self, parts: Sequence[Array]) -> Array:
-        """Channels (n_c,) or (n_c, k), stacked to (n, k) white rows."""
-        white = [
-            colour.whiten(rows, keep) for colour, rows, keep in zip(self.noise.colours, parts, self.judged, strict=True)
-        ]
-        if self.scatter is not None:
-            white[0] = self.scatter(white[0])
-        return np.concatenate(white)
-
-    @cached_property
-    def judged(self) -> tuple[Mask, ...]:
-        """Rows of each channel that count, by the longest memory, so that all models are scored on the same rows."""
-        return tuple(_judged(self.problem, k, LARGEST_ORDER, self.blind) for k in range(len(self.noise.colours)))
-
-    @cached_property
-    def log_det(self) -> Array:
-        """Per recording: log of the whitening Jacobian, shape (recordings,)."""
-        total = np.zeros(self.problem.recordings)
-        for k, (channel, colour) in enumerate(zip(self.problem.channels, self.noise.colours, strict=True)):
-            rows = self.judged[k]
-            total -= np.bincount(channel.recording[rows], minlength=len(total)) * np.log(colour.sd)
-        return total + (self.scatter.log_det if self.scatter is not None else 0.0)
-
-
-def _judged(problem: Problem, channel: int, order: int, blind: Mask) -> Mask:
-    recording = problem.channels[channel].recording
-    starts = starts_of(recording, problem.recordings)
-    return judged(len(recording), starts, order, blind if channel == 0 else None)
 
 
 @dataclass(frozen=True)
@@ -126,54 +54,9 @@ class Fit:
         return np.asarray(np.linalg.inv(self.hessian.sum(axis=0) + np.diag(prior_precision(self.free))))
 
 
-def prior_precision(free: Sequence[Par]) -> Array:
-    """A very weak pull that keeps a parameter the data do not see finite, shape (p,)."""
-    return np.array([(1.0 if par.log else 1 / par.scale**2) / PRIOR_SCALES**2 for par in free])
-
-
-def to_internal(par: Par, value: float) -> float:
-    """Logarithm for scale parameters, the value itself otherwise."""
-    return float(np.log(max(value, 1e-12))) if par.log else value
-
-
-def from_internal(par: Par, inner: float) -> float:
-    """Inverse of ``to_internal``, inside the bounds."""
-    return float(np.clip(np.exp(min(inner, 50.0)) if par.log else inner, par.low, par.high))
-
-
-def moved(par: Par, values: Values, change: float) -> Values:
-    """``values`` with one parameter moved by ``change`` in internal scale."""
-    return {**values, par.name: from_internal(par, to_internal(par, values[par.name]) + change)}
-
-
-def jacobian(whitener: Whitener, values: Values, free: Sequence[Par], prediction: Sequence[Array]) -> list[Array]:
-    """Finite-difference change of each channel per internal unit, one (n_c, p) array per channel."""
-    columns: list[list[Array]] = [[] for _ in prediction]
-    for par in free:
-        step = NUDGE * (1.0 if par.log else par.scale)
-        ahead = moved(par, values, step)
-        taken = to_internal(par, ahead[par.name]) - to_internal(par, values[par.name])
-        if abs(taken) < 0.5 * step:
-            ahead = moved(par, values, -step)
-            taken = to_internal(par, ahead[par.name]) - to_internal(par, values[par.name])
-        for stack, after, before in zip(columns, whitener.predict(ahead), prediction, strict=True):
-            stack.append((after - before) / taken)
-    return [np.stack(stack, axis=1) for stack in columns]
-
-
 def free_parameters(problem: Problem, effects: Sequence[Effect]) -> tuple[Par, ...]:
     """Base parameters and those of the effects."""
     return problem.base + tuple(par for effect in effects for par in effect.pars)
-
-
-def shifted(problem: Problem, values: Fields, shifts: Array) -> Fields:
-    """Values (arrays on the first channel) with each recording's shifts (recordings, k) in them."""
-    if not shifts.size:
-        return values
-    own = shifts[problem.channels[0].recording]
-    for k, scatter in enumerate(problem.scatter):
-        values = scatter.nudge(values, own[:, k])
-    return values
 
 
 def fit(
@@ -195,17 +78,19 @@ def fit(
         noise = Noise(tuple(flat), np.empty(0), np.empty((0, 0)))
         blind = np.zeros(len(problem.channels[0].observed), bool)
         whitener = Whitener(problem, noise, None, np.empty((0, 0)), blind)
-    values = _descend(free, values, whitener, 2 * LM_STEPS)
+    values, slopes = descend(free, values, whitener, 2 * LM_STEPS, confirm=False)
     level, best = -np.inf, (log_level(whitener, values), values, whitener)
     for done in range(rounds):
         whitener = estimate(problem, values, whitener)
-        values = _descend(free, values, whitener, LM_STEPS)
+        values, slopes = descend(free, values, whitener, LM_STEPS, slopes, confirm=False)
         reached = log_level(whitener, values)
         # Contact is a kink: a round may lead away. The best point seen is the fit.
         best = max(best, (reached, values, whitener), key=lambda point: point[0])
         if abs(reached - level) < SETTLED_NATS or (done >= 1 and best[0] < floor):
             break
         level = reached
+    if best[0] >= floor:
+        best = (best[0], descend(free, best[1], best[2], LM_STEPS)[0], best[2])
     return assemble(problem, effects, best[1], best[2])
 
 
@@ -230,7 +115,7 @@ def least_squares(model: Fit) -> Fit:
     whitener = Whitener(problem, noise, None, np.empty((0, 0)), blind)
     free = free_parameters(problem, model.effects)
     guess = {**problem.start(), **{par.name: model.values[par.name] for effect in model.effects for par in effect.pars}}
-    ends = [_descend(free, start, whitener, 3 * LM_STEPS) for start in (model.values, guess)]
+    ends = [descend(free, start, whitener, 3 * LM_STEPS)[0] for start in (model.values, guess)]
     return assemble(problem, model.effects, max(ends, key=lambda end: log_level(whitener, end)), whitener)
 
 
@@ -249,14 +134,32 @@ def attempt(
     """A fit, or None where its numbers ran away: a candidate that cannot be fitted is no candidate."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            # A frequency must not run away while the amplitude it belongs to is still nothing.
-            fixed = {par.name for par in effects[-1].shapes} if effects else set[str]()
-            free = [par for par in free_parameters(problem, effects) if par.name not in fixed]
-            start = _descend(free, start, whitener, LM_STEPS) if fixed else start
+            start = _anchored(problem, effects, start, whitener)
             found = fit(problem, effects, start, whitener, QUICK_ROUNDS, floor)
     except np.linalg.LinAlgError:
         return None
     return found if np.isfinite(level_of(found)) and np.isfinite(found.hessian).all() else None
+
+
+def glance(
+    problem: Problem, effects: Sequence[Effect], start: Values, whitener: Whitener
+) -> tuple[Values, float] | None:
+    """Where a fit under this very noise ends, and how well it explains the readings there; None as for ``attempt``."""
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            start = _anchored(problem, effects, start, whitener)
+            values, _ = descend(free_parameters(problem, effects), start, whitener, LM_STEPS, confirm=False)
+            reached = log_level(whitener, values)
+    except np.linalg.LinAlgError:
+        return None
+    return (values, reached) if np.isfinite(reached) else None
+
+
+def _anchored(problem: Problem, effects: Sequence[Effect], start: Values, whitener: Whitener) -> Values:
+    """Amplitudes fitted at the shapes given: a frequency must not run away while its amplitude is still nothing."""
+    fixed = {par.name for par in effects[-1].shapes} if effects else set[str]()
+    free = [par for par in free_parameters(problem, effects) if par.name not in fixed]
+    return descend(free, start, whitener, LM_STEPS, confirm=False)[0] if fixed else start
 
 
 def best_fit(problem: Problem, effects: Sequence[Effect], start: Values, whitener: Whitener) -> Fit | None:
@@ -277,7 +180,7 @@ def bold_view(model: Fit) -> Fit:
     problem = model.problem
     whitener = optimistic(problem, model.values, model.whitener)
     free = free_parameters(problem, model.effects)
-    return assemble(problem, model.effects, _descend(free, model.values, whitener, LM_STEPS), whitener)
+    return assemble(problem, model.effects, descend(free, model.values, whitener, LM_STEPS)[0], whitener)
 
 
 def level_of(model: Fit) -> float:
@@ -292,103 +195,6 @@ def refreshed(model: Fit) -> Fit:
     return fit(model.problem, model.effects, model.values, whitener)
 
 
-def optimistic(problem: Problem, values: Values, before: Whitener, wide: float = 1.0) -> Whitener:
-    """Noise as if the model were right: white, small scatter, no shifts, so that effects and not noise must explain.
-
-    ``wide`` widens the scatter: different specimens are not one specimen touched again.
-    """
-    colours = (quietest(problem, values), *before.noise.colours[1:])
-    steps = wide * np.array([scatter.step for scatter in problem.scatter])
-    shifts = np.zeros((problem.recordings, len(steps)))
-    noise = Noise(colours, steps, shifts)
-    if not problem.scatter:
-        return replace(before, noise=replace(noise, scatter_sd=np.empty(0), shifts=np.empty((0, 0))))
-    secants = secants_of(problem, values, shifts, problem.predict(values)[0])
-    starts = starts_of(problem.channels[0].recording, problem.recordings)
-    scatter = ScatterWhitener.of(colours[0].whiten(secants, before.judged[0]), steps, starts)
-    return Whitener(problem, noise, scatter, secants, before.blind)
-
-
-def estimate(problem: Problem, values: Values, before: Whitener) -> Whitener:
-    """Noise from the residuals at ``values``: each recording's shifts, their scatter, and the colour of the rest.
-
-    The model is linearised at each recording's own shifts (first-order conditional estimation, Lindstrom and Bates
-    1990), not at their mean: contact is a kink, where the two differ by more than the noise.
-    """
-    starts = [starts_of(c.recording, problem.recordings) for c in problem.channels]
-    noise, blinds = before.noise, [before.blind, *[None] * (len(problem.channels) - 1)]
-    if not problem.scatter:
-        parts = zip(problem.channels, problem.predict(values), starts, blinds, strict=True)
-        colours = tuple(estimate_colour(c.observed - p, s, b, c.memory) for c, p, s, b in parts)
-        return replace(before, noise=Noise(colours, np.empty(0), np.empty((0, 0))))
-    fresh, keep = noise.shifts.size == 0, before.judged[0]
-    steps = np.array([scatter.step for scatter in problem.scatter])
-    shifts = np.zeros((problem.recordings, len(steps))) if fresh else noise.shifts
-    sd = steps if fresh else noise.scatter_sd
-    # A first colour taken before the shifts are known would be a random walk that hides them: start white.
-    colour = quietest(problem, values) if fresh else noise.colours[0]
-    observed, recording = problem.channels[0].observed, problem.channels[0].recording
-    for _ in range(SHIFT_ROUNDS if fresh else SHIFT_ROUNDS // 2):
-        prediction = problem.predict(shifted(problem, values, shifts))
-        secants = secants_of(problem, values, shifts, prediction[0])
-        whole = observed - prediction[0] + np.einsum("nk,nk->n", secants, shifts[recording])
-        sd, found = estimate_scatter(colour.whiten(whole, keep), colour.whiten(secants, keep), starts[0], sd)
-        reach = 5 * np.minimum(np.maximum(steps, sd), 10 * steps)
-        shifts = shifts + np.clip(found - shifts, -reach, reach)
-        left = observed - problem.predict(shifted(problem, values, shifts))[0]
-        colour = estimate_colour(left, starts[0], blinds[0], problem.channels[0].memory)
-    prediction = problem.predict(shifted(problem, values, shifts))
-    secants = secants_of(problem, values, shifts, prediction[0])
-    others = list(zip(problem.channels, prediction, starts, strict=True))[1:]
-    colours = (colour, *(estimate_colour(channel.observed - part, start) for channel, part, start in others))
-    scatter = ScatterWhitener.of(colour.whiten(secants, keep), sd, starts[0])
-    return Whitener(problem, Noise(colours, sd, shifts), scatter, secants, before.blind)
-
-
-def quietest(problem: Problem, values: Values) -> Colour:
-    """White noise as large as the residual's change from sample to sample."""
-    residual = problem.channels[0].observed - problem.predict(values)[0]
-    return Colour(np.empty(0), max(float(np.std(np.diff(residual))) / np.sqrt(2), 1e-9))
-
-
-def secants_of(problem: Problem, values: Values, shifts: Array, prediction: Array) -> Array:
-    """Change of the first channel per unit of each scattering quantity, at the given shifts, shape (n, k)."""
-    columns = []
-    for k, scatter in enumerate(problem.scatter):
-        ahead = shifts.copy()
-        ahead[:, k] += NUDGE * scatter.step
-        columns.append((problem.predict(shifted(problem, values, ahead))[0] - prediction) / (NUDGE * scatter.step))
-    return np.stack(columns, axis=1)
-
-
-def _descend(free: Sequence[Par], values: Values, whitener: Whitener, steps: int) -> Values:
-    prediction = whitener.predict(values)
-    white = whitener.residual(prediction)
-    cost, damping = 0.5 * float(white @ white), 1e-3
-    for _ in range(steps):
-        columns = whitener(jacobian(whitener, values, free, prediction))
-        hessian, slope = columns.T @ columns, columns.T @ white
-        for _ in range(6):
-            scaled = hessian + np.diag(damping * np.diag(hessian) + prior_precision(free) + 1e-30)
-            step = np.linalg.solve(scaled, slope)
-            trial = values
-            for par, change in zip(free, step, strict=True):
-                trial = moved(par, trial, float(np.clip(change, -2, 2)) if par.log else float(change))
-            new_prediction = whitener.predict(trial)
-            new_white = whitener.residual(new_prediction)
-            new_cost = 0.5 * float(new_white @ new_white)
-            if np.isfinite(new_cost) and new_cost < cost:
-                break
-            damping = max(damping * 10, 1e-6)
-        else:
-            return values
-        gain, cost = cost - new_cost, new_cost
-        values, prediction, white, damping = trial, new_prediction, new_white, damping / 10
-        if gain < CONVERGED_NATS:
-            return values
-    return values
-
-
 def assemble(problem: Problem, effects: Sequence[Effect], values: Values, whitener: Whitener) -> Fit:
     """Per-recording sums at ``values``; parameters standing on a bound are held there."""
     prediction = whitener.predict(values)
@@ -399,12 +205,6 @@ def assemble(problem: Problem, effects: Sequence[Effect], values: Values, whiten
     return Fit(
         problem, tuple(effects), values, whitener, free, prediction, columns, white, raw[0], hessian, gradient, loss
     )
-
-
-def on_bound(par: Par, value: float) -> bool:
-    """Whether ``value`` stands on a bound, to a millionth of the range."""
-    margin = 1e-6 * (par.high - par.low)
-    return value <= par.low + (0 if par.log else margin) or value >= par.high - margin
 
 
 def by_recording(problem: Problem, columns: Array, white: Array) -> tuple[Array, Array, Array]:

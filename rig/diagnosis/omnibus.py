@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rig.diagnosis.descent import prior_precision
 from rig.diagnosis.evidence import FEWEST_TO_FLIP, Tangents, chance, chance_draws, flipped_draws, held_out
-from rig.diagnosis.fit import Fit, by_recording, prior_precision
+from rig.diagnosis.fit import Fit, by_recording
 from rig.diagnosis.noise import Array
 
 BUMPS = 6

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig.diagnosis.descent import on_bound
 from rig.diagnosis.evidence import (
     Direction,
     Tangents,
@@ -16,7 +17,7 @@ from rig.diagnosis.evidence import (
     linear_gains,
     tangents,
 )
-from rig.diagnosis.fit import Fit, best_fit, bold_fit, bold_view, fit, level_of, on_bound, refreshed
+from rig.diagnosis.fit import Fit, attempt, best_fit, bold_fit, bold_view, fit, glance, refreshed
 from rig.diagnosis.noise import Array
 from rig.diagnosis.omnibus import LEVEL, leftover
 from rig.diagnosis.problem import Effect, Problem, Values
@@ -29,7 +30,7 @@ KEEP_NATS = 3.0
 START_SCALES = 0.05
 BETWEEN_NATS = 0.3
 STANDS_OUT_NATS = 3.0
-GIVEN_UP_NATS = 300.0
+FOLLOWED = 5
 REACH_NATS = 20.0
 REACH_SHARE = 0.5
 
@@ -111,9 +112,12 @@ def candidates(current: Fit, t: Tangents) -> list[Fit]:
     reach = max(within_reach(top), 0.0)
     near = [d for gain, d in ranked[:SHORT_LIST] if gain > reach]
     near += [d for gain, d in ranked if d.effect.between and gain > BETWEEN_NATS and d not in near]
-    fits = [best_fit(problem, (*current.effects, d.effect), started(current, d, t), current.whitener) for d in near]
+    starts = [((*current.effects, d.effect), started(current, d, t)) for d in near]
+    fits = [attempt(problem, effects, start, current.whitener) for effects, start in starts]
     if top > STANDS_OUT_NATS or leftover(current, np.random.default_rng(0)).p_value <= LEVEL:
-        fits += second_look(current, t, ranked, {d.effect.key for d in near})
+        fits += second_look(current, t, ranked)
+    else:
+        fits += [bold_fit(problem, effects, start, current.whitener) for effects, start in starts]
     living = [c for c in fits if c is not None and alive(c.effects[-1], c.values)]
     gains = [float((score(c) - score(current)).sum()) for c in living]
     best = max(gains, default=0.0)
@@ -125,13 +129,14 @@ def candidates(current: Fit, t: Tangents) -> list[Fit]:
     return sorted(polished, key=lambda candidate: -float(score(candidate).sum()))
 
 
-def second_look(
-    current: Fit, t: Tangents, ranked: Sequence[tuple[float, Direction]], tried: set[str]
-) -> list[Fit | None]:
-    """Fits from noise too small to have swallowed an effect: the best, every peak of a scan, second beginnings."""
+def second_look(current: Fit, t: Tangents, ranked: Sequence[tuple[float, Direction]]) -> list[Fit | None]:
+    """Fits from noise too small to have swallowed an effect: of the best, every peak of a scan, second beginnings.
+
+    All are brought to their best under the same noise first; those that explain most there are fitted to the end.
+    """
     problem, bold = current.problem, bold_view(current)
     bold_t = tangents(bold, [d.effect for _, d in ranked] + aliased(t, ranked))
-    best = [d for gain, d in screened(bold_t, problem)[:SHORT_LIST] if gain > 0 and d.effect.key not in tried]
+    best = [d for gain, d in screened(bold_t, problem)[:SHORT_LIST] if gain > 0]
     # Strokes that repeat alias one frequency into another: every peak is followed to its end.
     best += [d for d in bold_t.directions if d.effect.tries(problem) > 1 and d not in best]
     starts = [(d.effect, started(bold, d, bold_t)) for d in best]
@@ -140,12 +145,12 @@ def second_look(
         own = free | {par.name for par in effect.pars}
         begin = {name: value for name, value in effect.begin.items() if name in own}
         starts.append((effect, {**current.values, **begin}))
-    fits, floor = list[Fit | None](), level_of(current) - GIVEN_UP_NATS
-    for effect, start in starts:
-        found = bold_fit(problem, (*current.effects, effect), start, current.whitener, floor)
-        floor = max(floor, level_of(found) - GIVEN_UP_NATS) if found is not None else floor
-        fits.append(found)
-    return fits
+    ends = [(effect, glance(problem, (*current.effects, effect), start, bold.whitener)) for effect, start in starts]
+    furthest = sorted(((effect, *end) for effect, end in ends if end is not None), key=lambda end: -end[2])
+    return [
+        bold_fit(problem, (*current.effects, effect), values, current.whitener)
+        for effect, values, _ in furthest[:FOLLOWED]
+    ]
 
 
 def within_reach(best: float) -> float:

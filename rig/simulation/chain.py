@@ -140,7 +140,7 @@ def surface_motion(drive: Drive, v: Fields) -> Array | float:
 def contact(depth_mm: Array, travel_mm: Array) -> tuple[Array, Array]:
     """Mean depth inside and share of time in contact while the tip travels by ``travel_mm`` in one sample."""
     half = np.maximum(0.5 * np.abs(travel_mm), 1e-9)
-    share = np.clip(0.5 + 0.5 * depth_mm / half, 0.0, 1.0)
+    share = np.minimum(np.maximum(0.5 + 0.5 * depth_mm / half, 0.0), 1.0)
     crossing = (depth_mm > -half) & (depth_mm < half)
     return np.where(crossing, (depth_mm + half) ** 2 / (4 * half), np.maximum(depth_mm, 0.0)), share
 
@@ -175,8 +175,8 @@ def viscous(velocity_mm_s: Array, v: Fields) -> Array:
 
 def tissue(drive: Drive, tip: Tip, v: Fields) -> Array:
     """Force of the tissue on the tip [N]."""
-    depth = depth_of(drive, tip, v)
     moving = surface_motion(drive, v)
+    depth = tip.position_mm - (v["surface_mm"] + v["contact_offset_mm"] + moving)
     velocity = tip.velocity_mm_s if isinstance(moving, float) else tip.velocity_mm_s - drive.rate(moving)
     inside, touching = contact(depth, velocity * drive.period_s)
     force = elastic(inside, v)

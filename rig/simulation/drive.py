@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +85,23 @@ class Drive:
 
     def shifted(self, signal: Array, delay_s: float) -> Array:
         """``signal(t - delay_s)`` by cubic interpolation inside each recording, held at its ends, shape (n,)."""
-        return self._gather(signal, np.arange(self.size, dtype=float) - delay_s / self.period_s, self.recording)
+        delay = delay_s / self.period_s
+        whole = int(np.floor(-delay))
+        reach = min(max(abs(whole - 1), abs(whole + 2)), self.size)
+        padded = np.pad(signal, reach, mode="edge")
+        rows = [padded[reach + whole + k : reach + whole + k + self.size] for k in (-1, 0, 1, 2)]
+        late = np.asarray(sum(w * row for w, row in zip(_lagrange(-delay - whole), rows, strict=True)))
+        ends = np.flatnonzero((self._from_start < reach) | (self._to_end < reach))
+        late[ends] = self._gather(signal, np.asarray(ends - delay, float), self.recording[ends])
+        return late
+
+    @cached_property
+    def _from_start(self) -> Index:
+        return np.arange(self.size) - self.starts[:-1][self.recording]
+
+    @cached_property
+    def _to_end(self) -> Index:
+        return self.starts[1:][self.recording] - 1 - np.arange(self.size)
 
     def at_tracker(self, signal: Array, delay_s: float = 0.0) -> Array:
         """``signal`` at the tracker's frame times minus ``delay_s``, shape (m,)."""
@@ -109,11 +126,15 @@ class Drive:
         base = np.floor(at).astype(np.int64)
         f = at - base
         rows = np.stack([np.minimum(np.maximum(base + k, low), high) for k in (-1, 0, 1, 2)])
-        weights = np.stack([
-            -f * (f - 1) * (f - 2) / 6, (f + 1) * (f - 1) * (f - 2) / 2, -(f + 1) * f * (f - 2) / 2,
-            (f + 1) * f * (f - 1) / 6,
-        ])  # fmt: skip
-        return rows, weights
+        return rows, np.stack(_lagrange(f))
+
+
+def _lagrange(f: Any) -> tuple[Any, ...]:
+    """Weights of the neighbours -1, 0, 1, 2 at the fraction ``f`` between 0 and 1."""
+    return (
+        -f * (f - 1) * (f - 2) / 6, (f + 1) * (f - 1) * (f - 2) / 2, -(f + 1) * f * (f - 2) / 2,
+        (f + 1) * f * (f - 1) / 6,
+    )  # fmt: skip
 
 
 def _weighted(signal: Array, stencil: tuple[Index, Array]) -> Array:

@@ -159,6 +159,7 @@ class _State:
         self.bristle = np.zeros(count)
         self.memory, self.elastic_before = np.zeros(count), np.zeros(count)
         self.filtered = np.zeros(count)
+        self.force_before: Array | None = None
         self.speed_before = np.zeros(count)
         self.touched = np.zeros(count, bool)
 
@@ -213,7 +214,10 @@ class _State:
         lag = hidden.get("filter_lag", "s")
         if not lag:
             return force
-        self.filtered += STEP_S / lag * (force - self.filtered)
+        # Trapezoidal: a plain Euler step would be a lag one step shorter than the number hidden.
+        middle = 0.5 * (force + (self.force_before if self.force_before is not None else force))
+        self.filtered += (middle - self.filtered) * STEP_S / (lag + 0.5 * STEP_S)
+        self.force_before = force
         return self.filtered.copy()
 
 
