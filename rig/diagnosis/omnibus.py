@@ -18,10 +18,12 @@ from rig.diagnosis.noise import Array
 BUMPS = 6
 DRAWS = 200
 LEVEL = 0.005
-# Twelve recordings have few enough orders that no pattern, however clear, is rarer than about 0.004.
-BETWEEN_LEVEL = 0.01
+# Ten recordings have so few orders that no pattern, however clear, is rarer than about 0.01: orders are only the check.
+BETWEEN_LEVEL = 0.003
+ORDER_LEVEL = 0.05
 WORTH_SHARE = 0.004
 MOST_UNNAMED = 0.1
+AMPLE_SHARE = 0.1
 RIDGE = 0.05
 BETWEEN = ("session time", "stroke number", "speed", "temperature")
 FEWEST_BETWEEN = 8
@@ -90,21 +92,23 @@ def judged_leftover(found: Leftover, named_nats: float) -> tuple[str, ...]:
     """Variables an unexplained leftover depends on; none where it is chance, too small to matter, or mostly named.
 
     A leftover is too small below 0.4 % of the noise power, or below a tenth of what the named causes explain: the
-    library has then got the cause, if not its last detail.
+    library has then got the cause, if not its last detail. A tenth of the noise power always matters.
     """
     if found.between_p <= BETWEEN_LEVEL:
         return found.between
     best = found.ranked[0]
-    matters = found.shares[best] >= WORTH_SHARE and found.gains[best] >= MOST_UNNAMED * named_nats
+    named_it = found.gains[best] < MOST_UNNAMED * named_nats and found.shares[best] < AMPLE_SHARE
+    matters = found.shares[best] >= WORTH_SHARE and not named_it
     if found.p_value > LEVEL or not matters:
         return ()
     return tuple(name for name in found.ranked if found.gains[name] >= 0.5 * found.gains[best])
 
 
 def between_recordings(fit: Fit, rng: np.random.Generator) -> tuple[tuple[str, ...], float]:
-    """What the recordings' own shifts depend on: the largest correlation with a trend or a step, against permutations.
+    """What the recordings' own shifts depend on: the largest correlation with a trend or a step.
 
-    Returns the variables of the largest correlation and the chance of it.
+    Its chance is taken among normal shifts, and the recordings' own in other orders must bear it out. Returns the
+    variables of the largest correlation and its chance.
     """
     shifts = fit.whitener.noise.shifts
     count = len(shifts)
@@ -125,11 +129,19 @@ def between_recordings(fit: Fit, rng: np.random.Generator) -> tuple[tuple[str, .
     strength = np.abs(basis @ scores.T)  # (patterns, quantities)
     best = float(strength.max())
     orders = np.stack([rng.permutation(count) for _ in range(BETWEEN_DRAWS)])
-    null = np.abs(np.einsum("pr,qdr->dpq", basis, scores[:, orders])).max(axis=(1, 2))
-    p_value = (1 + np.count_nonzero(null >= best)) / (1 + BETWEEN_DRAWS)
+    shuffled = scores[:, orders]
+    drawn = _standard(rng.standard_normal((len(scores), BETWEEN_DRAWS, count)))
+    p_order, p_normal = (_rarity(basis, rows, best) for rows in (shuffled, drawn))
+    p_value = p_normal if p_order <= ORDER_LEVEL else 1.0
     strongest = strength.max(axis=1)
     found = dict.fromkeys(owners[k] for k in np.argsort(-strongest) if strongest[k] > 0.95 * best)
     return tuple(found), float(p_value)
+
+
+def _rarity(basis: Array, rows: Array, best: float) -> float:
+    """Share of draws, rows (quantities, draws, recordings), with a correlation of at least ``best`` somewhere."""
+    null = np.abs(np.einsum("pr,qdr->dpq", basis, rows)).max(axis=(1, 2))
+    return float((1 + np.count_nonzero(null >= best)) / (1 + len(null)))
 
 
 def _standard(rows: Array) -> Array:
