@@ -1,8 +1,7 @@
-"""Speed of the lattice, as ratios within one run: ``python -m benchmarks.lattice [--figure FILE] [--quick]``.
+"""Speed of the lattice, as ratios within one run: ``python -m benchmarks.lattice [--figure FILE] [--part NAME]``.
 
 Rivals taichi and warp-lang are timed if they are installed (``uv pip install taichi warp-lang``); numpy always is.
-Every ratio states
-what it compares; what is extrapolated says so.
+Every ratio states what it compares; what is extrapolated says so.
 """
 
 import argparse
@@ -14,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -30,6 +30,7 @@ EXPONENT = 4.0
 DEPTH_MM = 2.0
 TOLERANCE_N = RELATIVE_TOLERANCE * 0.1
 GUESSES_PER_FORCE, FORCES = 4, 10
+STATE_ARRAYS = 7  # positions, rest, force, free, and the solver's velocity, inverse mass and diagonal
 RIVALS: Mapping[str, Callable[[Matrix, float, float], Callable[[], Matrix] | None]] = {
     "numpy slices": NumpySlices,
     "taichi": taichi_force,
@@ -149,39 +150,62 @@ def first_call_seconds() -> tuple[float, float]:
     return float(runs[0].stdout), float(runs[1].stdout)
 
 
-def scaling(repeats: int) -> list[tuple[int, float, float]]:
-    """Vertices, ms per force (springs only) and bytes of state per vertex, from 10^4 to 10^6 vertices."""
+class Size(NamedTuple):
+    """One block of the scaling: ms per force with springs alone and with cell volumes; bytes of state per vertex."""
+
+    vertices: int
+    springs_ms: float
+    cells_ms: float
+    bytes_per_vertex: float
+
+
+def scaling(repeats: int) -> list[Size]:
+    """From 10^4 to 10^6 vertices; the state is all that a solver keeps, with its padding."""
     found = []
     for nodes in ((21, 21, 24), (31, 31, 32), (51, 51, 40), (71, 71, 56), (91, 91, 80), (121, 121, 72)):
-        lattice = shaken(Block(nodes), Springs(0.1, 0.0, 0.0))
-        arrays = 7  # positions, rest, force, free, and the solver's velocity, inverse mass and diagonal
-        found.append(
-            (
-                lattice.block.vertices,
-                1e3 * best(lattice.force, repeats),
-                arrays * lattice.x.nbytes / lattice.block.vertices,
-            )
-        )
+        alone, with_cells = (shaken(Block(nodes), Springs(0.1, 0.0, ratio)) for ratio in (0.0, 1.0))
+        times = best_of_rounds({"alone": alone.force, "with cells": with_cells.force}, repeats)
+        vertices = alone.block.vertices
+        size = STATE_ARRAYS * alone.x.nbytes / vertices
+        found.append(Size(vertices, 1e3 * times["alone"], 1e3 * times["with cells"], size))
     return found
 
 
-def draw(points: Sequence[tuple[int, float, float]], file: Path) -> None:
+def draw(points: Sequence[Size], file: Path) -> None:
     """Cost against vertex count, as a picture."""
-    from rig.report.drawing import ACTUAL, dress, new_figure, png  # noqa: PLC0415
+    from rig.report.drawing import ACTUAL, MODEL, QUIET, dress, label, new_figure, png  # noqa: PLC0415
 
-    figure = new_figure(6.0, 4.0)
+    figure = new_figure(7.0, 4.4)
     axes = figure.subplots()
-    dress(axes, "One force evaluation, springs only", "vertices", "ms")
-    axes.loglog([p[0] for p in points], [p[1] for p in points], "o-", color=ACTUAL)
+    dress(axes, "One force evaluation", "vertices", "ms")
+    vertices = [p.vertices for p in points]
+    for values, name, color in (
+        ([p.springs_ms for p in points], "springs alone", ACTUAL),
+        ([p.cells_ms for p in points], "with cell volumes", MODEL),
+    ):
+        axes.loglog(vertices, values, "o-", color=color, markersize=5)
+        label(axes, (vertices[-1], values[-1]), name, color, beside="left" if color == MODEL else "below")
+    least, most = (pick(p.bytes_per_vertex for p in points) for pick in (min, max))
+    text = f"state: {least:.0f} to {most:.0f} bytes a vertex"
+    axes.annotate(text, (0.03, 0.94), xycoords="axes fraction", va="top", fontsize=9, color=QUIET)
     file.write_bytes(png(figure, dpi=90))
 
 
 def main() -> None:
-    """Run everything and print the tables; a JSON line at the end."""
+    """Run the parts asked for and print their tables; a JSON line at the end."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--figure", type=Path, help="write cost against vertex count here (png)")
-    parser.add_argument("--quick", action="store_true", help="force table only")
+    parser.add_argument("--part", choices=PARTS, action="append", help="only this; may be repeated")
     options = parser.parse_args()
+    result: dict[str, object] = {}
+    for part in options.part or PARTS:
+        result |= PARTS[part]()
+    if options.figure is not None:
+        draw(cast("list[Size]", result.get("scaling") or scaling(10)), options.figure)
+    print(json.dumps(result))
+
+
+def _force() -> dict[str, object]:
     forces, roof = force_table(40)
     count = springs_of(Block())
     print(f"force of {count} springs, float64, ms (least of many)")
@@ -190,13 +214,10 @@ def main() -> None:
             print(f"  {law:12} {name:24} {value:8.3f}   ours is {value / column['ours']:5.1f} x as fast")
         rate = FLOPS[law] * count / column["ours"] / 1e6
         print(f"  {law:12} {rate:.0f} Gflop/s of {roof:.0f} in a matrix product: {100 * rate / roof:.0f} %")
-    result: dict[str, object] = {"force_ms": forces, "peak_gflops": roof}
-    if not options.quick:
-        result |= _slow_part(options.figure)
-    print(json.dumps(result))
+    return {"force_ms": forces, "peak_gflops": roof}
 
 
-def _slow_part(figure: Path | None) -> dict[str, object]:
+def _equilibrium() -> dict[str, object]:
     settled = equilibria()
     slow = settled["study's scheme, full"][0]
     print("equilibrium at 2 mm, springs only")
@@ -208,17 +229,30 @@ def _slow_part(figure: Path | None) -> dict[str, object]:
         f"ten-force fit: sweep to 8 mm {swept:.1f} s; study's loop {loop:.0f} s (extrapolated: {FORCES} forces x "
         f"{GUESSES_PER_FORCE} simulations x {slow:.1f} s at 2 mm): {loop / swept:.0f} x"
     )
+    return {"equilibrium": settled, "sweep_s": swept, "loop_s": loop}
+
+
+def _first() -> dict[str, object]:
     cold, warm = first_call_seconds()
     print(f"first force of a fresh process: {cold:.1f} s compiling once per machine, {warm:.1f} s from disk")
+    return {"first_call_s": [cold, warm]}
+
+
+def _scaling() -> dict[str, object]:
     points = scaling(10)
-    for vertices, milliseconds, size in points:
-        print(
-            f"  {vertices:8d} vertices  {milliseconds:8.3f} ms  {1e6 * milliseconds / vertices:5.2f} ns/vertex  "
-            f"{size:.0f} B/vertex"
-        )
-    if figure is not None:
-        draw(points, figure)
-    return {"equilibrium": settled, "sweep_s": swept, "loop_s": loop, "first_call_s": [cold, warm], "scaling": points}
+    print("   vertices   springs alone, ms   ns/vertex   with cell volumes, ms   state, B/vertex")
+    for p in points:
+        each = 1e6 * p.springs_ms / p.vertices
+        print(f"  {p.vertices:9d}  {p.springs_ms:18.3f}  {each:10.2f}  {p.cells_ms:22.3f}  {p.bytes_per_vertex:16.0f}")
+    return {"scaling": points}
+
+
+PARTS: Mapping[str, Callable[[], dict[str, object]]] = {
+    "force": _force,
+    "equilibrium": _equilibrium,
+    "first": _first,
+    "scaling": _scaling,
+}
 
 
 if __name__ == "__main__":
