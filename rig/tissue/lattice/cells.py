@@ -6,14 +6,14 @@ One determinant per cell lets cells fold over while their mean volume stays posi
 
 Kernels go from node to node: eight corners meet at a node, one per octant, and share the six edges that leave it
 (a along x, b along y, d along z; the first of a pair goes down, the second up). Results go to seven times three buffer
-rows: what the node itself gets, then its neighbours in the order of the edges. The masks say which octants hold a cell;
-``low`` and ``high`` are the rows of the planes beside, with stiffness 0 where there is none.
+rows: what the node itself gets, then its neighbours in the order of the edges. The masks from ``m`` on say which
+octants hold a cell; ``low`` and ``high`` are the rows of the planes beside, with stiffness 0 where there is none.
 """
 
 import numpy as np
 
 from rig.tissue.lattice.numba_types import CELL, Floats, Matrix, part, row_kernel
-from rig.tissue.lattice.rows import MASKS, PAD, WIDTH, Vector, at, between, dot, store
+from rig.tissue.lattice.rows import PAD, WIDTH, Vector, at, between, dot, store
 
 SMALLEST_CORNER = 0.002
 _PARABOLA = 1.0 / SMALLEST_CORNER**2
@@ -22,8 +22,8 @@ Quad = tuple[float, float, float, float]
 Vectors = tuple[Vector, Vector, Vector, Vector]
 Corner = tuple[int, int, int, float, float, int, int, int, int]
 
-_M0, _M1, _M2, _M3 = (row * WIDTH + PAD for row in (0, 2, 6, 8))  # masks of the octants (-,-) ... (+,+)
-_OWN, _AL, _AH, _BL, _BH, _DL, _DH = ((MASKS + 3 * row) * WIDTH + PAD for row in range(7))
+_M1, _M2, _M3 = 2 * WIDTH, 6 * WIDTH, 8 * WIDTH  # masks of the octants (-,+), (+,-), (+,+) after that of (-,-)
+_OWN, _AL, _AH, _BL, _BH, _DL, _DH = (3 * row * WIDTH + PAD for row in range(7))
 
 
 @part
@@ -87,6 +87,8 @@ def cell_force(
     kv_high: float,
     volume: float,
     t: Floats,
+    masks: Floats,
+    m: int,
 ) -> None:
     """Forces in N. The determinant of an octant with an odd number of edges that go down is -J."""
     inverse = 1.0 / volume
@@ -97,7 +99,7 @@ def cell_force(
         bl, bh = between(x, o, o - stride), between(x, o, o + stride)
         dl, dh = between(x, o, o - 1), between(x, o, o + 1)
         of_a, of_b, of_d = _crosses(bl, bh, dl, dh), _crosses(dl, dh, al, ah), _crosses(al, ah, bl, bh)
-        mask = t[at(_M0 + c)], t[at(_M1 + c)], t[at(_M2 + c)], t[at(_M3 + c)]
+        mask = masks[at(m + c)], masks[at(m + _M1 + c)], masks[at(m + _M2 + c)], masks[at(m + _M3 + c)]
         s, h = _pulls(al, of_a, -inverse, -weak, mask), _pulls(ah, of_a, inverse, strong, mask)
         fal, fah = _weighted(s[0], s[1], s[2], s[3], of_a), _weighted(h[0], h[1], h[2], h[3], of_a)
         fbl, fbh = _weighted(s[0], h[0], s[1], h[1], of_b), _weighted(s[2], h[2], s[3], h[3], of_b)
@@ -115,14 +117,14 @@ def cell_force(
 def _corner(
     octant: int, p: int, low: int, high: int, stride: int, kv_low: float, kv_high: float, volume: float
 ) -> Corner:
-    """Where the edges of an octant end, +-1/volume, kv/8, its mask, and the buffer rows of its three edges."""
+    """Where the edges of an octant end, +-1/volume, kv/8, its mask in a set, and the rows of its three edges."""
     i, j, k = octant // 4, octant // 2 % 2, octant % 2
     a = high if i == 1 else low
     b = p + stride if j == 1 else p - stride
     d = p + 1 if k == 1 else p - 1
     sign = 1.0 if (i + j + k) % 2 == 1 else -1.0
     kv = 0.125 * (kv_high if i == 1 else kv_low)
-    return a, b, d, sign / volume, kv, _row(6 * j + 2 * k), _row(12 + 3 * i), _row(18 + 3 * j), _row(24 + 3 * k)
+    return a, b, d, sign / volume, kv, (6 * j + 2 * k) * WIDTH, _row(3 + 3 * i), _row(9 + 3 * j), _row(15 + 3 * k)
 
 
 @part
@@ -132,7 +134,7 @@ def _row(number: int) -> int:
 
 @part
 def _clear(t: Floats, n: int) -> None:
-    for number in range(MASKS, MASKS + 21):
+    for number in range(21):
         row = _row(number)
         for c in range(n):
             t[at(row + c)] = 0.0
@@ -164,17 +166,19 @@ def cell_product(
     kv_high: float,
     volume: float,
     t: Floats,
+    masks: Floats,
+    m: int,
 ) -> None:
     """Change of the forces for a small displacement u."""
     _clear(t, n)
     for octant in range(8):
-        ea, eb, ed, s, kv, m, ra, rb, rd = _corner(octant, p, low, high, stride, kv_low, kv_high, volume)
+        ea, eb, ed, s, kv, octant_mask, ra, rb, rd = _corner(octant, p, low, high, stride, kv_low, kv_high, volume)
         for c in range(n):
             o = p + c
             a, b, d = between(x, o, ea + c), between(x, o, eb + c), between(x, o, ed + c)
             da, db, dd = between(u, o, ea + c), between(u, o, eb + c), between(u, o, ed + c)
             ga, gb, gd = _cross(b, d), _cross(d, a), _cross(a, b)
-            j, weight = s * dot(a, ga), t[at(m + c)] * kv * s
+            j, weight = s * dot(a, ga), masks[at(m + octant_mask + c)] * kv * s
             slope = weight * _slope(j)
             curve = weight * s * _curvature(j) * (dot(ga, da) + dot(gb, db) + dot(gd, dd))
             fa = _along(curve, ga, slope, _cross(db, d), _cross(b, dd))
@@ -209,16 +213,18 @@ def cell_diagonal(
     kv_high: float,
     volume: float,
     t: Floats,
+    masks: Floats,
+    m: int,
 ) -> None:
     """A positive bound of the Hessian's diagonal."""
     _clear(t, n)
     for octant in range(8):
-        ea, eb, ed, s, kv, m, ra, rb, rd = _corner(octant, p, low, high, stride, kv_low, kv_high, volume)
+        ea, eb, ed, s, kv, octant_mask, ra, rb, rd = _corner(octant, p, low, high, stride, kv_low, kv_high, volume)
         for c in range(n):
             o = p + c
             a, b, d = between(x, o, ea + c), between(x, o, eb + c), between(x, o, ed + c)
             ga, gb, gd = _cross(b, d), _cross(d, a), _cross(a, b)
-            curve = t[at(m + c)] * kv * s * s * _curvature(s * dot(a, ga))
+            curve = masks[at(m + octant_mask + c)] * kv * s * s * _curvature(s * dot(a, ga))
             _add(t, _OWN + c, curve, _squares(_sizes(ga, gb, gd)))
             _add(t, ra + c, curve, _squares(ga))
             _add(t, rb + c, curve, _squares(gb))
@@ -238,15 +244,17 @@ def cell_energy(
     kv_high: float,
     volume: float,
     t: Floats,
+    masks: Floats,
+    m: int,
 ) -> None:
     """Twice the energy in N mm, in the node's own first row (of a spring's energy each end gets the whole, too)."""
     _clear(t, n)
     for octant in range(8):
-        ea, eb, ed, s, kv, m, _ra, _rb, _rd = _corner(octant, p, low, high, stride, kv_low, kv_high, volume)
+        ea, eb, ed, s, kv, octant_mask, _ra, _rb, _rd = _corner(octant, p, low, high, stride, kv_low, kv_high, volume)
         for c in range(n):
             o = p + c
             j = s * dot(between(x, o, ea + c), _cross(between(x, o, eb + c), between(x, o, ed + c)))
             inside = max(j, SMALLEST_CORNER)
             over = j - inside
             value = inside - 1.0 - np.log(inside) + (1.0 - 1.0 / inside) * over + 0.5 * (over / inside) ** 2
-            t[at(_OWN + c)] += 2.0 * t[at(m + c)] * kv * value
+            t[at(_OWN + c)] += 2.0 * masks[at(m + octant_mask + c)] * kv * value

@@ -12,12 +12,13 @@ import numpy as np
 
 from rig.tissue.lattice import cells, rows
 from rig.tissue.lattice.numba_types import Floats, Matrix, RowKernel, driver, piece
-from rig.tissue.lattice.rows import FRONT, LONGEST_ROW, MASKS, PAD, WIDTH
+from rig.tissue.lattice.rows import FRONT, MASKS, PAD, WIDTH, ZEROS
 from rig.tissue.lattice.threads import cut, in_parts
 
+SPRING_NODES = 320
 CELL_NODES = 160  # nodes per block of cells: 25 buffer rows of this length stay in the first cache level
-_ZEROS = MASKS + 27  # a buffer row nobody writes
-_BUFFER = (_ZEROS + 1) * WIDTH
+_BUFFER = (ZEROS + 1) * WIDTH
+_MASKS = 4 * MASKS * WIDTH
 
 # Steps along x, y, z of the nine directions; near ends are summed in this order. Rows 0-3 stay in the plane, 4-8 go
 # to the next one.
@@ -62,21 +63,34 @@ ENERGY = Sum(rows.spring_energy, rows.spring_energy, cells.cell_energy, 1.0)
 
 
 @piece
-def _mask(t: Floats, shape: Shape, j: int, count: int) -> None:
-    """Fill the masks for rows j ... j+count-1 of a plane; springs in the mirror plane y = 0 count half."""
-    for row in range(MASKS):
-        dj, dk = row // 3 - 1, row % 3 - 1
-        for y in range(j, j + count):
-            weight = 0.5 if shape.mirrored == 1 and y == 0 and dj == 0 else 1.0
-            at = row * WIDTH + PAD + (y - j) * shape.stride
-            for z in range(shape.stride):
-                inside = z < shape.nz and 0 <= z + dk < shape.nz and 0 <= y + dj < shape.ny
-                t[at + z] = weight if inside else 0.0
+def _at(row: int) -> int:
+    return row * WIDTH + PAD
 
 
 @piece
-def _at(row: int) -> int:
-    return row * WIDTH + PAD
+def _masks_of(shape: Shape, j: int, count: int) -> int:
+    """Where the set of masks for rows j ... j+count-1 of a plane starts; only first and last rows are special."""
+    special = (1 if j == 0 else 0) + (2 if j + count == shape.ny else 0)
+    return _at(MASKS * special)
+
+
+@piece
+def _fill_masks(masks: Floats, shape: Shape, most: int) -> None:
+    """Masks of all sets that blocks of ``most`` rows need; springs in the mirror plane y = 0 count half."""
+    for j in range(0, shape.ny, most):
+        count = min(most, shape.ny - j)
+        if j <= most or j + count == shape.ny:
+            for row in range(MASKS):
+                _fill_mask(masks, shape, j, count, row // 3 - 1, row % 3 - 1, _masks_of(shape, j, count) + row * WIDTH)
+
+
+@piece
+def _fill_mask(masks: Floats, shape: Shape, j: int, count: int, dj: int, dk: int, at: int) -> None:
+    for y in range(j, j + count):
+        weight = 0.5 if shape.mirrored == 1 and y == 0 and dj == 0 else 1.0
+        for z in range(shape.stride):
+            inside = z < shape.nz and 0 <= z + dk < shape.nz and 0 <= y + dj < shape.ny
+            masks[at + (y - j) * shape.stride + z] = weight if inside else 0.0
 
 
 @driver
@@ -92,14 +106,16 @@ def _springs(
     first: int,
     stop: int,
     t: Floats,
+    masks: Floats,
 ) -> None:
     """All springs that act on planes first ... stop-1."""
-    s, plane, most = shape.stride, shape.ny * shape.stride, LONGEST_ROW // shape.stride
-    for j in range(0, shape.ny, most):
-        count = min(most, shape.ny - j)
-        _mask(t, shape, j, count)
-        for i in range(max(first - 1, 0), stop):
-            own, own_next, last_plane = i >= first, first <= i + 1 < stop, i + 1 == shape.nx
+    s, plane, most = shape.stride, shape.ny * shape.stride, max(1, SPRING_NODES // shape.stride)
+    _fill_masks(masks, shape, most)
+    for i in range(max(first - 1, 0), stop):
+        own, own_next, last_plane = i >= first, first <= i + 1 < stop, i + 1 == shape.nx
+        for j in range(0, shape.ny, most):
+            count = min(most, shape.ny - j)
+            m = _masks_of(shape, j, count)
             p = FRONT + i * plane + j * s
             for d in range(9):
                 di, dj, dk = STEPS[d, 0], STEPS[d, 1], STEPS[d, 2]
@@ -107,8 +123,8 @@ def _springs(
                     length = law.spacing if d in (0, 1, 4) else law.spacing * np.sqrt(2.0)
                     k = 0.5 * law.k if shape.mirrored == 1 and i == 0 and di == 0 else law.k
                     q = p + di * plane + dj * s + dk
-                    mask = _at(3 * (dj + 1) + dk + 1)
-                    spring(x, u, p, q, count * s, k, length, law.b, t, _at(MASKS + 3 * d), mask)
+                    mask = m + (3 * dj + dk + 4) * WIDTH
+                    spring(x, u, p, q, count * s, k, length, law.b, t, _at(3 * d), masks, mask)
             _scatter(add, f, shape, p, count * s, own, own_next, last_plane, j == 0, j + count == shape.ny, far, t)
 
 
@@ -135,11 +151,11 @@ def _scatter(
     s, q = shape.stride, p + shape.ny * shape.stride
     up = n - s if highest else n
     down = s if lowest else 0
-    nil = _at(_ZEROS)
+    nil = _at(ZEROS)
     for w in range(3):
-        t0, t1, t2 = _at(MASKS + w), _at(MASKS + 3 + w), _at(MASKS + 6 + w)
-        t3, t4, t5 = _at(MASKS + 9 + w), _at(MASKS + 12 + w), _at(MASKS + 15 + w)
-        t6, t7, t8 = _at(MASKS + 18 + w), _at(MASKS + 21 + w), _at(MASKS + 24 + w)
+        t0, t1, t2 = _at(w), _at(3 + w), _at(6 + w)
+        t3, t4, t5 = _at(9 + w), _at(12 + w), _at(15 + w)
+        t6, t7, t8 = _at(18 + w), _at(21 + w), _at(24 + w)
         if own:
             add(f, w, p, n, t, t0, t1, t2, 1.0)
             add(f, w, p, n, t, t0 - 1, nil, nil, far)
@@ -167,22 +183,24 @@ def _cells(
     first: int,
     stop: int,
     t: Floats,
+    masks: Floats,
 ) -> None:
     """All corners of cells that act on planes first ... stop-1."""
     s, plane, most = shape.stride, shape.ny * shape.stride, max(1, CELL_NODES // shape.stride)
-    own, nil = _at(MASKS), _at(_ZEROS)
-    for j in range(0, shape.ny, most):
-        n = min(most, shape.ny - j) * s
-        _mask(t, shape, j, n // s)
-        up = n - s if j + n // s == shape.ny else n
-        down = s if j == 0 else 0
-        for i in range(max(first - 1, 0), min(stop + 1, shape.nx)):
+    nil = _at(ZEROS)
+    _fill_masks(masks, shape, most)
+    for i in range(max(first - 1, 0), min(stop + 1, shape.nx)):
+        for j in range(0, shape.ny, most):
+            count = min(most, shape.ny - j)
+            n = count * s
+            up = n - s if j + count == shape.ny else n
+            down = s if j == 0 else 0
             p = FRONT + i * plane + j * s
             low, kv_low = (p - plane, law.cell) if i > 0 else (p, 0.0)
             high, kv_high = (p + plane, law.cell) if i + 1 < shape.nx else (p, 0.0)
-            cell(x, u, p, low, high, s, n, kv_low, kv_high, law.spacing**3, t)
+            cell(x, u, p, low, high, s, n, kv_low, kv_high, law.spacing**3, t, masks, _masks_of(shape, j, count))
             for w in range(3):
-                r = own + w * WIDTH
+                r = _at(w)
                 if first <= i < stop:
                     add(f, w, p, n, t, r, r + 15 * WIDTH + 1, r + 18 * WIDTH - 1, 1.0)
                     add(f, w, p - s + down, n - down, t, r + 9 * WIDTH + down, nil, nil, 1.0)
@@ -198,9 +216,9 @@ def _slab(what: Sum, x: Matrix, u: Matrix, f: Matrix, shape: Shape, law: Stiffne
     plane, add = shape.ny * shape.stride, rows.add_three()
     f[:, FRONT + first * plane : FRONT + stop * plane] = 0.0
     spring = what.constant() if law.b == 0.0 else what.exponential()
-    _springs(spring, add, what.far, x, u, f, shape, law, first, stop, np.zeros(_BUFFER))
+    _springs(spring, add, what.far, x, u, f, shape, law, first, stop, np.zeros(_BUFFER), np.zeros(_MASKS))
     if law.cell > 0.0:
-        _cells(what.cell(), add, x, u, f, shape, law, first, stop, np.zeros(_BUFFER))
+        _cells(what.cell(), add, x, u, f, shape, law, first, stop, np.zeros(_BUFFER), np.zeros(_MASKS))
 
 
 def assemble(what: Sum, x: Matrix, u: Matrix, f: Matrix, shape: Shape, law: Stiffness, slabs: int) -> None:

@@ -23,11 +23,11 @@ RowKernel: TypeAlias = Any
 _MATRIX, _FLAT = types.float64[:, ::1], types.float64[::1]
 _INDEX, _REAL = types.int64, types.float64
 SPRING = types.void(
-    _MATRIX, _MATRIX, _INDEX, _INDEX, _INDEX, _REAL, _REAL, _REAL, _FLAT, _INDEX, _INDEX
-)  # x, u, p, q, n, k, length, b, t, at, mask
+    _MATRIX, _MATRIX, _INDEX, _INDEX, _INDEX, _REAL, _REAL, _REAL, _FLAT, _INDEX, _FLAT, _INDEX
+)  # x, u, p, q, n, k, length, b, t, out, masks, m
 CELL = types.void(
-    _MATRIX, _MATRIX, _INDEX, _INDEX, _INDEX, _INDEX, _INDEX, _REAL, _REAL, _REAL, _FLAT
-)  # x, u, p, low, high, stride, n, kv_low, kv_high, volume, t
+    _MATRIX, _MATRIX, _INDEX, _INDEX, _INDEX, _INDEX, _INDEX, _REAL, _REAL, _REAL, _FLAT, _FLAT, _INDEX
+)  # x, u, p, low, high, stride, n, kv_low, kv_high, volume, t, masks, m
 SUM = types.void(_MATRIX, _INDEX, _INDEX, _INDEX, _FLAT, _INDEX, _INDEX, _INDEX, _REAL)  # f, w, p, n, t, a, b, c, sign
 
 Function = TypeVar("Function", bound=Callable[..., object])

@@ -2,8 +2,8 @@
 
 A row is ``n`` consecutive nodes of the flat arrays. Results go to rows of one flat buffer at the constant distance
 ``WIDTH``, with ``PAD`` zeros on both sides, so that the sums can read their neighbours in z without a branch and the
-compiler can see that rows do not overlap. The buffer's first nine rows are masks: row 3 (dj + 1) + dk + 1 weighs what
-goes from a node to its neighbour at (dj, dk) in y and z, 0 where there is none.
+compiler can see that rows do not overlap. Masks are rows of a second buffer: row 3 (dj + 1) + dk + 1 of a set weighs
+what goes from a node to its neighbour at (dj, dk) in y and z, 0 where there is none.
 """
 
 import numpy as np
@@ -13,7 +13,8 @@ from rig.tissue.lattice.numba_types import SPRING, SUM, Floats, Matrix, part, ro
 PAD = 8
 WIDTH = 352  # one buffer row: nodes of a few rows and padding on both sides
 LONGEST_ROW = WIDTH - 2 * PAD
-MASKS = 9
+ZEROS = 27  # a row nobody writes, after three rows for each of nine directions
+MASKS = 9  # rows of one set
 FRONT = WIDTH  # room before the first node of the flat arrays: kernels read one row below it
 TINY = 1e-24  # mm^2; two nodes that meet exactly then pull with no force instead of with one that is not a number
 LARGEST_EXPONENT = 300.0  # exp(300) is a failed step, not a spring; keeps infinities out of the sums
@@ -73,29 +74,62 @@ def store(t: Floats, row: int, s: float, a: Vector) -> None:
 
 @row_kernel(SPRING)
 def constant_force(
-    x: Matrix, _u: Matrix, p: int, q: int, n: int, k: float, length: float, _b: float, t: Floats, out: int, m: int
+    x: Matrix,
+    _u: Matrix,
+    p: int,
+    q: int,
+    n: int,
+    k: float,
+    length: float,
+    _b: float,
+    t: Floats,
+    out: int,
+    masks: Floats,
+    m: int,
 ) -> None:
     """Pull of springs from row p to row q: k (r - L) d / r, in N."""
     for c in range(n):
         d = between(x, p + c, q + c)
-        store(t, out + c, t[at(m + c)] * (k - (k * length) / np.sqrt(dot(d, d) + TINY)), d)
+        store(t, out + c, masks[at(m + c)] * (k - (k * length) / np.sqrt(dot(d, d) + TINY)), d)
 
 
 @row_kernel(SPRING)
 def exponential_force(
-    x: Matrix, _u: Matrix, p: int, q: int, n: int, k: float, length: float, b: float, t: Floats, out: int, m: int
+    x: Matrix,
+    _u: Matrix,
+    p: int,
+    q: int,
+    n: int,
+    k: float,
+    length: float,
+    b: float,
+    t: Floats,
+    out: int,
+    masks: Floats,
+    m: int,
 ) -> None:
     """Pull of springs whose stiffness is k exp(b |r/L - 1|), in N."""
     inverse = 1.0 / length
     for c in range(n):
         d = between(x, p + c, q + c)
         r = np.sqrt(dot(d, d) + TINY)
-        store(t, out + c, t[at(m + c)] * (k - k * length / r) * stiffening(b, r * inverse - 1.0), d)
+        store(t, out + c, masks[at(m + c)] * (k - k * length / r) * stiffening(b, r * inverse - 1.0), d)
 
 
 @row_kernel(SPRING)
 def spring_product(
-    x: Matrix, u: Matrix, p: int, q: int, n: int, k: float, length: float, b: float, t: Floats, out: int, m: int
+    x: Matrix,
+    u: Matrix,
+    p: int,
+    q: int,
+    n: int,
+    k: float,
+    length: float,
+    b: float,
+    t: Floats,
+    out: int,
+    masks: Floats,
+    m: int,
 ) -> None:
     """Change of the pull for a small displacement u: [(T' - T/r) n (n.du) + (T/r) du]; b = 0 is the constant spring."""
     for c in range(n):
@@ -106,12 +140,25 @@ def spring_product(
         grown = k * stiffening(b, strain)
         s = grown * (1.0 - length / r)
         along = (grown * (1.0 + b * abs(strain)) - s) * dot(d, du) / r2
-        store(t, out + c, t[at(m + c)], (along * d[0] + s * du[0], along * d[1] + s * du[1], along * d[2] + s * du[2]))
+        store(
+            t, out + c, masks[at(m + c)], (along * d[0] + s * du[0], along * d[1] + s * du[1], along * d[2] + s * du[2])
+        )
 
 
 @row_kernel(SPRING)
 def spring_diagonal(
-    x: Matrix, _u: Matrix, p: int, q: int, n: int, k: float, length: float, b: float, t: Floats, out: int, m: int
+    x: Matrix,
+    _u: Matrix,
+    p: int,
+    q: int,
+    n: int,
+    k: float,
+    length: float,
+    b: float,
+    t: Floats,
+    out: int,
+    masks: Floats,
+    m: int,
 ) -> None:
     """Bound of the diagonal of a spring's Hessian, one positive value per direction, in N/mm."""
     for c in range(n):
@@ -125,14 +172,25 @@ def spring_diagonal(
         store(
             t,
             out + c,
-            t[at(m + c)],
+            masks[at(m + c)],
             (along * d[0] ** 2 + across, along * d[1] ** 2 + across, along * d[2] ** 2 + across),
         )
 
 
 @row_kernel(SPRING)
 def spring_energy(
-    x: Matrix, _u: Matrix, p: int, q: int, n: int, k: float, length: float, b: float, t: Floats, out: int, m: int
+    x: Matrix,
+    _u: Matrix,
+    p: int,
+    q: int,
+    n: int,
+    k: float,
+    length: float,
+    b: float,
+    t: Floats,
+    out: int,
+    masks: Floats,
+    m: int,
 ) -> None:
     """Energy of each spring in N mm, in the first of three rows: k (r-L)^2 / 2, or k L^2 [(b e - 1) exp(b e) + 1] / b^2
     with e = |r/L - 1|.
@@ -145,7 +203,7 @@ def spring_energy(
             shape = e * e * (0.5 + be * (1.0 / 3.0 + be * (0.125 + be * (1.0 / 30.0 + be / 144.0))))
         else:
             shape = ((be - 1.0) * vector_exp(be) + 1.0) / (b * b)
-        t[at(out + c)] = t[at(m + c)] * k * length * length * shape
+        t[at(out + c)] = masks[at(m + c)] * k * length * length * shape
 
 
 @row_kernel(SUM)
