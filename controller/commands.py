@@ -8,12 +8,14 @@ from controller.steps import Program
 from rig.config.table import parse
 from rig.errors import RigError, UsageError
 
-STOPS = {"stop", "pain", "estop"}
+STOPS = {"stop", "pain", "estop", "unattended"}
 
 
 class Inbox:
-    """Messages of the form ``{"do": verb, ...}``: program, stop, pain, estop, reset, note, lease,
-    shutdown; any of them renews the operator's lease."""
+    """Messages of the form ``{"do": verb, ...}``: program, stop, pain, estop, unattended, reset, note, lease, shutdown.
+
+    Any of them renews the lease of the operator's program.
+    """
 
     def __init__(self, link: Link) -> None:
         self._link = link

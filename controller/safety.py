@@ -176,6 +176,8 @@ def _supervisor_lost(world: World, watch: Watch, wiring: Wiring) -> str:
 
 
 def _operator_silent(world: World, watch: Watch, wiring: Wiring) -> str:
+    if "unattended" in watch.requests:
+        return "whoever started this is not in control any more: the lease was given back or ran out"
     lease_s = wiring.loop.lease_s
     if not lease_s or watch.operator_silent_s <= lease_s:
         return ""

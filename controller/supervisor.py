@@ -26,6 +26,7 @@ LEAVE_TIMEOUT_S = 15.0
 ANSWER_TIMEOUT_S = 5.0
 # Renewals within one lease, so that two may be late.
 LEASE_SHARE = 4
+UNASKED_LEASE_S = 3.0
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class Supervisor:
         self.recorder: RecorderClient | None = None
         self.ready = Ready({}, {})
         self.attended: Callable[[], bool] = lambda: True
-        """Whether the operator is there; while this says no, the lease is not renewed and motion ends."""
+        """Whether the operator is there; as soon as this says no, motion ends."""
         self._closing = threading.Event()
 
     def __enter__(self) -> "Supervisor":
@@ -114,13 +115,13 @@ class Supervisor:
             raise
 
     def _keep_lease(self) -> None:
-        period_s = self.wiring.loop.lease_s / LEASE_SHARE
-        while period_s and not self._closing.wait(period_s):
-            if self.attended():
-                try:
-                    self._tell({"do": "lease"})
-                except DeviceError:
-                    return
+        # Also where the loop asks for no sign of life: whether the operator attends is still to be said.
+        period_s = (self.wiring.loop.lease_s or UNASKED_LEASE_S) / LEASE_SHARE
+        while not self._closing.wait(period_s):
+            try:
+                self._tell({"do": "lease" if self.attended() else "unattended"})
+            except DeviceError:
+                return
 
     def _listen(self) -> None:
         link = self._link

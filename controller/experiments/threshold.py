@@ -10,8 +10,9 @@ from controller.experiments.recorded import Recorded
 from controller.experiments.references import Ramp
 from controller.steps import Program
 from controller.supervisor import Supervisor
+from rig.config.table import parse
 from rig.config.wiring import Wiring
-from rig.errors import SafetyStop
+from rig.errors import SafetyStop, UsageError
 from rig.recording.reader import read_recording
 from rig.tissue.model import Model
 
@@ -31,8 +32,10 @@ class Threshold:
 
 def plan(up_to_N: float, rate_N_s: float, model: Model, wiring: Wiring) -> Program:
     """The ramp, checked against model and limits: the present pain threshold is never passed to find a new one."""
-    ramp = Ramp(force_N=up_to_N, base_N=BASE_N, rate_N_s=rate_N_s, hold_s=0.5).reference()
-    return tracked.plan_reference(ramp, model, wiring)
+    if not up_to_N > BASE_N:
+        raise UsageError(f"--up-to {up_to_N:g} N must be above the {BASE_N:g} N at which the ramp begins")
+    values = {"force_N": up_to_N, "base_N": BASE_N, "rate_N_s": rate_N_s, "hold_s": 0.5}
+    return tracked.plan_reference(parse(Ramp, values, "--up-to or --rate").reference(), model, wiring)
 
 
 def run(bench: Supervisor, program: Program, up_to_N: float, folder: Path, model: str) -> Threshold:

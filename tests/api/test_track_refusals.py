@@ -1,4 +1,4 @@
-"""`rig track` and `rig capture` refuse what cannot be before any device is opened: number, bound, next step."""
+"""Commands that move refuse what cannot be before any device is opened: number, bound, next step."""
 
 from pathlib import Path
 
@@ -20,6 +20,7 @@ def nothing_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
     monkeypatch.setattr(motion, "bench_for", opened)
     monkeypatch.setattr("api.cli.comparison.bench_for", opened)
+    monkeypatch.setattr("api.cli.control.bench_for", opened)
     monkeypatch.chdir(tmp_path)
     index_model(0.12, 0.22, 0.01, force_N=11.0).save(tmp_path / "model.json")
 
@@ -59,6 +60,25 @@ def nothing_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 )
 def test_track_is_refused_before_any_device_is_opened(arguments: str, sentence: str) -> None:
     answer = runner.invoke(build("track"), ["track", *arguments.split()])
+    assert isinstance(answer.exception, UsageError), answer.exception
+    assert sentence in str(answer.exception)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ("--up-to nan", "--up-to nan N must be above the 0.5 N"),
+        ("--up-to 0.3", "--up-to 0.3 N must be above the 0.5 N"),
+        ("--up-to inf", "force_N: Input should be a finite number"),
+        ("--up-to 5 --rate 0", "rate_N_s: Input should be greater than 0"),
+        ("--up-to 5 --rate 100", "mm/s on this tissue, above the 24 mm/s of the force loop"),
+        ("--up-to 12", "12 N is outside what the model was fitted to"),
+        ("--up-to 8 --set subject.pain_threshold_N=5", "reference force 8 N is above the force limit, 5 N"),
+        ("--up-to 5 --out .", "is not empty; give a new folder"),
+    ],
+)
+def test_a_threshold_session_is_refused_before_any_device_is_opened(arguments: str, sentence: str) -> None:
+    answer = runner.invoke(build("threshold"), ["threshold", "--model", "model.json", *arguments.split()])
     assert isinstance(answer.exception, UsageError), answer.exception
     assert sentence in str(answer.exception)
 

@@ -188,6 +188,7 @@ def test_a_zero_far_from_the_first_one_is_refused() -> None:
         ({"recorder_silent_s": 10.0}, "recorder_stalled"),
         ({"supervisor_lost": True}, "supervisor_lost"),
         ({"operator_silent_s": 4.0}, "operator_silent"),
+        ({"requests": frozenset({"unattended"})}, "operator_silent"),
     ],
 )
 def test_each_soft_cause_retracts_from_contact_and_latches(change: dict[str, object], code: str) -> None:

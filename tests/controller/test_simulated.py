@@ -1,6 +1,7 @@
 """The loop on a virtual clock: against python-control, against the bench's own physics, on five subjects, and wrong."""
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -143,6 +144,20 @@ def test_margins_agree_with_python_control() -> None:
         assert ours.crossover_Hz == pytest.approx(crossover / (2 * math.pi), rel=1e-3)
         assert ours.phase_deg == pytest.approx(phase, abs=0.1)
         assert ours.gain == pytest.approx(gain, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "later_s", "least_deg"), [(1.0, 0, 55), (1.5, 0, 39), (0.5, 0, 55), (1.0, 0.002, 42)]
+)
+def test_the_margins_that_the_documentation_states(stiffness: float, later_s: float, least_deg: float) -> None:
+    designed = tracking.design_for(WIRING)
+    design = replace(designed, delay_s=designed.delay_s + later_s)
+    for name in SUBJECT_NAMES:
+        for row in law(name).gains[::3]:
+            gains = row.proportional_mm_N, row.integral_mm_N_s
+            found = margins(gains, stiffness * row.tangent_N_mm, subject(name).damping_N_s_mm, design)
+            assert found.phase_deg > least_deg - 0.5
+            assert found.gain > 2.0
 
 
 def response(force_N: list[float], command_mm: list[float], frequency_Hz: float) -> complex:
