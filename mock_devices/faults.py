@@ -33,6 +33,7 @@ class FaultyWire:
         self._rng = rng
         self._clock_ns = clock_ns
         self._late: deque[tuple[int, bytes]] = deque()
+        self._unheard = b""
         self.heal()
 
     def heal(self) -> None:
@@ -47,8 +48,13 @@ class FaultyWire:
 
     def read(self) -> bytes:
         """What the client sent."""
-        data = self._wire.read()
+        data = self._unheard or self._wire.read()
+        self._unheard = b""
         return b"" if self.frozen else data
+
+    def put_back(self, data: bytes) -> None:
+        """The next ``read`` brings ``data`` and no more."""
+        self._unheard = data
 
     def write(self, data: bytes) -> None:
         """Sends to the client what the faults leave of ``data``."""

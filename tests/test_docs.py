@@ -1,6 +1,7 @@
 """README and docs are executed: every ```sh block, in order, each file in a folder of its own beside the examples.
 
-A line that serves (`rig mock`, `rig serve`) is started, awaited until it says that it is ready, and ended.
+A line that serves (`rig mock`, `rig serve`) is started, awaited until it says that it is ready, and ended; its port is
+exchanged for one that is free here.
 `make` lines are what runs this test, and are only checked to name targets that exist.
 """
 
@@ -14,6 +15,8 @@ import sys
 from pathlib import Path
 
 import pytest
+
+from tests.system.stage import free_port
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -36,7 +39,8 @@ def environment() -> dict[str, str]:
 
 
 def serve(command: str, folder: Path) -> None:
-    process = subprocess.Popen(shlex.split(command), cwd=folder, env=environment(), stdout=subprocess.PIPE, text=True)
+    words = shlex.split(re.sub(r"--port \d+", f"--port {free_port()}", command))
+    process = subprocess.Popen(words, cwd=folder, env=environment(), stdout=subprocess.PIPE, text=True)
     assert process.stdout
     try:
         assert process.stdout.readline().strip(), f"{command} ended without saying that it is ready"

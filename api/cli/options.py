@@ -11,11 +11,17 @@ from rig.config.wiring import Wiring
 
 DEFAULT_FILE = Path("rig.toml")
 ENVIRONMENT = "RIG_CONFIG"
-# A simulated device is one more process of a busy computer: it may come late where a real one does not. An axis that
-# stands still for 150 ms falls behind by 4.5 mm at the study's 30 mm/s.
+# A simulated device is one more process of a busy computer: without real-time priority it may come a few tenths of a
+# second late where a real one does not. An axis that stands still for 400 ms falls behind by 12 mm at 30 mm/s.
 PATIENT = {
-    "loop": {"missed_periods": 0, "stale_force_ms": 150, "stale_axis_ms": 150, "overrun_ms": 150},
-    "axis": {"heartbeat_ms": 100, "following_error_mm": 5},
+    "loop": {
+        "missed_periods": 0,
+        "stale_force_ms": 400,
+        "stale_axis_ms": 400,
+        "stale_marker_ms": 500,
+        "overrun_ms": 400,
+    },
+    "axis": {"heartbeat_ms": 200, "following_error_mm": 12},
 }
 
 ConfigOption = Annotated[

@@ -1,8 +1,6 @@
 """The session of a Robotiq FT 300: against scripted bytes where pymodbus has no part, then against the mock."""
 
-import select
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise
 from math import isnan
@@ -14,16 +12,14 @@ from drivers.robotiq import device
 from drivers.robotiq.codec import FRAME_NS, STOP_BURST, encode_frame, with_crc
 from drivers.robotiq.device import RobotiqFt300
 from drivers.roles import Identity
-from rig.channels import ForceSample
 from rig.config.wiring import Force
 from rig.errors import DeviceError, UsageError
 from tests.drivers.scripted_port import ScriptedPort
-from tests.mock_devices.force_bench import WRENCH, Bench, Served, bench_process
+from tests.mock_devices.force_bench import WAIT_S, WRENCH, Bench, Served, await_silence, bench_process, collect
 
 FRAME = encode_frame([125, -250, -775, 125, -250, 500])
 PERIOD_NS = 10_000_000
 ARRIVAL_NS = 10**15
-WAIT_S = 20.0
 
 
 @pytest.fixture
@@ -133,17 +129,6 @@ def opened(mock: Served) -> RobotiqFt300:
     return RobotiqFt300(partial(open_port, mock.endpoint), Force())
 
 
-def collect(sensor: RobotiqFt300, enough: Callable[[list[ForceSample]], bool]) -> list[ForceSample]:
-    """Samples until there are enough; the deadline only ends a test that has failed."""
-    samples: list[ForceSample] = []
-    deadline = time.monotonic() + WAIT_S
-    while not enough(samples):
-        assert time.monotonic() < deadline, f"only {len(samples)} samples, {sensor.counters}"
-        select.select([sensor.fileno()], [], [], 0.1)
-        samples += sensor.poll(time.monotonic_ns())
-    return samples
-
-
 @pytest.fixture(scope="module")
 def bench() -> Iterator[Bench]:
     with bench_process() as bench:
@@ -247,9 +232,7 @@ class TestAgainstTheMockInAnotherProcess:
         sensor = opened(mock)
         sensor.start()
         mock.set(silent=True)
-        sensor.poll(time.monotonic_ns())
-        time.sleep(0.05)
-        assert list(sensor.poll(time.monotonic_ns())) == []
+        await_silence(sensor)
         mock.set(silent=False)
         collect(sensor, lambda got: len(got) >= 1)
         sensor.close()

@@ -8,13 +8,17 @@ from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from typing import Literal
 
+from drivers.roles import ForceSensor
 from mock_devices.bota import BotaMock
 from mock_devices.robotiq import RobotiqMock
 from mock_devices.stage import NEVER_NS
 from mock_devices.wire import PtyWire
+from rig.channels import ForceSample
 
 Product = Literal["bota", "robotiq"]
 Knobs = dict[str, bool | int | str]
+WAIT_S = 20.0
+QUIET_S = 0.2
 WRENCH = (1.25, -2.5, -7.75, 0.125, -0.25, 0.5)
 
 
@@ -98,6 +102,25 @@ class Bench:
         self._control.send(what)
         assert self._control.poll(30), "the bench process does not answer"
         return self._control.recv()
+
+
+def collect(sensor: ForceSensor, enough: Callable[[list[ForceSample]], bool]) -> list[ForceSample]:
+    """Samples until there are enough; the deadline only ends a test that has failed."""
+    samples: list[ForceSample] = []
+    deadline = time.monotonic() + WAIT_S
+    while not enough(samples):
+        assert time.monotonic() < deadline, f"only {len(samples)} samples, {sensor.counters}"
+        select.select([sensor.fileno()], [], [], 0.1)
+        samples += sensor.poll(time.monotonic_ns())
+    return samples
+
+
+def await_silence(sensor: ForceSensor) -> None:
+    """Waits until what was under way has come and nothing follows; a driver that raises at silence fails here."""
+    deadline = time.monotonic() + WAIT_S
+    while sensor.poll(time.monotonic_ns()) or select.select([sensor.fileno()], [], [], QUIET_S)[0]:
+        assert time.monotonic() < deadline, "the sensor does not fall silent"
+    assert list(sensor.poll(time.monotonic_ns())) == []
 
 
 @contextmanager

@@ -1,8 +1,8 @@
 """The mock of a Robotiq FT 300: its Modbus slave against literal bytes and third-party clients, and its stream."""
 
 import struct
-import time
 from collections.abc import Iterator
+from contextlib import closing
 
 import minimalmodbus
 import pytest
@@ -309,14 +309,18 @@ class TestThirdPartyClients:
         assert (refused.isError(), refused.exception_code) == (True, 2)
 
     def test_pymodbus_stops_a_stream_and_reads_again(self, mock: Served) -> None:
-        client = ModbusSerialClient(mock.endpoint, baudrate=19_200, timeout=0.3, retries=0)
-        assert client.connect()
-        assert not client.write_registers(410, [0x0200], device_id=9).isError()
-        with pytest.raises(ModbusIOException):
-            client.read_holding_registers(180, count=1, device_id=9)
-        assert isinstance(client.socket, serial.Serial)
-        client.socket.write(b"\xff" * 50)
-        time.sleep(0.2)
-        client.socket.reset_input_buffer()
-        assert client.read_holding_registers(180, count=1, device_id=9).registers == [125]
-        client.close()  # type: ignore[no-untyped-call]
+        with closing(ModbusSerialClient(mock.endpoint, baudrate=19_200, timeout=5)) as client:
+            assert client.connect()
+            assert not client.write_registers(410, [0x0200], device_id=9).isError()
+        with closing(ModbusSerialClient(mock.endpoint, baudrate=19_200, timeout=0.3, retries=0)) as client:
+            assert client.connect()
+            with pytest.raises(ModbusIOException):
+                client.read_holding_registers(180, count=1, device_id=9)
+            assert isinstance(client.socket, serial.Serial)
+            client.socket.write(b"\xff" * 50)
+            client.socket.timeout = 1.0
+            while client.socket.read(16):
+                continue
+        with closing(ModbusSerialClient(mock.endpoint, baudrate=19_200, timeout=5)) as client:
+            assert client.connect()
+            assert client.read_holding_registers(180, count=1, device_id=9).registers == [125]

@@ -1,14 +1,18 @@
+import array
+import fcntl
 import json
 import select
 import signal
 import socket
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 import pytest
 
 from drivers.bota.device import BotaSensOne
@@ -17,9 +21,11 @@ from drivers.ports import Port, PortClosed, open_port, read_until
 from mock_devices.bench import Bench
 from mock_devices.control import BenchControl
 from mock_devices.devices import Workshop
+from mock_devices.epos4 import Epos4Mock
 from mock_devices.parameters import Parameters
 from mock_devices.serve import Server, effects_table
 from rig.config.wiring import Axis, Force, Limits
+from tests.mock_devices.force_bench import collect
 
 COMMAND = [sys.executable, "-m", "mock_devices.serve", "--tracker-tcp-port", "0"]
 FRAME = 37
@@ -52,6 +58,14 @@ def reply(address: str, request: bytes, enough: Callable[[bytes], bool]) -> byte
     with opened(address) as port:
         port.write(request)
         return read_until(port, enough, 5.0)
+
+
+def await_bytes(fileno: int, count: int) -> None:
+    """Waits until ``count`` bytes lie at the descriptor."""
+    waiting, deadline = array.array("i", [0]), time.monotonic() + 5.0
+    while waiting[0] < count:
+        assert time.monotonic() < deadline, f"only {waiting[0]} bytes"
+        fcntl.ioctl(fileno, termios.FIONREAD, waiting)
 
 
 def configured(port: Port) -> bool:
@@ -110,21 +124,18 @@ def test_the_force_driver_gets_its_thousand_samples_a_second_from_the_bench() ->
     with started() as (_, endpoints), opened(endpoints["force"]["serial"]) as port:
         sensor = BotaSensOne(port, Force(port=endpoints["force"]["serial"]))
         sensor.start()
-        samples: list[float] = []
-        until = time.monotonic() + 1.0
-        while time.monotonic() < until:
-            samples += [sample.fz_N for sample in sensor.poll(time.monotonic_ns())]
-            time.sleep(0.005)
+        samples = collect(sensor, lambda got: len(got) >= 800)
         sensor.close()
-    assert len(samples) > 500
-    assert sum(samples) / len(samples) == pytest.approx(0.8, abs=0.005)
+    taken_us = samples[-1].device_us - samples[0].device_us
+    assert taken_us / (len(samples) - 1 + sensor.counters.device_lost) == pytest.approx(1000, rel=0.01)
+    assert sum(sample.fz_N for sample in samples) / len(samples) == pytest.approx(0.8, abs=0.005)
 
 
 @pytest.mark.bench
 @pytest.mark.xdist_group("wire")
 def test_the_axis_driver_homes_and_moves_the_tip_into_the_tissue() -> None:
     with started() as (_, endpoints), BenchControl(endpoints["control"]) as control:
-        axis = Epos4Axis(Axis(port=endpoints["axis"]["slcan"]), Limits())
+        axis = Epos4Axis(Axis(port=endpoints["axis"]["slcan"], heartbeat_ms=1000), Limits())
         try:
             axis.start()
             axis.home()
@@ -205,7 +216,7 @@ class Stage:
         self.clock = Clock()
         self.bench = Bench(Parameters.model_validate({"tracker": {"tcp_port": 0}, "force": {"counter_drift_ppm": 0.0}}))
         devices = Workshop(self.bench, 0, self.clock, seed=0).devices(("bota-sensone",))
-        self.line = devices[0].wire
+        self.line, self.axis = devices[0].wire, devices[1]
         self.server = Server(self.bench, devices, self.clock)
         self.port = open_port(self.line.endpoint, 460_800)
 
@@ -273,3 +284,22 @@ def test_after_a_long_stall_physics_goes_on_from_now_and_says_so(
 def test_bytes_that_came_during_a_stall_are_heard_before_time_is_caught_up(stage: Stage) -> None:
     stage.clock.now_ns += 500_000_000
     assert stage.say(b"C") == b"r,0,C,0\r\n"
+
+
+def test_what_the_axis_was_told_during_a_stall_is_heard_evenly_over_it(stage: Stage) -> None:
+    mock, line = stage.axis.mock, stage.axis.wire
+    assert isinstance(mock, Epos4Mock)
+    with opened(line.endpoint) as port:
+        port.write(b"C\rS8\rO\rt00020101\r")
+        assert select.select(line.filenos(), [], [], 5.0)[0]
+        stage.server.turn(line.filenos())
+        mock.synced_ns.clear()
+        before_ns = stage.clock.now_ns
+        stage.clock.now_ns += 100_000_000
+        port.write(b"t0800\r" * 50)
+        await_bytes(line.filenos()[0], 300)
+        stage.server.turn(line.filenos())
+    steps_ns = np.diff([before_ns, *mock.synced_ns])
+    assert len(mock.synced_ns) == 50
+    assert steps_ns == pytest.approx([0, *[2_000_000] * 49], abs=300_000)
+    assert stage.bench.now_ns == pytest.approx(stage.clock.now_ns, abs=5_000_000)

@@ -2,7 +2,6 @@
 
 import os
 import re
-import socket
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,10 +10,10 @@ import pytest
 from playwright.sync_api import Page, expect, sync_playwright
 
 from tests.system.browser import find, launch
-from tests.system.stage import RIG, ROOT, Stage, freed, pressed
+from tests.system.stage import PATIENCE_S, RIG, ROOT, Stage, free_port, freed, pressed
 from tests.system.test_service import SHORT, SLOW
 
-SECONDS = 1000
+expect.set_options(timeout=PATIENCE_S * 1000)
 
 
 @pytest.fixture
@@ -23,8 +22,7 @@ def page(bench: Stage, tmp_path: Path) -> Iterator[Page]:
     (tmp_path / "protocols").mkdir()
     (tmp_path / "protocols" / "slow.toml").write_text(SLOW)
     (tmp_path / "protocols" / "short.toml").write_text(SHORT)
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
+    port = free_port()
     command = [*RIG, "serve", "--port", str(port), "--protocols", "protocols", *bench.settings()]
     service = subprocess.Popen(
         command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, text=True
@@ -44,7 +42,7 @@ def page(bench: Stage, tmp_path: Path) -> Iterator[Page]:
 
 
 def state(page: Page, name: str) -> None:
-    expect(page.locator("#state")).to_have_text(re.compile(name, re.IGNORECASE), timeout=40 * SECONDS)
+    expect(page.locator("#state")).to_have_text(re.compile(name, re.IGNORECASE))
 
 
 @pytest.mark.timeout(200)
@@ -58,9 +56,9 @@ def test_a_person_runs_a_protocol_stops_it_and_finds_the_recordings(page: Page, 
     page.fill("#session", "first")
     page.click("text=Start capture")
     state(page, "running")
-    expect(page.locator("#job-text")).to_contain_text("trial_001", timeout=20 * SECONDS)
+    expect(page.locator("#job-text")).to_contain_text("trial_001")
     state(page, "idle")
-    expect(page.locator("#recordings")).to_contain_text("first: 1 recordings", timeout=10 * SECONDS)
+    expect(page.locator("#recordings")).to_contain_text("first: 1 recordings")
 
     expect(page.locator("#control")).to_contain_text("(this page)")
     page.click("#release")

@@ -10,9 +10,10 @@ from fastapi.testclient import TestClient
 from api.cli.options import built_in
 from api.cli.stage import plugged
 from api.http.app import build
+from api.http.lease import Control
 from api.http.service import Service
 from rig.recording.reader import read_recording
-from tests.system.stage import Stage, freed, pressed, stage, until
+from tests.system.stage import PATIENCE_S, PATIENT, Stage, freed, pressed, stage, until
 
 SLOW = (
     'kind = "indentation"\nspeeds_mm_s = [5]\ntrials = 1\ndepth_mm = 6\nair_dwell_s = 0.2\napproach_speed_mm_s = 20\n'
@@ -21,23 +22,38 @@ SLOW = (
 SHORT = SLOW.replace("hold_s = 30", "hold_s = 0.1").replace("speeds_mm_s = [5]", "speeds_mm_s = [20]")
 
 
+class Clock:
+    """The lease's clock: it stands still, however long a test takes, unless the test moves it."""
+
+    now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Stage, TestClient, Path]]:
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture(scope="module")
+def served(clock: Clock, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Stage, TestClient, Path]]:
     folder = tmp_path_factory.mktemp("service")
     (folder / "protocols").mkdir()
     (folder / "protocols" / "slow.toml").write_text(SLOW)
     (folder / "protocols" / "short.toml").write_text(SHORT)
     with stage("--seed", "2") as bench:
         service = Service(
-            plugged(built_in(["loop.lease_s=1"]), bench.endpoints), folder / "sessions", folder / "protocols"
+            plugged(built_in(["loop.lease_s=1", *PATIENT]), bench.endpoints), folder / "sessions", folder / "protocols"
         )
+        service.control = Control(clock)
         with TestClient(build(service), base_url="http://127.0.0.1:8000") as client:
             yield bench, client, folder
 
 
 @pytest.fixture(autouse=True)
 def in_control(served: tuple[Stage, TestClient, Path]) -> Iterator[None]:
-    """Every test takes the lease for as long as it may take, and gives it back."""
+    """Every test takes the lease, and gives it back."""
     _, client, _ = served
     taken = client.post("/api/v1/control/lease", json={"holder": "test", "ttl_s": 30.0})
     client.headers["X-Control-Lease"] = taken.json()["lease_id"]
@@ -53,19 +69,19 @@ def start(client: TestClient, protocol: str, session: str) -> str:
 
 
 def ended(client: TestClient, job: str) -> dict[str, object]:
-    until(lambda: client.get(f"/api/v1/jobs/{job}").json()["state"] != "running", 60, "the job's end")
+    until(lambda: client.get(f"/api/v1/jobs/{job}").json()["state"] != "running", PATIENCE_S, "the job's end")
     found: dict[str, object] = client.get(f"/api/v1/jobs/{job}").json()
     return found
 
 
 def reset(client: TestClient) -> None:
-    until(lambda: client.post("/api/v1/estop/reset").status_code == 200, 10, "the reset")
+    until(lambda: client.post("/api/v1/estop/reset").status_code == 200, PATIENCE_S, "the reset")
     assert client.get("/api/v1/rig").json()["state"] == "idle"
 
 
 def test_the_bench_is_shown_with_its_devices_and_their_health(served: tuple[Stage, TestClient, Path]) -> None:
     _, client, _ = served
-    until(lambda: client.get("/api/v1/rig").json()["ticks"] > 300, 20, "a running loop")
+    until(lambda: client.get("/api/v1/rig").json()["ticks"] > 300, PATIENCE_S, "a running loop")
     rig = client.get("/api/v1/rig").json()
     assert rig["state"] == "idle"
     assert set(rig["devices"]) == {"force", "axis", "tracker"}
@@ -78,8 +94,8 @@ def test_a_capture_runs_as_a_job_and_its_recording_can_be_downloaded(
     _, client, _ = served
     job = ended(client, start(client, "short", "first"))
     assert job["state"] == "succeeded", job["message"]
-    session = client.get("/api/v1/recordings").json()[0]
-    assert (session["name"], session["trials"], session["dropped"]) == ("first", 1, 0)
+    (session,) = (item for item in client.get("/api/v1/recordings").json() if item["name"] == "first")
+    assert (session["trials"], session["dropped"]) == (1, 0)
     href = next(item["href"] for item in session["recordings"] if item["file"].endswith(".mcap"))
     file = tmp_path / "downloaded.mcap"
     file.write_bytes(client.get(href).content)
@@ -89,8 +105,9 @@ def test_a_capture_runs_as_a_job_and_its_recording_can_be_downloaded(
 
 
 def test_a_session_is_never_overwritten(served: tuple[Stage, TestClient, Path]) -> None:
-    _, client, _ = served
-    answer = client.post("/api/v1/jobs", json={"kind": "capture", "protocol": "short", "session": "first"})
+    _, client, folder = served
+    (folder / "sessions" / "taken").mkdir(parents=True)
+    answer = client.post("/api/v1/jobs", json={"kind": "capture", "protocol": "short", "session": "taken"})
     assert (answer.status_code, answer.json()["code"]) == (409, "session-exists")
 
 
@@ -146,13 +163,13 @@ def test_the_subjects_pain_stop_retracts(served: tuple[Stage, TestClient, Path])
     reset(client)
 
 
-def test_a_user_who_does_not_renew_the_lease_is_retracted_from(served: tuple[Stage, TestClient, Path]) -> None:
+def test_a_user_who_does_not_renew_the_lease_is_retracted_from(
+    served: tuple[Stage, TestClient, Path], clock: Clock
+) -> None:
     bench, client, folder = served
-    client.delete("/api/v1/control/lease")
-    taken = client.post("/api/v1/control/lease", json={"holder": "goes away", "ttl_s": 5.0})
-    client.headers["X-Control-Lease"] = taken.json()["lease_id"]
     job = start(client, "slow", "seventh")
     pressed(bench)
+    clock.now_s += 31.0
     freed(bench)
     assert ended(client, job)["state"] == "stopped"
     events = read_recording(folder / "sessions" / "seventh" / "trial_001.mcap").events
