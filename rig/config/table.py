@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic_core import ErrorDetails, to_json
 
 from rig.errors import UsageError
 
 
 class Table(BaseModel):
-    """A TOML table: frozen, no unknown keys, no NaN or infinity, no silent conversion between text and number."""
+    """A TOML table: frozen, no unknown keys, no NaN or infinity; what is read is never turned from text into number."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
 
@@ -32,9 +32,12 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def parse(kind: type[AnyTable], values: Mapping[str, Any], where: str) -> AnyTable:
-    """``values`` as a ``kind``; raises UsageError naming ``where``, the key, the bound and the nearest valid key."""
+    """``values`` as a ``kind``; raises UsageError naming ``where``, the key, the bound and the nearest valid key.
+
+    A whole number serves as a number and a list as a tuple, as in JSON; "5" is no number and 5 no text.
+    """
     try:
-        return kind.model_validate(values)
+        return kind.model_validate_json(to_json(values), strict=True)
     except ValidationError as error:
         raise UsageError(f"{where}: " + "; ".join(_sentence(kind, detail) for detail in error.errors())) from error
 
