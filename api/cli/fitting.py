@@ -163,22 +163,19 @@ def _displacements(study: Study) -> tuple[list[str], list[list[str]]]:
 
 def worst_errors(judged: Mapping[str, Judged]) -> tuple[list[str], list[list[str]]]:
     """Header and one row a law: worst errors on what was fitted, and on trials, speeds and subjects left out."""
-    header = ["model", "fitted mm", "%", "trial out mm", "%", "speed out mm", "%"]
     subjects = any(found.subjects_left_out for found in judged.values())
-    header += ["subject out mm", "%"] if subjects else []
-    return [*header, "rms N"], [_worst_row(name, found, subjects) for name, found in judged.items()]
+    header = ["mm (%)", "fitted", "trial out", "speed out", *(["subject out"] if subjects else []), "rms N"]
+    return header, [_worst_row(name, found, subjects) for name, found in judged.items()]
 
 
 def _worst_row(name: str, judged: Judged, subjects: bool) -> list[str]:
-    cells = [name]
-    for errors in (judged.fitted, judged.trials_left_out, judged.speeds_left_out):
-        cells += _pair(errors)
-    cells += _pair(judged.subjects_left_out) if subjects else []
-    return [*cells, f"{judged.fitted.rmse_N:.3f}"]
+    found: list[Errors | None] = [judged.fitted, judged.trials_left_out, judged.speeds_left_out]
+    found += [judged.subjects_left_out] if subjects else []
+    return [name, *map(_worst, found), f"{judged.fitted.rmse_N:.3f}"]
 
 
-def _pair(errors: Errors | None) -> list[str]:
-    return [f"{errors.max_error_mm:.3f}", f"{errors.max_error_percent:.1f}"] if errors else ["--", "--"]
+def _worst(errors: Errors | None) -> str:
+    return f"{errors.max_error_mm:.3f} ({errors.max_error_percent:.1f})" if errors else "--"
 
 
 def _parameters(study: Study) -> tuple[list[str], list[list[str]]]:

@@ -153,6 +153,14 @@ def test_damping_that_grows_and_memory_are_recovered_from_loading_at_five_speeds
     assert fit.rmse_N < 0.01
 
 
+def test_a_law_with_more_parameters_than_the_tissue_shows_still_settles() -> None:
+    """Fung's A and b on a straight line: only their product shows, so the fit walks along a valley."""
+    bench = Bench(force=index_force(a_N_mm=0.6, b_per_mm=0.0, B_N_s_mm=0.01))
+    fit = fit_law(QuasiLinear, [loading_curve(stroke) for stroke in bench.strokes(trials=1)])
+    assert fit.law.slope(np.array([0.0, 8.0])) == pytest.approx(0.6, rel=0.15)
+    assert fit.rmse_N < 0.1
+
+
 def test_every_law_can_be_fitted(curves: list[Curve]) -> None:
     for kind in LAWS.values():
         fit = fit_law(kind, curves[::3])
