@@ -163,5 +163,5 @@ def _refuse_flat(depths_mm: Sequence[float], forces: Sequence[float], tangents: 
         if not tangent > 0 or (at and forces[at] <= forces[at - 1]):
             raise UsageError(
                 f"the model's tangent stiffness at {depth_mm:.3g} mm is {tangent:.3g} N/mm; gains need it above 0:"
-                " use a model fitted up to that depth"
+                " use a model fitted up to that depth, of a law that is stiff from contact on (rig fit --model index)"
             )

@@ -1,0 +1,30 @@
+"""Which tissue laws a force loop can be designed for: all that are stiff from contact on."""
+
+from dataclasses import replace
+
+import pytest
+
+from api.cli.options import built_in
+from controller.experiments.tracking import force_law
+from rig.errors import UsageError
+from rig.tissue.laws import Law
+from rig.tissue.model import ValidRange
+from tests.controller.models import index_model
+from tests.rig.tissue.examples import EXAMPLES
+
+SOFT_AT_CONTACT = {"power", "hunt_crossley"}
+MODEL = index_model(0.12, 0.22, 0.01)
+
+
+@pytest.mark.parametrize("law", EXAMPLES, ids=[law.name for law in EXAMPLES])
+def test_gains_follow_the_tangent_of_any_law_that_is_stiff_at_contact(law: Law) -> None:
+    valid = ValidRange(depth_mm=float(law.depth(10.0)), force_N=10.0, speeds_mm_s=(5.0,))
+    model = replace(MODEL, law=law, valid=valid)
+    if law.name in SOFT_AT_CONTACT:
+        with pytest.raises(UsageError, match=r"tangent stiffness at 0 mm is 0 N/mm; .*--model index"):
+            force_law(model, built_in(), "tangent", adapt=True)
+        return
+    gains = force_law(model, built_in(), "tangent", adapt=True).gains
+    for row in gains:
+        assert row.tangent_N_mm == pytest.approx(float(law.tangent_stiffness(row.depth_mm)))
+    assert gains[-1].force_N == pytest.approx(10.0)
