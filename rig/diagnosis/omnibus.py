@@ -23,7 +23,7 @@ BETWEEN_LEVEL = 0.003
 ORDER_LEVEL = 0.05
 WORTH_SHARE = 0.004
 MOST_UNNAMED = 0.1
-AMPLE_SHARE = 0.1
+AMPLE_SHARE = 0.15
 RIDGE = 0.05
 BETWEEN = ("session time", "stroke number", "speed", "temperature")
 FEWEST_BETWEEN = 8
@@ -92,7 +92,7 @@ def judged_leftover(found: Leftover, named_nats: float) -> tuple[str, ...]:
     """Variables an unexplained leftover depends on; none where it is chance, too small to matter, or mostly named.
 
     A leftover is too small below 0.4 % of the noise power, or below a tenth of what the named causes explain: the
-    library has then got the cause, if not its last detail. A tenth of the noise power always matters.
+    library has then got the cause, if not its last detail. 15 % of the noise power always matters.
     """
     if found.between_p <= BETWEEN_LEVEL:
         return found.between
