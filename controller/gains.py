@@ -127,6 +127,19 @@ def _refuse_fragile(gains: tuple[float, float], tangent_N_mm: float, damping_N_s
         )
 
 
+def _refuse_unstable(
+    choice: Choice, gains: tuple[float, float], tangent_N_mm: float, damping_N_s_mm: float, design: Design
+) -> None:
+    """Raises UsageError where gains made for another stiffness make the loop unstable on the model's own tissue."""
+    left = margins(gains, tangent_N_mm, damping_N_s_mm, design)
+    if left.phase_deg <= 0 or left.gain <= 1:
+        raise UsageError(
+            f"{choice} gains for {design.crossover_Hz:g} Hz are unstable where the model has {tangent_N_mm:.3g} N/mm:"
+            f" phase margin {left.phase_deg:.0f} deg, gain margin {left.gain:.2f} (bounds 0 and 1);"
+            " use tangent gains or lower loop.crossover_Hz"
+        )
+
+
 def schedule(
     model: Model, design: Design, depths_mm: Sequence[float], choice: Choice = "tangent"
 ) -> tuple[GainRow, ...]:
@@ -152,6 +165,8 @@ def schedule(
         secants = [f / d if d > 0 else k for d, f, k in zip(depths_mm, forces, tangents, strict=True)]
         stiffness = secants if choice == "secant" else tangents
         gains = [pi_gains(k, damping, design) for k in stiffness]
+    for found, tangent in zip(gains, tangents, strict=True):
+        _refuse_unstable(choice, found, tangent, damping, design)
     return tuple(
         GainRow(force_N=f, depth_mm=d, tangent_N_mm=k, proportional_mm_N=g[0], integral_mm_N_s=g[1])
         for f, d, k, g in zip(forces, depths_mm, stiffness, gains, strict=True)

@@ -13,11 +13,12 @@ from controller.experiments.recorded import Recorded
 from controller.experiments.references import Reference, Stairs
 from controller.gains import Choice, pi_gains
 from controller.operation import Operation
+from controller.steps import Program
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import parse
 from rig.config.wiring import Wiring
-from rig.errors import DataError, UsageError
+from rig.errors import DataError, DeviceError, SafetyStop, UsageError
 from rig.recording.reader import read_recording
 from rig.recording.sessions import open_session
 from rig.report.control_figures import comparison_figure
@@ -34,6 +35,9 @@ LEARNING = Indentation(
     hold_s=0.1, retract_speed_mm_s=20.0, clearance_mm=3.0, rest_s=0.1, force_limit_N=11.5,
 )  # fmt: skip
 LEARNT_N = 10.3
+# What stops a run where the computer, and not the gains, was late; such a run is done again.
+STALLED = ("axis_lost", "force_lost", "tracker_lost", "loop_overrun")
+ATTEMPTS = 3
 
 
 def compare(
@@ -67,7 +71,9 @@ def check(wiring: Wiring, out: Path, subjects: Sequence[str], reference: Referen
     pi_gains(1.0, 0.0, tracking.design_for(wiring))
     capture.check(LEARNING, wiring)
     for subject in subjects:
-        if not _model_file(out, subject).exists():
+        if _model_file(out, subject).exists():
+            load_model(_model_file(out, subject))
+        else:
             capture.refuse_used(_learning_folder(out, subject))
 
 
@@ -115,27 +121,56 @@ def bench_of(wiring: Wiring, subject: str) -> Wiring:
 
 def learnt(wiring: Wiring, out: Path, subject: str) -> Model:
     """The model `rig fit` makes of an indentation of this subject, breath held; kept in ``out``."""
-    folder, file = _learning_folder(out, subject), _model_file(out, subject)
+    file = _model_file(out, subject)
     if file.exists():
         return load_model(file)
-    with bench_for(bench_of(wiring, _who(subject))) as (live, _), Supervisor(live) as bench:
-        capture.capture(bench, LEARNING, folder, Operation("learn"), lambda _: None)
-    session = open_session(folder)
+    session = open_session(_indented(wiring, out, subject))
     model = model_of(study_session(session), "index", session.info.subject)
     model.save(file)
     return model
 
 
+def _indented(wiring: Wiring, out: Path, subject: str, attempt: int = 1) -> Path:
+    """The session of the indentation; one that a stall of the computer stopped is kept, and done again beside it."""
+    folder = _learning_folder(out, subject)
+    folder = folder if attempt == 1 else folder.with_name(f"{folder.name}-{attempt}")
+    try:
+        with bench_for(bench_of(wiring, _who(subject))) as (live, _), Supervisor(live) as bench:
+            capture.capture(bench, LEARNING, folder, Operation("learn"), lambda _: None)
+    except (SafetyStop, DeviceError) as cause:
+        if attempt == ATTEMPTS:
+            raise
+        console.print(f"{folder.name}: {cause}; once more", highlight=False)
+        return _indented(wiring, out, subject, attempt + 1)
+    return folder
+
+
 def _on_subject(
     wiring: Wiring, out: Path, subject: str, model: Model, choices: Sequence[Choice], reference: Reference
 ) -> Iterator[Run]:
-    with bench_for(bench_of(wiring, subject)) as (live, _), Supervisor(live) as bench:
-        for choice in choices:
-            program = tracked.plan_reference(reference, model, live, choice)
-            done = tracked.recorded_run(bench, program, out / subject, str(out / f"{subject}.json"))
-            if done.outcome.stopped:
-                bench.reset()
-            yield Run(subject, choice, _jumps(done), done.outcome.cause)
+    for choice in choices:
+        try:
+            program = tracked.plan_reference(reference, model, wiring, choice)
+        except UsageError as refusal:
+            yield Run(subject, choice, (), str(refusal))
+        else:
+            yield _tracked(wiring, out, subject, choice, program)
+
+
+def _tracked(wiring: Wiring, out: Path, subject: str, choice: Choice, program: Program, attempt: int = 1) -> Run:
+    """One run on a bench of its own; what a stall of the computer stopped is said, and done again."""
+    try:
+        with bench_for(bench_of(wiring, subject)) as (live, _), Supervisor(live) as bench:
+            done = tracked.recorded_run(bench, program, out / subject, str(_model_file(out, subject)))
+    except DeviceError as cause:
+        found, stalled = Run(subject, choice, (), str(cause)), True
+    else:
+        found = Run(subject, choice, _jumps(done), done.outcome.cause)
+        stalled = done.outcome.outcome in STALLED
+    if not stalled or attempt == ATTEMPTS:
+        return found
+    console.print(f"{subject}  {choice}: {found.stopped}; once more", highlight=False)
+    return _tracked(wiring, out, subject, choice, program, attempt + 1)
 
 
 def _jumps(done: Recorded) -> tuple[Jump, ...]:

@@ -142,6 +142,14 @@ def test_a_loop_that_half_as_stiff_again_tissue_would_make_fragile_is_refused() 
         pi_gains(1.0, 0.0, Design(34.0, 0.004, 20.0, 21.0, gain_margin=1.01))
 
 
+def test_gains_of_another_stiffness_that_make_the_loop_unstable_on_the_model_are_refused_with_its_margins() -> None:
+    stiffening = index_model(0.01, 0.9, 0.0, force_N=11.0)
+    depths = [0.1 * stiffening.valid.depth_mm * part for part in range(1, 11)]
+    schedule(stiffening, DESIGN, depths, "tangent")
+    with pytest.raises(UsageError, match=r"secant gains for 8 Hz are unstable where the model has .* N/mm: phase"):
+        schedule(stiffening, DESIGN, depths, "secant")
+
+
 def test_gains_are_in_proportion_to_compliance() -> None:
     soft, stiff = pi_gains(0.5, 0.0, DESIGN), pi_gains(5.0, 0.0, DESIGN)
     assert soft[1] == pytest.approx(10 * stiff[1])
