@@ -11,6 +11,7 @@ from rig.tissue.curves import Curve, loading_curve
 from rig.tissue.fitting import fit_law
 from rig.tissue.judging import Errors, Prediction, displacement_at, errors_of, given_forces, judge
 from rig.tissue.laws import Constant, Index
+from rig.tissue.laws_viscous import StandardLinear
 from rig.tissue.study import rows
 from tests.rig.tissue.synthetic import Bench, index_force
 
@@ -123,3 +124,14 @@ def test_scattered_trials_widen_the_intervals() -> None:
         lower, upper = judge(fit, curves, given_forces(curves), fit.offsets_mm).intervals["a_N_mm"]
         widths.append(upper - lower)
     assert widths[1] > 3 * widths[0]
+
+
+@pytest.mark.parametrize("trials", [3, 5])
+def test_what_the_data_say_nothing_of_is_uncertain_by_its_whole_range(trials: int) -> None:
+    """Tissue without memory leaves no branch to relax, so its time may be anything; by residuals and by leaving out."""
+    curves = [loading_curve(stroke) for stroke in Bench().strokes(trials=1)][:trials]
+    fit = fit_law(StandardLinear, curves)
+    assert fit.at_bounds[0] == "k1_N_mm"
+    judged = judge(fit, curves, given_forces(curves), fit.offsets_mm)
+    assert judged.intervals["tau_s"] == (1e-3, 1e3)
+    assert judged.interval_method.startswith("least squares" if trials == 3 else "jackknife over trials")
