@@ -16,16 +16,22 @@ test: $(READY) browser
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n 2 --dist loadgroup
 
+# A mirror that does not answer must not hold up the tests.
+APT := DEBIAN_FRONTEND=noninteractive timeout 300 apt-get -o Acquire::Retries=1 -o Acquire::http::Timeout=20
+
 .PHONY: browser
 browser:
-	@command -v chromium chromium-browser google-chrome >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null \
-	  && apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium >/dev/null; } \
+	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || command -v google-chrome >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null \
+	  && $(APT) update -qq && $(APT) install -y -qq --no-install-recommends chromium >/dev/null; } \
 	  || echo "no Chromium here and no right to install it: the browser tests will skip"
 
-# Debian's venv has no pip of its own; uv then installs in seconds what pip takes a minute for.
+# Debian's venv has no pip of its own, and a plain Debian no pip at all; uv then installs in seconds what pip takes a
+# minute for.
 $(READY): requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, $(PYTHON) is " + sys.version)'
 	$(PYTHON) -m venv --without-pip $(VENV)
-	$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check uv
+	pip=$$($(PYTHON) .ci/pip_wheel.py $(VENV)) \
+	  && $(PYTHON) $$pip --python $(BIN)/python install --quiet --disable-pip-version-check uv
 	$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock
 	$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation --editable .
 	touch $@
