@@ -93,7 +93,8 @@ class BenchLoop:
         incident = self.machine.update(self.watch)
         if incident:
             self._report(incident, now_ns)
-        self._command(now_ns)
+        # The drive samples when it is asked, which is later than this turn began.
+        self._command(self._now())
         self._publish(slot, now_ns)
         self._ticks += 1
         return self._commands.more(self)

@@ -64,11 +64,19 @@ class Server:
         self.control = ControlPort(Desk(bench, _by_role(devices), synced_ns).answer)
 
     def endpoints(self) -> dict[str, object]:
-        """Address of each device by role and kind of port, of the control channel, and this process' id."""
+        """Address of each device by role and kind of port, of the control channel, this process' id, and latencies.
+
+        ``latency_ms`` is what a data sheet would say of each device; what is hidden in the bench comes on top.
+        """
         addresses: dict[str, dict[str, str]] = {}
         for device in self._devices:
             addresses.setdefault(device.role, {}).update(device.mock.endpoints())
-        return {**addresses, "control": self.control.endpoint, "pid": os.getpid()}
+        return {
+            **addresses,
+            "control": self.control.endpoint,
+            "pid": os.getpid(),
+            "latency_ms": stated_latency_ms(self._bench.parameters),
+        }
 
     def serve(self, ended: Callable[[], bool], parent: int | None = None) -> None:
         """Plays until ``ended``, or until the pipe ``parent`` is closed at its other end."""
@@ -141,6 +149,15 @@ class Server:
                 return
             self._bench.advance(first.due_ns)
             first.tick(first.due_ns)
+
+
+def stated_latency_ms(parameters: Parameters) -> dict[str, float]:
+    """From event to sample, by role: a first-order filter is late by its time constant, the camera by its own."""
+    return {
+        "force": 1e3 * parameters.force.filter_s,
+        "force_modbus": 1e3 * parameters.force_modbus.filter_s,
+        "tracker": 1e3 * parameters.tracker.latency_s,
+    }
 
 
 def _by_role(devices: Sequence[Device]) -> dict[str, list[dict[str, Fault]]]:

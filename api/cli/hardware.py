@@ -40,6 +40,7 @@ def mock(
 
 def _lines(endpoints: dict[str, Any]) -> str:
     """Endpoints for a person, as the lines of a wiring file."""
+    late = endpoints["latency_ms"]
     return "\n".join(
         [
             "# the mock bench is ready; Ctrl-C ends it",
@@ -47,6 +48,8 @@ def _lines(endpoints: dict[str, Any]) -> str:
             f'force.port = "{endpoints["force_modbus"]["serial"]}"            # robotiq-ft300',
             f'axis.port = "{endpoints["axis"]["slcan"]}"',
             f'tracker.port = "tcp://{endpoints["tracker"]["tcp"]}"',
+            f"force.latency_ms = {late['force']:g}            # {late['force_modbus']:g} with robotiq-ft300",
+            f"tracker.latency_ms = {late['tracker']:g}",
             f"# control channel: {endpoints['control']}",
             "",
         ]

@@ -60,13 +60,18 @@ def bench_for(wiring: Wiring, hide: tuple[str, ...] = ()) -> Iterator[tuple[Wiri
 
 
 def plugged(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
-    """``wiring`` with each port `mock` replaced by the endpoint that serves it."""
-    force, axis, tracker = wiring.force, wiring.axis, wiring.tracker
+    """``wiring`` with each port `mock` replaced by the endpoint that serves it.
+
+    Where the wiring states no latency for a mock device, it takes what the device's data sheet would say.
+    """
+    force, axis, tracker, stated = wiring.force, wiring.axis, wiring.tracker, endpoints["latency_ms"]
     if force.port == MOCK_PORT:
         role = "force_modbus" if force.product == "robotiq-ft300" else "force"
-        force = force.model_copy(update={"port": endpoints[role]["serial"]})
+        known = {"port": endpoints[role]["serial"], "latency_ms": force.latency_ms or stated[role]}
+        force = force.model_copy(update=known)
     if axis.port == MOCK_PORT:
         axis = axis.model_copy(update={"port": endpoints["axis"]["slcan"]})
     if tracker and tracker.port == MOCK_PORT:
-        tracker = tracker.model_copy(update={"port": "tcp://" + endpoints["tracker"]["tcp"]})
+        known = {"port": "tcp://" + endpoints["tracker"]["tcp"], "latency_ms": tracker.latency_ms or stated["tracker"]}
+        tracker = tracker.model_copy(update=known)
     return wiring.model_copy(update={"force": force, "axis": axis, "tracker": tracker})

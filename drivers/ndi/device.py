@@ -152,7 +152,7 @@ class NdiTracker:
             self._decoder.discarded_bytes += len(reply[0])
             return []
         self._silent_since_ns = None
-        samples = self._frames.samples(tracking, now_ns)
+        samples = self._frames.samples(tracking, self._asked_ns, now_ns)
         # The next frame is one period away: look shortly before, then often, so that it is met soon after it is there.
         self._due_ns = self._asked_ns + (self.period_ns * 3 // 4 if samples else self.period_ns // 8)
         return samples

@@ -32,8 +32,11 @@ class FrameReader:
         self._last = [_NO_FRAME] * len(handles)
         self._seq = 0
 
-    def samples(self, reply: TrackingReply, arrival_ns: int) -> list[MarkerSample]:
-        """One sample for each tool whose frame is new; none where the reply repeats a frame."""
+    def samples(self, reply: TrackingReply, asked_ns: int, arrival_ns: int) -> list[MarkerSample]:
+        """One sample for each tool whose frame is new; none where the reply repeats a frame.
+
+        The tracker answers with the newest frame it has when asked, so the question, not the answer, dates it.
+        """
         readings = {tool.handle: tool for tool in reply.tools}
         tools = [readings.get(handle) for handle in self._handles]
         frames = [self._unwrap(tool.frame) if tool and tool.frame is not None else _NO_FRAME for tool in tools]
@@ -41,7 +44,7 @@ class FrameReader:
         if newest <= self._newest:
             return []
         self._count(newest)
-        newest_ns = self._clock(newest * 1_000_000_000 // COUNTER_HZ, arrival_ns)
+        newest_ns = self._clock(newest * 1_000_000_000 // COUNTER_HZ, asked_ns)
         samples = []
         for index, tool in enumerate(tools):
             # A disabled tool has no frame number of its own; active tools have theirs a frame or two apart.

@@ -22,6 +22,9 @@ LOWEST_RATE_HZ = 100.0
 MOST_SAMPLES = 60_000
 FEWEST_SAMPLES = 20
 DERIVATIVE_SPANS_S = (0.008, 0.016)
+JITTER_MM = 0.0004
+JITTERY_RATE_HZ = 125.0
+JITTERY_SPANS_S = (0.024, 0.024)
 
 
 @dataclass(frozen=True)
@@ -93,8 +96,9 @@ def observe(session: Session) -> Observations:
             f"{session.name}: no recording has at least {FEWEST_SAMPLES} samples of force and axis over a common time; "
             "run `rig verify` on it"
         )
-    period_s = working_period(usable)
-    parts = [_on_grid(streams, period_s) for streams in usable]
+    jitters = float(np.median([jitter_mm(streams) for streams in usable])) > JITTER_MM
+    period_s = working_period(usable, JITTERY_RATE_HZ if jitters else WORKING_RATE_HZ)
+    parts = [_on_grid(streams, period_s, JITTERY_SPANS_S if jitters else DERIVATIVE_SPANS_S) for streams in usable]
     parts.sort(key=lambda part: float(part.time_s[0]))
     drive, force, tip = _joined(parts)
     return Observations(
@@ -102,11 +106,18 @@ def observe(session: Session) -> Observations:
     )
 
 
-def working_period(recordings: Sequence[Streams]) -> float:
-    """Grid period [s]: a whole number of force periods, near 250 Hz, coarser only for very long sessions."""
+def jitter_mm(streams: Streams) -> float:
+    """How far positions lie off a smooth motion, root mean square while it moves: third differences of unit noise."""
+    rough = np.diff(streams.axis_mm, 3)
+    moving = np.abs(np.diff(streams.axis_mm))[1:-1] > 0
+    return float(np.sqrt(np.mean(rough[moving] ** 2) / 20)) if moving.any() else 0.0
+
+
+def working_period(recordings: Sequence[Streams], rate_Hz: float = WORKING_RATE_HZ) -> float:
+    """Grid period [s]: a whole number of force periods, near ``rate_Hz``, coarser only for very long sessions."""
     native_s = float(np.median([np.median(np.diff(streams.force_s)) for streams in recordings]))
     total_s = float(sum(streams.force_s[-1] - streams.force_s[0] for streams in recordings))
-    wanted_Hz = float(np.clip(MOST_SAMPLES / max(total_s, 1e-9), LOWEST_RATE_HZ, WORKING_RATE_HZ))
+    wanted_Hz = float(np.clip(MOST_SAMPLES / max(total_s, 1e-9), LOWEST_RATE_HZ, rate_Hz))
     return native_s * max(1, round(1 / wanted_Hz / native_s))
 
 
@@ -157,11 +168,11 @@ def _cleaned(streams: Streams) -> Streams | None:
     )  # fmt: skip
 
 
-def _on_grid(streams: Streams, period_s: float) -> _Gridded:
+def _on_grid(streams: Streams, period_s: float, spans_s: Sequence[float]) -> _Gridded:
     """Force and motion at the force's stamps, then the same samples of all of them averaged window by window."""
     native_s = float(np.median(np.diff(streams.force_s)))
     columns = [
-        streams.force_s, streams.force_N, *_motion(streams, streams.force_s),
+        streams.force_s, streams.force_N, *_motion(streams, streams.force_s, spans_s),
         *([streams.temperature_C] if streams.temperature_C is not None else []),
     ]  # fmt: skip
     window = np.floor((streams.force_s - streams.force_s[0]) / period_s + 0.5 * native_s / period_s).astype(np.int64)
@@ -177,16 +188,16 @@ def _on_grid(streams: Streams, period_s: float) -> _Gridded:
     return _Gridded(streams.name, time_s, (means[1], means[2], means[3], means[4]), temperature, marker_s, marker_mm)
 
 
-def _motion(streams: Streams, at_s: Array) -> tuple[Array, Array, Array]:
+def _motion(streams: Streams, at_s: Array, spans_s: Sequence[float]) -> tuple[Array, Array, Array]:
     """Position, velocity, acceleration at the given times.
 
-    Derivatives come from local quartics over 8 and 16 ms (Savitzky and Golay 1964): differences of an encoder's steps
+    Derivatives come from local quartics over ``spans_s`` (Savitzky and Golay 1964): differences of an encoder's steps
     would put noise into the simulation that no noise model of the force accounts for.
     """
     motion = CubicSpline(streams.axis_s, streams.axis_mm)
     period_s = float(np.median(np.diff(streams.axis_s)))
     even_s = np.arange(streams.axis_s[0], streams.axis_s[-1], period_s)
-    lengths = [max(5, 2 * round(0.5 * span_s / period_s) + 1) for span_s in DERIVATIVE_SPANS_S]
+    lengths = [max(5, 2 * round(0.5 * span_s / period_s) + 1) for span_s in spans_s]
     if len(even_s) <= max(lengths):
         return motion(at_s), motion(at_s, 1), motion(at_s, 2)
     even = motion(even_s)

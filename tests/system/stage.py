@@ -44,7 +44,8 @@ class Stage:
         """Options that plug a command into this bench and make it patient."""
         force, axis, tracker = self.endpoints["force"], self.endpoints["axis"], self.endpoints["tracker"]
         ports = (f"force.port={force['serial']}", f"axis.port={axis['slcan']}", f"tracker.port=tcp://{tracker['tcp']}")
-        return [part for setting in (*ports, *PATIENT, *more) for part in ("--set", setting)]
+        late = [f"{role}.latency_ms={self.endpoints['latency_ms'][role]}" for role in ("force", "tracker")]
+        return [part for setting in (*ports, *late, *PATIENT, *more) for part in ("--set", setting)]
 
 
 @contextlib.contextmanager
