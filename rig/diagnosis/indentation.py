@@ -26,6 +26,8 @@ BLIND_MM = 0.12
 MEMORY_S = 1.0
 FEWEST_WAY_OUT = 0.2
 BLIND_SAMPLES = 2.5
+# Beyond it, noise of the motion passes for a filter and a delay of the force.
+MOST_JITTER_MM = 0.0008
 Simulation = Literal["index", "constant"]
 
 
@@ -141,6 +143,11 @@ def missing(data: Observations) -> dict[str, str]:
         reasons["temperature"] = "no temperature was recorded, or it changed by less than 0.5 K"
     if data.rate_Hz < 99:
         reasons["fast"] = f"force at {data.rate_Hz:.0f} Hz is too slow; 200 Hz or more shows it"
+    elif data.jitter_mm > MOST_JITTER_MM:
+        reasons["fast"] = (
+            f"the axis' time stamps jitter, by {1e3 * data.jitter_mm:.1f} um of motion (limit {1e3 * MOST_JITTER_MM:g} "
+            "um): record on a computer with less to do, and with real-time priority"
+        )
     if drive.recordings < 4:
         reasons["strokes"] = f"{drive.recordings} recordings are too few strokes; at least 4"
     if way_out(drive) < FEWEST_WAY_OUT:
