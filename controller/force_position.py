@@ -5,11 +5,13 @@ Each tick adds to the commanded position
     dx = dx_ahead + Pf (e - e_last) + If e dt + u dt        du = wd (Pf (e - e_last) + If e dt)
 
 dx_ahead is the inverse tissue model: it solves B dx/dt + F(x) = F_ref, no faster than the axis may go, so that a jump
-of the reference is spread instead of cut off. e is what the axis should show of that by now (two equal lags that
-together last as long as axis and sensor) minus the force measured: feedback sees what is unforeseen and nothing else.
-u is the speed at which the surface itself is found to move (breathing): a second integral with corner wd, so that a
-steady motion leaves no steady error. Because only increments are formed, a change of gains moves nothing, a limit on dx
-is its own anti-windup, and the hand-over from position control makes no jump.
+of the reference is spread instead of cut off. Where the model knows of them, the tissue's memory, q' = -q / tau + r
+dF/dt of up to two terms, and the guide's friction, Fc z with dz/dx = (1 - sgn(v) z) / l (Dahl 1968), stand beside F.
+e is what the axis should show of that by now (two equal lags that together last as long as axis and sensor) minus the
+force measured: feedback sees what is unforeseen and nothing else. u is the speed at which the surface itself is found
+to move (breathing): a second integral with corner wd, so that a steady motion leaves no steady error. Because only
+increments are formed, a change of gains moves nothing, a limit on dx is its own anti-windup, and the hand-over from
+position control makes no jump.
 
 With ``forgetting`` above 0 the ratio of tissue to model is followed by recursive least squares (exponential
 forgetting, bounded, only while force moves), and gains and inverse model are scaled by it.
@@ -18,6 +20,7 @@ Everything here is plain arithmetic on numbers and tuples of columns: the same f
 in the simulation.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Annotated, NamedTuple, TypeAlias
 
@@ -66,13 +69,28 @@ class Settings(NamedTuple):
     forgetting: float
     drift_1_s: float
     drift_limit_mm_s: float
+    relaxing_1: float = 0.0
+    relaxing_s: float = 1.0
+    relaxing_too_1: float = 0.0
+    relaxing_too_s: float = 1.0
+    friction_N: float = 0.0
+    friction_mm: float = 1.0
+
+
+class Foreseen(NamedTuple):
+    """What the inverse model remembers: its place, what of the tissue's force will die out, the guide's bristles."""
+
+    depth_mm: float
+    dying_N: float
+    dying_too_N: float
+    bristle: float
 
 
 class Memory(NamedTuple):
     """What the law remembers from tick to tick."""
 
     error_N: float
-    ahead_mm: float
+    ahead: Foreseen
     lagged_N: float
     expected_N: float
     tangent_N_mm: float
@@ -111,27 +129,50 @@ def interpolate(at: Values, values: Values, x: float) -> float:
     return float(values[low] + (x - at[low]) / (at[high] - at[low]) * (values[high] - values[low]))
 
 
-def begin(table: Columns, force_N: float, depth_mm: float) -> Memory:
-    """Memory at hand-over: what is measured now is what was foreseen, so nothing moves."""
-    ahead_mm = interpolate(table.force_N, table.depth_mm, force_N)
+def begin(table: Columns, force_N: float, depth_mm: float, friction_N: float = 0.0) -> Memory:
+    """Memory at hand-over: what is measured now is what was foreseen, so nothing moves; the tip has come inwards."""
+    ahead_mm = interpolate(table.force_N, table.depth_mm, force_N - friction_N)
     tangent_N_mm = interpolate(table.force_N, table.tangent_N_mm, force_N)
-    return Memory(0.0, ahead_mm, force_N, force_N, tangent_N_mm, 1.0, SPREAD, depth_mm, force_N, force_N, 0.0)
+    return Memory(
+        0.0,
+        Foreseen(ahead_mm, 0.0, 0.0, 1.0),
+        force_N,
+        force_N,
+        tangent_N_mm,
+        1.0,
+        SPREAD,
+        depth_mm,
+        force_N,
+        force_N,
+        0.0,
+    )
 
 
 def foresee(
-    table: Columns, settings: Settings, ahead_mm: float, scale: float, reference_N: float, dt_s: float
-) -> tuple[float, float]:
-    """The step of the inverse model [mm], and the force it asks for after that step [N].
+    table: Columns, settings: Settings, ahead: Foreseen, scale: float, reference_N: float, dt_s: float
+) -> tuple[Foreseen, float]:
+    """The inverse model one tick later, and the force it asks for then [N].
 
-    One Newton step of the implicit equation B (x1 - x0) / dt + scale F(x1) = reference, within ``ahead_mm_s``.
+    One Newton step of the implicit equation B (x1 - x0) / dt + scale F(x1) + memory + friction = reference, within
+    ``ahead_mm_s``.
     """
     resistance = settings.damping_N_s_mm / dt_s
-    tangent = scale * interpolate(table.depth_mm, table.tangent_N_mm, ahead_mm)
-    lacking_N = reference_N - scale * interpolate(table.depth_mm, table.force_N, ahead_mm)
+    rest_N = scale * interpolate(table.depth_mm, table.force_N, ahead.depth_mm)
+    dying_N = math.exp(-dt_s / settings.relaxing_s) * ahead.dying_N
+    dying_too_N = math.exp(-dt_s / settings.relaxing_too_s) * ahead.dying_too_N
+    lacking_N = reference_N - rest_N - dying_N - dying_too_N - settings.friction_N * ahead.bristle
+    side = 1.0 if lacking_N > 0 else -1.0
+    rubbing = settings.friction_N * (1.0 - side * ahead.bristle) / settings.friction_mm
+    tangent = scale * interpolate(table.depth_mm, table.tangent_N_mm, ahead.depth_mm)
     largest_mm = settings.ahead_mm_s * dt_s
-    step_mm = min(max(lacking_N / (tangent + resistance), -largest_mm), largest_mm)
-    after_mm = ahead_mm + step_mm
-    return step_mm, scale * interpolate(table.depth_mm, table.force_N, after_mm) + resistance * step_mm
+    step_mm = min(max(lacking_N / (tangent + resistance + rubbing), -largest_mm), largest_mm)
+    after_mm = ahead.depth_mm + step_mm
+    after_N = scale * interpolate(table.depth_mm, table.force_N, after_mm)
+    dying_N += settings.relaxing_1 * (after_N - rest_N)
+    dying_too_N += settings.relaxing_too_1 * (after_N - rest_N)
+    bristle = side - (side - ahead.bristle) * math.exp(-abs(step_mm) / settings.friction_mm)
+    foreseen_N = after_N + dying_N + dying_too_N + settings.friction_N * bristle + resistance * step_mm
+    return Foreseen(after_mm, dying_N, dying_too_N, bristle), foreseen_N
 
 
 def adapt(
@@ -167,9 +208,9 @@ def increment(
     slow_force_N, slow_model_N = memory.slow_force_N, memory.slow_model_N
     if settings.forgetting > 0:
         scale, spread, slow_force_N, slow_model_N = adapt(memory, table, settings, force_N, depth_mm, dt_s)
-    ahead_step_mm, foreseen_N = 0.0, reference_N
+    ahead, foreseen_N = memory.ahead, reference_N
     if settings.ahead_mm_s > 0:
-        ahead_step_mm, foreseen_N = foresee(table, settings, memory.ahead_mm, scale, reference_N, dt_s)
+        ahead, foreseen_N = foresee(table, settings, memory.ahead, scale, reference_N, dt_s)
     share = dt_s / (dt_s + 0.5 * settings.lag_s)
     lagged_N = memory.lagged_N + share * (foreseen_N - memory.lagged_N)
     expected_N = memory.expected_N + share * (lagged_N - memory.expected_N)
@@ -180,9 +221,9 @@ def increment(
     feedback_mm = proportional * (error_N - memory.error_N) + integral * error_N * dt_s
     drift_mm_s = memory.drift_mm_s + settings.drift_1_s * feedback_mm
     drift_mm_s = min(max(drift_mm_s, -settings.drift_limit_mm_s), settings.drift_limit_mm_s)
-    return ahead_step_mm + feedback_mm + drift_mm_s * dt_s, Memory(
+    return ahead.depth_mm - memory.ahead.depth_mm + feedback_mm + drift_mm_s * dt_s, Memory(
         error_N,
-        memory.ahead_mm + ahead_step_mm,
+        ahead,
         lagged_N,
         expected_N,
         tangent_N_mm,

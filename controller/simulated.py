@@ -217,7 +217,7 @@ def follow(step: TrackForce, reference_N: Column, bench: SimulatedBench, dt_s: f
     late = bench.sensing.delay_ticks + 1
     start = Bench(at_rest(surface_mm), np.zeros(late), 0.0, Setpoint(surface_mm, 0.0))
     done, _ = stretches.track(
-        start, force_position.begin(table, 0.0, 0.0), table, step.settings, reference_N, noise,
+        start, force_position.begin(table, 0.0, 0.0, step.friction_N), table, step.settings, reference_N, noise,
         Plant(bench.motor, bench.loop, bench.limb, bench.sensing),
         Clock(0, dt_s, round(dt_s / axis_plant.STEP_S)), Zeros(0.0, 0.0, surface_mm), _speeds(step, dt_s), Bounds(),
     )  # fmt: skip

@@ -210,6 +210,11 @@ class TrackForce(Table):
     ahead_mm_s: float = Field(default=24.0, ge=0, description="speed of the inverse model; 0: it is not used")
     forgetting: float = Field(default=0.0, ge=0, lt=1, description="0: stiffness is not adapted")
     drift_Hz: float = Field(default=0.0, ge=0, description="corner of the second integral; 0: none")
+    memory: tuple[tuple[float, Positive], ...] = Field(
+        default=(), max_length=2, description="the tissue's: force that dies out over force at rest, and its time in s"
+    )
+    friction_N: Annotated[float, Field(ge=0)] = 0.0
+    friction_mm: Positive = 1.0
     speed_limit_mm_s: Positive = 30.0
     search_speed_mm_s: Positive = 5.0
     contact_force_N: Positive = 0.1
@@ -218,9 +223,11 @@ class TrackForce(Table):
     def settings(self) -> Settings:
         """What of this step the law wants to know; the surface is believed to move no faster than the search."""
         drift_1_s = 2 * math.pi * self.drift_Hz
+        first, second = (*self.memory, (0.0, 1.0), (0.0, 1.0))[:2]
         return Settings(
-            self.damping_N_s_mm, self.lag_s, self.ahead_mm_s, self.forgetting, drift_1_s, self.search_speed_mm_s
-        )
+            self.damping_N_s_mm, self.lag_s, self.ahead_mm_s, self.forgetting, drift_1_s, self.search_speed_mm_s,
+            *first, *second, self.friction_N, self.friction_mm,
+        )  # fmt: skip
 
     def begin(self) -> "TrackForceRun":
         """A run of this step."""
@@ -244,7 +251,7 @@ class TrackForceRun:
             world.setpoint = Setpoint(world.setpoint.position_mm, 0.0)
             return over
         if world.memory is None:
-            world.memory = force_position.begin(self._table, world.force_N, world.depth_mm)
+            world.memory = force_position.begin(self._table, world.force_N, world.depth_mm, self._settings.friction_N)
         delta_mm, world.memory = force_position.increment(
             world.memory, self._table, self._settings, world.reference_N, world.force_N, world.depth_mm, world.dt_s
         )

@@ -1,25 +1,33 @@
-"""`rig demo`: the whole job on the mock bench, from capture to report, in under three minutes."""
+"""`rig demo`: the whole job on the mock bench, from capture to report, in under three minutes.
 
+A cause is hidden in the bench, drawn at random; the analysis is not told, and the truth comes out last.
+"""
+
+import secrets
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
-from api.cli import live
-from api.cli.motion import captured, say_levels
+from api.cli.diagnose import run_diagnosis, save, show
+from api.cli.motion import captured, follow, say_levels
 from api.cli.options import built_in
 from api.cli.output import console, write_json
 from api.cli.science import fit_session
+from api.cli.secret import Secret, draw
 from api.cli.stage import bench_for
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.experiments.tracked import Tracked
-from controller.operation import Operation
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
+from rig.diagnosis.answers import Diagnosis
+from rig.diagnosis.files import FOLDER, TRUTH
 from rig.errors import CheckFailed, UsageError
+from rig.recording.files import write_text
 from rig.recording.sessions import derive, open_session
 from rig.recording.verify import verify
 from rig.report.page import write_report
@@ -27,16 +35,21 @@ from rig.tissue.model import load_model
 
 PLAN = Indentation(
     name="demonstration",
-    trials=3,
+    trials=2,
+    depth_mm=8.0,
+    second_depth_mm=5.0,
     air_dwell_s=0.3,
-    approach_speed_mm_s=6.0,
-    hold_s=0.4,
-    dither_amplitude_mm=0.3,
-    dither_s=0.4,
-    retract_speed_mm_s=20.0,
-    clearance_mm=4.0,
+    approach_speed_mm_s=8.0,
+    contact_force_N=0.25,
+    hold_s=0.8,
+    dither_amplitude_mm=0.25,
+    dither_frequency_Hz=6.0,
+    dither_s=0.5,
+    retract_speed_mm_s=10.0,
+    clearance_mm=3.0,
     rest_s=0.1,
 )
+LARGEST_SEED = 100_000
 FORCES_N = (1.0, 2.0, 3.0, 4.0, 5.0)
 SECONDS = 3.0
 MODEL = Path("fit") / "model.json"
@@ -56,8 +69,12 @@ class Counts:
     ticks: int
 
 
-def demo(out: OutOption = Path("demo"), trials: TrialsOption = PLAN.trials) -> None:
-    """Does the whole job on the mock bench: capture, verify, fit, track, report.
+def demo(
+    out: OutOption = Path("demo"),
+    trials: TrialsOption = PLAN.trials,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of what is hidden in the bench; else drawn.")] = None,
+) -> None:
+    """Does the whole job on the mock bench: capture, fit, track, diagnose, verify, report, and the truth at the end.
 
     Example: rig demo --out demo
     """
@@ -65,7 +82,10 @@ def demo(out: OutOption = Path("demo"), trials: TrialsOption = PLAN.trials) -> N
     session, wiring = out / SESSION, built_in()
     plan = PLAN.model_copy(update={"trials": trials})
     experiment.check(plan, wiring)
-    with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
+    seed = secrets.randbelow(LARGEST_SEED) if seed is None else seed
+    secret = draw(np.random.default_rng(seed), plan)
+    console.print(f"a cause is hidden in the bench; --seed {seed} hides the same again", highlight=False)
+    with bench_for(wiring, secret.hide) as (live_wiring, _), Supervisor(live_wiring) as bench:
         console.rule(f"capture: {len(plan.speeds_mm_s)} speeds, {trials} trials each")
         captured(bench, plan, session)
         console.rule("fit: constant stiffness against the index law")
@@ -73,15 +93,22 @@ def demo(out: OutOption = Path("demo"), trials: TrialsOption = PLAN.trials) -> N
         console.rule("track: gains from the tangent stiffness of the model")
         result = _track(bench, session)
     say_levels(result)
+    console.rule("diagnose: what the simulation gets wrong")
+    diagnosis = run_diagnosis(session, "index")
+    show(diagnosis)
+    save(diagnosis, session / FOLDER)
     console.rule("verify and report")
     counts = _verified(session)
     derive(session)
+    write_text(session / FOLDER / TRUTH, secret.sentence(diagnosis) + "\n")
     write_report(session, out / REPORT)
-    write_json(out / SUMMARY, _summary(counts, fitted, result))
+    write_json(out / SUMMARY, _summary(counts, fitted, result) | {"diagnosis": _diagnosis(diagnosis, secret, seed)})
     console.print(
         f"{counts.recordings} recordings, {counts.samples} samples, {counts.dropped} dropped", highlight=False
     )
     console.print(f"{out / REPORT} shows it; {out / SUMMARY} has the figures", highlight=False)
+    console.rule("the truth")
+    console.print(secret.sentence(diagnosis), highlight=False, markup=False)
 
 
 def _clear(out: Path) -> None:
@@ -100,8 +127,19 @@ def _clear(out: Path) -> None:
 def _track(bench: Supervisor, session: Path) -> Tracked:
     model = session / MODEL
     program = tracked.plan(FORCES_N, SECONDS, load_model(model), bench.wiring)
-    operation = Operation("track", total=1, unit="runs")
-    return live.run(bench, operation, lambda: tracked.run(bench, program, session, str(MODEL), operation))
+    return follow(bench, program, session, str(MODEL))
+
+
+def _diagnosis(result: Diagnosis, secret: Secret, seed: int) -> dict[str, object]:
+    """What was said, and last what is true."""
+    return {
+        "verdict": result.verdict,
+        "statement": result.statement,
+        "findings": [finding.as_json() for finding in result.findings],
+        "named": any(secret.effect in finding.effects for finding in result.findings),
+        "seed": seed,
+        "truth": secret.as_json(),
+    }
 
 
 def _verified(session: Path) -> Counts:

@@ -1,7 +1,9 @@
 """Commands that criticise: what a session shows of the simulation's errors, and what a protocol could show."""
 
+import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.console import Console
@@ -13,10 +15,16 @@ from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.design import check
+from rig.diagnosis.extended import extended_model
+from rig.diagnosis.files import FOLDER, MODEL, PICTURES, RESULT
 from rig.diagnosis.run import diagnose_session
 from rig.diagnosis.sources import read_source
 from rig.errors import UsageError
 from rig.recording.files import write_text
+from rig.recording.sessions import SESSION_FILE
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Janot, Gautier, Brunot, "Data Set and Reference Models of EMPS", 2019: symmetric model, closed-loop simulation.
 PUBLISHED = {"DATA_EMPS": "; published 5.85 %", "DATA_EMPS_PULSES": "; published 8.94 %"}
@@ -27,7 +35,9 @@ def diagnose(
     session: Annotated[Path, typer.Argument(help="Session folder, or a folder of CSV files as `rig import` reads it.")],
     simulation: Annotated[Simulation, typer.Option(help="Which simulation is judged.")] = "index",
     columns: Annotated[list[str] | None, typer.Option(help="[STREAM.]FIELD=HEADER for other column names.")] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Folder for pictures and the extended model.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for pictures and the extended model; else SESSION/diagnosis.")
+    ] = None,
     json_file: JsonOption = None,
 ) -> None:
     """Says what the simulation gets wrong on a session, names the cause, extends the model and measures the gain.
@@ -37,8 +47,9 @@ def diagnose(
     result = run_diagnosis(session, simulation, tuple(columns or ()))
     show(result)
     write_json(json_file, result.as_json())
-    if out is not None:
-        save(result, out)
+    folder = session / FOLDER if out is None and (session / SESSION_FILE).exists() else out
+    if folder is not None:
+        save(result, folder)
 
 
 def protocol(
@@ -46,6 +57,7 @@ def protocol(
     file: Annotated[Path, typer.Argument(help="Protocol file, for example examples/diagnosis.toml.")],
     tracker: Annotated[bool, typer.Option(help="Whether a tracker sees the tip.")] = True,
     rate_hz: Annotated[float, typer.Option("--rate-Hz", help="Rate of the force sensor.")] = 1000.0,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for the confusability picture.")] = None,
     json_file: JsonOption = None,
 ) -> None:
     """Says before any recording which causes a protocol can show, from what size, and which it cannot separate.
@@ -62,6 +74,10 @@ def protocol(
     if rows:
         console.print(table(("cause", "imitated by", "nats left of 50"), rows, "Hard to separate (safe from 20)"))
     write_json(json_file, result.as_json())
+    if out is not None:
+        from rig.report.diagnosis_figures import confusability_figure  # noqa: PLC0415 - matplotlib takes a second
+
+        draw({"confusability": confusability_figure(result.names, result.confusion)}, out)
 
 
 def run_diagnosis(folder: Path, simulation: Simulation, columns: tuple[str, ...] = ()) -> Diagnosis:
@@ -117,15 +133,30 @@ def show(result: Diagnosis) -> None:
 
 
 def save(result: Diagnosis, folder: Path) -> None:
-    """Pictures of the diagnosis in ``folder``."""
+    """``diagnosis.json``, pictures, and the extended model where there is one, in ``folder``."""
     from rig.report.diagnosis_figures import pictures  # noqa: PLC0415 - matplotlib takes a second to load
-    from rig.report.drawing import png, svg  # noqa: PLC0415
+
+    for old in (folder / MODEL, *(folder / f"{name}{kind}" for name in PICTURES for kind in (".svg", ".png"))):
+        old.unlink(missing_ok=True)
+    draw(pictures(result), folder)
+    write_text(folder / RESULT, json.dumps(result.as_json(), indent=2) + "\n")
+    console.print(f"pictures and {RESULT} are in {folder}", highlight=False)
+    if result.search is not None and result.simulation != "axis":
+        model = extended_model(result)
+        model.save(folder / MODEL)
+        console.print(f"{folder / MODEL} is the extended model, for rig track and rig simulate", highlight=False)
+        for effect in model.effects:
+            console.print(f"  {effect.name}: {effect.used}", highlight=False)
+
+
+def draw(figures: Mapping[str, "Figure"], folder: Path) -> None:
+    """Each figure as PNG and SVG in ``folder``, which is made."""
+    from rig.report.drawing import png, svg  # noqa: PLC0415 - matplotlib takes a second to load
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"{folder}: cannot be made: {error.strerror}; give another --out") from error
-    for name, picture in pictures(result).items():
+    for name, picture in figures.items():
         (folder / f"{name}.png").write_bytes(png(picture))
         write_text(folder / f"{name}.svg", svg(picture))
-    console.print(f"pictures are in {folder}", highlight=False)

@@ -83,6 +83,9 @@ def summary(info: SessionInfo, folder: Path) -> dict[str, object]:
 
 def track(
     model: Annotated[Path | None, typer.Option("--model", help="model.json as `rig fit` writes it.")] = None,
+    against: Annotated[
+        Path | None, typer.Option("--against", help="Another model.json, tracked with first on the same bench.")
+    ] = None,
     force: Annotated[str, typer.Option("--force", help="Force to track in N; several with commas.")] = "",
     reference: Annotated[
         str, typer.Option("--reference", help="Instead of --force: step:5, sine:0.5,mean_N=2, press:3, csv:FILE, ...")
@@ -104,22 +107,46 @@ def track(
 ) -> None:
     """Tracks a force with gains from a tissue model, and prints given and actual force.
 
+    With --against the error is also measured with another model, and what the first gains over it is printed.
+
     Example: rig track --model sessions/first/fit/model.json --force 1,2,5 --seconds 5 --json track.json
     """
     wiring = wiring_from(config, overrides)
     asked = Asked(model, force, reference, seconds, gains, subjects)
+    if compare and against:
+        raise UsageError("--table learns its own models: leave out --against")
     folder = out or Path("sessions") / f"track-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
     if compare:
         write_json(json_file, _compared(wiring, folder, asked))
         return
     program = _planned(wiring, asked)
+    other = _planned(wiring, asked._replace(model=against)) if against else None
     tracked.refuse_foreign(folder)
     with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
-        operation = Operation("track", total=1, unit="runs")
-        result = live.run(bench, operation, lambda: tracked.run(bench, program, folder, str(model), operation))
+        before = follow(bench, other, folder, str(against)) if other else None
+        result = follow(bench, program, folder, str(model))
     say_levels(result)
     console.print(f"recorded in {folder}", highlight=False)
-    write_json(json_file, tracked.as_json(result))
+    write_json(json_file, tracked.as_json(result) | (say_gain(before, result) if before else {}))
+
+
+def follow(bench: Supervisor, program: Program, folder: Path, model: str) -> Tracked:
+    """One tracking run into ``folder``, watched on the terminal."""
+    operation = Operation("track", total=1, unit="runs")
+    return live.run(bench, operation, lambda: tracked.run(bench, program, folder, model, operation))
+
+
+def say_gain(before: Tracked, after: Tracked) -> dict[str, object]:
+    """Prints and returns what one model gains over another on the same bench and reference, jumps included."""
+    old_N, new_N = before.followed.rms_error_N, after.followed.rms_error_N
+    reduction = 1 - new_N / old_N
+    console.print(
+        f"rms error over the whole run: {old_N:.4f} N with {before.model}, {new_N:.4f} N with {after.model}"
+        f" ({100 * reduction:+.0f} % less)",
+        highlight=False,
+    )
+    gain = {"rms_error_before_N": old_N, "rms_error_after_N": new_N, "reduction": reduction}
+    return {"against": tracked.as_json(before), "gain": gain}
 
 
 class Asked(NamedTuple):

@@ -118,6 +118,7 @@ def force_law(model: Model, wiring: Wiring, choice: Choice, adapt: bool) -> Trac
     depths = [float(depth) for depth in np.linspace(0.0, deepest_mm, GAIN_ROWS)]
     speed_mm_s = min(TRACK_MM_S, wiring.limits.speed_mm_s)
     ahead = choice != "admittance"
+    friction_N, friction_mm = model.law.friction
     return TrackForce(
         times_s=(0.0, 1.0),
         forces_N=(CONTACT_N, CONTACT_N),
@@ -127,6 +128,9 @@ def force_law(model: Model, wiring: Wiring, choice: Choice, adapt: bool) -> Trac
         ahead_mm_s=AHEAD_SHARE * speed_mm_s if ahead else 0.0,
         forgetting=FORGETTING if adapt else 0.0,
         drift_Hz=design.drift_Hz,
+        memory=tuple((term.ratio, term.tau_s) for term in model.law.terms[:2]),
+        friction_N=friction_N,
+        friction_mm=friction_mm,
         speed_limit_mm_s=speed_mm_s,
         search_speed_mm_s=min(APPROACH_MM_S, wiring.limits.speed_mm_s),
         contact_force_N=CONTACT_N,

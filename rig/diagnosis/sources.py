@@ -17,6 +17,7 @@ from rig.recording.reader import Recording
 from rig.recording.sessions import open_session
 from rig.recording.tables import compression_N
 from rig.simulation.drive import Array
+from rig.tissue.study import TRACKING
 
 TIP_TOOL = 0
 NS = 1e-9
@@ -34,14 +35,17 @@ def read_source(folder: Path, columns: tuple[str, ...] = ()) -> Session:
 
 
 def from_session(folder: Path) -> Session:
-    """Every trial of a session whose recording opens, on the clock of the first of them."""
+    """Every trial of a session whose recording opens, on the clock of the first; no runs of force tracking."""
     session = open_session(folder)
     recordings, findings = [], [Finding("", "session", "incomplete", remark) for remark in session.remarks]
     for trial in session.trials:
         try:
-            recordings.append((trial.name, session.recording(trial.name)))
+            recording = session.recording(trial.name)
         except RigError as error:
             findings.append(Finding(trial.name, "recording", "unreadable", str(error)))
+            continue
+        if recording.metadata.get("trial", {}).get("kind") != TRACKING:
+            recordings.append((trial.name, recording))
     starts = [int(r.tables["force"]["capture_ns"][0]) for _, r in recordings if len(r.tables["force"])]
     streams = [streams_of(name, recording, min(starts, default=0)) for name, recording in recordings]
     stated = {r.metadata.get("calibration", {}).get("surface_mm", "") for _, r in recordings}

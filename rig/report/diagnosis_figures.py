@@ -1,13 +1,17 @@
 """The pictures of a diagnosis: measured against simulated, what the error depends on, before and after, evidence."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.figure import Figure
 
 from rig.diagnosis.answers import Diagnosis
+from rig.diagnosis.design import ASSUMED_NATS, SAFE_NATS, confusability
 from rig.diagnosis.fit import Fit, least_squares
 from rig.diagnosis.omnibus import Leftover, variables
 from rig.diagnosis.search import Search
 from rig.report.drawing import ACTUAL, INK, MODEL, QUIET, RIVAL, SMALL_PT, dress, new_figure, thinned
+from rig.simulation.drive import Array
 
 BINS = 40
 SHOWN = 6
@@ -22,6 +26,7 @@ def pictures(result: Diagnosis) -> dict[str, Figure]:
         "simulation": simulation_figure(before, after),
         "residuals": residual_figure(before, after, result.before, result.after),
         "evidence": evidence_figure(result.search),
+        "confusability": confusability_figure(*confusability(result.search.tangents)),
     }
 
 
@@ -80,4 +85,22 @@ def evidence_figure(search: Search) -> Figure:
     axes.axvline(level, color=QUIET, linestyle=":", linewidth=1.2)
     axes.set_xscale("symlog", linthresh=10)
     dress(axes, "Evidence on recordings left out (dotted: chance, 1 in 20)", "gain [nats]", "")
+    return figure
+
+
+def confusability_figure(names: Sequence[str], left: Array) -> Figure:
+    """What is left of 50 nats for each cause (row) once another (column) imitates it; numbers where below 20."""
+    size = 1.6 + 0.36 * max(len(names), 3)
+    figure = new_figure(size + 1.2, size)
+    axes = figure.subplots()
+    picture = axes.imshow(left, cmap="Blues", vmin=0, vmax=ASSUMED_NATS)
+    for row, column in zip(*np.nonzero(left < SAFE_NATS), strict=True):
+        axes.text(column, row, f"{left[row, column]:.0f}", ha="center", va="center", fontsize=SMALL_PT, color=MODEL)
+    places = range(len(names))
+    axes.set_xticks(places, names, rotation=90)
+    axes.set_yticks(places, names)
+    dress(axes, "Evidence left when another cause imitates it", "imitating cause", "true cause")
+    axes.grid(visible=False)
+    bar = figure.colorbar(picture, ax=axes, shrink=0.8)
+    bar.set_label(f"nats of {ASSUMED_NATS:g}")
     return figure

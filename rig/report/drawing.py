@@ -106,7 +106,11 @@ def svg(figure: Figure) -> str:
 
 def inline_svg(figure: Figure, name: str, alt: str) -> str:
     """The figure as an SVG element of a page: described by ``alt``, own ids, ink and paper of the page's theme."""
-    text = svg(figure)
+    return inlined(svg(figure), name, alt)
+
+
+def inlined(text: str, name: str, alt: str) -> str:
+    """The same of a figure that was saved by ``svg``."""
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     for found, prefixed in ((r'\bid="', f'id="{name}-'), (r'href="#', f'href="#{name}-'), (r"url\(#", f"url(#{name}-")):

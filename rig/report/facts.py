@@ -1,6 +1,5 @@
 """What a session has to tell, read from its recordings; a part that is missing is a sentence in place of the part."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,9 @@ from rig.errors import DataError, RigError
 from rig.recording.reader import Recording
 from rig.recording.sessions import Session, TrialInfo, open_session
 from rig.recording.verify import Verdict, verify
+from rig.report.diagnosed import Diagnosed, read_diagnosis
 from rig.report.figures import Tracked
+from rig.report.values import json_table
 from rig.tissue.laws import FloatArray
 from rig.tissue.study import TRACKING, Study, study_session
 
@@ -66,6 +67,7 @@ class Facts:
     devices: Mapping[str, Mapping[str, object]]
     realtime: Mapping[str, str]
     metadata: Mapping[str, Mapping[str, str]]
+    diagnosis: Diagnosed | str
 
 
 def gather(folder: Path) -> Facts:
@@ -82,6 +84,7 @@ def gather(folder: Path) -> Facts:
         devices={role: json_table(text) for role, text in metadata.get("devices", {}).items() if role != "crc32"},
         realtime=metadata.get("realtime", {}),
         metadata=metadata,
+        diagnosis=read_diagnosis(folder),
     )
 
 
@@ -149,12 +152,3 @@ def _loop(recordings: Sequence[Recording]) -> LoopFacts | str:
 
 def _ages(ages_ns: FloatArray) -> FloatArray:
     return np.asarray(ages_ns[(ages_ns >= 0) & (ages_ns < OLDEST_NS)] * 1e-3)
-
-
-def json_table(text: str) -> Mapping[str, object]:
-    """The JSON object in ``text``; other text is the value of an empty name."""
-    try:
-        value = json.loads(text)
-    except ValueError:
-        return {"": text}
-    return value if isinstance(value, dict) else {"": value}

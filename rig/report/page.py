@@ -8,7 +8,7 @@ from rig.errors import UsageError
 from rig.recording.files import write_text
 from rig.report.facts import Facts, gather
 from rig.report.markup import paragraph, text
-from rig.report.sections import headline, key_figures, sections, simulated
+from rig.report.sections import diagnosed, headline, key_figures, sections, simulated
 
 TEMPLATE = Path(__file__).with_name("page.html")
 
@@ -30,6 +30,7 @@ def page(facts: Facts) -> str:
     head = [
         paragraph(" · ".join(part for part in (info.id, info.created[:16].replace("T", " "), subject) if part), "over"),
         f"<h1>{text(headline(facts))}</h1>",
+        diagnosed(facts),
         simulated(facts),
         key_figures(facts),
     ]

@@ -8,10 +8,12 @@ import numpy as np
 
 from rig.channels import EVENT
 from rig.recording.verify import StreamVerdict, Verdict
+from rig.report.diagnosed import Diagnosed, diagnosis_section
 from rig.report.drawing import inline_svg
-from rig.report.facts import Facts, LoopFacts, TrackingFacts, TrialFacts, json_table
+from rig.report.facts import Facts, LoopFacts, TrackingFacts, TrialFacts
 from rig.report.figures import fit_figure, loop_figure, quantiles, residual_figure, tracking_figure
 from rig.report.markup import cards, details, figure, pairs, paragraph, section, table
+from rig.report.values import json_table, number
 from rig.tissue.judging import LEVEL, Errors, Judged
 from rig.tissue.study import Row, Study, rows
 
@@ -40,17 +42,12 @@ def headline(facts: Facts) -> str:
         f"({index.max_error_percent:.2g}\u00a0%), constant stiffness within {constant.max_error_mm:.2g}\u00a0mm "
         f"({constant.max_error_percent:.2g}\u00a0%)"
     )
-    worst = _number(tracking.result, "max_error_percent") if isinstance(tracking, TrackingFacts) else None
+    worst = number(tracking.result, "max_error_percent") if isinstance(tracking, TrackingFacts) else None
     return said if worst is None else f"{said}; force was tracked within {worst:.2g}\u00a0%"
 
 
 def _fair(judged: Judged) -> Errors:
     return judged.trials_left_out or judged.fitted
-
-
-def _number(values: Mapping[str, object], key: str) -> float | None:
-    value = values.get(key)
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
 def key_figures(facts: Facts) -> str:
@@ -67,7 +64,7 @@ def key_figures(facts: Facts) -> str:
             note = f"{out.max_error_percent:.3g} % on left-out trials" if out else "no trial could be left out"
             found.append((f"{judged.fitted.max_error_percent:.3g} %", f"worst error, {name} model", note))
     if isinstance(facts.tracking, TrackingFacts):
-        worst, rms = (_number(facts.tracking.result, key) for key in ("max_error_percent", "rms_error_N"))
+        worst, rms = (number(facts.tracking.result, key) for key in ("max_error_percent", "rms_error_N"))
         if worst is not None and rms is not None:
             found.append((f"{worst:.3g} %", "worst force-tracking error", f"{rms:.2g} N rms"))
     if isinstance(facts.loop, LoopFacts):
@@ -88,11 +85,17 @@ def simulated(facts: Facts) -> str:
     )
 
 
+def diagnosed(facts: Facts) -> str:
+    """The diagnosis in one sentence; nothing where there is none."""
+    return paragraph(facts.diagnosis.statement, "lead") if isinstance(facts.diagnosis, Diagnosed) else ""
+
+
 def sections(facts: Facts) -> Iterator[str]:
     """All parts below the key figures, in order."""
     yield _curves(facts.study)
     yield _errors(facts.study)
     yield _tracking(facts.tracking)
+    yield diagnosis_section(facts.diagnosis)
     yield _loop(facts)
     yield _recorded(facts)
     yield _setup(facts)
@@ -212,7 +215,7 @@ def _tracking(tracking: TrackingFacts | str) -> str:
 
 
 def _level_row(level: Mapping[str, object]) -> list[str]:
-    numbers = ((_number(level, key), form) for key, (_, form) in LEVEL_COLUMNS.items())
+    numbers = ((number(level, key), form) for key, (_, form) in LEVEL_COLUMNS.items())
     return ["–" if value is None else format(value, form) for value, form in numbers]
 
 

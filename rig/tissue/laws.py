@@ -117,6 +117,11 @@ class Law(ABC):
         return ()
 
     @property
+    def friction(self) -> tuple[float, float]:
+        """Level [N] of a guide that rubs in front of the sensor, and the travel [mm] that builds it up."""
+        return 0.0, 1.0
+
+    @property
     def sudden(self) -> float:
         """Elastic force after a sudden move over that at rest: 1 + sum r_i."""
         return 1.0 + sum(term.ratio for term in self.terms)

@@ -51,6 +51,24 @@ class Quality(Table):
     held_out_max_error_percent: NotNegative | None = None
 
 
+class Interval(Table):
+    """A value with its unit and 95 % interval."""
+
+    value: float
+    unit: str
+    low: float
+    high: float
+
+
+class Effect(Table):
+    """A cause that a diagnosis named in the data; ``used`` says what the control makes of it."""
+
+    name: str
+    statement: str
+    parameters: dict[str, Interval]
+    used: str
+
+
 class _File(Table):
     """`model.json` as it stands on disk."""
 
@@ -69,6 +87,7 @@ class _File(Table):
     data: Provenance
     quality: Quality
     control: tuple[ControlRow, ...] = ()
+    effects: tuple[Effect, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -76,7 +95,8 @@ class Model:
     """A law fitted to data.
 
     ``covariance`` has the order of ``law.parameters``; ``intervals`` are per parameter, at ``interval_level``.
-    ``control`` says what the law means to a force loop at each given force, for readers without this program.
+    ``control`` says what the law means to a force loop at each given force, for readers without this program;
+    ``effects`` what a diagnosis named, be it in the law or not.
     """
 
     law: Law
@@ -88,6 +108,7 @@ class Model:
     data: Provenance
     quality: Quality
     control: tuple[ControlRow, ...] = ()
+    effects: tuple[Effect, ...] = ()
 
     @property
     def standard_errors(self) -> dict[str, float]:
@@ -141,6 +162,7 @@ class Model:
             data=self.data,
             quality=self.quality,
             control=self.control,
+            effects=self.effects,
         )
 
 
@@ -190,6 +212,7 @@ def _model(file: _File) -> Model:
         data=file.data,
         quality=file.quality,
         control=file.control,
+        effects=file.effects,
     )
 
 

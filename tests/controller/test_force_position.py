@@ -7,7 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.force_position import Columns, GainRow, Memory, Settings, begin, columns, increment, interpolate
+from controller.force_position import (
+    Columns,
+    GainRow,
+    Memory,
+    Settings,
+    begin,
+    columns,
+    foresee,
+    increment,
+    interpolate,
+)
 from controller.gains import Design, margins, pi_gains, schedule
 from rig.errors import UsageError
 from tests.controller.models import index_model
@@ -48,7 +58,7 @@ def test_a_change_of_gains_alone_moves_nothing() -> None:
 
 def test_the_inverse_model_moves_by_what_the_reference_needs_and_feedback_then_sees_no_error() -> None:
     step_mm, memory = increment(begin(linear(), 3.0, 3.0), linear(), AHEAD, 3.25, 3.0, 3.0, 0.001)
-    assert memory.ahead_mm - 3.0 == pytest.approx(0.25)
+    assert memory.ahead.depth_mm - 3.0 == pytest.approx(0.25)
     _, memory = increment(memory, linear(), AHEAD, 3.25, 3.25, 3.25, 0.001)
     assert memory.error_N == pytest.approx(0.0)
     assert step_mm > 0.25
@@ -57,14 +67,14 @@ def test_the_inverse_model_moves_by_what_the_reference_needs_and_feedback_then_s
 def test_a_jump_is_spread_at_the_speed_allowed_and_feedback_expects_no_more_than_that() -> None:
     slow = PLAIN._replace(ahead_mm_s=20.0)
     _, memory = increment(begin(linear(), 1.0, 1.0), linear(), slow, 5.0, 1.0, 1.0, 0.001)
-    assert memory.ahead_mm == pytest.approx(1.02)
+    assert memory.ahead.depth_mm == pytest.approx(1.02)
     assert memory.expected_N == pytest.approx(1.02)
 
 
 def test_damping_slows_the_inverse_model_so_that_its_force_is_the_reference() -> None:
     damped = PLAIN._replace(ahead_mm_s=1000.0, damping_N_s_mm=0.05)
     _, memory = increment(begin(linear(), 1.0, 1.0), linear(), damped, 2.0, 1.0, 1.0, 0.001)
-    moved_mm = memory.ahead_mm - 1.0
+    moved_mm = memory.ahead.depth_mm - 1.0
     assert moved_mm + 0.05 * moved_mm / 0.001 == pytest.approx(1.0)
 
 
@@ -158,3 +168,29 @@ def test_gains_are_in_proportion_to_compliance() -> None:
 def test_a_margin_that_the_delay_forbids_is_refused() -> None:
     with pytest.raises(UsageError, match=r"lower loop\.crossover_Hz"):
         pi_gains(1.0, 0.0, Design(1.0, 0.1, 5.0, 89.0))
+
+
+def test_the_inverse_of_a_model_with_memory_asks_for_the_force_that_the_tissue_with_memory_gives() -> None:
+    """The tissue is stepped by its own exact recursion; only the discretisation of one tick is left."""
+    settings = AHEAD._replace(ahead_mm_s=1e3, relaxing_1=0.5, relaxing_s=0.2)
+    ahead, rest_N, dying_N = begin(linear(), 1.0, 1.0).ahead, 1.0, 0.0
+    for _ in range(400):
+        before_mm = ahead.depth_mm
+        ahead, _ = foresee(linear(), settings, ahead, 1.0, 3.0, 0.001)
+        dying_N = dying_N * math.exp(-0.001 / 0.2) + 0.5 * (ahead.depth_mm - before_mm)
+        rest_N += ahead.depth_mm - before_mm
+    assert rest_N + dying_N == pytest.approx(3.0, abs=0.01)
+    assert rest_N == pytest.approx(3.0, abs=0.3), "it creeps on to where the lasting force is the reference"
+
+
+def test_the_inverse_of_a_model_with_friction_turns_the_guide_round_at_a_reversal() -> None:
+    """Pushing in, the guide carries its level; on the way out it holds back as much."""
+    settings = AHEAD._replace(friction_N=0.2, friction_mm=0.05)
+    places = []
+    for reference_N in (3.0, 2.0):
+        ahead = begin(linear(), 2.5, 2.5, settings.friction_N).ahead
+        for _ in range(2000):
+            ahead, foreseen_N = foresee(linear(), settings, ahead, 1.0, reference_N, 0.001)
+        assert foreseen_N == pytest.approx(reference_N, abs=1e-6)
+        places.append(ahead.depth_mm)
+    assert places == pytest.approx([2.8, 2.2], abs=settings.friction_mm)

@@ -96,8 +96,8 @@ def test_the_page_is_well_formed_and_has_all_parts(html: str) -> None:
     page = Page(html)
     assert page.open == []
     assert page.headings[1:] == [
-        "Force and displacement", "Constant stiffness and index model", "Force tracking", "The loop",
-        "What was recorded", "Bench, subject and protocol",
+        "Force and displacement", "Constant stiffness and index model", "Force tracking",
+        "What the simulation gets wrong", "The loop", "What was recorded", "Bench, subject and protocol",
     ]  # fmt: skip
     assert page.tags.count("svg") == 4
 

@@ -1,0 +1,83 @@
+"""What the demonstration hides in the mock bench: one cause, drawn where its protocol can see it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.config.protocol import Indentation
+from rig.diagnosis.answers import Diagnosis
+from rig.diagnosis.design import check
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A cause: its knob in the mock bench, its amplitude in the diagnosis, the range drawn from, further knobs."""
+
+    knob: str
+    parameter: str
+    low: float
+    high: float
+    further: Mapping[str, tuple[float, float]]
+
+
+KINDS = {
+    "friction": Kind("level_N", "friction_N", 0.04, 0.08, {"slip_length_mm": (0.04, 0.1)}),
+    "backlash": Kind("gap_mm", "backlash_mm", 0.15, 0.3, {}),
+    "relaxation": Kind("strength_1", "relaxation_1", 0.12, 0.3, {"time_constant_s": (0.2, 0.8)}),
+    "frame_compliance": Kind("compliance_mm_N", "frame_compliance_mm_N", 0.04, 0.1, {}),
+    "tracker_latency": Kind("delay_s", "tracker_latency_s", 0.015, 0.04, {}),
+}
+# A cause is drawn no smaller than this many times what the protocol could just show.
+MARGIN = 3.0
+
+
+@dataclass(frozen=True)
+class Secret:
+    """What is hidden: the cause, its knobs with their values, and what the diagnosis calls its amplitude."""
+
+    effect: str
+    knobs: Mapping[str, float]
+    parameter: str
+
+    @property
+    def hide(self) -> tuple[str, ...]:
+        """As the mock bench takes it."""
+        return tuple(f"{self.effect}.{knob}={value:g}" for knob, value in self.knobs.items())
+
+    @property
+    def size(self) -> float:
+        """The amplitude."""
+        return next(iter(self.knobs.values()))
+
+    def sentence(self, result: Diagnosis) -> str:
+        """The truth, and how the diagnosis did."""
+        hidden = f"Hidden was {self.effect} ({', '.join(f'{k} = {v:.4g}' for k, v in self.knobs.items())})"
+        finding = next((found for found in result.findings if self.effect in found.effects), None)
+        if finding is None:
+            return f"{hidden}: the diagnosis missed it."
+        how = "named it" if finding.effects[0] == self.effect else "has it among its rivals"
+        if self.parameter not in finding.parameters:
+            return f"{hidden}: the diagnosis {how}."
+        found = finding.parameters[self.parameter]
+        inside = "holds" if found.low <= self.size <= found.high else "misses"
+        return (
+            f"{hidden}: the diagnosis {how}, with {self.parameter} = {found.value:.4g}; its interval "
+            f"{found.low:.4g} to {found.high:.4g} {inside} the truth."
+        )
+
+    def as_json(self) -> dict[str, object]:
+        """For the summary."""
+        return {"effect": self.effect, "parameters": dict(self.knobs)}
+
+
+def draw(rng: np.random.Generator, protocol: Indentation) -> Secret:
+    """One cause the protocol can see, its size well beyond the smallest visible one."""
+    visible = check(protocol).detectable
+    least = {name: MARGIN * visible[name][0] for name, kind in KINDS.items() if name in visible}
+    names = sorted(name for name, size in least.items() if size < KINDS[name].high)
+    effect = str(rng.choice(names))
+    kind = KINDS[effect]
+    size = float(rng.uniform(max(kind.low, least[effect]), kind.high))
+    further = {knob: float(rng.uniform(*ends)) for knob, ends in kind.further.items()}
+    return Secret(effect, {kind.knob: round(size, 5), **{k: round(v, 5) for k, v in further.items()}}, kind.parameter)

@@ -1,0 +1,133 @@
+"""The simulation with its named causes as a model that the control takes at once."""
+
+import hashlib
+from collections.abc import Mapping
+
+import numpy as np
+
+import rig
+from rig.diagnosis.answers import Answer, Diagnosis
+from rig.diagnosis.fit import Fit
+from rig.diagnosis.indentation import Indentation
+from rig.errors import DataError
+from rig.tissue.laws_extended import Extended
+from rig.tissue.model import Effect, Interval, Model, Provenance, Quality, ValidRange
+
+# The law's parameter and the simulation's, which have the same unit.
+LAW = {
+    "a_N_mm": "stiffness_N_mm", "b_per_mm": "stiffening_1_mm", "B_N_s_mm": "viscosity_N_s_mm",
+    "n_1": "elastic_exponent_1", "q_per_mm": "elastic_quadratic_1_mm", "s_per_mm3": "substrate_1_mm3",
+    "r_1": "relaxation_1", "tau_s": "relaxation_tau_s", "c_mm_N": "frame_compliance_mm_N",
+    "friction_N": "friction_N", "friction_length_mm": "friction_length_mm",
+}  # fmt: skip
+ELASTIC = "in the force-depth curve: gains and inverse model"
+USED = {
+    "stiffening": ELASTIC,
+    "elastic_law": ELASTIC,
+    "substrate": ELASTIC,
+    "frame_compliance": ELASTIC,
+    "relaxation": "in the inverse model and, as sudden stiffness, in the gains",
+    "friction": "in the inverse model",
+    "rate_law": "its damping at 10 mm/s is in the gains and the inverse model",
+}
+UNUSED = "kept, and not used: it is no part of what the axis must do for a force"
+
+
+def extended_model(result: Diagnosis) -> Model:
+    """The final model of a diagnosis of indentations; raises DataError where nothing could be fitted."""
+    if result.search is None or not isinstance(result.search.after.problem, Indentation):
+        raise DataError(f"{result.session}: nothing was fitted, so there is no extended model")
+    fit = result.search.after
+    law = Extended.clipped(**{name: fit.values[there] for name, there in LAW.items()})
+    covariance = covariance_of(fit)
+    return Model(
+        law=law,
+        covariance=covariance,
+        intervals={p.name: _interval(result, LAW[p.name], p.value) for p in law.parameters},
+        interval_level=0.95,
+        interval_method="joint fit, recordings as units",
+        valid=_valid(fit, law),
+        data=_provenance(fit, result.session),
+        quality=_quality(fit, law),
+        effects=tuple(_effect(finding) for finding in result.findings),
+    )
+
+
+def covariance_of(fit: Fit) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """Covariance of the law's parameters, shape (11, 11); 0 where one was not free. Logarithms are carried through."""
+    free = {par.name: k for k, par in enumerate(fit.free)}
+    covariance = np.zeros((len(LAW), len(LAW)))
+    there = [(k, free[name]) for k, name in enumerate(LAW.values()) if name in free]
+    scale = {at: fit.values[fit.free[at].name] if fit.free[at].log else 1.0 for _, at in there}
+    for k, one in there:
+        for j, other in there:
+            covariance[k, j] = fit.covariance[one, other] * scale[one] * scale[other]
+    return 0.5 * (covariance + covariance.T)
+
+
+def _interval(result: Diagnosis, name: str, value: float) -> tuple[float, float]:
+    known: dict[str, tuple[float, float]] = {}
+    for found in (result.base, *(finding.parameters for finding in result.findings)):
+        known |= {key: (float(interval.low), float(interval.high)) for key, interval in found.items()}
+    low, high = known.get(name, (value, value))
+    return min(low, value), max(high, value)
+
+
+def _depth_mm(fit: Fit) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    assert isinstance(fit.problem, Indentation)
+    return np.asarray(fit.problem.data.drive.position_mm - fit.values["surface_mm"] - fit.values["contact_offset_mm"])
+
+
+def _valid(fit: Fit, law: Extended) -> ValidRange:
+    """As deep as was recorded, and the force the law has there at rest."""
+    assert isinstance(fit.problem, Indentation)
+    drive = fit.problem.data.drive
+    deepest_mm = float(_depth_mm(fit).max())
+    if not deepest_mm > 0:
+        raise DataError(f"{fit.problem.data.name}: the fitted surface was never reached, so there is no model")
+    speeds = np.unique(np.round(drive.speed_mm_s[drive.starts[:-1]]))
+    return ValidRange(
+        depth_mm=deepest_mm, force_N=float(law.force(deepest_mm)), speeds_mm_s=tuple(map(float, speeds)) or (0.0,)
+    )
+
+
+def _provenance(fit: Fit, session: str) -> Provenance:
+    assert isinstance(fit.problem, Indentation)
+    data = fit.problem.data
+    digest = hashlib.sha256()
+    for column in (data.drive.time_s, data.drive.position_mm, data.force_N):
+        digest.update(np.ascontiguousarray(column, "<f8").tobytes())
+    return Provenance(
+        session=session, trials=data.names, sha256=digest.hexdigest(), software=f"tissue-rig {rig.__version__}"
+    )
+
+
+def _quality(fit: Fit, law: Extended) -> Quality:
+    """Errors of force, turned into depth by the tangent; percentages of the deepest depth."""
+    deepest_mm = float(_depth_mm(fit).max())
+    largest_mm = float(np.abs(fit.residual).max() / law.tangent_stiffness(0.5 * deepest_mm))
+    return Quality(
+        rmse_N=float(np.sqrt(np.mean(fit.residual**2))),
+        max_error_mm=largest_mm,
+        max_error_percent=100 * largest_mm / deepest_mm,
+    )
+
+
+def _effect(finding: Answer) -> Effect:
+    name = finding.effects[0]
+    parameters: Mapping[str, Interval] = {
+        key: Interval(value=i.value, unit=_unit(key), low=float(i.low), high=float(i.high))
+        for key, i in finding.parameters.items()
+    }
+    return Effect(name=name, statement=finding.statement, parameters=dict(parameters), used=USED.get(name, UNUSED))
+
+
+UNITS = {"1_mm3": "1/mm^3", "1_mm": "1/mm", "mm_N": "mm/N", "N_h": "N/h", "1_K": "1/K"}
+
+
+def _unit(name: str) -> str:
+    """The unit a parameter's name ends in."""
+    for ending, unit in UNITS.items():
+        if name.endswith("_" + ending):
+            return unit
+    return name.rpartition("_")[2]

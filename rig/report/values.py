@@ -1,0 +1,24 @@
+"""Values out of JSON that somebody else wrote: what is not as expected is absent, never an exception."""
+
+import json
+from collections.abc import Mapping
+
+
+def json_table(text: str) -> Mapping[str, object]:
+    """The JSON object in ``text``; other text is the value of an empty name."""
+    try:
+        value = json.loads(text)
+    except ValueError:
+        return {"": text}
+    return value if isinstance(value, dict) else {"": value}
+
+
+def number(values: Mapping[str, object], key: str) -> float | None:
+    """A number, or None."""
+    value = values.get(key)
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+def listed(value: object) -> list[Mapping[str, object]]:
+    """The objects of a list."""
+    return [item for item in value if isinstance(item, Mapping)] if isinstance(value, list) else []
