@@ -15,8 +15,7 @@ from rig.tissue.lattice.numba_types import Floats, Matrix, RowKernel, driver, pi
 from rig.tissue.lattice.rows import FRONT, MASKS, PAD, WIDTH, ZEROS
 from rig.tissue.lattice.threads import cut, in_parts
 
-SPRING_NODES = 320
-CELL_NODES = 160  # nodes per block of cells: 25 buffer rows of this length stay in the first cache level
+SPRING_NODES, CELL_NODES = 320, 160  # of a block of rows: its buffers then stay in the nearest caches
 _BUFFER = (ZEROS + 1) * WIDTH
 _MASKS = 4 * MASKS * WIDTH
 
