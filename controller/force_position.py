@@ -131,11 +131,12 @@ def interpolate(at: Values, values: Values, x: float) -> float:
 
 def begin(table: Columns, force_N: float, depth_mm: float, friction_N: float = 0.0) -> Memory:
     """Memory at hand-over: what is measured now is what was foreseen, so nothing moves; the tip has come inwards."""
-    ahead_mm = interpolate(table.force_N, table.depth_mm, force_N - friction_N)
+    bristle = min(max(force_N / friction_N, -1.0), 1.0) if friction_N > 0 else 0.0
+    ahead_mm = interpolate(table.force_N, table.depth_mm, force_N - friction_N * bristle)
     tangent_N_mm = interpolate(table.force_N, table.tangent_N_mm, force_N)
     return Memory(
         0.0,
-        Foreseen(ahead_mm, 0.0, 0.0, 1.0),
+        Foreseen(ahead_mm, 0.0, 0.0, bristle),
         force_N,
         force_N,
         tangent_N_mm,

@@ -44,3 +44,11 @@ def test_a_clean_session_is_adequate_and_says_what_it_would_have_shown(seed: int
     assert {"friction", "backlash", "relaxation", "time_offset"} <= result.detectable.keys()
     assert result.not_testable["gain_error"].endswith("hang a known weight")
     assert "contact_offset" in result.not_testable
+
+
+def test_stiffening_comes_out_by_itself_where_constant_stiffness_is_simulated() -> None:
+    """The study's own discovery."""
+    bench, made = recorded(603, draw_secret(np.random.default_rng(5), "none"), 6)
+    result = diagnose(observe(session_of(bench, made)), "constant")
+    assert result.findings[0].effects[0] == "stiffening", result.statement
+    assert result.findings[0].gain.reduction.value > 0.5

@@ -84,7 +84,7 @@ def test_a_clock_that_runs_backwards_is_said_and_its_samples_left_out(clean: Ses
 
 def test_a_csv_folder_with_a_stream_missing_answers_with_the_rest(clean: Session, tmp_path: Path) -> None:
     for k, streams in enumerate(clean.recordings[:5]):
-        _write(tmp_path / f"trial_{k}", streams)
+        write_csv(tmp_path / f"trial_{k}", streams)
     (tmp_path / "trial_2" / "axis.csv").unlink()
     session = read_source(tmp_path)
     assert len(session.recordings) == 4
@@ -114,7 +114,7 @@ def _cut_before_retraction(streams: Streams) -> Streams:
     )  # fmt: skip
 
 
-def _write(folder: Path, streams: Streams) -> None:
+def write_csv(folder: Path, streams: Streams) -> None:
     folder.mkdir()
     for name, header, columns in (
         ("force", "time_s,force_N", (streams.force_s, streams.force_N)),

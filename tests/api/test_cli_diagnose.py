@@ -1,0 +1,71 @@
+"""`rig diagnose` and `rig protocol check` from the command line: files, report, and the model that control takes."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from api.cli.app import build
+from controller.experiments import tracked
+from rig.config.wiring import Wiring
+from rig.report.diagnosed import Diagnosed, diagnosis_section, read_diagnosis
+from rig.tissue.model import load_model
+from tests.hidden.draw import draw_secret, recorded, session_of
+from tests.rig.diagnosis.test_bad_input import write_csv
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def run(*arguments: str | Path) -> str:
+    """The command's output; a failure is raised as it is."""
+    result = CliRunner().invoke(build(str(arguments[0])), [str(part) for part in arguments], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Six strokes with friction in them as CSV files, diagnosed into the folder a session keeps its diagnosis in."""
+    made = tmp_path_factory.mktemp("measured")
+    bench, strokes = recorded(501, draw_secret(np.random.default_rng([501, 5]), "friction"), 6)
+    for k, streams in enumerate(session_of(bench, strokes).recordings):
+        write_csv(made / f"trial_{k}", streams)
+    run("diagnose", made, "--out", made / "diagnosis", "--json", made / "said.json")
+    return made
+
+
+def test_a_csv_folder_is_diagnosed_and_pictures_json_and_model_are_left(folder: Path) -> None:
+    said = json.loads((folder / "said.json").read_text())
+    assert said["findings"][0]["effects"][0] == "friction"
+    assert said == json.loads((folder / "diagnosis" / "diagnosis.json").read_text())
+    names = {path.name for path in (folder / "diagnosis").glob("*.png")}
+    assert names == {"simulation.png", "residuals.png", "evidence.png", "confusability.png"}
+
+
+def test_the_extended_model_goes_into_gains_and_inverse_model(folder: Path) -> None:
+    model = load_model(folder / "diagnosis" / "model.json")
+    found = json.loads((folder / "said.json").read_text())["findings"][0]["parameters"]["friction_N"]["value"]
+    assert model.effects[0].parameters["friction_N"].value == found
+    program = tracked.plan((0.5 * model.valid.force_N,), 2.0, model, Wiring())
+    assert {step.friction_N for step in program.steps if step.step == "track"} == {found}
+
+
+def test_the_report_gives_the_statement_the_pictures_and_what_could_not_be_tested(folder: Path) -> None:
+    found = read_diagnosis(folder)
+    assert isinstance(found, Diagnosed)
+    html = diagnosis_section(found)
+    assert found.statement in html and "rubs" in found.statement
+    assert html.count("<svg") == 4
+    assert "hang a known weight" in html
+
+
+def test_a_session_that_was_not_diagnosed_says_how_to(tmp_path: Path) -> None:
+    assert "rig diagnose" in diagnosis_section(read_diagnosis(tmp_path))
+
+
+def test_a_protocol_is_checked_and_its_confusability_drawn(tmp_path: Path) -> None:
+    said = run("protocol", "check", EXAMPLES / "diagnosis.toml", "--out", tmp_path / "pictures")
+    assert "friction" in said
+    assert (tmp_path / "pictures" / "confusability.png").read_bytes().startswith(b"\x89PNG")
