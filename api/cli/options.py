@@ -2,7 +2,7 @@
 
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -11,19 +11,6 @@ from rig.config.wiring import Wiring
 
 DEFAULT_FILE = Path("rig.toml")
 ENVIRONMENT = "RIG_CONFIG"
-# A simulated device is one more process of a busy computer: without real-time priority it may come a few tenths of a
-# second late where a real one does not. An axis that stands still for 400 ms falls behind by 12 mm at 30 mm/s.
-PATIENT = {
-    "loop": {
-        "missed_periods": 0,
-        "stale_force_ms": 400,
-        "stale_axis_ms": 400,
-        "stale_marker_ms": 500,
-        "overrun_ms": 400,
-    },
-    "axis": {"heartbeat_ms": 200, "following_error_mm": 12},
-}
-
 ConfigOption = Annotated[
     Path | None,
     typer.Option("--config", help=f"Wiring file; else ${ENVIRONMENT}, else ./rig.toml, else the mock bench."),
@@ -47,9 +34,8 @@ def wiring_from(config: Path | None, overrides: list[str] | None) -> Wiring:
 
 
 def built_in(overrides: list[str] | None = None) -> Wiring:
-    """The wiring of the mock bench, as patient with its pseudo-terminals as a busy computer makes necessary."""
-    values: dict[str, Any] = {section: dict(table) for section, table in PATIENT.items()}
-    return parse(Wiring, merged(values, overrides or []), "--set")
+    """The wiring of the mock bench: every port is `mock`."""
+    return parse(Wiring, merged({}, overrides or []), "--set")
 
 
 def _beside(wiring: Wiring, folder: Path) -> Wiring:

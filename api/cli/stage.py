@@ -12,6 +12,16 @@ from rig.errors import UsageError
 
 # Below the loop: a simulated device must not wait for the desktop either, but never keeps the loop waiting.
 BENCH_PRIORITY = 10
+# A simulated device is one more process of a busy computer: without real-time priority it may come a few tenths of a
+# second late where a real one does not. An axis that stands still for 400 ms falls behind by 12 mm at 30 mm/s.
+PATIENCE: dict[str, dict[str, dict[str, float]]] = {
+    "force": {"loop": {"missed_periods": 0, "stale_force_ms": 400.0, "overrun_ms": 400.0}},
+    "axis": {
+        "loop": {"stale_axis_ms": 400.0, "overrun_ms": 400.0},
+        "axis": {"heartbeat_ms": 200, "following_error_mm": 12.0},
+    },
+    "tracker": {"loop": {"stale_marker_ms": 500.0}},
+}
 
 
 def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, both_sensors: bool) -> list[str]:
@@ -60,10 +70,11 @@ def bench_for(wiring: Wiring, hide: tuple[str, ...] = ()) -> Iterator[tuple[Wiri
 
 
 def plugged(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
-    """``wiring`` with each port `mock` replaced by the endpoint that serves it.
+    """``wiring`` with each port `mock` replaced by the endpoint that serves it, and as patient as that needs.
 
     Where the wiring states no latency for a mock device, it takes what the device's data sheet would say.
     """
+    wiring = patient(wiring)
     force, axis, tracker, stated = wiring.force, wiring.axis, wiring.tracker, endpoints["latency_ms"]
     if force.port == MOCK_PORT:
         role = "force_modbus" if force.product == "robotiq-ft300" else "force"
@@ -75,3 +86,17 @@ def plugged(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
         known = {"port": "tcp://" + endpoints["tracker"]["tcp"], "latency_ms": tracker.latency_ms or stated["tracker"]}
         tracker = tracker.model_copy(update=known)
     return wiring.model_copy(update={"force": force, "axis": axis, "tracker": tracker})
+
+
+def patient(wiring: Wiring) -> Wiring:
+    """``wiring`` with limits of time that mock devices can keep; what the wiring itself states is kept."""
+    tables = {"force": wiring.force, "axis": wiring.axis, "tracker": wiring.tracker}
+    for role, sections in PATIENCE.items():
+        device = tables[role]
+        if device is None or device.port != MOCK_PORT:
+            continue
+        for section, values in sections.items():
+            table = getattr(wiring, section)
+            unsaid = {key: value for key, value in values.items() if key not in table.model_fields_set}
+            wiring = wiring.model_copy(update={section: table.model_copy(update=unsaid)})
+    return wiring
