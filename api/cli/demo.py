@@ -36,17 +36,13 @@ from rig.tissue.model import load_model
 PLAN = Indentation(
     name="demonstration",
     trials=2,
-    depth_mm=8.0,
-    second_depth_mm=5.0,
     air_dwell_s=0.3,
-    approach_speed_mm_s=8.0,
-    contact_force_N=0.25,
-    hold_s=0.8,
-    dither_amplitude_mm=0.25,
-    dither_frequency_Hz=6.0,
-    dither_s=0.5,
-    retract_speed_mm_s=10.0,
-    clearance_mm=3.0,
+    approach_speed_mm_s=6.0,
+    hold_s=0.4,
+    dither_amplitude_mm=0.3,
+    dither_s=0.4,
+    retract_speed_mm_s=20.0,
+    clearance_mm=4.0,
     rest_s=0.1,
 )
 LARGEST_SEED = 100_000

@@ -35,6 +35,9 @@ def diagnose(
     session: Annotated[Path, typer.Argument(help="Session folder, or a folder of CSV files as `rig import` reads it.")],
     simulation: Annotated[Simulation, typer.Option(help="Which simulation is judged.")] = "index",
     columns: Annotated[list[str] | None, typer.Option(help="[STREAM.]FIELD=HEADER for other column names.")] = None,
+    only: Annotated[
+        str, typer.Option("--only", help="Of recordings stacked in one CSV file: those matching, for example 'pork*'.")
+    ] = "",
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures and the extended model; else SESSION/diagnosis.")
     ] = None,
@@ -44,7 +47,7 @@ def diagnose(
 
     Example: rig diagnose sessions/first --json diagnosis.json
     """
-    result = run_diagnosis(session, simulation, tuple(columns or ()))
+    result = run_diagnosis(session, simulation, tuple(columns or ()), only)
     show(result)
     write_json(json_file, result.as_json())
     folder = session / FOLDER if out is None and (session / SESSION_FILE).exists() else out
@@ -80,7 +83,7 @@ def protocol(
         draw({"confusability": confusability_figure(result.names, result.confusion)}, out)
 
 
-def run_diagnosis(folder: Path, simulation: Simulation, columns: tuple[str, ...] = ()) -> Diagnosis:
+def run_diagnosis(folder: Path, simulation: Simulation, columns: tuple[str, ...] = (), only: str = "") -> Diagnosis:
     """The diagnosis of a folder, with a progress bar on stderr."""
     bar_columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     screen = Console(stderr=True)
@@ -95,7 +98,7 @@ def run_diagnosis(folder: Path, simulation: Simulation, columns: tuple[str, ...]
             from rig.diagnosis.axis_run import diagnose_axis_folder  # noqa: PLC0415
 
             return diagnose_axis_folder(folder, progress)
-        return diagnose_session(read_source(folder, columns), simulation, progress)
+        return diagnose_session(read_source(folder, columns, only), simulation, progress)
 
 
 def show(result: Diagnosis) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from rig.config.table import load
 from rig.diagnosis.gates import Finding
 from rig.diagnosis.observations import Session, Streams
+from rig.diagnosis.stacked import from_stacked, stacked_file
 from rig.errors import DataError, RigError
 from rig.recording.import_format import FIELDS, SessionTable, TrialTable, column_names
 from rig.recording.reader import Recording
@@ -23,14 +24,17 @@ TIP_TOOL = 0
 NS = 1e-9
 
 
-def read_source(folder: Path, columns: tuple[str, ...] = ()) -> Session:
-    """The session in ``folder``; raises DataError where it is neither kind of folder."""
+def read_source(folder: Path, columns: tuple[str, ...] = (), only: str = "") -> Session:
+    """The session in ``folder``, of which stacked recordings may be chosen by a pattern; raises DataError."""
     if not folder.is_dir():
         raise DataError(f"{folder}: no such folder; give a session, or a folder with session.toml and trial_*/")
     if any(folder.glob("*.mcap")):
         return from_session(folder)
     if any(folder.glob("trial_*")):
         return from_csv(folder, columns)
+    stacked = stacked_file(folder)
+    if stacked is not None:
+        return from_stacked(stacked, columns, only)
     raise DataError(f"{folder}: neither recordings (*.mcap) nor trial folders (trial_*) are in it")
 
 

@@ -66,7 +66,7 @@ def residual_figure(old: Fit, new: Fit, before: Leftover, after: Leftover) -> Fi
                 np.bincount(place, values) / count, np.bincount(place, fit.residual) / count, color=color, linewidth=1.5
             )
         mark = "  <- depends on it" if name in names[:1] and before.p_value < 0.05 else ""
-        gains = f"{before.gains[name]:.0f} -> {max(after.gains[name], 0):.0f} nats"
+        gains = f"{max(before.gains[name], 0):.0f} -> {max(after.gains[name], 0):.0f} nats"
         dress(axes, f"{name}{mark}", gains, "mean error")
     for axes in panels[len(names) :]:
         axes.set_visible(False)

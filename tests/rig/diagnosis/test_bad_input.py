@@ -11,6 +11,7 @@ from rig.diagnosis.observations import Session, Streams
 from rig.diagnosis.run import diagnose_session
 from rig.diagnosis.sources import read_source
 from rig.errors import DataError
+from tests.data import recording
 from tests.hidden.draw import draw_secret, recorded, session_of
 
 
@@ -122,3 +123,27 @@ def write_csv(folder: Path, streams: Streams) -> None:
     ):
         rows = np.stack(columns, axis=1)
         np.savetxt(folder / f"{name}.csv", rows, delimiter=",", header=header, comments="", fmt="%.6f")
+
+
+def test_recordings_stacked_in_one_file_are_told_apart_and_chosen_by_name(clean: Session, tmp_path: Path) -> None:
+    lines = ["recording,t_s,force_N,extension_mm"]
+    for k, streams in enumerate(clean.recordings[:2]):
+        place = np.interp(streams.force_s, streams.axis_s, streams.axis_mm)
+        rows = zip(streams.force_s[::100], streams.force_N[::100], place[::100], strict=True)
+        lines += [f"beef|{k},{t:.4f},{f:.4f},{x:.4f}" for t, f, x in rows]
+        lines += [f"silicone|{k},0,0,0"]
+    (tmp_path / "stacked.csv").write_text("\n".join(lines) + "\n")
+    assert [streams.name for streams in read_source(tmp_path).recordings] == ["beef|0", "beef|1"]
+    chosen = read_source(tmp_path, only="*|1")
+    assert [streams.name for streams in chosen.recordings] == ["beef|1", "silicone|1"]
+    assert "2 of 4 recordings" in chosen.findings[0].text
+    with pytest.raises(DataError, match="no recording matches"):
+        read_source(tmp_path, only="pork*")
+
+
+def test_what_the_index_law_gets_wrong_on_real_meat_is_relaxation() -> None:
+    folder = recording("perineal_indentation")
+    result = diagnose_session(read_source(folder, only="230411_C_Ind*_RDG*"))
+    assert "relaxation" in {effect for finding in result.findings for effect in finding.effects}, result.statement
+    named = next(finding for finding in result.findings if finding.effects[0] == "relaxation")
+    assert named.gain.reduction.value > 0.2
