@@ -65,7 +65,9 @@ class Workshop:
         wire = self._faulty(PtyWire())
         axis = self._bench.parameters.axis
         per_rev = abs(axis.increments_per_mm) * axis.lead_mm
-        mock = Epos4Mock(wire, self._bench.axis, self._start_ns, axis.node, axis.increments_per_mm, per_rev)
+        mock = Epos4Mock(
+            wire, self._bench.axis, self._start_ns, axis.node, axis.increments_per_mm, per_rev, self._clock_ns
+        )
         return _device("axis", mock, wire, EPOS4_FAULTS)
 
     def _camera(self) -> list[Device]:

@@ -6,6 +6,7 @@ and end in fault (object 6007), the node then leaves Operational (object 1029); 
 
 import struct
 from collections import deque
+from collections.abc import Callable
 
 from drivers.can.slcan import CanFrame
 from drivers.canopen.nmt import EMERGENCY_ID, HEARTBEAT_ID, SDO_REQUEST_ID, SDO_RESPONSE_ID, SYNC, NmtCommand, NmtState
@@ -48,6 +49,7 @@ class Epos4Mock:
         node: int = 1,
         increments_per_mm: float = 2000.0,
         increments_per_rev: float = 10_000.0,
+        clock_ns: Callable[[], int] | None = None,
     ) -> None:
         self.silent = False
         self.wrong_identity = False
@@ -68,7 +70,8 @@ class Epos4Mock:
         self._now_ns = start_ns
         self._consumed: dict[int, int] = {}
         self.synced_ns: deque[int] = deque(maxlen=SYNCS_KEPT)
-        """When SYNCs came, on the bench's clock; whoever wants them takes them out."""
+        """When SYNCs were taken, by ``clock_ns`` where there is one; whoever wants them takes them out."""
+        self._clock_ns = clock_ns
         self._connect()
 
     @property
@@ -149,7 +152,7 @@ class Epos4Mock:
         can_id, data = frame.can_id, frame.data
         if can_id == SYNC.can_id:
             if self.nmt is NmtState.OPERATIONAL:
-                self.synced_ns.append(self._now_ns)
+                self.synced_ns.append(self._clock_ns() if self._clock_ns else self._now_ns)
                 self._pdo.sync()
         elif can_id in self._pdo.rpdos:
             if self.nmt is NmtState.OPERATIONAL:
