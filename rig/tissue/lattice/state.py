@@ -4,9 +4,19 @@ import numpy as np
 
 from rig.tissue.lattice import kernels
 from rig.tissue.lattice.block import Block
+from rig.tissue.lattice.kernels import Shape
 from rig.tissue.lattice.numba_types import Matrix
 from rig.tissue.lattice.springs import Springs
 from rig.tissue.lattice.threads import threads
+
+# Below this many nodes a thread takes longer to be woken than to do its share, and much longer on a busy computer.
+NODES_A_THREAD = 5_000
+
+
+def slabs_for(shape: Shape) -> int:
+    """Parts worth working on at once."""
+    worth = shape.nx * shape.ny * shape.nz // NODES_A_THREAD
+    return max(1, min(threads(), shape.nx, worth))
 
 
 class Loaded:
@@ -23,7 +33,7 @@ class Loaded:
         self.rest = block.rest()
         self.x = aligned_copy(block, self.rest)
         self.f = block.allocate()
-        self.slabs = min(threads(), self.shape.nx)
+        self.slabs = slabs_for(self.shape)
         self.load_N = 0.0
 
     def force(self) -> Matrix:
