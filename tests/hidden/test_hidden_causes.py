@@ -1,4 +1,8 @@
-"""A cause is hidden by another program; the diagnosis sees only the data and must name it, size it and gain by it."""
+"""A cause is hidden by another program; the diagnosis sees only the data and must name it, size it and gain by it.
+
+The seeds draw the cause, its size and the whole session. They were fixed before any of them was run and none was
+exchanged since; how often such sessions are answered rightly is counted by ``benchmarks/criticism.py`` on others.
+"""
 
 import numpy as np
 import pytest
@@ -6,39 +10,62 @@ import pytest
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.observations import observe
 from rig.diagnosis.run import diagnose
-from tests.hidden.draw import draw_secret, recorded, session_of
+from tests.hidden.draw import KNOWN, UNKNOWN, Secret, draw_secret, recorded, session_of
 
-CAUSES = ("friction", "time_offset", "frame_compliance", "adhesion")
+STROKES = 10
+MISSED = {
+    9001: "a contact offset of 0.3 mm in ten strokes passes for another stiffness: the answer is adequate",
+    9004: "the substrate is named, but ten strokes' own shifts are taken for a trend: the answer is unexplained",
+}
+KNOWN_SEEDS = [501, 503, 504, 505, 9002, 9003] + [
+    pytest.param(seed, marks=pytest.mark.xfail(reason=reason, strict=True)) for seed, reason in MISSED.items()
+]
+pytestmark = pytest.mark.timeout(400)  # a diagnosis takes 10 s of a core; how long it waits for one is not its matter
+OLD_NAMES = {501: "friction", 503: "time_offset", 504: "frame_compliance", 505: "adhesion"}
+SEEN_BY_TRACKER_ONLY = {"frame_compliance", "tracker_latency"}
 
 
-def judged(seed: int, name: str, strokes: int = 10) -> tuple[dict[str, float], Diagnosis]:
-    """Truth and diagnosis of one session."""
-    secret = draw_secret(np.random.default_rng([seed, 5]), name)
-    bench, made = recorded(seed, secret, strokes)
-    data = observe(session_of(bench, made, stated=name == "contact_offset"))
-    return dict(secret.expected), diagnose(data)
+def secret_of(seed: int) -> Secret:
+    """The cause a seed draws."""
+    name = OLD_NAMES.get(seed) or str(np.random.default_rng([seed, 1]).choice(KNOWN))
+    return draw_secret(np.random.default_rng([seed, 5]), name)
 
 
-@pytest.mark.parametrize(("seed", "name"), list(zip((501, 503, 504, 505), CAUSES, strict=True)))
-def test_a_hidden_cause_is_in_the_answer_with_its_size_and_a_gain(seed: int, name: str) -> None:
-    expected, result = judged(seed, name)
+def judged(seed: int, secret: Secret) -> Diagnosis:
+    """Diagnosis of one session."""
+    bench, made = recorded(seed, secret, STROKES)
+    return diagnose(observe(session_of(bench, made, stated=secret.name == "contact_offset")))
+
+
+@pytest.mark.parametrize("seed", KNOWN_SEEDS)
+def test_a_hidden_cause_is_named_with_its_size_inside_the_interval_and_a_gain(seed: int) -> None:
+    secret = secret_of(seed)
+    result = judged(seed, secret)
     assert result.verdict == "explained", result.statement
     found = result.findings[0]
-    assert name in found.effects
+    assert secret.name in found.effects
     assert found.nats > 0
     assert found.p_value < 0.05
-    for parameter, truth in expected.items():
+    for parameter, truth in secret.expected.items():
         interval = found.parameters[parameter]
-        # Another integrator and another noise: the interval, and a few percent beside it.
-        slack = 0.05 * abs(truth)
-        assert interval.low - slack <= truth <= interval.high + slack, (parameter, truth, interval)
+        assert interval.low <= truth <= interval.high, (parameter, truth, interval)
     # What shows on the tracker only cannot gain on the force.
-    assert name == "frame_compliance" or found.gain.reduction.value > 0.02
+    assert secret.name in SEEN_BY_TRACKER_ONLY or found.gain.reduction.value > 0.02
+
+
+@pytest.mark.parametrize(("seed", "name"), list(zip((9101, 9102, 9103), UNKNOWN, strict=True)))
+def test_what_the_library_does_not_hold_is_called_unexplained_with_the_variable_it_depends_on(
+    seed: int, name: str
+) -> None:
+    result = judged(seed, draw_secret(np.random.default_rng([seed, 5]), name))
+    assert result.verdict == "unexplained", result.statement
+    assert set(result.depends_on) & set(UNKNOWN[name])
+    assert all(finding.provisional for finding in result.findings)
 
 
 @pytest.mark.parametrize("seed", [601, 602])
 def test_a_clean_session_is_adequate_and_says_what_it_would_have_shown(seed: int) -> None:
-    _, result = judged(seed, "none")
+    result = judged(seed, Secret("none", {}, {}))
     assert result.verdict == "adequate", result.statement
     assert result.findings == ()
     assert {"friction", "backlash", "relaxation", "time_offset"} <= result.detectable.keys()
