@@ -51,10 +51,10 @@ def _ripple_tries(_: Problem) -> float:
     return max(1.0, len(PITCHES_1_MM) / 3 / PEAKS)
 
 
-def _pair(stem: str, meaning: str) -> tuple[Par, Par]:
+def _pair(stem: str, meaning: str, worth_mm: float) -> tuple[Par, Par]:
     return (
-        Par(f"{stem}_sin_mm", "mm", 0.0, -10.0, 10.0, 0.02, worth=0.003, meaning=meaning),
-        Par(f"{stem}_cos_mm", "mm", 0.0, -10.0, 10.0, 0.02, worth=0.003, meaning=meaning),
+        Par(f"{stem}_sin_mm", "mm", 0.0, -10.0, 10.0, 0.02, worth=worth_mm, meaning=meaning),
+        Par(f"{stem}_cos_mm", "mm", 0.0, -10.0, 10.0, 0.02, worth=worth_mm, meaning=meaning),
     )
 
 
@@ -78,7 +78,7 @@ FRAME_COMPLIANCE = Effect(
 POSITION_RIPPLE = Effect(
     "position_ripple",
     "the screw has a periodic error of {amplitude:.3g} mm every {ripple_pitch_mm:.3g} mm",
-    _pair("ripple", "periodic error of the screw"),
+    _pair("ripple", "periodic error of the screw", 0.003),
     (Par("ripple_pitch_mm", "mm", 2.0, 0.2, 20.0, 0.02, meaning="period along the axis"),),
     _ripple_starts,
     _ripple_tries,
@@ -97,7 +97,7 @@ CONTACT_OFFSET = Effect(
 SURFACE_MOTION = Effect(
     "surface_motion",
     "the surface moves by {amplitude:.3g} mm at {surface_motion_Hz:.3g} Hz (breathing or pulse)",
-    _pair("surface_motion", "motion of the surface"),
+    _pair("surface_motion", "motion of the surface", 0.01),
     (Par("surface_motion_Hz", "Hz", 0.25, 0.05, 5.0, 0.002, meaning="frequency"),),
     _surface_starts,
     _surface_tries,
