@@ -2,6 +2,7 @@
 
 from rig.tissue.laws import Constant, Index, Law
 from rig.tissue.laws_elastic import Fung, Layer, Power, Quadratic
+from rig.tissue.laws_extended import Extended
 from rig.tissue.laws_viscous import HuntCrossley, Prony, QuasiLinear, StandardLinear
 
 EXAMPLES: tuple[Law, ...] = (
@@ -14,5 +15,6 @@ EXAMPLES: tuple[Law, ...] = (
     HuntCrossley(a_N_mmn=0.1, n=1.7, lambda_N_s_mmn1=0.001),
     StandardLinear(k_N_mm=0.5, k1_N_mm=0.2, tau_s=0.4),
     Prony(k_N_mm=0.5, k1_N_mm=0.1, tau1_s=0.05, k2_N_mm=0.2, tau2_s=1.5),
+    Extended(a_N_mm=0.12, b_per_mm=0.15, B_N_s_mm=0.01, q_per_mm=0.05, s_per_mm3=1e-4, r_1=0.2, tau_s=0.5, c_mm_N=0.03),
     QuasiLinear(A_N=0.3, b_per_mm=0.3, r=0.3, tau_s=0.5),
 )
