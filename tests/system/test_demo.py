@@ -17,13 +17,14 @@ from tests.system.stage import rig
 
 pytestmark = pytest.mark.timeout(300)
 LARGEST_STEADY_ERROR_PERCENT = 5.0
-HIDES_COMPLIANCE = "1"
+# Relaxation: slow enough that a busy computer's time stamps, a few ms off, leave it as it is.
+HIDES_RELAXATION = "4"
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("demonstration")
-    said = rig("demo", "--out", "demo", "--trials", "1", "--seed", HIDES_COMPLIANCE, folder=folder, timeout_s=280)
+    said = rig("demo", "--out", "demo", "--trials", "1", "--seed", HIDES_RELAXATION, folder=folder, timeout_s=280)
     assert said.code == 0, said.err
     return folder / "demo"
 
@@ -51,26 +52,26 @@ def test_the_summary_holds_what_was_recorded_fitted_and_tracked(made: Path) -> N
 
 def test_what_was_hidden_is_named_with_its_size_and_a_gain(made: Path) -> None:
     said: dict[str, Any] = json.loads((made / "summary.json").read_text())["diagnosis"]
-    assert said["truth"]["effect"] == "frame_compliance"
+    assert said["truth"]["effect"] == "relaxation"
     assert said["named"], said["statement"]
-    finding = next(found for found in said["findings"] if "frame_compliance" in found["effects"])
-    truth, interval = said["truth"]["parameters"]["compliance_mm_N"], finding["parameters"]["frame_compliance_mm_N"]
-    # Time stamps that jitter on a busy computer are no part of the interval.
-    slack = 0.1 * truth
-    assert interval["low"] - slack <= truth <= interval["high"] + slack
-    # It shows on the tracker, so the gain is told by the evidence and not by the force.
-    assert finding["evidence_nats"] > 20
+    finding = next(found for found in said["findings"] if "relaxation" in found["effects"])
+    for truth, name in (("strength_1", "relaxation_1"), ("time_constant_s", "relaxation_tau_s")):
+        interval = finding["parameters"][name]
+        # Time stamps that jitter on a busy computer are no part of the interval.
+        slack = 0.05 * said["truth"]["parameters"][truth]
+        assert interval["low"] - slack <= said["truth"]["parameters"][truth] <= interval["high"] + slack
+    assert finding["gain"]["low"] > 0.5
 
 
-def test_the_extended_model_has_the_compliance_and_is_a_model_like_any_other(made: Path) -> None:
+def test_the_extended_model_relaxes_and_is_a_model_like_any_other(made: Path) -> None:
     model = load_model(made / "session" / "diagnosis" / "model.json")
-    assert {p.name: p.value for p in model.law.parameters}["c_mm_N"] > 0.02
-    assert any(effect.name == "frame_compliance" and "gains" in effect.used for effect in model.effects)
+    assert {p.name: p.value for p in model.law.parameters}["r_1"] > 0.05
+    assert any(effect.name == "relaxation" and effect.used for effect in model.effects)
 
 
 def test_the_truth_comes_last(made: Path) -> None:
     page = (made / "report.html").read_text()
-    assert 0 < page.index("What the simulation gets wrong") < page.index("Hidden was frame_compliance")
+    assert 0 < page.index("What the simulation gets wrong") < page.index("Hidden was relaxation")
 
 
 def test_the_report_shows_its_pictures_without_the_network(made: Path, browser: Browser) -> None:
