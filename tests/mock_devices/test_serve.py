@@ -290,7 +290,12 @@ def test_what_the_axis_was_told_during_a_stall_is_heard_evenly_over_it(
 ) -> None:
     mock, line, told_ns = stage.axis.mock, stage.axis.wire, list[int]()
     hear = mock.receive
-    monkeypatch.setattr(mock, "receive", lambda now_ns: (told_ns.append(now_ns), hear(now_ns)))
+
+    def heard(now_ns: int) -> None:
+        told_ns.append(now_ns)
+        hear(now_ns)
+
+    monkeypatch.setattr(mock, "receive", heard)
     with opened(line.endpoint) as port:
         port.write(b"C\rS8\rO\rt00020101\r")
         assert select.select(line.filenos(), [], [], 5.0)[0]
