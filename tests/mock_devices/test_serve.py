@@ -224,10 +224,11 @@ class Stage:
         self.server.turn([])
 
     def say(self, data: bytes) -> bytes:
-        """The line the sensor answers."""
+        """What the sensor says until it has answered; boot text and samples may come in parts of their own."""
         self.write(data)
         self.server.turn(self.line.filenos())
-        return read_until(self.port, lambda answer: answer.endswith(b"\n"), 5.0)
+        answered = b",%c,0\r\n" % data[0]
+        return read_until(self.port, lambda answer: answer.endswith(answered), 5.0)
 
     def write(self, data: bytes) -> None:
         self.port.write(data)
