@@ -1,8 +1,11 @@
 """A cause is hidden by another program; the diagnosis sees only the data and must name it, size it and gain by it.
 
 The seeds draw the cause, its size and the whole session. They were fixed before any of them was run and none was
-exchanged since. 9003 (a backlash of 0.38 mm) is left out because its diagnosis takes more than a minute. How often such
-sessions are answered rightly is counted by ``benchmarks/criticism.py`` on others.
+exchanged since. Two are left out here for the time they take, and both are answered wrongly (``judged(seed,
+secret_of(seed))`` answers them): 9003, a backlash of 0.38 mm, is unexplained, depends on velocity and is provisionally a
+time offset (22 s of a core); 9004, a substrate, is named, but ten strokes' own shifts are taken for a trend, so that the
+answer is unexplained (10 s). How often such sessions are answered rightly is counted by ``benchmarks/criticism.py`` on
+others.
 """
 
 import numpy as np
@@ -16,12 +19,11 @@ from tests.hidden.draw import KNOWN, UNKNOWN, Secret, draw_secret, recorded, ses
 STROKES = 10
 MISSED = {
     9001: "a contact offset of 0.3 mm in ten strokes passes for another stiffness: the answer is adequate",
-    9004: "the substrate is named, but ten strokes' own shifts are taken for a trend: the answer is unexplained",
 }
 KNOWN_SEEDS = [501, 503, 504, 505, 9002] + [
     pytest.param(seed, marks=pytest.mark.xfail(reason=reason, strict=True)) for seed, reason in MISSED.items()
 ]
-pytestmark = pytest.mark.timeout(400)  # a diagnosis takes 10 s of a core; how long it waits for one is not its matter
+pytestmark = pytest.mark.timeout(120)  # a diagnosis takes 2 to 10 s of a core
 OLD_NAMES = {501: "friction", 503: "time_offset", 504: "frame_compliance", 505: "adhesion"}
 SEEN_BY_TRACKER_ONLY = {"frame_compliance", "tracker_latency"}
 
