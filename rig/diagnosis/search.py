@@ -228,7 +228,7 @@ def dropped(model: Fit) -> Fit:
 
 def swapped(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:
     """Every effect against all others in its place; a better one takes it, an equal one is a rival."""
-    for _ in range(2):
+    for swaps_left in (2, 1, 0):
         named, better = [], None
         for effect in model.effects:
             smaller = without(model, effect.name)
@@ -238,8 +238,8 @@ def swapped(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -
             named.append(_named(model, effect, smaller, others, p))
             if others and float((score(others[0]) - score(model)).sum()) > KEEP_NATS:
                 better = others[0]
-        if better is None:
-            return tuple(named), model
+        if better is None or not swaps_left:
+            break
         model = better
     return tuple(named), model
 

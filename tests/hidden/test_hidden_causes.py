@@ -3,8 +3,8 @@
 The seeds draw the cause, its size and the whole session. They were fixed before any of them was run and none was
 exchanged since. Two are left out here for the time they take, and both are answered wrongly, as ``judged(seed,
 secret_of(seed))`` shows. 9003, a backlash of 0.38 mm, is called unexplained, depending on velocity, and provisionally a
-time offset (22 s of a core). 9004, a substrate, is named, but ten strokes' own shifts are taken for a trend, so that
-the answer is unexplained (10 s). How often such sessions are answered rightly is counted by
+ripple of the screw (22 s of a core). 9004, a substrate, is named, but ten strokes' own shifts are taken for a trend, so
+that the answer is unexplained (10 s). How often such sessions are answered rightly is counted by
 ``benchmarks/criticism.py`` on others.
 """
 
