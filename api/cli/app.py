@@ -3,6 +3,7 @@
 Only the module of the command asked for is imported: numerics, plotting and HTTP together take a second to load.
 """
 
+import os
 import sys
 from collections.abc import Callable
 from importlib import import_module
@@ -58,6 +59,8 @@ def _load(target: str) -> Callable[..., None]:
 
 def main() -> None:
     """Entry point of the `rig` command."""
+    # Its matrices are small: threads of linear algebra mostly wait for one another, and take a core from the loop.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         build(next(iter(sys.argv[1:]), None))()
     except RigError as error:
