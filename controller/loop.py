@@ -42,6 +42,22 @@ def sleep_until(due_ns: int) -> None:
         time.sleep(left_ns * 1e-9)
 
 
+def sleep_then_spin(
+    spin_ns: int, now: Callable[[], int] = time.monotonic_ns, sleep: Callable[[int], None] = sleep_until
+) -> Callable[[int], None]:
+    """A sleep that ends ``spin_ns`` early and watches the clock for the rest.
+
+    From a sleep the kernel comes back tens of microseconds late; only a loop that nothing else waits for may do so.
+    """
+
+    def until(due_ns: int) -> None:
+        sleep(due_ns - spin_ns)
+        while now() < due_ns:
+            pass
+
+    return until
+
+
 class Executive:
     """Calls ``tick`` once a slot until it returns False."""
 

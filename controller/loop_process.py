@@ -16,7 +16,7 @@ from controller.bench_loop import BenchLoop
 from controller.commands import Inbox
 from controller.devices import Devices, start_devices
 from controller.link import Link
-from controller.loop import Executive
+from controller.loop import Executive, sleep_then_spin
 from rig.config.wiring import Wiring
 from rig.errors import RigError
 from rig.recording.ring import RingWriter
@@ -60,7 +60,8 @@ def _run(wiring: Wiring, devices: Devices, ring: RingWriter, link: Link, granted
     identities = {role: asdict(device.identity) for role, device in devices.by_role().items()}
     link.send({"ready": {"devices": identities, "realtime": granted, "ring": str(ring.path)}})
     loop = BenchLoop(wiring, devices, ring, link, Inbox(link), time.monotonic_ns)
-    Executive(round(1e9 / wiring.loop.rate_Hz)).run(loop.tick)
+    pause = sleep_then_spin(realtime.spin_ns(granted))
+    Executive(round(1e9 / wiring.loop.rate_Hz), sleep=pause).run(loop.tick)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,8 @@ import os
 
 MCL_CURRENT_AND_FUTURE = 3
 PR_SET_TIMERSLACK = 29
+# Longer than nearly all wake-ups take: with 120 us the slowest hundredth stayed as late. A quarter of a core at 1 kHz.
+SPIN_NS = 250_000
 
 
 def acquire(priority: int) -> dict[str, str]:
@@ -21,6 +23,11 @@ def acquire(priority: int) -> dict[str, str]:
     gc.freeze()
     gc.disable()
     return granted | {"garbage_collector": "frozen"}
+
+
+def spin_ns(granted: dict[str, str]) -> int:
+    """How long before each slot the loop may stop sleeping and watch the clock: without FIFO scheduling not at all."""
+    return SPIN_NS if granted["scheduler"].startswith("SCHED_FIFO") else 0
 
 
 def _scheduler(priority: int) -> str:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.loop import Executive, Grid, Slot
+from controller.loop import Executive, Grid, Slot, sleep_then_spin
 from controller.motion import Setpoint, arrived, toward
 
 DT_S = 0.001
@@ -90,3 +90,18 @@ def test_the_executive_never_catches_up_after_a_stall() -> None:
     assert slots[-1].missed == 4
     assert all(slot.wake_ns >= slot.scheduled_ns for slot in slots)
     assert math.isclose(slots[4].wake_ns - slots[4].scheduled_ns, 500_000)
+
+
+@pytest.mark.parametrize(("late_ns", "woke_ns"), [(40_000, 1_000_000), (120_000, 1_000_000), (300_000, 1_180_000)])
+def test_a_wake_up_no_later_than_the_spin_is_on_time(late_ns: int, woke_ns: int) -> None:
+    now = [0]
+
+    def clock() -> int:
+        now[0] += 1_000
+        return now[0]
+
+    def sleep(due_ns: int) -> None:
+        now[0] = due_ns + late_ns
+
+    sleep_then_spin(120_000, clock, sleep)(1_000_000)
+    assert now[0] == pytest.approx(woke_ns, abs=1_000)
