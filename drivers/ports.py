@@ -50,6 +50,19 @@ class Port(Protocol):
         """Gives the port back; may be called twice."""
 
 
+def read_waiting(tty: int, waiting: "array.array[int]") -> bytes:
+    """Bytes that have come on descriptor ``tty``, possibly none; raises OSError where the other end is gone.
+
+    Asks how much is there (into ``waiting``), and reads only then: read and poll of an empty tty wait for a kernel
+    worker.
+    """
+    try:
+        fcntl.ioctl(tty, termios.FIONREAD, waiting)
+        return os.read(tty, CHUNK) if waiting[0] else b""
+    except BlockingIOError:
+        return b""
+
+
 class SerialPort:
     """A serial line opened by pyserial for this process alone, then used through its descriptor."""
 
@@ -69,16 +82,10 @@ class SerialPort:
         return self._fd
 
     def read(self) -> bytes:
-        """Asks how much is there, and reads only then: read and poll of an empty tty wait for a kernel worker.
-
-        A hang-up makes the question itself fail, so nothing else need look for it.
-        """
+        """What has arrived; a hang-up makes the question itself fail, so nothing else need look for it."""
         self._check_open()
         try:
-            fcntl.ioctl(self._fd, termios.FIONREAD, self._waiting)
-            return os.read(self._fd, CHUNK) if self._waiting[0] else b""
-        except BlockingIOError:
-            return b""
+            return read_waiting(self._fd, self._waiting)
         except OSError as error:
             raise PortClosed(f"{self.address}: the line is gone ({_plain(error)}); check the cable") from error
 

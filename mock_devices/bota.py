@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 from drivers.bota.codec import BAUD_CODES, COMMAND_BYTES_MAX, CONVERTER_HZ, SINC_LENGTHS, Frame, Status, encode_frame
 from mock_devices.stage import NEVER_NS, SensorPlant
-from mock_devices.wire import Wire
+from mock_devices.wire import OnWire, Wire
 
 Mode = Literal["booting", "init", "config", "run"]
 
@@ -70,7 +70,7 @@ class CommandParser:
         return Command(letter, None)
 
 
-class BotaMock:
+class BotaMock(OnWire):
     """Gets power at ``start_ns`` and boots; its counter runs ``drift_ppm`` faster than the bench's clock.
 
     Failures of the device, plain attributes to be set at any time: ``silent`` sends nothing; ``frozen`` repeats the
@@ -84,13 +84,13 @@ class BotaMock:
     def __init__(
         self, wire: Wire, plant: SensorPlant, start_ns: int, drift_ppm: float = 0.0, serial_number: str = "000271"
     ) -> None:
+        super().__init__(wire)
         self.silent = False
         self.frozen = False
         self.invalid = False
         self.wrong_identity = False
         self.corrupt_every = 0
         self.refuse = ""
-        self._wire = wire
         self._plant = plant
         self._serial_number = serial_number
         self._speed = 1 + drift_ppm * 1e-6
@@ -108,18 +108,6 @@ class BotaMock:
     def due_ns(self) -> int:
         """When the boot text or the next frame is due."""
         return self._due_ns
-
-    def endpoints(self) -> dict[str, str]:
-        """Kind of port to address."""
-        return {"serial" if self._wire.endpoint.startswith("/") else "tcp": self._wire.endpoint}
-
-    def filenos(self) -> list[int]:
-        """Descriptors to wait on."""
-        return self._wire.filenos()
-
-    def close(self) -> None:
-        """Cuts the wire."""
-        self._wire.close()
 
     def tick(self, now_ns: int) -> None:
         """Finishes booting, or sends one frame."""

@@ -18,7 +18,7 @@ from mock_devices.epos4_pdo import ProcessData
 from mock_devices.sdo_server import SdoServer
 from mock_devices.slcan_adapter import SlcanAdapter
 from mock_devices.stage import NEVER_NS, AxisPlant
-from mock_devices.wire import Wire
+from mock_devices.wire import OnWire, Wire
 
 MS = 1_000_000
 BOOT_NS = 50 * MS
@@ -30,7 +30,7 @@ HEARTBEAT_LOST = 0x8130
 STRANGE_VENDOR, STRANGE_PRODUCT = 0x0000_024A, 0x0001_0002
 
 
-class Epos4Mock:
+class Epos4Mock(OnWire):
     """One drive on ``plant``, powered at ``start_ns``; its raw counter starts at 0 wherever the carriage stands.
 
     Failures of the device, plain attributes to be set at any time: ``silent`` neither hears nor sends anything;
@@ -51,6 +51,7 @@ class Epos4Mock:
         increments_per_rev: float = 10_000.0,
         clock_ns: Callable[[], int] | None = None,
     ) -> None:
+        super().__init__(wire)
         self.silent = False
         self.wrong_identity = False
         self.node = node
@@ -58,7 +59,6 @@ class Epos4Mock:
         self.dictionary = Dictionary(node)
         self.drive = Drive(plant, self.dictionary, self._report, increments_per_mm, increments_per_rev)
         self._plant = plant
-        self._wire = wire
         self._adapter = SlcanAdapter(wire)
         self._sdo = SdoServer(self.dictionary.read, self.dictionary.write)
         self._pdo = ProcessData(self.dictionary, self._send, self.drive.fault)
@@ -91,14 +91,6 @@ class Epos4Mock:
     def endpoints(self) -> dict[str, str]:
         """Kind of port to address."""
         return {"slcan": self._wire.endpoint}
-
-    def filenos(self) -> list[int]:
-        """Descriptors to wait on."""
-        return self._wire.filenos()
-
-    def close(self) -> None:
-        """Cuts the wire."""
-        self._wire.close()
 
     def inject_fault(self, code: int, lasting: bool = False) -> None:
         """Makes error ``code`` happen; 0 only removes a lasting cause."""

@@ -13,7 +13,7 @@ from drivers.ndi import replies
 from drivers.ndi.codec import encode_binary, encode_text
 from mock_devices.ndi_ports import PortHandles, Refused
 from mock_devices.stage import MarkerPose, TrackerPlant
-from mock_devices.wire import Wire
+from mock_devices.wire import OnWire, Wire
 
 FRAME_HZ = 60
 MAX_COMMAND = 1024
@@ -35,7 +35,7 @@ _SETUP: tuple[Mode, ...] = ("setup",)
 _TRACKING: tuple[Mode, ...] = ("tracking",)
 
 
-class NdiMock:
+class NdiMock(OnWire):
     """The tracker; ``tools`` names the markers of ``plant`` in order, each plugged into a port at power-up.
 
     Faults, to be set at any time:
@@ -60,7 +60,7 @@ class NdiMock:
         tools: Sequence[str] = ("tip", "arm"),
         kind: Literal["polaris", "vega"] = "vega",
     ) -> None:
-        self._wire = wire
+        super().__init__(wire)
         self._is_tcp = ":" in wire.endpoint
         self._plant = plant
         self._start_ns = start_ns
@@ -106,14 +106,6 @@ class NdiMock:
     def unplugged(self, tools: set[int]) -> None:
         self._ports.unplugged = tools
 
-    def endpoints(self) -> dict[str, str]:
-        """Where a client finds it."""
-        return {"tcp" if self._is_tcp else "serial": self._wire.endpoint}
-
-    def filenos(self) -> list[int]:
-        """Descriptors to wait on."""
-        return self._wire.filenos()
-
     @property
     def due_ns(self) -> int:
         """The next frame."""
@@ -133,10 +125,6 @@ class NdiMock:
         for line in lines:
             if not self.silent:
                 self._wire.write(self._damaged(self._answer(line)))
-
-    def close(self) -> None:
-        """Cuts the wire."""
-        self._wire.close()
 
     def _damaged(self, reply: bytes) -> bytes:
         self._replies += 1

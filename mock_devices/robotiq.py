@@ -30,7 +30,7 @@ from drivers.robotiq.codec import (
     with_crc,
 )
 from mock_devices.stage import NEVER_NS, SensorPlant
-from mock_devices.wire import Wire
+from mock_devices.wire import OnWire, Wire
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
 READ_COUNT_MAX = 125
@@ -85,7 +85,7 @@ def _request_bytes(text: bytes) -> int:
     return size if size <= len(text) else 0
 
 
-class RobotiqMock:
+class RobotiqMock(OnWire):
     """Powered at ``start_ns``; its 100 Hz run ``drift_ppm`` fast against the bench's clock.
 
     A frame is sent when it would have passed a 19200 baud line: 8.3 ms after its sample was taken.
@@ -101,6 +101,7 @@ class RobotiqMock:
     def __init__(
         self, wire: Wire, plant: SensorPlant, start_ns: int, drift_ppm: float = 0.0, serial_number: int = 1234
     ) -> None:
+        super().__init__(wire)
         self.silent = False
         self.frozen = False
         self.invalid = False
@@ -109,7 +110,6 @@ class RobotiqMock:
         self.mute_start = False
         self.deaf = False
         self.refuse_stream = False
-        self._wire = wire
         self._plant = plant
         self._serial_number = serial_number
         self._period_ns = 1e9 / STREAM_HZ / (1 + drift_ppm * 1e-6)
@@ -130,18 +130,6 @@ class RobotiqMock:
     def streaming(self) -> bool:
         """Whether the stream has the line."""
         return self._due_ns != NEVER_NS
-
-    def endpoints(self) -> dict[str, str]:
-        """Kind of port to address."""
-        return {"serial" if self._wire.endpoint.startswith("/") else "tcp": self._wire.endpoint}
-
-    def filenos(self) -> list[int]:
-        """Descriptors to wait on."""
-        return self._wire.filenos()
-
-    def close(self) -> None:
-        """Cuts the wire."""
-        self._wire.close()
 
     def tick(self, now_ns: int) -> None:
         """Takes a sample, or delivers the frame of the last one."""

@@ -1,7 +1,8 @@
 """What a protocol mock is, and what it may ask of the bench behind it.
 
 The bench process calls ``tick`` of the mock whose ``due_ns`` is earliest, after the physics has been integrated exactly
-to that time, and ``receive`` when bytes came. Mocks hold no clock of their own: every time is an argument.
+to that time, and ``receive`` when bytes came. What a mock does follows these times alone; the drive may be lent a clock
+to note when it really took a SYNC.
 """
 
 from typing import NamedTuple, Protocol

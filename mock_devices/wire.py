@@ -26,6 +26,25 @@ class Wire(Protocol):
         """Cuts the wire for good."""
 
 
+class OnWire:
+    """What every mock answers about the wire it is on."""
+
+    def __init__(self, wire: Wire) -> None:
+        self._wire = wire
+
+    def endpoints(self) -> dict[str, str]:
+        """Kind of port to address."""
+        return {"tcp" if ":" in self._wire.endpoint else "serial": self._wire.endpoint}
+
+    def filenos(self) -> list[int]:
+        """Descriptors to wait on."""
+        return self._wire.filenos()
+
+    def close(self) -> None:
+        """Cuts the wire."""
+        self._wire.close()
+
+
 class PtyWire:
     """A serial line; its endpoint is a device path that any serial client opens."""
 

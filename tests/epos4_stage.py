@@ -9,10 +9,8 @@ import contextlib
 import json
 import math
 import select
-import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from typing import Any
 
 from drivers.can.slcan import CanFrame, SlcanDecoder, encode_frame
@@ -21,6 +19,7 @@ from drivers.ports import PortClosed
 from mock_devices.epos4 import Epos4Mock
 from mock_devices.stage import NEVER_NS
 from mock_devices.wire import PtyWire
+from tests.remote import MemoryWire, Remote, say
 
 MS = 1_000_000
 TIME_CONSTANT_S = 1 / (2 * math.pi * 25)
@@ -56,29 +55,6 @@ class LaggingPlant:
         self.velocity_mm_s = (self.position_mm - before) / dt_s
         self.current_A = 2 * (self.target_mm - self.position_mm) if self.powered else 0.0
         self.at_reference = self.has_switch and self.position_mm <= 0
-
-
-class MemoryWire:
-    """A wire without a kernel: the client's bytes wait in ``sent``, the mock's writes in ``replies``."""
-
-    endpoint = "memory"
-
-    def __init__(self) -> None:
-        self.sent = b""
-        self.replies: list[bytes] = []
-
-    def filenos(self) -> list[int]:
-        return []
-
-    def read(self) -> bytes:
-        data, self.sent = self.sent, b""
-        return data
-
-    def write(self, data: bytes) -> None:
-        self.replies.append(data)
-
-    def close(self) -> None:
-        self.replies.clear()
 
 
 class HostDied(Exception):
@@ -124,9 +100,7 @@ class Stage:
 
     def heard(self) -> bytes:
         """Bytes from the adapter to the client since the last call."""
-        data = b"".join(self.wire.replies)
-        self.wire.replies.clear()
-        return data
+        return self.wire.take()
 
     def send(self, *frames: CanFrame) -> None:
         if self.clock_ns >= self.dies_at_ns:
@@ -167,44 +141,17 @@ class Stage:
             self.mock.tick(until_ns)
 
 
-class RemoteMock:
+class RemoteMock(Remote):
     """The mock in another process."""
 
     def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "tests.epos4_stage"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        self.port: str = self._answer()["slcan"]
-
-    def order(self, **order: object) -> dict[str, Any]:
-        """Sends an order and returns the plant's state after it."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(json.dumps(order) + "\n")
-        self._process.stdin.flush()
-        return self._answer()
-
-    def _answer(self) -> dict[str, Any]:
-        assert self._process.stdout is not None
-        answer: dict[str, Any] = json.loads(self._process.stdout.readline())
-        return answer
-
-    def close(self) -> None:
-        """Ends the process."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.close()
-        self._process.wait(10)
-        self._process.stdout.close()
+        super().__init__("tests.epos4_stage")
+        self.port = self.endpoints["slcan"]
 
 
-@contextlib.contextmanager
-def remote_mock() -> Iterator[RemoteMock]:
-    mock = RemoteMock()
-    try:
-        yield mock
-    finally:
-        mock.close()
+def remote_mock() -> contextlib.closing[RemoteMock]:
+    """The mock until the block ends."""
+    return contextlib.closing(RemoteMock())
 
 
 def _obey(mock: Epos4Mock, plant: LaggingPlant, order: dict[str, Any]) -> dict[str, object]:
@@ -231,8 +178,7 @@ def serve() -> None:
     mock = Epos4Mock(PtyWire(), plant, moved_ns)
     while mock.nmt is NmtState.BOOT_UP:
         mock.tick(mock.due_ns)
-    sys.stdout.write(json.dumps(mock.endpoints()) + "\n")
-    sys.stdout.flush()
+    say(mock.endpoints())
     while True:
         wait_s = max(0.0, min(mock.due_ns - time.monotonic_ns(), 5 * MS) / 1e9)
         ready, _, _ = select.select([sys.stdin.fileno(), *mock.filenos()], [], [], wait_s)
@@ -247,8 +193,7 @@ def serve() -> None:
             line = sys.stdin.readline()
             if not line:
                 break
-            sys.stdout.write(json.dumps(_obey(mock, plant, json.loads(line))) + "\n")
-            sys.stdout.flush()
+            say(_obey(mock, plant, json.loads(line)))
         elif ready:
             mock.receive(now_ns)
     mock.close()

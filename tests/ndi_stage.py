@@ -8,11 +8,8 @@ import contextlib
 import json
 import os
 import select
-import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from drivers.ndi.codec import encode_text
@@ -24,6 +21,7 @@ from mock_devices.stage import MarkerPose
 from mock_devices.wire import PtyWire, TcpWire
 from rig.channels import MarkerSample
 from rig.config.wiring import Tracker
+from tests.remote import MemoryWire, Remote, say
 
 MS = 1_000_000
 
@@ -39,29 +37,6 @@ class StillPlant:
 
     def markers(self, now_ns: int) -> list[MarkerPose | None]:
         return self.view
-
-
-class MemoryWire:
-    """A wire without a kernel: the client's bytes wait in ``sent``, the mock's writes in ``replies``."""
-
-    endpoint = "memory"
-
-    def __init__(self) -> None:
-        self.sent = b""
-        self.replies: list[bytes] = []
-
-    def filenos(self) -> list[int]:
-        return []
-
-    def read(self) -> bytes:
-        data, self.sent = self.sent, b""
-        return data
-
-    def write(self, data: bytes) -> None:
-        self.replies.append(data)
-
-    def close(self) -> None:
-        self.replies.clear()
 
 
 class Stage:
@@ -102,9 +77,7 @@ class Stage:
             raise PortClosed(f"{self.address}: the other end closed the connection")
         with contextlib.suppress(BlockingIOError):
             os.eventfd_read(self._readable)
-        data = b"".join(self.wire.replies)
-        self.wire.replies.clear()
-        return data
+        return self.wire.take()
 
     def write(self, data: bytes) -> None:
         if self.cut:
@@ -154,19 +127,11 @@ def run(stage: Stage, device: MarkerTracker, start_ms: int, end_ms: int) -> list
     return samples
 
 
-class RemoteMock:
+class RemoteMock(Remote):
     """The mock in another process."""
 
     def __init__(self, link: str, kind: str) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "tests.ndi_stage", link, kind],
-            cwd=Path(__file__).parents[1],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        assert self._process.stdout is not None
-        self.endpoints: dict[str, str] = json.loads(self._process.stdout.readline())
+        super().__init__("tests.ndi_stage", link, kind)
 
     @property
     def address(self) -> str:
@@ -175,29 +140,12 @@ class RemoteMock:
 
     def fault(self, name: str, value: object = True) -> None:
         """Sets a fault and waits until it is set."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write(json.dumps({"fault": name, "value": value}) + "\n")
-        self._process.stdin.flush()
-        self._process.stdout.readline()
-
-    def close(self) -> None:
-        """Ends the process."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.close()
-        self._process.wait(10)
-        self._process.stdout.close()
+        self.order(fault=name, value=value)
 
 
-@contextlib.contextmanager
-def remote_mock(link: str = "serial", kind: str = "vega") -> Iterator[RemoteMock]:
-    mock = RemoteMock(link, kind)
-    try:
-        yield mock
-    finally:
-        mock.close()
+def remote_mock(link: str = "serial", kind: str = "vega") -> contextlib.closing[RemoteMock]:
+    """The mock until the block ends."""
+    return contextlib.closing(RemoteMock(link, kind))
 
 
 def _set_fault(mock: NdiMock, name: str, value: Any) -> None:
@@ -223,8 +171,7 @@ def _set_fault(mock: NdiMock, name: str, value: Any) -> None:
 def serve(link: str, kind: str) -> None:
     wire = PtyWire() if link == "serial" else TcpWire()
     mock = NdiMock(wire, StillPlant(), time.monotonic_ns(), kind="vega" if kind == "vega" else "polaris")
-    sys.stdout.write(json.dumps(mock.endpoints()) + "\n")
-    sys.stdout.flush()
+    say(mock.endpoints())
     while True:
         wait_s = max(0.0, (mock.due_ns - time.monotonic_ns()) / 1e9)
         ready, _, _ = select.select([sys.stdin.fileno(), *mock.filenos()], [], [], wait_s)
@@ -236,8 +183,7 @@ def serve(link: str, kind: str) -> None:
                 break
             order = json.loads(line)
             _set_fault(mock, order["fault"], order["value"])
-            sys.stdout.write("set\n")
-            sys.stdout.flush()
+            say({"set": order["fault"]})
         elif ready:
             mock.receive(time.monotonic_ns())
     mock.close()

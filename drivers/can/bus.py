@@ -17,11 +17,10 @@ import can
 from can.interfaces.slcan import slcanBus
 
 from drivers.can.slcan import BITRATE_COMMANDS, CanFrame, SlcanDecoder, encode_frame
-from drivers.ports import PortClosed
+from drivers.ports import PortClosed, read_waiting
 from rig.errors import DeviceError, UsageError
 
 ADAPTER_TIMEOUT_S = 0.5
-CHUNK = 65536
 TEXT = frozenset(b"\a\r\n" + bytes(range(0x20, 0x7F)))
 
 
@@ -104,12 +103,8 @@ class SlcanLink:
         self._lock = -1
 
     def _read_raw(self) -> bytes:
-        """Asks how much is there, and reads only then: read and poll of an empty tty wait for a kernel worker."""
         try:
-            fcntl.ioctl(self._fd, termios.FIONREAD, self._waiting)
-            return os.read(self._fd, CHUNK) if self._waiting[0] else b""
-        except BlockingIOError:
-            return b""
+            return read_waiting(self._fd, self._waiting)
         except OSError as error:
             raise self._gone(error.strerror) from error
 

@@ -1,6 +1,7 @@
 """Levenberg-Marquardt on white rows, with a Jacobian that is corrected along the way and seldom computed anew."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -62,6 +63,22 @@ def corrected(slopes: Sequence[Array], change: Sequence[Array], step: Array, fre
     return [slope + np.outer(seen - slope @ step, along) for slope, seen in zip(slopes, change, strict=True)]
 
 
+class Point(NamedTuple):
+    """Where a descent is: what the values predict, its white residual, half the residual's sum of squares."""
+
+    values: Values
+    prediction: Sequence[Array]
+    white: Array
+    cost: float
+
+
+def point_at(whitener: Whitener, values: Values) -> Point:
+    """The point of ``values``."""
+    prediction = whitener.predict(values)
+    white = whitener.residual(prediction)
+    return Point(values, prediction, white, 0.5 * float(white @ white))
+
+
 def descend(
     free: Sequence[Par],
     values: Values,
@@ -75,39 +92,42 @@ def descend(
     ``slopes`` from nearby saves computing them. They are corrected after every step, and computed anew where a step
     does much worse than they foretold. With ``confirm`` the end is reached with a Jacobian of its own.
     """
-    prediction = whitener.predict(values)
-    white = whitener.residual(prediction)
-    cost, damping, fresh = 0.5 * float(white @ white), 1e-3, slopes is None
-    slopes = jacobian(whitener, values, free, prediction) if slopes is None else slopes
+    here, damping, fresh = point_at(whitener, values), 1e-3, slopes is None
+    slopes = jacobian(whitener, values, free, here.prediction) if slopes is None else slopes
     for _ in range(steps):
         columns = whitener(slopes)
-        hessian, slope = columns.T @ columns, columns.T @ white
-        for _ in range(6 if fresh else 2):
-            scaled = hessian + np.diag(damping * np.diag(hessian) + prior_precision(free) + 1e-30)
-            trial = stepped(free, values, np.asarray(np.linalg.solve(scaled, slope), float))
-            new_prediction = whitener.predict(trial)
-            new_white = whitener.residual(new_prediction)
-            new_cost = 0.5 * float(new_white @ new_white)
-            if np.isfinite(new_cost) and new_cost < cost:
-                break
-            damping = max(damping * 10, 1e-6)
-        else:
-            if fresh:
-                return values, slopes
-            fresh, slopes, damping = True, jacobian(whitener, values, free, prediction), 1e-3
+        hessian, slope = columns.T @ columns, columns.T @ here.white
+        below, damping = downhill(here, free, whitener, hessian, slope, damping, tries=6 if fresh else 2)
+        if below is None and fresh:
+            return here.values, slopes
+        if below is None:
+            fresh, slopes, damping = True, jacobian(whitener, here.values, free, here.prediction), 1e-3
             continue
-        taken = np.array([to_internal(p, trial[p.name]) - to_internal(p, values[p.name]) for p in free])
+        taken = np.array([to_internal(p, below.values[p.name]) - to_internal(p, here.values[p.name]) for p in free])
         foretold = float(slope @ taken - 0.5 * taken @ hessian @ taken)
-        gain, cost, damping = cost - new_cost, new_cost, damping / 10
-        change = [after - before for after, before in zip(new_prediction, prediction, strict=True)]
-        values, prediction, white = trial, new_prediction, new_white
+        gain, damping = here.cost - below.cost, damping / 10
+        change = [after - before for after, before in zip(below.prediction, here.prediction, strict=True)]
+        here = below
         if gain < CONVERGED_NATS and (fresh or not confirm):
-            return values, slopes
+            return here.values, slopes
         if gain < max(CONVERGED_NATS, TRUSTED_SHARE * foretold):
-            fresh, slopes = True, jacobian(whitener, values, free, prediction)
+            fresh, slopes = True, jacobian(whitener, here.values, free, here.prediction)
         else:
             fresh, slopes = False, corrected(slopes, change, taken, free)
-    return values, slopes
+    return here.values, slopes
+
+
+def downhill(
+    here: Point, free: Sequence[Par], whitener: Whitener, hessian: Array, slope: Array, damping: float, tries: int
+) -> tuple[Point | None, float]:
+    """The first of ``tries`` ever more damped steps that leads down, or None; and the damping reached."""
+    for _ in range(tries):
+        scaled = hessian + np.diag(damping * np.diag(hessian) + prior_precision(free) + 1e-30)
+        trial = point_at(whitener, stepped(free, here.values, np.asarray(np.linalg.solve(scaled, slope), float)))
+        if np.isfinite(trial.cost) and trial.cost < here.cost:
+            return trial, damping
+        damping = max(damping * 10, 1e-6)
+    return None, damping
 
 
 def stepped(free: Sequence[Par], values: Values, step: Array) -> Values:

@@ -6,17 +6,18 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
-from typing import Literal
+from typing import Generic, Literal, TypeVar
 
 from drivers.roles import ForceSensor
 from mock_devices.bota import BotaMock
 from mock_devices.robotiq import RobotiqMock
-from mock_devices.stage import NEVER_NS
+from mock_devices.stage import NEVER_NS, Mock
 from mock_devices.wire import PtyWire
 from rig.channels import ForceSample
 
 Product = Literal["bota", "robotiq"]
 Knobs = dict[str, bool | int | str]
+AnyMock = TypeVar("AnyMock", bound=Mock)
 WAIT_S = 20.0
 QUIET_S = 0.2
 WRENCH = (1.25, -2.5, -7.75, 0.125, -0.25, 0.5)
@@ -64,6 +65,27 @@ class MemoryWire:
         """What the mock sent since the last call."""
         data, self.sent = self.sent, b""
         return data
+
+
+class MemoryStage(Generic[AnyMock]):
+    """A mock on a wire in memory, with the clock in the test's hand."""
+
+    def __init__(self, mock: AnyMock, wire: MemoryWire, now_ns: int) -> None:
+        self.mock, self.wire, self.now_ns = mock, wire, now_ns
+
+    def say(self, data: bytes) -> bytes:
+        """What the mock answers at once."""
+        self.wire.inbox += data
+        self.mock.receive(self.now_ns)
+        return self.wire.take()
+
+    def wait(self, duration_ns: int) -> bytes:
+        """What the mock sends in the next while."""
+        end_ns = self.now_ns + duration_ns
+        while self.mock.due_ns <= end_ns:
+            self.mock.tick(self.mock.due_ns)
+        self.now_ns = end_ns
+        return self.wire.take()
 
 
 class Served:

@@ -9,37 +9,21 @@ from drivers.bota.codec import Decoder, Frame
 from drivers.roles import LinkCounters
 from mock_devices.bota import BOOT_NS, BotaMock, Command, CommandParser
 from mock_devices.stage import NEVER_NS, Mock
-from tests.mock_devices.force_bench import WRENCH, MemoryWire, StillPlant, bench_process
+from tests.mock_devices.force_bench import WRENCH, MemoryStage, MemoryWire, StillPlant, bench_process
 
 START_NS = 5_000_000_000
 SECOND_NS = 1_000_000_000
 BOOT = b"c,0,1,0,4\r\nApp Init\r\nname: BFT-SENS-SER-M8\r\nS/N: 000271\r\nFW version: 1.0.6\r\n"
 
 
-class Stage:
-    """A booted mock on a wire in memory, with the clock in the test's hand."""
+class Stage(MemoryStage[BotaMock]):
+    """A booted mock."""
 
     def __init__(self, drift_ppm: float = 0.0) -> None:
-        self.wire = MemoryWire()
-        self.plant = StillPlant()
-        self.mock = BotaMock(self.wire, self.plant, START_NS, drift_ppm)
-        self.now_ns = START_NS + BOOT_NS
+        wire, self.plant = MemoryWire(), StillPlant()
+        super().__init__(BotaMock(wire, self.plant, START_NS, drift_ppm), wire, START_NS + BOOT_NS)
         self.mock.tick(self.now_ns)
         self.wire.take()
-
-    def say(self, data: bytes) -> bytes:
-        """What the mock answers at once."""
-        self.wire.inbox += data
-        self.mock.receive(self.now_ns)
-        return self.wire.take()
-
-    def wait(self, duration_ns: int) -> bytes:
-        """What the mock sends in the next while."""
-        end_ns = self.now_ns + duration_ns
-        while self.mock.due_ns <= end_ns:
-            self.mock.tick(self.mock.due_ns)
-        self.now_ns = end_ns
-        return self.wire.take()
 
     def run(self) -> None:
         assert self.say(b"CR") == b"r,0,C,0\r\nr,0,R,0\r\n"

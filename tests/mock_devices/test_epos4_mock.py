@@ -5,8 +5,9 @@ import struct
 import pytest
 
 from mock_devices.slcan_adapter import SlcanAdapter
-from tests.epos4_stage import MemoryWire, Stage
+from tests.epos4_stage import Stage
 from tests.mock_devices.epos4_wire import download, enabled, exchange, follow, sdo, status, upload
+from tests.remote import MemoryWire
 
 PDO_MAPPING = [
     (0x1800, 1, 4, 0xC0000181),

@@ -8,7 +8,8 @@ from drivers.ndi import replies
 from drivers.ndi.codec import BinaryReply, ReplyDecoder, TextReply, encode_command
 from mock_devices.ndi import MAX_COMMAND, NdiMock
 from mock_devices.wire import PtyWire, TcpWire
-from tests.ndi_stage import ARM, TIP, MemoryWire, StillPlant
+from tests.ndi_stage import ARM, TIP, StillPlant
+from tests.remote import MemoryWire
 
 
 class Desk:

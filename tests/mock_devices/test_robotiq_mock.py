@@ -26,7 +26,7 @@ from drivers.robotiq.codec import (
 from drivers.roles import LinkCounters
 from mock_devices.robotiq import REQUEST_BYTES_MAX, RequestFinder, RobotiqMock
 from mock_devices.stage import NEVER_NS, Mock
-from tests.mock_devices.force_bench import WRENCH, Bench, MemoryWire, Served, StillPlant, bench_process
+from tests.mock_devices.force_bench import WRENCH, Bench, MemoryStage, MemoryWire, Served, StillPlant, bench_process
 
 START_NS = 7_000_000_000
 PERIOD_NS = 10_000_000
@@ -34,28 +34,12 @@ READ_FORCES = bytes.fromhex("09 03 00 B4 00 06 84 A6")
 FORCES = with_crc(bytes.fromhex("09 03 0C 007D FF06 FCF9 007D FF06 01F4"))
 
 
-class Stage:
-    """A mock on a wire in memory, with the clock in the test's hand."""
+class Stage(MemoryStage[RobotiqMock]):
+    """A mock just powered."""
 
     def __init__(self, drift_ppm: float = 0.0, serial_number: int = 1234) -> None:
-        self.wire = MemoryWire()
-        self.plant = StillPlant()
-        self.mock = RobotiqMock(self.wire, self.plant, START_NS, drift_ppm, serial_number)
-        self.now_ns = START_NS
-
-    def say(self, data: bytes) -> bytes:
-        """What the mock answers at once."""
-        self.wire.inbox += data
-        self.mock.receive(self.now_ns)
-        return self.wire.take()
-
-    def wait(self, duration_ns: int) -> bytes:
-        """What the mock sends in the next while."""
-        end_ns = self.now_ns + duration_ns
-        while self.mock.due_ns <= end_ns:
-            self.mock.tick(self.mock.due_ns)
-        self.now_ns = end_ns
-        return self.wire.take()
+        wire, self.plant = MemoryWire(), StillPlant()
+        super().__init__(RobotiqMock(wire, self.plant, START_NS, drift_ppm, serial_number), wire, START_NS)
 
     def frames(self, duration_ns: int) -> list[Wrench]:
         return Decoder(LinkCounters()).feed(self.wait(duration_ns))

@@ -1,7 +1,6 @@
 """The report in a real browser without a network: it draws, in light, dark and on paper, and asks for nothing."""
 
 import io
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,19 +12,17 @@ from playwright.sync_api import Browser, sync_playwright
 from rig.report.page import write_report
 from tests.rig.report.test_page import track_into
 from tests.rig.tissue.synthetic import Bench, write_made_session
+from tests.system.browser import find, launch
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """Chromium as installed here."""
-    path = next((found for name in NAMES if (found := shutil.which(name))), None)
-    if path is None:
-        pytest.skip(f"no Chromium here: none of {', '.join(NAMES)} is on the path")
+    executable = find()
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+        browser = launch(playwright, executable)
         yield browser
         browser.close()
 

@@ -1,0 +1,78 @@
+"""A mock in another process, spoken to line by line, and a wire in memory for one in this process."""
+
+import contextlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+
+class Remote:
+    """The process ``python -m MODULE``: it prints its endpoints, then answers each order; every line is JSON."""
+
+    def __init__(self, module: str, *arguments: str) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", module, *arguments],
+            cwd=Path(__file__).parents[1],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        self.endpoints: dict[str, str] = self._answer()
+
+    def order(self, **order: object) -> dict[str, Any]:
+        """Sends an order and returns what is answered once it is obeyed."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps(order) + "\n")
+        self._process.stdin.flush()
+        return self._answer()
+
+    def _answer(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        answer: dict[str, Any] = json.loads(self._process.stdout.readline())
+        return answer
+
+    def close(self) -> None:
+        """Ends the process."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.close()
+        self._process.wait(10)
+        self._process.stdout.close()
+
+
+def say(answer: object) -> None:
+    """The other end: one line of JSON."""
+    sys.stdout.write(json.dumps(answer) + "\n")
+    sys.stdout.flush()
+
+
+class MemoryWire:
+    """A wire without a kernel: the client's bytes wait in ``sent``, the mock's writes in ``replies``."""
+
+    endpoint = "memory"
+
+    def __init__(self) -> None:
+        self.sent = b""
+        self.replies: list[bytes] = []
+
+    def filenos(self) -> list[int]:
+        return []
+
+    def read(self) -> bytes:
+        data, self.sent = self.sent, b""
+        return data
+
+    def write(self, data: bytes) -> None:
+        self.replies.append(data)
+
+    def close(self) -> None:
+        self.replies.clear()
+
+    def take(self) -> bytes:
+        """What the mock wrote since the last call."""
+        data = b"".join(self.replies)
+        self.replies.clear()
+        return data
