@@ -28,6 +28,9 @@ STEADY_SHARE = 0.3
 ON_SHARE = 0.5
 TOP_SHARE = 0.005
 SPEED_BASE_MM = 0.5
+RUBBING_SAMPLES = 20
+RUBBING_SPREADS = 2.0
+RUBBING_FLAT = 0.25
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ def loading_curve(stroke: Stroke) -> Curve:
     """
     if len(stroke.force_N) < LEAST_SAMPLES:
         raise DataError(f"{stroke.name}: {len(stroke.force_N)} samples; a curve needs at least {LEAST_SAMPLES}")
-    rise = _rise(stroke)
+    stroke, rise = _run_in(stroke, _rise(stroke))
     zeroed, contact, noise_N = _zeroed(stroke, rise)
     wanted_mm_s = _wanted_speed(zeroed, rise)
     kept = _rising(zeroed, _steady(zeroed, rise, wanted_mm_s), noise_N)
@@ -118,6 +121,28 @@ def _rise(stroke: Stroke) -> _Rise:
             f"{stroke.name}: no air part: force rises from the first sample, so it has no zero; start higher"
         )
     return _Rise(int(air[-1]) + 1, peak)
+
+
+def _run_in(stroke: Stroke, rise: _Rise) -> tuple[Stroke, _Rise]:
+    """The stroke from where the tip runs in, if the guide rubs: force in the air then steps with motion, and stays.
+
+    At rest or on the way up the guide rubs otherwise than on the way down, so the zero of loading is the run-in's own.
+    """
+    turn = _descent(stroke, rise.touch, -np.inf)
+    way_mm = stroke.position_mm[turn : rise.peak + 1] - stroke.position_mm[turn]
+    start, stop = np.searchsorted(np.maximum.accumulate(way_mm), (AIR_MARGIN_MM, HIGHEST_SHARE * way_mm[-1]))
+    moving_N = stroke.force_N[turn + start : turn + stop]
+    if min(len(moving_N), turn) < RUBBING_SAMPLES:
+        return stroke, rise
+    level_N, spread_N = _middle(moving_N)
+    step_N = level_N - _middle(stroke.force_N[turn - RUBBING_SAMPLES : turn])[0]
+    early_N, late_N = (float(np.median(half)) for half in np.array_split(moving_N, 2))
+    if abs(step_N) < RUBBING_SPREADS * spread_N or abs(late_N - early_N) > RUBBING_FLAT * abs(step_N):
+        return stroke, rise
+    first = turn + int(start)
+    arrays = {name: getattr(stroke, name)[first:] for name in ("time_s", "force_N", "position_mm")}
+    shorter = replace(stroke, **arrays)
+    return shorter, _rise(shorter)
 
 
 def _despiked(values: FloatArray) -> FloatArray:

@@ -50,6 +50,17 @@ def along(law: Law) -> Force:
     return force
 
 
+def rubbing(level_N: float, force: Force = FOREARM) -> Force:
+    """Tissue behind a guide with Coulomb friction: against the motion, and at rest as the last motion left it."""
+
+    def total(depth_mm: Column, rate_mm_s: Column) -> Column:
+        moving = np.abs(rate_mm_s) > 0.05
+        last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), 0))
+        return np.asarray(force(depth_mm, rate_mm_s) + level_N * np.sign(np.where(moving, rate_mm_s, 0.0)[last]))
+
+    return total
+
+
 @dataclass(frozen=True)
 class Bench:
     """How a trial is made; the surface lies at ``surface_mm`` of the axis."""

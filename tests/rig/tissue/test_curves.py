@@ -13,7 +13,7 @@ from rig.tissue.contact import find_contact
 from rig.tissue.curves import loading_curve
 from rig.tissue.strokes import Stroke, stroke_of
 from tests import data
-from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, index_force, recording, tables
+from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, index_force, recording, rubbing, tables
 
 
 @pytest.mark.parametrize("speed_mm_s", SPEEDS_MM_S)
@@ -36,6 +36,18 @@ def test_a_curve_spans_from_the_air_to_the_deepest_steady_point() -> None:
 
 def test_speed_is_found_where_nobody_said_it() -> None:
     assert loading_curve(Bench().stroke(15.0, nominal=False)).speed_mm_s == pytest.approx(15.0)
+
+
+@pytest.mark.parametrize("speed_mm_s", SPEEDS_MM_S)
+@pytest.mark.parametrize("level_N", [0.05, 0.1, 0.3])
+def test_a_guide_that_rubs_moves_the_zero_and_neither_contact_nor_curve(speed_mm_s: float, level_N: float) -> None:
+    smooth = loading_curve(Bench().stroke(speed_mm_s))
+    rubbed = loading_curve(Bench(force=rubbing(level_N)).stroke(speed_mm_s))
+    assert rubbed.zero_N == pytest.approx(0.7 + level_N, abs=0.004)
+    assert rubbed.contact.lower_mm <= Bench().surface_mm <= rubbed.contact.upper_mm
+    at_mm = np.linspace(19.8, 27.5, 100)
+    forces = [np.interp(at_mm, c.depth_mm + c.contact.position_mm, c.force_N) for c in (smooth, rubbed)]
+    assert np.abs(forces[0] - forces[1]).max() < 0.015
 
 
 def test_holds_dither_and_a_second_depth_are_no_part_of_the_curve() -> None:
