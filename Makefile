@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
+# Modules are compiled once, not by each of the processes that a bench is made of.
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: demo test lint types contracts lock clean
 

@@ -16,8 +16,8 @@ from rig.errors import RigError
 COMMANDS = {
     "capture": "api.cli.motion:capture",
     "track": "api.cli.motion:track",
-    "simulate": "api.cli.control:simulate",
-    "threshold": "api.cli.control:threshold",
+    "simulate": "api.cli.simulate:simulate",
+    "threshold": "api.cli.threshold:threshold",
     "fit": "api.cli.science:fit",
     "report": "api.cli.science:report",
     "diagnose": "api.cli.diagnose:diagnose",

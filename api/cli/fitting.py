@@ -11,9 +11,10 @@ from rig.recording.files import whole_file, write_text
 from rig.recording.sessions import Session, open_session
 from rig.report.drawing import png, svg
 from rig.report.figures import fit_figure, residual_figure
-from rig.tissue.control_table import ControlRow, control_rows
+from rig.tissue.control_table import control_rows
 from rig.tissue.judging import Errors, Judged
 from rig.tissue.laws import Law
+from rig.tissue.model import ControlRow
 from rig.tissue.rates import STUDY_B_N_S_MM, RateTest
 from rig.tissue.registry import COMPARED, LAWS, law_named
 from rig.tissue.results import as_csv, as_json

@@ -1,34 +1,14 @@
 """K and B for control: what a fitted law means to a force loop at each force, and how sure that is."""
 
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 
-from rig.config.table import Table
 from rig.tissue.judging import Judged
 from rig.tissue.laws import FloatArray, Law
+from rig.tissue.model import ControlRow
 
-NotNegative = Annotated[float, Field(ge=0)]
 STEP = 1e-6
-
-
-class ControlRow(Table):
-    """One force: the depth at rest, stiffness from contact (secant) and for a small move (tangent), and damping.
-
-    The gain of a force loop is the tangent, not the secant that the study lists as K.
-    """
-
-    force_N: NotNegative
-    depth_mm: NotNegative
-    secant_N_mm: NotNegative
-    tangent_N_mm: NotNegative
-    tangent_low_N_mm: NotNegative
-    tangent_high_N_mm: NotNegative
-    damping_N_s_mm: NotNegative
-    damping_low_N_s_mm: NotNegative
-    damping_high_N_s_mm: NotNegative
 
 
 def control_rows(judged: Judged, force_N: Sequence[float] | FloatArray) -> tuple[ControlRow, ...]:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from rig.errors import DataError, UsageError
 from rig.tissue.lattice.fire import NotConverged, relax
@@ -189,7 +189,7 @@ def fit_index(points: list[KPoint]) -> IndexFit:
     residual = y - design @ np.array([level, b])
     freedom = max(len(x) - 2, 1)
     covariance = np.linalg.inv(design.T @ design) * float(residual @ residual) / freedom
-    reach = float(student.ppf((1.0 + LEVEL) / 2.0, freedom)) * np.sqrt(np.diag(covariance))
+    reach = float(stdtrit(freedom, (1.0 + LEVEL) / 2.0)) * np.sqrt(np.diag(covariance))
     spread = float(np.sum((y - y.mean()) ** 2))
     return IndexFit(
         float(np.exp(level)),

@@ -12,7 +12,6 @@ from pydantic import Field
 from rig.config.table import Table, parse
 from rig.errors import DataError, UsageError
 from rig.recording.files import write_text
-from rig.tissue.control_table import ControlRow
 from rig.tissue.laws import FloatArray, Law
 from rig.tissue.registry import law_named
 
@@ -58,6 +57,23 @@ class Interval(Table):
     unit: str
     low: float
     high: float
+
+
+class ControlRow(Table):
+    """One force: the depth at rest, stiffness from contact (secant) and for a small move (tangent), and damping.
+
+    The gain of a force loop is the tangent, not the secant that the study lists as K.
+    """
+
+    force_N: NotNegative
+    depth_mm: NotNegative
+    secant_N_mm: NotNegative
+    tangent_N_mm: NotNegative
+    tangent_low_N_mm: NotNegative
+    tangent_high_N_mm: NotNegative
+    damping_N_s_mm: NotNegative
+    damping_low_N_s_mm: NotNegative
+    damping_high_N_s_mm: NotNegative
 
 
 class Effect(Table):

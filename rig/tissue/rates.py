@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from rig.errors import DataError
 from rig.tissue.curves import Curve
@@ -122,5 +122,5 @@ def _slope(x: FloatArray, y: FloatArray, freedom: int) -> tuple[float, tuple[flo
     slope = float(x @ y / (x @ x))
     residual = y - slope * x
     error = float(np.sqrt(residual @ residual / freedom / (x @ x)))
-    reach = float(student.ppf((1.0 + LEVEL) / 2.0, freedom)) * error
+    reach = float(stdtrit(freedom, (1.0 + LEVEL) / 2.0)) * error
     return slope, (slope - reach, slope + reach)

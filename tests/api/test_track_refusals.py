@@ -20,7 +20,7 @@ def nothing_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
     monkeypatch.setattr(motion, "bench_for", opened)
     monkeypatch.setattr("api.cli.comparison.bench_for", opened)
-    monkeypatch.setattr("api.cli.control.bench_for", opened)
+    monkeypatch.setattr("api.cli.threshold.bench_for", opened)
     monkeypatch.chdir(tmp_path)
     index_model(0.12, 0.22, 0.01, force_N=11.0).save(tmp_path / "model.json")
 

@@ -1,4 +1,4 @@
-"""`rig simulate`: a reference on a tissue model, before anything real moves; `rig threshold`: the subject's limit."""
+"""`rig simulate`: a reference on a tissue model, before anything real moves."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -9,24 +9,18 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from api.cli import live
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import console, table, write_json
-from api.cli.stage import bench_for
 from controller import simulated
 from controller.experiments import comparison, tracked, tracking
-from controller.experiments import threshold as experiment
 from controller.experiments.references import named
 from controller.force_position import GainRow
 from controller.gains import Choice, margins
 from controller.modes import Mode
-from controller.operation import Operation
 from controller.simulated import SimulatedBench, Trace, limb_of
 from controller.steps import TrackForce
-from controller.supervisor import Supervisor
 from rig.config.wiring import Wiring
 from rig.errors import DataError
-from rig.report.drawing import png, svg
 from rig.tissue.model import Model, load_model
 
 PLAYS = 3
@@ -145,6 +139,7 @@ def _rows(loop: list[dict[str, float]]) -> list[tuple[str, ...]]:
 
 def _draw(trace: Trace, bench: SimulatedBench, out: Path, title: str) -> None:
     from rig.report.control_figures import Signals, run_figure  # noqa: PLC0415 - drawing takes a second to load
+    from rig.report.drawing import png, svg  # noqa: PLC0415
 
     on = trace.mode == Mode.CONTACT
     time_s = trace.time_s[on]
@@ -163,6 +158,7 @@ def _draw(trace: Trace, bench: SimulatedBench, out: Path, title: str) -> None:
 def _draw_bode(model: Model, wiring: Wiring, choice: Choice, stiffness: float, out: Path) -> None:
     from controller import linear  # noqa: PLC0415 - python-control loads slowly
     from rig.report.control_figures import bode_figure  # noqa: PLC0415
+    from rig.report.drawing import svg  # noqa: PLC0415
 
     design, curves = tracking.design_for(wiring), {}
     for row in _shown(model, wiring, choice):
@@ -170,31 +166,3 @@ def _draw_bode(model: Model, wiring: Wiring, choice: Choice, stiffness: float, o
         loop = linear.bode(linear.open_loop(row, tangent, model.damping_N_s_mm, design))
         curves[f"{row.force_N:.1f} N"] = (loop.frequency_Hz, loop.gain, loop.phase_deg)
     (out / "bode.svg").write_text(svg(bode_figure(curves)))
-
-
-def threshold(
-    model: Annotated[Path, typer.Option("--model", help="model.json as `rig fit` writes it.")],
-    up_to: Annotated[float, typer.Option("--up-to", help="Force in N at which the ramp ends.")],
-    rate: Annotated[float, typer.Option("--rate", help="How fast force rises, N/s.")] = 0.5,
-    out: Annotated[Path, typer.Option("--out", help="Session folder of the recording; new or existing.")] = Path(
-        "threshold"
-    ),
-    config: ConfigOption = None,
-    overrides: SetOption = None,
-    json_file: JsonOption = None,
-) -> None:
-    """Raises force slowly until the subject presses p, and prints the line of `rig.toml` that keeps it.
-
-    Example: rig threshold --model sessions/first/fit/model.json --up-to 10
-    """
-    wiring, fitted = wiring_from(config, overrides), load_model(model)
-    program = experiment.plan(up_to, rate, fitted, wiring)
-    tracked.refuse_foreign(out)
-    with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
-        operation = Operation("threshold", total=1, unit="ramps")
-        found = live.run(bench, operation, lambda: experiment.run(bench, program, up_to, out, str(model)))
-    if found.force_N is None:
-        console.print(f"no pain stop up to {up_to:g} N: the threshold lies above", highlight=False)
-    else:
-        console.print(f"[subject]\npain_threshold_N = {found.force_N:.1f}", highlight=False, markup=False)
-    write_json(json_file, asdict(found))

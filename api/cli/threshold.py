@@ -1,0 +1,45 @@
+"""`rig threshold`: the force at which the subject stops a slow ramp."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from api.cli import live
+from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
+from api.cli.output import console, write_json
+from api.cli.stage import bench_for
+from controller.experiments import threshold as experiment
+from controller.experiments import tracked
+from controller.operation import Operation
+from controller.supervisor import Supervisor
+from rig.tissue.model import load_model
+
+
+def threshold(
+    model: Annotated[Path, typer.Option("--model", help="model.json as `rig fit` writes it.")],
+    up_to: Annotated[float, typer.Option("--up-to", help="Force in N at which the ramp ends.")],
+    rate: Annotated[float, typer.Option("--rate", help="How fast force rises, N/s.")] = 0.5,
+    out: Annotated[Path, typer.Option("--out", help="Session folder of the recording; new or existing.")] = Path(
+        "threshold"
+    ),
+    config: ConfigOption = None,
+    overrides: SetOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Raises force slowly until the subject presses p, and prints the line of `rig.toml` that keeps it.
+
+    Example: rig threshold --model sessions/first/fit/model.json --up-to 10
+    """
+    wiring, fitted = wiring_from(config, overrides), load_model(model)
+    program = experiment.plan(up_to, rate, fitted, wiring)
+    tracked.refuse_foreign(out)
+    with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
+        operation = Operation("threshold", total=1, unit="ramps")
+        found = live.run(bench, operation, lambda: experiment.run(bench, program, up_to, out, str(model)))
+    if found.force_N is None:
+        console.print(f"no pain stop up to {up_to:g} N: the threshold lies above", highlight=False)
+    else:
+        console.print(f"[subject]\npain_threshold_N = {found.force_N:.1f}", highlight=False, markup=False)
+    write_json(json_file, asdict(found))
