@@ -16,7 +16,7 @@ from drivers.roles import Identity
 from rig.config.wiring import Force
 from rig.errors import DeviceError, UsageError
 from tests.drivers.scripted_port import ScriptedPort
-from tests.mock_devices.force_bench import WRENCH, Bench, Served, await_silence, bench_process, collect
+from tests.mock_devices.force_bench import WRENCH, Served, await_silence, collect
 
 BOOT = b"c,0,1,0,4\r\nApp Init\r\nname: BFT-SENS-SER-M8\r\nS/N: 000271\r\nFW version: 1.0.6\r\n"
 PERIOD_US = 996
@@ -243,23 +243,11 @@ def opened(mock: Served, config: Force | None = None) -> BotaSensOne:
     return BotaSensOne(open_port(mock.endpoint, BotaSensOne.DEFAULT_BAUD), config or Force())
 
 
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Bench]:
-    with bench_process() as bench:
-        yield bench
-
-
-@pytest.fixture
-def mock(bench: Bench) -> Iterator[Served]:
-    with bench.serve("bota") as mock:
-        yield mock
-
-
 @pytest.mark.bench
 @pytest.mark.xdist_group("wire")
 class TestAgainstTheMockInAnotherProcess:
-    def test_a_session_streams_at_its_rate_and_accounts_for_every_frame(self, mock: Served) -> None:
-        sensor = opened(mock)
+    def test_a_session_streams_at_its_rate_and_accounts_for_every_frame(self, bota: Served) -> None:
+        sensor = opened(bota)
         sensor.start()
         samples = collect(sensor, lambda got: len(got) >= 500)
         sensor.close()
@@ -270,59 +258,59 @@ class TestAgainstTheMockInAnotherProcess:
         assert sensor.counters.frames == len(samples)
         assert all(early.capture_ns <= late.capture_ns for early, late in pairwise(samples))
 
-    def test_an_abandoned_session_is_taken_over_while_it_streams(self, mock: Served) -> None:
-        first = open_port(mock.endpoint, BotaSensOne.DEFAULT_BAUD)
+    def test_an_abandoned_session_is_taken_over_while_it_streams(self, bota: Served) -> None:
+        first = open_port(bota.endpoint, BotaSensOne.DEFAULT_BAUD)
         abandoned = BotaSensOne(first, Force())
         abandoned.start()
         first.close()
-        sensor = opened(mock, Force(rate_Hz=400))
+        sensor = opened(bota, Force(rate_Hz=400))
         sensor.start()
         samples = collect(sensor, lambda got: len(got) >= 50)
         sensor.close()
         assert sensor.period_ns == 2_500_000
         assert all(sample.valid for sample in samples)
 
-    def test_another_load_and_another_status_arrive(self, mock: Served) -> None:
-        sensor = opened(mock)
+    def test_another_load_and_another_status_arrive(self, bota: Served) -> None:
+        sensor = opened(bota)
         sensor.start()
-        mock.load(0.0, 0.0, -12.5, 0.0, 0.0, 0.0)
+        bota.load(0.0, 0.0, -12.5, 0.0, 0.0, 0.0)
         samples = collect(sensor, lambda got: bool(got) and got[-1].fz_N == -12.5)
-        mock.set(invalid=True)
+        bota.set(invalid=True)
         samples = collect(sensor, lambda got: bool(got) and not got[-1].valid)
         sensor.close()
         assert samples[-1].status == 4
 
-    def test_spoilt_checksums_are_counted_and_seen_as_lost(self, mock: Served) -> None:
-        sensor = opened(mock)
+    def test_spoilt_checksums_are_counted_and_seen_as_lost(self, bota: Served) -> None:
+        sensor = opened(bota)
         sensor.start()
-        mock.set(corrupt_every=5)
+        bota.set(corrupt_every=5)
         collect(sensor, lambda _: sensor.counters.checksum_errors >= 10)
         sensor.close()
         assert sensor.counters.device_lost >= sensor.counters.checksum_errors - 1
 
-    def test_a_sensor_that_falls_silent_gives_no_samples_and_no_error(self, mock: Served) -> None:
-        sensor = opened(mock)
+    def test_a_sensor_that_falls_silent_gives_no_samples_and_no_error(self, bota: Served) -> None:
+        sensor = opened(bota)
         sensor.start()
-        mock.set(silent=True)
+        bota.set(silent=True)
         await_silence(sensor)
-        mock.set(silent=False)
+        bota.set(silent=False)
         collect(sensor, lambda got: len(got) >= 1)
         sensor.close()
         assert sensor.counters.device_lost >= 1
 
-    def test_a_cut_cable_raises_and_close_stays_quiet(self, mock: Served) -> None:
-        sensor = opened(mock)
+    def test_a_cut_cable_raises_and_close_stays_quiet(self, bota: Served) -> None:
+        sensor = opened(bota)
         sensor.start()
-        mock.cut()
+        bota.cut()
         with pytest.raises(PortClosed, match="the line is gone"):
             collect(sensor, lambda _: False)
         sensor.close()
         sensor.close()
 
     def test_a_second_close_does_not_write_into_the_file_that_got_the_lines_number(
-        self, mock: Served, tmp_path: Path
+        self, bota: Served, tmp_path: Path
     ) -> None:
-        sensor = opened(mock)
+        sensor = opened(bota)
         number = sensor.fileno()
         sensor.close()
         other = os.open(tmp_path / "other", os.O_CREAT | os.O_RDWR)
@@ -335,19 +323,19 @@ class TestAgainstTheMockInAnotherProcess:
         os.close(number)
         assert (tmp_path / "other").read_bytes() == b""
 
-    def test_a_silent_device_a_wrong_device_and_a_refusal_each_end_the_start(self, mock: Served) -> None:
-        mock.set(wrong_identity=True)
+    def test_a_silent_device_a_wrong_device_and_a_refusal_each_end_the_start(self, bota: Served) -> None:
+        bota.set(wrong_identity=True)
         with pytest.raises(DeviceError, match="not a Bota sensor"):
-            self._start(mock)
-        mock.set(wrong_identity=False, refuse="f")
+            self._start(bota)
+        bota.set(wrong_identity=False, refuse="f")
         with pytest.raises(DeviceError, match="refused b'f,51,0,0,1'"):
-            self._start(mock)
-        mock.set(silent=True)
+            self._start(bota)
+        bota.set(silent=True)
         with pytest.raises(DeviceError, match="nothing came"):
-            self._start(mock)
+            self._start(bota)
 
-    def _start(self, mock: Served) -> None:
-        sensor = opened(mock)
+    def _start(self, bota: Served) -> None:
+        sensor = opened(bota)
         try:
             sensor.start()
         finally:

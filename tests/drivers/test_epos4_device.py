@@ -1,7 +1,6 @@
 """Sessions of the servo axis against the mock drive in one process, on a clock that only waiting moves."""
 
 import math
-from collections.abc import Iterator
 
 import pytest
 
@@ -11,25 +10,6 @@ from rig.config.wiring import Limits
 from rig.errors import DeviceError, SafetyStop
 from tests.drivers.epos4_sessions import axis_on, tick
 from tests.epos4_stage import Stage
-
-
-@pytest.fixture
-def stage() -> Stage:
-    return Stage()
-
-
-@pytest.fixture
-def axis(stage: Stage) -> Iterator[Epos4Axis]:
-    axis = axis_on(stage)
-    axis.start()
-    yield axis
-    axis.close()
-
-
-@pytest.fixture
-def homed(axis: Epos4Axis) -> Epos4Axis:
-    axis.home()
-    return axis
 
 
 def test_the_drive_says_who_it_is(axis: Epos4Axis) -> None:

@@ -1,6 +1,6 @@
 """Stops, faults, heartbeats, losses and strangers: sessions of the servo axis on a clock that only waiting moves."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 from hypothesis import given
@@ -13,25 +13,6 @@ from mock_devices.stage import NEVER_NS
 from rig.errors import DeviceError
 from tests.drivers.epos4_sessions import axis_on, tick
 from tests.epos4_stage import HostDied, Stage
-
-
-@pytest.fixture
-def stage() -> Stage:
-    return Stage()
-
-
-@pytest.fixture
-def axis(stage: Stage) -> Iterator[Epos4Axis]:
-    axis = axis_on(stage)
-    axis.start()
-    yield axis
-    axis.close()
-
-
-@pytest.fixture
-def homed(axis: Epos4Axis) -> Epos4Axis:
-    axis.home()
-    return axis
 
 
 def test_a_quick_stop_brakes_by_the_ramp_and_holds(stage: Stage, homed: Epos4Axis) -> None:

@@ -15,7 +15,7 @@ from drivers.roles import Identity
 from rig.config.wiring import Force
 from rig.errors import DeviceError, UsageError
 from tests.drivers.scripted_port import ScriptedPort
-from tests.mock_devices.force_bench import WAIT_S, WRENCH, Bench, Served, await_silence, bench_process, collect
+from tests.mock_devices.force_bench import WAIT_S, WRENCH, Served, await_silence, collect
 
 FRAME = encode_frame([125, -250, -775, 125, -250, 500])
 PERIOD_NS = 10_000_000
@@ -129,23 +129,11 @@ def opened(mock: Served) -> RobotiqFt300:
     return RobotiqFt300(partial(open_port, mock.endpoint), Force())
 
 
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Bench]:
-    with bench_process() as bench:
-        yield bench
-
-
-@pytest.fixture
-def mock(bench: Bench) -> Iterator[Served]:
-    with bench.serve("robotiq") as mock:
-        yield mock
-
-
 @pytest.mark.bench
 @pytest.mark.xdist_group("wire")
 class TestAgainstTheMockInAnotherProcess:
-    def test_a_session_identifies_the_sensor_and_streams(self, mock: Served) -> None:
-        sensor = opened(mock)
+    def test_a_session_identifies_the_sensor_and_streams(self, robotiq: Served) -> None:
+        sensor = opened(robotiq)
         sensor.start()
         samples = collect(sensor, lambda got: len(got) >= 50)
         sensor.close()
@@ -165,89 +153,88 @@ class TestAgainstTheMockInAnotherProcess:
         assert all(sample.valid for sample in samples)
         assert sensor.counters.discarded_bytes == 0
 
-    def test_a_stream_left_running_is_stopped_and_started_again(self, mock: Served) -> None:
+    def test_a_stream_left_running_is_stopped_and_started_again(self, robotiq: Served) -> None:
         ports: list[Port] = []
 
         def opener(baud: int) -> Port:
-            ports.append(open_port(mock.endpoint, baud))
+            ports.append(open_port(robotiq.endpoint, baud))
             return ports[-1]
 
         RobotiqFt300(opener, Force()).start()
         ports[-1].close()
-        sensor = opened(mock)
+        sensor = opened(robotiq)
         sensor.start()
         assert len(collect(sensor, lambda got: len(got) >= 10)) >= 10
         sensor.close()
 
-    def test_close_leaves_a_sensor_that_answers_modbus_again(self, mock: Served) -> None:
+    def test_close_leaves_a_sensor_that_answers_modbus_again(self, robotiq: Served) -> None:
         for _ in range(2):
-            sensor = opened(mock)
+            sensor = opened(robotiq)
             sensor.start()
             sensor.close()
-        port = open_port(mock.endpoint, 19_200)
+        port = open_port(robotiq.endpoint, 19_200)
         port.write(bytes.fromhex("09 03 00 B4 00 01 C5 64"))
         expected = with_crc(bytes.fromhex("09 03 02 00 7D"))
         answer = read_until(port, lambda data: expected in data, WAIT_S)
         port.close()
         assert answer.endswith(expected)
 
-    def test_a_start_without_an_answer_counts_if_frames_come(self, mock: Served) -> None:
-        mock.set(mute_start=True)
-        sensor = opened(mock)
+    def test_a_start_without_an_answer_counts_if_frames_come(self, robotiq: Served) -> None:
+        robotiq.set(mute_start=True)
+        sensor = opened(robotiq)
         sensor.start()
         assert len(collect(sensor, lambda got: len(got) >= 5)) >= 5
         sensor.close()
 
-    def test_a_refused_start_is_one_sentence(self, mock: Served) -> None:
-        self._fails(mock, "refused to start its stream with Modbus exception 3", refuse_stream=True)
+    def test_a_refused_start_is_one_sentence(self, robotiq: Served) -> None:
+        self._fails(robotiq, "refused to start its stream with Modbus exception 3", refuse_stream=True)
 
-    def test_a_sensor_that_cannot_be_stopped_is_one_sentence(self, mock: Served) -> None:
-        sensor = opened(mock)
+    def test_a_sensor_that_cannot_be_stopped_is_one_sentence(self, robotiq: Served) -> None:
+        sensor = opened(robotiq)
         sensor.start()
-        mock.set(deaf=True)
+        robotiq.set(deaf=True)
         sensor.close()
-        sensor = opened(mock)
+        sensor = opened(robotiq)
         with pytest.raises(DeviceError, match=r"still sends bytes after 3 s of stop bursts"):
             sensor.start()
         sensor.close()
 
-    def test_a_device_that_is_no_force_sensor_is_one_sentence(self, mock: Served) -> None:
-        self._fails(mock, "firmware 'KMS-2.0.4' is not that of a force sensor", wrong_identity=True)
+    def test_a_device_that_is_no_force_sensor_is_one_sentence(self, robotiq: Served) -> None:
+        self._fails(robotiq, "firmware 'KMS-2.0.4' is not that of a force sensor", wrong_identity=True)
 
-    def test_a_silent_device_is_one_sentence(self, mock: Served) -> None:
-        self._fails(mock, "no Modbus answer from slave 9, registers 500 to 502 in 3 tries of 0.4 s", silent=True)
+    def test_a_silent_device_is_one_sentence(self, robotiq: Served) -> None:
+        self._fails(robotiq, "no Modbus answer from slave 9, registers 500 to 502 in 3 tries of 0.4 s", silent=True)
 
-    def _fails(self, mock: Served, sentence: str, **knobs: bool) -> None:
-        mock.set(**knobs)
-        sensor = opened(mock)
+    def _fails(self, robotiq: Served, sentence: str, **knobs: bool) -> None:
+        robotiq.set(**knobs)
+        sensor = opened(robotiq)
         with pytest.raises(DeviceError, match=sentence):
             sensor.start()
         sensor.close()
 
-    def test_another_product_behind_the_port_is_one_sentence(self, bench: Bench) -> None:
-        with bench.serve("bota") as bota:
-            self._fails(bota, "no Modbus answer")
+    def test_another_product_behind_the_port_is_one_sentence(self, bota: Served) -> None:
+        self._fails(bota, "no Modbus answer")
 
-    def test_a_sensor_that_falls_silent_gives_no_samples_and_no_error(self, mock: Served) -> None:
-        sensor = opened(mock)
+    def test_a_sensor_that_falls_silent_gives_no_samples_and_no_error(self, robotiq: Served) -> None:
+        sensor = opened(robotiq)
         sensor.start()
-        mock.set(silent=True)
+        robotiq.set(silent=True)
         await_silence(sensor)
-        mock.set(silent=False)
+        robotiq.set(silent=False)
         collect(sensor, lambda got: len(got) >= 1)
         sensor.close()
 
-    def test_spoilt_checksums_are_counted(self, mock: Served) -> None:
-        sensor = opened(mock)
+    def test_spoilt_checksums_are_counted(self, robotiq: Served) -> None:
+        sensor = opened(robotiq)
         sensor.start()
-        mock.set(corrupt_every=4)
+        robotiq.set(corrupt_every=4)
         collect(sensor, lambda _: sensor.counters.checksum_errors >= 5)
         sensor.close()
 
-    def test_a_cut_cable_raises_and_close_stays_quiet(self, mock: Served) -> None:
-        sensor = opened(mock)
+    def test_a_cut_cable_raises_and_close_stays_quiet(self, robotiq: Served) -> None:
+        sensor = opened(robotiq)
         sensor.start()
-        mock.cut()
+        robotiq.cut()
         with pytest.raises(PortClosed, match="the line is gone"):
             collect(sensor, lambda _: False)
         sensor.close()

@@ -9,7 +9,7 @@ from drivers.bota.codec import Decoder, Frame
 from drivers.roles import LinkCounters
 from mock_devices.bota import BOOT_NS, BotaMock, Command, CommandParser
 from mock_devices.stage import NEVER_NS, Mock
-from tests.mock_devices.force_bench import WRENCH, MemoryStage, MemoryWire, StillPlant, bench_process
+from tests.mock_devices.force_bench import WRENCH, MemoryStage, MemoryWire, Served, StillPlant
 
 START_NS = 5_000_000_000
 SECOND_NS = 1_000_000_000
@@ -202,13 +202,9 @@ def test_close_cuts_the_wire() -> None:
 
 @pytest.mark.bench
 @pytest.mark.xdist_group("wire")
-def test_a_client_that_follows_the_makers_example_gets_frames() -> None:
+def test_a_client_that_follows_the_makers_example_gets_frames(bota: Served) -> None:
     """The steps of `bota_serial_example.py`, with pyserial and nothing of ours but the served bytes."""
-    with (
-        bench_process() as bench,
-        bench.serve("bota") as mock,
-        serial.Serial(mock.endpoint, 460_800, timeout=10) as line,
-    ):
+    with serial.Serial(bota.endpoint, 460_800, timeout=10) as line:
         line.write(b"#")
         assert line.read_until(b"App Init").endswith(b"App Init")
         assert line.read_until(b"FW version: 1.0.6\r").endswith(b"\r")

@@ -1,7 +1,6 @@
 """The mock of a Robotiq FT 300: its Modbus slave against literal bytes and third-party clients, and its stream."""
 
 import struct
-from collections.abc import Iterator
 from contextlib import closing
 
 import minimalmodbus
@@ -26,7 +25,7 @@ from drivers.robotiq.codec import (
 from drivers.roles import LinkCounters
 from mock_devices.robotiq import REQUEST_BYTES_MAX, RequestFinder, RobotiqMock
 from mock_devices.stage import NEVER_NS, Mock
-from tests.mock_devices.force_bench import WRENCH, Bench, MemoryStage, MemoryWire, Served, StillPlant, bench_process
+from tests.mock_devices.force_bench import WRENCH, MemoryStage, MemoryWire, Served, StillPlant
 
 START_NS = 7_000_000_000
 PERIOD_NS = 10_000_000
@@ -244,25 +243,13 @@ def test_close_cuts_the_wire() -> None:
     assert stage.wire.closed
 
 
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Bench]:
-    with bench_process() as bench:
-        yield bench
-
-
-@pytest.fixture
-def mock(bench: Bench) -> Iterator[Served]:
-    with bench.serve("robotiq") as mock:
-        yield mock
-
-
 @pytest.mark.bench
 @pytest.mark.xdist_group("wire")
 class TestThirdPartyClients:
     """Clients written elsewhere use the mock, in another process, unchanged."""
 
-    def test_minimalmodbus_reads_registers_and_starts_the_stream(self, mock: Served) -> None:
-        instrument = minimalmodbus.Instrument(mock.endpoint, 9)
+    def test_minimalmodbus_reads_registers_and_starts_the_stream(self, robotiq: Served) -> None:
+        instrument = minimalmodbus.Instrument(robotiq.endpoint, 9)
         line = instrument.serial
         line.baudrate, line.timeout = 19_200, 1.0
         assert instrument.read_registers(180, 6) == [125, 0x10000 - 250, 0x10000 - 775, 125, 0x10000 - 250, 500]
@@ -276,15 +263,15 @@ class TestThirdPartyClients:
         line.close()
         assert Decoder(LinkCounters()).feed(frame) == [Wrench(*WRENCH)]
 
-    def test_minimalmodbus_hears_nothing_from_another_slave(self, mock: Served) -> None:
-        instrument = minimalmodbus.Instrument(mock.endpoint, 8)
+    def test_minimalmodbus_hears_nothing_from_another_slave(self, robotiq: Served) -> None:
+        instrument = minimalmodbus.Instrument(robotiq.endpoint, 8)
         instrument.serial.baudrate, instrument.serial.timeout = 19_200, 0.2
         with pytest.raises(minimalmodbus.NoResponseError):
             instrument.read_register(180)
         instrument.serial.close()
 
-    def test_pymodbus_reads_registers_and_gets_exceptions(self, mock: Served) -> None:
-        client = ModbusSerialClient(mock.endpoint, baudrate=19_200, timeout=2)
+    def test_pymodbus_reads_registers_and_gets_exceptions(self, robotiq: Served) -> None:
+        client = ModbusSerialClient(robotiq.endpoint, baudrate=19_200, timeout=2)
         assert client.connect()
         forces = client.read_holding_registers(180, count=6, device_id=9).registers
         refused = client.read_holding_registers(186, count=1, device_id=9)
@@ -292,11 +279,11 @@ class TestThirdPartyClients:
         assert struct.unpack(">6h", struct.pack(">6H", *forces)) == (125, -250, -775, 125, -250, 500)
         assert (refused.isError(), refused.exception_code) == (True, 2)
 
-    def test_pymodbus_stops_a_stream_and_reads_again(self, mock: Served) -> None:
-        with closing(ModbusSerialClient(mock.endpoint, baudrate=19_200, timeout=5)) as client:
+    def test_pymodbus_stops_a_stream_and_reads_again(self, robotiq: Served) -> None:
+        with closing(ModbusSerialClient(robotiq.endpoint, baudrate=19_200, timeout=5)) as client:
             assert client.connect()
             assert not client.write_registers(410, [0x0200], device_id=9).isError()
-        with closing(ModbusSerialClient(mock.endpoint, baudrate=19_200, timeout=0.3, retries=0)) as client:
+        with closing(ModbusSerialClient(robotiq.endpoint, baudrate=19_200, timeout=0.3, retries=0)) as client:
             assert client.connect()
             with pytest.raises(ModbusIOException):
                 client.read_holding_registers(180, count=1, device_id=9)
@@ -305,6 +292,6 @@ class TestThirdPartyClients:
             client.socket.timeout = 1.0
             while client.socket.read(16):
                 continue
-        with closing(ModbusSerialClient(mock.endpoint, baudrate=19_200, timeout=5)) as client:
+        with closing(ModbusSerialClient(robotiq.endpoint, baudrate=19_200, timeout=5)) as client:
             assert client.connect()
             assert client.read_holding_registers(180, count=1, device_id=9).registers == [125]

@@ -16,9 +16,14 @@ ARGUMENTS = (
 )
 
 
+def installed() -> str | None:
+    """Path of the browser, if there is one."""
+    return next((path for name in NAMES if (path := shutil.which(name))), None)
+
+
 def find() -> str:
     """Path of the browser; skips the test, saying so, where there is none."""
-    found = next((path for name in NAMES if (path := shutil.which(name))), None)
+    found = installed()
     if found is None:
         pytest.skip(f"no browser here: looked for {', '.join(NAMES)}")
     return found
