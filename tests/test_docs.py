@@ -71,7 +71,7 @@ def check_make(command: str) -> None:
 
 
 @pytest.mark.bench
-@pytest.mark.xdist_group("bench")
+@pytest.mark.xdist_group("commands")
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_command_of_the_page_works_in_order(page: Path, tmp_path: Path) -> None:

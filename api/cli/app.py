@@ -3,10 +3,13 @@
 Only the module of the command asked for is imported: numerics, plotting and HTTP together take a second to load.
 """
 
+import ast
 import os
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 
 import typer
 from rich.console import Console
@@ -34,7 +37,7 @@ COMMANDS = {
 
 
 def build(wanted: str | None = None) -> typer.Typer:
-    """The application with the command ``wanted``, or with all where it is none of them."""
+    """The application with the command ``wanted``; where it is no command, with the name and summary of each."""
     app = typer.Typer(
         help="Software for a soft-tissue bench: capture, fit, track, report. Exit codes: 0 ok, 1 check failed,"
         " 2 wrong use, 3 safety stop.",
@@ -45,10 +48,22 @@ def build(wanted: str | None = None) -> typer.Typer:
     )
     # A callback keeps the name of the command on the line also where only one is loaded.
     app.callback()(lambda: None)
-    names = [wanted] if wanted in COMMANDS else list(COMMANDS)
-    for name in names:
-        app.command(name)(_load(COMMANDS[name]))
+    if wanted in COMMANDS:
+        app.command(wanted)(_load(COMMANDS[wanted]))
+        return app
+    for name, target in COMMANDS.items():
+        app.command(name, short_help=_summary(target))(lambda: None)
     return app
+
+
+def _summary(target: str) -> str:
+    """First sentence of the command's docstring, read without loading its module."""
+    module, _, function = target.partition(":")
+    source = find_spec(module)
+    assert source and source.origin
+    body = ast.parse(Path(source.origin).read_text()).body
+    (definition,) = (part for part in body if isinstance(part, ast.FunctionDef) and part.name == function)
+    return (ast.get_docstring(definition) or "").partition("\n")[0]
 
 
 def _load(target: str) -> Callable[..., None]:
@@ -62,7 +77,7 @@ def main() -> None:
     # Its matrices are small: threads of linear algebra mostly wait for one another, and take a core from the loop.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        build(next(iter(sys.argv[1:]), None))()
+        build(next((word for word in sys.argv[1:] if word != "--"), None))()
     except RigError as error:
         Console(stderr=True, highlight=False, soft_wrap=True).print(f"rig: {error}", markup=False)
         sys.exit(error.exit_code)

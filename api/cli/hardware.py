@@ -56,6 +56,12 @@ def _lines(endpoints: dict[str, Any]) -> str:
     )
 
 
+def _measured(finding: examination.Finding) -> tuple[str, ...]:
+    if not finding.rate_Hz:
+        return ("not heard",)
+    return f"{finding.rate_Hz:.1f}", finding.noise, f"{finding.latency_ms:.2f}", finding.range
+
+
 def doctor(config: ConfigOption = None, overrides: SetOption = None, json_file: JsonOption = None) -> None:
     """Looks at each device without moving anything: identity, measured rate, noise, latency, range.
 
@@ -64,10 +70,7 @@ def doctor(config: ConfigOption = None, overrides: SetOption = None, json_file: 
     wiring = wiring_from(config, overrides)
     with bench_for(wiring) as (live_wiring, _):
         findings = examination.examine(live_wiring)
-    rows = [
-        (f.role, f.product, f.serial, f.firmware, f"{f.rate_Hz:.1f}", f.noise, f"{f.latency_ms:.2f}", f.range)
-        for f in findings
-    ]
+    rows = [(f.role, f.product, f.serial, f.firmware, *_measured(f)) for f in findings]
     header = ("role", "product", "serial", "firmware", "rate Hz", "noise", "latency ms", "range seen")
     console.print(table(header, rows, title="Devices"))
     write_json(json_file, {"devices": [asdict(finding) for finding in findings]})

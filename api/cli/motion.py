@@ -190,5 +190,5 @@ def _compared(wiring: Wiring, folder: Path, asked: Asked) -> dict[str, object]:
 def say_levels(result: Tracked) -> None:
     """The table of given and actual force."""
     if result.levels:
-        console.print(table(*tracked.table(result), title="Given and actual force"))
+        console.print(table(*tracked.table(result), title="Given and actual force in N"))
     console.print(tracked.sentence(result), highlight=False)

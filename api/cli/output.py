@@ -13,8 +13,10 @@ console = Console()
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]], title: str = "") -> Table:
-    """A table for people."""
-    found = Table(*header, title=title, title_justify="left", show_edge=False)
+    """A table for people; where the terminal is narrow, cells go on in the next line instead of being cut."""
+    found = Table(title=title, title_justify="left", show_edge=False)
+    for name in header:
+        found.add_column(name, overflow="fold")
     for row in rows:
         found.add_row(*row)
     return found

@@ -172,7 +172,7 @@ def write_result(folder: Path, result: Tracked) -> None:
 
 def table(result: Tracked) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Header and rows of given and actual force, for people."""
-    header = ("given N", "actual N", "error N", "error %", "largest error N", "rms N", "overshoot %", "settling s")
+    header = ("given", "actual", "error", "error %", "largest", "rms", "overshoot %", "settling s")
     return header, [_row(level) for level in result.levels]
 
 

@@ -53,6 +53,8 @@ def import_session(folder: Path, out: Path, columns: Iterable[str], now: datetim
     if not folder.is_dir():
         raise DataError(f"{folder}: no such folder; give the folder that holds session.toml and trial_*/")
     names = column_names(columns)
+    if not (folder / "session.toml").exists():
+        raise DataError(f"{folder}: no session.toml in it; examples/measured shows what an import folder holds")
     session = load(SessionTable, folder / "session.toml")
     trials = read_trials(folder, names)
     info = _info(folder, session, trials, now)

@@ -19,16 +19,18 @@ def test_help_of_every_command_ends_with_an_example_of_that_command(name: str) -
     assert re.search(rf"Example:\s+rig {name} ?", answer.output), answer.output
 
 
-def test_help_of_the_whole_lists_every_command() -> None:
-    answer = runner.invoke(build(), ["--help"])
-    assert all(re.search(rf"^ *{name} ", answer.output, re.MULTILINE) for name in COMMANDS)
+def test_help_of_the_whole_lists_every_command_with_its_whole_first_sentence() -> None:
+    answer = runner.invoke(build(), ["--help"], terminal_width=200)
+    for name in COMMANDS:
+        (listed,) = re.findall(rf"^ *{name} +(.*)$", answer.output, re.MULTILINE)
+        assert f"  {listed}\n" in runner.invoke(build(name), [name, "--help"], terminal_width=200).output
 
 
 @pytest.mark.parametrize(
     "arguments", [["no-such-command"], ["verify"], ["fit", "a", "--no-such-option"], ["serve", "--port", "0"]]
 )
 def test_wrong_use_ends_with_code_2(arguments: list[str]) -> None:
-    assert runner.invoke(build(), arguments).exit_code == 2
+    assert runner.invoke(build(arguments[0]), arguments).exit_code == 2
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,5 @@
-"""Every test here starts real processes: one worker runs them, one after another."""
+"""Every test here starts real processes. One worker runs those in which something goes wrong at a certain moment, one
+after another; whole commands from start to end (`commands`) may run beside them on another."""
 
 from collections.abc import Iterator
 
@@ -12,7 +13,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if "tests/system" in item.nodeid:
             item.add_marker(pytest.mark.bench)
-            item.add_marker(pytest.mark.xdist_group("bench"))
+            if item.get_closest_marker("xdist_group") is None:
+                item.add_marker(pytest.mark.xdist_group("bench"))
 
 
 @pytest.fixture(autouse=True)

@@ -15,7 +15,7 @@ from rig.tissue.model import load_model
 from tests.system.browser import find, launch
 from tests.system.stage import rig
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.timeout(300), pytest.mark.xdist_group("commands")]
 LARGEST_STEADY_ERROR_PERCENT = 5.0
 # Relaxation: slow enough that a busy computer's time stamps, a few ms off, leave it as it is.
 HIDES_RELAXATION = "4"

@@ -7,6 +7,7 @@ import pytest
 from rig.recording.reader import read_recording
 from tests.system.stage import EXAMPLES, Stage, rig
 
+pytestmark = pytest.mark.xdist_group("commands")
 SURFACE_MM = 20.0
 
 
