@@ -20,6 +20,8 @@ from rig.errors import SafetyStop
 Positive = Annotated[float, Field(gt=0)]
 CONTACT_SAMPLES = 3
 CONTACT_NOISE = 4.0
+RUN_IN_MM = 0.5
+LARGEST_RUBBING_N = 0.5
 LARGEST_ZERO_SHIFT_N = 0.5
 
 
@@ -98,16 +100,23 @@ class Approach(Table):
 
 
 class ApproachRun:
-    """Counts consecutive samples above the threshold: one spike is not contact, and neither is the sensor's noise."""
+    """Counts consecutive samples above the threshold: one spike is not contact, and neither is the sensor's noise.
+
+    Nor is it contact that the guide rubs once the tip moves: force counts from what it is after the first 0.5 mm, where
+    that is up to 0.5 N above the zero.
+    """
 
     def __init__(self, step: Approach) -> None:
         self._step, self._above, self._seen = step, 0, -1
+        self._from_mm, self._rubbing_N = math.nan, LARGEST_RUBBING_N
+        self._running_in_N: list[float] = []
 
     def advance(self, world: World, elapsed_s: float) -> bool:  # noqa: ARG002
         """One tick of the search; raises SafetyStop where it ends without contact."""
         if world.force_samples != self._seen:
             self._seen = world.force_samples
-            threshold_N = self._step.threshold_N(world)
+            self._run_in(world)
+            threshold_N = self._step.threshold_N(world) + self._rubbing_N
             self._above = self._above + 1 if world.force_N > threshold_N else 0
         if self._above >= CONTACT_SAMPLES:
             world.surface_mm, world.memory = world.position_mm, None
@@ -119,6 +128,17 @@ class ApproachRun:
                 " is the limb under the tip? raise search_to_mm if the surface lies deeper"
             )
         return False
+
+    def _run_in(self, world: World) -> None:
+        """Force after the slip of the guide and before 0.5 mm; until then anything up to the largest may be rubbing."""
+        if math.isnan(self._from_mm):
+            self._from_mm = world.position_mm
+        moved_mm = world.position_mm - self._from_mm
+        if 0.5 * RUN_IN_MM <= moved_mm < RUN_IN_MM:
+            self._running_in_N.append(world.force_N)
+        elif self._running_in_N:
+            self._rubbing_N = min(max(fmean(self._running_in_N), 0.0), LARGEST_RUBBING_N)
+            self._running_in_N = []
 
 
 class Compress(Table):

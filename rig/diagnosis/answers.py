@@ -27,6 +27,8 @@ DRAWS = 1000
 LARGEST_LOG = 20.0
 # A model whose noise and scatter are this large against the signal explains nothing, however white its residual.
 MOST_CHANCE = 0.25
+# White: a leftover of 0.7 mN in the dither of a quiet bench comes to less, and nobody would act on it.
+LEAST_LEFT_N = 0.0002
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ class Diagnosis:
 
     def as_json(self) -> dict[str, object]:
         """What the file holds."""
-        unexplained = {"depends_on": list(self.depends_on), "p_value": self.leftover_p} if self.depends_on else None
+        left = {"depends_on": list(self.depends_on), "p_value": self.leftover_p}
         return {
             "verdict": self.verdict,
             "statement": self.statement,
@@ -127,7 +129,7 @@ class Diagnosis:
             "session": self.session,
             "recordings": self.recordings,
             "findings": [finding.as_json() for finding in self.findings],
-            "unexplained": unexplained,
+            "unexplained": left if self.verdict == "unexplained" else None,
             "detectable": {name: {"minimum": size, "unit": unit} for name, (size, unit) in self.detectable.items()},
             "not_testable": dict(self.not_testable),
             "next_experiment": self.next_experiment,
@@ -248,6 +250,8 @@ def verdict_of(search: Search, after: Leftover) -> tuple[Verdict, tuple[str, ...
     """Adequate, explained or unexplained, and what a leftover depends on."""
     named = sum(float(found.gains.sum()) for found in search.named)
     depends = judged_leftover(after, named)
+    if depends != after.between and left_N(search.after, after) < LEAST_LEFT_N:
+        depends = ()
     if not depends:
         depends = imitated([found.effect for found in search.named])
     if not depends and left_to_chance(search.after) > MOST_CHANCE:
@@ -255,6 +259,12 @@ def verdict_of(search: Search, after: Leftover) -> tuple[Verdict, tuple[str, ...
     if depends:
         return "unexplained", depends
     return ("explained" if search.named else "adequate"), ()
+
+
+def left_N(fit: Fit, found: Leftover) -> float:
+    """The most telling leftover as a white force [N]; infinite for what is no force."""
+    share = max(found.shares[found.ranked[0]], 0.0)
+    return float(np.sqrt(share)) * fit.whitener.noise.colours[0].sd if fit.problem.channels[0].unit == "N" else np.inf
 
 
 def left_to_chance(fit: Fit) -> float:

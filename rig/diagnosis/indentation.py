@@ -105,12 +105,13 @@ class Indentation:
         return response if self.data.has_tracker else (response.force_N,)
 
     def blind(self, values: Fields) -> NDArray[np.bool_]:
-        """Samples about the instant of contact: the damper's force jumps there between two samples."""
+        """Samples about the instant of contact, where the damper's force jumps between two, and gaps of the axis."""
         drive = self.data.drive
         surface = values["surface_mm"] + values["contact_offset_mm"]
         reach = np.maximum(BLIND_MM, BLIND_SAMPLES * np.abs(drive.velocity_mm_s) * drive.period_s)
         moving = np.abs(drive.velocity_mm_s) > SETTLE_MM_S
-        return np.asarray((np.abs(drive.position_mm - surface) < reach) & moving)
+        touching = np.asarray((np.abs(drive.position_mm - surface) < reach) & moving)
+        return touching if self.data.unseen is None else touching | self.data.unseen
 
     def variables(self) -> Mapping[str, Array]:
         """What a leftover may depend on; ``depth`` counts from an arbitrary zero."""

@@ -24,6 +24,8 @@ FEWEST_SAMPLES = 20
 DERIVATIVE_SPANS_S = (0.008, 0.016)
 JITTER_MM = 0.0004
 JITTERY = 125.0, (0.024, 0.024)
+GAP_PERIODS, GAP_S = 3.0, 0.01
+MOST_TURN_MM_S = 12.0
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,10 @@ class Session:
 
 @dataclass(frozen=True)
 class Observations:
-    """Drive and readings on the working grid: force shape (n,), tip at the tracker's frames shape (m,)."""
+    """Drive and readings on the working grid: force shape (n,), tip at the tracker's frames shape (m,).
+
+    ``unseen``, shape (n,), marks gaps of the axis' samples: nobody knows how the tip moved there, least how fast.
+    """
 
     name: str
     names: tuple[str, ...]
@@ -65,6 +70,7 @@ class Observations:
     surface_mm: float | None
     findings: tuple[Finding, ...] = field(default=())
     jitter_mm: float = 0.0
+    unseen: NDArray[np.bool_] | None = None
 
     @property
     def rate_Hz(self) -> float:
@@ -85,6 +91,7 @@ class _Gridded:
     temperature_C: Array | None
     marker_s: Array
     marker_mm: Array
+    unseen: NDArray[np.bool_]
 
 
 def observe(session: Session) -> Observations:
@@ -104,7 +111,7 @@ def observe(session: Session) -> Observations:
     drive, force, tip = _joined(parts)
     return Observations(
         session.name, tuple(part.name for part in parts), drive, force, tip, session.surface_mm, _merged(findings),
-        rough_mm,
+        rough_mm, np.concatenate([part.unseen for part in parts]),
     )  # fmt: skip
 
 
@@ -188,7 +195,22 @@ def _on_grid(streams: Streams, period_s: float, spans_s: Sequence[float]) -> _Gr
         marker_s, *xyz = ordered(streams.marker_s, *streams.marker_mm.T)
         inside = (marker_s >= time_s[0]) & (marker_s <= time_s[-1])
         marker_s, marker_mm = marker_s[inside], np.array(xyz).T[inside]
-    return _Gridded(streams.name, time_s, (means[1], means[2], means[3], means[4]), temperature, marker_s, marker_mm)
+    unseen = beside_gaps(streams.axis_s, time_s, 0.5 * max(spans_s))
+    if spans_s[0] > DERIVATIVE_SPANS_S[0]:
+        # Derivatives over long spans round off what turns within one.
+        unseen |= np.abs(means[4]) * spans_s[0] > MOST_TURN_MM_S
+    motion = means[1], means[2], means[3], means[4]
+    return _Gridded(streams.name, time_s, motion, temperature, marker_s, marker_mm, unseen)
+
+
+def beside_gaps(axis_s: Array, at_s: Array, margin_s: float) -> NDArray[np.bool_]:
+    """Which times lie in a gap of the axis' clock, or so near to one that derivatives there reach across it."""
+    step_s = np.diff(axis_s)
+    gaps = np.flatnonzero(step_s > max(GAP_PERIODS * float(np.median(step_s)), GAP_S))
+    marks = np.zeros(len(at_s) + 1)
+    np.add.at(marks, np.searchsorted(at_s, axis_s[gaps] - margin_s), 1)
+    np.add.at(marks, np.searchsorted(at_s, axis_s[gaps + 1] + margin_s), -1)
+    return np.asarray(np.cumsum(marks)[:-1] > 0)
 
 
 def _motion(streams: Streams, at_s: Array, spans_s: Sequence[float]) -> tuple[Array, Array, Array]:

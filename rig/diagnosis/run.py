@@ -1,6 +1,7 @@
 """One call from observations to a diagnosis."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +14,10 @@ from rig.diagnosis.observations import Observations, Session, observe
 from rig.diagnosis.omnibus import leftover
 from rig.diagnosis.problem import Problem
 from rig.diagnosis.search import Progress, search
+from rig.diagnosis.strokes import in_strokes
 from rig.errors import DataError
+
+FEWEST_RECORDINGS = 4
 
 
 def silent(_: str, __: float) -> None:
@@ -25,9 +29,9 @@ def diagnose(
 ) -> Diagnosis:
     """What the simulation gets wrong on these recordings; never raises on data that merely say nothing."""
     problem = Indentation(data, simulation)
-    reason = unusable(data)
-    if reason is not None:
-        return cannot(simulation, data.name, data.drive.recordings, reason, data.findings)
+    fault = unusable(data)
+    if fault is not None:
+        return cannot(simulation, data.name, data.drive.recordings, fault, data.findings)
     result = judge(problem, data.name, data.findings, seed, progress)
     return replace(result, next_experiment=next_experiment(result))
 
@@ -72,44 +76,61 @@ def judge(
     )
 
 
-def unusable(data: Observations) -> str | None:
+class Fault(NamedTuple):
+    """Why nothing can be judged, and what to do about it."""
+
+    reason: str
+    remedy: str
+
+
+RECORD = "record at least 6 strokes at three or more speeds, for example with examples/diagnosis.toml"
+
+
+def unusable(data: Observations) -> Fault | None:
     """Why nothing can be tested with these data; None where something can."""
     force, position = data.force_N, data.drive.position_mm
-    if data.drive.recordings < 4:
-        count = data.drive.recordings
-        return f"{count} recording{'s' * (count > 1)}: a cause is judged on recordings left out, which takes at least 4"
     if np.ptp(force) == 0 or np.ptp(position) == 0:
         still = "force" if np.ptp(force) == 0 else "position"
-        return f"the {still} never changes, so the recordings carry no experiment"
+        return Fault(f"the {still} never changes, so the recordings carry no experiment", f"connect the {still} sensor")
     deep = position >= np.quantile(position, 0.9)
     high = position <= np.quantile(position, 0.1)
     # Third differences: at 10 Hz the first ones of a ramp are no noise.
     noise = float(np.median(np.abs(np.diff(force, 3)))) / (0.6745 * np.sqrt(20))
     rise = float(np.median(force[deep]) - np.median(force[high]))
     if rise < 0 and -rise > 5 * noise:
-        return (
-            "force falls as the tip goes in: force or position has the wrong sign; correct force_positive or "
-            "position_positive in session.toml and diagnose again"
+        return Fault(
+            "force falls as the tip goes in, so force or position has the wrong sign",
+            "correct force_positive or position_positive in session.toml (force.compression in rig.toml for a capture) "
+            "and diagnose again",
         )
     if rise < 5 * noise:
-        return f"the force rises by {rise:.3g} N from above to below, no more than its noise: no contact was recorded"
+        return Fault(f"the force rises by {rise:.3g} N from above to below, no more than its noise: no contact", RECORD)
+    if data.drive.recordings < FEWEST_RECORDINGS:
+        count = data.drive.recordings
+        return Fault(
+            f"{count} recording{'s' * (count > 1)} of one stroke: a cause is judged on strokes left out, which takes "
+            f"at least {FEWEST_RECORDINGS}",
+            RECORD,
+        )
     return None
 
 
-def cannot(simulation: Simulation, name: str, recordings: int, reason: str, quality: tuple[Finding, ...]) -> Diagnosis:
-    """The answer where nothing can be tested: no cause is named, and every one is listed with the reason."""
+def cannot(simulation: Simulation, name: str, recordings: int, fault: Fault, quality: tuple[Finding, ...]) -> Diagnosis:
+    """The answer where nothing can be judged: nothing is explained, no cause named, and each listed with the reason."""
     return Diagnosis(
-        session=name, simulation=simulation, recordings=recordings, verdict="adequate",
-        statement=f"Nothing could be tested: {reason}.", findings=(), depends_on=(), leftover_p=None, detectable={},
-        not_testable={effect.name: reason for effect in library(simulation)},
-        next_experiment={"do": reason, "nats_per_minute": None}, quality=quality,
+        session=name, simulation=simulation, recordings=recordings, verdict="unexplained",
+        statement=f"Nothing could be judged: {fault.reason}. This says neither that the simulation is right nor wrong.",
+        findings=(), depends_on=(), leftover_p=None, detectable={},
+        not_testable={effect.name: fault.reason for effect in library(simulation)},
+        next_experiment={"do": fault.remedy, "separates": [], "nats_per_minute": None}, quality=quality,
     )  # fmt: skip
 
 
 def diagnose_session(session: Session, simulation: Simulation = "index", progress: Progress = silent) -> Diagnosis:
     """A session as it was read; one without a usable recording gets an answer too."""
     try:
-        data = observe(session)
+        data = observe(in_strokes(session) if len(session.recordings) < FEWEST_RECORDINGS else session)
     except DataError as error:
-        return cannot(simulation, session.name, 0, str(error), session.findings)
+        reason = str(error).removeprefix(f"{session.name}: ").partition(";")[0]
+        return cannot(simulation, session.name, 0, Fault(reason, RECORD), session.findings)
     return diagnose(data, simulation, progress=progress)

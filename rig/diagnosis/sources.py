@@ -7,6 +7,7 @@ was left out: data that are wrong in part are the very data somebody wants to un
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.config.table import load
 from rig.diagnosis.gates import Finding
@@ -17,11 +18,13 @@ from rig.recording.import_format import FIELDS, SessionTable, TrialTable, column
 from rig.recording.reader import Recording
 from rig.recording.sessions import open_session
 from rig.recording.tables import compression_N
-from rig.simulation.drive import Array
+from rig.simulation.drive import Array, Index
 from rig.tissue.study import TRACKING
 
 TIP_TOOL = 0
 NS = 1e-9
+LATE_NS = 500_000
+MOST_LATE = 0.01
 
 
 def read_source(folder: Path, columns: tuple[str, ...] = (), only: str = "") -> Session:
@@ -52,6 +55,7 @@ def from_session(folder: Path) -> Session:
             recordings.append((trial.name, recording))
     starts = [int(r.tables["force"]["capture_ns"][0]) for _, r in recordings if len(r.tables["force"])]
     streams = [streams_of(name, recording, min(starts, default=0)) for name, recording in recordings]
+    findings += [finding for name, recording in recordings for finding in late(name, recording)]
     stated = {r.metadata.get("calibration", {}).get("surface_mm", "") for _, r in recordings}
     surface = float(stated.pop()) if len(stated) == 1 and "" not in stated else None
     return Session(folder.name, tuple(streams), surface, findings=tuple(findings))
@@ -60,7 +64,7 @@ def from_session(folder: Path) -> Session:
 def streams_of(name: str, recording: Recording, start_ns: int) -> Streams:
     """The raw streams of a recording, samples the devices vouch for; the tip is tool 0 of the tracker."""
     force, axis, marker = (recording.tables[stream] for stream in ("force", "axis", "marker"))
-    sound, moving = force["valid"] != 0, axis["valid"] != 0
+    sound, moving = force["valid"] != 0, (axis["valid"] != 0) & in_time(axis["capture_ns"], axis["arrival_ns"])
     seen = (marker["tool"] == TIP_TOOL) & (marker["valid"] != 0)
     temperature = force["temperature_C"][sound]
     return Streams(
@@ -73,6 +77,24 @@ def streams_of(name: str, recording: Recording, start_ns: int) -> Streams:
         np.stack([marker[field][seen] for field in ("x_mm", "y_mm", "z_mm")], axis=1),
         temperature if temperature.size and np.isfinite(temperature).all() else None,
     )
+
+
+def late(name: str, recording: Recording) -> list[Finding]:
+    """What to say of an axis whose samples came late; nothing below 1 %."""
+    axis = recording.tables["axis"]
+    share = 1 - float(np.mean(in_time(axis["capture_ns"], axis["arrival_ns"]))) if len(axis) else 0.0
+    text = f"axis: {100 * share:.0f} % of the samples came more than 0.5 ms later than usual; these were left out"
+    return [Finding(name, "axis", "late", text)] if share > MOST_LATE else []
+
+
+def in_time(capture_ns: Index, arrival_ns: Index) -> NDArray[np.bool_]:
+    """Samples that came no later than usual, within 0.5 ms.
+
+    A drive that is asked late tells where it is then, under the time it should have been asked; at the ends of a dither
+    that is always further back, and would pass for stiffer tissue there.
+    """
+    taken_ns = arrival_ns - capture_ns
+    return np.asarray(taken_ns < np.median(taken_ns) + LATE_NS) if len(taken_ns) else np.zeros(0, bool)
 
 
 def from_csv(folder: Path, columns: tuple[str, ...] = ()) -> Session:

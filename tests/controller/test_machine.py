@@ -44,6 +44,7 @@ class SpringBench:
     forces_N: list[float] = field(default_factory=list)
     every: int = 1
     noise_N: float = 0.0
+    rubbing_N: float = 0.0
     noise: random.Random = field(default_factory=lambda: random.Random(1))
     count: int = -1
 
@@ -54,6 +55,8 @@ class SpringBench:
 
     def _sense(self) -> None:
         force_N = self.stiffness_N_mm * max(0.0, self.position_mm - SURFACE_MM)
+        if self.position_mm > self.world.position_mm:
+            force_N += self.rubbing_N
         self.world.position_mm = self.position_mm
         self.count += 1
         if self.count % self.every == 0:
@@ -150,6 +153,19 @@ def test_while_the_force_is_late_the_tip_stands_still() -> None:
     bench.world.force_late = False
     bench.run()
     assert bench.ended == [("complete", None)]
+
+
+def test_a_guide_that_rubs_is_no_contact_and_the_surface_is_found_below_it() -> None:
+    bench = SpringBench(rubbing_N=0.3)
+    bench.run(ZERO, APPROACH)
+    assert bench.ended == [("complete", None)]
+    assert bench.world.surface_mm == pytest.approx(SURFACE_MM, abs=0.1)
+
+
+def test_tissue_met_in_the_first_half_millimetre_is_found_within_half_a_newton() -> None:
+    bench = SpringBench(position_mm=SURFACE_MM - 0.1, stiffness_N_mm=3.0)
+    bench.run(ZERO, APPROACH)
+    assert bench.world.peak_force_N < 0.5 + APPROACH.contact_force_N + 0.1
 
 
 def test_no_contact_within_the_search_retracts_and_says_so() -> None:

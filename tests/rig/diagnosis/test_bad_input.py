@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from rig.diagnosis.answers import Diagnosis
-from rig.diagnosis.observations import Session, Streams
+from rig.diagnosis.indentation import library
+from rig.diagnosis.observations import Session, Streams, beside_gaps
 from rig.diagnosis.run import diagnose_session
-from rig.diagnosis.sources import read_source
+from rig.diagnosis.sources import in_time, read_source
+from rig.diagnosis.strokes import cut
 from rig.errors import DataError
 from tests.data import recording
 from tests.hidden.draw import draw_secret, recorded, session_of
@@ -27,12 +29,37 @@ def changed(session: Session, **fields: object) -> Session:
 
 def nothing_named(result: Diagnosis, because: str) -> None:
     assert result.findings == ()
-    assert result.as_json()["not_testable"]
+    assert result.verdict == "unexplained"
+    assert result.as_json()["unexplained"] == {"depends_on": [], "p_value": None}
+    assert set(result.not_testable) == {effect.name for effect in library("index")}
+    assert result.statement.startswith("Nothing could be judged"), result.statement
     assert because in result.statement, result.statement
 
 
-def test_one_recording_cannot_be_judged(clean: Session) -> None:
-    nothing_named(diagnose_session(replace(clean, recordings=clean.recordings[:1])), "takes at least 4")
+@pytest.mark.parametrize("count", [1, 3])
+def test_fewer_than_four_strokes_cannot_be_judged(clean: Session, count: int) -> None:
+    nothing_named(diagnose_session(replace(clean, recordings=clean.recordings[:count])), "takes at least 4")
+
+
+def test_one_long_recording_is_judged_by_its_strokes(clean: Session) -> None:
+    result = diagnose_session(replace(clean, recordings=(joined(clean.recordings),)))
+    assert result.verdict == "adequate"
+    assert result.recordings == 6
+    assert "friction" in result.detectable
+    assert any("cut into 6 strokes" in finding.text for finding in result.quality)
+
+
+def test_strokes_that_never_leave_the_tissue_are_not_cut(clean: Session) -> None:
+    pressed = joined(clean.recordings)
+    inside = replace(pressed, force_N=np.maximum(pressed.force_N, np.quantile(pressed.force_N, 0.8)))
+    inside.force_N[:200] = 0.0
+    assert len(cut(pressed)) == 6
+    assert len(cut(inside)) == 1
+
+
+def joined(recordings: tuple[Streams, ...]) -> Streams:
+    fields = ("force_s", "force_N", "axis_s", "axis_mm", "marker_s", "marker_mm", "temperature_C")
+    return Streams("long", **{name: np.concatenate([getattr(r, name) for r in recordings]) for name in fields})
 
 
 def test_a_wrong_sign_of_force_is_said(clean: Session) -> None:
@@ -81,6 +108,22 @@ def test_a_clock_that_runs_backwards_is_said_and_its_samples_left_out(clean: Ses
     result = diagnose_session(replace(clean, recordings=(replace(first, force_s=time), *clean.recordings[1:])))
     assert any(finding.kind == "clock" for finding in result.quality)
     assert result.findings == ()
+
+
+def test_positions_that_came_late_are_of_no_known_time() -> None:
+    capture_ns = np.arange(10) * 1_000_000
+    arrival_ns = capture_ns + 800_000
+    arrival_ns[4:7] += [4_000_000, 3_000_000, 2_000_000]
+    assert np.flatnonzero(~in_time(capture_ns, arrival_ns)).tolist() == [4, 5, 6]
+    assert in_time(capture_ns, capture_ns).all()
+
+
+def test_beside_a_gap_of_the_axis_the_motion_is_not_judged() -> None:
+    axis_s = np.concatenate([np.arange(0.0, 0.1, 0.001), np.arange(0.13, 0.2, 0.001)])
+    at_s = np.arange(0.0, 0.2, 0.004)
+    unseen = at_s[beside_gaps(axis_s, at_s, 0.008)]
+    assert unseen[[0, -1]] == pytest.approx([0.092, 0.136])
+    assert not beside_gaps(axis_s[:100], at_s, 0.008).any()
 
 
 def test_a_csv_folder_with_a_stream_missing_answers_with_the_rest(clean: Session, tmp_path: Path) -> None:
