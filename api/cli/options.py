@@ -16,7 +16,7 @@ ConfigOption = Annotated[
     typer.Option("--config", help=f"Wiring file; else ${ENVIRONMENT}, else ./rig.toml, else the mock bench."),
 ]
 SetOption = Annotated[
-    list[str] | None, typer.Option("--set", help="Overrides one key: section.key=value; may be repeated.")
+    list[str] | None, typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Overrides one key; may be repeated.")
 ]
 JsonOption = Annotated[Path | None, typer.Option("--json", help="Writes the result to this file as JSON.")]
 

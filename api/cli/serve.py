@@ -1,6 +1,7 @@
 """`rig serve`: the HTTP service and its page over one bench."""
 
 import contextlib
+import os
 import socket
 from pathlib import Path
 from typing import Annotated
@@ -42,8 +43,19 @@ def serve(
         raise UsageError(
             f"--host {host}: the service has no log-in yet, so it listens on this computer only: {LOCAL[0]}"
         )
-    with bench_for(wiring_from(config, overrides)) as (wiring, _):
+    settings = wiring_from(config, overrides)
+    with _listening(host, port) as listening, bench_for(settings) as (wiring, _):
         application = build(Service(wiring, sessions, protocols))
         # The server hands on the Ctrl-C that ended it, after an orderly end.
         with contextlib.suppress(KeyboardInterrupt):
-            Announced(uvicorn.Config(application, host=host, port=port, log_level="warning")).run()
+            Announced(uvicorn.Config(application, host=host, port=port, log_level="warning")).run([listening])
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    """Taken before the bench starts, which homes the axis."""
+    try:
+        return socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+    except OSError as error:
+        raise UsageError(
+            f"--port {port}: {os.strerror(error.errno or 0)}; end what listens there, or give another port"
+        ) from error

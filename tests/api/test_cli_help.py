@@ -1,6 +1,7 @@
 """Every command explains itself with an example, and wrong use is one sentence with exit code 2."""
 
 import re
+import socket
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,14 @@ def test_help_of_the_whole_lists_every_command_with_its_whole_first_sentence() -
 )
 def test_wrong_use_ends_with_code_2(arguments: list[str]) -> None:
     assert runner.invoke(build(arguments[0]), arguments).exit_code == 2
+
+
+def test_a_port_that_is_taken_is_one_sentence_before_the_bench_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("api.cli.serve.bench_for", lambda _: pytest.fail("a bench was started"))
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        answer = runner.invoke(build("serve"), ["serve", "--port", str(taken.getsockname()[1])])
+    assert isinstance(answer.exception, UsageError)
+    assert "Address already in use; end what listens there, or give another port" in str(answer.exception)
 
 
 @pytest.mark.parametrize(
