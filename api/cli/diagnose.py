@@ -71,8 +71,8 @@ def protocol(
     console.print(f"{result.strokes} strokes in {result.duration_s:.0f} s", highlight=False)
     seen = [(name, f"{size:.3g} {unit}") for name, (size, unit) in sorted(result.detectable.items())]
     console.print(table(("cause", "visible from"), seen, "On a limb and noise as the mock bench has them"))
-    for name, reason in sorted(result.not_testable.items()):
-        console.print(f"cannot be seen: {name}: {reason}", highlight=False, markup=False)
+    for reason, names in by_reason(result.not_testable):
+        console.print(f"cannot be seen: {names}: {reason}", highlight=False, markup=False)
     rows = [(one, other, f"{left:.1f}") for one, other, left in result.pairs]
     if rows:
         console.print(table(("cause", "imitated by", "nats left of 50"), rows, "Hard to separate (safe from 20)"))
@@ -120,8 +120,8 @@ def show(result: Diagnosis) -> None:
     seen = [(name, f"{size:.3g} {unit}") for name, (size, unit) in sorted(result.detectable.items())]
     if seen:
         console.print(table(("cause", "would have been named from"), seen, "Not found"))
-    for name, reason in sorted(result.not_testable.items()):
-        console.print(f"cannot be tested: {name}: {reason}", highlight=False, markup=False)
+    for reason, names in by_reason(result.not_testable):
+        console.print(f"cannot be tested: {names}: {reason}", highlight=False, markup=False)
     for item in result.simulated:
         which = "fitted" if item.fitted else "left out"
         console.print(
@@ -132,7 +132,23 @@ def show(result: Diagnosis) -> None:
     for finding in result.quality:
         console.print(f"data: {finding.recording} {finding.text}", highlight=False, markup=False)
     if result.next_experiment:
-        console.print(f"next experiment: {result.next_experiment}", highlight=False, markup=False)
+        console.print(f"next experiment: {after(result.next_experiment)}", highlight=False, markup=False)
+
+
+def by_reason(reasons: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Each reason once, with the causes it holds for."""
+    return [
+        (reason, ", ".join(sorted(name for name, why in reasons.items() if why == reason)))
+        for reason in dict.fromkeys(reasons.values())
+    ]
+
+
+def after(experiment: Mapping[str, object]) -> str:
+    """The next experiment as a sentence."""
+    rate, pair = experiment.get("nats_per_minute"), experiment.get("separates")
+    if not isinstance(rate, float) or not isinstance(pair, list):
+        return str(experiment.get("do"))
+    return f"{experiment.get('do')}, which separates {' from '.join(map(str, pair))} at {rate:.1f} nats a minute"
 
 
 def save(result: Diagnosis, folder: Path) -> None:

@@ -147,6 +147,7 @@ def _summary_table(study: Study) -> str:
         found.append((name, "trials fitted", *_worst(judged.fitted)))
         found.append((name, "each trial left out", *_worst(judged.trials_left_out)))
         found.append((name, "each speed left out", *_worst(judged.speeds_left_out)))
+        found.append((name, "each subject left out", *_worst(judged.subjects_left_out)))
     return table(
         ("model", "judged on", "worst, mm", "worst, %", "force residual, N rms"), found, "Worst errors", words=2
     )

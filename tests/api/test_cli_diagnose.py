@@ -1,6 +1,7 @@
 """`rig diagnose` and `rig protocol check` from the command line: files, report, and the model that control takes."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +60,17 @@ def test_the_report_gives_the_statement_the_pictures_and_what_could_not_be_teste
     assert found.statement in html and "rubs" in found.statement
     assert html.count("<svg") == 4
     assert "hang a known weight" in html
+
+
+def test_one_stroke_is_answered_without_a_verdict_in_its_favour(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    shutil.copytree(folder / "trial_0", tmp_path / "one" / "trial_0")
+    said = run("diagnose", tmp_path / "one", "--json", tmp_path / "said.json")
+    assert said.startswith("unexplained: Nothing could be judged: 1 recording of one stroke")
+    assert said.count("cannot be tested") == 1
+    found = json.loads((tmp_path / "said.json").read_text())
+    assert found["findings"] == [] and found["detectable"] == {}
+    assert "examples/diagnosis.toml" in found["next_experiment"]["do"]
 
 
 def test_a_session_that_was_not_diagnosed_says_how_to(tmp_path: Path) -> None:
