@@ -74,8 +74,10 @@ def network(mock: RemoteMock) -> Iterator[canopen.Network]:
 
 @pytest.fixture
 def node(network: canopen.Network) -> canopen.RemoteNode:
+    """Answering: what a drive says before its adapter's channel is open, nobody hears."""
     node = network.add_node(1, dictionary())
     node.sdo.RESPONSE_TIMEOUT = PATIENCE_S
+    assert node.sdo[0x6041].raw
     return node
 
 
