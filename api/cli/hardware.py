@@ -56,10 +56,11 @@ def _lines(endpoints: dict[str, Any]) -> str:
     )
 
 
-def _measured(finding: examination.Finding) -> tuple[str, ...]:
-    if not finding.rate_Hz:
-        return ("not heard",)
-    return f"{finding.rate_Hz:.1f}", finding.noise, f"{finding.latency_ms:.2f}", finding.range
+def _row(finding: examination.Finding) -> tuple[str, ...]:
+    if not finding.product:
+        return finding.role, "not heard"
+    device = f"{finding.product}, serial {finding.serial}, firmware {finding.firmware}"
+    return finding.role, device, f"{finding.rate_Hz:.1f}", finding.noise, f"{finding.latency_ms:.2f}", finding.range
 
 
 def doctor(config: ConfigOption = None, overrides: SetOption = None, json_file: JsonOption = None) -> None:
@@ -70,9 +71,8 @@ def doctor(config: ConfigOption = None, overrides: SetOption = None, json_file: 
     wiring = wiring_from(config, overrides)
     with bench_for(wiring) as (live_wiring, _):
         findings = examination.examine(live_wiring)
-    rows = [(f.role, f.product, f.serial, f.firmware, *_measured(f)) for f in findings]
-    header = ("role", "product", "serial", "firmware", "rate Hz", "noise", "latency ms", "range seen")
-    console.print(table(header, rows, title="Devices"))
+    header = ("role", "device", "rate Hz", "noise", "latency ms", "range seen")
+    console.print(table(header, map(_row, findings), title="Devices"))
     write_json(json_file, {"devices": [asdict(finding) for finding in findings]})
     broken = [f"{finding.role}: {finding.problem}" for finding in findings if finding.problem]
     if broken:
