@@ -58,7 +58,7 @@ def test_a_person_runs_a_protocol_stops_it_and_finds_the_recordings(page: Page, 
     state(page, "running")
     expect(page.locator("#job-text")).to_contain_text("trial_001")
     state(page, "idle")
-    expect(page.locator("#recordings")).to_contain_text("first: 1 recordings")
+    expect(page.locator("#recordings")).to_contain_text("first: 1 recording,")
 
     expect(page.locator("#control")).to_contain_text("(this page)")
     page.click("#release")

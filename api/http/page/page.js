@@ -119,7 +119,8 @@ async function loadRecordings() {
   if (!sessions.length) return;
   at("recordings").replaceChildren(...sessions.map((session) => {
     const details = document.createElement("details"), summary = document.createElement("summary");
-    summary.textContent = `${session.name}: ${session.trials} recordings, ${session.samples} samples, ${session.dropped} dropped`;
+    const count = session.trials === 1 ? "1 recording" : `${session.trials} recordings`;
+    summary.textContent = `${session.name}: ${count}, ${session.samples} samples, ${session.dropped} dropped`;
     const list = document.createElement("ul");
     list.append(...session.recordings.map((file) => {
       const item = document.createElement("li"), link = document.createElement("a");
