@@ -28,7 +28,7 @@ LARGEST_LOG = 20.0
 # A model whose noise and scatter are this large against the signal explains nothing, however white its residual.
 MOST_CHANCE = 0.25
 # White: a leftover of 0.7 mN in the dither of a quiet bench comes to less, and nobody would act on it.
-LEAST_LEFT_N = 0.0002
+LEAST_LEFT_N = 0.0003
 
 
 @dataclass(frozen=True)
