@@ -21,7 +21,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -219,12 +219,10 @@ def known_faults() -> dict[str, Act]:
         return faults(bench.control)
 
 
-def missing(fault: str, act: Act, options: argparse.Namespace, done: Sequence[Trial]) -> Iterator[Trial]:
-    """The trials of one fault that are not among ``done``."""
-    over = {one.number for one in done if one.fault == fault}
-    for number in range(options.trials):
-        if number not in over:
-            yield _repeated(fault, act, number, options.seed)
+def missing(faults: Sequence[str], trials: int, done: Sequence[Trial]) -> list[tuple[str, int]]:
+    """What is not among ``done``: every fault once before any comes a second time, so that an end leaves none out."""
+    over = {(one.fault, one.number) for one in done}
+    return [(fault, number) for number in range(trials) for fault in faults if (fault, number) not in over]
 
 
 def _repeated(fault: str, act: Act, number: int, seed: int) -> Trial:
@@ -267,26 +265,24 @@ def read(file: Path | None) -> list[Trial]:
 
 
 def run(options: argparse.Namespace) -> list[Trial]:
-    """Runs what is missing, writes each trial, and prints the line of each fault once it is complete."""
+    """Runs what is missing, writes each trial as soon as it is done, and prints a line for every fault."""
     done, known = read(options.json), known_faults()
     unknown = [name for name in options.only if name not in known]
     if unknown:
         raise UsageError(f"--only {unknown[0]}: there are {', '.join(known)}")
     acts = {name: act for name, act in known.items() if name in options.only or not options.only}
     until_s = time.monotonic() + 60 * options.minutes
-    print(HEADER, flush=True)
-    for fault, act in acts.items():
-        for one in missing(fault, act, options, list(done)):
-            done.append(one)
-            if options.json:
-                write_text(options.json, json.dumps([asdict(each) for each in done], indent=2) + "\n")
-            if time.monotonic() > until_s:
-                break
-        mine = [one for one in done if one.fault == fault]
-        if mine:
-            print(line(mine), flush=True)
+    for fault, number in missing(list(acts), options.trials, done):
         if time.monotonic() > until_s:
             break
+        done.append(_repeated(fault, acts[fault], number, options.seed))
+        if options.json:
+            write_text(options.json, json.dumps([asdict(each) for each in done], indent=2) + "\n")
+    print(HEADER)
+    for fault in acts:
+        mine = [one for one in done if one.fault == fault]
+        if mine:
+            print(line(mine))
     return done
 
 

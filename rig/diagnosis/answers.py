@@ -11,7 +11,7 @@ from rig.diagnosis.evidence import Tangents, held_out_square_error, information,
 from rig.diagnosis.fit import Fit, least_squares
 from rig.diagnosis.gates import Finding
 from rig.diagnosis.noise import Array
-from rig.diagnosis.omnibus import Leftover, judged_leftover
+from rig.diagnosis.omnibus import Leftover, beaten, judged_leftover
 from rig.diagnosis.problem import Effect, Par, Problem
 from rig.diagnosis.search import Named, Search, imitated, testable
 from rig.diagnosis.simulated import Simulated
@@ -252,6 +252,9 @@ def verdict_of(search: Search, after: Leftover) -> tuple[Verdict, tuple[str, ...
     depends = judged_leftover(after, named)
     if depends != after.between and left_N(search.after, after) < LEAST_LEFT_N:
         depends = ()
+    if not depends:
+        plainer = [beaten(found.effect, search.after, found.without) for found in search.named]
+        depends = tuple(dict.fromkeys(name for names in plainer for name in names))
     if not depends:
         depends = imitated([found.effect for found in search.named])
     if not depends and left_to_chance(search.after) > MOST_CHANCE:

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.diagnosis.descent import prior_precision
-from rig.diagnosis.fit import Fit, by_recording
+from rig.diagnosis.fit import Fit, bounded, by_recording
 from rig.diagnosis.noise import Array
 from rig.diagnosis.problem import Effect, Values
 from rig.diagnosis.whitening import NUDGE
 
 DRAWS = 400
 FEWEST_TO_FLIP = 6
+MOST_BITS = 40
 ALIAS_SHARE = 1e-6
 PROBE = 0.1
 
@@ -97,7 +98,8 @@ def white_direction(fit: Fit, effect: Effect, amplitude: str, shape: Values) -> 
     values = {**fit.values, **{p.name: p.null for p in effect.amplitudes}, **shape}
     step = (NUDGE if effect.between else PROBE) * par.scale
     ahead = fit.whitener.predict({**values, amplitude: par.null + step})
-    return fit.whitener([(a - b) / step for a, b in zip(ahead, fit.prediction, strict=True)])
+    white = fit.whitener([(a - b) / step for a, b in zip(ahead, fit.prediction, strict=True)])
+    return bounded(white[:, None])[:, 0]
 
 
 def linear_gains(t: Tangents, gradients: Array) -> Array:
@@ -161,9 +163,20 @@ def chance_draws(t: Tangents, rng: np.random.Generator, draws: int = DRAWS) -> A
 
 
 def flipped_draws(t: Tangents, rng: np.random.Generator, draws: int = DRAWS) -> Array:
-    """The data's own gradients with whole recordings turned round at random, shape (draws, recordings, P)."""
-    signs = rng.choice([-1.0, 1.0], size=(draws, len(t.hessian), 1))
-    return np.asarray(signs * t.gradient)
+    """The data's own gradients with whole recordings turned round, shape (draws, recordings, P).
+
+    No draw turns all or none of them: that is what was observed, and is counted once already.
+    """
+    return np.asarray(_signs(len(t.hessian), rng, draws)[..., None] * t.gradient)
+
+
+def _signs(recordings: int, rng: np.random.Generator, draws: int) -> Array:
+    """Different ways to turn recordings round, the last one never: all there are, or ``draws`` of them."""
+    free = min(recordings - 1, MOST_BITS)
+    ways = 2**free - 1
+    codes = 1 + (np.arange(ways) if ways <= draws else rng.choice(ways, draws, replace=False))
+    turned = (codes[:, None] >> np.arange(free)) & 1
+    return np.concatenate([1.0 - 2.0 * turned, np.ones((len(codes), recordings - free))], axis=1)
 
 
 def chance_maxima(t: Tangents, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -175,6 +188,10 @@ def chance_maxima(t: Tangents, rng: np.random.Generator) -> tuple[Array, Array]:
 
 
 def chance(maxima: tuple[Array, Array], gain: float) -> float:
-    """Probability of at least ``gain`` by chance: the larger of the two nulls, never 0."""
-    values = [(1 + np.count_nonzero(m >= gain)) / (1 + len(m)) for m in maxima if m.size]
-    return float(max(values))
+    """Probability of at least ``gain`` by chance: the larger of the two nulls, never 0.
+
+    Few recordings can be turned in few ways; where none of them reaches ``gain`` the drawn null alone speaks.
+    """
+    drawn, turned = (np.count_nonzero(m >= gain) for m in maxima)
+    rarity = (1 + drawn) / (1 + len(maxima[0]))
+    return float(max(rarity, (1 + turned) / (1 + len(maxima[1])) if turned else 0.0))

@@ -15,6 +15,9 @@ LM_STEPS = 8
 NOISE_ROUNDS = 25
 QUICK_ROUNDS = 5
 SETTLED_NATS = 0.1
+FALLS_APART_NATS = 0.1
+MOST_OF_ONE_ROW = 0.05
+BOUND_PASSES = 12
 
 
 @dataclass(frozen=True)
@@ -189,10 +192,19 @@ def level_of(model: Fit) -> float:
 
 
 def refreshed(model: Fit) -> Fit:
-    """The same model with the rows it cannot judge marked anew from where it now sees the contact."""
+    """The same model with the rows it cannot judge marked anew from where it now sees the contact.
+
+    Once only: a model that is wrong about something else walks away from the rows taken from it. One that falls apart
+    on the new rows stays as it was.
+    """
     values = shifted(model.problem, model.values, model.whitener.noise.shifts)
     whitener = replace(model.whitener, blind=model.problem.blind(values))
-    return fit(model.problem, model.effects, model.values, whitener)
+    fresh = fit(model.problem, model.effects, model.values, whitener)
+    return fresh if _level_of_a_row(fresh) > _level_of_a_row(model) - FALLS_APART_NATS else model
+
+
+def _level_of_a_row(model: Fit) -> float:
+    return level_of(model) / max(sum(int(np.count_nonzero(keep)) for keep in model.whitener.judged), 1)
 
 
 def assemble(problem: Problem, effects: Sequence[Effect], values: Values, whitener: Whitener) -> Fit:
@@ -200,11 +212,25 @@ def assemble(problem: Problem, effects: Sequence[Effect], values: Values, whiten
     prediction = whitener.predict(values)
     free = tuple(par for par in free_parameters(problem, effects) if not on_bound(par, values[par.name]))
     raw = jacobian(whitener, values, free, prediction)
-    columns, white = whitener(raw), whitener.residual(prediction)
+    columns, white = bounded(whitener(raw)), whitener.residual(prediction)
     hessian, gradient, loss = by_recording(problem, columns, white)
     return Fit(
         problem, tuple(effects), values, whitener, free, prediction, columns, white, raw[0], hessian, gradient, loss
     )
+
+
+def bounded(columns: Array) -> Array:
+    """White columns (n, p) in which no row holds more than a twentieth of what all of them know of a direction.
+
+    Contact and release are kinks: a fit that is wrong about something else comes to rest with a kink on a sample, whose
+    derivative would then outweigh the whole recording (bounded influence, Mallows 1975).
+    """
+    for _ in range(BOUND_PASSES):
+        leverage = ((columns @ np.linalg.pinv(columns.T @ columns, hermitian=True)) * columns).sum(axis=1)
+        if leverage.max(initial=0.0) <= 1.5 * MOST_OF_ONE_ROW:
+            break
+        columns = columns * np.sqrt(np.minimum(1.0, MOST_OF_ONE_ROW / np.maximum(leverage, 1e-300)))[:, None]
+    return columns
 
 
 def by_recording(problem: Problem, columns: Array, white: Array) -> tuple[Array, Array, Array]:

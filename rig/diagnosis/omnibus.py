@@ -7,13 +7,15 @@ largest gain over all variables.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from rig.diagnosis.descent import prior_precision
 from rig.diagnosis.evidence import FEWEST_TO_FLIP, Tangents, chance, chance_draws, flipped_draws, held_out
 from rig.diagnosis.fit import Fit, by_recording
-from rig.diagnosis.noise import Array
+from rig.diagnosis.noise import Array, starts_of
+from rig.diagnosis.problem import Effect, Problem
 
 BUMPS = 6
 DRAWS = 200
@@ -28,6 +30,8 @@ RIDGE = 0.05
 BETWEEN = ("session time", "stroke number", "speed", "temperature")
 FEWEST_BETWEEN = 8
 BETWEEN_DRAWS = 999
+BEATEN_NATS = 3.0
+EVEN_SHARE = 0.05
 
 
 @dataclass(frozen=True)
@@ -47,12 +51,16 @@ class Leftover:
 
 
 def bumps(variable: Array) -> Array:
-    """Gaussian bumps between the 1st and 99th percentile, shape (n, 6); none where the variable is constant."""
-    low, high = np.percentile(variable, [1, 99])
+    """Gaussian bumps between the outer permilles, beyond which they stay; (n, 6), none where nothing varies.
+
+    A fast stroke is over soon: a hundredth of the samples may hold all of the highest speed.
+    """
+    low, high = np.percentile(variable, [0.1, 99.9])
     if not high > low:
         return np.empty((len(variable), 0))
     centres = np.linspace(low, high, BUMPS)
-    return np.asarray(np.exp(-0.5 * ((variable[:, None] - centres) / (centres[1] - centres[0])) ** 2))
+    inside = np.clip(variable, low, high)[:, None]
+    return np.asarray(np.exp(-0.5 * ((inside - centres) / (centres[1] - centres[0])) ** 2))
 
 
 def variables(fit: Fit) -> dict[str, Array]:
@@ -114,46 +122,102 @@ def between_recordings(fit: Fit, rng: np.random.Generator) -> tuple[tuple[str, .
     count = len(shifts)
     if count < FEWEST_BETWEEN:
         return (), 1.0
-    recording = fit.problem.channels[0].recording
-    means = {name: np.bincount(recording, values) / np.bincount(recording) for name, values in
-             fit.problem.variables().items() if name in BETWEEN}  # fmt: skip
-    patterns, owners = [], []
-    for name, mean in means.items():
-        if np.ptp(mean) > 0:
-            for pattern in _patterns(mean):
-                patterns.append(pattern)
-                owners.append(name)
-    if not patterns:
+    patterns, owners = _trends_and_steps(fit.problem)
+    if not owners:
         return (), 1.0
-    basis, scores = np.stack(patterns), _standard(shifts.T)
-    strength = np.abs(basis @ scores.T)  # (patterns, quantities)
-    best = float(strength.max())
+    beside = beside_named(fit)
+    basis = _unit(np.einsum("qrs,ps->qpr", beside, patterns))
+
+    def strength(rows: Array) -> Array:
+        """Correlation of rows (quantities, draws, recordings) with every pattern, (draws, patterns)."""
+        own = _unit(np.einsum("qrs,qds->qdr", beside, rows))
+        return np.asarray(np.abs(np.einsum("qpr,qdr->qdp", basis, own)).max(axis=0))
+
+    observed = strength(shifts.T[:, None])[0]
+    best = float(observed.max())
     orders = np.stack([rng.permutation(count) for _ in range(BETWEEN_DRAWS)])
-    shuffled = scores[:, orders]
-    drawn = _standard(rng.standard_normal((len(scores), BETWEEN_DRAWS, count)))
-    p_order, p_normal = (_rarity(basis, rows, best) for rows in (shuffled, drawn))
-    p_value = p_normal if p_order <= ORDER_LEVEL else 1.0
-    strongest = strength.max(axis=1)
-    found = dict.fromkeys(owners[k] for k in np.argsort(-strongest) if strongest[k] > 0.95 * best)
-    return tuple(found), float(p_value)
+    drawn = rng.standard_normal((shifts.shape[1], BETWEEN_DRAWS, count))
+    p_order, p_normal = (
+        float((1 + np.count_nonzero(strength(rows).max(axis=1) >= best)) / (1 + BETWEEN_DRAWS))
+        for rows in (shifts.T[:, orders], drawn)
+    )
+    found = dict.fromkeys(owners[k] for k in np.argsort(-observed) if observed[k] > 0.95 * best)
+    return tuple(found), p_normal if p_order <= ORDER_LEVEL else 1.0
 
 
-def _rarity(basis: Array, rows: Array, best: float) -> float:
-    """Share of draws, rows (quantities, draws, recordings), with a correlation of at least ``best`` somewhere."""
-    null = np.abs(np.einsum("pr,qdr->dpq", basis, rows)).max(axis=(1, 2))
-    return float((1 + np.count_nonzero(null >= best)) / (1 + len(null)))
+def beside_named(fit: Fit) -> Array:
+    """Projectors (quantities, recordings, recordings) that take off the mean and what named causes can do to shifts.
+
+    A step that a named trend has half explained is a step again beside it.
+    """
+    taken = [_level(fit), *(carried(fit, effect) for effect in fit.effects if effect.between)]
+    columns = np.concatenate(taken, axis=2)
+    return np.eye(fit.problem.recordings) - columns @ np.linalg.pinv(columns, rcond=1e-6)
 
 
-def _standard(rows: Array) -> Array:
-    centred = rows - rows.mean(axis=-1, keepdims=True)
-    return np.asarray(centred / np.maximum(np.linalg.norm(centred, axis=-1, keepdims=True), 1e-300))
+def _level(fit: Fit) -> Array:
+    return np.ones((len(fit.problem.scatter), fit.problem.recordings, 1))
+
+
+def carried(fit: Fit, effect: Effect) -> Array:
+    """What a named effect does to the recordings as if it were shifts, (quantities, recordings, parameters)."""
+    names = {par.name for par in effect.pars}
+    columns = [k for k, par in enumerate(fit.free) if par.name in names]
+    colour, keep = fit.whitener.noise.colours[0], fit.whitener.judged[0]
+    secants, moves = colour.whiten(fit.whitener.secants, keep), colour.whiten(fit.raw[:, columns], keep)
+    starts = starts_of(fit.problem.channels[0].recording, fit.problem.recordings)
+    return np.stack([np.linalg.lstsq(secants[i:j], moves[i:j], rcond=None)[0] for i, j in pairwise(starts)], axis=1)
+
+
+def beaten(effect: Effect, after: Fit, without: Fit) -> tuple[str, ...]:
+    """Variables a plain step or trend over which predicts the recordings' shifts better than a named effect does.
+
+    Judged on the model without the effect, each recording left out; what was tried is taken off the evidence.
+    """
+    if not effect.between or after.problem.recordings < FEWEST_BETWEEN:
+        return ()
+    patterns, owners = _trends_and_steps(after.problem)
+    own, shifts = carried(after, effect), without.whitener.noise.shifts.T
+    size = np.abs(own[:, :, 0]).max(axis=1) / np.maximum(without.whitener.noise.scatter_sd, 1e-12)
+    quantity = int(size.argmax())
+    if np.ptp(own[quantity, :, 0]) < EVEN_SHARE * np.abs(own[quantity, :, 0]).max():
+        return ()
+    level = np.ones((after.problem.recordings, 1))
+    mine = _left_out(np.concatenate([level, own[quantity]], axis=1), shifts[quantity])
+    plain = np.array([_left_out(np.column_stack([level, pattern]), shifts[quantity]) for pattern in patterns])
+    cost = np.log(len(np.unique(patterns.round(9), axis=0)))
+    if not owners or plain.max() - mine - cost < BEATEN_NATS:
+        return ()
+    return tuple(dict.fromkeys(owner for owner, nats in zip(owners, plain, strict=True) if nats > plain.max() - 0.5))
+
+
+def _left_out(columns: Array, shifts: Array) -> float:
+    """Log density of shifts (recordings,) each left out of a least-squares fit, up to a constant (Allen's PRESS)."""
+    hat = columns @ np.linalg.pinv(columns)
+    errors = (shifts - hat @ shifts) / np.maximum(1 - np.diag(hat), 1e-9)
+    return float(-0.5 * len(shifts) * np.log(max(float(errors @ errors), 1e-300)))
+
+
+def _trends_and_steps(problem: Problem) -> tuple[Array, list[str]]:
+    """Patterns (patterns, recordings) of every variable that differs between recordings, and the variable of each."""
+    recording, patterns, owners = problem.channels[0].recording, [np.empty((0, problem.recordings))], list[str]()
+    for name, values in problem.variables().items():
+        mean = np.bincount(recording, values) / np.bincount(recording)
+        if name in BETWEEN and np.ptp(mean) > 0:
+            patterns.append(_patterns(mean))
+            owners += [name] * len(patterns[-1])
+    return np.concatenate(patterns), owners
+
+
+def _unit(rows: Array) -> Array:
+    return np.asarray(rows / np.maximum(np.linalg.norm(rows, axis=-1, keepdims=True), 1e-300))
 
 
 def _patterns(mean: Array) -> Array:
-    """A straight trend and every step with at least three recordings on each side, unit rows (patterns, recordings)."""
+    """A straight trend and every step with at least three recordings on each side, rows (patterns, recordings)."""
     rank = np.argsort(np.argsort(mean, kind="stable"), kind="stable")
     steps = [np.where(rank >= k, 1.0, 0.0) for k in range(3, len(mean) - 2)]
-    return _standard(np.stack([mean, *steps]))
+    return np.stack([mean - mean.mean(), *steps])
 
 
 def _gains(t: Tangents, groups: Mapping[str, tuple[int, ...]], gradients: Array) -> Array:

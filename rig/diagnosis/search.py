@@ -13,11 +13,12 @@ from rig.diagnosis.evidence import (
     chance,
     chance_maxima,
     held_out_log_density,
+    held_out_square_error,
     is_alias,
     linear_gains,
     tangents,
 )
-from rig.diagnosis.fit import Fit, attempt, best_fit, bold_fit, bold_view, fit, glance, refreshed
+from rig.diagnosis.fit import Fit, attempt, best_fit, bold_fit, bold_view, fit, glance, least_squares, refreshed
 from rig.diagnosis.noise import Array
 from rig.diagnosis.omnibus import LEVEL, leftover
 from rig.diagnosis.problem import Effect, Problem, Values
@@ -27,8 +28,8 @@ SHORT_LIST = 5
 MOST_EFFECTS = 3
 RIVAL_SE = 2.0
 KEEP_NATS = 3.0
+MUCH_WORSE = 1.1
 START_SCALES = 0.05
-BETWEEN_NATS = 0.3
 STANDS_OUT_NATS = 3.0
 FOLLOWED = 5
 REACH_NATS = 20.0
@@ -104,14 +105,14 @@ def score(model: Fit) -> Array:
 def candidates(current: Fit, t: Tangents) -> list[Fit]:
     """Effects that may be next, jointly refitted, best first.
 
-    Tried are those within reach of the best by the linear gain, whatever passes for scatter where it has any gain, and,
-    where anything stands out, the best of a second look under noise too small to have swallowed them.
+    Tried are those within reach of the best by the linear gain, whatever may pass for scatter, and, where anything
+    stands out, the best of a second look under noise too small to have swallowed them.
     """
     problem, ranked = current.problem, screened(t, current.problem)
     top = ranked[0][0] if ranked else 0.0
     reach = max(within_reach(top), 0.0)
     near = [d for gain, d in ranked[:SHORT_LIST] if gain > reach]
-    near += [d for gain, d in ranked if d.effect.between and gain > BETWEEN_NATS and d not in near]
+    near += [d for _, d in ranked if d.effect.between and d not in near]
     starts = [((*current.effects, d.effect), started(current, d, t)) for d in near]
     fits = [attempt(problem, effects, start, current.whitener) for effects, start in starts]
     if top > STANDS_OUT_NATS or leftover(current, np.random.default_rng(0)).p_value <= LEVEL:
@@ -195,6 +196,9 @@ def search(problem: Problem, before: Fit, rng: np.random.Generator, progress: Pr
         current = refreshed(found[0])
     progress("drop and swap", 0.8)
     current = dropped(current)
+    if not current.effects and float((score(current) - score(before)).sum()) > KEEP_NATS:
+        # Taking the cause away led the simulation to a better fit than it had begun with: begin there.
+        return search(problem, current, rng, progress)
     # A single cause that left all others far behind has no rivals; with more than one the order of naming may mislead.
     named, current = swapped(current, library if len(current.effects) > 1 or not alone else (), p_values)
     if current.names != tuple(p_values):
@@ -218,12 +222,19 @@ def without(model: Fit, name: str) -> Fit:
 
 
 def dropped(model: Fit) -> Fit:
-    """Without the effects that stopped earning their place, or shrank below it, once others had joined."""
+    """Without the effects that stopped earning their place, shrank below it, or predict worse, once others joined."""
     for effect in model.effects:
         smaller = without(model, effect.name)
-        if not alive(effect, model.values) or float((score(model) - score(smaller)).sum()) < KEEP_NATS:
+        earned = float((score(model) - score(smaller)).sum())
+        if not alive(effect, model.values) or earned < KEEP_NATS or (len(model.effects) > 1 and worse(model, smaller)):
             return dropped(smaller)
     return model
+
+
+def worse(model: Fit, smaller: Fit) -> bool:
+    """Whether the larger model is further from recordings left out, in the channel's unit, by a tenth and more."""
+    errors = [held_out_square_error(least_squares(one)).mean() for one in (model, smaller)]
+    return bool(errors[0] > MUCH_WORSE**2 * errors[1])
 
 
 def swapped(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:

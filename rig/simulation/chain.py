@@ -41,6 +41,7 @@ NULLS: dict[str, float] = {
     "ripple_pitch_mm": 2.0,
     "friction_N": 0.0,
     "friction_length_mm": 0.1,
+    "friction_start_1": 0.0,
     "tip_inertia_kg": 0.0,
     "filter_lag_s": 0.0,
     "gain_error_1": 0.0,
@@ -204,7 +205,8 @@ def friction(drive: Drive, tip: Tip, v: Fields) -> Array | float:
     """Guide in front of the sensor: Dahl friction [N]."""
     if not one(v, "friction_N"):
         return 0.0
-    return one(v, "friction_N") * dahl(tip.position_mm, drive.first, one(v, "friction_length_mm"))
+    state = dahl(tip.position_mm, drive.first, one(v, "friction_length_mm"), one(v, "friction_start_1"))
+    return one(v, "friction_N") * state
 
 
 def on_sensor(drive: Drive, tip: Tip, v: Fields) -> Array:

@@ -44,11 +44,11 @@ def low_pass(signal: Array, time_s: Array, first: NDArray[np.bool_], tau_s: floa
     return signal - high_pass(signal, time_s, first, tau_s)
 
 
-def dahl(position: Array, first: NDArray[np.bool_], length: float) -> Array:
-    """Friction state z in -1..1 of ``dz/dx = (1 - sgn(v) z) / length`` (Dahl 1968), 0 at the start of a recording."""
+def dahl(position: Array, first: NDArray[np.bool_], length: float, start: float = 0.0) -> Array:
+    """Friction state z in -1..1 of ``dz/dx = (1 - sgn(v) z) / length`` (Dahl 1968), from ``start`` on."""
     travel = np.where(first, 0.0, np.diff(position, prepend=position[:1]))
     decay = np.exp(-np.abs(travel) / length)
-    return recurrence(np.where(first, 0.0, decay), (1 - decay) * np.sign(travel))
+    return recurrence(np.where(first, 0.0, decay), np.where(first, start, (1 - decay) * np.sign(travel)))
 
 
 def play(position: Array, first: NDArray[np.bool_], width: float) -> Array:

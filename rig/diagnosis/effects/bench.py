@@ -109,19 +109,11 @@ FRICTION = Effect(
     "the guide in front of the sensor rubs with {friction_N:.3g} N",
     (Par("friction_N", "N", 0.0, 0.0, 20.0, 0.02, worth=0.005, meaning="Coulomb level"),),
     (
-        Par(
-            "friction_length_mm",
-            "mm",
-            0.1,
-            2e-3,
-            5.0,
-            1.0,
-            log=True,
-            may_end=True,
-            meaning="travel over which it builds up",
-        ),
+        Par("friction_length_mm", "mm", 0.1, 2e-3, 5.0, 1.0, log=True, may_end=True, meaning="travel to build it up"),
+        # A recording begins where the way out of the one before has left the guide.
+        Par("friction_start_1", "1", 0.0, -1.0, 1.0, 0.2, may_end=True, meaning="share of it when a recording begins"),
     ),
-    lambda *_: [{"friction_length_mm": length} for length in (0.005, 0.03, 0.15, 0.6)],
+    lambda *_: [{"friction_length_mm": mm, "friction_start_1": -0.5} for mm in (0.005, 0.03, 0.15, 0.6)],
     one_sided=True,
     needs=frozenset({"unloading"}),
     repair="clean and align the guide, or put the sensor at the tip",

@@ -48,6 +48,10 @@ def test_dahl_friction_builds_up_over_its_length_and_turns_after_a_reversal() ->
     np.testing.assert_allclose(state[10], 1 - np.exp(-1), atol=1e-12)
     assert state[100] > 0.999
     assert state[200] < -0.999
+    # Begun where a way out left the guide, all of the change comes once more.
+    left = dahl(position, first, 0.1, -1.0)
+    assert left[0] == -1.0
+    np.testing.assert_allclose(left - state, -np.exp(-np.cumsum(np.abs(np.diff(position, prepend=0.0))) / 0.1))
 
 
 def test_relaxation_of_a_ramp_is_the_textbook_exponential() -> None:
