@@ -28,7 +28,7 @@ SHORT_LIST = 5
 MOST_EFFECTS = 3
 RIVAL_SE = 2.0
 KEEP_NATS = 3.0
-MUCH_WORSE = 1.1
+WORSE = 1.01
 START_SCALES = 0.05
 STANDS_OUT_NATS = 3.0
 FOLLOWED = 5
@@ -200,7 +200,7 @@ def search(problem: Problem, before: Fit, rng: np.random.Generator, progress: Pr
         # Taking the cause away led the simulation to a better fit than it had begun with: begin there.
         return search(problem, current, rng, progress)
     # A single cause that left all others far behind has no rivals; with more than one the order of naming may mislead.
-    named, current = swapped(current, library if len(current.effects) > 1 or not alone else (), p_values)
+    named, current = settled(current, library if len(current.effects) > 1 or not alone else (), p_values)
     if current.names != tuple(p_values):
         t = tangents(current, [effect for effect in library if effect.name not in current.names])
         maxima = chance_maxima(t, rng)
@@ -222,19 +222,30 @@ def without(model: Fit, name: str) -> Fit:
 
 
 def dropped(model: Fit) -> Fit:
-    """Without the effects that stopped earning their place, shrank below it, or predict worse, once others joined."""
+    """Without the effects that stopped earning their place, or shrank below it, once others had joined."""
     for effect in model.effects:
         smaller = without(model, effect.name)
-        earned = float((score(model) - score(smaller)).sum())
-        if not alive(effect, model.values) or earned < KEEP_NATS or (len(model.effects) > 1 and worse(model, smaller)):
+        if not alive(effect, model.values) or float((score(model) - score(smaller)).sum()) < KEEP_NATS:
             return dropped(smaller)
     return model
 
 
+def settled(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:
+    """After the swaps, without what earns nothing or takes the simulation further from recordings it has not seen.
+
+    However sure a cause is of itself, one that predicts worse in newtons explains nothing.
+    """
+    named, model = swapped(model, library, p_values)
+    weak = [one for one in named if one.gains.sum() < KEEP_NATS or worse(model, one.without)]
+    if not weak:
+        return named, model
+    return settled(min(weak, key=lambda one: float(one.gains.sum())).without, (), p_values)
+
+
 def worse(model: Fit, smaller: Fit) -> bool:
-    """Whether the larger model is further from recordings left out, in the channel's unit, by a tenth and more."""
+    """Whether the larger model's error on recordings left out is larger, by a hundredth and more."""
     errors = [held_out_square_error(least_squares(one)).mean() for one in (model, smaller)]
-    return bool(errors[0] > MUCH_WORSE**2 * errors[1])
+    return bool(errors[0] > WORSE**2 * errors[1])
 
 
 def swapped(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:

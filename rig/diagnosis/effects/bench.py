@@ -69,7 +69,7 @@ BACKLASH = Effect(
 FRAME_COMPLIANCE = Effect(
     "frame_compliance",
     "the frame gives way by {frame_compliance_mm_N:.3g} mm per newton between encoder and tip",
-    (Par("frame_compliance_mm_N", "mm/N", 0.0, 0.0, 0.8, 0.005, worth=0.001, meaning="tip behind encoder per force"),),
+    (Par("frame_compliance_mm_N", "mm/N", 0.0, 0.0, 0.8, 0.005, worth=0.002, meaning="tip behind encoder per force"),),
     one_sided=True,
     needs=frozenset({"tracker", "depth"}),
     aliases=("stiffness_N_mm", "stiffening_1_mm"),
