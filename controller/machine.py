@@ -38,6 +38,11 @@ class Machine:
         return self._program is not None or self.mode in MOVING
 
     @property
+    def run(self) -> Run | None:
+        """The step under way as it is run."""
+        return self._run
+
+    @property
     def step(self) -> Step | None:
         """The step under way."""
         return self._program.steps[self.step_index] if self._program else None

@@ -11,13 +11,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller import force_position, stretches
+from controller import force_position, lines, stretches
 from controller.force_position import Columns
+from controller.lines import Line
 from controller.machine import Machine
 from controller.modes import Mode
 from controller.motion import Setpoint
 from controller.safety import Incident, Watch
-from controller.steps import Approach, Program, Retract, TrackForce
+from controller.steps import Approach, ApproachRun, Program, Retract, TrackForce
 from controller.stretches import Bench, Bounds, Clock, Move, Plant, Speeds, Stretch, Zeros, hold_compiled
 from controller.world import World
 from rig.config.wiring import Wiring
@@ -91,7 +92,7 @@ class _Playback:
         self._world = World(dt_s=self._period_s, acceleration_mm_s2=acceleration, position_mm=start_mm)
         self._machine = Machine(wiring, self._world, lambda _, incident: self._ended.append(incident))
         self._machine.start(program)
-        self._law: tuple[TrackForce, Columns] | None = None
+        self._law: tuple[TrackForce, Columns, Line] | None = None
 
     def play(self, stretched: bool) -> Trace:
         steps, watch = round(self._period_s / axis_plant.STEP_S), Watch()
@@ -133,13 +134,13 @@ class _Playback:
 
     def _stretch(self, steps: int) -> None:
         """As many ticks as can be without the state machine; none where it has to decide."""
-        world, step = self._world, self._machine.step
+        world, step, run = self._world, self._machine.step, self._machine.run
         if world.now_ns == self._machine.step_start_ns:  # its first tick may set more than the set-point
             return
         if isinstance(step, TrackForce) and world.memory is not None:
             self._follow(step, steps)
-        elif isinstance(step, Approach):
-            self._travel(step.search_to_mm, step.speed_mm_s, step.threshold_N(world), steps)
+        elif isinstance(step, Approach) and isinstance(run, ApproachRun) and run.has_run_in:
+            self._travel(step.search_to_mm, step.speed_mm_s, run.threshold_N(world), steps)
         elif isinstance(step, Retract):
             self._travel(step.target_mm(world), step.speed_mm_s, math.inf, steps)
 
@@ -147,12 +148,13 @@ class _Playback:
         world = self._world
         assert world.memory
         if self._law is None or self._law[0] is not step:
-            self._law = step, _columns(step)
+            self._law = step, _columns(step), lines.previewed(step.given, step.preview_s)
         elapsed_s = self._times_ns(LONGEST_STRETCH, self._machine.step_start_ns) * 1e-9
-        elapsed_s = elapsed_s[elapsed_s < step.times_s[-1] * step.repeats]
-        reference_N = reference_at(step, elapsed_s)
+        elapsed_s = elapsed_s[elapsed_s < step.given.duration_s]
+        reference_N = lines.along(step.given, elapsed_s)
+        asked_N = lines.along(self._law[2], elapsed_s)
         done, world.memory = stretches.track(
-            self._now, world.memory, self._law[1], step.settings, reference_N, self._drawn(len(reference_N)),
+            self._now, world.memory, self._law[1], step.settings, asked_N, self._drawn(len(asked_N)),
             self._plant, Clock(self._tick, self._period_s, steps), self._zeros(), _speeds(step, self._period_s),
             self._bounds(),
         )  # fmt: skip
@@ -189,17 +191,6 @@ class _Playback:
             self._wiring.force_limit_N, limits.depth_mm, axis.following_error_mm,
             limits.position_min_mm, limits.position_max_mm,
         )  # fmt: skip
-
-
-def reference_at(step: TrackForce, elapsed_s: Column) -> Column:
-    """What `TrackForceRun` follows at each time, all at once."""
-    times, forces = np.array(step.times_s), np.array(step.forces_N)
-    played = np.minimum((elapsed_s / times[-1]).astype(np.int64), step.repeats - 1)
-    within_s = elapsed_s - played * times[-1]
-    at = np.clip(np.searchsorted(times, within_s, side="right") - 1, 0, len(times) - 2)
-    span_s = times[at + 1] - times[at]
-    share = np.clip(np.divide(within_s - times[at], span_s, out=np.ones_like(within_s), where=span_s > 0), 0.0, 1.0)
-    return np.asarray(forces[at] + share * (forces[at + 1] - forces[at]))
 
 
 def _columns(step: TrackForce) -> Columns:

@@ -9,8 +9,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from controller import force_position
+from controller import force_position, lines
 from controller.force_position import GainRow, Settings
+from controller.lines import Line
 from controller.modes import Mode
 from controller.motion import Setpoint, arrived, clamp, toward
 from controller.world import World
@@ -94,10 +95,6 @@ class Approach(Table):
         """A run of this step."""
         return ApproachRun(self)
 
-    def threshold_N(self, world: World) -> float:
-        """Force that may be contact."""
-        return max(self.contact_force_N, CONTACT_NOISE * world.noise_N)
-
 
 class ApproachRun:
     """Counts consecutive samples above the threshold: one spike is not contact, and neither is the sensor's noise.
@@ -110,14 +107,19 @@ class ApproachRun:
         self._step, self._above, self._seen = step, 0, -1
         self._from_mm, self._rubbing_N = math.nan, LARGEST_RUBBING_N
         self._running_in_N: list[float] = []
+        self.has_run_in = False
+
+    def threshold_N(self, world: World) -> float:
+        """Force that may be contact."""
+        return max(self._step.contact_force_N, CONTACT_NOISE * world.noise_N) + self._rubbing_N
 
     def advance(self, world: World, elapsed_s: float) -> bool:  # noqa: ARG002
         """One tick of the search; raises SafetyStop where it ends without contact."""
         if world.force_samples != self._seen:
             self._seen = world.force_samples
-            self._run_in(world)
-            threshold_N = self._step.threshold_N(world) + self._rubbing_N
-            self._above = self._above + 1 if world.force_N > threshold_N else 0
+            if not self.has_run_in:
+                self._run_in(world)
+            self._above = self._above + 1 if world.force_N > self.threshold_N(world) else 0
         if self._above >= CONTACT_SAMPLES:
             world.surface_mm, world.memory = world.position_mm, None
             world.setpoint = Setpoint(world.setpoint.position_mm, 0.0)
@@ -134,11 +136,11 @@ class ApproachRun:
         if math.isnan(self._from_mm):
             self._from_mm = world.position_mm
         moved_mm = world.position_mm - self._from_mm
-        if 0.5 * RUN_IN_MM <= moved_mm < RUN_IN_MM:
+        if moved_mm >= RUN_IN_MM:
+            self.has_run_in = True
+            self._rubbing_N = min(max(fmean(self._running_in_N or [0.0]), 0.0), LARGEST_RUBBING_N)
+        elif moved_mm >= 0.5 * RUN_IN_MM:
             self._running_in_N.append(world.force_N)
-        elif self._running_in_N:
-            self._rubbing_N = min(max(fmean(self._running_in_N), 0.0), LARGEST_RUBBING_N)
-            self._running_in_N = []
 
 
 class Compress(Table):
@@ -216,7 +218,8 @@ class DitherRun:
 class TrackForce(Table):
     """Follows a force: a list of (seconds, newtons) joined by straight lines, played ``repeats`` times.
 
-    The law goes on where the track step before it ended.
+    The law goes on where the track step before it ended. What it is to follow is known beforehand, so it is asked for
+    what will be wanted when the axis has followed.
     """
 
     step: Literal["track"] = "track"
@@ -227,6 +230,7 @@ class TrackForce(Table):
     gains: tuple[GainRow, ...] = Field(min_length=2)
     damping_N_s_mm: Annotated[float, Field(ge=0)] = 0.0
     lag_s: Annotated[float, Field(ge=0)] = 0.0
+    preview_s: float = Field(default=0.0, ge=0, description="how much earlier the law is asked for it")
     ahead_mm_s: float = Field(default=24.0, ge=0, description="speed of the inverse model; 0: it is not used")
     forgetting: float = Field(default=0.0, ge=0, lt=1, description="0: stiffness is not adapted")
     drift_Hz: float = Field(default=0.0, ge=0, description="corner of the second integral; 0: none")
@@ -238,6 +242,11 @@ class TrackForce(Table):
     speed_limit_mm_s: Positive = 30.0
     search_speed_mm_s: Positive = 5.0
     contact_force_N: Positive = 0.1
+
+    @property
+    def given(self) -> Line:
+        """The force that is to be there."""
+        return Line(self.times_s, self.forces_N, self.repeats)
 
     @property
     def settings(self) -> Settings:
@@ -258,41 +267,31 @@ class TrackForceRun:
     """The force loop; below the contact threshold it only searches, slowly."""
 
     def __init__(self, step: TrackForce) -> None:
-        self._step, self._at, self._begun = step, 0, 0
+        self._step, self._given = step, step.given
+        self._asked = lines.previewed(step.given, step.preview_s)
         self._table = force_position.columns(step.gains)
         self._settings = step.settings
 
     def advance(self, world: World, elapsed_s: float) -> bool:
         """One tick of the force loop around the position loop."""
         step = self._step
-        world.reference_N = self._reference(elapsed_s)
-        over = elapsed_s >= step.times_s[-1] * step.repeats
+        world.reference_N = lines.at(self._given, elapsed_s)
+        asked_N = lines.at(self._asked, elapsed_s)
+        over = elapsed_s >= self._given.duration_s
         if world.force_late:  # an old force corrected again and again is how a stall becomes a push
             world.setpoint = Setpoint(world.setpoint.position_mm, 0.0)
             return over
         if world.memory is None:
             world.memory = force_position.begin(self._table, world.force_N, world.depth_mm, self._settings.friction_N)
         delta_mm, world.memory = force_position.increment(
-            world.memory, self._table, self._settings, world.reference_N, world.force_N, world.depth_mm, world.dt_s
+            world.memory, self._table, self._settings, asked_N, world.force_N, world.depth_mm, world.dt_s
         )
         world.tangent_N_mm = world.memory.tangent_N_mm
-        lost = world.force_N < 0.5 * step.contact_force_N < world.reference_N
+        lost = world.force_N < 0.5 * step.contact_force_N < asked_N
         limit_mm = (step.search_speed_mm_s if lost else step.speed_limit_mm_s) * world.dt_s
         delta_mm = clamp(delta_mm, 0.0, limit_mm)
         world.setpoint = Setpoint(world.setpoint.position_mm + delta_mm, delta_mm / world.dt_s)
         return over
-
-    def _reference(self, elapsed_s: float) -> float:
-        times, forces, length_s = self._step.times_s, self._step.forces_N, self._step.times_s[-1]
-        played = min(int(elapsed_s / length_s), self._step.repeats - 1)
-        if played != self._begun:
-            self._begun, self._at = played, 0
-        elapsed_s -= played * length_s
-        while self._at + 2 < len(times) and elapsed_s >= times[self._at + 1]:
-            self._at += 1
-        start_s, end_s = times[self._at], times[self._at + 1]
-        share = min(max((elapsed_s - start_s) / (end_s - start_s), 0.0), 1.0) if end_s > start_s else 1.0
-        return forces[self._at] + share * (forces[self._at + 1] - forces[self._at])
 
 
 class Retract(Table):

@@ -30,8 +30,6 @@ SMOOTH_S = 0.05
 GAIN_ROWS = 40
 APPROACH_MM_S = 5.0
 CONTACT_N = 0.05
-# All of it at 5 Hz arrives too late at the axis and does harm: 0.043 N rms became 0.057 N with friction of 0.084 N.
-COMPENSATED = 0.5
 
 Column = NDArray[np.float64]
 
@@ -111,6 +109,11 @@ def design_for(wiring: Wiring) -> Design:
     )
 
 
+def sensor_lag_s(wiring: Wiring) -> float:
+    """How old a force is when the loop has it: its way here, and on average half of the time until the next one."""
+    return wiring.force.latency_ms * 1e-3 + 0.5 / wiring.force.sampled_Hz
+
+
 def force_law(model: Model, wiring: Wiring, choice: Choice, adapt: bool) -> TrackForce:
     """A track step with its gains, without a reference of its own yet."""
     design = design_for(wiring)
@@ -127,11 +130,12 @@ def force_law(model: Model, wiring: Wiring, choice: Choice, adapt: bool) -> Trac
         gains=schedule(model, design, depths, choice),
         damping_N_s_mm=model.damping_N_s_mm,
         lag_s=design.lag_s if ahead else 0.0,
+        preview_s=max(0.0, design.lag_s - sensor_lag_s(wiring)) if ahead else 0.0,
         ahead_mm_s=AHEAD_SHARE * speed_mm_s if ahead else 0.0,
         forgetting=FORGETTING if adapt else 0.0,
         drift_Hz=design.drift_Hz,
         memory=tuple((term.ratio, term.tau_s) for term in model.law.terms[:2]),
-        friction_N=COMPENSATED * friction_N,
+        friction_N=friction_N,
         friction_mm=friction_mm,
         speed_limit_mm_s=speed_mm_s,
         search_speed_mm_s=min(APPROACH_MM_S, wiring.limits.speed_mm_s),

@@ -27,7 +27,7 @@ USED = {
     "substrate": ELASTIC,
     "frame_compliance": ELASTIC,
     "relaxation": "in the inverse model and, as sudden stiffness, in the gains",
-    "friction": "half of it, in the inverse model: all of it comes too late for the axis",
+    "friction": "in the inverse model",
     "rate_law": "its damping at 10 mm/s is in the gains and the inverse model",
 }
 UNUSED = "kept, and not used: it is no part of what the axis must do for a force"
