@@ -42,8 +42,9 @@ class Effect:
     residual, ``tries`` is how many independent ones it scanned, and their logarithm is taken off the evidence.
     ``begin`` is a second place to start from, far from null, where the way from null leads into a wrong valley.
     ``one_sided`` effects exist only above their null. ``between`` effects differ between recordings rather than inside
-    them, so that without them they pass for scatter: they are always tried with a scatter of their own. ``through``
-    names the one variable an effect acts through, if it is one: two such together may imitate a third that is unknown.
+    them, so that without them they pass for scatter: they are always tried with a scatter of their own; ``mean_of`` is
+    the scatter whose mean an effect is. ``through`` names the one variable an effect acts through, if it is one: two
+    such together may imitate a third that is unknown.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Effect:
     begin: Values = field(default_factory=dict)
     one_sided: bool = False
     between: bool = False
+    mean_of: str = ""
     through: str = ""
     needs: frozenset[str] = frozenset()
     aliases: tuple[str, ...] = ()

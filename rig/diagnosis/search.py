@@ -28,6 +28,7 @@ SHORT_LIST = 5
 MOST_EFFECTS = 3
 RIVAL_SE = 2.0
 KEEP_NATS = 3.0
+AMPLE_NATS = 20.0
 WORSE = 1.01
 START_SCALES = 0.05
 STANDS_OUT_NATS = 3.0
@@ -88,11 +89,14 @@ def started(current: Fit, direction: Direction, t: Tangents) -> dict[str, float]
     """Values with one more effect just off its null, to the side the data ask for.
 
     A start at the linear estimate with all else unmoved would be a worse model than the current one, and noise
-    estimated there would hide the effect.
+    estimated there would hide the effect. What the mean of a scatter may be starts there.
     """
     start = {**current.values, **direction.shape}
     for par, value in zip(direction.effect.amplitudes, amplitudes_of(t, direction), strict=True):
         start[par.name] = par.null + float(np.clip(value, -START_SCALES * par.scale, START_SCALES * par.scale))
+    for k, scatter in enumerate(current.problem.scatter):
+        if scatter.name == direction.effect.mean_of:
+            start[direction.effect.amplitudes[0].name] = float(current.whitener.noise.shifts[:, k].mean())
     return start
 
 
@@ -115,10 +119,10 @@ def candidates(current: Fit, t: Tangents) -> list[Fit]:
     near += [d for _, d in ranked if d.effect.between and d not in near]
     starts = [((*current.effects, d.effect), started(current, d, t)) for d in near]
     fits = [attempt(problem, effects, start, current.whitener) for effects, start in starts]
-    if top > STANDS_OUT_NATS or leftover(current, np.random.default_rng(0)).p_value <= LEVEL:
-        fits += second_look(current, t, ranked)
-    else:
-        fits += [bold_fit(problem, effects, start, current.whitener) for effects, start in starts]
+    loud = top > STANDS_OUT_NATS or leftover(current, np.random.default_rng(0)).p_value <= LEVEL
+    hidden = [(effects, start) for effects, start in starts if not loud or effects[-1].mean_of]
+    fits += [bold_fit(problem, effects, start, current.whitener) for effects, start in hidden]
+    fits += second_look(current, t, ranked) if loud else []
     living = [c for c in fits if c is not None and alive(c.effects[-1], c.values)]
     gains = [float((score(c) - score(current)).sum()) for c in living]
     best = max(gains, default=0.0)
@@ -231,12 +235,14 @@ def dropped(model: Fit) -> Fit:
 
 
 def settled(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:
-    """After the swaps, without what earns nothing or takes the simulation further from recordings it has not seen.
-
-    However sure a cause is of itself, one that predicts worse in newtons explains nothing.
-    """
+    """After the swaps, without what earns nothing, or little while it predicts unseen recordings worse in newtons."""
     named, model = swapped(model, library, p_values)
-    weak = [one for one in named if one.gains.sum() < KEEP_NATS or worse(model, one.without)]
+    earned = [float(one.gains.sum()) for one in named]
+    weak = [
+        one
+        for one, nats in zip(named, earned, strict=True)
+        if nats < KEEP_NATS or (nats < AMPLE_NATS and worse(model, one.without))
+    ]
     if not weak:
         return named, model
     return settled(min(weak, key=lambda one: float(one.gains.sum())).without, (), p_values)

@@ -91,6 +91,7 @@ CONTACT_OFFSET = Effect(
     "the surface lies {contact_offset_mm:+.3g} mm from where it was stated",
     (Par("contact_offset_mm", "mm", 0.0, -8.0, 8.0, 0.05, worth=0.02, meaning="true surface minus stated surface"),),
     between=True,
+    mean_of="touch",
     needs=frozenset({"surface", "depth"}),
     repair="find the contact again, or correct the stated surface",
 )
