@@ -168,6 +168,14 @@ def test_tissue_met_in_the_first_half_millimetre_is_found_within_half_a_newton()
     assert bench.world.peak_force_N < 0.5 + APPROACH.contact_force_N + 0.1
 
 
+def test_a_sensor_too_slow_to_see_the_run_in_leaves_the_threshold_as_it_was_asked_for() -> None:
+    world, run = SpringBench().world, APPROACH.begin()
+    for place_mm, waits_for_N in ((10.0, 0.55), (10.2, 0.55), (10.8, 0.05)):
+        world.position_mm, world.force_samples = place_mm, world.force_samples + 1
+        assert not run.advance(world, 0.0)
+        assert run.threshold_N(world) == pytest.approx(waits_for_N)
+
+
 def test_no_contact_within_the_search_retracts_and_says_so() -> None:
     bench = SpringBench(stiffness_N_mm=0.0)
     bench.run(ZERO, Approach(speed_mm_s=20.0, contact_force_N=0.05, search_to_mm=30.0))
