@@ -24,6 +24,7 @@ from controller.experiments import tracked
 from controller.experiments.tracked import Tracked
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
+from rig.config.table import load
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.files import FOLDER, TRUTH
 from rig.errors import CheckFailed, UsageError
@@ -50,7 +51,12 @@ FORCES_N = (1.0, 2.0, 3.0, 4.0, 5.0)
 SECONDS = 3.0
 MODEL = Path("fit") / "model.json"
 SUMMARY, REPORT, SESSION = "summary.json", "report.html", "session"
-TrialsOption = Annotated[int, typer.Option(min=1, max=5, help="Trials at each speed.")]
+TrialsOption = Annotated[
+    int | None, typer.Option(min=1, max=5, help="Trials at each speed; else 2, or the protocol's own.")
+]
+ProtocolOption = Annotated[
+    Path | None, typer.Option(help="Recorded instead of a short one, for example examples/diagnosis.toml (4 minutes).")
+]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for session, report and summary.")]
 
 
@@ -67,22 +73,24 @@ class Counts:
 
 def demo(
     out: OutOption = Path("demo"),
-    trials: TrialsOption = PLAN.trials,
+    trials: TrialsOption = None,
+    protocol: ProtocolOption = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Of what is hidden in the bench; else drawn.")] = None,
 ) -> None:
     """Does the whole job on the mock bench: capture, fit, track, diagnose, verify, report, and the truth at the end.
 
     Example: rig demo --out demo
     """
-    _clear(out)
     session, wiring = out / SESSION, built_in()
-    plan = PLAN.model_copy(update={"trials": trials})
+    plan = PLAN if protocol is None else load(Indentation, protocol)
+    plan = plan.model_copy(update={"trials": trials or plan.trials})
     experiment.check(plan, wiring)
+    _clear(out)
     seed = secrets.randbelow(LARGEST_SEED) if seed is None else seed
     secret = draw(np.random.default_rng(seed), plan)
     console.print(f"a cause is hidden in the bench; --seed {seed} hides the same again", highlight=False)
     with bench_for(wiring, secret.hide) as (live_wiring, _), Supervisor(live_wiring) as bench:
-        console.rule(f"capture: {len(plan.speeds_mm_s)} speeds, {trials} trials each")
+        console.rule(f"capture: {len(plan.speeds_mm_s)} speeds, {plan.trials} trials each")
         captured(bench, plan, session)
         console.rule("fit: constant stiffness against the index law")
         fitted = fit_session(session)

@@ -94,3 +94,25 @@ def test_a_capture_into_a_used_folder_is_refused_before_any_device_is_opened(tmp
     (tmp_path / "protocol.toml").write_text('kind = "indentation"\ndepth_mm = 5\n')
     answer = runner.invoke(build("capture"), ["capture", "protocol.toml", "--out", "."])
     assert "is not empty; give a new folder" in str(answer.exception)
+
+
+@pytest.mark.parametrize(
+    ("written", "sentence"),
+    [
+        ("", "no such file"),
+        ('kind = "indentation"\ndepth_mm = 50\n', "50"),
+        ('kind = "indentation"\ndeep = 5\n', "deep"),
+    ],
+)
+def test_a_demonstration_of_a_wrong_protocol_is_refused_and_removes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: str, sentence: str
+) -> None:
+    monkeypatch.setattr("api.cli.demo.bench_for", lambda *_: pytest.fail("a bench was started"))
+    (tmp_path / "demo").mkdir()
+    (tmp_path / "demo" / "report.html").touch()
+    if written:
+        (tmp_path / "protocol.toml").write_text(written)
+    answer = runner.invoke(build("demo"), ["demo", "--protocol", "protocol.toml", "--out", "demo"])
+    assert isinstance(answer.exception, UsageError), answer.exception
+    assert sentence in str(answer.exception)
+    assert (tmp_path / "demo" / "report.html").exists()
