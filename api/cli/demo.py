@@ -129,9 +129,16 @@ def _clear(out: Path) -> None:
 
 
 def _track(bench: Supervisor, session: Path) -> Tracked:
-    model = session / MODEL
-    program = tracked.plan(FORCES_N, SECONDS, load_model(model), bench.wiring)
+    model = load_model(session / MODEL)
+    program = tracked.plan(forces_within(model.valid.force_N), SECONDS, model, bench.wiring)
     return follow(bench, program, session, str(MODEL))
+
+
+def forces_within(largest_N: float) -> tuple[float, ...]:
+    """1 to 5 N; five steps below what the model was fitted to where that is less."""
+    if largest_N >= FORCES_N[-1]:
+        return FORCES_N
+    return tuple(round(force_N / FORCES_N[-1] * 0.95 * largest_N, 2) for force_N in FORCES_N)
 
 
 def _diagnosis(result: Diagnosis, secret: Secret, seed: int) -> dict[str, object]:

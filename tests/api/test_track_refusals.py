@@ -7,6 +7,7 @@ from typer.testing import CliRunner
 
 from api.cli import motion
 from api.cli.app import build
+from api.cli.demo import forces_within
 from rig.errors import UsageError
 from tests.controller.models import index_model
 
@@ -116,3 +117,10 @@ def test_a_demonstration_of_a_wrong_protocol_is_refused_and_removes_nothing(
     assert isinstance(answer.exception, UsageError), answer.exception
     assert sentence in str(answer.exception)
     assert (tmp_path / "demo" / "report.html").exists()
+
+
+@pytest.mark.parametrize(("largest_N", "forces_N"), [(5.2, (1, 2, 3, 4, 5)), (2.0, (0.38, 0.76, 1.14, 1.52, 1.9))])
+def test_the_demonstration_presses_no_harder_than_its_model_was_fitted_to(
+    largest_N: float, forces_N: tuple[float, ...]
+) -> None:
+    assert forces_within(largest_N) == pytest.approx(forces_N)
