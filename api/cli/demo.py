@@ -135,10 +135,10 @@ def _track(bench: Supervisor, session: Path) -> Tracked:
 
 
 def forces_within(largest_N: float) -> tuple[float, ...]:
-    """1 to 5 N; five steps below what the model was fitted to where that is less."""
+    """1 to 5 N; where the model was fitted to less, five steps that leave it room at the end."""
     if largest_N >= FORCES_N[-1]:
         return FORCES_N
-    return tuple(round(force_N / FORCES_N[-1] * 0.95 * largest_N, 2) for force_N in FORCES_N)
+    return tuple(round(force_N / FORCES_N[-1] * 0.85 * largest_N, 2) for force_N in FORCES_N)
 
 
 def _diagnosis(result: Diagnosis, secret: Secret, seed: int) -> dict[str, object]:

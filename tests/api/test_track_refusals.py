@@ -119,7 +119,7 @@ def test_a_demonstration_of_a_wrong_protocol_is_refused_and_removes_nothing(
     assert (tmp_path / "demo" / "report.html").exists()
 
 
-@pytest.mark.parametrize(("largest_N", "forces_N"), [(5.2, (1, 2, 3, 4, 5)), (2.0, (0.38, 0.76, 1.14, 1.52, 1.9))])
+@pytest.mark.parametrize(("largest_N", "forces_N"), [(5.2, (1, 2, 3, 4, 5)), (2.0, (0.34, 0.68, 1.02, 1.36, 1.7))])
 def test_the_demonstration_presses_no_harder_than_its_model_was_fitted_to(
     largest_N: float, forces_N: tuple[float, ...]
 ) -> None:
