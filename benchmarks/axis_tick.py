@@ -60,7 +60,7 @@ def mock_tick() -> None:
     times = []
     for tick in range(TICKS):
         stage.heard()
-        stage.wire.sent = b"t20160F00%02X000000\rt0800\r" % (tick % 200)
+        stage.wire.said = b"t20160F00%02X000000\rt0800\r" % (tick % 200)
         begun = time.perf_counter_ns()
         stage.mock.receive(stage.now())
         times.append(time.perf_counter_ns() - begun)

@@ -81,7 +81,7 @@ class Stage:
         self.dies_at_ns = NEVER_NS
         self.say(b"C\rS8\rO\r")
         self.run(0.1 if booted else 0.0)
-        self.wire.replies.clear()
+        self.wire.sent.clear()
 
     def open(self, path: str, bitrate: int, now: object) -> "Stage":
         self.closed = False
@@ -95,7 +95,7 @@ class Stage:
 
     def say(self, lines: bytes) -> None:
         """Bytes from the client to the adapter."""
-        self.wire.sent += lines
+        self.wire.said += lines
         self.mock.receive(self.clock_ns)
 
     def heard(self) -> bytes:
@@ -121,7 +121,7 @@ class Stage:
 
     def wait(self, timeout_s: float) -> None:
         end_ns = self.clock_ns + round(timeout_s * 1e9)
-        while self.clock_ns < end_ns and not self.wire.replies:
+        while self.clock_ns < end_ns and not self.wire.sent:
             self._step(end_ns)
 
     def run(self, time_s: float) -> None:

@@ -87,9 +87,9 @@ class Stage:
             return
         name = data.partition(b":")[0].decode()
         if name in self.canned:
-            self.wire.replies.append(encode_text(self.canned[name]))
+            self.wire.sent.append(encode_text(self.canned[name]))
         else:
-            self.wire.sent += data
+            self.wire.said += data
             self.mock.receive(0)
         if name == "COMM":
             self.speed = 115200 if data.startswith(b"COMM:5") else 9600
@@ -102,7 +102,7 @@ class Stage:
         self.commands.append(b"<break>")
         if self.heeds_break:
             self.speed = 9600
-            self.wire.replies.append(encode_text("RESET"))
+            self.wire.sent.append(encode_text("RESET"))
             os.eventfd_write(self._readable, 1)
 
     def close(self) -> None:

@@ -50,29 +50,29 @@ def say(answer: object) -> None:
 
 
 class MemoryWire:
-    """A wire without a kernel: the client's bytes wait in ``sent``, the mock's writes in ``replies``."""
+    """A wire without a kernel: what the client says waits in ``said``, what the mock wrote stands in ``sent``."""
 
-    endpoint = "memory"
-
-    def __init__(self) -> None:
-        self.sent = b""
-        self.replies: list[bytes] = []
+    def __init__(self, endpoint: str = "memory") -> None:
+        self.endpoint = endpoint
+        self.said = b""
+        self.sent: list[bytes] = []
+        self.closed = False
 
     def filenos(self) -> list[int]:
         return []
 
     def read(self) -> bytes:
-        data, self.sent = self.sent, b""
-        return data
+        said, self.said = self.said, b""
+        return said
 
     def write(self, data: bytes) -> None:
-        self.replies.append(data)
+        self.sent.append(data)
 
     def close(self) -> None:
-        self.replies.clear()
+        self.closed = True
 
     def take(self) -> bytes:
         """What the mock wrote since the last call."""
-        data = b"".join(self.replies)
-        self.replies.clear()
+        data = b"".join(self.sent)
+        self.sent.clear()
         return data

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from rig.diagnosis.evidence import Tangents, held_out_square_error, information, is_alias, jackknife
 from rig.diagnosis.fit import Fit, least_squares
@@ -144,7 +144,7 @@ def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Interval]:
 
     To amplitudes 1.5 % is added, in quadrature: what the operators themselves are good for.
     """
-    wide = float(student.ppf(0.975, max(fit.problem.recordings - 1, 1)))
+    wide = float(stdtrit(max(fit.problem.recordings - 1, 1), 0.975))
     covariances = fit.covariance, jackknife(fit)
     place = {par.name: k for k, par in enumerate(fit.free)}
     found: dict[str, Interval] = {}
@@ -199,7 +199,7 @@ def answer(named: Named, after: Fit, provisional: bool) -> Answer:
         named.share * (PROVISIONAL_SHARE if provisional else 1.0),
         intervals(after, effect.pars),
         gain_of(named.without, after),
-        float(named.gains.sum()),
+        named.nats,
         named.p_value,
         effect.repair,
         provisional,
@@ -248,7 +248,7 @@ def limits(problem: Problem, search: Search) -> tuple[dict[str, tuple[float, str
 
 def verdict_of(search: Search, after: Leftover) -> tuple[Verdict, tuple[str, ...]]:
     """Adequate, explained or unexplained, and what a leftover depends on."""
-    named = sum(float(found.gains.sum()) for found in search.named)
+    named = sum(found.nats for found in search.named)
     depends = judged_leftover(after, named)
     if depends != after.between and left_N(search.after, after) < LEAST_LEFT_N:
         depends = ()

@@ -150,13 +150,10 @@ def beside_named(fit: Fit) -> Array:
 
     A step that a named trend has half explained is a step again beside it.
     """
-    taken = [_level(fit), *(carried(fit, effect) for effect in fit.effects if effect.between)]
+    level = np.ones((len(fit.problem.scatter), fit.problem.recordings, 1))
+    taken = [level, *(carried(fit, effect) for effect in fit.effects if effect.between)]
     columns = np.concatenate(taken, axis=2)
     return np.eye(fit.problem.recordings) - columns @ np.linalg.pinv(columns, rcond=1e-6)
-
-
-def _level(fit: Fit) -> Array:
-    return np.ones((len(fit.problem.scatter), fit.problem.recordings, 1))
 
 
 def carried(fit: Fit, effect: Effect) -> Array:
@@ -182,11 +179,13 @@ def beaten(effect: Effect, after: Fit, without: Fit) -> tuple[str, ...]:
     quantity = int(size.argmax())
     if np.ptp(own[quantity, :, 0]) < EVEN_SHARE * np.abs(own[quantity, :, 0]).max():
         return ()
+    if not owners:
+        return ()
     level = np.ones((after.problem.recordings, 1))
     mine = _left_out(np.concatenate([level, own[quantity]], axis=1), shifts[quantity])
     plain = np.array([_left_out(np.column_stack([level, pattern]), shifts[quantity]) for pattern in patterns])
     cost = np.log(len(np.unique(patterns.round(9), axis=0)))
-    if not owners or plain.max() - mine - cost < BEATEN_NATS:
+    if plain.max() - mine - cost < BEATEN_NATS:
         return ()
     return tuple(dict.fromkeys(owner for owner, nats in zip(owners, plain, strict=True) if nats > plain.max() - 0.5))
 

@@ -50,6 +50,11 @@ class Named:
     without: Fit
     share: float
 
+    @property
+    def nats(self) -> float:
+        """The whole gain."""
+        return float(self.gains.sum())
+
 
 @dataclass(frozen=True)
 class Search:
@@ -106,6 +111,11 @@ def score(model: Fit) -> Array:
     return held_out_log_density(model) - cost / model.problem.recordings
 
 
+def ahead(model: Fit, other: Fit) -> float:
+    """By how many nats a model predicts recordings left out better than another."""
+    return float((score(model) - score(other)).sum())
+
+
 def candidates(current: Fit, t: Tangents) -> list[Fit]:
     """Effects that may be next, jointly refitted, best first.
 
@@ -124,7 +134,7 @@ def candidates(current: Fit, t: Tangents) -> list[Fit]:
     fits += [bold_fit(problem, effects, start, current.whitener) for effects, start in hidden]
     fits += second_look(current, t, ranked) if loud else []
     living = [c for c in fits if c is not None and alive(c.effects[-1], c.values)]
-    gains = [float((score(c) - score(current)).sum()) for c in living]
+    gains = [ahead(c, current) for c in living]
     best = max(gains, default=0.0)
     polished = [
         fit(c.problem, c.effects, c.values, c.whitener) if gain > within_reach(best) else c
@@ -187,7 +197,7 @@ def search(problem: Problem, before: Fit, rng: np.random.Generator, progress: Pr
         # What two causes through one variable leave, a third cannot name.
         found = [] if imitated(current.effects) else candidates(current, t)
         # Best first, so that of several beginnings of one cause the best stands in the table.
-        gains = {c.names[-1]: float((score(c) - score(current)).sum()) for c in reversed(found)}
+        gains = {c.names[-1]: ahead(c, current) for c in reversed(found)}
         bars = bars or gains
         if not found or step == MOST_EFFECTS:
             break
@@ -200,7 +210,7 @@ def search(problem: Problem, before: Fit, rng: np.random.Generator, progress: Pr
         current = refreshed(found[0])
     progress("drop and swap", 0.8)
     current = dropped(current)
-    if not current.effects and float((score(current) - score(before)).sum()) > KEEP_NATS:
+    if not current.effects and ahead(current, before) > KEEP_NATS:
         # Taking the cause away led the simulation to a better fit than it had begun with: begin there.
         return search(problem, current, rng, progress)
     # A single cause that left all others far behind has no rivals; with more than one the order of naming may mislead.
@@ -229,7 +239,7 @@ def dropped(model: Fit) -> Fit:
     """Without the effects that stopped earning their place, or shrank below it, once others had joined."""
     for effect in model.effects:
         smaller = without(model, effect.name)
-        if not alive(effect, model.values) or float((score(model) - score(smaller)).sum()) < KEEP_NATS:
+        if not alive(effect, model.values) or ahead(model, smaller) < KEEP_NATS:
             return dropped(smaller)
     return model
 
@@ -237,15 +247,10 @@ def dropped(model: Fit) -> Fit:
 def settled(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:
     """After the swaps, without what earns nothing, or little while it predicts unseen recordings worse in newtons."""
     named, model = swapped(model, library, p_values)
-    earned = [float(one.gains.sum()) for one in named]
-    weak = [
-        one
-        for one, nats in zip(named, earned, strict=True)
-        if nats < KEEP_NATS or (nats < AMPLE_NATS and worse(model, one.without))
-    ]
+    weak = [one for one in named if one.nats < KEEP_NATS or (one.nats < AMPLE_NATS and worse(model, one.without))]
     if not weak:
         return named, model
-    return settled(min(weak, key=lambda one: float(one.gains.sum())).without, (), p_values)
+    return settled(min(weak, key=lambda one: one.nats).without, (), p_values)
 
 
 def worse(model: Fit, smaller: Fit) -> bool:
@@ -264,7 +269,7 @@ def swapped(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -
             others = [c for c in candidates(smaller, t) if c.effects[-1].key != effect.key]
             p = p_values.get(effect.name, 1 / 401)
             named.append(_named(model, effect, smaller, others, p))
-            if others and float((score(others[0]) - score(model)).sum()) > KEEP_NATS:
+            if others and ahead(others[0], model) > KEEP_NATS:
                 better = others[0]
         if better is None or not swaps_left:
             break
@@ -274,7 +279,7 @@ def swapped(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -
 
 def _named(model: Fit, effect: Effect, smaller: Fit, others: Sequence[Fit], p_value: float) -> Named:
     mine = score(model)
-    rivals = [c for c in others if _equal(mine - score(c)) and float((score(c) - score(smaller)).sum()) > 0]
+    rivals = [c for c in others if _equal(mine - score(c)) and ahead(c, smaller) > 0]
     table = np.stack([mine, *[score(c) for c in rivals]])
     names = dict.fromkeys(c.names[-1] for c in rivals if c.names[-1] != effect.name)
     named = Named(effect, tuple(names), mine - score(smaller), p_value, smaller, 1.0)

@@ -316,7 +316,7 @@ def test_whatever_the_bus_brings_only_a_device_error_comes_out(frames: list[CanF
     axis = axis_on(stage)
     axis.start()
     for frame in frames:
-        stage.wire.replies += [encode_frame(frame), noise]
+        stage.wire.sent += [encode_frame(frame), noise]
         stage.run(0.001)
         try:
             axis.poll(stage.now())

@@ -187,7 +187,7 @@ def test_an_error_reply_is_told_in_words(stage: Stage) -> None:
 def test_a_tracker_that_restarts_by_itself_is_told(stage: Stage) -> None:
     device = started(stage)
     run(stage, device, 100, 200)
-    stage.wire.replies.append(b"RESETBE6F\r")
+    stage.wire.sent.append(b"RESETBE6F\r")
     with pytest.raises(DeviceError, match="restarted by itself; check its power"):
         run(stage, device, 200, 300)
 
@@ -204,6 +204,6 @@ def test_a_reply_that_is_no_tracking_data_is_counted_and_asked_for_again(stage: 
     device = started(stage)
     run(stage, device, 100, 200)
     discarded = device.counters.discarded_bytes
-    stage.wire.replies.append(b"OKAYA896\r")
+    stage.wire.sent.append(b"OKAYA896\r")
     assert run(stage, device, 200, 300)
     assert device.counters.discarded_bytes == discarded + 4

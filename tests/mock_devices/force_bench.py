@@ -14,6 +14,7 @@ from mock_devices.robotiq import RobotiqMock
 from mock_devices.stage import NEVER_NS, Mock
 from mock_devices.wire import PtyWire
 from rig.channels import ForceSample
+from tests.remote import MemoryWire
 
 Product = Literal["bota", "robotiq"]
 Knobs = dict[str, bool | int | str]
@@ -38,35 +39,6 @@ class StillPlant:
         return self.over
 
 
-class MemoryWire:
-    """What the client sent is put into ``inbox``; what the mock sent collects in ``sent``."""
-
-    endpoint = "/memory"
-
-    def __init__(self) -> None:
-        self.inbox = b""
-        self.sent = b""
-        self.closed = False
-
-    def filenos(self) -> list[int]:
-        return []
-
-    def read(self) -> bytes:
-        data, self.inbox = self.inbox, b""
-        return data
-
-    def write(self, data: bytes) -> None:
-        self.sent += data
-
-    def close(self) -> None:
-        self.closed = True
-
-    def take(self) -> bytes:
-        """What the mock sent since the last call."""
-        data, self.sent = self.sent, b""
-        return data
-
-
 class MemoryStage(Generic[AnyMock]):
     """A mock on a wire in memory, with the clock in the test's hand."""
 
@@ -75,7 +47,7 @@ class MemoryStage(Generic[AnyMock]):
 
     def say(self, data: bytes) -> bytes:
         """What the mock answers at once."""
-        self.wire.inbox += data
+        self.wire.said += data
         self.mock.receive(self.now_ns)
         return self.wire.take()
 

@@ -9,7 +9,8 @@ from drivers.bota.codec import Decoder, Frame
 from drivers.roles import LinkCounters
 from mock_devices.bota import BOOT_NS, BotaMock, Command, CommandParser
 from mock_devices.stage import NEVER_NS, Mock
-from tests.mock_devices.force_bench import WRENCH, MemoryStage, MemoryWire, Served, StillPlant
+from tests.mock_devices.force_bench import WRENCH, MemoryStage, Served, StillPlant
+from tests.remote import MemoryWire
 
 START_NS = 5_000_000_000
 SECOND_NS = 1_000_000_000
@@ -20,7 +21,7 @@ class Stage(MemoryStage[BotaMock]):
     """A booted mock."""
 
     def __init__(self, drift_ppm: float = 0.0) -> None:
-        wire, self.plant = MemoryWire(), StillPlant()
+        wire, self.plant = MemoryWire("/memory"), StillPlant()
         super().__init__(BotaMock(wire, self.plant, START_NS, drift_ppm), wire, START_NS + BOOT_NS)
         self.mock.tick(self.now_ns)
         self.wire.take()
@@ -38,13 +39,13 @@ def test_it_is_a_mock_of_the_stage() -> None:
 
 
 def test_power_prints_who_it_is_after_booting_and_then_waits() -> None:
-    wire = MemoryWire()
+    wire = MemoryWire("/memory")
     mock = BotaMock(wire, StillPlant(), START_NS)
     assert mock.due_ns == START_NS + BOOT_NS
     mock.tick(START_NS + BOOT_NS - 1)
-    assert wire.sent == b""
+    assert wire.sent == []
     mock.tick(START_NS + BOOT_NS)
-    assert wire.sent == BOOT
+    assert b"".join(wire.sent) == BOOT
     assert mock.due_ns == NEVER_NS
 
 

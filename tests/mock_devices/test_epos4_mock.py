@@ -46,10 +46,10 @@ def test_the_adapter_answers_as_the_lawicel_manual_says() -> None:
 def test_an_adapter_without_a_bit_rate_does_not_open() -> None:
     wire = MemoryWire()
     adapter = SlcanAdapter(wire)
-    wire.sent = b"O\rS8\rO\r"
+    wire.said = b"O\rS8\rO\r"
     assert adapter.receive() == []
     adapter.flush()
-    assert wire.replies == [b"\a\r\r"]
+    assert wire.sent == [b"\a\r\r"]
 
 
 def test_a_channel_at_another_bit_rate_reaches_no_node(stage: Stage) -> None:

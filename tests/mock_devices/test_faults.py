@@ -11,30 +11,7 @@ from mock_devices.parameters import Parameters
 from mock_devices.stage import NEVER_NS
 from mock_devices.wire import PtyWire, TcpWire
 from rig.errors import UsageError
-
-
-class LoopWire:
-    """A wire inside the test: what the mock sends is kept, what the client says is given."""
-
-    endpoint = "here"
-
-    def __init__(self) -> None:
-        self.sent: list[bytes] = []
-        self.said = b""
-        self.closed = False
-
-    def filenos(self) -> list[int]:
-        return []
-
-    def read(self) -> bytes:
-        said, self.said = self.said, b""
-        return said
-
-    def write(self, data: bytes) -> None:
-        self.sent.append(data)
-
-    def close(self) -> None:
-        self.closed = True
+from tests.remote import MemoryWire
 
 
 class Clock:
@@ -45,8 +22,8 @@ class Clock:
 
 
 @pytest.fixture
-def inside() -> LoopWire:
-    return LoopWire()
+def inside() -> MemoryWire:
+    return MemoryWire("here")
 
 
 @pytest.fixture
@@ -55,7 +32,7 @@ def clock() -> Clock:
 
 
 @pytest.fixture
-def wire(inside: LoopWire, clock: Clock) -> FaultyWire:
+def wire(inside: MemoryWire, clock: Clock) -> FaultyWire:
     return FaultyWire(inside, random.Random(1), clock)
 
 
@@ -64,7 +41,7 @@ def inject(wire: FaultyWire, kind: str, value: bool | float | None = None) -> No
     fault.apply(fault.default if value is None else value)
 
 
-def test_a_wire_without_faults_passes_everything_at_once_both_ways(wire: FaultyWire, inside: LoopWire) -> None:
+def test_a_wire_without_faults_passes_everything_at_once_both_ways(wire: FaultyWire, inside: MemoryWire) -> None:
     inside.said = b"C"
     wire.write(b"\xaa\x01")
     assert wire.read() == b"C"
@@ -73,7 +50,7 @@ def test_a_wire_without_faults_passes_everything_at_once_both_ways(wire: FaultyW
     assert wire.endpoint == "here"
 
 
-def test_a_frozen_wire_passes_nothing_either_way_until_it_is_healed(wire: FaultyWire, inside: LoopWire) -> None:
+def test_a_frozen_wire_passes_nothing_either_way_until_it_is_healed(wire: FaultyWire, inside: MemoryWire) -> None:
     inject(wire, "freeze")
     inside.said = b"C"
     wire.write(b"lost")
@@ -84,7 +61,7 @@ def test_a_frozen_wire_passes_nothing_either_way_until_it_is_healed(wire: Faulty
     assert not inside.closed
 
 
-def test_dropping_loses_the_share_asked_for(wire: FaultyWire, inside: LoopWire) -> None:
+def test_dropping_loses_the_share_asked_for(wire: FaultyWire, inside: MemoryWire) -> None:
     inject(wire, "drop", 0.25)
     for number in range(4000):
         wire.write(bytes([number % 256]))
@@ -92,7 +69,7 @@ def test_dropping_loses_the_share_asked_for(wire: FaultyWire, inside: LoopWire) 
 
 
 def test_corruption_flips_one_bit_in_the_share_asked_for_and_keeps_the_length(
-    wire: FaultyWire, inside: LoopWire
+    wire: FaultyWire, inside: MemoryWire
 ) -> None:
     inject(wire, "corrupt", 0.5)
     for _ in range(1000):
@@ -103,7 +80,7 @@ def test_corruption_flips_one_bit_in_the_share_asked_for_and_keeps_the_length(
     assert {len(data) for data in inside.sent} == {37}
 
 
-def test_truncation_shortens_messages_to_a_beginning_of_themselves(wire: FaultyWire, inside: LoopWire) -> None:
+def test_truncation_shortens_messages_to_a_beginning_of_themselves(wire: FaultyWire, inside: MemoryWire) -> None:
     inject(wire, "truncate", 1.0)
     for _ in range(100):
         wire.write(b"0123456789")
@@ -111,7 +88,7 @@ def test_truncation_shortens_messages_to_a_beginning_of_themselves(wire: FaultyW
     assert len({len(data) for data in inside.sent}) > 5
 
 
-def test_garbage_stands_in_front_of_a_whole_message(wire: FaultyWire, inside: LoopWire) -> None:
+def test_garbage_stands_in_front_of_a_whole_message(wire: FaultyWire, inside: MemoryWire) -> None:
     inject(wire, "garbage", 1.0)
     wire.write(b"message")
     assert inside.sent[0].endswith(b"message")
@@ -119,7 +96,7 @@ def test_garbage_stands_in_front_of_a_whole_message(wire: FaultyWire, inside: Lo
 
 
 def test_delayed_messages_arrive_in_order_when_their_time_has_come(
-    wire: FaultyWire, inside: LoopWire, clock: Clock
+    wire: FaultyWire, inside: MemoryWire, clock: Clock
 ) -> None:
     inject(wire, "delay", 0.05)
     wire.write(b"first")

@@ -21,9 +21,9 @@ class Desk:
         self.mock = NdiMock(self.wire, self.plant, start_ns=0, **kind)
 
     def raw(self, data: bytes) -> list[bytes]:
-        self.wire.sent += data
+        self.wire.said += data
         self.mock.receive(self.mock.due_ns)
-        written, self.wire.replies = self.wire.replies, []
+        written, self.wire.sent = self.wire.sent, []
         return written
 
     def ask(self, command: str) -> str:

@@ -25,7 +25,8 @@ from drivers.robotiq.codec import (
 from drivers.roles import LinkCounters
 from mock_devices.robotiq import REQUEST_BYTES_MAX, RequestFinder, RobotiqMock
 from mock_devices.stage import NEVER_NS, Mock
-from tests.mock_devices.force_bench import WRENCH, MemoryStage, MemoryWire, Served, StillPlant
+from tests.mock_devices.force_bench import WRENCH, MemoryStage, Served, StillPlant
+from tests.remote import MemoryWire
 
 START_NS = 7_000_000_000
 PERIOD_NS = 10_000_000
@@ -37,7 +38,7 @@ class Stage(MemoryStage[RobotiqMock]):
     """A mock just powered."""
 
     def __init__(self, drift_ppm: float = 0.0, serial_number: int = 1234) -> None:
-        wire, self.plant = MemoryWire(), StillPlant()
+        wire, self.plant = MemoryWire("/memory"), StillPlant()
         super().__init__(RobotiqMock(wire, self.plant, START_NS, drift_ppm, serial_number), wire, START_NS)
 
     def frames(self, duration_ns: int) -> list[Wrench]:
