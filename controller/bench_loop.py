@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from controller.devices import Devices
-from controller.health import IDENTICAL_LIMIT, StreamHealth
+from controller.health import IDENTICAL_LIMIT, Standstill, StreamHealth
 from controller.link import Link, Message
 from controller.loop import Slot
 from controller.machine import Machine
@@ -65,6 +65,7 @@ class BenchLoop:
         self.machine = Machine(wiring, self.world, self._finished)
         self.watch = Watch()
         self._registration = Registration()
+        self._standstill = Standstill()
         self._health = {
             "force": StreamHealth(
                 devices.force.period_ns,
@@ -141,6 +142,7 @@ class BenchLoop:
     def _take_axis(self, sample: AxisSample) -> None:
         world = self.world
         world.position_mm, world.velocity_mm_s = sample.position_mm, sample.velocity_mm_s
+        world.standstill_mm = self._standstill.update(sample.position_mm, world.setpoint.position_mm)
         if self.devices.tracker:
             self._registration.axis(sample.capture_ns, sample.position_mm)
         self._health["axis"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample.seq)
@@ -207,6 +209,8 @@ class BenchLoop:
     def start(self, program: Program) -> None:
         """Begins a program; where the limb is now is where it should stay."""
         self._registration.begin()
+        self._standstill.begin()
+        self.world.standstill_mm = 0.0
         self.machine.start(program)
 
     def release(self) -> None:

@@ -1,10 +1,15 @@
-"""Health of one stream in three bits: alive (young enough), valid (the device vouches for it), on rate."""
+"""Health of one stream in three bits: alive (young enough), valid (the device vouches for it), on rate.
 
+A position may stay the same for ever, and be right; what tells a frozen one is a set-point that goes on without it.
+"""
+
+import math
 from dataclasses import dataclass
 
 NEVER_NS = 1 << 62
 ALIVE, VALID, ON_RATE = 1, 2, 4
 IDENTICAL_LIMIT = 100
+STANDING_REPORTS = 10
 RATE_TOLERANCE = 0.2
 
 
@@ -55,3 +60,23 @@ class StreamHealth:
         """The three bits."""
         on_rate = abs(self._mean_period_ns - self.period_ns) < RATE_TOLERANCE * self.period_ns
         return ALIVE * self.alive(now_ns) | VALID * self.valid | ON_RATE * on_rate
+
+
+@dataclass(slots=True)
+class Standstill:
+    """How far a set-point went while the axis named one and the same place; ``update`` is called once a report."""
+
+    _position_mm: float = math.nan
+    _setpoint_mm: float = math.nan
+    _reports: int = 0
+
+    def update(self, position_mm: float, setpoint_mm: float) -> float:
+        """Way of the set-point since the place last changed [mm]; 0 until ten reports in a row name the same."""
+        if position_mm != self._position_mm:
+            self._position_mm, self._setpoint_mm, self._reports = position_mm, setpoint_mm, 0
+        self._reports += 1
+        return abs(setpoint_mm - self._setpoint_mm) if self._reports > STANDING_REPORTS else 0.0
+
+    def begin(self) -> None:
+        """What came before counts no more: a new program sets out from where the axis is."""
+        self._position_mm = math.nan

@@ -85,6 +85,16 @@ def _following_error(world: World, watch: Watch, wiring: Wiring) -> str:
     return f"the axis lags its set-point by {abs(world.following_mm):.2f} mm (limit {limit_mm:g} mm): is it blocked?"
 
 
+def _standstill(world: World, watch: Watch, wiring: Wiring) -> str:
+    limit_mm = wiring.axis.standstill_mm
+    if world.standstill_mm <= limit_mm:
+        return ""
+    return (
+        f"the axis goes on reporting {world.position_mm:.3f} mm while its set-point went {world.standstill_mm:.2f} mm "
+        f"further (limit {limit_mm:g} mm): its position is frozen, or it is blocked"
+    )
+
+
 def _workspace(world: World, watch: Watch, wiring: Wiring) -> str:
     low_mm = wiring.limits.position_min_mm - RETRACTING_MARGIN_MM
     high_mm = wiring.limits.position_max_mm + RETRACTING_MARGIN_MM
@@ -195,6 +205,7 @@ TABLE: tuple[tuple[str, Action, Check], ...] = (
     ("drive_fault", Action.IMMEDIATE, _drive_fault),
     ("axis_lost", Action.IMMEDIATE, _axis_lost),
     ("following_error", Action.IMMEDIATE, _following_error),
+    ("axis_frozen", Action.IMMEDIATE, _standstill),
     ("overspeed", Action.IMMEDIATE, _speed),
     ("workspace", Action.IMMEDIATE, _workspace),
     ("force_limit", Action.SOFT, _force_limit),

@@ -24,6 +24,7 @@ class World:
     position_mm: float = math.nan
     velocity_mm_s: float = 0.0
     following_mm: float = 0.0
+    standstill_mm: float = 0.0
     patient_mm: float = math.nan
     zero_N: float = math.nan
     first_zero_N: float = math.nan

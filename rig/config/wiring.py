@@ -47,6 +47,9 @@ class Axis(Table):
     homing_speed_mm_s: Positive = 20.0
     heartbeat_ms: int = Field(default=50, ge=5, le=1000, description="period of the heartbeat each side sends")
     following_error_mm: Positive = 2.0
+    standstill_mm: Positive = Field(
+        default=0.3, description="how far the set-point may go while ten reports of the axis name the same place"
+    )
     current_limit_A: Positive = 5.0
     acceleration_mm_s2: Positive = 2000.0
     bandwidth_Hz: Positive = Field(default=34.0, description="-3 dB of the drive's position loop, for the gains")

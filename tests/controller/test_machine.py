@@ -10,7 +10,7 @@ import pytest
 from controller.checks import refuse_beyond_limits
 from controller.force_position import GainRow
 from controller.gains import pi_gains
-from controller.health import StreamHealth
+from controller.health import Standstill, StreamHealth
 from controller.machine import Machine
 from controller.modes import Mode
 from controller.safety import TABLE, Action, Incident, Watch
@@ -295,6 +295,30 @@ def test_a_converter_that_repeats_itself_for_more_than_two_periods_is_frozen() -
         health.update(number * 1_000_000, number * 1_000_000, True, value)
         frozen.append(health.frozen)
     assert frozen == [False] * 6 + [True]
+
+
+def test_an_axis_that_names_one_place_while_its_set_point_goes_on_stands() -> None:
+    standstill = Standstill()
+    gone_mm = [standstill.update(7.0, 7.0 + 0.1 * tick) for tick in range(12)]
+    assert gone_mm == pytest.approx([0.0] * 10 + [1.0, 1.1])
+    assert standstill.update(7.0005, 8.2) == 0.0, "it moves again"
+
+
+def test_what_an_axis_named_before_a_program_is_not_held_against_it() -> None:
+    standstill = Standstill()
+    for _ in range(1000):
+        standstill.update(7.0, 9.0)
+    standstill.begin()
+    assert [standstill.update(7.0, 7.0) for _ in range(20)] == [0.0] * 20
+
+
+def test_a_frozen_axis_is_stopped_at_once() -> None:
+    bench = SpringBench()
+    bench.run(ZERO, APPROACH, PRESS, until=lambda: bench.world.force_N > 2.0)
+    bench.world.standstill_mm = 0.31
+    incident = bench.tick()
+    assert incident and (incident.code, incident.action) == ("axis_frozen", Action.IMMEDIATE)
+    assert "set-point went 0.31 mm further (limit 0.3 mm)" in incident.text
 
 
 def test_the_force_limit_counts_from_the_first_zero_so_a_wrong_tare_hides_nothing() -> None:

@@ -152,6 +152,14 @@ def test_a_cut_cable_of_the_axis_ends_with_the_drive_stopped_by_itself(
     at_rest(bench)
 
 
+def test_an_axis_that_goes_on_naming_one_place_is_stopped(bench: Stage, protocol: Path, tmp_path: Path) -> None:
+    running = capture(bench, protocol, tmp_path)
+    pressed(bench)
+    bench.control.fault("axis", "frozen", True)
+    ended_safely(running.end(), tmp_path, 3, "position is frozen")
+    at_rest(bench)
+
+
 def test_a_drive_fault_stops_at_once(bench: Stage, protocol: Path, tmp_path: Path) -> None:
     running = capture(bench, protocol, tmp_path)
     pressed(bench)
