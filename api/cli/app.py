@@ -10,10 +10,12 @@ from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Annotated
 
 import typer
 from rich.console import Console
 
+import rig
 from rig.errors import RigError
 
 COMMANDS = {
@@ -42,18 +44,25 @@ def build(wanted: str | None = None) -> typer.Typer:
         help="Software for a soft-tissue bench: capture, fit, track, report. Exit codes: 0 ok, 1 check failed,"
         " 2 wrong use, 3 safety stop.",
         no_args_is_help=True,
+        invoke_without_command=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
         add_completion=False,
     )
     # A callback keeps the name of the command on the line also where only one is loaded.
-    app.callback()(lambda: None)
+    app.callback()(_common)
     if wanted in COMMANDS:
         app.command(wanted)(_load(COMMANDS[wanted]))
         return app
     for name, target in COMMANDS.items():
         app.command(name, short_help=_summary(target))(lambda: None)
     return app
+
+
+def _common(version: Annotated[bool, typer.Option("--version", help="Prints the version.")] = False) -> None:
+    if version:
+        typer.echo(f"tissue-rig {rig.__version__}")
+        raise typer.Exit
 
 
 def _summary(target: str) -> str:

@@ -1,7 +1,8 @@
 """Commands that criticise: what a session shows of the simulation's errors, and what a protocol could show."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import chain, repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -13,11 +14,12 @@ from api.cli.options import JsonOption
 from api.cli.output import console, table, write_json
 from rig.config.protocol import Indentation
 from rig.config.table import load
-from rig.diagnosis.answers import Diagnosis
+from rig.diagnosis.answers import Answer, Diagnosis
 from rig.diagnosis.design import check
 from rig.diagnosis.extended import extended_model
 from rig.diagnosis.files import FOLDER, MODEL, PICTURES, RESULT
 from rig.diagnosis.run import diagnose_session
+from rig.diagnosis.simulated import Simulated
 from rig.diagnosis.sources import read_source
 from rig.errors import UsageError
 from rig.recording.files import write_text
@@ -104,35 +106,50 @@ def run_diagnosis(folder: Path, simulation: Simulation, columns: tuple[str, ...]
 def show(result: Diagnosis) -> None:
     """The diagnosis for a person."""
     console.print(f"{result.verdict}: {result.statement}", highlight=False, markup=False)
-    rows = [
-        (
-            " or ".join(finding.effects),
-            ", ".join(f"{name} {i.value:.4g} ({i.low:.4g} to {i.high:.4g})" for name, i in finding.parameters.items()),
-            f"{finding.gain.before:.4f} -> {finding.gain.after:.4f} {finding.gain.unit}",
-            f"{finding.nats:.0f}",
-            finding.repair,
-        )
-        for finding in result.findings
-    ]
-    if rows:
-        header = ("cause", "parameters, 95 % interval", "error on recordings left out", "nats", "repair")
-        console.print(table(header, rows, "Named" if result.verdict == "explained" else "Named provisionally"))
+    if result.findings:
+        _show_named(result)
     seen = [(name, f"{size:.3g} {unit}") for name, (size, unit) in sorted(result.detectable.items())]
     if seen:
         console.print(table(("cause", "would have been named from"), seen, "Not found"))
-    for reason, names in by_reason(result.not_testable):
-        console.print(f"cannot be tested: {names}: {reason}", highlight=False, markup=False)
-    for item in result.simulated:
-        which = "fitted" if item.fitted else "left out"
-        console.print(
-            f"closed-loop force error, {item.recording} ({which}): "
-            f"{item.before_percent:.2f} % -> {item.after_percent:.2f} %{PUBLISHED.get(item.recording, '')}",
-            highlight=False,
-        )
-    for finding in result.quality:
-        console.print(f"data: {finding.recording} {finding.text}", highlight=False, markup=False)
-    if result.next_experiment:
-        console.print(f"next experiment: {after(result.next_experiment)}", highlight=False, markup=False)
+    said = [f"cannot be tested: {names}: {reason}" for reason, names in by_reason(result.not_testable)]
+    said += [_in_closed_loop(item) for item in result.simulated]
+    said += [f"data: {finding.recording} {finding.text}" for finding in result.quality]
+    said += [f"next experiment: {after(result.next_experiment)}"] if result.next_experiment else []
+    for sentence in said:
+        console.print(sentence, highlight=False, markup=False)
+
+
+def _show_named(result: Diagnosis) -> None:
+    rows = [
+        (cause, name, f"{found.value:.4g}", f"{found.low:.4g} to {found.high:.4g}")
+        for finding in result.findings
+        for cause, (name, found) in zip(_once(" or ".join(finding.effects)), finding.parameters.items(), strict=False)
+    ]
+    title = "Named" if result.verdict == "explained" else "Named provisionally"
+    console.print(table(("cause", "parameter", "value", "95 % interval"), rows, title))
+    for finding in result.findings:
+        console.print(f"{finding.effects[0]}: {_gained(finding)}; {finding.repair}", highlight=False, markup=False)
+
+
+def _once(text: str) -> Iterator[str]:
+    """``text``, then nothing for ever: a name beside the first of its rows."""
+    return chain([text], repeat(""))
+
+
+def _gained(finding: Answer) -> str:
+    gain, less = finding.gain, finding.gain.reduction
+    return (
+        f"error on recordings left out {gain.before:.4f} -> {gain.after:.4f} {gain.unit} "
+        f"({100 * less.value:.0f} % less, {100 * less.low:.0f} to {100 * less.high:.0f}), {finding.nats:.0f} nats"
+    )
+
+
+def _in_closed_loop(item: Simulated) -> str:
+    which = "fitted" if item.fitted else "left out"
+    return (
+        f"closed-loop force error, {item.recording} ({which}): "
+        f"{item.before_percent:.2f} % -> {item.after_percent:.2f} %{PUBLISHED.get(item.recording, '')}"
+    )
 
 
 def by_reason(reasons: Mapping[str, str]) -> list[tuple[str, str]]:
@@ -163,7 +180,9 @@ def save(result: Diagnosis, folder: Path) -> None:
     if result.search is not None and result.simulation != "axis":
         model = extended_model(result)
         model.save(folder / MODEL)
-        console.print(f"{folder / MODEL} is the extended model, for rig track and rig simulate", highlight=False)
+        console.print(
+            f"{folder / MODEL} is the extended model, for rig track, simulate and fit --with", highlight=False
+        )
         for effect in model.effects:
             console.print(f"  {effect.name}: {effect.used}", highlight=False)
 

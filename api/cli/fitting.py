@@ -14,7 +14,7 @@ from rig.report.figures import fit_figure, residual_figure
 from rig.tissue.control_table import control_rows
 from rig.tissue.judging import Errors, Judged
 from rig.tissue.laws import Law
-from rig.tissue.model import ControlRow
+from rig.tissue.model import ControlRow, load_model
 from rig.tissue.rates import STUDY_B_N_S_MM, RateTest
 from rig.tissue.registry import COMPARED, LAWS, law_named
 from rig.tissue.results import as_csv, as_json
@@ -32,10 +32,17 @@ class Wanted:
     saved: str = SAVED_LAW
 
     @classmethod
-    def from_options(cls, laws: str, known: Sequence[str], saved: str) -> Self:
-        """From the command's options; raises UsageError for laws and parameters that are not."""
+    def from_options(cls, laws: str, known: Sequence[str], saved: str, model: Path | None = None) -> Self:
+        """From the command's options; raises UsageError for laws, parameters and a model file that are not.
+
+        The law of ``model`` is compared too, and what it takes as known it takes from there.
+        """
         names = list(LAWS) if laws == "all" else [name.strip() for name in laws.split(",") if name.strip()]
-        chosen = list(dict.fromkeys([*COMPARED, *map(law_named, names), law_named(saved)]))
+        found = {law.name: law for law in (*COMPARED, *map(law_named, names), law_named(saved))}
+        if model:
+            law = load_model(model).law
+            found[law.name] = law.held()
+        chosen = list(found.values())
         return cls(chosen, dict(_known(text, chosen) for text in known), law_named(saved).name)
 
 
@@ -112,9 +119,9 @@ def _print(study: Study, saved: str) -> None:
     console.print(table(("speed mm/s", "trials", "largest depth mm", "largest force N"), speeds, "Curves"))
     for trial, reason in study.skipped:
         console.print(f"skipped {trial}: {reason}", highlight=False, markup=False)
-    console.print(
-        table(*_displacements(study), "Displacement in mm at given forces, and how far off the worst trial is")
-    )
+    for names in _pairs(list(study.judged)):
+        title = "Displacement in mm at given forces, and the worst error"
+        console.print(table(*_displacements(study, names), title))
     console.print(table(*worst_errors(study.judged), "Worst errors: on trials fitted, and on what was left out"))
     console.print(table(*_parameters(study), "Parameters"))
     print_control(control_rows(study.judged[saved], study.force_N), saved)
@@ -147,10 +154,15 @@ def print_control(found: Sequence[ControlRow], law: str) -> None:
     console.print(table(header, cells, f"K and B for control ({law})"))
 
 
-def _displacements(study: Study) -> tuple[list[str], list[list[str]]]:
+def _pairs(names: Sequence[str]) -> list[Sequence[str]]:
+    """Laws side by side, as many as 80 columns take."""
+    return [names[at : at + 2] for at in range(0, len(names), 2)]
+
+
+def _displacements(study: Study, names: Sequence[str]) -> tuple[list[str], list[list[str]]]:
     header = ["force N", "measured"]
-    columns = [rows(judged.fitted) for judged in study.judged.values()]
-    for name in study.judged:
+    columns = [rows(study.judged[name].fitted) for name in names]
+    for name in names:
         header += [name, "off mm", "off %"]
     found = []
     for index, row in enumerate(columns[0]):

@@ -24,6 +24,10 @@ def fit(
         typer.Option("--known", help="A parameter not to be fitted: thickness_mm=25; may be repeated."),
     ] = None,
     model: Annotated[str, typer.Option("--model", help="The law that model.json holds.")] = "index",
+    extended: Annotated[
+        Path | None,
+        typer.Option("--with", help="Also the law of this model.json, with what `rig diagnose` named in it as known."),
+    ] = None,
     lattice: Annotated[bool, typer.Option("--lattice", help="Also the mass-spring lattice, spring by spring.")] = False,
     block: Annotated[
         str, typer.Option("--block", help="Vertices of the lattice and their spacing in mm: 51x51x40@1, the study's.")
@@ -42,10 +46,12 @@ def fit(
     trials, speeds and, with several sessions, subjects left out.
 
     Example: rig fit sessions/first --laws fung,qlv --json fit.json
+
+    Example: rig fit sessions/second --with sessions/first/diagnosis/model.json
     """
     from api.cli.fitting import Wanted, fit_and_write  # noqa: PLC0415
 
-    wanted = Wanted.from_options(laws, known or [], model)
+    wanted = Wanted.from_options(laws, known or [], model, extended)
     simulated = (block, springs, per_spring) if lattice or per_spring else None
     write_json(json_file, fit_and_write(session, out, wanted, simulated))
 

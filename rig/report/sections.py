@@ -13,7 +13,7 @@ from rig.report.drawing import inline_svg
 from rig.report.facts import Facts, LoopFacts, TrackingFacts, TrialFacts
 from rig.report.figures import fit_figure, loop_figure, quantiles, residual_figure, tracking_figure
 from rig.report.markup import cards, details, figure, pairs, paragraph, section, table
-from rig.report.values import json_table, number
+from rig.report.values import json_table, number, of_many
 from rig.tissue.judging import LEVEL, Errors, Judged
 from rig.tissue.study import Row, Study, rows
 
@@ -34,7 +34,7 @@ def headline(facts: Facts) -> str:
     """What came out, in one sentence."""
     study, tracking = facts.study, facts.tracking
     if isinstance(study, str):
-        return f"{len(facts.trials)} recordings, without a fit"
+        return f"{len(facts.trials)} {of_many('recording', len(facts.trials))}, without a fit"
     index, constant = _fair(study.judged["index"]), _fair(study.judged["constant"])
     where = "left\u2011out trials" if study.judged["index"].trials_left_out else "the trials fitted"
     said = (
@@ -54,7 +54,7 @@ def key_figures(facts: Facts) -> str:
     """The figures a reader looks for first."""
     good = sum(1 for trial in facts.trials if not isinstance(trial.verdict, str) and trial.verdict.ok)
     found = [
-        (f"{len(facts.trials)}", "recordings", f"{good} complete and without loss"),
+        (f"{len(facts.trials)}", of_many("recording", len(facts.trials)), f"{good} complete and without loss"),
         (f"{sum(trial.samples for trial in facts.trials):,}", "samples", ""),
         (f"{sum(trial.dropped for trial in facts.trials):,}", "dropped samples", ""),
     ]

@@ -22,3 +22,8 @@ def number(values: Mapping[str, object], key: str) -> float | None:
 def listed(value: object) -> list[Mapping[str, object]]:
     """The objects of a list."""
     return [item for item in value if isinstance(item, Mapping)] if isinstance(value, list) else []
+
+
+def of_many(noun: str, count: int) -> str:
+    """The noun for that many: ``recording`` of one, ``recordings`` of two."""
+    return noun if count == 1 else f"{noun}s"

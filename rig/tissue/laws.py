@@ -86,6 +86,11 @@ class Law(ABC):
         """The law with these parameters, each moved inside its bounds."""
         return cls(**{name: float(np.clip(values[name], b.lower, b.upper)) for name, b in cls.bounds.items()})
 
+    def held(self) -> type[Self]:
+        """The same kind of law, whose ``known`` parameters a fit takes as they are here."""
+        known = {name: float(getattr(self, name)) for name in self.known}
+        return type(type(self).__name__, (type(self),), {"known": known})
+
     @classmethod
     @abstractmethod
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:

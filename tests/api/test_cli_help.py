@@ -2,6 +2,7 @@
 
 import re
 import socket
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,10 @@ def test_help_of_the_whole_lists_every_command_with_its_whole_first_sentence() -
     for name in COMMANDS:
         (listed,) = re.findall(rf"^ *{name} +(.*)$", answer.output, re.MULTILINE)
         assert f"  {listed}\n" in runner.invoke(build(name), [name, "--help"], terminal_width=200).output
+
+
+def test_the_version_is_that_of_the_package() -> None:
+    assert runner.invoke(build(), ["--version"]).output == f"tissue-rig {version('tissue-rig')}\n"
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """`rig fit` and `rig report` from the command line."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -60,6 +61,34 @@ def test_fit_compares_further_laws_with_known_parameters_and_saves_the_one_asked
     assert "speed: B = " in output
 
 
+def test_fit_takes_what_a_diagnosis_named_as_known(session: Path, tmp_path: Path) -> None:
+    run(
+        "fit",
+        session,
+        "--out",
+        tmp_path / "first",
+        "--laws",
+        "extended",
+        "--known",
+        "c_mm_N=0.05",
+        "--model",
+        "extended",
+    )
+    named = tmp_path / "first" / "model.json"
+    output = run("fit", session, "--out", tmp_path / "second", "--with", named, "--model", "extended")
+    law = load_model(tmp_path / "second" / "model.json").law
+    assert law.name == "extended"
+    assert law.values == pytest.approx(load_model(named).law.values)
+    assert re.search(r"c_mm_N +│ 0.05 +│ known", output)
+
+
+def test_fit_prints_many_laws_in_80_columns_without_a_cell_broken(session: Path, tmp_path: Path) -> None:
+    output = run("fit", session, "--out", tmp_path, "--laws", "fung,power")
+    assert output.count("Displacement in mm at given forces") == 2
+    assert max(map(len, output.splitlines())) <= 80
+    assert not re.search(r"│ +\d +│ *$", output.split("Worst errors")[0], re.MULTILINE)
+
+
 def test_fit_of_every_law_draws_them_all(session: Path, tmp_path: Path) -> None:
     run("fit", session, "--out", tmp_path, "--laws", "all")
     for picture in ("fit.png", "residuals.png"):
@@ -69,6 +98,7 @@ def test_fit_of_every_law_draws_them_all(session: Path, tmp_path: Path) -> None:
 
 BAD = [
     (["--laws", "cubic"], r"no tissue law is called 'cubic'; choose one of .*fung.*sls"),
+    (["--with", "nowhere.json"], r"nowhere.json: no such file"),
     (["--model", "cubic"], r"no tissue law is called 'cubic'"),
     (["--known", "k=1"], r"--known k=1: the laws compared have k_N_mm, B_N_s_mm, a_N_mm, b_per_mm; add --laws"),
     (["--known", "k_N_mm=soft"], r"--known k_N_mm=soft: write k_N_mm=NUMBER"),

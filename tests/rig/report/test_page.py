@@ -179,7 +179,7 @@ def test_a_session_without_curves_loop_tracking_or_devices_still_has_a_report(tm
     write_session(folder, SessionInfo("bare", "import", "2026-01-02", "tissue-rig 0.1.0", trials=(trial,)))
     write_report(folder, tmp_path / "report.html")
     page = Page((tmp_path / "report.html").read_text())
-    assert page.headings[0] == "1 recordings, without a fit"
+    assert page.headings[0] == "1 recording, without a fit"
     for said in (
         "No fit: ", "no contact", "No force was tracked in this session", "No loop ran in this session",
         "The recordings name no device", "No protocol: imported data", "0 dropped samples",
