@@ -116,18 +116,20 @@ def track(
     if compare and against:
         raise UsageError("--table learns its own models: leave out --against")
     folder = out or Path("sessions") / f"track-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
-    if compare:
-        write_json(json_file, _compared(wiring, folder, asked))
-        return
+    write_json(json_file, _compared(wiring, folder, asked) if compare else _tracked(wiring, folder, asked, against))
+
+
+def _tracked(wiring: Wiring, folder: Path, asked: "Asked", against: Path | None) -> dict[str, object]:
+    """One run, after one with the other model where there is one; all is checked before anything is opened."""
     program = _planned(wiring, asked)
     other = _planned(wiring, asked._replace(model=against)) if against else None
     tracked.refuse_foreign(folder)
     with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
         before = follow(bench, other, folder, str(against)) if other else None
-        result = follow(bench, program, folder, str(model))
+        result = follow(bench, program, folder, str(asked.model))
     say_levels(result)
     console.print(f"recorded in {folder}", highlight=False)
-    write_json(json_file, tracked.as_json(result) | (say_gain(before, result) if before else {}))
+    return tracked.as_json(result) | (say_gain(before, result) if before else {})
 
 
 def follow(bench: Supervisor, program: Program, folder: Path, model: str) -> Tracked:
