@@ -3,9 +3,13 @@
 import math
 from itertools import pairwise
 
+import numpy as np
+
 from controller.steps import Approach, Compress, Dither, Hold, MoveTo, Program, Retract, Step, TrackForce, Zero
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
+
+LONGEST_S = 3600.0
 
 
 def refuse_beyond_limits(program: Program, wiring: Wiring) -> None:
@@ -48,7 +52,9 @@ def _reasons(step: Step, wiring: Wiring) -> list[str]:
             return _above("speed of the dither", peak_mm_s, limits.speed_mm_s, "mm/s", "limits.speed_mm_s")
         case TrackForce():
             reasons = [*_speed(step.speed_limit_mm_s, wiring), *_reference(step)]
-            return reasons + _above("reference force", max(step.forces_N), force_N, "N", "the force limit")
+            reasons += _above("reference force", max(step.forces_N), force_N, "N", "the force limit")
+            depth_mm = _depth_mm(step)
+            return reasons + _above("depth of it by the model", depth_mm, limits.depth_mm, "mm", "limits.depth_mm")
         case Retract():
             return [
                 *_speed(step.speed_mm_s, wiring),
@@ -66,8 +72,15 @@ def _reference(step: TrackForce) -> list[str]:
         reasons.append(f"the reference has {len(step.times_s)} times but {len(step.forces_N)} forces")
     if any(later < earlier for earlier, later in pairwise(step.times_s)):
         reasons.append("the reference's times go backwards")
-    reached_N = step.gains[-1].force_N
+    reached_N, lasts_s = step.gains[-1].force_N, step.repeats * step.times_s[-1]
+    reasons += _above("duration of the reference", lasts_s, LONGEST_S, "s", "an hour")
     return reasons + _above("reference force", max(step.forces_N), reached_N, "N", "the largest force of the model")
+
+
+def _depth_mm(step: TrackForce) -> float:
+    """Where the model has the largest force of the reference."""
+    rows = sorted(step.gains, key=lambda row: row.force_N)
+    return float(np.interp(max(step.forces_N), [row.force_N for row in rows], [row.depth_mm for row in rows]))
 
 
 def _speed(speed_mm_s: float, wiring: Wiring) -> list[str]:

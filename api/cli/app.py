@@ -88,5 +88,5 @@ def main() -> None:
     try:
         build(next((word for word in sys.argv[1:] if word != "--"), None))()
     except RigError as error:
-        Console(stderr=True, highlight=False, soft_wrap=True).print(f"rig: {error}", markup=False)
+        Console(stderr=True, highlight=False, soft_wrap=True, emoji=False).print(f"rig: {error}", markup=False)
         sys.exit(error.exit_code)

@@ -18,6 +18,7 @@ from rig.diagnosis.answers import Answer, Diagnosis
 from rig.diagnosis.design import check
 from rig.diagnosis.extended import extended_model
 from rig.diagnosis.files import FOLDER, MODEL, PICTURES, RESULT
+from rig.diagnosis.gates import Finding
 from rig.diagnosis.run import diagnose_session
 from rig.diagnosis.simulated import Simulated
 from rig.diagnosis.sources import read_source
@@ -61,7 +62,9 @@ def protocol(
     action: Annotated[Literal["check"], typer.Argument(help="What to do with the protocol.")],  # noqa: ARG001 - a verb
     file: Annotated[Path, typer.Argument(help="Protocol file, for example examples/diagnosis.toml.")],
     tracker: Annotated[bool, typer.Option(help="Whether a tracker sees the tip.")] = True,
-    rate_hz: Annotated[float, typer.Option("--rate-Hz", help="Rate of the force sensor.")] = 1000.0,
+    rate_hz: Annotated[
+        float, typer.Option("--rate-Hz", min=10, max=100_000, help="Rate of the force sensor.")
+    ] = 1000.0,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the confusability picture.")] = None,
     json_file: JsonOption = None,
 ) -> None:
@@ -71,7 +74,7 @@ def protocol(
     """
     result = check(load(Indentation, file), tracker, rate_hz)
     console.print(f"{result.strokes} strokes in {result.duration_s:.0f} s", highlight=False)
-    seen = [(name, f"{size:.3g} {unit}") for name, (size, unit) in sorted(result.detectable.items())]
+    seen = [(name, measured(size, unit)) for name, (size, unit) in sorted(result.detectable.items())]
     console.print(table(("cause", "visible from"), seen, "On a limb and noise as the mock bench has them"))
     for reason, names in by_reason(result.not_testable):
         console.print(f"cannot be seen: {names}: {reason}", highlight=False, markup=False)
@@ -108,12 +111,14 @@ def show(result: Diagnosis) -> None:
     console.print(f"{result.verdict}: {result.statement}", highlight=False, markup=False)
     if result.findings:
         _show_named(result)
-    seen = [(name, f"{size:.3g} {unit}") for name, (size, unit) in sorted(result.detectable.items())]
+    seen = [(name, measured(size, unit)) for name, (size, unit) in sorted(result.detectable.items())]
     if seen:
         console.print(table(("cause", "would have been named from"), seen, "Not found"))
     said = [f"cannot be tested: {names}: {reason}" for reason, names in by_reason(result.not_testable)]
+    if result.search is None:
+        said = [f"cannot be tested: any of the {len(result.not_testable)} causes, for this reason"]
     said += [_in_closed_loop(item) for item in result.simulated]
-    said += [f"data: {finding.recording} {finding.text}" for finding in result.quality]
+    said += [_of_the_data(finding) for finding in result.quality]
     said += [f"next experiment: {after(result.next_experiment)}"] if result.next_experiment else []
     for sentence in said:
         console.print(sentence, highlight=False, markup=False)
@@ -144,12 +149,22 @@ def _gained(finding: Answer) -> str:
     )
 
 
+def _of_the_data(finding: Finding) -> str:
+    others = f" (and in {finding.recordings - 1} more)" if finding.recordings > 1 else ""
+    return f"data: {f'{finding.recording} ' if finding.recording else ''}{finding.text}{others}"
+
+
 def _in_closed_loop(item: Simulated) -> str:
     which = "fitted" if item.fitted else "left out"
     return (
         f"closed-loop force error, {item.recording} ({which}): "
         f"{item.before_percent:.2f} % -> {item.after_percent:.2f} %{PUBLISHED.get(item.recording, '')}"
     )
+
+
+def measured(size: float, unit: str) -> str:
+    """A size with its unit, where it has one."""
+    return f"{size:.3g} {unit}" if unit != "1" else f"{size:.3g}"
 
 
 def by_reason(reasons: Mapping[str, str]) -> list[tuple[str, str]]:
@@ -174,15 +189,16 @@ def save(result: Diagnosis, folder: Path) -> None:
 
     for old in (folder / MODEL, *(folder / f"{name}{kind}" for name in PICTURES for kind in (".svg", ".png"))):
         old.unlink(missing_ok=True)
-    draw(pictures(result), folder)
+    figures = pictures(result)
+    draw(figures, folder)
     write_text(folder / RESULT, json.dumps(result.as_json(), indent=2) + "\n")
-    console.print(f"pictures and {RESULT} are in {folder}", highlight=False)
+    said = f"pictures and {RESULT} are in {folder}" if figures else f"{folder / RESULT} is written"
+    console.print(said, highlight=False)
     if result.search is not None and result.simulation != "axis":
         model = extended_model(result)
         model.save(folder / MODEL)
-        console.print(
-            f"{folder / MODEL} is the extended model, for rig track, simulate and fit --with", highlight=False
-        )
+        what = "extended model" if model.effects else "simulation's own model, with nothing added,"
+        console.print(f"{folder / MODEL} is the {what} for rig track, simulate and fit --with", highlight=False)
         for effect in model.effects:
             console.print(f"  {effect.name}: {effect.used}", highlight=False)
 

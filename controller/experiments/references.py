@@ -116,7 +116,7 @@ class Vibrate(Sine):
 
     kind: ClassVar[str] = "vibrate"
     amplitude_N: Positive = 0.5
-    frequency_Hz: Positive = 8.0
+    frequency_Hz: Positive = 6.0
     duration_s: Positive = 10.0
 
 
@@ -206,7 +206,8 @@ def from_csv(path: Path) -> Reference:
     try:
         lines = path.read_text().splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"{path}: cannot be read as text: {error}") from error
+        why = error.strerror if isinstance(error, OSError) else "it is no text"
+        raise DataError(f"{path}: cannot be read: {why}") from error
     table = csv.DictReader(lines)
     if not {"time_s", "force_N"} <= set(table.fieldnames or ()):
         found = ", ".join(table.fieldnames or ()) or "none"

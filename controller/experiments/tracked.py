@@ -20,7 +20,7 @@ from rig.channels import LoopSample
 from rig.config.wiring import Wiring
 from rig.errors import SafetyStop, UsageError
 from rig.recording.reader import read_recording
-from rig.recording.sessions import SESSION_FILE, TrialInfo, open_session, write_session
+from rig.recording.sessions import SESSION_FILE, TRACKING, TrialInfo, open_session, write_session
 from rig.tissue.model import Model
 
 RESULT = "track.json"
@@ -95,9 +95,9 @@ def run(bench: Supervisor, program: Program, folder: Path, model: str, operation
 def recorded_run(bench: Supervisor, program: Program, folder: Path, model: str) -> Recorded:
     """One run into the session in ``folder``, a new one where there is none; listed there however it ended."""
     if not (folder / SESSION_FILE).exists():
-        new_session(folder, "track", {"name": program.name, "kind": "tracking"}, bench.wiring)
+        new_session(folder, "track", {"name": program.name, "kind": TRACKING}, bench.wiring)
     name = _free_name(folder)
-    about = {"trial": {"kind": "tracking", "name": program.name}, "model": {"file": model}}
+    about = {"trial": {"kind": TRACKING, "name": program.name}, "model": {"file": model}}
     done = record(
         bench, program, folder / f"{name}.mcap", metadata(bench, folder.name, name, about), _longest_s(program)
     )

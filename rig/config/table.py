@@ -24,7 +24,10 @@ AnyTable = TypeVar("AnyTable", bound=Table)
 def read_toml(path: Path) -> dict[str, Any]:
     """The file's table; a missing or malformed file is one sentence."""
     try:
-        return tomllib.loads(path.read_text())
+        text = path.read_text()
+        if not text:
+            raise UsageError(f"{path}: is empty; the examples folder shows what belongs into it")
+        return tomllib.loads(text)
     except FileNotFoundError as error:
         raise UsageError(f"{path}: no such file; give the path of a TOML file") from error
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -70,13 +73,13 @@ def _value(text: str) -> object:
 
 def _sentence(kind: type[BaseModel], detail: ErrorDetails) -> str:
     location = [str(part) for part in detail["loc"]]
-    place = ".".join(location) or "table"
+    place = ".".join(location)
     if detail["type"] == "extra_forbidden":
         keys = _keys(kind, location[:-1])
         near = difflib.get_close_matches(location[-1], keys, n=1, cutoff=0.0)
         return f"unknown key {place}; nearest valid key: {near[0] if near else ', '.join(keys)}"
     got = "" if isinstance(detail["input"], dict | BaseModel) else f" (got {detail['input']!r})"
-    return f"{place}: {detail['msg'].removeprefix('Value error, ')}{got}"
+    return f"{place and f'{place}: '}{detail['msg'].removeprefix('Value error, ')}{got}"
 
 
 def _keys(kind: type[BaseModel], sections: list[str]) -> list[str]:

@@ -183,6 +183,11 @@ class AxisProblem:
         """Standstill, where friction is whatever holds the axis."""
         return np.asarray(np.abs(self.motion.velocity) < BLIND_M_S)
 
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Of the variables; the drive is asked for newtons."""
+        return {"depth": "m", "velocity": "m/s", "acceleration": "m/s2", "session time": "s", "force": "N"}
+
     def variables(self) -> Mapping[str, Array]:
         """What a leftover may depend on."""
         m = self.motion

@@ -1,5 +1,6 @@
 """From a folder of axis recordings to a diagnosis, and the simulation error on the recording left out."""
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +86,6 @@ def _mat(path: Path) -> dict[str, np.ndarray[tuple[int, ...], np.dtype[np.float6
 
 
 def _csv(path: Path) -> dict[str, np.ndarray[tuple[int, ...], np.dtype[np.float64]]]:
-    with path.open() as file:
-        header = [name.strip() for name in file.readline().split(",")]
-    return read_table(path, {name: name for name in header})
+    with path.open(newline="") as file:
+        header = [name.strip() for name in next(csv.reader(file), [])]
+    return read_table(path, {name: name for name in header})[0]

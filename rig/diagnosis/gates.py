@@ -28,23 +28,44 @@ def inspect_stream(recording: str, stream: str, time_s: Array, value: Array) -> 
         return [
             Finding(recording, stream, "missing", f"{stream} holds {len(time_s)} samples; nothing can be said of it")
         ]
-    found = [*_clock(time_s), *_values(time_s, value, may_rest=stream != "force")]
+    found = [*_numbers(time_s, value, may_hide=stream == "marker"), *_clock(time_s)]
+    found += _values(time_s, value, may_rest=stream != "force")
     return [Finding(recording, stream, kind, f"{stream}: {text}") for kind, text in found]
 
 
+def _numbers(time_s: Array, value: Array, may_hide: bool) -> list[tuple[str, str]]:
+    """A marker that is hidden has no numbers, and no fault."""
+    bad = ~np.isfinite(time_s) | (~np.isfinite(value) & (not may_hide))
+    if not bad.any():
+        return []
+    count = int(np.count_nonzero(bad))
+    return [("number", f"{count} of {len(bad)} samples hold no number, first sample {np.argmax(bad) + 1}; left out")]
+
+
+def in_order(time_s: Array) -> NDArray[np.bool_]:
+    """Which of the finite times lie after every earlier one."""
+    return np.concatenate([[True], time_s[1:] > np.maximum.accumulate(time_s)[:-1]]) if time_s.size else time_s > 0
+
+
 def _clock(time_s: Array) -> list[tuple[str, str]]:
+    time_s = time_s[np.isfinite(time_s)]
+    if len(time_s) < 2:
+        return []
     step = np.diff(time_s)
     period = float(np.median(step))
     found = []
     if np.any(step <= 0):
-        backwards = np.count_nonzero(step <= 0)
-        found.append(("clock", f"time stands still or runs backwards at {backwards} samples; these were left out"))
+        lost, first = np.count_nonzero(~in_order(time_s)), int(np.argmax(step <= 0)) + 2
+        text = f"time stands still or runs backwards, first at sample {first}; {lost} of {len(time_s)} samples left out"
+        found.append(("clock", text))
     if period <= 0:
         return found
     gaps = step > 5 * period
     if np.any(gaps):
         longest_ms = 1e3 * float(step.max())
-        found.append(("gap", f"{np.count_nonzero(gaps)} gaps, the longest {longest_ms:.0f} ms at {1 / period:.0f} Hz"))
+        count = int(np.count_nonzero(gaps))
+        text = f"{count} gap{'s' * (count > 1)}, the longest {longest_ms:.0f} ms at {1 / period:.0f} Hz"
+        found.append(("gap", text))
     spread = float(np.std(step[~gaps & (step > 0)], ddof=0)) / period
     if spread > JITTER:
         found.append(("jitter", f"the period scatters by {100 * spread:.0f} % about {1e3 * period:.2f} ms"))
@@ -59,23 +80,28 @@ def _values(time_s: Array, value: Array, may_rest: bool) -> list[tuple[str, str]
     if span == 0:
         return [("constant", f"constant at {finite[0]:g}: the stream carries nothing")]
     found = []
-    top = finite >= finite.max() - 1e-9 * span
-    longest = _longest_run(top)
     same = np.diff(finite) == 0
     quantum = float(np.min(np.abs(np.diff(finite))[~same])) if not same.all() else span
-    if (
-        not may_rest
-        and longest >= FLAT_TOP_SAMPLES
-        and longest > 4 * _longest_run(same & ~top[1:])
-        and span > 20 * quantum
-    ):
-        found.append(("saturation", f"{longest} samples in a row stand at the largest value {finite.max():g}"))
+    clipped = 0 if may_rest else _longest_run(at_the_end_of_range(finite))
+    if clipped:
+        text = f"{clipped} samples in a row stand at the largest value {finite.max():g}; not judged there"
+        found.append(("saturation", text))
     if span / max(quantum, 1e-300) < COARSE_STEPS:
         found.append(("quantisation", f"only {span / quantum:.0f} steps of {quantum:g} over its range"))
     frozen_s = _longest_run(same) * float(np.median(np.diff(time_s)))
     if not may_rest and frozen_s > FROZEN_S and span / quantum >= COARSE_STEPS and np.mean(same) < 0.5:
         found.append(("frozen", f"the value does not change for {1e3 * frozen_s:.0f} ms"))
     return found
+
+
+def at_the_end_of_range(value: Array) -> NDArray[np.bool_]:
+    """Which finite samples a full converter cut off: long runs of the largest value, where other values do not last."""
+    span, same = float(np.ptp(value)), np.diff(value) == 0
+    top = value >= value.max() - 1e-9 * span
+    longest = _longest_run(top)
+    quantum = float(np.min(np.abs(np.diff(value))[~same])) if not same.all() else span
+    clipped = longest >= FLAT_TOP_SAMPLES and longest > 4 * _longest_run(same & ~top[1:]) and span > 20 * quantum
+    return np.asarray(top & clipped)
 
 
 def _longest_run(mark: NDArray[np.bool_]) -> int:

@@ -113,6 +113,11 @@ class Indentation:
         touching = np.asarray((np.abs(drive.position_mm - surface) < reach) & moving)
         return touching if self.data.unseen is None else touching | self.data.unseen
 
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Of the variables, and of the force."""
+        return UNITS
+
     def variables(self) -> Mapping[str, Array]:
         """What a leftover may depend on; ``depth`` counts from an arbitrary zero."""
         drive = self.data.drive
@@ -127,6 +132,12 @@ class Indentation:
             "speed": drive.speed_mm_s,
         }
         return given if drive.temperature_C is None else {**given, "temperature": drive.temperature_C}
+
+
+UNITS = {
+    "depth": "mm", "velocity": "mm/s", "acceleration": "mm/s2", "time in recording": "s", "time since reversal": "s",
+    "session time": "s", "stroke number": "1", "speed": "mm/s", "temperature": "degC", "force": "N",
+}  # fmt: skip
 
 
 def _scaled(values: Fields, share: Array) -> Fields:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import savgol_filter
 
-from rig.diagnosis.gates import Finding, inspect_stream
+from rig.diagnosis.gates import Finding, at_the_end_of_range, in_order, inspect_stream
 from rig.errors import DataError
 from rig.simulation.drive import Array, Drive
 
@@ -59,7 +59,7 @@ class Session:
 class Observations:
     """Drive and readings on the working grid: force shape (n,), tip at the tracker's frames shape (m,).
 
-    ``unseen``, shape (n,), marks gaps of the axis' samples: nobody knows how the tip moved there, least how fast.
+    ``unseen``, shape (n,), marks what nobody knows: motion in gaps of the axis' clock, force beyond the sensor's range.
     """
 
     name: str
@@ -97,12 +97,16 @@ class _Gridded:
 def observe(session: Session) -> Observations:
     """The session on its working grid; raises DataError where no recording can be used at all."""
     findings = [*session.findings, *(finding for streams in session.recordings for finding in _inspect(streams))]
-    usable = [clean for streams in session.recordings if (clean := _cleaned(streams)) is not None]
+    cleaned = {streams.name: _cleaned(streams) for streams in session.recordings}
+    lost = {name: clean for name, clean in cleaned.items() if isinstance(clean, str)}
+    usable = [clean for clean in cleaned.values() if isinstance(clean, Streams)]
     if not usable:
-        raise DataError(
-            f"{session.name}: no recording has at least {FEWEST_SAMPLES} samples of force and axis over a common time; "
-            "run `rig verify` on it"
-        )
+        said = [*(f"{name}: {why}" for name, why in lost.items()), *(finding.text for finding in session.findings)]
+        why = said[0] if said else "there is none"
+        raise DataError(f"{session.name}: no recording can be used ({why}); run `rig verify` on it")
+    findings += [Finding(name, "recording", "unusable", f"recording left out: {why}") for name, why in lost.items()]
+    usable, turned = _turned(usable)
+    findings += turned
     rough_mm = float(np.median([jitter_mm(streams) for streams in usable]))
     rate_Hz, spans_s = (WORKING_RATE_HZ, DERIVATIVE_SPANS_S) if rough_mm <= JITTER_MM else JITTERY
     period_s = working_period(usable, rate_Hz)
@@ -156,26 +160,48 @@ def ordered(time_s: Array, *columns: Array) -> tuple[Array, ...]:
     time_s, columns = time_s[finite], tuple(c[finite] for c in columns)
     if time_s.size == 0:
         return (time_s, *columns)
-    ahead = np.maximum.accumulate(time_s)
-    keep = np.concatenate([[True], time_s[1:] > ahead[:-1]])
+    keep = in_order(time_s)
     return (time_s[keep], *(c[keep] for c in columns))
 
 
-def _cleaned(streams: Streams) -> Streams | None:
-    """The recording with ordered clocks, cut to the time both force and axis cover; None where too little is left."""
+def _cleaned(streams: Streams) -> Streams | str:
+    """The recording with ordered clocks, cut to the time both force and axis cover; why, where too little is left."""
     temperature = streams.temperature_C
     extra = () if temperature is None or not np.isfinite(temperature).all() else (temperature,)
     force = ordered(streams.force_s, streams.force_N, *extra)
     axis = ordered(streams.axis_s, streams.axis_mm)
-    if min(force[0].size, axis[0].size) < FEWEST_SAMPLES:
-        return None
+    for name, raw, kept in (("force", streams.force_s, force[0]), ("axis", streams.axis_s, axis[0])):
+        if kept.size < FEWEST_SAMPLES:
+            return f"{kept.size} of {raw.size} samples of {name} are numbers at growing times (limit {FEWEST_SAMPLES})"
     inside = (force[0] >= axis[0][0]) & (force[0] <= axis[0][-1])
     if np.count_nonzero(inside) < FEWEST_SAMPLES:
-        return None
+        return (
+            f"force from {force[0][0]:g} to {force[0][-1]:g} s and axis from {axis[0][0]:g} to {axis[0][-1]:g} s have "
+            "no common time"
+        )
     return Streams(
         streams.name, force[0][inside], force[1][inside], axis[0], axis[1], streams.marker_s, streams.marker_mm,
         force[2][inside] if extra else None,
     )  # fmt: skip
+
+
+def _turned(usable: Sequence[Streams]) -> tuple[list[Streams], list[Finding]]:
+    """Without the few recordings in which force falls as the tip goes in while it rises in the others."""
+    rises = np.array([_rise(streams) for streams in usable])
+    large = 0.5 * float(np.median(np.abs(rises)))
+    falls = rises < -large
+    if large == 0 or not 0 < np.count_nonzero(falls) < 0.5 * len(usable):
+        return list(usable), []
+    text = "recording left out: its force falls as the tip goes in, and rises in the others: turn its sign"
+    gone = [Finding(streams.name, "recording", "sign", text) for streams, out in zip(usable, falls, strict=True) if out]
+    return [streams for streams, out in zip(usable, falls, strict=True) if not out], gone
+
+
+def _rise(streams: Streams) -> float:
+    """Force [N] at the deepest tenth of the motion, less that at the highest."""
+    place_mm = np.interp(streams.force_s, streams.axis_s, streams.axis_mm)
+    deep, high = (place_mm >= np.quantile(place_mm, 0.9)), (place_mm <= np.quantile(place_mm, 0.1))
+    return float(np.median(streams.force_N[deep]) - np.median(streams.force_N[high]))
 
 
 def _on_grid(streams: Streams, period_s: float, spans_s: Sequence[float]) -> _Gridded:
@@ -196,6 +222,7 @@ def _on_grid(streams: Streams, period_s: float, spans_s: Sequence[float]) -> _Gr
         inside = (marker_s >= time_s[0]) & (marker_s <= time_s[-1])
         marker_s, marker_mm = marker_s[inside], np.array(xyz).T[inside]
     unseen = beside_gaps(streams.axis_s, time_s, 0.5 * max(spans_s))
+    unseen |= np.bincount(window, at_the_end_of_range(streams.force_N))[full] > 0
     if spans_s[0] > DERIVATIVE_SPANS_S[0]:
         # Derivatives over long spans round off what turns within one.
         unseen |= np.abs(means[4]) * spans_s[0] > MOST_TURN_MM_S

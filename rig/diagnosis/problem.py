@@ -135,5 +135,9 @@ class Problem(Protocol):
     def blind(self, values: Fields) -> NDArray[np.bool_]:
         """Rows of the first channel that cannot be judged at its sampling rate (``values`` may hold arrays)."""
 
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Unit of each variable."""
+
     def variables(self) -> Mapping[str, Array]:
         """What a leftover may depend on, each on the first channel, shape (n,)."""

@@ -86,9 +86,36 @@ class Fault(NamedTuple):
 RECORD = "record at least 6 strokes at three or more speeds, for example with examples/diagnosis.toml"
 
 
+SLOWEST_HZ, LONGEST_MM = 2.0, 300.0
+# Of tissue and of anything soft in its place, over the whole travel.
+STIFFEST_N_MM, SOFTEST_N_MM = 100.0, 1e-4
+
+
+def _unit_fault(data: Observations) -> Fault | None:
+    """What looks like another unit than s, N or mm."""
+    force_N, travel_mm = float(np.ptp(data.force_N)), float(np.ptp(data.drive.position_mm))
+    if data.rate_Hz < SLOWEST_HZ:
+        return Fault(
+            f"force was sampled {data.rate_Hz:.3g} times a second by its time stamps (limit {SLOWEST_HZ:g})",
+            "give time_s in seconds (divide milliseconds by 1000), or sample faster",
+        )
+    if travel_mm > LONGEST_MM:
+        return Fault(f"the axis travels {travel_mm:.4g} mm (limit {LONGEST_MM:g} mm)", "give position_mm in mm")
+    if force_N and travel_mm and not SOFTEST_N_MM < force_N / travel_mm < STIFFEST_N_MM:
+        return Fault(
+            f"force changes by {force_N:.4g} N over {travel_mm:.4g} mm of travel (limits {SOFTEST_N_MM:g} to "
+            f"{STIFFEST_N_MM:g} N/mm), which no tissue does",
+            "give force_N in N and position_mm in mm",
+        )
+    return None
+
+
 def unusable(data: Observations) -> Fault | None:
     """Why nothing can be tested with these data; None where something can."""
     force, position = data.force_N, data.drive.position_mm
+    odd = _unit_fault(data)
+    if odd is not None:
+        return odd
     if np.ptp(force) == 0 or np.ptp(position) == 0:
         still = "force" if np.ptp(force) == 0 else "position"
         return Fault(f"the {still} never changes, so the recordings carry no experiment", f"connect the {still} sensor")
@@ -131,6 +158,6 @@ def diagnose_session(session: Session, simulation: Simulation = "index", progres
     try:
         data = observe(in_strokes(session) if len(session.recordings) < FEWEST_RECORDINGS else session)
     except DataError as error:
-        reason = str(error).removeprefix(f"{session.name}: ").partition(";")[0]
-        return cannot(simulation, session.name, 0, Fault(reason, RECORD), session.findings)
+        reason = str(error).removeprefix(f"{session.name}: ").removesuffix("; run `rig verify` on it")
+        return cannot(simulation, session.name, 0, Fault(reason, f"mend these files, or {RECORD}"), session.findings)
     return diagnose(data, simulation, progress=progress)

@@ -30,6 +30,9 @@ RIVAL_SE = 2.0
 KEEP_NATS = 3.0
 AMPLE_NATS = 20.0
 WORSE = 1.01
+# What takes nothing off the error needs more evidence than this, or a tracker to have been seen by.
+PLENTY_NATS = 50.0
+BETTER = 0.998
 START_SCALES = 0.05
 STANDS_OUT_NATS = 3.0
 FOLLOWED = 5
@@ -247,16 +250,20 @@ def dropped(model: Fit) -> Fit:
 def settled(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:
     """After the swaps, without what earns nothing, or little while it predicts unseen recordings worse in newtons."""
     named, model = swapped(model, library, p_values)
-    weak = [one for one in named if one.nats < KEEP_NATS or (one.nats < AMPLE_NATS and worse(model, one.without))]
+    weak = [one for one in named if is_weak(model, one)]
     if not weak:
         return named, model
     return settled(min(weak, key=lambda one: one.nats).without, (), p_values)
 
 
-def worse(model: Fit, smaller: Fit) -> bool:
-    """Whether the larger model's error on recordings left out is larger, by a hundredth and more."""
-    errors = [held_out_square_error(least_squares(one)).mean() for one in (model, smaller)]
-    return bool(errors[0] > WORSE**2 * errors[1])
+def is_weak(model: Fit, one: Named) -> bool:
+    """Too little evidence for what the cause does to the error [N] on recordings left out."""
+    if one.nats < KEEP_NATS or one.nats >= PLENTY_NATS:
+        return one.nats < KEEP_NATS
+    errors = [float(held_out_square_error(least_squares(fit)).mean()) for fit in (model, one.without)]
+    ratio = np.sqrt(errors[0] / errors[1])
+    seen_by_tracker = "tracker" in one.effect.needs
+    return bool((ratio > WORSE and one.nats < AMPLE_NATS) or (ratio > BETTER and not seen_by_tracker))
 
 
 def swapped(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:

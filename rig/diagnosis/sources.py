@@ -4,6 +4,8 @@ Unlike the import, which refuses a folder with anything wrong in it, the diagnos
 was left out: data that are wrong in part are the very data somebody wants to understand.
 """
 
+import csv
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +16,12 @@ from rig.diagnosis.gates import Finding
 from rig.diagnosis.observations import Session, Streams
 from rig.diagnosis.stacked import from_stacked, stacked_file
 from rig.errors import DataError, RigError
-from rig.recording.import_format import FIELDS, SessionTable, TrialTable, column_names
+from rig.recording.csv_columns import TOOL
+from rig.recording.import_format import EXPORTED, FIELDS, OPTIONAL, SessionTable, TrialTable, column_names
 from rig.recording.reader import Recording
-from rig.recording.sessions import open_session
+from rig.recording.sessions import TRACKING, open_session
 from rig.recording.tables import compression_N
 from rig.simulation.drive import Array, Index
-from rig.tissue.study import TRACKING
 
 TIP_TOOL = 0
 NS = 1e-9
@@ -55,7 +57,7 @@ def from_session(folder: Path) -> Session:
             recordings.append((trial.name, recording))
     starts = [int(r.tables["force"]["capture_ns"][0]) for _, r in recordings if len(r.tables["force"])]
     streams = [streams_of(name, recording, min(starts, default=0)) for name, recording in recordings]
-    findings += [finding for name, recording in recordings for finding in late(name, recording)]
+    findings += [finding for name, recording in recordings for finding in late(name, recording.tables["axis"])]
     stated = {r.metadata.get("calibration", {}).get("surface_mm", "") for _, r in recordings}
     surface = float(stated.pop()) if len(stated) == 1 and "" not in stated else None
     return Session(folder.name, tuple(streams), surface, findings=tuple(findings))
@@ -79,15 +81,14 @@ def streams_of(name: str, recording: Recording, start_ns: int) -> Streams:
     )
 
 
-def late(name: str, recording: Recording) -> list[Finding]:
+def late(name: str, axis: Mapping[str, Array] | NDArray[np.void]) -> list[Finding]:
     """What to say of an axis whose samples came late; nothing below 1 %."""
-    axis = recording.tables["axis"]
-    share = 1 - float(np.mean(in_time(axis["capture_ns"], axis["arrival_ns"]))) if len(axis) else 0.0
+    share = 1 - float(np.mean(in_time(axis["capture_ns"], axis["arrival_ns"]))) if len(axis["capture_ns"]) else 0.0
     text = f"axis: {100 * share:.0f} % of the samples came more than 0.5 ms later than usual; these were left out"
     return [Finding(name, "axis", "late", text)] if share > MOST_LATE else []
 
 
-def in_time(capture_ns: Index, arrival_ns: Index) -> NDArray[np.bool_]:
+def in_time(capture_ns: Index | Array, arrival_ns: Index | Array) -> NDArray[np.bool_]:
     """Samples that came no later than usual, within 0.5 ms.
 
     A drive that is asked late tells where it is then, under the time it should have been asked; at the ends of a dither
@@ -105,19 +106,22 @@ def from_csv(folder: Path, columns: tuple[str, ...] = ()) -> Session:
     for path in sorted(path for path in folder.glob("trial_*") if path.is_dir()):
         read: dict[str, dict[str, Array]] = {}
         for stream in FIELDS:
+            if stream in OPTIONAL and not (path / f"{stream}.csv").exists():
+                continue
             try:
-                read[stream] = read_table(path / f"{stream}.csv", names[stream])
+                read[stream], remark = read_table(path / f"{stream}.csv", names[stream], EXPORTED[stream])
+                findings += [Finding(path.name, stream, "text", remark)] if remark else []
             except DataError as error:
-                if stream != "marker" or (path / "marker.csv").exists():
-                    findings.append(Finding(path.name, stream, "unreadable", str(error)))
+                findings.append(Finding(path.name, stream, "unreadable", str(error)))
         if "force" in read and "axis" in read:
+            findings += late(path.name, read["axis"]) if "arrival_ns" in read["axis"] else []
             streams.append(_csv_streams(path, read, table))
     surface = None if table.surface_mm is None else table.position_positive * table.surface_mm
     return Session(folder.name, tuple(streams), surface, findings=tuple(findings))
 
 
 def _csv_streams(path: Path, read: dict[str, dict[str, Array]], table: SessionTable) -> Streams:
-    force, axis, marker = read["force"], read["axis"], read.get("marker")
+    force, axis, marker = read["force"], _in_time_rows(read["axis"]), _tip_rows(read.get("marker"))
     trial = load(TrialTable, path / "trial.toml") if (path / "trial.toml").exists() else None
     kelvin = None if trial is None else trial.temperature_C
     return Streams(
@@ -132,28 +136,77 @@ def _csv_streams(path: Path, read: dict[str, dict[str, Array]], table: SessionTa
     )
 
 
-def read_table(path: Path, names: dict[str, str]) -> dict[str, Array]:
-    """The named columns of a CSV file; fields that are no number become NaN. Raises DataError naming file and cause."""
+def _in_time_rows(axis: dict[str, Array]) -> dict[str, Array]:
+    """Without the rows that came late, where the file says when each came."""
+    if "arrival_ns" not in axis:
+        return axis
+    keep = in_time(axis["capture_ns"], axis["arrival_ns"])
+    return {field: column[keep] for field, column in axis.items()}
+
+
+def _tip_rows(marker: dict[str, Array] | None) -> dict[str, Array] | None:
+    """The tip's own rows, where the file holds several tools."""
+    if marker is None or TOOL not in marker:
+        return marker
+    return {field: column[marker[TOOL] == TIP_TOOL] for field, column in marker.items()}
+
+
+def read_table(path: Path, names: Mapping[str, str], more: Sequence[str] = ()) -> tuple[dict[str, Array], str]:
+    """The named columns of a CSV file, with ``more`` where all of these are there, and a remark on what is no number.
+
+    Cells that are no number become NaN. Raises DataError naming file and cause.
+    """
     try:
-        with path.open() as file:
-            header = [name.strip() for name in file.readline().split(",")]
-            rows = _numbers(path, file.readlines())
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            header = [name.strip() for name in next(csv.reader([file.readline()]), [])]
+            lines = file.readlines()
     except FileNotFoundError as error:
         raise DataError(f"{path}: no such file, so this stream is missing") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"{path}: cannot be read: {error}") from error
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: is no text; export it as CSV again") from error
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
     lacking = [name for name in names.values() if name not in header]
     if lacking:
-        raise DataError(f"{path}: no column {lacking[0]}; it has {', '.join(header)}; name it with --columns")
-    if rows.shape[1] != len(header):
-        raise DataError(f"{path}: rows of {rows.shape[1]} values under a header of {len(header)}")
-    return {field: rows[:, header.index(name)] for field, name in names.items()}
-
-
-def _numbers(path: Path, lines: list[str]) -> Array:
+        raise DataError(f"{path}: {_lacking(header, lacking[0])}")
     if not lines:
         raise DataError(f"{path}: holds a header and nothing else")
+    wanted = {**names, **({name: name for name in more} if all(name in header for name in more) else {})}
+    rows, remark = _numbers(lines, [header.index(name) for name in wanted.values()], header)
+    return {field: rows[:, column] for column, field in enumerate(wanted)}, f"{path.name} {remark}" if remark else ""
+
+
+def _lacking(header: Sequence[str], name: str) -> str:
+    if not any(header):
+        return "is empty; export it again"
+    if len(header) == 1 and any(separator in header[0] for separator in ";\t|"):
+        return f"the header is {header[0]!r}; separate columns by commas and write decimals with points"
+    return f"no column {name}; it has {', '.join(header)}; name it with --columns"
+
+
+def _numbers(lines: Sequence[str], columns: Sequence[int], header: Sequence[str]) -> tuple[Array, str]:
+    """The columns, and where the first cell is that is no number; in one go where there is none."""
     try:
-        return np.atleast_2d(np.loadtxt(lines, delimiter=",", ndmin=2))
+        return np.loadtxt(lines, delimiter=",", ndmin=2, usecols=columns, quotechar='"', comments=None), ""
+    except (ValueError, IndexError):
+        pass
+    found, bad = [], []
+    for line, cells in enumerate(csv.reader(lines), start=2):
+        texts = [cells[column].strip() if column < len(cells) else "" for column in columns]
+        found.append([as_number(text) for text in texts])
+        bad += [(line, header[c], text) for c, text in zip(columns, texts, strict=True) if not is_number_or_gap(text)]
+    remark = "line {}, column {}: {!r} is no number; left out".format(*bad[0]) if bad else ""
+    return np.array(found), remark + (f", as {len(bad) - 1} more" if len(bad) > 1 else "")
+
+
+def is_number_or_gap(text: str) -> bool:
+    """Whether a cell holds a number, or says by itself that nothing was measured."""
+    return text.lower() in ("", "nan") or not np.isnan(as_number(text))
+
+
+def as_number(text: str) -> float:
+    """The number a cell holds, NaN for anything else."""
+    try:
+        return float(text)
     except ValueError:
-        return np.atleast_2d(np.genfromtxt(lines, delimiter=",", invalid_raise=False, loose=True))
+        return float("nan")

@@ -6,7 +6,7 @@ Arrow reads the file in one go; only where something is wrong is it read again, 
 import csv
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rig.errors import DataError
 
-TIME = "time_s"
+TIME, TOOL = "time_s", "tool"
 # Beyond this, nanoseconds do not fit 64 bits: the column is not in seconds.
 TIME_LIMIT_S = 9e9
 # Units people write behind a name; used only to tell a wrong unit from a wrong name.
@@ -24,15 +24,20 @@ UNITS = frozenset("s ms us ns min N kN mN cN kg g lb lbf kgf V mV mm m cm um nm 
 _MISSING = ("", "nan", "NaN", "NAN", "MISSING")
 
 
-def read_columns(path: Path, names: Mapping[str, str], gaps: bool = False) -> dict[str, NDArray[np.float64]]:
+def read_columns(
+    path: Path, names: Mapping[str, str], gaps: bool = False, more: Sequence[str] = ()
+) -> dict[str, NDArray[np.float64]]:
     """Columns of ``path`` by field; ``names`` says which header each field (``time_s`` first) stands under.
 
     Times are finite and strictly increasing, all values finite, rows at least two. With ``gaps`` a row may lack all its
-    values (empty or NaN), but not its time. Raises DataError with file, line, column and what was found there.
+    values (empty or NaN), but not its time. ``more`` are columns to be read where they are there, all of them or none;
+    rows of different ``tool`` may be of one time. Raises DataError with file, line, column and what was found there.
     """
     header = _header(path)
     for field, name in names.items():
         _check_name(path, header, field, name)
+    if all(name in header for name in more):
+        names = {**names, **{name: name for name in more}}
     try:
         table = _read(path, header, names)
     except pa.ArrowInvalid as error:
@@ -100,23 +105,25 @@ def _read(path: Path, header: list[str], names: Mapping[str, str]) -> dict[str, 
 
 
 def _is_good(table: Mapping[str, NDArray[np.float64]], gaps: bool) -> bool:
-    time_s, *values = table.values()
+    time_s, *values = (column for field, column in table.items() if field != TOOL)
+    tool = table.get(TOOL, np.zeros_like(time_s))
     finite = np.array([np.isfinite(value) for value in values])
     whole = finite.all(axis=0) | (np.isnan(np.array(values)).all(axis=0) & gaps)
-    return bool(
-        time_s.size >= 2 and (np.abs(time_s) < TIME_LIMIT_S).all() and (np.diff(time_s) > 0).all() and whole.all()
-    )
+    rising = all((np.diff(time_s[tool == one]) > 0).all() for one in np.unique(tool))
+    usable = whole.all() and np.isfinite(tool).all()
+    return bool(time_s.size >= 2 and (np.abs(time_s) < TIME_LIMIT_S).all() and rising and usable)
 
 
 def _explain(path: Path, header: list[str], names: Mapping[str, str], gaps: bool) -> None:
     """Raises the sentence for the first thing wrong in the file, line by line."""
-    before: float | None = None
+    before: dict[str, float] = {}
     rows = 0
     reader = csv.reader(io.StringIO(_text(path), newline=""))
     try:
         next(reader)
         for cells in filter(None, reader):
-            before, rows = _check_row(f"{path} line {reader.line_num}", cells, header, names, before, gaps), rows + 1
+            _check_row(f"{path} line {reader.line_num}", cells, header, names, before, gaps)
+            rows += 1
     except csv.Error as error:
         raise DataError(f"{path} line {reader.line_num}: {error}") from error
     if rows < 2:
@@ -134,21 +141,22 @@ def _text(path: Path) -> str:
 
 
 def _check_row(
-    place: str, cells: list[str], header: list[str], names: Mapping[str, str], before: float | None, gaps: bool
-) -> float:
-    """Checks one row and returns its time."""
+    place: str, cells: list[str], header: list[str], names: Mapping[str, str], before: dict[str, float], gaps: bool
+) -> None:
+    """Checks one row, and notes its time in ``before``, by tool."""
     if len(cells) != len(header):
         raise DataError(f"{place}: {len(cells)} cells where the header has {len(header)}")
-    named = [(name, cells[header.index(name)].strip()) for name in names.values()]
-    time_s, *values = [_number(place, name, text) for name, text in named]
-    bad = [not math.isfinite(time_s), *(not math.isfinite(value) for value in values)]
-    if gaps and all(math.isnan(value) for value in values):
-        bad = bad[:1]
-    for (name, text), is_bad in zip(named, bad, strict=False):
-        if is_bad:
+    named = {field: (name, cells[header.index(name)].strip()) for field, name in names.items()}
+    numbers = {field: _number(place, name, text) for field, (name, text) in named.items()}
+    values = [value for field, value in numbers.items() if field not in (TIME, TOOL)]
+    hidden = gaps and all(math.isnan(value) for value in values)
+    for field, value in numbers.items():
+        if not math.isfinite(value) and not (hidden and field not in (TIME, TOOL)):
+            name, text = named[field]
             raise DataError(f"{place}, column {name}: {text or 'nothing'} where a number is needed")
-    _check_time(f"{place}, column {named[0][0]}", time_s, before)
-    return time_s
+    tool = str(numbers.get(TOOL, ""))
+    _check_time(f"{place}, column {named[TIME][0]}", numbers[TIME], before.get(tool))
+    before[tool] = numbers[TIME]
 
 
 def _check_time(place: str, time_s: float, before: float | None) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rig.channels import FORCE, STREAMS
 from rig.errors import UsageError
 from rig.recording.files import whole_file, whole_folder, write_text
-from rig.recording.sessions import Session, TrialInfo, plain
+from rig.recording.sessions import TRACKING, Session, TrialInfo, plain
 from rig.recording.tables import Column, arrow_table, compression_N, filled, write_parquet
 
 Format = Literal["csv", "parquet", "hdf5", "mat"]
@@ -52,20 +52,24 @@ def _information(session: Session) -> str:
 def _csv(session: Session, out: Path) -> None:
     """The layout `rig import` reads: ``session.toml``, ``trial_NAME/trial.toml`` and ``trial_NAME/STREAM.csv``.
 
+    Runs of force tracking stand in folders of their own names, which the import leaves alone: they press to no depth.
+
     Each table begins with ``time_s`` (capture, host's monotonic clock), force also with ``force_N`` in compression.
     Units and meanings stand in ``columns.csv``, the session's facts in ``session.json``.
     """
     with whole_folder(out) as folder:
         for trial in session.trials:
-            _csv_trial(folder / f"trial_{trial.name.removeprefix('trial_')}", session, trial)
+            _csv_trial(folder, session, trial)
         write_text(folder / "session.toml", _toml({"id": session.info.id, "subject": session.info.subject}))
         write_text(folder / COLUMNS_FILE, _legend())
         write_text(folder / "session.json", _information(session))
 
 
-def _csv_trial(folder: Path, session: Session, trial: TrialInfo) -> None:
-    folder.mkdir()
+def _csv_trial(out: Path, session: Session, trial: TrialInfo) -> None:
     recording = session.recording(trial.name)
+    tracked = recording.metadata.get("trial", {}).get("kind") == TRACKING
+    folder = out / (trial.name if tracked else f"trial_{trial.name.removeprefix('trial_')}")
+    folder.mkdir()
     for stream, columns in filled(recording):
         table = arrow_table(recording, stream)
         if stream is FORCE:

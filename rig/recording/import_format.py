@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field
 
 from rig.config.table import Table
 from rig.errors import UsageError
-from rig.recording.csv_columns import TIME
+from rig.recording.csv_columns import TIME, TOOL
 
 FIELDS = {
     "force": (TIME, "force_N"),
@@ -17,6 +17,8 @@ FIELDS = {
     "marker": (TIME, "x_mm", "y_mm", "z_mm"),
 }
 OPTIONAL = ("marker",)
+# Columns of a file that `rig export` wrote; read where all of a stream's are there.
+EXPORTED = {"force": ("capture_ns", "arrival_ns"), "axis": ("capture_ns", "arrival_ns"), "marker": (TOOL,)}
 _FORCE_WORDS = {
     1: ("compression", "compressive", "push", "pushing"),
     -1: ("tension", "tensile", "pull", "pulling"),

@@ -24,9 +24,9 @@ import rig
 from rig.channels import AXIS, FORCE, MARKER, Stream
 from rig.config.table import load
 from rig.errors import DataError
-from rig.recording.csv_columns import TIME, read_columns
+from rig.recording.csv_columns import TIME, TOOL, read_columns
 from rig.recording.files import whole_folder
-from rig.recording.import_format import FIELDS, OPTIONAL, SessionTable, TrialTable, column_names
+from rig.recording.import_format import EXPORTED, FIELDS, OPTIONAL, SessionTable, TrialTable, column_names
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.sessions import Session, SessionInfo, TrialInfo, open_session, plain, write_session
 
@@ -78,7 +78,7 @@ def read_trials(folder: Path, names: Mapping[str, Mapping[str, str]]) -> list[Tr
 def _read_trial(path: Path, names: Mapping[str, Mapping[str, str]]) -> Trial:
     table = load(TrialTable, path / "trial.toml")
     streams = {
-        stream: read_columns(path / f"{stream}.csv", names[stream], gaps=stream == "marker")
+        stream: read_columns(path / f"{stream}.csv", names[stream], stream == "marker", EXPORTED[stream])
         for stream in FIELDS
         if stream not in OPTIONAL or (path / f"{stream}.csv").exists()
     }
@@ -172,6 +172,8 @@ def _rows(stream: str, columns: Mapping[str, NDArray[np.float64]], session: Sess
     rows["seq"] = np.arange(time_s.size)
     rows["capture_ns"] = rows["arrival_ns"] = np.round(time_s * 1e9).astype(np.int64)
     rows["valid"] = 1
+    if "arrival_ns" in columns:
+        rows["arrival_ns"] += (columns["arrival_ns"] - columns["capture_ns"]).astype(np.int64)
     if stream == "force":
         rows["fz_N"] = session.force_positive * columns["force_N"]
     elif stream == "axis":
@@ -179,6 +181,7 @@ def _rows(stream: str, columns: Mapping[str, NDArray[np.float64]], session: Sess
         rows["velocity_mm_s"] = np.gradient(rows["position_mm"], time_s)
     else:
         rows["frame"] = rows["seq"]
+        rows["tool"] = columns.get(TOOL, 0)
         for name in FIELDS["marker"][1:]:
             rows[name] = columns[name]
         rows["valid"] = np.isfinite(rows["x_mm"])

@@ -8,13 +8,14 @@ from matplotlib.figure import Figure
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.design import ASSUMED_NATS, SAFE_NATS, confusability
 from rig.diagnosis.fit import Fit, least_squares
-from rig.diagnosis.omnibus import Leftover, variables
+from rig.diagnosis.omnibus import variables
 from rig.diagnosis.search import Search
-from rig.report.drawing import ACTUAL, INK, MODEL, QUIET, RIVAL, SMALL_PT, dress, new_figure, thinned
+from rig.report.drawing import ACTUAL, INK, MODEL, QUIET, RIVAL, SIZE_PT, SMALL_PT, dress, new_figure, thinned
 from rig.simulation.drive import Array
 
 BINS = 40
 SHOWN = 6
+CLEAR = 0.05
 
 
 def pictures(result: Diagnosis) -> dict[str, Figure]:
@@ -24,7 +25,7 @@ def pictures(result: Diagnosis) -> dict[str, Figure]:
     before, after = least_squares(result.search.before), least_squares(result.search.after)
     return {
         "simulation": simulation_figure(before, after),
-        "residuals": residual_figure(before, after, result.before, result.after),
+        "residuals": residual_figure(before, after, result),
         "evidence": evidence_figure(result.search),
         "confusability": confusability_figure(*confusability(result.search.tangents)),
     }
@@ -37,7 +38,8 @@ def simulation_figure(before: Fit, after: Fit) -> Figure:
     channel = before.problem.channels[0]
     worst = int(np.argmax(np.bincount(channel.recording, before.residual**2)))
     rows = channel.recording == worst
-    time = before.problem.variables().get("time in recording", np.arange(len(rows), dtype=float))[rows]
+    known = before.problem.variables()
+    time = known.get("time in recording", known["session time"])[rows]
     measured = channel.observed[rows]
     above.plot(*thinned(time, measured, 600), color=ACTUAL, linewidth=2.2, label="measured")
     for fit, color, name in ((before, RIVAL, "simulated before"), (after, MODEL, "extended")):
@@ -46,31 +48,49 @@ def simulation_figure(before: Fit, after: Fit) -> Figure:
         below.plot(*thinned(time, fit.residual[rows], 600), color=color, linewidth=1.0)
     above.legend(frameon=False, fontsize=SMALL_PT, labelcolor=INK)
     dress(above, "The recording the simulation gets most wrong", "", f"{channel.name} [{channel.unit}]")
-    dress(below, "What is left: grey before, red after", "time in recording [s]", f"error [{channel.unit}]")
+    dress(below, "What is left: grey before, orange after", "time [s]", f"measured - simulated [{channel.unit}]")
     return figure
 
 
-def residual_figure(old: Fit, new: Fit, before: Leftover, after: Leftover) -> Figure:
-    """The error against each variable, the most telling ones first and marked; grey before, red after."""
-    names = before.ranked[:SHOWN]
-    figure = new_figure(10.0, 5.6)
+def residual_figure(old: Fit, new: Fit, result: Diagnosis) -> Figure:
+    """The error against each variable, those that tell most first and the offending ones marked."""
+    assert result.before is not None and result.after is not None
+    marks = offending(result)
+    names = list(dict.fromkeys([*marks, *result.before.ranked]))[:SHOWN]
+    figure = new_figure(10.0, 5.8)
+    figure.suptitle("Mean error over each variable: grey before, orange after", fontsize=SIZE_PT, color=QUIET)
     panels = np.atleast_1d(figure.subplots(2, 3)).ravel()
-    known = variables(old)
+    known, channel = variables(old), old.problem.channels[0]
     for axes, name in zip(panels, names, strict=False):
-        values = known[name]
-        edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+        values = known[name] - (new.values.get("surface_mm", 0.0) if name == "depth" else 0.0)
         for fit, color in ((old, RIVAL), (new, MODEL)):
-            place = np.clip(np.digitize(values, edges) - 1, 0, max(len(edges) - 2, 0))
-            count = np.maximum(np.bincount(place), 1)
-            axes.plot(
-                np.bincount(place, values) / count, np.bincount(place, fit.residual) / count, color=color, linewidth=1.5
-            )
-        mark = "  <- depends on it" if name in names[:1] and before.p_value < 0.05 else ""
-        gains = f"{max(before.gains[name], 0):.0f} -> {max(after.gains[name], 0):.0f} nats"
-        dress(axes, f"{name}{mark}", gains, "mean error")
+            axes.plot(*binned(values, fit.residual), color=color, linewidth=1.5)
+        gains = f"{max(result.before.gains[name], 0):.0f} -> {max(result.after.gains[name], 0):.0f} nats"
+        unit = old.problem.units.get(name, channel.unit)
+        dress(axes, f"{name}{marks.get(name, '')}", f"{name} [{unit}]; {gains}", f"error [{channel.unit}]")
     for axes in panels[len(names) :]:
         axes.set_visible(False)
     return figure
+
+
+def offending(result: Diagnosis) -> dict[str, str]:
+    """The variables to be marked, each with its words: what is left depends on, or what named the cause; else none."""
+    known = result.before.gains if result.before else {}
+    if result.depends_on:
+        return {name: "  <- still depends on it" for name in result.depends_on if name in known}
+    if result.findings and result.before and result.before.p_value < CLEAR:
+        return {result.before.ranked[0]: "  <- depended on it"}
+    return {}
+
+
+def binned(values: Array, error: Array) -> tuple[Array, Array]:
+    """Means of both over bins of equally many samples, shape (bins,)."""
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+    place = np.clip(np.digitize(values, edges) - 1, 0, max(len(edges) - 2, 0))
+    count = np.bincount(place)
+    held = count > 0
+    means = (np.bincount(place, column)[held] / count[held] for column in (values, error))
+    return next(means), next(means)
 
 
 def evidence_figure(search: Search) -> Figure:
@@ -81,6 +101,9 @@ def evidence_figure(search: Search) -> Figure:
     names = [name for name, _ in bars]
     colors = [MODEL if name in search.after.names else RIVAL for name in names]
     axes.barh(names, [max(gain, 0.0) for _, gain in bars], color=colors)
+    if not bars:
+        axes.text(0.5, 0.5, "no cause gained more than chance does", ha="center", transform=axes.transAxes, color=QUIET)
+        axes.set_yticks([])
     level = max((float(np.quantile(maxima, 0.95)) for maxima in search.maxima if maxima.size), default=0.0)
     axes.axvline(level, color=QUIET, linestyle=":", linewidth=1.2)
     axes.set_xscale("symlog", linthresh=10)

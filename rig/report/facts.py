@@ -9,13 +9,13 @@ import numpy as np
 
 from rig.errors import DataError, RigError
 from rig.recording.reader import Recording
-from rig.recording.sessions import Session, TrialInfo, open_session
+from rig.recording.sessions import TRACKING, Session, TrialInfo, open_session
 from rig.recording.verify import Verdict, verify
 from rig.report.diagnosed import Diagnosed, read_diagnosis
 from rig.report.figures import Tracked
 from rig.report.values import json_table
 from rig.tissue.laws import FloatArray
-from rig.tissue.study import TRACKING, Study, study_session
+from rig.tissue.study import Study, study_session
 
 TRACK_FILE = "track.json"
 AGES = {"force": "force_age_ns", "axis": "axis_age_ns", "marker": "marker_age_ns"}

@@ -9,7 +9,7 @@ import numpy as np
 
 import rig
 from rig.errors import DataError, UsageError
-from rig.recording.sessions import Session
+from rig.recording.sessions import TRACKING, Session
 from rig.tissue.control_table import control_rows
 from rig.tissue.curves import Curve, loading_curve
 from rig.tissue.fitting import fit_law
@@ -20,7 +20,6 @@ from rig.tissue.rates import RateTest, rate_of
 from rig.tissue.registry import COMPARED
 from rig.tissue.strokes import stroke_of
 
-TRACKING = "tracking"
 Laws = Sequence[type[Law]]
 Known = Mapping[str, float]
 

@@ -119,6 +119,17 @@ def test_a_reference_beyond_the_pain_threshold_is_refused() -> None:
         refuse_beyond_limits(tracking.following(named("step:5"), MODEL, wiring), wiring)
 
 
+def test_a_force_deeper_than_the_limit_is_refused_before_it_is_tried() -> None:
+    wiring = Wiring.model_validate({"limits": {"depth_mm": 3.0}})
+    with pytest.raises(UsageError, match=r"depth of it by the model \d\.\d+ mm is above limits.depth_mm, 3 mm"):
+        refuse_beyond_limits(tracking.following(named("step:5"), MODEL, wiring), wiring)
+
+
+def test_a_reference_without_end_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"duration of the reference 1e\+09 s is above an hour, 3600 s"):
+        refuse_beyond_limits(tracking.following(named("step:5,duration_s=1e9"), MODEL, Wiring()), Wiring())
+
+
 def test_a_design_that_cannot_be_reached_is_refused() -> None:
     wiring = Wiring(loop=Loop(crossover_Hz=20.0, phase_margin_deg=89.0), axis=Axis(delay_ms=20.0))
     stiff = index_model(2.0, 0.0, 0.0, force_N=11.0)

@@ -10,7 +10,7 @@ from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.indentation import library
 from rig.diagnosis.observations import Session, Streams, beside_gaps
 from rig.diagnosis.run import diagnose_session
-from rig.diagnosis.sources import in_time, read_source
+from rig.diagnosis.sources import in_time, read_source, read_table
 from rig.diagnosis.strokes import cut
 from rig.errors import DataError
 from tests.data import recording
@@ -70,6 +70,69 @@ def test_a_wrong_sign_of_force_is_said(clean: Session) -> None:
 def test_a_wrong_sign_of_position_is_said(clean: Session) -> None:
     turned = tuple(replace(streams, axis_mm=-streams.axis_mm) for streams in clean.recordings)
     nothing_named(diagnose_session(replace(clean, recordings=turned)), "wrong sign")
+
+
+def test_one_recording_of_wrong_sign_is_left_out_and_named(clean: Session) -> None:
+    turned = replace(clean.recordings[2], force_N=-clean.recordings[2].force_N)
+    result = diagnose_session(replace(clean, recordings=(*clean.recordings[:2], turned, *clean.recordings[3:])))
+    assert (result.verdict, result.recordings) == ("adequate", 5)
+    (said,) = [finding for finding in result.quality if finding.kind == "sign"]
+    assert said.recording == turned.name
+    assert said.text.endswith("turn its sign")
+
+
+@pytest.mark.parametrize(
+    ("field", "factor", "because"),
+    [
+        ("force_N", 1000.0, "limits 0.0001 to 100 N/mm"),
+        ("axis_mm", 0.001, "limits 0.0001 to 100 N/mm"),
+        ("axis_mm", 1000.0, "limit 300 mm"),
+    ],
+)
+def test_what_looks_like_another_unit_is_not_judged(clean: Session, field: str, factor: float, because: str) -> None:
+    scaled = tuple(replace(streams, **{field: factor * getattr(streams, field)}) for streams in clean.recordings)
+    nothing_named(diagnose_session(replace(clean, recordings=scaled)), because)
+
+
+def test_time_in_milliseconds_is_not_judged(clean: Session) -> None:
+    slow = tuple(
+        replace(streams, force_s=1e3 * streams.force_s, axis_s=1e3 * streams.axis_s, marker_s=None, marker_mm=None)
+        for streams in clean.recordings
+    )
+    nothing_named(diagnose_session(replace(clean, recordings=slow)), "times a second by its time stamps (limit 2)")
+
+
+def test_a_force_cut_off_by_the_sensors_range_is_not_judged_there(clean: Session) -> None:
+    largest_N = 0.7 * max(float(streams.force_N.max()) for streams in clean.recordings)
+    cut_off = tuple(replace(streams, force_N=np.minimum(streams.force_N, largest_N)) for streams in clean.recordings)
+    result = diagnose_session(replace(clean, recordings=cut_off))
+    assert result.findings == ()
+    assert any(finding.kind == "saturation" and "not judged there" in finding.text for finding in result.quality)
+
+
+def test_a_recording_whose_streams_share_no_time_is_left_out_and_named(clean: Session) -> None:
+    away = replace(clean.recordings[0], axis_s=clean.recordings[0].axis_s + 1000.0)
+    result = diagnose_session(replace(clean, recordings=(away, *clean.recordings[1:])))
+    assert result.recordings == 5
+    assert any("have no common time" in finding.text for finding in result.quality)
+
+
+def test_samples_that_hold_no_number_are_counted(clean: Session) -> None:
+    first = clean.recordings[0]
+    force_N = first.force_N.copy()
+    force_N[[40, 50]] = np.nan
+    result = diagnose_session(replace(clean, recordings=(replace(first, force_N=force_N), *clean.recordings[1:])))
+    (said,) = [finding for finding in result.quality if finding.kind == "number"]
+    assert said.text == f"force: 2 of {len(force_N)} samples hold no number, first sample 41; left out"
+
+
+def test_a_word_among_numbers_is_named_with_its_line(tmp_path: Path) -> None:
+    file = tmp_path / "force.csv"
+    file.write_text('"time_s","force_N"\n0,1\n0.1,OVERLOAD\n0.2\n0.3,inf\n')
+    columns, remark = read_table(file, {"time_s": "time_s", "force_N": "force_N"})
+    assert columns["time_s"].tolist() == [0, 0.1, 0.2, 0.3]
+    assert np.isnan(columns["force_N"]).tolist() == [False, True, True, False]
+    assert remark == "force.csv line 3, column force_N: 'OVERLOAD' is no number; left out"
 
 
 def test_constant_force_is_no_experiment(clean: Session) -> None:

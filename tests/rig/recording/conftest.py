@@ -35,9 +35,11 @@ def event(seq: int) -> EventSample:
 def write_recording(tmp_path: Path) -> WriteRecording:
     """Writes ``rows`` ms of force and axis with events, 100 ms a batch; ``finish`` false leaves a prefix."""
 
-    def write(name: str = "indent-1", rows: int = 1000, finish: bool = True, skip: tuple[int, ...] = ()) -> Path:
+    def write(
+        name: str = "indent-1", rows: int = 1000, finish: bool = True, skip: tuple[int, ...] = (), kind: str = ""
+    ) -> Path:
         path = tmp_path / f"{name}.mcap"
-        writer = RecordingWriter(path, METADATA)
+        writer = RecordingWriter(path, METADATA | ({"trial": {"kind": kind}} if kind else {}))
         for seq in range(rows):
             if seq % 100 == 0:
                 writer.flush()

@@ -14,7 +14,7 @@ import pytest
 import scipy.io
 
 from rig.channels import FORCE, STREAMS
-from rig.errors import UsageError
+from rig.errors import DataError, UsageError
 from rig.recording.export import FORMATS, Format, export
 from rig.recording.files import WriteFailed
 from rig.recording.importing import import_session
@@ -166,3 +166,41 @@ def test_exported_csv_can_be_imported_again(source: Path, tmp_path: Path) -> Non
         assert one.metadata["calibration"] == two.metadata["calibration"]
         for name, table in one.tables.items():
             assert table.tobytes() == two.tables[name].tobytes()
+
+
+def test_two_tools_seen_at_one_time_come_back_as_two(source: Path, tmp_path: Path) -> None:
+    folder = export(run(source), "csv", tmp_path / "csv")
+    (trial, *_) = sorted(folder.glob("trial_*"))
+    rows = [f"{0.1 * frame:.1f},{frame},0,0,{tool}" for frame in range(5) for tool in (0, 1)]
+    (trial / "marker.csv").write_text("\n".join(["time_s,x_mm,y_mm,z_mm,tool", *rows]) + "\n")
+    again = import_session(folder, tmp_path / "again", [], NOW)
+    marker = again.recording(trial.name).tables["marker"]
+    assert marker["tool"].tolist() == [0, 1] * 5
+    assert marker["x_mm"].tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
+    (trial / "marker.csv").write_text("\n".join(["time_s,x_mm,y_mm,z_mm,tool", *rows[::-1]]) + "\n")
+    with pytest.raises(DataError, match=r"marker.csv line 4, column time_s: 0.3 s follows 0.4 s; time must increase"):
+        import_session(folder, tmp_path / "turned", [], NOW)
+
+
+def test_how_late_each_sample_came_is_kept(source: Path, tmp_path: Path) -> None:
+    folder = export(run(source), "csv", tmp_path / "csv")
+    (trial, *_) = sorted(folder.glob("trial_*"))
+    header, *rows = (trial / "axis.csv").read_text().splitlines()
+    names = [name.strip('"') for name in header.split(",")]
+    at = names.index("arrival_ns")
+    cells = [row.split(",") for row in rows]
+    later = [[*row[:at], str(int(row[at]) + 700), *row[at + 1 :]] for row in cells]
+    (trial / "axis.csv").write_text("\n".join([header, *(",".join(row) for row in later)]) + "\n")
+    axis_rows = import_session(folder, tmp_path / "again", [], NOW).recording(trial.name).tables["axis"]
+    assert set((axis_rows["arrival_ns"] - axis_rows["capture_ns"]).tolist()) == {700}
+
+
+def test_a_run_that_tracked_a_force_is_exported_and_no_trial_to_import(
+    tmp_path: Path, write_recording: WriteRecording
+) -> None:
+    write_recording("track_001", rows=50, kind="tracking")
+    trial = TrialInfo("track_001", "track_001.mcap", math.nan, math.nan, "done")
+    write_session(tmp_path, SessionInfo("s1", "track", "2024-05-01T10:00:00", "tissue-rig", trials=(trial,)))
+    out = export(open_session(tmp_path), "csv", tmp_path / "out")
+    assert (out / "track_001" / "force.csv").exists()
+    assert not list(out.glob("trial_*"))
