@@ -24,10 +24,7 @@ AnyTable = TypeVar("AnyTable", bound=Table)
 def read_toml(path: Path) -> dict[str, Any]:
     """The file's table; a missing or malformed file is one sentence."""
     try:
-        text = path.read_text()
-        if not text:
-            raise UsageError(f"{path}: is empty; the examples folder shows what belongs into it")
-        return tomllib.loads(text)
+        return tomllib.loads(path.read_text())
     except FileNotFoundError as error:
         raise UsageError(f"{path}: no such file; give the path of a TOML file") from error
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
