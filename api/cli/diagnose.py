@@ -126,7 +126,7 @@ def show(result: Diagnosis) -> None:
 
 def _show_named(result: Diagnosis) -> None:
     rows = [
-        (cause, name, f"{found.value:.4g}", f"{found.low:.4g} to {found.high:.4g}")
+        (cause, name, f"{found.value:.4g}", f"{found.low:.4g} to {found.high:.4g}{', at its bound' * found.at_bound}")
         for finding in result.findings
         for cause, (name, found) in zip(_once(" or ".join(finding.effects)), finding.parameters.items(), strict=False)
     ]

@@ -79,6 +79,8 @@ def fit_and_write(
     with console.status("fitting"):
         study = study_sessions(sessions, wanted.laws, wanted.known)
     _print(study, wanted.saved)
+    if any(judged.law.friction[0] for judged in study.judged.values()):
+        console.print("friction shows at reversals: curves of loading say nothing for or against it", highlight=False)
     _write(study, sessions, target, wanted.saved)
     console.print(f"fit.png, fit.svg, residuals.png, table.csv and model.json are in {target}", highlight=False)
     result = as_json(study) | {"model": str(target / "model.json")}

@@ -24,6 +24,7 @@ OPERATOR_SHARE = 0.015
 # On development seeds none of the names beside an unexplained leftover was right; some will be.
 PROVISIONAL_SHARE = 0.2
 DRAWS = 1000
+NEAR_BOUND = 0.99
 LARGEST_LOG = 20.0
 # A model whose noise and scatter are this large against the signal explains nothing, however white its residual.
 MOST_CHANCE = 0.25
@@ -33,15 +34,17 @@ LEAST_LEFT_N = 0.0003
 
 @dataclass(frozen=True)
 class Interval:
-    """A value with its 95 % interval."""
+    """A value with its 95 % interval; ``at_bound`` where the fit was stopped by a bound and says little of the size."""
 
     value: float
     low: float
     high: float
+    at_bound: bool = False
 
-    def as_json(self) -> dict[str, float]:
+    def as_json(self) -> dict[str, float | bool]:
         """For the file."""
-        return {"value": self.value, "low": self.low, "high": self.high}
+        stopped: dict[str, float | bool] = {"at_bound": True} if self.at_bound else {}
+        return {"value": self.value, "low": self.low, "high": self.high} | stopped
 
 
 @dataclass(frozen=True)
@@ -160,8 +163,14 @@ def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Interval]:
             half = min(half, LARGEST_LOG) if par.log else half
             half = float(np.hypot(half, OPERATOR_SHARE * abs(value - par.null))) if par.worth else half
             low, high = (value / np.exp(half), value * np.exp(half)) if par.log else (value - half, value + half)
-            found[par.name] = Interval(value, max(low, par.low), min(high, par.high))
+            found[par.name] = Interval(value, max(low, par.low), min(high, par.high), stopped(par, value))
     return found
+
+
+def stopped(par: Par, value: float) -> bool:
+    """Whether a size has gone all the way from its null to a bound."""
+    bound = par.high if value > par.null else par.low
+    return bool(par.worth) and abs(value - par.null) >= NEAR_BOUND * abs(bound - par.null)
 
 
 def _amplitude(fit: Fit, sine: str, place: Mapping[str, int], wide: float, covariances: Sequence[Array]) -> Interval:

@@ -32,7 +32,8 @@ AXIS_EFFECTS = (
         one_sided=True, repair="add Coulomb friction to the feed-forward",
     ),
     Effect(
-        "asymmetric_friction", "friction grows with speed by {asymmetry_N_s_m:+.3g} N s/m more forward than its mean",
+        "asymmetric_friction",
+        "friction grows with speed by {asymmetry_N_s_m:+.3g} N s/m forward and as much the other way backward",
         (Par("asymmetry_N_s_m", "N s/m", 0.0, -1e4, 1e4, 2.0, worth=1.0, meaning="half the difference of directions"),),
         repair="use friction parameters of their own for each direction",
     ),

@@ -137,7 +137,7 @@ FILTER_LAG = Effect(
 )
 TIME_OFFSET = Effect(
     "time_offset",
-    "the force's time stamps are late by {time_offset_s:.3g} s against the position's",
+    "the force's time stamps are off by {time_offset_s:+.3g} s against the position's (plus: late)",
     (Par("time_offset_s", "s", 0.0, -0.3, 0.3, 0.002, worth=0.0007, meaning="force stamps late"),),
     needs=frozenset({"fast"}),
     repair="correct the sensor's latency in rig.toml, or stamp both in hardware",
