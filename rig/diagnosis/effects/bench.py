@@ -62,6 +62,8 @@ BACKLASH = Effect(
     "backlash",
     "the tip follows the encoder with a dead band of {backlash_mm:.3g} mm",
     (Par("backlash_mm", "mm", 0.0, 0.0, 3.0, 0.03, worth=0.005, meaning="dead band"),),
+    # The first micrometres of a dead band are no measure of it: at null the data may ask for less than none.
+    begin={"backlash_mm": 0.15},
     one_sided=True,
     needs=frozenset({"unloading"}),
     repair="preload or replace the nut; or measure the tip itself",
