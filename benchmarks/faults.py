@@ -50,6 +50,7 @@ LATEST_S = 2.5
 WIRING = parse(Wiring, merged(Wiring().model_dump(mode="json"), ["loop.missed_periods=0"]), "the campaign")
 REST_S, STILL_MM = 0.3, 0.03
 ATTEMPTS = 5
+TURN_NS = 2_000_000
 # Faults that need another value than their own default to show while the bench runs.
 VALUES: dict[str, Value] = {"axis.lasting_error": 0x2310, "axis.error": 0x2310, "tracker.missing": 1}
 START_ONLY = ("wrong_identity", "refuse", "mute_start", "refuse_stream", "deaf", "heal")
@@ -197,14 +198,15 @@ def _end(bench: Stage) -> tuple[str, str]:
 def _judged(seen: Trial, happened_ns: int, unpowered_ns: int | None, folder: Path) -> Trial:
     """What was seen from outside, with what the recording says of it."""
     recording = read_recording(folder / "track_001.mcap")
-    stops = [event for event in recording.events if event.level >= 30 and event.capture_ns > happened_ns]
+    # An event carries the time at which its turn of the loop began, which may be just before what it answers.
+    stops = [event for event in recording.events if event.level >= 30 and event.capture_ns > happened_ns - TURN_NS]
     first_ns = [*(event.capture_ns for event in stops[:1]), *([unpowered_ns] if unpowered_ns else [])]
     over_N = max(0.0, seen.peak_N - WIRING.force_limit_N)
     unsafe = "; ".join(part for part in (seen.unsafe, f"{over_N:.2f} N over the limit" if over_N else "") if part)
     loop = recording.tables["loop"]
     return replace(
         seen,
-        detected_s=(min(first_ns) - happened_ns) * 1e-9 if first_ns else None,
+        detected_s=max(min(first_ns) - happened_ns, 0) * 1e-9 if first_ns else None,
         cause=stops[0].code if stops else seen.cause,
         over_N=over_N,
         unsafe=unsafe,
