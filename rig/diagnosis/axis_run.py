@@ -8,11 +8,11 @@ import scipy.io
 
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.axis import AxisProblem, AxisRecording, force_error_percent, motion_of
+from rig.diagnosis.csv_table import read_table
 from rig.diagnosis.gates import inspect_stream
 from rig.diagnosis.run import judge, silent
 from rig.diagnosis.search import Progress
 from rig.diagnosis.simulated import Simulated
-from rig.diagnosis.sources import read_table
 from rig.errors import DataError
 
 NAMES = {

@@ -4,14 +4,14 @@ Unlike the import, which refuses a folder with anything wrong in it, the diagnos
 was left out: data that are wrong in part are the very data somebody wants to understand.
 """
 
-import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.table import load
+from rig.diagnosis.csv_table import read_table
 from rig.diagnosis.gates import Finding
 from rig.diagnosis.observations import Session, Streams
 from rig.diagnosis.stacked import from_stacked, stacked_file
@@ -104,20 +104,31 @@ def from_csv(folder: Path, columns: tuple[str, ...] = ()) -> Session:
     table = load(SessionTable, folder / "session.toml") if (folder / "session.toml").exists() else SessionTable()
     streams, findings = [], []
     for path in sorted(path for path in folder.glob("trial_*") if path.is_dir()):
-        read: dict[str, dict[str, Array]] = {}
-        for stream in FIELDS:
-            if stream in OPTIONAL and not (path / f"{stream}.csv").exists():
-                continue
-            try:
-                read[stream], remark = read_table(path / f"{stream}.csv", names[stream], EXPORTED[stream])
-                findings += [Finding(path.name, stream, "text", remark)] if remark else []
-            except DataError as error:
-                findings.append(Finding(path.name, stream, "unreadable", str(error)))
+        read, said = _read_trial(path, names)
+        findings += said
         if "force" in read and "axis" in read:
             findings += late(path.name, read["axis"]) if "arrival_ns" in read["axis"] else []
             streams.append(_csv_streams(path, read, table))
     surface = None if table.surface_mm is None else table.position_positive * table.surface_mm
     return Session(folder.name, tuple(streams), surface, findings=tuple(findings))
+
+
+def _read_trial(
+    path: Path, names: Mapping[str, Mapping[str, str]]
+) -> tuple[dict[str, dict[str, Array]], list[Finding]]:
+    """The streams that can be read, and what is to be said of the others."""
+    read: dict[str, dict[str, Array]] = {}
+    findings = []
+    for stream in FIELDS:
+        file = path / f"{stream}.csv"
+        if stream in OPTIONAL and not file.exists():
+            continue
+        try:
+            read[stream], remark = read_table(file, names[stream], EXPORTED[stream])
+            findings += [Finding(path.name, stream, "text", remark)] if remark else []
+        except DataError as error:
+            findings.append(Finding(path.name, stream, "unreadable", str(error)))
+    return read, findings
 
 
 def _csv_streams(path: Path, read: dict[str, dict[str, Array]], table: SessionTable) -> Streams:
@@ -149,64 +160,3 @@ def _tip_rows(marker: dict[str, Array] | None) -> dict[str, Array] | None:
     if marker is None or TOOL not in marker:
         return marker
     return {field: column[marker[TOOL] == TIP_TOOL] for field, column in marker.items()}
-
-
-def read_table(path: Path, names: Mapping[str, str], more: Sequence[str] = ()) -> tuple[dict[str, Array], str]:
-    """The named columns of a CSV file, with ``more`` where all of these are there, and a remark on what is no number.
-
-    Cells that are no number become NaN. Raises DataError naming file and cause.
-    """
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            header = [name.strip() for name in next(csv.reader([file.readline()]), [])]
-            lines = file.readlines()
-    except FileNotFoundError as error:
-        raise DataError(f"{path}: no such file, so this stream is missing") from error
-    except UnicodeDecodeError as error:
-        raise DataError(f"{path}: is no text; export it as CSV again") from error
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
-    lacking = [name for name in names.values() if name not in header]
-    if lacking:
-        raise DataError(f"{path}: {_lacking(header, lacking[0])}")
-    if not lines:
-        raise DataError(f"{path}: holds a header and nothing else")
-    wanted = {**names, **({name: name for name in more} if all(name in header for name in more) else {})}
-    rows, remark = _numbers(lines, [header.index(name) for name in wanted.values()], header)
-    return {field: rows[:, column] for column, field in enumerate(wanted)}, f"{path.name} {remark}" if remark else ""
-
-
-def _lacking(header: Sequence[str], name: str) -> str:
-    if not any(header):
-        return "is empty; export it again"
-    if len(header) == 1 and any(separator in header[0] for separator in ";\t|"):
-        return f"the header is {header[0]!r}; separate columns by commas and write decimals with points"
-    return f"no column {name}; it has {', '.join(header)}; name it with --columns"
-
-
-def _numbers(lines: Sequence[str], columns: Sequence[int], header: Sequence[str]) -> tuple[Array, str]:
-    """The columns, and where the first cell is that is no number; in one go where there is none."""
-    try:
-        return np.loadtxt(lines, delimiter=",", ndmin=2, usecols=columns, quotechar='"', comments=None), ""
-    except (ValueError, IndexError):
-        pass
-    found, bad = [], []
-    for line, cells in enumerate(csv.reader(lines), start=2):
-        texts = [cells[column].strip() if column < len(cells) else "" for column in columns]
-        found.append([as_number(text) for text in texts])
-        bad += [(line, header[c], text) for c, text in zip(columns, texts, strict=True) if not is_number_or_gap(text)]
-    remark = "line {}, column {}: {!r} is no number; left out".format(*bad[0]) if bad else ""
-    return np.array(found), remark + (f", as {len(bad) - 1} more" if len(bad) > 1 else "")
-
-
-def is_number_or_gap(text: str) -> bool:
-    """Whether a cell holds a number, or says by itself that nothing was measured."""
-    return text.lower() in ("", "nan") or not np.isnan(as_number(text))
-
-
-def as_number(text: str) -> float:
-    """The number a cell holds, NaN for anything else."""
-    try:
-        return float(text)
-    except ValueError:
-        return float("nan")

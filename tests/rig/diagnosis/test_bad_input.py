@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from rig.diagnosis.answers import Diagnosis
+from rig.diagnosis.csv_table import read_table
 from rig.diagnosis.indentation import library
 from rig.diagnosis.observations import Session, Streams, beside_gaps
 from rig.diagnosis.run import diagnose_session
-from rig.diagnosis.sources import in_time, read_source, read_table
+from rig.diagnosis.sources import in_time, read_source
 from rig.diagnosis.strokes import cut
 from rig.errors import DataError
 from tests.data import recording
