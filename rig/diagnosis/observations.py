@@ -105,8 +105,9 @@ def observe(session: Session) -> Observations:
         why = said[0] if said else "there is none"
         raise DataError(f"{session.name}: no recording can be used ({why}); run `rig verify` on it")
     findings += [Finding(name, "recording", "unusable", f"recording left out: {why}") for name, why in lost.items()]
+    usable, copies = _without_copies(usable)
     usable, turned = _turned(usable)
-    findings += turned
+    findings += [*copies, *turned]
     rough_mm = float(np.median([jitter_mm(streams) for streams in usable]))
     rate_Hz, spans_s = (WORKING_RATE_HZ, DERIVATIVE_SPANS_S) if rough_mm <= JITTER_MM else JITTERY
     period_s = working_period(usable, rate_Hz)
@@ -183,6 +184,19 @@ def _cleaned(streams: Streams) -> Streams | str:
         streams.name, force[0][inside], force[1][inside], axis[0], axis[1], streams.marker_s, streams.marker_mm,
         force[2][inside] if extra else None,
     )  # fmt: skip
+
+
+def _without_copies(usable: Sequence[Streams]) -> tuple[list[Streams], list[Finding]]:
+    """Each recording once: a copy would be left out and predicted from itself."""
+    first: dict[bytes, Streams] = {}
+    copies = []
+    for streams in usable:
+        of = first.setdefault(streams.force_N.tobytes(), streams)
+        if of is not streams and np.ptp(streams.force_N) > 0:
+            text = f"recording left out: it holds the same forces as {of.name}"
+            copies.append(Finding(streams.name, "recording", "copy", text))
+    gone = {copy.recording for copy in copies}
+    return [streams for streams in usable if streams.name not in gone], copies
 
 
 def _turned(usable: Sequence[Streams]) -> tuple[list[Streams], list[Finding]]:

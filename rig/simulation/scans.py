@@ -26,7 +26,7 @@ def recurrence(decay: Array, source: Array) -> Array:
 def decays(time_s: Array, first: NDArray[np.bool_], tau_s: float) -> Array:
     """Per-sample factors exp(-dt / tau) for ``recurrence``."""
     step_s = np.diff(time_s, prepend=time_s[:1])
-    return np.where(first, 0.0, np.exp(-step_s / tau_s))
+    return np.where(first, 0.0, np.exp(-np.maximum(step_s, 0.0) / tau_s))
 
 
 def high_pass(signal: Array, time_s: Array, first: NDArray[np.bool_], tau_s: float) -> Array:

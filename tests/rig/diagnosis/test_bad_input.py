@@ -82,6 +82,13 @@ def test_one_recording_of_wrong_sign_is_left_out_and_named(clean: Session) -> No
     assert said.text.endswith("turn its sign")
 
 
+def test_a_recording_that_is_a_copy_of_another_is_left_out_and_named(clean: Session) -> None:
+    copies = tuple(replace(clean.recordings[0], name=f"copy {number}") for number in range(4))
+    result = diagnose_session(replace(clean, recordings=copies))
+    nothing_named(result, "1 recording of one stroke")
+    assert any(finding.text.endswith("it holds the same forces as copy 0") for finding in result.quality)
+
+
 @pytest.mark.parametrize(
     ("field", "factor", "because"),
     [
