@@ -53,7 +53,8 @@ def compare(
         for run in _on_subject(wiring, out, subject, model, choices, reference):
             runs.append(run)
             console.print("  ".join(cell for cell in comparison.rows([run])[0] if cell), highlight=False)
-    console.print(table(HEADER, comparison.rows(runs), title=f"Worst of {reference.name}"))
+    cells = [row[: len(HEADER)] for row in comparison.rows(runs)]
+    console.print(table(HEADER, cells, title=f"Worst of {reference.name}; over %: overshoot of the jump"))
     _draw(runs, out)
     return {"reference": reference.name, "models": models, "runs": [run.as_json() for run in runs]}
 

@@ -129,11 +129,11 @@ def choice_from(text: str) -> Choice:
     return found[0]
 
 
-HEADER = ("subject", "gains", "error N", "error %", "largest N", "overshoot %", "settling s", "")
+HEADER = ("subject", "gains", "error N", "error %", "largest N", "over %", "settle s")
 
 
 def rows(runs: Sequence[Run]) -> list[tuple[str, ...]]:
-    """The worst of each run, for people."""
+    """The worst of each run, for people, as ``HEADER`` says; last what stopped it."""
     return [_row(run) for run in runs]
 
 
