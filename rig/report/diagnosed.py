@@ -11,11 +11,11 @@ from rig.report.values import json_table, listed, number
 
 TITLE = "What the simulation gets wrong"
 CAPTIONS = {
-    "simulation": "Above, the recording the simulation gets most wrong; below, the error before (grey) and after (red) "
-    "the causes named were put into it.",
-    "residuals": "The error against each variable it may depend on, before (grey) and after (red); where the variable "
-    "that tells most is beyond chance, it is marked.",
-    "evidence": "Evidence on recordings left out for each cause tried first; the causes named are red.",
+    "simulation": "Above, the recording the simulation gets most wrong; below, the error before (grey) and after "
+    "(orange) the causes named were put into it.",
+    "residuals": "The error against each variable it may depend on, before (grey) and after (orange); marked is "
+    "what the cause named was seen by, or what the error still depends on.",
+    "evidence": "Evidence on recordings left out for each cause tried first; the causes named are orange.",
     "confusability": "How much of the evidence for a cause (row) is left in this experiment once another (column) "
     "imitates it: pale pairs cannot be told apart.",
 }

@@ -74,13 +74,15 @@ def residual_figure(old: Fit, new: Fit, result: Diagnosis) -> Figure:
 
 
 def offending(result: Diagnosis) -> dict[str, str]:
-    """The variables to be marked, each with its words: what is left depends on, or what named the cause; else none."""
-    known = result.before.gains if result.before else {}
+    """The variables to be marked, each with its words: what the error still depends on, or what a cause took away."""
+    if result.before is None or result.after is None:
+        return {}
     if result.depends_on:
-        return {name: "  <- still depends on it" for name in result.depends_on if name in known}
-    if result.findings and result.before and result.before.p_value < CLEAR:
-        return {result.before.ranked[0]: "  <- depended on it"}
-    return {}
+        return {name: "  <- still depends on it" for name in result.depends_on if name in result.before.gains}
+    first = result.before.ranked[0]
+    taken = result.after.gains[first] < 0.5 * result.before.gains[first]
+    seen = bool(result.findings) and result.before.p_value < CLEAR and taken
+    return {first: "  <- depended on it"} if seen else {}
 
 
 def binned(values: Array, error: Array) -> tuple[Array, Array]:
