@@ -79,8 +79,8 @@ def _reference(step: TrackForce) -> list[str]:
 
 def _depth_mm(step: TrackForce) -> float:
     """Where the model has the largest force of the reference."""
-    rows = sorted(step.gains, key=lambda row: row.force_N)
-    return float(np.interp(max(step.forces_N), [row.force_N for row in rows], [row.depth_mm for row in rows]))
+    forces_N, depths_mm = [row.force_N for row in step.gains], [row.depth_mm for row in step.gains]
+    return float(np.interp(max(step.forces_N), forces_N, depths_mm))
 
 
 def _speed(speed_mm_s: float, wiring: Wiring) -> list[str]:

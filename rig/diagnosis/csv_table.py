@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.errors import DataError
+from rig.recording.csv_columns import with_more
 from rig.simulation.drive import Array
 
 
@@ -30,7 +31,7 @@ def read_table(path: Path, names: Mapping[str, str], more: Sequence[str] = ()) -
         raise DataError(f"{path}: {_lacking(header, lacking[0])}")
     if not lines:
         raise DataError(f"{path}: holds a header and nothing else")
-    wanted = {**names, **({name: name for name in more} if all(name in header for name in more) else {})}
+    wanted = with_more(names, header, more)
     rows, remark = _numbers(lines, [header.index(name) for name in wanted.values()], header)
     return {field: rows[:, column] for column, field in enumerate(wanted)}, f"{path.name} {remark}" if remark else ""
 

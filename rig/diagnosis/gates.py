@@ -80,8 +80,7 @@ def _values(time_s: Array, value: Array, may_rest: bool) -> list[tuple[str, str]
     if span == 0:
         return [("constant", f"constant at {finite[0]:g}: the stream carries nothing")]
     found = []
-    same = np.diff(finite) == 0
-    quantum = float(np.min(np.abs(np.diff(finite))[~same])) if not same.all() else span
+    same, quantum = np.diff(finite) == 0, _quantum(finite)
     clipped = 0 if may_rest else _longest_run(at_the_end_of_range(finite))
     if clipped:
         text = f"{clipped} samples in a row stand at the largest value {finite.max():g}; not judged there"
@@ -99,9 +98,16 @@ def at_the_end_of_range(value: Array) -> NDArray[np.bool_]:
     span, same = float(np.ptp(value)), np.diff(value) == 0
     top = value >= value.max() - 1e-9 * span
     longest = _longest_run(top)
-    quantum = float(np.min(np.abs(np.diff(value))[~same])) if not same.all() else span
-    clipped = longest >= FLAT_TOP_SAMPLES and longest > 4 * _longest_run(same & ~top[1:]) and span > 20 * quantum
+    clipped = (
+        longest >= FLAT_TOP_SAMPLES and longest > 4 * _longest_run(same & ~top[1:]) and span > 20 * _quantum(value)
+    )
     return np.asarray(top & clipped)
+
+
+def _quantum(value: Array) -> float:
+    """Smallest step between neighbours; the whole range where there is none."""
+    steps = np.abs(np.diff(value))
+    return float(np.min(steps[steps > 0])) if np.any(steps > 0) else float(np.ptp(value))
 
 
 def _longest_run(mark: NDArray[np.bool_]) -> int:

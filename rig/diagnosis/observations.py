@@ -201,7 +201,7 @@ def _without_copies(usable: Sequence[Streams]) -> tuple[list[Streams], list[Find
 
 def _turned(usable: Sequence[Streams]) -> tuple[list[Streams], list[Finding]]:
     """Without the few recordings in which force falls as the tip goes in while it rises in the others."""
-    rises = np.array([_rise(streams) for streams in usable])
+    rises = np.array([rise_N(np.interp(s.force_s, s.axis_s, s.axis_mm), s.force_N) for s in usable])
     large = 0.5 * float(np.median(np.abs(rises)))
     falls = rises < -large
     if large == 0 or not 0 < np.count_nonzero(falls) < 0.5 * len(usable):
@@ -211,11 +211,10 @@ def _turned(usable: Sequence[Streams]) -> tuple[list[Streams], list[Finding]]:
     return [streams for streams, out in zip(usable, falls, strict=True) if not out], gone
 
 
-def _rise(streams: Streams) -> float:
-    """Force [N] at the deepest tenth of the motion, less that at the highest."""
-    place_mm = np.interp(streams.force_s, streams.axis_s, streams.axis_mm)
+def rise_N(place_mm: Array, force_N: Array) -> float:
+    """Force at the deepest tenth of the motion, less that at the highest; both of shape (n,)."""
     deep, high = (place_mm >= np.quantile(place_mm, 0.9)), (place_mm <= np.quantile(place_mm, 0.1))
-    return float(np.median(streams.force_N[deep]) - np.median(streams.force_N[high]))
+    return float(np.median(force_N[deep]) - np.median(force_N[high]))
 
 
 def _on_grid(streams: Streams, period_s: float, spans_s: Sequence[float]) -> _Gridded:

@@ -10,7 +10,7 @@ from rig.diagnosis.design import next_experiment
 from rig.diagnosis.fit import first_fit, refreshed
 from rig.diagnosis.gates import Finding
 from rig.diagnosis.indentation import Indentation, Simulation, library
-from rig.diagnosis.observations import Observations, Session, observe
+from rig.diagnosis.observations import Observations, Session, observe, rise_N
 from rig.diagnosis.omnibus import leftover
 from rig.diagnosis.problem import Problem
 from rig.diagnosis.search import Progress, search
@@ -119,11 +119,9 @@ def unusable(data: Observations) -> Fault | None:
     if np.ptp(force) == 0 or np.ptp(position) == 0:
         still = "force" if np.ptp(force) == 0 else "position"
         return Fault(f"the {still} never changes, so the recordings carry no experiment", f"connect the {still} sensor")
-    deep = position >= np.quantile(position, 0.9)
-    high = position <= np.quantile(position, 0.1)
     # Third differences: at 10 Hz the first ones of a ramp are no noise.
     noise = float(np.median(np.abs(np.diff(force, 3)))) / (0.6745 * np.sqrt(20))
-    rise = float(np.median(force[deep]) - np.median(force[high]))
+    rise = rise_N(position, force)
     if rise < 0 and -rise > 5 * noise:
         return Fault(
             "force falls as the tip goes in, so force or position has the wrong sign",

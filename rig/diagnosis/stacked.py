@@ -8,6 +8,7 @@ from typing import TextIO
 
 import numpy as np
 
+from rig.diagnosis.csv_table import as_number
 from rig.diagnosis.gates import Finding
 from rig.diagnosis.observations import Session, Streams
 from rig.errors import DataError
@@ -66,17 +67,10 @@ def _read(path: Path, headers: dict[str, tuple[str, ...]]) -> dict[str, Array]:
                 raise DataError(f"{path}: no column {known[0]}; it has {', '.join(header)}; name it with --columns")
             names.append((field, held[0]))
         for row in reader:
-            rows.setdefault(str(row[NAME]), []).append(tuple(_number(row[name]) for _, name in names))
+            rows.setdefault(str(row[NAME]), []).append(tuple(as_number(row[name] or "") for _, name in names))
     if not rows:
         raise DataError(f"{path}: holds a header and nothing else")
     return {name: np.array(values).T for name, values in rows.items()}
-
-
-def _number(text: str | None) -> float:
-    try:
-        return float(text or "nan")
-    except ValueError:
-        return float("nan")
 
 
 def _opened(path: Path) -> TextIO:

@@ -36,8 +36,7 @@ def read_columns(
     header = _header(path)
     for field, name in names.items():
         _check_name(path, header, field, name)
-    if all(name in header for name in more):
-        names = {**names, **{name: name for name in more}}
+    names = with_more(names, header, more)
     try:
         table = _read(path, header, names)
     except pa.ArrowInvalid as error:
@@ -46,6 +45,11 @@ def read_columns(
     if not _is_good(table, gaps):
         _explain(path, header, names, gaps)
     return table
+
+
+def with_more(names: Mapping[str, str], header: Sequence[str], more: Sequence[str]) -> dict[str, str]:
+    """``names``, and ``more`` under their own names where the header has all of these."""
+    return {**names, **({name: name for name in more} if all(name in header for name in more) else {})}
 
 
 def _header(path: Path) -> list[str]:
