@@ -19,8 +19,8 @@ from controller.supervisor import Supervisor
 from rig.channels import LoopSample
 from rig.config.wiring import Wiring
 from rig.errors import SafetyStop, UsageError
-from rig.recording.reader import read_recording
-from rig.recording.sessions import SESSION_FILE, TRACKING, TrialInfo, open_session, write_session
+from rig.recording.reader import TRACKING, read_recording
+from rig.recording.sessions import SESSION_FILE, TrialInfo, open_session, write_session
 from rig.tissue.model import Model
 
 RESULT = "track.json"

@@ -19,7 +19,7 @@ from rig.errors import DataError, RigError
 from rig.recording.csv_columns import TOOL
 from rig.recording.import_format import EXPORTED, FIELDS, OPTIONAL, SessionTable, TrialTable, column_names
 from rig.recording.reader import Recording
-from rig.recording.sessions import TRACKING, open_session
+from rig.recording.sessions import open_session
 from rig.recording.tables import compression_N
 from rig.simulation.drive import Array, Index
 
@@ -53,7 +53,7 @@ def from_session(folder: Path) -> Session:
         except RigError as error:
             findings.append(Finding(trial.name, "recording", "unreadable", str(error)))
             continue
-        if recording.metadata.get("trial", {}).get("kind") != TRACKING:
+        if not recording.tracks_force:
             recordings.append((trial.name, recording))
     starts = [int(r.tables["force"]["capture_ns"][0]) for _, r in recordings if len(r.tables["force"])]
     streams = [streams_of(name, recording, min(starts, default=0)) for name, recording in recordings]

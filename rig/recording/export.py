@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rig.channels import FORCE, STREAMS
 from rig.errors import UsageError
 from rig.recording.files import whole_file, whole_folder, write_text
-from rig.recording.sessions import TRACKING, Session, TrialInfo, plain
+from rig.recording.sessions import Session, TrialInfo, plain
 from rig.recording.tables import Column, arrow_table, compression_N, filled, write_parquet
 
 Format = Literal["csv", "parquet", "hdf5", "mat"]
@@ -67,7 +67,7 @@ def _csv(session: Session, out: Path) -> None:
 
 def _csv_trial(out: Path, session: Session, trial: TrialInfo) -> None:
     recording = session.recording(trial.name)
-    tracked = recording.metadata.get("trial", {}).get("kind") == TRACKING
+    tracked = recording.tracks_force
     folder = out / (trial.name if tracked else f"trial_{trial.name.removeprefix('trial_')}")
     folder.mkdir()
     for stream, columns in filled(recording):

@@ -12,6 +12,8 @@ from rig.errors import DataError
 from rig.recording.mcap_file import SUMMARY
 from rig.recording.scan import MAGIC, Chunk, Definition, Scan, scan
 
+# The kind of a trial that tracked a force; one that indents has none.
+TRACKING = "tracking"
 NUMERIC = tuple(stream for stream in STREAMS if not stream.has_text)
 
 
@@ -31,6 +33,11 @@ class Recording:
     complete: bool
     damage: tuple[str, ...]
     cut: str = ""
+
+    @property
+    def tracks_force(self) -> bool:
+        """Whether a force was tracked in it, rather than a stroke made."""
+        return self.metadata.get("trial", {}).get("kind") == TRACKING
 
 
 def read_recording(path: Path) -> Recording:

@@ -23,9 +23,6 @@ PARQUET_FOLDER = "parquet"
 # JSON has no NaN: an unknown number is null in the file and NaN here.
 Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
 
-# The kind of a trial that tracked a force; one that indents has none.
-TRACKING = "tracking"
-
 
 @dataclass(frozen=True)
 class TrialInfo:

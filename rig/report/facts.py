@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.errors import DataError, RigError
 from rig.recording.reader import Recording
-from rig.recording.sessions import TRACKING, Session, TrialInfo, open_session
+from rig.recording.sessions import Session, TrialInfo, open_session
 from rig.recording.verify import Verdict, verify
 from rig.report.diagnosed import Diagnosed, read_diagnosis
 from rig.report.figures import Tracked
@@ -115,9 +115,7 @@ def _study(session: Session) -> Study | str:
 
 
 def _tracking(session: Session, recordings: Mapping[str, Recording]) -> TrackingFacts | str:
-    runs = [
-        name for name, recording in recordings.items() if recording.metadata.get("trial", {}).get("kind") == TRACKING
-    ]
+    runs = [name for name, recording in recordings.items() if recording.tracks_force]
     if not runs:
         return "No force was tracked in this session; `rig track --model MODEL --force 5 --out SESSION` adds a run."
     loop = recordings[runs[-1]].tables["loop"]

@@ -9,7 +9,7 @@ import numpy as np
 
 import rig
 from rig.errors import DataError, UsageError
-from rig.recording.sessions import TRACKING, Session
+from rig.recording.sessions import Session
 from rig.tissue.control_table import control_rows
 from rig.tissue.curves import Curve, loading_curve
 from rig.tissue.fitting import fit_law
@@ -117,7 +117,7 @@ def curves_of(session: Session) -> tuple[list[Curve], list[Skipped]]:
     for trial in session.trials:
         try:
             recording = session.recording(trial.name)
-            if recording.metadata.get("trial", {}).get("kind") != TRACKING:
+            if not recording.tracks_force:
                 curve = loading_curve(stroke_of(trial.name, recording))
                 curves.append(replace(curve, subject=str(session.info.subject.get("id", ""))))
         except DataError as error:
