@@ -12,8 +12,9 @@ from controller.loop import Slot
 from controller.machine import Machine
 from controller.modes import Mode
 from controller.registration import Point, Registration
-from controller.safety import Action, Incident, Watch
+from controller.safety import TABLE, Action, Check, Incident
 from controller.steps import Program
+from controller.watch import Watch
 from controller.world import World
 from rig.channels import (
     AXIS,
@@ -56,13 +57,20 @@ class BenchLoop:
     """Owns devices, world and machine; ``tick`` is called once a slot and returns False when it is time to go."""
 
     def __init__(
-        self, wiring: Wiring, devices: Devices, ring: Ring, link: Link, commands: "Commands", now: Callable[[], int]
+        self,
+        wiring: Wiring,
+        devices: Devices,
+        ring: Ring,
+        link: Link,
+        commands: "Commands",
+        now: Callable[[], int],
+        table: tuple[Check, ...] = TABLE,
     ) -> None:
         self.wiring, self.devices, self._ring, self._link, self._now = wiring, devices, ring, link, now
         self._commands = commands
         period_s = 1.0 / wiring.loop.rate_Hz
         self.world = World(dt_s=period_s, acceleration_mm_s2=wiring.axis.acceleration_mm_s2)
-        self.machine = Machine(wiring, self.world, self._finished)
+        self.machine = Machine(wiring, self.world, self._finished, table)
         self.watch = Watch()
         self._registration = Registration()
         self._standstill = Standstill()

@@ -17,18 +17,22 @@ from controller.commands import Inbox
 from controller.devices import Devices, start_devices
 from controller.link import Link
 from controller.loop import Executive, sleep_then_spin
+from controller.safety import TABLE, Check
 from rig.config.wiring import Wiring
 from rig.errors import RigError
 from rig.recording.ring import RingWriter
 
 
-def main(arguments: list[str]) -> int:
-    """Runs the loop; 0 after an orderly end, 1 after a failure that was reported over the link."""
+def main(arguments: list[str], table: tuple[Check, ...] = TABLE) -> int:
+    """Runs the loop; 0 after an orderly end, 1 after a failure that was reported over the link.
+
+    ``table`` is what it stops for; nothing but a trial of the safety table itself gives another one.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     wiring = Wiring.model_validate_json(arguments[0])
     link = Link(socket.socket(fileno=int(arguments[2])))
     try:
-        _serve(wiring, Path(arguments[1]), link)
+        _serve(wiring, Path(arguments[1]), link, table)
     except RigError as error:
         link.send({"failed": str(error)})
         return 1
@@ -40,7 +44,7 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _serve(wiring: Wiring, ring_path: Path, link: Link) -> None:
+def _serve(wiring: Wiring, ring_path: Path, link: Link, table: tuple[Check, ...]) -> None:
     # Memory and privileges first: from the axis' start on, the drive counts the time between our heartbeats.
     ring = RingWriter.create(ring_path)
     try:
@@ -49,17 +53,24 @@ def _serve(wiring: Wiring, ring_path: Path, link: Link) -> None:
         try:
             devices.axis.home()
             devices.axis.enable()
-            _run(wiring, devices, ring, link, granted)
+            _run(wiring, devices, ring, link, granted, table)
         finally:
             devices.close()
     finally:
         ring.close()
 
 
-def _run(wiring: Wiring, devices: Devices, ring: RingWriter, link: Link, granted: dict[str, str]) -> None:
+def _run(
+    wiring: Wiring,
+    devices: Devices,
+    ring: RingWriter,
+    link: Link,
+    granted: dict[str, str],
+    table: tuple[Check, ...],
+) -> None:
     identities = {role: asdict(device.identity) for role, device in devices.by_role().items()}
     link.send({"ready": {"devices": identities, "realtime": granted, "ring": str(ring.path)}})
-    loop = BenchLoop(wiring, devices, ring, link, Inbox(link), time.monotonic_ns)
+    loop = BenchLoop(wiring, devices, ring, link, Inbox(link), time.monotonic_ns, table)
     pause = sleep_then_spin(realtime.spin_ns(granted))
     Executive(round(1e9 / wiring.loop.rate_Hz), sleep=pause).run(loop.tick)
 

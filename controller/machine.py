@@ -9,8 +9,9 @@ from collections.abc import Callable
 
 from controller.modes import Mode
 from controller.motion import Setpoint, arrived, toward
-from controller.safety import Action, Incident, Watch, judge
+from controller.safety import TABLE, Action, Check, Incident, evaluate
 from controller.steps import Program, Run, Step
+from controller.watch import Watch
 from controller.world import World
 from rig.config.wiring import Wiring
 from rig.errors import SafetyStop
@@ -22,8 +23,14 @@ MOVING = (Mode.FREE, Mode.APPROACH, Mode.COMPRESS, Mode.CONTACT, Mode.RETRACT)
 class Machine:
     """Decides mode and set-point every tick; ``finished`` is called once a program with its outcome."""
 
-    def __init__(self, wiring: Wiring, world: World, finished: Callable[[str, Incident | None], None]) -> None:
-        self._wiring, self.world, self._finished = wiring, world, finished
+    def __init__(
+        self,
+        wiring: Wiring,
+        world: World,
+        finished: Callable[[str, Incident | None], None],
+        table: tuple[Check, ...] = TABLE,
+    ) -> None:
+        self._wiring, self.world, self._finished, self._table = wiring, world, finished, table
         self.mode = Mode.IDLE
         self.latched: Incident | None = None
         self.step_index = -1
@@ -70,7 +77,7 @@ class Machine:
     def update(self, watch: Watch) -> Incident | None:
         """One tick; returns the incident that has just stopped motion, if any."""
         watch.mode = self.mode
-        incident = self._judge(watch)
+        incident = self._evaluate(watch)
         if incident:
             self._stop(incident)
         elif self.latched:
@@ -79,11 +86,9 @@ class Machine:
             incident = self._advance()
         return incident
 
-    def _judge(self, watch: Watch) -> Incident | None:
-        if self.mode not in MOVING and "estop" not in watch.requests:
-            return None
+    def _evaluate(self, watch: Watch) -> Incident | None:
         least = Action.IMMEDIATE if self.latched else Action.SOFT
-        return judge(self.world, watch, self._wiring, least)
+        return evaluate(self.world, watch, self._wiring, self._table, least, at_rest=self.mode not in MOVING)
 
     def _stop(self, incident: Incident) -> None:
         self.latched = incident

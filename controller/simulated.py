@@ -17,9 +17,10 @@ from controller.lines import Line
 from controller.machine import Machine
 from controller.modes import Mode
 from controller.motion import Setpoint
-from controller.safety import Incident, Watch
+from controller.safety import Incident
 from controller.steps import Approach, ApproachRun, Program, Retract, TrackForce
 from controller.stretches import Bench, Bounds, Clock, Move, Plant, Speeds, Stretch, Zeros, hold_compiled
+from controller.watch import Watch
 from controller.world import World
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 
 from controller.machine import Machine
 from controller.modes import Mode
-from controller.safety import Action, Incident, Watch
+from controller.safety import TABLE, Action, Check, Incident
 from controller.steps import Approach, Compress, Program, Retract, Step, Zero
+from controller.watch import Watch
 from controller.world import World
 from rig.config.wiring import Subject, Wiring
 
@@ -27,6 +28,7 @@ class SpringBench:
     """A perfect axis over a linear spring; ``stiffness`` and ``watch`` may be changed while it runs."""
 
     wiring: Wiring = WIRING
+    table: tuple[Check, ...] = TABLE
     stiffness_N_mm: float = STIFFNESS_N_MM
     position_mm: float = 15.0
     watch: Watch = field(default_factory=Watch)
@@ -41,7 +43,9 @@ class SpringBench:
 
     def __post_init__(self) -> None:
         self.world = World(position_mm=self.position_mm)
-        self.machine = Machine(self.wiring, self.world, lambda outcome, cause: self.ended.append((outcome, cause)))
+        self.machine = Machine(
+            self.wiring, self.world, lambda outcome, cause: self.ended.append((outcome, cause)), self.table
+        )
         self.sense()
 
     def sense(self) -> None:

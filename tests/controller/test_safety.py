@@ -171,5 +171,23 @@ def test_safe_is_left_only_by_acknowledging() -> None:
 
 
 def test_the_table_puts_every_immediate_cause_before_every_soft_one() -> None:
-    actions = [action for _, action, _ in TABLE]
+    actions = [line.action for line in TABLE]
     assert actions == sorted(actions, reverse=True)
+
+
+def test_a_code_stands_once_in_the_table_and_fits_into_a_row_of_the_event_stream() -> None:
+    codes = [line.code for line in TABLE]
+    assert len(set(codes)) == len(codes)
+    assert max(map(len, codes)) <= 20
+
+
+def test_every_check_says_how_late_it_may_be_and_none_is_slower_than_the_operators_lease() -> None:
+    assert all(0.0 < line.bound_s <= 3.2 for line in TABLE)
+
+
+def test_a_table_without_a_check_does_not_stop_for_it() -> None:
+    without = tuple(line for line in TABLE if line.code != "overspeed")
+    bench = SpringBench(table=without)
+    bench.run(ZERO, APPROACH, PRESS, until=lambda: bench.world.force_N > 2.0)
+    bench.world.velocity_mm_s = -80.0
+    assert bench.tick() is None

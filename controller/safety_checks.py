@@ -1,0 +1,172 @@
+"""The checks of the safety table: each looks at one thing and says in a sentence what is wrong, "" where nothing is.
+
+Every one takes (world, watch, wiring). Force is counted from the reference zero, so a wrong tare cannot hide a load.
+"""
+# ruff: noqa: ARG001 - every check has the one signature of the table
+
+import math
+
+from controller.watch import Watch
+from controller.world import World
+from rig.config.wiring import Wiring
+
+RECORDER_FILL = 0.5
+RECORDER_SILENT_S = 3.0
+RETRACTING_MARGIN_MM = 1.0
+SPEED_MARGIN = 1.2
+
+
+def emergency_stop(world: World, watch: Watch, wiring: Wiring) -> str:
+    """Somebody pressed the emergency stop."""
+    return "emergency stop pressed" if "estop" in watch.requests else ""
+
+
+def drive_fault(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The drive reports a fault of its own."""
+    return f"the drive reports: {watch.drive_fault}" if watch.drive_fault else ""
+
+
+def axis_lost(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The axis does not answer, or its newest sample is too old."""
+    if watch.axis_lost:
+        return f"axis lost: {watch.axis_lost}"
+    return _older("axis", watch.axis_age_ms, wiring.loop.stale_axis_ms)
+
+
+def following_error(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The axis lags its set-point."""
+    limit_mm = wiring.axis.following_error_mm
+    if abs(world.following_mm) <= limit_mm:
+        return ""
+    return f"the axis lags its set-point by {abs(world.following_mm):.2f} mm (limit {limit_mm:g} mm): is it blocked?"
+
+
+def standstill(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The axis reports one place while its set-point goes on."""
+    limit_mm = wiring.axis.standstill_mm
+    if world.standstill_mm <= limit_mm:
+        return ""
+    return (
+        f"the axis goes on reporting {world.position_mm:.3f} mm while its set-point went {world.standstill_mm:.2f} mm "
+        f"further (limit {limit_mm:g} mm): its position is frozen, or it is blocked"
+    )
+
+
+def workspace(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The axis is outside the workspace."""
+    low_mm = wiring.limits.position_min_mm - RETRACTING_MARGIN_MM
+    high_mm = wiring.limits.position_max_mm + RETRACTING_MARGIN_MM
+    if low_mm <= world.position_mm <= high_mm:
+        return ""
+    return f"position {world.position_mm:.2f} mm is outside {low_mm:g} to {high_mm:g} mm"
+
+
+def speed(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The axis is faster than it may be."""
+    limit_mm_s = SPEED_MARGIN * wiring.limits.speed_mm_s
+    if abs(world.velocity_mm_s) <= limit_mm_s:
+        return ""
+    return f"the axis moves at {abs(world.velocity_mm_s):.0f} mm/s (limit {limit_mm_s:g} mm/s)"
+
+
+def force_limit(world: World, watch: Watch, wiring: Wiring) -> str:
+    """Force above the lower of machine limit and pain threshold."""
+    force_N = world.raw_N - (0.0 if math.isnan(world.first_zero_N) else world.first_zero_N)
+    if force_N <= wiring.force_limit_N:
+        return ""
+    whose = "the subject's pain threshold" if wiring.force_limit_N < wiring.limits.force_N else "limits.force_N"
+    return f"force {force_N:.2f} N is above {whose}, {wiring.force_limit_N:g} N"
+
+
+def pain_stop(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The subject's stop."""
+    return f"the subject's pain stop at {world.force_N:.2f} N" if "pain" in watch.requests else ""
+
+
+def operator_stop(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The operator's stop."""
+    return "stopped by the operator" if "stop" in watch.requests else ""
+
+
+def force_lost(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The force sensor does not answer, or its newest sample is too old."""
+    if watch.force_lost:
+        return f"force sensor lost: {watch.force_lost}"
+    return _older("force", watch.force_age_ms, wiring.stale_force_ms)
+
+
+def force_invalid(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The sensor does not vouch for its samples, or repeats one."""
+    if not watch.force_valid or math.isnan(world.raw_N):
+        return "the force sensor marks its samples as invalid or out of range"
+    return "the force sensor repeats the same value: it is frozen" if watch.force_frozen else ""
+
+
+def force_rate(world: World, watch: Watch, wiring: Wiring) -> str:
+    """Force changes faster than it may."""
+    limit = wiring.limits.force_rate_N_s
+    if abs(world.force_rate_N_s) <= limit:
+        return ""
+    return f"force changes by {world.force_rate_N_s:.0f} N/s (limit {limit:g} N/s)"
+
+
+def depth(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The tip is deeper than it may be."""
+    limit_mm = wiring.limits.depth_mm
+    return f"depth {world.depth_mm:.2f} mm is above {limit_mm:g} mm" if world.depth_mm > limit_mm else ""
+
+
+def tracker_lost(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The tracker does not answer, or the limb's marker is gone."""
+    if wiring.tracker is None:
+        return ""
+    if watch.marker_lost:
+        return f"tracker lost: {watch.marker_lost}"
+    limit_ms = wiring.loop.stale_marker_ms
+    return _older("tracker", watch.marker_age_ms, limit_ms) or _older("limb's marker", watch.limb_age_ms, limit_ms)
+
+
+def patient_moved(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The limb moved against the robot."""
+    limit_mm = wiring.limits.patient_mm
+    if not world.patient_mm > limit_mm:
+        return ""
+    return f"the limb moved by {world.patient_mm:.1f} mm against the robot (limit {limit_mm:g} mm)"
+
+
+def loop_overrun(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The loop woke late."""
+    limit_ms = wiring.loop.overrun_ms
+    if watch.wake_latency_ms <= limit_ms:
+        return ""
+    return f"the loop woke {watch.wake_latency_ms:.0f} ms late (limit {limit_ms:g} ms): is the computer overloaded?"
+
+
+def recorder_stalled(world: World, watch: Watch, wiring: Wiring) -> str:
+    """Nobody takes the rows that are to be recorded."""
+    if watch.recorder_fill <= RECORDER_FILL and watch.recorder_silent_s <= RECORDER_SILENT_S:
+        return ""
+    return (
+        f"the recorder is silent for {watch.recorder_silent_s:.1f} s, its buffer {100 * watch.recorder_fill:.0f} % full"
+    )
+
+
+def supervisor_lost(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The program that started the loop is gone."""
+    return "the program that started the loop is gone" if watch.supervisor_lost else ""
+
+
+def operator_silent(world: World, watch: Watch, wiring: Wiring) -> str:
+    """Nobody is in control."""
+    if "unattended" in watch.requests:
+        return "whoever started this is not in control any more: the lease was given back or ran out"
+    lease_s = wiring.loop.lease_s
+    if not lease_s or watch.operator_silent_s <= lease_s:
+        return ""
+    return f"the operator's program is silent for {watch.operator_silent_s:.1f} s (lease {lease_s:g} s)"
+
+
+def _older(name: str, age_ms: float, limit_ms: float) -> str:
+    return (
+        f"{name}: newest sample is {min(age_ms, 1e6):.0f} ms old (limit {limit_ms:g} ms)" if age_ms > limit_ms else ""
+    )

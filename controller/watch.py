@@ -1,0 +1,28 @@
+"""What the safety table looks at besides the world: the state of links, clocks, recorder and people."""
+
+from dataclasses import dataclass
+
+from controller.modes import Mode
+
+
+@dataclass(slots=True)
+class Watch:
+    """What the table looks at besides the world; filled by the loop every tick."""
+
+    mode: Mode = Mode.IDLE
+    force_lost: str = ""
+    axis_lost: str = ""
+    marker_lost: str = ""
+    drive_fault: str = ""
+    force_valid: bool = True
+    force_frozen: bool = False
+    force_age_ms: float = 0.0
+    axis_age_ms: float = 0.0
+    marker_age_ms: float = 0.0
+    limb_age_ms: float = 0.0
+    wake_latency_ms: float = 0.0
+    recorder_fill: float = 0.0
+    recorder_silent_s: float = 0.0
+    supervisor_lost: bool = False
+    operator_silent_s: float = 0.0
+    requests: frozenset[str] = frozenset()
