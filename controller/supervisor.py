@@ -21,6 +21,7 @@ from rig.errors import DeviceError, SafetyStop, UsageError
 from rig.recording.client import RecorderClient
 from rig.recording.ring import new_path
 
+LOOP_MODULE = "controller.loop_process"
 START_TIMEOUT_S = 60.0
 LEAVE_TIMEOUT_S = 15.0
 ANSWER_TIMEOUT_S = 5.0
@@ -68,8 +69,10 @@ class _Mail:
 class Supervisor:
     """A running bench: ``with Supervisor(wiring) as bench: bench.run(program)``."""
 
-    def __init__(self, wiring: Wiring) -> None:
+    def __init__(self, wiring: Wiring, loop_module: str = LOOP_MODULE) -> None:
+        """``loop_module`` is what the loop's process runs: this program's own, or one that prepares something first."""
         self.wiring = wiring
+        self._loop_module = loop_module
         self._mail = _Mail()
         self._ring_path = new_path()
         self._link: Link | None = None
@@ -93,7 +96,7 @@ class Supervisor:
         """Starts loop and recorder; raises DeviceError with the loop's own sentence where a device is not right."""
         mine, theirs = pair()
         self._link = Link(mine)
-        command = [sys.executable, "-m", "controller.loop_process"]
+        command = [sys.executable, "-m", self._loop_module]
         arguments = [self.wiring.model_dump_json(), str(self._ring_path), str(theirs.fileno())]
         self._process = subprocess.Popen(
             command + arguments,
