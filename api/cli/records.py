@@ -12,7 +12,7 @@ import typer
 
 from api.cli.options import JsonOption
 from api.cli.output import console, table, write_json
-from rig.errors import CheckFailed, UsageError
+from rig.errors import CheckFailed, DataError, UsageError
 from rig.recording import verify as verification
 from rig.recording.export import FORMATS, Format, export
 from rig.recording.files import make_folder
@@ -61,7 +61,16 @@ def _verdicts(path: Path) -> tuple[list[Verdict], tuple[str, ...]]:
     if path.is_file():
         return [verification.verify(path)], ()
     session = open_session(path)
-    return [verification.verify(session.path(trial.name)) for trial in session.trials], session.remarks
+    verdicts = [_verdict(session.path(trial.name)) for trial in session.trials]
+    return verdicts, (*session.remarks, *session.mismatches)
+
+
+def _verdict(path: Path) -> Verdict:
+    """What is no recording at all is damaged, and hides no other."""
+    try:
+        return verification.verify(path)
+    except DataError as error:
+        return Verdict(path, "damaged", str(error), damage=(str(error),))
 
 
 def _verdict_table(verdicts: list[Verdict]) -> object:

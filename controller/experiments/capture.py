@@ -106,5 +106,5 @@ def _run(
         peak_force_N=outcome.peak_force_N,
         samples=done.samples,
         dropped=done.dropped,
-    )
+    ).sealed(folder)
     return result, SafetyStop(f"stopped: {outcome.cause}") if outcome.stopped else None

@@ -96,11 +96,10 @@ def recorded_run(bench: Supervisor, program: Program, folder: Path, model: str) 
     """One run into the session in ``folder``, a new one where there is none; listed there however it ended."""
     if not (folder / SESSION_FILE).exists():
         new_session(folder, "track", {"name": program.name, "kind": TRACKING}, bench.wiring)
+    session = open_session(folder).info.id
     name = _free_name(folder)
     about = {"trial": {"kind": TRACKING, "name": program.name}, "model": {"file": model}}
-    done = record(
-        bench, program, folder / f"{name}.mcap", metadata(bench, folder.name, name, about), _longest_s(program)
-    )
+    done = record(bench, program, folder / f"{name}.mcap", metadata(bench, session, name, about), _longest_s(program))
     _enter(folder, name, done)
     return done
 
@@ -117,7 +116,7 @@ def _enter(folder: Path, name: str, done: Recorded) -> None:
         peak_force_N=done.outcome.peak_force_N,
         samples=done.samples,
         dropped=done.dropped,
-    )
+    ).sealed(folder)
     kept = tuple(trial for trial in info.trials if trial.name != name)
     write_session(folder, replace(info, trials=(*kept, entry)))
 

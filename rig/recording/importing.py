@@ -60,7 +60,7 @@ def import_session(folder: Path, out: Path, columns: Iterable[str], now: datetim
     info = _info(folder, session, trials, now)
     with whole_folder(out) as scratch:
         _write_all(scratch, trials, session, info)
-        write_session(scratch, info)
+        write_session(scratch, replace(info, trials=tuple(trial.sealed(scratch) for trial in info.trials)))
     written = open_session(out)
     return replace(written, remarks=(*written.remarks, *_overlaps(trials)))
 

@@ -15,6 +15,7 @@ from pydantic import BeforeValidator, TypeAdapter, ValidationError
 
 from rig.errors import DataError, UsageError
 from rig.recording.files import write_text
+from rig.recording.manifest import Listed, file_sha256, find_mismatches, seal
 from rig.recording.reader import Recording, read_recording
 from rig.recording.tables import write_parquet
 
@@ -26,7 +27,7 @@ Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is Non
 
 @dataclass(frozen=True)
 class TrialInfo:
-    """One trial. ``file`` stands in the session's folder; unknown numbers are NaN."""
+    """One trial. ``file`` stands in the session's folder, ``sha256`` is its hash; unknown numbers are NaN."""
 
     name: str
     file: str
@@ -36,6 +37,11 @@ class TrialInfo:
     peak_force_N: Number = math.nan
     samples: dict[str, int] = field(default_factory=dict)
     dropped: dict[str, int] = field(default_factory=dict)
+    sha256: str = ""
+
+    def sealed(self, folder: Path) -> "TrialInfo":
+        """The same with the hash of its recording in ``folder``, which is closed and there."""
+        return replace(self, sha256=file_sha256(folder / self.file))
 
 
 @dataclass(frozen=True)
@@ -73,6 +79,12 @@ class Session:
                 return trial
         raise UsageError(f"{self.folder}: no trial {name}; there are {', '.join(item.name for item in self.trials)}")
 
+    @property
+    def mismatches(self) -> tuple[str, ...]:
+        """Sentences on files that were swapped, copied or changed since the list was written; reads every byte."""
+        listed = [Listed(trial.name, trial.file, trial.sha256) for trial in self.trials]
+        return find_mismatches(self.folder, SESSION_FILE, self.info.id, listed)
+
     def path(self, name: str) -> Path:
         """The recording of a trial."""
         return self.folder / self.trial(name).file
@@ -86,8 +98,12 @@ _INFO = TypeAdapter(SessionInfo)
 
 
 def write_session(folder: Path, info: SessionInfo) -> None:
-    """Replaces ``session.json`` in one step."""
-    write_text(folder / SESSION_FILE, json.dumps(plain(asdict(info)), indent=2, ensure_ascii=False) + "\n")
+    """Replaces ``session.json``, sealed, in one step."""
+    write_text(folder / SESSION_FILE, json.dumps(seal(_plain_table(info)), indent=2, ensure_ascii=False) + "\n")
+
+
+def _plain_table(info: SessionInfo) -> dict[str, object]:
+    return {name: plain(value) for name, value in asdict(info).items()}
 
 
 def plain(value: object) -> object:

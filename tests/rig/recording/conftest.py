@@ -1,6 +1,6 @@
 """A recording with known content, for every test that reads one."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
@@ -36,10 +36,16 @@ def write_recording(tmp_path: Path) -> WriteRecording:
     """Writes ``rows`` ms of force and axis with events, 100 ms a batch; ``finish`` false leaves a prefix."""
 
     def write(
-        name: str = "indent-1", rows: int = 1000, finish: bool = True, skip: tuple[int, ...] = (), kind: str = ""
+        name: str = "indent-1",
+        rows: int = 1000,
+        finish: bool = True,
+        skip: tuple[int, ...] = (),
+        kind: str = "",
+        about: Mapping[str, str] | None = None,
     ) -> Path:
         path = tmp_path / f"{name}.mcap"
-        writer = RecordingWriter(path, METADATA | ({"trial": {"kind": kind}} if kind else {}))
+        metadata = METADATA | ({"trial": {"kind": kind}} if kind else {}) | ({"recording": about} if about else {})
+        writer = RecordingWriter(path, metadata)
         for seq in range(rows):
             if seq % 100 == 0:
                 writer.flush()

@@ -161,7 +161,7 @@ def test_exported_csv_can_be_imported_again(source: Path, tmp_path: Path) -> Non
     assert again.info.id == first.info.id
     assert again.info.subject == first.info.subject
     for before, after in zip(first.trials, again.trials, strict=True):
-        assert before == after
+        assert replace(before, sha256="") == replace(after, sha256="")
         one, two = first.recording(before.name), again.recording(after.name)
         assert one.metadata["calibration"] == two.metadata["calibration"]
         for name, table in one.tables.items():
