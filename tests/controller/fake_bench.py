@@ -1,0 +1,229 @@
+"""``BenchLoop`` whole, with everything around it in one thread on one clock: thousands of cycles a second of CPU.
+
+``bench = FakeBench(); bench.run(ZERO, APPROACH); bench.force.frozen = True; bench.until(lambda: bench.mode is SAFE)``
+"""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+from controller.bench_loop import BenchLoop
+from controller.commands import Inbox
+from controller.devices import Devices
+from controller.link import Link, Message
+from controller.loop import Slot
+from controller.modes import Mode
+from controller.steps import Approach, Compress, Hold, Program, Retract, Step, Zero
+from rig.channels import (
+    AXIS,
+    BY_ID,
+    EVENT,
+    FORCE,
+    LOOP,
+    MARKER,
+    AxisSample,
+    EventSample,
+    ForceSample,
+    LoopSample,
+    MarkerSample,
+)
+from rig.config.wiring import Wiring
+from tests.controller.fake_devices import Clock, FakeAxis, FakeForce, FakeTracker
+
+ZERO = Zero(duration_s=0.2)
+APPROACH = Approach(speed_mm_s=5.0, contact_force_N=0.05, search_to_mm=40.0)
+PRESS = Compress(depth_mm=5.0, speed_mm_s=20.0, force_limit_N=9.0)
+LEAVE = Retract(clearance_mm=5.0, speed_mm_s=10.0)
+HOLD = Hold(duration_s=30.0)
+SETTLED_CYCLES = 20
+"""Cycles before a test begins: no bench is asked to move before its devices have spoken."""
+
+
+def wired(sensor_Hz: float = 1000.0, **sections: dict[str, Any]) -> Wiring:
+    """The default wiring with a force sensor of that rate: 100 Hz is the FT 300."""
+    product = "robotiq-ft300" if sensor_Hz == 100.0 else "bota-sensone"
+    force = {"product": product, "rate_Hz": 1000.0 if sensor_Hz == 100.0 else sensor_Hz} | sections.pop("force", {})
+    return Wiring.model_validate({"force": force, **sections})
+
+
+@dataclass
+class FakeRing:
+    """Keeps every row by stream, unpacked again from its bytes; ``fill`` and ``silent_s`` are what the reader shows."""
+
+    fill: float = 0.0
+    silent_s: float = 0.0
+    rows: dict[int, list[tuple[Any, ...]]] = field(default_factory=lambda: {stream: [] for stream in BY_ID})
+
+    def put(self, stream_id: int, body: bytes) -> None:
+        """One row."""
+        self.rows[stream_id].append(BY_ID[stream_id].unpack(body))
+
+    def reader_age_ns(self, now_ns: int) -> int:
+        """As long as the test says."""
+        return round(self.silent_s * 1e9)
+
+    @property
+    def loop(self) -> list[LoopSample]:
+        """The rows of the loop itself."""
+        return cast(list[LoopSample], self.rows[LOOP.id])
+
+    @property
+    def events(self) -> list[EventSample]:
+        """What happened."""
+        return cast(list[EventSample], self.rows[EVENT.id])
+
+    @property
+    def force(self) -> list[ForceSample]:
+        """Rows of the force sensor."""
+        return cast(list[ForceSample], self.rows[FORCE.id])
+
+    @property
+    def axis(self) -> list[AxisSample]:
+        """Rows of the axis."""
+        return cast(list[AxisSample], self.rows[AXIS.id])
+
+    @property
+    def marker(self) -> list[MarkerSample]:
+        """Rows of the tracker."""
+        return cast(list[MarkerSample], self.rows[MARKER.id])
+
+
+@dataclass
+class FakeLink:
+    """The loop's end of the link: what the other end says is put into ``inbox``; what the loop says is kept."""
+
+    inbox: deque[Message] = field(default_factory=deque)
+    sent: list[Message] = field(default_factory=list)
+    statuses: list[Message] = field(default_factory=list)
+    flushes: int = 0
+    lost: bool = False
+
+    def send(self, message: Message) -> None:
+        """Kept."""
+        self.sent.append(message)
+
+    def send_status(self, message: Message) -> None:
+        """Kept apart."""
+        self.statuses.append(message["status"])
+
+    def flush(self) -> bool:
+        """Counts."""
+        self.flushes += 1
+        return True
+
+    def receive(self) -> Message | None:
+        """The oldest message."""
+        return self.inbox.popleft() if self.inbox else None
+
+    def of(self, kind: str) -> list[Any]:
+        """What the loop said of this kind, in order."""
+        return [message[kind] for message in self.sent if kind in message]
+
+
+class FakeBench:
+    """Everything wired together; ``cycle`` is one period of the loop."""
+
+    def __init__(
+        self,
+        wiring: Wiring | None = None,
+        position_mm: float = 10.0,
+        execution_ns: int = 50_000,
+        settled: int = SETTLED_CYCLES,
+    ) -> None:
+        self.wiring = wiring or wired()
+        self.clock = Clock()
+        self.period_ns = round(1e9 / self.wiring.loop.rate_Hz)
+        self.axis = FakeAxis(self.clock, self.period_ns, position_mm=position_mm, target_mm=position_mm)
+        self.force = FakeForce(
+            self.clock, round(1e9 / self.wiring.force.sampled_Hz), axis=self.axis, wiring=self.wiring
+        )
+        rate_Hz = self.wiring.tracker.rate_Hz if self.wiring.tracker else 60.0
+        self.tracker = FakeTracker(self.clock, round(1e9 / rate_Hz), axis=self.axis)
+        self.ring, self.link = FakeRing(), FakeLink()
+        self.devices = Devices(self.force, self.axis, self.tracker if self.wiring.tracker else None)
+        link = cast(Link, self.link)
+        self.loop = BenchLoop(self.wiring, self.devices, self.ring, link, Inbox(link), self.clock)
+        self.slot = self.missed = 0
+        self.execution_ns = execution_ns
+        self.start_ns = self.clock.now_ns
+        self.going = True
+        self.true_peak_N = 0.0
+        self.keep_lease = True
+        self.cycles(settled)
+
+    @property
+    def mode(self) -> Mode:
+        """What the machine does."""
+        return self.loop.machine.mode
+
+    @property
+    def latched(self) -> str:
+        """Code of the stop in force; empty without one."""
+        latched = self.loop.machine.latched
+        return latched.code if latched else ""
+
+    @property
+    def time_s(self) -> float:
+        """Since the start."""
+        return (self.clock.now_ns - self.start_ns) * 1e-9
+
+    def cycle(self, late_ns: int = 0) -> bool:
+        """One cycle, woken ``late_ns`` after it was due; whole periods of lateness are missed cycles."""
+        due_ns = self.start_ns + self.slot * self.period_ns
+        wake_ns = due_ns + late_ns
+        self.axis.advance(wake_ns)
+        self.clock.now_ns = wake_ns
+        self._renew()
+        self.going = self.loop.tick(Slot(self.slot, due_ns, wake_ns, self.missed))
+        self.clock.now_ns = wake_ns + self.execution_ns
+        self.true_peak_N = max(self.true_peak_N, self.force.true_N)
+        skipped = late_ns // self.period_ns
+        self.slot, self.missed = self.slot + 1 + skipped, self.missed + skipped
+        return self.going
+
+    def _renew(self) -> None:
+        if self.keep_lease and not self.link.inbox and self.slot % 100 == 0:
+            self.link.inbox.append({"do": "lease"})
+
+    def cycles(self, count: int) -> None:
+        """That many, on time."""
+        for _ in range(count):
+            self.cycle()
+
+    def wait(self, seconds: float) -> None:
+        """Cycles for that long."""
+        self.cycles(round(seconds * 1e9 / self.period_ns))
+
+    def until(self, condition: Callable[[], bool], within_s: float = 60.0) -> float:
+        """Cycles until ``condition``; returns how long that took, or fails."""
+        began_ns = self.clock.now_ns
+        while not condition():
+            assert (self.clock.now_ns - began_ns) * 1e-9 < within_s, f"still {self.mode.name} {self.latched}"
+            self.cycle()
+        return (self.clock.now_ns - began_ns) * 1e-9
+
+    def say(self, verb: str, **more: object) -> None:
+        """A message to the loop, taken in the next cycle."""
+        self.link.inbox.append({"do": verb, **more})
+
+    def begin(self, *steps: Step) -> None:
+        """Sends a program; the next cycle starts it."""
+        self.say("program", program=Program(name="test", steps=steps).model_dump(mode="json"))
+        self.cycles(len(self.link.inbox))
+
+    def run(self, *steps: Step, within_s: float = 60.0) -> dict[str, Any]:
+        """A program to its end; returns what the loop said of it."""
+        before = len(self.link.of("finished"))
+        self.begin(*steps)
+        self.until(lambda: len(self.link.of("finished")) > before, within_s)
+        return cast(dict[str, Any], self.link.of("finished")[-1])
+
+    def press(self, force_N: float = 3.0) -> None:
+        """Into the tissue until the loop sees that force, then holding."""
+        depth_mm = force_N / self.force.stiffness_N_mm
+        self.begin(ZERO, APPROACH, Compress(depth_mm=depth_mm, speed_mm_s=10.0, force_limit_N=force_N + 2.0), HOLD)
+        self.until(lambda: self.loop.machine.step_index == 3)
+        self.wait(0.1)
+        assert math.isclose(self.force.true_N, force_N, abs_tol=0.6), self.force.true_N

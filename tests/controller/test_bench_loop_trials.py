@@ -1,0 +1,37 @@
+"""Whole programs through the loop on a clock of its own, at both sensors' rates; expected values are the spring's."""
+
+import pytest
+
+from controller.modes import Mode
+from controller.steps import Compress
+from tests.controller.fake_bench import APPROACH, LEAVE, PRESS, ZERO, FakeBench, wired
+from tests.controller.fake_devices import SURFACE_MM, ZERO_N
+
+RATES_HZ = pytest.mark.parametrize("sensor_Hz", [1000.0, 100.0])
+
+
+@RATES_HZ
+def test_a_trial_finds_the_surface_presses_by_the_springs_law_and_leaves(sensor_Hz: float) -> None:
+    bench = FakeBench(wired(sensor_Hz))
+    finished = bench.run(ZERO, APPROACH, PRESS, LEAVE)
+    # Three samples above 0.05 N at 5 mm/s, and the noise: that far below the true surface it is noticed.
+    late_mm = 0.05 + 3 / sensor_Hz * APPROACH.speed_mm_s + 0.01
+    assert (finished["outcome"], finished["cause"]) == ("complete", "")
+    assert finished["zero_N"] == pytest.approx(ZERO_N, abs=0.001)
+    assert SURFACE_MM < finished["surface_mm"] < SURFACE_MM + late_mm
+    pressed_mm = finished["surface_mm"] - SURFACE_MM + PRESS.depth_mm
+    assert finished["peak_force_N"] == pytest.approx(bench.force.stiffness_N_mm * pressed_mm, abs=0.12)
+    bench.wait(0.05)  # ten lags of the axis
+    assert bench.axis.position_mm == pytest.approx(finished["surface_mm"] - LEAVE.clearance_mm, abs=0.001)
+    assert list(dict.fromkeys(row.mode for row in bench.ring.loop)) == [
+        Mode.IDLE, Mode.FREE, Mode.APPROACH, Mode.COMPRESS, Mode.RETRACT
+    ]  # fmt: skip
+
+
+@RATES_HZ
+def test_the_force_limit_of_a_step_ends_it_within_one_sample_and_one_lag(sensor_Hz: float) -> None:
+    bench = FakeBench(wired(sensor_Hz))
+    finished = bench.run(ZERO, APPROACH, Compress(depth_mm=5.0, speed_mm_s=20.0, force_limit_N=2.0), LEAVE)
+    assert finished["outcome"] == "force limit"
+    # 1 N/mm at 20 mm/s gives 20 N/s for one sample period; then the axis catches up with its lag of 4.7 ms.
+    assert 2.0 < bench.true_peak_N < 2.0 + 20.0 * (1 / sensor_Hz + 0.0047 + 0.003)
