@@ -95,6 +95,10 @@ def _axis_stranger(axis: Epos4Mock, value: Value) -> None:
     axis.wrong_identity = as_switch(value)
 
 
+def _axis_unguarded(axis: Epos4Mock, value: Value) -> None:
+    axis.unguarded = as_switch(value)
+
+
 def _error(axis: Epos4Mock, value: Value) -> None:
     axis.inject_fault(_whole(value, 0xFFFF))
 
@@ -133,6 +137,7 @@ EPOS4_FAULTS: Mapping[str, Kind[Epos4Mock]] = {
     "silent": Kind("neither hears nor sends anything", True, _axis_silent),
     "frozen": Kind("repeats the position it had", True, _axis_frozen),
     "wrong_identity": Kind("has another maker and product", True, _axis_stranger),
+    "unguarded": Kind("watches neither heartbeats nor its own limits any more", True, _axis_unguarded),
     "error": Kind("this error happens once (0x603F code, for example 0x8611 following error)", 0x8611, _error),
     "lasting_error": Kind("this error comes back at each reset; 0: its cause is gone", 0x3210, _lasting_error),
 }

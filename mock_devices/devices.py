@@ -12,6 +12,7 @@ from mock_devices.epos4 import Epos4Mock
 from mock_devices.faults import WIRE_FAULTS, Fault, FaultyWire, Kind, faults_of
 from mock_devices.ndi import NdiMock
 from mock_devices.robotiq import RobotiqMock
+from mock_devices.sensing_faults import CAMERA_FAULTS, SENSOR_FAULTS
 from mock_devices.stage import Mock
 from mock_devices.wire import PtyWire, TcpWire, Wire
 
@@ -53,13 +54,14 @@ class Workshop:
         wire = self._faulty(PtyWire())
         drift_ppm = self._bench.parameters.force.counter_drift_ppm
         mock = BotaMock(wire, self._bench.force, self._start_ns, drift_ppm)
-        return _device("force", mock, wire, BOTA_FAULTS)
+        return _device("force", mock, wire, BOTA_FAULTS, faults_of(self._bench.force, SENSOR_FAULTS))
 
     def _robotiq(self) -> Device:
         wire = self._faulty(PtyWire())
         drift_ppm = self._bench.parameters.force_modbus.counter_drift_ppm
         mock = RobotiqMock(wire, self._bench.force_modbus, self._start_ns, drift_ppm)
-        return _device("force_modbus", mock, wire, ROBOTIQ_FAULTS)
+        inside = faults_of(self._bench.force_modbus, SENSOR_FAULTS)
+        return _device("force_modbus", mock, wire, ROBOTIQ_FAULTS, inside)
 
     def _axis(self) -> Device:
         wire = self._faulty(PtyWire())
@@ -74,17 +76,24 @@ class Workshop:
         serial = self._faulty(PtyWire())
         tcp = self._faulty(_listen(self._bench.parameters.tracker.tcp_port))
         tracker = self._bench.tracker
+        inside = faults_of(tracker, CAMERA_FAULTS)
         return [
-            _device("tracker", NdiMock(serial, tracker, self._start_ns, TOOLS, "polaris"), serial, NDI_FAULTS),
-            _device("tracker", NdiMock(tcp, tracker, self._start_ns, TOOLS, "vega"), tcp, NDI_FAULTS),
+            _device("tracker", NdiMock(serial, tracker, self._start_ns, TOOLS, "polaris"), serial, NDI_FAULTS, inside),
+            _device("tracker", NdiMock(tcp, tracker, self._start_ns, TOOLS, "vega"), tcp, NDI_FAULTS, inside),
         ]
 
     def _faulty(self, wire: Wire) -> FaultyWire:
         return FaultyWire(wire, self._rng, self._clock_ns)
 
 
-def _device(role: str, mock: AnyMock, wire: FaultyWire, kinds: Mapping[str, Kind[AnyMock]]) -> Device:
-    return Device(role, mock, wire, faults_of(wire, WIRE_FAULTS) | faults_of(mock, kinds))
+def _device(
+    role: str,
+    mock: AnyMock,
+    wire: FaultyWire,
+    kinds: Mapping[str, Kind[AnyMock]],
+    inside: Mapping[str, Fault] | None = None,
+) -> Device:
+    return Device(role, mock, wire, faults_of(wire, WIRE_FAULTS) | faults_of(mock, kinds) | dict(inside or {}))
 
 
 def _listen(port: int) -> TcpWire:

@@ -22,12 +22,28 @@ class Dial(NamedTuple):
     switch: bool = False
 
 
+def _lead_astray(bench: Bench, speed_mm_s: float) -> None:
+    bench.axis.astray_mm_s = speed_mm_s
+
+
 def _move_surface(bench: Bench, position_mm: float) -> None:
     bench.limb.wanted_mm = position_mm
 
 
 def _stiffen(bench: Bench, scale: float) -> None:
     bench.tissue.stiffness_scale = scale
+
+
+def _include(bench: Bench, stiffness_N_mm: float) -> None:
+    bench.tissue.inclusion_N_mm = stiffness_N_mm
+
+
+def _sink_inclusion(bench: Bench, depth_mm: float) -> None:
+    bench.tissue.inclusion_mm = depth_mm
+
+
+def _hurry(bench: Bench, speed_mm_s: float) -> None:
+    bench.limb.speed_limit_mm_s = speed_mm_s
 
 
 def _place_tissue(bench: Bench, present: float) -> None:
@@ -51,6 +67,13 @@ DIALS: dict[str, Dial] = {
     "axis.position_mm": Dial("true position of the carriage", lambda bench: bench.axis.position_mm),
     "axis.velocity_mm_s": Dial("true velocity of the carriage", lambda bench: bench.axis.velocity_mm_s),
     "axis.target_mm": Dial("last set-point the drive was given", lambda bench: bench.axis.target_mm),
+    "axis.astray_mm_s": Dial(
+        "how fast the drive's set-points run away from those it was given",
+        lambda bench: bench.axis.astray_mm_s,
+        _lead_astray,
+        -500,
+        500,
+    ),
     "axis.current_A": Dial("motor current", lambda bench: bench.axis.current_A),
     "axis.powered": Dial("whether the motor has torque", lambda bench: bench.axis.powered),
     "tip.position_mm": Dial("true position of the tip", lambda bench: bench.tip_mm),
@@ -59,6 +82,15 @@ DIALS: dict[str, Dial] = {
     "tip.force_N": Dial("true force of the tissue on the tip", lambda bench: bench.contact_N),
     "surface.position_mm": Dial(
         "where the limb's surface is; set: where it goes", lambda bench: bench.limb.position_mm, _move_surface, -50, 150
+    ),
+    "surface.speed_mm_s": Dial(
+        "how fast the limb goes to where it was told", lambda bench: bench.limb.speed_limit_mm_s, _hurry, 0.01, 1000
+    ),
+    "tissue.inclusion_mm": Dial(
+        "depth at which something stiff begins", lambda bench: bench.tissue.inclusion_mm, _sink_inclusion, 0, 100
+    ),
+    "tissue.inclusion_N_mm": Dial(
+        "what it adds per millimetre; 0: there is none", lambda bench: bench.tissue.inclusion_N_mm, _include, 0, 100
     ),
     "tissue.stiffness_scale": Dial(
         "factor on the elastic force", lambda bench: bench.tissue.stiffness_scale, _stiffen, 0, 20

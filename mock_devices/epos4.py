@@ -34,8 +34,9 @@ class Epos4Mock(OnWire):
     """One drive on ``plant``, powered at ``start_ns``; its raw counter starts at 0 wherever the carriage stands.
 
     Failures of the device, plain attributes to be set at any time: ``silent`` neither hears nor sends anything;
-    ``frozen`` repeats the position it had; ``wrong_identity`` has another maker and product. ``inject_fault(code)``
-    makes an error happen; a ``lasting`` one comes back at each reset until ``inject_fault(0)``.
+    ``frozen`` repeats the position it had; ``wrong_identity`` has another maker and product; ``unguarded`` watches
+    neither heartbeats nor software limits nor its following error. ``inject_fault(code)`` makes an error happen; a
+    ``lasting`` one comes back at each reset until ``inject_fault(0)``.
     ``increments_per_mm`` is negative where increments shrink into the tissue.
     """
 
@@ -73,6 +74,15 @@ class Epos4Mock(OnWire):
         """When SYNCs were taken, by ``clock_ns`` where there is one; whoever wants them takes them out."""
         self._clock_ns = clock_ns
         self._connect()
+
+    @property
+    def unguarded(self) -> bool:
+        """Whether its own watch over heartbeats, software limits and following error does nothing."""
+        return self.drive.unguarded
+
+    @unguarded.setter
+    def unguarded(self, unguarded: bool) -> None:
+        self.drive.unguarded = unguarded
 
     @property
     def frozen(self) -> bool:
@@ -216,7 +226,7 @@ class Epos4Mock(OnWire):
         lost = [sub for sub, deadline_ns in self._consumed.items() if self._now_ns >= deadline_ns]
         for sub in lost:
             del self._consumed[sub]
-        if lost:
+        if lost and not self.unguarded:
             self.drive.fault(HEARTBEAT_LOST)
             self._leave_operational()
 

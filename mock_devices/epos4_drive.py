@@ -72,6 +72,7 @@ class Drive:
         self.mode = PROFILE_POSITION
         self.remote = False
         self.cause = 0
+        self.unguarded = False
         self._plant = plant
         self._dictionary = dictionary
         self._values = dictionary.values
@@ -376,7 +377,7 @@ class Drive:
         self._plant.target(self._ramp.position / self._scale)
 
     def _within(self, increments: float) -> bool:
-        return self._values[0x607D, 1] <= increments <= self._values[0x607D, 2]
+        return self.unguarded or self._values[0x607D, 1] <= increments <= self._values[0x607D, 2]
 
     def _watch(self) -> None:
         """Following error always; leaving the software limits except while homing."""
@@ -384,7 +385,7 @@ class Drive:
         window = self._values[0x6065, 0]
         inside = self._within(raw - self.zero)
         left, self._inside = self._inside and not inside, inside
-        if self.state is State.FAULT_REACTION:
+        if self.state is State.FAULT_REACTION or self.unguarded:
             return
         if abs(self._ramp.position - raw) > window != U32_MAX:
             # The demand is where the axis cannot follow: it brakes from where it is.

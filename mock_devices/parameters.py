@@ -51,12 +51,14 @@ class Axis(Table):
 
 
 class Tissue(Table):
-    """The limb under the tip: F = scale a x exp(b x) + B v, never negative, nothing in the air."""
+    """The limb under the tip: F = scale a x exp(b x) + B v, never negative, nothing in the air; an inclusion adds."""
 
     a_N_mm: NotNegative = 0.12
     b_1_mm: float = Field(default=0.22, ge=0, le=2)
     B_N_s_mm: float = Field(default=0.01, ge=0, le=1)
     stiffness_scale: NotNegative = 1.0
+    inclusion_mm: NotNegative = Field(default=4.0, description="depth at which something stiff begins")
+    inclusion_N_mm: NotNegative = Field(default=0.0, description="what it adds per millimetre; 0: there is none")
     present: bool = True
 
 

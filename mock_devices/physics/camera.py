@@ -6,6 +6,7 @@ import numpy as np
 
 from mock_devices.parameters import Camera, Vector
 from mock_devices.physics import STEP_NS, STEP_S
+from mock_devices.physics.channels import Slips, moved
 from mock_devices.physics.sensor import normals
 from mock_devices.stage import MarkerPose
 
@@ -20,6 +21,7 @@ class CameraPlant:
         self.tip_in_view = camera.tip_in_view
         self.arm_in_view = camera.arm_in_view
         self.extra_delay_s = 0.0
+        self.slips = Slips()
         self.start_ns = start_ns
         self._camera = camera
         self._direction = _unit(camera.direction)
@@ -39,8 +41,8 @@ class CameraPlant:
         """Tools tip and arm as they were one latency ago."""
         age_s = self._camera.latency_s + self.extra_delay_s
         steps = (now_ns - self.start_ns) / STEP_NS - age_s / STEP_S
-        tip = self._pose(self._camera.tip_origin_mm, self._past(self._tips, steps))
-        arm = self._pose(self._camera.arm_origin_mm, self._past(self._arms, steps))
+        tip = self._pose(moved(self._camera.tip_origin_mm, self.slips.tip_mm), self._past(self._tips, steps))
+        arm = self._pose(moved(self._camera.arm_origin_mm, self.slips.arm_mm), self._past(self._arms, steps))
         return [tip if self.tip_in_view else None, arm if self.arm_in_view else None]
 
     def _past(self, history: list[float], steps: float) -> float:

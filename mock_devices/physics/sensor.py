@@ -8,6 +8,7 @@ import numpy as np
 from mock_devices.parameters import Sensor
 from mock_devices.physics import STEP_S
 from mock_devices.physics.chain import Chain
+from mock_devices.physics.channels import Channels
 
 M_PER_MM = 1e-3
 FORCES = ("fx", "fy", "fz")
@@ -27,6 +28,7 @@ class ForcePlant:
         self.temperature_C = sensor.temperature_C
         self.zero = [*sensor.zero_N, *sensor.zero_N_m]
         self.axis = FORCES.index(sensor.axis)
+        self.channels = Channels()
         self._sensor = sensor
         self._noise = normals(rng, 6)
         self._rms = [sensor.noise_N] * 3 + [sensor.noise_N_m] * 3
@@ -45,6 +47,11 @@ class ForcePlant:
         moments[(self.axis + 1) % 3] = sign * self._sensor.lever_mm * M_PER_MM
         return forces + moments
 
+    @property
+    def time_s(self) -> float:
+        """Time simulated, as the converter was told last."""
+        return self._time_s
+
     def step(self, load_N: float) -> None:
         """Lets the filter see the force of one more step."""
         change_N = self._share * (load_N - self._force_N)
@@ -61,14 +68,14 @@ class ForcePlant:
         fx, fy, fz, mx, my, mz = (
             _convert(value + rms * unit, quantum, end)
             for value, rms, unit, quantum, end in zip(
-                self._clean(), self._rms, noise, self._quantum, self._end, strict=True
+                self._clean(), self._rms, noise, self._quantum, self._ends(), strict=True
             )
         )
         return fx, fy, fz, mx, my, mz
 
     def overrange(self) -> bool:
         """Whether a channel is at its end now, noise apart."""
-        return any(abs(value) >= end for value, end in zip(self._clean(), self._end, strict=True))
+        return any(abs(value) >= end for value, end in zip(self._clean(), self._ends(), strict=True))
 
     def _clean(self) -> list[float]:
         """Channels without noise; also brings the temperature up to date."""
@@ -77,7 +84,13 @@ class ForcePlant:
         force_N = self._force_N + self._slope_N_s * self._lag_s
         for convert in self._chain.readings:
             force_N = convert(force_N, self._time_s, self.temperature_C)
-        return [force_N * per_N + zero for per_N, zero in zip(self._per_N, self.zero, strict=True)]
+        force_N += self.channels.drifted_N(self._time_s)
+        loads = self.channels.converted([force_N * per_N for per_N in self._per_N])
+        return [load + zero for load, zero in zip(loads, self.zero, strict=True)]
+
+    def _ends(self) -> list[float]:
+        end_N = self.channels.end_N
+        return [min(end, end_N) for end in self._end[:3]] + self._end[3:]
 
 
 def _convert(value: float, quantum: float, end: float) -> float:

@@ -13,7 +13,7 @@ class Limb:
     def __init__(self, surface: Surface) -> None:
         self.wanted_mm = surface.position_mm
         self._rest_mm = surface.position_mm
-        self._stride_mm = surface.speed_mm_s * STEP_S
+        self.speed_limit_mm_s = surface.speed_mm_s
         self.position_mm = surface.position_mm
         self.speed_mm_s = 0.0
 
@@ -21,7 +21,8 @@ class Limb:
         """Where the surface is one step later."""
         if self._rest_mm != self.wanted_mm:
             way_mm = self.wanted_mm - self._rest_mm
-            self._rest_mm += max(-self._stride_mm, min(way_mm, self._stride_mm))
+            stride_mm = self.speed_limit_mm_s * STEP_S
+            self._rest_mm += max(-stride_mm, min(way_mm, stride_mm))
         position_mm = self._rest_mm
         for shift in chain.surface:
             position_mm += shift(time_s, touching)
@@ -36,11 +37,16 @@ class TissueLaw:
     def __init__(self, tissue: Tissue) -> None:
         self.stiffness_scale = tissue.stiffness_scale
         self.present = tissue.present
+        self.inclusion_mm, self.inclusion_N_mm = tissue.inclusion_mm, tissue.inclusion_N_mm
         self._a, self._b, self._viscosity = tissue.a_N_mm, tissue.b_1_mm, tissue.B_N_s_mm
 
     def elastic_N(self, depth_mm: float) -> float:
         """The index law at rest, without any hidden effect."""
         return self.stiffness_scale * self._a * depth_mm * math.exp(self._b * depth_mm)
+
+    def included_N(self, depth_mm: float) -> float:
+        """What something stiff inside adds once the tip has reached it: a straight line from its depth on."""
+        return self.inclusion_N_mm * max(depth_mm - self.inclusion_mm, 0.0)
 
     def force_N(self, chain: Chain, depth_mm: float, speed_mm_s: float, time_s: float) -> float:
         """Compressive force on the tip; below zero only where an adhesion is hidden."""
@@ -52,6 +58,7 @@ class TissueLaw:
             elastic_N = self.elastic_N(depth_mm) if chain.elastic is None else chain.elastic(self.elastic_N, depth_mm)
             for factor in chain.factors:
                 elastic_N *= factor(depth_mm, time_s)
+            elastic_N += self.included_N(depth_mm)
             viscous_N = self._viscosity * speed_mm_s if chain.viscous is None else chain.viscous(speed_mm_s)
         force_N = elastic_N + viscous_N
         for memory in chain.memories:

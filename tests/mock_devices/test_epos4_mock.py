@@ -228,6 +228,14 @@ def test_object_1029_says_where_a_communication_error_leads(stage: Stage, behavi
     assert stage.heard().endswith(f"t7011{state}\r".encode())
 
 
+def test_an_unguarded_node_misses_no_host(stage: Stage) -> None:
+    stage.mock.unguarded = True
+    download(stage, 0x1016, 1, 4, 127 << 16 | 40)
+    exchange(stage, b"t77F105\r")
+    stage.run(0.1)
+    assert upload(stage, 0x603F, kind="H") == 0
+
+
 # Process data
 
 

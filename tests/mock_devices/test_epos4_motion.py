@@ -144,6 +144,15 @@ def test_running_out_of_the_software_limit_is_an_error(stage: Stage) -> None:
     assert stage.plant.position_mm == pytest.approx(8 + 2.0, abs=0.6)
 
 
+def test_an_unguarded_drive_runs_out_of_its_software_limit(stage: Stage) -> None:
+    stage.mock.unguarded = True
+    download(stage, 0x607D, 2, 4, 4000)
+    download(stage, 0x60FF, 0, 4, 240)
+    enabled(stage, 3)
+    follow(stage, 0.5)
+    assert upload(stage, 0x603F, kind="H") == 0
+
+
 def test_a_velocity_is_reached_with_the_profile_acceleration(stage: Stage) -> None:
     download(stage, 0x60FF, 0, 4, -120)
     enabled(stage, 3)
