@@ -1,6 +1,7 @@
 """An operation on the terminal: progress and live values, keys for pain stop and stop, Ctrl-C retracts."""
 
 import contextlib
+import os
 import select
 import signal
 import sys
@@ -88,14 +89,24 @@ def act_on(key: str, bench: Supervisor, operation: Operation) -> None:
 @contextlib.contextmanager
 def _interrupt_stops(bench: Supervisor, operation: Operation) -> Iterator[None]:
     def interrupted(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature of a handler
+        if number == signal.SIGHUP:
+            _leave_terminal()
         act_on("s", bench, operation)
 
-    before = {number: signal.signal(number, interrupted) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, interrupted) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _leave_terminal() -> None:
+    """A terminal that was closed answers every write with an error, which must not end the retraction."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for stream in (sys.stdin, sys.stdout, sys.stderr):
+        os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
 
 
 @contextlib.contextmanager

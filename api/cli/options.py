@@ -8,6 +8,8 @@ import typer
 
 from rig.config.table import load, merged, parse
 from rig.config.wiring import Wiring
+from rig.errors import UsageError
+from rig.recording.files import refuse_unwritable
 
 DEFAULT_FILE = Path("rig.toml")
 ENVIRONMENT = "RIG_CONFIG"
@@ -18,7 +20,20 @@ ConfigOption = Annotated[
 SetOption = Annotated[
     list[str] | None, typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Overrides one key; may be repeated.")
 ]
-JsonOption = Annotated[Path | None, typer.Option("--json", help="Writes the result to this file as JSON.")]
+
+
+def _checked_json(path: Path | None) -> Path | None:
+    """A result that cannot be written is told before the work, not after it."""
+    if path is not None:
+        refuse_unwritable(path)
+        if not path.absolute().parent.is_dir():
+            raise UsageError(f"--json {path}: its folder does not exist; make it, or give another file")
+    return path
+
+
+JsonOption = Annotated[
+    Path | None, typer.Option("--json", help="Writes the result to this file as JSON.", callback=_checked_json)
+]
 
 
 def wiring_from(config: Path | None, overrides: list[str] | None) -> Wiring:

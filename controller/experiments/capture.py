@@ -15,7 +15,8 @@ from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring
 from rig.errors import RigError, SafetyStop, UsageError
-from rig.recording.sessions import SessionInfo, TrialInfo, write_session
+from rig.recording.files import make_folder, refuse_unwritable
+from rig.recording.sessions import SESSION_FILE, SessionInfo, TrialInfo, write_session
 
 Report = Callable[[TrialInfo], None]
 
@@ -37,6 +38,7 @@ def refuse_used(folder: Path) -> None:
         raise UsageError(f"{folder}: is a file; give a new folder")
     if folder.exists() and any(folder.iterdir()):
         raise UsageError(f"{folder}: is not empty; give a new folder, recordings are never overwritten")
+    refuse_unwritable(folder / SESSION_FILE)
 
 
 def new_session(
@@ -44,7 +46,7 @@ def new_session(
 ) -> SessionInfo:
     """An empty session in ``folder``; raises UsageError where there is one already."""
     refuse_used(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     info = SessionInfo(
         id=folder.resolve().name,
         kind=kind,

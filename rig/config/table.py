@@ -29,6 +29,8 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise UsageError(f"{path}: no such file; give the path of a TOML file") from error
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise UsageError(f"{path}: cannot be read as TOML: {error}") from error
+    except RecursionError as error:
+        raise UsageError(f"{path}: nests its values too deeply for a TOML file of this program; flatten it") from error
 
 
 def parse(kind: type[AnyTable], values: Mapping[str, Any], where: str) -> AnyTable:
@@ -57,6 +59,8 @@ def merged(values: dict[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
         table = values
         for section in sections:
             table = table.setdefault(section, {})
+            if not isinstance(table, dict):
+                raise UsageError(f"--set {override}: {section} is a value, not a section; write its own name = value")
         table[key] = _value(text.strip())
     return values
 

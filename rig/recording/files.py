@@ -52,6 +52,17 @@ def make_folder(path: Path) -> None:
         raise WriteFailed(f"{path}: cannot be made: {error.strerror}; give another place") from error
 
 
+def refuse_unwritable(path: Path) -> None:
+    """Raises UsageError where ``path`` could not be made, before any work is done for it; writes nothing."""
+    if path.is_dir():
+        raise UsageError(f"{path}: is a folder; give the name of a file")
+    parent = next(place for place in path.absolute().parents if place.exists())
+    if not parent.is_dir():
+        raise UsageError(f"{path}: {parent} is a file, not a folder; give another place")
+    if not os.access(parent, os.W_OK | os.X_OK):
+        raise UsageError(f"{path}: {parent} may not be written to; give another place, or change its permissions")
+
+
 def write_text(path: Path, text: str) -> None:
     """Replaces the content of ``path`` in one step."""
     with whole_file(path, overwrite=True) as scratch:

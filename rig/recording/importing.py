@@ -9,6 +9,7 @@ is written.
 import hashlib
 import json
 import math
+import signal
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -143,9 +144,15 @@ def _write_all(folder: Path, trials: Sequence[Trial], session: SessionTable, inf
             _write(*job)
         return
     # The stock writer takes some 4 us a row; the trials of a long session are written side by side.
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        for done in [pool.submit(_write, *job) for job in jobs]:
-            done.result()
+    # Ctrl-C reaches the whole group of processes; this one alone answers it.
+    ignoring = (signal.SIGINT, signal.SIG_IGN)
+    with ProcessPoolExecutor(mp_context=get_context("spawn"), initializer=signal.signal, initargs=ignoring) as pool:
+        try:
+            for done in [pool.submit(_write, *job) for job in jobs]:
+                done.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
 
 
 def _write(path: Path, index: int, trial: Trial, session: SessionTable, info: SessionInfo) -> None:

@@ -20,6 +20,7 @@ import os
 import signal
 import struct
 import sys
+import threading
 import time
 from collections import Counter
 from collections.abc import Mapping
@@ -188,9 +189,13 @@ def _texts(value: object) -> dict[str, dict[str, str]]:
     return {str(name): _strings(items) for name, items in records.items()}
 
 
-def run(ring: RingReader, recorder: Recorder, commands: Lines, reply_fd: int) -> None:
-    """Serves commands until told to quit, or until supervisor and loop are both gone."""
+def run(ring: RingReader, recorder: Recorder, commands: Lines, reply_fd: int, ending: threading.Event) -> None:
+    """Serves commands until told to quit, until supervisor and loop are both gone, or until ``ending`` is set."""
     while not commands.ended:
+        if ending.is_set():
+            with contextlib.suppress(RecordingFailed):
+                recorder.end("recorder ended by a signal")
+            return
         for line in commands.wait(DRAIN_PERIOD_S):
             reply = recorder.handle(parse(line))
             _reply(reply_fd, reply)
@@ -227,6 +232,10 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     # Ctrl-C goes to the whole group of processes; the recorder ends when its supervisor says so or is gone.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # A terminal that is closed or a computer that shuts down leaves a finished file.
+    ending = threading.Event()
+    for number in (signal.SIGHUP, signal.SIGTERM):
+        signal.signal(number, lambda *_: ending.set())
     try:
         ring = RingReader.open(cast(Path, options.ring))
     except RigError as error:
@@ -234,7 +243,7 @@ def main(arguments: list[str]) -> int:
         return error.exit_code
     ring.touch(time.monotonic_ns())
     _reply(sys.stdout.fileno(), {"ready": os.getpid()})
-    run(ring, Recorder(ring, options.resume), Lines(sys.stdin.fileno()), sys.stdout.fileno())
+    run(ring, Recorder(ring, options.resume), Lines(sys.stdin.fileno()), sys.stdout.fileno(), ending)
     ring.close()
     return 0
 

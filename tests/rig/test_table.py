@@ -51,3 +51,15 @@ def test_a_file_reads_as_written() -> None:
 def test_an_unknown_key_names_the_nearest_valid_one() -> None:
     with pytest.raises(UsageError, match=r"rig.toml: unknown key axis.nodes; nearest valid key: node"):
         wiring("axis.nodes=1")
+
+
+def test_a_value_is_no_section() -> None:
+    with pytest.raises(UsageError, match=r"--set limits.force_N.x=1: force_N is a value, not a section"):
+        load(Wiring, EXAMPLE, ["limits.force_N.x=1"])
+
+
+def test_a_file_that_nests_without_end_is_one_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "deep.toml"
+    path.write_text("speeds_mm_s = " + "[" * 3000 + "]" * 3000)
+    with pytest.raises(UsageError, match=r"deep.toml: nests its values too deeply"):
+        load(Wiring, path)

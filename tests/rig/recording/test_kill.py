@@ -2,6 +2,7 @@
 
 import os
 import random
+import signal
 import struct
 import subprocess
 import sys
@@ -133,6 +134,22 @@ def test_a_killed_supervisor_leaves_a_finished_recording_and_no_ring(tmp_path: P
     assert recording.complete
     assert recording.metadata["summary"]["outcome"] == "supervisor lost"
     assert seqs[-1] == published - 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
+def test_a_recorder_that_is_told_to_end_leaves_a_finished_recording(tmp_path: Path, number: signal.Signals) -> None:
+    ring = new_path()
+    with producer(ring):
+        client = RecorderClient(ring)
+        client.open(tmp_path / "a.mcap", {})
+        time.sleep(0.3)
+        client._process.send_signal(number)
+        assert client._process.wait(30) == 0
+        client.quit()
+    recording = read_recording(tmp_path / "a.mcap")
+    assert recording.complete
+    assert recording.metadata["summary"]["outcome"] == "recorder ended by a signal"
+    assert true_rows(recording).size > 0
 
 
 def test_a_dead_recorder_is_told_in_one_sentence(tmp_path: Path) -> None:
