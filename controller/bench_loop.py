@@ -7,15 +7,16 @@ from typing import Protocol
 
 from controller.devices import Devices
 from controller.health import IDENTICAL_LIMIT, Standstill, StreamHealth
-from controller.link import Link, Message
 from controller.loop import Slot
 from controller.machine import Machine
+from controller.messages import Finished, Outcome, Status, StatusSaid, Stopped
 from controller.modes import Mode
 from controller.registration import Point, Registration
 from controller.safety import TABLE, Action, Check, Incident
 from controller.steps import Program
 from controller.watch import Watch
 from controller.world import World
+from rig.channel import Channel
 from rig.channels import (
     AXIS,
     EVENT,
@@ -61,12 +62,12 @@ class BenchLoop:
         wiring: Wiring,
         devices: Devices,
         ring: Ring,
-        link: Link,
+        channel: Channel,
         commands: "Commands",
         now: Callable[[], int],
         table: tuple[Check, ...] = TABLE,
     ) -> None:
-        self.wiring, self.devices, self._ring, self._link, self._now = wiring, devices, ring, link, now
+        self.wiring, self.devices, self._ring, self._channel, self._now = wiring, devices, ring, channel, now
         self._commands = commands
         period_s = 1.0 / wiring.loop.rate_Hz
         self.world = World(dt_s=period_s, acceleration_mm_s2=wiring.axis.acceleration_mm_s2)
@@ -86,7 +87,7 @@ class BenchLoop:
             ),
         }
         self._status_every = max(1, round(STATUS_EVERY_S / period_s))
-        self._ticks = self._events = 0
+        self._ticks = self._events = self._program = 0
         self._recent: deque[tuple[int, float]] = deque()
         self._signs = 1.0 if wiring.force.compression == "positive" else -1.0
         self._force_field = ForceSample._fields.index(f"{wiring.force.axis}_N")
@@ -185,7 +186,7 @@ class BenchLoop:
         watch.wake_latency_ms = (slot.wake_ns - slot.scheduled_ns) * 1e-6
         watch.recorder_fill = self._ring.fill
         watch.recorder_silent_s = self._ring.reader_age_ns(now_ns) * 1e-9
-        watch.supervisor_lost = self._link.lost
+        watch.supervisor_lost = self._channel.lost
         watch.operator_silent_s = (now_ns - self._commands.heard_ns) * 1e-9 if self._commands.heard_ns else 0.0
 
     def _force_rate(self) -> float:
@@ -206,7 +207,7 @@ class BenchLoop:
 
     def _report(self, incident: Incident, now_ns: int) -> None:
         self.event(incident.action, incident.code, incident.text, now_ns)
-        self._link.send({"incident": {"code": incident.code, "text": incident.text, "action": incident.action.name}})
+        self._channel.send(Stopped(code=incident.code, text=incident.text, action=incident.action.name))
         if incident.action is Action.IMMEDIATE and not self.watch.axis_lost:
             self._pulled = True
             try:
@@ -214,8 +215,9 @@ class BenchLoop:
             except DeviceError as error:
                 self.watch.axis_lost = str(error)
 
-    def start(self, program: Program) -> None:
-        """Begins a program; where the limb is now is where it should stay."""
+    def start(self, program: Program, number: int) -> None:
+        """Begins a program, whose outcome will carry ``number``; where the limb is now is where it should stay."""
+        self._program = number
         self._registration.begin()
         self._standstill.begin()
         self.world.standstill_mm = 0.0
@@ -239,17 +241,14 @@ class BenchLoop:
     def _finished(self, outcome: str, incident: Incident | None) -> None:
         world = self.world
         self.event(Action.NOTE, "program_end", outcome, world.now_ns)
-        self._link.send(
-            {
-                "finished": {
-                    "outcome": outcome,
-                    "cause": incident.text if incident else "",
-                    "peak_force_N": world.peak_force_N,
-                    "surface_mm": None if math.isnan(world.surface_mm) else world.surface_mm,
-                    "zero_N": None if math.isnan(world.zero_N) else world.zero_N,
-                }
-            }
+        outcome_of = Outcome(
+            outcome=outcome,
+            cause=incident.text if incident else "",
+            peak_force_N=world.peak_force_N,
+            surface_mm=None if math.isnan(world.surface_mm) else world.surface_mm,
+            zero_N=None if math.isnan(world.zero_N) else world.zero_N,
         )
+        self._channel.send(Finished(program=self._program, outcome=outcome_of))
 
     def _publish(self, slot: Slot, now_ns: int) -> None:
         world, health, machine = self.world, self._health, self.machine
@@ -279,11 +278,11 @@ class BenchLoop:
         )
         self._ring.put(LOOP.id, LOOP.pack(row))
         if self._ticks % self._status_every == 0:
-            self._link.send_status({"status": self._status(row)})
+            self._channel.send_newest(StatusSaid(status=self._status(row)))
         else:
-            self._link.flush()
+            self._channel.flush()
 
-    def _status(self, row: LoopSample) -> Message:
+    def _status(self, row: LoopSample) -> Status:
         latched = self.machine.latched
         return {
             "time_ns": row.capture_ns,

@@ -2,70 +2,70 @@
 
 from controller.bench_loop import BenchLoop
 from controller.checks import refuse_beyond_limits
-from controller.link import Link, Message
+from controller.messages import Lease, Note, Reset, Run, Shutdown, Stop
 from controller.safety import Action
 from controller.steps import Program
-from rig.config.table import parse
+from rig.channel import Answer, Channel, Received
 from rig.errors import RigError, UsageError
-
-STOPS = {"stop", "pain", "estop", "unattended"}
 
 
 class Inbox:
-    """Messages of the form ``{"do": verb, ...}``: program, stop, pain, estop, unattended, reset, note, lease, shutdown.
+    """Messages of `controller.messages`, each answered by its id; any of them renews the operator's lease."""
 
-    Any of them renews the lease of the operator's program.
-    """
-
-    def __init__(self, link: Link) -> None:
-        self._link = link
+    def __init__(self, channel: Channel) -> None:
+        self._channel = channel
         self._leaving = False
+        self._refused = 0
         self.heard_ns = 0
 
     def collect(self, loop: BenchLoop) -> frozenset[str]:
         """One message at most; a refused one is answered with its reason."""
-        message = None if self._link.lost else self._link.receive()
-        if message is None:
-            return frozenset()
+        received = None if self._channel.lost else self._channel.receive()
+        if self._channel.refused > self._refused:
+            self._refused = self._channel.refused
+            text = f"{self._refused} messages to the loop were not understood so far"
+            loop.event(Action.WARNING, "refused", text, loop.world.now_ns)
+        return self._take(received, loop) if received else frozenset()
+
+    def _take(self, received: Received, loop: BenchLoop) -> frozenset[str]:
         self.heard_ns = loop.world.now_ns
-        verb = str(message.get("do"))
-        if verb in STOPS:
-            return frozenset({verb})
+        match received.message:
+            case Stop(kind=kind):
+                return frozenset({kind})
+            case Lease(attending=attending):
+                return frozenset() if attending else frozenset({"unattended"})
         try:
-            self._act(verb, message, loop)
+            self._act(received, loop)
         except RigError as refusal:
             loop.event(Action.WARNING, "refused", str(refusal), loop.world.now_ns)
-            self._link.send({"refused": {"do": verb, "text": str(refusal)}})
+            self._channel.send(Answer(to=received.id, refused=str(refusal)))
+        else:
+            self._channel.send(Answer(to=received.id))
         return frozenset()
 
-    def _act(self, verb: str, message: Message, loop: BenchLoop) -> None:
-        match verb:
-            case "program":
-                self._start(parse(Program, message["program"], "program"), loop)
-            case "reset":
+    def _act(self, received: Received, loop: BenchLoop) -> None:
+        match received.message:
+            case Run(program=program):
+                self._start(received.id, program, loop)
+            case Reset():
                 if loop.machine.latched and loop.machine.busy:
                     raise UsageError("the tip still retracts: wait until it stands, then acknowledge the stop")
                 loop.release()
                 loop.event(Action.NOTE, "reset", "stop acknowledged", loop.world.now_ns)
-                self._link.send({"reset": loop.world.now_ns})
-            case "note":
-                loop.event(Action.NOTE, str(message["code"]), str(message["text"]), loop.world.now_ns)
-            case "lease":
-                pass
-            case "shutdown":
+            case Note(code=code, text=text):
+                loop.event(Action.NOTE, code, text, loop.world.now_ns)
+            case Shutdown():
                 self._leaving = True
-            case _:
-                raise UsageError(f"the loop does not know how to {verb}")
 
-    def _start(self, program: Program, loop: BenchLoop) -> None:
+    def _start(self, number: int, program: Program, loop: BenchLoop) -> None:
         if loop.machine.busy:
             raise UsageError("a program is already under way: stop it or wait for its end")
         if loop.machine.latched:
             raise UsageError(f"stopped by {loop.machine.latched.text}: acknowledge it with a reset first")
         refuse_beyond_limits(program, loop.wiring)
         loop.event(Action.NOTE, "program_start", program.name, loop.world.now_ns)
-        loop.start(program)
+        loop.start(program, number)
 
     def more(self, loop: BenchLoop) -> bool:
         """False once asked to leave, or left alone, and at rest."""
-        return loop.machine.busy or not (self._leaving or self._link.lost)
+        return loop.machine.busy or not (self._leaving or self._channel.lost)

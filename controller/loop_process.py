@@ -15,36 +15,37 @@ from controller import realtime
 from controller.bench_loop import BenchLoop
 from controller.commands import Inbox
 from controller.devices import Devices, start_devices
-from controller.link import Link
 from controller.loop import Executive, sleep_then_spin
+from controller.messages import TO_LOOP, Failed, Ready
 from controller.safety import TABLE, Check
+from rig.channel import Channel
 from rig.config.wiring import Wiring
 from rig.errors import RigError
 from rig.recording.ring import RingWriter
 
 
 def main(arguments: list[str], table: tuple[Check, ...] = TABLE) -> int:
-    """Runs the loop; 0 after an orderly end, 1 after a failure that was reported over the link.
+    """Runs the loop; 0 after an orderly end, 1 after a failure that was reported over the channel.
 
     ``table`` is what it stops for; nothing but a trial of the safety table itself gives another one.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     wiring = Wiring.model_validate_json(arguments[0])
-    link = Link(socket.socket(fileno=int(arguments[2])))
+    channel = Channel(socket.socket(fileno=int(arguments[2])), TO_LOOP)
     try:
-        _serve(wiring, Path(arguments[1]), link, table)
+        _serve(wiring, Path(arguments[1]), channel, table)
     except RigError as error:
-        link.send({"failed": str(error)})
+        channel.send(Failed(text=str(error)))
         return 1
     except Exception as error:  # the last word of a dying process: named, sent, and the devices are closed by then
-        link.send({"failed": f"the loop met an error of its own: {type(error).__name__}: {error}"})
+        channel.send(Failed(text=f"the loop met an error of its own: {type(error).__name__}: {error}"))
         raise
     finally:
-        link.close()
+        channel.close()
     return 0
 
 
-def _serve(wiring: Wiring, ring_path: Path, link: Link, table: tuple[Check, ...]) -> None:
+def _serve(wiring: Wiring, ring_path: Path, channel: Channel, table: tuple[Check, ...]) -> None:
     # Memory and privileges first: from the axis' start on, the drive counts the time between our heartbeats.
     ring = RingWriter.create(ring_path)
     try:
@@ -53,7 +54,7 @@ def _serve(wiring: Wiring, ring_path: Path, link: Link, table: tuple[Check, ...]
         try:
             devices.axis.home()
             devices.axis.enable()
-            _run(wiring, devices, ring, link, granted, table)
+            _run(wiring, devices, ring, channel, granted, table)
         finally:
             devices.close()
     finally:
@@ -64,13 +65,13 @@ def _run(
     wiring: Wiring,
     devices: Devices,
     ring: RingWriter,
-    link: Link,
+    channel: Channel,
     granted: dict[str, str],
     table: tuple[Check, ...],
 ) -> None:
     identities = {role: asdict(device.identity) for role, device in devices.by_role().items()}
-    link.send({"ready": {"devices": identities, "realtime": granted, "ring": str(ring.path)}})
-    loop = BenchLoop(wiring, devices, ring, link, Inbox(link), time.monotonic_ns, table)
+    channel.send(Ready(devices=identities, realtime=granted))
+    loop = BenchLoop(wiring, devices, ring, channel, Inbox(channel), time.monotonic_ns, table)
     pause = sleep_then_spin(realtime.spin_ns(granted))
     Executive(round(1e9 / wiring.loop.rate_Hz), sleep=pause).run(loop.tick)
 

@@ -1,69 +1,29 @@
 """Starts and supervises the loop and the recorder, each a process of its own; what the command line and HTTP drive.
 
-One thread reads what the loop says; everything else happens in the caller's thread. A supervisor that dies leaves a
-loop that retracts and ends, and a recorder that closes its file.
+A supervisor that dies leaves a loop that retracts and ends, and a recorder that closes its file.
 """
 
 import os
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from select import select
-from typing import Any
+from collections.abc import Callable
 
-from controller.link import Link, Message, pair
+from controller.loop_client import ANSWER_TIMEOUT_S, LoopClient
+from controller.messages import Lease, Note, Outcome, Ready, Reset, Run, Shutdown, Status, Stop, Stopped
 from controller.steps import Program
+from rig.channel import Message, pair
 from rig.config.wiring import Wiring
-from rig.errors import DeviceError, SafetyStop, UsageError
+from rig.errors import DeviceError, SafetyStop
 from rig.recording.client import RecorderClient
 from rig.recording.ring import new_path
 
 LOOP_MODULE = "controller.loop_process"
 START_TIMEOUT_S = 60.0
 LEAVE_TIMEOUT_S = 15.0
-ANSWER_TIMEOUT_S = 5.0
 # Renewals within one lease, so that two may be late.
 LEASE_SHARE = 4
 UNASKED_LEASE_S = 3.0
-
-
-@dataclass(frozen=True)
-class Ready:
-    """What the loop found when it started."""
-
-    devices: Mapping[str, Mapping[str, Any]]
-    realtime: Mapping[str, str]
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a program ended."""
-
-    outcome: str
-    cause: str
-    peak_force_N: float
-    surface_mm: float | None
-    zero_N: float | None
-
-    @property
-    def stopped(self) -> bool:
-        """Whether a limit, a person or a fault ended it."""
-        return bool(self.cause)
-
-
-@dataclass
-class _Mail:
-    """What the loop has said, shared between its reader and the caller."""
-
-    changed: threading.Condition = field(default_factory=threading.Condition)
-    status: Message = field(default_factory=dict)
-    answers: list[Message] = field(default_factory=list)
-    incidents: list[Message] = field(default_factory=list)
-    failed: str = ""
-    gone: bool = False
 
 
 class Supervisor:
@@ -73,14 +33,11 @@ class Supervisor:
         """``loop_module`` is what the loop's process runs: this program's own, or one that prepares something first."""
         self.wiring = wiring
         self._loop_module = loop_module
-        self._mail = _Mail()
         self._ring_path = new_path()
-        self._link: Link | None = None
+        self._client: LoopClient | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self._reader: threading.Thread | None = None
-        self._sending = threading.Lock()
         self.recorder: RecorderClient | None = None
-        self.ready = Ready({}, {})
+        self.ready = Ready()
         self.attended: Callable[[], bool] = lambda: True
         """Whether the operator is there; as soon as this says no, motion ends."""
         self._closing = threading.Event()
@@ -95,7 +52,6 @@ class Supervisor:
     def start(self) -> None:
         """Starts loop and recorder; raises DeviceError with the loop's own sentence where a device is not right."""
         mine, theirs = pair()
-        self._link = Link(mine)
         command = [sys.executable, "-m", self._loop_module]
         arguments = [self.wiring.model_dump_json(), str(self._ring_path), str(theirs.fileno())]
         self._process = subprocess.Popen(
@@ -106,11 +62,9 @@ class Supervisor:
             env=process_environment(),
         )
         theirs.close()
-        self._reader = threading.Thread(target=self._listen, name="loop-reader", daemon=True)
-        self._reader.start()
+        self._client = LoopClient(mine, self._exit_text)
         try:
-            answer = self._answer("ready", START_TIMEOUT_S)
-            self.ready = Ready(answer["devices"], answer["realtime"])
+            self.ready = self._client.ready(START_TIMEOUT_S)
             self.recorder = RecorderClient(self._ring_path)
             threading.Thread(target=self._keep_lease, name="lease", daemon=True).start()
         except BaseException:
@@ -122,81 +76,37 @@ class Supervisor:
         period_s = (self.wiring.loop.lease_s or UNASKED_LEASE_S) / LEASE_SHARE
         while not self._closing.wait(period_s):
             try:
-                self._tell({"do": "lease" if self.attended() else "unattended"})
+                self._tell(Lease(attending=self.attended()))
             except DeviceError:
                 return
-
-    def _listen(self) -> None:
-        link = self._link
-        assert link
-        while not link.lost:
-            select([link], [], [], 0.5)
-            message = link.receive()
-            while message is not None:
-                self._file(message)
-                message = link.receive()
-        with self._mail.changed:
-            self._mail.gone = True
-            self._mail.changed.notify_all()
-
-    def _file(self, message: Message) -> None:
-        mail = self._mail
-        with mail.changed:
-            if "status" in message:
-                mail.status = message["status"]
-            elif "incident" in message:
-                mail.incidents.append(message["incident"])
-            elif "failed" in message:
-                mail.failed = message["failed"]
-            else:
-                mail.answers.append(message)
-            mail.changed.notify_all()
-
-    def _answer(self, kind: str, timeout_s: float) -> Any:
-        """The next answer of ``kind``; a refusal raises UsageError, a lost loop DeviceError."""
-        deadline = time.monotonic() + timeout_s
-        mail = self._mail
-        with mail.changed:
-            while True:
-                for message in mail.answers:
-                    if kind in message or "refused" in message:
-                        mail.answers.remove(message)
-                        if kind in message:
-                            return message[kind]
-                        raise UsageError(message["refused"]["text"])
-                if mail.failed or mail.gone:
-                    raise DeviceError(mail.failed or f"the loop's process ended unasked ({self._exit_text()})")
-                left_s = deadline - time.monotonic()
-                if left_s <= 0:
-                    raise DeviceError(f"the loop gave no '{kind}' within {timeout_s:g} s; stop and restart the bench")
-                mail.changed.wait(left_s)
 
     def _exit_text(self) -> str:
         code = self._process.wait(5) if self._process else None
         return f"exit code {code}" if code is None or code >= 0 else f"killed by signal {-code}"
 
-    def _tell(self, message: Message) -> None:
-        if self._link is None or self._mail.gone:
+    def _loop(self) -> LoopClient:
+        if self._client is None:
             raise DeviceError("the bench is not running")
-        with self._sending:
-            self._link.send(message)
+        return self._client
+
+    def _tell(self, message: Message) -> None:
+        self._loop().tell(message)
 
     @property
-    def status(self) -> Message:
+    def status(self) -> Status:
         """The loop's newest status; empty before the first."""
-        with self._mail.changed:
-            return self._mail.status
+        return self._client.status if self._client else {}
 
     @property
-    def incidents(self) -> list[Message]:
+    def incidents(self) -> list[Stopped]:
         """What has stopped motion so far, oldest first."""
-        with self._mail.changed:
-            return list(self._mail.incidents)
+        return self._client.incidents if self._client else []
 
     @property
     def alive(self) -> bool:
         """Whether the loop's process is there."""
-        return self._process is not None and self._process.poll() is None and not self._mail.gone
+        client = self._client
+        return self._process is not None and self._process.poll() is None and client is not None and not client.gone
 
     @property
     def loop_pid(self) -> int:
@@ -206,67 +116,63 @@ class Supervisor:
         return self._process.pid
 
     def run(self, program: Program, timeout_s: float) -> Outcome:
-        """Executes ``program`` to its end, however it ends; raises UsageError where the loop refuses it."""
-        self._tell({"do": "program", "program": program.model_dump(mode="json")})
-        return Outcome(**self._answer("finished", timeout_s))
+        """Executes ``program`` to its end, however it ends; raises UsageError where the loop refuses it.
+
+        One that has not ended in time is stopped, and DeviceError raised; how it ended is then nobody's any more.
+        """
+        try:
+            return self._loop().run(Run(program=program), timeout_s)
+        except DeviceError:
+            if self.alive:
+                self.stop()
+            raise
 
     def wait_at_rest(self, timeout_s: float = 30.0) -> None:
         """Waits until nothing moves any more."""
-        deadline = time.monotonic() + timeout_s
-        with self._mail.changed:
-            self._mail.changed.wait(0.1)
-            while self._mail.status.get("busy") and not self._mail.gone and time.monotonic() < deadline:
-                self._mail.changed.wait(0.2)
+        self._closing.wait(0.1)
+        self._loop().wait_until(lambda status: not status.get("busy"), timeout_s)
 
     def stop(self) -> None:
         """Soft stop by the operator: retract, then stay."""
-        self._tell({"do": "stop"})
+        self._tell(Stop(kind="stop"))
 
     def pain(self) -> None:
         """The subject's stop: retract, then stay."""
-        self._tell({"do": "pain"})
+        self._tell(Stop(kind="pain"))
 
     def estop(self) -> None:
         """Immediate stop by the drive's own ramp."""
-        self._tell({"do": "estop"})
+        self._tell(Stop(kind="estop"))
 
     def reset(self) -> None:
         """Acknowledges a stop and waits until the loop's status shows it; raises where the cause is still there."""
-        self._tell({"do": "reset"})
-        self._answer("reset", ANSWER_TIMEOUT_S)
-        mail = self._mail
-        with mail.changed:
-            if not mail.changed.wait_for(lambda: mail.gone or not mail.status.get("latched"), ANSWER_TIMEOUT_S):
-                raise DeviceError(
-                    f"the loop did not leave its safe state within {ANSWER_TIMEOUT_S:g} s after the reset"
-                )
+        loop = self._loop()
+        loop.ask(Reset(), "a reset")
+        if not loop.wait_until(lambda status: not status.get("latched"), ANSWER_TIMEOUT_S):
+            raise DeviceError(f"the loop did not leave its safe state within {ANSWER_TIMEOUT_S:g} s after the reset")
 
     def note(self, code: str, text: str) -> None:
         """Writes a note into the event stream."""
-        self._tell({"do": "note", "code": code, "text": text})
+        self._tell(Note(code=code, text=text))
 
     def close(self) -> None:
         """Ends loop and recorder in order; may be called twice."""
         self._closing.set()
         if self.alive:
             try:
-                self._tell({"do": "stop"})
-                self._tell({"do": "shutdown"})
+                self._tell(Stop(kind="stop"))
+                self._tell(Shutdown())
             except DeviceError:
                 pass
         self._await_exit()
-        if self._link:
-            self._link.lost = True
-        if self._reader:
-            self._reader.join(2)
+        if self._client:
+            self._client.close()
+            self._client = None
         if self.recorder:
             self.recorder.quit()
             self.recorder = None
         # A killed loop leaves its ring behind.
         self._ring_path.unlink(missing_ok=True)
-        if self._link:
-            self._link.close()
-            self._link = None
 
     def _await_exit(self) -> None:
         if self._process is None:

@@ -196,7 +196,7 @@ class Service:
         deadline = time.monotonic() + ACKNOWLEDGE_S
         while time.monotonic() < deadline:
             if len(bench.incidents) > seen:
-                return str(bench.incidents[-1]["text"])
+                return bench.incidents[-1].text
             status = bench.status
             taken = int(status.get("time_ns", 0)) > sent_ns + TAKEN_NS
             if taken and not status.get("busy") and not status.get("latched"):

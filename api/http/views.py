@@ -9,7 +9,7 @@ from api.http.models import ControlView, JobView, LeaseView, ProtocolView, Recor
 from api.http.service import Job, Service
 from controller.experiments.capture import check
 from controller.health import ALIVE, ON_RATE, VALID
-from controller.link import Message
+from controller.messages import Status
 from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.errors import RigError
@@ -83,7 +83,7 @@ def lease(service: Service, held: Lease) -> LeaseView:
     return LeaseView(lease_id=held.id, holder=held.holder, since=held.since, ttl_s=held.ttl_s, left_s=left_s)
 
 
-def _state(service: Service, status: Message, alive: bool) -> tuple[State, str]:
+def _state(service: Service, status: Status, alive: bool) -> tuple[State, str]:
     if not alive:
         return "disconnected", service.reason or "the loop's process is gone"
     latched = status.get("latched")

@@ -9,8 +9,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import rig
+from controller.messages import Outcome
 from controller.steps import Program
-from controller.supervisor import Outcome, Supervisor
+from controller.supervisor import Supervisor
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, RigError
 from rig.recording.mcap_file import RecordingFailed

@@ -12,10 +12,11 @@ from typing import Any, cast
 from controller.bench_loop import BenchLoop
 from controller.commands import Inbox
 from controller.devices import Devices
-from controller.link import Link, Message
 from controller.loop import Slot
+from controller.messages import Finished, Lease, Note, Reset, Run, Shutdown, StatusSaid, Stop, Stopped
 from controller.modes import Mode
 from controller.steps import Approach, Compress, Hold, Program, Retract, Step, Zero
+from rig.channel import Answer, Channel, Message, Received
 from rig.channels import (
     AXIS,
     BY_ID,
@@ -90,36 +91,57 @@ class FakeRing:
         return cast(list[MarkerSample], self.rows[MARKER.id])
 
 
+SAID: dict[str, Callable[..., Message]] = {
+    "program": Run,
+    "stop": lambda: Stop(kind="stop"),
+    "pain": lambda: Stop(kind="pain"),
+    "estop": lambda: Stop(kind="estop"),
+    "lease": lambda: Lease(attending=True),
+    "unattended": lambda: Lease(attending=False),
+    "reset": Reset,
+    "note": Note,
+    "shutdown": Shutdown,
+}
+HEARD: dict[str, type[Message]] = {"finished": Finished, "incident": Stopped, "answer": Answer}
+
+
 @dataclass
 class FakeLink:
-    """The loop's end of the link: what the other end says is put into ``inbox``; what the loop says is kept."""
+    """The loop's end of the channel: what the other end says is put into ``inbox``; what the loop says is kept."""
 
     inbox: deque[Message] = field(default_factory=deque)
     sent: list[Message] = field(default_factory=list)
-    statuses: list[Message] = field(default_factory=list)
+    statuses: list[dict[str, Any]] = field(default_factory=list)
     flushes: int = 0
     lost: bool = False
+    refused: int = 0
+    received: int = 0
 
-    def send(self, message: Message) -> None:
+    def send(self, message: Message) -> int:
         """Kept."""
         self.sent.append(message)
+        return len(self.sent)
 
-    def send_status(self, message: Message) -> None:
+    def send_newest(self, message: StatusSaid) -> None:
         """Kept apart."""
-        self.statuses.append(message["status"])
+        self.statuses.append(message.status)
 
     def flush(self) -> bool:
         """Counts."""
         self.flushes += 1
         return True
 
-    def receive(self) -> Message | None:
-        """The oldest message."""
-        return self.inbox.popleft() if self.inbox else None
+    def receive(self) -> Received | None:
+        """The oldest message; its id is how many there were before."""
+        if not self.inbox:
+            return None
+        self.received += 1
+        return Received(self.received, self.inbox.popleft())
 
-    def of(self, kind: str) -> list[Any]:
-        """What the loop said of this kind, in order."""
-        return [message[kind] for message in self.sent if kind in message]
+    def of(self, kind: str) -> list[dict[str, Any]]:
+        """What the loop said of this kind, in order; of a finished program its outcome."""
+        found = [message.model_dump() for message in self.sent if isinstance(message, HEARD[kind])]
+        return [said.get("outcome", said) for said in found]
 
 
 class FakeBench:
@@ -143,7 +165,7 @@ class FakeBench:
         self.tracker = FakeTracker(self.clock, round(1e9 / rate_Hz), axis=self.axis)
         self.ring, self.link = FakeRing(), FakeLink()
         self.devices = Devices(self.force, self.axis, self.tracker if self.wiring.tracker else None)
-        link = cast(Link, self.link)
+        link = cast(Channel, self.link)
         self.loop = BenchLoop(self.wiring, self.devices, self.ring, link, Inbox(link), self.clock)
         self.slot = self.missed = 0
         self.execution_ns = execution_ns
@@ -185,7 +207,7 @@ class FakeBench:
 
     def _renew(self) -> None:
         if self.keep_lease and not self.link.inbox and self.slot % 100 == 0:
-            self.link.inbox.append({"do": "lease"})
+            self.say("lease")
 
     def cycles(self, count: int) -> None:
         """That many, on time."""
@@ -206,11 +228,11 @@ class FakeBench:
 
     def say(self, verb: str, **more: object) -> None:
         """A message to the loop, taken in the next cycle."""
-        self.link.inbox.append({"do": verb, **more})
+        self.link.inbox.append(SAID[verb](**more))
 
     def begin(self, *steps: Step) -> None:
         """Sends a program; the next cycle starts it."""
-        self.say("program", program=Program(name="test", steps=steps).model_dump(mode="json"))
+        self.say("program", program=Program(name="test", steps=steps))
         self.cycles(len(self.link.inbox))
 
     def run(self, *steps: Step, within_s: float = 60.0) -> dict[str, Any]:
@@ -218,7 +240,7 @@ class FakeBench:
         before = len(self.link.of("finished"))
         self.begin(*steps)
         self.until(lambda: len(self.link.of("finished")) > before, within_s)
-        return cast(dict[str, Any], self.link.of("finished")[-1])
+        return self.link.of("finished")[-1]
 
     def press(self, force_N: float = 3.0) -> None:
         """Into the tissue until the loop sees that force, then holding."""
