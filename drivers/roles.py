@@ -30,6 +30,7 @@ class LinkCounters:
     checksum_errors: int = 0
     discarded_bytes: int = 0
     device_lost: int = 0
+    repeated: int = 0
 
 
 class Device(Protocol):

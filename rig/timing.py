@@ -1,17 +1,24 @@
 """From a device's own counter to the host's monotonic clock.
 
-The delay of a sample on its way is never negative and often near its minimum, so the lower edge of arrival minus device
-time, taken per window, carries offset and drift of the device's clock; a line through these minima is the map. A window
-in which every sample came late, because the host was busy, is no part of it.
+No sample arrives before it was taken, so the least delay seen bounds the offset between the clocks, and how far two
+crystals may drift apart says for how long: a map that needs no window to fill, and that late samples cannot bend.
 """
 
 from collections import deque
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Iterable, Sequence
+from itertools import accumulate, pairwise
 
 Point = tuple[int, int]
-# How many times as high above the lower edge as half of the minima another may be and still count as one of them.
-USUAL = 3
+
+# The most that two crystals' rates differ: data sheets of AT cuts allow each 30 ppm of tolerance, 50 for temperature
+# and 5 a year, 260 for both after ten years; the rest is for a host that steers its clock.
+CRYSTAL_PPM = 300.0
+# How far the smallest delays of two windows lie apart by chance, at least: what a kernel takes to wake somebody.
+SCATTER_NS = 50_000
+# How fast the offset may rise beyond that where an old minimum leaves the windows: the host's clock was steered.
+SETTLING_PPM = 50.0
+# Over less than this, chance says more about the drift than the clocks do.
+LEAST_SPAN_NS = 1_000_000_000
 
 
 class Unwrapper:
@@ -34,85 +41,134 @@ class Unwrapper:
 
 
 class ClockMap:
-    """Regresses device time onto host time; ``latency_ns`` is the known smallest transport delay.
+    """Device time onto host time; ``latency_ns`` is the known smallest transport delay.
 
-    Windows of ``window_ns`` keep their smallest delay; the last ``windows`` of them carry the line.
+    The offset is the least of ``delay + rate x age`` over all samples; ``rate`` is ``bound_ppm`` at first, and what the
+    samples leave possible later on. It is kept from sample to sample, and taken anew from the smallest delays of the
+    last ``windows`` windows of ``window_ns`` whenever one closes.
     """
 
-    def __init__(self, latency_ns: int = 0, window_ns: int = 500_000_000, windows: int = 60) -> None:
-        self._latency_ns = latency_ns
+    def __init__(
+        self, latency_ns: int = 0, bound_ppm: float = CRYSTAL_PPM, window_ns: int = 500_000_000, windows: int = 60
+    ) -> None:
+        self.latency_ns = latency_ns
+        self._bound = bound_ppm * 1e-6
         self._window_ns = window_ns
         self._minima: deque[Point] = deque(maxlen=windows)
-        self._start: int | None = None
-        self._open: Point | None = None
-        self._slope = 0.0
-        self._anchor: Point = (0, 0)
         self._last_capture_ns = -(1 << 62)
+        self.restart()
+
+    def restart(self) -> None:
+        """The device counts anew; capture times go on upwards."""
+        self._minima.clear()
+        self._start_ns: int | None = None
+        self._edge: Point = (0, 0)
+        self._slope, self._rate = 0.0, self._bound
+        self._last_device_ns = 0
 
     @property
     def drift_ppm(self) -> float:
-        """How much faster the host's clock runs than the device's, as regressed so far."""
+        """How much faster the host's clock runs than the device's, as far as the samples tell."""
         return self._slope * 1e6
 
-    def __call__(self, device_ns: int, arrival_ns: int) -> int:
-        """Host time of capture; never after arrival and never before an earlier capture."""
-        self._observe(device_ns, arrival_ns - device_ns)
-        anchor_ns, offset_ns = self._anchor
-        capture_ns = device_ns + offset_ns + round(self._slope * (device_ns - anchor_ns)) - self._latency_ns
-        capture_ns = max(min(capture_ns, arrival_ns), self._last_capture_ns)
-        self._last_capture_ns = capture_ns
+    def lateness_ns(self, device_ns: int, arrival_ns: int) -> int:
+        """How much later than possible a sample comes; negative where it is the quickest so far."""
+        return arrival_ns - device_ns - self._offset_ns(device_ns)
+
+    def observe(self, device_ns: int, arrival_ns: int) -> None:
+        """Takes note of a sample; device times go upwards."""
+        point = device_ns, arrival_ns - device_ns
+        if self._start_ns is None:
+            self._start_ns, self._edge, self._last_device_ns = device_ns, point, device_ns
+            self._minima.append(point)
+            return
+        if device_ns - self._start_ns >= self._window_ns:
+            self._start_ns = device_ns
+            self._refit()
+            self._minima.append(point)
+        elif point[1] < self._minima[-1][1]:
+            self._minima[-1] = point
+        self._edge = device_ns, min(point[1], _bound_ns(self._edge, device_ns, self._rate))
+
+    def captures(self, devices_ns: Sequence[int], arrival_ns: int) -> list[int]:
+        """Host times of capture of samples that were observed and came together, oldest first.
+
+        Each is later than the one before it, and none is after arrival as long as arrivals go upwards.
+        """
+        left = len(devices_ns)
+        return [self._capture(device_ns, arrival_ns, left - index) for index, device_ns in enumerate(devices_ns)]
+
+    def _capture(self, device_ns: int, arrival_ns: int, left: int) -> int:
+        """Where the offset has fallen, time goes on at half its pace until it is right again."""
+        capture_ns = device_ns + self._offset_ns(device_ns) - self.latency_ns
+        room_ns = (arrival_ns - self._last_capture_ns) // left
+        least_ns = max(1, min((device_ns - self._last_device_ns) // 2, room_ns))
+        capture_ns = max(min(capture_ns, arrival_ns - left + 1), self._last_capture_ns + least_ns)
+        self._last_capture_ns, self._last_device_ns = capture_ns, device_ns
         return capture_ns
 
-    def _observe(self, device_ns: int, delay_ns: int) -> None:
-        if self._start is None or self._open is None:
-            self._start, self._open = device_ns, (device_ns, delay_ns)
-            self._anchor = self._open
-        elif device_ns - self._start >= self._window_ns:
-            self._minima.append(self._open)
-            self._start, self._open = device_ns, (device_ns, delay_ns)
-            self._refit()
-        elif delay_ns < self._open[1]:
-            self._open = (device_ns, delay_ns)
-            if len(self._minima) < 2:
-                self._anchor = min(self._anchor, self._open, key=lambda point: point[1])
+    def _offset_ns(self, device_ns: int) -> int:
+        return _bound_ns(self._edge, device_ns, self._slope)
 
     def _refit(self) -> None:
-        """Least squares in plain numbers: the first call into a linear algebra library costs 0.1 s of locked memory."""
-        if len(self._minima) < 4:
-            return
-        points = _usual(self._minima)
-        count = len(points)
-        mean_ns = sum(device_ns for device_ns, _ in points) // count
-        mean_delay_ns = sum(delay_ns for _, delay_ns in points) / count
-        spread = sum((device_ns - mean_ns) ** 2 for device_ns, _ in points)
-        covariance = sum((device_ns - mean_ns) * (delay_ns - mean_delay_ns) for device_ns, delay_ns in points)
-        self._slope = covariance / spread
-        self._anchor = (mean_ns, round(mean_delay_ns))
+        points = _in_time(self._minima, self._bound)
+        span_ns = points[-1][0] - points[0][0]
+        self._slope, self._rate = 0.0, self._bound
+        if span_ns >= LEAST_SPAN_NS:
+            hull = _lower_hull(points)
+            self._slope = _slope(hull)
+            self._rate = min(self._bound, self._slope + _scatter_ns(points, hull) / span_ns)
+        at_ns, offset_ns = self._edge
+        least_ns = min(_bound_ns(point, at_ns, self._rate) for point in points)
+        self._edge = at_ns, min(least_ns, offset_ns + round(self._window_ns * SETTLING_PPM * 1e-6))
 
 
-def _usual(minima: Sequence[Point]) -> list[Point]:
-    """The points near the lower edge of all: late windows lie far above it, however late they are."""
-    (first_ns, low_ns), (last_ns, high_ns) = _lower_edge(minima)
-    slope = (high_ns - low_ns) / (last_ns - first_ns)
-    heights_ns = [delay_ns - low_ns - slope * (device_ns - first_ns) for device_ns, delay_ns in minima]
-    limit_ns = USUAL * sorted(heights_ns)[len(heights_ns) // 2]
-    return [point for point, height_ns in zip(minima, heights_ns, strict=True) if height_ns <= limit_ns]
+def _bound_ns(point: Point, device_ns: int, rate: float) -> int:
+    """What a delay bounds the offset to at another device time, where the clocks drift apart at ``rate``."""
+    at_ns, delay_ns = point
+    return delay_ns + round(rate * (device_ns - at_ns))
 
 
-def _lower_edge(points: Sequence[Point]) -> tuple[Point, Point]:
-    """The edge of the lower convex hull below the middle point.
+def _in_time(minima: Sequence[Point], bound: float) -> list[Point]:
+    """The points that no other shows to be late: higher above it than the clocks can have drifted between the two."""
+    before = accumulate(minima, lambda least, point: min(point, (point[0], _bound_ns(least, point[0], bound))))
+    after = accumulate(
+        reversed(minima), lambda least, point: min(point, (point[0], _bound_ns(least, point[0], -bound)))
+    )
+    lowest = zip(before, reversed(list(after)), strict=True)
+    return [point for point, (low, high) in zip(minima, lowest, strict=True) if point[1] <= min(low[1], high[1])]
 
-    After Moon, Skelly and Towsley, Estimation and removal of clock skew from network delay measurements, INFOCOM 1999,
-    who take the edge below the mean time: one window long before the others would move that, but not the middle.
+
+def _lower_hull(points: Iterable[Point]) -> list[Point]:
+    """The lower convex hull: drift lies below all delays and touches the smallest.
+
+    After Moon, Skelly and Towsley, Estimation and removal of clock skew from network delay measurements, INFOCOM 1999.
     """
     hull: list[Point] = []
     for point in points:
         while len(hull) > 1 and not _bends_up(hull[-2], hull[-1], point):
             hull.pop()
         hull.append(point)
-    middle_ns, _ = points[len(points) // 2]
-    return next(edge for edge in pairwise(hull) if edge[1][0] >= middle_ns)
+    return hull
 
 
 def _bends_up(first: Point, middle: Point, last: Point) -> bool:
     return (middle[0] - first[0]) * (last[1] - first[1]) > (last[0] - first[0]) * (middle[1] - first[1])
+
+
+def _slope(hull: Sequence[Point]) -> float:
+    """The hull's mean slope over the middle half of its span: its ends lean on single points."""
+    quarter_ns = (hull[-1][0] - hull[0][0]) // 4
+    first_ns, last_ns = hull[0][0] + quarter_ns, hull[-1][0] - quarter_ns
+    return (_height_ns(hull, last_ns) - _height_ns(hull, first_ns)) / (last_ns - first_ns)
+
+
+def _scatter_ns(points: Sequence[Point], hull: Sequence[Point]) -> float:
+    """Twice what half of the smallest delays lie above the least possible."""
+    heights_ns = sorted(delay_ns - _height_ns(hull, device_ns) for device_ns, delay_ns in points)
+    return max(2 * heights_ns[len(heights_ns) // 2], SCATTER_NS)
+
+
+def _height_ns(hull: Sequence[Point], device_ns: int) -> float:
+    left, right = next(edge for edge in pairwise(hull) if edge[1][0] >= device_ns)
+    return left[1] + (right[1] - left[1]) * (device_ns - left[0]) / (right[0] - left[0])

@@ -21,7 +21,7 @@ from mock_devices.stage import MarkerPose
 from mock_devices.wire import PtyWire, TcpWire
 from rig.channels import MarkerSample
 from rig.config.wiring import Tracker
-from tests.remote import MemoryWire, Remote, say
+from tests.remote import MemoryWire, Remote, long_ago, say
 
 MS = 1_000_000
 
@@ -113,7 +113,7 @@ class Stage:
 
 
 def started(stage: Stage, **settings: Any) -> NdiTracker:
-    device = NdiTracker(stage.open, Tracker(**settings))
+    device = NdiTracker(stage.open, Tracker(**settings), long_ago)
     device.start()
     return device
 

@@ -4,6 +4,7 @@ import contextlib
 import json
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,11 @@ def say(answer: object) -> None:
     """The other end: one line of JSON."""
     sys.stdout.write(json.dumps(answer) + "\n")
     sys.stdout.flush()
+
+
+def long_ago() -> int:
+    """A running clock, behind every time that a test names [ns]."""
+    return time.monotonic_ns() - (1 << 60)
 
 
 class MemoryWire:

@@ -52,6 +52,10 @@ FIRST_FRAMES = 20
 FIRST_FRAMES_S = 1.0
 
 
+# A frame and the sensor's unwrapped clock [us].
+Timed = tuple[int, Frame]
+
+
 class BotaSensOne:
     """Owns ``port`` until ``close``. ``now`` is the monotonic clock in ns.
 
@@ -73,7 +77,8 @@ class BotaSensOne:
         self._identity = Identity(PRODUCT, "", "")
         self._latency_ns = round(config.latency_ms * 1e6)
         self._seq = 0
-        self._early: list[ForceSample] = []
+        self._clock = ClockMap(self._latency_ns)
+        self._taken: list[tuple[list[Timed], int]] = []
         self._forget_clock()
 
     @property
@@ -103,11 +108,12 @@ class BotaSensOne:
 
     def poll(self, now_ns: int) -> Sequence[ForceSample]:
         """Samples since the last call."""
-        samples, self._early = self._early, []
         data = self._port.read()
         if data:
-            samples += [self._sample(frame, now_ns) for frame in self._decoder.feed(data)]
-        return samples
+            # A host that is interrupted between its look at the clock and the read finds what came later.
+            self._take(data, max(now_ns, self._now()))
+        taken, self._taken = self._taken, []
+        return [sample for frames, arrival_ns in taken for sample in self._samples(frames, arrival_ns)]
 
     def close(self) -> None:
         """Takes the sensor out of run mode and gives the port back."""
@@ -119,8 +125,9 @@ class BotaSensOne:
         """The sensor's clock starts anew with every reset."""
         self._decoder = Decoder(self.counters)
         self._unwrap = Unwrapper(32)
-        self._clock = ClockMap(self._latency_ns)
+        self._clock.restart()
         self._last_us: int | None = None
+        self._taken = []
 
     def _reset(self) -> BootText:
         self._port.read()
@@ -165,45 +172,57 @@ class BotaSensOne:
         timeout_s = FIRST_FRAMES_S + FIRST_FRAMES * self._period_ns / 1e9
         deadline_ns = self._now() + round(timeout_s * 1e9)
         while True:
-            self._early += [self._sample(frame, self._now()) for frame in self._decoder.feed(data)]
-            if any(sample.valid for sample in self._early):
+            self._take(data, self._now())
+            frames = [frame for timed, _ in self._taken for _, frame in timed]
+            if any(map(_is_valid, frames)):
                 self.counters.discarded_bytes = 0  # the rest of the last answer, not a loss
                 return
             left_s = (deadline_ns - self._now()) / 1e9
             if left_s <= 0:
-                raise self._error(self._no_valid_frame(timeout_s))
+                raise self._error(self._no_valid_frame(frames, timeout_s))
             select.select([self._port.fileno()], [], [], left_s)
             data = self._port.read()
 
-    def _no_valid_frame(self, timeout_s: float) -> str:
-        if not self._early:
+    def _no_valid_frame(self, frames: Sequence[Frame], timeout_s: float) -> str:
+        if not frames:
             return (
                 f"no frame within {timeout_s:.1f} s of run mode, {self.counters.discarded_bytes} bytes without "
                 "a good checksum; check cable and baud"
             )
-        status = Status(self._early[-1].status)
+        status = Status(frames[-1].status)
         return f"no valid reading within {timeout_s:.1f} s of run mode, status {status!r}; unload it and check power"
 
-    def _sample(self, frame: Frame, now_ns: int) -> ForceSample:
-        device_us = self._unwrap(frame.time_us)
-        self._count_lost(device_us)
-        capture_ns = self._clock(device_us * 1000, now_ns)
-        readings = frame[1:7]
-        valid = not frame.status & UNUSABLE and math.isfinite(sum(readings))
+    def _take(self, data: bytes, arrival_ns: int) -> None:
+        """Keeps the frames in ``data``, and dates none of them before all are known: the first may be the latest."""
+        timed = [(self._unwrap(frame.time_us), frame) for frame in self._decoder.feed(data)]
+        timed = [(device_us, frame) for device_us, frame in timed if self._is_new(device_us)]
+        for device_us, _ in timed:
+            self._clock.observe(device_us * 1000, arrival_ns)
+        self._taken.append((timed, arrival_ns))
+
+    def _samples(self, timed: Sequence[Timed], arrival_ns: int) -> list[ForceSample]:
+        captures_ns = self._clock.captures([device_us * 1000 for device_us, _ in timed], arrival_ns)
+        pairs = zip(timed, captures_ns, strict=True)
+        return [self._sample(device_us, frame, capture_ns, arrival_ns) for (device_us, frame), capture_ns in pairs]
+
+    def _sample(self, device_us: int, frame: Frame, capture_ns: int, arrival_ns: int) -> ForceSample:
         self._seq += 1
+        valid = int(_is_valid(frame))
         return ForceSample(
-            self._seq - 1, capture_ns, now_ns, device_us, *readings, frame.temperature_C, frame.status, int(valid)
+            self._seq - 1, capture_ns, arrival_ns, device_us, *frame[1:7], frame.temperature_C, frame.status, valid
         )
 
-    def _count_lost(self, device_us: int) -> None:
-        if self._last_us is not None:
-            step_us = device_us - self._last_us
-            if step_us <= 0:
-                raise self._error(
-                    f"its clock went back by {-step_us / 1e3:.1f} ms: it restarted by itself; check power, start again"
-                )
-            self.counters.device_lost += max(round(step_us * 1000 / self._period_ns) - 1, 0)
+    def _is_new(self, device_us: int) -> bool:
+        """Counts what is missing before this reading; False where the line brings one reading twice."""
+        step_us = device_us - self._last_us if self._last_us is not None else round(self._period_ns / 1000)
+        if step_us < 0:
+            raise self._error(
+                f"its clock went back by {-step_us / 1e3:.1f} ms: it restarted by itself; check power, start again"
+            )
         self._last_us = device_us
+        self.counters.repeated += not step_us
+        self.counters.device_lost += max(round(step_us * 1000 / self._period_ns) - 1, 0)
+        return bool(step_us)
 
     def _error(self, what: str) -> DeviceError:
         return DeviceError(self._about(what))
@@ -228,6 +247,10 @@ def _line_settings(config: Force) -> tuple[int, int]:
             "lower rate_Hz or raise baud"
         )
     return baud, sinc
+
+
+def _is_valid(frame: Frame) -> bool:
+    return not frame.status & UNUSABLE and math.isfinite(sum(frame[1:7]))
 
 
 def _came(text: bytes) -> str:

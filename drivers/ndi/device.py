@@ -27,8 +27,7 @@ _CLOSE_S = 0.5
 class NdiTracker:
     """A marker tracker (role ``drivers.roles.MarkerTracker``).
 
-    ``open_port`` gives the port at a speed in baud, which TCP passes over; ``now`` is the host's monotonic clock [ns],
-    used by ``start`` and ``close`` only.
+    ``open_port`` gives the port at a speed in baud, which TCP passes over; ``now`` is the host's monotonic clock [ns].
     """
 
     def __init__(
@@ -142,7 +141,8 @@ class NdiTracker:
         if not self._waiting and now_ns >= self._due_ns:
             self._port.write(self._question)
             self._waiting = True
-            self._asked_ns = now_ns
+            # A host that was interrupted since it looked at its clock asks later than it thinks.
+            self._asked_ns = max(now_ns, self._now())
             self._silent_since_ns = now_ns if since_ns is None else since_ns
 
     def _take(self, reply: codec.Reply, now_ns: int) -> list[MarkerSample]:

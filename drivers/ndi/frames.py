@@ -12,6 +12,7 @@ from rig.timing import ClockMap, Unwrapper
 COUNTER_HZ = 60
 """The frame counter advances at this rate whatever the rate of the tools (Vega API guide, frame number)."""
 _NO_FRAME = -1
+_LONG_NS = 1 << 62
 _NO_POSE = Pose(*[math.nan] * 8)
 
 
@@ -30,6 +31,7 @@ class FrameReader:
         self._unwrap = Unwrapper(32)
         self._newest = _NO_FRAME
         self._last = [_NO_FRAME] * len(handles)
+        self._last_ns = [-_LONG_NS] * len(handles)
         self._seq = 0
 
     def samples(self, reply: TrackingReply, asked_ns: int, arrival_ns: int) -> list[MarkerSample]:
@@ -44,7 +46,9 @@ class FrameReader:
         if newest <= self._newest:
             return []
         self._count(newest)
-        newest_ns = self._clock(newest * 1_000_000_000 // COUNTER_HZ, asked_ns)
+        taken_ns = newest * 1_000_000_000 // COUNTER_HZ
+        self._clock.observe(taken_ns, asked_ns)
+        (newest_ns,) = self._clock.captures([taken_ns], asked_ns)
         samples = []
         for index, tool in enumerate(tools):
             # A disabled tool has no frame number of its own; active tools have theirs a frame or two apart.
@@ -52,6 +56,8 @@ class FrameReader:
             if frame > self._last[index]:
                 self._last[index] = frame
                 capture_ns = newest_ns - (newest - frame) * 1_000_000_000 // COUNTER_HZ
+                # While the map finds its offset, an older frame may lie further back than time went on.
+                self._last_ns[index] = capture_ns = max(capture_ns, self._last_ns[index] + 1)
                 samples.append(self._sample(index, tool, frame, capture_ns, arrival_ns))
         return samples
 

@@ -17,9 +17,11 @@ from rig.config.wiring import Force
 from rig.errors import DeviceError, UsageError
 from tests.drivers.scripted_port import ScriptedPort
 from tests.mock_devices.force_bench import WRENCH, Served, await_silence, collect
+from tests.remote import long_ago
 
 BOOT = b"c,0,1,0,4\r\nApp Init\r\nname: BFT-SENS-SER-M8\r\nS/N: 000271\r\nFW version: 1.0.6\r\n"
 PERIOD_US = 996
+MS = 1_000_000
 
 
 def frame(time_us: int, status: int = 0, fz_N: float = -3.0) -> bytes:
@@ -38,7 +40,7 @@ def started(
     answer: Callable[[bytes], bytes] = sensor_like, config: Force | None = None
 ) -> tuple[BotaSensOne, ScriptedPort]:
     port = ScriptedPort(answer)
-    sensor = BotaSensOne(port, config or Force())
+    sensor = BotaSensOne(port, config or Force(), long_ago)
     try:
         sensor.start()
     except DeviceError:
@@ -202,6 +204,39 @@ def test_a_clock_that_goes_back_means_the_sensor_restarted(running: tuple[BotaSe
     port.push(frame(500))
     with pytest.raises(DeviceError, match=r"its clock went back by 0.5 ms: it restarted by itself"):
         sensor.poll(1)
+
+
+def test_a_frame_that_the_line_brings_twice_is_dropped_and_counted(running: tuple[BotaSensOne, ScriptedPort]) -> None:
+    sensor, port = running
+    port.push(frame(1000 + PERIOD_US) * 2 + frame(1000 + 2 * PERIOD_US))
+    port.push(frame(1000 + 2 * PERIOD_US))
+    assert [(sample.seq, sample.device_us) for sample in sensor.poll(1)] == [(1, 1996), (2, 2992)]
+    assert (sensor.counters.repeated, sensor.counters.device_lost) == (2, 0)
+
+
+def test_frames_that_came_after_the_look_at_the_clock_are_dated_by_a_later_one() -> None:
+    """A host stops for 5 ms between clock and read: dated by the clock alone, all frames since would be 5 ms early."""
+    port, clock_ns = ScriptedPort(sensor_like), 10 * MS
+    sensor = BotaSensOne(port, Force(), lambda: clock_ns)
+    sensor.start()
+    for number in range(1, 6):
+        port.push(frame(1000 + number * PERIOD_US))
+    clock_ns += 5 * PERIOD_US * 1000
+    assert sensor.poll(10 * MS)[-1].arrival_ns == clock_ns
+    clock_ns += PERIOD_US * 1000
+    port.push(frame(1000 + 6 * PERIOD_US))
+    assert sensor.poll(clock_ns)[0].capture_ns == clock_ns
+    sensor.close()
+
+
+def test_capture_times_go_upwards_through_a_new_start(running: tuple[BotaSensOne, ScriptedPort]) -> None:
+    sensor, port = running
+    port.push(frame(5_000_000))
+    before = sensor.poll(10**15)
+    sensor.start()
+    port.push(frame(1000 + PERIOD_US))
+    captures = [sample.capture_ns for sample in (*before, *sensor.poll(10**15))]
+    assert all(late > early for early, late in pairwise(captures))
 
 
 def test_a_sensor_may_be_started_again_and_goes_on_numbering(running: tuple[BotaSensOne, ScriptedPort]) -> None:

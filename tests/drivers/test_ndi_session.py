@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from drivers.ndi.device import LOST_AFTER_NS, REPLY_TIMEOUT_NS
+from drivers.ndi.device import LOST_AFTER_NS, REPLY_TIMEOUT_NS, NdiTracker
 from drivers.ports import PortClosed
+from rig.config.wiring import Tracker
 from rig.errors import DeviceError
 from tests.ndi_stage import ARM, MS, TIP, Stage, run, started
 
@@ -61,6 +62,22 @@ def test_capture_times_are_a_frame_apart_and_never_after_arrival(stage: Stage) -
     late = samples[60:]
     steps = [b.capture_ns - a.capture_ns for a, b in itertools.pairwise(late)]
     assert all(abs(step - FRAME_NS) < 0.1 * MS for step in steps)
+
+
+def test_a_question_asked_late_is_dated_when_it_went_out(stage: Stage) -> None:
+    """A host that stops for 8 ms before each question would take the frames for that much older than they are."""
+    device = NdiTracker(stage.open, Tracker(), lambda: 10**9)
+    device.start()
+    stage.run_until(100 * MS)
+    assert not device.poll(10**9 - 8 * MS)
+    assert [sample.capture_ns for sample in device.poll(10**9 + MS)] == [10**9, 10**9]
+
+
+def test_capture_times_of_each_tool_differ(stage: Stage) -> None:
+    samples = run(stage, started(stage), 100, 1100)
+    for tool in (0, 1):
+        captures = [sample.capture_ns for sample in samples if sample.tool == tool]
+        assert all(late > early for early, late in itertools.pairwise(captures))
 
 
 def test_the_known_latency_lies_between_capture_and_arrival(stage: Stage) -> None:
