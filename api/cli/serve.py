@@ -12,7 +12,9 @@ import uvicorn
 from api.cli.options import ConfigOption, SetOption, wiring_from
 from api.cli.output import console
 from api.cli.stage import bench_for
-from api.http.app import LOCAL, build
+from api.http.app import build
+from api.http.connection import server_settings
+from api.http.guard import LOCAL
 from api.http.service import Service
 from rig.errors import UsageError
 
@@ -48,7 +50,7 @@ def serve(
         application = build(Service(wiring, sessions, protocols))
         # The server hands on the Ctrl-C that ended it, after an orderly end.
         with contextlib.suppress(KeyboardInterrupt):
-            Announced(uvicorn.Config(application, host=host, port=port, log_level="warning")).run([listening])
+            Announced(uvicorn.Config(application, host=host, port=port, **server_settings())).run([listening])
 
 
 def _listening(host: str, port: int) -> socket.socket:

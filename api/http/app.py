@@ -1,26 +1,22 @@
 """The application: routes, page, problems, and who may talk to it."""
 
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
-from fastapi import FastAPI, Request, Response
+from fastapi import FastAPI
 from fastapi.responses import FileResponse
 from fastapi.staticfiles import StaticFiles
 
 import rig
 from api.http import problems, routes
+from api.http.guard import Guard
 from api.http.problems import Problem
 from api.http.service import Service
 
 PAGE = Path(__file__).parent / "page"
-LOCAL = ("127.0.0.1", "localhost", "::1")
-Next = Callable[[Request], Awaitable[Response]]
 INVALID = 422
-SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
-CONTENT_POLICY = "default-src 'self'; frame-ancestors 'none'"
 
 
 def build(service: Service) -> FastAPI:
@@ -43,7 +39,7 @@ def build(service: Service) -> FastAPI:
         openapi_url="/api/v1/openapi.json",
     )
     problems.install(app)
-    app.middleware("http")(_own_pages_only)
+    app.add_middleware(Guard, headers=_headers())
     app.include_router(routes.build(service))
     app.get("/", include_in_schema=False)(_page)
     app.mount("/page", StaticFiles(directory=PAGE))
@@ -51,28 +47,18 @@ def build(service: Service) -> FastAPI:
     return app
 
 
+def _headers() -> dict[str, str]:
+    """The page may talk to this service and to the stop process on this computer, whatever port that has."""
+    stops = " ".join(f"http://{host}:*" for host in ("127.0.0.1", "localhost"))
+    return {
+        "Content-Security-Policy": f"default-src 'self'; connect-src 'self' {stops}; frame-ancestors 'none'",
+        "X-Content-Type-Options": "nosniff",
+        "Cache-Control": "no-cache",
+    }
+
+
 async def _page() -> FileResponse:
     return FileResponse(PAGE / "index.html")
-
-
-async def _own_pages_only(request: Request, call_next: Next) -> Response:
-    """No other site's page may move this bench: the host must be local, and so must the page that asks."""
-    host = request.url.hostname or ""
-    origin = request.headers.get("origin")
-    if host not in LOCAL and not _same_host(request):
-        return problems.answer(403, "host", f"the host name {host} is not this service's")
-    if origin and request.method not in SAFE_METHODS and urlsplit(origin).netloc != request.headers.get("host"):
-        return problems.answer(403, "origin", f"a page of {origin} may not act on this bench")
-    response = await call_next(request)
-    response.headers["Content-Security-Policy"] = CONTENT_POLICY
-    response.headers["X-Content-Type-Options"] = "nosniff"
-    response.headers["Cache-Control"] = "no-cache"
-    return response
-
-
-def _same_host(request: Request) -> bool:
-    address, _ = request.scope.get("server") or ("", 0)
-    return request.url.hostname == address
 
 
 def _describe_problems(app: FastAPI) -> None:

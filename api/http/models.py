@@ -133,6 +133,7 @@ class SessionView(BaseModel):
     trials: int
     samples: int
     dropped: int
+    remarks: list[str] = Field(description="what is not as it should be in the folder, as its list tells")
     recordings: list[RecordingView]
 
 

@@ -1,9 +1,6 @@
 """The routes of the service, version 1. State is data, stops need nothing, motion is a job."""
 
-import asyncio
-import json
 import time
-from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +9,7 @@ from fastapi.responses import FileResponse, StreamingResponse
 
 import rig
 from api.http import views
+from api.http.live import Broadcast
 from api.http.models import (
     CaptureRequest,
     ControlView,
@@ -31,7 +29,6 @@ from api.http.problems import Refused, responses
 from api.http.service import Service
 
 PREFIX = "/api/v1"
-LIVE_PERIOD_S = 0.05
 MEDIA_TYPES = {".mcap": "application/octet-stream", ".json": "application/json", ".html": "text/html"}
 
 LeaseHeader = Annotated[str, Header(alias="X-Control-Lease", description="lease_id of the lease in force")]
@@ -49,6 +46,8 @@ def build(service: Service) -> APIRouter:
 
 
 def _state(router: APIRouter, service: Service) -> None:
+    broadcast = Broadcast(lambda: views.rig(service).model_dump_json())
+
     @router.get("/info", summary="Who this service is")
     def info() -> Info:
         return Info(
@@ -77,18 +76,11 @@ def _state(router: APIRouter, service: Service) -> None:
         responses={200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
     )
     async def live() -> StreamingResponse:
-        return StreamingResponse(_events(service), media_type="text/event-stream")
+        return StreamingResponse(broadcast.stream(), media_type="text/event-stream")
 
     @router.get("/protocols", summary="Protocols that can be started")
     def protocols() -> list[ProtocolView]:
         return views.protocols(service)
-
-
-async def _events(service: Service) -> AsyncIterator[str]:
-    while True:
-        view = await asyncio.to_thread(views.rig, service)
-        yield f"data: {json.dumps(view.model_dump(mode='json'))}\n\n"
-        await asyncio.sleep(LIVE_PERIOD_S)
 
 
 def _control(router: APIRouter, service: Service) -> None:
@@ -173,7 +165,8 @@ def _recordings(router: APIRouter, service: Service) -> None:
     )
     def download(session: Name, file: Name) -> FileResponse:
         path = service.session(session) / file
-        if not path.is_file():
+        # A link may lead out of the session, to what nobody meant to serve.
+        if not path.is_file() or path.is_symlink():
             raise Refused(404, "no-such-recording", f"session {session} has no file {file}")
         return FileResponse(path, media_type=_media_type(path), filename=f"{session}-{file}")
 

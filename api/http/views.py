@@ -13,7 +13,7 @@ from controller.messages import Status
 from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.errors import RigError
-from rig.recording.sessions import open_session
+from rig.recording.sessions import read_listing
 
 State = Literal["disconnected", "idle", "running", "stopped"]
 STREAMS = ("force", "axis", "marker")
@@ -130,22 +130,21 @@ def sessions(service: Service) -> list[SessionView]:
 
 
 def _session(folder: Path) -> SessionView:
-    info = open_session(folder).info
-    files = sorted(path for path in folder.iterdir() if path.suffix in SHOWN)
+    info, remarks = read_listing(folder)
+    trials = info.trials if info else ()
+    created = info.created if info else ""
     return SessionView(
         name=folder.name,
-        kind=info.kind,
-        created=info.created or datetime.fromtimestamp(folder.stat().st_mtime, UTC).isoformat(),
-        trials=len(info.trials),
-        samples=sum(sum(trial.samples.values()) for trial in info.trials),
-        dropped=sum(sum(trial.dropped.values()) for trial in info.trials),
-        recordings=[
-            RecordingView(
-                session=folder.name,
-                file=path.name,
-                bytes=path.stat().st_size,
-                href=f"/api/v1/recordings/{folder.name}/{path.name}",
-            )
-            for path in files
-        ],
+        kind=info.kind if info else "unknown",
+        created=created or datetime.fromtimestamp(folder.stat().st_mtime, UTC).isoformat(),
+        trials=len(trials),
+        samples=sum(sum(trial.samples.values()) for trial in trials),
+        dropped=sum(sum(trial.dropped.values()) for trial in trials),
+        remarks=list(remarks),
+        recordings=[_file(folder.name, path) for path in sorted(folder.iterdir()) if path.suffix in SHOWN],
     )
+
+
+def _file(session: str, path: Path) -> RecordingView:
+    size = path.lstat().st_size
+    return RecordingView(session=session, file=path.name, bytes=size, href=f"/api/v1/recordings/{session}/{path.name}")

@@ -138,6 +138,17 @@ def open_session(folder: Path) -> Session:
     return Session(folder, replace(info, trials=(*kept, *map(_trial_from, found))), (*remarks, *unreadable))
 
 
+def read_listing(folder: Path) -> tuple[SessionInfo | None, tuple[str, ...]]:
+    """What ``session.json`` says, None where it is missing or broken, and sentences on that.
+
+    No recording is opened: a listing takes as long beside a session of an hour as beside an empty one.
+    """
+    info, remarks = _read_info(folder)
+    listed = {trial.file for trial in info.trials} if info else set()
+    unlisted = sorted(path.name for path in folder.glob("*.mcap") if path.name not in listed)
+    return info, (*remarks, *(f"{name}: not listed in {SESSION_FILE}" for name in unlisted))
+
+
 def derive(folder: Path, names: Collection[str] | None = None) -> list[Path]:
     """Rebuilds ``parquet/NAME.STREAM.parquet`` of all trials, or of those in ``names``; the paths written."""
     session = open_session(folder)

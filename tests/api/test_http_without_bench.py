@@ -102,6 +102,29 @@ def test_protocols_beyond_the_limits_are_listed_with_the_refusal(tmp_path: Path)
     assert "nearest valid key: depth_mm" in listed["typo"]
 
 
+def test_one_bad_file_hides_no_other(tmp_path: Path) -> None:
+    protocols, sessions = tmp_path / "protocols", tmp_path / "sessions"
+    for folder in (protocols, sessions / "garbage", sessions / "secret"):
+        folder.mkdir(parents=True)
+    (protocols / "nested.toml").write_text('kind = "indentation"\nspeeds_mm_s = ' + "[" * 3000 + "]" * 3000)
+    (protocols / "fine.toml").write_text('kind = "indentation"\n')
+    (sessions / "garbage" / "a.mcap").write_bytes(b"no recording at all")
+    (sessions / "secret" / "b.mcap").symlink_to("/etc/hostname")
+    with TestClient(
+        build(Service(Wiring(force=Force(port="/dev/no-such-sensor")), sessions, protocols)),
+        base_url="http://127.0.0.1:8000",
+    ) as client:
+        listed = {item["name"]: item["refusal"] for item in client.get("/api/v1/protocols").json()}
+        found = {item["name"]: item for item in client.get("/api/v1/recordings").json()}
+        assert client.get("/api/v1/recordings/secret/b.mcap").status_code == 404
+    assert listed["fine"] == ""
+    assert "nests its values too deeply" in listed["nested"]
+    assert found["garbage"]["remarks"] == [
+        "session.json is missing: the session is taken from its recordings",
+        "a.mcap: not listed in session.json",
+    ]
+
+
 def test_the_interface_description_covers_every_route_and_every_problem(client: TestClient) -> None:
     schema = client.get("/api/v1/openapi.json").json()
     paths = set(schema["paths"])

@@ -1,0 +1,68 @@
+"""HTTP connections that end by themselves where the other side does not read or write: a slow client keeps nothing."""
+
+import asyncio
+import socket
+import struct
+from typing import Any, ClassVar
+
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+NO_LINGER = struct.pack("ii", 1, 0)
+
+
+class ImpatientProtocol(H11Protocol):
+    """Uvicorn's own protocol with two deadlines: for a request's head to come, and for what is sent to be read."""
+
+    # A request's head is one packet; a client on this computer sends it in one go.
+    head_s: ClassVar = 5.0
+    # A page that shows live values reads twenty times a second; one that has not read for this long has been left.
+    read_s: ClassVar = 5.0
+    _head: asyncio.TimerHandle | None = None
+    _reading: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Starts the first deadline."""
+        super().connection_made(transport)
+        self._head = self.loop.call_later(self.head_s, self._end_without_head)
+
+    @property
+    def _asked(self) -> bool:
+        """Whether a whole head has come."""
+        cycle: object = self.cycle
+        return cycle is not None
+
+    def pause_writing(self) -> None:
+        """The client has stopped reading."""
+        super().pause_writing()
+        self._reading = self.loop.call_later(self.read_s, self._drop)
+
+    def resume_writing(self) -> None:
+        """It reads again."""
+        self._cancel_reading()
+        super().resume_writing()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Ends both deadlines."""
+        if self._head:
+            self._head.cancel()
+        self._cancel_reading()
+        super().connection_lost(exc)
+
+    def _end_without_head(self) -> None:
+        if not self._asked:
+            self._drop()
+
+    def _drop(self) -> None:
+        """At once: what the system still holds for a client that does not read is thrown away too."""
+        self.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_LINGER)
+        self.transport.abort()
+
+    def _cancel_reading(self) -> None:
+        if self._reading:
+            self._reading.cancel()
+            self._reading = None
+
+
+def server_settings() -> dict[str, Any]:
+    """What `uvicorn.Config` needs so that no client can hold the service up."""
+    return {"http": ImpatientProtocol, "timeout_keep_alive": 5, "backlog": 128, "log_level": "warning"}

@@ -1,0 +1,129 @@
+"""Bodies that are too large or too slow, and clients that do not read, over real sockets."""
+
+import asyncio
+import json
+import socket
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+import uvicorn
+
+from api.http.connection import ImpatientProtocol, server_settings
+from api.http.guard import LARGEST_BODY_BYTES, Application, Guard, Message, Receive, Scope, Send
+
+GIGABYTE = 1_000_000_000
+MEGABYTE = b"x" * 1_000_000
+
+
+class Hasty(ImpatientProtocol):
+    head_s = 0.3
+    read_s = 0.3
+
+
+async def echo(scope: Scope, receive: Receive, send: Send) -> None:
+    """Answers with the body's size; `/flood` sends more than any buffer takes, for up to 2 s."""
+    flooding = scope["path"] == "/flood"
+    text = b"" if flooding else str(len((await receive())["body"])).encode()
+    length = [] if flooding else [(b"content-length", str(len(text)).encode())]
+    await send({"type": "http.response.start", "status": 200, "headers": length})
+    for _ in range(1000 if flooding else 0):
+        await send({"type": "http.response.body", "body": MEGABYTE, "more_body": True})
+        await asyncio.sleep(0.002)
+    await send({"type": "http.response.body", "body": text, "more_body": False})
+
+
+@pytest.fixture(scope="module")
+def port() -> Iterator[int]:
+    app: Application = Guard(echo, {"X-Content-Type-Options": "nosniff"}, body_s=0.3)
+    config = uvicorn.Config(app, **server_settings() | {"http": Hasty}, lifespan="off")
+    server = uvicorn.Server(config)
+    listening = socket.create_server(("127.0.0.1", 0))
+    thread = threading.Thread(target=server.run, args=([listening],))
+    thread.start()
+    while not server.started:
+        time.sleep(0.01)
+    yield int(listening.getsockname()[1])
+    server.should_exit = server.force_exit = True
+    thread.join()
+    listening.close()
+
+
+def ask(port: int, head: str, body: bytes = b"") -> tuple[int, str]:
+    """Status and body of the answer to one request; the answer is read until the service closes."""
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as client:
+        client.sendall(f"POST / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n{head}\r\n".encode() + body)
+        answer = b""
+        while part := client.recv(65536):
+            answer += part
+    status, _, text = answer.decode().partition("\r\n\r\n")
+    return int(status.split()[1]), text
+
+
+def test_a_body_within_the_limit_reaches_the_application_whole(port: int) -> None:
+    size = LARGEST_BODY_BYTES
+    assert ask(port, f"Content-Length: {size}\r\nConnection: close\r\n", b"x" * size) == (200, str(size))
+
+
+def test_a_stated_gigabyte_is_refused_before_any_of_it_comes(port: int) -> None:
+    began_s = time.monotonic()
+    status, text = ask(port, f"Content-Length: {GIGABYTE}\r\n")
+    assert (status, json.loads(text)["code"]) == (413, "too-large")
+    assert "above 64000 bytes" in text
+    assert time.monotonic() - began_s < 2
+
+
+def test_an_unstated_size_is_refused_when_the_limit_is_passed(port: int) -> None:
+    chunk = b"8000\r\n" + b"x" * 0x8000 + b"\r\n"
+    status, text = ask(port, "Transfer-Encoding: chunked\r\n", chunk * 3)
+    assert (status, json.loads(text)["code"]) == (413, "too-large")
+
+
+def test_a_body_that_trickles_is_refused(port: int) -> None:
+    status, text = ask(port, "Content-Length: 1000\r\n", b"x")
+    assert (status, json.loads(text)["code"]) == (408, "slow-body")
+
+
+@pytest.mark.parametrize("head", [b"", b"GET / HT", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"])
+def test_a_head_that_does_not_come_loses_the_connection(port: int, head: bytes) -> None:
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as client:
+        client.sendall(head)
+        with pytest.raises(ConnectionError):
+            assert client.recv(100) == b""
+            raise ConnectionError
+
+
+def test_a_client_that_does_not_read_loses_its_connection(port: int) -> None:
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.sendall(f"GET /flood HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+        time.sleep(1.0)
+        with pytest.raises(ConnectionError):
+            while client.recv(1_000_000):
+                pass
+            raise ConnectionError
+
+
+def test_a_client_that_reads_slowly_but_reads_keeps_its_connection(port: int) -> None:
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as client:
+        client.sendall(f"GET /flood HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+        until_s = time.monotonic() + 1.0
+        while time.monotonic() < until_s:
+            assert client.recv(1_000_000)
+            time.sleep(0.001)
+
+
+def test_a_size_that_is_no_number_is_refused() -> None:
+    sent: list[Message] = []
+
+    async def send(message: Message) -> None:
+        sent.append(message)
+
+    async def receive() -> Message:
+        raise AssertionError("nothing is read")
+
+    headers = [(b"host", b"127.0.0.1"), (b"content-length", b"-5")]
+    scope = {"type": "http", "method": "POST", "path": "/", "headers": headers, "server": ("127.0.0.1", 80)}
+    asyncio.run(Guard(echo, {})(scope, receive, send))
+    assert sent[0]["status"] == 400
