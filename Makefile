@@ -6,7 +6,7 @@ READY := $(VENV)/ready
 # Modules are compiled once, not by each of the processes that a bench is made of.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test lint types contracts lock clean
+.PHONY: demo test mutants mutants-sample lint types contracts lock clean
 
 demo: $(READY)
 	$(BIN)/rig demo --out demo
@@ -17,6 +17,13 @@ test: $(READY) browser
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n 2 --dist loadgroup
+
+# Mutants of what keeps the tip from hurting; a sample of them, drawn by SEED, in every run of CI.
+mutants: $(READY)
+	$(BIN)/python -m benchmarks.mutation
+
+mutants-sample: $(READY)
+	$(BIN)/python -m benchmarks.mutation --sample 60 $(if $(SEED),--seed $(SEED))
 
 # A mirror that does not answer must not hold up the tests.
 APT := DEBIAN_FRONTEND=noninteractive timeout 300 apt-get -o Acquire::Retries=1 -o Acquire::http::Timeout=20

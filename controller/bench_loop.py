@@ -1,16 +1,18 @@
 """One turn of the loop: poll inputs, decide, command, publish. Nothing in it waits."""
 
 import math
-from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
 from controller.devices import Devices
+from controller.force_watch import ForceWatch, calibrated_zero
 from controller.health import IDENTICAL_LIMIT, Standstill, StreamHealth
 from controller.loop import Slot
 from controller.machine import Machine
 from controller.messages import Finished, Outcome, Status, StatusSaid, Stopped
 from controller.modes import Mode
+from controller.motion import Setpoint
+from controller.paired import Touch
 from controller.registration import Point, Registration
 from controller.safety import TABLE, Action, Check, Incident
 from controller.steps import Program
@@ -34,7 +36,6 @@ from rig.errors import DeviceError
 
 STATUS_EVERY_S = 0.05
 TEXT_BYTES = 160
-RATE_WINDOW_NS = 10_000_000
 TIP, ARM = 0, 1
 # A sample this many periods old is not acted on; when it counts as lost is for the safety table to say.
 LATE_PERIODS = 5
@@ -88,10 +89,11 @@ class BenchLoop:
         }
         self._status_every = max(1, round(STATUS_EVERY_S / period_s))
         self._ticks = self._events = self._program = 0
-        self._recent: deque[tuple[int, float]] = deque()
-        self._signs = 1.0 if wiring.force.compression == "positive" else -1.0
-        self._force_field = ForceSample._fields.index(f"{wiring.force.axis}_N")
+        self._force_watch = ForceWatch(devices.force.period_ns)
+        self._calibrated_zero = calibrated_zero(wiring)
+        self._force_map = wiring.force_map
         self._pulled = False
+        self._touch_said: Touch | None = None
         self._limb_seen_ns = 0
 
     def tick(self, slot: Slot) -> bool:
@@ -103,6 +105,7 @@ class BenchLoop:
         incident = self.machine.update(self.watch)
         if incident:
             self._report(incident, now_ns)
+        self._say_touch(now_ns)
         # The drive samples when it is asked, which is later than this turn began.
         self._command(self._now())
         self._publish(slot, now_ns)
@@ -110,8 +113,8 @@ class BenchLoop:
         return self._commands.more(self)
 
     def _poll(self, now_ns: int) -> None:
+        self._poll_axis(now_ns)  # before the force, which is placed by where the axis was
         self._poll_force(now_ns)
-        self._poll_axis(now_ns)
         if self.devices.tracker and not self.watch.marker_lost:
             try:
                 for sample in self.devices.tracker.poll(now_ns):
@@ -140,18 +143,23 @@ class BenchLoop:
             self.watch.axis_lost = str(error)
 
     def _take_force(self, sample: ForceSample) -> None:
-        raw_N = self._signs * float(sample[self._force_field])
-        self.world.raw_N = raw_N
+        self.world.raw_N = self._force_map.compression_N(sample.fx_N, sample.fy_N, sample.fz_N)
+        self.world.wrench = sample[4:10]
         self.world.force_samples += 1
+        self._force_watch.force(sample.capture_ns, sample[4:10])
+        if sample.valid:
+            self.world.paired.force(sample.capture_ns, self.world.raw_N)
         self._health["force"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample[4:10])
-        self._recent.append((sample.capture_ns, raw_N))
-        while sample.capture_ns - self._recent[0][0] > RATE_WINDOW_NS and len(self._recent) > 2:
-            self._recent.popleft()
 
     def _take_axis(self, sample: AxisSample) -> None:
         world = self.world
+        if math.isnan(world.position_mm):  # until the axis has said where it is, it is not told where to be
+            world.setpoint = Setpoint(sample.position_mm, 0.0)
         world.position_mm, world.velocity_mm_s = sample.position_mm, sample.velocity_mm_s
+        if sample.valid:
+            world.paired.axis(sample.capture_ns, sample.position_mm)
         world.standstill_mm = self._standstill.update(sample.position_mm, world.setpoint.position_mm)
+        self._force_watch.axis(sample.capture_ns, sample.position_mm)
         if self.devices.tracker:
             self._registration.axis(sample.capture_ns, sample.position_mm)
         self._health["axis"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample.seq)
@@ -173,7 +181,10 @@ class BenchLoop:
         world, watch, health = self.world, self.watch, self._health
         world.now_ns = now_ns
         world.force_N = world.raw_N - world.zero_N
-        world.force_rate_N_s = self._force_rate()
+        going = world.setpoint if self.machine.busy else Setpoint(world.position_mm, 0.0)
+        world.load = self._force_watch.load(
+            now_ns, world.reference_zero or self._calibrated_zero, world.noise_N, going, world.acceleration_mm_s2
+        )
         world.force_late = health["force"].age_ns(now_ns) > LATE_PERIODS * health["force"].period_ns
         world.following_mm = world.setpoint.position_mm - world.position_mm if self.machine.busy else 0.0
         watch.force_valid, watch.force_frozen = health["force"].valid, health["force"].frozen
@@ -189,16 +200,11 @@ class BenchLoop:
         watch.supervisor_lost = self._channel.lost
         watch.operator_silent_s = (now_ns - self._commands.heard_ns) * 1e-9 if self._commands.heard_ns else 0.0
 
-    def _force_rate(self) -> float:
-        first, last = (self._recent[0], self._recent[-1]) if len(self._recent) > 2 else ((0, 0.0), (0, 0.0))
-        span_ns = last[0] - first[0]
-        return (last[1] - first[1]) / span_ns * 1e9 if span_ns > RATE_WINDOW_NS // 2 else 0.0
-
     def _command(self, now_ns: int) -> None:
         if self.watch.axis_lost:
             return
         try:
-            if self.devices.axis.enabled and not self._pulled:
+            if self.devices.axis.enabled and not self._pulled and math.isfinite(self.world.position_mm):
                 self.devices.axis.command(self.world.setpoint.position_mm, now_ns)
             else:
                 self.devices.axis.request(now_ns)
@@ -238,6 +244,13 @@ class BenchLoop:
         self._ring.put(EVENT.id, EVENT.pack(row))
         self._events += 1
 
+    def _say_touch(self, now_ns: int) -> None:
+        """One note for each surface found."""
+        touch = self.world.touch
+        if touch is not None and touch is not self._touch_said:
+            self.event(Action.NOTE, "contact", touch.sentence, now_ns)
+        self._touch_said = touch
+
     def _finished(self, outcome: str, incident: Incident | None) -> None:
         world = self.world
         self.event(Action.NOTE, "program_end", outcome, world.now_ns)
@@ -247,6 +260,7 @@ class BenchLoop:
             peak_force_N=world.peak_force_N,
             surface_mm=None if math.isnan(world.surface_mm) else world.surface_mm,
             zero_N=None if math.isnan(world.zero_N) else world.zero_N,
+            touch=world.touch,
         )
         self._channel.send(Finished(program=self._program, outcome=outcome_of))
 

@@ -1,7 +1,10 @@
 """What the supervisor asks of the loop, taken at most one message a tick."""
 
+from datetime import UTC, datetime
+
 from controller.bench_loop import BenchLoop
 from controller.checks import refuse_beyond_limits
+from controller.commissioning.refusals import refuse_uncommissioned
 from controller.messages import Lease, Note, Reset, Run, Shutdown, Stop
 from controller.safety import Action
 from controller.steps import Program
@@ -63,6 +66,8 @@ class Inbox:
         if loop.machine.latched:
             raise UsageError(f"stopped by {loop.machine.latched.text}: acknowledge it with a reset first")
         refuse_beyond_limits(program, loop.wiring)
+        force, axis = loop.devices.force.identity, loop.devices.axis.identity
+        refuse_uncommissioned(program, loop.wiring, force, axis, datetime.now(UTC))
         loop.event(Action.NOTE, "program_start", program.name, loop.world.now_ns)
         loop.start(program, number)
 

@@ -18,6 +18,7 @@ from controller.devices import Devices, start_devices
 from controller.loop import Executive, sleep_then_spin
 from controller.messages import TO_LOOP, Failed, Ready
 from controller.safety import TABLE, Check
+from controller.touch import warm_up
 from rig.channel import Channel
 from rig.config.wiring import Wiring
 from rig.errors import RigError
@@ -49,6 +50,7 @@ def _serve(wiring: Wiring, ring_path: Path, channel: Channel, table: tuple[Check
     # Memory and privileges first: from the axis' start on, the drive counts the time between our heartbeats.
     ring = RingWriter.create(ring_path)
     try:
+        warm_up()
         granted = realtime.acquire(wiring.loop.priority)
         devices = start_devices(wiring)
         try:

@@ -59,7 +59,7 @@ class Machine:
         world = self.world
         world.setpoint = self._here()
         world.surface_mm = world.reference_N = world.tangent_N_mm = math.nan
-        world.peak_force_N, world.outcome, world.memory = 0.0, "", None
+        world.peak_force_N, world.outcome, world.memory, world.touch = 0.0, "", None, None
         self._program = program
         self._enter(0)
 

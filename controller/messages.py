@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
+from controller.paired import Touch
 from controller.steps import Program
 from rig.channel import Message
 
@@ -21,6 +22,7 @@ class Outcome:
     peak_force_N: float
     surface_mm: float | None
     zero_N: float | None
+    touch: Touch | None = None
 
     @property
     def stopped(self) -> bool:

@@ -69,6 +69,7 @@ TABLE: tuple[Check, ...] = (
     Check("overspeed", Action.IMMEDIATE, check.speed, TURN_S),
     Check("workspace", Action.IMMEDIATE, check.workspace, TURN_S),
     Check("force_limit", Action.SOFT, check.force_limit, TURN_S),
+    Check("torque_limit", Action.SOFT, check.torque_limit, TURN_S),
     Check("pain_stop", Action.SOFT, check.pain_stop, TURN_S),
     Check("operator_stop", Action.SOFT, check.operator_stop, TURN_S),
     Check("force_lost", Action.SOFT, check.force_lost, STALE_S),

@@ -70,12 +70,22 @@ def speed(world: World, watch: Watch, wiring: Wiring) -> str:
 
 
 def force_limit(world: World, watch: Watch, wiring: Wiring) -> str:
-    """Force above the lower of machine limit and pain threshold."""
-    force_N = world.raw_N - (0.0 if math.isnan(world.first_zero_N) else world.first_zero_N)
-    if force_N <= wiring.force_limit_N:
+    """Load, or the load that will be there before the axis stands, above machine limit or pain threshold."""
+    load_N, predicted_N, limit_N = world.load.force_N, world.load.predicted_N, wiring.force_limit_N
+    if load_N <= limit_N and predicted_N <= limit_N:
         return ""
-    whose = "the subject's pain threshold" if wiring.force_limit_N < wiring.limits.force_N else "limits.force_N"
-    return f"force {force_N:.2f} N is above {whose}, {wiring.force_limit_N:g} N"
+    whose = "the subject's pain threshold" if limit_N < wiring.limits.force_N else "limits.force_N"
+    if not load_N <= limit_N:
+        return f"force {load_N:.2f} N is above {whose}, {limit_N:g} N"
+    return f"force {load_N:.2f} N would be {predicted_N:.2f} N before the axis stands, above {whose}, {limit_N:g} N"
+
+
+def torque_limit(world: World, watch: Watch, wiring: Wiring) -> str:
+    """Moment above its limit."""
+    torque_N_m, limit_N_m = world.load.torque_N_m, wiring.limits.torque_N_m
+    if torque_N_m <= limit_N_m:
+        return ""
+    return f"torque {torque_N_m:.3f} N m is above limits.torque_N_m, {limit_N_m:g} N m"
 
 
 def pain_stop(world: World, watch: Watch, wiring: Wiring) -> str:
@@ -97,17 +107,15 @@ def force_lost(world: World, watch: Watch, wiring: Wiring) -> str:
 
 def force_invalid(world: World, watch: Watch, wiring: Wiring) -> str:
     """The sensor does not vouch for its samples, or repeats one."""
-    if not watch.force_valid or math.isnan(world.raw_N):
+    if not watch.force_valid or not all(map(math.isfinite, world.wrench)):
         return "the force sensor marks its samples as invalid or out of range"
     return "the force sensor repeats the same value: it is frozen" if watch.force_frozen else ""
 
 
 def force_rate(world: World, watch: Watch, wiring: Wiring) -> str:
     """Force changes faster than it may."""
-    limit = wiring.limits.force_rate_N_s
-    if abs(world.force_rate_N_s) <= limit:
-        return ""
-    return f"force changes by {world.force_rate_N_s:.0f} N/s (limit {limit:g} N/s)"
+    rate_N_s, limit_N_s = world.load.rate_N_s, wiring.limits.force_rate_N_s
+    return "" if rate_N_s <= limit_N_s else f"force changes by {rate_N_s:.0f} N/s (limit {limit_N_s:g} N/s)"
 
 
 def depth(world: World, watch: Watch, wiring: Wiring) -> str:

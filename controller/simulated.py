@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from controller import force_position, lines, stretches
 from controller.force_position import Columns
+from controller.force_watch import Load
 from controller.lines import Line
 from controller.machine import Machine
 from controller.modes import Mode
@@ -113,8 +114,12 @@ class _Playback:
         if self._tick % sensing.every_ticks == 0:
             held_N = axis_plant.reading(sensed[0], self._drawn(1)[0], sensing)
         world.now_ns, world.raw_N, world.force_samples = round(self._tick * self._period_s * 1e9), held_N, self._tick
+        world.wrench = (0.0, 0.0, held_N, 0.0, 0.0, 0.0)
+        load_N = abs(held_N - self._zeros().first_N)
+        world.load = Load(load_N, 0.0, 0.0, 0.0, load_N)
         world.force_N, world.position_mm = world.raw_N - world.zero_N, state.position_mm
         world.following_mm = world.setpoint.position_mm - world.position_mm
+        self._pair(self._tick, world.raw_N, world.position_mm)
         machine.update(watch)
         command_mm = world.setpoint.position_mm
         row = (world.now_ns * 1e-9, machine.mode, world.reference_N, state.force_N, world.force_N, command_mm,
@@ -125,6 +130,13 @@ class _Playback:
             self._now = Bench(state, np.append(sensed[1:], state.sensed_N), held_N, world.setpoint)
         self._tick += 1
         return machine.busy
+
+    def _pair(self, tick: int, raw_N: float, position_mm: float) -> None:
+        """One tick's samples as devices would tell them: force is sensed as many ticks late as the sensor is."""
+        sensing, paired = self._plant.sensing, self._world.paired
+        if tick % sensing.every_ticks == 0:
+            paired.force(round((tick - sensing.delay_ticks) * self._period_s * 1e9), raw_N)
+        paired.axis(round(tick * self._period_s * 1e9), position_mm)
 
     def _drawn(self, count: int) -> Column:
         """Standard normals of the next ``count`` ticks."""
@@ -140,7 +152,7 @@ class _Playback:
             return
         if isinstance(step, TrackForce) and world.memory is not None:
             self._follow(step, steps)
-        elif isinstance(step, Approach) and isinstance(run, ApproachRun) and run.has_run_in:
+        elif isinstance(step, Approach) and isinstance(run, ApproachRun) and run.has_run_in and run.searches:
             self._travel(step.search_to_mm, step.speed_mm_s, run.threshold_N(world), steps)
         elif isinstance(step, Retract):
             self._travel(step.target_mm(world), step.speed_mm_s, math.inf, steps)
@@ -169,6 +181,9 @@ class _Playback:
         clock = Clock(self._tick, self._period_s, steps)
         noise = self._drawn(LONGEST_STRETCH)
         done = stretches.travel(self._now, move, noise, self._plant, clock, self._zeros(), self._bounds())
+        if self._world.paired.collecting:
+            for index, (force_N, position_mm) in enumerate(done.rows[[1, 3]].T.tolist()):
+                self._pair(self._tick + index, force_N + self._world.zero_N, position_mm)
         self._take(done, np.full(done.rows.shape[1], self._world.reference_N))
 
     def _take(self, done: Stretch, reference_N: Column) -> None:
@@ -184,7 +199,8 @@ class _Playback:
 
     def _zeros(self) -> Zeros:
         world = self._world
-        return Zeros(world.zero_N, 0.0 if math.isnan(world.first_zero_N) else world.first_zero_N, world.surface_mm)
+        first_N = world.reference_zero[2] if world.reference_zero else 0.0
+        return Zeros(world.zero_N, first_N, world.surface_mm)
 
     def _bounds(self) -> Bounds:
         limits, axis = self._wiring.limits, self._wiring.axis

@@ -11,19 +11,28 @@ from pydantic import Field
 
 from controller import force_position, lines
 from controller.force_position import GainRow, Settings
+from controller.force_watch import Wrench
 from controller.lines import Line
 from controller.modes import Mode
-from controller.motion import Setpoint, arrived, clamp, toward
+from controller.motion import Setpoint, clamp
+from controller.touch import Touching, TouchRun
 from controller.world import World
 from rig.config.table import Table
 from rig.errors import SafetyStop
 
 Positive = Annotated[float, Field(gt=0)]
 CONTACT_SAMPLES = 3
-CONTACT_NOISE = 4.0
+# The loading up to ten times the noise tells where it began; noise alone reaches four times itself three times in a
+# row once in 10^13. More than 1 N is not pressed for that: the lowest pain thresholds of limbs are near 5 N.
+TELLING_NOISE, CONTACT_NOISE, LARGEST_DETECTION_N = 10.0, 4.0, 1.0
 RUN_IN_MM = 0.5
 LARGEST_RUBBING_N = 0.5
+# Ten standard deviations of one sample of the noisier product; a hundred times those of a zero's mean.
 LARGEST_ZERO_SHIFT_N = 0.5
+# A tenth of limits.torque_N_m, and 25 standard deviations of one sample of the noisier product.
+LARGEST_ZERO_SHIFT_N_M = 0.05
+CHANNELS = ("fx", "fy", "fz", "mx", "my", "mz")
+CHANNEL_SHIFTS = 3 * ((LARGEST_ZERO_SHIFT_N, "N"),) + 3 * ((LARGEST_ZERO_SHIFT_N_M, "N m"),)
 
 
 class Zero(Table):
@@ -39,30 +48,42 @@ class Zero(Table):
 
 
 class ZeroRun:
-    """Collects the raw force while resting, each sample once however often the loop turns."""
+    """Collects all channels while resting, each sample once however often the loop turns."""
 
     def __init__(self, step: Zero) -> None:
         self._step, self._seen = step, -1
         self._values_N: list[float] = []
+        self._wrenches: list[Wrench] = []
 
     def advance(self, world: World, elapsed_s: float) -> bool:
-        """Stands still; at the end sets zero and noise, refusing a zero far from the first."""
+        """Stands still; at the end sets zero and noise, refusing a zero far from the first in any channel."""
         if world.force_samples != self._seen:
             self._seen = world.force_samples
             self._values_N.append(world.raw_N)
+            self._wrenches.append(world.wrench)
         if elapsed_s < self._step.duration_s:
             return False
-        zero_N = fmean(self._values_N)
-        world.noise_N = pstdev(self._values_N, zero_N)
-        if math.isnan(world.first_zero_N):
-            world.first_zero_N = zero_N
-        elif abs(zero_N - world.first_zero_N) > LARGEST_ZERO_SHIFT_N:
-            raise SafetyStop(
-                f"force in the air moved by {zero_N - world.first_zero_N:+.2f} N since the first zero"
-                f" (limit {LARGEST_ZERO_SHIFT_N:g} N): is the tip touching, or the sensor drifting?"
-            )
-        world.zero_N = zero_N
+        fx_N, fy_N, fz_N, mx_N_m, my_N_m, mz_N_m = (fmean(channel) for channel in zip(*self._wrenches, strict=True))
+        zero = (fx_N, fy_N, fz_N, mx_N_m, my_N_m, mz_N_m)
+        _refuse_drift(zero, world.reference_zero or zero)
+        world.reference_zero = world.reference_zero or zero
+        world.zero_N = fmean(self._values_N)
+        world.noise_N = pstdev(self._values_N, world.zero_N)
         return True
+
+
+def _refuse_drift(zero: Wrench, reference: Wrench) -> None:
+    """Raises SafetyStop naming the channel that is furthest from the first zero of the session."""
+    shifts = {
+        name: (now - first, limit, unit)
+        for name, now, first, (limit, unit) in zip(CHANNELS, zero, reference, CHANNEL_SHIFTS, strict=True)
+    }
+    name, (shift, limit, unit) = max(shifts.items(), key=lambda item: abs(item[1][0]) / item[1][1])
+    if not abs(shift) <= limit:
+        raise SafetyStop(
+            f"{name} in the air moved by {shift:+.2g} {unit} since the first zero (limit {limit:g} {unit}):"
+            " is the tip touching, or the sensor drifting?"
+        )
 
 
 class MoveTo(Table):
@@ -79,17 +100,23 @@ class MoveTo(Table):
 
     def advance(self, world: World, elapsed_s: float) -> bool:  # noqa: ARG002
         """One tick of the move."""
-        return _go(world, self.position_mm, self.speed_mm_s)
+        return world.go(self.position_mm, self.speed_mm_s)
 
 
 class Approach(Table):
-    """Moves down until the force says contact; the position there is the surface."""
+    """Moves down until the force says contact, and rests while the surface is estimated from the force on the way.
+
+    Where the surface is not known to ``within_mm`` (95 %), the tip touches again, slowly, up to ``touches`` times.
+    """
 
     step: Literal["approach"] = "approach"
     mode: ClassVar[Mode] = Mode.APPROACH
     speed_mm_s: Positive
     contact_force_N: Positive
     search_to_mm: float
+    within_mm: Positive = 0.2
+    touches: Annotated[int, Field(ge=0, le=10)] = 0
+    touch_speed_mm_s: Positive = 0.5
 
     def begin(self) -> "ApproachRun":
         """A run of this step."""
@@ -107,24 +134,34 @@ class ApproachRun:
         self._step, self._above, self._seen = step, 0, -1
         self._from_mm, self._rubbing_N = math.nan, LARGEST_RUBBING_N
         self._running_in_N: list[float] = []
+        self._touch: TouchRun | None = None
         self.has_run_in = False
 
     def threshold_N(self, world: World) -> float:
         """Force that may be contact."""
-        return max(self._step.contact_force_N, CONTACT_NOISE * world.noise_N) + self._rubbing_N
+        telling_N = min(TELLING_NOISE * world.noise_N, LARGEST_DETECTION_N)
+        return max(self._step.contact_force_N, telling_N, CONTACT_NOISE * world.noise_N) + self._rubbing_N
+
+    @property
+    def searches(self) -> bool:
+        """Whether contact was not detected yet."""
+        return self._touch is None
 
     def advance(self, world: World, elapsed_s: float) -> bool:  # noqa: ARG002
-        """One tick of the search; raises SafetyStop where it ends without contact."""
+        """One tick of the search, then of the touch; raises SafetyStop where it ends without contact."""
+        if self._touch:
+            return self._touch.advance(world)
         if world.force_samples != self._seen:
             self._seen = world.force_samples
             if not self.has_run_in:
                 self._run_in(world)
             self._above = self._above + 1 if world.force_N > self.threshold_N(world) else 0
         if self._above >= CONTACT_SAMPLES:
-            world.surface_mm, world.memory = world.position_mm, None
-            world.setpoint = Setpoint(world.setpoint.position_mm, 0.0)
-            return True
-        if _go(world, self._step.search_to_mm, self._step.speed_mm_s):
+            step = self._step
+            touching = Touching(step.within_mm, step.touches, step.touch_speed_mm_s)
+            self._touch = TouchRun(world, touching, self.has_run_in)
+            return self._touch.advance(world)
+        if world.go(self._step.search_to_mm, self._step.speed_mm_s):
             raise SafetyStop(
                 f"no contact down to {self._step.search_to_mm:g} mm (threshold {self._step.contact_force_N:g} N):"
                 " is the limb under the tip? raise search_to_mm if the surface lies deeper"
@@ -135,9 +172,12 @@ class ApproachRun:
         """Force after the slip of the guide and before 0.5 mm; until then anything up to the largest may be rubbing."""
         if math.isnan(self._from_mm):
             self._from_mm = world.position_mm
+            world.paired.clear()
+            world.paired.collecting = True
         moved_mm = world.position_mm - self._from_mm
         if moved_mm >= RUN_IN_MM:
             self.has_run_in = True
+            world.paired.clear()
             self._rubbing_N = min(max(fmean(self._running_in_N or [0.0]), 0.0), LARGEST_RUBBING_N)
         elif moved_mm >= 0.5 * RUN_IN_MM:
             self._running_in_N.append(world.force_N)
@@ -162,7 +202,7 @@ class Compress(Table):
             world.outcome = "force limit"
             world.setpoint = Setpoint(world.setpoint.position_mm, 0.0)
             return True
-        return _go(world, world.surface_mm + self.depth_mm, self.speed_mm_s)
+        return world.go(world.surface_mm + self.depth_mm, self.speed_mm_s)
 
 
 class Hold(Table):
@@ -311,7 +351,7 @@ class Retract(Table):
         """One tick of the way out; without a surface it leaves from where it is."""
         world.reference_N = world.tangent_N_mm = math.nan
         world.memory = None
-        return _go(world, self.target_mm(world), self.speed_mm_s)
+        return world.go(self.target_mm(world), self.speed_mm_s)
 
     def target_mm(self, world: World) -> float:
         """Where it ends."""
@@ -328,8 +368,3 @@ class Program(Table):
 
     name: str
     steps: tuple[Annotated[Step, Field(discriminator="step")], ...] = Field(min_length=1)
-
-
-def _go(world: World, target_mm: float, speed_mm_s: float) -> bool:
-    world.setpoint = toward(world.setpoint, target_mm, speed_mm_s, world.acceleration_mm_s2, world.dt_s)
-    return arrived(world.setpoint, target_mm)

@@ -95,7 +95,7 @@ class Stretch(NamedTuple):
 def beyond(bounds: Bounds, zeros: Zeros, raw_N: float, bench_position_mm: float, setpoint_mm: float) -> bool:
     """Whether the safety table would have a word."""
     return (
-        raw_N - zeros.first_N > bounds.force_N
+        abs(raw_N - zeros.first_N) > bounds.force_N
         or bench_position_mm - zeros.surface_mm > bounds.depth_mm
         or abs(setpoint_mm - bench_position_mm) > bounds.following_mm
         or bench_position_mm < bounds.low_mm

@@ -4,22 +4,30 @@ import math
 from dataclasses import dataclass, field
 
 from controller.force_position import Memory
-from controller.motion import Setpoint
+from controller.force_watch import NAN_WRENCH, UNKNOWN, Load, Wrench
+from controller.motion import Setpoint, arrived, toward
+from controller.paired import PairedSamples, Touch
 
 
 @dataclass(slots=True)
 class World:
-    """State shared by steps and safety, owned by the machine; forces are compressive, from the reference zero."""
+    """State shared by steps and safety, owned by the machine.
+
+    ``raw_N``, ``zero_N`` and ``force_N`` are the configured channel with its sign, compression positive; what safety
+    looks at, ``load``, is all channels from ``reference_zero``, the first zero of the session.
+    """
 
     setpoint: Setpoint = field(default_factory=lambda: Setpoint(0.0, 0.0))
     now_ns: int = 0
     dt_s: float = 0.001
     acceleration_mm_s2: float = 2000.0
+    wrench: Wrench = NAN_WRENCH
+    reference_zero: Wrench | None = None
+    load: Load = UNKNOWN
     raw_N: float = math.nan
     force_samples: int = 0
     noise_N: float = 0.0
     force_N: float = math.nan
-    force_rate_N_s: float = 0.0
     force_late: bool = False
     position_mm: float = math.nan
     velocity_mm_s: float = 0.0
@@ -27,11 +35,12 @@ class World:
     standstill_mm: float = 0.0
     patient_mm: float = math.nan
     zero_N: float = math.nan
-    first_zero_N: float = math.nan
     surface_mm: float = math.nan
     reference_N: float = math.nan
     tangent_N_mm: float = math.nan
     memory: Memory | None = None
+    paired: PairedSamples = field(default_factory=PairedSamples)
+    touch: Touch | None = None
     peak_force_N: float = 0.0
     outcome: str = ""
 
@@ -39,3 +48,8 @@ class World:
     def depth_mm(self) -> float:
         """Position below the surface found; NaN before contact."""
         return self.position_mm - self.surface_mm
+
+    def go(self, target_mm: float, speed_mm_s: float) -> bool:
+        """The next set-point of a move; whether the move is over."""
+        self.setpoint = toward(self.setpoint, target_mm, speed_mm_s, self.acceleration_mm_s2, self.dt_s)
+        return arrived(self.setpoint, target_mm)

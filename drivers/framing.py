@@ -14,7 +14,7 @@ class FixedFrames:
 
     ``is_good`` gets ``size`` bytes that begin with ``start`` and says whether their checksum is right. A checksum error
     is counted where a frame was due, that is behind another one; every byte outside a good frame is counted as
-    discarded.
+    discarded. ``gaps`` are the bytes discarded before each frame of the last ``feed``.
     """
 
     def __init__(self, start: bytes, size: int, is_good: Callable[[bytes], bool], counters: LinkCounters) -> None:
@@ -22,6 +22,8 @@ class FixedFrames:
         self._size = size
         self._is_good = is_good
         self._counters = counters
+        self.gaps: list[int] = []
+        self._gap = 0
         self._rest = b""
         self._due = -1
 
@@ -34,11 +36,14 @@ class FixedFrames:
         """The good frames completed by ``data``, oldest first."""
         buffer = self._rest + data
         frames = []
+        self.gaps = []
         at = self._candidate(buffer, 0)
         while at + self._size <= len(buffer):
             frame = buffer[at : at + self._size]
             if self._is_good(frame):
                 frames.append(frame)
+                self.gaps.append(self._gap)
+                self._gap = 0
                 self._due = following = at + self._size
             else:
                 self._miss(at)
@@ -54,7 +59,7 @@ class FixedFrames:
         found = buffer.find(self._start, at)
         if found < 0:
             found = len(buffer) - self._partial_start(buffer, at)
-        self._counters.discarded_bytes += found - at
+        self._discard(found - at)
         return found
 
     def _partial_start(self, buffer: bytes, at: int) -> int:
@@ -62,7 +67,11 @@ class FixedFrames:
         return next((size for size in range(len(tail), 0, -1) if self._start.startswith(tail[-size:])), 0)
 
     def _miss(self, at: int) -> None:
-        self._counters.discarded_bytes += 1
+        self._discard(1)
         if at == self._due:
             self._counters.checksum_errors += 1
             self._due += self._size
+
+    def _discard(self, count: int) -> None:
+        self._gap += count
+        self._counters.discarded_bytes += count

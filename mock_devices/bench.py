@@ -19,7 +19,10 @@ from mock_devices.physics.tissue import Limb, TissueLaw
 
 
 class Bench:
-    """All physics; ``axis``, ``force``, ``force_modbus`` and ``tracker`` are the plants the mocks are given."""
+    """All physics; ``axis``, ``force``, ``force_modbus`` and ``tracker`` are the plants the mocks are given.
+
+    ``weight_N`` presses on the tip along the axis besides the tissue, as a person would put it there.
+    """
 
     def __init__(self, parameters: Parameters, seed: int = 0, start_ns: int = 0) -> None:
         self.parameters = parameters
@@ -32,6 +35,7 @@ class Bench:
         self.force_modbus = ForcePlant(parameters.force_modbus, randoms[1])
         self.tracker = CameraPlant(parameters.tracker, randoms[2], start_ns, tip_mm, self.limb.position_mm)
         self.tip_mm, self.tip_speed_mm_s, self.contact_N = tip_mm, 0.0, 0.0
+        self.weight_N = 0.0
         self.hidden: Hidden = {}
         self._operators: dict[str, Effect] = {}
         self._chain = Chain()
@@ -89,7 +93,7 @@ class Bench:
         limb = self.limb
         surface_mm = limb.step(chain, time_s, self.contact_N > 0)
         contact_N = self.tissue.force_N(chain, tip_mm - surface_mm, speed_mm_s - limb.speed_mm_s, time_s)
-        load_N = contact_N
+        load_N = contact_N + self.weight_N
         for guide in chain.guide:
             load_N += guide(tip_mm - self.tip_mm, (speed_mm_s - self.tip_speed_mm_s) / STEP_S)
         self.tip_mm, self.tip_speed_mm_s, self.contact_N, self._load_N = tip_mm, speed_mm_s, contact_N, load_N

@@ -92,7 +92,7 @@ class BotaMock(OnWire):
         self.corrupt_every = 0
         self.refuse = ""
         self._plant = plant
-        self._serial_number = serial_number
+        self.serial_number = serial_number
         self._speed = 1 + drift_ppm * 1e-6
         self._parser = CommandParser()
         self._mode: Mode = "booting"
@@ -175,7 +175,7 @@ class BotaMock(OnWire):
     def _boot_text(self) -> bytes:
         name = "KMS40" if self.wrong_identity else NAME
         return (
-            f"{self._setup_text()}App Init\r\nname: {name}\r\nS/N: {self._serial_number}\r\nFW version: {FIRMWARE}\r\n"
+            f"{self._setup_text()}App Init\r\nname: {name}\r\nS/N: {self.serial_number}\r\nFW version: {FIRMWARE}\r\n"
         ).encode()
 
     def _setup_text(self) -> str:

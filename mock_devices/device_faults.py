@@ -9,6 +9,7 @@ from mock_devices.ndi import NdiMock
 from mock_devices.robotiq import RobotiqMock
 from rig.errors import UsageError
 
+ASTRAY_LARGEST_MM_S = 500.0
 AnySensor = BotaMock | RobotiqMock
 
 
@@ -99,6 +100,10 @@ def _axis_unguarded(axis: Epos4Mock, value: Value) -> None:
     axis.unguarded = as_switch(value)
 
 
+def _astray(axis: Epos4Mock, value: Value) -> None:
+    axis.lead_astray(as_number(value, -ASTRAY_LARGEST_MM_S, ASTRAY_LARGEST_MM_S))
+
+
 def _error(axis: Epos4Mock, value: Value) -> None:
     axis.inject_fault(_whole(value, 0xFFFF))
 
@@ -138,6 +143,7 @@ EPOS4_FAULTS: Mapping[str, Kind[Epos4Mock]] = {
     "frozen": Kind("repeats the position it had", True, _axis_frozen),
     "wrong_identity": Kind("has another maker and product", True, _axis_stranger),
     "unguarded": Kind("watches neither heartbeats nor its own limits any more", True, _axis_unguarded),
+    "astray": Kind("its set-points run away from those that were sent at this speed, mm/s; 0: no more", 10.0, _astray),
     "error": Kind("this error happens once (0x603F code, for example 0x8611 following error)", 0x8611, _error),
     "lasting_error": Kind("this error comes back at each reset; 0: its cause is gone", 0x3210, _lasting_error),
 }

@@ -4,6 +4,7 @@ import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeVar
+from zlib import crc32
 
 from mock_devices.bench import Bench
 from mock_devices.bota import BotaMock
@@ -11,6 +12,7 @@ from mock_devices.device_faults import BOTA_FAULTS, EPOS4_FAULTS, NDI_FAULTS, RO
 from mock_devices.epos4 import Epos4Mock
 from mock_devices.faults import WIRE_FAULTS, Fault, FaultyWire, Kind, faults_of
 from mock_devices.ndi import NdiMock
+from mock_devices.parameters import Parameters, Sensor
 from mock_devices.robotiq import RobotiqMock
 from mock_devices.sensing_faults import CAMERA_FAULTS, SENSOR_FAULTS
 from mock_devices.stage import Mock
@@ -19,6 +21,9 @@ from mock_devices.wire import PtyWire, TcpWire, Wire
 ForceProduct = Literal["bota-sensone", "robotiq-ft300"]
 AnyMock = TypeVar("AnyMock", bound=Mock)
 TOOLS = ("tip", "arm")
+BOTA_NUMBER, ROBOTIQ_NUMBER = 271, 1234
+# Six digits are what the Bota sensor prints.
+OTHER_SENSORS = 900_000
 FORCE_CHOICES: dict[str, tuple[ForceProduct, ...]] = {
     "both": ("bota-sensone", "robotiq-ft300"),
     "bota-sensone": ("bota-sensone",),
@@ -53,13 +58,15 @@ class Workshop:
     def _bota(self) -> Device:
         wire = self._faulty(PtyWire())
         drift_ppm = self._bench.parameters.force.counter_drift_ppm
-        mock = BotaMock(wire, self._bench.force, self._start_ns, drift_ppm)
+        number = number_of(self._bench.parameters.force, Parameters().force, BOTA_NUMBER)
+        mock = BotaMock(wire, self._bench.force, self._start_ns, drift_ppm, f"{number:06d}")
         return _device("force", mock, wire, BOTA_FAULTS, faults_of(self._bench.force, SENSOR_FAULTS))
 
     def _robotiq(self) -> Device:
         wire = self._faulty(PtyWire())
         drift_ppm = self._bench.parameters.force_modbus.counter_drift_ppm
-        mock = RobotiqMock(wire, self._bench.force_modbus, self._start_ns, drift_ppm)
+        number = number_of(self._bench.parameters.force_modbus, Parameters().force_modbus, ROBOTIQ_NUMBER)
+        mock = RobotiqMock(wire, self._bench.force_modbus, self._start_ns, drift_ppm, number)
         inside = faults_of(self._bench.force_modbus, SENSOR_FAULTS)
         return _device("force_modbus", mock, wire, ROBOTIQ_FAULTS, inside)
 
@@ -84,6 +91,11 @@ class Workshop:
 
     def _faulty(self, wire: Wire) -> FaultyWire:
         return FaultyWire(wire, self._rng, self._clock_ns)
+
+
+def number_of(sensor: Sensor, usual: Sensor, number: int) -> int:
+    """A sensor made of other figures is another sensor, and has another serial number."""
+    return number if sensor == usual else number + 1 + crc32(sensor.model_dump_json().encode()) % OTHER_SENSORS
 
 
 def _device(

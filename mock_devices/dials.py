@@ -22,10 +22,6 @@ class Dial(NamedTuple):
     switch: bool = False
 
 
-def _lead_astray(bench: Bench, speed_mm_s: float) -> None:
-    bench.axis.astray_mm_s = speed_mm_s
-
-
 def _move_surface(bench: Bench, position_mm: float) -> None:
     bench.limb.wanted_mm = position_mm
 
@@ -54,6 +50,14 @@ def _zero(bench: Bench, zero_N: float) -> None:
     bench.force.zero[bench.force.axis] = zero_N
 
 
+def _press(bench: Bench, weight_N: float) -> None:
+    bench.weight_N = weight_N
+
+
+def _push_aside(bench: Bench, lateral_N: float) -> None:
+    bench.force.lateral_N = bench.force_modbus.lateral_N = lateral_N
+
+
 def _show_tip(bench: Bench, seen: float) -> None:
     bench.tracker.tip_in_view = bool(seen)
 
@@ -67,13 +71,6 @@ DIALS: dict[str, Dial] = {
     "axis.position_mm": Dial("true position of the carriage", lambda bench: bench.axis.position_mm),
     "axis.velocity_mm_s": Dial("true velocity of the carriage", lambda bench: bench.axis.velocity_mm_s),
     "axis.target_mm": Dial("last set-point the drive was given", lambda bench: bench.axis.target_mm),
-    "axis.astray_mm_s": Dial(
-        "how fast the drive's set-points run away from those it was given",
-        lambda bench: bench.axis.astray_mm_s,
-        _lead_astray,
-        -500,
-        500,
-    ),
     "axis.current_A": Dial("motor current", lambda bench: bench.axis.current_A),
     "axis.powered": Dial("whether the motor has torque", lambda bench: bench.axis.powered),
     "tip.position_mm": Dial("true position of the tip", lambda bench: bench.tip_mm),
@@ -97,6 +94,12 @@ DIALS: dict[str, Dial] = {
     ),
     "tissue.present": Dial(
         "whether there is a limb at all", lambda bench: bench.tissue.present, _place_tissue, switch=True
+    ),
+    "load.axial_N": Dial(
+        "weight on the tip along the axis, below 0: hanging from it", lambda bench: bench.weight_N, _press, -200, 200
+    ),
+    "load.lateral_N": Dial(
+        "push on the tip across the axis", lambda bench: bench.force.lateral_N, _push_aside, -200, 200
     ),
     "force.zero_N": Dial("zero of the axial channel", lambda bench: bench.force.zero[bench.force.axis], _zero),
     "force.temperature_C": Dial("inside the sensor", lambda bench: bench.force.temperature_C),

@@ -36,7 +36,8 @@ class Epos4Mock(OnWire):
     Failures of the device, plain attributes to be set at any time: ``silent`` neither hears nor sends anything;
     ``frozen`` repeats the position it had; ``wrong_identity`` has another maker and product; ``unguarded`` watches
     neither heartbeats nor software limits nor its following error. ``inject_fault(code)`` makes an error happen; a
-    ``lasting`` one comes back at each reset until ``inject_fault(0)``.
+    ``lasting`` one comes back at each reset until ``inject_fault(0)``. ``lead_astray(mm/s)`` falsifies set-points more
+    and more on their way to the position loop.
     ``increments_per_mm`` is negative where increments shrink into the tissue.
     """
 
@@ -70,6 +71,7 @@ class Epos4Mock(OnWire):
         self._moved_ns = start_ns
         self._now_ns = start_ns
         self._consumed: dict[int, int] = {}
+        self._scale, self._astray_1_s, self._astray_since_ns = increments_per_mm, 0.0, start_ns
         self.synced_ns: deque[int] = deque(maxlen=SYNCS_KEPT)
         """When SYNCs were taken, by ``clock_ns`` where there is one; whoever wants them takes them out."""
         self._clock_ns = clock_ns
@@ -109,6 +111,10 @@ class Epos4Mock(OnWire):
             self.drive.fault(code)
             self._schedule()
             self._adapter.flush()
+
+    def lead_astray(self, speed_mm_s: float) -> None:
+        """From now on set-points run away from those that were sent, until 0."""
+        self._astray_1_s, self._astray_since_ns = speed_mm_s * self._scale, self._now_ns
 
     def receive(self, now_ns: int) -> None:
         """Takes what the client sent, and answers."""
@@ -158,6 +164,7 @@ class Epos4Mock(OnWire):
                 self._pdo.sync()
         elif can_id in self._pdo.rpdos:
             if self.nmt is NmtState.OPERATIONAL:
+                self.drive.astray = self._astray_1_s * (self._now_ns - self._astray_since_ns) * 1e-9
                 self._pdo.take(can_id, data)
         elif can_id == SDO_REQUEST_ID + self.node:
             if self.nmt in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL):

@@ -72,7 +72,7 @@ class Drive:
         self.mode = PROFILE_POSITION
         self.remote = False
         self.cause = 0
-        self.unguarded = False
+        self.unguarded, self.astray = False, 0.0
         self._plant = plant
         self._dictionary = dictionary
         self._values = dictionary.values
@@ -183,7 +183,7 @@ class Drive:
         if self.mode != CYCLIC_POSITION or self.state is not State.ENABLED or self._leaving:
             return
         if self._within(increments):
-            self._ramp.position = increments + self.zero
+            self._ramp.position = increments + self.astray + self.zero
             self._watch()
             self._aim()
         else:

@@ -74,6 +74,7 @@ class Sensor(Table):
 
     axis: Literal["fx", "fy", "fz"] = Field(default="fz", description="channel that lies along the tip")
     compression: Literal["positive", "negative"] = "negative"
+    gain: NotNegative = Field(default=1.0, description="what all channels show of a load, as a factor")
     zero_N: Vector = (0.21, -0.14, 0.8)
     zero_N_m: Vector = (0.004, -0.011, 0.002)
     noise_N: NotNegative = Field(default=0.005, description="rms of each sample, white")

@@ -111,7 +111,8 @@ class RobotiqMock(OnWire):
         self.deaf = False
         self.refuse_stream = False
         self._plant = plant
-        self._serial_number = serial_number
+        self._number = serial_number
+        self.serial_number = f"{SERIAL_PREFIX}-{serial_number:04d}"
         self._period_ns = 1e9 / STREAM_HZ / (1 + drift_ppm * 1e-6)
         self._requests = RequestFinder()
         self._stream_ns = start_ns
@@ -209,7 +210,7 @@ class RobotiqMock(OnWire):
             ACCELERATION: AT_REST_MILLI_G,
             OUTPUT_SELECT: (STREAM_OUTPUT if self.streaming else 0,),
             FIRMWARE: struct.unpack(">3H", firmware + bytes(FIRMWARE_VERSION)),
-            SERIAL_NUMBER: (*struct.unpack(">2H", prefix), self._serial_number & 0xFFFF, self._serial_number >> 16),
+            SERIAL_NUMBER: (*struct.unpack(">2H", prefix), self._number & 0xFFFF, self._number >> 16),
             PRODUCTION_YEAR: (YEAR,),
         }
         return {first + index: value for first, values in groups.items() for index, value in enumerate(values)}

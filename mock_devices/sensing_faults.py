@@ -10,6 +10,7 @@ from mock_devices.physics.sensor import ForcePlant
 GAIN_LARGEST = 10.0
 DRIFT_LARGEST_N_S = 100.0
 SLIP_LARGEST_MM = 200.0
+LEVER_LARGEST_MM = 1000.0
 
 
 def _polarity(plant: ForcePlant, value: Value) -> None:
@@ -36,6 +37,10 @@ def _saturate(plant: ForcePlant, value: Value) -> None:
     plant.channels.end_N = as_number(value, 0.01, 1e6)
 
 
+def _lever(plant: ForcePlant, value: Value) -> None:
+    plant.lean(as_number(value, -LEVER_LARGEST_MM, LEVER_LARGEST_MM))
+
+
 def _tip_slips(camera: CameraPlant, value: Value) -> None:
     camera.slips.tip_mm = (_slip(value), 0.0, 0.0)
 
@@ -59,6 +64,7 @@ SENSOR_FAULTS: Mapping[str, Kind[ForcePlant]] = {
     "dead": Kind("the channel of this index answers no load (0 to 5: Fx Fy Fz Mx My Mz); false: none", 2, _dead),
     "crossed": Kind("Fx Fy Fz come out one place further: Fz as Fx, Fx as Fy, Fy as Fz", True, _crossed),
     "drift": Kind("the zero runs away from now on, N/s of compression shown; 0: it is back", 0.5, _drift),
+    "lever": Kind("the load acts this many mm beside the sensor's axis", 50.0, _lever),
     "saturate": Kind("all force channels end at this many newtons, and flag it where the product can", 2.0, _saturate),
 }
 CAMERA_FAULTS: Mapping[str, Kind[CameraPlant]] = {

@@ -19,12 +19,14 @@ from pathlib import Path
 from typing import Protocol
 
 from mock_devices.bench import Bench
+from mock_devices.bota import BotaMock
 from mock_devices.control import ControlPort, Desk
 from mock_devices.devices import FORCE_CHOICES, Device, Workshop
 from mock_devices.epos4 import Epos4Mock
 from mock_devices.faults import Fault
 from mock_devices.parameters import Parameters, load_parameters
 from mock_devices.physics.effects import EFFECTS, complete, knobs, parse_hidden, statement
+from mock_devices.robotiq import RobotiqMock
 from rig.errors import RigError
 
 # A client's bytes that came during a stall were sent before its end: they are heard before time is caught up, or every
@@ -66,7 +68,8 @@ class Server:
     def endpoints(self) -> dict[str, object]:
         """Address of each device by role and kind of port, of the control channel, this process' id, and latencies.
 
-        ``latency_ms`` is what a data sheet would say of each device; what is hidden in the bench comes on top.
+        ``serials`` has the serial number of each force sensor by role. ``latency_ms`` is what a data sheet would say of
+        each device; what is hidden in the bench comes on top.
         """
         addresses: dict[str, dict[str, str]] = {}
         for device in self._devices:
@@ -75,6 +78,11 @@ class Server:
             **addresses,
             "control": self.control.endpoint,
             "pid": os.getpid(),
+            "serials": {
+                device.role: device.mock.serial_number
+                for device in self._devices
+                if isinstance(device.mock, BotaMock | RobotiqMock)
+            },
             "latency_ms": stated_latency_ms(self._bench.parameters),
         }
 

@@ -24,6 +24,14 @@ settings.register_profile(
 settings.load_profile("shared machine")
 
 
+@pytest.fixture(scope="session", autouse=True)
+def state_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What the software keeps by itself is kept for this run alone: mock sensors are calibrated once in it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        yield
+
+
 @pytest.fixture(scope="session")
 def force_bench() -> Iterator["Bench"]:
     """The process in which mocks of force sensors live, one at a time."""

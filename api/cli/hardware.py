@@ -69,7 +69,7 @@ def doctor(config: ConfigOption = None, overrides: SetOption = None, json_file: 
     Example: rig doctor --config rig.toml
     """
     wiring = wiring_from(config, overrides)
-    with bench_for(wiring) as (live_wiring, _):
+    with bench_for(wiring, approaches=False) as (live_wiring, _):
         findings = examination.examine(live_wiring)
     header = ("role", "device", "rate Hz", "noise", "latency ms", "range seen")
     console.print(table(header, map(_row, findings), title="Devices"))

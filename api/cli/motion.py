@@ -1,5 +1,6 @@
 """Commands that move: capture and track."""
 
+import math
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -22,7 +23,7 @@ from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
-from rig.recording.sessions import SessionInfo, TrialInfo
+from rig.recording.sessions import SessionInfo, TrialInfo, plain
 from rig.tissue.model import load_model
 
 Out = Annotated[Path, typer.Option("--out", help="New folder for the session.")]
@@ -61,10 +62,17 @@ def captured(bench: Supervisor, plan: Indentation, out: Path) -> SessionInfo:
 def _say(trial: TrialInfo) -> None:
     samples, dropped = sum(trial.samples.values()), sum(trial.dropped.values())
     console.print(
-        f"{trial.name}  {trial.speed_mm_s:5g} mm/s  peak {trial.peak_force_N:6.2f} N  {samples:7d} samples"
-        f"  {dropped} dropped  {trial.outcome}",
+        f"{trial.name}  {trial.speed_mm_s:5g} mm/s  {_surface(trial)}  peak {trial.peak_force_N:6.2f} N"
+        f"  {samples:7d} samples  {dropped} dropped  {trial.outcome}",
         highlight=False,
+        soft_wrap=True,
     )
+
+
+def _surface(trial: TrialInfo) -> str:
+    """Where the surface was found, and how far its 95 % interval reaches."""
+    within_mm = max(trial.surface_high_mm - trial.surface_mm, trial.surface_mm - trial.surface_low_mm)
+    return "no surface" if math.isnan(trial.surface_mm) else f"surface {trial.surface_mm:6.2f} +-{within_mm:.2f} mm"
 
 
 def summary(info: SessionInfo, folder: Path) -> dict[str, object]:
@@ -75,7 +83,13 @@ def summary(info: SessionInfo, folder: Path) -> dict[str, object]:
         "samples": sum(sum(trial.samples.values()) for trial in info.trials),
         "dropped": sum(sum(trial.dropped.values()) for trial in info.trials),
         "trials": [
-            {"name": t.name, "speed_mm_s": t.speed_mm_s, "outcome": t.outcome, "peak_force_N": t.peak_force_N}
+            {
+                "name": t.name,
+                "speed_mm_s": t.speed_mm_s,
+                "outcome": t.outcome,
+                "peak_force_N": t.peak_force_N,
+                "surface_mm": plain([t.surface_mm, t.surface_low_mm, t.surface_high_mm]),
+            }
             for t in info.trials
         ],
     }

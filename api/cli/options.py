@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from rig.config.calibration_files import with_files
 from rig.config.table import load, merged, parse
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
@@ -48,6 +49,11 @@ def wiring_from(config: Path | None, overrides: list[str] | None) -> Wiring:
     return _beside(load(Wiring, path, overrides or []), path.parent)
 
 
+def calibrated(wiring: Wiring) -> Wiring:
+    """``wiring`` with what its calibration files hold; raises UsageError naming the file that is not as it must be."""
+    return wiring.model_copy(update={"calibration": with_files(wiring.calibration)})
+
+
 def built_in(overrides: list[str] | None = None) -> Wiring:
     """The wiring of the mock bench: every port is `mock`."""
     return parse(Wiring, merged({}, overrides or []), "--set")
@@ -55,7 +61,7 @@ def built_in(overrides: list[str] | None = None) -> Wiring:
 
 def _beside(wiring: Wiring, folder: Path) -> Wiring:
     """Paths in the file are relative to the file."""
-    if wiring.mock.parameters is None or wiring.mock.parameters.is_absolute():
-        return wiring
-    mock = wiring.mock.model_copy(update={"parameters": folder / wiring.mock.parameters})
-    return wiring.model_copy(update={"mock": mock})
+    mock, known = wiring.mock, wiring.calibration
+    mock = mock.model_copy(update={"parameters": mock.parameters and folder / mock.parameters})
+    files = {"force": known.force and folder / known.force, "axis": known.axis and folder / known.axis}
+    return wiring.model_copy(update={"mock": mock, "calibration": known.model_copy(update=files)})

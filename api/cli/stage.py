@@ -5,8 +5,12 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from typing import Any
 
+from api.cli.mock_calibration import mock_calibration, role_of
+from api.cli.options import calibrated
+from controller.commissioning.refusals import refuse_uncalibrated
 from rig.config.wiring import MOCK_PORT, Wiring
 from rig.errors import UsageError
 
@@ -60,16 +64,39 @@ def bench_process(
 
 
 @contextmanager
-def bench_for(wiring: Wiring, hide: tuple[str, ...] = ()) -> Iterator[tuple[Wiring, dict[str, Any]]]:
-    """``wiring`` with real endpoints, and what the mock bench said; without a port `mock` there is no mock bench."""
+def bench_for(
+    wiring: Wiring, hide: tuple[str, ...] = (), approaches: bool = True
+) -> Iterator[tuple[Wiring, dict[str, Any]]]:
+    """``wiring`` with real endpoints, and what the mock bench said; without a port `mock` there is no mock bench.
+
+    Where it ``approaches``, calibrations are read and checked before anything is opened, and a mock sensor that has
+    none is calibrated.
+    """
+    if approaches:
+        wiring = calibrated(wiring)
+        refuse_uncalibrated(wiring, datetime.now(UTC))
     if not wiring.uses_mock:
         yield wiring, {}
         return
     with bench_process(wiring, hide) as (_, endpoints):
-        yield plugged(wiring, endpoints), endpoints
+        yield (plugged if approaches else at_endpoints)(wiring, endpoints), endpoints
 
 
 def plugged(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
+    """``wiring`` on the mock bench's endpoints, with a calibration of its force sensor, where that is a mock one.
+
+    A calibration that the wiring brings along is kept, whosever it is.
+    """
+    live = at_endpoints(wiring, endpoints)
+    if wiring.force.port != MOCK_PORT or wiring.calibration.of_force:
+        return live
+    known = live.calibration.model_copy(update={"of_force": mock_calibration(live, endpoints)})
+    live = live.model_copy(update={"calibration": known})
+    refuse_uncalibrated(live, datetime.now(UTC))
+    return live
+
+
+def at_endpoints(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
     """``wiring`` with each port `mock` replaced by the endpoint that serves it, and as patient as that needs.
 
     Where the wiring states no latency for a mock device, it takes what the device's data sheet would say.
@@ -77,7 +104,7 @@ def plugged(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
     wiring = patient(wiring)
     force, axis, tracker, stated = wiring.force, wiring.axis, wiring.tracker, endpoints["latency_ms"]
     if force.port == MOCK_PORT:
-        role = "force_modbus" if force.product == "robotiq-ft300" else "force"
+        role = role_of(force.product)
         known = {"port": endpoints[role]["serial"], "latency_ms": force.latency_ms or stated[role]}
         force = force.model_copy(update=known)
     if axis.port == MOCK_PORT:

@@ -10,6 +10,7 @@ import rig
 from controller.checks import refuse_beyond_limits
 from controller.experiments.indentation import Trial, longest_s, trials
 from controller.experiments.recorded import metadata, record
+from controller.messages import Outcome
 from controller.operation import Operation
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
@@ -103,10 +104,18 @@ def _run(
         return planned, error
     outcome = done.outcome
     result = replace(
-        planned,
+        _with_surface(planned, outcome),
         outcome=outcome.outcome,
         peak_force_N=outcome.peak_force_N,
         samples=done.samples,
         dropped=done.dropped,
     ).sealed(folder)
     return result, SafetyStop(f"stopped: {outcome.cause}") if outcome.stopped else None
+
+
+def _with_surface(trial: TrialInfo, outcome: Outcome) -> TrialInfo:
+    """The entry with the surface that was found, where one was."""
+    touch = outcome.touch
+    if touch is None:
+        return trial
+    return replace(trial, surface_mm=touch.surface_mm, surface_low_mm=touch.low_mm, surface_high_mm=touch.high_mm)

@@ -4,7 +4,11 @@ import random
 from dataclasses import dataclass
 
 from controller.steps import Approach, Compress, Dither, Hold, Program, Retract, Step, Zero
+from controller.touch import BACK_OFF_MM, RETURN_SPEED_MM_S, TOUCH_MM
 from rig.config.protocol import Indentation
+
+# 366 portions, two a cycle at 1 kHz, and as much again for cycles missed.
+ESTIMATING_S = 0.4
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,9 @@ def _steps(speed_mm_s: float, protocol: Indentation) -> list[Step]:
             speed_mm_s=protocol.approach_speed_mm_s,
             contact_force_N=protocol.contact_force_N,
             search_to_mm=protocol.search_to_mm,
+            within_mm=protocol.contact_within_mm,
+            touches=protocol.touches,
+            touch_speed_mm_s=protocol.touch_speed_mm_s,
         ),
         Retract(clearance_mm=protocol.run_up_mm, speed_mm_s=protocol.retract_speed_mm_s),
         *_press(protocol.depth_mm, speed_mm_s, protocol),
@@ -72,4 +79,10 @@ def longest_s(protocol: Indentation, speed_mm_s: float, travel_mm: float) -> flo
     way_s = travel_mm / protocol.approach_speed_mm_s + 3 * travel_mm / protocol.retract_speed_mm_s
     press_s = 2 * (protocol.deepest_mm + protocol.run_up_mm) / speed_mm_s
     rests_s = protocol.air_dwell_s + 2 * protocol.hold_s + protocol.dither_s + protocol.rest_s
-    return 1.5 * (way_s + press_s + rests_s) + 10.0
+    return 1.5 * (way_s + press_s + rests_s + _touches_s(protocol)) + 10.0
+
+
+def _touches_s(protocol: Indentation) -> float:
+    """A touch goes at most 4 mm deep, from as far above the surface as the first one left it unknown."""
+    longest_mm = 2 * TOUCH_MM + BACK_OFF_MM
+    return protocol.touches * (longest_mm / protocol.touch_speed_mm_s + longest_mm / RETURN_SPEED_MM_S + ESTIMATING_S)

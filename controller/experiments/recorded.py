@@ -4,7 +4,7 @@ import json
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from rig.recording.mcap_file import RecordingFailed
 
 Metadata = Mapping[str, Mapping[str, str]]
 LOOK_S = 0.1
+CONTACT_METHOD = "onset of force, extrapolated back through the loading curve"
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,12 @@ def metadata(bench: Supervisor, session: str, trial: str, about: Mapping[str, ob
 
 
 def _calibration(wiring: Wiring) -> dict[str, str]:
-    return {"force_axis": wiring.force.axis, "compression": wiring.force.compression}
+    """What readers of force need; the calibrations themselves, with loads and uncertainty, stand in the wiring."""
+    return {
+        "force_axis": wiring.force.axis,
+        "compression": wiring.force.compression,
+        "matrix": json.dumps(wiring.force_map.matrix),
+    }
 
 
 def _texts(value: object) -> dict[str, str]:
@@ -121,6 +127,7 @@ def _summary(outcome: Outcome) -> dict[str, str]:
         "peak_force_N": repr(outcome.peak_force_N),
         "surface_mm": "" if outcome.surface_mm is None else repr(outcome.surface_mm),
         "force_zero_N": "" if outcome.zero_N is None else repr(outcome.zero_N),
+        "contact": json.dumps({"method": CONTACT_METHOD} | asdict(outcome.touch)) if outcome.touch else "",
     }
 
 

@@ -139,6 +139,11 @@ class Decoder:
         """Bytes kept for the next call, less than one frame."""
         return self._frames.held
 
+    @property
+    def gaps(self) -> list[int]:
+        """Bytes discarded before each reading of the last ``feed``."""
+        return self._frames.gaps
+
     def feed(self, data: bytes) -> list[Wrench]:
         """The readings completed by ``data``, oldest first."""
         return [_scaled(_STREAM.unpack_from(raw, len(STREAM_START))) for raw in self._frames.feed(data)]

@@ -1,11 +1,12 @@
 """A Robotiq FT 300 in the role of force sensor.
 
 The line has one owner at a time: our port stops a stream that may still run, then pymodbus reads who the sensor is,
-then our port again starts the stream and keeps the line. The stream carries no counter and no status: capture time
-follows from arrival and the time a frame takes on the line, and lost frames cannot be counted.
+then our port again starts the stream and keeps the line. The stream carries no counter and no status: what dates its
+frames and counts the lost ones is their place in it, see ``frame_clock``.
 """
 
 import logging
+import select
 import time
 from collections.abc import Callable, Sequence
 from contextlib import closing, suppress
@@ -19,7 +20,6 @@ from drivers.robotiq.codec import (
     DEFAULT_BAUD,
     FIRMWARE,
     FORCES,
-    FRAME_NS,
     PRODUCTION_YEAR,
     SERIAL_NUMBER,
     SLAVE_ID,
@@ -34,6 +34,7 @@ from drivers.robotiq.codec import (
     decode_serial_number,
     refusal,
 )
+from drivers.robotiq.frame_clock import LISTEN_NS, PERIOD_NS, FrameClock
 from drivers.roles import Identity, LinkCounters
 from rig.channels import ForceSample
 from rig.config.wiring import Force
@@ -41,7 +42,6 @@ from rig.errors import DeviceError, UsageError
 
 PRODUCT = "robotiq-ft300"
 FIRMWARE_LETTER = "F"
-PERIOD_NS = 1_000_000_000 // STREAM_HZ
 # The maker's driver takes 80 ms without bytes for a stopped stream and gives the sensor another 100 ms.
 SILENCE_S = 0.18
 # A burst takes 26 ms on the line; the rest leaves room for what was under way before it, and for the silence.
@@ -55,6 +55,10 @@ FIRST_FRAME_S = 1.0 + 20 / STREAM_HZ
 
 # pymodbus logs each failed try; here a failure is one sentence in a DeviceError.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
+
+
+# A frame and its place in the stream [ns].
+Timed = tuple[int, Wrench]
 
 
 class RobotiqFt300:
@@ -74,12 +78,11 @@ class RobotiqFt300:
         self._open_port = open_port
         self._now = now
         self._port = open_port(DEFAULT_BAUD)
-        self._delay_ns = FRAME_NS + round(config.latency_ms * 1e6)
+        self._clock = FrameClock(round(config.latency_ms * 1e6))
         self._decoder = Decoder(self.counters)
         self._identity = Identity(PRODUCT, "", "")
-        self._last_capture_ns = 0
         self._seq = 0
-        self._early: list[ForceSample] = []
+        self._taken: list[tuple[list[Timed], int]] = []
 
     @property
     def identity(self) -> Identity:
@@ -102,14 +105,16 @@ class RobotiqFt300:
         self._identity = self._read_identity()
         self._port = self._open_port(DEFAULT_BAUD)
         self._start_stream()
+        self._listen()
 
     def poll(self, now_ns: int) -> Sequence[ForceSample]:
         """Samples since the last call."""
-        samples, self._early = self._early, []
         data = self._port.read()
         if data:
-            samples += self._samples(self._decoder.feed(data), now_ns)
-        return samples
+            # A host that is interrupted between its look at the clock and the read finds what came later.
+            self._take(data, max(now_ns, self._now()))
+        taken, self._taken = self._taken, []
+        return [sample for frames, arrival_ns in taken for sample in self._samples(frames, arrival_ns)]
 
     def close(self) -> None:
         """Stops the stream and gives the port back."""
@@ -177,22 +182,39 @@ class RobotiqFt300:
         code = refusal(text)
         if code is not None:
             raise self._error(f"refused to start its stream with Modbus exception {code}; check its firmware")
-        self._early = self._samples(self._decoder.feed(text.replace(STREAM_STARTED, b"", 1)), self._now())
-        if not self._early:
+        self._decoder = Decoder(self.counters)
+        self._clock.restart()
+        self._taken = []
+        self._take(text.replace(STREAM_STARTED, b"", 1), self._now())
+        if not any(frames for frames, _ in self._taken):
             raise self._error(
                 f"no stream frame within {FIRST_FRAME_S:.1f} s of the start command, {len(text)} bytes came; "
                 "check the cable"
             )
 
-    def _samples(self, wrenches: Sequence[Wrench], now_ns: int) -> list[ForceSample]:
-        """Frames that arrived together were sent one period apart."""
-        return [self._sample(wrench, now_ns, len(wrenches) - 1 - index) for index, wrench in enumerate(wrenches)]
+    def _listen(self) -> None:
+        """Lets the clock map find the stream's rate before the first frame is dated."""
+        end_ns = self._now() + LISTEN_NS
+        while (left_ns := end_ns - self._now()) > 0:
+            select.select([self._port.fileno()], [], [], left_ns * 1e-9)
+            self._take(self._port.read(), self._now())
 
-    def _sample(self, wrench: Wrench, now_ns: int, followers: int) -> ForceSample:
-        capture_ns = max(now_ns - self._delay_ns - followers * PERIOD_NS, self._last_capture_ns)
-        self._last_capture_ns = capture_ns
+    def _take(self, data: bytes, arrival_ns: int) -> None:
+        wrenches = self._decoder.feed(data)
+        devices_ns = self._clock.take(self._decoder.gaps, arrival_ns)
+        self.counters.device_lost = self._clock.lost
+        self._taken.append((list(zip(devices_ns, wrenches, strict=True)), arrival_ns))
+
+    def _samples(self, frames: Sequence[Timed], arrival_ns: int) -> list[ForceSample]:
+        captures_ns = self._clock.captures([device_ns for device_ns, _ in frames], arrival_ns)
+        pairs = zip(frames, captures_ns, strict=True)
+        return [self._sample(device_ns, wrench, capture_ns, arrival_ns) for (device_ns, wrench), capture_ns in pairs]
+
+    def _sample(self, device_ns: int, wrench: Wrench, capture_ns: int, arrival_ns: int) -> ForceSample:
         self._seq += 1
-        return ForceSample(self._seq - 1, capture_ns, now_ns, 0, *wrench, float("nan"), 0, int(wrench.in_range))
+        return ForceSample(
+            self._seq - 1, capture_ns, arrival_ns, device_ns // 1000, *wrench, float("nan"), 0, int(wrench.in_range)
+        )
 
     def _error(self, what: str) -> DeviceError:
         return DeviceError(f"{PRODUCT} at {self._port.address}: {what}")

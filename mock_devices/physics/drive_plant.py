@@ -20,7 +20,6 @@ class DrivePlant:
         self.at_reference = axis.start_mm <= 0
         self.current_limit_A = axis.current_limit_A
         self.powered = False
-        self.astray_mm_s = 0.0
         self._axis = axis
         self._accel_per_N = MM_PER_M / axis.mass_kg
         self._interpolation_steps = max(round(axis.interpolation_s / STEP_S), 1)
@@ -36,8 +35,6 @@ class DrivePlant:
         self._raw_step = self._speed = 0.0
         self._steps_left = 0
         self._integral_mm_s = 0.0
-        self._untold_steps = 0
-        self._astray_mm = 0.0
 
     def power(self, on: bool) -> None:
         """Torque on, holding where the carriage is; off, the brake closes after its delay."""
@@ -48,18 +45,14 @@ class DrivePlant:
         self.powered = on
 
     def target(self, position_mm: float) -> None:
-        """Goes to ``position_mm`` over one interpolation period, and as much farther as set-points have gone astray."""
+        """Goes to ``position_mm`` over one interpolation period."""
         self.target_mm = position_mm
-        self._astray_mm += self.astray_mm_s * self._untold_steps * STEP_S
-        self._untold_steps = 0
-        position_mm += self._astray_mm
         self._steps_left = self._interpolation_steps
         self._raw_step = (position_mm - self._raw) / self._interpolation_steps
 
     def step(self, load_N: float) -> tuple[float, float]:
         """Position and velocity one step later, under ``load_N`` against the direction of positive motion."""
         force_N = self._motor_N() if self.powered else 0.0
-        self._untold_steps += 1
         axis, v = self._axis, self._v
         accel = (force_N - load_N - axis.viscous_N_s_mm * v) * self._accel_per_N
         free = v + accel * STEP_S

@@ -29,22 +29,27 @@ class ForcePlant:
         self.zero = [*sensor.zero_N, *sensor.zero_N_m]
         self.axis = FORCES.index(sensor.axis)
         self.channels = Channels()
+        self.lateral_N = 0.0
         self._sensor = sensor
         self._noise = normals(rng, 6)
         self._rms = [sensor.noise_N] * 3 + [sensor.noise_N_m] * 3
         self._quantum = [sensor.quantum_N] * 3 + [sensor.quantum_N_m] * 3
         self._end = [sensor.range_N] * 3 + [sensor.range_N_m] * 3
-        self._per_N = self._response()
+        self.lean(sensor.lever_mm)
         self._share = -math.expm1(-STEP_S / sensor.filter_s) if sensor.filter_s else 1.0
         self._force_N = self._slope_N_s = self._lag_s = self._time_s = 0.0
         self._chain = Chain()
 
-    def _response(self) -> list[float]:
+    def lean(self, lever_mm: float) -> None:
+        """The load acts ``lever_mm`` beside the sensor's axis from now on."""
+        self._per_N = self._response(lever_mm)
+
+    def _response(self, lever_mm: float) -> list[float]:
         """Each channel's answer to 1 N of compression: the axial one, cross-talk, and the moment of the lever."""
-        sign = 1.0 if self._sensor.compression == "positive" else -1.0
+        sign = self._sensor.gain * (1.0 if self._sensor.compression == "positive" else -1.0)
         forces = [sign * (1.0 if channel == self.axis else self._sensor.crosstalk) for channel in range(3)]
         moments = [0.0, 0.0, 0.0]
-        moments[(self.axis + 1) % 3] = sign * self._sensor.lever_mm * M_PER_MM
+        moments[(self.axis + 1) % 3] = sign * lever_mm * M_PER_MM
         return forces + moments
 
     @property
@@ -86,6 +91,7 @@ class ForcePlant:
             force_N = convert(force_N, self._time_s, self.temperature_C)
         force_N += self.channels.drifted_N(self._time_s)
         loads = self.channels.converted([force_N * per_N for per_N in self._per_N])
+        loads[(self.axis + 1) % 3] += sensor.gain * self.lateral_N
         return [load + zero for load, zero in zip(loads, self.zero, strict=True)]
 
     def _ends(self) -> list[float]:

@@ -5,6 +5,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from rig.config.calibration import Calibration
+from rig.config.force_map import UNIT, ForceMap
+from rig.config.maxima import beyond
 from rig.config.table import Table
 
 Positive = Annotated[float, Field(gt=0)]
@@ -45,7 +48,7 @@ class Axis(Table):
     direction: Literal[1, -1] = Field(default=1, description="1: increments grow into the tissue")
     homing_method: Literal[-4, -3, -2, -1, 1, 2, 7, 11, 17, 18, 23, 27, 33, 34, 37] = 17
     homing_speed_mm_s: Positive = 20.0
-    heartbeat_ms: int = Field(default=50, ge=5, le=1000, description="period of the heartbeat each side sends")
+    heartbeat_ms: int = Field(default=50, ge=5, description="period of the heartbeat each side sends")
     following_error_mm: Positive = 2.0
     standstill_mm: Positive = Field(
         default=0.3, description="how far the set-point may go while ten reports of the axis name the same place"
@@ -99,8 +102,10 @@ class Limits(Table):
 
     force_N: Positive = 20.0
     force_rate_N_s: Positive = 1000.0
+    # Friction of 0.3 under 15 N, 0.1 m in front of the sensor, gives 0.45 N m; more is a tip that is levered.
+    torque_N_m: Positive = Field(default=0.5, description="norm of the sensor's moments, from the reference zero")
     depth_mm: Positive = 15.0
-    position_min_mm: float = 0.0
+    position_min_mm: float = Field(default=0.0, ge=-500)
     position_max_mm: float = 60.0
     patient_mm: Positive = Field(default=10.0, description="how far the limb may move against the robot in a program")
     speed_mm_s: Positive = 60.0
@@ -142,6 +147,7 @@ class Wiring(Table):
     limits: Limits = Limits()
     subject: Subject = Subject()
     mock: Mock = Mock()
+    calibration: Calibration = Calibration()
 
     @model_validator(mode="after")
     def _loop_within_axis(self) -> Self:
@@ -151,6 +157,20 @@ class Wiring(Table):
                 f" axis.bandwidth_Hz {self.axis.bandwidth_Hz:g}"
             )
         return self
+
+    @model_validator(mode="after")
+    def _within_maxima(self) -> Self:
+        tables = {"limits": self.limits, "subject": self.subject, "axis": self.axis, "loop": self.loop}
+        reasons = beyond(self.force.product, tables)
+        if reasons:
+            raise ValueError("; ".join(reasons))
+        return self
+
+    @property
+    def force_map(self) -> ForceMap:
+        """From the sensor's readings to compression; without a calibration by the configured channel and sign alone."""
+        known = self.calibration.of_force
+        return ForceMap(self.force.axis, self.force.compression, known.matrix if known else UNIT)
 
     @property
     def force_limit_N(self) -> float:

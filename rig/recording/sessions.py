@@ -37,6 +37,9 @@ class TrialInfo:
     peak_force_N: Number = math.nan
     samples: dict[str, int] = field(default_factory=dict)
     dropped: dict[str, int] = field(default_factory=dict)
+    surface_mm: Number = math.nan
+    surface_low_mm: Number = math.nan
+    surface_high_mm: Number = math.nan
     sha256: str = ""
 
     def sealed(self, folder: Path) -> "TrialInfo":

@@ -8,11 +8,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
+from pydantic import TypeAdapter, ValidationError
 
 from rig.channels import EVENT, FORCE, STREAMS, Stream
+from rig.config.force_map import CHANNELS, UNIT, ForceMap, Matrix
+from rig.errors import DataError
 from rig.recording.files import whole_file
 from rig.recording.reader import Recording
 
+FORCE_FIELDS = ("fx_N", "fy_N", "fz_N")
 Column = NDArray[np.int64] | NDArray[np.float64] | list[str]
 
 
@@ -50,9 +54,32 @@ def arrow_table(recording: Recording, stream: Stream) -> pa.Table:
 
 def compression_N(recording: Recording) -> NDArray[np.float64]:
     """Compressive force of every force row [N], by the recording's calibration; no zero is taken off."""
-    calibration = recording.metadata.get("calibration", {})
-    force = recording.tables[FORCE.name][f"{calibration.get('force_axis', 'fz')}_N"]
-    return np.array(force if calibration.get("compression", "negative") == "positive" else -force, dtype=np.float64)
+    rows = recording.tables[FORCE.name]
+    forces = (rows[field].astype(np.float64) for field in FORCE_FIELDS)
+    return np.asarray(force_map(recording).compression_N(*forces))
+
+
+def force_map(recording: Recording) -> ForceMap:
+    """How compression is read from the recording's force rows; raises DataError where its metadata do not say it.
+
+    A recording made without a calibration has no matrix, and compression is its channel with its sign.
+    """
+    known, name = recording.metadata.get("calibration", {}), recording.path.stem
+    channel, compression = known.get("force_axis", "fz"), known.get("compression", "negative")
+    if channel not in CHANNELS:
+        raise DataError(f"{name}: calibration force_axis is {channel!r}; it must be fx, fy or fz")
+    if compression not in ("positive", "negative"):
+        raise DataError(f"{name}: calibration compression is {compression!r}; it must be positive or negative")
+    return ForceMap(
+        channel, "positive" if compression == "positive" else "negative", _matrix(name, known.get("matrix", ""))
+    )
+
+
+def _matrix(name: str, text: str) -> Matrix:
+    try:
+        return TypeAdapter(Matrix).validate_json(text, strict=True) if text else UNIT
+    except ValidationError as error:
+        raise DataError(f"{name}: calibration matrix is {text!r}; it must be three rows of three numbers") from error
 
 
 def write_parquet(recording: Recording, folder: Path, name: str) -> list[Path]:

@@ -19,9 +19,9 @@ from scipy.optimize import minimize_scalar
 
 from rig.errors import DataError, UsageError
 from rig.tissue.arrow import Problem, Slopes, Values, minimise, normal_equations
-from rig.tissue.curves import Curve
 from rig.tissue.history import History
 from rig.tissue.laws import FloatArray, Law
+from rig.trials.curves import Curve
 
 BINS = 100
 EARLY_SHARE = 0.25

@@ -9,9 +9,9 @@ from scipy.interpolate import PchipInterpolator
 from scipy.special import stdtrit
 
 from rig.errors import DataError
-from rig.tissue.curves import Curve
 from rig.tissue.fitting import LawFit, early_offset, fit_law, residual_force
 from rig.tissue.laws import FloatArray, Law
+from rig.trials.curves import Curve
 
 ROWS = 10
 LEVEL = 0.95

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from rig.errors import DataError
-from rig.tissue.curves import Curve
 from rig.tissue.laws import FloatArray
+from rig.trials.curves import Curve
 
 LEVEL = 0.95
 STUDY_B_N_S_MM = 1.3

@@ -11,14 +11,14 @@ import rig
 from rig.errors import DataError, UsageError
 from rig.recording.sessions import Session
 from rig.tissue.control_table import control_rows
-from rig.tissue.curves import Curve, loading_curve
 from rig.tissue.fitting import fit_law
 from rig.tissue.judging import LEVEL, Errors, Judged, given_forces, judge
 from rig.tissue.laws import FloatArray, Law
 from rig.tissue.model import Model, Provenance, Quality, ValidRange
 from rig.tissue.rates import RateTest, rate_of
 from rig.tissue.registry import COMPARED
-from rig.tissue.strokes import stroke_of
+from rig.trials.curves import Curve, loading_curve
+from rig.trials.strokes import stroke_of
 
 Laws = Sequence[type[Law]]
 Known = Mapping[str, float]

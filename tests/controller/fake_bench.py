@@ -31,6 +31,7 @@ from rig.channels import (
     MarkerSample,
 )
 from rig.config.wiring import Wiring
+from tests.calibrations import with_calibration
 from tests.controller.fake_devices import Clock, FakeAxis, FakeForce, FakeTracker
 
 ZERO = Zero(duration_s=0.2)
@@ -42,10 +43,12 @@ SETTLED_CYCLES = 20
 """Cycles before a test begins: no bench is asked to move before its devices have spoken."""
 
 
-def wired(sensor_Hz: float = 1000.0, **sections: dict[str, Any]) -> Wiring:
+def wired(sensor_Hz: float = 1000.0, **sections: dict[str, Any] | None) -> Wiring:
     """The default wiring with a force sensor of that rate: 100 Hz is the FT 300."""
     product = "robotiq-ft300" if sensor_Hz == 100.0 else "bota-sensone"
-    force = {"product": product, "rate_Hz": 1000.0 if sensor_Hz == 100.0 else sensor_Hz} | sections.pop("force", {})
+    force = {"product": product, "rate_Hz": 1000.0 if sensor_Hz == 100.0 else sensor_Hz} | (
+        sections.pop("force", None) or {}
+    )
     return Wiring.model_validate({"force": force, **sections})
 
 
@@ -154,7 +157,7 @@ class FakeBench:
         execution_ns: int = 50_000,
         settled: int = SETTLED_CYCLES,
     ) -> None:
-        self.wiring = wiring or wired()
+        self.wiring = with_calibration(wiring or wired(), FakeForce.__name__, "1")
         self.clock = Clock()
         self.period_ns = round(1e9 / self.wiring.loop.rate_Hz)
         self.axis = FakeAxis(self.clock, self.period_ns, position_mm=position_mm, target_mm=position_mm)

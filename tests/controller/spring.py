@@ -4,8 +4,10 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from controller.force_watch import NO_WRENCH, ForceWatch
 from controller.machine import Machine
 from controller.modes import Mode
+from controller.motion import Setpoint
 from controller.safety import TABLE, Action, Check, Incident
 from controller.steps import Approach, Compress, Program, Retract, Step, Zero
 from controller.watch import Watch
@@ -46,19 +48,38 @@ class SpringBench:
         self.machine = Machine(
             self.wiring, self.world, lambda outcome, cause: self.ended.append((outcome, cause)), self.table
         )
+        self.force_watch = ForceWatch(self.every * 1_000_000)
         self.sense()
+
+    def tissue_N(self, moved_mm: float) -> float:
+        """What presses on the tip that has ``moved_mm`` since the tick before."""
+        return self.stiffness_N_mm * max(0.0, self.position_mm - SURFACE_MM)
+
+    def converted_N(self, force_N: float) -> float:
+        """What the sensor makes of a force."""
+        return force_N + self.noise.gauss(0.0, self.noise_N)
 
     def sense(self) -> None:
         """What the bench shows of where the axis stands now."""
-        force_N = self.stiffness_N_mm * max(0.0, self.position_mm - SURFACE_MM)
+        force_N = self.tissue_N(self.position_mm - self.world.position_mm)
         if self.position_mm > self.world.position_mm:
             force_N += self.rubbing_N
         self.world.position_mm = self.position_mm
+        self.force_watch.axis(self.world.now_ns, self.position_mm)
         self.count += 1
         if self.count % self.every == 0:
             self.world.force_samples += 1
-            self.world.raw_N = force_N + ZERO_N + self.noise.gauss(0.0, self.noise_N)
+            self.world.raw_N = self.converted_N(force_N + ZERO_N)
+            self.world.wrench = (0.0, 0.0, -self.world.raw_N, 0.0, 0.0, 0.0)
+            self.force_watch.force(self.world.now_ns, self.world.wrench)
+            self.world.paired.force(self.world.now_ns, self.world.raw_N)
+        self.world.paired.axis(self.world.now_ns, self.position_mm)
         self.world.force_N = self.world.raw_N - self.world.zero_N
+        going = self.world.setpoint if self.machine.busy else Setpoint(self.position_mm, 0.0)
+        self.world.load = self.force_watch.load(
+            self.world.now_ns, self.world.reference_zero or NO_WRENCH, self.world.noise_N, going,
+            self.world.acceleration_mm_s2,
+        )  # fmt: skip
 
     def tick(self) -> Incident | None:
         """One turn of the machine; the axis is where it is told to be at once."""

@@ -14,11 +14,12 @@ RATES_HZ = pytest.mark.parametrize("sensor_Hz", [1000.0, 100.0])
 def test_a_trial_finds_the_surface_presses_by_the_springs_law_and_leaves(sensor_Hz: float) -> None:
     bench = FakeBench(wired(sensor_Hz))
     finished = bench.run(ZERO, APPROACH, PRESS, LEAVE)
-    # Three samples above 0.05 N at 5 mm/s, and the noise: that far below the true surface it is noticed.
-    late_mm = 0.05 + 3 / sensor_Hz * APPROACH.speed_mm_s + 0.01
+    # Extrapolated back to where force began: no better known than the samples of the approach lie apart.
+    apart_mm = max(APPROACH.speed_mm_s / sensor_Hz, 0.01)
     assert (finished["outcome"], finished["cause"]) == ("complete", "")
     assert finished["zero_N"] == pytest.approx(ZERO_N, abs=0.001)
-    assert SURFACE_MM < finished["surface_mm"] < SURFACE_MM + late_mm
+    assert finished["surface_mm"] == pytest.approx(SURFACE_MM, abs=apart_mm)
+    assert finished["touch"]["low_mm"] < SURFACE_MM < finished["touch"]["high_mm"]
     pressed_mm = finished["surface_mm"] - SURFACE_MM + PRESS.depth_mm
     assert finished["peak_force_N"] == pytest.approx(bench.force.stiffness_N_mm * pressed_mm, abs=0.12)
     bench.wait(0.05)  # ten lags of the axis

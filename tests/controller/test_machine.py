@@ -200,4 +200,4 @@ def test_a_slow_and_noisy_sensor_finds_the_surface_and_not_its_own_noise(every: 
     bench = SpringBench(position_mm=5.0, every=every, noise_N=noise_N)
     bench.run(Zero(duration_s=1.0), APPROACH, LEAVE)
     assert bench.ended == [("complete", None)]
-    assert SURFACE_MM < bench.world.surface_mm < SURFACE_MM + 4.5 * noise_N + 0.3
+    assert bench.world.surface_mm == pytest.approx(SURFACE_MM, abs=0.01 + noise_N)

@@ -16,6 +16,7 @@ from rig.config.wiring import Force
 from rig.errors import DeviceError, UsageError
 from tests.drivers.scripted_port import ScriptedPort
 from tests.mock_devices.force_bench import WAIT_S, WRENCH, Served, await_silence, collect
+from tests.remote import long_ago
 
 FRAME = encode_frame([125, -250, -775, 125, -250, 500])
 PERIOD_NS = 10_000_000
@@ -26,7 +27,7 @@ ARRIVAL_NS = 10**15
 def listening() -> Iterator[tuple[RobotiqFt300, ScriptedPort]]:
     """A sensor whose line is in the test's hand, as if it already streamed."""
     port = ScriptedPort()
-    sensor = RobotiqFt300(lambda _: port, Force(latency_ms=1.5))
+    sensor = RobotiqFt300(lambda _: port, Force(latency_ms=1.5), long_ago)
     yield sensor, port
     sensor.close()
 
@@ -53,12 +54,29 @@ def test_frames_read_together_were_captured_a_period_apart(listening: tuple[Robo
     assert {sample.arrival_ns for sample in samples} == {ARRIVAL_NS}
 
 
-def test_capture_never_goes_back(listening: tuple[RobotiqFt300, ScriptedPort]) -> None:
+def test_a_frame_that_comes_41_ms_late_is_recorded_where_it_was_sampled(
+    listening: tuple[RobotiqFt300, ScriptedPort],
+) -> None:
+    sensor, port = listening
+    captures = []
+    for number in range(200):
+        late_ns = 41_000_000 if number == 150 else 0
+        if not 150 < number < 155:  # what was sent meanwhile is read with the late one, or right behind it
+            port.push(FRAME * (1 if number != 155 else 5))
+            captures += [sample.capture_ns for sample in sensor.poll(ARRIVAL_NS + number * PERIOD_NS + late_ns)]
+    first = captures[0]
+    assert captures == pytest.approx([first + number * PERIOD_NS for number in range(200)], abs=100_000)
+    assert sensor.counters.device_lost == 0
+
+
+def test_capture_goes_on_upwards_where_the_first_frame_was_late(listening: tuple[RobotiqFt300, ScriptedPort]) -> None:
     sensor, port = listening
     port.push(FRAME)
-    first = sensor.poll(ARRIVAL_NS)[0].capture_ns
+    captures = [sensor.poll(ARRIVAL_NS)[0].capture_ns]
     port.push(FRAME * 2)
-    assert [sample.capture_ns for sample in sensor.poll(ARRIVAL_NS + 4_000_000)] == [first, first + 4_000_000]
+    captures += [sample.capture_ns for sample in sensor.poll(ARRIVAL_NS + 4_000_000)]
+    assert all(late > early for early, late in pairwise(captures))
+    assert captures[-1] <= ARRIVAL_NS + 4_000_000
 
 
 def test_a_reading_beyond_the_range_is_not_valid(listening: tuple[RobotiqFt300, ScriptedPort]) -> None:
@@ -72,6 +90,17 @@ def test_a_wrong_checksum_is_counted(listening: tuple[RobotiqFt300, ScriptedPort
     port.push(FRAME + FRAME[:-1] + b"\x00" + FRAME)
     assert len(sensor.poll(ARRIVAL_NS)) == 2
     assert (sensor.counters.frames, sensor.counters.checksum_errors, sensor.counters.device_lost) == (2, 1, 0)
+
+
+def test_a_frame_lost_to_a_wrong_checksum_keeps_its_place(listening: tuple[RobotiqFt300, ScriptedPort]) -> None:
+    sensor, port = listening
+    captures = []
+    for number in range(10):
+        port.push(FRAME[:-1] + b"\x00" if number == 5 else FRAME)
+        captures += [sample.capture_ns for sample in sensor.poll(ARRIVAL_NS + number * PERIOD_NS)]
+    steps = [(late - early) / PERIOD_NS for early, late in pairwise(captures)]
+    assert steps == pytest.approx([1, 1, 1, 1, 2, 1, 1, 1], abs=0.01)
+    assert (sensor.counters.checksum_errors, sensor.counters.device_lost) == (1, 1)
 
 
 def test_close_stops_the_stream_and_may_be_called_twice() -> None:

@@ -172,6 +172,21 @@ def test_cyclic_positions_are_followed_at_once(stage: Stage) -> None:
     assert upload(stage, 0x603F, kind="H") == 0
 
 
+def test_set_points_led_astray_take_the_carriage_with_them_until_the_drive_stops_by_itself(stage: Stage) -> None:
+    enabled(stage, 8)
+    stage.mock.unguarded = True
+    set_point = b"t40160F0000000000\r"
+    exchange(stage, b"t00020101\r")
+    stage.mock.lead_astray(-4.0)
+    for _ in range(500):
+        exchange(stage, set_point)
+        stage.run(0.001)
+    assert stage.plant.position_mm == pytest.approx(8 - 4.0 * 0.5, abs=0.1)
+    control(stage, 0x0B)
+    stopped = follow(stage, 0.3)
+    assert stopped[-1] == pytest.approx(stopped[-100], abs=0.001)
+
+
 def test_a_carriage_that_is_held_is_a_following_error_even_without_sync(stage: Stage) -> None:
     enabled(stage, 8)
     stage.plant.position_mm += 1.5

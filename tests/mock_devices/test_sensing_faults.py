@@ -11,7 +11,7 @@ from mock_devices.faults import Fault, Value, faults_of
 from mock_devices.parameters import Parameters
 from mock_devices.sensing_faults import CAMERA_FAULTS, SENSOR_FAULTS
 from rig.errors import UsageError
-from tests.mock_devices.playing import MS_NS, QUIET, SURFACE_MM, play, quiet_bench, settle
+from tests.mock_devices.playing import MS_NS, QUIET, SURFACE_MM, quiet_bench, settle
 
 DEPTH_MM = 8.0
 LOAD_N = 0.12 * DEPTH_MM * math.exp(0.22 * DEPTH_MM)
@@ -86,6 +86,12 @@ def test_a_saturated_sensor_ends_there_and_says_so(pressed: Bench) -> None:
     assert not pressed.force.overrange()
 
 
+def test_a_load_beside_the_axis_is_a_moment(pressed: Bench) -> None:
+    inject(pressed, "lever", 50.0)
+    assert loads(pressed)[3] == pytest.approx(-LOAD_N * 0.050, rel=1e-3)
+    assert loads(pressed)[2] == pytest.approx(-LOAD_N, abs=1e-3)
+
+
 @pytest.mark.parametrize(("kind", "value"), [("polarity", 1.0), ("gain", True), ("dead", 6), ("saturate", 0.0)])
 def test_a_value_that_means_nothing_is_refused(kind: str, value: Value) -> None:
     with pytest.raises(UsageError, match="this fault"):
@@ -116,13 +122,3 @@ def test_a_limb_can_be_told_how_fast_to_move() -> None:
     bench.limb.wanted_mm, bench.limb.speed_limit_mm_s = 10.0, 5.0
     bench.advance(bench.now_ns + 1000 * MS_NS)
     assert bench.limb.position_mm == pytest.approx(SURFACE_MM - 5.0, abs=0.01)
-
-
-def test_set_points_that_run_away_take_the_carriage_with_them_and_only_while_they_come() -> None:
-    bench = quiet_bench()
-    settle(bench, 10.0, 1.0)
-    bench.axis.astray_mm_s = -4.0
-    trace = play(bench, lambda _: 10.0, 1.0)
-    assert trace.axis_mm[-1] == pytest.approx(10.0 - 4.0, abs=0.1)
-    bench.advance(bench.now_ns + 1000 * MS_NS)
-    assert bench.axis.position_mm == pytest.approx(trace.axis_mm[-1], abs=0.05)

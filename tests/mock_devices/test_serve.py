@@ -80,7 +80,7 @@ def configured(port: Port) -> bool:
 @pytest.mark.xdist_group("wire")
 def test_one_line_tells_where_everything_is_and_every_product_answers_there() -> None:
     with started("--hide", "friction.level_N=0.2") as (process, endpoints):
-        assert set(endpoints) == {"force", "force_modbus", "axis", "tracker", "control", "pid", "latency_ms"}
+        assert set(endpoints) == {"force", "force_modbus", "axis", "tracker", "control", "pid", "serials", "latency_ms"}
         assert endpoints["pid"] == process.pid
         assert "friction" not in json.dumps(endpoints)
         with opened(endpoints["force"]["serial"]) as port:

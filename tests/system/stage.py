@@ -13,6 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from api.cli.mock_calibration import mock_file
+from api.cli.options import built_in
+from api.cli.stage import plugged
 from mock_devices.control import BenchControl
 
 ROOT = Path(__file__).parents[2]
@@ -41,11 +44,19 @@ class Stage:
     control: BenchControl
 
     def settings(self, *more: str) -> list[str]:
-        """Options that plug a command into this bench and make it patient."""
+        """Options that plug a command into this bench and make it patient, its force sensor calibrated."""
         force, axis, tracker = self.endpoints["force"], self.endpoints["axis"], self.endpoints["tracker"]
         ports = (f"force.port={force['serial']}", f"axis.port={axis['slcan']}", f"tracker.port=tcp://{tracker['tcp']}")
         late = [f"{role}.latency_ms={self.endpoints['latency_ms'][role]}" for role in ("force", "tracker")]
-        return [part for setting in (*ports, *late, *PATIENT, *more) for part in ("--set", setting)]
+        known = f"calibration.force={self.calibrated(*more)}"
+        return [part for setting in (*ports, *late, known, *PATIENT, *more) for part in ("--set", setting)]
+
+    def calibrated(self, *more: str) -> Path:
+        """File of the calibration of this bench's force sensor, of the product that ``more`` names."""
+        products = [setting for setting in more if setting.startswith("force.product=")]
+        wiring = built_in(products)
+        plugged(wiring, self.endpoints)
+        return mock_file(wiring, self.endpoints)
 
 
 @contextlib.contextmanager

@@ -13,8 +13,8 @@ from matplotlib.patches import Rectangle
 
 from rig.report.drawing import inline_svg, new_figure, png, speed_colors, svg, thinned
 from rig.report.figures import Tracked, fit_figure, loop_figure, quantiles, residual_figure, tracking_figure
-from rig.tissue.curves import loading_curve
 from rig.tissue.study import Study, study_curves
+from rig.trials.curves import loading_curve
 from tests.rig.tissue.synthetic import Bench
 
 

@@ -17,7 +17,7 @@ from rig.recording.reader import Recording
 from rig.recording.sessions import SessionInfo, TrialInfo, write_session
 from rig.tissue.history import History
 from rig.tissue.laws import Law
-from rig.tissue.strokes import Stroke
+from rig.trials.strokes import Stroke
 
 Column = NDArray[np.float64]
 Force = Callable[[Column, Column], Column]

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from rig.errors import DataError, UsageError
-from rig.tissue.curves import Curve, loading_curve
 from rig.tissue.fitting import BINS, Steps, early_offset, fit_law, residual_force
 from rig.tissue.judging import given_forces, judge
 from rig.tissue.laws import Constant, Index, Law
 from rig.tissue.laws_elastic import Layer
 from rig.tissue.laws_viscous import HuntCrossley, QuasiLinear, StandardLinear
 from rig.tissue.registry import LAWS
+from rig.trials.curves import Curve, loading_curve
 from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, along, index_force
 
 

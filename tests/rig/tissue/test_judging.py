@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from rig.errors import DataError
-from rig.tissue.contact import Contact
-from rig.tissue.curves import Curve, loading_curve
 from rig.tissue.fitting import fit_law
 from rig.tissue.judging import Errors, Prediction, displacement_at, errors_of, given_forces, judge
 from rig.tissue.laws import Constant, Index
 from rig.tissue.laws_viscous import StandardLinear
 from rig.tissue.study import rows
+from rig.trials.contact import Contact
+from rig.trials.curves import Curve, loading_curve
 from tests.rig.tissue.synthetic import Bench, index_force
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from api.cli.lattice import fit_lattice
 from rig.errors import DataError
-from rig.tissue.curves import loading_curve
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice_study import LatticeStudy, lattice_study
 from rig.tissue.study import Study, study_curves
+from rig.trials.curves import loading_curve
 from tests.rig.tissue.synthetic import Bench
 
 BLOCK = Block((9, 9, 12), spacing_mm=2.0)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from rig.errors import DataError
-from rig.tissue.contact import Contact
-from rig.tissue.curves import Curve
 from rig.tissue.rates import rate_test
+from rig.trials.contact import Contact
+from rig.trials.curves import Curve
 
 SPEEDS = (5.0, 10.0, 15.0, 20.0, 30.0)
 

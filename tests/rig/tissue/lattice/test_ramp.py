@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from rig.errors import DataError
-from rig.tissue.curves import loading_curve
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.ramp import project, ramp
 from rig.tissue.lattice.springs import Springs
@@ -14,6 +13,7 @@ from rig.tissue.lattice.symmetry import compare
 from rig.tissue.laws_springs import springs_law
 from rig.tissue.per_spring import PerSpring, per_spring
 from rig.tissue.study import study_curves
+from rig.trials.curves import loading_curve
 from tests.rig.tissue.synthetic import Bench
 
 BLOCK = Block((11, 11, 8), tip_diameter_mm=4.0, quarter=True)

@@ -1,6 +1,6 @@
 """One trial as three aligned arrays, from whatever a recording holds: captured by the loop or imported from CSV."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from rig.errors import DataError
 from rig.recording.reader import Recording
-from rig.tissue.laws import FloatArray
-
-FORCE_FIELDS = {"fx": "fx_N", "fy": "fy_N", "fz": "fz_N"}
+from rig.recording.tables import compression_N, force_map
+from rig.trials.contact import FloatArray
 
 
 @dataclass(frozen=True)
@@ -33,9 +32,8 @@ def stroke_of(name: str, recording: Recording) -> Stroke:
     Samples a device marked invalid are left out. Raises DataError where a stream is missing, empty, out of order or
     holds NaN, or where force and axis do not overlap in time.
     """
-    field, sign = _force_channel(name, recording.metadata)
-    force_ns, force_N = _column(name, recording, "force", field)
-    axis_ns, position_mm = _column(name, recording, "axis", "position_mm")
+    force_ns, force_N = _column(name, recording, "force", f"{force_map(recording).channel}_N", compression_N)
+    axis_ns, position_mm = _column(name, recording, "axis", "position_mm", _position_mm)
     inside = (force_ns >= axis_ns[0]) & (force_ns <= axis_ns[-1])
     if np.count_nonzero(inside) < 2:
         raise DataError(f"{name}: force and axis do not overlap in time; check the clocks of the two streams")
@@ -45,19 +43,13 @@ def stroke_of(name: str, recording: Recording) -> Stroke:
         name=name,
         speed_mm_s=_nominal_speed(name, recording.metadata),
         time_s=(force_ns - start_ns) * 1e-9,
-        force_N=sign * force_N,
+        force_N=force_N,
         position_mm=np.interp((force_ns - start_ns) * 1e-9, (axis_ns - start_ns) * 1e-9, position_mm),
     )
 
 
-def _force_channel(name: str, metadata: Mapping[str, Mapping[str, str]]) -> tuple[str, float]:
-    calibration = metadata.get("calibration", {})
-    axis, compression = calibration.get("force_axis", "fz"), calibration.get("compression", "negative")
-    if axis not in FORCE_FIELDS:
-        raise DataError(f"{name}: calibration force_axis is {axis!r}; it must be fx, fy or fz")
-    if compression not in ("positive", "negative"):
-        raise DataError(f"{name}: calibration compression is {compression!r}; it must be positive or negative")
-    return FORCE_FIELDS[axis], 1.0 if compression == "positive" else -1.0
+def _position_mm(recording: Recording) -> FloatArray:
+    return recording.tables["axis"]["position_mm"].astype(float)
 
 
 def _nominal_speed(name: str, metadata: Mapping[str, Mapping[str, str]]) -> float:
@@ -68,14 +60,16 @@ def _nominal_speed(name: str, metadata: Mapping[str, Mapping[str, str]]) -> floa
         raise DataError(f"{name}: trial speed_mm_s is {text!r}; it must be a number in mm/s") from error
 
 
-def _column(name: str, recording: Recording, stream: str, field: str) -> tuple[NDArray[np.int64], FloatArray]:
+def _column(
+    name: str, recording: Recording, stream: str, field: str, values_of: Callable[[Recording], FloatArray]
+) -> tuple[NDArray[np.int64], FloatArray]:
     table = recording.tables.get(stream)
     if table is None or not len(table):
         raise DataError(f"{name}: no {stream} samples; a curve needs force and axis")
-    table = table[table["valid"] == 1]
-    if len(table) < 2:
+    sound = table["valid"] == 1
+    if np.count_nonzero(sound) < 2:
         raise DataError(f"{name}: no valid {stream} samples; the device vouched for none")
-    times_ns, values = table["capture_ns"].astype(np.int64), table[field].astype(float)
+    times_ns, values = table["capture_ns"][sound].astype(np.int64), values_of(recording)[sound]
     if np.any(np.diff(times_ns) < 0):
         raise DataError(f"{name}: {stream} times go backwards at sample {int(np.argmax(np.diff(times_ns) < 0)) + 1}")
     if not np.all(np.isfinite(values)):

@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import DataError
-from rig.tissue.contact import Contact, find_contact
-from rig.tissue.laws import FloatArray
-from rig.tissue.strokes import Stroke
+from rig.trials.contact import Contact, FloatArray, find_contact
+from rig.trials.strokes import Stroke
 
 LEAST_SAMPLES = 3
 LEAST_AIR_SAMPLES = 3

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from rig.errors import DataError
-from rig.tissue.contact import find_contact
-from rig.tissue.curves import loading_curve
-from rig.tissue.strokes import Stroke, stroke_of
+from rig.trials.contact import find_contact
+from rig.trials.curves import loading_curve
+from rig.trials.strokes import Stroke, stroke_of
 from tests import data
 from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, index_force, recording, rubbing, tables
 

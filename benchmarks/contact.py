@@ -1,0 +1,70 @@
+"""The surface as the loop finds it, over hundreds of approaches: ``python -m benchmarks.contact [--approaches 100]``.
+
+Both sensors' noise and rate, limbs from 0.05 to 5 N/mm, on a clock of its own. Last line: one JSON object.
+"""
+
+import argparse
+import json
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.paired import Touch
+from tests.controller.limb import BOTA, FT300, Limb, LimbBench, Sensor, approached
+from tests.controller.spring import SURFACE_MM
+
+LIMBS = (
+    Limb(0.12, 0.22, 0.01), Limb(0.05, 0.0, 0.0), Limb(0.05, 0.3, 0.01), Limb(0.5, 0.2, 0.0),
+    Limb(0.5, 0.0, 0.05), Limb(1.0, 0.3, 0.05), Limb(5.0, 0.0, 0.02),
+)  # fmt: skip
+SENSORS = {"bota-sensone": BOTA, "robotiq-ft300": FT300}
+# What depth is promised to, and what a trial has to say itself where it is not known so well.
+PROMISED_MM = 0.2
+
+
+def main() -> None:
+    """Prints a line a sensor and limb, then totals."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--approaches", type=int, default=40, help="of each sensor and limb")
+    count = parser.parse_args().approaches
+    print("sensor         limb (a, b, B)      error mean, sd, largest mm  held  within  known  touches  seconds")
+    found = [_row(name, SENSORS[name], limb, count) for name, limb in product(SENSORS, LIMBS)]
+    errors, known = np.concatenate([row[0] for row in found]), np.concatenate([row[2] for row in found])
+    held = np.concatenate([row[1] for row in found])
+    print(json.dumps({
+        "approaches": len(errors),
+        "interval_holds": round(float(held.mean()), 4),
+        "known": int(known.sum()),
+        "largest_error_known_mm": round(float(np.abs(errors[known]).max()), 4),
+        "p95_error_known_mm": round(float(np.quantile(np.abs(errors[known]), 0.95)), 4),
+        "largest_error_mm": round(float(np.abs(errors).max()), 4),
+    }))  # fmt: skip
+
+
+def _row(
+    name: str, sensor: Sensor, limb: Limb, count: int
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Errors, whether the interval held the surface, and whether it was as narrow as is promised; each (count,)."""
+    runs = [approached(limb, sensor, seed) for seed in range(count)]
+    touches = [_touch(bench) for bench in runs]
+    errors = np.array([touch.surface_mm - SURFACE_MM for touch in touches])
+    held = np.array([touch.low_mm <= SURFACE_MM <= touch.high_mm for touch in touches])
+    within = np.array([touch.within_mm for touch in touches])
+    print(
+        f"{name:14s} {limb.a_N_mm:5g} {limb.b_per_mm:5g} {limb.B_N_s_mm:6g}"
+        f"  {errors.mean():+8.3f} {errors.std():6.3f} {np.abs(errors).max():7.3f}"
+        f"  {100 * held.mean():9.0f} % {within.mean():6.2f} {100 * np.mean(within <= PROMISED_MM):5.0f} %"
+        f" {np.mean([touch.touches for touch in touches]):6.1f} {np.mean([b.world.now_ns for b in runs]) * 1e-9:9.1f}",
+        flush=True,
+    )
+    return errors, held, within <= PROMISED_MM
+
+
+def _touch(bench: LimbBench) -> Touch:
+    assert bench.world.touch, bench.ended
+    return bench.world.touch
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,108 @@
+"""How faults are brought about: on the bench, on our own processes, by the operator."""
+
+import os
+import resource
+import signal
+import threading
+from collections.abc import Callable
+from functools import partial
+
+from benchmarks.faults.fault import Act, Live
+from controller.steps import Hold, Program
+from mock_devices.faults import Value
+
+LOOP, RECORDER = "loop_process", "rig.recording.recorder"
+# Longer than anything may go on without the frozen process, and short enough for the bench to be asked afterwards.
+FROZEN_S = 4.5
+# Any file is larger already: what is written next fails.
+FILE_BYTES = 1
+# More points than one message may carry: 4,000 of them made the loop's process raise.
+POINTS = 400_000
+
+
+def nothing(_: Live) -> None:
+    """The configuration is the fault."""
+
+
+def device(role: str, kind: str, value: Value | None = None) -> Act:
+    """A fault of one device, as `rig mock` offers it."""
+    return lambda live: live.bench.control.fault(role, kind, value)
+
+
+def several(*acts: Act) -> Act:
+    """One after the other."""
+
+    def act(live: Live) -> None:
+        for each in acts:
+            each(live)
+
+    return act
+
+
+def dials(**values: Value) -> Act:
+    """Turns figures of the bench; ``tissue__present`` stands for ``tissue.present``."""
+    wanted = {name.replace("__", "."): value for name, value in values.items()}
+
+    def act(live: Live) -> None:
+        live.bench.control.set(wanted)
+
+    return act
+
+
+def killed(pid_of: Callable[[Live], int]) -> Act:
+    """SIGKILL."""
+    return lambda live: os.kill(pid_of(live), signal.SIGKILL)
+
+
+def frozen(pid_of: Callable[[Live], int], seconds: float = FROZEN_S) -> Act:
+    """SIGSTOP, and SIGCONT after ``seconds``."""
+
+    def act(live: Live) -> None:
+        pid = pid_of(live)
+        os.kill(pid, signal.SIGSTOP)
+        threading.Timer(seconds, partial(_continue, pid)).start()
+
+    return act
+
+
+def _continue(pid: int) -> None:
+    try:
+        os.kill(pid, signal.SIGCONT)
+    except ProcessLookupError:
+        return
+
+
+def loop(live: Live) -> int:
+    """The loop's process."""
+    return live.rig.loop_pid if live.rig else live.child("loop")
+
+
+def recorder(live: Live) -> int:
+    """The recorder's process."""
+    return live.child(RECORDER)
+
+
+def operator(live: Live) -> int:
+    """The program that runs the bench, which is another process than this one."""
+    assert live.other, "only a program of its own can be frozen or killed"
+    return live.pid
+
+
+def bench(live: Live) -> int:
+    """The process that plays all devices."""
+    return int(live.bench.endpoints["pid"])
+
+
+def full_disk(live: Live) -> None:
+    """The recorder may write no more."""
+    resource.prlimit(recorder(live), resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
+
+
+def unattended(live: Live) -> None:
+    """Whoever runs the bench is there no more."""
+    live.supervisor.attended = lambda: False
+
+
+def oversized_message(live: Live) -> None:
+    """A program too large for a message."""
+    live.supervisor.run(Program(name="x" * POINTS, steps=(Hold(duration_s=0.0),)), 5.0)

@@ -1,0 +1,157 @@
+"""All faults of the campaign; each line of the safety table has one that nothing else may notice: its proof."""
+
+import math
+
+from benchmarks.faults import acts
+from benchmarks.faults.acts import device, dials, several
+from benchmarks.faults.fault import DRIVE, PROTOCOL, QUALITY, REFUSED, Fault
+from benchmarks.faults.scenarios import SURFACE_MM, Truth
+from controller.safety import TABLE, Check
+
+DEPTH_LIMIT_MM = 10.0
+WORKSPACE_MM = 28.5
+PATIENT_MM = 10.0
+RUNNING = device("axis", "unguarded")
+"""Without it the drive's own watches stop what the loop is to notice here."""
+# The rate of a program of 1 to 3 N, once a second, is 6.3 N/s; half of 1 N within the window of 10 ms is 50 N/s.
+GENTLE = ("limits.force_rate_N_s=40",)
+# Patient enough for a cycle that comes 70 ms late to be the only thing that is wrong.
+LATE = ("loop.overrun_ms=40", "loop.stale_axis_ms=300", "loop.stale_force_ms=300", "axis.heartbeat_ms=300")
+LATE_S = 0.07
+# The program looks after its recorder ten times a second; a recorder writes what it has at least every 0.4 s.
+RECORDER_GONE_S = 0.3
+DISK_FULL_S = 0.7
+
+
+def _too_deep(truth: Truth) -> bool:
+    return truth["tip.depth_mm"] > DEPTH_LIMIT_MM
+
+
+def _outside(truth: Truth) -> bool:
+    return truth["tip.position_mm"] > WORKSPACE_MM + 1.0
+
+
+def _limb_moved(truth: Truth) -> bool:
+    return abs(truth["surface.position_mm"] - SURFACE_MM) > PATIENT_MM
+
+
+def _too_strong(truth: Truth) -> bool:
+    return truth["tip.force_N"] > 15.0
+
+
+AXIS = (
+    Fault("axis.error", "press", ("drive_fault",), device("axis", "error", 0x2310)),
+    Fault("axis.lasting_error", "press", ("drive_fault",), device("axis", "lasting_error", 0x2310)),
+    Fault("axis.cut", "press", ("axis_lost",), device("axis", "cut")),
+    Fault("axis.freeze", "press", ("axis_lost",), device("axis", "freeze")),
+    Fault("axis.silent", "press", ("axis_lost",), device("axis", "silent")),
+    Fault("axis.delay", "press", ("axis_lost", "drive_fault"), device("axis", "delay", 0.1)),
+    Fault("axis.frozen", "loading", ("axis_frozen",), device("axis", "frozen"), latest_s=0.3),
+    Fault(
+        "axis.astray", "hold", ("following_error",), several(RUNNING, device("axis", "astray", -30.0)),
+        why="set-points reach the drive falsified, outwards",
+    ),
+    Fault(
+        "axis.runs_away", "hold", ("overspeed",), several(RUNNING, device("axis", "astray", -200.0)),
+        settings=("axis.following_error_mm=30",), why="the same, faster than the axis may move",
+    ),
+    Fault(
+        "axis.leaves", "hold", ("workspace",), several(RUNNING, device("axis", "astray", 5.0)), _outside,
+        settings=(f"limits.position_max_mm={WORKSPACE_MM}", "axis.following_error_mm=10"),
+        why="the same, slowly inwards, past the end of the workspace",
+    ),
+)  # fmt: skip
+
+FORCE = (
+    Fault("force.cut", "press", ("force_lost",), device("force", "cut")),
+    Fault("force.freeze", "press", ("force_lost",), device("force", "freeze")),
+    Fault("force.silent", "press", ("force_lost",), device("force", "silent")),
+    Fault("force.delay", "press", ("force_lost",), device("force", "delay", 0.1)),
+    Fault("force.invalid", "press", ("force_invalid",), device("force", "invalid")),
+    Fault("force.frozen", "press", ("force_invalid",), device("force", "frozen"), settings=("loop.missed_periods=20",)),
+    Fault("force.saturated", "press", ("force_invalid",), device("force", "saturate", 0.5)),
+    Fault("force.lever", "hold", ("torque_limit",), device("force", "lever", 500.0)),
+    Fault("force.polarity", "press", ("force_rate",), device("force", "polarity"), settings=GENTLE),
+    Fault("force.gain_half", "press", ("force_rate",), device("force", "gain", 0.5), settings=GENTLE),
+    Fault("force.gain_double", "press", ("force_rate",), device("force", "gain", 2.0), settings=GENTLE),
+    Fault("force.dead", "press", ("force_rate",), device("force", "dead"), settings=GENTLE),
+    Fault("force.crossed", "press", ("force_rate",), device("force", "crossed"), settings=GENTLE),
+)
+
+TRACKER = (
+    Fault("tracker.cut", "press", ("tracker_lost",), device("tracker", "cut")),
+    Fault("tracker.freeze", "press", ("tracker_lost",), device("tracker", "freeze")),
+    Fault("tracker.silent", "press", ("tracker_lost",), device("tracker", "silent")),
+    Fault("tracker.frozen", "press", ("tracker_lost",), device("tracker", "frozen")),
+    Fault("tracker.delay", "press", ("tracker_lost",), device("tracker", "delay", 0.5)),
+    Fault("tracker.unplugged", "press", ("tracker_lost",), device("tracker", "unplugged", 1)),
+    Fault("tracker.error_reply", "press", ("tracker_lost",), device("tracker", "error_reply")),
+    Fault("tracker.arm_hidden", "press", ("tracker_lost",), dials(tracker__arm_in_view=False)),
+    Fault("tracker.jumps", "press", ("patient_moved",), device("tracker", "arm_slips", 15.0)),
+)
+
+LIMB = (
+    Fault(
+        "limb.pushes", "hold", ("force_limit",), dials(surface__speed_mm_s=20.0, surface__position_mm=11.0), _too_strong
+    ),
+    Fault(
+        "limb.inclusion", "loading", ("force_limit",), dials(tissue__inclusion_mm=4.0, tissue__inclusion_N_mm=20.0),
+        _too_strong, latest_s=0.0, why="20 N/mm from 4 mm on, met at 10 mm/s",
+    ),
+    Fault("limb.leaves", "press", ("depth_limit",), dials(tissue__present=False), _too_deep,
+          settings=(f"limits.depth_mm={DEPTH_LIMIT_MM}",), why="the tip searches for it, down to the depth limit"),
+    Fault("limb.moves", "press", ("patient_moved",), dials(surface__position_mm=35.0), _limb_moved),
+)  # fmt: skip
+
+OPERATOR = (
+    Fault("operator.estop", "press", ("emergency_stop",), lambda live: live.supervisor.estop()),
+    Fault("operator.stop", "press", ("operator_stop",), lambda live: live.supervisor.stop()),
+    Fault("operator.pain", "press", ("pain_stop",), lambda live: live.supervisor.pain()),
+    Fault("operator.unattended", "press", ("operator_silent",), acts.unattended),
+    Fault("operator.frozen", "press", ("operator_silent",), acts.frozen(acts.operator), latest_s=0.5, apart=True),
+    Fault("operator.killed", "press", ("supervisor_lost",), acts.killed(acts.operator), apart=True),
+    Fault("operator.oversized", "press", (REFUSED,), acts.oversized_message, why="a program of 400 kB"),
+)
+
+PROCESSES = (
+    Fault("loop.killed", "press", (DRIVE,), acts.killed(acts.loop)),
+    Fault("loop.frozen", "press", (DRIVE,), acts.frozen(acts.loop)),
+    Fault("loop.late", "press", ("loop_overrun",), acts.frozen(acts.loop, LATE_S), settings=LATE),
+    Fault(
+        "bench.frozen", "press", ("axis_lost", "force_lost"), acts.frozen(acts.bench, 0.8), why="all devices at once"
+    ),
+    Fault("recorder.frozen", "press", ("recorder_stalled",), acts.frozen(acts.recorder), latest_s=0.5),
+    Fault("recorder.killed", "press", ("operator_stop",), acts.killed(acts.recorder), within_s=RECORDER_GONE_S),
+    Fault("recorder.disk_full", "press", ("operator_stop",), acts.full_disk, within_s=DISK_FULL_S),
+)
+
+ANY_AXIS = ("axis_lost", "drive_fault", "following_error", "overspeed", "workspace", "axis_frozen", QUALITY)
+ANY_FORCE = ("force_lost", "force_invalid", "force_rate", QUALITY)
+ANY_TRACKER = ("tracker_lost", QUALITY)
+DAMAGE = ("drop", "corrupt", "truncate", "garbage")
+# A share of messages: when one of them is one too many is chance.
+BY_CHANCE_S = math.inf
+WIRES = (
+    *(Fault(f"axis.{kind}", "hold", ANY_AXIS, device("axis", kind, 0.1), within_s=BY_CHANCE_S) for kind in DAMAGE),
+    *(Fault(f"force.{kind}", "hold", ANY_FORCE, device("force", kind, 0.1), within_s=BY_CHANCE_S) for kind in DAMAGE),
+    *(
+        Fault(f"tracker.{kind}", "hold", ANY_TRACKER, device("tracker", kind, 0.3), within_s=BY_CHANCE_S)
+        for kind in DAMAGE
+    ),
+    Fault("tracker.missing", "hold", ANY_TRACKER, device("tracker", "missing", 0)),
+    Fault("force.drift", "hold", (PROTOCOL, QUALITY), device("force", "drift", 0.5)),
+)
+
+FAULTS: dict[str, Fault] = {
+    fault.name: fault for fault in (*AXIS, *FORCE, *TRACKER, *LIMB, *OPERATOR, *PROCESSES, *WIRES)
+}
+
+
+def proofs(code: str) -> tuple[Fault, ...]:
+    """Faults that nothing but ``code`` may notice."""
+    return tuple(fault for fault in FAULTS.values() if fault.expected == (code,))
+
+
+def unproven(table: tuple[Check, ...] = TABLE) -> list[str]:
+    """Lines of ``table`` for which no fault is declared that they alone may notice."""
+    return [line.code for line in table if not proofs(line.code)]

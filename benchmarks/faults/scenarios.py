@@ -1,0 +1,114 @@
+"""What the bench does while a fault happens: a press with the force loop, an indentation, or resting in contact."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from controller.experiments import capture, tracked
+from controller.experiments.references import named
+from controller.operation import Operation
+from controller.steps import Approach, Compress, MoveTo, Program, Retract, TrackForce, Zero
+from controller.supervisor import Supervisor
+from rig.config.protocol import Indentation
+from rig.config.wiring import Wiring
+from tests.controller.models import index_model
+
+Truth = dict[str, float]
+"""Figures of the bench by name, as `rig mock` tells them."""
+
+MODEL = index_model(0.12, 0.22, 0.01, force_N=11.0)
+"""The mock bench's own forearm."""
+PRESSES = named("press:2,base_N=1,frequency_Hz=1,duration_s=5")
+SURFACE_MM = 20.0
+NEAR_MM = 15.0
+"""Short of the surface; far enough from 0 for the tracker to be registered to the axis."""
+SEARCH_TO_MM = 28.0
+REST_DEPTH_MM = 4.0
+INDENTATION = Indentation(
+    name="campaign",
+    speeds_mm_s=(10.0,),
+    trials=1,
+    depth_mm=7.0,
+    air_dwell_s=0.3,
+    approach_speed_mm_s=20.0,
+    search_to_mm=SEARCH_TO_MM,
+    hold_s=2.0,
+    retract_speed_mm_s=20.0,
+    rest_s=0.3,
+    force_limit_N=15.0,
+)
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a scenario ended: the cause of its end, and what the trial was worth where it is one."""
+
+    cause: str
+    verdict: str = ""
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """``perform`` runs it into a folder; a fault comes at a random moment after ``ready`` holds for the first time.
+
+    ``at_rest``: it is over by then, and the tip stays where it is.
+    """
+
+    perform: Callable[[Supervisor, Path], Ended]
+    ready: Callable[[Truth], bool]
+    at_rest: bool = False
+
+
+def _press(rig: Supervisor, folder: Path) -> Ended:
+    done = tracked.recorded_run(rig, press_program(rig.wiring), folder, "")
+    return Ended(done.outcome.cause or "complete")
+
+
+def press_program(wiring: Wiring) -> Program:
+    """1 to 3 N once a second; the way there is faster than a capture's, nothing else differs."""
+    planned = tracked.plan_reference(PRESSES, MODEL, wiring)
+    presses = tuple(step for step in planned.steps if isinstance(step, TrackForce))
+    return planned.model_copy(update={"steps": (*_touch(), *presses, Retract(clearance_mm=5.0, speed_mm_s=20.0))})
+
+
+def _touch() -> tuple[Zero, MoveTo, Approach]:
+    return (
+        Zero(duration_s=0.3),
+        MoveTo(position_mm=NEAR_MM, speed_mm_s=40.0),
+        Approach(speed_mm_s=10.0, contact_force_N=0.1, search_to_mm=SEARCH_TO_MM),
+    )
+
+
+def _indent(rig: Supervisor, folder: Path) -> Ended:
+    info = capture.capture(rig, INDENTATION, folder, Operation("campaign"), lambda _: None)
+    return Ended(info.trials[-1].outcome)
+
+
+def _rest(rig: Supervisor, folder: Path) -> Ended:
+    """Leaves the tip in contact, idle."""
+    steps = (*_touch(), Compress(depth_mm=REST_DEPTH_MM, speed_mm_s=10.0, force_limit_N=5.0))
+    done = tracked.recorded_run(rig, Program(name="rest in contact", steps=steps), folder, "")
+    return Ended(done.outcome.cause or "complete")
+
+
+def _safe(rig: Supervisor, folder: Path) -> Ended:
+    """Leaves the tip in contact after an emergency stop."""
+    ended = _rest(rig, folder)
+    rig.estop()
+    rig.wait_at_rest()
+    return ended
+
+
+def _rests_in_contact(truth: Truth) -> bool:
+    return truth["tip.depth_mm"] > REST_DEPTH_MM - 0.1 and abs(truth["tip.velocity_mm_s"]) < 0.5
+
+
+SCENARIOS = {
+    "press": Scenario(_press, lambda truth: truth["tip.force_N"] > 0.95),
+    "hold": Scenario(_indent, lambda truth: truth["tip.depth_mm"] > INDENTATION.depth_mm - 0.1),
+    "loading": Scenario(_indent, lambda truth: truth["tip.depth_mm"] > 0.5 and truth["tip.velocity_mm_s"] > 5.0),
+    "approach": Scenario(_indent, lambda truth: truth["tip.position_mm"] > NEAR_MM - 5.0),
+    "idle": Scenario(_rest, _rests_in_contact, at_rest=True),
+    "safe": Scenario(_safe, _rests_in_contact, at_rest=True),
+}

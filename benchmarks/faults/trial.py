@@ -1,0 +1,190 @@
+"""One trial: a fresh bench, a scenario, a fault at a moment that seed, fault and number say, and what came of it."""
+
+import contextlib
+import random
+import subprocess
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from api.cli.stage import plugged
+from benchmarks.faults.evaluation import Notice, Outcome, evaluate
+from benchmarks.faults.fault import Fault, at_once
+from benchmarks.faults.observer import Observer
+from benchmarks.faults.program import Program, program
+from benchmarks.faults.scenarios import SCENARIOS, Ended
+from rig.config.table import merged, parse
+from rig.config.wiring import Wiring
+from rig.errors import RigError, UsageError
+from rig.recording.reader import read_recording
+from tests.system.stage import Stage, stage
+
+# Every limit of a real bench is stated, so that none is as patient as a mock device gets it; only missed samples are
+# counted by age, because the bench is a process of the same computer.
+STATED = ("loop.missed_periods=0",)
+READY_S = 30.0
+REST_S, STILL_MM = 0.3, 0.03
+SETTLE_S = 0.2
+# Part 1 of the limits: a peak may pass the force limit by a tenth, while the axis comes to stand.
+MARGIN = 1.1
+# An event carries the time at which its cycle began, which may be just before what it answers.
+CYCLE_NS = 2_000_000
+STOPPING_LEVEL = 30
+# After a fault at rest nothing ends by itself: so long its notice is awaited.
+AT_REST_S = 1.5
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What one fault did once; times in s from the fault or its onset, forces are the tissue's own."""
+
+    fault: str
+    number: int
+    plant: str
+    commit: str
+    moment_s: float
+    noticed_by: str
+    detected_s: float | None
+    unnoticed: str
+    unsafe: str
+    peak_N: float
+    over_N: float
+    end: str
+    cause: str
+    complete: bool
+
+
+class Spoilt(RigError):
+    """The run had ended before its fault: the computer stalled, or the moment came too late."""
+
+
+def wiring_for(fault: Fault) -> Wiring:
+    """The bench's configuration in a trial of ``fault``."""
+    return parse(Wiring, merged(Wiring().model_dump(mode="json"), [*STATED, *fault.settings]), fault.name)
+
+
+def trial(fault: Fault, number: int, seed: int, folder: Path, plant: str = "", planted: str = "") -> Trial:
+    """Runs ``fault`` once; ``planted`` are the checks that ``plant`` switches off in the loop."""
+    moment_s = random.Random(f"{seed} {fault.name} {number}").uniform(0.0, fault.latest_s)
+    with (
+        stage("--seed", str(seed + number)) as bench,
+        contextlib.closing(Observer(bench.endpoints["control"])) as observer,
+    ):
+        outcome = _outcome(fault, bench, folder, planted, observer, moment_s)
+    found = evaluate(fault, outcome)
+    over_N = max(0.0, observer.peak_N - MARGIN * wiring_for(fault).force_limit_N)
+    unsafe = [outcome.moves, f"{over_N:.2f} N over the limit and its margin" if over_N else ""]
+    return Trial(
+        fault=fault.name,
+        number=number,
+        plant=plant,
+        commit=commit(),
+        moment_s=round(moment_s, 3),
+        noticed_by=found.by,
+        detected_s=found.detected_s,
+        unnoticed=found.unnoticed,
+        unsafe="; ".join(part for part in unsafe if part),
+        peak_N=round(observer.peak_N, 3),
+        over_N=round(over_N, 3),
+        end=outcome.end,
+        cause=outcome.ended.cause,
+        complete=outcome.complete,
+    )
+
+
+def _outcome(fault: Fault, bench: Stage, folder: Path, planted: str, observer: Observer, moment_s: float) -> Outcome:
+    happened_ns, refusal, unpowered_ns = time.monotonic_ns(), "", None
+    try:
+        wiring = plugged(wiring_for(fault), bench.endpoints)
+        with program(bench, wiring, fault, folder, planted) as running:
+            observer.listen(running.live.rig)
+            happened_ns, refusal = _provoke(fault, running, observer, moment_s)
+            ended = running.wait()
+            _await_notice(fault, observer)
+            unpowered_ns = observer.unpowered_ns
+            end, moves = _end(bench)
+    except RigError as error:
+        if not fault.before:
+            raise
+        ended, refusal = Ended(str(error)), str(error)
+        end, moves = _end(bench)
+    stops = [*_recorded(folder, happened_ns), *(one for one in observer.notices if one.at_ns > happened_ns)]
+    return Outcome(
+        ended,
+        happened_ns,
+        happened_ns if fault.onset is at_once else observer.onset_ns,
+        tuple(sorted(stops, key=lambda notice: notice.at_ns)),
+        unpowered_ns,
+        refusal,
+        end,
+        moves,
+        _complete(folder),
+    )
+
+
+def _provoke(fault: Fault, running: Program, observer: Observer, moment_s: float) -> tuple[int, str]:
+    """When the fault was brought about, and the sentence that refused it, if one did."""
+    if not fault.before:
+        running.begin()
+        _wait(lambda: SCENARIOS[fault.scenario].ready(observer.truth) or running.ended is not None)
+        time.sleep(moment_s)
+        if running.ended is not None and not SCENARIOS[fault.scenario].at_rest:
+            raise Spoilt(running.ended.cause)
+    happened_ns = time.monotonic_ns()
+    observer.expect(fault.onset)
+    refusal = ""
+    try:
+        fault.act(running.live)
+    except RigError as error:
+        refusal = str(error)
+    running.begin()
+    return happened_ns, refusal
+
+
+def _await_notice(fault: Fault, observer: Observer) -> None:
+    if SCENARIOS[fault.scenario].at_rest:
+        until_s = time.monotonic() + AT_REST_S
+        while not observer.notices and time.monotonic() < until_s:
+            time.sleep(0.01)
+
+
+def _wait(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + READY_S
+    while not condition():
+        if time.monotonic() > deadline:
+            raise UsageError(f"the bench was not ready for its fault within {READY_S:g} s")
+        time.sleep(0.003)
+
+
+def _recorded(folder: Path, happened_ns: int) -> list[Notice]:
+    """What stopped motion, from the events of the recordings."""
+    return [
+        Notice(event.code, event.capture_ns)
+        for file in sorted(folder.glob("*.mcap"))
+        for event in read_recording(file).events
+        if event.level >= STOPPING_LEVEL and event.capture_ns > happened_ns - CYCLE_NS
+    ]
+
+
+def _complete(folder: Path) -> bool:
+    recordings = [read_recording(file) for file in sorted(folder.glob("*.mcap"))]
+    return all(recording.complete and not recording.damage for recording in recordings)
+
+
+def _end(bench: Stage) -> tuple[str, str]:
+    """Where it ended, and what is unsafe about it."""
+    time.sleep(SETTLE_S)
+    before_mm = bench.control.number("tip.position_mm")
+    time.sleep(REST_S)
+    now = bench.control.get("tip.position_mm", "tip.force_N", "axis.powered")
+    moved_mm = abs(float(now["tip.position_mm"]) - before_mm)
+    place = "free" if float(now["tip.force_N"]) == 0 else "stopped in contact"
+    place += ", powered" if now["axis.powered"] else ", braked"
+    return place, f"still moves, {moved_mm:.2f} mm in {REST_S:g} s" if moved_mm > STILL_MM else ""
+
+
+def commit() -> str:
+    """The version that is tried, with a plus where files differ from it."""
+    said = subprocess.run(["git", "describe", "--always", "--dirty=+"], capture_output=True, text=True, check=False)
+    return said.stdout.strip() or "unknown"

@@ -1,0 +1,1 @@
+"""Mutation testing of what keeps the tip from hurting: `make mutants`."""

@@ -1,0 +1,111 @@
+"""Mutation testing: `python -m benchmarks.mutation [--sample 60 --seed N] [--only controller/safety.py ...]`.
+
+Each mutant is the code with one change; it is killed if a test fails with it. Prints what survived and is not listed in
+`survivors.toml`, and what is listed there but was killed or is no mutant any more. The last line is one JSON object.
+Exits with 1 where less than nine tenths of a file's mutants are killed, or where list and run do not agree.
+"""
+
+import argparse
+import json
+import os
+import random
+import shlex
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+# Before numpy is imported: a forked process has no threads but its own.
+os.environ |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+
+from benchmarks.mutation.mutants import Mutant
+from benchmarks.mutation.run import Result, Subject, run
+from benchmarks.mutation.survivors import disagreements, listed
+from rig.errors import CheckFailed
+
+LEAST_SHARE = 0.9
+ROOT = Path(__file__).resolve().parents[2]
+SURVIVORS = Path(__file__).with_name("survivors.toml")
+MODULES = (
+    "controller/safety.py",
+    "controller/safety_checks.py",
+    "controller/watch.py",
+    "controller/health.py",
+    "controller/bench_loop.py",
+    "controller/commands.py",
+    "controller/machine.py",
+    "controller/steps.py",
+    "controller/supervisor.py",
+)
+# Tests of the compiled control law and of its design take minutes and run no line of these that others do not.
+SLOW = ("simulated", "extended_gain", "force_position", "laws", "comparison", "lines", "references")
+TESTS = ("tests/controller", *(f"--ignore=tests/controller/test_{name}.py" for name in SLOW))
+
+
+def main() -> int:
+    """Runs what was asked for; the exit code."""
+    asked = _arguments()
+    subject = Subject(asked.root, tuple(asked.only) or MODULES, asked.tests or TESTS)
+    chosen = _chosen(subject.mutants, asked.sample, asked.seed)
+    began = time.monotonic()
+    try:
+        results = run(subject, chosen, asked.jobs)
+    except CheckFailed as error:
+        print(error, file=sys.stderr)
+        return 1
+    wrong = disagreements(results, listed(asked.survivors), subject.mutants)
+    for sentence in wrong:
+        print(sentence)
+    _write(asked.json, results)
+    modules = _counts(results)
+    low = [] if asked.sample else [path for path, (made, killed) in modules.items() if killed < LEAST_SHARE * made]
+    for path in low:
+        print(f"{path}: {modules[path][1]} of {modules[path][0]} mutants are killed, fewer than {LEAST_SHARE:.0%}")
+    print(f"{len(results)} mutants in {time.monotonic() - began:.0f} s")
+    made, killed = len(results), sum(result.verdict.killed for result in results)
+    print(json.dumps({"mutants": made, "killed": killed, "share": round(killed / max(made, 1), 4), "modules": modules}))
+    return 1 if wrong or low else 0
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.mutation", description=__doc__)
+    parser.add_argument("--sample", type=int, default=0, metavar="N", help="only N mutants, drawn by the seed")
+    parser.add_argument("--seed", type=int, default=None, help="of the sample; without it one is drawn and printed")
+    parser.add_argument("--only", nargs="*", default=(), metavar="FILE", help="mutate only these files")
+    parser.add_argument("--root", type=Path, default=ROOT, help="of the project, for other files and tests than ours")
+    parser.add_argument("--tests", type=shlex.split, default=(), metavar="ARGUMENTS", help="pytest's arguments")
+    parser.add_argument("--survivors", type=Path, default=SURVIVORS, metavar="FILE", help="the list to agree with")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="mutants tried at a time")
+    parser.add_argument("--json", type=Path, default=None, metavar="FILE", help="write every verdict there")
+    return parser.parse_args()
+
+
+def _chosen(mutants: Sequence[Mutant], sample: int, seed: int | None) -> list[Mutant]:
+    if not sample:
+        return list(mutants)
+    seed = random.SystemRandom().randrange(1 << 32) if seed is None else seed
+    print(f"a sample of {sample} of {len(mutants)} mutants, --seed {seed}", flush=True)
+    return random.Random(seed).sample(list(mutants), min(sample, len(mutants)))
+
+
+def _counts(results: Sequence[Result]) -> dict[str, list[int]]:
+    counts: dict[str, list[int]] = {}
+    for result in sorted(results, key=lambda result: result.mutant.path):
+        both = counts.setdefault(result.mutant.path, [0, 0])
+        both[0] += 1
+        both[1] += result.verdict.killed
+    return counts
+
+
+def _write(path: Path | None, results: Sequence[Result]) -> None:
+    if path:
+        rows = [
+            {"path": result.mutant.path, "line": result.mutant.place.line, "mutant": result.mutant.name,
+             "killed": result.verdict.killed, "by": result.verdict.by, "seconds": round(result.verdict.seconds, 2)}
+            for result in results
+        ]  # fmt: skip
+        path.write_text(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,124 @@
+"""Tries mutants, some at a time, each in a process of its own; first makes sure that the tests pass without any."""
+
+import ast
+import json
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from benchmarks.mutation import trials
+from benchmarks.mutation.lines import Tests, traced
+from benchmarks.mutation.mutants import Mutant, enums_of, mutants_of, mutated
+from benchmarks.mutation.trials import Trial, Verdict
+from rig.errors import CheckFailed
+
+POLL_S = 0.005
+EVERY = 100
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is mutated: files below ``root``, and pytest's arguments for the tests that are to notice."""
+
+    root: Path
+    paths: Sequence[str]
+    tests: Sequence[str]
+
+    @cached_property
+    def enums(self) -> dict[str, list[str]]:
+        """Enumerations that stand beside the mutated files."""
+        return enums_of(path for folder in {(self.root / path).parent for path in self.paths}
+                        for path in sorted(folder.glob("*.py")))  # fmt: skip
+
+    @cached_property
+    def mutants(self) -> list[Mutant]:
+        """All of them."""
+        return [mutant for path in self.paths for mutant in mutants_of(self.root / path, path, self.enums)]
+
+
+@dataclass(frozen=True)
+class Result:
+    """What became of one mutant."""
+
+    mutant: Mutant
+    verdict: Verdict
+
+
+def run(subject: Subject, chosen: Sequence[Mutant], jobs: int) -> list[Result]:
+    """Tries ``chosen``; raises CheckFailed where tests fail without any mutant."""
+    trials.FRESH.update(path.partition("/")[0] for path in subject.paths)
+    os.chdir(subject.root)
+    tests = _looked_at(subject)
+    _check_unchanged(subject, tests)
+    waiting, under_way, results = list(reversed(chosen)), dict[int, tuple[Mutant, Trial]](), list[Result]()
+    while waiting or under_way:
+        while waiting and len(under_way) < jobs:
+            mutant = waiting.pop()
+            under_way[mutant_id(mutant)] = mutant, _begin(subject, mutant, tests)
+        for key, (mutant, trial) in list(under_way.items()):
+            if verdict := trial.poll():
+                del under_way[key]
+                results.append(Result(mutant, verdict))
+                _tell(results, len(chosen))
+        time.sleep(POLL_S)
+    return results
+
+
+def mutant_id(mutant: Mutant) -> int:
+    """Distinguishes the mutants of a run."""
+    return hash((mutant.path, mutant.number))
+
+
+def _begin(subject: Subject, mutant: Mutant, tests: Tests) -> Trial:
+    path = subject.root / mutant.path
+    place = mutant.place
+    noticing = tests.noticing(mutant.path, place.first_line, place.line, place.at_import)
+    tree = mutated(path.read_text(), mutant.number, subject.enums)
+    return trials.begin(path, _module(mutant.path), tree, noticing, tests.seconds)
+
+
+def _module(path: str) -> str:
+    return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+
+
+def _tell(results: Sequence[Result], of: int) -> None:
+    if len(results) % EVERY == 0:
+        print(f"{len(results)} of {of}, {sum(result.verdict.killed for result in results)} killed", flush=True)
+
+
+def _looked_at(subject: Subject) -> Tests:
+    """Traces the tests in a process of its own, and imports here what they needed of code that is not mutated."""
+    told, tell = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        os.close(told)
+        with open(os.devnull, "w") as nothing:  # noqa: PTH123 - a descriptor is wanted
+            os.dup2(nothing.fileno(), 1)
+        tests = traced([*trials.OPTIONS, *subject.tests], subject.root, subject.paths)
+        with os.fdopen(tell, "w") as pipe:
+            json.dump([{test: sorted(lines) for test, lines in tests.lines.items()}, tests.seconds, tests.failed,
+                       trials.imported()], pipe)  # fmt: skip
+        os._exit(0)
+    os.close(tell)
+    with os.fdopen(told) as pipe:
+        text = pipe.read()
+    os.waitpid(pid, 0)
+    lines, seconds, failed, modules = json.loads(text)
+    if failed or not lines:
+        raise CheckFailed(f"without any mutant tests fail: {', '.join(failed) or 'none was found'}; mend them first")
+    trials.warm(modules)
+    return Tests({test: {(path, line) for path, line in places} for test, places in lines.items()}, seconds, [])
+
+
+def _check_unchanged(subject: Subject, tests: Tests) -> None:
+    """A file put in its own place must pass all tests, or every mutant would be killed by the way it is tried."""
+    for path in subject.paths:
+        tree = ast.parse((subject.root / path).read_text())
+        trial = trials.begin(subject.root / path, _module(path), tree, list(tests.lines), tests.seconds)
+        while (verdict := trial.poll()) is None:
+            time.sleep(POLL_S)
+        if verdict.killed:
+            raise CheckFailed(f"{path}: tests fail although nothing is changed: {verdict.by}")

@@ -1,0 +1,164 @@
+"""One mutant, one forked process: it imports the code under test anew, the mutated file in place of the real one.
+
+The parent has imported everything else (the interpreter's and the packages' modules, pytest, those parts of the
+project that are not mutated): a trial costs an import of the controller and the tests that run the mutated line.
+"""
+
+import ast
+import contextlib
+import gc
+import importlib
+import importlib.abc
+import importlib.machinery
+import os
+import resource
+import signal
+import sys
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import CodeType, ModuleType
+
+import pytest
+
+FRESH = {"controller", "tests", "api", "mock_devices"}
+"""Packages that each trial imports anew: those that are mutated, and whatever may have copied a constant of them."""
+SLOWEST = 5.0
+LEAST_CPU_S = 2.0
+"""CPU time a test may take: this and so many times what it took while it was traced. More is an endless loop."""
+LONGEST_S = 60.0
+"""A mutant that waits for ever takes no CPU time; whole trials take less than 20 s on a busy computer."""
+MEMORY_BYTES = 8 << 30
+SURVIVED, KILLED, TIMED_OUT = 0, 1, 3
+# pytest itself is imported before the trial.
+REWRITTEN = "ignore::pytest.PytestAssertRewriteWarning"
+OPTIONS = ("-q", "-m", "not bench", "-p", "no:xdist", "--timeout=0", "--hypothesis-seed=0", "-W", REWRITTEN)
+
+
+class _Instead(importlib.abc.MetaPathFinder, importlib.abc.Loader):
+    """Imports one module from code given."""
+
+    def __init__(self, name: str, path: Path, code: CodeType) -> None:
+        self._name, self._path, self._code = name, path, code
+
+    def find_spec(
+        self,
+        fullname: str,
+        path: Sequence[str] | None,  # noqa: ARG002
+        target: ModuleType | None = None,  # noqa: ARG002
+    ) -> importlib.machinery.ModuleSpec | None:
+        if fullname != self._name:
+            return None
+        return importlib.machinery.ModuleSpec(fullname, self, origin=str(self._path))
+
+    def exec_module(self, module: ModuleType) -> None:
+        exec(self._code, module.__dict__)
+
+
+class _Budget:
+    """A pytest plugin: the tests wanted, in their order, each with its CPU time; the first failure is told."""
+
+    def __init__(self, wanted: Sequence[str], seconds: Mapping[str, float], told: int) -> None:
+        self._order = {test: number for number, test in enumerate(wanted)}
+        self._files = {test.partition("::")[0] for test in wanted}
+        self._seconds, self.told = seconds, told
+
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Tests that only a mutant has (a table's entry under another name) are run too, last."""
+        known = [item for item in items if item.nodeid in self._order or item.nodeid not in self._seconds]
+        items[:] = sorted(known, key=lambda item: self._order.get(item.nodeid, len(self._order)))
+
+    def pytest_runtest_setup(self, item: pytest.Item) -> None:
+        """The clock starts."""
+        budget_s = LEAST_CPU_S + SLOWEST * self._seconds.get(item.nodeid, 1.0)
+        signal.signal(signal.SIGPROF, lambda *_: self._late(item.nodeid))
+        signal.setitimer(signal.ITIMER_PROF, budget_s)
+
+    def _late(self, test: str) -> None:
+        os.write(self.told, f"out of time in {test}".encode())
+        os._exit(TIMED_OUT)
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """What killed the mutant."""
+        if report.failed:
+            os.write(self.told, report.nodeid.encode())
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        """A mutant that cannot even be imported."""
+        if report.failed:
+            os.write(self.told, f"import, in {report.nodeid}".encode())
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How a trial ended: by which test the mutant was killed, nothing where it survived."""
+
+    killed: bool
+    by: str
+    seconds: float
+
+
+@dataclass
+class Trial:
+    """A trial under way in a process of its own."""
+
+    pid: int
+    told: int
+    began: float
+
+    def poll(self) -> Verdict | None:
+        """The verdict, once there is one; a trial that takes too long is ended here."""
+        pid, status = os.waitpid(self.pid, os.WNOHANG)
+        late = time.monotonic() - self.began > LONGEST_S
+        if not pid and not late:
+            return None
+        if not pid:
+            os.killpg(self.pid, signal.SIGKILL)
+            os.waitpid(self.pid, 0)
+        by = os.read(self.told, 500).decode(errors="replace")
+        os.close(self.told)
+        code = os.waitstatus_to_exitcode(status) if pid else TIMED_OUT
+        seconds = time.monotonic() - self.began
+        return Verdict(code != SURVIVED, "" if code == SURVIVED else by or f"ended with {code}", seconds)
+
+
+def warm(modules: Iterable[str]) -> None:
+    """Imports what trials need and never mutate."""
+    for name in modules:
+        # What cannot be imported by itself is imported by the trial.
+        with contextlib.suppress(Exception):
+            importlib.import_module(name)
+    gc.freeze()
+
+
+def imported() -> list[str]:
+    """Modules that this process has, those of the packages tried anew left out."""
+    return [name for name in sys.modules if name.partition(".")[0] not in FRESH and name != "__main__"]
+
+
+def begin(path: Path, module: str, tree: ast.Module, tests: Sequence[str], seconds: Mapping[str, float]) -> Trial:
+    """Starts a trial of ``tree`` in place of ``module``."""
+    code = compile(tree, str(path), "exec")
+    told, tell = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        os.setpgid(0, 0)
+        os._exit(_run(_Instead(module, path, code), _Budget(tests, seconds, tell), tests))
+    os.close(tell)
+    return Trial(pid, told, time.monotonic())
+
+
+def _run(instead: _Instead, budget: _Budget, tests: Sequence[str]) -> int:
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for stream in (0, 1, 2):
+        os.dup2(nothing, stream)
+    sys.meta_path.insert(0, instead)
+    files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
+    try:
+        code = pytest.main([*OPTIONS, "-x", *files], plugins=[budget]) if files else SURVIVED
+    except BaseException as error:
+        os.write(budget.told, f"{type(error).__name__}: {error}".encode())
+        return KILLED
+    return SURVIVED if code in (0, 5) else KILLED

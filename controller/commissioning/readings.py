@@ -1,0 +1,67 @@
+"""Rested readings of the force sensor: six means and six noises out of the samples of a short while."""
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from drivers.roles import ForceSensor
+from rig.channels import ForceSample
+from rig.errors import CheckFailed, DeviceError
+
+# Fewer would not tell noise from a swinging weight.
+FEWEST_SAMPLES = 8
+PERIOD_S = 0.001
+Six = tuple[float, float, float, float, float, float]
+
+
+class Reading(NamedTuple):
+    """Means and rms about them of Fx Fy Fz [N], Mx My Mz [N m]."""
+
+    mean: Six
+    rms: Six
+    samples: int
+
+
+def read(
+    sensor: ForceSensor,
+    product: str,
+    seconds: float,
+    settle_s: float,
+    now: Callable[[], int] = time.monotonic_ns,
+    sleep: Callable[[float], None] = time.sleep,
+) -> Reading:
+    """Rests ``settle_s``, then reads for ``seconds``; CheckFailed where saturated, DeviceError where silent."""
+    _poll(sensor, settle_s, now, sleep)
+    return reading_of(_poll(sensor, seconds, now, sleep), product)
+
+
+def reading_of(samples: Sequence[ForceSample], product: str) -> Reading:
+    """Means and noise; raises CheckFailed where a sample is not vouched for or at the end of the product's range."""
+    if len(samples) < FEWEST_SAMPLES:
+        raise DeviceError(f"{product} gave {len(samples)} samples, {FEWEST_SAMPLES} are needed; run `rig doctor`")
+    values = np.array([sample[4:10] for sample in samples])
+    spoilt = sum(not sample.valid for sample in samples)
+    if spoilt:
+        raise CheckFailed(
+            f"{product} is saturated, or does not vouch for its readings: {spoilt} of {len(samples)} samples flagged,"
+            f" largest {np.nanmax(np.abs(values[:, :3])):.2f} N; unload it and use lighter weights"
+        )
+    return Reading(_six(values.mean(axis=0)), _six(values.std(axis=0, ddof=1)), len(samples))
+
+
+def _six(values: Iterable[float]) -> Six:
+    fx, fy, fz, mx, my, mz = (float(value) for value in values)
+    return fx, fy, fz, mx, my, mz
+
+
+def _poll(
+    sensor: ForceSensor, seconds: float, now: Callable[[], int], sleep: Callable[[float], None]
+) -> list[ForceSample]:
+    found: list[ForceSample] = []
+    end_ns = now() + round(seconds * 1e9)
+    while (at_ns := now()) < end_ns:
+        found.extend(sensor.poll(at_ns))
+        sleep(PERIOD_S)
+    return found

@@ -1,0 +1,74 @@
+"""Who may approach: no program with an approach without a force calibration that belongs to the sensor that answers.
+
+A configuration that contradicts a calibration is refused; nothing is ever corrected by the difference.
+"""
+
+from datetime import datetime
+
+from controller.steps import Approach, Program
+from drivers.roles import Identity
+from rig.config.calibration import AxisCalibration, ForceCalibration
+from rig.config.wiring import MOCK_PORT, Wiring
+from rig.errors import UsageError
+
+# Counts of the encoder to the millimetre are a whole number or a short decimal; this allows for its last digit.
+SAME_SCALE = 1e-6
+
+
+def refuse_uncommissioned(program: Program, wiring: Wiring, sensor: Identity, axis: Identity, now: datetime) -> None:
+    """Raises UsageError where ``program`` approaches and a calibration is missing, foreign, unfit or contradicted."""
+    if not any(isinstance(step, Approach) for step in program.steps):
+        return
+    known = wiring.calibration
+    if known.of_force is None:
+        raise UsageError(f"{program.name} refused before moving: {_missing(f'{sensor.product} {sensor.serial}')}")
+    reasons = [*_foreign(known.of_force, sensor, "force"), *contradictions(wiring), *known.unfit(now)]
+    if known.of_axis:
+        reasons += _foreign(known.of_axis, axis, "axis")
+    if reasons:
+        raise UsageError(f"{program.name} refused before moving: " + "; ".join(reasons))
+
+
+def refuse_uncalibrated(wiring: Wiring, now: datetime) -> None:
+    """The same as far as it is known before a device is opened; raises UsageError. A mock sensor calibrates itself."""
+    reasons = [*contradictions(wiring), *wiring.calibration.unfit(now)]
+    if wiring.calibration.of_force is None and wiring.force.port != MOCK_PORT:
+        reasons.append(_missing(f"the sensor at {wiring.force.port}"))
+    if reasons:
+        raise UsageError("; ".join(reasons))
+
+
+def contradictions(wiring: Wiring) -> list[str]:
+    """Words of the wiring that say something else than the calibrations, one sentence each."""
+    found = []
+    force, axis, known = wiring.force, wiring.axis, wiring.calibration
+    if known.of_force and (force.axis, force.compression) != (known.of_force.channel, known.of_force.compression):
+        found.append(
+            f"force.axis {force.axis}, force.compression {force.compression}: the calibration found compression"
+            f" {known.of_force.compression} on {known.of_force.channel}; correct the wiring, or calibrate again"
+        )
+    if known.of_axis and not _same_scale(wiring, known.of_axis):
+        found.append(
+            f"axis.increments_per_mm {axis.increments_per_mm:g}, axis.direction {axis.direction}: the axis was"
+            f" calibrated with {known.of_axis.increments_per_mm:g} and {known.of_axis.direction};"
+            " correct the wiring, or calibrate again"
+        )
+    return found
+
+
+def _same_scale(wiring: Wiring, known: AxisCalibration) -> bool:
+    off = abs(wiring.axis.increments_per_mm / known.increments_per_mm - 1)
+    return wiring.axis.direction == known.direction and off <= SAME_SCALE
+
+
+def _foreign(known: ForceCalibration | AxisCalibration, answered: Identity, role: str) -> list[str]:
+    if (known.product, known.serial) == (answered.product, answered.serial):
+        return []
+    return [
+        f"calibration.{role} is of {known.product} {known.serial}, but {answered.product} {answered.serial} answered:"
+        f" give its own, or run `rig calibrate {role}`"
+    ]
+
+
+def _missing(whose: str) -> str:
+    return f"no force calibration of {whose}: run `rig calibrate force` and give its file as calibration.force"

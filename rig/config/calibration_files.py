@@ -1,0 +1,46 @@
+"""Calibration files: JSON or TOML, read whole and checked, written whole or not at all."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
+from rig.config.table import AnyTable, parse, read_toml
+from rig.errors import UsageError
+
+
+def with_files(calibration: Calibration) -> Calibration:
+    """``calibration`` with what its files hold; raises UsageError naming file and key where one is malformed."""
+    found: dict[str, object] = {}
+    if calibration.force:
+        found["of_force"] = _read(ForceCalibration, calibration.force, "calibration.force")
+    if calibration.axis:
+        found["of_axis"] = _read(AxisCalibration, calibration.axis, "calibration.axis")
+    return calibration.model_copy(update=found)
+
+
+def text_of(calibration: ForceCalibration | AxisCalibration) -> str:
+    """What a calibration file holds."""
+    return calibration.model_dump_json(indent=2) + "\n"
+
+
+def read_force(path: Path) -> ForceCalibration:
+    """The force calibration in ``path``; raises UsageError."""
+    return _read(ForceCalibration, path, "force calibration")
+
+
+def _read(kind: type[AnyTable], path: Path, role: str) -> AnyTable:
+    values = read_toml(path) if path.suffix == ".toml" else _read_json(path, role)
+    return parse(kind, values, f"{role} {path}")
+
+
+def _read_json(path: Path, role: str) -> dict[str, Any]:
+    try:
+        values = json.loads(path.read_text())
+    except FileNotFoundError as error:
+        raise UsageError(f"{role} {path}: no such file; run `rig calibrate`, or correct the path") from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise UsageError(f"{role} {path}: cannot be read as JSON: {error}; calibrate again") from error
+    if not isinstance(values, dict):
+        raise UsageError(f"{role} {path}: holds no calibration; calibrate again")
+    return values

@@ -1,0 +1,1 @@
+"""What one trial says, whoever made it: where the tip touched, and how good the recording is."""

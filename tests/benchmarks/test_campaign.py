@@ -1,0 +1,121 @@
+"""The campaign's own rules: who counts as having noticed, how soon, and that nothing of the table is left out."""
+
+from dataclasses import replace
+
+import pytest
+
+from benchmarks.faults import planted_loop
+from benchmarks.faults.catalogue import FAULTS, proofs, unproven
+from benchmarks.faults.evaluation import Notice, Outcome, evaluate
+from benchmarks.faults.fault import DRIVE, QUALITY, REFUSED, Fault, bounds
+from benchmarks.faults.plants import chosen, plants
+from benchmarks.faults.results import interval
+from benchmarks.faults.scenarios import SCENARIOS, Ended
+from benchmarks.faults.trial import wiring_for
+from controller.safety import TABLE
+from rig.errors import UsageError
+
+MS = 1_000_000
+BOUND_MS = 100
+"""Of a stop by the operator: one cycle of a busy computer."""
+STOP = Fault("test", "press", ("operator_stop",), lambda _: None)
+SEEN = Outcome(Ended("stopped"), 0, 0, (Notice("operator_stop", 5 * MS),), None, "", "free, powered", "", True)
+
+
+def test_what_is_declared_notices_within_its_bound() -> None:
+    found = evaluate(STOP, SEEN)
+    assert (found.by, found.detected_s, found.unnoticed) == ("operator_stop", 0.005, "")
+
+
+@pytest.mark.parametrize(("after_ms", "is_late"), [(BOUND_MS, False), (BOUND_MS + 1, True)])
+def test_a_notice_after_its_bound_is_a_failure(after_ms: int, is_late: bool) -> None:
+    found = evaluate(STOP, replace(SEEN, stops=(Notice("operator_stop", after_ms * MS),)))
+    assert ("late" in found.unnoticed) is is_late
+
+
+def test_the_bound_counts_from_the_onset_of_what_the_fault_leads_to() -> None:
+    stops = (Notice("operator_stop", 2000 * MS),)
+    assert "late" in evaluate(STOP, replace(SEEN, stops=stops)).unnoticed
+    assert evaluate(STOP, replace(SEEN, stops=stops, onset_ns=1950 * MS)).detected_s == 0.05
+
+
+def test_a_stop_before_what_the_fault_leads_to_took_no_time() -> None:
+    assert evaluate(STOP, replace(SEEN, onset_ns=None)).detected_s == 0.0
+
+
+def test_another_check_does_not_count() -> None:
+    found = evaluate(STOP, replace(SEEN, stops=(Notice("force_limit", MS), Notice("operator_stop", 2 * MS))))
+    assert found.unnoticed == "noticed by force_limit only, not by operator_stop"
+
+
+def test_a_fault_that_nobody_noticed_is_a_failure() -> None:
+    assert evaluate(STOP, replace(SEEN, stops=())).unnoticed == "nobody noticed"
+
+
+@pytest.mark.parametrize(("verdict", "reasons", "is_noticed"), [
+    ("good", (), False), ("good", ("3 samples missing",), False), ("usable", (), False),
+    ("usable", ("3 samples missing",), True), ("bad", ("3 samples missing",), True),
+])  # fmt: skip
+def test_quality_notices_only_where_it_names_the_disturbance(
+    verdict: str, reasons: tuple[str, ...], is_noticed: bool
+) -> None:
+    ended = Ended("complete", verdict, reasons)
+    found = evaluate(replace(STOP, expected=(QUALITY,)), replace(SEEN, ended=ended, stops=()))
+    assert (found.unnoticed == "") is is_noticed
+
+
+def test_a_drive_that_stopped_by_itself_comes_before_a_loop_that_woke_up_later() -> None:
+    frozen = replace(STOP, expected=(DRIVE,))
+    late = (Notice("axis_lost", 4500 * MS),)
+    assert evaluate(frozen, replace(SEEN, stops=late, unpowered_ns=60 * MS)).by == DRIVE
+    told = (Notice("drive_fault", 61 * MS),)
+    assert evaluate(frozen, replace(SEEN, stops=told, unpowered_ns=60 * MS)).by == "drive_fault"
+
+
+def test_torque_lost_before_the_fault_is_not_its_doing() -> None:
+    assert evaluate(STOP, replace(SEEN, stops=(), happened_ns=MS, unpowered_ns=0)).by == ""
+
+
+def test_what_is_turned_down_is_noticed_by_its_sentence() -> None:
+    refused = replace(STOP, expected=(REFUSED,))
+    assert evaluate(refused, replace(SEEN, stops=(), refusal="too large")).unnoticed == ""
+    assert evaluate(refused, replace(SEEN, stops=())).unnoticed == "nobody noticed"
+
+
+def test_every_line_of_the_table_has_a_fault_that_it_alone_may_notice() -> None:
+    assert unproven() == []
+    assert unproven((*TABLE, TABLE[0]._replace(code="unheard_of"))) == ["unheard_of"]
+
+
+def test_every_fault_can_be_configured_and_is_expected_by_what_there_is() -> None:
+    for name, fault in FAULTS.items():
+        wiring_for(fault)
+        assert fault.name == name
+        assert fault.scenario in SCENARIOS
+        assert set(fault.expected) <= set(bounds())
+
+
+def test_every_line_of_the_table_is_planted_with_its_proof() -> None:
+    for line in TABLE:
+        plant = plants()[line.code]
+        assert plant.off == (line.code,)
+        assert plant.faults == proofs(line.code)[:1]
+        assert len(plant.faults) == 1
+
+
+def test_a_planted_loop_lacks_the_check_and_nothing_else() -> None:
+    codes = [line.code for line in TABLE]
+    left = [line.code for line in planted_loop.without({"force_limit"})]
+    assert left == [code for code in codes if code != "force_limit"]
+
+
+def test_a_plant_that_is_not_there_is_named() -> None:
+    with pytest.raises(UsageError, match="--plant unheard_of: there are all, emergency_stop"):
+        chosen(["unheard_of"])
+
+
+def test_intervals_of_rates_are_exact() -> None:
+    """Clopper and Pearson 1934: none of n has the upper bound 1 - 0.025 ** (1 / n)."""
+    assert interval(0, 45) == pytest.approx((0.0, 1 - 0.025 ** (1 / 45)))
+    assert interval(45, 45)[0] == pytest.approx(0.025 ** (1 / 45))
+    assert interval(0, 0) == (0.0, 1.0)
