@@ -2,9 +2,12 @@
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Protocol
 
-from controller.devices import Devices
+from controller import attending
+from controller.connections import Connections
+from controller.devices import Devices, openers
 from controller.force_watch import ForceWatch, calibrated_zero
 from controller.health import IDENTICAL_LIMIT, Standstill, StreamHealth
 from controller.loop import Slot
@@ -14,6 +17,7 @@ from controller.modes import Mode
 from controller.motion import Setpoint
 from controller.paired import Touch
 from controller.registration import Point, Registration
+from controller.reopening import Openers
 from controller.safety import TABLE, Action, Check, Incident
 from controller.steps import Program
 from controller.watch import Watch
@@ -67,6 +71,7 @@ class BenchLoop:
         commands: "Commands",
         now: Callable[[], int],
         table: tuple[Check, ...] = TABLE,
+        opens: Openers | None = None,
     ) -> None:
         self.wiring, self.devices, self._ring, self._channel, self._now = wiring, devices, ring, channel, now
         self._commands = commands
@@ -76,17 +81,10 @@ class BenchLoop:
         self.watch = Watch()
         self._registration = Registration()
         self._standstill = Standstill()
-        self._health = {
-            "force": StreamHealth(
-                devices.force.period_ns,
-                round(wiring.stale_force_ms * 1e6),
-                wiring.loop.missed_periods or IDENTICAL_LIMIT,
-            ),
-            "axis": StreamHealth(devices.axis.period_ns, round(wiring.loop.stale_axis_ms * 1e6)),
-            "marker": StreamHealth(
-                devices.tracker.period_ns if devices.tracker else 1, round(wiring.loop.stale_marker_ms * 1e6)
-            ),
-        }
+        self.health = {stream: self._unheard(stream) for stream in ("force", "axis", "marker")}
+        self.published = {"force": -1, "axis": -1, "tracker": -1}
+        said = partial(attending.said, self)
+        self.connections = Connections(devices.by_role(), opens or openers(wiring), said, now())
         self._status_every = max(1, round(STATUS_EVERY_S / period_s))
         self._ticks = self._events = self._program = 0
         self._force_watch = ForceWatch(devices.force.period_ns)
@@ -95,6 +93,28 @@ class BenchLoop:
         self._pulled = False
         self._touch_said: Touch | None = None
         self._limb_seen_ns = 0
+
+    def _unheard(self, stream: str) -> StreamHealth:
+        """The health of a stream before its first sample."""
+        devices, loop = self.devices, self.wiring.loop
+        if stream == "force":
+            identical = loop.missed_periods or IDENTICAL_LIMIT
+            return StreamHealth(devices.force.period_ns, round(self.wiring.stale_force_ms * 1e6), identical)
+        if stream == "axis":
+            return StreamHealth(devices.axis.period_ns, round(loop.stale_axis_ms * 1e6))
+        period_ns = devices.tracker.period_ns if devices.tracker else 1
+        return StreamHealth(period_ns, round(loop.stale_marker_ms * 1e6))
+
+    def forget(self, stream: str) -> None:
+        """What a device said before it was lost counts no more."""
+        self.health[stream] = self._unheard(stream)
+        if stream == "force":
+            self._force_watch = ForceWatch(self.devices.force.period_ns)
+        elif stream == "marker":
+            self._registration.begin()
+            self._limb_seen_ns = 0
+        else:
+            self._standstill.begin()
 
     def tick(self, slot: Slot) -> bool:
         """One turn."""
@@ -143,18 +163,20 @@ class BenchLoop:
             self.watch.axis_lost = str(error)
 
     def _take_force(self, sample: ForceSample) -> None:
+        self.published["force"] = sample.seq
         self.world.raw_N = self._force_map.compression_N(sample.fx_N, sample.fy_N, sample.fz_N)
         self.world.wrench = sample[4:10]
         self.world.force_samples += 1
         self._force_watch.force(sample.capture_ns, sample[4:10])
         if sample.valid:
             self.world.paired.force(sample.capture_ns, self.world.raw_N)
-        self._health["force"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample[4:10])
+        self.health["force"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample[4:10])
 
     def _take_axis(self, sample: AxisSample) -> None:
         world = self.world
         if math.isnan(world.position_mm):  # until the axis has said where it is, it is not told where to be
             world.setpoint = Setpoint(sample.position_mm, 0.0)
+        self.published["axis"] = sample.seq
         world.position_mm, world.velocity_mm_s = sample.position_mm, sample.velocity_mm_s
         if sample.valid:
             world.paired.axis(sample.capture_ns, sample.position_mm)
@@ -162,12 +184,13 @@ class BenchLoop:
         self._force_watch.axis(sample.capture_ns, sample.position_mm)
         if self.devices.tracker:
             self._registration.axis(sample.capture_ns, sample.position_mm)
-        self._health["axis"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample.seq)
+        self.health["axis"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample.seq)
 
     def _take_marker(self, sample: MarkerSample) -> None:
         self._ring.put(MARKER.id, MARKER.pack(sample))
+        self.published["tracker"] = sample.seq
         if sample.tool == 0:
-            self._health["marker"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample.frame)
+            self.health["marker"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample.frame)
         if sample.valid:
             at = Point(sample.x_mm, sample.y_mm, sample.z_mm)
             if sample.tool == TIP:
@@ -178,7 +201,7 @@ class BenchLoop:
         self.world.patient_mm = self._registration.moved_mm
 
     def _look(self, now_ns: int, slot: Slot) -> None:
-        world, watch, health = self.world, self.watch, self._health
+        world, watch, health = self.world, self.watch, self.health
         world.now_ns = now_ns
         world.force_N = world.raw_N - world.zero_N
         going = world.setpoint if self.machine.busy else Setpoint(world.position_mm, 0.0)
@@ -237,6 +260,11 @@ class BenchLoop:
         self._pulled = False
         self.machine.acknowledge()
 
+    def close(self) -> None:
+        """Leaves the devices there are now safe; they may not be those it began with."""
+        self.connections.close()
+        self.devices.close()
+
     def event(self, level: int, code: str, text: str, now_ns: int) -> None:
         """One row of the event stream; the text is cut to what a ring slot takes."""
         short = text.encode()[:TEXT_BYTES].decode(errors="ignore")
@@ -265,7 +293,7 @@ class BenchLoop:
         self._channel.send(Finished(program=self._program, outcome=outcome_of))
 
     def _publish(self, slot: Slot, now_ns: int) -> None:
-        world, health, machine = self.world, self._health, self.machine
+        world, health, machine = self.world, self.health, self.machine
         bits = health["force"].bits(now_ns) | health["axis"].bits(now_ns) << 3 | health["marker"].bits(now_ns) << 6
         row = LoopSample(
             self._ticks,
@@ -292,6 +320,7 @@ class BenchLoop:
         )
         self._ring.put(LOOP.id, LOOP.pack(row))
         if self._ticks % self._status_every == 0:
+            attending.attend(self, now_ns)
             self._channel.send_newest(StatusSaid(status=self._status(row)))
         else:
             self._channel.flush()
@@ -310,7 +339,7 @@ class BenchLoop:
             "reference_N": _finite(row.reference_N),
             "position_mm": _finite(row.position_mm),
             "depth_mm": _finite(row.depth_mm),
-            "rates_Hz": {name: round(stream.rate_Hz, 1) for name, stream in self._health.items()},
+            "rates_Hz": {name: round(stream.rate_Hz, 1) for name, stream in self.health.items()},
             "lost": {
                 name: cause
                 for name, cause in (
@@ -320,6 +349,8 @@ class BenchLoop:
                 )
                 if cause
             },
+            "devices": attending.as_status(self.connections.statuses.items()),
+            "ready": self.connections.ready,
             "latched": {"code": latched.code, "text": latched.text} if latched else None,
         }
 

@@ -2,6 +2,7 @@
 
 from datetime import UTC, datetime
 
+from controller.attending import refusal as missing_device
 from controller.bench_loop import BenchLoop
 from controller.checks import refuse_beyond_limits
 from controller.commissioning.refusals import refuse_uncommissioned
@@ -65,6 +66,9 @@ class Inbox:
             raise UsageError("a program is already under way: stop it or wait for its end")
         if loop.machine.latched:
             raise UsageError(f"stopped by {loop.machine.latched.text}: acknowledge it with a reset first")
+        missing = missing_device(loop, program, loop.world.now_ns)
+        if missing:
+            raise UsageError(missing)
         refuse_beyond_limits(program, loop.wiring)
         force, axis = loop.devices.force.identity, loop.devices.axis.identity
         refuse_uncommissioned(program, loop.wiring, force, axis, datetime.now(UTC))

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import partial
 
+from controller.reopening import Open, Openers
 from drivers.bota.device import BotaSensOne
 from drivers.epos4.device import Epos4Axis
 from drivers.ndi.device import NdiTracker
@@ -48,6 +49,16 @@ def open_axis(config: Axis, limits: Limits, rate_Hz: float) -> ServoAxis:
 def open_tracker(config: Tracker) -> MarkerTracker:
     """The tracker, not yet started."""
     return NdiTracker(partial(open_port, config.port), config)
+
+
+def openers(wiring: Wiring) -> Openers:
+    """How each device of the bench is opened again."""
+    by_role: dict[str, Open] = {
+        "force": lambda: open_force(wiring.force),
+        "axis": lambda: open_axis(wiring.axis, wiring.limits, wiring.loop.rate_Hz),
+    }
+    tracker = wiring.tracker
+    return Openers(by_role | ({"tracker": lambda: open_tracker(tracker)} if tracker else {}))
 
 
 def start_devices(wiring: Wiring) -> Devices:

@@ -75,7 +75,10 @@ def _run(
     channel.send(Ready(devices=identities, realtime=granted))
     loop = BenchLoop(wiring, devices, ring, channel, Inbox(channel), time.monotonic_ns, table)
     pause = sleep_then_spin(realtime.spin_ns(granted))
-    Executive(round(1e9 / wiring.loop.rate_Hz), sleep=pause).run(loop.tick)
+    try:
+        Executive(round(1e9 / wiring.loop.rate_Hz), sleep=pause).run(loop.tick)
+    finally:
+        loop.close()
 
 
 if __name__ == "__main__":

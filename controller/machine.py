@@ -69,6 +69,10 @@ class Machine:
             self.mode, self.latched = Mode.IDLE, None
             self.world.setpoint = self._here()
 
+    def hold(self, incident: Incident) -> None:
+        """At rest, and stays so until this is acknowledged."""
+        self.mode, self.latched = Mode.SAFE, incident
+
     def _here(self) -> Setpoint:
         """The present position; at the end of the workspace the encoder's last count may lie beyond it."""
         limits = self._wiring.limits

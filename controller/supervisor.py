@@ -21,6 +21,8 @@ from rig.recording.ring import new_path
 LOOP_MODULE = "controller.loop_process"
 START_TIMEOUT_S = 60.0
 LEAVE_TIMEOUT_S = 15.0
+# A device is degraded after a second of bad samples and ok with the first good one; more is no passing disturbance.
+READY_TIMEOUT_S = 3.0
 # Renewals within one lease, so that two may be late.
 LEASE_SHARE = 4
 UNASKED_LEASE_S = 3.0
@@ -67,6 +69,7 @@ class Supervisor:
             self.ready = self._client.ready(START_TIMEOUT_S)
             self.recorder = RecorderClient(self._ring_path)
             threading.Thread(target=self._keep_lease, name="lease", daemon=True).start()
+            self._await_ready()
         except BaseException:
             self.close()
             raise
@@ -120,12 +123,17 @@ class Supervisor:
 
         One that has not ended in time is stopped, and DeviceError raised; how it ended is then nobody's any more.
         """
+        self._await_ready()
         try:
             return self._loop().run(Run(program=program), timeout_s)
         except DeviceError:
             if self.alive:
                 self.stop()
             raise
+
+    def _await_ready(self) -> None:
+        """Gives devices that have just started, or are a moment late, time to be ok; what the loop then says counts."""
+        self._loop().wait_until(lambda status: bool(status.get("ready") or status.get("latched")), READY_TIMEOUT_S)
 
     def wait_at_rest(self, timeout_s: float = 30.0) -> None:
         """Waits until nothing moves any more."""

@@ -37,6 +37,8 @@ class Device(Protocol):
     """What every device has."""
 
     counters: LinkCounters
+    next_seq: int
+    """Number of the next sample; whoever takes over a stream from another driver sets it before ``start``."""
 
     @property
     def identity(self) -> Identity:
@@ -76,6 +78,10 @@ class ServoAxis(Device, Protocol):
     @property
     def enabled(self) -> bool:
         """Whether the drive follows cyclic positions now."""
+
+    @property
+    def referenced(self) -> bool:
+        """Whether positions count from home, as the drive last said."""
 
     def home(self) -> None:
         """Finds the reference; waits, with a deadline from distance and speed."""

@@ -18,7 +18,11 @@ import numpy as np
 
 CDR_HEADER = b"\x00\x01\x00\x00"
 STAMP = {
-    "seq": ("1", "sample number of this stream since its device started; no number is used twice or left out"),
+    "seq": (
+        "1",
+        "sample number of this stream since its device first started, going on where it was opened again;"
+        " no number is used twice or left out",
+    ),
     "capture_ns": ("ns", "host monotonic time at which the device took the sample"),
     "arrival_ns": ("ns", "host monotonic time at which the bytes were read"),
 }

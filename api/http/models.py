@@ -87,8 +87,9 @@ class Info(BaseModel):
 class RigView(BaseModel):
     """The bench as of now."""
 
-    state: Literal["disconnected", "idle", "running", "stopped"]
-    reason: str = Field(description="why it is disconnected or stopped; empty otherwise")
+    state: Literal["disconnected", "not ready", "idle", "running", "stopped"]
+    reason: str = Field(description="why it is disconnected, not ready or stopped; empty otherwise")
+    ready: bool = Field(description="every device is ok; without that nothing starts")
     mode: str
     time_ns: int
     force_N: float | None
@@ -100,7 +101,10 @@ class RigView(BaseModel):
     rates_Hz: dict[str, float]
     health: dict[str, dict[str, bool]] = Field(description="per stream: alive, valid, on_rate")
     lost: dict[str, str]
-    devices: dict[str, dict[str, object]]
+    devices: dict[str, dict[str, object]] = Field(
+        description="per role: product, serial, firmware, settings; state (connecting, ok, degraded, lost,"
+        " reconnecting, fault), detail, since_ns"
+    )
     limits: dict[str, float]
     control: ControlView
     job: JobView | None

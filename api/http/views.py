@@ -10,12 +10,13 @@ from api.http.service import Job, Service
 from controller.experiments.capture import check
 from controller.health import ALIVE, ON_RATE, VALID
 from controller.messages import Status
+from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.errors import RigError
 from rig.recording.sessions import read_listing
 
-State = Literal["disconnected", "idle", "running", "stopped"]
+State = Literal["disconnected", "not ready", "idle", "running", "stopped"]
 STREAMS = ("force", "axis", "marker")
 SHOWN = (".mcap", ".json", ".html")
 
@@ -58,7 +59,8 @@ def rig(service: Service) -> RigView:
         rates_Hz=status.get("rates_Hz", {}),
         health=_health(int(status.get("health", 0))),
         lost=status.get("lost", {}),
-        devices={role: dict(identity) for role, identity in bench.ready.devices.items()} if bench else {},
+        ready=bool(status.get("ready")),
+        devices=_devices(bench, status) if bench else {},
         limits={
             "force_N": service.wiring.force_limit_N,
             "depth_mm": limits.depth_mm,
@@ -89,7 +91,25 @@ def _state(service: Service, status: Status, alive: bool) -> tuple[State, str]:
     latched = status.get("latched")
     if latched:
         return "stopped", str(latched["text"])
-    return ("running" if status.get("busy") or service.running else "idle"), ""
+    if status.get("busy") or service.running:
+        return "running", ""
+    return ("idle", "") if status.get("ready") else ("not ready", _missing(status))
+
+
+def _missing(status: Status) -> str:
+    """Which devices are not as they should be."""
+    devices = status.get("devices", {})
+    return "; ".join(
+        f"{role} is {device['state']}: {device['detail']}"
+        for role, device in devices.items()
+        if device["state"] != "ok"
+    )
+
+
+def _devices(bench: Supervisor, status: Status) -> dict[str, dict[str, object]]:
+    """Who each device is, and how it is."""
+    states = status.get("devices", {})
+    return {role: dict(identity) | states.get(role, {}) for role, identity in bench.ready.devices.items()}
 
 
 def _health(bits: int) -> dict[str, dict[str, bool]]:

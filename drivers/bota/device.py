@@ -76,7 +76,7 @@ class BotaSensOne:
         self._period_ns = round(self._sinc * 1e9 / CONVERTER_HZ)
         self._identity = Identity(PRODUCT, "", "")
         self._latency_ns = round(config.latency_ms * 1e6)
-        self._seq = 0
+        self.next_seq = 0
         self._clock = ClockMap(self._latency_ns)
         self._taken: list[tuple[list[Timed], int]] = []
         self._forget_clock()
@@ -206,10 +206,10 @@ class BotaSensOne:
         return [self._sample(device_us, frame, capture_ns, arrival_ns) for (device_us, frame), capture_ns in pairs]
 
     def _sample(self, device_us: int, frame: Frame, capture_ns: int, arrival_ns: int) -> ForceSample:
-        self._seq += 1
+        self.next_seq += 1
         valid = int(_is_valid(frame))
         return ForceSample(
-            self._seq - 1, capture_ns, arrival_ns, device_us, *frame[1:7], frame.temperature_C, frame.status, valid
+            self.next_seq - 1, capture_ns, arrival_ns, device_us, *frame[1:7], frame.temperature_C, frame.status, valid
         )
 
     def _is_new(self, device_us: int) -> bool:

@@ -66,6 +66,15 @@ class Epos4Axis:
         return self._identity
 
     @property
+    def next_seq(self) -> int:
+        """Number of the next sample."""
+        return self._samples.next_seq
+
+    @next_seq.setter
+    def next_seq(self, number: int) -> None:
+        self._samples.next_seq = number
+
+    @property
     def period_ns(self) -> int:
         """Nominal time between samples: that between set-points."""
         return self._period_ns
@@ -86,6 +95,11 @@ class Epos4Axis:
             and walker.state is State.ENABLED
         )
 
+    @property
+    def referenced(self) -> bool:
+        """Whether positions count from home, as the drive last said."""
+        return self._walker is not None and bool(self._walker.status & Status.REFERENCED)
+
     def fileno(self) -> int:
         """Descriptor of the adapter's serial line; raises DeviceError before ``start``."""
         return self._started().node.link.fileno()
@@ -96,7 +110,7 @@ class Epos4Axis:
         config = self._config
         self._link = self._open_link(config.port, config.bitrate, self._now)
         node = Node(self._link, config.node, setup.host_node(config), config.heartbeat_ms, self._name, self._now)
-        self._samples = SampleBuilder(self._units)
+        self._samples = SampleBuilder(self._units, self._samples.next_seq)
         node.handlers[TPDO_IDS[0] + config.node] = self._samples.take_state
         node.handlers[TPDO_IDS[1] + config.node] = self._samples.take_motion
         walker = Walker(node, self._now, self._limits.speed_mm_s / config.acceleration_mm_s2)

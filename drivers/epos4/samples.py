@@ -55,12 +55,12 @@ class SyncMatcher:
 class SampleBuilder:
     """Joins the two PDOs of one SYNC to a sample; numbers are contiguous, so a loss shows in ``lost`` only."""
 
-    def __init__(self, units: Units) -> None:
+    def __init__(self, units: Units, next_seq: int = 0) -> None:
         self.matcher = SyncMatcher()
+        self.next_seq = next_seq
         self._units = units
         self._state: DriveState | None = None
         self._ready: list[AxisSample] = []
-        self._seq = 0
 
     def take_state(self, data: bytes, _now_ns: int) -> None:
         """TPDO1 came."""
@@ -86,7 +86,7 @@ class SampleBuilder:
         current_A = units.direction * motion.current_mA / 1000
         self._ready.append(
             AxisSample(
-                self._seq,
+                self.next_seq,
                 sync_ns,
                 now_ns,
                 units.mm(state.increments),
@@ -96,7 +96,7 @@ class SampleBuilder:
                 valid,
             )
         )
-        self._seq += 1
+        self.next_seq += 1
 
     def collect(self) -> list[AxisSample]:
         """Samples completed since the last call."""

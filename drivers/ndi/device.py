@@ -54,6 +54,15 @@ class NdiTracker:
         return self._identity
 
     @property
+    def next_seq(self) -> int:
+        """Number of the next sample."""
+        return self._frames.next_seq
+
+    @next_seq.setter
+    def next_seq(self, number: int) -> None:
+        self._frames.next_seq = number
+
+    @property
     def period_ns(self) -> int:
         """Time between frames as configured."""
         return round(1e9 / self._config.rate_Hz)
@@ -96,7 +105,7 @@ class NdiTracker:
         startup.start_tracking(dialogue)
         settings = {"reply": self._config.reply, "warnings": " ".join(dialogue.warnings)}
         self._identity = replace(identity, settings=identity.settings | settings)
-        self._frames = FrameReader(handles, self._config, self.counters)
+        self._frames = FrameReader(handles, self._config, self.counters, self.next_seq)
         self._waiting = False
         self._asked_ns = self._due_ns = 0
         self._silent_since_ns = None

@@ -23,7 +23,8 @@ class FrameReader:
     number jumped over it.
     """
 
-    def __init__(self, handles: Sequence[int], config: Tracker, counters: LinkCounters) -> None:
+    def __init__(self, handles: Sequence[int], config: Tracker, counters: LinkCounters, next_seq: int = 0) -> None:
+        self.next_seq = next_seq
         self._handles = tuple(handles)
         self._step = max(1, round(COUNTER_HZ / config.rate_Hz))
         self._counters = counters
@@ -32,7 +33,6 @@ class FrameReader:
         self._newest = _NO_FRAME
         self._last = [_NO_FRAME] * len(handles)
         self._last_ns = [-_LONG_NS] * len(handles)
-        self._seq = 0
 
     def samples(self, reply: TrackingReply, asked_ns: int, arrival_ns: int) -> list[MarkerSample]:
         """One sample for each tool whose frame is new; none where the reply repeats a frame.
@@ -72,8 +72,8 @@ class FrameReader:
     ) -> MarkerSample:
         pose = tool.pose if tool and isinstance(tool.pose, Pose) else _NO_POSE
         q0, qx, qy, qz, x_mm, y_mm, z_mm, error_mm = pose
-        self._seq += 1
+        self.next_seq += 1
         return MarkerSample(
-            self._seq - 1, capture_ns, arrival_ns, frame, index,
+            self.next_seq - 1, capture_ns, arrival_ns, frame, index,
             x_mm, y_mm, z_mm, q0, qx, qy, qz, error_mm, int(pose is not _NO_POSE),
         )  # fmt: skip

@@ -81,7 +81,7 @@ class RobotiqFt300:
         self._clock = FrameClock(round(config.latency_ms * 1e6))
         self._decoder = Decoder(self.counters)
         self._identity = Identity(PRODUCT, "", "")
-        self._seq = 0
+        self.next_seq = 0
         self._taken: list[tuple[list[Timed], int]] = []
 
     @property
@@ -211,9 +211,9 @@ class RobotiqFt300:
         return [self._sample(device_ns, wrench, capture_ns, arrival_ns) for (device_ns, wrench), capture_ns in pairs]
 
     def _sample(self, device_ns: int, wrench: Wrench, capture_ns: int, arrival_ns: int) -> ForceSample:
-        self._seq += 1
+        self.next_seq += 1
         return ForceSample(
-            self._seq - 1, capture_ns, arrival_ns, device_ns // 1000, *wrench, float("nan"), 0, int(wrench.in_range)
+            self.next_seq - 1, capture_ns, arrival_ns, device_ns // 1000, *wrench, float("nan"), 0, int(wrench.in_range)
         )
 
     def _error(self, what: str) -> DeviceError:

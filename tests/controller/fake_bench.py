@@ -7,6 +7,7 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, cast
 
 from controller.bench_loop import BenchLoop
@@ -15,7 +16,9 @@ from controller.devices import Devices
 from controller.loop import Slot
 from controller.messages import Finished, Lease, Note, Reset, Run, Shutdown, StatusSaid, Stop, Stopped
 from controller.modes import Mode
+from controller.reopening import Openers
 from controller.steps import Approach, Compress, Hold, Program, Retract, Step, Zero
+from drivers.roles import Device
 from rig.channel import Answer, Channel, Message, Received
 from rig.channels import (
     AXIS,
@@ -31,8 +34,9 @@ from rig.channels import (
     MarkerSample,
 )
 from rig.config.wiring import Wiring
+from rig.errors import DeviceError
 from tests.calibrations import with_calibration
-from tests.controller.fake_devices import Clock, FakeAxis, FakeForce, FakeTracker
+from tests.controller.fake_devices import Clock, FakeAxis, FakeDevice, FakeForce, FakeTracker
 
 ZERO = Zero(duration_s=0.2)
 APPROACH = Approach(speed_mm_s=5.0, contact_force_N=0.05, search_to_mm=40.0)
@@ -147,6 +151,10 @@ class FakeLink:
         return [said.get("outcome", said) for said in found]
 
 
+def _at_once(work: Callable[[], None]) -> None:
+    work()
+
+
 class FakeBench:
     """Everything wired together; ``cycle`` is one period of the loop."""
 
@@ -169,7 +177,17 @@ class FakeBench:
         self.ring, self.link = FakeRing(), FakeLink()
         self.devices = Devices(self.force, self.axis, self.tracker if self.wiring.tracker else None)
         link = cast(Channel, self.link)
-        self.loop = BenchLoop(self.wiring, self.devices, self.ring, link, Inbox(link), self.clock)
+        self.spares: dict[str, FakeDevice] = {}
+        self.attempts: list[str] = []
+        self.loop = BenchLoop(
+            self.wiring,
+            self.devices,
+            self.ring,
+            link,
+            Inbox(link),
+            self.clock,
+            opens=Openers(self._openers(), _at_once),
+        )
         self.slot = self.missed = 0
         self.execution_ns = execution_ns
         self.start_ns = self.clock.now_ns
@@ -177,6 +195,17 @@ class FakeBench:
         self.true_peak_N = 0.0
         self.keep_lease = True
         self.cycles(settled)
+
+    def _openers(self) -> dict[str, Callable[[], Device]]:
+        """A lost device comes back where a spare was put; until then each attempt fails."""
+
+        def opened(role: str) -> Device:
+            self.attempts.append(role)
+            if role not in self.spares:
+                raise DeviceError(f"{role}: still unplugged")
+            return cast(Device, self.spares.pop(role))
+
+        return {role: partial(opened, role) for role in self.devices.by_role()}
 
     @property
     def mode(self) -> Mode:

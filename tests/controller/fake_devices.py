@@ -45,11 +45,13 @@ class FakeDevice:
     closed: bool = False
     counters: LinkCounters = field(default_factory=LinkCounters)
     calls: list[str] = field(default_factory=list)
+    next_seq: int = 0
+    serial: str = "1"
 
     @property
     def identity(self) -> Identity:
         """Who it claims to be."""
-        return Identity(type(self).__name__, "1", "1")
+        return Identity(type(self).__name__, self.serial, "1")
 
     def start(self) -> None:
         """Counts as a call; fails where the cable is cut."""
@@ -89,7 +91,7 @@ class FakeAxis(FakeDevice):
     requests: list[int] = field(default_factory=list)
     quick_stops: list[int] = field(default_factory=list)
     target_mm: float = math.nan
-    seq: int = 0
+    referenced: bool = True
     _due: deque[tuple[int, float, float]] = field(default_factory=deque)
     _moved_ns: int = 0
 
@@ -119,9 +121,9 @@ class FakeAxis(FakeDevice):
         return [self._sample(captured_ns, now_ns, mm, mm_s) for captured_ns, mm, mm_s in due]
 
     def _sample(self, captured_ns: int, now_ns: int, mm: float, mm_s: float) -> AxisSample:
-        self.seq += 1
+        self.next_seq += 1
         read_mm = mm if self.reads_mm is None else self.reads_mm
-        return AxisSample(self.seq - 1, captured_ns, now_ns, read_mm, mm_s, 0.0, 0, int(self.valid))
+        return AxisSample(self.next_seq - 1, captured_ns, now_ns, read_mm, mm_s, 0.0, 0, int(self.valid))
 
     def command(self, position_mm: float, now_ns: int) -> None:
         """A set-point; the place and speed of this moment will be in the next poll."""
@@ -218,7 +220,8 @@ class FakeForce(FakeDevice):
             values = self.samples[-1][4:10]
         else:
             values = (*self._force(captured_ns, DITHER_N[number % 3]), *self.moment_N_m)
-        return ForceSample(number, captured_ns, captured_ns, 0, *values, math.nan, 0, int(self.valid))
+        self.next_seq += 1
+        return ForceSample(self.next_seq - 1, captured_ns, captured_ns, 0, *values, math.nan, 0, int(self.valid))
 
     def _force(self, captured_ns: int, noise_N: float) -> Triple:
         config = self.wiring.force
@@ -268,8 +271,9 @@ class FakeTracker(FakeDevice):
         arm = [at + moved for at, moved in zip(ARM, self.limb_mm, strict=True)]
         for tool, place in enumerate((tip, arm)):
             x_mm, y_mm, z_mm = LOST if tool in self.hidden else place
+            self.next_seq += 1
             self._held.append(
-                MarkerSample(2 * self.frame + tool, self._due_ns, self._due_ns, self.frame, tool, x_mm, y_mm, z_mm,
+                MarkerSample(self.next_seq - 1, self._due_ns, self._due_ns, self.frame, tool, x_mm, y_mm, z_mm,
                              1.0, 0.0, 0.0, 0.0, 0.1, int(tool not in self.hidden))
             )  # fmt: skip
         self.frame += 1

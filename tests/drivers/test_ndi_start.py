@@ -210,12 +210,12 @@ def test_close_does_not_raise_on_a_cut_cable(stage: Stage) -> None:
     assert stage.closed
 
 
-def test_it_can_be_started_again(stage: Stage) -> None:
+def test_it_can_be_started_again_and_its_numbers_go_on(stage: Stage) -> None:
     device = started(stage)
-    run(stage, device, 100, 200)
+    before = run(stage, device, 100, 200)
     device.close()
     device.start()
-    assert run(stage, device, 200, 300)[0].seq == 0
+    assert run(stage, device, 200, 300)[0].seq == before[-1].seq + 1
 
 
 def test_a_tracker_left_tracking_by_a_host_that_died_is_taken_over(stage: Stage) -> None:
