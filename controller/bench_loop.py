@@ -165,9 +165,9 @@ class BenchLoop:
     def _take_force(self, sample: ForceSample) -> None:
         self.published["force"] = sample.seq
         self.world.raw_N = self._force_map.compression_N(sample.fx_N, sample.fy_N, sample.fz_N)
-        self.world.wrench = sample[4:10]
+        self.world.wrench = self._force_map.wrench(sample[4:10])
         self.world.force_samples += 1
-        self._force_watch.force(sample.capture_ns, sample[4:10])
+        self._force_watch.force(sample.capture_ns, self.world.wrench)
         if sample.valid:
             self.world.paired.force(sample.capture_ns, self.world.raw_N)
         self.health["force"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample[4:10])

@@ -6,6 +6,7 @@ ForceChannel = Literal["fx", "fy", "fz"]
 Sign = Literal["positive", "negative"]
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
+Wrench = tuple[float, float, float, float, float, float]
 
 CHANNELS: tuple[ForceChannel, ...] = ("fx", "fy", "fz")
 UNIT: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -42,3 +43,8 @@ class ForceMap(NamedTuple):
         """Force vector [N] in the sensor's frame."""
         x, y, z = (row[0] * fx_N + row[1] * fy_N + row[2] * fz_N for row in self.matrix)
         return x, y, z
+
+    def wrench(self, reading: Wrench) -> Wrench:
+        """Force vector [N] as ``force_N`` has it, and the three moments [N m] as they were read."""
+        (fx_N, fy_N, fz_N), (mx_N_m, my_N_m, mz_N_m) = self.force_N(*reading[:3]), reading[3:]
+        return fx_N, fy_N, fz_N, mx_N_m, my_N_m, mz_N_m

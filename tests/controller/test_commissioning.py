@@ -133,3 +133,5 @@ def test_the_loop_reads_compression_through_the_matrix() -> None:
     plain, scaled = FakeBench(), FakeBench(wired(calibration={"of_force": known}))
     assert plain.loop.world.raw_N != 0
     assert scaled.loop.world.raw_N == pytest.approx(1.04 * plain.loop.world.raw_N)
+    assert scaled.loop.world.wrench[2] == pytest.approx(1.04 * plain.loop.world.wrench[2])
+    assert scaled.loop.world.wrench[3:] == plain.loop.world.wrench[3:]
