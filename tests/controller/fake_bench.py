@@ -3,11 +3,13 @@
 ``bench = FakeBench(); bench.run(ZERO, APPROACH); bench.force.frozen = True; bench.until(lambda: bench.mode is SAFE)``
 """
 
+import copy
+import json
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from typing import Any, cast
 
 from controller.bench_loop import BenchLoop
@@ -281,3 +283,18 @@ class FakeBench:
         self.until(lambda: self.loop.machine.step_index == 3)
         self.wait(0.1)
         assert math.isclose(self.force.true_N, force_N, abs_tol=0.6), self.force.true_N
+
+
+def pressing(sensor_Hz: float = 1000.0, sections: Mapping[str, dict[str, Any] | None] | None = None) -> FakeBench:
+    """A bench that presses with 3 N and holds; its histories begin there."""
+    return copy.deepcopy(_pressed(sensor_Hz, json.dumps(sections or {})))
+
+
+@cache
+def _pressed(sensor_Hz: float, sections: str) -> FakeBench:
+    bench = FakeBench(wired(sensor_Hz, **json.loads(sections)))
+    bench.press(3.0)
+    for rows in bench.ring.rows.values():
+        rows.clear()
+    del bench.axis.commands[:], bench.axis.requests[:], bench.axis.calls[:], bench.link.sent[:], bench.link.statuses[:]
+    return bench

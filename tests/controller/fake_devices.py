@@ -140,7 +140,8 @@ class FakeAxis(FakeDevice):
 
     def _ask(self, now_ns: int) -> None:
         self.advance(now_ns)
-        away_mm = 0.0 if math.isnan(self.target_mm) else self.target_mm - self.position_mm
+        stands = self.blocked or math.isnan(self.target_mm)
+        away_mm = 0.0 if stands else self.target_mm - self.position_mm
         mm_s = away_mm / self.lag_s if self.lag_s else 0.0
         self._due.append((now_ns, self.position_mm, mm_s if self.velocity_mm_s is None else self.velocity_mm_s))
 
