@@ -9,11 +9,12 @@ from controller import attending
 from controller.connections import Connections
 from controller.devices import Devices, openers
 from controller.force_watch import ForceWatch, calibrated_zero
+from controller.giving_way import give_way
 from controller.health import IDENTICAL_LIMIT, Standstill, StreamHealth
 from controller.loop import Slot
 from controller.machine import Machine
 from controller.messages import Finished, Outcome, Status, StatusSaid, Stopped
-from controller.modes import Mode
+from controller.modes import AT_REST, Mode
 from controller.motion import Setpoint
 from controller.paired import Touch
 from controller.registration import Point, Registration
@@ -122,9 +123,12 @@ class BenchLoop:
         self._poll(now_ns)
         self.watch.requests = self._commands.collect(self)
         self._look(now_ns, slot)
+        resting = self.machine.mode in AT_REST
         incident = self.machine.update(self.watch)
         if incident:
             self._report(incident, now_ns)
+            if resting and incident.action is Action.SOFT:
+                self._give_way(now_ns)
         self._say_touch(now_ns)
         # The drive samples when it is asked, which is later than this turn began.
         self._command(self._now())
@@ -243,6 +247,17 @@ class BenchLoop:
                 self.devices.axis.quick_stop()
             except DeviceError as error:
                 self.watch.axis_lost = str(error)
+
+    def _give_way(self, now_ns: int) -> None:
+        """The machine retreats from a limb that pushes; here the drive is made to follow it, or loses its power."""
+        self._standstill.begin()
+        try:
+            self._pulled = not give_way(self.devices.axis, self.wiring.limits)
+        except DeviceError as error:
+            self._pulled = True
+            self.event(Action.WARNING, "no_way", str(error), now_ns)
+        if self._pulled:
+            self.machine.stay()
 
     def start(self, program: Program, number: int) -> None:
         """Begins a program, whose outcome will carry ``number``; where the limb is now is where it should stay."""

@@ -7,7 +7,7 @@ any  -> (soft stop) -> RETRACT -> SAFE;   any -> (immediate stop) -> SAFE;   SAF
 import math
 from collections.abc import Callable
 
-from controller.modes import Mode
+from controller.modes import AT_REST, Mode
 from controller.motion import Setpoint, arrived, toward
 from controller.safety import TABLE, Action, Check, Incident, evaluate
 from controller.steps import Program, Run, Step
@@ -17,6 +17,8 @@ from rig.config.wiring import Wiring
 from rig.errors import SafetyStop
 
 SAFE_CLEARANCE_MM = 10.0
+# Less way than this is none: the end of the workspace is where a retreat ends.
+LEAST_WAY_MM = 0.5
 MOVING = (Mode.FREE, Mode.APPROACH, Mode.COMPRESS, Mode.CONTACT, Mode.RETRACT)
 
 
@@ -38,6 +40,7 @@ class Machine:
         self._run: Run | None = None
         self.step_start_ns = 0
         self._escape_mm = math.nan
+        self._stays = False
 
     @property
     def busy(self) -> bool:
@@ -66,7 +69,7 @@ class Machine:
     def acknowledge(self) -> None:
         """Leaves SAFE once the cause was looked at."""
         if self.mode is Mode.SAFE:
-            self.mode, self.latched = Mode.IDLE, None
+            self.mode, self.latched, self._stays = Mode.IDLE, None, False
             self.world.setpoint = self._here()
 
     def hold(self, incident: Incident) -> None:
@@ -81,6 +84,7 @@ class Machine:
     def update(self, watch: Watch) -> Incident | None:
         """One tick; returns the incident that has just stopped motion, if any."""
         watch.mode = self.mode
+        self._note_rest()
         incident = self._evaluate(watch)
         if incident:
             self._stop(incident)
@@ -91,10 +95,32 @@ class Machine:
         return incident
 
     def _evaluate(self, watch: Watch) -> Incident | None:
-        least = Action.IMMEDIATE if self.latched else Action.SOFT
-        return evaluate(self.world, watch, self._wiring, self._table, least, at_rest=self.mode not in MOVING)
+        resting = self.mode in AT_REST
+        retreating = self.latched and not resting
+        least = Action.IMMEDIATE if retreating or self._stuck else Action.SOFT
+        return evaluate(self.world, watch, self._wiring, self._table, least, at_rest=resting)
+
+    @property
+    def _stuck(self) -> bool:
+        """Whether a stop is in force and the axis can do no more for a limb that pushes."""
+        at_the_end = self.world.position_mm - self._wiring.limits.position_min_mm < LEAST_WAY_MM
+        return self.latched is not None and (self._stays or at_the_end)
+
+    def stay(self) -> None:
+        """The drive has no power, or cannot have it: there is no way out until the stop is acknowledged."""
+        self.mode, self._stays = Mode.SAFE, True
+
+    def _note_rest(self) -> None:
+        """The smallest load since the tip came to rest: what comes on top is a limb that pushes."""
+        world = self.world
+        if self.mode not in AT_REST:
+            world.rest_N = math.nan
+        elif not world.load.force_N >= world.rest_N:
+            world.rest_N = world.load.force_N
 
     def _stop(self, incident: Incident) -> None:
+        if self.mode in AT_REST:  # what was wanted last may be far from where the tip was left
+            self.world.setpoint = self._here()
         self.latched = incident
         self._end(incident.code, incident)
         if incident.action is Action.IMMEDIATE:

@@ -13,3 +13,7 @@ class Mode(IntEnum):
     CONTACT = 4
     RETRACT = 5
     SAFE = 6
+
+
+AT_REST = (Mode.IDLE, Mode.SAFE)
+"""Modes in which nothing is asked to move."""

@@ -1,7 +1,7 @@
 """One priority table: what stops motion, how, and how soon. First match wins.
 
 IMMEDIATE: the drive stops by its own quick-stop ramp and stays. SOFT: the tip retracts at safe speed, then stays.
-Both are latched until acknowledged.
+Both are latched until acknowledged. At rest (IDLE, SAFE) a soft stop gives way: `controller.giving_way`.
 """
 
 from collections.abc import Callable
@@ -68,13 +68,14 @@ TABLE: tuple[Check, ...] = (
     Check("axis_frozen", Action.IMMEDIATE, check.standstill, STANDSTILL_S),
     Check("overspeed", Action.IMMEDIATE, check.speed, TURN_S),
     Check("workspace", Action.IMMEDIATE, check.workspace, TURN_S),
-    Check("force_limit", Action.SOFT, check.force_limit, TURN_S),
-    Check("torque_limit", Action.SOFT, check.torque_limit, TURN_S),
+    Check("force_limit", Action.SOFT, check.force_limit, TURN_S, at_rest=True),
+    Check("torque_limit", Action.SOFT, check.torque_limit, TURN_S, at_rest=True),
+    Check("pushed", Action.SOFT, check.pushed, TURN_S, at_rest=True),
     Check("pain_stop", Action.SOFT, check.pain_stop, TURN_S),
     Check("operator_stop", Action.SOFT, check.operator_stop, TURN_S),
     Check("force_lost", Action.SOFT, check.force_lost, STALE_S),
     Check("force_invalid", Action.SOFT, check.force_invalid, TURN_S),
-    Check("force_rate", Action.SOFT, check.force_rate, TURN_S),
+    Check("force_rate", Action.SOFT, check.force_rate, TURN_S, at_rest=True),
     Check("depth_limit", Action.SOFT, check.depth, TURN_S),
     Check("tracker_lost", Action.SOFT, check.tracker_lost, STALE_S),
     Check("patient_moved", Action.SOFT, check.patient_moved, PATIENT_S),

@@ -6,6 +6,7 @@ Every one takes (world, watch, wiring). Force is counted from the reference zero
 
 import math
 
+from controller.modes import AT_REST
 from controller.watch import Watch
 from controller.world import World
 from rig.config.wiring import Wiring
@@ -71,6 +72,8 @@ def speed(world: World, watch: Watch, wiring: Wiring) -> str:
 
 def force_limit(world: World, watch: Watch, wiring: Wiring) -> str:
     """Load, or the load that will be there before the axis stands, above machine limit or pain threshold."""
+    if _unfelt(world, watch, wiring):
+        return ""
     load_N, predicted_N, limit_N = world.load.force_N, world.load.predicted_N, wiring.force_limit_N
     if load_N <= limit_N and predicted_N <= limit_N:
         return ""
@@ -82,10 +85,20 @@ def force_limit(world: World, watch: Watch, wiring: Wiring) -> str:
 
 def torque_limit(world: World, watch: Watch, wiring: Wiring) -> str:
     """Moment above its limit."""
+    if _unfelt(world, watch, wiring):
+        return ""
     torque_N_m, limit_N_m = world.load.torque_N_m, wiring.limits.torque_N_m
     if torque_N_m <= limit_N_m:
         return ""
     return f"torque {torque_N_m:.3f} N m is above limits.torque_N_m, {limit_N_m:g} N m"
+
+
+def pushed(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The load rises while the tip rests: the limb pushes."""
+    more_N, limit_N = world.load.force_N - world.rest_N, wiring.limits.pushed_N
+    if watch.mode not in AT_REST or _unfelt(world, watch, wiring) or not more_N > limit_N:
+        return ""
+    return f"the limb pushes: {more_N:.2f} N more than when the tip came to rest (limits.pushed_N {limit_N:g} N)"
 
 
 def pain_stop(world: World, watch: Watch, wiring: Wiring) -> str:
@@ -114,6 +127,8 @@ def force_invalid(world: World, watch: Watch, wiring: Wiring) -> str:
 
 def force_rate(world: World, watch: Watch, wiring: Wiring) -> str:
     """Force changes faster than it may."""
+    if _unfelt(world, watch, wiring):
+        return ""
     rate_N_s, limit_N_s = world.load.rate_N_s, wiring.limits.force_rate_N_s
     return "" if rate_N_s <= limit_N_s else f"force changes by {rate_N_s:.0f} N/s (limit {limit_N_s:g} N/s)"
 
@@ -172,6 +187,14 @@ def operator_silent(world: World, watch: Watch, wiring: Wiring) -> str:
     if not lease_s or watch.operator_silent_s <= lease_s:
         return ""
     return f"the operator's program is silent for {watch.operator_silent_s:.1f} s (lease {lease_s:g} s)"
+
+
+def _unfelt(world: World, watch: Watch, wiring: Wiring) -> bool:
+    """At rest the axis gives way to what is felt now, not to what a lost or invalid sensor said last."""
+    if watch.mode not in AT_REST:
+        return False
+    fresh = not watch.force_lost and watch.force_valid and watch.force_age_ms <= wiring.stale_force_ms
+    return not fresh or not math.isfinite(world.load.force_N)
 
 
 def _older(name: str, age_ms: float, limit_ms: float) -> str:

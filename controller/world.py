@@ -14,7 +14,8 @@ class World:
     """State shared by steps and safety, owned by the machine.
 
     ``raw_N``, ``zero_N`` and ``force_N`` are the configured channel with its sign, compression positive; what safety
-    looks at, ``load``, is all channels from ``reference_zero``, the first zero of the session.
+    looks at, ``load``, is all channels from ``reference_zero``, the first zero of the session. ``rest_N`` is the
+    smallest load since the tip came to rest, NaN while it moves.
     """
 
     setpoint: Setpoint = field(default_factory=lambda: Setpoint(0.0, 0.0))
@@ -24,6 +25,7 @@ class World:
     wrench: Wrench = NAN_WRENCH
     reference_zero: Wrench | None = None
     load: Load = UNKNOWN
+    rest_N: float = math.nan
     raw_N: float = math.nan
     force_samples: int = 0
     noise_N: float = 0.0

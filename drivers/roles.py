@@ -104,6 +104,9 @@ class ServoAxis(Device, Protocol):
     def quick_stop(self) -> None:
         """Stops by the drive's own ramp and stays stopped."""
 
+    def power_off(self) -> None:
+        """Takes the torque away and does not wait: what does not hold by itself can then be pushed."""
+
     def reset_fault(self) -> None:
         """Acknowledges a fault; waits; raises DeviceError where the cause is still there."""
 

@@ -216,6 +216,12 @@ class Epos4Axis:
         walker.controlword = int(Control.QUICK_STOP)
         self._sync(walker, self._now())
 
+    def power_off(self) -> None:
+        """Without torque from the next PDO on, until ``enable``; does not wait."""
+        walker = self._started()
+        walker.controlword = int(Control.DISABLE_VOLTAGE)
+        self._sync(walker, self._now())
+
     def reset_fault(self) -> None:
         """Acknowledges a fault; raises DeviceError where it is still there. The drive has no torque afterwards."""
         walker = self._started()

@@ -32,6 +32,7 @@ MAXIMA: tuple[Maximum, ...] = (
     Maximum("subject.pain_threshold_N", 50.0, "N", _PRESSURE),
     Maximum("limits.torque_N_m", 5.0, "N m", "50 N, the largest force, 0.1 m in front of the sensor"),
     Maximum("limits.force_rate_N_s", 5000.0, "N/s", "above it, force passes 50 N in the 10 ms that a rate takes"),
+    Maximum("limits.pushed_N", 15.0, "N", "the default pain threshold: a limb that pushes has nobody who stops it"),
     Maximum("limits.depth_mm", 30.0, "mm", "half the thickness of a slender forearm, 60 mm"),
     Maximum("limits.speed_mm_s", 100.0, "mm/s", "a person needs 0.2 s to press a button, in which that is 20 mm"),
     Maximum("limits.patient_mm", 30.0, "mm", "half the width of a slender forearm: the tip is not above it any more"),

@@ -56,6 +56,9 @@ class Axis(Table):
     current_limit_A: Positive = 5.0
     acceleration_mm_s2: Positive = 2000.0
     bandwidth_Hz: Positive = Field(default=34.0, description="-3 dB of the drive's position loop, for the gains")
+    holds_unpowered: bool = Field(
+        default=True, description="a brake or a self-locking screw: without power a limb cannot push it back"
+    )
     delay_ms: float = Field(default=4.0, ge=0, description="from command to motion, sensor included")
 
 
@@ -104,6 +107,11 @@ class Limits(Table):
     force_rate_N_s: Positive = 1000.0
     # Friction of 0.3 under 15 N, 0.1 m in front of the sensor, gives 0.45 N m; more is a tip that is levered.
     torque_N_m: Positive = Field(default=0.5, description="norm of the sensor's moments, from the reference zero")
+    # A third of the default pain threshold, and ten times the drift in the air that is accepted.
+    pushed_N: Positive = Field(default=5.0, description="how much load may rise while the tip rests")
+    when_pushed: Literal["retreat", "release"] = Field(
+        default="retreat", description="at rest: away from the limb, or without power where a limb can push the axis"
+    )
     depth_mm: Positive = 15.0
     position_min_mm: float = Field(default=0.0, ge=-500)
     position_max_mm: float = 60.0
@@ -155,6 +163,15 @@ class Wiring(Table):
             raise ValueError(
                 f"loop.crossover_Hz {self.loop.crossover_Hz:g} must stay below"
                 f" axis.bandwidth_Hz {self.axis.bandwidth_Hz:g}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _gives_way(self) -> Self:
+        if self.limits.when_pushed == "release" and self.axis.holds_unpowered:
+            raise ValueError(
+                "limits.when_pushed release: axis.holds_unpowered says that a limb cannot push the axis back without"
+                " power; use retreat, or say false where neither brake nor screw holds it"
             )
         return self
 

@@ -79,6 +79,7 @@ class FakeAxis(FakeDevice):
     position_mm: float = 10.0
     lag_s: float = 0.0047
     on: bool = True
+    limp: bool = False
     fault_text: str = ""
     blocked: bool = False
     reads_mm: float | None = None
@@ -157,7 +158,7 @@ class FakeAxis(FakeDevice):
     def enable(self) -> None:
         """Torque on at the present position."""
         self.called("enable")
-        self.on, self.target_mm = True, self.position_mm
+        self.on, self.limp, self.target_mm = True, False, self.position_mm
 
     def quick_stop(self) -> None:
         """Stands at once; takes no commands until it is enabled."""
@@ -166,6 +167,11 @@ class FakeAxis(FakeDevice):
             raise DeviceError(self.unstoppable)
         self.quick_stops.append(self.clock.now_ns)
         self.on, self.target_mm = False, self.position_mm
+
+    def power_off(self) -> None:
+        """Without torque: it stands, and ``limp`` says so."""
+        self.called("power_off")
+        self.on, self.limp, self.target_mm = False, True, math.nan
 
     def reset_fault(self) -> None:
         """Clears the fault unless ``unclearable`` says why not."""

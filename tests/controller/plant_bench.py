@@ -133,7 +133,7 @@ class PlantBench(FakeBench):
     ) -> None:
         known = with_calibration(wiring or wired(product.rate_Hz, tracker=None), PlantForce.__name__, "1")
         super().__init__(known, position_mm=15.0, settled=0)
-        self.axis = PlantAxis(
+        self.axis: PlantAxis = PlantAxis(
             self.clock, self.period_ns, position_mm=15.0, limb=limb, filter_s=product.filter_s, state=at_rest(15.0)
         )
         self.force = PlantForce(

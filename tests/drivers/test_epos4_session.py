@@ -46,6 +46,19 @@ def test_after_a_quick_stop_set_points_move_nothing_until_it_is_enabled_again(st
     assert stage.plant.position_mm == pytest.approx(1.0, abs=0.01)
 
 
+def test_powered_off_it_has_no_torque_until_it_is_enabled_again(stage: Stage, homed: Epos4Axis) -> None:
+    homed.enable()
+    homed.power_off()
+    enabled = [homed.enabled]
+    for _ in range(50):
+        tick(stage, homed, 1.0)
+    powered = [stage.plant.powered]
+    homed.enable()
+    tick(stage, homed, 0.0)
+    assert [*enabled, homed.enabled] == [False, True]
+    assert [*powered, stage.plant.powered] == [False, True]
+
+
 def test_a_step_beyond_the_window_is_a_following_error_and_the_axis_stops(stage: Stage, homed: Epos4Axis) -> None:
     homed.move_to(10, 30)
     homed.enable()
