@@ -34,6 +34,7 @@ COMMANDS = {
     "serve": "api.cli.serve:serve",
     "mock": "api.cli.hardware:mock",
     "doctor": "api.cli.hardware:doctor",
+    "calibrate": "api.cli.calibrate:calibrate",
     "demo": "api.cli.demo:demo",
 }
 

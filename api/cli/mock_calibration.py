@@ -6,7 +6,7 @@ are hidden in the bench are switched off meanwhile: a sensor is calibrated befor
 
 import contextlib
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
@@ -63,8 +63,12 @@ def mock_calibration(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibrat
     return made
 
 
+def mock_weights(wiring: Wiring) -> Weights:
+    """The weights that the mock bench has."""
+    return Weights(tuple(share * wiring.limits.force_N for share in SHARES), uncertainty=0.0)
+
+
 def _made(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibration:
-    loads_N = tuple(share * wiring.limits.force_N for share in SHARES)
     with (
         BenchControl(endpoints["control"]) as control,
         _nothing_hidden(control),
@@ -75,7 +79,7 @@ def _made(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibration:
         return calibrate(
             sensor.identity,
             wiring.force,
-            Weights(loads_N, uncertainty=0.0),
+            mock_weights(wiring),
             put_on,
             lambda: read(sensor, wiring.force.product, READ_S, SETTLE_S),
             datetime.now(UTC),
@@ -83,12 +87,16 @@ def _made(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibration:
 
 
 @contextlib.contextmanager
-def weights_on(control: BenchControl) -> Iterator[Any]:
+def weights_on(control: BenchControl) -> Iterator[Callable[[float], None]]:
     """Puts weights on the tip of the mock bench as a person would, and takes them off at the end."""
+
+    def put_on(load_N: float) -> None:
+        control.set({"load.axial_N": load_N})
+
     try:
-        yield lambda load_N: control.set({"load.axial_N": load_N})
+        yield put_on
     finally:
-        control.set({"load.axial_N": 0.0})
+        put_on(0.0)
 
 
 @contextlib.contextmanager

@@ -39,14 +39,19 @@ JsonOption = Annotated[
 
 def wiring_from(config: Path | None, overrides: list[str] | None) -> Wiring:
     """The wiring a command works with; without any file every port is `mock`, and that is said on stderr."""
-    named = config or (Path(os.environ[ENVIRONMENT]) if ENVIRONMENT in os.environ else None)
-    path = named or (DEFAULT_FILE if DEFAULT_FILE.exists() else None)
+    path = wiring_file(config)
     if path is None:
         wiring = built_in(overrides)
         if wiring.uses_mock:
             typer.echo("no wiring file given or found: working on the built-in mock bench", err=True)
         return wiring
     return _beside(load(Wiring, path, overrides or []), path.parent)
+
+
+def wiring_file(config: Path | None) -> Path | None:
+    """The file the wiring comes from, if any."""
+    named = config or (Path(os.environ[ENVIRONMENT]) if ENVIRONMENT in os.environ else None)
+    return named or (DEFAULT_FILE if DEFAULT_FILE.exists() else None)
 
 
 def calibrated(wiring: Wiring) -> Wiring:

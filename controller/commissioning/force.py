@@ -33,6 +33,8 @@ LARGEST_CROSSTALK = 0.03
 LARGEST_RESIDUAL = 0.01
 LARGEST_DRIFT = 0.01
 LEAST_CHANGE = 0.01
+# Of the largest load: a mean over a second of such a swing at 1 Hz and more is still within a third of a per cent.
+LARGEST_SWING = 0.02
 # Of a mean: what lies within is not told from noise (1 in 15,000 for a normal distribution).
 NOISE_SIGMAS = 4.0
 
@@ -60,6 +62,7 @@ def calibrate(
         taken.append(Measured(load_N, read()))
         if load_N:
             _refuse_wrong_channel(taken[0].reading, taken[-1], config)
+        _refuse_unsteady(taken[0].reading, taken[-1], max(map(abs, weights.loads_N)))
     return calibration_of(sensor, config, weights, taken, now)
 
 
@@ -141,6 +144,16 @@ def _refuse_wrong_channel(unloaded: Reading, now: Measured, config: Force) -> No
         raise CheckFailed(
             f"compression is {shown} on {config.axis}, and force.compression is {config.compression}: correct it, or"
             " say whether the weights press on the tip or hang from it"
+        )
+
+
+def _refuse_unsteady(unloaded: Reading, now: Measured, largest_N: float) -> None:
+    limit_N = max(LARGEST_SWING * largest_N, NOISE_SIGMAS * max(unloaded.rms[:3]))
+    swing_N = max(now.reading.rms[:3])
+    if swing_N > limit_N:
+        raise CheckFailed(
+            f"the reading under {abs(now.load_N):g} N moves by {swing_N:.2g} N rms (limit {limit_N:.2g} N): let the"
+            " weight come to rest, and keep the bench quiet"
         )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from drivers.roles import ForceSensor
 from rig.channels import ForceSample
+from rig.config.maxima import RANGES
 from rig.errors import CheckFailed, DeviceError
 
 # Fewer would not tell noise from a swinging weight.
@@ -38,15 +39,19 @@ def read(
 
 
 def reading_of(samples: Sequence[ForceSample], product: str) -> Reading:
-    """Means and noise; raises CheckFailed where a sample is not vouched for or at the end of the product's range."""
+    """Means and noise; raises CheckFailed where a sample is not vouched for or at the end of the product's range.
+
+    ``product`` is that of the configuration, ``force.product``.
+    """
     if len(samples) < FEWEST_SAMPLES:
         raise DeviceError(f"{product} gave {len(samples)} samples, {FEWEST_SAMPLES} are needed; run `rig doctor`")
     values = np.array([sample[4:10] for sample in samples])
-    spoilt = sum(not sample.valid for sample in samples)
+    at_end = np.abs(values[:, :3]).max(axis=1) >= RANGES[product].force_N
+    spoilt = int(np.count_nonzero(at_end | ~np.array([bool(sample.valid) for sample in samples])))
     if spoilt:
         raise CheckFailed(
-            f"{product} is saturated, or does not vouch for its readings: {spoilt} of {len(samples)} samples flagged,"
-            f" largest {np.nanmax(np.abs(values[:, :3])):.2f} N; unload it and use lighter weights"
+            f"{product} is saturated, or does not vouch for its readings: {spoilt} of {len(samples)} samples, largest"
+            f" {np.nanmax(np.abs(values[:, :3])):.2f} N; unload it and use lighter weights"
         )
     return Reading(_six(values.mean(axis=0)), _six(values.std(axis=0, ddof=1)), len(samples))
 

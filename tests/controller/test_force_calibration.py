@@ -36,7 +36,7 @@ class Person:
 
     def read(self) -> Reading:
         self.readings += 1
-        return reading_of([self._sample() for _ in range(120)], SENSOR.product)
+        return reading_of([self._sample() for _ in range(120)], "bota-sensone")
 
     def _sample(self) -> ForceSample:
         self._pass(1)
@@ -148,9 +148,28 @@ def test_a_weight_pushed_aside_is_refused() -> None:
         calibrated(hand)
 
 
+def test_a_weight_that_swings_is_refused() -> None:
+    hand = person()
+    still = hand._sample
+
+    def swinging() -> ForceSample:
+        hand.bench.weight_N += 0.05 if hand.bench.weight_N else 0.0
+        return still()
+
+    hand._sample = swinging  # type: ignore[method-assign]
+    with pytest.raises(CheckFailed, match=r"the reading under 2 N moves by 1.\d N rms \(limit 0.2 N\)"):
+        calibrated(hand)
+
+
+def test_a_sensor_without_a_status_is_saturated_at_the_end_of_its_range() -> None:
+    samples = [ForceSample(0, 0, 0, 0, 0.0, 0.0, force_N, 0.0, 0.0, 0.0, 25.0, 0, 1) for force_N in (0.0, 300.0) * 8]
+    with pytest.raises(CheckFailed, match=r"robotiq-ft300 is saturated, .*: 8 of 16 samples, largest 300.00 N"):
+        reading_of(samples, "robotiq-ft300")
+
+
 def test_a_silent_sensor_is_told() -> None:
     with pytest.raises(DeviceError, match=f"gave 0 samples, {FEWEST_SAMPLES} are needed"):
-        reading_of([], SENSOR.product)
+        reading_of([], "bota-sensone")
 
 
 def parsed(text: str, hung: bool = False, tolerance: float = 0.0, gravity_m_s2: float | None = None) -> Weights:

@@ -1,0 +1,101 @@
+"""Guides a person through a force calibration; the mock bench puts weights on its own tip instead."""
+
+from collections.abc import Callable
+from contextlib import closing
+from datetime import UTC, datetime
+from typing import Literal, NamedTuple
+
+from api.cli.asking import Person
+from api.cli.mock_calibration import READ_S as MOCK_READ_S
+from api.cli.mock_calibration import SETTLE_S as MOCK_SETTLE_S
+from api.cli.mock_calibration import mock_weights, weights_on
+from api.cli.output import console, table
+from api.cli.stage import bench_for
+from controller.commissioning.force import calibrate
+from controller.commissioning.readings import read
+from controller.commissioning.weights import Weights, parse_weights
+from controller.devices import open_force
+from mock_devices.control import BenchControl
+from rig.config.calibration import ForceCalibration
+from rig.config.force_map import CHANNELS
+from rig.config.wiring import MOCK_PORT, Wiring
+from rig.errors import UsageError
+
+Load = Literal["pressed", "hung"]
+# A weight put on by hand swings for half a second; a second of readings then averages breath and traffic.
+READ_S, SETTLE_S = 1.0, 0.5
+
+
+class ForceAsked(NamedTuple):
+    """What `rig calibrate force` was asked for; empty and None where it is to be asked."""
+
+    weights: str
+    load: Load | None
+    tolerance: float
+    gravity_m_s2: float | None
+
+
+def calibrate_force(wiring: Wiring, asked: ForceAsked, person: Person) -> ForceCalibration:
+    """The calibration, and what it says on the terminal; raises CheckFailed with what is wrong."""
+    if wiring.force.port == MOCK_PORT:
+        weights = _weights(wiring, asked, person) if asked.weights else mock_weights(wiring)
+        with (
+            bench_for(wiring, approaches=False) as (live, endpoints),
+            BenchControl(endpoints["control"]) as control,
+            weights_on(control) as put_on,
+        ):
+            found = _measured(live, weights, put_on, MOCK_READ_S, MOCK_SETTLE_S)
+    else:
+        weights = _weights(wiring, asked, person)
+        found = _measured(wiring, weights, lambda load_N: person.do(_request(load_N)), READ_S, SETTLE_S)
+    _say(found)
+    return found
+
+
+def _weights(wiring: Wiring, asked: ForceAsked, person: Person) -> Weights:
+    """From the options; what they leave open is asked for."""
+    text = asked.weights or person.answer("which weights will you use, for example 100 g,200 g,500 g", "--weights")
+    load = asked.load
+    if load is None and wiring.force.port != MOCK_PORT:
+        said = person.answer("do they press on the tip or hang from it (pressed or hung)", "--load pressed or hung")
+        if said not in ("pressed", "hung"):
+            raise UsageError(f"{said!r}: answer pressed or hung, or give --load")
+        load = "hung" if said == "hung" else "pressed"
+    return parse_weights(text, load == "hung", asked.tolerance, wiring.limits.force_N, asked.gravity_m_s2)
+
+
+def _measured(
+    wiring: Wiring, weights: Weights, put_on: Callable[[float], None], read_s: float, settle_s: float
+) -> ForceCalibration:
+    with closing(open_force(wiring.force)) as sensor:
+        sensor.start()
+        return calibrate(
+            sensor.identity,
+            wiring.force,
+            weights,
+            put_on,
+            lambda: read(sensor, wiring.force.product, read_s, settle_s),
+            datetime.now(UTC),
+        )
+
+
+def _request(load_N: float) -> str:
+    if not load_N:
+        return "take every weight off the tip and let nothing touch it"
+    return f"{'hang' if load_N < 0 else 'put'} {abs(load_N):.4g} N {'from' if load_N < 0 else 'on'} the tip, alone"
+
+
+def _say(found: ForceCalibration) -> None:
+    rows = [(f"{load.load_N:.3f}", *(f"{value:.3f}" for value in load.force_N)) for load in found.loads]
+    console.print(table(("load N", *(f"{name} N" for name in CHANNELS)), rows, "Known loads and readings"))
+    sure, largest_N = found.uncertainty, max(abs(load.load_N) for load in found.loads)
+    at = CHANNELS.index(found.channel)
+    sentences = [
+        f"{found.product} {found.serial}: compression is {found.compression} on {found.channel},"
+        f" corrected by {found.matrix[at][at]:.4f}",
+        f"noise {found.noise_N[at]:.4f} N rms; standard uncertainty {100 * sure.combined:.2f} % at {largest_N:.4g} N"
+        f" (repeatability {100 * sure.repeatability:.2f}, weights {100 * sure.weights:.2f},"
+        f" linearity {100 * sure.linearity:.2f})",
+    ]
+    for sentence in sentences:
+        console.print(sentence, highlight=False, markup=False)
