@@ -93,9 +93,9 @@ def _say(found: ForceCalibration) -> None:
     sentences = [
         f"{found.product} {found.serial}: compression is {found.compression} on {found.channel},"
         f" corrected by {found.matrix[at][at]:.4f}",
-        f"noise {found.noise_N[at]:.4f} N rms; standard uncertainty {100 * sure.combined:.2f} % at {largest_N:.4g} N"
-        f" (repeatability {100 * sure.repeatability:.2f}, weights {100 * sure.weights:.2f},"
-        f" linearity {100 * sure.linearity:.2f})",
+        f"noise {found.noise_N[at]:.4f} N rms; standard uncertainty {100 * sure.combined:.2g} % at {largest_N:.4g} N"
+        f" (repeatability {100 * sure.repeatability:.2g}, weights {100 * sure.weights:.2g},"
+        f" linearity {100 * sure.linearity:.2g})",
     ]
     for sentence in sentences:
-        console.print(sentence, highlight=False, markup=False)
+        console.print(sentence, highlight=False, markup=False, soft_wrap=True)

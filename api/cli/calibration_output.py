@@ -30,7 +30,7 @@ def keep(what: What, found: ForceCalibration | AxisCalibration, out: Path | None
     path = out or FOLDER / f"{what}-{_plain(found.serial)}-{_stamp(found.date)}.json"
     with whole_file(path) as scratch:
         scratch.write_text(text_of(found), encoding="utf-8")
-    console.print(f"written: {path}; the lines of rig.toml that use it:", highlight=False, markup=False)
+    console.print(f"written: {path}; the lines of rig.toml that use it:", highlight=False, markup=False, soft_wrap=True)
     named = os.path.relpath(path, wiring_folder)
     console.print(f'[calibration]\n{what} = "{named}"', highlight=False, markup=False, soft_wrap=True)
     return path

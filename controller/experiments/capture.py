@@ -9,7 +9,7 @@ from typing import Literal
 import rig
 from controller.checks import refuse_beyond_limits
 from controller.experiments.indentation import Trial, longest_s, trials
-from controller.experiments.recorded import metadata, record
+from controller.experiments.recorded import metadata, record, refuse_bench
 from controller.messages import Outcome
 from controller.operation import Operation
 from controller.supervisor import Supervisor
@@ -66,8 +66,9 @@ def capture(
 ) -> SessionInfo:
     """Runs all trials; raises SafetyStop, with everything recorded kept, where a trial was stopped."""
     check(protocol, bench.wiring)
-    info = new_session(folder, "capture", protocol.model_dump(mode="json"), bench.wiring)
     planned = trials(protocol)
+    refuse_bench(bench, planned[0].program)
+    info = new_session(folder, "capture", protocol.model_dump(mode="json"), bench.wiring)
     for trial in planned:
         operation.advance(trial.index - 1, f"{trial.name}, {trial.speed_mm_s:g} mm/s")
         result, cause = _run(bench, trial, protocol, folder, info)

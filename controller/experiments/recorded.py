@@ -9,9 +9,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import rig
+from controller.commissioning.refusals import refuse_uncommissioned
 from controller.messages import Outcome
 from controller.steps import Program
 from controller.supervisor import Supervisor
+from drivers.roles import Identity
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, RigError
 from rig.recording.mcap_file import RecordingFailed
@@ -50,6 +52,12 @@ def metadata(bench: Supervisor, session: str, trial: str, about: Mapping[str, ob
         "subject": {name: str(value) for name, value in wiring.subject.model_dump().items()},
         **{name: _texts(value) for name, value in about.items()},
     }
+
+
+def refuse_bench(bench: Supervisor, program: Program) -> None:
+    """Raises what the loop would refuse ``program`` for, before a session or a recording is begun for it."""
+    force, axis = (Identity(**bench.ready.devices[role]) for role in ("force", "axis"))
+    refuse_uncommissioned(program, bench.wiring, force, axis, datetime.now(UTC))
 
 
 def _calibration(wiring: Wiring) -> dict[str, str]:

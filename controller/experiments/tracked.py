@@ -9,7 +9,7 @@ from pathlib import Path
 from controller.checks import refuse_beyond_limits
 from controller.experiments import tracking
 from controller.experiments.capture import new_session, refuse_used
-from controller.experiments.recorded import Recorded, metadata, record
+from controller.experiments.recorded import Recorded, metadata, record, refuse_bench
 from controller.experiments.references import Reference
 from controller.experiments.tracking import Followed, Plateau
 from controller.gains import Choice
@@ -94,6 +94,7 @@ def run(bench: Supervisor, program: Program, folder: Path, model: str, operation
 
 def recorded_run(bench: Supervisor, program: Program, folder: Path, model: str) -> Recorded:
     """One run into the session in ``folder``, a new one where there is none; listed there however it ended."""
+    refuse_bench(bench, program)
     if not (folder / SESSION_FILE).exists():
         new_session(folder, "track", {"name": program.name, "kind": TRACKING}, bench.wiring)
     session = open_session(folder).info.id

@@ -1,0 +1,204 @@
+"""`rig calibrate` without a bench: what is asked, what is refused before anybody moves a weight, what files hold."""
+
+import json
+import sys
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from api.cli import mock_calibration
+from api.cli.app import build
+from api.cli.asking import Person
+from api.cli.calibration_output import keep, refuse_unwritable
+from api.cli.mock_calibration import mock_file, state_folder
+from api.cli.options import built_in, calibrated, wiring_from
+from api.cli.stage import bench_for, plugged
+from rig.config.calibration_files import read_force, text_of
+from rig.errors import UsageError
+from tests.calibrations import force_calibration
+
+runner = CliRunner()
+ENDPOINTS = {
+    "force": {"serial": "/dev/pts/90"}, "force_modbus": {"serial": "/dev/pts/91"}, "axis": {"slcan": "/dev/pts/92"},
+    "tracker": {"tcp": "127.0.0.1:8765"}, "control": "127.0.0.1:1", "latency_ms": {"force": 0.5, "force_modbus": 3.0,
+    "tracker": 15.0}, "serials": {"force": "000271", "force_modbus": "FTS-1234"},
+}  # fmt: skip
+REAL = ["--set", "force.port=/dev/null"]
+
+
+@pytest.fixture(autouse=True)
+def own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ([], "which weights will you use.*: no terminal to answer at; give --weights"),
+        (["--weights", "1 N,2 N"], "do they press on the tip or hang from it.*; give --load pressed or hung"),
+        (["--weights", "1 N,99 N", "--load", "hung"], "99 N is above limits.force_N, 20 N"),
+        (["--weights", "1 stone", "--load", "hung"], "'1 stone' is no weight"),
+    ],
+)
+def test_without_a_terminal_an_open_question_names_the_option(
+    options: list[str], sentence: str, own_state: Path
+) -> None:
+    answer = runner.invoke(build("calibrate"), ["calibrate", "force", *REAL, *options])
+    assert isinstance(answer.exception, UsageError)
+    assert answer.exception.exit_code == 2
+    with pytest.raises(UsageError, match=sentence):
+        raise answer.exception
+    assert not list(own_state.rglob("*.json"))
+
+
+def test_a_request_that_nobody_can_say_is_done_names_the_option() -> None:
+    with pytest.raises(UsageError, match=r"put 2 N on the tip, alone: no terminal .*; give --pause SECONDS"):
+        Person().do("put 2 N on the tip, alone")
+
+
+def test_with_a_pause_a_request_is_said_and_waited_for(capsys: pytest.CaptureFixture[str]) -> None:
+    waited: list[float] = []
+    Person(5.0, waited.append).do("put 2 N on the tip, alone")
+    assert waited == [5.0]
+    assert "put 2 N on the tip, alone (5 s)" in capsys.readouterr().out
+
+
+def test_at_a_terminal_the_answer_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: True)
+    monkeypatch.setattr("typer.prompt", lambda *_, **__: "pressed")
+    assert Person().answer("pressed or hung", "--load") == "pressed"
+    Person().do("put 2 N on the tip, alone")
+
+
+def test_a_calibration_is_written_whole_and_its_line_is_relative_to_the_wiring(
+    own_state: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = force_calibration(date=datetime(2026, 3, 1, 9, tzinfo=UTC))
+    refuse_unwritable(None)
+    path = keep("force", found, None, Path("bench"))
+    assert path == Path("calibration/force-000271-20260301T090000Z.json")
+    assert read_force(path) == found
+    assert 'force = "../calibration/force-000271-20260301T090000Z.json"' in capsys.readouterr().out
+    assert [file.name for file in (own_state / "calibration").iterdir()] == [path.name]
+    with pytest.raises(UsageError, match="exists already"):
+        refuse_unwritable(path)
+
+
+def test_calibration_paths_are_beside_the_wiring_file(own_state: Path) -> None:
+    (own_state / "bench").mkdir()
+    (own_state / "bench" / "force.json").write_text(text_of(force_calibration()))
+    (own_state / "bench" / "rig.toml").write_text('[calibration]\nforce = "force.json"\n')
+    found = calibrated(wiring_from(Path("bench/rig.toml"), None)).calibration.of_force
+    assert found is not None
+    assert found.serial == "000271"
+
+
+@pytest.mark.parametrize(
+    ("edit", "sentence"),
+    [
+        (lambda file: file.unlink(), "no such file; run `rig calibrate`"),
+        (lambda file: file.write_text("{"), "cannot be read as JSON"),
+        (lambda file: file.write_text("[" * 100_000), "cannot be read as JSON"),
+        (lambda file: file.write_text("[]"), "holds no calibration"),
+        (lambda file: edited(file, serial=5), "serial: Input should be a valid string"),
+        (lambda file: edited(file, date="2026-03-01T09:00:00"), "date: .*timezone"),
+        (lambda file: edited(file, chanel="fz"), "unknown key chanel; nearest valid key: channel"),
+        (lambda file: edited(file, compression="positive"), "its own loads do not come out of its matrix"),
+        (lambda file: edited(file, channel="fx"), "its own loads do not come out of its matrix"),
+        (lambda file: edited(file, matrix=[[1, 0, 0], [0, 1, 0], [0, 0, 1.07]]), "its own loads do not come out"),
+        (lambda file: edited(file, matrix=[[1, 0, 0.3], [0, 1, 0], [0, 0, 1]]), "matrix corrects by 0.3"),
+    ],
+)
+def test_a_file_that_is_not_as_it_was_written_is_refused(edit: object, sentence: str, own_state: Path) -> None:
+    file = own_state / "force.json"
+    file.write_text(text_of(force_calibration()))
+    edit(file)  # type: ignore[operator]
+    with pytest.raises(UsageError, match=sentence):
+        calibrated(built_in([f"calibration.force={file}"]))
+
+
+def edited(file: Path, **changes: object) -> None:
+    file.write_text(json.dumps(json.loads(file.read_text()) | changes))
+
+
+# The mock sensor's own calibration
+
+
+def stored(date: datetime | None = None) -> None:
+    file = mock_file(built_in(), ENDPOINTS)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text_of(force_calibration(date=date)))
+
+
+def test_a_mock_sensor_uses_the_calibration_that_is_kept_for_its_serial_number(
+    monkeypatch: pytest.MonkeyPatch, own_state: Path
+) -> None:
+    monkeypatch.setattr(mock_calibration, "_made", lambda *_: pytest.fail("calibrated again"))
+    stored()
+    assert state_folder() == own_state / "state" / "tissue-rig"
+    found = plugged(built_in(), ENDPOINTS).calibration.of_force
+    assert found is not None
+    assert found.serial == "000271"
+
+
+@pytest.mark.parametrize("why", ["none", "other sensor", "old", "damaged"])
+def test_it_is_made_once_where_none_may_be_used_and_said(
+    why: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    endpoints = ENDPOINTS
+    if why == "other sensor":
+        stored()
+        endpoints = ENDPOINTS | {"serials": {"force": "000300", "force_modbus": "FTS-1234"}}
+    elif why == "old":
+        stored(datetime.now(UTC) - timedelta(days=400))
+    elif why == "damaged":
+        stored()
+        mock_file(built_in(), ENDPOINTS).write_text("{")
+    made: list[str] = []
+
+    def make(*_: object) -> object:
+        made.append("made")
+        return force_calibration(serial=endpoints["serials"]["force"])  # type: ignore[index]
+
+    monkeypatch.setattr(mock_calibration, "_made", make)
+    for _ in range(2):
+        assert plugged(built_in(), endpoints).calibration.of_force is not None
+    assert made == ["made"]
+    assert capsys.readouterr().err.count("was calibrated by itself") == 1
+
+
+def test_where_it_cannot_be_kept_that_is_said(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], own_state: Path
+) -> None:
+    (own_state / "state").write_text("in the way")
+    monkeypatch.setattr(mock_calibration, "_made", lambda *_: force_calibration())
+    assert plugged(built_in(), ENDPOINTS).calibration.of_force is not None
+    assert "and again next time: " in capsys.readouterr().err
+
+
+def test_a_wiring_that_contradicts_what_is_kept_is_refused() -> None:
+    stored()
+    with pytest.raises(UsageError, match=r"force.compression positive: the calibration found compression negative"):
+        plugged(built_in(["force.compression=positive"]), ENDPOINTS)
+
+
+def test_a_real_sensor_beside_a_mock_axis_is_never_calibrated_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mock_calibration, "_made", lambda *_: pytest.fail("calibrated"))
+    known = force_calibration(serial="real")
+    wiring = built_in(["force.port=/dev/ttyUSB0"])
+    wiring = wiring.model_copy(update={"calibration": wiring.calibration.model_copy(update={"of_force": known})})
+    live = plugged(wiring, ENDPOINTS)
+    assert (live.force.port, live.axis.port, live.calibration.of_force) == ("/dev/ttyUSB0", "/dev/pts/92", known)
+
+
+def test_a_real_sensor_without_calibration_is_refused_before_a_bench_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("api.cli.stage.bench_process", lambda *_: pytest.fail("a bench was started"))
+    with (
+        pytest.raises(UsageError, match="no force calibration of the sensor at /dev/ttyUSB0"),
+        bench_for(built_in(["force.port=/dev/ttyUSB0"])),
+    ):
+        pass
