@@ -6,11 +6,12 @@ otherwise.
 """
 
 import re
+from collections import deque
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 from drivers.bota.codec import BAUD_CODES, COMMAND_BYTES_MAX, CONVERTER_HZ, SINC_LENGTHS, Frame, Status, encode_frame
-from mock_devices.stage import NEVER_NS, SensorPlant
+from mock_devices.stage import NEVER_NS, SAMPLES_KEPT, SensorPlant
 from mock_devices.wire import OnWire, Wire
 
 Mode = Literal["booting", "init", "config", "run"]
@@ -91,6 +92,7 @@ class BotaMock(OnWire):
         self.wrong_identity = False
         self.corrupt_every = 0
         self.refuse = ""
+        self.sampled: deque[tuple[int, int]] = deque(maxlen=SAMPLES_KEPT)
         self._plant = plant
         self.serial_number = serial_number
         self._speed = 1 + drift_ppm * 1e-6
@@ -194,6 +196,7 @@ class BotaMock(OnWire):
         if not self.frozen:
             self._wrench = self._plant.wrench()
         time_us = round((self._due_ns - self._power_ns) * self._speed / 1000) & 0xFFFF_FFFF
+        self.sampled.append((time_us, self._due_ns))
         raw = encode_frame(Frame(self._status(), *self._wrench, time_us, self._plant.temperature_C))
         self._frames += 1
         if self.corrupt_every and self._frames % self.corrupt_every == 0:

@@ -8,6 +8,7 @@
     {"hide": {"friction.level_N": 0.2}}                                 {"hide": [names]}; {} none, null defaults
     {"truth": true}                                                     {"truth": {effect: {parameter: value}}}
     {"synced_ns": true}                                                 {"synced_ns": [times]}; each is said once
+    {"sampled": "force"}                                                {"sampled": [[mark, time]]}; each is said once
 
 A request that cannot be fulfilled is answered by {"error": sentence}.
 """
@@ -18,7 +19,7 @@ import socket
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from mock_devices import dials
 from mock_devices.bench import Bench
@@ -30,16 +31,21 @@ from rig.errors import DeviceError, RigError, UsageError
 LINE_BYTES_MAX = 65536
 CLIENT_TIMEOUT_S = 10.0
 TIMES_A_LINE = 1000
+Time = TypeVar("Time")
 
 Answer = dict[str, Any]
 Faults = Mapping[str, Sequence[Mapping[str, Fault]]]
+Sampled = Mapping[str, deque[tuple[int, int]]]
 
 
 class Desk:
     """Answers requests on ``bench`` and on the ``faults`` of its devices; knows no sockets."""
 
-    def __init__(self, bench: Bench, faults: Faults, synced_ns: deque[int] | None = None) -> None:
+    def __init__(
+        self, bench: Bench, faults: Faults, synced_ns: deque[int] | None = None, sampled: Sampled | None = None
+    ) -> None:
         self._bench = bench
+        self._sampled = sampled or {}
         self._synced_ns = deque[int]() if synced_ns is None else synced_ns
         self._faults = faults
         self._verbs: dict[str, Callable[[Any], Any]] = {
@@ -50,7 +56,8 @@ class Desk:
             "faults": lambda _: self._list_faults(),
             "hide": self._hide,
             "truth": lambda _: self._bench.hidden,
-            "synced_ns": lambda _: [self._synced_ns.popleft() for _ in range(min(len(self._synced_ns), TIMES_A_LINE))],
+            "synced_ns": lambda _: _said_once(self._synced_ns),
+            "sampled": lambda role: _said_once(self._sampled[known(str(role), self._sampled, "sensor")]),
         }
 
     def answer(self, line: bytes) -> bytes:
@@ -96,6 +103,10 @@ class Desk:
         return {
             device: {kind: fault.meaning for kind, fault in lines[0].items()} for device, lines in self._faults.items()
         }
+
+
+def _said_once(times: deque[Time]) -> list[Time]:
+    return [times.popleft() for _ in range(min(len(times), TIMES_A_LINE))]
 
 
 def _table(values: object, verb: str) -> dict[str, Any]:
@@ -206,6 +217,13 @@ class BenchControl:
     def synced_ns(self) -> list[int]:
         """When the drive took SYNCs, on this computer's monotonic clock, those not asked for before; 1000 at most."""
         return list(self._ask("synced_ns", True))
+
+    def sampled(self, role: str) -> list[tuple[int, int]]:
+        """When a force sensor took samples, by a mark that is in them, like ``synced_ns``.
+
+        The mark is a SensONE's time stamp [us], and an FT 300's six counts of 16 bits as one number, the first lowest.
+        """
+        return [(mark, time_ns) for mark, time_ns in self._ask("sampled", role)]
 
     def _ask(self, verb: str, argument: object) -> Any:
         try:

@@ -6,6 +6,7 @@ selected.
 """
 
 import struct
+from collections import deque
 from collections.abc import Iterator
 
 from drivers.robotiq.codec import (
@@ -29,7 +30,7 @@ from drivers.robotiq.codec import (
     to_counts,
     with_crc,
 )
-from mock_devices.stage import NEVER_NS, SensorPlant
+from mock_devices.stage import NEVER_NS, SAMPLES_KEPT, SensorPlant
 from mock_devices.wire import OnWire, Wire
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
@@ -110,6 +111,7 @@ class RobotiqMock(OnWire):
         self.mute_start = False
         self.deaf = False
         self.refuse_stream = False
+        self.sampled: deque[tuple[int, int]] = deque(maxlen=SAMPLES_KEPT)
         self._plant = plant
         self._number = serial_number
         self.serial_number = f"{SERIAL_PREFIX}-{serial_number:04d}"
@@ -224,6 +226,7 @@ class RobotiqMock(OnWire):
 
     def _frame(self) -> bytes:
         raw = encode_frame(self._converted())
+        self.sampled.append((int.from_bytes(raw[2:14], "little"), self._due_ns))
         if self.corrupt_every and (self._frames + 1) % self.corrupt_every == 0:
             raw = raw[:-1] + bytes([raw[-1] ^ 0xFF])
         return raw

@@ -8,6 +8,8 @@ to note when it really took a SYNC.
 from typing import NamedTuple, Protocol
 
 NEVER_NS = 1 << 62
+# Times of samples that a mock keeps for whoever asks: ten seconds at 1 kHz.
+SAMPLES_KEPT = 10_000
 
 
 class MarkerPose(NamedTuple):

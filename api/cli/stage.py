@@ -36,6 +36,8 @@ def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, both_sen
         command += ["--seed", str(seed)]
     for effect in (*wiring.mock.hide, *hide):
         command += ["--hide", effect]
+    # A real sensor's product may be one that the bench cannot play, and need not.
+    both_sensors = both_sensors or wiring.force.port != MOCK_PORT
     return [*command, "--force", "both" if both_sensors else wiring.force.product]
 
 

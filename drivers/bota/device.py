@@ -50,6 +50,8 @@ CONFIG_TRIES = 3
 # The filter settles within a few frames; the rest is for the host.
 FIRST_FRAMES = 20
 FIRST_FRAMES_S = 1.0
+# Frames of this long are dated together: among them are some that came at once, which the first may not have done.
+LISTEN_S = 0.25
 
 
 # A frame and the sensor's unwrapped clock [us].
@@ -170,17 +172,18 @@ class BotaSensOne:
     def _await_frames(self, data: bytes) -> None:
         """Waits for the first sample that the sensor vouches for; samples until then are kept for ``poll``."""
         timeout_s = FIRST_FRAMES_S + FIRST_FRAMES * self._period_ns / 1e9
-        deadline_ns = self._now() + round(timeout_s * 1e9)
+        begun_ns = self._now()
+        deadline_ns = begun_ns + round(timeout_s * 1e9)
         while True:
             self._take(data, self._now())
             frames = [frame for timed, _ in self._taken for _, frame in timed]
-            if any(map(_is_valid, frames)):
+            left_s = (deadline_ns - self._now()) / 1e9
+            if any(map(_is_valid, frames)) and self._now() - begun_ns >= LISTEN_S * 1e9:
                 self.counters.discarded_bytes = 0  # the rest of the last answer, not a loss
                 return
-            left_s = (deadline_ns - self._now()) / 1e9
             if left_s <= 0:
                 raise self._error(self._no_valid_frame(frames, timeout_s))
-            select.select([self._port.fileno()], [], [], left_s)
+            select.select([self._port.fileno()], [], [], min(left_s, LISTEN_S))
             data = self._port.read()
 
     def _no_valid_frame(self, frames: Sequence[Frame], timeout_s: float) -> str:

@@ -64,6 +64,7 @@ def short_waits(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest)
     if request.node.get_closest_marker("bench") is None:
         for name in ("BOOT_S", "ACK_S", "FIRST_FRAMES_S"):
             monkeypatch.setattr(device, name, 0.05)
+        monkeypatch.setattr(device, "LISTEN_S", 0.0)
 
 
 def test_start_resets_configures_and_runs_the_sensor() -> None:

@@ -52,6 +52,13 @@ def test_times_at_which_the_drive_was_synced_are_told_once() -> None:
     assert ask(desk, {"synced_ns": True})["synced_ns"] == []
 
 
+def test_times_at_which_a_sensor_took_its_samples_are_told_once() -> None:
+    desk = Desk(quiet_bench(), {}, sampled={"force": deque([(7, 10**12), (8, 10**12 + 1)])})
+    assert ask(desk, {"sampled": "force"})["sampled"] == [[7, 10**12], [8, 10**12 + 1]]
+    assert ask(desk, {"sampled": "force"})["sampled"] == []
+    assert "force" in ask(desk, {"sampled": "forse"})["error"]
+
+
 def test_the_limb_is_moved_stiffened_and_removed_while_running() -> None:
     bench = quiet_bench()
     desk = Desk(bench, {})

@@ -117,6 +117,17 @@ def test_frames_carry_the_plants_load_and_the_sensors_own_time() -> None:
     assert second == Frame(0, *WRENCH, booted_us + 20_000, 24.5)
 
 
+def test_when_samples_were_taken_is_kept_on_the_benchs_clock() -> None:
+    stage = Stage(drift_ppm=20_000)
+    begun_ns = stage.now_ns
+    stage.run()
+    frames = stage.frames(30_000_000)
+    times_ns = [begun_ns + round(number * 1e7 / 1.02) for number in (1, 2, 3)]
+    assert list(stage.mock.sampled) == [
+        (frame.time_us, time_ns) for frame, time_ns in zip(frames, times_ns, strict=True)
+    ]
+
+
 def test_a_fast_clock_gives_more_frames_and_more_microseconds() -> None:
     stage = Stage(drift_ppm=20_000)
     stage.run()

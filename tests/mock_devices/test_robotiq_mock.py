@@ -152,6 +152,15 @@ def test_a_frame_arrives_when_it_has_passed_the_line() -> None:
     assert stage.frames(1) == [Wrench(*WRENCH)]
 
 
+def test_when_samples_were_taken_is_kept_on_the_benchs_clock() -> None:
+    stage = Stage()
+    begun_ns = stage.now_ns
+    stage.stream()
+    stage.wait(2 * PERIOD_NS)
+    mark = int.from_bytes(struct.pack("<6h", 125, -250, -775, 125, -250, 500), "little")
+    assert list(stage.mock.sampled) == [(mark, begun_ns + PERIOD_NS), (mark, begun_ns + 2 * PERIOD_NS)]
+
+
 def test_a_fast_clock_gives_more_frames() -> None:
     stage = Stage(drift_ppm=20_000)
     stage.stream()

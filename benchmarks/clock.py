@@ -1,0 +1,177 @@
+"""How true the capture times are: `python -m benchmarks.clock [--seconds 20]`; the last line is one JSON object.
+
+The mock bench tells when each sample was really taken, on this computer's monotonic clock; both serial force sensors
+are read by their drivers once a millisecond, as the loop does and with its priority where that is granted, idle and
+with a busy process for each core. No second is left out for settling. For comparison: how late samples arrive, and
+arrival less the delay that is known, which is what there would be without a clock map.
+"""
+
+import argparse
+import contextlib
+import json
+import multiprocessing
+import os
+import struct
+import sys
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from api.cli.stage import bench_process
+from controller.devices import open_force
+from controller.realtime import acquire
+from drivers.robotiq.codec import FRAME_NS, to_counts
+from drivers.roles import ForceSensor
+from mock_devices.control import BenchControl
+from rig.channels import ForceSample
+from rig.config.wiring import Force, Loop, Wiring
+
+PERIOD_S = 0.001
+COLLECT_S = 0.5
+LIMIT_MS = 0.2
+ROLES = {"bota-sensone": "force", "robotiq-ft300": "force_modbus"}
+KNOWN_NS = {"bota-sensone": 0, "robotiq-ft300": FRAME_NS}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One sensor under one load; times in ms, errors without their sign."""
+
+    product: str
+    load: str
+    samples: int
+    unmatched: int
+    not_increasing: int
+    error_p50: float
+    error_p99: float
+    error_max: float
+    arrival_p50: float
+    arrival_p99: float
+    plain_p99: float
+
+
+def mark(product: str, sample: ForceSample) -> int:
+    """What stands in a sample and in the mock's own list of it, see ``BenchControl.sampled``."""
+    if product == "bota-sensone":
+        return sample.device_us
+    return int.from_bytes(struct.pack("<6h", *to_counts(sample[4:10])), "little")
+
+
+def listen(
+    sensor: ForceSensor, control: BenchControl, role: str, seconds: float
+) -> tuple[list[ForceSample], list[tuple[int, int]]]:
+    """Samples, and marks and times of all that were taken."""
+    samples, taken = list[ForceSample](), list[tuple[int, int]]()
+    end_s = time.monotonic() + seconds
+    collect_s = 0.0
+    while (now_s := time.monotonic()) < end_s:
+        samples += sensor.poll(time.monotonic_ns())
+        if now_s >= collect_s:
+            taken += control.sampled(role)
+            collect_s = now_s + COLLECT_S
+        time.sleep(PERIOD_S)
+    while more := control.sampled(role):
+        taken += more
+    return samples, taken
+
+
+def truths_ns(product: str, samples: Sequence[ForceSample], taken: Sequence[tuple[int, int]]) -> list[int | None]:
+    """When each sample was taken; None where the bench did not say so. Both go upwards in time."""
+    waiting, found = deque(taken), list[int | None]()
+    marks = {each for each, _ in taken}
+    for sample in samples:
+        wanted = mark(product, sample)
+        while wanted in marks and waiting and waiting[0][0] != wanted:
+            waiting.popleft()
+        found.append(waiting.popleft()[1] if wanted in marks and waiting else None)
+    return found
+
+
+def row(product: str, load: str, samples: Sequence[ForceSample], truth_ns: Sequence[int | None]) -> Row:
+    """The figures of one run."""
+    pairs = [(sample, true_ns) for sample, true_ns in zip(samples, truth_ns, strict=True) if true_ns is not None]
+    error_ms = np.abs([(sample.capture_ns - true_ns) * 1e-6 for sample, true_ns in pairs])
+    arrival_ms = np.array([(sample.arrival_ns - true_ns) * 1e-6 for sample, true_ns in pairs])
+    plain_ms = np.abs(arrival_ms - KNOWN_NS[product] * 1e-6)
+    backward = sum(late.capture_ns <= early.capture_ns for early, late in pairwise(samples))
+    figures = [*percentiles(error_ms, 50, 99, 100), *percentiles(arrival_ms, 50, 99), *percentiles(plain_ms, 99)]
+    return Row(product, load, len(samples), len(samples) - len(pairs), backward, *figures)
+
+
+def percentiles(values: NDArray[np.float64], *shares: float) -> list[float]:
+    """Percentiles to a tenth of a microsecond."""
+    return [round(float(np.percentile(values, share)), 4) for share in shares]
+
+
+def measured(product: str, load: str, seconds: float, priority: int) -> Row:
+    """One run on a bench of its own; takes the process' priority, and what it starts would inherit that."""
+    role = ROLES[product]
+    with contextlib.ExitStack() as stack:
+        _, endpoints = stack.enter_context(bench_process(Wiring(), both_sensors=True))
+        control = stack.enter_context(BenchControl(endpoints["control"]))
+        config = Force.model_validate({"product": product, "port": endpoints[role]["serial"]})
+        sensor = stack.enter_context(contextlib.closing(open_force(config)))
+        acquire(priority)
+        sensor.start()
+        samples, taken = listen(sensor, control, role, seconds)
+    return row(product, load, samples, truths_ns(product, samples, taken))
+
+
+def spin() -> None:
+    """Keeps a core busy."""
+    while True:
+        pass
+
+
+@contextlib.contextmanager
+def busy(load: str) -> Iterator[None]:
+    """A spinning process for each core, where ``load`` says so."""
+    context = multiprocessing.get_context("spawn")
+    cores = os.cpu_count() or 1
+    workers = [context.Process(target=spin, daemon=True) for _ in range(cores if load == "loaded" else 0)]
+    for worker in workers:
+        worker.start()
+    try:
+        yield
+    finally:
+        for worker in workers:
+            worker.kill()
+            worker.join()
+
+
+def alone() -> ProcessPoolExecutor:
+    """A process for one run."""
+    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
+
+
+def main() -> int:
+    """Prints a table and one JSON object; 0 where each 99th percentile of the errors is below 0.2 ms."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.clock", description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=20.0, help="of each of the four runs")
+    parser.add_argument("--priority", type=int, default=Loop().priority, help="SCHED_FIFO priority to ask for; 0: none")
+    options = parser.parse_args()
+    rows = []
+    names = ("samples", "unmatched", "not_increasing", "error_p50", "error_p99", "error_max", "arrival_p50",
+             "arrival_p99", "plain_p99")  # fmt: skip
+    sys.stdout.write(f"{'times in ms':22}" + "".join(f"{name:>15}" for name in names) + "\n")
+    for product in ROLES:
+        for load in ("idle", "loaded"):
+            with busy(load), alone() as process:
+                rows.append(process.submit(measured, product, load, options.seconds, options.priority).result())
+            figures = asdict(rows[-1])
+            sys.stdout.write(f"{product + ', ' + load:22}" + "".join(f"{figures[name]:>15}" for name in names) + "\n")
+            sys.stdout.flush()
+    worst = max(each.error_p99 for each in rows)
+    sound = worst < LIMIT_MS and not any(each.not_increasing or each.unmatched for each in rows)
+    print(json.dumps({"error_p99_ms": worst, "limit_ms": LIMIT_MS, "ok": sound, "runs": [asdict(r) for r in rows]}))
+    return 0 if sound else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
