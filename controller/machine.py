@@ -70,7 +70,7 @@ class Machine:
         """Leaves SAFE once the cause was looked at."""
         if self.mode is Mode.SAFE:
             self.mode, self.latched, self._stays = Mode.IDLE, None, False
-            self.world.setpoint = self._here()
+            self.world.setpoint, self.world.rest_N = self._here(), math.nan
 
     def hold(self, incident: Incident) -> None:
         """At rest, and stays so until this is acknowledged."""

@@ -194,7 +194,7 @@ def _unfelt(world: World, watch: Watch, wiring: Wiring) -> bool:
     if watch.mode not in AT_REST:
         return False
     fresh = not watch.force_lost and watch.force_valid and watch.force_age_ms <= wiring.stale_force_ms
-    return not fresh or not math.isfinite(world.load.force_N)
+    return not fresh or not all(map(math.isfinite, world.load))
 
 
 def _older(name: str, age_ms: float, limit_ms: float) -> str:

@@ -189,7 +189,7 @@ def test_noise_makes_no_stiffness_and_a_restless_zero_does_not_blind_the_predict
 def test_before_the_first_sample_nothing_is_known_and_an_unknown_load_is_a_stop() -> None:
     watch = ForceWatch(1_000_000)
     assert math.isnan(watch.load(0, NO_WRENCH, 0.0, Setpoint(0.0, 0.0), 2000.0).predicted_N)
-    incident = evaluate(World(wrench=NO_WRENCH, position_mm=20.0), Watch(), WIRING)
+    incident = evaluate(World(wrench=NO_WRENCH, position_mm=20.0), Watch(mode=Mode.APPROACH), WIRING)
     assert incident and incident.code == "force_limit"
 
 
