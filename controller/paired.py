@@ -10,8 +10,9 @@ from rig.trials.contact import Loading
 
 # 1,024 rows a hundredth of a millimetre apart are the last ten millimetres, and 0.15 ms a portion of the estimator.
 ROWS, ROW_MM = 1024, 0.01
-# Samples wait for the axis sample after them: 64 are more than either device has under way.
-WAITING = 64
+# Samples of force wait for the axis sample after them, or come long after it: 64 of force are more than a device has
+# under way, and 256 of the axis reach back a quarter of a second, ten times the slower sensor's latency.
+WAITING, AXIS_SAMPLES = 64, 256
 
 
 class PairedSamples:
@@ -23,31 +24,44 @@ class PairedSamples:
     def __init__(self) -> None:
         self.collecting = False
         self._waiting: deque[tuple[int, float]] = deque(maxlen=WAITING)
+        self._axis: deque[tuple[int, float]] = deque(maxlen=AXIS_SAMPLES)
         self._rows: deque[list[float]] = deque(maxlen=ROWS)
-        self._axis: tuple[int, float] | None = None
         self.samples = 0
 
     def clear(self) -> None:
-        """Forgets all."""
+        """Forgets all but where the axis was."""
         self._waiting.clear()
         self._rows.clear()
         self.samples = 0
 
     def force(self, capture_ns: int, force_N: float) -> None:
-        """One sample of force."""
+        """One sample of force, which may come long after the axis' of the same time."""
         if self.collecting and math.isfinite(force_N):
             self._waiting.append((capture_ns, force_N))
+            self._pair()
 
     def axis(self, capture_ns: int, position_mm: float) -> None:
         """One sample of the axis: all force taken before it has its position now."""
-        before, self._axis = self._axis, (capture_ns, position_mm)
-        if before is None or capture_ns <= before[0]:
-            return
-        while self._waiting and self._waiting[0][0] <= capture_ns:
+        if not self._axis or capture_ns > self._axis[-1][0]:
+            self._axis.append((capture_ns, position_mm))
+            self._pair()
+
+    def _pair(self) -> None:
+        while self._waiting and self._axis and self._waiting[0][0] <= self._axis[-1][0]:
             taken_ns, force_N = self._waiting.popleft()
-            if taken_ns >= before[0] and self.collecting:
-                share = (taken_ns - before[0]) / (capture_ns - before[0])
-                self._add(before[1] + share * (position_mm - before[1]), force_N)
+            position_mm = self._position_mm(taken_ns)
+            if position_mm is not None:
+                self._add(position_mm, force_N)
+
+    def _position_mm(self, taken_ns: int) -> float | None:
+        """The axis at a time up to its newest sample; None before the oldest that is kept."""
+        after_ns, after_mm = self._axis[-1]
+        for before_ns, before_mm in reversed(self._axis):
+            if before_ns <= taken_ns:
+                share = (taken_ns - before_ns) / max(after_ns - before_ns, 1)
+                return before_mm + share * (after_mm - before_mm)
+            after_ns, after_mm = before_ns, before_mm
+        return None
 
     def _add(self, position_mm: float, force_N: float) -> None:
         self.samples += 1

@@ -75,6 +75,8 @@ class TouchRun:
     def _settle(self, world: World, contact: Contact) -> bool:
         self._found, self._search = contact, None
         known = self._sound and contact.within_mm <= self._touching.within_mm
+        # Two touches without samples tell no more than one: something else is wrong, and the interval says so.
+        known |= self._slow > 0 and len(world.paired.loading.samples) < LEAST_ROWS
         if not known and self._slow < self._touching.touches:
             self._phase = self._back_off
             return False

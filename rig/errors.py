@@ -32,3 +32,9 @@ class SafetyStop(RigError):
     """Motion was stopped by a limit, a person or a lost input; acknowledge the cause before moving again."""
 
     exit_code = 3
+
+
+class BadTrial(RigError):
+    """A trial's quality stayed bad however often it was made again; what was recorded is kept and marked."""
+
+    exit_code = 4

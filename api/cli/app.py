@@ -43,7 +43,7 @@ def build(wanted: str | None = None) -> typer.Typer:
     """The application with the command ``wanted``; where it is no command, with the name and summary of each."""
     app = typer.Typer(
         help="Software for a soft-tissue bench: capture, fit, track, report. Exit codes: 0 ok, 1 check failed,"
-        " 2 wrong use, 3 safety stop.",
+        " 2 wrong use, 3 safety stop, 4 a bad trial remained.",
         no_args_is_help=True,
         invoke_without_command=True,
         pretty_exceptions_enable=False,

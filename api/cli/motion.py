@@ -16,6 +16,7 @@ from controller.experiments import tracked
 from controller.experiments.comparison import CHOICES, choice_from, choices_from
 from controller.experiments.references import named
 from controller.experiments.tracked import Tracked
+from controller.experiments.verdicts import refuse_bad
 from controller.operation import Operation
 from controller.steps import Program
 from controller.supervisor import Supervisor
@@ -39,7 +40,7 @@ def capture(
     """Runs an indentation protocol and records every trial.
 
     While it runs: p is the subject's pain stop, space the emergency stop, s or Ctrl-C stop and retract; what was
-    recorded is kept.
+    recorded is kept. A bad trial is made again (quality.repeats in the protocol); exit code 4 if one stayed bad.
 
     Example: rig capture examples/indentation.toml --config examples/forearm.toml --out sessions/first
     """
@@ -50,6 +51,7 @@ def capture(
     with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
         info = captured(bench, plan, out)
     write_json(json_file, summary(info, out))
+    refuse_bad(info)
 
 
 def captured(bench: Supervisor, plan: Indentation, out: Path) -> SessionInfo:
@@ -63,10 +65,12 @@ def _say(trial: TrialInfo) -> None:
     samples, dropped = sum(trial.samples.values()), sum(trial.dropped.values())
     console.print(
         f"{trial.name}  {trial.speed_mm_s:5g} mm/s  {_surface(trial)}  peak {trial.peak_force_N:6.2f} N"
-        f"  {samples:7d} samples  {dropped} dropped  {trial.outcome}",
+        f"  {samples:7d} samples  {dropped} dropped  {trial.outcome}  {trial.quality}",
         highlight=False,
         soft_wrap=True,
     )
+    for reason in trial.reasons:
+        console.print(f"    {reason}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _surface(trial: TrialInfo) -> str:
@@ -88,6 +92,10 @@ def summary(info: SessionInfo, folder: Path) -> dict[str, object]:
                 "speed_mm_s": t.speed_mm_s,
                 "outcome": t.outcome,
                 "peak_force_N": t.peak_force_N,
+                "quality": t.quality,
+                "reasons": list(t.reasons),
+                "measured": plain(t.measured),
+                "repeats": t.repeats,
                 "surface_mm": plain([t.surface_mm, t.surface_low_mm, t.surface_high_mm]),
             }
             for t in info.trials
@@ -130,10 +138,13 @@ def track(
     if compare and against:
         raise UsageError("--table learns its own models: leave out --against")
     folder = out or Path("sessions") / f"track-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
-    write_json(json_file, _compared(wiring, folder, asked) if compare else _tracked(wiring, folder, asked, against))
+    if compare:
+        write_json(json_file, _compared(wiring, folder, asked))
+    else:
+        _tracked(wiring, folder, asked, against, json_file)
 
 
-def _tracked(wiring: Wiring, folder: Path, asked: "Asked", against: Path | None) -> dict[str, object]:
+def _tracked(wiring: Wiring, folder: Path, asked: "Asked", against: Path | None, json_file: Path | None) -> None:
     """One run, after one with the other model where there is one; all is checked before anything is opened."""
     program = _planned(wiring, asked)
     other = _planned(wiring, asked._replace(model=against)) if against else None
@@ -142,8 +153,17 @@ def _tracked(wiring: Wiring, folder: Path, asked: "Asked", against: Path | None)
         before = follow(bench, other, folder, str(against)) if other else None
         result = follow(bench, program, folder, str(asked.model))
     say_levels(result)
+    say_quality(result)
     console.print(f"recorded in {folder}", highlight=False)
-    return tracked.as_json(result) | (say_gain(before, result) if before else {})
+    write_json(json_file, tracked.as_json(result) | (say_gain(before, result) if before else {}))
+    for run in (before, result):
+        if run is not None:
+            tracked.refuse_bad(run)
+
+
+def say_quality(result: Tracked) -> None:
+    """The verdict on the recording, and why it is not good."""
+    console.print("quality: " + "; ".join([result.quality, *result.reasons]), highlight=False, markup=False)
 
 
 def follow(bench: Supervisor, program: Program, folder: Path, model: str) -> Tracked:

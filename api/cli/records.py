@@ -1,5 +1,6 @@
 """Commands about what was recorded: verify, repair, import, export."""
 
+import contextlib
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -18,8 +19,10 @@ from rig.recording.export import FORMATS, Format, export
 from rig.recording.files import make_folder
 from rig.recording.import_format import FIELDS
 from rig.recording.importing import import_session
+from rig.recording.reader import read_recording
 from rig.recording.sessions import TrialInfo, open_session, plain
 from rig.recording.verify import Verdict
+from rig.trials.quality import TrialQuality, quality_of
 
 SUFFIXES: Mapping[Format, str] = {"csv": "csv", "parquet": "parquet", "hdf5": "session.h5", "mat": "session.mat"}
 SessionArgument = Annotated[Path, typer.Argument(help="Session folder.")]
@@ -31,12 +34,16 @@ def verify(
 ) -> None:
     """Reads every byte of a recording or session and says per stream what is complete, missing, dropped or damaged.
 
-    Exit code 1 if anything is.
+    Exit code 1 if anything is. The quality of each trial is said too, and is no matter of completeness.
 
     Example: rig verify sessions/first
     """
     verdicts, remarks = _verdicts(path)
+    qualities = _qualities(path, verdicts)
     console.print(_verdict_table(verdicts))
+    for name, quality in qualities.items():
+        said = "; ".join([f"{name}: quality {quality.verdict}", *quality.reasons])
+        console.print(said, markup=False, highlight=False, soft_wrap=True)
     for sentence in [*remarks, *(verdict.sentence for verdict in verdicts if not verdict.ok)]:
         console.print(sentence, markup=False, highlight=False, soft_wrap=True)
     bad = [verdict.path.stem for verdict in verdicts if not verdict.ok]
@@ -45,7 +52,10 @@ def verify(
         {
             "ok": not bad and not remarks,
             "remarks": list(remarks),
-            "recordings": {verdict.path.stem: _verdict_values(verdict) for verdict in verdicts},
+            "recordings": {
+                verdict.path.stem: _verdict_values(verdict) | _quality_values(qualities.get(verdict.path.stem))
+                for verdict in verdicts
+            },
         },
     )
     if bad or remarks:
@@ -63,6 +73,23 @@ def _verdicts(path: Path) -> tuple[list[Verdict], tuple[str, ...]]:
     session = open_session(path)
     verdicts = [_verdict(session.path(trial.name)) for trial in session.trials]
     return verdicts, (*session.remarks, *session.mismatches)
+
+
+def _qualities(path: Path, verdicts: list[Verdict]) -> dict[str, TrialQuality]:
+    """Of every trial that was made with bounds and can be read, by the name of its recording."""
+    listed = {} if path.is_file() else {trial.file: trial for trial in open_session(path).trials}
+    found = {}
+    for verdict in verdicts:
+        trial = listed.get(verdict.path.name, TrialInfo(verdict.path.stem, verdict.path.name, math.nan, math.nan, ""))
+        with contextlib.suppress(DataError):
+            found[verdict.path.stem] = quality_of(read_recording(verdict.path), trial)
+    return {name: quality for name, quality in found.items() if quality is not None}
+
+
+def _quality_values(quality: TrialQuality | None) -> dict[str, object]:
+    if quality is None:
+        return {"quality": "", "reasons": [], "measured": {}}
+    return {"quality": quality.verdict, "reasons": list(quality.reasons), "measured": plain(quality.measured)}
 
 
 def _verdict(path: Path) -> Verdict:

@@ -126,6 +126,8 @@ class RecordingView(BaseModel):
     file: str
     bytes: int
     href: str
+    quality: str = Field(default="", description="of a trial: good, usable, bad, or empty where nobody judged")
+    reasons: list[str] = Field(default_factory=list, description="why the quality is not good, one sentence each")
 
 
 class SessionView(BaseModel):

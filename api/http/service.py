@@ -11,6 +11,7 @@ from api.http.lease import Control
 from api.http.problems import Refused
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
+from controller.experiments.verdicts import remaining_bad
 from controller.operation import Operation, Progress
 from controller.steps import Program, Retract
 from controller.supervisor import Supervisor
@@ -112,7 +113,8 @@ class Service:
 
         def work() -> Mapping[str, object]:
             info = experiment.capture(bench, plan, folder, operation, lambda _: None)
-            return {"session": session, "trials": len(info.trials)}
+            bad = [trial.name for trial in remaining_bad(info)]
+            return {"session": session, "trials": len(info.trials), "bad": bad}
 
         return self._start("capture", lease, operation, work)
 

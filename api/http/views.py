@@ -14,7 +14,7 @@ from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.errors import RigError
-from rig.recording.sessions import read_listing
+from rig.recording.sessions import TrialInfo, read_listing
 
 State = Literal["disconnected", "not ready", "idle", "running", "stopped"]
 STREAMS = ("force", "axis", "marker")
@@ -153,6 +153,7 @@ def _session(folder: Path) -> SessionView:
     info, remarks = read_listing(folder)
     trials = info.trials if info else ()
     created = info.created if info else ""
+    listed = {trial.file: trial for trial in trials}
     return SessionView(
         name=folder.name,
         kind=info.kind if info else "unknown",
@@ -161,10 +162,18 @@ def _session(folder: Path) -> SessionView:
         samples=sum(sum(trial.samples.values()) for trial in trials),
         dropped=sum(sum(trial.dropped.values()) for trial in trials),
         remarks=list(remarks),
-        recordings=[_file(folder.name, path) for path in sorted(folder.iterdir()) if path.suffix in SHOWN],
+        recordings=[
+            _file(folder.name, path, listed.get(path.name)) for path in sorted(folder.iterdir()) if path.suffix in SHOWN
+        ],
     )
 
 
-def _file(session: str, path: Path) -> RecordingView:
-    size = path.lstat().st_size
-    return RecordingView(session=session, file=path.name, bytes=size, href=f"/api/v1/recordings/{session}/{path.name}")
+def _file(session: str, path: Path, trial: TrialInfo | None) -> RecordingView:
+    return RecordingView(
+        session=session,
+        file=path.name,
+        bytes=path.lstat().st_size,
+        href=f"/api/v1/recordings/{session}/{path.name}",
+        quality=trial.quality if trial else "",
+        reasons=list(trial.reasons) if trial else [],
+    )

@@ -8,8 +8,9 @@ from typing import Literal
 
 import rig
 from controller.checks import refuse_beyond_limits
-from controller.experiments.indentation import Trial, longest_s, trials
+from controller.experiments.indentation import Trial, attempts, longest_s, trials
 from controller.experiments.recorded import metadata, record, refuse_bench
+from controller.experiments.verdicts import with_quality
 from controller.messages import Outcome
 from controller.operation import Operation
 from controller.supervisor import Supervisor
@@ -64,21 +65,24 @@ def new_session(
 def capture(
     bench: Supervisor, protocol: Indentation, folder: Path, operation: Operation, report: Report
 ) -> SessionInfo:
-    """Runs all trials; raises SafetyStop, with everything recorded kept, where a trial was stopped."""
+    """Runs all trials, bad ones again; raises SafetyStop, with everything recorded kept, where a trial was stopped."""
     check(protocol, bench.wiring)
     planned = trials(protocol)
     refuse_bench(bench, planned[0].program)
     info = new_session(folder, "capture", protocol.model_dump(mode="json"), bench.wiring)
     for trial in planned:
-        operation.advance(trial.index - 1, f"{trial.name}, {trial.speed_mm_s:g} mm/s")
-        result, cause = _run(bench, trial, protocol, folder, info)
-        info = replace(info, trials=(*info.trials, result))
-        write_session(folder, info)
-        report(result)
-        if cause is not None:
-            raise cause
-        if operation.stopping:
-            raise SafetyStop(f"stopped by the operator after {trial.index} of {len(planned)} trials")
+        for attempt in attempts(trial, protocol.quality.repeats):
+            operation.advance(trial.index - 1, f"{attempt.name}, {trial.speed_mm_s:g} mm/s")
+            result, cause = _run(bench, attempt, protocol, folder, info)
+            info = replace(info, trials=(*info.trials, result))
+            write_session(folder, info)
+            report(result)
+            if cause is not None:
+                raise cause
+            if operation.stopping:
+                raise SafetyStop(f"stopped by the operator after {trial.index} of {len(planned)} trials")
+            if result.quality != "bad":
+                break
     operation.advance(len(planned), "done")
     return info
 
@@ -87,7 +91,12 @@ def _run(
     bench: Supervisor, trial: Trial, protocol: Indentation, folder: Path, info: SessionInfo
 ) -> tuple[TrialInfo, RigError | None]:
     about = {
-        "trial": {"index": trial.index, "speed_mm_s": trial.speed_mm_s, "depth_mm": protocol.depth_mm},
+        "trial": {
+            "index": trial.index,
+            "speed_mm_s": trial.speed_mm_s,
+            "depth_mm": protocol.depth_mm,
+            "repeats": trial.repeats,
+        },
         "protocol": protocol.model_dump(mode="json"),
     }
     file = folder / f"{trial.name}.mcap"
@@ -97,6 +106,7 @@ def _run(
         speed_mm_s=trial.speed_mm_s,
         depth_mm=protocol.depth_mm,
         outcome="failed",
+        repeats=trial.repeats,
     )
     longest = longest_s(protocol, trial.speed_mm_s, bench.wiring.limits.position_max_mm)
     try:
@@ -111,6 +121,7 @@ def _run(
         samples=done.samples,
         dropped=done.dropped,
     ).sealed(folder)
+    result = with_quality(result, folder, protocol.quality)
     return result, SafetyStop(f"stopped: {outcome.cause}") if outcome.stopped else None
 
 

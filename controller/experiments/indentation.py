@@ -1,7 +1,8 @@
 """Constant-velocity indentation as programs: one a trial, speeds in random order."""
 
 import random
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 from controller.steps import Approach, Compress, Dither, Hold, Program, Retract, Step, Zero
 from controller.touch import BACK_OFF_MM, RETURN_SPEED_MM_S, TOUCH_MM
@@ -13,12 +14,13 @@ ESTIMATING_S = 0.4
 
 @dataclass(frozen=True)
 class Trial:
-    """One trial: its place in the session and what it does."""
+    """One trial: its place in the session and what it does; ``repeats`` names the trial it makes again."""
 
     index: int
     name: str
     speed_mm_s: float
     program: Program
+    repeats: str = ""
 
 
 def trials(protocol: Indentation) -> tuple[Trial, ...]:
@@ -27,6 +29,13 @@ def trials(protocol: Indentation) -> tuple[Trial, ...]:
     if protocol.randomise:
         random.Random(protocol.seed).shuffle(speeds)
     return tuple(_trial(index, speed, protocol) for index, speed in enumerate(speeds, start=1))
+
+
+def attempts(trial: Trial, repeats: int) -> Iterator[Trial]:
+    """The trial, and as many repeats of it under names of their own."""
+    yield trial
+    for number in range(1, repeats + 1):
+        yield replace(trial, name=f"{trial.name}_repeat_{number}", repeats=trial.name)
 
 
 def _trial(index: int, speed_mm_s: float, protocol: Indentation) -> Trial:

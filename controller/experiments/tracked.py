@@ -12,13 +12,15 @@ from controller.experiments.capture import new_session, refuse_used
 from controller.experiments.recorded import Recorded, metadata, record, refuse_bench
 from controller.experiments.references import Reference
 from controller.experiments.tracking import Followed, Plateau
+from controller.experiments.verdicts import with_quality
 from controller.gains import Choice
 from controller.operation import Operation
 from controller.steps import Program, TrackForce
 from controller.supervisor import Supervisor
 from rig.channels import LoopSample
+from rig.config.quality import QualityLimits
 from rig.config.wiring import Wiring
-from rig.errors import SafetyStop, UsageError
+from rig.errors import BadTrial, SafetyStop, UsageError
 from rig.recording.reader import TRACKING, read_recording
 from rig.recording.sessions import SESSION_FILE, TrialInfo, open_session, write_session
 from rig.tissue.model import Model
@@ -39,6 +41,8 @@ class Tracked:
     dropped: int
     ticks: int
     missed: int
+    quality: str = ""
+    reasons: tuple[str, ...] = ()
 
 
 def forces(text: str) -> tuple[float, ...]:
@@ -86,7 +90,8 @@ def run(bench: Supervisor, program: Program, folder: Path, model: str, operation
     done = recorded_run(bench, program, folder, model)
     if done.outcome.stopped:
         raise SafetyStop(f"stopped: {done.outcome.cause}")
-    result = evaluate(done, model)
+    entry = open_session(folder).trial(done.file.stem)
+    result = replace(evaluate(done, model), quality=entry.quality, reasons=entry.reasons)
     write_result(folder, result)
     operation.advance(1, "done")
     return result
@@ -99,7 +104,11 @@ def recorded_run(bench: Supervisor, program: Program, folder: Path, model: str) 
         new_session(folder, "track", {"name": program.name, "kind": TRACKING}, bench.wiring)
     session = open_session(folder).info.id
     name = _free_name(folder)
-    about = {"trial": {"kind": TRACKING, "name": program.name}, "model": {"file": model}}
+    about = {
+        "trial": {"kind": TRACKING, "name": program.name},
+        "model": {"file": model},
+        "protocol": {"kind": TRACKING, "quality": QualityLimits().model_dump(mode="json")},
+    }
     done = record(bench, program, folder / f"{name}.mcap", metadata(bench, session, name, about), _longest_s(program))
     _enter(folder, name, done)
     return done
@@ -118,6 +127,7 @@ def _enter(folder: Path, name: str, done: Recorded) -> None:
         samples=done.samples,
         dropped=done.dropped,
     ).sealed(folder)
+    entry = with_quality(entry, folder, QualityLimits())
     kept = tuple(trial for trial in info.trials if trial.name != name)
     write_session(folder, replace(info, trials=(*kept, entry)))
 
@@ -160,6 +170,8 @@ def as_json(result: Tracked) -> dict[str, object]:
         "samples": result.samples,
         "dropped": result.dropped,
         "loop": {"ticks": result.ticks, "missed": result.missed},
+        "quality": result.quality,
+        "reasons": list(result.reasons),
     }
 
 
@@ -168,6 +180,12 @@ def write_result(folder: Path, result: Tracked) -> None:
     partial = folder / (RESULT + ".part")
     partial.write_text(json.dumps(as_json(result), indent=2) + "\n")
     partial.replace(folder / RESULT)
+
+
+def refuse_bad(result: Tracked) -> None:
+    """Raises BadTrial where the run's quality is bad."""
+    if result.quality == "bad":
+        raise BadTrial(f"{result.recording} is of bad quality: {'; '.join(result.reasons)}; mend that and track again")
 
 
 def table(result: Tracked) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

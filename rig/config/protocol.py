@@ -4,6 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from rig.config.quality import QualityLimits
 from rig.config.table import Table
 
 Positive = Annotated[float, Field(gt=0)]
@@ -41,6 +42,8 @@ class Indentation(Table):
     clearance_mm: Positive = Field(default=5.0, description="distance above the surface at rest")
     rest_s: NotNegative = Field(default=0.2, description="pause between trials")
     force_limit_N: Positive = Field(default=12.0, description="ends the compression of a trial, which then retracts")
+
+    quality: QualityLimits = QualityLimits()
 
     @property
     def deepest_mm(self) -> float:

@@ -22,6 +22,7 @@ from rig.recording.reader import Recording
 from rig.recording.sessions import open_session
 from rig.recording.tables import compression_N
 from rig.simulation.drive import Array, Index
+from rig.trials.quality import TrialQuality, quality_of
 
 TIP_TOOL = 0
 NS = 1e-9
@@ -53,7 +54,12 @@ def from_session(folder: Path) -> Session:
         except RigError as error:
             findings.append(Finding(trial.name, "recording", "unreadable", str(error)))
             continue
-        if not recording.tracks_force:
+        if recording.tracks_force:
+            continue
+        found = quality_of(recording, trial)
+        if found and found.reasons:
+            findings.append(Finding(trial.name, "recording", f"quality_{found.verdict}", _of_quality(found)))
+        if found is None or found.verdict != "bad":
             recordings.append((trial.name, recording))
     starts = [int(r.tables["force"]["capture_ns"][0]) for _, r in recordings if len(r.tables["force"])]
     streams = [streams_of(name, recording, min(starts, default=0)) for name, recording in recordings]
@@ -61,6 +67,11 @@ def from_session(folder: Path) -> Session:
     stated = {r.metadata.get("calibration", {}).get("surface_mm", "") for _, r in recordings}
     surface = float(stated.pop()) if len(stated) == 1 and "" not in stated else None
     return Session(folder.name, tuple(streams), surface, findings=tuple(findings))
+
+
+def _of_quality(found: TrialQuality) -> str:
+    left_out = ", left out" if found.verdict == "bad" else ""
+    return f"quality {found.verdict}{left_out}: {'; '.join(found.reasons)}"
 
 
 def streams_of(name: str, recording: Recording, start_ns: int) -> Streams:

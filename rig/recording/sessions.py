@@ -27,7 +27,11 @@ Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is Non
 
 @dataclass(frozen=True)
 class TrialInfo:
-    """One trial. ``file`` stands in the session's folder, ``sha256`` is its hash; unknown numbers are NaN."""
+    """One trial. ``file`` stands in the session's folder, ``sha256`` is its hash; unknown numbers are NaN.
+
+    ``quality`` is good, usable or bad, empty where nobody judged, with ``reasons`` in words and what was ``measured``
+    (see `rig.trials.quality`). ``repeats`` names the trial that was bad and is made again here.
+    """
 
     name: str
     file: str
@@ -41,6 +45,10 @@ class TrialInfo:
     surface_low_mm: Number = math.nan
     surface_high_mm: Number = math.nan
     sha256: str = ""
+    quality: Literal["", "good", "usable", "bad"] = ""
+    reasons: tuple[str, ...] = ()
+    measured: dict[str, Number] = field(default_factory=dict)
+    repeats: str = ""
 
     def sealed(self, folder: Path) -> "TrialInfo":
         """The same with the hash of its recording in ``folder``, which is closed and there."""

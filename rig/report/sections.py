@@ -254,12 +254,17 @@ def _recorded(facts: Facts) -> str:
         for trial in facts.trials
         if isinstance(trial.verdict, str) or not trial.verdict.ok
     ]
-    header = ("recording", "outcome", "verdict", "speed, mm/s", "peak force, N", "samples", "dropped")
+    faults += [
+        paragraph(f"{trial.info.name}: quality {trial.info.quality}: {'; '.join(trial.info.reasons)}", "warning")
+        for trial in facts.trials
+        if trial.info.reasons
+    ]
+    header = ("recording", "outcome", "verdict", "quality", "speed, mm/s", "peak force, N", "samples", "dropped")
     return section(
         "What was recorded",
         *[paragraph(remark, "warning") for remark in facts.session.remarks],
         *faults,
-        table(header, found, words=3) if found else paragraph("No recording.", "missing"),
+        table(header, found, words=4) if found else paragraph("No recording.", "missing"),
         _stream_table(facts.trials),
     )
 
@@ -286,7 +291,8 @@ def _stream_table(trials: Sequence[TrialFacts]) -> str:
 def _trial_row(trial: TrialFacts) -> Sequence[str]:
     info = trial.info
     speed, peak = _known(info.speed_mm_s, "g"), _known(info.peak_force_N, ".2f")
-    return info.name, info.outcome, _state(trial.verdict), speed, peak, f"{trial.samples:,}", f"{trial.dropped:,}"
+    counts = f"{trial.samples:,}", f"{trial.dropped:,}"
+    return info.name, info.outcome, _state(trial.verdict), info.quality or "not judged", speed, peak, *counts
 
 
 def _state(verdict: Verdict | str) -> str:

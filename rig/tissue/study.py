@@ -18,6 +18,7 @@ from rig.tissue.model import Model, Provenance, Quality, ValidRange
 from rig.tissue.rates import RateTest, rate_of
 from rig.tissue.registry import COMPARED
 from rig.trials.curves import Curve, loading_curve
+from rig.trials.quality import refusal
 from rig.trials.strokes import stroke_of
 
 Laws = Sequence[type[Law]]
@@ -111,13 +112,16 @@ def _curves_or_refusal(session: Session) -> tuple[list[Curve], list[Skipped]]:
 
 
 def curves_of(session: Session) -> tuple[list[Curve], list[Skipped]]:
-    """The loading curves of a session's trials, and the trials that have none; force-tracking runs are neither."""
+    """The loading curves of a session's trials, and those that have none or are bad; runs of force are neither."""
     curves: list[Curve] = []
     skipped: list[Skipped] = []
     for trial in session.trials:
         try:
             recording = session.recording(trial.name)
-            if not recording.tracks_force:
+            why = "" if recording.tracks_force else refusal(recording, trial)
+            if why:
+                skipped.append(Skipped(trial.name, why))
+            elif not recording.tracks_force:
                 curve = loading_curve(stroke_of(trial.name, recording))
                 curves.append(replace(curve, subject=str(session.info.subject.get("id", ""))))
         except DataError as error:

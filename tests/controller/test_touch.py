@@ -103,6 +103,16 @@ def test_force_is_paired_with_the_place_at_its_own_time() -> None:
     assert paired.loading.force_N.tolist() == [1.0, 2.0]
 
 
+def test_force_that_comes_long_after_the_axis_of_its_time_is_paired_with_that() -> None:
+    """A slow sensor's frame arrives 20 ms after it was taken; the axis has told of twenty places since."""
+    paired = PairedSamples()
+    paired.collecting = True
+    for tick in range(100):
+        paired.axis(1_000_000 * tick, 0.5 * tick)
+    paired.force(79_500_000, 1.0)
+    assert paired.loading.position_mm.tolist() == [39.75]
+
+
 def test_samples_of_a_hundredth_of_a_millimetre_are_averaged_and_the_ring_is_bounded() -> None:
     paired = PairedSamples()
     paired.collecting = True

@@ -1,0 +1,195 @@
+"""What can be measured of how good a recording is; each is NaN where the recording does not show it."""
+
+import json
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from rig.config.wiring import Force, Loop, Tracker
+from rig.errors import DataError
+from rig.recording.mcap_file import SUMMARY
+from rig.recording.reader import Recording
+from rig.recording.slope import TIP_TOOL, Slope
+from rig.recording.tables import compression_N, force_map
+from rig.trials.contact import FloatArray
+from rig.trials.curves import Curve
+
+CHANNELS = ("fx_N", "fy_N", "fz_N", "mx_N_m", "my_N_m", "mz_N_m")
+# A sample later than one and a half periods has a lost one before it.
+LATE_PERIODS = 1.5
+# A converter that is full repeats its last value; eight in a row are no noise.
+FULL_SAMPLES = 8
+COMPRESS, RETRACT = 3, 5
+LEAST_AIR = 10
+# Samples further apart than a twentieth of the depth, and twice as far as usual, have a hole between them.
+HOLE_SHARE = 0.05
+
+
+def nominal_Hz(recording: Recording) -> dict[str, float]:
+    """The rate that each stream was to have, where the recording's wiring says so."""
+    wiring = recording.metadata.get("wiring", {})
+    try:
+        rates = {
+            "force": Force.model_validate_json(wiring["force"]).sampled_Hz,
+            "axis": Loop.model_validate_json(wiring["loop"]).rate_Hz,
+        }
+        tracker = wiring.get("tracker", "null")
+        return rates | ({} if tracker == "null" else {"marker": Tracker.model_validate_json(tracker).rate_Hz})
+    except (KeyError, ValidationError):
+        return {}
+
+
+def rate_lost(recording: Recording, stream: str, nominal_Hz: float) -> float:
+    """Share of the nominal rate not achieved, 0 where there was more."""
+    taken_ns = np.unique(recording.tables[stream]["capture_ns"])
+    if len(taken_ns) < 2:
+        return 1.0
+    rate_Hz = (len(taken_ns) - 1) / (float(taken_ns[-1] - taken_ns[0]) * 1e-9)
+    return max(0.0, 1.0 - rate_Hz / nominal_Hz)
+
+
+def gap_ms(recording: Recording, stream: str) -> float:
+    """Longest time between two samples, in excess of two of its periods: a slow sensor has no gaps by being slow."""
+    taken_ns = recording.tables[stream]["capture_ns"]
+    if len(taken_ns) < 3:
+        return math.nan
+    step_ns = np.diff(taken_ns)
+    return float(max(step_ns.max() - 2 * np.median(step_ns), 0)) * 1e-6
+
+
+def samples_lost(recording: Recording) -> float:
+    """Share of force samples that never came, found no place in the ring, or that the sensor did not vouch for."""
+    force = recording.tables["force"]
+    if len(force) < 3:
+        return math.nan
+    step_ns = np.diff(force["capture_ns"])
+    period_ns = float(np.median(step_ns))
+    late = step_ns > LATE_PERIODS * period_ns
+    missing = float(np.sum(np.round(step_ns[late] / period_ns) - 1)) + _dropped(recording)
+    return (missing + float(np.count_nonzero(force["valid"] != 1))) / (len(force) + missing)
+
+
+def _dropped(recording: Recording) -> float:
+    try:
+        return float(json.loads(recording.metadata.get(SUMMARY, {}).get("dropped", ""))["force"])
+    except (ValueError, KeyError, TypeError):
+        return 0.0
+
+
+def cycles_missed(recording: Recording) -> float:
+    """Share of the loop's cycles that were not run."""
+    slots = recording.tables["loop"]["slot"]
+    if len(slots) < 2:
+        return math.nan
+    return 1.0 - (len(slots) - 1) / max(int(slots[-1] - slots[0]), 1)
+
+
+def saturated(recording: Recording) -> float:
+    """Share of force samples at the end of a range: where a full converter repeats its largest or smallest value.
+
+    Beyond the range that its maker states a sensor marks its samples as invalid; those count as lost.
+    """
+    read_N = recording.tables["force"][f"{force_map(recording).channel}_N"]
+    return float(np.mean(_full(read_N))) if len(read_N) > 1 else math.nan
+
+
+def _full(values: FloatArray) -> NDArray[np.bool_]:
+    """Which values are a largest or smallest one that lasts, where others do not."""
+    ends = (values == values.max()) | (values == values.min())
+    length = _run_lengths(ends)
+    held = _run_lengths(np.concatenate([[False], np.diff(values) == 0]) & ~ends).max(initial=0)
+    return np.asarray(ends & (length >= FULL_SAMPLES) & (length > 4 * held) & (np.ptp(values) > 0))
+
+
+def frozen_samples(recording: Recording) -> float:
+    """Longest run of force samples that are equal in all six channels."""
+    rows = np.stack([recording.tables["force"][name] for name in CHANNELS], axis=1)
+    if len(rows) < 2:
+        return math.nan
+    same = np.all(rows[1:] == rows[:-1], axis=1)
+    return float(_run_lengths(same).max(initial=0))
+
+
+def _run_lengths(mark: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """For each element the length of the run of marks it lies in, 0 where it is not marked."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mark, [False]]).astype(np.int8)))
+    lengths = np.zeros(len(mark), np.int64)
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        lengths[start:stop] = stop - start
+    return lengths
+
+
+def dead_channels(recording: Recording) -> tuple[str, ...]:
+    """Channels of force and torque whose reading never changes."""
+    force = recording.tables["force"]
+    return tuple(name for name in CHANNELS if len(force) > 1 and np.ptp(force[name]) == 0)
+
+
+def tracker_lost(recording: Recording, nominal_Hz: float) -> float:
+    """Share of the tip's frames that were not seen, or did not come within the time the axis was recorded."""
+    marker, axis = recording.tables["marker"], recording.tables["axis"]
+    tip = marker[marker["tool"] == TIP_TOOL]
+    if len(axis) < 2:
+        return math.nan
+    due = float(axis["capture_ns"][-1] - axis["capture_ns"][0]) * 1e-9 * nominal_Hz
+    return max(0.0, 1.0 - float(np.count_nonzero(tip["valid"] == 1)) / due) if due > 1 else math.nan
+
+
+def tracker_jump_mm(recording: Recording, slope: Slope) -> float:
+    """Largest step of the tip's marker from one frame to the next that the axis did not make."""
+    marker, axis = recording.tables["marker"], recording.tables["axis"]
+    tip = marker[(marker["tool"] == TIP_TOOL) & (marker["valid"] == 1)]
+    start_ns = axis["capture_ns"][0]
+    way_mm = np.diff(np.interp(tip["capture_ns"] - start_ns, axis["capture_ns"] - start_ns, axis["position_mm"]))
+    steps_mm = np.diff(np.stack([tip[field] for field in ("x_mm", "y_mm", "z_mm")], axis=1), axis=0)
+    own_mm = steps_mm - slope.slope * way_mm[:, None] * np.array(slope.direction)
+    return float(np.linalg.norm(own_mm, axis=1).max(initial=0.0))
+
+
+def zero_drift_N(recording: Recording) -> float:
+    """Compressive force at rest in the air after the last step, less that of the first; by the loop's own steps."""
+    loop, force = recording.tables["loop"], recording.tables["force"]
+    steps = loop["step"]
+    if not len(loop) or not (steps >= 0).any() or not (loop["mode"] == RETRACT).any():
+        return math.nan
+    after = int(steps.max())
+    left = loop["capture_ns"][np.flatnonzero(loop["mode"] == RETRACT)[-1]]
+    first, last = (loop["capture_ns"][steps == step] for step in (0, after))
+    last = last[last > left]
+    compression = compression_N(recording)
+    rests = [(force["capture_ns"] >= at[0]) & (force["capture_ns"] <= at[-1]) for at in (first, last) if len(at)]
+    if len(rests) < 2 or min(np.count_nonzero(rest) for rest in rests) < LEAST_AIR:
+        return math.nan
+    before_N, after_N = (float(np.median(compression[rest])) for rest in rests)
+    return after_N - before_N
+
+
+def depth_mm(recording: Recording, contact_mm: float) -> float:
+    """Deepest position of the first compression and the rest after it, from ``contact_mm``."""
+    loop, axis = recording.tables["loop"], recording.tables["axis"]
+    pressing = loop[loop["mode"] == COMPRESS]
+    if not len(pressing):
+        return math.nan
+    first = pressing[pressing["step"] <= pressing["step"][0] + 1]["capture_ns"]
+    inside = (axis["capture_ns"] >= first[0]) & (axis["capture_ns"] <= first[-1])
+    return float(axis["position_mm"][inside].max()) - contact_mm if inside.any() else math.nan
+
+
+def loading_lost(curve: Curve, reached_mm: float) -> float:
+    """Share of the way from contact to the depth reached that the loading curve leaves out."""
+    depth_mm = curve.depth_mm[curve.depth_mm > 0]
+    if not len(depth_mm) or not reached_mm > 0:
+        return 1.0
+    steps = np.diff(np.concatenate([[0.0], depth_mm, [max(reached_mm, float(depth_mm[-1]))]]))
+    hole_mm = max(HOLE_SHARE * reached_mm, 2 * float(np.median(steps)))
+    return min(1.0, float(steps[steps > hole_mm].sum()) / reached_mm)
+
+
+def asked_mm(recording: Recording) -> float:
+    """The depth that was asked for; NaN where nobody said."""
+    try:
+        return float(recording.metadata.get("trial", {}).get("depth_mm", "nan"))
+    except ValueError as error:
+        raise DataError(f"{recording.path.stem}: trial depth_mm is no number") from error

@@ -1,0 +1,196 @@
+"""How good a trial is: what was measured of its recording, against the bounds of its protocol, in words."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+from pydantic import ValidationError
+
+from rig.config.quality import Bounds, QualityLimits
+from rig.errors import DataError
+from rig.recording.mcap_file import SUMMARY
+from rig.recording.reader import Recording
+from rig.recording.sessions import TrialInfo
+from rig.recording.slope import tracker_slope
+from rig.trials import measures
+from rig.trials.contact import Contact
+from rig.trials.curves import Curve, loading_curve
+from rig.trials.strokes import stroke_of
+
+Verdict = Literal["good", "usable", "bad"]
+
+
+@dataclass(frozen=True)
+class TrialQuality:
+    """The verdict, a sentence for each thing that keeps it from being good, and what was measured, by name.
+
+    A name is that of a bound in `rig.config.quality`, for streams with the stream before it: ``force.gap_ms``.
+    """
+
+    verdict: Verdict
+    reasons: tuple[str, ...] = ()
+    measured: Mapping[str, float] = field(default_factory=dict)
+
+
+class Measure(NamedTuple):
+    """One thing measured: ``value`` against ``bounds``, both shown ``scale`` times with ``unit``; NaN: not shown."""
+
+    name: str
+    value: float
+    bounds: Bounds
+    text: str
+    unit: str = ""
+    scale: float = 1.0
+
+
+def evaluate_trial(recording: Recording, limits: QualityLimits) -> TrialQuality:
+    """The verdict on a captured or tracked trial: bad where anything is, good where everything is."""
+    found = [measure for measure in _measures(recording, limits) if not math.isnan(measure.value)]
+    unusable = list(_unusable(recording))
+    beyond = [measure for measure in found if measure.value > measure.bounds.good]
+    bad = unusable or any(m.bounds.bad is not None and m.value > m.bounds.bad for m in beyond)
+    verdict: Verdict = "bad" if bad else "usable" if beyond else "good"
+    reasons = (*unusable, *map(_sentence, beyond))
+    return TrialQuality(verdict, reasons, {measure.name: measure.value for measure in found})
+
+
+def _sentence(measure: Measure) -> str:
+    value, good = measure.value * measure.scale, measure.bounds.good * measure.scale
+    return f"{measure.text} {value:.3g}{measure.unit} (good up to {good:.3g}{measure.unit})"
+
+
+def _unusable(recording: Recording) -> Iterator[str]:
+    """What makes a trial bad whatever else holds."""
+    summary = recording.metadata.get(SUMMARY, {})
+    if not recording.complete:
+        yield "the recording was not finished"
+    elif summary.get("cause") and not _answered(recording):
+        yield f"it was stopped: {summary['cause']}"
+    if recording.damage:
+        yield f"the recording is damaged: {recording.damage[0]}"
+    if not recording.tracks_force and isinstance(curve := _curve(recording), str):
+        yield f"no loading can be read from it: {curve}"
+
+
+def _answered(recording: Recording) -> bool:
+    """Whether the subject ended a run of force: that is what a threshold is measured by, and no fault of the trial."""
+    return recording.tracks_force and recording.metadata.get(SUMMARY, {}).get("outcome") == "pain_stop"
+
+
+def _curve(recording: Recording) -> Curve | str:
+    try:
+        return loading_curve(stroke_of(recording.path.stem, recording))
+    except DataError as error:
+        return str(error)
+
+
+def _measures(recording: Recording, limits: QualityLimits) -> Iterator[Measure]:
+    yield from _of_streams(recording, limits)
+    yield from _of_force(recording, limits)
+    yield from _of_tracker(recording, limits)
+    if not recording.tracks_force:
+        yield from _of_loading(recording, limits)
+
+
+def _of_streams(recording: Recording, limits: QualityLimits) -> Iterator[Measure]:
+    rates = measures.nominal_Hz(recording)
+    yield Measure(
+        "cycles_missed", measures.cycles_missed(recording), limits.cycles_missed,
+        "the loop missed of its cycles", " %", 100,
+    )  # fmt: skip
+    for stream in ("force", "axis"):
+        lost = measures.rate_lost(recording, stream, rates[stream]) if stream in rates else math.nan
+        yield Measure(f"{stream}.rate_lost", lost, limits.rate_lost, f"{stream}: below its nominal rate by", " %", 100)
+        gap_ms = measures.gap_ms(recording, stream)
+        yield Measure(f"{stream}.gap_ms", gap_ms, limits.gap_ms, f"{stream}: a gap of", " ms")
+
+
+def _of_force(recording: Recording, limits: QualityLimits) -> Iterator[Measure]:
+    lost, full = measures.samples_lost(recording), measures.saturated(recording)
+    yield Measure("force.samples_lost", lost, limits.samples_lost, "force: samples lost or invalid", " %", 100)
+    yield Measure("saturated", full, limits.saturated, "force: samples at the end of the range", " %", 100)
+    yield Measure(
+        "frozen_samples", measures.frozen_samples(recording), limits.frozen_samples,
+        "force: equal readings in a row, as of a frozen sensor:",
+    )  # fmt: skip
+    dead = measures.dead_channels(recording)
+    yield Measure(
+        "dead_channels",
+        float(len(dead)),
+        limits.dead_channels,
+        f"force: channels that never change ({', '.join(dead)}):",
+    )
+    drift_N = abs(measures.zero_drift_N(recording))
+    yield Measure("zero_drift_N", drift_N, limits.zero_drift_N, "force in the air went off during the trial by", " N")
+
+
+def _of_tracker(recording: Recording, limits: QualityLimits) -> Iterator[Measure]:
+    nominal_Hz = measures.nominal_Hz(recording).get("marker")
+    if nominal_Hz is None:
+        return
+    lost = measures.tracker_lost(recording, nominal_Hz)
+    yield Measure("tracker_lost", lost, limits.tracker_lost, "tracker: frames of the tip lost", " %", 100)
+    slope = tracker_slope(recording)
+    if slope is not None:
+        off = max(abs(slope.slope - 1.0) - 2 * slope.deviation, 0.0)
+        text = f"tracker: travels {slope.slope:.4f} mm while the axis says 1 mm, off by"
+        yield Measure("tracker_slope_off", off, limits.tracker_slope_off, text, " %", 100)
+        jump_mm = measures.tracker_jump_mm(recording, slope)
+        yield Measure("tracker_jump_mm", jump_mm, limits.tracker_jump_mm, "tracker: the tip's marker jumps by", " mm")
+
+
+def _of_loading(recording: Recording, limits: QualityLimits) -> Iterator[Measure]:
+    yield Measure(
+        "contact_within_mm", _contact_within_mm(recording), limits.contact_within_mm,
+        "the surface is known no better than +-", " mm",
+    )  # fmt: skip
+    curve, asked_mm = _curve(recording), measures.asked_mm(recording)
+    if isinstance(curve, str):
+        return
+    reached_mm = measures.depth_mm(recording, curve.contact.position_mm)
+    off_mm = max(abs(reached_mm - asked_mm) - _uncertain_mm(curve.contact), 0.0)
+    text = f"depth reached {reached_mm:.2f} of {asked_mm:g} mm: off by"
+    yield Measure("depth_off_mm", off_mm, limits.depth_off_mm, text, " mm")
+    lost = measures.loading_lost(curve, reached_mm)
+    yield Measure("loading_lost", lost, limits.loading_lost, "loading no fit can use:", " %", 100)
+
+
+def _uncertain_mm(contact: Contact) -> float:
+    """What the whole loading leaves open of contact: two deviations, within the interval it must lie in."""
+    return 2 * contact.likely_mm
+
+
+def _contact_within_mm(recording: Recording) -> float:
+    """Half of the interval in which the loop knew the surface when it set out the depth; NaN where nothing is said."""
+    try:
+        found = json.loads(recording.metadata.get(SUMMARY, {}).get("contact") or "{}")
+        return float(max(found["high_mm"] - found["surface_mm"], found["surface_mm"] - found["low_mm"]))
+    except (ValueError, KeyError, TypeError):
+        return math.nan
+
+
+def limits_of(recording: Recording) -> QualityLimits | None:
+    """The bounds in the protocol a recording was made by; None where it was made by none that has them."""
+    text = recording.metadata.get("protocol", {}).get("quality", "")
+    try:
+        return QualityLimits.model_validate_json(text) if text else None
+    except ValidationError:
+        return None
+
+
+def quality_of(recording: Recording, trial: TrialInfo) -> TrialQuality | None:
+    """What the session says of ``trial``; else what its recording gives; None where it was made without bounds."""
+    if trial.quality:
+        return TrialQuality(trial.quality, trial.reasons, trial.measured)
+    limits = limits_of(recording)
+    return evaluate_trial(recording, limits) if limits else None
+
+
+def refusal(recording: Recording, trial: TrialInfo) -> str:
+    """Why no fit or diagnosis should use the trial; empty where it is good or usable, or nobody can tell."""
+    found = quality_of(recording, trial)
+    if found is None or found.verdict != "bad":
+        return ""
+    return f"left out, its quality is bad: {'; '.join(found.reasons)}"
