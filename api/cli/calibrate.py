@@ -6,23 +6,37 @@ from typing import Annotated, Literal
 import typer
 
 from api.cli.asking import Person
+from api.cli.calibrate_axis import AxisAsked, calibrate_axis
 from api.cli.calibrate_force import ForceAsked, Load, calibrate_force
 from api.cli.calibration_output import keep, refuse_unwritable
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_file, wiring_from
 from api.cli.output import write_json
+from rig.config.calibration import AxisCalibration, ForceCalibration
 
 
 def calibrate(
-    what: Annotated[Literal["force"], typer.Argument(help="What to calibrate.")],
+    what: Annotated[Literal["force", "axis"], typer.Argument(help="What to calibrate.")],
     weights: Annotated[
-        str, typer.Option("--weights", help="Known weights, as '100 g,200 g,5 N'; a mock sensor has its own.")
+        str, typer.Option("--weights", help="force: known weights, as '100 g,200 g,5 N'; a mock sensor has its own.")
     ] = "",
-    load: Annotated[Load | None, typer.Option("--load", help="How weights act: pressed on the tip, or hung.")] = None,
+    load: Annotated[Load | None, typer.Option("--load", help="force: pressed on the tip, or hung.")] = None,
     tolerance_percent: Annotated[
-        float, typer.Option("--tolerance-percent", min=0, max=10, help="Bound on the error of each weight.")
+        float, typer.Option("--tolerance-percent", min=0, max=10, help="force: bound on the error of each weight.")
     ] = 0.5,
     gravity: Annotated[
-        float | None, typer.Option("--gravity", min=9.7, max=9.9, help="m/s2 at this place, for weights in g and kg.")
+        float | None, typer.Option("--gravity", min=9.7, max=9.9, help="force: m/s2 at this place, for g and kg.")
+    ] = None,
+    from_mm: Annotated[float, typer.Option("--from-mm", help="axis: where it begins, in the air.")] = 2.0,
+    to_mm: Annotated[float, typer.Option("--to-mm", help="axis: how far it goes, in the air.")] = 14.0,
+    clear: Annotated[bool, typer.Option("--clear", help="axis: the tip's way is free, and the limb out.")] = False,
+    toward_limb: Annotated[
+        bool | None, typer.Option("--toward-limb/--away-from-limb", help="axis: where the tip went at first.")
+    ] = None,
+    gauge_block_mm: Annotated[
+        float | None, typer.Option("--gauge-block-mm", min=1, max=100, help="axis: against a block, not the tracker.")
+    ] = None,
+    near_mm: Annotated[
+        float | None, typer.Option("--near-mm", help="axis: position just before the table, for the block.")
     ] = None,
     pause: Annotated[
         float | None, typer.Option("--pause", min=0, max=600, help="Seconds to wait instead of Enter each time.")
@@ -32,16 +46,21 @@ def calibrate(
     overrides: SetOption = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Calibrates the force sensor with known weights, and says what is wrong instead of correcting it.
+    """Calibrates force sensor (known weights) or axis (tracker, gauge block), and says what is wrong with it.
 
-    Nothing moves. Unloaded, each weight up and down again, unloaded: guided step by step. Nothing is written where
-    direction, channel, gain, cross-talk, range, zero or a weight does not fit.
+    force: nothing moves; unloaded, each weight up and down again, unloaded, step by step. axis: the tip moves in the
+    air between rests. What contradicts the configuration is refused, never corrected, and then nothing is written.
 
     Example: rig calibrate force --weights "100 g,200 g,500 g" --load pressed
     """
     wiring = wiring_from(config, overrides)
     refuse_unwritable(out)
-    asked = ForceAsked(weights, load, tolerance_percent / 100, gravity)
-    found = calibrate_force(wiring, asked, Person(pause))
+    found: ForceCalibration | AxisCalibration
+    if what == "force":
+        asked = ForceAsked(weights, load, tolerance_percent / 100, gravity)
+        found = calibrate_force(wiring, asked, Person(pause))
+    else:
+        way = AxisAsked(from_mm, to_mm, clear, toward_limb, gauge_block_mm, near_mm)
+        found = calibrate_axis(wiring, way, Person(pause))
     path = keep(what, found, out, (wiring_file(config) or Path()).parent)
     write_json(json_file, {"file": str(path), **found.model_dump(mode="json")})

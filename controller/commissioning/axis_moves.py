@@ -1,0 +1,147 @@
+"""What moves the axis while it is calibrated: the drive's own moves from rest to rest, the force looked at between.
+
+No loop runs meanwhile: between two moves everything is read, and what presses on the tip ends it.
+"""
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from controller.commissioning.axis import Array, Place, refuse_first_step
+from controller.devices import Devices
+from rig.channels import MarkerSample
+from rig.errors import CheckFailed, DeviceError, SafetyStop
+
+SPEED_MM_S = 5.0
+# The axis' own ripple and the smoothing of the drive are gone after a tenth of a second; a camera is 15 to 100 ms late.
+SETTLE_S, READ_S, PERIOD_S = 0.3, 0.5, 0.001
+# Between zero and what a person takes for a touch; the tip moves in the air.
+LARGEST_TOUCH_N = 0.5
+# On steel, 0.05 mm meets the stiffness of the bench alone, some 100 N/mm: 5 N at most, one step after the first touch.
+STEP_MM, CONTACT_N, SEARCH_MM, BACK_MM, TOUCHES = 0.05, 0.3, 5.0, 1.0, 3
+# What came during a move was measured under way.
+DRAIN_S, TOUCH_READ_S = 0.04, 0.08
+TIP, ARM = 0, 1
+
+
+class RestingAxis:
+    """Devices that are started and an axis that is homed; ``reference_N`` is the force when nothing touched."""
+
+    def __init__(
+        self,
+        devices: Devices,
+        now: Callable[[], int] = time.monotonic_ns,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._devices, self._now, self._sleep = devices, now, sleep
+        self._reference_N: Array | None = None
+
+    def go(self, position_mm: float) -> None:
+        """By the drive's own profile, to rest."""
+        self._devices.axis.move_to(position_mm, SPEED_MM_S)
+
+    def place(self) -> Place:
+        """Where everything is, at rest; raises SafetyStop where something presses on the tip."""
+        self._read(SETTLE_S)
+        axis_mm, markers, force_N = self._read(READ_S)
+        if self._reference_N is None:
+            self._reference_N = force_N
+        load_N = float(np.linalg.norm(force_N - self._reference_N))
+        if load_N > LARGEST_TOUCH_N:
+            raise SafetyStop(
+                f"{load_N:.2g} N on the tip at {axis_mm:.2f} mm (limit {LARGEST_TOUCH_N:g} N): something is in its way"
+            )
+        return Place(axis_mm, _places(markers, TIP), _places(markers, ARM))
+
+    def load_N(self, read_s: float = TOUCH_READ_S) -> tuple[float, float]:
+        """Position [mm] and load [N] since ``place`` was first asked for."""
+        self._read(DRAIN_S)
+        axis_mm, _, force_N = self._read(read_s)
+        assert self._reference_N is not None
+        return axis_mm, float(np.linalg.norm(force_N - self._reference_N))
+
+    def wait_for(self, act: Callable[[], object]) -> None:
+        """Returns once ``act`` has, which may take a person minutes: the drive hears from us meanwhile."""
+        errors: list[BaseException] = []
+
+        def work() -> None:
+            try:
+                act()
+            except BaseException as error:
+                errors.append(error)
+
+        # A daemon: at Ctrl-C nobody waits for a question that is still open.
+        waiting = threading.Thread(target=work, daemon=True)
+        waiting.start()
+        while waiting.is_alive():
+            self._read(DRAIN_S)
+        if errors:
+            raise errors[0]
+
+    def _read(self, seconds: float) -> tuple[float, list[MarkerSample], Array]:
+        """Mean position, frames and mean force of a while; the reading keeps the drive's heartbeat going."""
+        positions: list[float] = []
+        markers: list[MarkerSample] = []
+        forces: list[tuple[float, ...]] = []
+        axis, force, tracker = self._devices.axis, self._devices.force, self._devices.tracker
+        end_ns = self._now() + round(seconds * 1e9)
+        while (at_ns := self._now()) < end_ns:
+            axis.request(at_ns)
+            positions += [sample.position_mm for sample in axis.poll(at_ns)]
+            forces += [sample[4:7] for sample in force.poll(at_ns) if sample.valid]
+            markers += [sample for sample in tracker.poll(at_ns) if sample.valid] if tracker else []
+            self._sleep(PERIOD_S)
+        if not positions or not forces:
+            raise DeviceError(f"{len(positions)} samples of the axis and {len(forces)} of force came in {seconds:g} s")
+        return float(np.mean(positions)), markers, np.mean(forces, axis=0)
+
+
+def _places(markers: Sequence[MarkerSample], tool: int) -> Array:
+    found = [(sample.x_mm, sample.y_mm, sample.z_mm) for sample in markers if sample.tool == tool]
+    return np.array(found, dtype=float).reshape(-1, 3)
+
+
+def steps_mm(from_mm: float, to_mm: float, count: int) -> list[float]:
+    """Places up in ``count`` even steps, and down again by the same: what the way back adds is seen."""
+    up = np.linspace(from_mm, to_mm, count + 1).tolist()
+    return [*up, *up[-2::-1]]
+
+
+def travelled(axis: RestingAxis, positions_mm: Sequence[float]) -> list[Place]:
+    """The places at ``positions_mm``; raises CheckFailed with the first step where the scale is far off."""
+    places: list[Place] = []
+    for position_mm in positions_mm:
+        axis.go(position_mm)
+        places.append(axis.place())
+        if not len(places[-1].tip_mm):
+            raise CheckFailed(f"the tip's marker is not seen at {places[-1].axis_mm:.2f} mm: bring it into view")
+        if len(places) == 2:
+            refuse_first_step(*places)
+    return places
+
+
+def touches_mm(axis: RestingAxis, near_mm: float, count: int = TOUCHES) -> list[float]:
+    """Axis positions at which the load passes 0.3 N, ``count`` times from ``near_mm`` on; backs off after each."""
+    return [_touch_mm(axis, near_mm) for _ in range(count)]
+
+
+def _touch_mm(axis: RestingAxis, near_mm: float) -> float:
+    axis.go(near_mm)
+    before_mm, before_N = axis.load_N()
+    if before_N > CONTACT_N:
+        raise CheckFailed(
+            f"{before_N:.2g} N on the tip at {before_mm:.2f} mm already: begin farther out, give --near-mm"
+        )
+    for step in range(1, round(SEARCH_MM / STEP_MM) + 1):
+        axis.go(near_mm + step * STEP_MM)
+        now_mm, now_N = axis.load_N()
+        if now_N > CONTACT_N:
+            axis.go(near_mm - BACK_MM)
+            return before_mm + (CONTACT_N - before_N) / (now_N - before_N) * (now_mm - before_mm)
+        before_mm, before_N = now_mm, now_N
+    raise CheckFailed(
+        f"no contact from {near_mm:g} to {near_mm + SEARCH_MM:g} mm: give --near-mm closer to it, and check"
+        " axis.direction: a growing position must lead to it"
+    )

@@ -1,0 +1,92 @@
+"""`rig calibrate force` as a person does it, on a sensor that is right and on ones that are not."""
+
+import json
+import re
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from api.cli.mock_calibration import mock_file
+from api.cli.options import built_in
+from api.cli.stage import plugged
+from rig.config.calibration_files import read_force, text_of
+from tests.calibrations import force_calibration
+from tests.system.stage import EXAMPLES, Running, Said, Stage, rig
+
+WEIGHTS = ["--weights", "2 N,5 N,10 N", "--load", "pressed", "--pause", "0.3"]
+REQUEST = re.compile(r"put (\d+) N on the tip|take every weight off")
+
+
+def guided(bench: Stage, folder: Path, *options: str) -> Said:
+    """The command, and somebody who puts on what it asks for."""
+    port = f"force.port={bench.endpoints['force']['serial']}"
+    running = Running(["calibrate", "force", "--set", port, *WEIGHTS, *options], folder)
+    assert running.process.stdout
+    said = ""
+    for line in running.process.stdout:
+        said += line
+        asked = REQUEST.match(line)
+        if asked:
+            bench.control.set({"load.axial_N": float(asked[1] or 0)})
+    ended = running.end()
+    return Said(ended.code, said, ended.err)
+
+
+def test_a_person_is_led_through_and_the_file_and_its_line_are_there(bench: Stage, tmp_path: Path) -> None:
+    said = guided(bench, tmp_path, "--json", "result.json")
+    assert said.code == 0, said.err
+    result = json.loads((tmp_path / "result.json").read_text())
+    found = read_force(tmp_path / result["file"])
+    assert (found.product, found.serial, found.channel, found.compression) == (
+        "BFT-SENS-SER-M8", "000271", "fz", "negative",
+    )  # fmt: skip
+    assert f'[calibration]\nforce = "{result["file"]}"' in said.out
+    assert [load.load_N for load in found.loads] == [0, 2, 5, 10, 5, 2, 0]
+    assert found.matrix[2][2] == pytest.approx(1.0, abs=0.002)
+    # Weights within 0.5 %: 0.29 %; noise of 5 mN in means of a thousand samples is nothing beside that.
+    assert found.uncertainty.combined == pytest.approx(0.005 / 3**0.5, rel=0.1)
+    assert (datetime.now(UTC) - found.date).total_seconds() < 60
+
+
+@pytest.mark.parametrize(
+    ("fault", "value", "sentence"),
+    [
+        ("polarity", True, "compression is positive on fz, and force.compression is negative"),
+        ("dead", 2, "2 N change no force channel"),
+        ("crossed", True, "2 N change fx most"),
+        ("saturate", 1.0, "is saturated"),
+    ],
+)
+def test_a_sensor_that_is_wrong_is_named_with_the_first_weight_and_nothing_is_written(
+    bench: Stage, tmp_path: Path, fault: str, value: float | bool, sentence: str
+) -> None:
+    bench.control.fault("force", fault, value)
+    said = guided(bench, tmp_path)
+    assert said.code == 1
+    assert sentence in said.sentence
+    assert not list(tmp_path.rglob("*.json*"))
+
+
+def test_a_mock_sensor_is_calibrated_once_without_what_is_hidden_in_the_bench(
+    bench: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    bench.control.hide({"gain_error.gain_1": 0.2})
+    found = plugged(built_in(), bench.endpoints).calibration.of_force
+    assert found is not None
+    assert found.matrix[2][2] == pytest.approx(1.0, abs=0.002)
+    assert bench.control.truth() == {"gain_error": {"gain_1": 0.2}}
+    assert bench.control.number("load.axial_N") == 0.0
+    assert plugged(built_in(), bench.endpoints).calibration.of_force == found
+    assert capsys.readouterr().err.count("000271 was calibrated by itself; kept in") == 1
+    assert mock_file(built_in(), bench.endpoints).is_file()
+
+
+def test_the_calibration_of_another_sensor_moves_nothing_and_leaves_no_session(bench: Stage, tmp_path: Path) -> None:
+    (tmp_path / "other.json").write_text(text_of(force_calibration(serial="000999")))
+    settings = bench.settings(f"calibration.force={tmp_path / 'other.json'}")
+    said = rig("capture", EXAMPLES / "quick.toml", "--out", tmp_path / "session", *settings, folder=tmp_path)
+    assert said.code == 2
+    assert "is of BFT-SENS-SER-M8 000999, but BFT-SENS-SER-M8 000271 answered" in said.sentence
+    assert not (tmp_path / "session").exists()
