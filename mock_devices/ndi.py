@@ -153,6 +153,7 @@ class NdiMock(OnWire):
 
     def _initialise(self, _: str) -> str:
         """Ends tracking; port handles stay, which the manual's front matter leaves open."""
+        self._ports.initialise_system()
         self._mode = "setup"
         return "OKAY"
 

@@ -36,7 +36,8 @@ class Handle:
 class PortHandles:
     """At power-up each tool sits in a port of its own; further handles are asked for by PHRQ and filled by PVWR.
 
-    The definitions loaded follow the tools in the order in which they were asked for.
+    The definitions loaded since INIT follow the tools in the order in which they were written; those loaded before
+    stay and follow theirs too, as two handles with one definition do on the device.
     """
 
     def __init__(self, names: tuple[str, ...]) -> None:
@@ -47,6 +48,11 @@ class PortHandles:
     def power_up(self) -> None:
         """Forgets everything but what is plugged in."""
         self._handles = {index + 1: Handle(index + 1, index, wired=True) for index in range(len(self._names))}
+        self._earlier: set[int] = set()
+
+    def initialise_system(self) -> None:
+        """INIT: handles stay, and definitions are counted anew."""
+        self._earlier = set(self._handles)
 
     def tracked(self) -> list[Handle]:
         """What a TX or BX reply reports on, in order of handles."""
@@ -77,9 +83,7 @@ class PortHandles:
         free = [number for number in range(1, 0x19) if number not in self._handles]
         if not free:
             raise Refused(0x2D)
-        taken = {handle.tool for handle in self._handles.values() if not handle.wired}
-        tool = next((index for index in range(len(self._names)) if index not in taken), None)
-        self._handles[free[0]] = Handle(free[0], tool, wired=False)
+        self._handles[free[0]] = Handle(free[0], None, wired=False)
         return f"{free[0]:02X}"
 
     def write(self, params: str) -> str:
@@ -92,9 +96,16 @@ class PortHandles:
             raise Refused(0x23)
         if handle.wired:
             raise Refused(0x2F)
+        if not handle.rom:
+            handle.tool = self._next_tool()
         handle.rom = handle.rom.ljust(ROM_BYTES, b"\0")
         handle.rom[address : address + 64] = data
         return "OKAY"
+
+    def _next_tool(self) -> int | None:
+        mine = [handle for number, handle in self._handles.items() if number not in self._earlier]
+        taken = {handle.tool for handle in mine if not handle.wired}
+        return next((index for index in range(len(self._names)) if index not in taken), None)
 
     def initialise(self, params: str) -> str:
         """PINIT."""
@@ -126,6 +137,7 @@ class PortHandles:
         """PHF; a tool that stays plugged in is offered again, uninitialised, under the same handle."""
         handle = self._find(params)
         del self._handles[handle.number]
+        self._earlier.discard(handle.number)
         if handle.wired and handle.tool not in self.unplugged:
             self._handles[handle.number] = Handle(handle.number, handle.tool, wired=True)
         return "OKAY"

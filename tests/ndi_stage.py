@@ -43,7 +43,8 @@ class Stage:
     """A mock and the port to it in one process; frames pass only by ``run_until``.
 
     ``canned`` answers a command by another text than the mock's. On a serial address bytes at the wrong speed are lost;
-    ``speed`` is the tracker's own, and ``heeds_break`` says whether the line carries a break.
+    ``speed`` is the tracker's own, and ``heeds_break`` says whether the line carries a break. ``spoil`` numbers the
+    replies of which one bit arrives wrong, ``mishear`` the commands of which one does.
     """
 
     def __init__(self, address: str = "tcp://memory:1", **kind: Any) -> None:
@@ -54,6 +55,8 @@ class Stage:
         self.canned: dict[str, str] = {}
         self.commands: list[bytes] = []
         self.bauds: list[int] = []
+        self.spoil: set[int] = set()
+        self.mishear: set[int] = set()
         self.speed = 9600
         self.heeds_break = True
         self.closed = False
@@ -89,9 +92,11 @@ class Stage:
         if name in self.canned:
             self.wire.sent.append(encode_text(self.canned[name]))
         else:
-            self.wire.said += data
+            self.wire.said += flipped(data) if len(self.commands) in self.mishear else data
             self.mock.receive(0)
-        if name == "COMM":
+            if len(self.commands) in self.spoil:
+                self.wire.sent = [flipped(reply) for reply in self.wire.sent]
+        if name == "COMM" and len(self.commands) not in self.mishear:
             self.speed = 115200 if data.startswith(b"COMM:5") else 9600
         os.eventfd_write(self._readable, 1)
 
@@ -110,6 +115,12 @@ class Stage:
 
     def release(self) -> None:
         os.close(self._readable)
+
+
+def flipped(message: bytes) -> bytes:
+    """One bit in its middle the other way round."""
+    middle = len(message) // 2
+    return message[:middle] + bytes([message[middle] ^ 0x01]) + message[middle + 1 :]
 
 
 def started(stage: Stage, **settings: Any) -> NdiTracker:

@@ -25,6 +25,12 @@ _SLOW_REPLY_S = 5.0
 _PROBE_S = 1.0
 _RESET_S = 3.0
 
+# One damaged reply is the line's noise, three in a row are its state.
+TRIES = 3
+# Invalid command, too long, too short, wrong checksum: nothing was done.
+_MISHEARD = (0x01, 0x02, 0x03, 0x04)
+_INVALID_HANDLE, _WRONG_MODE = 0x08, 0x0C
+
 ROM_BYTES = 1024
 _ROM_CHUNK = 64
 _ROM_MAGIC = b"NDI\0"
@@ -32,11 +38,13 @@ _ALL, _STALE, _UNINITIALISED, _NOT_ENABLED, _ENABLED = "00", "01", "02", "03", "
 
 
 class Dialogue:
-    """One command, one reply."""
+    """One command, one reply; ``repeats`` counts what was said again."""
 
     def __init__(self, port: Port, decoder: codec.ReplyDecoder, now: Callable[[], int]) -> None:
         self.port = port
         self.fast = self.tracking = False
+        self.loaded: list[int] = []
+        self.repeats = 0
         self.warnings: list[str] = []
         self._decoder = decoder
         self._now = now
@@ -48,39 +56,82 @@ class Dialogue:
 
     def ask(self, name: str, params: str = "", timeout_s: float = _REPLY_S) -> str:
         """The reply's text; raises DeviceError on silence, on bytes that are no reply, and on ERROR."""
-        self.send(name, params)
-        return self._checked(name, self.wait(name, timeout_s))
+        return self.checked(name, self.exchange(name, params, timeout_s))
 
-    def tell(self, name: str, params: str = "", timeout_s: float = _REPLY_S) -> None:
-        """Waits for OKAY or WARNING; a late reply to an earlier command is passed over."""
-        self.send(name, params)
-        text = self._checked(name, self.wait(name, timeout_s, lambda text: text.startswith(("OKAY", "WARN", "ERROR"))))
+    def tell(self, name: str, params: str = "", timeout_s: float = _REPLY_S, already: int = 0) -> None:
+        """Waits for OKAY or WARNING; a late reply to an earlier command is passed over.
+
+        ``already`` is the ERROR code by which a repeated command says that it was obeyed the first time.
+        """
+        repeats = self.repeats
+        text = self.exchange(name, params, timeout_s, _is_verdict)
+        if self.repeats == repeats or replies.parse_error(text) != already:
+            self.checked(name, text)
         if replies.is_warning(text):
             self.warnings.append(f"{name}:{params}")
 
-    def send(self, name: str, params: str = "") -> None:
-        """Sends a command; what came unasked before it is dropped and counted."""
+    def exchange(
+        self,
+        name: str,
+        params: str = "",
+        timeout_s: float = _REPLY_S,
+        accept: Callable[[str], bool] = bool,
+        damaged: str = "",
+    ) -> str:
+        """The reply's text, be it ERROR; what is damaged on its way, there or back, is said again.
+
+        ``damaged`` is what a damaged reply is taken for, where the command must not be said again.
+        """
+        for _ in range(TRIES - 1):
+            try:
+                text = self.once(name, params, timeout_s, accept)
+            except Damaged:
+                text = damaged
+            if text and replies.parse_error(text) not in _MISHEARD:
+                return text
+            self.repeats += 1
+        return self.once(name, params, timeout_s, accept)
+
+    def once(
+        self, name: str, params: str = "", timeout_s: float = _REPLY_S, accept: Callable[[str], bool] = bool
+    ) -> str:
+        """The reply to a command that is not said again; what came unasked before it is dropped and counted."""
         self._decoder.feed(self.port.read())
         self._decoder.reset()
         self.port.write(codec.encode_command(name, params))
+        return self.wait(name, timeout_s, accept)
 
     def wait(self, name: str, timeout_s: float, accept: Callable[[str], bool] = bool) -> str:
-        """The next text reply that is acceptable; raises DeviceError when the time is over."""
+        """The next text reply that is acceptable; raises Damaged, or DeviceError when the time is over."""
         deadline_ns = self._now() + round(timeout_s * 1e9)
-        heard = 0
+        heard, damaged = 0, self._decoder.checksum_errors
         while (left_ns := deadline_ns - self._now()) > 0:
             data = read_until(self.port, bool, left_ns / 1e9)
             heard += len(data)
             for reply in self._decoder.feed(data):
                 if isinstance(reply, codec.TextReply) and accept(reply.text):
                     return reply.text
+            if self._decoder.checksum_errors > damaged:
+                raise Damaged(
+                    f"{self.port.address}: {name} brought {_heard(heard)} and a good checksum; check its shield"
+                )
         raise DeviceError(f"{self.port.address}: {name} brought {_heard(heard)} within {timeout_s:g} s")
 
-    def _checked(self, name: str, text: str) -> str:
+    def checked(self, name: str, text: str) -> str:
+        """``text``, unless it is an ERROR, which is raised as DeviceError."""
         code = replies.parse_error(text)
         if code is not None:
             raise DeviceError(f"{self.port.address}: the tracker refused {name} ({replies.error_words(code)})")
         return text
+
+
+class Damaged(DeviceError):
+    """A reply came whose checksum is wrong."""
+
+
+def _is_verdict(text: str) -> bool:
+    """Whether a reply says how a command went, and is no late tracking data."""
+    return text.startswith(("OKAY", "WARN", "ERROR"))
 
 
 def _heard(count: int) -> str:
@@ -130,8 +181,7 @@ def identify(dialogue: Dialogue) -> Identity:
         raise DeviceError(
             f"{dialogue.port.address}: VER answered {text[:60]!r}, which is no NDI position sensor; check the port"
         )
-    dialogue.send("GETINFO", "Features.Firmware.Version")
-    information = replies.parse_info(dialogue.wait("GETINFO", _REPLY_S))
+    information = replies.parse_info(dialogue.exchange("GETINFO", "Features.Firmware.Version"))
     firmware = information.get("Features.Firmware.Version", version.freeze_tag)
     return Identity(version.product, version.serial, firmware, {"freeze_tag": version.freeze_tag})
 
@@ -139,7 +189,8 @@ def identify(dialogue: Dialogue) -> Identity:
 def speed_up(dialogue: Dialogue) -> None:
     """On a serial line, 115200 baud: at 9600 a frame of two tools takes 0.1 s."""
     if dialogue.serial:
-        dialogue.tell("COMM", _TO_115200)
+        # Not to be said again where the reply is damaged: the tracker is at the new speed by then.
+        dialogue.checked("COMM", dialogue.exchange("COMM", _TO_115200, accept=_is_verdict, damaged="OKAY"))
         time.sleep(_COMM_SETTLE_S)
         dialogue.port.set_baud(TRACKING_BAUD)
         dialogue.fast = True
@@ -166,10 +217,15 @@ def _read_rom(path: Path) -> bytes:
 
 def load_tools(dialogue: Dialogue, roms: Sequence[bytes], tools: Sequence[str]) -> list[int]:
     """Enables the tools and gives their handles in the order of ``tools``."""
-    # Definitions left by an earlier session would be tracked a second time beside the new ones.
-    for port in _handles(dialogue, _ALL if roms else _STALE):
-        dialogue.tell("PHF", f"{port.handle:02X}")
+    _free(dialogue, _handles(dialogue, _STALE))
+    present = _handles(dialogue, _ALL)
+    if roms or len(present) > len(tools):
+        # INIT keeps what an earlier session loaded and did not free: it would be tracked beside the tools named here.
+        _free(dialogue, present)
     loaded = [_load(dialogue, rom) for rom in roms]
+    if dialogue.repeats:
+        # A handle asked for twice is one too many, and empty.
+        _free(dialogue, _handles(dialogue, _STALE))
     for port in _handles(dialogue, _UNINITIALISED):
         if not roms or port.handle in loaded:
             dialogue.tell("PINIT", f"{port.handle:02X}", _SLOW_REPLY_S)
@@ -185,6 +241,11 @@ def load_tools(dialogue: Dialogue, roms: Sequence[bytes], tools: Sequence[str]) 
     return handles
 
 
+def _free(dialogue: Dialogue, ports: Sequence[replies.PortHandle]) -> None:
+    for port in ports:
+        dialogue.tell("PHF", f"{port.handle:02X}", already=_INVALID_HANDLE)
+
+
 def _handles(dialogue: Dialogue, kind: str) -> tuple[replies.PortHandle, ...]:
     text = dialogue.ask("PHSR", kind)
     handles = replies.parse_handles(text)
@@ -198,6 +259,7 @@ def _load(dialogue: Dialogue, rom: bytes) -> int:
     handle = replies.parse_handle(text)
     if handle is None:
         raise DeviceError(f"{dialogue.port.address}: PHRQ answered {text[:60]!r}, which is no handle")
+    dialogue.loaded.append(handle)
     for at in range(0, ROM_BYTES, _ROM_CHUNK):
         dialogue.tell("PVWR", f"{handle:02X}{at:04X}{rom[at : at + _ROM_CHUNK].hex().upper()}")
     return handle
@@ -205,13 +267,15 @@ def _load(dialogue: Dialogue, rom: bytes) -> int:
 
 def start_tracking(dialogue: Dialogue) -> None:
     """From here on the frame counter is read by BX or TX."""
-    dialogue.tell("TSTART", timeout_s=_SLOW_REPLY_S)
+    dialogue.tell("TSTART", timeout_s=_SLOW_REPLY_S, already=_WRONG_MODE)
     dialogue.tracking = True
 
 
 def leave(dialogue: Dialogue, timeout_s: float) -> None:
-    """Stops tracking and leaves a serial tracker at its power-up speed, for whoever comes next."""
+    """Stops tracking, frees what was loaded, leaves a serial tracker at its power-up speed: for whoever comes next."""
     if dialogue.tracking:
-        dialogue.tell("TSTOP", timeout_s=timeout_s)
+        dialogue.exchange("TSTOP", "", timeout_s, _is_verdict)
+    for handle in dialogue.loaded:
+        dialogue.exchange("PHF", f"{handle:02X}", timeout_s, _is_verdict)
     if dialogue.fast:
-        dialogue.tell("COMM", _TO_9600, timeout_s)
+        dialogue.once("COMM", _TO_9600, timeout_s, _is_verdict)

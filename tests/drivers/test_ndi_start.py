@@ -26,6 +26,7 @@ def test_start_over_tcp_follows_the_manual(stage: Stage) -> None:
         b"VER:065EE\r",
         b"GETINFO:Features.Firmware.Version0492\r",
         b"PHSR:01E03E\r",
+        b"PHSR:0020FF\r",
         b"PHSR:02E17E\r",
         b"PINIT:0131EA\r",
         b"PINIT:0230AA\r",
@@ -138,10 +139,8 @@ def test_a_refusal_during_start_is_told_and_closes_the_port(
 
 
 def test_a_warning_during_start_is_kept(stage: Stage) -> None:
-    stage.canned = {"PHF": "WARNING"}
-    stage.mock.unplugged = {1}
-    device = started(stage, tools=("tip",))
-    assert device.identity.settings["warnings"] == "PHF:02"
+    stage.canned = {"TSTART": "WARNING"}
+    assert started(stage).identity.settings["warnings"] == "TSTART:"
 
 
 def test_old_firmware_without_information_is_known_by_its_freeze_tag(stage: Stage) -> None:
@@ -221,3 +220,41 @@ def test_it_can_be_started_again_and_its_numbers_go_on(stage: Stage) -> None:
 def test_a_tracker_left_tracking_by_a_host_that_died_is_taken_over(stage: Stage) -> None:
     run(stage, started(stage), 100, 200)
     assert run(stage, started(stage), 200, 300)[0].valid == 1
+
+
+ROM_COMMANDS = 2 * 17
+
+
+def with_roms(stage: Stage, folder: Path) -> NdiTracker:
+    paths = (folder / "tip.rom", folder / "arm.rom")
+    for path in paths:
+        path.write_bytes(b"NDI\0")
+    return started(stage, roms=paths)
+
+
+@pytest.mark.parametrize("address", ["tcp://memory:1", "/dev/memory"])
+@pytest.mark.parametrize("fault", ["spoil", "mishear"])
+def test_any_one_reply_or_command_damaged_during_start_is_said_again(address: str, fault: str, tmp_path: Path) -> None:
+    """Each in turn, tool definitions included; only the change of speed is not said again, nor need be."""
+    for number in range(1, 100):
+        stage = Stage(address=address)
+        setattr(stage, fault, {number})
+        device = with_roms(stage, tmp_path)
+        if number > len(stage.commands):
+            break
+        damaged = stage.commands[number - 1]
+        if fault == "mishear" or not damaged.startswith(b"COMM"):
+            assert stage.commands[number] == damaged, number
+        assert [sample.valid for sample in run(stage, device, 100, 130)[:2]] == [1, 1], damaged
+        device.close()
+        assert stage.mock._ports.search("00").startswith("02")
+        stage.release()
+    assert number > ROM_COMMANDS
+
+
+def test_three_damaged_replies_in_a_row_are_told_as_what_they_are(stage: Stage) -> None:
+    stage.spoil = {2, 3, 4}
+    with pytest.raises(DeviceError, match=r"VER brought .* bytes but no reply .* and a good checksum"):
+        started(stage)
+    assert stage.commands.count(b"VER:065EE\r") == 3
+    assert stage.closed

@@ -6,12 +6,17 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from drivers.ndi.device import NdiTracker
+from drivers.ports import open_port
+from rig.config.wiring import Tracker
 from tests.ndi_stage import RemoteMock, remote_mock
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
@@ -142,3 +147,26 @@ def test_scikit_surgery_sees_a_missing_tool(tmp_path: Path) -> None:
     tip, arm = result["poses"]
     assert tip == TIP_WIRE
     assert all(map(math.isnan, arm))
+
+
+def test_scikit_surgery_tracks_in_each_of_its_sessions_and_our_driver_starts_after_them(tmp_path: Path) -> None:
+    """It frees nothing it loads; and one of its sessions is killed while it tracks."""
+    with remote_mock("tcp") as mock:
+        roms = [tmp_path / name for name in ("tip.rom", "arm.rom")]
+        for rom in roms:
+            rom.write_bytes(b"NDI\0" + bytes(range(256)))
+        for _ in range(3):
+            result = client(SCIKIT_SURGERY, mock, *map(str, roms), folder=pretended_ping(tmp_path))
+            assert result["poses"] == [TIP_WIRE, ARM_WIRE]
+        killed = SCIKIT_SURGERY.replace("tracker.stop_tracking()", "import os; os._exit(0)")
+        with pytest.raises(IndexError):
+            client(killed, mock, *map(str, roms), folder=pretended_ping(tmp_path))
+        device = NdiTracker(partial(open_port, mock.address), Tracker(port=mock.address))
+        device.start()
+        seen: set[int] = set()
+        deadline = time.monotonic() + 10
+        while seen != {0, 1} and time.monotonic() < deadline:
+            seen |= {sample.tool for sample in device.poll(time.monotonic_ns()) if sample.valid}
+            time.sleep(0.001)
+        device.close()
+        assert seen == {0, 1}

@@ -1,0 +1,110 @@
+"""The tracker keeps what a session leaves behind; ours leaves nothing, and starts after whatever came before."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers.ndi import codec
+from tests.ndi_stage import Stage, run, started
+
+ROM = b"NDI\0".ljust(1024, b"\x07")
+
+
+@pytest.fixture
+def stage() -> Iterator[Stage]:
+    stage = Stage()
+    yield stage
+    stage.release()
+
+
+@pytest.fixture
+def roms(tmp_path: Path) -> tuple[Path, Path]:
+    paths = tmp_path / "tip.rom", tmp_path / "arm.rom"
+    for path in paths:
+        path.write_bytes(ROM)
+    return paths
+
+
+def said(stage: Stage, *commands: str) -> list[str]:
+    """What the tracker answers to another client's commands."""
+    answers = []
+    for command in commands:
+        name, _, params = command.partition(":")
+        stage.write(codec.encode_command(name, params))
+        (reply,) = codec.ReplyDecoder().feed(stage.read())
+        answers.append(reply.text if isinstance(reply, codec.TextReply) else "")
+    return answers
+
+
+def handles(stage: Stage) -> str:
+    return said(stage, "PHSR:00")[0][:2]
+
+
+def other_client(stage: Stage) -> None:
+    """As scikit-surgerynditracker does it: loads, enables, tracks, stops, and frees nothing."""
+    said(stage, "INIT:")
+    for _ in range(2):
+        (handle,) = said(stage, "PHRQ:*********1****")
+        for at in range(0, 1024, 64):
+            said(stage, f"PVWR:{handle}{at:04X}{ROM[at : at + 64].hex().upper()}")
+        assert said(stage, f"PINIT:{handle}", f"PENA:{handle}D") == ["OKAY", "OKAY"]
+    assert said(stage, "TSTART:80", "TSTOP:") == ["OKAY", "OKAY"]
+
+
+def killed_while_loading(stage: Stage) -> None:
+    said(stage, "INIT:", "PHRQ:*********1****", f"PVWR:030000{ROM[:64].hex().upper()}")
+
+
+def killed_while_tracking(stage: Stage) -> None:
+    other_client(stage)
+    said(stage, "TSTART:")
+
+
+BEFORE: tuple[Callable[[Stage], None], ...] = (other_client, killed_while_loading, killed_while_tracking)
+
+
+@pytest.mark.parametrize("before", [*BEFORE, lambda stage: [session(stage) for session in BEFORE * 3]])
+@pytest.mark.parametrize("with_roms", [False, True])
+def test_it_starts_and_sees_both_tools(
+    stage: Stage, roms: tuple[Path, Path], before: Callable[[Stage], None], with_roms: bool
+) -> None:
+    before(stage)
+    device = started(stage, roms=roms if with_roms else ())
+    assert [(sample.tool, sample.valid) for sample in run(stage, device, 100, 130)[:2]] == [(0, 1), (1, 1)]
+    device.close()
+
+
+def test_closing_frees_what_was_loaded_and_leaves_the_ports_as_they_were(stage: Stage, roms: tuple[Path, Path]) -> None:
+    said(stage, "INIT:")
+    assert handles(stage) == "02"
+    for _ in range(3):
+        device = started(stage, roms=roms)
+        run(stage, device, 100, 130)
+        device.close()
+        assert stage.commands[-3:] == [codec.encode_command("TSTOP"), *freed(3, 4)]
+    said(stage, "INIT:")
+    assert handles(stage) == "02"
+
+
+def freed(*numbers: int) -> list[bytes]:
+    return [codec.encode_command("PHF", f"{number:02X}") for number in numbers]
+
+
+def test_a_start_that_fails_while_loading_frees_what_it_had_loaded(stage: Stage, roms: tuple[Path, Path]) -> None:
+    stage.canned = {"PENA": "ERROR0E"}
+    with pytest.raises(Exception, match="refused PENA"):
+        started(stage, roms=roms)
+    assert stage.commands[-2:] == freed(3, 4)
+
+
+def test_after_our_sessions_another_client_finds_its_markers(stage: Stage, roms: tuple[Path, Path]) -> None:
+    """And after its own: what an earlier session left does not keep the later one's tools from the camera."""
+    started(stage, roms=roms).close()
+    for _ in range(3):
+        other_client(stage)
+        said(stage, "TSTART:")
+        stage.run_until(1_000_000_000)
+        tracked = said(stage, "TX:0001")[0]
+        assert "MISSING" not in tracked
+        said(stage, "TSTOP:")
