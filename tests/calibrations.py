@@ -2,7 +2,7 @@
 
 from datetime import UTC, datetime
 
-from rig.config.calibration import ForceCalibration, Load, Uncertainty
+from rig.config.calibration import AxisCalibration, AxisStep, ForceCalibration, Load, Uncertainty
 from rig.config.force_map import CHANNELS, UNIT, ForceMap, Matrix, Vector
 from rig.config.wiring import Wiring
 
@@ -36,6 +36,22 @@ def force_calibration(
             Load(load_N=load_N, force_N=_shown_N(load_N, known), torque_N_m=(0.0, 0.0, 0.0)) for load_N in LOADS_N
         ),
         uncertainty=uncertainty,
+    )
+
+
+def axis_calibration(serial: str = "A1", date: datetime | None = None) -> AxisCalibration:
+    """Of an axis whose millimetres are those of the tracker but for a thousandth."""
+    return AxisCalibration(
+        product="EPOS4",
+        serial=serial,
+        date=date or datetime.now(UTC),
+        scale=1.001,
+        uncertainty=0.002,
+        direction=1,
+        direction_known_by="limb marker",
+        increments_per_mm=2000.0,
+        reference="tracker",
+        steps=(AxisStep(axis_mm=0.0, reference_mm=0.0), AxisStep(axis_mm=10.0, reference_mm=10.01)),
     )
 
 

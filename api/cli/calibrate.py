@@ -8,7 +8,7 @@ import typer
 from api.cli.asking import Person
 from api.cli.calibrate_axis import AxisAsked, calibrate_axis
 from api.cli.calibrate_force import ForceAsked, Load, calibrate_force
-from api.cli.calibration_output import keep, refuse_unwritable
+from api.cli.calibration_output import keep, refuse_out
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_file, wiring_from
 from api.cli.output import write_json
 from rig.config.calibration import AxisCalibration, ForceCalibration
@@ -54,7 +54,7 @@ def calibrate(
     Example: rig calibrate force --weights "100 g,200 g,500 g" --load pressed
     """
     wiring = wiring_from(config, overrides)
-    refuse_unwritable(out)
+    refuse_out(out)
     found: ForceCalibration | AxisCalibration
     if what == "force":
         asked = ForceAsked(weights, load, tolerance_percent / 100, gravity)

@@ -9,25 +9,23 @@ from api.cli.output import console
 from rig.config.calibration import AxisCalibration, ForceCalibration
 from rig.config.calibration_files import text_of
 from rig.errors import UsageError
-from rig.recording.files import make_folder, whole_file
+from rig.recording.files import make_folder, refuse_unwritable, whole_file
 
 FOLDER = Path("calibration")
 What = Literal["force", "axis"]
 
 
-def refuse_unwritable(out: Path | None) -> None:
+def refuse_out(out: Path | None) -> None:
     """Raises, before anybody is asked to do anything, where the calibration could not be written."""
     if out and out.exists():
         raise UsageError(f"{out}: exists already; calibrations are never overwritten, give --out another name")
-    folder = out.parent if out else FOLDER
-    make_folder(folder)
-    if not os.access(folder, os.W_OK):
-        raise UsageError(f"{folder}: cannot be written to; give --out in another folder")
+    refuse_unwritable(out or FOLDER / "new.json")
 
 
 def keep(what: What, found: ForceCalibration | AxisCalibration, out: Path | None, wiring_folder: Path) -> Path:
     """Writes it, whole or not at all, and prints the line of the wiring file; returns the path."""
     path = out or FOLDER / f"{what}-{_plain(found.serial)}-{_stamp(found.date)}.json"
+    make_folder(path.parent)
     with whole_file(path) as scratch:
         scratch.write_text(text_of(found), encoding="utf-8")
     console.print(f"written: {path}; the lines of rig.toml that use it:", highlight=False, markup=False, soft_wrap=True)

@@ -15,14 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.roles import Identity
-from rig.config.calibration import AxisCalibration, AxisStep
+from rig.config.calibration import LARGEST_SCALE_ERROR, AxisCalibration, AxisStep
 from rig.config.wiring import Axis
 from rig.errors import CheckFailed
 from rig.recording.slope import COVERAGE, slope_of
 
-# 0.08 mm of the 8 mm of an indentation, well inside the 0.2 mm that depth is to be known to; a ball screw is ten times
-# better, so that more is a wrong figure in the configuration.
-LARGEST_SCALE_ERROR = 0.01
 # Seen with the first step, before the axis goes on: twice or half the way is no matter of noise.
 LARGEST_FIRST_ERROR = 0.2
 # A marker lies on the skin beside the tip; less than this in front of it may be its own height.

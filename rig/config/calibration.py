@@ -18,6 +18,9 @@ Name = Annotated[str, Field(min_length=1)]
 LARGEST_CORRECTION = 0.1
 # Rounding and noise of the readings; `rig calibrate` refuses residuals of 0.01 of the largest load.
 LARGEST_MISFIT = 0.05
+# 0.08 mm of the 8 mm of an indentation, well inside the 0.2 mm that depth is to be known to; a ball screw is ten times
+# better, so that more is a wrong figure in the configuration.
+LARGEST_SCALE_ERROR = 0.01
 # Two computers' clocks may differ by this; a calibration of tomorrow means that one of them is wrong.
 CLOCKS_AGREE = timedelta(minutes=1)
 
@@ -86,7 +89,7 @@ class ForceCalibration(Table):
 
 
 class AxisStep(Table):
-    """Where the axis said it was, and what the reference said of the same place."""
+    """How far the axis said it went from the first place, and what the reference said of it."""
 
     axis_mm: float
     reference_mm: float
@@ -109,6 +112,21 @@ class AxisCalibration(Table):
     increments_per_mm: Positive
     reference: Literal["tracker", "gauge block"]
     steps: tuple[AxisStep, ...] = Field(min_length=2)
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        if abs(self.scale - 1) > LARGEST_SCALE_ERROR:
+            raise ValueError(
+                f"scale {self.scale:g} is off from 1 by more than {LARGEST_SCALE_ERROR:g}: calibrate again"
+            )
+        travel_mm = max(abs(step.axis_mm) for step in self.steps)
+        misfit_mm = max(abs(step.axis_mm * self.scale - step.reference_mm) for step in self.steps)
+        if misfit_mm > LARGEST_MISFIT * travel_mm:
+            raise ValueError(
+                f"its own steps do not come out of its scale (by {misfit_mm:.3g} mm of {travel_mm:.3g} mm):"
+                " the file was changed, calibrate again"
+            )
+        return self
 
 
 class Calibration(Table):

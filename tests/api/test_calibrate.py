@@ -11,13 +11,13 @@ from typer.testing import CliRunner
 from api.cli import mock_calibration
 from api.cli.app import build
 from api.cli.asking import Person
-from api.cli.calibration_output import keep, refuse_unwritable
+from api.cli.calibration_output import keep, refuse_out
 from api.cli.mock_calibration import mock_file, state_folder
 from api.cli.options import built_in, calibrated, wiring_from
 from api.cli.stage import bench_for, plugged
 from rig.config.calibration_files import read_force, text_of
 from rig.errors import UsageError
-from tests.calibrations import force_calibration
+from tests.calibrations import axis_calibration, force_calibration
 
 runner = CliRunner()
 ENDPOINTS = {
@@ -78,14 +78,13 @@ def test_a_calibration_is_written_whole_and_its_line_is_relative_to_the_wiring(
     own_state: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found = force_calibration(date=datetime(2026, 3, 1, 9, tzinfo=UTC))
-    refuse_unwritable(None)
     path = keep("force", found, None, Path("bench"))
     assert path == Path("calibration/force-000271-20260301T090000Z.json")
     assert read_force(path) == found
     assert 'force = "../calibration/force-000271-20260301T090000Z.json"' in capsys.readouterr().out
     assert [file.name for file in (own_state / "calibration").iterdir()] == [path.name]
     with pytest.raises(UsageError, match="exists already"):
-        refuse_unwritable(path)
+        refuse_out(path)
 
 
 def test_calibration_paths_are_beside_the_wiring_file(own_state: Path) -> None:
@@ -119,6 +118,26 @@ def test_a_file_that_is_not_as_it_was_written_is_refused(edit: object, sentence:
     edit(file)  # type: ignore[operator]
     with pytest.raises(UsageError, match=sentence):
         calibrated(built_in([f"calibration.force={file}"]))
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"scale": 1.02}, "scale 1.02 is off from 1 by more than 0.01"),
+        ({"steps": [{"axis_mm": 0.0, "reference_mm": 0.0}, {"axis_mm": 10.0, "reference_mm": 20.0}]}, "its own steps"),
+        ({"direction": 0}, "direction: Input should be 1 or -1"),
+        ({"steps": []}, "steps: Tuple should have at least 2 items"),
+    ],
+)
+def test_an_axis_file_that_is_not_as_it_was_written_is_refused(
+    changes: dict[str, object], sentence: str, own_state: Path
+) -> None:
+    file, known = own_state / "axis.json", axis_calibration()
+    file.write_text(text_of(known))
+    assert calibrated(built_in([f"calibration.axis={file}"])).calibration.of_axis == known
+    edited(file, **changes)
+    with pytest.raises(UsageError, match=sentence):
+        calibrated(built_in([f"calibration.axis={file}"]))
 
 
 def edited(file: Path, **changes: object) -> None:

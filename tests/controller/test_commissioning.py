@@ -7,11 +7,11 @@ import pytest
 from controller.commissioning.refusals import refuse_uncalibrated, refuse_uncommissioned
 from controller.steps import Approach, Program, Retract, Zero
 from drivers.roles import Identity
-from rig.config.calibration import AxisCalibration, AxisStep, Calibration, ForceCalibration, Uncertainty
+from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration, Uncertainty
 from rig.config.force_map import ForceMap
 from rig.config.wiring import Axis, Force, Wiring
 from rig.errors import UsageError
-from tests.calibrations import force_calibration
+from tests.calibrations import axis_calibration, force_calibration
 from tests.controller.fake_bench import FakeBench, wired
 
 NOW = datetime(2026, 3, 1, 9, 0, tzinfo=UTC)
@@ -20,11 +20,7 @@ ZERO, APPROACH = Zero(duration_s=0.2), Approach(speed_mm_s=5.0, contact_force_N=
 PRESSES = Program(name="press", steps=(ZERO, APPROACH))
 LEAVES = Program(name="leave", steps=(Retract(clearance_mm=5.0, speed_mm_s=10.0),))
 OF_FORCE = force_calibration(date=NOW)
-OF_AXIS = AxisCalibration(
-    product=DRIVE.product, serial=DRIVE.serial, date=NOW, scale=1.001, uncertainty=0.002, direction=1,
-    direction_known_by="limb marker", increments_per_mm=2000.0, reference="tracker",
-    steps=(AxisStep(axis_mm=0.0, reference_mm=0.0), AxisStep(axis_mm=10.0, reference_mm=10.01)),
-)  # fmt: skip
+OF_AXIS = axis_calibration(date=NOW)
 
 
 def wiring(
