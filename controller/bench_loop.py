@@ -74,7 +74,7 @@ class BenchLoop:
         table: tuple[Check, ...] = TABLE,
         opens: Openers | None = None,
     ) -> None:
-        self.wiring, self.devices, self._ring, self._channel, self._now = wiring, devices, ring, channel, now
+        self.wiring, self.devices, self._ring, self._channel, self.now = wiring, devices, ring, channel, now
         self._commands = commands
         period_s = 1.0 / wiring.loop.rate_Hz
         self.world = World(dt_s=period_s, acceleration_mm_s2=wiring.axis.acceleration_mm_s2)
@@ -91,7 +91,7 @@ class BenchLoop:
         self._force_watch = ForceWatch(devices.force.period_ns)
         self._calibrated_zero = calibrated_zero(wiring)
         self._force_map = wiring.force_map
-        self._pulled = False
+        self.braked = False
         self._touch_said: Touch | None = None
         self._limb_seen_ns = 0
 
@@ -127,11 +127,12 @@ class BenchLoop:
         incident = self.machine.update(self.watch)
         if incident:
             self._report(incident, now_ns)
-            if resting and incident.action is Action.SOFT:
+            if resting and self.machine.mode is Mode.RETRACT:
                 self._give_way(now_ns)
         self._say_touch(now_ns)
         # The drive samples when it is asked, which is later than this turn began.
-        self._command(self._now())
+        self._command(self.now())
+        self._commands.confirm(self)
         self._publish(slot, now_ns)
         self._ticks += 1
         return self._commands.more(self)
@@ -231,7 +232,7 @@ class BenchLoop:
         if self.watch.axis_lost:
             return
         try:
-            if self.devices.axis.enabled and not self._pulled and math.isfinite(self.world.position_mm):
+            if self.devices.axis.enabled and not self.braked and math.isfinite(self.world.position_mm):
                 self.devices.axis.command(self.world.setpoint.position_mm, now_ns)
             else:
                 self.devices.axis.request(now_ns)
@@ -242,7 +243,7 @@ class BenchLoop:
         self.event(incident.action, incident.code, incident.text, now_ns)
         self._channel.send(Stopped(code=incident.code, text=incident.text, action=incident.action.name))
         if incident.action is Action.IMMEDIATE and not self.watch.axis_lost:
-            self._pulled = True
+            self.braked = True
             try:
                 self.devices.axis.quick_stop()
             except DeviceError as error:
@@ -252,11 +253,11 @@ class BenchLoop:
         """The machine retreats from a limb that pushes; here the drive is made to follow it, or loses its power."""
         self._standstill.begin()
         try:
-            self._pulled = not give_way(self.devices.axis, self.wiring.limits)
+            self.braked = not give_way(self.devices.axis, self.wiring.limits)
         except DeviceError as error:
-            self._pulled = True
+            self.braked = True
             self.event(Action.WARNING, "no_way", str(error), now_ns)
-        if self._pulled:
+        if self.braked:
             self.machine.stay()
 
     def start(self, program: Program, number: int) -> None:
@@ -269,10 +270,10 @@ class BenchLoop:
 
     def release(self) -> None:
         """After a reset: the axis is enabled anew at its present position and takes commands again."""
-        if self._pulled or not self.devices.axis.enabled:
+        if self.braked or not self.devices.axis.enabled:
             self.devices.axis.reset_fault()
             self.devices.axis.enable()
-        self._pulled = False
+        self.braked = False
         self.machine.acknowledge()
 
     def close(self) -> None:
@@ -318,7 +319,7 @@ class BenchLoop:
             slot.missed,
             slot.scheduled_ns,
             slot.wake_ns - slot.scheduled_ns,
-            self._now() - slot.wake_ns,
+            self.now() - slot.wake_ns,
             health["force"].age_ns(now_ns),
             health["axis"].age_ns(now_ns),
             health["marker"].age_ns(now_ns),
@@ -379,6 +380,9 @@ class Commands(Protocol):
 
     def collect(self, loop: BenchLoop) -> frozenset[str]:
         """Takes what has come, acts on it, and returns the stop requests among it."""
+
+    def confirm(self, loop: BenchLoop) -> None:
+        """Says what came of the stop requests, once the axis has been told."""
 
     def more(self, loop: BenchLoop) -> bool:
         """Whether the loop goes on."""

@@ -1,4 +1,4 @@
-"""What the supervisor asks of the loop, taken at most one message a tick."""
+"""What the supervisor asks of the loop, at most one message a tick, and the stop word, every tick."""
 
 from datetime import UTC, datetime
 
@@ -6,24 +6,50 @@ from controller.attending import refusal as missing_device
 from controller.bench_loop import BenchLoop
 from controller.checks import refuse_beyond_limits
 from controller.commissioning.refusals import refuse_uncommissioned
-from controller.messages import Lease, Note, Reset, Run, Shutdown, Stop
+from controller.messages import Lease, Note, Reset, Run, Shutdown
+from controller.modes import Mode
 from controller.safety import Action
 from controller.steps import Program
+from controller.stop.word import DEEDS, Deed, Kind, Request, Responder
 from rig.channel import Answer, Channel, Received
-from rig.errors import RigError, UsageError
+from rig.errors import RigError, SafetyStop, UsageError
+
+REQUESTS = {
+    Kind.STOP: frozenset({"stop"}),
+    Kind.PAIN: frozenset({"pain"}),
+    Kind.EMERGENCY: frozenset({"estop"}),
+    Kind.KEYPAD_LOST: frozenset({"stop", "keypad"}),
+}
+"""What each kind of stop is called in the safety table's checks."""
 
 
 class Inbox:
     """Messages of `controller.messages`, each answered by its id; any of them renews the operator's lease."""
 
-    def __init__(self, channel: Channel) -> None:
-        self._channel = channel
+    def __init__(self, channel: Channel, stops: Responder) -> None:
+        self._channel, self._stops = channel, stops
+        self._asked: tuple[Request, ...] = ()
         self._leaving = False
         self._refused = 0
         self.heard_ns = 0
 
     def collect(self, loop: BenchLoop) -> frozenset[str]:
-        """One message at most; a refused one is answered with its reason."""
+        """All stops that were asked for, and one message at most; a refused one is answered with its reason."""
+        self._asked = self._stops.take(loop.now())
+        wanted = self._hear(loop)
+        return wanted.union(*(REQUESTS[request.kind] for request in self._asked)) if self._asked else wanted
+
+    def confirm(self, loop: BenchLoop) -> None:
+        """Answers the stops taken in this cycle with what was done; one that nothing came of stays asked for."""
+        deed = _deed(loop, self._asked) if self._asked else None
+        if deed is None:
+            return
+        now_ns = loop.now()
+        self._stops.answer(deed, now_ns)
+        for request in self._asked:
+            loop.event(Action.NOTE, "stop_answered", f"{request.kind.name} {request.id}: {DEEDS[deed]}", now_ns)
+
+    def _hear(self, loop: BenchLoop) -> frozenset[str]:
         received = None if self._channel.lost else self._channel.receive()
         if self._channel.refused > self._refused:
             self._refused = self._channel.refused
@@ -33,16 +59,14 @@ class Inbox:
 
     def _take(self, received: Received, loop: BenchLoop) -> frozenset[str]:
         self.heard_ns = loop.world.now_ns
-        match received.message:
-            case Stop(kind=kind):
-                return frozenset({kind})
-            case Lease(attending=attending):
-                return frozenset() if attending else frozenset({"unattended"})
+        if isinstance(received.message, Lease):
+            return frozenset() if received.message.attending else frozenset({"unattended"})
         try:
             self._act(received, loop)
         except RigError as refusal:
             loop.event(Action.WARNING, "refused", str(refusal), loop.world.now_ns)
-            self._channel.send(Answer(to=received.id, refused=str(refusal)))
+            stopped = isinstance(refusal, SafetyStop)
+            self._channel.send(Answer(to=received.id, refused=str(refusal), stopped=stopped))
         else:
             self._channel.send(Answer(to=received.id))
         return frozenset()
@@ -65,7 +89,9 @@ class Inbox:
         if loop.machine.busy:
             raise UsageError("a program is already under way: stop it or wait for its end")
         if loop.machine.latched:
-            raise UsageError(f"stopped by {loop.machine.latched.text}: acknowledge it with a reset first")
+            raise SafetyStop(f"stopped by {loop.machine.latched.text}: acknowledge it with a reset first")
+        if self._asked:
+            raise SafetyStop("a stop was asked for at the same moment: acknowledge it with a reset first")
         missing = missing_device(loop, program, loop.world.now_ns)
         if missing:
             raise UsageError(missing)
@@ -78,3 +104,15 @@ class Inbox:
     def more(self, loop: BenchLoop) -> bool:
         """False once asked to leave, or left alone, and at rest."""
         return loop.machine.busy or not (self._leaving or self._channel.lost)
+
+
+def _deed(loop: BenchLoop, asked: tuple[Request, ...]) -> Deed | None:
+    if loop.watch.axis_lost:
+        return Deed.AXIS_LOST
+    if loop.braked:
+        return Deed.BRAKED
+    if loop.machine.mode in (Mode.IDLE, Mode.SAFE):
+        return Deed.HELD
+    # Whoever asked for an emergency stop is not told that a retraction will do.
+    brake = any(request.kind is Kind.EMERGENCY for request in asked)
+    return Deed.RETRACTING if loop.machine.latched and not brake else None

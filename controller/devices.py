@@ -1,16 +1,20 @@
 """From one line of `rig.toml` to the driver that fills the role."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
 from controller.reopening import Open, Openers
 from drivers.bota.device import BotaSensOne
 from drivers.epos4.device import Epos4Axis
+from drivers.epos4.walker import never
 from drivers.ndi.device import NdiTracker
 from drivers.ports import open_port
 from drivers.robotiq.device import RobotiqFt300
 from drivers.roles import Device, ForceSensor, MarkerTracker, ServoAxis
 from rig.config.wiring import Axis, Force, Limits, Tracker, Wiring
+
+Interrupted = Callable[[], bool]
 
 
 @dataclass(frozen=True)
@@ -41,9 +45,12 @@ def open_force(config: Force) -> ForceSensor:
     return BotaSensOne(open_port(config.port, config.baud or BotaSensOne.DEFAULT_BAUD), config)
 
 
-def open_axis(config: Axis, limits: Limits, rate_Hz: float) -> ServoAxis:
-    """The servo axis, not yet started, to be asked for a sample ``rate_Hz`` times a second."""
-    return Epos4Axis(config, limits, rate_Hz=rate_Hz)
+def open_axis(config: Axis, limits: Limits, rate_Hz: float, interrupted: Interrupted = never) -> ServoAxis:
+    """The servo axis, not yet started, to be asked for a sample ``rate_Hz`` times a second.
+
+    ``interrupted`` is asked while it moves by itself; a yes brakes it.
+    """
+    return Epos4Axis(config, limits, rate_Hz=rate_Hz, interrupted=interrupted)
 
 
 def open_tracker(config: Tracker) -> MarkerTracker:
@@ -61,14 +68,14 @@ def openers(wiring: Wiring) -> Openers:
     return Openers(by_role | ({"tracker": lambda: open_tracker(tracker)} if tracker else {}))
 
 
-def start_devices(wiring: Wiring) -> Devices:
+def start_devices(wiring: Wiring, interrupted: Interrupted = never) -> Devices:
     """Opens and starts all devices; on any failure those already open are closed again, and DeviceError is raised."""
     opened: list[Device] = []
     try:
         force = open_force(wiring.force)
         opened.append(force)
         force.start()
-        axis = open_axis(wiring.axis, wiring.limits, wiring.loop.rate_Hz)
+        axis = open_axis(wiring.axis, wiring.limits, wiring.loop.rate_Hz, interrupted)
         opened.append(axis)
         axis.start()
         tracker = open_tracker(wiring.tracker) if wiring.tracker else None

@@ -80,15 +80,18 @@ class LoopClient:
         return number
 
     def ask(self, message: Message, what: str) -> int:
-        """As ``tell``, then waits until the loop has done it; a refusal raises UsageError in the loop's words."""
+        """As ``tell``, then waits until the loop has done it; raises UsageError in the loop's words where it refuses.
+
+        SafetyStop instead, where it refuses because a stop is in force.
+        """
         number = self.tell(message)
         answer = self._wait(lambda: self._answers.pop(number, None), f"did not answer {what}", ANSWER_TIMEOUT_S)
         if answer.refused:
-            raise UsageError(answer.refused)
+            raise (SafetyStop if answer.stopped else UsageError)(answer.refused)
         return number
 
     def run(self, program: Run, timeout_s: float) -> Outcome:
-        """The outcome of this very program; raises UsageError where the loop refuses it."""
+        """The outcome of this very program; raises as ``ask`` where the loop refuses it."""
         refuse_oversized(program, f"program {program.program.name}")
         number = self.ask(program, "a program")
         return self._wait(lambda: self._outcomes.pop(number, None), "did not end its program", timeout_s)

@@ -1,9 +1,11 @@
-"""The loop's own process: ``python -m controller.loop_process WIRING_JSON RING_PATH SOCKET_FD``.
+"""The loop's own process: ``python -m controller.loop_process WIRING_JSON RING_PATH SOCKET_FD STOP_PATH``.
 
 It owns the devices, says ``ready`` with their identities (or ``failed`` with one sentence), then runs until it is told
 to leave or left alone. Whatever happens, the devices are closed, which stops the axis.
 """
 
+import contextlib
+import os
 import signal
 import socket
 import sys
@@ -18,10 +20,12 @@ from controller.devices import Devices, start_devices
 from controller.loop import Executive, sleep_then_spin
 from controller.messages import TO_LOOP, Failed, Ready
 from controller.safety import TABLE, Check
+from controller.stop.start import StartGuard
+from controller.stop.word import Responder, StopWord
 from controller.touch import warm_up
 from rig.channel import Channel
 from rig.config.wiring import Wiring
-from rig.errors import RigError
+from rig.errors import RigError, SafetyStop
 from rig.recording.ring import RingWriter
 
 
@@ -34,9 +38,10 @@ def main(arguments: list[str], table: tuple[Check, ...] = TABLE) -> int:
     wiring = Wiring.model_validate_json(arguments[0])
     channel = Channel(socket.socket(fileno=int(arguments[2])), TO_LOOP)
     try:
-        _serve(wiring, Path(arguments[1]), channel, table)
+        with contextlib.closing(StopWord.open(Path(arguments[3]))) as page:
+            _serve(wiring, Path(arguments[1]), channel, Responder(page), table)
     except RigError as error:
-        channel.send(Failed(text=str(error)))
+        channel.send(Failed(text=str(error), stopped=isinstance(error, SafetyStop)))
         return 1
     except Exception as error:  # the last word of a dying process: named, sent, and the devices are closed by then
         channel.send(Failed(text=f"the loop met an error of its own: {type(error).__name__}: {error}"))
@@ -46,19 +51,21 @@ def main(arguments: list[str], table: tuple[Check, ...] = TABLE) -> int:
     return 0
 
 
-def _serve(wiring: Wiring, ring_path: Path, channel: Channel, table: tuple[Check, ...]) -> None:
+def _serve(wiring: Wiring, ring_path: Path, channel: Channel, stops: Responder, table: tuple[Check, ...]) -> None:
     # Memory and privileges first: from the axis' start on, the drive counts the time between our heartbeats.
     ring = RingWriter.create(ring_path)
+    stops.attach(os.getpid())
     try:
         warm_up()
         granted = realtime.acquire(wiring.loop.priority)
-        devices = start_devices(wiring)
-        try:
-            devices.axis.home()
-            devices.axis.enable()
-            _run(wiring, devices, ring, channel, granted, table)
-        finally:
-            devices.close()
+        with contextlib.ExitStack() as started:
+            with StartGuard(stops) as guard:
+                devices = start_devices(wiring, guard.interrupted)
+                started.callback(devices.close)
+                with guard.moving():
+                    devices.axis.home()
+                    devices.axis.enable()
+            _run(wiring, devices, ring, channel, Inbox(channel, stops), granted, table)
     finally:
         ring.close()
 
@@ -68,12 +75,13 @@ def _run(
     devices: Devices,
     ring: RingWriter,
     channel: Channel,
+    inbox: Inbox,
     granted: dict[str, str],
     table: tuple[Check, ...],
 ) -> None:
     identities = {role: asdict(device.identity) for role, device in devices.by_role().items()}
     channel.send(Ready(devices=identities, realtime=granted))
-    loop = BenchLoop(wiring, devices, ring, channel, Inbox(channel), time.monotonic_ns, table)
+    loop = BenchLoop(wiring, devices, ring, channel, inbox, time.monotonic_ns, table)
     pause = sleep_then_spin(realtime.spin_ns(granted))
     try:
         Executive(round(1e9 / wiring.loop.rate_Hz), sleep=pause).run(loop.tick)

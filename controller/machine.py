@@ -21,6 +21,9 @@ SAFE_CLEARANCE_MM = 10.0
 LEAST_WAY_MM = 0.5
 MOVING = (Mode.FREE, Mode.APPROACH, Mode.COMPRESS, Mode.CONTACT, Mode.RETRACT)
 
+# Stops that a person asks for: at rest they forbid what comes next, and move the tip only out of contact.
+ASKED = ("pain_stop", "operator_stop")
+
 
 class Machine:
     """Decides mode and set-point every tick; ``finished`` is called once a program with its outcome."""
@@ -118,7 +121,15 @@ class Machine:
         elif not world.load.force_N >= world.rest_N:
             world.rest_N = world.load.force_N
 
+    def _holds(self, incident: Incident) -> bool:
+        """Whether a person asked for a stop at rest, where it is out of contact or another stop is in force already."""
+        stopped = self.latched is not None or not self.world.depth_mm > 0
+        return self.mode in AT_REST and incident.code in ASKED and stopped
+
     def _stop(self, incident: Incident) -> None:
+        if self._holds(incident):
+            self.mode, self.latched = Mode.SAFE, self.latched or incident
+            return
         if self.mode in AT_REST:  # what was wanted last may be far from where the tip was left
             self.world.setpoint = self._here()
         self.latched = incident

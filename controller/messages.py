@@ -37,13 +37,6 @@ class Run(Message):
     program: Program
 
 
-class Stop(Message):
-    """Stop: ``kind`` is stop, pain or estop."""
-
-    TYPE: ClassVar[int] = 11
-    kind: str
-
-
 class Reset(Message):
     """A stop is acknowledged."""
 
@@ -111,5 +104,5 @@ class Finished(Message):
     outcome: Outcome
 
 
-TO_LOOP = (Run, Stop, Reset, Note, Lease, Shutdown)
+TO_LOOP = (Run, Reset, Note, Lease, Shutdown)
 FROM_LOOP = (Ready, Failed, StatusSaid, Stopped, Finished)

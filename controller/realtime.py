@@ -25,6 +25,13 @@ def acquire(priority: int) -> dict[str, str]:
     return granted | {"garbage_collector": "frozen"}
 
 
+def raise_priority(priority: int) -> None:
+    """FIFO scheduling at ``priority`` (0: no) and locked memory where granted, and nothing else."""
+    _scheduler(priority)
+    _lock_memory()
+    gc.freeze()
+
+
 def spin_ns(granted: dict[str, str]) -> int:
     """How long before each slot the loop may stop sleeping and watch the clock: without FIFO scheduling not at all."""
     return SPIN_NS if granted["scheduler"].startswith("SCHED_FIFO") else 0

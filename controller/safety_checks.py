@@ -107,7 +107,9 @@ def pain_stop(world: World, watch: Watch, wiring: Wiring) -> str:
 
 
 def operator_stop(world: World, watch: Watch, wiring: Wiring) -> str:
-    """The operator's stop."""
+    """The operator's stop, also for want of the keypad that must be there."""
+    if "keypad" in watch.requests:
+        return "the keypad or foot switch for stops is gone: plug it in, then acknowledge the stop"
     return "stopped by the operator" if "stop" in watch.requests else ""
 
 

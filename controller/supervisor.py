@@ -10,8 +10,10 @@ import threading
 from collections.abc import Callable
 
 from controller.loop_client import ANSWER_TIMEOUT_S, LoopClient
-from controller.messages import Lease, Note, Outcome, Ready, Reset, Run, Shutdown, Status, Stop, Stopped
+from controller.messages import Lease, Note, Outcome, Ready, Reset, Run, Shutdown, Status, Stopped
 from controller.steps import Program
+from controller.stop.client import StopProcess
+from controller.stop.word import Kind, Requester
 from rig.channel import Message, pair
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, SafetyStop
@@ -36,6 +38,7 @@ class Supervisor:
         self.wiring = wiring
         self._loop_module = loop_module
         self._ring_path = new_path()
+        self._stop: StopProcess | None = None
         self._client: LoopClient | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self.recorder: RecorderClient | None = None
@@ -51,11 +54,21 @@ class Supervisor:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def prepare(self) -> None:
+        """Starts the stop process alone, which ``start`` does by itself: from now on a stop counts."""
+        if self._stop is None:
+            self._stop = StopProcess(self.wiring, self._ring_path.with_suffix(".stop"))
+
     def start(self) -> None:
-        """Starts loop and recorder; raises DeviceError with the loop's own sentence where a device is not right."""
+        """Starts the stop process, loop and recorder; raises with the loop's own sentence where a device is not right.
+
+        DeviceError then, or SafetyStop where someone stopped it before it was up.
+        """
+        self.prepare()
+        assert self._stop
         mine, theirs = pair()
         command = [sys.executable, "-m", self._loop_module]
-        arguments = [self.wiring.model_dump_json(), str(self._ring_path), str(theirs.fileno())]
+        arguments = [self.wiring.model_dump_json(), str(self._ring_path), str(theirs.fileno()), str(self._stop.path)]
         self._process = subprocess.Popen(
             command + arguments,
             pass_fds=[theirs.fileno()],
@@ -140,17 +153,29 @@ class Supervisor:
         self._closing.wait(0.1)
         self._loop().wait_until(lambda status: not status.get("busy"), timeout_s)
 
+    @property
+    def stops(self) -> Requester:
+        """This process' own way to the stop word: ask, and see what the loop did about it."""
+        if self._stop is None:
+            raise DeviceError("the bench is not running")
+        return self._stop.requester
+
+    @property
+    def stop_port(self) -> int:
+        """Port on 127.0.0.1 at which the stop process takes POST /estop, /pain and /stop; 0 where there is none."""
+        return self._stop.port if self._stop else 0
+
     def stop(self) -> None:
         """Soft stop by the operator: retract, then stay."""
-        self._tell(Stop(kind="stop"))
+        self.stops.request(Kind.STOP)
 
     def pain(self) -> None:
         """The subject's stop: retract, then stay."""
-        self._tell(Stop(kind="pain"))
+        self.stops.request(Kind.PAIN)
 
     def estop(self) -> None:
         """Immediate stop by the drive's own ramp."""
-        self._tell(Stop(kind="estop"))
+        self.stops.request(Kind.EMERGENCY)
 
     def reset(self) -> None:
         """Acknowledges a stop and waits until the loop's status shows it; raises where the cause is still there."""
@@ -168,7 +193,7 @@ class Supervisor:
         self._closing.set()
         if self.alive:
             try:
-                self._tell(Stop(kind="stop"))
+                self.stop()
                 self._tell(Shutdown())
             except DeviceError:
                 pass
@@ -179,6 +204,9 @@ class Supervisor:
         if self.recorder:
             self.recorder.quit()
             self.recorder = None
+        if self._stop:
+            self._stop.close()
+            self._stop = None
         # A killed loop leaves its ring behind.
         self._ring_path.unlink(missing_ok=True)
 

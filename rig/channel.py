@@ -44,10 +44,11 @@ class Reply(Message):
 
 
 class Answer(Reply):
-    """Done, or not done because of ``refused``."""
+    """Done, or not done because of ``refused``; ``stopped``: because a stop is in force."""
 
     TYPE: ClassVar[int] = 1
     refused: str = ""
+    stopped: bool = False
 
 
 class Frame(NamedTuple):

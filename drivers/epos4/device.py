@@ -19,7 +19,7 @@ from drivers.epos4.cia402 import Control, Goal, State, Status
 from drivers.epos4.codec import encode_setpoint
 from drivers.epos4.node import Node
 from drivers.epos4.samples import SampleBuilder
-from drivers.epos4.walker import REACTION_S, Walker
+from drivers.epos4.walker import REACTION_S, Walker, never
 from drivers.roles import Identity, LinkCounters
 from rig.channels import AxisSample
 from rig.config.wiring import Axis, Limits
@@ -35,7 +35,10 @@ OpenLink = Callable[[str, int, Callable[[], int]], CanLink]
 
 
 class Epos4Axis:
-    """ServoAxis on one drive; nothing is opened before ``start``. ``rate_Hz`` is how often ``command`` will come."""
+    """ServoAxis on one drive; nothing is opened before ``start``. ``rate_Hz`` is how often ``command`` will come.
+
+    ``interrupted`` is asked while the axis homes, moves or is enabled; a yes brakes it and raises SafetyStop.
+    """
 
     def __init__(
         self,
@@ -44,6 +47,7 @@ class Epos4Axis:
         now: Callable[[], int] = time.monotonic_ns,
         rate_Hz: float = 1000.0,
         open_link: OpenLink = SlcanLink,
+        interrupted: Callable[[], bool] = never,
     ) -> None:
         self.counters = LinkCounters()
         self._period_ns = round(1e9 / rate_Hz)
@@ -51,6 +55,7 @@ class Epos4Axis:
         self._limits = limits
         self._now = now
         self._open_link = open_link
+        self._interrupted = interrupted
         self._units = setup.units(config)
         self._name = f"servo axis on {config.port}, node {config.node}"
         self._samples = SampleBuilder(self._units)
@@ -133,7 +138,7 @@ class Epos4Axis:
         walker = self._started()
         done = Status.ACKNOWLEDGE | Status.TARGET_REACHED
         ended = Status.MODE_ERROR | Status.FAULT
-        with self._moving(walker.node):
+        with self._moving(walker):
             walker.set_mode(HOMING)
             walker.walk(Goal.ENABLED)
             walker.control(Control.ENABLE_OPERATION)
@@ -156,7 +161,7 @@ class Epos4Axis:
         target = self._checked(position_mm)
         self._check_speed(speed_mm_s)
         node = walker.node
-        with self._moving(node):
+        with self._moving(walker):
             distance_mm = abs(position_mm - self._units.mm(node.read(objects.POSITION)))
             travel_s = distance_mm / speed_mm_s + 2 * speed_mm_s / self._config.acceleration_mm_s2
             walker.set_mode(PROFILE_POSITION)
@@ -176,7 +181,7 @@ class Epos4Axis:
         """Torque on, in cyclic synchronous position at the present position."""
         walker = self._started()
         self._check_referenced(walker, "enabling")
-        with self._moving(walker.node):
+        with self._moving(walker):
             self._target = self._checked(self._units.mm(walker.node.read(objects.POSITION)))
             walker.node.write(objects.TARGET, self._target)
             walker.set_mode(CYCLIC_POSITION)
@@ -284,15 +289,18 @@ class Epos4Axis:
         return self._units.increments(min(max(position_mm, low_mm), high_mm))
 
     @contextlib.contextmanager
-    def _moving(self, node: Node) -> Iterator[None]:
+    def _moving(self, walker: Walker) -> Iterator[None]:
         """From before the first motion the drive watches the host; whatever goes wrong here stops the axis."""
-        node.beat(self._now())
+        walker.node.beat(self._now())
+        walker.interrupted = self._interrupted
         try:
             yield
         except BaseException:
             with contextlib.suppress(RigError):
                 self.quick_stop()
             raise
+        finally:
+            walker.interrupted = never
 
     def _homing_time_s(self) -> float:
         """Twice the travel at homing speed, one turn of the screw at the slow speed, and the ramps between."""

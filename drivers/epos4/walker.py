@@ -6,12 +6,17 @@ from drivers.epos4 import objects
 from drivers.epos4.cia402 import Control, Goal, State, Status, decode_state, next_controlword, obstacle, reached
 from drivers.epos4.faults import describe
 from drivers.epos4.node import Node
-from rig.errors import DeviceError
+from rig.errors import DeviceError, SafetyStop
 
 REACTION_S = 1.0
 """How long a drive may take to do what takes no way: change state or mode, acknowledge a set-point."""
 POLL_S = 0.002
 STANDSTILL_RPM = 1
+
+
+def never() -> bool:
+    """Nobody interrupts."""
+    return False
 
 
 class Walker:
@@ -22,6 +27,8 @@ class Walker:
         self.status = 0
         self.mode = 0
         self.controlword = int(Control.DISABLE_VOLTAGE)
+        self.interrupted: Callable[[], bool] = never
+        """Asked in every wait; a yes ends the wait with SafetyStop."""
         self._now = now
         self._braking_s = braking_s
 
@@ -56,7 +63,7 @@ class Walker:
         while (shown := self.node.read(objects.MODE_DISPLAY)) != mode:
             if self._now() >= deadline_ns:
                 raise DeviceError(f"{self.node.name}: does not take mode {mode}, it shows {shown}; restart the drive")
-            self.node.pump(POLL_S)
+            self._pause()
 
     def walk(self, goal: Goal) -> None:
         """Goes to ``goal`` state by state; raises DeviceError with the reason where it cannot."""
@@ -67,14 +74,14 @@ class Walker:
                 why = why or f"it stays in {decode_state(status).value}"
                 raise DeviceError(f"{self.node.name}: is not {goal.value}: {why} ({self.fault or 'no fault'})")
             self.control(next_controlword(status, goal))
-            self.node.pump(POLL_S)
+            self._pause()
 
     def make_safe(self) -> None:
         """From wherever it is: stopped by its ramp, then without torque."""
         self.walk(Goal.STOPPED)
         deadline_ns = self._deadline_ns(REACTION_S + self._braking_s)
         while abs(self.node.read(objects.VELOCITY)) > STANDSTILL_RPM and self._now() < deadline_ns:
-            self.node.pump(POLL_S)
+            self._pause()
         self.walk(Goal.DISABLED)
 
     def watch(self, timeout_s: float, done: Callable[[int], bool]) -> bool:
@@ -83,7 +90,7 @@ class Walker:
         while not done(self.read_status()):
             if self._now() >= deadline_ns:
                 return False
-            self.node.pump(POLL_S)
+            self._pause()
         return True
 
     def require(self, timeout_s: float, bit: Status, value: bool, otherwise: str) -> None:
@@ -112,6 +119,11 @@ class Walker:
         """Takes over a fault that was there before anyone listened."""
         if self.read_status() & Status.FAULT:
             self.node.emergency = self.node.emergency._replace(code=self.node.read(objects.ERROR_CODE))
+
+    def _pause(self) -> None:
+        if self.interrupted():
+            raise SafetyStop(f"{self.node.name}: stopped on request while it was moved")
+        self.node.pump(POLL_S)
 
     def _deadline_ns(self, timeout_s: float) -> int:
         return self._now() + round(timeout_s * 1e9)

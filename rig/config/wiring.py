@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from rig.config.calibration import Calibration
 from rig.config.force_map import UNIT, ForceMap
 from rig.config.maxima import beyond
+from rig.config.stop import Stop
 from rig.config.table import Table
 
 Positive = Annotated[float, Field(gt=0)]
@@ -154,6 +155,7 @@ class Wiring(Table):
     loop: Loop = Loop()
     limits: Limits = Limits()
     subject: Subject = Subject()
+    stop: Stop = Stop()
     mock: Mock = Mock()
     calibration: Calibration = Calibration()
 

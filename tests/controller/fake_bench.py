@@ -16,10 +16,12 @@ from controller.bench_loop import BenchLoop
 from controller.commands import Inbox
 from controller.devices import Devices
 from controller.loop import Slot
-from controller.messages import Finished, Lease, Note, Reset, Run, Shutdown, StatusSaid, Stop, Stopped
+from controller.messages import Finished, Lease, Note, Reset, Run, Shutdown, StatusSaid, Stopped
 from controller.modes import Mode
 from controller.reopening import Openers
 from controller.steps import Approach, Compress, Hold, Program, Retract, Step, Zero
+from controller.stop.word import PAGE, Kind, Lane, Request, Requester, Responder, StopWord
+from controller.stop.word import Answer as StopAnswer
 from drivers.roles import Device
 from rig.channel import Answer, Channel, Message, Received
 from rig.channels import (
@@ -102,15 +104,13 @@ class FakeRing:
 
 SAID: dict[str, Callable[..., Message]] = {
     "program": Run,
-    "stop": lambda: Stop(kind="stop"),
-    "pain": lambda: Stop(kind="pain"),
-    "estop": lambda: Stop(kind="estop"),
     "lease": lambda: Lease(attending=True),
     "unattended": lambda: Lease(attending=False),
     "reset": Reset,
     "note": Note,
     "shutdown": Shutdown,
 }
+KINDS = {"stop": Kind.STOP, "pain": Kind.PAIN, "estop": Kind.EMERGENCY, "keypad": Kind.KEYPAD_LOST}
 HEARD: dict[str, type[Message]] = {"finished": Finished, "incident": Stopped, "answer": Answer}
 
 
@@ -153,6 +153,13 @@ class FakeLink:
         return [said.get("outcome", said) for said in found]
 
 
+@dataclass
+class FakePage:
+    """The stop word in memory of this process."""
+
+    words: list[int] = field(default_factory=lambda: [0] * (PAGE // 8))
+
+
 def _at_once(work: Callable[[], None]) -> None:
     work()
 
@@ -179,6 +186,10 @@ class FakeBench:
         self.ring, self.link = FakeRing(), FakeLink()
         self.devices = Devices(self.force, self.axis, self.tracker if self.wiring.tracker else None)
         link = cast(Channel, self.link)
+        page = cast(StopWord, FakePage())
+        self.stops, self.asked = Requester(page, Lane.STOP_PROCESS), list[Request]()
+        self.responder = Responder(page)
+        inbox = Inbox(link, self.responder)
         self.spares: dict[str, FakeDevice] = {}
         self.attempts: list[str] = []
         self.loop = BenchLoop(
@@ -186,7 +197,7 @@ class FakeBench:
             self.devices,
             self.ring,
             link,
-            Inbox(link),
+            inbox,
             self.clock,
             opens=Openers(self._openers(), _at_once),
         )
@@ -261,8 +272,15 @@ class FakeBench:
         return (self.clock.now_ns - began_ns) * 1e-9
 
     def say(self, verb: str, **more: object) -> None:
-        """A message to the loop, taken in the next cycle."""
+        """A message to the loop, or a stop, taken in the next cycle."""
+        if verb in KINDS:
+            self.asked.append(self.stops.request(KINDS[verb]))
+            return
         self.link.inbox.append(SAID[verb](**more))
+
+    def stop_answers(self) -> list[StopAnswer | None]:
+        """What the loop answered to each stop so far, in order."""
+        return [self.stops.answer(request) for request in self.asked]
 
     def begin(self, *steps: Step) -> None:
         """Sends a program; the next cycle starts it."""

@@ -142,7 +142,8 @@ class PlantBench(FakeBench):
         )  # fmt: skip
         self.devices = Devices(self.force, self.axis, None)
         link = cast(Channel, self.link)
-        self.loop = BenchLoop(self.wiring, self.devices, self.ring, link, Inbox(link), self.clock, table)
+        inbox = Inbox(link, self.responder)
+        self.loop = BenchLoop(self.wiring, self.devices, self.ring, link, inbox, self.clock, table)
         self.cycles(SETTLED_CYCLES)
 
 

@@ -21,7 +21,7 @@ class Linked(FakeBench):
         mine, theirs = pair()
         self.raw, self.mine, self.theirs = mine, Channel(mine, FROM_LOOP), Channel(theirs, TO_LOOP)
         self.loop._channel = self.theirs
-        self.loop._commands = Inbox(self.theirs)
+        self.loop._commands = Inbox(self.theirs, self.responder)
 
     def replies(self) -> list[Message]:
         """What the loop has said, its status left out."""

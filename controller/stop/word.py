@@ -1,0 +1,250 @@
+"""The stop word: a page of memory in which stops are asked for and the loop answers with their id and what it did.
+
+Each who may ask has a lane with one writer, so nothing is ever locked: first the request's id is stored under its
+kind, then under the lane's newest id, which is all that the loop looks at in a cycle without a request. An answer is
+one word, id and deed together, stored after the time that belongs to it. Words are 64 bits and aligned: they reach
+the other process whole, and in order (x86-64; elsewhere an answer may carry the time of the answer before).
+"""
+
+import mmap
+import os
+import threading
+import time
+from collections.abc import Callable
+from enum import IntEnum
+from pathlib import Path
+from typing import NamedTuple, Self
+
+from rig.errors import DeviceError
+
+PAGE = 4096
+MAGIC = int.from_bytes(b"tissstop", "little")
+_MAGIC, _LOOP_PID, _LOOP_BEAT, _SERVER_PID, _KEYPAD = range(5)
+_LANES, _LANE_WORDS = 16, 32
+_REQUESTS, _ANSWERS, _TIMES = 1, 9, 17
+_DEED_BITS = 4
+LOOK_S = 0.0005
+
+
+class Lane(IntEnum):
+    """Who asks."""
+
+    STOP_PROCESS = 0
+    SUPERVISOR = 1
+
+
+class Kind(IntEnum):
+    """What is asked for: retract by the operator's or the subject's wish, brake at once, retract for lack of keys."""
+
+    STOP = 0
+    PAIN = 1
+    EMERGENCY = 2
+    KEYPAD_LOST = 3
+
+
+class Deed(IntEnum):
+    """What the loop did."""
+
+    HELD = 1
+    RETRACTING = 2
+    BRAKED = 3
+    START_ENDED = 4
+    START_BRAKED = 5
+    AXIS_LOST = 6
+
+
+DEEDS = {
+    Deed.HELD: "nothing was moving: the axis stays where it is",
+    Deed.RETRACTING: "retracting",
+    Deed.BRAKED: "braked",
+    Deed.START_ENDED: "nothing was moving: the bench does not start",
+    Deed.START_BRAKED: "braked during homing: the bench does not start",
+    Deed.AXIS_LOST: "the axis does not answer the loop",
+}
+NOT_CONFIRMED = "NOT CONFIRMED: use the hardware stop"
+
+
+class Keypad(IntEnum):
+    """State of the foot switch or keypad."""
+
+    NONE = 0
+    OK = 1
+    LOST = 2
+
+
+class Request(NamedTuple):
+    """A stop that was asked for."""
+
+    id: int
+    kind: Kind
+
+
+class Answer(NamedTuple):
+    """What the loop did about a request, and when on the monotonic clock."""
+
+    id: int
+    deed: Deed
+    time_ns: int
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the axis heard of it."""
+        return self.deed is not Deed.AXIS_LOST
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return DEEDS[self.deed]
+
+
+class StopWord:
+    """The mapped page; the file's owner alone can open it."""
+
+    def __init__(self, path: Path, fd: int) -> None:
+        self.path = path
+        self._memory = mmap.mmap(fd, PAGE)
+        self._view = memoryview(self._memory)
+        self.words = self._view.cast("q")
+
+    @classmethod
+    def create(cls, path: Path) -> Self:
+        """A new page; raises DeviceError where there is no memory for it."""
+        try:
+            fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+        except OSError as error:
+            raise DeviceError(f"{path}: the stop word cannot be created: {error.strerror}") from error
+        try:
+            os.posix_fallocate(fd, 0, PAGE)
+            page = cls(path, fd)
+        except OSError as error:
+            path.unlink()
+            raise DeviceError(f"{path}: no memory for the stop word: {error.strerror}; free some") from error
+        finally:
+            os.close(fd)
+        page.words[_MAGIC] = MAGIC
+        return page
+
+    @classmethod
+    def open(cls, path: Path) -> Self:
+        """The page at ``path``; raises DeviceError where it is none."""
+        try:
+            fd = os.open(path, os.O_RDWR)
+        except OSError as error:
+            raise DeviceError(f"{path}: no stop word: {error.strerror}") from error
+        try:
+            if os.fstat(fd).st_size != PAGE or os.pread(fd, 8, 0) != MAGIC.to_bytes(8, "little"):
+                raise DeviceError(f"{path}: not a stop word of this program")
+            return cls(path, fd)
+        finally:
+            os.close(fd)
+
+    @property
+    def loop_pid(self) -> int:
+        """Process number of the loop; 0 before it has come."""
+        return self.words[_LOOP_PID]
+
+    @property
+    def loop_beat_ns(self) -> int:
+        """When the loop last looked; 0 before its first cycle."""
+        return self.words[_LOOP_BEAT]
+
+    @property
+    def server_pid(self) -> int:
+        """Process number of the stop process, set once it serves."""
+        return self.words[_SERVER_PID]
+
+    @property
+    def keypad(self) -> Keypad:
+        """State of the foot switch or keypad."""
+        return Keypad(self.words[_KEYPAD])
+
+    def serve(self, pid: int) -> None:
+        """The stop process serves."""
+        self.words[_SERVER_PID] = pid
+
+    def show_keypad(self, state: Keypad) -> None:
+        """Says how the keypad is."""
+        self.words[_KEYPAD] = state
+
+    def close(self, unlink: bool = False) -> None:
+        """Lets go of the page, may be called twice; ``unlink`` removes the file, which others keep."""
+        if not self._memory.closed:
+            self.words.release()
+            self._view.release()
+            self._memory.close()
+        if unlink:
+            self.path.unlink(missing_ok=True)
+
+
+class Requester:
+    """The asking end of one lane; safe from any thread of the one process that has it."""
+
+    def __init__(self, page: StopWord, lane: Lane) -> None:
+        self._words, self._base = page.words, _LANES + lane * _LANE_WORDS
+        self._lock = threading.Lock()
+
+    def request(self, kind: Kind) -> Request:
+        """Asks; the loop sees it in its next cycle."""
+        with self._lock:
+            number = self._words[self._base] + 1
+            self._words[self._base + _REQUESTS + kind] = number
+            self._words[self._base] = number
+        return Request(number, kind)
+
+    def answer(self, request: Request) -> Answer | None:
+        """What was done about ``request``, or about a later one of its kind; None before that."""
+        word = self._words[self._base + _ANSWERS + request.kind]
+        if word >> _DEED_BITS < request.id:
+            return None
+        deed = Deed(word & ((1 << _DEED_BITS) - 1))
+        return Answer(request.id, deed, self._words[self._base + _TIMES + request.kind])
+
+    def confirmed(
+        self,
+        request: Request,
+        within_s: float,
+        now: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> Answer | None:
+        """The answer to ``request``, waited for; None where it has not come within ``within_s``."""
+        deadline = now() + within_s
+        while (answer := self.answer(request)) is None and now() < deadline:
+            sleep(LOOK_S)
+        return answer
+
+
+class Responder:
+    """The loop's end of all lanes."""
+
+    def __init__(self, page: StopWord) -> None:
+        self._words = page.words
+        self._seen = {_LANES + lane * _LANE_WORDS: 0 for lane in Lane}
+        self._pending: dict[tuple[int, Kind], Request] = {}
+
+    def attach(self, pid: int) -> None:
+        """The loop is there; what was asked before counts."""
+        self._words[_LOOP_PID] = pid
+
+    def take(self, now_ns: int) -> tuple[Request, ...]:
+        """What has been asked and not answered yet; called every cycle."""
+        words = self._words
+        words[_LOOP_BEAT] = now_ns
+        for base, seen in self._seen.items():
+            if words[base] != seen:
+                self._collect(base)
+        return tuple(self._pending.values()) if self._pending else ()
+
+    def _collect(self, base: int) -> None:
+        words = self._words
+        self._seen[base] = words[base]
+        for kind in Kind:
+            number = words[base + _REQUESTS + kind]
+            if number > words[base + _ANSWERS + kind] >> _DEED_BITS:
+                self._pending[base, kind] = Request(number, kind)
+
+    def answer(self, deed: Deed, now_ns: int) -> None:
+        """Answers all that has been taken."""
+        for (base, kind), request in self._pending.items():
+            self._words[base + _TIMES + kind] = now_ns
+            self._words[base + _ANSWERS + kind] = request.id << _DEED_BITS | deed
+        self._pending.clear()

@@ -1,0 +1,148 @@
+"""The stop word: every request is taken once, answered by its id, and none covers another."""
+
+import threading
+import time
+import timeit
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controller.stop.word import DEEDS, Answer, Deed, Keypad, Kind, Lane, Request, Requester, Responder, StopWord
+from rig.errors import DeviceError
+
+
+@pytest.fixture
+def page(tmp_path: Path) -> Iterator[StopWord]:
+    page = StopWord.create(tmp_path / "a.stop")
+    yield page
+    page.close(unlink=True)
+
+
+def test_a_request_is_taken_until_it_is_answered_and_the_answer_has_its_id_and_time(page: StopWord) -> None:
+    asking, loop = Requester(page, Lane.SUPERVISOR), Responder(page)
+    assert loop.take(1) == ()
+    request = asking.request(Kind.PAIN)
+    assert asking.answer(request) is None
+    assert loop.take(2) == loop.take(3) == (request,)
+    loop.answer(Deed.RETRACTING, 4)
+    assert asking.answer(request) == Answer(request.id, Deed.RETRACTING, 4)
+    assert loop.take(5) == ()
+
+
+def test_a_second_press_is_a_request_of_its_own(page: StopWord) -> None:
+    asking, loop = Requester(page, Lane.STOP_PROCESS), Responder(page)
+    first = asking.request(Kind.PAIN)
+    loop.take(1)
+    loop.answer(Deed.RETRACTING, 1)
+    second = asking.request(Kind.PAIN)
+    assert second.id > first.id
+    assert asking.answer(second) is None
+    assert loop.take(2) == (second,)
+    loop.answer(Deed.HELD, 2)
+    assert asking.answer(second) == Answer(second.id, Deed.HELD, 2)
+
+
+def test_a_pain_stop_in_the_same_cycle_does_not_cover_an_emergency_stop(page: StopWord) -> None:
+    asking, loop = Requester(page, Lane.STOP_PROCESS), Responder(page)
+    emergency, pain = asking.request(Kind.EMERGENCY), asking.request(Kind.PAIN)
+    assert set(loop.take(1)) == {emergency, pain}
+
+
+def test_the_lanes_do_not_disturb_each_other(page: StopWord) -> None:
+    one, two, loop = Requester(page, Lane.STOP_PROCESS), Requester(page, Lane.SUPERVISOR), Responder(page)
+    stop, pain = one.request(Kind.STOP), two.request(Kind.PAIN)
+    assert set(loop.take(1)) == {stop, pain}
+    assert two.answer(Request(1, Kind.STOP)) is None
+    loop.answer(Deed.HELD, 1)
+    assert one.answer(stop)
+    assert two.answer(pain)
+    assert one.answer(Request(1, Kind.PAIN)) is None
+
+
+def test_what_was_asked_before_the_loop_came_counts(page: StopWord) -> None:
+    request = Requester(page, Lane.SUPERVISOR).request(Kind.EMERGENCY)
+    assert Responder(page).take(1) == (request,)
+
+
+def test_a_loop_that_takes_over_does_not_repeat_what_was_answered(page: StopWord) -> None:
+    asking, loop = Requester(page, Lane.SUPERVISOR), Responder(page)
+    asking.request(Kind.STOP)
+    loop.take(1)
+    loop.answer(Deed.HELD, 1)
+    assert Responder(page).take(2) == ()
+
+
+def test_a_stop_process_that_takes_over_goes_on_counting(page: StopWord) -> None:
+    first = Requester(page, Lane.STOP_PROCESS).request(Kind.STOP)
+    assert Requester(page, Lane.STOP_PROCESS).request(Kind.STOP).id == first.id + 1
+
+
+@given(st.lists(st.tuples(st.sampled_from(Lane), st.sampled_from(Kind), st.booleans()), max_size=40))
+def test_whenever_the_loop_looks_every_kind_asked_is_taken_and_answered(
+    steps: list[tuple[Lane, Kind, bool]],
+) -> None:
+    path = Path(f"/dev/shm/test-{time.monotonic_ns()}.stop")
+    page = StopWord.create(path)
+    asking, loop = {lane: Requester(page, lane) for lane in Lane}, Responder(page)
+    asked: list[tuple[Lane, Request]] = []
+    for now, (lane, kind, look) in enumerate(steps):
+        asked.append((lane, asking[lane].request(kind)))
+        if look:
+            taken = loop.take(now)
+            assert asked[-1][1] in taken
+            loop.answer(Deed.HELD, now)
+            assert all(asking[lane].answer(request) for lane, request in asked)
+    page.close(unlink=True)
+
+
+def test_it_reaches_another_mapping_of_the_file_and_only_a_page_of_ours_is_opened(
+    page: StopWord, tmp_path: Path
+) -> None:
+    other = StopWord.open(page.path)
+    request = Requester(page, Lane.SUPERVISOR).request(Kind.STOP)
+    assert Responder(other).take(7) == (request,)
+    assert page.loop_beat_ns == 7
+    other.serve(12)
+    other.show_keypad(Keypad.LOST)
+    assert (page.server_pid, page.keypad) == (12, Keypad.LOST)
+    other.close()
+    (tmp_path / "b.stop").write_bytes(bytes(4096))
+    for path, sentence in ((tmp_path / "b.stop", "not a stop word"), (tmp_path / "c.stop", "no stop word: No such")):
+        with pytest.raises(DeviceError, match=sentence):
+            StopWord.open(path)
+    with pytest.raises(DeviceError, match="cannot be created: File exists"):
+        StopWord.create(page.path)
+    assert page.path.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_thread_waits_for_its_answer_and_no_longer_than_it_said(page: StopWord) -> None:
+    asking, loop = Requester(page, Lane.SUPERVISOR), Responder(page)
+    request = asking.request(Kind.PAIN)
+    began = time.monotonic()
+    assert asking.confirmed(request, 0.05) is None
+    assert time.monotonic() - began >= 0.05
+
+    def answer_it() -> None:
+        loop.take(1)
+        loop.answer(Deed.BRAKED, 1)
+
+    answering = threading.Timer(0.02, answer_it)
+    answering.start()
+    answer = asking.confirmed(request, 10.0)
+    answering.join()
+    assert answer == Answer(request.id, Deed.BRAKED, 1)
+
+
+def test_every_deed_has_words_and_only_an_axis_that_does_not_answer_is_unconfirmed() -> None:
+    assert set(DEEDS) == set(Deed)
+    assert [deed for deed in Deed if not Answer(1, deed, 1).confirmed] == [Deed.AXIS_LOST]
+    assert Answer(1, Deed.BRAKED, 1).text == "braked"
+
+
+def test_a_look_without_a_request_costs_the_loop_less_than_two_microseconds(page: StopWord) -> None:
+    loop = Responder(page)
+    best_s = min(timeit.repeat(lambda: loop.take(1), number=2000, repeat=20)) / 2000
+    assert best_s < 2e-6
