@@ -149,3 +149,4 @@ class Done(BaseModel):
     done: bool
     mode: str
     detail: str
+    id: int = Field(default=0, description="of a stop, as in the recording")

@@ -27,6 +27,7 @@ from api.http.models import (
 )
 from api.http.problems import Refused, responses
 from api.http.service import Service
+from controller.stop.word import Answer, Kind
 
 PREFIX = "/api/v1"
 MEDIA_TYPES = {".mcap": "application/octet-stream", ".json": "application/json", ".html": "text/html"}
@@ -104,12 +105,12 @@ def _control(router: APIRouter, service: Service) -> None:
 
 def _stops(router: APIRouter, service: Service) -> None:
     @router.post("/estop", summary="Software emergency stop: the drive's own quick stop", responses=responses(503, 504))
-    def emergency_stop() -> Done:
-        return _done(service, service.emergency_stop())
+    async def emergency_stop() -> Done:
+        return _stopped(service, await service.stop(Kind.EMERGENCY))
 
     @router.post("/pain", summary="The subject's stop: retracts at safe speed", responses=responses(503, 504))
-    def pain() -> Done:
-        return _done(service, service.pain())
+    async def pain() -> Done:
+        return _stopped(service, await service.stop(Kind.PAIN))
 
     @router.post("/estop/reset", summary="Acknowledges a stop; moves nothing", responses=responses(409, 503))
     def reset(lease: LeaseHeader = "") -> Done:
@@ -120,6 +121,10 @@ def _stops(router: APIRouter, service: Service) -> None:
 
 def _done(service: Service, detail: str) -> Done:
     return Done(done=True, mode=views.rig(service).mode, detail=detail)
+
+
+def _stopped(service: Service, answer: Answer) -> Done:
+    return _done(service, answer.text).model_copy(update={"id": answer.id})
 
 
 def _jobs(router: APIRouter, service: Service) -> None:

@@ -1,5 +1,6 @@
 """What the routes call: one bench, at most one job, stops that never wait for either."""
 
+import asyncio
 import threading
 import time
 import uuid
@@ -14,6 +15,7 @@ from controller.experiments import tracked
 from controller.experiments.verdicts import remaining_bad
 from controller.operation import Operation, Progress
 from controller.steps import Program, Retract
+from controller.stop.word import NOT_CONFIRMED, Answer, Kind
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
@@ -22,9 +24,9 @@ from rig.errors import DeviceError, RigError, SafetyStop, UsageError
 from rig.tissue.model import load_model
 
 MODEL = Path("fit") / "model.json"
-ACKNOWLEDGE_S = 1.0
-# A stop is taken within a tick or two; a status this much younger than the request knows of it.
-TAKEN_NS = 20_000_000
+# As long as the stop process itself waits for the loop.
+CONFIRM_S = 0.5
+LOOK_S = 0.001
 RETRACT_MM = 20.0
 RETRACT_MM_S = 10.0
 RETRACT_TIMEOUT_S = 60.0
@@ -55,7 +57,14 @@ class Service:
         self.bench: Supervisor | None = None
         self.control = Control()
         self.jobs: dict[str, Job] = {}
+        self._coming: Supervisor | None = None
         self._starting = threading.Lock()
+
+    @property
+    def stop_port(self) -> int:
+        """Where the stop process listens; 0 while there is none."""
+        bench = self._coming or self.bench
+        return bench.stop_port if bench else 0
 
     def connect(self) -> None:
         """Starts loop and recorder; what fails is kept as ``reason`` and shown, the service goes on."""
@@ -66,10 +75,14 @@ class Service:
             bench = Supervisor(self.wiring)
             bench.attended = self.attended
             try:
+                bench.prepare()
+                self._coming = bench
                 bench.start()
             except RigError as error:
                 self.reason = str(error)
                 return
+            finally:
+                self._coming = None
             self.bench, self.reason = bench, ""
 
     def disconnect(self) -> None:
@@ -180,31 +193,23 @@ class Service:
             self.the_bench().stop()
         return job
 
-    def pain(self) -> str:
-        """The subject's stop; returns once the loop has taken it."""
-        return self._stop(Supervisor.pain)
-
-    def emergency_stop(self) -> str:
-        """Immediate stop; returns once the loop has taken it, and raises 504 where it has not in time."""
-        return self._stop(Supervisor.estop)
-
-    def _stop(self, kind: Callable[[Supervisor], None]) -> str:
-        bench = self.the_bench()
-        seen = len(bench.incidents)
-        for job in self.jobs.values():
+    async def stop(self, kind: Kind) -> Answer:
+        """Asks the loop itself to stop and returns what it did; raises 504 where it has not confirmed that in time."""
+        bench = self.stoppable()
+        request = bench.stops.request(kind)
+        for job in list(self.jobs.values()):
             job.operation.stop()
-        kind(bench)
-        sent_ns = time.monotonic_ns()
-        deadline = time.monotonic() + ACKNOWLEDGE_S
-        while time.monotonic() < deadline:
-            if len(bench.incidents) > seen:
-                return bench.incidents[-1].text
-            status = bench.status
-            taken = int(status.get("time_ns", 0)) > sent_ns + TAKEN_NS
-            if taken and not status.get("busy") and not status.get("latched"):
-                return "nothing was moving"
-            time.sleep(0.005)
-        raise Refused(504, "no-answer", "the loop did not confirm the stop: use the hardware emergency stop")
+        deadline = time.monotonic() + CONFIRM_S
+        while (answer := bench.stops.answer(request)) is None and time.monotonic() < deadline:
+            await asyncio.sleep(LOOK_S)
+        if answer is None or not answer.confirmed:
+            why = answer.text if answer else "the loop does not answer"
+            raise Refused(504, "not-confirmed", f"{NOT_CONFIRMED} ({why})")
+        return answer
+
+    def stoppable(self) -> Supervisor:
+        """The bench, also one that is just starting and homes; Refused where there is none."""
+        return self._coming or self.the_bench()
 
     def reset(self) -> None:
         """Acknowledges a stop; never restarts motion."""

@@ -133,10 +133,12 @@ def test_the_emergency_stop_holds_until_acknowledged_and_moves_nothing_then(
     job = start(client, "slow", "fourth")
     pressed(bench)
     answer = client.post("/api/v1/estop")
-    assert (answer.status_code, answer.json()["detail"]) == (200, "emergency stop pressed")
+    assert (answer.status_code, answer.json()["detail"]) == (200, "braked")
     assert ended(client, job)["state"] == "stopped"
+    again = client.post("/api/v1/estop").json()
+    assert (again["detail"], again["id"] > answer.json()["id"]) == ("braked", True)
     refused = client.post("/api/v1/jobs", json={"kind": "capture", "protocol": "short", "session": "fifth"})
-    assert ended(client, refused.json()["id"])["state"] == "failed"
+    assert ended(client, refused.json()["id"])["state"] == "stopped"
     before_mm = bench.control.number("axis.position_mm")
     reset(client)
     time.sleep(0.3)
@@ -151,11 +153,13 @@ def test_the_emergency_stop_holds_until_acknowledged_and_moves_nothing_then(
 def test_the_subjects_pain_stop_retracts(served: tuple[Stage, TestClient, Path]) -> None:
     bench, client, folder = served
     bench.control.set({"tissue.present": False})
-    assert client.post("/api/v1/pain").json()["detail"] == "nothing was moving"
+    assert client.post("/api/v1/pain").json()["detail"] == "nothing was moving: the axis stays where it is"
+    reset(client)
     bench.control.set({"tissue.present": True})
     job = start(client, "slow", "sixth")
     pressed(bench)
-    assert client.post("/api/v1/pain").status_code == 200
+    first, second = client.post("/api/v1/pain"), client.post("/api/v1/pain")
+    assert (first.json()["detail"], second.json()["detail"]) == ("retracting", "retracting")
     freed(bench)
     assert ended(client, job)["state"] == "stopped"
     events = read_recording(folder / "sessions" / "sixth" / "trial_001.mcap").events
