@@ -119,3 +119,16 @@ def test_an_axis_that_stands_away_from_zero_when_the_loop_begins_stays_there() -
     bench = FakeBench(position_mm=23.0)
     bench.wait(0.5)
     assert bench.axis.position_mm == pytest.approx(23.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("verb", ["stop", "pain"])
+def test_a_soft_stop_after_an_emergency_stop_leaves_the_axis_braked(verb: str) -> None:
+    bench = FakeBench()
+    bench.press()
+    bench.say("estop")
+    bench.wait(0.2)
+    stood_mm = bench.axis.position_mm
+    bench.say(verb)
+    bench.wait(0.5)
+    assert deeds(bench) == [Deed.BRAKED, Deed.BRAKED]
+    assert (bench.latched, bench.axis.position_mm) == ("emergency_stop", stood_mm)
