@@ -3,9 +3,11 @@
 ``bench = FakeBench(); bench.run(ZERO, APPROACH); bench.force.frozen = True; bench.until(lambda: bench.mode is SAFE)``
 """
 
+import contextlib
 import copy
 import json
 import math
+import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -188,6 +190,8 @@ class FakeBench:
         link = cast(Channel, self.link)
         page = cast(StopWord, FakePage())
         self.stops, self.asked = Requester(page, Lane.STOP_PROCESS), list[Request]()
+        # A bench is copied whole by some tests, and a lock cannot be.
+        self.stops._lock = cast(threading.Lock, contextlib.nullcontext())
         self.responder = Responder(page)
         inbox = Inbox(link, self.responder)
         self.spares: dict[str, FakeDevice] = {}
