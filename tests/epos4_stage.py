@@ -65,7 +65,8 @@ class Stage:
     """A mock, its plant and the link to it in one process; time passes only in ``wait`` and ``run``.
 
     Is itself the CanLink of the driver. ``cut`` is a cable pulled out; ``drop`` swallows that many answers to come;
-    from ``dies_at_ns`` on the client gets nothing done any more.
+    from ``dies_at_ns`` on the client gets nothing done any more. ``spoil`` numbers the lines with SDO answers of which
+    ``digit`` (counted from the end) arrives as ``becomes``.
     """
 
     def __init__(self, position_mm: float = 8.0, booted: bool = True, **kind: Any) -> None:
@@ -79,6 +80,9 @@ class Stage:
         self.closed = False
         self.drop = 0
         self.dies_at_ns = NEVER_NS
+        self.answers = 0
+        self.spoil: set[int] = set()
+        self.digit, self.becomes = 1, b"G"
         self.say(b"C\rS8\rO\r")
         self.run(0.1 if booted else 0.0)
         self.wire.sent.clear()
@@ -113,11 +117,18 @@ class Stage:
     def read(self) -> list[CanFrame]:
         if self.cut:
             raise PortClosed("memory: the CAN adapter is gone (hang-up); check its cable, then connect again")
-        frames = self.decoder.feed(self.heard())
+        frames = self.decoder.feed(b"".join(map(self._spoilt, self.heard().splitlines(keepends=True))))
         while self.drop and frames:
             frames.pop(0)
             self.drop -= 1
         return frames
+
+    def _spoilt(self, line: bytes) -> bytes:
+        self.answers += line.startswith(b"t581")
+        if not line.startswith(b"t581") or self.answers not in self.spoil:
+            return line
+        at = len(line) - 1 - self.digit
+        return line[:at] + self.becomes + line[at + 1 :]
 
     def wait(self, timeout_s: float) -> None:
         end_ns = self.clock_ns + round(timeout_s * 1e9)

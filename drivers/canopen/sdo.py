@@ -1,7 +1,8 @@
 """The client side of SDO transfers (CiA 301, 7.2.4): expedited and segmented, without any input or output.
 
 A transfer offers ``request``, the 8 bytes to send now; ``feed`` takes each answer and moves on. It ends ``done``, with
-``data`` for an upload, or with an ``abort`` code. Bytes that are not an answer to it are ignored and counted.
+``data`` for an upload, or with an ``abort`` code; ``garbled`` says that it was ours, because an answer made no sense.
+Bytes that are not an answer to it are ignored and counted.
 """
 
 import struct
@@ -46,6 +47,7 @@ class Transfer(ABC):
         self.data = b""
         self.done = False
         self.abort: int | None = None
+        self.garbled = False
         self.ignored = 0
         self._started = False
         self._toggle = 0
@@ -80,6 +82,7 @@ class Transfer(ABC):
 
     def _give_up(self, code: int) -> bool:
         self.abort = code
+        self.garbled = True
         self.request = encode_abort(self.index, self.sub, code)
         return True
 

@@ -1,10 +1,11 @@
 """Bringing a drive up: who it is, its limits and PDOs written and read back, and the step to operational."""
 
 from collections.abc import Callable
+from functools import partial
 
 from drivers.canopen.nmt import NmtCommand, NmtState
 from drivers.epos4 import objects, setup
-from drivers.epos4.node import Node
+from drivers.epos4.node import TRIES, Node
 from drivers.roles import Identity
 from rig.config.wiring import Axis, Limits
 from rig.errors import DeviceError
@@ -17,15 +18,15 @@ START_S = 1.0
 
 def identify(node: Node) -> Identity:
     """Who the node says it is; raises DeviceError where it is silent, no EPOS4, or without a mode that is needed."""
-    vendor, product = node.probe(objects.VENDOR), node.read(objects.PRODUCT)
+    vendor = _reread(lambda: node.probe(objects.VENDOR), lambda value: value == VENDOR)
+    product = _reread(lambda: node.read(objects.PRODUCT), lambda value: value >> 16 == PRODUCT_FAMILY)
     if vendor != VENDOR or product >> 16 != PRODUCT_FAMILY:
         raise DeviceError(
             f"{node.name}: is not a maxon EPOS4: its identity (object 1018) is vendor {vendor:#x}, product "
             f"{product:#010x} instead of 0xfb, 0x6150xxxx; check axis.port and axis.node"
         )
-    modes = node.read(objects.SUPPORTED_MODES)
-    missing = [mode for mode in NEEDED_MODES if not modes >> (mode - 1) & 1]
-    if missing:
+    modes = _reread(lambda: node.read(objects.SUPPORTED_MODES), lambda value: not _missing(value))
+    if missing := _missing(modes):
         raise DeviceError(f"{node.name}: lacks modes {missing} (object 6502 is {modes:#x}); update its firmware")
     return Identity(
         product=f"maxon {node.read_text(objects.DEVICE_NAME)} {product:08X}",
@@ -41,7 +42,7 @@ def configure(node: Node, config: Axis, limits: Limits) -> None:
     for entry, value in writes:
         node.write(entry, value)
     for entry, value in setup.expected(writes).items():
-        got = node.read(entry)
+        got = _reread(partial(node.read, entry), partial(setup.agrees, entry, value))
         if not setup.agrees(entry, value, got):
             raise DeviceError(f"{node.name}: {entry} was set to {value} and reads back as {got}; restart the drive")
 
@@ -56,3 +57,15 @@ def go_operational(node: Node, config: Axis, now: Callable[[], int]) -> None:
         if left_ns <= 0:
             raise DeviceError(f"{node.name}: sends no heartbeat of an operational node; restart the drive")
         node.pump(left_ns / 1e9)
+
+
+def _missing(modes: int) -> list[int]:
+    return [mode for mode in NEEDED_MODES if not modes >> (mode - 1) & 1]
+
+
+def _reread(read: Callable[[], int], expected: Callable[[int], bool]) -> int:
+    """A value as read, again where it is not as expected: a line of SLCAN has no checksum, a wrong digit passes."""
+    for _ in range(TRIES - 1):
+        if expected(value := read()):
+            return value
+    return read()

@@ -25,7 +25,7 @@ from rig.errors import DeviceError
 SDO_TIMEOUT_S = 1.0
 BOOT_TIMEOUT_S = 3.0
 REPEAT_S = 0.2
-NEVER_S = 1e6
+TRIES = 3
 Handler = Callable[[bytes, int], None]
 
 
@@ -85,22 +85,24 @@ class Node:
 
     def read(self, entry: Entry) -> int:
         """The object's value; raises DeviceError."""
-        return self._value(entry, self._run(Upload(entry.index, entry.sub), f"reading {entry}", self.timeout_s))
+        return self._value(entry, self._upload(entry, self.timeout_s, TRIES))
 
     def probe(self, entry: Entry) -> int:
         """The object's value from a node that may still be booting: asks again until it answers."""
-        data = self._run(Upload(entry.index, entry.sub), f"reading {entry}", BOOT_TIMEOUT_S, REPEAT_S)
-        return self._value(entry, data)
+        return self._value(entry, self._upload(entry, BOOT_TIMEOUT_S, round(BOOT_TIMEOUT_S / REPEAT_S)))
 
     def read_text(self, entry: Entry) -> str:
         """The object's text; raises DeviceError."""
-        return (
-            self._run(Upload(entry.index, entry.sub), f"reading {entry}", self.timeout_s).decode("latin-1").strip("\0 ")
-        )
+        return self._upload(entry, self.timeout_s, TRIES).decode("latin-1").strip("\0 ")
 
-    def write(self, entry: Entry, value: int) -> None:
-        """Writes the object; raises DeviceError."""
-        self._run(Download(entry.index, entry.sub, entry.pack(value)), f"writing {value} to {entry}", self.timeout_s)
+    def write(self, entry: Entry, value: int, tries: int = TRIES) -> None:
+        """Writes the object; raises DeviceError. ``tries`` is 1 where writing it twice is not like writing it once."""
+        data = entry.pack(value)
+        what = f"writing {value} to {entry}"
+        self._run(lambda: Download(entry.index, entry.sub, data), what, self.timeout_s * tries / TRIES, tries)
+
+    def _upload(self, entry: Entry, timeout_s: float, tries: int) -> bytes:
+        return self._run(lambda: Upload(entry.index, entry.sub), f"reading {entry}", timeout_s, tries)
 
     def _value(self, entry: Entry, data: bytes) -> int:
         value = entry.unpack(data)
@@ -108,24 +110,27 @@ class Node:
             raise DeviceError(f"{self.name}: reading {entry} gave {len(data)} bytes instead of {entry.size}")
         return value
 
-    def _run(self, transfer: Transfer, what: str, timeout_s: float, repeat_s: float = NEVER_S) -> bytes:
-        self._transfer = transfer
-        begun_ns = self._now()
-        asked_ns = begun_ns - round(repeat_s * 1e9)
-        while not transfer.ended:
-            now_ns = self._now()
-            if now_ns - begun_ns >= timeout_s * 1e9:
-                raise DeviceError(
-                    f"{self.name}: does not answer: {what} took longer than {timeout_s:g} s; "
-                    "check its power, the CAN cable, axis.node and axis.bitrate"
-                )
-            if now_ns - asked_ns >= repeat_s * 1e9:
-                asked_ns = now_ns
-                self._request(transfer)
-            self.pump(min(timeout_s - (now_ns - begun_ns) / 1e9, repeat_s))
+    def _run(self, begin: Callable[[], Transfer], what: str, timeout_s: float, tries: int) -> bytes:
+        """Begins anew where no answer comes, or one that makes no sense: one damaged line must not cost a start."""
+        for _ in range(tries):
+            self._transfer = transfer = begin()
+            self._request(transfer)
+            deadline_ns = self._now() + round(timeout_s / tries * 1e9)
+            while not transfer.ended and (left_ns := deadline_ns - self._now()) > 0:
+                self.pump(left_ns / 1e9)
+            if transfer.done or (transfer.abort is not None and not transfer.garbled):
+                break
+        return self._outcome(transfer, what, timeout_s, tries)
+
+    def _outcome(self, transfer: Transfer, what: str, timeout_s: float, tries: int) -> bytes:
         if transfer.abort is not None:
             reason = ABORT_TEXTS.get(transfer.abort, "no text for this code")
             raise DeviceError(f"{self.name}: refused {what}: {transfer.abort:08X} {reason}")
+        if not transfer.done:
+            raise NoAnswer(
+                f"{self.name}: does not answer: {what} took longer than {timeout_s:g} s, tries: {tries}; "
+                "check its power, the CAN cable, axis.node and axis.bitrate"
+            )
         return transfer.data
 
     def _request(self, transfer: Transfer) -> None:
@@ -145,3 +150,7 @@ class Node:
         self.restarted |= state is NmtState.BOOT_UP
         self.state = state
         self.heard_ns = now_ns
+
+
+class NoAnswer(DeviceError):
+    """The node let a request go unanswered; whether it obeyed is not known."""

@@ -1,11 +1,12 @@
 """Controlword and statusword through SDO: the state walk, modes, waiting for bits, each with a deadline."""
 
+import contextlib
 from collections.abc import Callable
 
 from drivers.epos4 import objects
 from drivers.epos4.cia402 import Control, Goal, State, Status, decode_state, next_controlword, obstacle, reached
 from drivers.epos4.faults import describe
-from drivers.epos4.node import Node
+from drivers.epos4.node import NoAnswer, Node
 from rig.errors import DeviceError, SafetyStop
 
 REACTION_S = 1.0
@@ -51,8 +52,8 @@ class Walker:
         return self.status
 
     def control(self, word: int) -> None:
-        """Writes the controlword; set-points that follow repeat it."""
-        self.node.write(objects.CONTROLWORD, int(word))
+        """Writes the controlword, once: its edges give orders. Set-points that follow repeat it."""
+        self.node.write(objects.CONTROLWORD, int(word), tries=1)
         self.controlword = int(word)
 
     def set_mode(self, mode: int) -> None:
@@ -73,7 +74,9 @@ class Walker:
             if why or self._now() >= deadline_ns:
                 why = why or f"it stays in {decode_state(status).value}"
                 raise DeviceError(f"{self.node.name}: is not {goal.value}: {why} ({self.fault or 'no fault'})")
-            self.control(next_controlword(status, goal))
+            # No answer to an order is no end of it: the state tells what became of it, and what to order next.
+            with contextlib.suppress(NoAnswer):
+                self.control(next_controlword(status, goal))
             self._pause()
 
     def make_safe(self) -> None:
