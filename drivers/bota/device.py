@@ -10,7 +10,8 @@ import math
 import select
 import time
 from collections.abc import Callable, Sequence
-from typing import ClassVar
+from functools import partial
+from typing import ClassVar, TypeVar
 
 from drivers.bota.codec import (
     BAUD_CODES,
@@ -45,8 +46,9 @@ UNUSABLE = int(Status.OVERRANGE | Status.INVALID | Status.RAW)
 BOOT_S = 4.0
 # A command and its answer are 30 characters, 31 ms at 9600 baud; the rest is for the host.
 ACK_S = 1.0
-# A sensor that has just printed its text may still drop a character, so the first command is repeated.
-CONFIG_TRIES = 3
+# Neither commands nor answers carry a checksum, and a sensor that has just printed its text may still drop a character.
+TRIES = 3
+Said = TypeVar("Said")
 # The filter settles within a few frames; the rest is for the host.
 FIRST_FRAMES = 20
 FIRST_FRAMES_S = 1.0
@@ -99,12 +101,12 @@ class BotaSensOne:
 
     def start(self) -> None:
         """Resets, identifies, configures and runs the sensor; raises DeviceError with one sentence."""
-        boot = self._reset()
+        boot = _repeated(self._reset)
         self._forget_clock()
-        self._enter_config_mode()
-        self._command(encode_communication(temperature_compensation=False, calibrated=True, baud=self._baud))
-        self._command(encode_filter(self._sinc))
-        self._await_frames(self._command(RUN_MODE))
+        setup = encode_communication(temperature_compensation=False, calibrated=True, baud=self._baud)
+        for command in (CONFIG_MODE, setup, encode_filter(self._sinc)):
+            _repeated(partial(self._command, command))
+        self._await_frames(_repeated(partial(self._command, RUN_MODE)))
         settings = {"rate": f"{rate_Hz(self._sinc):.1f} Hz", "sinc": str(self._sinc), "baud": str(self._baud)}
         self._identity = Identity(boot.name, boot.serial, boot.firmware, settings)
 
@@ -137,10 +139,13 @@ class BotaSensOne:
         text = read_until(self._port, lambda data: find_boot_text(data) is not None, BOOT_S)
         boot = find_boot_text(text)
         if boot is None:
-            raise self._error(f"no boot text within {BOOT_S:g} s of a reset, {_came(text)}; {self._advice(text)}")
+            why = f"no boot text within {BOOT_S:g} s of a reset, {_came(text)}; {self._advice(text)}"
+            raise _Misheard(self._about(why)) if text else self._error(why)
         if not boot.name.startswith(NAME_PREFIX):
-            raise self._error(
-                f"is a {boot.name!r}, not a Bota sensor ({NAME_PREFIX}...); check force.port and force.product"
+            raise _Misheard(
+                self._about(
+                    f"is a {boot.name!r}, not a Bota sensor ({NAME_PREFIX}...); check force.port and force.product"
+                )
             )
         return boot
 
@@ -149,24 +154,17 @@ class BotaSensOne:
             return f"check force.port and that the sensor is set to {self._baud} baud"
         return "check power, cable and force.port"
 
-    def _enter_config_mode(self) -> None:
-        for _ in range(CONFIG_TRIES - 1):
-            with contextlib.suppress(_NoAnswer):
-                self._command(CONFIG_MODE)
-                return
-        self._command(CONFIG_MODE)
-
     def _command(self, command: bytes) -> bytes:
         """Sends ``command`` and waits for its acknowledgement; returns what came behind it."""
         self._port.write(command)
         text = read_until(self._port, lambda data: find_ack(data, command) is not None, ACK_S)
         ack = find_ack(text, command)
         if ack is None:
-            raise _NoAnswer(
+            raise _Misheard(
                 self._about(f"no answer to {command!r} within {ACK_S:g} s, {_came(text)}; run `rig doctor`")
             )
         if ack.code:
-            raise self._error(f"refused {command!r} with code {ack.code}, expected 0; check its firmware")
+            raise _Misheard(self._about(f"refused {command!r} with code {ack.code}, expected 0; check its firmware"))
         return text[ack.end :]
 
     def _await_frames(self, data: bytes) -> None:
@@ -234,8 +232,16 @@ class BotaSensOne:
         return f"{PRODUCT} at {self._port.address}: {what}"
 
 
-class _NoAnswer(DeviceError):
-    """A command was not acknowledged in time."""
+class _Misheard(DeviceError):
+    """What came back is not what should; no checksum tells whether either way was damaged."""
+
+
+def _repeated(say: Callable[[], Said]) -> Said:
+    """``say``, again where it was misheard: all that is said at start says the same when it is said twice."""
+    for _ in range(TRIES - 1):
+        with contextlib.suppress(_Misheard):
+            return say()
+    return say()
 
 
 def _line_settings(config: Force) -> tuple[int, int]:

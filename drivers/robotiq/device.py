@@ -50,6 +50,8 @@ STOP_S = 3.0
 # Request and longest answer are 31 bytes, 16 ms; the maker's driver waits 400 ms.
 ANSWER_S = 0.4
 RETRIES = 2
+# A command that arrives damaged is not obeyed, and starting a stream twice starts it once.
+START_TRIES = 2
 # Twenty frames of the stream; the rest is for the host.
 FIRST_FRAME_S = 1.0 + 20 / STREAM_HZ
 
@@ -177,8 +179,12 @@ class RobotiqFt300:
 
     def _start_stream(self) -> None:
         """The answer to the command may be lost in the stream it starts: frames are answer enough."""
-        self._port.write(START_STREAM)
-        text = read_until(self._port, _started_or_refused, FIRST_FRAME_S)
+        text = b""
+        for _ in range(START_TRIES):
+            self._port.write(START_STREAM)
+            text = read_until(self._port, _started_or_refused, FIRST_FRAME_S)
+            if _started_or_refused(text):
+                break
         code = refusal(text)
         if code is not None:
             raise self._error(f"refused to start its stream with Modbus exception {code}; check its firmware")

@@ -106,6 +106,30 @@ def test_the_first_command_after_a_reset_is_repeated_where_it_is_lost() -> None:
     sensor.close()
 
 
+@pytest.mark.parametrize("number", range(5))
+@pytest.mark.parametrize("damage", [b"", b"r,0,\xd2\r\n", b"r,0,c,1\r\nr,0,f,1\r\nr,0,R,1\r\nr,0,C,1\r\n"])
+def test_any_one_damaged_answer_during_start_is_asked_for_again(number: int, damage: bytes) -> None:
+    """Lost, not understood, or a refusal of what arrived damaged at the sensor."""
+    heard: list[bytes] = []
+
+    def damaged_once(command: bytes) -> bytes:
+        heard.append(command)
+        return (damage or b"?") if len(heard) == number + 1 else sensor_like(command)
+
+    sensor, port = started(damaged_once)
+    commands = [b"#", b"C", b"c,0,1,0,4", b"f,51,0,0,1", b"R"]
+    assert port.written == [*commands[: number + 1], *commands[number:]]
+    assert len(sensor.poll(0)) == 1
+    sensor.close()
+
+
+def test_a_boot_text_with_a_damaged_name_is_asked_for_again() -> None:
+    texts = iter([BOOT.replace(b"BFT", b"BGT"), BOOT])
+    sensor, _ = started(lambda command: next(texts) if command == b"#" else sensor_like(command))
+    assert sensor.identity.product == "BFT-SENS-SER-M8"
+    sensor.close()
+
+
 def test_a_silent_device_is_one_sentence() -> None:
     with pytest.raises(DeviceError, match=r"bota-sensone at /dev/scripted: no boot text .* nothing came; check power"):
         started(lambda _: b"")
