@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from controller.commissioning.axis import Array, Place, refuse_first_step
+from controller.commissioning.axis import Array, Place, ahead_mm, known_direction, refuse_first_step
 from controller.devices import Devices
 from rig.channels import MarkerSample
 from rig.errors import CheckFailed, DeviceError, SafetyStop
@@ -23,6 +23,8 @@ LARGEST_TOUCH_N = 0.5
 STEP_MM, CONTACT_N, SEARCH_MM, BACK_MM, TOUCHES = 0.05, 0.3, 5.0, 1.0, 3
 # What came during a move was measured under way.
 DRAIN_S, TOUCH_READ_S = 0.04, 0.08
+# Thirty frames at each end know it to 2 %, and 20 % are asked.
+FIRST_STEP_MM = 1.0
 TIP, ARM = 0, 1
 
 
@@ -110,16 +112,23 @@ def steps_mm(from_mm: float, to_mm: float, count: int) -> list[float]:
 
 
 def travelled(axis: RestingAxis, positions_mm: Sequence[float]) -> list[Place]:
-    """The places at ``positions_mm``; raises CheckFailed with the first step where the scale is far off."""
-    places: list[Place] = []
+    """Where it stands, then ``positions_mm``; CheckFailed with the first step where scale or sense is wrong."""
+    places = [_seen(axis.place())]
+    checked = False
     for position_mm in positions_mm:
         axis.go(position_mm)
-        places.append(axis.place())
-        if not len(places[-1].tip_mm):
-            raise CheckFailed(f"the tip's marker is not seen at {places[-1].axis_mm:.2f} mm: bring it into view")
-        if len(places) == 2:
-            refuse_first_step(*places)
+        places.append(_seen(axis.place()))
+        if not checked and abs(places[-1].axis_mm - places[0].axis_mm) >= FIRST_STEP_MM:
+            refuse_first_step(places[0], places[-1])
+            known_direction(ahead_mm(places))
+            checked = True
     return places
+
+
+def _seen(place: Place) -> Place:
+    if not len(place.tip_mm):
+        raise CheckFailed(f"the tip's marker is not seen at {place.axis_mm:.2f} mm: bring it into the tracker's view")
+    return place
 
 
 def touches_mm(axis: RestingAxis, near_mm: float, count: int = TOUCHES) -> list[float]:

@@ -169,15 +169,28 @@ def resting(bench: AxisOf) -> RestingAxis:
 
 def test_the_axis_is_read_at_each_place() -> None:
     found = travelled(resting(AxisOf()), steps_mm(2.0, 14.0, 4))
-    assert [one.axis_mm for one in found] == pytest.approx(steps_mm(2.0, 14.0, 4))
+    assert [one.axis_mm for one in found] == pytest.approx([0.0, *steps_mm(2.0, 14.0, 4)])
     assert against_tracker(DRIVE, Axis(), found, "limb marker", NOW).scale == pytest.approx(1.0)
 
 
 def test_a_wrong_scale_goes_no_farther_than_the_first_step() -> None:
     bench = AxisOf(scale=2.0)
-    with pytest.raises(CheckFailed, match="the tracker saw 6 mm"):
+    with pytest.raises(CheckFailed, match="the tracker saw 4 mm"):
         travelled(resting(bench), steps_mm(2.0, 14.0, 4))
-    assert max(bench.visited) == 5.0
+    assert max(bench.visited) == 2.0
+
+
+def test_the_wrong_way_goes_no_farther_than_the_first_step() -> None:
+    bench = AxisOf(scale=-1.0)
+    with pytest.raises(CheckFailed, match=r"goes away from the limb's marker, .* axis.direction is wrong"):
+        travelled(resting(bench), steps_mm(2.0, 14.0, 4))
+    assert max(bench.visited) == 2.0
+
+
+def test_a_first_step_too_short_to_tell_is_not_judged() -> None:
+    bench = AxisOf(scale=2.0)
+    with pytest.raises(CheckFailed, match=r"the axis says it went 3.5 mm and the tracker saw 7 mm"):
+        travelled(resting(bench), steps_mm(0.5, 12.5, 4))
 
 
 def test_something_in_the_way_ends_it() -> None:
@@ -190,7 +203,7 @@ def test_something_in_the_way_ends_it() -> None:
 def test_a_tip_that_is_not_seen_ends_it() -> None:
     bench = AxisOf()
     bench.tip_seen = False
-    with pytest.raises(CheckFailed, match=r"the tip's marker is not seen at 2.00 mm"):
+    with pytest.raises(CheckFailed, match=r"the tip's marker is not seen at 0.00 mm"):
         travelled(resting(bench), steps_mm(2.0, 14.0, 4))
 
 

@@ -90,3 +90,40 @@ def test_the_calibration_of_another_sensor_moves_nothing_and_leaves_no_session(b
     assert said.code == 2
     assert "is of BFT-SENS-SER-M8 000999, but BFT-SENS-SER-M8 000271 answered" in said.sentence
     assert not (tmp_path / "session").exists()
+
+
+def axis(folder: Path, *options: str) -> Said:
+    """The axis of the built-in mock bench."""
+    return rig("calibrate", "axis", "--json", "result.json", *options, folder=folder)
+
+
+def test_the_axis_of_the_mock_bench_is_calibrated_against_its_tracker(tmp_path: Path) -> None:
+    said = axis(tmp_path)
+    assert said.code == 0, said.err
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["scale"] == pytest.approx(1.0, abs=0.005)
+    assert (result["direction"], result["direction_known_by"]) == (1, "limb marker")
+    assert f'[calibration]\naxis = "{result["file"]}"' in said.out
+
+
+def test_its_scale_comes_out_of_a_gauge_block_too(tmp_path: Path) -> None:
+    said = axis(tmp_path, "--gauge-block-mm", "10")
+    assert said.code == 0, said.err
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["scale"] == pytest.approx(1.0, abs=0.005)
+    assert (result["reference"], result["direction_known_by"]) == ("gauge block", "contact")
+
+
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        ("axis.increments_per_mm=4000", r"the axis says it went 2 mm and the tracker saw (3\.9\d*|4|4\.0\d*) mm"),
+        ("axis.increments_per_mm=1000", r"the axis says it went 2 mm and the tracker saw (0\.9\d*|1|1\.0\d*) mm"),
+        ("axis.direction=-1", "the tip goes away from the limb's marker"),
+    ],
+)
+def test_a_scale_or_sense_that_is_wrong_stops_at_the_first_step(tmp_path: Path, setting: str, sentence: str) -> None:
+    said = axis(tmp_path, "--set", setting)
+    assert said.code == 1
+    assert re.search(sentence, said.sentence)
+    assert not list(tmp_path.rglob("*.json"))
