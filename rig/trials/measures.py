@@ -180,7 +180,9 @@ def depth_mm(recording: Recording, contact_mm: float) -> float:
 def loading_lost(curve: Curve, reached_mm: float) -> float:
     """Share of the way from contact to the depth reached that the loading curve leaves out."""
     depth_mm = curve.depth_mm[curve.depth_mm > 0]
-    if not len(depth_mm) or not reached_mm > 0:
+    if math.isnan(reached_mm):
+        return math.nan
+    if not len(depth_mm) or reached_mm <= 0:
         return 1.0
     steps = np.diff(np.concatenate([[0.0], depth_mm, [max(reached_mm, float(depth_mm[-1]))]]))
     hole_mm = max(HOLE_SHARE * reached_mm, 2 * float(np.median(steps)))

@@ -1,6 +1,7 @@
 """`rig verify`, `rig repair`, `rig import`, `rig export` as typed by a person."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from typer.testing import CliRunner, Result
 from api.cli import records
 from rig.errors import CheckFailed, DataError, UsageError
 from rig.recording.files import WriteFailed
-from rig.recording.sessions import open_session
+from rig.recording.sessions import open_session, write_session
 from tests.rig.recording.measured import measured
 
 app = typer.Typer(rich_markup_mode=None)
@@ -107,6 +108,18 @@ def test_a_missing_recording_fails_the_check(session: Path) -> None:
     error = rig("verify", session).exception
     assert isinstance(error, CheckFailed)
     assert "trial trial_02: its recording trial_02.mcap is missing" in str(error)
+
+
+def test_the_quality_of_a_trial_is_said_and_is_no_matter_of_completeness(session: Path, tmp_path: Path) -> None:
+    info = open_session(session).info
+    spoilt = replace(info.trials[0], quality="bad", reasons=("the loop missed of its cycles 40 % (good up to 5 %)",))
+    write_session(session, replace(info, trials=(spoilt, *info.trials[1:])))
+    result = rig("verify", session, "--json", tmp_path / "result.json")
+    assert result.exit_code == 0
+    assert f"{spoilt.name}: quality bad; the loop missed of its cycles 40 % (good up to 5 %)" in result.output
+    recordings = json.loads((tmp_path / "result.json").read_text())["recordings"]
+    assert recordings[spoilt.name]["quality"] == "bad" and len(recordings[spoilt.name]["reasons"]) == 1
+    assert recordings[info.trials[1].name]["quality"] == ""
 
 
 def test_one_recording_can_be_verified(session: Path) -> None:

@@ -1,6 +1,7 @@
 """The service where no bench answers: state is data, requests are strict, other sites' pages are kept out."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,8 @@ from fastapi.testclient import TestClient
 from api.http.app import build
 from api.http.service import Service
 from rig.config.wiring import Axis, Force, Wiring
+from rig.recording.sessions import open_session, write_session
+from tests.rig.tissue.synthetic import Bench, write_made_session
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PROBLEM = "application/problem+json"
@@ -123,6 +126,19 @@ def test_one_bad_file_hides_no_other(tmp_path: Path) -> None:
         "session.json is missing: the session is taken from its recordings",
         "a.mcap: not listed in session.json",
     ]
+
+
+def test_the_quality_of_a_recording_stands_in_the_list(tmp_path: Path) -> None:
+    folder = write_made_session(tmp_path / "sessions" / "made", Bench().strokes(trials=1, speeds_mm_s=(10.0,)))
+    info = open_session(folder).info
+    reason = "force: a gap of 58 ms (good up to 20 ms)"
+    write_session(folder, replace(info, trials=(replace(info.trials[0], quality="usable", reasons=(reason,)),)))
+    app = build(Service(Wiring(force=Force(port="/dev/no-such-sensor")), tmp_path / "sessions", EXAMPLES))
+    with TestClient(app, base_url="http://127.0.0.1:8000") as client:
+        (session,) = client.get("/api/v1/recordings").json()
+    found = {entry["file"]: (entry["quality"], entry["reasons"]) for entry in session["recordings"]}
+    assert found[info.trials[0].file] == ("usable", [reason])
+    assert found["session.json"] == ("", [])
 
 
 def test_the_interface_description_covers_every_route_and_every_problem(client: TestClient) -> None:

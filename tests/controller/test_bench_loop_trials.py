@@ -36,3 +36,12 @@ def test_the_force_limit_of_a_step_ends_it_within_one_sample_and_one_lag(sensor_
     assert finished["outcome"] == "force limit"
     # 1 N/mm at 20 mm/s gives 20 N/s for one sample period; then the axis catches up with its lag of 4.7 ms.
     assert 2.0 < bench.true_peak_N < 2.0 + 20.0 * (1 / sensor_Hz + 0.0047 + 0.003)
+
+
+def test_force_that_arrives_long_after_the_axis_of_its_time_gives_the_same_surface() -> None:
+    bench = FakeBench(wired(100.0))
+    bench.force.latency_ns = 20_000_000
+    finished = bench.run(ZERO, APPROACH, LEAVE)
+    assert finished["surface_mm"] == pytest.approx(SURFACE_MM, abs=0.06)
+    # Ten millimetres at 5 mm/s and 100 Hz, but for the half millimetre in which the guide may slip.
+    assert finished["touch"]["samples"] == pytest.approx(190, abs=5)

@@ -1,11 +1,13 @@
 """The second force sensor does the whole job: one line of configuration changes, nothing else."""
 
+import time
 from pathlib import Path
 
 import pytest
 
 from rig.recording.reader import read_recording
-from tests.system.stage import EXAMPLES, Stage, rig
+from rig.recording.sessions import open_session
+from tests.system.stage import EXAMPLES, Running, Stage, rig
 
 pytestmark = pytest.mark.xdist_group("commands")
 SURFACE_MM = 20.0
@@ -21,5 +23,23 @@ def test_one_line_exchanges_the_force_sensor(bench: Stage, tmp_path: Path) -> No
     force, loop = recording.tables["force"], recording.tables["loop"]
     slots = int(loop["slot"][-1] - loop["slot"][0])
     assert slots / len(force) == pytest.approx(10.0, rel=0.1)
-    assert loop["surface_mm"][-1] == pytest.approx(SURFACE_MM, abs=3.0)
+    assert loop["surface_mm"][-1] == pytest.approx(SURFACE_MM, abs=0.25)
     assert float(recording.metadata["summary"]["peak_force_N"]) > 3.0
+
+
+@pytest.mark.parametrize("product", ["bota-sensone", "robotiq-ft300"])
+def test_8_mm_are_8_mm_with_either_sensor(bench: Stage, tmp_path: Path, product: str) -> None:
+    """Depth is the bench's own: how far the true tip went below the true surface."""
+    role = {"bota-sensone": "force", "robotiq-ft300": "force_modbus"}[product]
+    settings = bench.settings(f"force.product={product}", f"force.port={bench.endpoints[role]['serial']}")
+    (tmp_path / "one.toml").write_text("speeds_mm_s = [10]\ntrials = 1\ndepth_mm = 8\n")
+    running = Running(["capture", tmp_path / "one.toml", "--out", tmp_path / "session", *settings], tmp_path)
+    deepest_mm = 0.0
+    while running.process.poll() is None:
+        deepest_mm = max(deepest_mm, bench.control.number("tip.depth_mm"))
+        time.sleep(0.01)
+    assert running.end().code in (0, 4)
+    (trial, *_) = open_session(tmp_path / "session").trials
+    assert trial.surface_low_mm - 0.05 <= SURFACE_MM <= trial.surface_high_mm + 0.05
+    assert trial.surface_mm == pytest.approx(SURFACE_MM, abs=0.2)
+    assert deepest_mm == pytest.approx(8.0, abs=0.2)

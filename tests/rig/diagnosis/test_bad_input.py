@@ -14,8 +14,10 @@ from rig.diagnosis.run import diagnose_session
 from rig.diagnosis.sources import in_time, read_source
 from rig.diagnosis.strokes import cut
 from rig.errors import DataError
+from rig.recording.sessions import open_session, write_session
 from tests.data import recording
 from tests.hidden.draw import draw_secret, recorded, session_of
+from tests.rig.tissue.synthetic import Bench, write_made_session
 
 
 @pytest.fixture(scope="module")
@@ -261,3 +263,21 @@ def test_what_the_index_law_gets_wrong_on_real_meat_is_relaxation() -> None:
     assert "relaxation" in {effect for finding in result.findings for effect in finding.effects}, result.statement
     named = next(finding for finding in result.findings if finding.effects[0] == "relaxation")
     assert named.gain.reduction.value > 0.2
+
+
+def test_a_trial_of_bad_quality_is_left_out_and_one_that_is_not_good_is_named(tmp_path: Path) -> None:
+    folder = write_made_session(tmp_path / "session", Bench().strokes(trials=3, speeds_mm_s=(10.0,)))
+    info = open_session(folder).info
+    bad, usable, good = info.trials
+    marked = (
+        replace(bad, quality="bad", reasons=("force: a gap of 500 ms",)),
+        replace(usable, quality="usable", reasons=("the loop missed of its cycles 15 %",)),
+        replace(good, quality="good"),
+    )
+    write_session(folder, replace(info, trials=marked))
+    session = read_source(folder)
+    assert [streams.name for streams in session.recordings] == [usable.name, good.name]
+    said = {finding.recording: finding.text for finding in session.findings}
+    assert said[bad.name] == "quality bad, left out: force: a gap of 500 ms"
+    assert said[usable.name] == "quality usable: the loop missed of its cycles 15 %"
+    assert good.name not in said

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from rig.errors import DataError, UsageError
-from rig.recording.sessions import SessionInfo, TrialInfo, write_session
+from rig.recording.sessions import SessionInfo, TrialInfo, open_session, write_session
 from rig.report.page import write_report
 from tests.rig.tissue.synthetic import Bench, index_force, metadata, tables, write_made_session, write_recording
 
@@ -230,6 +231,17 @@ def test_the_report_replaces_an_older_one_and_leaves_no_scraps(folder: Path, tmp
 def test_a_place_that_is_not_there_is_refused(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"its folder does not exist"):
         write_report(folder, tmp_path / "missing" / "report.html")
+
+
+def test_the_quality_of_each_trial_is_shown_and_why_it_is_not_good(tmp_path: Path) -> None:
+    folder = write_made_session(tmp_path / "session", Bench(rate_Hz=500.0).strokes(trials=2, speeds_mm_s=(10.0,)))
+    info = open_session(folder).info
+    spoilt = replace(info.trials[0], quality="usable", reasons=("axis: a gap of 58 ms (good up to 20 ms)",))
+    write_session(folder, replace(info, trials=(spoilt, replace(info.trials[1], quality="good"))))
+    write_report(folder, folder / "report.html")
+    words = Page((folder / "report.html").read_text(encoding="utf-8")).words
+    assert f"{spoilt.name}: quality usable: axis: a gap of 58 ms (good up to 20 ms)" in words
+    assert f"{info.trials[1].name}: quality" not in words
 
 
 def test_a_folder_without_a_session_is_refused(tmp_path: Path) -> None:

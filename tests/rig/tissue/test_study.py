@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 
 from rig.errors import DataError, UsageError
 from rig.recording.importing import import_session
-from rig.recording.sessions import Session, open_session
+from rig.recording.sessions import Session, open_session, write_session
 from rig.tissue.laws_viscous import QuasiLinear
 from rig.tissue.model import load_model
 from rig.tissue.registry import COMPARED
@@ -44,6 +45,19 @@ def test_every_trial_with_a_curve_counts_and_the_others_say_why_not(study: Study
     ]  # fmt: skip
     assert [trial for trial, _ in study.skipped] == ["trial_999"]
     assert "no contact" in study.skipped[0].reason
+
+
+def test_a_trial_of_bad_quality_is_left_out_and_said(tmp_path: Path) -> None:
+    folder = write_made_session(tmp_path / "session", Bench().strokes(trials=2, speeds_mm_s=(10.0,)))
+    session = open_session(folder)
+    first, second = session.trials
+    spoilt = replace(first, quality="bad", reasons=("force: a gap of 500 ms (good up to 20 ms)",))
+    write_session(folder, replace(session.info, trials=(spoilt, replace(second, quality="usable"))))
+    study = study_session(open_session(folder))
+    assert [curve.name for curve in study.curves] == [second.name]
+    assert study.skipped == (
+        (first.name, "left out, its quality is bad: force: a gap of 500 ms (good up to 20 ms)"),
+    )  # fmt: skip
 
 
 def test_the_index_law_is_closest_on_tissue_that_follows_it(study: Study) -> None:
