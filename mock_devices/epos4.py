@@ -177,7 +177,7 @@ class Epos4Mock(OnWire):
 
     def _send(self, can_id: int, data: bytes) -> None:
         if data and not self.silent:
-            self._adapter.send(can_id, data)
+            self._adapter.send(can_id, data, self._now_ns)
 
     # NMT and heartbeats
 

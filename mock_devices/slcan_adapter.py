@@ -1,15 +1,17 @@
 """A CAN adapter on a wire (Lawicel CANUSB commands), for mocks of CAN nodes: text on one side, frames on the other.
 
 It refuses with BEL what a real one refuses: a bit rate while the channel is open, frames while it is closed. A channel
-opened at another bit rate than the bus' accepts frames, but they reach nobody.
+opened at another bit rate than the bus' accepts frames, but they reach nobody. A line feed behind the carriage return
+is passed over, as terminal programs send one. After Z1 each frame carries the milliseconds of the running minute.
 """
 
 from binascii import hexlify
 
-from drivers.can.slcan import LONGEST, CanFrame, decode_line, encode_frame
+from drivers.can.slcan import LONGEST, CanFrame, decode_line
 from mock_devices.wire import Wire
 
 OK, BEL = b"\r", b"\a"
+STAMP_MS = 60_000
 FRAME_SENT = {b"t": b"z\r", b"r": b"z\r", b"T": b"Z\r", b"R": b"Z\r"}
 
 
@@ -20,6 +22,7 @@ class SlcanAdapter:
         self.wire = wire
         self.open = False
         self.refused = 0
+        self._stamped = False
         self._rate = rate
         self._chosen = b""
         self._listen_only = False
@@ -28,7 +31,7 @@ class SlcanAdapter:
 
     def receive(self) -> list[CanFrame]:
         """Frames the client put on the bus since the last call; everything else is answered here."""
-        *lines, self._rest = (self._rest + self.wire.read()).split(OK)
+        *lines, self._rest = (self._rest + self.wire.read().replace(b"\n", b"")).split(OK)
         self._rest = self._rest[-LONGEST - 1 :]
         frames = []
         for line in lines:
@@ -40,15 +43,13 @@ class SlcanAdapter:
                 self._out.append(self._answer(line))
         return frames
 
-    def send(self, can_id: int, data: bytes) -> None:
+    def send(self, can_id: int, data: bytes, now_ns: int) -> None:
         """A frame from the bus to the client."""
         if self.open and self._chosen == self._rate:
-            self._out.append(b"t%03X%d%b\r" % (can_id, len(data), hexlify(data).upper()))
+            self._out.append(b"t%03X%d%b%b\r" % (can_id, len(data), hexlify(data).upper(), self._stamp(now_ns)))
 
-    def send_frame(self, frame: CanFrame) -> None:
-        """A frame of any kind from the bus to the client."""
-        if self.open and self._chosen == self._rate:
-            self._out.append(encode_frame(frame))
+    def _stamp(self, now_ns: int) -> bytes:
+        return b"%04X" % (now_ns // 1_000_000 % STAMP_MS) if self._stamped else b""
 
     def flush(self) -> None:
         """Hands all output to the wire in one write."""
@@ -83,6 +84,9 @@ class SlcanAdapter:
             case b"s" if not self.open and len(argument) == 4:
                 self._chosen = b"s" + argument
                 return OK
-            case b"Z" | b"M" | b"m" if not self.open:
+            case b"Z" if not self.open and argument in (b"0", b"1"):
+                self._stamped = argument == b"1"
+                return OK
+            case b"M" | b"m" if not self.open:
                 return OK
         return BEL

@@ -1,8 +1,9 @@
 """The Lawicel text protocol of CAN adapters (CAN232 manual v3, mac-can/SLCAN): pure, bounded, resynchronising.
 
 A frame is one line that ends in CR: ``tiiildd..`` (11-bit identifier), ``Tiiiiiiiildd..`` (29-bit), ``r``/``R`` the
-same as remote requests. The adapter answers a command with CR, ``z`` CR or ``Z`` CR, or refuses it with BEL. Lines
-carry no checksum: a damaged digit that is still a digit passes, which is why what matters is read back through SDO.
+same as remote requests; a line feed, which some adapters send behind it, is passed over. The adapter answers a command
+with CR, ``z`` CR or ``Z`` CR, or refuses it with BEL. Lines carry no checksum: a damaged digit that is still a digit
+passes, which is why what matters is read back through SDO.
 """
 
 from binascii import hexlify, unhexlify
@@ -81,6 +82,8 @@ class SlcanDecoder:
 
     def feed(self, data: bytes) -> list[CanFrame]:
         """Frames completed by ``data``, oldest first."""
+        if b"\n" in data:
+            data = data.replace(b"\n", b"")
         if b"\a" in data:
             data = data.replace(b"\a", b"\a\r")
         *lines, rest = (self._rest + data).split(b"\r")

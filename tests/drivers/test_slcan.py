@@ -114,3 +114,11 @@ def test_no_bytes_raise_and_after_two_ends_of_line_it_is_in_step_again(chunks: l
         decoder.feed(chunk)
     assert decoder.feed(b"\r\rt0800\r")[-1:] == [CanFrame(0x080)]
     assert len(decoder.replies) <= 16
+
+
+@pytest.mark.parametrize("split", range(20))
+def test_line_feeds_behind_the_lines_are_passed_over(split: int) -> None:
+    stream = b"\r\nV1013\r\nt701105\r\nz\r\n"
+    decoder = SlcanDecoder()
+    assert decoder.feed(stream[:split]) + decoder.feed(stream[split:]) == [CanFrame(0x701, b"\x05")]
+    assert (decoder.acknowledged, decoder.malformed, list(decoder.replies)) == (2, 0, [b"V1013"])

@@ -4,8 +4,9 @@ import struct
 
 import pytest
 
+from drivers.can.slcan import decode_line
 from mock_devices.slcan_adapter import SlcanAdapter
-from tests.epos4_stage import Stage
+from tests.epos4_stage import MS, Stage
 from tests.mock_devices.epos4_wire import download, enabled, exchange, follow, sdo, status, upload
 from tests.remote import MemoryWire
 
@@ -41,6 +42,23 @@ def test_the_adapter_answers_as_the_lawicel_manual_says() -> None:
     assert exchange(stage, b"O\rS6\rF\r") == b"\a\aF00\r"
     assert exchange(stage, b"t0800\rT000000010\rr0800\rR000000010\r") == b"z\rZ\rz\rZ\r"
     assert exchange(stage, b"t08\rhello\r") == b"\a\a"
+
+
+def test_a_line_feed_behind_a_command_is_no_command_of_its_own(stage: Stage) -> None:
+    assert exchange(stage, b"C\r\nS8\r\nO\r\nV\r\n") == b"\r\r\rV1013\r"
+    stage.mock.receive(stage.now())
+    assert exchange(stage, b"\n") == b""
+
+
+def test_time_stamps_are_sent_once_they_are_asked_for_and_our_decoder_passes_over_them(stage: Stage) -> None:
+    assert exchange(stage, b"Z1\rC\rZ2\rZ1\rO\r") == b"\a\r\a\r\r"
+    ask = b"t60184000100000000000\r"
+    now_ms = stage.now() // MS % 60_000
+    acknowledged, answer = exchange(stage, ask).split(b"\r")[:2]
+    assert (acknowledged, len(answer), int(answer[-4:], 16)) == (b"z", 5 + 16 + 4, now_ms)
+    assert decode_line(answer) == decode_line(answer[:-4])
+    assert exchange(stage, b"C\rZ0\rO\r") == b"\r\r\r"
+    assert len(exchange(stage, ask).split(b"\r")[1]) == 5 + 16
 
 
 def test_an_adapter_without_a_bit_rate_does_not_open() -> None:
