@@ -12,9 +12,14 @@ from api.cli.calibration_output import keep, refuse_out
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_file, wiring_from
 from api.cli.output import write_json
 from rig.config.calibration import AxisCalibration, ForceCalibration
+from rig.errors import UsageError
+
+OF_FORCE = ("weights", "load", "tolerance_percent", "gravity")
+OF_AXIS = ("from_mm", "to_mm", "clear", "toward_limb", "gauge_block_mm", "near_mm")
 
 
 def calibrate(
+    context: typer.Context,
     what: Annotated[Literal["force", "axis"], typer.Argument(help="What to calibrate.")],
     weights: Annotated[
         str, typer.Option("--weights", help="force: known weights, as '100 g,200 g,5 N'; a mock sensor has its own.")
@@ -53,6 +58,7 @@ def calibrate(
 
     Example: rig calibrate force --weights "100 g,200 g,500 g" --load pressed
     """
+    _refuse_options(context, OF_AXIS if what == "force" else OF_FORCE, what)
     wiring = wiring_from(config, overrides)
     refuse_out(out)
     found: ForceCalibration | AxisCalibration
@@ -64,3 +70,11 @@ def calibrate(
         found = calibrate_axis(wiring, way, Person(pause))
     path = keep(what, found, out, (wiring_file(config) or Path()).parent)
     write_json(json_file, {"file": str(path), **found.model_dump(mode="json")})
+
+
+def _refuse_options(context: typer.Context, others: tuple[str, ...], what: str) -> None:
+    """An option that would not count is told."""
+    for name in others:
+        source = context.get_parameter_source(name)
+        if source is not None and source.name == "COMMANDLINE":
+            raise UsageError(f"--{name.replace('_', '-')} says nothing to `rig calibrate {what}`; leave it out")

@@ -38,7 +38,7 @@ class ForceAsked(NamedTuple):
 def calibrate_force(wiring: Wiring, asked: ForceAsked, person: Person) -> ForceCalibration:
     """The calibration, and what it says on the terminal; raises CheckFailed with what is wrong."""
     if wiring.force.port == MOCK_PORT:
-        weights = _weights(wiring, asked, person) if asked.weights else mock_weights(wiring)
+        weights = _weights(wiring, asked, person) if asked.weights else mock_weights(wiring, asked.load == "hung")
         with (
             bench_for(wiring, approaches=False) as (live, endpoints),
             BenchControl(endpoints["control"]) as control,

@@ -63,9 +63,10 @@ def mock_calibration(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibrat
     return made
 
 
-def mock_weights(wiring: Wiring) -> Weights:
+def mock_weights(wiring: Wiring, hung: bool = False) -> Weights:
     """The weights that the mock bench has."""
-    return Weights(tuple(share * wiring.limits.force_N for share in SHARES), uncertainty=0.0)
+    largest_N = -wiring.limits.force_N if hung else wiring.limits.force_N
+    return Weights(tuple(share * largest_N for share in SHARES), uncertainty=0.0)
 
 
 def _made(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibration:

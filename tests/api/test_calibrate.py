@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from api.cli import mock_calibration
 from api.cli.app import build
 from api.cli.asking import Person
+from api.cli.calibrate_axis import AxisAsked, calibrate_axis
 from api.cli.calibration_output import keep, refuse_out
 from api.cli.mock_calibration import mock_file, state_folder
 from api.cli.options import built_in, calibrated, wiring_from
@@ -53,6 +54,37 @@ def test_without_a_terminal_an_open_question_names_the_option(
     with pytest.raises(UsageError, match=sentence):
         raise answer.exception
     assert not list(own_state.rglob("*.json"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["force", "--gauge-block-mm", "10"], "--gauge-block-mm says nothing to `rig calibrate force`"),
+        (["force", "--clear"], "--clear says nothing to `rig calibrate force`"),
+        (["axis", "--weights", "1 N,2 N"], "--weights says nothing to `rig calibrate axis`"),
+        (["axis", "--to-mm", "99"], "the axis would go to 99 mm, outside 0 to 60 mm"),
+        (["axis", "--to-mm", "9"], "--from-mm 2 --to-mm 9: 8 mm of travel or more are needed"),
+        (["axis", "--gauge-block-mm", "10", "--near-mm", "8"], "the axis would go to -3 mm, outside 0 to 60 mm"),
+        (["axis", "--set", "axis.port=/dev/null"], "is the tip's way free .*: no terminal to answer at; give --clear"),
+        (["axis", "--set", "axis.port=/dev/null", "--clear", "--gauge-block-mm", "5"], "give --near-mm"),
+    ],
+)
+def test_what_cannot_be_calibrated_is_refused_before_anything_is_opened(
+    arguments: list[str], sentence: str, monkeypatch: pytest.MonkeyPatch, own_state: Path
+) -> None:
+    monkeypatch.setattr("api.cli.stage.bench_process", lambda *_: pytest.fail("a bench was started"))
+    answer = runner.invoke(build("calibrate"), ["calibrate", *arguments])
+    assert isinstance(answer.exception, UsageError)
+    with pytest.raises(UsageError, match=sentence):
+        raise answer.exception
+    assert list(own_state.iterdir()) == []
+
+
+def test_without_tracker_and_block_there_is_nothing_to_compare_the_axis_with(own_state: Path) -> None:
+    (own_state / "rig.toml").write_text("[force]\n")
+    wiring = wiring_from(Path("rig.toml"), None).model_copy(update={"tracker": None})
+    with pytest.raises(UsageError, match=r"there is no \[tracker\] .* give --gauge-block-mm"):
+        calibrate_axis(wiring, AxisAsked(2.0, 14.0, True, None, None, None), Person())
 
 
 def test_a_request_that_nobody_can_say_is_done_names_the_option() -> None:
