@@ -10,8 +10,7 @@ import rig
 from controller.checks import refuse_beyond_limits
 from controller.experiments.indentation import Trial, attempts, longest_s, trials
 from controller.experiments.recorded import metadata, record, refuse_bench
-from controller.experiments.verdicts import with_quality
-from controller.messages import Outcome
+from controller.experiments.verdicts import with_quality, with_surface
 from controller.operation import Operation
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
@@ -115,19 +114,11 @@ def _run(
         return planned, error
     outcome = done.outcome
     result = replace(
-        _with_surface(planned, outcome),
+        with_surface(planned, outcome),
         outcome=outcome.outcome,
         peak_force_N=outcome.peak_force_N,
         samples=done.samples,
         dropped=done.dropped,
     ).sealed(folder)
-    result = with_quality(result, folder, protocol.quality)
+    result = with_quality(result, folder, protocol.quality, info.trials)
     return result, SafetyStop(f"stopped: {outcome.cause}") if outcome.stopped else None
-
-
-def _with_surface(trial: TrialInfo, outcome: Outcome) -> TrialInfo:
-    """The entry with the surface that was found, where one was."""
-    touch = outcome.touch
-    if touch is None:
-        return trial
-    return replace(trial, surface_mm=touch.surface_mm, surface_low_mm=touch.low_mm, surface_high_mm=touch.high_mm)

@@ -12,7 +12,7 @@ from controller.experiments.capture import new_session, refuse_used
 from controller.experiments.recorded import Recorded, metadata, record, refuse_bench
 from controller.experiments.references import Reference
 from controller.experiments.tracking import Followed, Plateau
-from controller.experiments.verdicts import with_quality
+from controller.experiments.verdicts import with_quality, with_surface
 from controller.gains import Choice
 from controller.operation import Operation
 from controller.steps import Program, TrackForce
@@ -127,7 +127,7 @@ def _enter(folder: Path, name: str, done: Recorded) -> None:
         samples=done.samples,
         dropped=done.dropped,
     ).sealed(folder)
-    entry = with_quality(entry, folder, QualityLimits())
+    entry = with_quality(with_surface(entry, done.outcome), folder, QualityLimits())
     kept = tuple(trial for trial in info.trials if trial.name != name)
     write_session(folder, replace(info, trials=(*kept, entry)))
 

@@ -1,8 +1,10 @@
 """The quality verdict of what was just recorded, and the end of a command whose trials stayed bad."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from controller.messages import Outcome
 from rig.config.quality import QualityLimits
 from rig.errors import BadTrial, DataError
 from rig.recording.reader import read_recording
@@ -10,10 +12,23 @@ from rig.recording.sessions import SessionInfo, TrialInfo
 from rig.trials.quality import TrialQuality, evaluate_trial
 
 
-def with_quality(trial: TrialInfo, folder: Path, limits: QualityLimits) -> TrialInfo:
-    """The entry with the verdict on its recording, which is closed; one that cannot be read is bad."""
+def with_surface(trial: TrialInfo, outcome: Outcome) -> TrialInfo:
+    """The entry with the surface that was found, where one was."""
+    touch = outcome.touch
+    if touch is None:
+        return trial
+    return replace(trial, surface_mm=touch.surface_mm, surface_low_mm=touch.low_mm, surface_high_mm=touch.high_mm)
+
+
+def with_quality(trial: TrialInfo, folder: Path, limits: QualityLimits, before: Sequence[TrialInfo] = ()) -> TrialInfo:
+    """The entry with the verdict on its recording, which is closed; one that cannot be read is bad.
+
+    ``before`` are the session's trials so far; those that reached the same depth and are not bad are compared with.
+    """
+    alike = [one for one in before if one.depth_mm == trial.depth_mm and one.outcome == "complete"]
+    peaks_N = [one.peak_force_N for one in alike if one.quality in ("good", "usable") and one.peak_force_N > 0]
     try:
-        found = evaluate_trial(read_recording(folder / trial.file), limits)
+        found = evaluate_trial(read_recording(folder / trial.file), limits, peaks_N)
     except DataError as error:
         found = TrialQuality("bad", (str(error),))
     return replace(trial, quality=found.verdict, reasons=found.reasons, measured=dict(found.measured))

@@ -54,3 +54,5 @@ class QualityLimits(Table):
     tracker_lost: Bounds = Field(default=Bounds(good=0.1), description="share of the tip's frames lost")
     # 2 % of the study's peak of 5 N, and five times a noisy sensor's uncertainty of a mean.
     zero_drift_N: Bounds = Field(default=Bounds(good=0.1, bad=1.0), description="force in the air, after less before")
+    # Preconditioning takes 10 to 20 % off a limb's force, speed 5 %; half or twice is another gain, or another site.
+    peak_off: Bounds = Field(default=Bounds(good=0.3), description="peak force over that of the trials before, less 1")

@@ -2,8 +2,9 @@
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from statistics import median
 from typing import Literal, NamedTuple
 
 from pydantic import ValidationError
@@ -45,9 +46,13 @@ class Measure(NamedTuple):
     scale: float = 1.0
 
 
-def evaluate_trial(recording: Recording, limits: QualityLimits) -> TrialQuality:
-    """The verdict on a captured or tracked trial: bad where anything is, good where everything is."""
-    found = [measure for measure in _measures(recording, limits) if not math.isnan(measure.value)]
+def evaluate_trial(recording: Recording, limits: QualityLimits, peaks_before_N: Sequence[float] = ()) -> TrialQuality:
+    """The verdict on a captured or tracked trial: bad where anything is, good where everything is.
+
+    ``peaks_before_N``: what trials to the same depth on the same site reached before.
+    """
+    measured = (*_measures(recording, limits), *_against_before(recording, limits, peaks_before_N))
+    found = [measure for measure in measured if not math.isnan(measure.value)]
     unusable = list(_unusable(recording))
     beyond = [measure for measure in found if measure.value > measure.bounds.good]
     bad = unusable or any(m.bounds.bad is not None and m.value > m.bounds.bad for m in beyond)
@@ -155,6 +160,16 @@ def _of_loading(recording: Recording, limits: QualityLimits) -> Iterator[Measure
     yield Measure("depth_off_mm", off_mm, limits.depth_off_mm, text, " mm")
     lost = measures.loading_lost(curve, reached_mm)
     yield Measure("loading_lost", lost, limits.loading_lost, "loading no fit can use:", " %", 100)
+
+
+def _against_before(recording: Recording, limits: QualityLimits, peaks_before_N: Sequence[float]) -> Iterator[Measure]:
+    """The force of a trial that reached its depth against the median of those that did before it."""
+    summary = recording.metadata.get(SUMMARY, {})
+    if recording.tracks_force or not peaks_before_N or summary.get("outcome") != "complete":
+        return
+    peak_N, usual_N = float(summary.get("peak_force_N", "nan")), median(peaks_before_N)
+    text = f"peak force {peak_N:.2f} N, {usual_N:.2f} N in the trials before (another gain, or another site?): off by"
+    yield Measure("peak_off", abs(peak_N / usual_N - 1.0), limits.peak_off, text, " %", 100)
 
 
 def _uncertain_mm(contact: Contact) -> float:

@@ -116,6 +116,21 @@ def test_a_sensor_too_slow_to_see_the_run_in_leaves_the_threshold_as_it_was_aske
         assert run.threshold_N(world) == pytest.approx(waits_for_N)
 
 
+@pytest.mark.parametrize(
+    ("noise_N", "waits_for_N"), [(0.0, 0.05), (0.005, 0.05), (0.02, 0.2), (0.05, 0.5), (0.2, 1.0), (0.5, 2.0)]
+)
+def test_contact_is_detected_at_ten_times_the_noise_but_no_more_than_noise_asks_for(
+    noise_N: float, waits_for_N: float
+) -> None:
+    """What is pressed to tell the surface is 1 N at most; four times the noise is what noise alone does not reach."""
+    world, run = SpringBench().world, APPROACH.begin()
+    for place_mm in (10.0, 10.3, 10.8):
+        world.position_mm, world.force_samples, world.force_N = place_mm, world.force_samples + 1, 0.0
+        run.advance(world, 0.0)
+    world.noise_N = noise_N
+    assert run.threshold_N(world) == pytest.approx(waits_for_N)
+
+
 def test_no_contact_within_the_search_retracts_and_says_so() -> None:
     bench = SpringBench(stiffness_N_mm=0.0)
     bench.run(ZERO, Approach(speed_mm_s=20.0, contact_force_N=0.05, search_to_mm=30.0))

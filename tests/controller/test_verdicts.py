@@ -1,5 +1,6 @@
 """A bad trial is made again, under a name of its own; one that stays bad ends the command with a code of its own."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -104,3 +105,17 @@ def test_a_recording_that_cannot_be_read_is_bad(tmp_path: Path) -> None:
     (tmp_path / "trial_001.mcap").write_bytes(b"nothing of the kind")
     trial = with_quality(TrialInfo("trial_001", "trial_001.mcap", 10.0, 8.0, "complete"), tmp_path, QualityLimits())
     assert trial.quality == "bad" and "not a recording" in trial.reasons[0]
+
+
+def test_a_trial_is_compared_with_those_before_that_reached_the_same_depth(tmp_path: Path) -> None:
+    stroke = Bench().stroke(10.0)
+    made = tables(stroke)
+    for name in NOISY:
+        made["force"][name] = 0.001 * (np.arange(len(made["force"])) % 3)
+    write_recording(tmp_path / "trial_002.mcap", made, metadata(stroke), peak_force_N="5.0")
+    entry = TrialInfo("trial_002", "trial_002.mcap", 10.0, 8.0, "complete", 5.0)
+    before = TrialInfo("trial_001", "trial_001.mcap", 10.0, 8.0, "complete", 10.0, quality="good")
+    others = (replace(before, quality="bad"), replace(before, depth_mm=4.0), replace(before, outcome="force limit"))
+    assert with_quality(entry, tmp_path, QualityLimits(), others).quality == "good"
+    found = with_quality(entry, tmp_path, QualityLimits(), (*others, before))
+    assert found.quality == "usable" and found.measured["peak_off"] == pytest.approx(0.5)

@@ -186,9 +186,9 @@ def recording(stroke: Stroke, path: Path = Path("trial.mcap")) -> Recording:
 
 
 def write_recording(
-    path: Path, streams: dict[str, NDArray[np.void]], about: dict[str, dict[str, str]], finish: bool = True
+    path: Path, streams: dict[str, NDArray[np.void]], about: dict[str, dict[str, str]], finish: bool = True, **said: str
 ) -> None:
-    """A real file with these streams."""
+    """A real file with these streams; ``said`` goes into its summary."""
     writer = RecordingWriter(path, about)
     kinds = {"force": (FORCE, ForceSample), "axis": (AXIS, AxisSample), "loop": (LOOP, LoopSample)}
     for name, table in streams.items():
@@ -197,7 +197,7 @@ def write_recording(
             writer.add(stream.id, stream.pack(kind(*row)))
     writer.flush()
     if finish:
-        writer.finish({"outcome": "complete"})
+        writer.finish({"outcome": "complete"} | said)
     else:
         writer.close()
 

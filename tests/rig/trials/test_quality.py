@@ -185,6 +185,16 @@ def test_the_session_decides_where_it_says_and_the_recording_where_it_does_not()
     assert quality_of(foreign, silent) is None and refusal(foreign, silent) == ""
 
 
+@pytest.mark.parametrize(("gain", "verdict"), [(0.5, "usable"), (1.0, "good"), (1.15, "good"), (2.0, "usable")])
+def test_another_gain_than_in_the_trials_before_is_visible(gain: float, verdict: str) -> None:
+    found = evaluate_trial(trial(peak_force_N=repr(5.6 * gain)), LIMITS, (5.5, 5.6, 5.9))
+    assert found.verdict == verdict
+    if verdict != "good":
+        said = f"peak force {5.6 * gain:.2f} N, 5.60 N in the trials before (another gain, or another site?): off by"
+        assert found.reasons[0].startswith(said)
+    assert evaluate_trial(trial(peak_force_N="2.0", outcome="force limit"), LIMITS, (5.5,)).verdict == "good"
+
+
 def test_a_bad_bound_below_the_good_one_is_refused() -> None:
     with pytest.raises(ValueError, match=r"bad 0\.1 is below good 0\.5"):
         Bounds(good=0.5, bad=0.1)
