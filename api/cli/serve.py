@@ -46,7 +46,7 @@ def serve(
             f"--host {host}: the service has no log-in yet, so it listens on this computer only: {LOCAL[0]}"
         )
     settings = wiring_from(config, overrides)
-    with _listening(host, port) as listening, bench_for(settings) as (wiring, _):
+    with _listening(host, port) as listening, bench_for(settings, refuses=False) as (wiring, _):
         application = build(Service(wiring, sessions, protocols))
         # The server hands on the Ctrl-C that ended it, after an orderly end.
         with contextlib.suppress(KeyboardInterrupt):

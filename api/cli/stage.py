@@ -67,21 +67,25 @@ def bench_process(
 
 @contextmanager
 def bench_for(
-    wiring: Wiring, hide: tuple[str, ...] = (), approaches: bool = True
+    wiring: Wiring, hide: tuple[str, ...] = (), approaches: bool = True, refuses: bool = True
 ) -> Iterator[tuple[Wiring, dict[str, Any]]]:
     """``wiring`` with real endpoints, and what the mock bench said; without a port `mock` there is no mock bench.
 
     Where it ``approaches``, calibrations are read and checked before anything is opened, and a mock sensor that has
-    none is calibrated.
+    none is calibrated. A service only looks and retracts at first: it starts whatever they say (``refuses`` false), and
+    the loop refuses the approach.
     """
-    if approaches:
-        wiring = calibrated(wiring)
+    wiring = calibrated(wiring) if approaches else wiring
+    if approaches and refuses:
         refuse_uncalibrated(wiring, datetime.now(UTC))
     if not wiring.uses_mock:
         yield wiring, {}
         return
     with bench_process(wiring, hide) as (_, endpoints):
-        yield (plugged if approaches else at_endpoints)(wiring, endpoints), endpoints
+        live = plugged(wiring, endpoints) if approaches else at_endpoints(wiring, endpoints)
+        if approaches and refuses:
+            refuse_uncalibrated(live, datetime.now(UTC))
+        yield live, endpoints
 
 
 def plugged(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
@@ -93,9 +97,7 @@ def plugged(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
     if wiring.force.port != MOCK_PORT or wiring.calibration.of_force:
         return live
     known = live.calibration.model_copy(update={"of_force": mock_calibration(live, endpoints)})
-    live = live.model_copy(update={"calibration": known})
-    refuse_uncalibrated(live, datetime.now(UTC))
-    return live
+    return live.model_copy(update={"calibration": known})
 
 
 def at_endpoints(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:

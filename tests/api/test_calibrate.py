@@ -1,5 +1,6 @@
 """`rig calibrate` without a bench: what is asked, what is refused before anybody moves a weight, what files hold."""
 
+import contextlib
 import json
 import sys
 from datetime import UTC, datetime, timedelta
@@ -231,10 +232,26 @@ def test_where_it_cannot_be_kept_that_is_said(
     assert "and again next time: " in capsys.readouterr().err
 
 
-def test_a_wiring_that_contradicts_what_is_kept_is_refused() -> None:
+def test_a_wiring_that_contradicts_what_is_kept_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     stored()
-    with pytest.raises(UsageError, match=r"force.compression positive: the calibration found compression negative"):
-        plugged(built_in(["force.compression=positive"]), ENDPOINTS)
+    monkeypatch.setattr("api.cli.stage.bench_process", lambda *_: contextlib.nullcontext((None, ENDPOINTS)))
+    wrong = built_in(["force.compression=positive"])
+    with (
+        pytest.raises(UsageError, match=r"force.compression positive: the calibration found compression negative"),
+        bench_for(wrong),
+    ):
+        pass
+    with bench_for(wrong, refuses=False) as (live, _):
+        assert live.calibration.of_force is not None  # for the loop, which refuses the approach
+
+
+def test_whoever_only_looks_or_retracts_needs_no_calibration(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mock_calibration, "_made", lambda *_: pytest.fail("calibrated"))
+    real = built_in(["force.port=/dev/ttyUSB0", "axis.port=/dev/ttyACM0", "tracker.port=/dev/ttyUSB1"])
+    with bench_for(real, approaches=False) as (live, _):
+        assert live == real
+    with bench_for(real, refuses=False) as (live, _):
+        assert live == real
 
 
 def test_a_real_sensor_beside_a_mock_axis_is_never_calibrated_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
