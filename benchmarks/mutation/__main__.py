@@ -53,7 +53,7 @@ def main() -> int:
     """Runs what was asked for; the exit code."""
     asked = _arguments()
     subject = Subject(asked.root, tuple(asked.only) or MODULES, asked.tests or TESTS)
-    chosen = _chosen(subject.mutants, asked.sample, asked.seed)
+    chosen = _chosen(_again(subject.mutants, asked.again), asked.sample, asked.seed)
     began = time.monotonic()
     try:
         results = run(subject, chosen, asked.jobs)
@@ -65,7 +65,11 @@ def main() -> int:
         print(sentence)
     _write(asked.json, results)
     modules = _counts(results)
-    low = [] if asked.sample else [path for path, (made, killed) in modules.items() if killed < LEAST_SHARE * made]
+    low = (
+        []
+        if asked.sample or asked.again
+        else [path for path, (made, killed) in modules.items() if killed < LEAST_SHARE * made]
+    )
     for path in low:
         print(f"{path}: {modules[path][1]} of {modules[path][0]} mutants are killed, fewer than {LEAST_SHARE:.0%}")
     print(f"{len(results)} mutants in {time.monotonic() - began:.0f} s")
@@ -83,8 +87,16 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--tests", type=shlex.split, default=(), metavar="ARGUMENTS", help="pytest's arguments")
     parser.add_argument("--survivors", type=Path, default=SURVIVORS, metavar="FILE", help="the list to agree with")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="mutants tried at a time")
+    parser.add_argument("--again", type=Path, default=None, metavar="FILE", help="only what survived in that --json")
     parser.add_argument("--json", type=Path, default=None, metavar="FILE", help="write every verdict there")
     return parser.parse_args()
+
+
+def _again(mutants: Sequence[Mutant], verdicts: Path | None) -> Sequence[Mutant]:
+    if verdicts is None:
+        return mutants
+    survived = {(row["path"], row["mutant"]) for row in json.loads(verdicts.read_text()) if not row["killed"]}
+    return [mutant for mutant in mutants if (mutant.path, mutant.name) in survived]
 
 
 def _chosen(mutants: Sequence[Mutant], sample: int, seed: int | None) -> list[Mutant]:

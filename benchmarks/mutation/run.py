@@ -3,14 +3,17 @@
 import ast
 import json
 import os
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import pytest
+
 from benchmarks.mutation import trials
-from benchmarks.mutation.lines import Tests, traced
+from benchmarks.mutation.lines import RAN, Coverage, Observer, with_probes
 from benchmarks.mutation.mutants import Mutant, enums_of, mutants_of, mutated
 from benchmarks.mutation.trials import Trial, Verdict
 from rig.errors import CheckFailed
@@ -72,10 +75,10 @@ def mutant_id(mutant: Mutant) -> int:
     return hash((mutant.path, mutant.number))
 
 
-def _begin(subject: Subject, mutant: Mutant, tests: Tests) -> Trial:
+def _begin(subject: Subject, mutant: Mutant, tests: Coverage) -> Trial:
     path = subject.root / mutant.path
     place = mutant.place
-    noticing = tests.noticing(mutant.path, place.first_line, place.line, place.at_import)
+    noticing = tests.noticing(mutant.path, place.first_line, place.at_import)
     tree = mutated(path.read_text(), mutant.number, subject.enums)
     return trials.begin(path, _module(mutant.path), tree, noticing, tests.seconds)
 
@@ -89,15 +92,15 @@ def _tell(results: Sequence[Result], of: int) -> None:
         print(f"{len(results)} of {of}, {sum(result.verdict.killed for result in results)} killed", flush=True)
 
 
-def _looked_at(subject: Subject) -> Tests:
-    """Traces the tests in a process of its own, and imports here what they needed of code that is not mutated."""
+def _looked_at(subject: Subject) -> Coverage:
+    """Runs the tests once with probes, in a process of its own; imports here what they needed of code not mutated."""
     told, tell = os.pipe()
     pid = os.fork()
     if pid == 0:
         os.close(told)
         with open(os.devnull, "w") as nothing:  # noqa: PTH123 - a descriptor is wanted
             os.dup2(nothing.fileno(), 1)
-        tests = traced([*trials.OPTIONS, *subject.tests], subject.root, subject.paths)
+        tests = _observed(subject)
         with os.fdopen(tell, "w") as pipe:
             json.dump([{test: sorted(lines) for test, lines in tests.lines.items()}, tests.seconds, tests.failed,
                        trials.imported()], pipe)  # fmt: skip
@@ -110,10 +113,20 @@ def _looked_at(subject: Subject) -> Tests:
     if failed or not lines:
         raise CheckFailed(f"without any mutant tests fail: {', '.join(failed) or 'none was found'}; mend them first")
     trials.warm(modules)
-    return Tests({test: {(path, line) for path, line in places} for test, places in lines.items()}, seconds, [])
+    return Coverage({test: {(path, line) for path, line in places} for test, places in lines.items()}, seconds, [])
 
 
-def _check_unchanged(subject: Subject, tests: Tests) -> None:
+def _observed(subject: Subject) -> Coverage:
+    ran: dict[str, dict[int, int]] = {path: {} for path in subject.paths}
+    trees = {path: with_probes(ast.parse((subject.root / path).read_text())) for path in subject.paths}
+    codes = {_module(path): compile(tree, str(subject.root / path), "exec") for path, tree in trees.items()}
+    sys.meta_path.insert(0, trials.Instead(codes, {_module(path): {RAN: ran[path]} for path in subject.paths}))
+    observer = Observer(ran)
+    pytest.main([*trials.OPTIONS, *subject.tests], plugins=[observer])
+    return observer.tests
+
+
+def _check_unchanged(subject: Subject, tests: Coverage) -> None:
     """A file put in its own place must pass all tests, or every mutant would be killed by the way it is tried."""
     for path in subject.paths:
         tree = ast.parse((subject.root / path).read_text())

@@ -36,11 +36,11 @@ REWRITTEN = "ignore::pytest.PytestAssertRewriteWarning"
 OPTIONS = ("-q", "-m", "not bench", "-p", "no:xdist", "--timeout=0", "--hypothesis-seed=0", "-W", REWRITTEN)
 
 
-class _Instead(importlib.abc.MetaPathFinder, importlib.abc.Loader):
-    """Imports one module from code given."""
+class Instead(importlib.abc.MetaPathFinder, importlib.abc.Loader):
+    """Imports modules from code given, each by its name; ``extra`` stands among each module's names."""
 
-    def __init__(self, name: str, path: Path, code: CodeType) -> None:
-        self._name, self._path, self._code = name, path, code
+    def __init__(self, codes: Mapping[str, CodeType], extra: Mapping[str, Mapping[str, object]] | None = None) -> None:
+        self._codes, self._extra = codes, extra or {}
 
     def find_spec(
         self,
@@ -48,12 +48,13 @@ class _Instead(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         path: Sequence[str] | None,  # noqa: ARG002
         target: ModuleType | None = None,  # noqa: ARG002
     ) -> importlib.machinery.ModuleSpec | None:
-        if fullname != self._name:
+        if fullname not in self._codes:
             return None
-        return importlib.machinery.ModuleSpec(fullname, self, origin=str(self._path))
+        return importlib.machinery.ModuleSpec(fullname, self, origin=self._codes[fullname].co_filename)
 
     def exec_module(self, module: ModuleType) -> None:
-        exec(self._code, module.__dict__)
+        module.__dict__.update(self._extra.get(module.__name__, {}))
+        exec(self._codes[module.__name__], module.__dict__)
 
 
 class _Budget:
@@ -139,17 +140,17 @@ def imported() -> list[str]:
 
 def begin(path: Path, module: str, tree: ast.Module, tests: Sequence[str], seconds: Mapping[str, float]) -> Trial:
     """Starts a trial of ``tree`` in place of ``module``."""
-    code = compile(tree, str(path), "exec")
+    instead = Instead({module: compile(tree, str(path), "exec")})
     told, tell = os.pipe()
     pid = os.fork()
     if pid == 0:
         os.setpgid(0, 0)
-        os._exit(_run(_Instead(module, path, code), _Budget(tests, seconds, tell), tests))
+        os._exit(_run(instead, _Budget(tests, seconds, tell), tests))
     os.close(tell)
     return Trial(pid, told, time.monotonic())
 
 
-def _run(instead: _Instead, budget: _Budget, tests: Sequence[str]) -> int:
+def _run(instead: Instead, budget: _Budget, tests: Sequence[str]) -> int:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     nothing = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):

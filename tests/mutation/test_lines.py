@@ -1,0 +1,48 @@
+"""Probes change nothing of what the code does and name every statement that ran."""
+
+import ast
+from typing import Any
+
+from benchmarks.mutation.lines import RAN, Coverage, with_probes
+
+SOURCE = '''
+def sign(x):
+    """A docstring."""
+    if x > 0:
+        return 1
+    elif x < 0:
+        return -1
+    try:
+        y = 1 / x
+    except ZeroDivisionError:
+        y = 0
+    finally:
+        done = True
+    match y:
+        case 0:
+            return [
+                0,
+            ][0]
+'''
+
+
+def ran(x: int) -> tuple[object, list[int]]:
+    names: dict[str, Any] = {RAN: {}}
+    exec(compile(with_probes(ast.parse(SOURCE)), "sign", "exec"), names)
+    return names["sign"](x), sorted(names[RAN])
+
+
+def test_each_statement_that_ran_is_named_by_its_first_line() -> None:
+    assert ran(5) == (1, [3, 4, 5])
+    assert ran(-5) == (-1, [3, 4, 6, 7])
+    assert ran(0) == (0, [3, 4, 6, 8, 9, 11, 13, 14, 16])
+
+
+def test_a_change_in_a_function_is_for_the_tests_that_run_it_and_a_constant_for_all_those_of_its_file_first() -> None:
+    tests = Coverage(
+        lines={"slow": {("a.py", 1), ("a.py", 2)}, "quick": {("a.py", 1)}, "other": {("b.py", 1)}},
+        seconds={"slow": 2.0, "quick": 0.1, "other": 0.0},
+    )
+    assert tests.noticing("a.py", 1, at_import=False) == ["quick", "slow"]
+    assert tests.noticing("a.py", 2, at_import=False) == ["slow"]
+    assert tests.noticing("a.py", 7, at_import=True) == ["quick", "slow", "other"]
