@@ -31,6 +31,7 @@ MODULES = (
     "controller/safety_checks.py",
     "controller/watch.py",
     "controller/force_watch.py",
+    "controller/giving_way.py",
     "controller/health.py",
     "controller/bench_loop.py",
     "controller/attending.py",
@@ -41,12 +42,29 @@ MODULES = (
     "controller/touch.py",
     "controller/supervisor.py",
     "controller/loop_client.py",
+    "controller/stop/word.py",
+    "controller/stop/start.py",
+    "controller/stop/keypad.py",
+    "controller/stop/http.py",
+    "controller/stop/server.py",
+    "controller/stop/client.py",
 )
-# Tests of the compiled control law and of its design take minutes and run no line of these that others do not.
-SLOW = ("simulated", "extended_gain", "force_position", "laws", "comparison", "lines", "references")
-# A portion of an estimate within its share of a cycle: a question of time, which trials share a computer for.
-TIMED = "tests/controller/test_touch.py::test_a_portion_of_the_estimate_leaves_the_loop_its_cycle"
-TESTS = ("tests/controller", f"--deselect={TIMED}", *(f"--ignore=tests/controller/test_{name}.py" for name in SLOW))
+# Left out of the tests that are to notice: those of the compiled control law and of its design, of calibrations, of
+# whole physics (a minute, and other tests run the same lines), and those that measure time, which trials share.
+LEFT_OUT = (
+    "simulated", "extended_gain", "force_position", "laws", "comparison", "lines", "references", "registration",
+    "motion_and_grid", "commissioning", "force_calibration", "axis_calibration", "force_limit", "giving_way",
+)  # fmt: skip
+TIMED = (
+    "test_touch.py::test_a_portion_of_the_estimate_leaves_the_loop_its_cycle",
+    "stop/test_word.py::test_a_look_without_a_request_costs_the_loop_less_than_two_microseconds",
+)
+FOLDER = "tests/controller"
+TESTS = (
+    FOLDER,
+    *(f"--ignore={FOLDER}/test_{name}.py" for name in LEFT_OUT),
+    *(f"--deselect={FOLDER}/{test}" for test in TIMED),
+)
 
 
 def main() -> int:
@@ -55,8 +73,15 @@ def main() -> int:
     subject = Subject(asked.root, tuple(asked.only) or MODULES, asked.tests or TESTS)
     chosen = _chosen(_again(subject.mutants, asked.again), asked.sample, asked.seed)
     began = time.monotonic()
+
+    def tell(results: Sequence[Result]) -> None:
+        print(
+            f"{len(results)} of {len(chosen)}, {_killed(results)} killed, {time.monotonic() - began:.0f} s", flush=True
+        )
+        _write(asked.json, results)
+
     try:
-        results = run(subject, chosen, asked.jobs)
+        results = run(subject, chosen, asked.jobs, tell)
     except CheckFailed as error:
         print(error, file=sys.stderr)
         return 1
@@ -73,7 +98,7 @@ def main() -> int:
     for path in low:
         print(f"{path}: {modules[path][1]} of {modules[path][0]} mutants are killed, fewer than {LEAST_SHARE:.0%}")
     print(f"{len(results)} mutants in {time.monotonic() - began:.0f} s")
-    made, killed = len(results), sum(result.verdict.killed for result in results)
+    made, killed = len(results), _killed(results)
     print(json.dumps({"mutants": made, "killed": killed, "share": round(killed / max(made, 1), 4), "modules": modules}))
     return 1 if wrong or low else 0
 
@@ -105,6 +130,10 @@ def _chosen(mutants: Sequence[Mutant], sample: int, seed: int | None) -> list[Mu
     seed = random.SystemRandom().randrange(1 << 32) if seed is None else seed
     print(f"a sample of {sample} of {len(mutants)} mutants, --seed {seed}", flush=True)
     return random.Random(seed).sample(list(mutants), min(sample, len(mutants)))
+
+
+def _killed(results: Sequence[Result]) -> int:
+    return sum(result.verdict.killed for result in results)
 
 
 def _counts(results: Sequence[Result]) -> dict[str, list[int]]:

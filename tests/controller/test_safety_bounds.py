@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from controller import safety_checks
-from controller.force_watch import Load
+from controller.force_watch import UNKNOWN, Load
 from controller.modes import Mode
 from controller.safety import TABLE, Action, Check, Incident, evaluate
 from controller.watch import Watch
@@ -25,13 +25,14 @@ LINES = [
     ("axis_frozen", IMMEDIATE, 0.45, False),
     ("overspeed", IMMEDIATE, 0.1, False),
     ("workspace", IMMEDIATE, 0.1, False),
-    ("force_limit", SOFT, 0.1, False),
-    ("torque_limit", SOFT, 0.1, False),
+    ("force_limit", SOFT, 0.1, True),
+    ("torque_limit", SOFT, 0.1, True),
+    ("pushed", SOFT, 0.1, True),
     ("pain_stop", SOFT, 0.1, True),
     ("operator_stop", SOFT, 0.1, True),
     ("force_lost", SOFT, 0.6, False),
     ("force_invalid", SOFT, 0.1, False),
-    ("force_rate", SOFT, 0.1, False),
+    ("force_rate", SOFT, 0.1, True),
     ("depth_limit", SOFT, 0.1, False),
     ("tracker_lost", SOFT, 0.6, False),
     ("patient_moved", SOFT, 0.3, False),
@@ -50,6 +51,10 @@ def load(**parts: float) -> dict[str, Any]:
 
 def asked(*requests: str) -> dict[str, Any]:
     return {"requests": frozenset(requests)}
+
+
+def resting(force_N: float, rest_N: float, mode: Mode = Mode.SAFE) -> dict[str, Any]:
+    return {**load(force_N=force_N, predicted_N=force_N), "rest_N": rest_N, "mode": mode}
 
 
 def wiring(**sections: dict[str, Any]) -> Wiring:
@@ -100,8 +105,16 @@ CASES = [
     Case("torque_limit", load(torque_N_m=0.5), load(torque_N_m=0.501),
          "torque 0.501 N m is above limits.torque_N_m, 0.5 N m"),
     Case("torque_limit", {}, load(torque_N_m=math.nan), "torque nan N m is above limits.torque_N_m, 0.5 N m"),
+    Case("pushed", resting(6.0, 1.0), resting(6.01, 1.0),
+         "the limb pushes: 5.01 N more than when the tip came to rest (limits.pushed_N 5 N)"),
+    Case("pushed", resting(9.0, 1.0, mode=Mode.COMPRESS), resting(9.0, 1.0, mode=Mode.IDLE),
+         "the limb pushes: 8.00 N more than when the tip came to rest (limits.pushed_N 5 N)"),
+    Case("pushed", resting(9.0, math.nan), resting(7.5, 1.0, mode=Mode.SAFE),
+         "the limb pushes: 6.50 N more than when the tip came to rest (limits.pushed_N 5 N)"),
     Case("pain_stop", asked("stop"), {**asked("pain"), "force_N": 7.25}, "the subject's pain stop at 7.25 N"),
     Case("operator_stop", asked("pain"), asked("stop"), "stopped by the operator"),
+    Case("operator_stop", asked("pain"), asked("stop", "keypad"),
+         "the keypad or foot switch for stops is gone: plug it in, then acknowledge the stop"),
     Case("force_lost", {"force_age_ms": 4.0}, {"force_age_ms": 5.0}, "force: newest sample is 5 ms old (limit 4 ms)"),
     Case("force_lost", {}, {"force_lost": "cable"}, "force sensor lost: cable"),
     Case("force_invalid", {}, {"force_valid": False},
@@ -137,7 +150,8 @@ CASES = [
 
 def found(line: Check, case: Case, change: dict[str, Any]) -> str:
     """What a line of the table says of a quiet bench with ``change``."""
-    world, watch = World(position_mm=20.0, load=QUIET, wrench=WRENCH, force_N=0.0), Watch()
+    world = World(position_mm=20.0, load=QUIET, wrench=WRENCH, force_N=0.0)
+    watch = Watch(mode=Mode.COMPRESS)
     for name, value in change.items():
         setattr(watch if hasattr(watch, name) else world, name, value)
     return line.evaluate(world, watch, case.wiring)
@@ -169,6 +183,29 @@ def test_every_line_has_a_case() -> None:
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.code}-{case.sentence[:30]}")
 def test_what_one_check_stops_at_no_other_does(case: Case) -> None:
     assert [line.code for line in TABLE if found(line, case, case.beyond)] == [case.code]
+
+
+@pytest.mark.parametrize("code", ["force_limit", "torque_limit", "force_rate", "pushed"])
+@pytest.mark.parametrize("mode", [Mode.IDLE, Mode.SAFE])
+@pytest.mark.parametrize(
+    "unfelt",
+    [
+        {"force_lost": "cable"},
+        {"force_valid": False},
+        {"force_age_ms": 4.1},
+        {"load": QUIET._replace(torque_N_m=math.nan)},
+    ],
+)
+def test_at_rest_the_axis_gives_way_only_to_what_is_felt_now(code: str, mode: Mode, unfelt: dict[str, Any]) -> None:
+    much = {**load(force_N=49.0, predicted_N=49.0, torque_N_m=4.0, rate_N_s=4000.0), "rest_N": 1.0, "mode": mode}
+    assert found(line_of(code), CASES[0], {**much, "force_age_ms": 4.0})
+    assert found(line_of(code), CASES[0], {**much, **unfelt}) == ""
+
+
+@pytest.mark.parametrize("code", ["force_limit", "torque_limit", "force_rate"])
+def test_while_the_tip_moves_what_is_not_known_is_a_stop_too(code: str) -> None:
+    nothing = {"load": UNKNOWN._replace(rate_N_s=math.nan), "force_lost": "cable", "mode": Mode.COMPRESS}
+    assert found(line_of(code), CASES[0], nothing)
 
 
 def test_without_a_tracker_no_tracker_can_be_lost() -> None:
