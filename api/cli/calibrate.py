@@ -1,5 +1,6 @@
 """`rig calibrate`: force sensor against known weights, axis against tracker or gauge block."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -8,7 +9,7 @@ import typer
 from api.cli.asking import Person
 from api.cli.calibrate_axis import AxisAsked, calibrate_axis
 from api.cli.calibrate_force import ForceAsked, Load, calibrate_force
-from api.cli.calibration_output import keep, refuse_out
+from api.cli.calibration_output import keep, refuse_out, refuse_unfit
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_file, wiring_from
 from api.cli.output import write_json
 from rig.config.calibration import AxisCalibration, ForceCalibration
@@ -68,6 +69,7 @@ def calibrate(
     else:
         way = AxisAsked(from_mm, to_mm, clear, toward_limb, gauge_block_mm, near_mm)
         found = calibrate_axis(wiring, way, Person(pause))
+    refuse_unfit(wiring.calibration, found, datetime.now(UTC))
     path = keep(what, found, out, (wiring_file(config) or Path()).parent)
     write_json(json_file, {"file": str(path), **found.model_dump(mode="json")})
 

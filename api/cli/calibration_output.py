@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Literal
 
 from api.cli.output import console
-from rig.config.calibration import AxisCalibration, ForceCalibration
+from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
 from rig.config.calibration_files import text_of
-from rig.errors import UsageError
+from rig.errors import CheckFailed, UsageError
 from rig.recording.files import make_folder, refuse_unwritable, whole_file
 
 FOLDER = Path("calibration")
@@ -20,6 +20,14 @@ def refuse_out(out: Path | None) -> None:
     if out and out.exists():
         raise UsageError(f"{out}: exists already; calibrations are never overwritten, give --out another name")
     refuse_unwritable(out or FOLDER / "new.json")
+
+
+def refuse_unfit(stated: Calibration, found: ForceCalibration | AxisCalibration, now: datetime) -> None:
+    """Raises CheckFailed where the new calibration is not as good as the wiring states: it would be refused at use."""
+    role = "of_force" if isinstance(found, ForceCalibration) else "of_axis"
+    reasons = stated.model_copy(update={"of_force": None, "of_axis": None, role: found}).unfit(now)
+    if reasons:
+        raise CheckFailed("; ".join(reasons))
 
 
 def keep(what: What, found: ForceCalibration | AxisCalibration, out: Path | None, wiring_folder: Path) -> Path:

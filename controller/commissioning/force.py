@@ -17,7 +17,7 @@ from controller.commissioning.readings import Reading
 from controller.commissioning.weights import Weights
 from drivers.roles import Identity
 from rig.config.calibration import ForceCalibration, Load, Uncertainty
-from rig.config.force_map import CHANNELS, Matrix, Vector
+from rig.config.force_map import CHANNELS, ForceMap, Matrix, Vector
 from rig.config.wiring import Force
 from rig.errors import CheckFailed
 
@@ -74,7 +74,7 @@ def calibration_of(
     readings = np.array([one.reading.mean for one in taken])
     slopes, zeros = np.polyfit(loads, readings, 1)
     at = CHANNELS.index(config.axis)
-    sign = 1.0 if config.compression == "positive" else -1.0
+    sign = ForceMap(config.axis, config.compression).sign
     gain = sign * float(slopes[at])
     residuals_N = readings[:, at] - slopes[at] * loads - zeros[at]
     _refuse_drift(taken, loads)

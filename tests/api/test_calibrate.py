@@ -13,12 +13,13 @@ from api.cli import mock_calibration
 from api.cli.app import build
 from api.cli.asking import Person
 from api.cli.calibrate_axis import AxisAsked, calibrate_axis
-from api.cli.calibration_output import keep, refuse_out
+from api.cli.calibration_output import keep, refuse_out, refuse_unfit
 from api.cli.mock_calibration import mock_file, state_folder
 from api.cli.options import built_in, calibrated, wiring_from
 from api.cli.stage import bench_for, plugged
+from rig.config.calibration import Calibration, Uncertainty
 from rig.config.calibration_files import read_force, text_of
-from rig.errors import UsageError
+from rig.errors import CheckFailed, UsageError
 from tests.calibrations import axis_calibration, force_calibration
 
 runner = CliRunner()
@@ -118,6 +119,15 @@ def test_a_calibration_is_written_whole_and_its_line_is_relative_to_the_wiring(
     assert [file.name for file in (own_state / "calibration").iterdir()] == [path.name]
     with pytest.raises(UsageError, match="exists already"):
         refuse_out(path)
+
+
+def test_one_less_certain_than_the_wiring_states_is_not_written() -> None:
+    unsure = Uncertainty(combined=0.03, repeatability=0.001, weights=0.029, linearity=0.002)
+    with pytest.raises(CheckFailed, match=r"is uncertain by 3 %, calibration.max_uncertainty is 2 %"):
+        refuse_unfit(Calibration(), force_calibration(uncertainty=unsure), datetime.now(UTC))
+    refuse_unfit(Calibration(max_uncertainty=0.05), force_calibration(uncertainty=unsure), datetime.now(UTC))
+    with pytest.raises(CheckFailed, match=r"calibration.max_uncertainty is 0.1 %"):
+        refuse_unfit(Calibration(max_uncertainty=0.001), axis_calibration(), datetime.now(UTC))
 
 
 def test_calibration_paths_are_beside_the_wiring_file(own_state: Path) -> None:
