@@ -163,6 +163,7 @@ class PortHandles:
 
 
 def _hex(digits: str) -> int:
-    if not digits or set(digits) - set("0123456789ABCDEF"):
+    """A number in either case, as the clients of the maker and of others write it."""
+    if not digits or set(digits) - set("0123456789ABCDEFabcdef"):
         raise Refused(0x07)
     return int(digits, 16)
