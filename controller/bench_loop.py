@@ -8,6 +8,7 @@ from typing import Protocol
 from controller import attending
 from controller.connections import Connections
 from controller.devices import Devices, openers
+from controller.first_touch import FirstTouch
 from controller.force_watch import ForceWatch, calibrated_zero
 from controller.giving_way import give_way
 from controller.health import IDENTICAL_LIMIT, Standstill, StreamHealth
@@ -42,6 +43,7 @@ from rig.errors import DeviceError
 STATUS_EVERY_S = 0.05
 TEXT_BYTES = 160
 TIP, ARM = 0, 1
+TOUCHING = (Mode.APPROACH, Mode.COMPRESS, Mode.CONTACT)
 # A sample this many periods old is not acted on; when it counts as lost is for the safety table to say.
 LATE_PERIODS = 5
 
@@ -89,6 +91,7 @@ class BenchLoop:
         self._status_every = max(1, round(STATUS_EVERY_S / period_s))
         self._ticks = self._events = self._program = 0
         self._force_watch = ForceWatch(devices.force.period_ns)
+        self._first_touch = FirstTouch(wiring)
         self._calibrated_zero = calibrated_zero(wiring)
         self._force_map = wiring.force_map
         self.braked = False
@@ -196,14 +199,14 @@ class BenchLoop:
         self.published["tracker"] = sample.seq
         if sample.tool == 0:
             self.health["marker"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample.frame)
-        if sample.valid:
+        if sample.valid and math.isfinite(sample.x_mm + sample.y_mm + sample.z_mm):
             at = Point(sample.x_mm, sample.y_mm, sample.z_mm)
             if sample.tool == TIP:
                 self._registration.tip(sample.frame, sample.capture_ns, at)
             elif sample.tool == ARM:
                 self._limb_seen_ns = sample.capture_ns
                 self._registration.arm(sample.frame, at)
-        self.world.patient_mm = self._registration.moved_mm
+        self.world.patient_mm, self.world.axis_scale = self._registration.moved_mm, self._registration.scale
 
     def _look(self, now_ns: int, slot: Slot) -> None:
         world, watch, health = self.world, self.watch, self.health
@@ -215,6 +218,7 @@ class BenchLoop:
         )
         world.force_late = health["force"].age_ns(now_ns) > LATE_PERIODS * health["force"].period_ns
         world.following_mm = world.setpoint.position_mm - world.position_mm if self.machine.busy else 0.0
+        watch.touch_wrong = self._first_touch.update(world) if self.machine.mode in TOUCHING else ""
         watch.force_valid, watch.force_frozen = health["force"].valid, health["force"].frozen
         watch.force_age_ms = health["force"].age_ns(now_ns) * 1e-6
         watch.axis_age_ms = health["axis"].age_ns(now_ns) * 1e-6
@@ -265,7 +269,8 @@ class BenchLoop:
         self._program = number
         self._registration.begin()
         self._standstill.begin()
-        self.world.standstill_mm = 0.0
+        self._first_touch.begin()
+        self.world.standstill_mm, self.world.axis_scale = 0.0, None
         self.machine.start(program)
 
     def release(self) -> None:

@@ -177,7 +177,8 @@ class Machine:
         low_mm, high_mm = self._wiring.limits.position_min_mm, self._wiring.limits.position_max_mm
         if low_mm <= wanted_mm <= high_mm:
             return None
-        self.world.setpoint = Setpoint(min(max(wanted_mm, low_mm), high_mm), 0.0)
+        bounded_mm = min(max(wanted_mm, low_mm), high_mm) if math.isfinite(wanted_mm) else self._here().position_mm
+        self.world.setpoint = Setpoint(bounded_mm, 0.0)
         text = f"the program leads to {wanted_mm:.2f} mm, outside {low_mm:g} to {high_mm:g} mm"
         return Incident(Action.SOFT, "workspace", text)
 

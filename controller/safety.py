@@ -57,6 +57,10 @@ STANDSTILL_S = 0.45
 PATIENT_S = 0.3
 # RECORDER_SILENT_S, and one turn.
 RECORDER_S = check.RECORDER_SILENT_S + TURN_S
+# From the first load: 1 N of the softest tissue (0.1 N/mm) at the 5 mm/s of an approach.
+TOUCH_S = 2.0
+# From the first motion: 2 mm of it at 1 mm/s, and one turn.
+SCALE_S = 2.0 + TURN_S
 # The lease of 3 s, and one turn; what says by itself that nobody is there is faster.
 OPERATOR_S = 3.0 + TURN_S
 
@@ -76,6 +80,8 @@ TABLE: tuple[Check, ...] = (
     Check("force_lost", Action.SOFT, check.force_lost, STALE_S),
     Check("force_invalid", Action.SOFT, check.force_invalid, TURN_S),
     Check("force_rate", Action.SOFT, check.force_rate, TURN_S, at_rest=True),
+    Check("first_touch", Action.SOFT, check.first_touch, TOUCH_S),
+    Check("axis_scale", Action.SOFT, check.axis_scale, SCALE_S),
     Check("depth_limit", Action.SOFT, check.depth, TURN_S),
     Check("tracker_lost", Action.SOFT, check.tracker_lost, STALE_S),
     Check("patient_moved", Action.SOFT, check.patient_moved, PATIENT_S),

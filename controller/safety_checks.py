@@ -11,6 +11,8 @@ from controller.watch import Watch
 from controller.world import World
 from rig.config.wiring import Wiring
 
+# 0.4 mm of 8 mm of depth; over 8 mm a tracker's own scale is off by 0.02 at most (0.12 mm rms over its volume).
+SCALE_TOLERANCE = 0.05
 RECORDER_FILL = 0.5
 RECORDER_SILENT_S = 3.0
 RETRACTING_MARGIN_MM = 1.0
@@ -133,6 +135,22 @@ def force_rate(world: World, watch: Watch, wiring: Wiring) -> str:
         return ""
     rate_N_s, limit_N_s = world.load.rate_N_s, wiring.limits.force_rate_N_s
     return "" if rate_N_s <= limit_N_s else f"force changes by {rate_N_s:.0f} N/s (limit {limit_N_s:g} N/s)"
+
+
+def first_touch(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The sensor does not answer a touch as it was calibrated."""
+    return watch.touch_wrong
+
+
+def axis_scale(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The tracker sees the tip go another way than the axis says, beyond tolerance and chance."""
+    seen = world.axis_scale
+    if seen is None or (seen.high >= 1.0 - SCALE_TOLERANCE and seen.low <= 1.0 + SCALE_TOLERANCE):
+        return ""
+    return (
+        f"the tracker sees {seen.low:.3f} to {seen.high:.3f} mm for each mm of the axis (1 within"
+        f" {SCALE_TOLERANCE:g}): check axis.increments_per_mm, then `rig calibrate axis`"
+    )
 
 
 def depth(world: World, watch: Watch, wiring: Wiring) -> str:

@@ -66,9 +66,10 @@ class ZeroRun:
         fx_N, fy_N, fz_N, mx_N_m, my_N_m, mz_N_m = (fmean(channel) for channel in zip(*self._wrenches, strict=True))
         zero = (fx_N, fy_N, fz_N, mx_N_m, my_N_m, mz_N_m)
         _refuse_drift(zero, world.reference_zero or zero)
-        world.reference_zero = world.reference_zero or zero
+        world.zero, world.reference_zero = zero, world.reference_zero or zero
         world.zero_N = fmean(self._values_N)
         world.noise_N = pstdev(self._values_N, world.zero_N)
+        world.noise_N_m = math.sqrt(fmean(math.dist(wrench[3:], zero[3:]) ** 2 for wrench in self._wrenches))
         return True
 
 

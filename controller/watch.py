@@ -16,6 +16,7 @@ class Watch:
     drive_fault: str = ""
     force_valid: bool = True
     force_frozen: bool = False
+    touch_wrong: str = ""
     force_age_ms: float = 0.0
     axis_age_ms: float = 0.0
     marker_age_ms: float = 0.0

@@ -7,6 +7,7 @@ from controller.force_position import Memory
 from controller.force_watch import NAN_WRENCH, UNKNOWN, Load, Wrench
 from controller.motion import Setpoint, arrived, toward
 from controller.paired import PairedSamples, Touch
+from controller.registration import Interval
 
 
 @dataclass(slots=True)
@@ -14,8 +15,8 @@ class World:
     """State shared by steps and safety, owned by the machine.
 
     ``raw_N``, ``zero_N`` and ``force_N`` are the configured channel with its sign, compression positive; what safety
-    looks at, ``load``, is all channels from ``reference_zero``, the first zero of the session. ``rest_N`` is the
-    smallest load since the tip came to rest, NaN while it moves.
+    looks at, ``load``, is all channels from ``reference_zero``, the first zero of the session; ``zero`` is the last.
+    ``rest_N`` is the smallest load since the tip came to rest, NaN while it moves.
     """
 
     setpoint: Setpoint = field(default_factory=lambda: Setpoint(0.0, 0.0))
@@ -23,12 +24,14 @@ class World:
     dt_s: float = 0.001
     acceleration_mm_s2: float = 2000.0
     wrench: Wrench = NAN_WRENCH
+    zero: Wrench | None = None
     reference_zero: Wrench | None = None
     load: Load = UNKNOWN
     rest_N: float = math.nan
     raw_N: float = math.nan
     force_samples: int = 0
     noise_N: float = 0.0
+    noise_N_m: float = 0.0
     force_N: float = math.nan
     force_late: bool = False
     position_mm: float = math.nan
@@ -36,6 +39,7 @@ class World:
     following_mm: float = 0.0
     standstill_mm: float = 0.0
     patient_mm: float = math.nan
+    axis_scale: Interval | None = None
     zero_N: float = math.nan
     surface_mm: float = math.nan
     reference_N: float = math.nan

@@ -96,6 +96,7 @@ class PlantForce(FakeForce):
 
     product: Product = BOTA
     channel: int = 2
+    lever_m: float = 0.0015
     noise: random.Random = field(default_factory=lambda: random.Random(1))
 
     @property
@@ -110,6 +111,7 @@ class PlantForce(FakeForce):
         along = [-sensed_N if at == self.channel else 0.0 for at in range(3)]
         fx_N, fy_N, fz_N = (self._converted(sum(parts)) for parts in zip(along, self.sideways_N, strict=True))
         mx, my, mz = (moment + self.noise.gauss(0.0, self.product.noise_N_m) for moment in self.moment_N_m)
+        mx -= self.lever_m * self.axis.state.sensed_N
         number = len(self.samples) + len(self._held)
         return ForceSample(
             number, captured_ns, captured_ns, 0, fx_N, fy_N, fz_N, mx, my, mz, math.nan, 0, int(self.valid)
@@ -136,7 +138,7 @@ class PlantBench(FakeBench):
         self.axis: PlantAxis = PlantAxis(
             self.clock, self.period_ns, position_mm=15.0, limb=limb, filter_s=product.filter_s, state=at_rest(15.0)
         )
-        self.force = PlantForce(
+        self.force: PlantForce = PlantForce(
             self.clock, round(1e9 / product.rate_Hz), axis=self.axis, wiring=self.wiring, product=product,
             noise=random.Random(seed), latency_ns=product.latency_ns,
         )  # fmt: skip

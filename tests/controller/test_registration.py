@@ -62,3 +62,42 @@ def test_a_new_program_starts_from_where_the_limb_is() -> None:
     registration.begin()
     frames(registration, APPROACHING, start=240, limb=(20.0, 0.0, 0.0))
     assert registration.moved_mm < 0.5
+
+
+def scale_of(scale: float, positions_mm: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Registration:
+    """The registration of an axis that says ``positions_mm`` and goes ``scale`` times as far."""
+    registration = Registration()
+    for frame, position_mm in enumerate(positions_mm):
+        captured_ns = frame * 16_666_667
+        registration.axis(captured_ns, position_mm)
+        tip = TIP + DIRECTION * scale * position_mm + np.random.default_rng(frame).normal(0, 0.06, 3)
+        registration.tip(frame, captured_ns, Point(*tip))
+    return registration
+
+
+def test_the_scale_of_the_axis_is_unknown_until_it_has_travelled_two_millimetres() -> None:
+    assert scale_of(1.0, np.linspace(0.0, 1.9, 60)).scale is None
+    assert scale_of(1.0, np.linspace(0.0, 2.1, 15)).scale is None
+    assert scale_of(1.0, np.linspace(0.0, 2.1, 60)).scale is not None
+
+
+@pytest.mark.parametrize("scale", [0.5, 0.9, 1.0, 2.0])
+def test_the_interval_of_the_scale_holds_the_truth_and_is_as_wide_as_its_closed_form(scale: float) -> None:
+    positions_mm = np.linspace(0.0, 7.9, 96)
+    known = scale_of(scale, positions_mm).scale
+    assert known is not None and known.low < scale < known.high
+    spread = float(np.sum((positions_mm - positions_mm.mean()) ** 2))
+    assert (known.high - known.low) / 2 == pytest.approx(3.29 * 0.06 / math.sqrt(spread), rel=0.15)
+
+
+def test_a_frame_between_two_samples_of_the_axis_is_placed_between_them() -> None:
+    registration = Registration()
+    for sample in range(12):
+        registration.axis(sample * 100_000_000, 1.0 * sample)
+    for frame in range(60):
+        captured_ns = frame * 16_666_667
+        place = TIP + np.array([0.0, 0.0, 1.0]) * captured_ns * 1e-8
+        registration.tip(frame, captured_ns, Point(*place))
+    assert registration.scale is not None
+    assert registration.scale.high - registration.scale.low < 1e-3
+    assert registration.scale.low == pytest.approx(1.0, abs=1e-3)

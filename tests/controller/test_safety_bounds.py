@@ -10,6 +10,7 @@ import pytest
 from controller import safety_checks
 from controller.force_watch import UNKNOWN, Load
 from controller.modes import Mode
+from controller.registration import Interval
 from controller.safety import TABLE, Action, Check, Incident, evaluate
 from controller.watch import Watch
 from controller.world import World
@@ -33,6 +34,8 @@ LINES = [
     ("force_lost", SOFT, 0.6, False),
     ("force_invalid", SOFT, 0.1, False),
     ("force_rate", SOFT, 0.1, True),
+    ("first_touch", SOFT, 2.0, False),
+    ("axis_scale", SOFT, 2.1, False),
     ("depth_limit", SOFT, 0.1, False),
     ("tracker_lost", SOFT, 0.6, False),
     ("patient_moved", SOFT, 0.3, False),
@@ -111,6 +114,13 @@ CASES = [
          "the limb pushes: 8.00 N more than when the tip came to rest (limits.pushed_N 5 N)"),
     Case("pushed", resting(9.0, math.nan), resting(7.5, 1.0, mode=Mode.SAFE),
          "the limb pushes: 6.50 N more than when the tip came to rest (limits.pushed_N 5 N)"),
+    Case("first_touch", {"touch_wrong": ""}, {"touch_wrong": "another channel answers"}, "another channel answers"),
+    Case("axis_scale", {"axis_scale": Interval(0.9, 0.95)}, {"axis_scale": Interval(0.9, 0.949)},
+         "the tracker sees 0.900 to 0.949 mm for each mm of the axis (1 within 0.05): check axis.increments_per_mm,"
+         " then `rig calibrate axis`"),
+    Case("axis_scale", {"axis_scale": Interval(1.05, 1.1)}, {"axis_scale": Interval(1.051, 1.1)},
+         "the tracker sees 1.051 to 1.100 mm for each mm of the axis (1 within 0.05): check axis.increments_per_mm,"
+         " then `rig calibrate axis`"),
     Case("pain_stop", asked("stop"), {**asked("pain"), "force_N": 7.25}, "the subject's pain stop at 7.25 N"),
     Case("operator_stop", asked("pain"), asked("stop"), "stopped by the operator"),
     Case("operator_stop", asked("pain"), asked("stop", "keypad"),
@@ -256,6 +266,7 @@ def test_what_the_table_looks_at_is_well_until_the_loop_says_otherwise() -> None
     watch = Watch()
     assert watch == Watch(
         mode=Mode.IDLE, force_lost="", axis_lost="", marker_lost="", drive_fault="", force_valid=True,
-        force_frozen=False, force_age_ms=0.0, axis_age_ms=0.0, marker_age_ms=0.0, limb_age_ms=0.0, wake_latency_ms=0.0,
+        force_frozen=False, touch_wrong="", force_age_ms=0.0,
+        axis_age_ms=0.0, marker_age_ms=0.0, limb_age_ms=0.0, wake_latency_ms=0.0,
         recorder_fill=0.0, recorder_silent_s=0.0, supervisor_lost=False, operator_silent_s=0.0, requests=frozenset(),
     )  # fmt: skip
