@@ -82,6 +82,7 @@ class Info(BaseModel):
     service_id: str = Field(description="changes with every start of the service")
     monotonic_ns: int = Field(description="the clock of all samples, now")
     sessions_folder: str
+    stop_port: int = Field(description="of the stop process on 127.0.0.1, which takes POST /estop, /pain and /stop")
 
 
 class RigView(BaseModel):

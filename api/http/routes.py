@@ -56,6 +56,7 @@ def _state(router: APIRouter, service: Service) -> None:
             service_id=service.id,
             monotonic_ns=time.monotonic_ns(),
             sessions_folder=str(service.sessions),
+            stop_port=service.stop_port,
         )
 
     @router.get("/rig", summary="The bench as of now")
