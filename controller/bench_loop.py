@@ -79,7 +79,11 @@ class BenchLoop:
         self.wiring, self.devices, self._ring, self._channel, self.now = wiring, devices, ring, channel, now
         self._commands = commands
         period_s = 1.0 / wiring.loop.rate_Hz
-        self.world = World(dt_s=period_s, acceleration_mm_s2=wiring.axis.acceleration_mm_s2)
+        self.world = World(
+            dt_s=period_s,
+            acceleration_mm_s2=wiring.axis.acceleration_mm_s2,
+            position_min_mm=wiring.limits.position_min_mm,
+        )
         self.machine = Machine(wiring, self.world, self._finished, table)
         self.watch = Watch()
         self._registration = Registration()

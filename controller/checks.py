@@ -40,6 +40,7 @@ def _reasons(step: Step, wiring: Wiring) -> list[str]:
             return [*_speed(step.speed_mm_s, wiring), *_position("position", step.position_mm, wiring)]
         case Approach():
             reasons = [*_speed(step.speed_mm_s, wiring), *_position("search_to_mm", step.search_to_mm, wiring)]
+            reasons += _touches(step, wiring) if step.touches else []
             return reasons + _above("contact_force_N", step.contact_force_N, force_N, "N", "the force limit")
         case Compress():
             reasons = [
@@ -64,6 +65,14 @@ def _reasons(step: Step, wiring: Wiring) -> list[str]:
             ]
         case _:
             return []
+
+
+def _touches(step: Approach, wiring: Wiring) -> list[str]:
+    limits = wiring.limits
+    return [
+        *_above("touch speed", step.touch_speed_mm_s, limits.speed_mm_s, "mm/s", "limits.speed_mm_s"),
+        *_above("back-off speed", step.back_off_mm_s, limits.retract_speed_mm_s, "mm/s", "limits.retract_speed_mm_s"),
+    ]
 
 
 def _reference(step: TrackForce) -> list[str]:

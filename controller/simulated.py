@@ -92,6 +92,7 @@ class _Playback:
         self._ended: list[Incident | None] = []
         acceleration = wiring.axis.acceleration_mm_s2
         self._world = World(dt_s=self._period_s, acceleration_mm_s2=acceleration, position_mm=start_mm)
+        self._world.position_min_mm = wiring.limits.position_min_mm
         self._machine = Machine(wiring, self._world, lambda _, incident: self._ended.append(incident))
         self._machine.start(program)
         self._law: tuple[TrackForce, Columns, Line] | None = None

@@ -118,6 +118,7 @@ class Approach(Table):
     within_mm: Positive = 0.2
     touches: Annotated[int, Field(ge=0, le=10)] = 0
     touch_speed_mm_s: Positive = 0.5
+    back_off_mm_s: Positive = 5.0
 
     def begin(self) -> "ApproachRun":
         """A run of this step."""
@@ -159,7 +160,7 @@ class ApproachRun:
             self._above = self._above + 1 if world.force_N > self.threshold_N(world) else 0
         if self._above >= CONTACT_SAMPLES:
             step = self._step
-            touching = Touching(step.within_mm, step.touches, step.touch_speed_mm_s)
+            touching = Touching(step.within_mm, step.touches, step.touch_speed_mm_s, step.back_off_mm_s)
             self._touch = TouchRun(world, touching, self.has_run_in)
             return self._touch.advance(world)
         if world.go(self._step.search_to_mm, self._step.speed_mm_s):

@@ -24,7 +24,6 @@ BACK_OFF_MM = 1.0
 SLIP_MM = 0.5
 # What lies deeper says more of the tissue than of its surface.
 TOUCH_MM = 4.0
-RETURN_SPEED_MM_S = 5.0
 # A limb that came nearer meanwhile: twice the force that was detected is no touch.
 TOUCH_SHARE = 2.0
 
@@ -35,12 +34,14 @@ class Touching(NamedTuple):
     within_mm: float
     touches: int
     speed_mm_s: float
+    back_off_mm_s: float
 
 
 class TouchRun:
     """Rests and estimates; backs off and touches slowly as long as that is needed and allowed."""
 
     def __init__(self, world: World, touching: Touching, slipped: bool) -> None:
+        """``slipped``: the guide had before contact."""
         self._touching = touching
         self._detected_mm, self._detected_N = world.position_mm, world.force_N
         # A loading that began before the guide had slipped holds its friction too.
@@ -88,18 +89,21 @@ class TouchRun:
         return True
 
     def _back_off(self, world: World) -> bool:
-        assert self._found
-        target_mm = max(self._found.low_mm - BACK_OFF_MM, 0.0)
-        if world.go(target_mm, RETURN_SPEED_MM_S):
+        if world.go(self._top_mm(world), self._touching.back_off_mm_s):
             if not self._slow:
                 world.paired.clear()
             self._slow, self._sound = self._slow + 1, True
             self._phase = self._touch
         return False
 
+    def _top_mm(self, world: World) -> float:
+        """Where a touch begins: in the air, within the workspace."""
+        assert self._found
+        return max(self._found.low_mm - BACK_OFF_MM, world.position_min_mm)
+
     def _touch(self, world: World) -> bool:
         assert self._found
-        world.paired.collecting = world.position_mm > self._found.low_mm - BACK_OFF_MM + SLIP_MM
+        world.paired.collecting = world.position_mm > self._top_mm(world) + SLIP_MM
         target_mm = min(self._detected_mm, self._found.position_mm + TOUCH_MM)
         pressed = world.force_N > TOUCH_SHARE * self._detected_N
         if world.go(target_mm, self._touching.speed_mm_s) or pressed:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from controller.steps import Approach, Compress, Dither, Hold, Program, Retract, Step, Zero
-from controller.touch import BACK_OFF_MM, RETURN_SPEED_MM_S, TOUCH_MM
+from controller.touch import BACK_OFF_MM, TOUCH_MM
 from rig.config.protocol import Indentation
 
 # 366 portions, two a cycle at 1 kHz, and as much again for cycles missed.
@@ -54,6 +54,7 @@ def _steps(speed_mm_s: float, protocol: Indentation) -> list[Step]:
             within_mm=protocol.contact_within_mm,
             touches=protocol.touches,
             touch_speed_mm_s=protocol.touch_speed_mm_s,
+            back_off_mm_s=protocol.retract_speed_mm_s,
         ),
         Retract(clearance_mm=protocol.run_up_mm, speed_mm_s=protocol.retract_speed_mm_s),
         *_press(protocol.depth_mm, speed_mm_s, protocol),
@@ -94,4 +95,6 @@ def longest_s(protocol: Indentation, speed_mm_s: float, travel_mm: float) -> flo
 def _touches_s(protocol: Indentation) -> float:
     """A touch goes at most 4 mm deep, from as far above the surface as the first one left it unknown."""
     longest_mm = 2 * TOUCH_MM + BACK_OFF_MM
-    return protocol.touches * (longest_mm / protocol.touch_speed_mm_s + longest_mm / RETURN_SPEED_MM_S + ESTIMATING_S)
+    return protocol.touches * (
+        longest_mm / protocol.touch_speed_mm_s + longest_mm / protocol.retract_speed_mm_s + ESTIMATING_S
+    )

@@ -37,6 +37,7 @@ class SpringBench:
     ended: list[tuple[str, Incident | None]] = field(default_factory=list)
     modes: list[Mode] = field(default_factory=list)
     forces_N: list[float] = field(default_factory=list)
+    positions_mm: list[float] = field(default_factory=list)
     every: int = 1
     noise_N: float = 0.0
     rubbing_N: float = 0.0
@@ -91,6 +92,7 @@ class SpringBench:
         self.world.now_ns += 1_000_000
         self.modes.append(self.machine.mode)
         self.forces_N.append(self.world.force_N)
+        self.positions_mm.append(self.position_mm)
         return incident
 
     def run(self, *steps: Step, until: Callable[[], bool] | None = None, ticks: int = 30_000) -> None:

@@ -45,3 +45,14 @@ def test_force_that_arrives_long_after_the_axis_of_its_time_gives_the_same_surfa
     assert finished["surface_mm"] == pytest.approx(SURFACE_MM, abs=0.06)
     # Ten millimetres at 5 mm/s and 100 Hz, but for the half millimetre in which the guide may slip.
     assert finished["touch"]["samples"] == pytest.approx(190, abs=5)
+
+
+def test_touches_stay_within_the_workspace_of_the_wiring() -> None:
+    """A limb near the end of the workspace: a touch begins a millimetre above it, or where the workspace does."""
+    bench = FakeBench(wired(100.0, limits={"position_min_mm": 9.9}))
+    bench.force.surface_mm = bench.axis.position_mm + 0.7
+    finished = bench.run(ZERO, APPROACH.model_copy(update={"touches": 2, "within_mm": 1e-6}))
+    assert (finished["outcome"], finished["touch"]["touches"]) == ("complete", 2)
+    assert finished["surface_mm"] == pytest.approx(bench.force.surface_mm, abs=0.02)
+    approaching = [row.command_mm for row in bench.ring.loop if row.mode == Mode.APPROACH]
+    assert min(approaching) == pytest.approx(9.9)

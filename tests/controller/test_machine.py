@@ -39,6 +39,10 @@ def gains() -> tuple[GainRow, ...]:
     )
 
 
+def touching(**speeds: float) -> Approach:
+    return APPROACH.model_copy(update={"touches": 2, **speeds})
+
+
 def track(*points: tuple[float, float]) -> TrackForce:
     return TrackForce(times_s=tuple(t for t, _ in points), forces_N=tuple(f for _, f in points), gains=gains())
 
@@ -161,6 +165,8 @@ def test_a_zero_far_from_the_first_one_is_refused() -> None:
         ((ZERO, MoveTo(position_mm=70.0, speed_mm_s=5.0)), "position 70 mm is outside 0 to 60 mm"),
         ((ZERO, Retract(clearance_mm=1.0, speed_mm_s=30.0)), "retract speed 30 mm/s is above"),
         ((ZERO, APPROACH, Dither(amplitude_mm=1.0, frequency_Hz=20.0, duration_s=1.0)), "speed of the dither"),
+        ((ZERO, touching(touch_speed_mm_s=99.0)), "touch speed 99 mm/s is above limits.speed_mm_s, 60 mm/s"),
+        ((ZERO, touching(back_off_mm_s=30.0)), "back-off speed 30 mm/s is above limits.retract_speed_mm_s, 20 mm/s"),
         ((APPROACH, PRESS), "the first step must be a zero"),
         ((ZERO, PRESS), "no approach comes before it"),
     ],

@@ -62,6 +62,14 @@ def test_a_limb_met_before_the_guide_has_slipped_is_touched_again() -> None:
     assert touch.surface_mm == pytest.approx(SURFACE_MM, abs=0.02)
 
 
+def test_the_tip_backs_off_no_farther_than_the_workspace_reaches() -> None:
+    bench = SpringBench(position_mm=SURFACE_MM - 0.7, stiffness_N_mm=3.0)
+    bench.world.position_min_mm = SURFACE_MM - 0.8
+    bench.run(Zero(duration_s=0.05), APPROACH.model_copy(update={"touches": 2, "within_mm": 1e-6}))
+    assert bench.world.touch and bench.world.touch.touches == 2
+    assert min(bench.positions_mm) == pytest.approx(SURFACE_MM - 0.8)
+
+
 def test_the_tip_rests_while_the_surface_is_estimated() -> None:
     bench = SpringBench()
     bench.run(Zero(duration_s=0.05), APPROACH, until=lambda: bench.world.force_N > 0.05)
