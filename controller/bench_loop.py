@@ -75,7 +75,9 @@ class BenchLoop:
         now: Callable[[], int],
         table: tuple[Check, ...] = TABLE,
         opens: Openers | None = None,
+        held: str = "",
     ) -> None:
+        """``held``: why a person is to look first; until that is acknowledged nothing starts."""
         self.wiring, self.devices, self._ring, self._channel, self.now = wiring, devices, ring, channel, now
         self._commands = commands
         period_s = 1.0 / wiring.loop.rate_Hz
@@ -101,6 +103,8 @@ class BenchLoop:
         self.braked = False
         self._touch_said: Touch | None = None
         self._limb_seen_ns = 0
+        if held:
+            self.machine.hold(Incident(Action.IMMEDIATE, "recovery", held))
 
     def _unheard(self, stream: str) -> StreamHealth:
         """The health of a stream before its first sample."""
@@ -285,6 +289,13 @@ class BenchLoop:
         self.braked = False
         self.machine.acknowledge()
 
+    def regain(self, homed: bool = False) -> None:
+        """Torque on at the present position; ``homed``: where that is, the next report says."""
+        self.devices.axis.enable()
+        self.braked = False
+        if homed:
+            self.world.position_mm = math.nan
+
     def close(self) -> None:
         """Leaves the devices there are now safe; they may not be those it began with."""
         self.connections.close()
@@ -376,7 +387,7 @@ class BenchLoop:
             },
             "devices": attending.as_status(self.connections.statuses.items()),
             "ready": self.connections.ready,
-            "latched": {"code": latched.code, "text": latched.text} if latched else None,
+            "latched": {"code": latched.code, "text": latched.text, "action": latched.action.name} if latched else None,
         }
 
 

@@ -2,14 +2,17 @@
 
 from datetime import UTC, datetime
 
+from controller import recovery_acts
 from controller.attending import refusal as missing_device
 from controller.bench_loop import BenchLoop
 from controller.checks import refuse_beyond_limits
 from controller.commissioning.refusals import refuse_uncommissioned
-from controller.messages import Lease, Note, Reset, Run, Shutdown
+from controller.devices import Interruption
+from controller.messages import Lease, Note, Recover, Reset, Run, Shutdown, Survey, Surveyed
 from controller.modes import Mode
 from controller.safety import Action
 from controller.steps import Program
+from controller.stop.start import StartGuard
 from controller.stop.word import DEEDS, Deed, Kind, Request, Responder
 from rig.channel import Answer, Channel, Received
 from rig.errors import RigError, SafetyStop, UsageError
@@ -26,8 +29,9 @@ REQUESTS = {
 class Inbox:
     """Messages of `controller.messages`, each answered by its id; any of them renews the operator's lease."""
 
-    def __init__(self, channel: Channel, stops: Responder) -> None:
+    def __init__(self, channel: Channel, stops: Responder, interruption: Interruption | None = None) -> None:
         self._channel, self._stops = channel, stops
+        self.interruption = interruption or Interruption()
         self._asked: tuple[Request, ...] = ()
         self._leaving = False
         self._refused = 0
@@ -80,6 +84,12 @@ class Inbox:
                     raise UsageError("the tip still retracts: wait until it stands, then acknowledge the stop")
                 loop.release()
                 loop.event(Action.NOTE, "reset", "stop acknowledged", loop.world.now_ns)
+            case Survey():
+                self._channel.send(Surveyed(to=received.id, situation=recovery_acts.survey(loop)))
+            case Recover(act="home"):
+                self._home(loop)
+            case Recover(act=act):
+                recovery_acts.do(loop, act)
             case Note(code=code, text=text):
                 loop.event(Action.NOTE, code, text, loop.world.now_ns)
             case Shutdown():
@@ -100,6 +110,13 @@ class Inbox:
         refuse_uncommissioned(program, loop.wiring, force, axis, datetime.now(UTC))
         loop.event(Action.NOTE, "program_start", program.name, loop.world.now_ns)
         loop.start(program, number)
+
+    def _home(self, loop: BenchLoop) -> None:
+        """The loop stands still while the drive homes, so stops are taken beside it, as at its start."""
+        with StartGuard(self._stops, loop.now) as guard:
+            self.interruption.source = guard.interrupted
+            with guard.moving():
+                recovery_acts.do(loop, "home")
 
     def more(self, loop: BenchLoop) -> bool:
         """False once asked to leave, or left alone, and at rest."""

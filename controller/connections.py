@@ -7,7 +7,7 @@ from controller import device_states
 from controller.device_states import DeviceStatus, Observation, State
 from controller.health import NEVER_NS, ON_RATE, StreamHealth
 from controller.reopening import Openers, Reopening
-from drivers.roles import Device, ServoAxis
+from drivers.roles import Device, Identity, ServoAxis
 
 NO_TORQUE = "it takes no set-points after a stop: acknowledge that with a reset, or recover"
 NO_REFERENCE = "it has no reference: it restarted, or was not homed; recovery homes it"
@@ -34,6 +34,11 @@ def of_axis(health: StreamHealth, lost: str, axis: ServoAxis, now_ns: int) -> Ob
     return replace(seen, fault=fault, withheld="" if axis.enabled else NO_TORQUE)
 
 
+def _known(identity: Identity) -> Identity | None:
+    """None for a device that never answered."""
+    return identity if identity.product else None
+
+
 class Connections:
     """Statuses by role; ``update`` is called a few times a second. ``said`` is told each change of state."""
 
@@ -41,7 +46,8 @@ class Connections:
         self._said = said
         self.statuses = {role: device_states.connecting(now_ns) for role in devices}
         self._ways_back = {
-            role: Reopening(openers.by_role[role], device.identity, openers.spawn) for role, device in devices.items()
+            role: Reopening(openers.by_role[role], _known(device.identity), openers.spawn)
+            for role, device in devices.items()
         }
 
     @property

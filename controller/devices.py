@@ -58,11 +58,22 @@ def open_tracker(config: Tracker) -> MarkerTracker:
     return NdiTracker(partial(open_port, config.port), config)
 
 
-def openers(wiring: Wiring) -> Openers:
+class Interruption:
+    """Whether the axis, while it moves by itself, is to be braked: asks ``source``, which is whoever looks just now."""
+
+    def __init__(self) -> None:
+        self.source: Interrupted = never
+
+    def __call__(self) -> bool:
+        """The answer of now."""
+        return self.source()
+
+
+def openers(wiring: Wiring, interrupted: Interrupted = never) -> Openers:
     """How each device of the bench is opened again."""
     by_role: dict[str, Open] = {
         "force": lambda: open_force(wiring.force),
-        "axis": lambda: open_axis(wiring.axis, wiring.limits, wiring.loop.rate_Hz),
+        "axis": lambda: open_axis(wiring.axis, wiring.limits, wiring.loop.rate_Hz, interrupted),
     }
     tracker = wiring.tracker
     return Openers(by_role | ({"tracker": lambda: open_tracker(tracker)} if tracker else {}))

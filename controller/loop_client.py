@@ -17,7 +17,10 @@ from controller.messages import (
     Status,
     StatusSaid,
     Stopped,
+    Survey,
+    Surveyed,
 )
+from controller.recovery import Situation
 from rig.channel import Answer, Channel, Message, Received, refuse_oversized
 from rig.errors import DeviceError, SafetyStop, UsageError
 
@@ -39,6 +42,7 @@ class LoopClient:
         self._changed = threading.Condition()
         self._answers: dict[int, Answer] = {}
         self._outcomes: dict[int, Outcome] = {}
+        self._situations: dict[int, Situation] = {}
         self._ready: Ready | None = None
         self._failed: Failed | None = None
         self._status: Status = {}
@@ -79,13 +83,13 @@ class LoopClient:
         self._push()
         return number
 
-    def ask(self, message: Message, what: str) -> int:
+    def ask(self, message: Message, what: str, timeout_s: float = ANSWER_TIMEOUT_S) -> int:
         """As ``tell``, then waits until the loop has done it; raises UsageError in the loop's words where it refuses.
 
         SafetyStop instead, where it refuses because a stop is in force.
         """
         number = self.tell(message)
-        answer = self._wait(lambda: self._answers.pop(number, None), f"did not answer {what}", ANSWER_TIMEOUT_S)
+        answer = self._wait(lambda: self._answers.pop(number, None), f"did not answer {what}", timeout_s)
         if answer.refused:
             raise (SafetyStop if answer.stopped else UsageError)(answer.refused)
         return number
@@ -95,6 +99,11 @@ class LoopClient:
         refuse_oversized(program, f"program {program.program.name}")
         number = self.ask(program, "a program")
         return self._wait(lambda: self._outcomes.pop(number, None), "did not end its program", timeout_s)
+
+    def survey(self) -> Situation:
+        """How things stand, for recovery; raises UsageError while anything moves."""
+        number = self.ask(Survey(), "a survey")
+        return self._wait(lambda: self._situations.pop(number, None), "did not say how things stand", ANSWER_TIMEOUT_S)
 
     def wait_until(self, condition: Callable[[Status], bool], timeout_s: float) -> bool:
         """Waits for a status that fulfils ``condition``; whether it came, or True where the loop is gone."""
@@ -155,6 +164,8 @@ class LoopClient:
                 self._status = status
             case Answer(to=number) as answer:
                 _keep(self._answers, number, answer)
+            case Surveyed(to=number, situation=situation):
+                _keep(self._situations, number, situation)
             case Finished(program=number, outcome=outcome):
                 _keep(self._outcomes, number, outcome)
             case Stopped() as stopped:

@@ -1,7 +1,8 @@
-"""The loop's own process: ``python -m controller.loop_process WIRING_JSON RING_PATH SOCKET_FD STOP_PATH``.
+"""The loop's own process: ``python -m controller.loop_process WIRING_JSON RING_PATH SOCKET_FD STOP_PATH [HELD]``.
 
 It owns the devices, says ``ready`` with their identities (or ``failed`` with one sentence), then runs until it is told
-to leave or left alone. Whatever happens, the devices are closed, which stops the axis.
+to leave or left alone. Whatever happens, the devices are closed, which stops the axis. With HELD, a sentence that says
+why, or with a drive in fault, it moves nothing and waits for recovery.
 """
 
 import contextlib
@@ -14,15 +15,17 @@ from dataclasses import asdict
 from pathlib import Path
 
 from controller import realtime
+from controller.absent import start_what_answers
 from controller.bench_loop import BenchLoop
 from controller.commands import Inbox
-from controller.devices import Devices, start_devices
+from controller.devices import Devices, Interruption, openers, start_devices
 from controller.loop import Executive, sleep_then_spin
 from controller.messages import TO_LOOP, Failed, Ready
 from controller.safety import TABLE, Check
 from controller.stop.start import StartGuard
 from controller.stop.word import Responder, StopWord
 from controller.touch import warm_up
+from drivers.roles import ServoAxis
 from rig.channel import Channel
 from rig.config.wiring import Wiring
 from rig.errors import RigError, SafetyStop
@@ -39,7 +42,7 @@ def main(arguments: list[str], table: tuple[Check, ...] = TABLE) -> int:
     channel = Channel(socket.socket(fileno=int(arguments[2])), TO_LOOP)
     try:
         with contextlib.closing(StopWord.open(Path(arguments[3]))) as page:
-            _serve(wiring, Path(arguments[1]), channel, Responder(page), table)
+            _serve(wiring, Path(arguments[1]), channel, Responder(page), table, "".join(arguments[4:5]))
     except RigError as error:
         channel.send(Failed(text=str(error), stopped=isinstance(error, SafetyStop)))
         return 1
@@ -51,23 +54,38 @@ def main(arguments: list[str], table: tuple[Check, ...] = TABLE) -> int:
     return 0
 
 
-def _serve(wiring: Wiring, ring_path: Path, channel: Channel, stops: Responder, table: tuple[Check, ...]) -> None:
+def _serve(
+    wiring: Wiring, ring_path: Path, channel: Channel, stops: Responder, table: tuple[Check, ...], held: str
+) -> None:
     # Memory and privileges first: from the axis' start on, the drive counts the time between our heartbeats.
     ring = RingWriter.create(ring_path)
     stops.attach(os.getpid())
     try:
         warm_up()
         granted = realtime.acquire(wiring.loop.priority)
+        interruption = Interruption()
+        start = start_what_answers if held else start_devices
         with contextlib.ExitStack() as started:
             with StartGuard(stops) as guard:
-                devices = start_devices(wiring, guard.interrupted)
+                interruption.source = guard.interrupted
+                devices = start(wiring, interruption)
                 started.callback(devices.close)
                 with guard.moving():
-                    devices.axis.home()
-                    devices.axis.enable()
-            _run(wiring, devices, ring, channel, Inbox(channel, stops), granted, table)
+                    held = _prepare(devices.axis, held)
+            inbox = Inbox(channel, stops, interruption)
+            _run(wiring, devices, ring, channel, inbox, granted, table, held)
     finally:
         ring.close()
+
+
+def _prepare(axis: ServoAxis, held: str) -> str:
+    """Homes and enables the axis; not where a person is to look first, and then returns why."""
+    if axis.fault and not held:
+        held = f"the drive was in fault when the bench started: {axis.fault}"
+    if not held:
+        axis.home()
+        axis.enable()
+    return held
 
 
 def _run(
@@ -78,10 +96,12 @@ def _run(
     inbox: Inbox,
     granted: dict[str, str],
     table: tuple[Check, ...],
+    held: str,
 ) -> None:
     identities = {role: asdict(device.identity) for role, device in devices.by_role().items()}
     channel.send(Ready(devices=identities, realtime=granted))
-    loop = BenchLoop(wiring, devices, ring, channel, inbox, time.monotonic_ns, table)
+    opens = openers(wiring, inbox.interruption)
+    loop = BenchLoop(wiring, devices, ring, channel, inbox, time.monotonic_ns, table, opens, held)
     pause = sleep_then_spin(realtime.spin_ns(granted))
     try:
         Executive(round(1e9 / wiring.loop.rate_Hz), sleep=pause).run(loop.tick)

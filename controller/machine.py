@@ -79,6 +79,12 @@ class Machine:
         """At rest, and stays so until this is acknowledged."""
         self.mode, self.latched = Mode.SAFE, incident
 
+    def withdraw(self) -> None:
+        """Out to the end of the way, with the stop still in force: nothing but a failing axis ends it."""
+        self.world.setpoint = self._here()
+        self._escape_mm = self._wiring.limits.position_min_mm
+        self.mode, self._stays = Mode.RETRACT, False
+
     def _here(self) -> Setpoint:
         """The present position; at the end of the workspace the encoder's last count may lie beyond it."""
         limits = self._wiring.limits

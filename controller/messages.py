@@ -6,8 +6,9 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from controller.paired import Touch
+from controller.recovery import Act, Situation
 from controller.steps import Program
-from rig.channel import Message
+from rig.channel import Message, Reply
 
 Status = dict[str, Any]
 """The loop as of one moment, for people to see; what decides anything has a message of its own."""
@@ -104,5 +105,25 @@ class Finished(Message):
     outcome: Outcome
 
 
-TO_LOOP = (Run, Reset, Note, Lease, Shutdown)
-FROM_LOOP = (Ready, Failed, StatusSaid, Stopped, Finished)
+class Survey(Message):
+    """Say how things stand, for recovery."""
+
+    TYPE: ClassVar[int] = 16
+
+
+class Recover(Message):
+    """Do one act of recovery."""
+
+    TYPE: ClassVar[int] = 17
+    act: Act
+
+
+class Surveyed(Reply):
+    """How things stand."""
+
+    TYPE: ClassVar[int] = 25
+    situation: Situation
+
+
+TO_LOOP = (Run, Reset, Note, Lease, Shutdown, Survey, Recover)
+FROM_LOOP = (Ready, Failed, StatusSaid, Stopped, Finished, Surveyed)

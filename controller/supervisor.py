@@ -8,21 +8,31 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from socket import socket
 
+from controller.claims import Claim, take
 from controller.loop_client import ANSWER_TIMEOUT_S, LoopClient
-from controller.messages import Lease, Note, Outcome, Ready, Reset, Run, Shutdown, Status, Stopped
+from controller.messages import Lease, Note, Outcome, Ready, Recover, Reset, Run, Shutdown, Status, Stopped
+from controller.recovering import recover
+from controller.recovery import Act, Consent, Recovered, Situation
+from controller.safety import Action
 from controller.steps import Program
 from controller.stop.client import StopProcess
 from controller.stop.word import Kind, Requester
 from rig.channel import Message, pair
 from rig.config.wiring import Wiring
-from rig.errors import DeviceError, SafetyStop
+from rig.errors import DeviceError, SafetyStop, UsageError
 from rig.recording.client import RecorderClient
-from rig.recording.ring import new_path
+from rig.recording.ring import new_path, remove_abandoned
 
 LOOP_MODULE = "controller.loop_process"
 START_TIMEOUT_S = 60.0
 LEAVE_TIMEOUT_S = 15.0
+# Homing over 60 mm at the 20 mm/s of the default, and twice that for a slower axis.
+ACT_TIMEOUT_S = 60.0
+WAITING = "the bench was started for recovery"
+# In order, or with a failure it reported; a loop that was killed left the axis where it was.
+ENDED_BY_ITSELF = (0, 1)
 # A device is degraded after a second of bad samples and ok with the first good one; more is no passing disturbance.
 READY_TIMEOUT_S = 3.0
 # Renewals within one lease, so that two may be late.
@@ -33,8 +43,17 @@ UNASKED_LEASE_S = 3.0
 class Supervisor:
     """A running bench: ``with Supervisor(wiring) as bench: bench.run(program)``."""
 
-    def __init__(self, wiring: Wiring, loop_module: str = LOOP_MODULE) -> None:
-        """``loop_module`` is what the loop's process runs: this program's own, or one that prepares something first."""
+    def __init__(
+        self, wiring: Wiring, loop_module: str = LOOP_MODULE, waiting: bool = False, address: str = ""
+    ) -> None:
+        """``loop_module`` is what the loop's process runs: this program's own, or one that prepares something first.
+
+        ``waiting``: nothing is homed at the start, and only the axis need be there, for recovery. ``address`` is where
+        others reach whoever uses this bench.
+        """
+        self._waiting, self._address = waiting, address
+        self._claim: Claim | None = None
+        self._tip_left_in = False
         self.wiring = wiring
         self._loop_module = loop_module
         self._ring_path = new_path()
@@ -49,6 +68,11 @@ class Supervisor:
 
     def __enter__(self) -> "Supervisor":
         self.start()
+        try:
+            self.refuse_held()
+        except BaseException:
+            self.close()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -64,28 +88,39 @@ class Supervisor:
 
         DeviceError then, or SafetyStop where someone stopped it before it was up.
         """
+        try:
+            self._start()
+        except BaseException:
+            self.close()
+            raise
+
+    def _start(self) -> None:
+        remove_abandoned()
+        self._claim = take(self.wiring, self._address)
         self.prepare()
+        self._client = LoopClient(self._start_loop(self._claim), self._exit_text)
+        self.ready = self._client.ready(START_TIMEOUT_S)
+        self.recorder = RecorderClient(self._ring_path)
+        threading.Thread(target=self._keep_lease, name="lease", daemon=True).start()
+        self._await_ready()
+
+    def _start_loop(self, claim: Claim) -> socket:
+        """Its process; returns our end of the channel to it."""
         assert self._stop
+        held = claim.unfinished or (WAITING if self._waiting else "")
         mine, theirs = pair()
         command = [sys.executable, "-m", self._loop_module]
-        arguments = [self.wiring.model_dump_json(), str(self._ring_path), str(theirs.fileno()), str(self._stop.path)]
+        paths = [str(self._ring_path), str(theirs.fileno()), str(self._stop.path)]
+        arguments = [self.wiring.model_dump_json(), *paths, held]
         self._process = subprocess.Popen(
             command + arguments,
-            pass_fds=[theirs.fileno()],
+            pass_fds=[theirs.fileno(), *claim.fds],
             start_new_session=True,
             stdin=subprocess.DEVNULL,
             env=process_environment(),
         )
         theirs.close()
-        self._client = LoopClient(mine, self._exit_text)
-        try:
-            self.ready = self._client.ready(START_TIMEOUT_S)
-            self.recorder = RecorderClient(self._ring_path)
-            threading.Thread(target=self._keep_lease, name="lease", daemon=True).start()
-            self._await_ready()
-        except BaseException:
-            self.close()
-            raise
+        return mine
 
     def _keep_lease(self) -> None:
         # Also where the loop asks for no sign of life: whether the operator attends is still to be said.
@@ -184,6 +219,43 @@ class Supervisor:
         if not loop.wait_until(lambda status: not status.get("latched"), ANSWER_TIMEOUT_S):
             raise DeviceError(f"the loop did not leave its safe state within {ANSWER_TIMEOUT_S:g} s after the reset")
 
+    @property
+    def held(self) -> str:
+        """Why nothing moves before recovery; empty where it may."""
+        latched = self.status.get("latched") or {}
+        return str(latched["text"]) if latched.get("code") == "recovery" else ""
+
+    def refuse_held(self) -> None:
+        """Raises DeviceError where the bench waits for recovery and was not started for it."""
+        if self.held and not self._waiting:
+            raise DeviceError(f"{self.held}; run `rig reset`, which says what happened and brings the tip out")
+
+    def survey(self) -> Situation:
+        """How things stand, for recovery; raises UsageError while anything moves."""
+        return self._loop().survey()
+
+    def act(self, act: Act) -> None:
+        """One act of recovery, to its end; raises DeviceError where it does not succeed."""
+        try:
+            self._loop().ask(Recover(act=act), act, ACT_TIMEOUT_S)
+        except UsageError as refusal:
+            raise DeviceError(str(refusal)) from refusal
+        self.wait_at_rest(ACT_TIMEOUT_S)
+
+    def recover(self, consent: Consent) -> Recovered:
+        """The way back to a bench that can be used, as far as ``consent`` goes."""
+        found = recover(self, consent)
+        if self._claim and not found.open:
+            self._claim.finished = True
+        return found
+
+    def await_device(self, role: str, timeout_s: float) -> bool:
+        """Whether the device is, or comes back, within that time."""
+        away = ("connecting", "lost", "reconnecting")
+        return self._loop().wait_until(
+            lambda status: status.get("devices", {}).get(role, {}).get("state", "lost") not in away, timeout_s
+        )
+
     def note(self, code: str, text: str) -> None:
         """Writes a note into the event stream."""
         self._tell(Note(code=code, text=text))
@@ -191,6 +263,8 @@ class Supervisor:
     def close(self) -> None:
         """Ends loop and recorder in order; may be called twice."""
         self._closing.set()
+        latched = self.status.get("latched") or {}
+        self._tip_left_in |= latched.get("action") == Action.IMMEDIATE.name
         if self.alive:
             try:
                 self.stop()
@@ -207,8 +281,17 @@ class Supervisor:
         if self._stop:
             self._stop.close()
             self._stop = None
+        self._give_back()
         # A killed loop leaves its ring behind.
         self._ring_path.unlink(missing_ok=True)
+
+    def _give_back(self) -> None:
+        if self._claim is None:
+            return
+        if self._tip_left_in:
+            self._claim.leave_note()
+        self._claim.release()
+        self._claim = None
 
     def _await_exit(self) -> None:
         if self._process is None:
@@ -218,6 +301,7 @@ class Supervisor:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        self._tip_left_in |= self._process.returncode not in ENDED_BY_ITSELF
 
 
 def stopped(outcome: Outcome) -> SafetyStop:

@@ -107,6 +107,9 @@ class ServoAxis(Device, Protocol):
     def power_off(self) -> None:
         """Takes the torque away and does not wait: what does not hold by itself can then be pushed."""
 
+    def history(self) -> tuple[str, ...]:
+        """The errors the drive remembers, in words, newest first; waits."""
+
     def reset_fault(self) -> None:
         """Acknowledges a fault; waits; raises DeviceError where the cause is still there."""
 

@@ -33,6 +33,7 @@ COMMANDS = {
     "export": "api.cli.records:export_",
     "serve": "api.cli.serve:serve",
     "mock": "api.cli.hardware:mock",
+    "reset": "api.cli.recovery:reset",
     "doctor": "api.cli.hardware:doctor",
     "calibrate": "api.cli.calibrate:calibrate",
     "demo": "api.cli.demo:demo",

@@ -47,10 +47,14 @@ def serve(
         )
     settings = wiring_from(config, overrides)
     with _listening(host, port) as listening, bench_for(settings, refuses=False) as (wiring, _):
-        application = build(Service(wiring, sessions, protocols))
+        application = build(Service(wiring, sessions, protocols, f"http://{_in_url(host)}:{port}"))
         # The server hands on the Ctrl-C that ended it, after an orderly end.
         with contextlib.suppress(KeyboardInterrupt):
             Announced(uvicorn.Config(application, host=host, port=port, **server_settings())).run([listening])
+
+
+def _in_url(host: str) -> str:
+    return f"[{host}]" if ":" in host else host
 
 
 def _listening(host: str, port: int) -> socket.socket:

@@ -36,6 +36,31 @@ class RetractRequest(Request):
     kind: Literal["retract"]
 
 
+class RecoverRequest(Request):
+    """What is agreed to; without a consent that is needed, the answer asks for it and nothing is done."""
+
+    clear: bool = Field(default=False, description="clear the drive's fault")
+    retract: bool = Field(default=False, description="move the tip out")
+    home: bool = Field(default=False, description="home the axis where it has no reference")
+
+
+class QuestionView(BaseModel):
+    """A consent that is needed."""
+
+    act: Literal["clear", "retract", "home"]
+    question: str
+
+
+class RecoveredView(BaseModel):
+    """How far recovery went."""
+
+    happened: list[str] = Field(description="what happened and how things stood, for a person")
+    done: list[str]
+    open: list[QuestionView] = Field(description="what must be agreed to before more is done")
+    missing: str = Field(description="devices that are still not ok; empty if none")
+    ready: bool = Field(description="the bench can be used again")
+
+
 class LeaseRequest(Request):
     """Takes control of the bench."""
 

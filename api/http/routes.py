@@ -20,6 +20,8 @@ from api.http.models import (
     LeaseView,
     Name,
     ProtocolView,
+    RecoveredView,
+    RecoverRequest,
     RetractRequest,
     RigView,
     SessionView,
@@ -27,6 +29,7 @@ from api.http.models import (
 )
 from api.http.problems import Refused, responses
 from api.http.service import Service
+from controller.recovery import Consent
 from controller.stop.word import Answer, Kind
 
 PREFIX = "/api/v1"
@@ -41,6 +44,7 @@ def build(service: Service) -> APIRouter:
     _state(router, service)
     _control(router, service)
     _stops(router, service)
+    _recovery(router, service)
     _jobs(router, service)
     _recordings(router, service)
     return router
@@ -118,6 +122,17 @@ def _stops(router: APIRouter, service: Service) -> None:
         service.control.check(lease)
         service.reset()
         return _done(service, "acknowledged")
+
+
+def _recovery(router: APIRouter, service: Service) -> None:
+    @router.post(
+        "/recover",
+        summary="After a crash, a fault or a stop: says what happened, and does what is agreed to",
+        responses=responses(409, 503),
+    )
+    def recover(request: RecoverRequest, lease: LeaseHeader = "") -> RecoveredView:
+        service.control.check(lease)
+        return views.recovered(service.recover(Consent(request.clear, request.retract, request.home)))
 
 
 def _done(service: Service, detail: str) -> Done:

@@ -14,6 +14,7 @@ from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.experiments.verdicts import remaining_bad
 from controller.operation import Operation, Progress
+from controller.recovery import Consent, Recovered
 from controller.steps import Program, Retract
 from controller.stop.word import NOT_CONFIRMED, Answer, Kind
 from controller.supervisor import Supervisor
@@ -50,7 +51,9 @@ class Job:
 class Service:
     """The bench behind the routes. Every method is safe from any thread."""
 
-    def __init__(self, wiring: Wiring, sessions: Path, protocols: Path) -> None:
+    def __init__(self, wiring: Wiring, sessions: Path, protocols: Path, address: str = "") -> None:
+        """``address`` is where it listens, for commands beside it."""
+        self.address = address
         self.wiring, self.sessions, self.protocols = wiring, sessions, protocols
         self.id = uuid.uuid4().hex
         self.reason = "not connected yet"
@@ -71,19 +74,36 @@ class Service:
         with self._starting:
             if self.bench and self.bench.alive:
                 return
-            self.disconnect()
-            bench = Supervisor(self.wiring)
-            bench.attended = self.attended
+            self._start_bench(waiting=False)
+
+    def _start_bench(self, waiting: bool) -> None:
+        """A new loop; ``waiting``: for recovery, so that nothing moves at its start."""
+        self.disconnect()
+        bench = Supervisor(self.wiring, waiting=waiting, address=self.address)
+        bench.attended = self.attended
+        try:
+            bench.prepare()
+            self._coming = bench
+            bench.start()
+        except RigError as error:
+            self.reason = str(error)
+            return
+        finally:
+            self._coming = None
+        self.bench, self.reason = bench, ""
+
+    def recover(self, consent: Consent) -> Recovered:
+        """The way back after a crash, a fault or a stop, as far as ``consent`` goes; a dead loop is replaced."""
+        with self._starting:
+            if self.running:
+                raise Refused(409, "busy", "a job is under way; stop it, then recover")
+            if not (self.bench and self.bench.alive):
+                self._start_bench(waiting=True)
+            bench = self.the_bench()
             try:
-                bench.prepare()
-                self._coming = bench
-                bench.start()
+                return bench.recover(consent)
             except RigError as error:
-                self.reason = str(error)
-                return
-            finally:
-                self._coming = None
-            self.bench, self.reason = bench, ""
+                raise Refused(409, "not-recovered", str(error)) from error
 
     def disconnect(self) -> None:
         """Ends loop and recorder."""

@@ -5,11 +5,22 @@ from pathlib import Path
 from typing import Literal
 
 from api.http.lease import Lease
-from api.http.models import ControlView, JobView, LeaseView, ProtocolView, RecordingView, RigView, SessionView
+from api.http.models import (
+    ControlView,
+    JobView,
+    LeaseView,
+    ProtocolView,
+    QuestionView,
+    RecordingView,
+    RecoveredView,
+    RigView,
+    SessionView,
+)
 from api.http.service import Job, Service
 from controller.experiments.capture import check
 from controller.health import ALIVE, ON_RATE, VALID
 from controller.messages import Status
+from controller.recovery import Recovered
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
@@ -68,6 +79,17 @@ def rig(service: Service) -> RigView:
         },
         control=control(service),
         job=job(running) if running else None,
+    )
+
+
+def recovered(found: Recovered) -> RecoveredView:
+    """How far recovery went."""
+    return RecoveredView(
+        happened=list(found.happened),
+        done=list(found.done),
+        open=[QuestionView(act=act, question=question) for act, question in found.open],
+        missing=found.missing,
+        ready=found.ready,
     )
 
 

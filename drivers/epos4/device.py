@@ -17,6 +17,7 @@ from drivers.epos4 import objects, setup
 from drivers.epos4.bringup import CYCLIC_POSITION, HOMING, PROFILE_POSITION, configure, go_operational, identify
 from drivers.epos4.cia402 import Control, Goal, State, Status
 from drivers.epos4.codec import encode_setpoint
+from drivers.epos4.faults import describe
 from drivers.epos4.node import Node
 from drivers.epos4.samples import SampleBuilder
 from drivers.epos4.walker import REACTION_S, Walker, never
@@ -226,6 +227,12 @@ class Epos4Axis:
         walker = self._started()
         walker.controlword = int(Control.DISABLE_VOLTAGE)
         self._sync(walker, self._now())
+
+    def history(self) -> tuple[str, ...]:
+        """The errors the drive remembers (object 1003), in words, newest first."""
+        node = self._started().node
+        count = node.read(objects.ERROR_COUNT)
+        return tuple(describe(node.read(entry) & 0xFFFF) for entry in objects.ERROR_HISTORY[:count])
 
     def reset_fault(self) -> None:
         """Acknowledges a fault; raises DeviceError where it is still there. The drive has no torque afterwards."""

@@ -49,6 +49,9 @@ class Entry:
 
 ERROR_REGISTER = Entry(0x1001, 0, "error register", U8, "ro+")
 DEVICE_NAME = Entry(0x1008, 0, "device name", TEXT, "const", "EPOS4")
+ERROR_COUNT = Entry(0x1003, 0, "number of errors", U8, "rw", 0, 0, 0)
+ERROR_HISTORY = tuple(Entry(0x1003, sub, f"error history {sub}", U32, "ro") for sub in range(1, 6))
+"""The newest first; the lower half of a value is the error code (CiA 301, object 1003)."""
 HEARTBEAT_CONSUMER = Entry(0x1016, 1, "consumer heartbeat time 1", U32, "rw")
 HEARTBEAT_PRODUCER = Entry(0x1017, 0, "producer heartbeat time", U16, "rw")
 VENDOR = Entry(0x1018, 1, "vendor", U32, "ro", 0xFB)
@@ -91,8 +94,8 @@ HOMING_METHODS = (-4, -3, -2, -1, 1, 2, 7, 11, 17, 18, 23, 27, 33, 34, 37)
 
 _OTHERS = (
     Entry(0x1000, 0, "device type", U32, "ro", 0x0002_0192),
-    Entry(0x1003, 0, "number of errors", U8, "rw", 0, 0, 0),
-    *(Entry(0x1003, sub, f"error history {sub}", U32, "ro") for sub in range(1, 6)),
+    ERROR_COUNT,
+    *ERROR_HISTORY,
     Entry(0x1005, 0, "SYNC identifier", U32, "const", 0x80),
     Entry(0x100A, 0, "software version", TEXT, "const", "0x0170"),
     Entry(0x1010, 0, "store parameters", U8, "const", 1),

@@ -39,6 +39,16 @@ def new_path() -> Path:
     return folder / f"tissue-rig-{os.getuid()}-{os.getpid()}-{os.urandom(3).hex()}.ring"
 
 
+def remove_abandoned() -> None:
+    """Removes shared memory of this user's processes that were killed, rings only once nobody reads them."""
+    for path in new_path().parent.glob(f"tissue-rig-{os.getuid()}-*-*"):
+        pid = path.name.split("-")[3]
+        if pid.isdigit() and not Path(f"/proc/{pid}").exists():
+            with contextlib.suppress(OSError), path.open("rb") as file:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                path.unlink()
+
+
 class _Mapping:
     """The mapped file: the header as words, the slots as bytes."""
 

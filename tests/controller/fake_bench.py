@@ -18,7 +18,19 @@ from controller.bench_loop import BenchLoop
 from controller.commands import Inbox
 from controller.devices import Devices
 from controller.loop import Slot
-from controller.messages import Finished, Lease, Note, Reset, Run, Shutdown, StatusSaid, Stopped
+from controller.messages import (
+    Finished,
+    Lease,
+    Note,
+    Recover,
+    Reset,
+    Run,
+    Shutdown,
+    StatusSaid,
+    Stopped,
+    Survey,
+    Surveyed,
+)
 from controller.modes import Mode
 from controller.reopening import Openers
 from controller.steps import Approach, Compress, Hold, Program, Retract, Step, Zero
@@ -111,9 +123,11 @@ SAID: dict[str, Callable[..., Message]] = {
     "reset": Reset,
     "note": Note,
     "shutdown": Shutdown,
+    "survey": Survey,
+    "recover": Recover,
 }
 KINDS = {"stop": Kind.STOP, "pain": Kind.PAIN, "estop": Kind.EMERGENCY, "keypad": Kind.KEYPAD_LOST}
-HEARD: dict[str, type[Message]] = {"finished": Finished, "incident": Stopped, "answer": Answer}
+HEARD: dict[str, type[Message]] = {"finished": Finished, "incident": Stopped, "answer": Answer, "surveyed": Surveyed}
 
 
 @dataclass
@@ -175,6 +189,7 @@ class FakeBench:
         position_mm: float = 10.0,
         execution_ns: int = 50_000,
         settled: int = SETTLED_CYCLES,
+        held: str = "",
     ) -> None:
         self.wiring = with_calibration(wiring or wired(), FakeForce.__name__, "1")
         self.clock = Clock()
@@ -204,6 +219,7 @@ class FakeBench:
             inbox,
             self.clock,
             opens=Openers(self._openers(), _at_once),
+            held=held,
         )
         self.slot = self.missed = 0
         self.execution_ns = execution_ns

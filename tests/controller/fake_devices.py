@@ -93,6 +93,8 @@ class FakeAxis(FakeDevice):
     quick_stops: list[int] = field(default_factory=list)
     target_mm: float = math.nan
     referenced: bool = True
+    remembered: tuple[str, ...] = ()
+    home_mm: float = math.nan
     _due: deque[tuple[int, float, float]] = field(default_factory=deque)
     _moved_ns: int = 0
 
@@ -147,8 +149,11 @@ class FakeAxis(FakeDevice):
         self._due.append((now_ns, self.position_mm, mm_s if self.velocity_mm_s is None else self.velocity_mm_s))
 
     def home(self) -> None:
-        """Homing is instant."""
+        """Homing is instant; it ends at ``home_mm``."""
         self.called("home")
+        self.referenced = True
+        if not math.isnan(self.home_mm):
+            self.position_mm = self.home_mm
 
     def move_to(self, position_mm: float, speed_mm_s: float) -> None:
         """A move of the drive's own is instant."""
@@ -172,6 +177,11 @@ class FakeAxis(FakeDevice):
         """Without torque: it stands, and ``limp`` says so."""
         self.called("power_off")
         self.on, self.limp, self.target_mm = False, True, math.nan
+
+    def history(self) -> tuple[str, ...]:
+        """What it remembers."""
+        self.called("history")
+        return self.remembered
 
     def reset_fault(self) -> None:
         """Clears the fault unless ``unclearable`` says why not."""

@@ -154,7 +154,9 @@ def test_status_names_what_is_lost_and_why_and_what_stopped_motion(role: str, na
     bench.wait(0.06)
     status = bench.link.statuses[-1]
     assert status["lost"] == {name: "cable"}
-    assert status["latched"] == {"code": bench.latched, "text": bench.loop.machine.latched.text}  # type: ignore[union-attr]
+    latched = bench.loop.machine.latched
+    assert latched
+    assert status["latched"] == {"code": latched.code, "text": latched.text, "action": latched.action.name}
     assert status["devices"][role]["state"] == "lost"
     assert status["ready"] is False
 

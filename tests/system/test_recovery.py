@@ -1,0 +1,85 @@
+"""After a kill of each process while a force is tracked in contact, one command brings the tip out."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from rig.recording.ring import new_path
+from tests.controller.models import index_model
+from tests.system.stage import Running, Stage, children, freed, pressed, rig
+
+LOOP, RECORDER = "controller.loop_process", "rig.recording.recorder"
+
+
+def tracking(bench: Stage, tmp_path: Path) -> Running:
+    """A force held in contact."""
+    model = tmp_path / "model.json"
+    index_model(0.12, 0.22, 0.01, force_N=11.0).save(model)
+    out = tmp_path / f"session-{time.monotonic_ns()}"
+    running = Running(
+        ["track", "--model", model, "--force", "2", "--seconds", "60", "--out", out, *bench.settings()], tmp_path
+    )
+    pressed(bench, 1.5)
+    return running
+
+
+def killed(running: Running, *whom: str) -> None:
+    """Kills those processes of the command at once, and the command itself where ``whom`` names it."""
+    command = running.process.pid
+    pids = {"command": [command], "loop": children(command, LOOP), "recorder": children(command, RECORDER)}
+    for name in whom:
+        for pid in pids[name]:
+            os.kill(pid, signal.SIGKILL)
+    if "command" in whom:
+        running.end()
+
+
+@pytest.mark.parametrize(
+    "whom", [("loop",), ("recorder",), ("command",), ("command", "loop"), ("command", "loop", "recorder")]
+)
+def test_one_command_brings_the_tip_out_after_a_kill(bench: Stage, tmp_path: Path, whom: tuple[str, ...]) -> None:
+    running = tracking(bench, tmp_path)
+    killed(running, *whom)
+    if "command" not in whom:
+        assert running.end().code == 1
+    said = rig("reset", "--yes", *bench.settings(), folder=tmp_path)
+    assert said.code == 0, said.err
+    assert bench.control.number("tip.force_N") == 0.0
+    assert bench.control.number("axis.position_mm") == pytest.approx(0.0, abs=0.6)
+    if "loop" in whom:
+        assert "did not end in order" in said.out
+        assert "0x8130 the host's heartbeat was missing" in said.out
+        assert "the drive's fault was cleared" in said.out
+    assert "the tip moved out" in said.out or "command" in whom or "recorder" in whom
+    assert "the axis was homed" not in said.out
+    mine = f"tissue-rig-{os.getuid()}-{running.process.pid}-"
+    assert not list(new_path().parent.glob(f"{mine}*"))
+
+
+def test_after_a_crash_nothing_moves_before_somebody_agrees(bench: Stage, tmp_path: Path) -> None:
+    killed(tracking(bench, tmp_path), "command", "loop")
+    before_mm = bench.control.number("axis.position_mm")
+    refused = rig("doctor", *bench.settings(), folder=tmp_path)
+    assert refused.code in (0, 1)
+    said = rig("track", "--model", tmp_path / "model.json", "--force", "1", "--out", tmp_path / "next",
+               *bench.settings(), folder=tmp_path)  # fmt: skip
+    assert said.code == 1
+    assert "did not end in order" in said.sentence
+    assert "run `rig reset`" in said.sentence
+    asked = rig("reset", *bench.settings(), folder=tmp_path)
+    assert asked.code == 2
+    assert (
+        "may the drive's fault (0x8130 the host's heartbeat was missing) be cleared? Agree with --clear"
+        in asked.sentence
+    )
+    asked = rig("reset", "--clear", *bench.settings(), folder=tmp_path)
+    assert asked.code == 2
+    assert "may the tip move out" in asked.sentence
+    assert bench.control.number("axis.position_mm") == pytest.approx(before_mm, abs=0.05)
+    assert rig("reset", "--retract", *bench.settings(), folder=tmp_path).code == 0
+    freed(bench)
+    again = rig("reset", *bench.settings(), folder=tmp_path)
+    assert again.code == 0, again.err
