@@ -10,9 +10,13 @@ import typer
 
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import console, table, write_json
+from api.cli.remote import RemoteBench
 from api.cli.stage import bench_for, bench_process
 from controller import doctor as examination
-from rig.errors import CheckFailed
+from controller.attending import STREAMS
+from controller.claims import Holder, holder
+from controller.doctor import Finding
+from rig.errors import CheckFailed, DeviceError
 
 
 def mock(
@@ -60,17 +64,47 @@ def _row(finding: examination.Finding) -> tuple[str, ...]:
     if not finding.product:
         return finding.role, "not heard"
     device = f"{finding.product}, serial {finding.serial}, firmware {finding.firmware}"
-    return finding.role, device, f"{finding.rate_Hz:.1f}", finding.noise, f"{finding.latency_ms:.2f}", finding.range
+    latency = f"{finding.latency_ms:.2f}" if finding.latency_ms else ""
+    return finding.role, device, f"{finding.rate_Hz:.1f}", finding.noise, latency, finding.range
+
+
+def _as_served(held: Holder) -> tuple[Finding, ...]:
+    """What the service that uses the bench says of each device; raises DeviceError where it is no service."""
+    if not held.address:
+        raise DeviceError(held.sentence)
+    state = RemoteBench(held.address).state()
+    console.print(f"as the service at {held.address} sees them", highlight=False)
+    if not state["devices"]:
+        raise CheckFailed(f"the service at {held.address} is {state['state']}: {state['reason']}")
+    return tuple(_finding(role, device, state["rates_Hz"]) for role, device in state["devices"].items())
+
+
+def _finding(role: str, device: dict[str, Any], rates_Hz: dict[str, float]) -> Finding:
+    state = device.get("state", "unknown")
+    return Finding(
+        role,
+        product=str(device["product"]),
+        serial=str(device["serial"]),
+        firmware=str(device["firmware"]),
+        rate_Hz=rates_Hz.get(STREAMS[role], 0.0),
+        problem="" if state == "ok" else f"{state}: {device.get('detail', '')}",
+    )
 
 
 def doctor(config: ConfigOption = None, overrides: SetOption = None, json_file: JsonOption = None) -> None:
     """Looks at each device without moving anything: identity, measured rate, noise, latency, range.
 
+    A service that uses the bench is asked what it knows, and is not disturbed.
+
     Example: rig doctor --config rig.toml
     """
     wiring = wiring_from(config, overrides)
-    with bench_for(wiring, approaches=False) as (live_wiring, _):
-        findings = examination.examine(live_wiring)
+    held = holder(wiring)
+    if held:
+        findings = _as_served(held)
+    else:
+        with bench_for(wiring, approaches=False) as (live_wiring, _):
+            findings = examination.examine(live_wiring)
     header = ("role", "device", "rate Hz", "noise", "latency ms", "range seen")
     console.print(table(header, map(_row, findings), title="Devices"))
     write_json(json_file, {"devices": [asdict(finding) for finding in findings]})

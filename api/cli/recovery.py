@@ -44,7 +44,10 @@ def reset(
         with RemoteBench(held.address) as remote:
             found = converse(remote.recover, agreed, ask)
     else:
-        with bench_for(wiring) as (live_wiring, _), closing(Supervisor(live_wiring, waiting=True)) as bench:
+        with (
+            bench_for(wiring, approaches=False) as (live_wiring, _),
+            closing(Supervisor(live_wiring, waiting=True)) as bench,
+        ):
             bench.start()
             found = converse(bench.recover, agreed, ask)
     write_json(json_file, asdict(found) | {"ready": found.ready})
