@@ -108,6 +108,11 @@ def _error(axis: Epos4Mock, value: Value) -> None:
     axis.inject_fault(_whole(value, 0xFFFF))
 
 
+def _restart(axis: Epos4Mock, value: Value) -> None:
+    if as_switch(value):
+        axis.restart()
+
+
 def _lasting_error(axis: Epos4Mock, value: Value) -> None:
     axis.inject_fault(_whole(value, 0xFFFF), lasting=True)
 
@@ -145,5 +150,6 @@ EPOS4_FAULTS: Mapping[str, Kind[Epos4Mock]] = {
     "unguarded": Kind("watches neither heartbeats nor its own limits any more", True, _axis_unguarded),
     "astray": Kind("its set-points run away from those that were sent at this speed, mm/s; 0: no more", 10.0, _astray),
     "error": Kind("this error happens once (0x603F code, for example 0x8611 following error)", 0x8611, _error),
+    "restart": Kind("loses its power for a moment, and with it reference, limits and torque", True, _restart),
     "lasting_error": Kind("this error comes back at each reset; 0: its cause is gone", 0x3210, _lasting_error),
 }

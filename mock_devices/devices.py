@@ -3,6 +3,7 @@
 import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, TypeVar
 from zlib import crc32
 
@@ -44,7 +45,11 @@ class Device:
 class Workshop:
     """Builds devices on ``bench``; ``clock_ns`` times delayed writes, ``seed`` draws what wire faults spoil."""
 
-    def __init__(self, bench: Bench, start_ns: int, clock_ns: Callable[[], int], seed: int) -> None:
+    def __init__(
+        self, bench: Bench, start_ns: int, clock_ns: Callable[[], int], seed: int, links: Path | None = None
+    ) -> None:
+        """Serial lines are found under ``links`` by the name of their role, also after they were unplugged."""
+        self._links = links
         self._bench = bench
         self._start_ns = start_ns
         self._clock_ns = clock_ns
@@ -56,14 +61,14 @@ class Workshop:
         return [*(sensors[product]() for product in products), self._axis(), *self._camera()]
 
     def _bota(self) -> Device:
-        wire = self._faulty(PtyWire())
+        wire = self._faulty(self._line("force"))
         drift_ppm = self._bench.parameters.force.counter_drift_ppm
         number = number_of(self._bench.parameters.force, Parameters().force, BOTA_NUMBER)
         mock = BotaMock(wire, self._bench.force, self._start_ns, drift_ppm, f"{number:06d}")
         return _device("force", mock, wire, BOTA_FAULTS, faults_of(self._bench.force, SENSOR_FAULTS))
 
     def _robotiq(self) -> Device:
-        wire = self._faulty(PtyWire())
+        wire = self._faulty(self._line("force_modbus"))
         drift_ppm = self._bench.parameters.force_modbus.counter_drift_ppm
         number = number_of(self._bench.parameters.force_modbus, Parameters().force_modbus, ROBOTIQ_NUMBER)
         mock = RobotiqMock(wire, self._bench.force_modbus, self._start_ns, drift_ppm, number)
@@ -71,7 +76,7 @@ class Workshop:
         return _device("force_modbus", mock, wire, ROBOTIQ_FAULTS, inside)
 
     def _axis(self) -> Device:
-        wire = self._faulty(PtyWire())
+        wire = self._faulty(self._line("axis"))
         axis = self._bench.parameters.axis
         per_rev = abs(axis.increments_per_mm) * axis.lead_mm
         mock = Epos4Mock(
@@ -80,7 +85,7 @@ class Workshop:
         return _device("axis", mock, wire, EPOS4_FAULTS)
 
     def _camera(self) -> list[Device]:
-        serial = self._faulty(PtyWire())
+        serial = self._faulty(self._line("tracker"))
         tcp = self._faulty(_listen(self._bench.parameters.tracker.tcp_port))
         tracker = self._bench.tracker
         inside = faults_of(tracker, CAMERA_FAULTS)
@@ -88,6 +93,9 @@ class Workshop:
             _device("tracker", NdiMock(serial, tracker, self._start_ns, TOOLS, "polaris"), serial, NDI_FAULTS, inside),
             _device("tracker", NdiMock(tcp, tracker, self._start_ns, TOOLS, "vega"), tcp, NDI_FAULTS, inside),
         ]
+
+    def _line(self, role: str) -> PtyWire:
+        return PtyWire(self._links / role if self._links else None)
 
     def _faulty(self, wire: Wire) -> FaultyWire:
         return FaultyWire(wire, self._rng, self._clock_ns)

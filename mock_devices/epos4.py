@@ -116,6 +116,11 @@ class Epos4Mock(OnWire):
         """From now on set-points run away from those that were sent, until 0."""
         self._astray_1_s, self._astray_since_ns = speed_mm_s * self._scale, self._now_ns
 
+    def restart(self) -> None:
+        """Loses its power for a moment: no torque, no reference, and settings as from the factory."""
+        self._restart(whole=True)
+        self._schedule()
+
     def receive(self, now_ns: int) -> None:
         """Takes what the client sent, and answers."""
         self._now_ns = now_ns

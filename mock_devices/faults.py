@@ -10,7 +10,7 @@ from functools import partial
 from typing import Generic, NamedTuple, TypeVar
 
 from mock_devices.stage import NEVER_NS
-from mock_devices.wire import Wire
+from mock_devices.wire import Pluggable, Wire
 from rig.errors import UsageError
 
 GARBAGE_BYTES = 23
@@ -68,6 +68,12 @@ class FaultyWire:
         """Cuts the wire for good."""
         self._late.clear()
         self._wire.close()
+
+    def plug(self) -> None:
+        """In again after ``close``; raises UsageError where this wire has no plug."""
+        if not isinstance(self._wire, Pluggable):
+            raise UsageError("this wire has no plug")
+        self._wire.plug()
 
     @property
     def due_ns(self) -> int:
@@ -139,6 +145,13 @@ def _cut(wire: FaultyWire, value: Value) -> None:
         wire.close()
 
 
+def _unplug(wire: FaultyWire, value: Value) -> None:
+    if as_switch(value):
+        wire.close()
+    else:
+        wire.plug()
+
+
 def _freeze(wire: FaultyWire, value: Value) -> None:
     wire.frozen = as_switch(value)
 
@@ -170,6 +183,7 @@ def _heal(wire: FaultyWire, value: Value) -> None:
 
 WIRE_FAULTS: Mapping[str, Kind[FaultyWire]] = {
     "cut": Kind("the cable is pulled: the client sees a hang-up; for good", True, _cut),
+    "unplug": Kind("the cable is pulled, and with false plugged in again under the same address", True, _unplug),
     "freeze": Kind("nothing passes any more in either direction, though the line stays open", True, _freeze),
     "drop": Kind("this share of messages is lost", 0.1, _drop),
     "corrupt": Kind("one bit is flipped in this share of messages", 0.1, _corrupt),

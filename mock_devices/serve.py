@@ -218,7 +218,7 @@ def _server(options: argparse.Namespace) -> Server:
     parameters = _parameters(options)
     start_ns = time.monotonic_ns() - POWERED_BEFORE_NS
     bench = Bench(parameters, options.seed, start_ns)
-    workshop = Workshop(bench, start_ns, time.monotonic_ns, options.seed)
+    workshop = Workshop(bench, start_ns, time.monotonic_ns, options.seed, options.links)
     devices = workshop.devices(FORCE_CHOICES[options.force])
     return Server(bench, devices, time.monotonic_ns)
 
@@ -258,6 +258,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--force", choices=tuple(FORCE_CHOICES), default="both")
     parser.add_argument("--seed", type=int, default=0, help="of all noise")
     parser.add_argument("--tracker-tcp-port", type=int, metavar="N", help="instead of 8765; 0: any")
+    parser.add_argument("--links", type=Path, metavar="FOLDER", help="serial lines there, and again after an unplug")
     parser.add_argument("--priority", type=int, default=0, metavar="N", help="SCHED_FIFO priority to ask for; 0: none")
     parser.add_argument("--with-parent", action="store_true", help="end when standard input is closed")
     return parser

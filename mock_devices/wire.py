@@ -5,7 +5,10 @@ import os
 import pty
 import socket
 import tty
-from typing import Protocol
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+from rig.errors import UsageError
 
 
 class Wire(Protocol):
@@ -24,6 +27,17 @@ class Wire(Protocol):
 
     def close(self) -> None:
         """Cuts the wire for good."""
+
+
+@runtime_checkable
+class Pluggable(Protocol):
+    """A wire whose plug can be pulled and pushed in again."""
+
+    def close(self) -> None:
+        """Pulls it: the client sees a hang-up."""
+
+    def plug(self) -> None:
+        """Pushes it in again; the same address leads here."""
 
 
 class OnWire:
@@ -46,13 +60,30 @@ class OnWire:
 
 
 class PtyWire:
-    """A serial line; its endpoint is a device path that any serial client opens."""
+    """A serial line; its endpoint is a device path that any serial client opens.
 
-    def __init__(self) -> None:
+    A pseudo-terminal has another name each time it is opened: only with a ``link`` to it can it be plugged in again.
+    """
+
+    def __init__(self, link: Path | None = None) -> None:
+        self._link = link
+        self._open()
+        self.endpoint = str(link) if link else os.ttyname(self._slave)
+
+    def _open(self) -> None:
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
-        self.endpoint = os.ttyname(self._slave)
+        if self._link:
+            self._link.unlink(missing_ok=True)
+            self._link.symlink_to(os.ttyname(self._slave))
+
+    def plug(self) -> None:
+        """A new line under the old name; raises UsageError without a link."""
+        if self._link is None:
+            raise UsageError("a line can be plugged in again only under a lasting name: serve with --links FOLDER")
+        if self._master < 0:
+            self._open()
 
     def filenos(self) -> list[int]:
         """The master side."""
@@ -76,6 +107,8 @@ class PtyWire:
         for fd in (self._slave, self._master):
             with contextlib.suppress(OSError):
                 os.close(fd)
+        if self._link:
+            self._link.unlink(missing_ok=True)
         self._master = self._slave = -1
 
 
@@ -83,10 +116,19 @@ class TcpWire:
     """A listening port with one client at a time; a new client replaces the old one."""
 
     def __init__(self, port: int = 0) -> None:
+        self._listen(port)
+        self._client: socket.socket | None = None
+        self._port = self._listener.getsockname()[1]
+        self.endpoint = f"127.0.0.1:{self._port}"
+
+    def _listen(self, port: int) -> None:
         self._listener = socket.create_server(("127.0.0.1", port))
         self._listener.setblocking(False)
-        self._client: socket.socket | None = None
-        self.endpoint = f"127.0.0.1:{self._listener.getsockname()[1]}"
+
+    def plug(self) -> None:
+        """Listens again, on the port it had."""
+        if self._listener.fileno() < 0:
+            self._listen(self._port)
 
     def filenos(self) -> list[int]:
         """Listener and client."""

@@ -10,6 +10,7 @@ from drivers.can.slcan import CanFrame, encode_frame
 from drivers.epos4.device import Epos4Axis
 from mock_devices.sdo_server import SdoAbort
 from mock_devices.stage import NEVER_NS
+from rig.channels import AxisSample
 from rig.errors import DeviceError
 from tests.drivers.epos4_sessions import axis_on, tick
 from tests.epos4_stage import HostDied, Stage
@@ -335,3 +336,42 @@ def test_whatever_the_bus_brings_only_a_device_error_comes_out(frames: list[CanF
         except DeviceError as error:
             assert "restarted by itself" in str(error)
     axis.close()
+
+
+def test_the_errors_a_drive_remembers_are_told_in_words_newest_first(stage: Stage, homed: Epos4Axis) -> None:
+    assert homed.history() == ()
+    stage.mock.inject_fault(0x2310)
+    stage.mock.inject_fault(0x8611)
+    assert homed.history() == ("0x8611 following error", "0x2310 overcurrent")
+
+
+def test_a_drive_that_lost_its_power_has_no_reference_when_it_is_opened_again(stage: Stage, homed: Epos4Axis) -> None:
+    homed.enable()
+    tick(stage, homed, 0.0)
+    tick(stage, homed, 0.0)
+    before = homed.referenced
+    stage.mock.restart()
+    with pytest.raises(DeviceError, match="restarted by itself"):
+        for _ in range(100):
+            tick(stage, homed, 0.0)
+    homed.start()
+    for _ in range(3):
+        stage.run(0.001)
+        homed.request(stage.now())
+        homed.poll(stage.now())
+    assert (before, homed.referenced, homed.enabled) == (True, False, False)
+
+
+def test_numbers_go_on_where_the_driver_before_left_off(stage: Stage, homed: Epos4Axis) -> None:
+    homed.enable()
+    last = [sample.seq for _ in range(5) for sample in tick(stage, homed, 0.0)][-1]
+    homed.close()
+    again = axis_on(stage)
+    again.next_seq = last + 1
+    again.start()
+    samples: list[AxisSample] = []
+    while not samples:
+        stage.run(0.001)
+        again.request(stage.now())
+        samples = list(again.poll(stage.now()))
+    assert samples[0].seq == last + 1

@@ -1,5 +1,6 @@
 import random
 import time
+from pathlib import Path
 
 import pytest
 
@@ -10,7 +11,7 @@ from mock_devices.faults import WIRE_FAULTS, FaultyWire, as_number, faults_of
 from mock_devices.parameters import Parameters
 from mock_devices.stage import NEVER_NS
 from mock_devices.wire import PtyWire, TcpWire
-from rig.errors import UsageError
+from rig.errors import DeviceError, UsageError
 from tests.remote import MemoryWire
 
 
@@ -161,3 +162,44 @@ def test_every_device_has_every_wire_fault_and_its_own_and_takes_each_at_its_def
         for fault in device.faults.values():
             fault.apply(fault.default)
         assert device.wire.filenos() == []
+
+
+def test_a_serial_line_is_found_under_its_link_again_after_an_unplug(tmp_path: Path) -> None:
+    line = PtyWire(tmp_path / "force")
+    wire = FaultyWire(line, random.Random(1), time.monotonic_ns)
+    port = SerialPort(wire.endpoint, 115200)
+    inject(wire, "unplug")
+    assert not (tmp_path / "force").exists()
+    with pytest.raises(PortClosed):
+        port.read()
+    with pytest.raises(DeviceError, match="cannot be opened"):
+        SerialPort(wire.endpoint, 115200)
+    inject(wire, "unplug", False)
+    inject(wire, "unplug", False)
+    again = SerialPort(wire.endpoint, 115200)
+    wire.write(b"here")
+    assert read_until(again, lambda data: data == b"here", 2.0) == b"here"
+    port.close()
+    again.close()
+    wire.close()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_port_listens_again_after_an_unplug() -> None:
+    wire = FaultyWire(TcpWire(), random.Random(1), time.monotonic_ns)
+    host, _, number = wire.endpoint.partition(":")
+    inject(wire, "unplug")
+    with pytest.raises(DeviceError, match="no connection"):
+        TcpPort(host, int(number))
+    inject(wire, "unplug", False)
+    TcpPort(host, int(number)).close()
+    wire.close()
+
+
+def test_a_line_without_a_lasting_name_and_a_wire_without_a_plug_refuse(wire: FaultyWire) -> None:
+    line = FaultyWire(PtyWire(), random.Random(1), time.monotonic_ns)
+    inject(line, "unplug")
+    with pytest.raises(UsageError, match="serve with --links"):
+        inject(line, "unplug", False)
+    with pytest.raises(UsageError, match="has no plug"):
+        inject(wire, "unplug", False)
