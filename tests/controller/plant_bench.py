@@ -24,7 +24,7 @@ from rig.simulation import axis_plant
 from rig.simulation.axis_plant import AxisState, Limb, Motor, PositionLoop, Sensing, at_rest
 from tests.calibrations import with_calibration
 from tests.controller.fake_bench import SETTLED_CYCLES, ZERO, FakeBench, wired
-from tests.controller.fake_devices import FakeAxis, FakeForce
+from tests.controller.fake_devices import FakeAxis, FakeForce, Triple
 
 SURFACE_MM = 20.0
 DEEPEST_MM, POINTS = 40.0, 4001
@@ -97,6 +97,7 @@ class PlantForce(FakeForce):
     product: Product = BOTA
     channel: int = 2
     lever_m: float = 0.0015
+    disturbed_N: Triple = (0.0, 0.0, 0.0)
     noise: random.Random = field(default_factory=lambda: random.Random(1))
 
     @property
@@ -108,11 +109,12 @@ class PlantForce(FakeForce):
     def _sample(self, captured_ns: int) -> ForceSample:
         assert isinstance(self.axis, PlantAxis)
         sensed_N = self.axis.state.sensed_N * self.gain + self.zero_N + self.extra_N(captured_ns)
+        number = len(self.samples) + len(self._held)
         along = [-sensed_N if at == self.channel else 0.0 for at in range(3)]
         fx_N, fy_N, fz_N = (self._converted(sum(parts)) for parts in zip(along, self.sideways_N, strict=True))
         mx, my, mz = (moment + self.noise.gauss(0.0, self.product.noise_N_m) for moment in self.moment_N_m)
+        fx_N, fy_N, fz_N = (force + more for force, more in zip((fx_N, fy_N, fz_N), self.disturbed_N, strict=True))
         mx -= self.lever_m * self.axis.state.sensed_N
-        number = len(self.samples) + len(self._held)
         return ForceSample(
             number, captured_ns, captured_ns, 0, fx_N, fy_N, fz_N, mx, my, mz, math.nan, 0, int(self.valid)
         )
