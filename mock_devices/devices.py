@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Literal, TypeVar
 from zlib import crc32
 
+from drivers.epos4.objects import SERIAL
 from mock_devices.bench import Bench
 from mock_devices.bota import BotaMock
 from mock_devices.device_faults import BOTA_FAULTS, EPOS4_FAULTS, NDI_FAULTS, ROBOTIQ_FAULTS
 from mock_devices.epos4 import Epos4Mock
 from mock_devices.faults import WIRE_FAULTS, Fault, FaultyWire, Kind, faults_of
 from mock_devices.ndi import NdiMock
-from mock_devices.parameters import Parameters, Sensor
+from mock_devices.parameters import Axis, Parameters, Sensor
 from mock_devices.robotiq import RobotiqMock
 from mock_devices.sensing_faults import CAMERA_FAULTS, SENSOR_FAULTS
 from mock_devices.stage import Mock
@@ -22,9 +23,9 @@ from mock_devices.wire import PtyWire, TcpWire, Wire
 ForceProduct = Literal["bota-sensone", "robotiq-ft300"]
 AnyMock = TypeVar("AnyMock", bound=Mock)
 TOOLS = ("tip", "arm")
-BOTA_NUMBER, ROBOTIQ_NUMBER = 271, 1234
+BOTA_NUMBER, ROBOTIQ_NUMBER, AXIS_NUMBER = 271, 1234, int(SERIAL.default)
 # Six digits are what the Bota sensor prints.
-OTHER_SENSORS = 900_000
+OTHER_DEVICES = 900_000
 FORCE_CHOICES: dict[str, tuple[ForceProduct, ...]] = {
     "both": ("bota-sensone", "robotiq-ft300"),
     "bota-sensone": ("bota-sensone",),
@@ -79,8 +80,9 @@ class Workshop:
         wire = self._faulty(self._line("axis"))
         axis = self._bench.parameters.axis
         per_rev = abs(axis.increments_per_mm) * axis.lead_mm
+        number = number_of(Axis(increments_per_mm=axis.increments_per_mm, lead_mm=axis.lead_mm), Axis(), AXIS_NUMBER)
         mock = Epos4Mock(
-            wire, self._bench.axis, self._start_ns, axis.node, axis.increments_per_mm, per_rev, self._clock_ns
+            wire, self._bench.axis, self._start_ns, axis.node, axis.increments_per_mm, per_rev, self._clock_ns, number
         )
         return _device("axis", mock, wire, EPOS4_FAULTS)
 
@@ -101,9 +103,9 @@ class Workshop:
         return FaultyWire(wire, self._rng, self._clock_ns)
 
 
-def number_of(sensor: Sensor, usual: Sensor, number: int) -> int:
-    """A sensor made of other figures is another sensor, and has another serial number."""
-    return number if sensor == usual else number + 1 + crc32(sensor.model_dump_json().encode()) % OTHER_SENSORS
+def number_of(device: Sensor | Axis, usual: Sensor | Axis, number: int) -> int:
+    """A device made of other figures is another device, and has another serial number."""
+    return number if device == usual else number + 1 + crc32(device.model_dump_json().encode()) % OTHER_DEVICES
 
 
 def _device(

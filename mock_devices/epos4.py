@@ -11,7 +11,7 @@ from collections.abc import Callable
 from drivers.can.slcan import CanFrame
 from drivers.canopen.nmt import EMERGENCY_ID, HEARTBEAT_ID, SDO_REQUEST_ID, SDO_RESPONSE_ID, SYNC, NmtCommand, NmtState
 from drivers.epos4.faults import FAULTS, UNKNOWN
-from drivers.epos4.objects import PRODUCT, VENDOR
+from drivers.epos4.objects import PRODUCT, SERIAL, VENDOR
 from mock_devices.epos4_dictionary import Dictionary
 from mock_devices.epos4_drive import Drive
 from mock_devices.epos4_pdo import ProcessData
@@ -52,8 +52,10 @@ class Epos4Mock(OnWire):
         increments_per_mm: float = 2000.0,
         increments_per_rev: float = 10_000.0,
         clock_ns: Callable[[], int] | None = None,
+        number: int = int(SERIAL.default),
     ) -> None:
         super().__init__(wire)
+        self.serial_number = f"{number:08X}"
         self.silent = False
         self.wrong_identity = False
         self.node = node
@@ -271,6 +273,7 @@ class Epos4Mock(OnWire):
                 (0x1001, 0): lambda: self._error_register,
                 (0x1018, 1): lambda: STRANGE_VENDOR if self.wrong_identity else int(VENDOR.default),
                 (0x1018, 2): lambda: STRANGE_PRODUCT if self.wrong_identity else int(PRODUCT.default),
+                (0x1018, 4): lambda: int(self.serial_number, 16),
                 (0x30D1, 1): lambda: drive.current_mA,
                 (0x30D1, 2): lambda: drive.current_mA,
                 (0x30D3, 1): lambda: drive.rpm,

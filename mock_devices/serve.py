@@ -72,8 +72,8 @@ class Server:
     def endpoints(self) -> dict[str, object]:
         """Address of each device by role and kind of port, of the control channel, this process' id, and latencies.
 
-        ``serials`` has the serial number of each force sensor by role. ``latency_ms`` is what a data sheet would say of
-        each device; what is hidden in the bench comes on top.
+        ``serials`` has the serial number of force sensors and axis by role. ``latency_ms`` is what a data sheet would
+        say of each device; what is hidden in the bench comes on top.
         """
         addresses: dict[str, dict[str, str]] = {}
         for device in self._devices:
@@ -85,7 +85,7 @@ class Server:
             "serials": {
                 device.role: device.mock.serial_number
                 for device in self._devices
-                if isinstance(device.mock, BotaMock | RobotiqMock)
+                if isinstance(device.mock, BotaMock | RobotiqMock | Epos4Mock)
             },
             "latency_ms": stated_latency_ms(self._bench.parameters),
         }

@@ -1,7 +1,8 @@
-"""The mock force sensor's calibration: made by itself the first time it is needed, said once, kept and used again.
+"""What a mock bench is calibrated with by itself the first time it is needed: said once, kept and used again.
 
-It is made by the functions of `rig calibrate force`, with weights that the mock bench puts on its own tip. Effects that
-are hidden in the bench are switched off meanwhile: a sensor is calibrated before it goes wrong.
+Force sensor and axis are calibrated by the functions of `rig calibrate`, with weights that the mock bench puts on its
+own tip, and in the air. Effects that are hidden in the bench are switched off meanwhile: a device is calibrated before
+it goes wrong.
 """
 
 import contextlib
@@ -14,15 +15,17 @@ from typing import Any
 
 import typer
 
+from controller.commissioning.axis import against_tracker, ahead_mm, known_direction
+from controller.commissioning.axis_moves import Pace, RestingAxis, travelled
 from controller.commissioning.force import calibrate
 from controller.commissioning.readings import read
 from controller.commissioning.weights import Weights
-from controller.devices import open_force
+from controller.devices import open_force, start_devices
 from mock_devices.control import BenchControl
-from rig.config.calibration import ForceCalibration
-from rig.config.calibration_files import read_force, text_of
+from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
+from rig.config.calibration_files import read_axis, read_force, text_of
 from rig.config.wiring import Wiring
-from rig.errors import RigError, UsageError
+from rig.errors import DeviceError, RigError, UsageError
 from rig.recording.files import make_folder, write_text
 
 STATE = "XDG_STATE_HOME"
@@ -30,6 +33,9 @@ STATE = "XDG_STATE_HOME"
 SHARES = (0.1, 0.25, 0.5)
 # Ten samples of the slower sensor; its filter and the tip's own take a few milliseconds.
 READ_S, SETTLE_S = 0.12, 0.05
+# The simulated camera is 15 ms late; 18 frames at each place know the slope to 0.2 %.
+PACE = Pace(speed_mm_s=20.0, settle_s=0.15, read_s=0.3)
+AXIS_STEPS_MM = (2.0, 14.0, 2.0)
 
 
 def state_folder() -> Path:
@@ -43,24 +49,53 @@ def role_of(product: str) -> str:
     return "force_modbus" if product == "robotiq-ft300" else "force"
 
 
-def mock_file(wiring: Wiring, endpoints: dict[str, Any]) -> Path:
+def force_file(wiring: Wiring, endpoints: dict[str, Any]) -> Path:
     """Where the calibration of this mock sensor is kept: another serial number, another file."""
     product = wiring.force.product
     return state_folder() / f"{product}-{endpoints['serials'][role_of(product)]}.json"
 
 
-def mock_calibration(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibration:
+def axis_file(wiring: Wiring, endpoints: dict[str, Any]) -> Path:
+    """Where the calibration of this mock axis is kept."""
+    return state_folder() / f"{wiring.axis.product}-{endpoints['serials']['axis']}.json"
+
+
+def mock_force_calibration(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibration:
     """The calibration of the mock sensor at ``wiring.force.port``, made now where there is none that may be used."""
-    file = mock_file(wiring, endpoints)
+    file = force_file(wiring, endpoints)
     with contextlib.suppress(UsageError):
         known = read_force(file)
-        if not wiring.calibration.model_copy(update={"of_force": known}).unfit(datetime.now(UTC)):
+        if _fit(Calibration(of_force=known), wiring):
             return known
-    made = _made(wiring, endpoints)
-    typer.echo(
-        f"the mock force sensor {made.product} {made.serial} was calibrated by itself{_kept(made, file)}", err=True
-    )
+    made = _measured_force(wiring, endpoints)
+    _say(f"the mock force sensor {made.product} {made.serial} was calibrated by itself{_kept(made, file)}")
     return made
+
+
+def mock_axis_calibration(wiring: Wiring, endpoints: dict[str, Any]) -> AxisCalibration | None:
+    """The calibration of the mock axis against the mock tracker, made now where there is none that may be used.
+
+    None where a marker is out of view or the limb's does not tell the sense, where the workspace is too short, and
+    where the computer was too busy for it: the approach does not need it.
+    """
+    file = axis_file(wiring, endpoints)
+    with contextlib.suppress(UsageError):
+        known = read_axis(file)
+        if _fit(Calibration(of_axis=known), wiring):
+            return known
+    try:
+        made = _measured_axis(wiring, endpoints)
+    except DeviceError as error:
+        _say(f"the mock axis was not calibrated, next time again: {error}")
+        return None
+    if made:
+        _say(f"the mock axis {made.product} {made.serial} was calibrated by itself{_kept(made, file)}")
+    return made
+
+
+def _fit(known: Calibration, wiring: Wiring) -> bool:
+    stated = wiring.calibration.model_copy(update={"of_force": known.of_force, "of_axis": known.of_axis})
+    return not stated.unfit(datetime.now(UTC))
 
 
 def mock_weights(wiring: Wiring, hung: bool = False) -> Weights:
@@ -69,7 +104,7 @@ def mock_weights(wiring: Wiring, hung: bool = False) -> Weights:
     return Weights(tuple(share * largest_N for share in SHARES), uncertainty=0.0)
 
 
-def _made(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibration:
+def _measured_force(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibration:
     with (
         BenchControl(endpoints["control"]) as control,
         _nothing_hidden(control),
@@ -87,6 +122,30 @@ def _made(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibration:
         )
 
 
+def _measured_axis(wiring: Wiring, endpoints: dict[str, Any]) -> AxisCalibration | None:
+    places_mm = [wiring.limits.position_min_mm + step_mm for step_mm in AXIS_STEPS_MM]
+    if max(places_mm) > wiring.limits.position_max_mm:
+        return None
+    with BenchControl(endpoints["control"]) as control, _nothing_hidden(control), _in_the_air(control):
+        if not all(control.get("tracker.tip_in_view", "tracker.arm_in_view").values()):
+            return None
+        devices = start_devices(wiring)
+        try:
+            devices.axis.home()
+            places = travelled(RestingAxis(devices, PACE), places_mm)
+        except DeviceError:
+            # What the computer was too late for must not be found in fault by what comes next.
+            with contextlib.suppress(RigError):
+                devices.axis.reset_fault()
+            raise
+        finally:
+            devices.close()
+    known_by = known_direction(ahead_mm(places))
+    if known_by is None:
+        return None
+    return against_tracker(devices.axis.identity, wiring.axis, places, known_by, datetime.now(UTC))
+
+
 @contextlib.contextmanager
 def weights_on(control: BenchControl) -> Iterator[Callable[[float], None]]:
     """Puts weights on the tip of the mock bench as a person would, and takes them off at the end."""
@@ -101,6 +160,17 @@ def weights_on(control: BenchControl) -> Iterator[Callable[[float], None]]:
 
 
 @contextlib.contextmanager
+def _in_the_air(control: BenchControl) -> Iterator[None]:
+    """Without the limb."""
+    present = bool(control.get("tissue.present")["tissue.present"])
+    control.set({"tissue.present": False})
+    try:
+        yield
+    finally:
+        control.set({"tissue.present": present})
+
+
+@contextlib.contextmanager
 def _nothing_hidden(control: BenchControl) -> Iterator[None]:
     hidden = {f"{effect}.{name}": value for effect, values in control.truth().items() for name, value in values.items()}
     if hidden:
@@ -112,7 +182,11 @@ def _nothing_hidden(control: BenchControl) -> Iterator[None]:
             control.hide(hidden)
 
 
-def _kept(made: ForceCalibration, file: Path) -> str:
+def _say(sentence: str) -> None:
+    typer.echo(sentence, err=True)
+
+
+def _kept(made: ForceCalibration | AxisCalibration, file: Path) -> str:
     """Where it is kept; a folder that cannot be written costs a calibration each time, and is said."""
     try:
         make_folder(file.parent)

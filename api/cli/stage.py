@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from typing import Any
 
-from api.cli.mock_calibration import mock_calibration, role_of
+from api.cli.mock_calibration import mock_axis_calibration, mock_force_calibration, role_of
 from api.cli.options import calibrated
 from controller.commissioning.refusals import refuse_uncalibrated
 from rig.config.wiring import MOCK_PORT, Wiring
@@ -89,14 +89,17 @@ def bench_for(
 
 
 def plugged(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
-    """``wiring`` on the mock bench's endpoints, with a calibration of its force sensor, where that is a mock one.
+    """``wiring`` on the mock bench's endpoints, with calibrations of what is a mock: its force sensor, and its axis.
 
-    A calibration that the wiring brings along is kept, whosever it is.
+    A calibration that the wiring brings along is kept, whosever it is. A mock axis is seen by the mock tracker alone.
     """
     live = at_endpoints(wiring, endpoints)
-    if wiring.force.port != MOCK_PORT or wiring.calibration.of_force:
-        return live
-    known = live.calibration.model_copy(update={"of_force": mock_calibration(live, endpoints)})
+    known, tracker = live.calibration, wiring.tracker
+    if wiring.force.port == MOCK_PORT and not known.of_force:
+        known = known.model_copy(update={"of_force": mock_force_calibration(live, endpoints)})
+    seen = tracker is not None and tracker.port == wiring.axis.port == MOCK_PORT
+    if seen and not known.of_axis:
+        known = known.model_copy(update={"of_axis": mock_axis_calibration(live, endpoints)})
     return live.model_copy(update={"calibration": known})
 
 

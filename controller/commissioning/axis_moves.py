@@ -6,6 +6,7 @@ No loop runs meanwhile: between two moves everything is read, and what presses o
 import threading
 import time
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,9 +15,7 @@ from controller.devices import Devices
 from rig.channels import MarkerSample
 from rig.errors import CheckFailed, DeviceError, SafetyStop
 
-SPEED_MM_S = 5.0
-# The axis' own ripple and the smoothing of the drive are gone after a tenth of a second; a camera is 15 to 100 ms late.
-SETTLE_S, READ_S, PERIOD_S = 0.3, 0.5, 0.001
+PERIOD_S = 0.001
 # Between zero and what a person takes for a touch; the tip moves in the air.
 LARGEST_TOUCH_N = 0.5
 # On steel, 0.05 mm meets the stiffness of the bench alone, some 100 N/mm: 5 N at most, one step after the first touch.
@@ -28,26 +27,42 @@ FIRST_STEP_MM = 1.0
 TIP, ARM = 0, 1
 
 
+class Pace(NamedTuple):
+    """How fast from rest to rest, and how long to rest before and while reading.
+
+    The axis' own ripple and the smoothing of the drive are gone after a tenth of a second; a camera is 15 to 100 ms
+    late, and half a second of it are 30 frames.
+    """
+
+    speed_mm_s: float = 5.0
+    settle_s: float = 0.3
+    read_s: float = 0.5
+
+
+PACE = Pace()
+
+
 class RestingAxis:
     """Devices that are started and an axis that is homed; ``reference_N`` is the force when nothing touched."""
 
     def __init__(
         self,
         devices: Devices,
+        pace: Pace = PACE,
         now: Callable[[], int] = time.monotonic_ns,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self._devices, self._now, self._sleep = devices, now, sleep
+        self._devices, self._pace, self._now, self._sleep = devices, pace, now, sleep
         self._reference_N: Array | None = None
 
     def go(self, position_mm: float) -> None:
         """By the drive's own profile, to rest."""
-        self._devices.axis.move_to(position_mm, SPEED_MM_S)
+        self._devices.axis.move_to(position_mm, self._pace.speed_mm_s)
 
     def place(self) -> Place:
         """Where everything is, at rest; raises SafetyStop where something presses on the tip."""
-        self._read(SETTLE_S)
-        axis_mm, markers, force_N = self._read(READ_S)
+        self._read(self._pace.settle_s)
+        axis_mm, markers, force_N = self._read(self._pace.read_s)
         if self._reference_N is None:
             self._reference_N = force_N
         load_N = float(np.linalg.norm(force_N - self._reference_N))

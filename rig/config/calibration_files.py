@@ -29,6 +29,11 @@ def read_force(path: Path) -> ForceCalibration:
     return _read(ForceCalibration, path, "force calibration")
 
 
+def read_axis(path: Path) -> AxisCalibration:
+    """The axis calibration in ``path``; raises UsageError."""
+    return _read(AxisCalibration, path, "axis calibration")
+
+
 def _read(kind: type[AnyTable], path: Path, role: str) -> AnyTable:
     values = read_toml(path) if path.suffix == ".toml" else _read_json(path, role)
     return parse(kind, values, f"{role} {path}")

@@ -14,19 +14,19 @@ from api.cli.app import build
 from api.cli.asking import Person
 from api.cli.calibrate_axis import AxisAsked, calibrate_axis
 from api.cli.calibration_output import keep, refuse_out, refuse_unfit
-from api.cli.mock_calibration import mock_file, state_folder
+from api.cli.mock_calibration import force_file, state_folder
 from api.cli.options import built_in, calibrated, wiring_from
 from api.cli.stage import bench_for, plugged
 from rig.config.calibration import Calibration, Uncertainty
 from rig.config.calibration_files import read_force, text_of
-from rig.errors import CheckFailed, UsageError
+from rig.errors import CheckFailed, DeviceError, UsageError
 from tests.calibrations import axis_calibration, force_calibration
 
 runner = CliRunner()
 ENDPOINTS = {
     "force": {"serial": "/dev/pts/90"}, "force_modbus": {"serial": "/dev/pts/91"}, "axis": {"slcan": "/dev/pts/92"},
     "tracker": {"tcp": "127.0.0.1:8765"}, "control": "127.0.0.1:1", "latency_ms": {"force": 0.5, "force_modbus": 3.0,
-    "tracker": 15.0}, "serials": {"force": "000271", "force_modbus": "FTS-1234"},
+    "tracker": 15.0}, "serials": {"force": "000271", "force_modbus": "FTS-1234", "axis": "A1"},
 }  # fmt: skip
 REAL = ["--set", "force.port=/dev/null"]
 
@@ -35,6 +35,7 @@ REAL = ["--set", "force.port=/dev/null"]
 def own_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setattr(mock_calibration, "_measured_axis", lambda *_: None)
     return tmp_path
 
 
@@ -191,7 +192,7 @@ def edited(file: Path, **changes: object) -> None:
 
 
 def stored(date: datetime | None = None) -> None:
-    file = mock_file(built_in(), ENDPOINTS)
+    file = force_file(built_in(), ENDPOINTS)
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(text_of(force_calibration(date=date)))
 
@@ -199,7 +200,7 @@ def stored(date: datetime | None = None) -> None:
 def test_a_mock_sensor_uses_the_calibration_that_is_kept_for_its_serial_number(
     monkeypatch: pytest.MonkeyPatch, own_state: Path
 ) -> None:
-    monkeypatch.setattr(mock_calibration, "_made", lambda *_: pytest.fail("calibrated again"))
+    monkeypatch.setattr(mock_calibration, "_measured_force", lambda *_: pytest.fail("calibrated again"))
     stored()
     assert state_folder() == own_state / "state" / "tissue-rig"
     found = plugged(built_in(), ENDPOINTS).calibration.of_force
@@ -214,30 +215,60 @@ def test_it_is_made_once_where_none_may_be_used_and_said(
     endpoints = ENDPOINTS
     if why == "other sensor":
         stored()
-        endpoints = ENDPOINTS | {"serials": {"force": "000300", "force_modbus": "FTS-1234"}}
+        endpoints = ENDPOINTS | {"serials": {"force": "000300", "force_modbus": "FTS-1234", "axis": "A1"}}
     elif why == "old":
         stored(datetime.now(UTC) - timedelta(days=400))
     elif why == "damaged":
         stored()
-        mock_file(built_in(), ENDPOINTS).write_text("{")
+        force_file(built_in(), ENDPOINTS).write_text("{")
     made: list[str] = []
 
     def make(*_: object) -> object:
         made.append("made")
         return force_calibration(serial=endpoints["serials"]["force"])  # type: ignore[index]
 
-    monkeypatch.setattr(mock_calibration, "_made", make)
+    monkeypatch.setattr(mock_calibration, "_measured_force", make)
     for _ in range(2):
         assert plugged(built_in(), endpoints).calibration.of_force is not None
     assert made == ["made"]
     assert capsys.readouterr().err.count("was calibrated by itself") == 1
 
 
+def test_a_mock_axis_is_calibrated_once_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stored()
+    made: list[str] = []
+
+    def make(*_: object) -> object:
+        made.append("made")
+        return axis_calibration()
+
+    monkeypatch.setattr(mock_calibration, "_measured_axis", make)
+    for _ in range(2):
+        assert plugged(built_in(), ENDPOINTS).calibration.of_axis is not None
+    assert made == ["made"]
+    assert capsys.readouterr().err.count("the mock axis EPOS4 A1 was calibrated by itself; kept in") == 1
+    assert plugged(built_in(["tracker.port=tcp://10.0.0.1:8765"]), ENDPOINTS).calibration.of_axis is None
+
+
+def test_a_computer_too_busy_to_calibrate_the_mock_axis_is_told_and_goes_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def late(*_: object) -> object:
+        raise DeviceError("its heartbeat is missing")
+
+    stored()
+    monkeypatch.setattr(mock_calibration, "_measured_axis", late)
+    assert plugged(built_in(), ENDPOINTS).calibration.of_axis is None
+    assert "the mock axis was not calibrated, next time again: its heartbeat is missing" in capsys.readouterr().err
+
+
 def test_where_it_cannot_be_kept_that_is_said(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], own_state: Path
 ) -> None:
     (own_state / "state").write_text("in the way")
-    monkeypatch.setattr(mock_calibration, "_made", lambda *_: force_calibration())
+    monkeypatch.setattr(mock_calibration, "_measured_force", lambda *_: force_calibration())
     assert plugged(built_in(), ENDPOINTS).calibration.of_force is not None
     assert "and again next time: " in capsys.readouterr().err
 
@@ -256,7 +287,7 @@ def test_a_wiring_that_contradicts_what_is_kept_is_refused(monkeypatch: pytest.M
 
 
 def test_whoever_only_looks_or_retracts_needs_no_calibration(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mock_calibration, "_made", lambda *_: pytest.fail("calibrated"))
+    monkeypatch.setattr(mock_calibration, "_measured_force", lambda *_: pytest.fail("calibrated"))
     real = built_in(["force.port=/dev/ttyUSB0", "axis.port=/dev/ttyACM0", "tracker.port=/dev/ttyUSB1"])
     with bench_for(real, approaches=False) as (live, _):
         assert live == real
@@ -265,7 +296,7 @@ def test_whoever_only_looks_or_retracts_needs_no_calibration(monkeypatch: pytest
 
 
 def test_a_real_sensor_beside_a_mock_axis_is_never_calibrated_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mock_calibration, "_made", lambda *_: pytest.fail("calibrated"))
+    monkeypatch.setattr(mock_calibration, "_measured_force", lambda *_: pytest.fail("calibrated"))
     known = force_calibration(serial="real")
     wiring = built_in(["force.port=/dev/ttyUSB0"])
     wiring = wiring.model_copy(update={"calibration": wiring.calibration.model_copy(update={"of_force": known})})

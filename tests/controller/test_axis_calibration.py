@@ -164,7 +164,7 @@ def _seen(now_ns: int, tool: int, at_mm: np.ndarray, valid: bool) -> MarkerSampl
 
 def resting(bench: AxisOf) -> RestingAxis:
     devices = Devices(ForceOf(bench), bench, TrackerOf(bench))  # type: ignore[arg-type]
-    return RestingAxis(devices, bench.clock, bench.sleep)
+    return RestingAxis(devices, now=bench.clock, sleep=bench.sleep)
 
 
 def test_the_axis_is_read_at_each_place() -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from api.cli.mock_calibration import mock_file
+from api.cli.mock_calibration import force_file
 from api.cli.options import built_in
 from api.cli.stage import plugged
 from mock_devices.control import BenchControl
@@ -56,7 +56,7 @@ class Stage:
         products = [setting for setting in more if setting.startswith("force.product=")]
         wiring = built_in(products)
         plugged(wiring, self.endpoints)
-        return mock_file(wiring, self.endpoints)
+        return force_file(wiring, self.endpoints)
 
 
 @contextlib.contextmanager

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from api.cli.mock_calibration import mock_file
+from api.cli.mock_calibration import force_file
 from api.cli.options import built_in
 from api.cli.stage import plugged
+from controller.commissioning.refusals import contradictions
 from rig.config.calibration_files import read_force, text_of
+from rig.errors import CheckFailed
 from tests.calibrations import force_calibration
 from tests.system.stage import EXAMPLES, Running, Said, Stage, rig
 
@@ -68,19 +70,37 @@ def test_a_sensor_that_is_wrong_is_named_with_the_first_weight_and_nothing_is_wr
     assert not list(tmp_path.rglob("*.json*"))
 
 
-def test_a_mock_sensor_is_calibrated_once_without_what_is_hidden_in_the_bench(
+def test_a_mock_bench_is_calibrated_once_without_what_is_hidden_in_it(
     bench: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     bench.control.hide({"gain_error.gain_1": 0.2})
-    found = plugged(built_in(), bench.endpoints).calibration.of_force
-    assert found is not None
-    assert found.matrix[2][2] == pytest.approx(1.0, abs=0.002)
+    found = plugged(built_in(), bench.endpoints).calibration
+    assert found.of_force is not None
+    assert found.of_axis is not None
+    assert found.of_force.matrix[2][2] == pytest.approx(1.0, abs=0.002)
+    assert found.of_axis.scale == pytest.approx(1.0, abs=0.005)
     assert bench.control.truth() == {"gain_error": {"gain_1": 0.2}}
-    assert bench.control.number("load.axial_N") == 0.0
-    assert plugged(built_in(), bench.endpoints).calibration.of_force == found
-    assert capsys.readouterr().err.count("000271 was calibrated by itself; kept in") == 1
-    assert mock_file(built_in(), bench.endpoints).is_file()
+    assert bench.control.get("load.axial_N", "tissue.present") == {"load.axial_N": 0.0, "tissue.present": True}
+    assert plugged(built_in(), bench.endpoints).calibration == found
+    said = capsys.readouterr().err
+    assert said.count("000271 was calibrated by itself; kept in") == 1
+    assert said.count("62014711 was calibrated by itself; kept in") == 1
+    assert force_file(built_in(), bench.endpoints).is_file()
+
+
+def test_a_wiring_with_a_wrong_scale_is_refused_by_the_first_run_and_by_later_ones(
+    bench: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    wrong = built_in(["axis.increments_per_mm=4000"])
+    with pytest.raises(CheckFailed, match="the axis says it went 2 mm and the tracker saw"):
+        plugged(wrong, bench.endpoints)
+    assert plugged(built_in(), bench.endpoints).calibration.of_axis is not None
+    assert contradictions(plugged(wrong, bench.endpoints)) == [
+        "axis.increments_per_mm 4000, axis.direction 1: the axis was calibrated with 2000 and 1; correct the wiring, or"
+        " calibrate again"
+    ]
 
 
 def test_the_calibration_of_another_sensor_moves_nothing_and_leaves_no_session(bench: Stage, tmp_path: Path) -> None:
