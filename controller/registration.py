@@ -16,6 +16,8 @@ SCALE_TRAVEL_MM = 2.0
 CONFIDENCE = 3.29
 LEAST_FRAMES = 20
 SMOOTH_FRAMES = 6
+# From one frame of 60 Hz to the next at 0.5 mm/s.
+LEAST_STEP_MM = 0.008
 HISTORY = 1000
 
 
@@ -63,8 +65,11 @@ class Registration:
         position_mm = self._position(capture_ns)
         if position_mm is None:
             return
-        self._tip = (frame, at, position_mm)
+        before, self._tip = self._tip, (frame, at, position_mm)
         if self.registered:  # what comes after may be a camera that was pushed
+            return
+        # At rest a frame that is dated wrongly shows no lag and in motion it does: together they would bend the line.
+        if before is None or abs(position_mm - before[2]) < LEAST_STEP_MM:
             return
         self._count += 1
         change_mm = position_mm - self._mean_mm

@@ -101,3 +101,19 @@ def test_a_frame_between_two_samples_of_the_axis_is_placed_between_them() -> Non
     assert registration.scale is not None
     assert registration.scale.high - registration.scale.low < 1e-3
     assert registration.scale.low == pytest.approx(1.0, abs=1e-3)
+
+
+def test_frames_that_are_dated_wrongly_bend_no_scale_where_the_axis_had_rested_before() -> None:
+    registration, late_s = Registration(), 0.05
+    for milli in range(1000):
+        registration.axis(milli * 1_000_000, moved_mm(milli * 1e-3))
+        if milli % 16 == 0:
+            place = TIP + np.array([0.0, 0.0, 1.0]) * moved_mm(milli * 1e-3 - late_s)
+            registration.tip(milli // 16, milli * 1_000_000, Point(*place))
+    known = registration.scale
+    assert known is not None and 0.5 * (known.low + known.high) == pytest.approx(1.0, abs=0.05)
+
+
+def moved_mm(time_s: float) -> float:
+    """Half a second of rest, then 20 mm/s."""
+    return 20.0 * max(time_s - 0.5, 0.0)
