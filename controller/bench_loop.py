@@ -365,7 +365,7 @@ class BenchLoop:
         latched = self.machine.latched
         return {
             "time_ns": row.capture_ns,
-            "mode": Mode(row.mode).name.lower(),
+            "mode": self.connections.shown_mode(Mode(row.mode)),
             "busy": self.machine.busy,
             "step": row.step,
             "health": row.health,

@@ -6,6 +6,7 @@ from dataclasses import replace
 from controller import device_states
 from controller.device_states import DeviceStatus, Observation, State
 from controller.health import NEVER_NS, ON_RATE, StreamHealth
+from controller.modes import Mode
 from controller.reopening import Openers, Reopening
 from drivers.roles import Device, Identity, ServoAxis
 
@@ -54,6 +55,13 @@ class Connections:
     def ready(self) -> bool:
         """Whether every device is ok."""
         return all(status.state is State.OK for status in self.statuses.values())
+
+    def shown_mode(self, mode: Mode) -> str:
+        """The mode for people: idle only where every device is ok, else which are not."""
+        if mode is not Mode.IDLE or self.ready:
+            return mode.name.lower()
+        bad = [f"{role} {status.state}" for role, status in self.statuses.items() if status.state is not State.OK]
+        return f"not ready: {', '.join(bad)}"
 
     def refusal(self, needed: Iterable[str] | None = None) -> str:
         """Why nothing can start that needs those roles (all of them unless said), and the next step."""

@@ -58,6 +58,14 @@ def test_a_cut_cable_is_a_loss_that_is_named_and_refuses_a_start_with_the_next_s
     assert "check its power and cable" in text or "reset" in text
 
 
+def test_it_is_idle_only_while_every_device_is_ok() -> None:
+    bench = settled()
+    assert bench.link.statuses[-1]["mode"] == "idle"
+    bench.tracker.cut = "the line is gone"
+    bench.wait(0.2)
+    assert bench.link.statuses[-1]["mode"] == "not ready: tracker lost"
+
+
 def test_a_sensor_that_fell_silent_is_lost_and_is_opened_again() -> None:
     bench = settled()
     bench.force.silent = True
