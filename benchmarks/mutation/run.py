@@ -1,18 +1,21 @@
 """Tries mutants, some at a time, each in a process of its own; first makes sure that the tests pass without any."""
 
 import ast
+import gc
 import json
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TextIO
 
 import pytest
 
-from benchmarks.mutation import trials
+from benchmarks.mutation import inplace, trials
+from benchmarks.mutation.inplace import Collected
 from benchmarks.mutation.lines import RAN, Coverage, Observer, with_probes
 from benchmarks.mutation.mutants import Mutant, enums_of, mutants_of, mutated
 from benchmarks.mutation.trials import Trial, Verdict
@@ -51,40 +54,104 @@ class Result:
     verdict: Verdict
 
 
-def run(
-    subject: Subject, chosen: Sequence[Mutant], jobs: int, tell: Callable[[Sequence[Result]], None]
-) -> list[Result]:
-    """Tries ``chosen`` and tells what is known so far every hundred; CheckFailed where tests fail without a mutant."""
+Begin = Callable[[Mutant], Trial | None]
+Tell = Callable[[Sequence[Result]], None]
+
+
+def run(subject: Subject, chosen: Sequence[Mutant], jobs: int, tell: Tell) -> list[Result]:
+    """Tries ``chosen`` and tells what is known so far every hundred; CheckFailed where tests fail without a mutant.
+
+    First those of functions, in place; then, imported anew, those that run at import or could not be put in place.
+    """
     trials.FRESH.update(path.partition("/")[0] for path in subject.paths)
     os.chdir(subject.root)
     tests = _looked_at(subject)
     _check_unchanged(subject, tests)
-    waiting, under_way, results = list(reversed(chosen)), dict[int, tuple[Mutant, Trial]](), list[Result]()
-    while waiting or under_way:
-        while waiting and len(under_way) < jobs:
-            mutant = waiting.pop()
-            under_way[mutant_id(mutant)] = mutant, _begin(subject, mutant, tests)
-        for key, (mutant, trial) in list(under_way.items()):
-            if verdict := trial.poll():
-                del under_way[key]
-                results.append(Result(mutant, verdict))
-                if len(results) % EVERY == 0:
-                    tell(results)
-        time.sleep(POLL_S)
+    results = _in_place(subject, [mutant for mutant in chosen if not mutant.place.at_import], tests, jobs, tell)
+    done = {result.mutant for result in results}
+    left = [mutant for mutant in chosen if mutant not in done]
+    list(_tried(left, jobs, lambda mutant: _begin_anew(subject, mutant, tests), results, tell))
     return results
 
 
-def mutant_id(mutant: Mutant) -> int:
-    """Distinguishes the mutants of a run."""
-    return hash((mutant.path, mutant.number))
+def _tried(mutants: Sequence[Mutant], jobs: int, begin: Begin, results: list[Result], tell: Tell) -> Iterator[Result]:
+    """Tries ``jobs`` at a time, but for mutants that ``begin`` has no trial for; ``results`` grows by what is found."""
+    waiting, under_way = list(reversed(mutants)), dict[Mutant, Trial]()
+    while waiting or under_way:
+        while waiting and len(under_way) < jobs:
+            mutant = waiting.pop()
+            if trial := begin(mutant):
+                under_way[mutant] = trial
+        for mutant, trial in list(under_way.items()):
+            if verdict := trial.poll():
+                del under_way[mutant]
+                results.append(Result(mutant, verdict))
+                yield results[-1]
+                if len(results) % EVERY == 0:
+                    tell(results)
+        time.sleep(POLL_S)
 
 
-def _begin(subject: Subject, mutant: Mutant, tests: Coverage) -> Trial:
-    path = subject.root / mutant.path
-    place = mutant.place
+def _in_place(subject: Subject, chosen: Sequence[Mutant], tests: Coverage, jobs: int, tell: Tell) -> list[Result]:
+    """A process of its own imports and collects everything, tries the mutants in forks, and tells the verdicts."""
+    if not chosen:
+        return []
+    told, to_tell = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        os.close(told)
+        _silence()
+        with os.fdopen(to_tell, "w") as pipe:
+            inplace.collect(subject.tests, lambda collected: _campaign(subject, chosen, tests, jobs, collected, pipe),
+                            tests.seconds)  # fmt: skip
+        os._exit(0)
+    os.close(to_tell)
+    by_key, results = {(mutant.path, mutant.number): mutant for mutant in chosen}, list[Result]()
+    with os.fdopen(told) as pipe:
+        for line in pipe:
+            path, number, verdict = json.loads(line)
+            results.append(Result(by_key[path, number], Verdict(*verdict)))
+            if len(results) % EVERY == 0:
+                tell(results)
+    os.waitpid(pid, 0)
+    return results
+
+
+def _campaign(
+    subject: Subject, chosen: Sequence[Mutant], tests: Coverage, jobs: int, collected: Collected, pipe: TextIO
+) -> None:
+    gc.freeze()
+
+    def begin(mutant: Mutant) -> Trial | None:
+        module = sys.modules.get(_module(mutant.path))
+        function = inplace.function_of(module, mutant.place.scope) if module else None
+        if function is None:
+            return None
+        path, noticing = subject.root / mutant.path, tests.noticing(mutant.path, mutant.place.first_line, False)
+        tree = mutated(path.read_text(), mutant.number, subject.enums)
+        kept = function.__code__
+        if not inplace.patch(function, tree, str(path)):
+            return None
+        function.__code__ = kept
+        return collected.begin(function, tree, str(path), noticing)
+
+    for result in _tried(chosen, jobs, begin, [], lambda _: None):
+        mutant, verdict = result.mutant, result.verdict
+        row = (mutant.path, mutant.number, (verdict.killed, verdict.by, verdict.seconds))
+        print(json.dumps(row), file=pipe, flush=True)
+
+
+def _begin_anew(subject: Subject, mutant: Mutant, tests: Coverage) -> Trial:
+    path, place = subject.root / mutant.path, mutant.place
     noticing = tests.noticing(mutant.path, place.first_line, place.at_import)
     tree = mutated(path.read_text(), mutant.number, subject.enums)
     return trials.begin(path, _module(mutant.path), tree, noticing, tests.seconds)
+
+
+def _silence() -> None:
+    with open(os.devnull, "r+") as nothing:  # noqa: PTH123 - a descriptor is wanted
+        for stream in (0, 1, 2):
+            os.dup2(nothing.fileno(), stream)
 
 
 def _module(path: str) -> str:
@@ -97,8 +164,7 @@ def _looked_at(subject: Subject) -> Coverage:
     pid = os.fork()
     if pid == 0:
         os.close(told)
-        with open(os.devnull, "w") as nothing:  # noqa: PTH123 - a descriptor is wanted
-            os.dup2(nothing.fileno(), 1)
+        _silence()
         tests = _observed(subject)
         with os.fdopen(tell, "w") as pipe:
             json.dump([{test: sorted(lines) for test, lines in tests.lines.items()}, tests.seconds, tests.failed,

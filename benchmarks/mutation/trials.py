@@ -57,13 +57,13 @@ class Instead(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         exec(self._codes[module.__name__], module.__dict__)
 
 
-class _Budget:
+class Budget:
     """A pytest plugin: the tests wanted, in their order, each with its CPU time; the first failure is told."""
 
     def __init__(self, wanted: Sequence[str], seconds: Mapping[str, float], told: int) -> None:
         self._order = {test: number for number, test in enumerate(wanted)}
-        self._files = {test.partition("::")[0] for test in wanted}
         self._seconds, self.told = seconds, told
+        self.failed = False
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Tests that only a mutant has (a table's entry under another name) are run too, last."""
@@ -83,6 +83,7 @@ class _Budget:
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """What killed the mutant."""
         if report.failed:
+            self.failed = True
             os.write(self.told, report.nodeid.encode())
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
@@ -145,16 +146,21 @@ def begin(path: Path, module: str, tree: ast.Module, tests: Sequence[str], secon
     pid = os.fork()
     if pid == 0:
         os.setpgid(0, 0)
-        os._exit(_run(instead, _Budget(tests, seconds, tell), tests))
+        os._exit(_run(instead, Budget(tests, seconds, tell), tests))
     os.close(tell)
     return Trial(pid, told, time.monotonic())
 
 
-def _run(instead: Instead, budget: _Budget, tests: Sequence[str]) -> int:
+def limited() -> None:
+    """This process may take so much memory and say nothing."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     nothing = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):
         os.dup2(nothing, stream)
+
+
+def _run(instead: Instead, budget: Budget, tests: Sequence[str]) -> int:
+    limited()
     sys.meta_path.insert(0, instead)
     files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
     try:
