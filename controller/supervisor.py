@@ -196,6 +196,11 @@ class Supervisor:
         return self._stop.requester
 
     @property
+    def loop_is_to_come(self) -> bool:
+        """Whether the stop process is there and the loop not yet: a stop now forbids its start."""
+        return self._stop is not None and self._process is None
+
+    @property
     def stop_port(self) -> int:
         """Port on 127.0.0.1 at which the stop process takes POST /estop, /pain and /stop; 0 where there is none."""
         return self._stop.port if self._stop else 0

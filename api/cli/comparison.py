@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import mock_devices
+from api.cli import live
 from api.cli.output import console, table
 from api.cli.stage import bench_for
 from controller.experiments import capture, comparison, tracked, tracking
@@ -14,7 +15,6 @@ from controller.experiments.references import Reference, Stairs
 from controller.gains import Choice, pi_gains
 from controller.operation import Operation
 from controller.steps import Program
-from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import parse
 from rig.config.wiring import Wiring
@@ -136,7 +136,7 @@ def _indented(wiring: Wiring, out: Path, subject: str, attempt: int = 1) -> Path
     folder = _learning_folder(out, subject)
     folder = folder if attempt == 1 else folder.with_name(f"{folder.name}-{attempt}")
     try:
-        with bench_for(bench_of(wiring, _who(subject))) as (live, _), Supervisor(live) as bench:
+        with bench_for(bench_of(wiring, _who(subject))) as (plugged, _), live.connected(plugged) as bench:
             capture.capture(bench, LEARNING, folder, Operation("learn"), lambda _: None)
     except (SafetyStop, DeviceError) as cause:
         if attempt == ATTEMPTS:
@@ -161,7 +161,7 @@ def _on_subject(
 def _tracked(wiring: Wiring, out: Path, subject: str, choice: Choice, program: Program, attempt: int = 1) -> Run:
     """One run on a bench of its own; what a stall of the computer stopped is said, and done again."""
     try:
-        with bench_for(bench_of(wiring, subject)) as (live, _), Supervisor(live) as bench:
+        with bench_for(bench_of(wiring, subject)) as (plugged, _), live.connected(plugged) as bench:
             done = tracked.recorded_run(bench, program, out / subject, str(_model_file(out, subject)))
     except DeviceError as cause:
         found, stalled = Run(subject, choice, (), str(cause)), True

@@ -12,6 +12,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from api.cli import live
 from api.cli.diagnose import run_diagnosis, save, show
 from api.cli.motion import captured, follow, say_levels
 from api.cli.options import built_in
@@ -89,7 +90,7 @@ def demo(
     seed = secrets.randbelow(LARGEST_SEED) if seed is None else seed
     secret = draw(np.random.default_rng(seed), plan)
     console.print(f"a cause is hidden in the bench; --seed {seed} hides the same again", highlight=False)
-    with bench_for(wiring, secret.hide) as (live_wiring, _), Supervisor(live_wiring) as bench:
+    with bench_for(wiring, secret.hide) as (live_wiring, _), live.connected(live_wiring) as bench:
         console.rule(f"capture: {len(plan.speeds_mm_s)} speeds, {plan.trials} trials each")
         captured(bench, plan, session)
         console.rule("fit: constant stiffness against the index law")

@@ -2,12 +2,9 @@
 
 import contextlib
 import os
-import select
 import signal
 import sys
-import termios
 import threading
-import tty
 from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import TypeVar
@@ -15,14 +12,47 @@ from typing import TypeVar
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from api.cli.keys import stop_keys
 from controller.operation import Operation
+from controller.stop.word import NOT_CONFIRMED, Kind
 from controller.supervisor import Supervisor
+from rig.config.wiring import Wiring
 from rig.errors import DeviceError
 
 LOOK_S = 0.1
+# As long as the stop process waits for the loop.
+CONFIRM_S = 0.5
+NAMES = {Kind.PAIN: "pain stop", Kind.EMERGENCY: "emergency stop", Kind.STOP: "stop"}
 KEYS = "keys: p pain stop, space emergency stop, s or Ctrl-C stop and retract"
 
 T = TypeVar("T")
+
+
+@contextlib.contextmanager
+def connected(wiring: Wiring) -> Iterator[Supervisor]:
+    """The bench, running; the terminal's keys stop it from before it starts, and while the axis homes."""
+    with stop_keys() as attach:
+        bench = Supervisor(wiring)
+        try:
+            bench.prepare()
+            attach(lambda kind: _press(bench, kind))
+            bench.start()
+            yield bench
+        finally:
+            bench.close()
+
+
+def _press(bench: Supervisor, kind: Kind) -> None:
+    """Asks for the stop and says what the loop made of it."""
+    try:
+        coming = bench.loop_is_to_come
+        stops = bench.stops
+        request = stops.request(kind)
+        answer = None if coming else stops.confirmed(request, CONFIRM_S)
+    except DeviceError:
+        return
+    said = answer.text if answer and answer.confirmed else "the bench will not start" if coming else NOT_CONFIRMED
+    sys.stderr.write(f"{NAMES[kind]}: {said}\n")
 
 
 def run(bench: Supervisor, operation: Operation, work: Callable[[], T]) -> T:
@@ -37,16 +67,16 @@ def run(bench: Supervisor, operation: Operation, work: Callable[[], T]) -> T:
             errors.append(error)
 
     thread = threading.Thread(target=worker, name=operation.progress.name)
-    with _interrupt_stops(bench, operation), _keys() as key:
+    with _interrupt_stops(bench, operation):
         thread.start()
-        _show(bench, operation, thread, key)
+        _show(bench, operation, thread)
     thread.join()
     if errors:
         raise errors[0]
     return results[0]
 
 
-def _show(bench: Supervisor, operation: Operation, thread: threading.Thread, key: Callable[[], str]) -> None:
+def _show(bench: Supervisor, operation: Operation, thread: threading.Thread) -> None:
     console = Console(stderr=True)
     columns = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()]
     with Progress(*columns, TextColumn("{task.fields[live]}"), console=console, disable=not console.is_terminal) as bar:
@@ -55,7 +85,6 @@ def _show(bench: Supervisor, operation: Operation, thread: threading.Thread, key
             bar.print(KEYS)
         while thread.is_alive():
             thread.join(LOOK_S)
-            act_on(key(), bench, operation)
             now = operation.progress
             bar.update(task, completed=now.done, total=now.total, description=now.message, live=live_text(bench))
 
@@ -77,21 +106,14 @@ def live_text(bench: Supervisor) -> str:
     )
 
 
-def act_on(key: str, bench: Supervisor, operation: Operation) -> None:
-    """What a key does; other keys do nothing."""
-    actions = {"p": bench.pain, " ": bench.estop, "s": bench.stop}
-    if key in actions:
-        operation.stop()
-        with contextlib.suppress(DeviceError):
-            actions[key]()
-
-
 @contextlib.contextmanager
 def _interrupt_stops(bench: Supervisor, operation: Operation) -> Iterator[None]:
     def interrupted(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature of a handler
         if number == signal.SIGHUP:
             _leave_terminal()
-        act_on("s", bench, operation)
+        operation.stop()
+        with contextlib.suppress(DeviceError):
+            bench.stop()
 
     before = {number: signal.signal(number, interrupted) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
@@ -107,17 +129,3 @@ def _leave_terminal() -> None:
     for stream in (sys.stdin, sys.stdout, sys.stderr):
         os.dup2(nowhere, stream.fileno())
     os.close(nowhere)
-
-
-@contextlib.contextmanager
-def _keys() -> Iterator[Callable[[], str]]:
-    if not sys.stdin.isatty():
-        yield lambda: ""
-        return
-    fd = sys.stdin.fileno()
-    before = termios.tcgetattr(fd)
-    tty.setcbreak(fd)
-    try:
-        yield lambda: sys.stdin.read(1).lower() if select.select([fd], [], [], 0)[0] else ""
-    finally:
-        termios.tcsetattr(fd, termios.TCSADRAIN, before)

@@ -48,7 +48,7 @@ def capture(
     plan = load(Indentation, protocol)
     experiment.check(plan, wiring)
     experiment.refuse_used(out)
-    with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
+    with bench_for(wiring) as (live_wiring, _), live.connected(live_wiring) as bench:
         info = captured(bench, plan, out)
     write_json(json_file, summary(info, out))
     refuse_bad(info)
@@ -149,7 +149,7 @@ def _tracked(wiring: Wiring, folder: Path, asked: "Asked", against: Path | None,
     program = _planned(wiring, asked)
     other = _planned(wiring, asked._replace(model=against)) if against else None
     tracked.refuse_foreign(folder)
-    with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
+    with bench_for(wiring) as (live_wiring, _), live.connected(live_wiring) as bench:
         before = follow(bench, other, folder, str(against)) if other else None
         result = follow(bench, program, folder, str(asked.model))
     say_levels(result)

@@ -13,7 +13,6 @@ from api.cli.stage import bench_for
 from controller.experiments import threshold as experiment
 from controller.experiments import tracked
 from controller.operation import Operation
-from controller.supervisor import Supervisor
 from rig.tissue.model import load_model
 
 
@@ -35,7 +34,7 @@ def threshold(
     wiring, fitted = wiring_from(config, overrides), load_model(model)
     program = experiment.plan(up_to, rate, fitted, wiring)
     tracked.refuse_foreign(out)
-    with bench_for(wiring) as (live_wiring, _), Supervisor(live_wiring) as bench:
+    with bench_for(wiring) as (live_wiring, _), live.connected(live_wiring) as bench:
         operation = Operation("threshold", total=1, unit="ramps")
         found = live.run(bench, operation, lambda: experiment.run(bench, program, up_to, out, str(model)))
     if found.force_N is None:

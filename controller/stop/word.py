@@ -6,11 +6,12 @@ one word, id and deed together, stored after the time that belongs to it. Words 
 the other process whole, and in order (x86-64; elsewhere an answer may carry the time of the answer before).
 """
 
+import contextlib
 import mmap
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from enum import IntEnum
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -176,6 +177,14 @@ class StopWord:
             self.path.unlink(missing_ok=True)
 
 
+@contextlib.contextmanager
+def _open_page() -> Iterator[None]:
+    try:
+        yield
+    except ValueError as error:  # of a memoryview that was released
+        raise DeviceError("the bench is not running") from error
+
+
 class Requester:
     """The asking end of one lane; safe from any thread of the one process that has it."""
 
@@ -184,20 +193,21 @@ class Requester:
         self._lock = threading.Lock()
 
     def request(self, kind: Kind) -> Request:
-        """Asks; the loop sees it in its next cycle."""
-        with self._lock:
+        """Asks; the loop sees it in its next cycle. Raises DeviceError where the page was given back."""
+        with self._lock, _open_page():
             number = self._words[self._base] + 1
             self._words[self._base + _REQUESTS + kind] = number
             self._words[self._base] = number
         return Request(number, kind)
 
     def answer(self, request: Request) -> Answer | None:
-        """What was done about ``request``, or about a later one of its kind; None before that."""
-        word = self._words[self._base + _ANSWERS + request.kind]
+        """What was done about ``request``, or a later one of its kind; None before that. Raises as ``request``."""
+        with _open_page():
+            word = self._words[self._base + _ANSWERS + request.kind]
+            time_ns = self._words[self._base + _TIMES + request.kind]
         if word >> _DEED_BITS < request.id:
             return None
-        deed = Deed(word & ((1 << _DEED_BITS) - 1))
-        return Answer(request.id, deed, self._words[self._base + _TIMES + request.kind])
+        return Answer(request.id, Deed(word & ((1 << _DEED_BITS) - 1)), time_ns)
 
     def confirmed(
         self,

@@ -178,3 +178,21 @@ def test_a_foot_switch_retracts_and_the_supervisors_own_lane_answers_too(bench: 
     os.close(writer)
     assert rig.stop_port == 0
     assert children(os.getpid(), "controller.stop.server") == []
+
+
+@pytest.mark.parametrize("key", [b"p", b" ", b"s"])
+def test_a_key_pressed_before_the_bench_is_up_keeps_it_from_starting(bench: Stage, tmp_path: Path, key: bytes) -> None:
+    keyboard, terminal = os.openpty()
+    os.write(keyboard, key)
+    (tmp_path / "slow.toml").write_text(SLOW)
+    running = Running(
+        ["capture", tmp_path / "slow.toml", "--out", tmp_path / "session", *bench.settings("stop.port=0")],
+        tmp_path,
+        stdin=terminal,
+    )
+    said = running.end()
+    os.close(keyboard)
+    os.close(terminal)
+    assert said.code == 3, said.err
+    assert "stopped by a person while the bench started" in said.sentence
+    assert bench.control.get("axis.powered")["axis.powered"] is False
