@@ -4,12 +4,17 @@ import os
 import resource
 import signal
 import threading
+import time
 from collections.abc import Callable
+from contextlib import closing
 from functools import partial
+from http.client import HTTPConnection
 
 from benchmarks.faults.fault import Act, Live
 from controller.steps import Hold, Program
+from controller.stop.keypad import DOWN, EV_KEY, EVENT
 from mock_devices.faults import Value
+from rig.config.stop import KEY_CODES
 
 LOOP, RECORDER = "loop_process", "rig.recording.recorder"
 # Longer than anything may go on without the frozen process, and short enough for the bench to be asked afterwards.
@@ -65,6 +70,20 @@ def frozen(pid_of: Callable[[Live], int], seconds: float = FROZEN_S) -> Act:
     return act
 
 
+def stuttering(pid_of: Callable[[Live], int], times: int, seconds: float) -> Act:
+    """Stopped for ``seconds``, then running as long, again and again."""
+
+    def act(live: Live) -> None:
+        pid = pid_of(live)
+        for _ in range(times):
+            os.kill(pid, signal.SIGSTOP)
+            time.sleep(seconds)
+            os.kill(pid, signal.SIGCONT)
+            time.sleep(seconds)
+
+    return act
+
+
 def _continue(pid: int) -> None:
     try:
         os.kill(pid, signal.SIGCONT)
@@ -96,6 +115,33 @@ def bench(live: Live) -> int:
 def full_disk(live: Live) -> None:
     """The recorder may write no more."""
     resource.prlimit(recorder(live), resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
+
+
+def stop_process(live: Live) -> int:
+    """The process of the stop port and the foot switch."""
+    return live.child("controller.stop.server")
+
+
+def at_stop_port(path: str) -> Act:
+    """A request to the stop process, as page and REST send it."""
+
+    def act(live: Live) -> None:
+        connection = HTTPConnection("127.0.0.1", live.supervisor.stop_port, timeout=5.0)
+        with closing(connection):
+            connection.request("POST", path)
+            connection.getresponse().read()
+
+    return act
+
+
+def foot_switch(key: str) -> Act:
+    """Its key goes down; the device is a FIFO."""
+
+    def act(live: Live) -> None:
+        with live.keypad.open("wb") as device:
+            device.write(EVENT.pack(0, 0, EV_KEY, KEY_CODES[key], DOWN))
+
+    return act
 
 
 def unattended(live: Live) -> None:

@@ -4,13 +4,16 @@ import math
 
 from benchmarks.faults import acts
 from benchmarks.faults.acts import device, dials, several
-from benchmarks.faults.fault import DRIVE, PROTOCOL, QUALITY, REFUSED, Fault
-from benchmarks.faults.scenarios import SURFACE_MM, Truth
+from benchmarks.faults.fault import DRIVE, NOBODY, QUALITY, REFUSED, Fault
+from benchmarks.faults.scenarios import REST_N, SURFACE_MM, Truth
 from controller.safety import TABLE, Check
+from rig.config.wiring import Limits
 
 DEPTH_LIMIT_MM = 10.0
 WORKSPACE_MM = 28.5
 PATIENT_MM = 10.0
+PUSH = dials(surface__speed_mm_s=20.0, surface__position_mm=SURFACE_MM - 9.0)
+"""The limb comes 9 mm towards the tip."""
 RUNNING = device("axis", "unguarded")
 """Without it the drive's own watches stop what the loop is to notice here."""
 # The rate of a program of 1 to 3 N, once a second, is 6.3 N/s; half of 1 N within the window of 10 ms is 50 N/s.
@@ -18,6 +21,8 @@ GENTLE = ("limits.force_rate_N_s=40",)
 # Patient enough for a cycle that comes 70 ms late to be the only thing that is wrong.
 LATE = ("loop.overrun_ms=40", "loop.stale_axis_ms=300", "loop.stale_force_ms=300", "axis.heartbeat_ms=300")
 LATE_S = 0.07
+# A hundred equal samples of 1 kHz where missed samples count by age alone, and one cycle.
+FROZEN_S = 0.2
 # The program looks after its recorder ten times a second; a recorder writes what it has at least every 0.4 s.
 RECORDER_GONE_S = 0.3
 DISK_FULL_S = 0.7
@@ -33,6 +38,18 @@ def _outside(truth: Truth) -> bool:
 
 def _limb_moved(truth: Truth) -> bool:
     return abs(truth["surface.position_mm"] - SURFACE_MM) > PATIENT_MM
+
+
+def _pushed(truth: Truth) -> bool:
+    return truth["tip.force_N"] > REST_N + Limits().pushed_N
+
+
+def _touches(truth: Truth) -> bool:
+    return truth["tip.force_N"] > 0.1
+
+
+def _moves(truth: Truth) -> bool:
+    return truth["tip.velocity_mm_s"] > 1.0
 
 
 def _too_strong(truth: Truth) -> bool:
@@ -68,9 +85,12 @@ FORCE = (
     Fault("force.silent", "press", ("force_lost",), device("force", "silent")),
     Fault("force.delay", "press", ("force_lost",), device("force", "delay", 0.1)),
     Fault("force.invalid", "press", ("force_invalid",), device("force", "invalid")),
-    Fault("force.frozen", "press", ("force_invalid",), device("force", "frozen"), settings=("loop.missed_periods=20",)),
+    Fault("force.frozen", "press", ("force_invalid",), device("force", "frozen"), within_s=FROZEN_S),
     Fault("force.saturated", "press", ("force_invalid",), device("force", "saturate", 0.5)),
     Fault("force.lever", "hold", ("torque_limit",), device("force", "lever", 500.0)),
+    Fault("touch.polarity", "hold", ("first_touch",), device("force", "polarity"), _touches, before=True),
+    Fault("touch.crossed", "hold", ("first_touch",), device("force", "crossed"), _touches, before=True),
+    Fault("touch.dead", "hold", ("first_touch",), device("force", "dead"), _touches, before=True),
     Fault("force.polarity", "press", ("force_rate",), device("force", "polarity"), settings=GENTLE),
     Fault("force.gain_half", "press", ("force_rate",), device("force", "gain", 0.5), settings=GENTLE),
     Fault("force.gain_double", "press", ("force_rate",), device("force", "gain", 2.0), settings=GENTLE),
@@ -92,7 +112,7 @@ TRACKER = (
 
 LIMB = (
     Fault(
-        "limb.pushes", "hold", ("force_limit",), dials(surface__speed_mm_s=20.0, surface__position_mm=11.0), _too_strong
+        "limb.pushes", "hold", ("force_limit",), PUSH, _too_strong
     ),
     Fault(
         "limb.inclusion", "loading", ("force_limit",), dials(tissue__inclusion_mm=4.0, tissue__inclusion_N_mm=20.0),
@@ -100,10 +120,30 @@ LIMB = (
     ),
     Fault("limb.leaves", "press", ("depth_limit",), dials(tissue__present=False), _too_deep,
           settings=(f"limits.depth_mm={DEPTH_LIMIT_MM}",), why="the tip searches for it, down to the depth limit"),
+    Fault("limb.pushes_idle", "idle", ("pushed",), PUSH, _pushed),
+    Fault("limb.pushes_safe", "safe", ("pushed",), PUSH, _pushed, why="after an emergency stop in contact"),
     Fault("limb.moves", "press", ("patient_moved",), dials(surface__position_mm=35.0), _limb_moved),
 )  # fmt: skip
 
 OPERATOR = (
+    Fault("port.estop", "press", ("emergency_stop",), acts.at_stop_port("/estop")),
+    Fault("port.stop", "press", ("operator_stop",), acts.at_stop_port("/stop")),
+    Fault("port.pain", "press", ("pain_stop",), acts.at_stop_port("/pain")),
+    Fault("foot_switch.pain", "press", ("pain_stop",), acts.foot_switch("b"), keypad=True),
+    Fault("foot_switch.estop", "press", ("emergency_stop",), acts.foot_switch("space"), keypad=True),
+    Fault(
+        "stop_process.frozen",
+        "press",
+        ("emergency_stop",),
+        several(acts.frozen(acts.stop_process), lambda live: live.supervisor.estop()),
+        why="the operator's own stop needs no stop process",
+    ),
+    Fault(
+        "stop_process.killed",
+        "press",
+        ("emergency_stop",),
+        several(acts.killed(acts.stop_process), lambda live: live.supervisor.estop()),
+    ),
     Fault("operator.estop", "press", ("emergency_stop",), lambda live: live.supervisor.estop()),
     Fault("operator.stop", "press", ("operator_stop",), lambda live: live.supervisor.stop()),
     Fault("operator.pain", "press", ("pain_stop",), lambda live: live.supervisor.pain()),
@@ -128,23 +168,60 @@ PROCESSES = (
 ANY_AXIS = ("axis_lost", "drive_fault", "following_error", "overspeed", "workspace", "axis_frozen", QUALITY)
 ANY_FORCE = ("force_lost", "force_invalid", "force_rate", QUALITY)
 ANY_TRACKER = ("tracker_lost", QUALITY)
-DAMAGE = ("drop", "corrupt", "truncate", "garbage")
 # A share of messages: when one of them is one too many is chance.
 BY_CHANCE_S = math.inf
-WIRES = (
-    *(Fault(f"axis.{kind}", "hold", ANY_AXIS, device("axis", kind, 0.1), within_s=BY_CHANCE_S) for kind in DAMAGE),
-    *(Fault(f"force.{kind}", "hold", ANY_FORCE, device("force", kind, 0.1), within_s=BY_CHANCE_S) for kind in DAMAGE),
-    *(
-        Fault(f"tracker.{kind}", "hold", ANY_TRACKER, device("tracker", kind, 0.3), within_s=BY_CHANCE_S)
-        for kind in DAMAGE
-    ),
-    Fault("tracker.missing", "hold", ANY_TRACKER, device("tracker", "missing", 0)),
-    Fault("force.drift", "hold", (PROTOCOL, QUALITY), device("force", "drift", 0.5)),
-)
-
-FAULTS: dict[str, Fault] = {
-    fault.name: fault for fault in (*AXIS, *FORCE, *TRACKER, *LIMB, *OPERATOR, *PROCESSES, *WIRES)
+LOST = {
+    "axis": (ANY_AXIS, ("axis.gap_ms", "axis.rate_lost"), 0.1),
+    "force": (ANY_FORCE, ("force.samples_lost", "force.gap_ms", "force.rate_lost"), 0.1),
+    "tracker": (ANY_TRACKER, ("tracker_lost",), 0.3),
 }
+"""By device: who may notice damage on its wire, the measures that name it, and the share of messages damaged."""
+WIRES = tuple(
+    Fault(f"{role}.{kind}", "hold", by, device(role, kind, share), within_s=BY_CHANCE_S, named=named)
+    for role, (by, named, share) in LOST.items()
+    for kind in ("drop", "corrupt", "truncate", "garbage")
+)
+TRIALS = (
+    Fault("nothing", "hold", (NOBODY,), acts.nothing, why="a sound trial is good, and nothing stops it"),
+    Fault("tracker.missing", "hold", ANY_TRACKER, device("tracker", "missing", 0), named=("tracker_lost",)),
+    Fault("tracker.tip_slips", "hold", (QUALITY,), device("tracker", "tip_slips"), named=("tracker_jump_mm",)),
+    Fault("force.drift", "hold", (QUALITY,), device("force", "drift", 0.5), named=("zero_drift_N",)),
+    Fault("loop.stutters", "loading", (QUALITY,), acts.stuttering(acts.loop, 30, 0.015), latest_s=0.0,
+          named=("cycles_missed",), why="half of the time it does not run"),
+)  # fmt: skip
+SCALE = ("axis_scale",)
+CONFIGURATION = (
+    Fault("config.sign", "hold", (REFUSED,), acts.nothing, settings=("force.compression=positive",), before=True),
+    Fault(
+        "config.increments_double",
+        "hold",
+        SCALE,
+        acts.nothing,
+        _moves,
+        settings=("axis.increments_per_mm=4000",),
+        before=True,
+    ),
+    Fault(
+        "config.increments_half",
+        "hold",
+        SCALE,
+        acts.nothing,
+        _moves,
+        settings=("axis.increments_per_mm=1000",),
+        before=True,
+    ),
+    Fault("config.channel", "hold", (REFUSED,), acts.nothing, settings=("force.axis=fx",), before=True),
+)
+COMMISSIONING = tuple(
+    Fault(f"commission.{name}", "commission", (REFUSED,), device("force", kind, value), before=True)
+    for name, kind, value in (
+        ("polarity", "polarity", True), ("gain_half", "gain", 0.5), ("gain_double", "gain", 2.0),
+        ("dead", "dead", 2), ("crossed", "crossed", True), ("drift", "drift", 0.5), ("saturated", "saturate", 6.0),
+    )
+)  # fmt: skip
+
+ALL = (*AXIS, *FORCE, *TRACKER, *LIMB, *OPERATOR, *PROCESSES, *WIRES, *TRIALS, *CONFIGURATION, *COMMISSIONING)
+FAULTS: dict[str, Fault] = {fault.name: fault for fault in ALL}
 
 
 def proofs(code: str) -> tuple[Fault, ...]:

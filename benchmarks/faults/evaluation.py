@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from benchmarks.faults.fault import DRIVE, QUALITY, REFUSED, Fault, bounds
+from benchmarks.faults.fault import DRIVE, NOBODY, QUALITY, REFUSED, Fault, bounds
 from benchmarks.faults.scenarios import Ended
 
 GOOD = "good"
@@ -46,11 +46,13 @@ class Finding:
 def evaluate(fault: Fault, outcome: Outcome) -> Finding:
     """A fault counts as noticed only by what is declared for it, and only within the bound of that."""
     by, at_ns = _first(outcome)
-    if not by:
+    if by == QUALITY and not set(fault.named) & set(outcome.ended.measures):
+        return Finding(by, None, f"the quality names {', '.join(outcome.ended.measures)} only")
+    if not by and NOBODY not in fault.expected:
         return Finding("", None, "nobody noticed")
     detected_s = None if at_ns is None else round(max(at_ns - _since_ns(outcome), 0) * 1e-9, 4)
     if by not in fault.expected:
-        return Finding(by, detected_s, f"noticed by {by} only, not by {' or '.join(fault.expected)}")
+        return Finding(by, detected_s, f"noticed by {by} only, not by {' or '.join(fault.expected) or 'nobody'}")
     bound_s = bounds()[by] if fault.within_s is None else fault.within_s
     if detected_s is not None and detected_s > bound_s:
         return Finding(by, detected_s, f"late: {detected_s:.3f} s, bound {bound_s:g} s")
@@ -66,9 +68,9 @@ def _first(outcome: Outcome) -> tuple[str, int | None]:
         return outcome.stops[0]
     if drive_ns is not None:
         return DRIVE, drive_ns
-    if outcome.refusal:
+    if outcome.refusal or outcome.ended.refused:
         return REFUSED, None
-    if outcome.ended.verdict not in ("", GOOD) and outcome.ended.reasons:
+    if outcome.ended.verdict not in ("", GOOD) and outcome.ended.measures:
         return QUALITY, None
     return "", None
 

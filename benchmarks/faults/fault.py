@@ -4,6 +4,7 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 from benchmarks.faults.scenarios import Truth
 from controller.safety import TABLE, Check
@@ -14,6 +15,8 @@ DRIVE = "drive_guard"
 """The drive itself: it misses our heartbeats, stops and brakes."""
 PROTOCOL = "protocol"
 """A step that meets what it cannot go on with: no contact, a zero that has moved."""
+NOBODY = ""
+"""Nothing is wrong: whoever notices something, and any verdict but good, is a failure."""
 REFUSED = "refused"
 """Nothing moves at all: configuration, calibration or message is turned down in one sentence."""
 QUALITY = "quality"
@@ -27,11 +30,12 @@ PROTOCOL_S = 0.5
 
 @dataclass(frozen=True)
 class Live:
-    """What a fault acts on: the bench, the program that runs it, and its process number."""
+    """What a fault acts on: the bench, the program that runs it, its process number, and its foot switch (a FIFO)."""
 
     bench: Stage
     pid: int
     rig: Supervisor | None = None
+    keypad: Path = Path()
 
     @property
     def supervisor(self) -> Supervisor:
@@ -67,8 +71,9 @@ class Fault:
     the first moment after the fault at which ``onset`` holds for the bench's true figures. ``before``: it is brought
     about when the bench has started and no program yet. ``settings`` are of the wiring. Its moment is drawn from 0 to
     ``latest_s`` after the scenario is ready for it. ``apart``: the program that runs the bench is a process of its own.
-    ``within_s`` replaces the bound of the table where the program outside the loop notices first. ``why`` says what it
-    stands for, where its name does not.
+    ``keypad``: there is a foot switch. ``named`` are the measures of quality that may name it. ``within_s`` replaces
+    the bound of the table where the program outside the loop notices first. ``why`` says what it stands for, where its
+    name does not.
     """
 
     name: str
@@ -81,10 +86,12 @@ class Fault:
     latest_s: float = 1.5
     apart: bool = False
     within_s: float | None = None
+    named: tuple[str, ...] = ()
+    keypad: bool = False
     why: str = ""
 
 
 def bounds(table: tuple[Check, ...] = TABLE) -> dict[str, float]:
     """The longest time from fault to reaction that is accepted, by code [s]; infinite where nothing has to stop."""
-    others = {DRIVE: DRIVE_S, PROTOCOL: PROTOCOL_S, REFUSED: math.inf, QUALITY: math.inf}
+    others = {DRIVE: DRIVE_S, PROTOCOL: PROTOCOL_S, REFUSED: math.inf, QUALITY: math.inf, NOBODY: math.inf}
     return {line.code: line.bound_s for line in table} | others

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from benchmarks.faults.catalogue import FAULTS, proofs
-from benchmarks.faults.fault import Fault
+from benchmarks.faults.fault import REFUSED, Fault
+from benchmarks.faults.planted_loop import CONTRADICTIONS
 from controller.safety import TABLE, Check
 from rig.errors import UsageError
 
@@ -20,7 +21,9 @@ class Plant:
 ADDITIONS = (
     "force.polarity", "force.gain_half", "force.gain_double", "force.dead", "force.crossed", "force.drift",
     "force.saturated", "loop.frozen", "recorder.frozen", "operator.frozen", "bench.frozen", "tracker.jumps",
-    "limb.inclusion", "limb.pushes", "limb.leaves",
+    "limb.inclusion", "limb.pushes", "limb.pushes_safe", "limb.leaves", "tracker.tip_slips", "loop.stutters",
+    "touch.polarity", "touch.crossed", "touch.dead", "config.increments_double", "config.increments_half",
+    "config.sign", "config.channel",
 )  # fmt: skip
 """Faults that are planted one by one besides the table: everything that may notice them is switched off."""
 
@@ -28,8 +31,12 @@ ADDITIONS = (
 def plants(table: tuple[Check, ...] = TABLE) -> dict[str, Plant]:
     """A plant for every line of ``table``, with the first fault that proves it, and one for each addition."""
     lines = {line.code: Plant(line.code, (line.code,), proofs(line.code)[:1]) for line in table}
-    additions = {name: Plant(name, FAULTS[name].expected, (FAULTS[name],)) for name in ADDITIONS}
+    additions = {name: Plant(name, _off(FAULTS[name]), (FAULTS[name],)) for name in ADDITIONS}
     return lines | additions
+
+
+def _off(fault: Fault) -> tuple[str, ...]:
+    return tuple(CONTRADICTIONS if code == REFUSED else code for code in fault.expected)
 
 
 def chosen(names: list[str]) -> list[Plant]:

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmarks.faults import planted_loop
+from benchmarks.faults.commission import SCENARIO as COMMISSIONING
+from benchmarks.faults.commission import commission
 from benchmarks.faults.fault import Fault, Live
 from benchmarks.faults.scenarios import SCENARIOS, Ended
 from controller.supervisor import LOOP_MODULE, Supervisor
@@ -51,7 +53,7 @@ class Here(Program):
         try:
             self.ended = SCENARIOS[scenario].perform(self.live.supervisor, folder)
         except RigError as error:
-            self.ended = Ended(str(error))
+            self.ended = Ended(str(error), refused=isinstance(error, UsageError))
 
     def wait(self) -> Ended:
         """Its end; raises UsageError where there is none."""
@@ -59,6 +61,19 @@ class Here(Program):
         if self.ended is None:
             raise UsageError(f"the scenario did not end within {LONGEST_S:g} s")
         return self.ended
+
+
+class Commissioning(Program):
+    """No program, only the calibration of the force sensor."""
+
+    def __init__(self, live: Live, wiring: Wiring) -> None:
+        super().__init__(live)
+        self._wiring = wiring
+
+    def wait(self) -> Ended:
+        """Its end; raises RigError where it is refused."""
+        commission(self._wiring, self.live.bench)
+        return Ended("complete")
 
 
 class Apart(Program):
@@ -73,7 +88,7 @@ class Apart(Program):
         assert self._process.stdout
         line = self._process.stdout.readline()
         said = json.loads(line) if line else {"cause": "killed"}
-        self.ended = Ended(said["cause"], said.get("verdict", ""), tuple(said.get("reasons", ())))
+        self.ended = Ended(said["cause"], said.get("verdict", ""), tuple(said.get("measures", ())))
         return self.ended
 
 
@@ -82,12 +97,14 @@ def program(bench: Stage, wiring: Wiring, fault: Fault, folder: Path, planted: s
     """The program for ``fault`` with its bench ready; the loop lacks the checks ``planted`` (codes with commas)."""
     module = planted_loop.MODULE if planted else LOOP_MODULE
     with _environment(planted):
-        if fault.apart:
+        if fault.scenario == COMMISSIONING:
+            yield Commissioning(Live(bench, os.getpid()), wiring)
+        elif fault.apart:
             with _apart(bench, wiring, fault, folder, module) as running:
                 yield running
         else:
             with Supervisor(wiring, loop_module=module) as rig:
-                yield Here(Live(bench, os.getpid(), rig), fault, folder)
+                yield Here(Live(bench, os.getpid(), rig, Path(wiring.stop.keypad)), fault, folder)
 
 
 @contextlib.contextmanager
@@ -119,6 +136,7 @@ def _apart(bench: Stage, wiring: Wiring, fault: Fault, folder: Path, module: str
 def _environment(planted: str) -> Iterator[None]:
     os.environ[planted_loop.VARIABLE] = planted
     try:
-        yield
+        with planted_loop.replaced(planted.split(",")):
+            yield
     finally:
         del os.environ[planted_loop.VARIABLE]

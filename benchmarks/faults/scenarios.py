@@ -1,8 +1,10 @@
 """What the bench does while a fault happens: a press with the force loop, an indentation, or resting in contact."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from controller.experiments import capture, tracked
 from controller.experiments.references import named
@@ -10,6 +12,7 @@ from controller.operation import Operation
 from controller.steps import Approach, Compress, MoveTo, Program, Retract, TrackForce, Zero
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
+from rig.config.quality import Bounds, QualityLimits
 from rig.config.wiring import Wiring
 from tests.controller.models import index_model
 
@@ -24,6 +27,8 @@ NEAR_MM = 15.0
 """Short of the surface; far enough from 0 for the tracker to be registered to the axis."""
 SEARCH_TO_MM = 28.0
 REST_DEPTH_MM = 4.0
+ANYTHING = 1e12
+REST_N = float(MODEL.law.elastic(np.array(REST_DEPTH_MM)))
 INDENTATION = Indentation(
     name="campaign",
     speeds_mm_s=(10.0,),
@@ -35,17 +40,20 @@ INDENTATION = Indentation(
     hold_s=2.0,
     retract_speed_mm_s=20.0,
     rest_s=0.3,
+    touches=0,
+    quality=QualityLimits(repeats=0),
     force_limit_N=15.0,
 )
 
 
 @dataclass(frozen=True)
 class Ended:
-    """How a scenario ended: the cause of its end, and what the trial was worth where it is one."""
+    """How a scenario ended: the cause, the trial's verdict, and the measures that keep it from being good."""
 
     cause: str
     verdict: str = ""
-    reasons: tuple[str, ...] = ()
+    measures: tuple[str, ...] = ()
+    refused: bool = False
 
 
 @dataclass(frozen=True)
@@ -82,7 +90,24 @@ def _touch() -> tuple[Zero, MoveTo, Approach]:
 
 def _indent(rig: Supervisor, folder: Path) -> Ended:
     info = capture.capture(rig, INDENTATION, folder, Operation("campaign"), lambda _: None)
-    return Ended(info.trials[-1].outcome)
+    trial = info.trials[-1]
+    return Ended(trial.outcome, trial.quality, beyond_good(trial.measured, INDENTATION.quality))
+
+
+def beyond_good(measured: Mapping[str, float], limits: QualityLimits) -> tuple[str, ...]:
+    """Names of what was measured beyond its good bound."""
+    return tuple(name for name, value in measured.items() if value > _bounds(limits, name).good)
+
+
+def _bounds(limits: QualityLimits, name: str) -> Bounds:
+    found: Bounds = getattr(limits, name.rpartition(".")[2])
+    return found
+
+
+def blind(limits: QualityLimits) -> QualityLimits:
+    """``limits`` that find every trial good."""
+    anything = {name: Bounds(good=ANYTHING) for name, value in limits if isinstance(value, Bounds)}
+    return limits.model_copy(update=anything)
 
 
 def _rest(rig: Supervisor, folder: Path) -> Ended:

@@ -1,6 +1,7 @@
 """One trial: a fresh bench, a scenario, a fault at a moment that seed, fault and number say, and what came of it."""
 
 import contextlib
+import os
 import random
 import subprocess
 import time
@@ -10,13 +11,13 @@ from pathlib import Path
 
 from api.cli.stage import plugged
 from benchmarks.faults.evaluation import Notice, Outcome, evaluate
-from benchmarks.faults.fault import Fault, at_once
+from benchmarks.faults.fault import DRIVE, Fault, at_once
 from benchmarks.faults.observer import Observer
 from benchmarks.faults.program import Program, program
 from benchmarks.faults.scenarios import SCENARIOS, Ended
 from rig.config.table import merged, parse
 from rig.config.wiring import Wiring
-from rig.errors import RigError, UsageError
+from rig.errors import RigError
 from rig.recording.reader import read_recording
 from tests.system.stage import Stage, stage
 
@@ -25,7 +26,8 @@ from tests.system.stage import Stage, stage
 STATED = ("loop.missed_periods=0",)
 READY_S = 30.0
 REST_S, STILL_MM = 0.3, 0.03
-SETTLE_S = 0.2
+# Out of the deepest trial at the retraction's 20 mm/s, and back.
+WAY_OUT_S = 3.0
 # Part 1 of the limits: a peak may pass the force limit by a tenth, while the axis comes to stand.
 MARGIN = 1.1
 # An event carries the time at which its cycle began, which may be just before what it answers.
@@ -94,22 +96,24 @@ def trial(fault: Fault, number: int, seed: int, folder: Path, plant: str = "", p
 
 
 def _outcome(fault: Fault, bench: Stage, folder: Path, planted: str, observer: Observer, moment_s: float) -> Outcome:
-    happened_ns, refusal, unpowered_ns = time.monotonic_ns(), "", None
+    happened_ns, refusal, unpowered_ns, notices = time.monotonic_ns(), "", None, list[Notice]()
     try:
-        wiring = plugged(wiring_for(fault), bench.endpoints)
+        wiring = plugged(_with_keypad(wiring_for(fault), fault, folder), bench.endpoints)
         with program(bench, wiring, fault, folder, planted) as running:
             observer.listen(running.live.rig)
+            if DRIVE in planted.split(","):
+                bench.control.fault("axis", "unguarded")
             happened_ns, refusal = _provoke(fault, running, observer, moment_s)
             ended = running.wait()
-            _await_notice(fault, observer)
-            unpowered_ns = observer.unpowered_ns
+            _await_notice(fault, observer, happened_ns)
+            unpowered_ns, notices = observer.unpowered_ns, list(observer.notices)
             end, moves = _end(bench)
     except RigError as error:
         if not fault.before:
             raise
         ended, refusal = Ended(str(error)), str(error)
         end, moves = _end(bench)
-    stops = [*_recorded(folder, happened_ns), *(one for one in observer.notices if one.at_ns > happened_ns)]
+    stops = [*_recorded(folder, happened_ns), *(one for one in notices if one.at_ns > happened_ns)]
     return Outcome(
         ended,
         happened_ns,
@@ -127,10 +131,10 @@ def _provoke(fault: Fault, running: Program, observer: Observer, moment_s: float
     """When the fault was brought about, and the sentence that refused it, if one did."""
     if not fault.before:
         running.begin()
-        _wait(lambda: SCENARIOS[fault.scenario].ready(observer.truth) or running.ended is not None)
+        _wait(lambda: _is_ready(fault, running, observer))
         time.sleep(moment_s)
-        if running.ended is not None and not SCENARIOS[fault.scenario].at_rest:
-            raise Spoilt(running.ended.cause)
+        if not _at_rest(fault) and (running.ended or observer.notices):
+            raise Spoilt(running.ended.cause if running.ended else observer.notices[0].code)
     happened_ns = time.monotonic_ns()
     observer.expect(fault.onset)
     refusal = ""
@@ -142,10 +146,28 @@ def _provoke(fault: Fault, running: Program, observer: Observer, moment_s: float
     return happened_ns, refusal
 
 
-def _await_notice(fault: Fault, observer: Observer) -> None:
-    if SCENARIOS[fault.scenario].at_rest:
+def _with_keypad(wiring: Wiring, fault: Fault, folder: Path) -> Wiring:
+    if not fault.keypad:
+        return wiring
+    os.mkfifo(folder.with_name("keypad"))
+    settings = wiring.stop.model_copy(update={"keypad": str(folder.with_name("keypad"))})
+    return wiring.model_copy(update={"stop": settings})
+
+
+def _is_ready(fault: Fault, running: Program, observer: Observer) -> bool:
+    if _at_rest(fault):
+        return running.ended is not None
+    return running.ended is not None or SCENARIOS[fault.scenario].ready(observer.truth)
+
+
+def _at_rest(fault: Fault) -> bool:
+    return fault.scenario in SCENARIOS and SCENARIOS[fault.scenario].at_rest
+
+
+def _await_notice(fault: Fault, observer: Observer, since_ns: int) -> None:
+    if _at_rest(fault):
         until_s = time.monotonic() + AT_REST_S
-        while not observer.notices and time.monotonic() < until_s:
+        while not any(one.at_ns > since_ns for one in observer.notices) and time.monotonic() < until_s:
             time.sleep(0.01)
 
 
@@ -153,7 +175,7 @@ def _wait(condition: Callable[[], bool]) -> None:
     deadline = time.monotonic() + READY_S
     while not condition():
         if time.monotonic() > deadline:
-            raise UsageError(f"the bench was not ready for its fault within {READY_S:g} s")
+            raise Spoilt(f"the bench was not ready for its fault within {READY_S:g} s")
         time.sleep(0.003)
 
 
@@ -173,15 +195,21 @@ def _complete(folder: Path) -> bool:
 
 
 def _end(bench: Stage) -> tuple[str, str]:
-    """Where it ended, and what is unsafe about it."""
-    time.sleep(SETTLE_S)
-    before_mm = bench.control.number("tip.position_mm")
-    time.sleep(REST_S)
-    now = bench.control.get("tip.position_mm", "tip.force_N", "axis.powered")
-    moved_mm = abs(float(now["tip.position_mm"]) - before_mm)
+    """Where it ended, and what is unsafe about it: the way out takes a while, but it has an end."""
+    until_s = time.monotonic() + WAY_OUT_S
+    moved_mm = _moved_mm(bench)
+    while moved_mm > STILL_MM and time.monotonic() < until_s:
+        moved_mm = _moved_mm(bench)
+    now = bench.control.get("tip.force_N", "axis.powered")
     place = "free" if float(now["tip.force_N"]) == 0 else "stopped in contact"
     place += ", powered" if now["axis.powered"] else ", braked"
     return place, f"still moves, {moved_mm:.2f} mm in {REST_S:g} s" if moved_mm > STILL_MM else ""
+
+
+def _moved_mm(bench: Stage) -> float:
+    before_mm = bench.control.number("tip.position_mm")
+    time.sleep(REST_S)
+    return abs(bench.control.number("tip.position_mm") - before_mm)
 
 
 def commit() -> str:

@@ -6,11 +6,12 @@ import pytest
 
 from benchmarks.faults import planted_loop
 from benchmarks.faults.catalogue import FAULTS, proofs, unproven
+from benchmarks.faults.commission import SCENARIO as COMMISSIONING
 from benchmarks.faults.evaluation import Notice, Outcome, evaluate
-from benchmarks.faults.fault import DRIVE, QUALITY, REFUSED, Fault, bounds
+from benchmarks.faults.fault import DRIVE, NOBODY, QUALITY, REFUSED, Fault, bounds
 from benchmarks.faults.plants import chosen, plants
 from benchmarks.faults.results import interval
-from benchmarks.faults.scenarios import SCENARIOS, Ended
+from benchmarks.faults.scenarios import INDENTATION, SCENARIOS, Ended, beyond_good
 from benchmarks.faults.trial import wiring_for
 from controller.safety import TABLE
 from rig.errors import UsageError
@@ -52,16 +53,29 @@ def test_a_fault_that_nobody_noticed_is_a_failure() -> None:
     assert evaluate(STOP, replace(SEEN, stops=())).unnoticed == "nobody noticed"
 
 
-@pytest.mark.parametrize(("verdict", "reasons", "is_noticed"), [
-    ("good", (), False), ("good", ("3 samples missing",), False), ("usable", (), False),
-    ("usable", ("3 samples missing",), True), ("bad", ("3 samples missing",), True),
+@pytest.mark.parametrize(("verdict", "measures", "is_noticed"), [
+    ("good", (), False), ("usable", ("zero_drift_N",), False), ("usable", ("force.gap_ms",), True),
+    ("bad", ("zero_drift_N", "force.gap_ms"), True),
 ])  # fmt: skip
 def test_quality_notices_only_where_it_names_the_disturbance(
-    verdict: str, reasons: tuple[str, ...], is_noticed: bool
+    verdict: str, measures: tuple[str, ...], is_noticed: bool
 ) -> None:
-    ended = Ended("complete", verdict, reasons)
-    found = evaluate(replace(STOP, expected=(QUALITY,)), replace(SEEN, ended=ended, stops=()))
+    gap = replace(STOP, expected=(QUALITY,), named=("force.gap_ms",))
+    found = evaluate(gap, replace(SEEN, ended=Ended("complete", verdict, measures), stops=()))
     assert (found.unnoticed == "") is is_noticed
+
+
+def test_where_nothing_is_wrong_nobody_may_notice_anything() -> None:
+    nothing = replace(STOP, expected=(NOBODY,))
+    assert evaluate(nothing, replace(SEEN, stops=(), ended=Ended("complete", "good"))).unnoticed == ""
+    assert evaluate(nothing, SEEN).unnoticed == "noticed by operator_stop only, not by nobody"
+    assert evaluate(nothing, replace(SEEN, stops=(), ended=Ended("complete", "usable", ("gap_ms",)))).unnoticed
+
+
+def test_a_blind_quality_names_nothing() -> None:
+    measured = {"force.gap_ms": 200.0, "zero_drift_N": 0.01}
+    assert beyond_good(measured, INDENTATION.quality) == ("force.gap_ms",)
+    assert beyond_good(measured, planted_loop.BLIND.quality) == ()
 
 
 def test_a_drive_that_stopped_by_itself_comes_before_a_loop_that_woke_up_later() -> None:
@@ -79,6 +93,8 @@ def test_torque_lost_before_the_fault_is_not_its_doing() -> None:
 def test_what_is_turned_down_is_noticed_by_its_sentence() -> None:
     refused = replace(STOP, expected=(REFUSED,))
     assert evaluate(refused, replace(SEEN, stops=(), refusal="too large")).unnoticed == ""
+    ended = Ended("force.axis contradicts the calibration", refused=True)
+    assert evaluate(refused, replace(SEEN, stops=(), ended=ended)).unnoticed == ""
     assert evaluate(refused, replace(SEEN, stops=())).unnoticed == "nobody noticed"
 
 
@@ -91,8 +107,9 @@ def test_every_fault_can_be_configured_and_is_expected_by_what_there_is() -> Non
     for name, fault in FAULTS.items():
         wiring_for(fault)
         assert fault.name == name
-        assert fault.scenario in SCENARIOS
+        assert fault.scenario in (*SCENARIOS, COMMISSIONING)
         assert set(fault.expected) <= set(bounds())
+        assert fault.named or QUALITY not in fault.expected
 
 
 def test_every_line_of_the_table_is_planted_with_its_proof() -> None:
