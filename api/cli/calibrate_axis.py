@@ -40,6 +40,7 @@ def calibrate_axis(wiring: Wiring, asked: AxisAsked, person: Person) -> AxisCali
     _check(wiring, asked)
     if wiring.axis.port != MOCK_PORT:
         asked = _confirmed(asked, person)
+        console.print("the axis homes and moves now; Ctrl-C stops it", highlight=False)
     with bench_for(wiring, approaches=False) as (live, endpoints):
         alone = endpoints if wiring.axis.port == MOCK_PORT else {}
         found = _by_block(live, asked, person, alone) if asked.gauge_block_mm else _by_tracker(live, asked, person)

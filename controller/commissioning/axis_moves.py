@@ -20,6 +20,8 @@ PERIOD_S = 0.001
 LARGEST_TOUCH_N = 0.5
 # On steel, 0.05 mm meets the stiffness of the bench alone, some 100 N/mm: 5 N at most, one step after the first touch.
 STEP_MM, CONTACT_N, SEARCH_MM, BACK_MM, TOUCHES = 0.05, 0.3, 5.0, 1.0, 3
+# A computer that was stopped for a while has read nothing yet when its time is over.
+SILENT_S = 0.5
 # What came during a move was measured under way.
 DRAIN_S, TOUCH_READ_S = 0.04, 0.08
 # Thirty frames at each end know it to 2 %, and 20 % are asked.
@@ -104,14 +106,17 @@ class RestingAxis:
         forces: list[tuple[float, ...]] = []
         axis, force, tracker = self._devices.axis, self._devices.force, self._devices.tracker
         end_ns = self._now() + round(seconds * 1e9)
-        while (at_ns := self._now()) < end_ns:
+        last_ns = end_ns + round(SILENT_S * 1e9)
+        while (at_ns := self._now()) < (end_ns if positions and forces else last_ns):
             axis.request(at_ns)
             positions += [sample.position_mm for sample in axis.poll(at_ns)]
             forces += [sample[4:7] for sample in force.poll(at_ns) if sample.valid]
             markers += [sample for sample in tracker.poll(at_ns) if sample.valid] if tracker else []
             self._sleep(PERIOD_S)
         if not positions or not forces:
-            raise DeviceError(f"{len(positions)} samples of the axis and {len(forces)} of force came in {seconds:g} s")
+            raise DeviceError(
+                f"{len(positions)} samples of the axis and {len(forces)} of force came in {seconds + SILENT_S:g} s"
+            )
         return float(np.mean(positions)), markers, np.mean(forces, axis=0)
 
 

@@ -20,7 +20,7 @@ from drivers.roles import Identity
 from rig.channels import AxisSample, ForceSample, MarkerSample
 from rig.config.calibration import AxisCalibration
 from rig.config.wiring import Axis
-from rig.errors import CheckFailed, SafetyStop
+from rig.errors import CheckFailed, DeviceError, SafetyStop
 
 NOW = datetime(2026, 3, 1, 9, 0, tzinfo=UTC)
 DRIVE = Identity("EPOS4", "A1", "0x0170")
@@ -115,12 +115,13 @@ class Bench:
         self.now_ns, self.position_mm = 10**9, 0.0
         self.wall_mm, self.scale, self.visited = wall_mm, scale, [0.0]
         self.tip_seen, self.polls = True, 0
+        self.stall_s, self.silent = 0.0, False
 
     def clock(self) -> int:
         return self.now_ns
 
     def sleep(self, seconds: float) -> None:
-        self.now_ns += round(seconds * 1e9)
+        self.now_ns += round((seconds + self.stall_s) * 1e9)
 
     def move_to(self, position_mm: float, speed_mm_s: float) -> None:
         self.position_mm = position_mm
@@ -145,6 +146,8 @@ class ForceOf:
         self.bench = bench
 
     def poll(self, now_ns: int) -> list[ForceSample]:
+        if self.bench.silent:
+            return []
         return [ForceSample(0, now_ns, now_ns, 0, 0.2, -0.1, 0.8 - self.bench.load_N, 0.0, 0.0, 0.0, 25.0, 0, 1)]
 
 
@@ -225,6 +228,15 @@ def test_a_search_that_begins_in_contact_or_meets_nothing_is_refused() -> None:
         touches_mm(axis, 19.5)
     with pytest.raises(CheckFailed, match=r"no contact from 5 to 10 mm.* axis.direction"):
         touches_mm(axis, 5.0)
+
+
+def test_a_computer_that_stalls_still_reads_and_a_sensor_that_is_silent_ends_it() -> None:
+    bench = AxisOf()
+    bench.stall_s = 0.6
+    assert resting(bench).place().axis_mm == 0.0
+    bench.silent = True
+    with pytest.raises(DeviceError, match=r"\d+ samples of the axis and 0 of force came in 0.8 s"):
+        resting(bench).place()
 
 
 def test_while_a_person_is_waited_for_the_axis_is_kept_alive() -> None:
