@@ -74,7 +74,7 @@ def speed(world: World, watch: Watch, wiring: Wiring) -> str:
 
 def force_limit(world: World, watch: Watch, wiring: Wiring) -> str:
     """Load, or the load that will be there before the axis stands, above machine limit or pain threshold."""
-    if _unfelt(world, watch, wiring):
+    if _unfelt(world, watch, wiring) or _unzeroed(world, watch, wiring):
         return ""
     load_N, predicted_N, limit_N = world.load.force_N, world.load.predicted_N, wiring.force_limit_N
     if load_N <= limit_N and predicted_N <= limit_N:
@@ -87,7 +87,7 @@ def force_limit(world: World, watch: Watch, wiring: Wiring) -> str:
 
 def torque_limit(world: World, watch: Watch, wiring: Wiring) -> str:
     """Moment above its limit."""
-    if _unfelt(world, watch, wiring):
+    if _unfelt(world, watch, wiring) or _unzeroed(world, watch, wiring):
         return ""
     torque_N_m, limit_N_m = world.load.torque_N_m, wiring.limits.torque_N_m
     if torque_N_m <= limit_N_m:
@@ -215,6 +215,11 @@ def _unfelt(world: World, watch: Watch, wiring: Wiring) -> bool:
         return False
     fresh = not watch.force_lost and watch.force_valid and watch.force_age_ms <= wiring.stale_force_ms
     return not fresh or not all(map(math.isfinite, world.load))
+
+
+def _unzeroed(world: World, watch: Watch, wiring: Wiring) -> bool:
+    """At rest, with neither zero nor calibration, only a change says something: unloaded, a sensor may show 20 N."""
+    return watch.mode in AT_REST and world.reference_zero is None and wiring.calibration.of_force is None
 
 
 def _older(name: str, age_ms: float, limit_ms: float) -> str:

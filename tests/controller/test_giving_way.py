@@ -2,13 +2,16 @@
 
 import pytest
 
+from controller.force_watch import NO_WRENCH, Load
 from controller.giving_way import give_way
 from controller.modes import Mode
-from controller.safety import TABLE, Check
+from controller.safety import TABLE, Check, evaluate
 from controller.steps import Approach, Compress, Hold, Step
+from controller.watch import Watch
+from controller.world import World
 from rig.config.wiring import Limits, Wiring
 from rig.errors import DeviceError
-from tests.controller.fake_bench import ZERO, wired
+from tests.controller.fake_bench import ZERO, FakeBench, wired
 from tests.controller.fake_devices import Clock, FakeAxis
 from tests.controller.plant_bench import BOTA, FT300, PlantBench, Product, linear
 
@@ -181,3 +184,21 @@ def test_the_drive_is_enabled_only_where_it_is_not() -> None:
     axis.fault_text = "0x8611 following error"
     with pytest.raises(DeviceError, match="cannot give way, its drive is in fault"):
         give_way(axis, Limits())
+
+
+@pytest.mark.parametrize("mode", [Mode.IDLE, Mode.SAFE])
+def test_a_sensor_without_zero_or_calibration_may_show_anything_at_rest_but_a_push_is_felt(mode: Mode) -> None:
+    shown = Load(force_N=25.0, torque_N_m=2.0, rate_N_s=0.0, stiffness_N_mm=0.0, predicted_N=25.0)
+    world = World(load=shown, rest_N=25.0)
+    assert evaluate(world, Watch(mode=mode), Wiring(), at_rest=True) is None
+    world.rest_N = 19.9
+    assert (felt := evaluate(world, Watch(mode=mode), Wiring(), at_rest=True)) and felt.code == "pushed"
+    world.reference_zero, world.rest_N = NO_WRENCH, 25.0
+    assert (felt := evaluate(world, Watch(mode=mode), Wiring(), at_rest=True)) and felt.code == "force_limit"
+
+
+def test_with_a_calibration_the_limits_hold_before_the_first_zero_too() -> None:
+    bench = FakeBench(wired(tracker=None, limits={"pushed_N": 15.0}))
+    bench.force.sideways_N = (15.5, 0.0, 0.0)
+    bench.until(lambda: bench.mode is Mode.SAFE)
+    assert bench.latched == "force_limit"

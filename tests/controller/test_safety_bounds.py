@@ -160,7 +160,7 @@ CASES = [
 
 def found(line: Check, case: Case, change: dict[str, Any]) -> str:
     """What a line of the table says of a quiet bench with ``change``."""
-    world = World(position_mm=20.0, load=QUIET, wrench=WRENCH, force_N=0.0)
+    world = World(position_mm=20.0, load=QUIET, wrench=WRENCH, reference_zero=WRENCH, force_N=0.0)
     watch = Watch(mode=Mode.COMPRESS)
     for name, value in change.items():
         setattr(watch if hasattr(watch, name) else world, name, value)
