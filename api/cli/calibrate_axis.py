@@ -1,11 +1,12 @@
 """Guides a person through a calibration of the axis; the mock bench needs nobody, and nothing is in its way."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
 from api.cli.asking import Person
+from api.cli.claimed import claimed
 from api.cli.output import console, table
 from api.cli.stage import bench_for
 from controller.commissioning.axis import KnownBy, against_block, against_tracker, ahead_mm, known_direction
@@ -90,12 +91,9 @@ def _number(text: str) -> float:
 @contextmanager
 def _resting(wiring: Wiring) -> Iterator[tuple[RestingAxis, Identity]]:
     """Devices started and the axis homed; whatever happens, they are closed, which stops it."""
-    devices = start_devices(wiring)
-    try:
+    with claimed(wiring, moves=True), closing(start_devices(wiring)) as devices:
         devices.axis.home()
         yield RestingAxis(devices), devices.axis.identity
-    finally:
-        devices.close()
 
 
 def _by_tracker(wiring: Wiring, asked: AxisAsked, person: Person) -> AxisCalibration:

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from typing import Literal, NamedTuple
 
 from api.cli.asking import Person
+from api.cli.claimed import claimed
 from api.cli.mock_calibration import READ_S as MOCK_READ_S
 from api.cli.mock_calibration import SETTLE_S as MOCK_SETTLE_S
 from api.cli.mock_calibration import mock_weights, weights_on
@@ -67,7 +68,7 @@ def _weights(wiring: Wiring, asked: ForceAsked, person: Person) -> Weights:
 def _measured(
     wiring: Wiring, weights: Weights, put_on: Callable[[float], None], read_s: float, settle_s: float
 ) -> ForceCalibration:
-    with closing(open_force(wiring.force)) as sensor:
+    with claimed(wiring, moves=False), closing(open_force(wiring.force)) as sensor:
         sensor.start()
         return calibrate(
             sensor.identity,

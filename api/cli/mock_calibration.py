@@ -6,7 +6,6 @@ it goes wrong.
 """
 
 import contextlib
-import os
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from datetime import UTC, datetime
@@ -15,6 +14,7 @@ from typing import Any
 
 import typer
 
+from controller.claims import state_folder
 from controller.commissioning.axis import against_tracker, ahead_mm, known_direction
 from controller.commissioning.axis_moves import Pace, RestingAxis, travelled
 from controller.commissioning.force import calibrate
@@ -28,7 +28,6 @@ from rig.config.wiring import Wiring
 from rig.errors import DeviceError, RigError, UsageError
 from rig.recording.files import make_folder, write_text
 
-STATE = "XDG_STATE_HOME"
 # Shares of limits.force_N; weights of the mock bench are exact.
 SHARES = (0.1, 0.25, 0.5)
 # Ten samples of the slower sensor; its filter and the tip's own take a few milliseconds.
@@ -36,12 +35,6 @@ READ_S, SETTLE_S = 0.12, 0.05
 # The simulated camera is 15 ms late; 18 frames at each place know the slope to 0.2 %.
 PACE = Pace(speed_mm_s=20.0, settle_s=0.15, read_s=0.3)
 AXIS_STEPS_MM = (2.0, 14.0, 2.0)
-
-
-def state_folder() -> Path:
-    """Where this computer keeps what it found out by itself (XDG Base Directory Specification)."""
-    base = os.environ.get(STATE)
-    return (Path(base) if base else Path.home() / ".local" / "state") / "tissue-rig"
 
 
 def role_of(product: str) -> str:

@@ -14,7 +14,7 @@ from api.cli.app import build
 from api.cli.asking import Person
 from api.cli.calibrate_axis import AxisAsked, calibrate_axis
 from api.cli.calibration_output import keep, refuse_out, refuse_unfit
-from api.cli.mock_calibration import force_file, state_folder
+from api.cli.mock_calibration import force_file
 from api.cli.options import built_in, calibrated, wiring_from
 from api.cli.stage import bench_for, plugged
 from rig.config.calibration import Calibration, Uncertainty
@@ -202,7 +202,7 @@ def test_a_mock_sensor_uses_the_calibration_that_is_kept_for_its_serial_number(
 ) -> None:
     monkeypatch.setattr(mock_calibration, "_measured_force", lambda *_: pytest.fail("calibrated again"))
     stored()
-    assert state_folder() == own_state / "state" / "tissue-rig"
+    assert force_file(built_in(), ENDPOINTS).parent == own_state / "state" / "tissue-rig"
     found = plugged(built_in(), ENDPOINTS).calibration.of_force
     assert found is not None
     assert found.serial == "000271"
@@ -267,7 +267,7 @@ def test_a_computer_too_busy_to_calibrate_the_mock_axis_is_told_and_goes_on(
 def test_where_it_cannot_be_kept_that_is_said(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], own_state: Path
 ) -> None:
-    (own_state / "state").write_text("in the way")
+    force_file(built_in(), ENDPOINTS).mkdir(parents=True)
     monkeypatch.setattr(mock_calibration, "_measured_force", lambda *_: force_calibration())
     assert plugged(built_in(), ENDPOINTS).calibration.of_force is not None
     assert "and again next time: " in capsys.readouterr().err
