@@ -55,12 +55,17 @@ MAXIMA: tuple[Maximum, ...] = (
 def beyond(product: str, tables: Mapping[str, object]) -> list[str]:
     """What of ``tables`` (section to table) is above its maximum with that force sensor, one sentence each."""
     found = []
-    for key, value, unit, reason in (*MAXIMA, *_measurable(product)):
+    least = {maximum.key: maximum for maximum in sorted((*MAXIMA, *_measurable(product)), key=_largest_first)}
+    for key, value, unit, reason in least.values():
         section, _, name = key.partition(".")
         given = getattr(tables[section], name)
         if not given <= value:
             found.append(f"{key} {given:g} {unit} is above its maximum, {value:g} {unit}: {reason}")
     return found
+
+
+def _largest_first(maximum: Maximum) -> float:
+    return -maximum.value
 
 
 def _measurable(product: str) -> tuple[Maximum, Maximum]:
