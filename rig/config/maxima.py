@@ -55,7 +55,7 @@ MAXIMA: tuple[Maximum, ...] = (
 def beyond(product: str, tables: Mapping[str, object]) -> list[str]:
     """What of ``tables`` (section to table) is above its maximum with that force sensor, one sentence each."""
     found = []
-    least = {maximum.key: maximum for maximum in sorted((*MAXIMA, *_measurable(product)), key=_largest_first)}
+    least = {maximum.key: maximum for maximum in sorted((*_measurable(product), *MAXIMA), key=_largest_first)}
     for key, value, unit, reason in least.values():
         section, _, name = key.partition(".")
         given = getattr(tables[section], name)
