@@ -4,8 +4,8 @@ import math
 
 from benchmarks.faults import acts
 from benchmarks.faults.acts import device, dials, several
-from benchmarks.faults.fault import DRIVE, NOBODY, QUALITY, REFUSED, Fault
-from benchmarks.faults.scenarios import REST_N, SURFACE_MM, Truth
+from benchmarks.faults.fault import DRIVE, NOBODY, PROTOCOL, QUALITY, REFUSED, Fault
+from benchmarks.faults.scenarios import REST_N, SEARCH_TO_MM, SURFACE_MM, Truth
 from controller.safety import TABLE, Check
 from rig.config.wiring import Limits
 
@@ -42,6 +42,10 @@ def _limb_moved(truth: Truth) -> bool:
 
 def _pushed(truth: Truth) -> bool:
     return truth["tip.force_N"] > REST_N + Limits().pushed_N
+
+
+def _searched(truth: Truth) -> bool:
+    return truth["tip.position_mm"] > SEARCH_TO_MM - 0.1
 
 
 def _touches(truth: Truth) -> bool:
@@ -120,6 +124,7 @@ LIMB = (
     ),
     Fault("limb.leaves", "press", ("depth_limit",), dials(tissue__present=False), _too_deep,
           settings=(f"limits.depth_mm={DEPTH_LIMIT_MM}",), why="the tip searches for it, down to the depth limit"),
+    Fault("limb.absent", "hold", (PROTOCOL,), dials(tissue__present=False), _searched, before=True),
     Fault("limb.pushes_idle", "idle", ("pushed",), PUSH, _pushed),
     Fault("limb.pushes_safe", "safe", ("pushed",), PUSH, _pushed, why="after an emergency stop in contact"),
     Fault("limb.moves", "press", ("patient_moved",), dials(surface__position_mm=35.0), _limb_moved),
