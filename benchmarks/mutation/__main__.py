@@ -46,8 +46,6 @@ MODULES = (
     "controller/stop/start.py",
     "controller/stop/keypad.py",
     "controller/stop/http.py",
-    "controller/stop/server.py",
-    "controller/stop/client.py",
 )
 # Left out of the tests that are to notice: those of the compiled control law and of its design, of calibrations, of
 # whole physics (a minute, and other tests run the same lines), and those that measure time, which trials share.
@@ -62,6 +60,7 @@ TIMED = (
 FOLDER = "tests/controller"
 TESTS = (
     FOLDER,
+    f"--ignore={FOLDER}/stop/test_server.py",  # sockets, threads and waits of a process of its own
     *(f"--ignore={FOLDER}/test_{name}.py" for name in LEFT_OUT),
     *(f"--deselect={FOLDER}/{test}" for test in TIMED),
 )

@@ -33,7 +33,17 @@ MEMORY_BYTES = 8 << 30
 SURVIVED, KILLED, TIMED_OUT = 0, 1, 3
 # pytest itself is imported before the trial.
 REWRITTEN = "ignore::pytest.PytestAssertRewriteWarning"
-OPTIONS = ("-q", "-m", "not bench", "-p", "no:xdist", "--timeout=0", "--hypothesis-seed=0", "-W", REWRITTEN)
+OPTIONS = (
+    "-q",
+    "-m",
+    "not bench",
+    "-p",
+    "no:xdist",
+    f"--timeout={LONGEST_S:g}",
+    "--hypothesis-seed=0",
+    "-W",
+    REWRITTEN,
+)
 
 
 class Instead(importlib.abc.MetaPathFinder, importlib.abc.Loader):
