@@ -295,6 +295,8 @@ class BenchLoop:
         self.braked = False
         if homed:
             self.world.position_mm = math.nan
+            for stream in self.health:  # the loop stood still meanwhile, which is no fault of theirs
+                self.forget(stream)
 
     def close(self) -> None:
         """Leaves the devices there are now safe; they may not be those it began with."""

@@ -83,13 +83,14 @@ class LoopClient:
         self._push()
         return number
 
-    def ask(self, message: Message, what: str, timeout_s: float = ANSWER_TIMEOUT_S) -> int:
+    def ask(self, message: Message, what: str, timeout_s: float = 0.0) -> int:
         """As ``tell``, then waits until the loop has done it; raises UsageError in the loop's words where it refuses.
 
-        SafetyStop instead, where it refuses because a stop is in force.
+        SafetyStop instead, where it refuses because a stop is in force. ``timeout_s`` 0: what any answer may take.
         """
         number = self.tell(message)
-        answer = self._wait(lambda: self._answers.pop(number, None), f"did not answer {what}", timeout_s)
+        wait_s = timeout_s or ANSWER_TIMEOUT_S
+        answer = self._wait(lambda: self._answers.pop(number, None), f"did not answer {what}", wait_s)
         if answer.refused:
             raise (SafetyStop if answer.stopped else UsageError)(answer.refused)
         return number

@@ -35,6 +35,9 @@ class Bench(Protocol):
     def wait_at_rest(self, timeout_s: float = 30.0) -> None:
         """Waits until nothing moves."""
 
+    def await_ready(self, timeout_s: float) -> bool:
+        """Whether every device is ok within that time."""
+
     def await_device(self, role: str, timeout_s: float) -> bool:
         """Whether the device is there within that time."""
 
@@ -68,8 +71,7 @@ def _answering(now: Situation) -> Situation:
 
 def _missing(bench: Bench) -> str:
     """Which devices are still not ok, after those that come back by themselves had time to."""
+    bench.await_ready(SENSORS_BACK_S)
     devices = bench.status.get("devices", {})
-    waits = [role for role in devices if not bench.await_device(role, SENSORS_BACK_S)]
-    devices = bench.status.get("devices", {})
-    bad = [role for role in devices if role in waits or devices[role]["state"] != "ok"]
+    bad = [role for role in devices if devices[role]["state"] != "ok"]
     return "; ".join(f"{role} is {devices[role]['state']}: {devices[role]['detail']}" for role in bad)

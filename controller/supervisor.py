@@ -102,7 +102,7 @@ class Supervisor:
         self.ready = self._client.ready(START_TIMEOUT_S)
         self.recorder = RecorderClient(self._ring_path)
         threading.Thread(target=self._keep_lease, name="lease", daemon=True).start()
-        self._await_ready()
+        self.await_ready()
 
     def _start_loop(self, claim: Claim) -> socket:
         """Its process; returns our end of the channel to it."""
@@ -171,7 +171,7 @@ class Supervisor:
 
         One that has not ended in time is stopped, and DeviceError raised; how it ended is then nobody's any more.
         """
-        self._await_ready()
+        self.await_ready()
         try:
             return self._loop().run(Run(program=program), timeout_s)
         except DeviceError:
@@ -179,9 +179,9 @@ class Supervisor:
                 self.stop()
             raise
 
-    def _await_ready(self) -> None:
-        """Gives devices that have just started, or are a moment late, time to be ok; what the loop then says counts."""
-        self._loop().wait_until(lambda status: bool(status.get("ready") or status.get("latched")), READY_TIMEOUT_S)
+    def await_ready(self, timeout_s: float = READY_TIMEOUT_S) -> bool:
+        """Whether every device is ok within that time, or a stop is in force; what the loop says in the end counts."""
+        return self._loop().wait_until(lambda status: bool(status.get("ready") or status.get("latched")), timeout_s)
 
     def wait_at_rest(self, timeout_s: float = 30.0) -> None:
         """Waits until nothing moves any more."""

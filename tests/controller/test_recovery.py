@@ -107,6 +107,10 @@ class ScriptedBench:
     def wait_at_rest(self, timeout_s: float = 30.0) -> None:
         assert timeout_s > 0
 
+    def await_ready(self, timeout_s: float) -> bool:
+        assert timeout_s > 0
+        return not self.away
+
     def await_device(self, role: str, timeout_s: float) -> bool:
         assert timeout_s > 0
         return role not in self.away

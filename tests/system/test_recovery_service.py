@@ -1,0 +1,121 @@
+"""A service that uses the bench: what others may do beside it, what comes back by itself, what recovers."""
+
+import json
+import os
+import signal
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.error import URLError
+from urllib.request import Request, urlopen
+
+import pytest
+
+from rig.recording.sessions import SessionInfo, write_session
+from tests.controller.models import index_model
+from tests.system.stage import PATIENCE_S, Running, Stage, children, free_port, pressed, rig, stage, until
+
+LOOP = "controller.loop_process"
+
+
+@dataclass(frozen=True)
+class Served:
+    """A bench, and `rig serve` on it."""
+
+    bench: Stage
+    running: Running
+    address: str
+    folder: Path
+
+    def ask(self, method: str, path: str, body: object = None, lease: str = "") -> dict[str, Any]:
+        """One request."""
+        data = None if body is None else json.dumps(body).encode()
+        headers = {"Content-Type": "application/json", "X-Control-Lease": lease}
+        with urlopen(Request(self.address + path, data, headers, method=method), timeout=30) as reply:
+            found: dict[str, Any] = json.load(reply)
+        return found
+
+    @property
+    def rig(self) -> dict[str, Any]:
+        """The bench as it shows it; empty while it does not listen yet."""
+        try:
+            return self.ask("GET", "/api/v1/rig")
+        except (URLError, OSError):
+            return {}
+
+    def becomes(self, state: str) -> None:
+        """Waits for that state."""
+        until(lambda: self.rig.get("state") == state, PATIENCE_S, f"the service being {state}")
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[Served]:
+    (tmp_path / "links").mkdir()
+    (tmp_path / "sessions" / "known" / "fit").mkdir(parents=True)
+    index_model(0.12, 0.22, 0.01, force_N=11.0).save(tmp_path / "sessions" / "known" / "fit" / "model.json")
+    write_session(tmp_path / "sessions" / "known", SessionInfo("known", "track", "2026-01-01T00:00:00Z", "test"))
+    port = free_port()
+    with stage("--seed", "1", "--links", str(tmp_path / "links")) as bench:
+        running = Running(["serve", "--port", str(port), *bench.settings()], tmp_path)
+        found = Served(bench, running, f"http://127.0.0.1:{port}", tmp_path)
+        found.becomes("idle")
+        yield found
+        if running.process.poll() is None:
+            running.interrupt()
+            running.end()
+
+
+def test_beside_a_service_nobody_disturbs_it_and_what_was_lost_comes_back(served: Served) -> None:
+    bench, settings = served.bench, served.bench.settings()
+    seen = rig("doctor", *settings, "--json", "doctor.json", folder=served.folder)
+    assert seen.code == 0, seen.err
+    assert f"as the service at {served.address} sees them" in seen.out
+    roles = [found["role"] for found in json.loads((served.folder / "doctor.json").read_text())["devices"]]
+    assert sorted(roles) == ["axis", "force", "tracker"]
+    model = served.folder / "sessions" / "known" / "fit" / "model.json"
+    second = rig("track", "--model", model, "--force", "1", "--out", "second", *settings, folder=served.folder)
+    assert second.code == 1
+    assert f"(process {served.running.process.pid})" in second.sentence
+    assert f"or use it at {served.address}" in second.sentence
+    assert served.rig["state"] == "idle"
+    for role in ("force", "tracker"):
+        bench.control.fault(role, "unplug", True)
+        served.becomes("not ready")
+        assert role in served.rig["reason"]
+        bench.control.fault(role, "unplug", False)
+        served.becomes("idle")
+        assert served.rig["devices"][role]["state"] == "ok"
+
+
+def test_a_loop_killed_under_a_service_is_recovered_through_it(served: Served) -> None:
+    bench = served.bench
+    (loop,) = children(served.running.process.pid, LOOP)
+    os.kill(loop, signal.SIGKILL)
+    served.becomes("disconnected")
+    said = rig("reset", "--yes", *bench.settings(), folder=served.folder)
+    assert said.code == 0, said.err
+    assert "the drive's fault was cleared" in said.out
+    served.becomes("idle")
+    # The axis: its cable first, then its power. It comes back without torque, and moves only after a recovery.
+    bench.control.fault("axis", "unplug", True)
+    until(lambda: served.rig["devices"]["axis"]["state"] in ("lost", "reconnecting"), PATIENCE_S, "the axis lost")
+    bench.control.fault("axis", "restart", True)
+    bench.control.fault("axis", "unplug", False)
+    until(lambda: served.rig["devices"]["axis"]["state"] == "fault", PATIENCE_S, "the axis back without a reference")
+    assert bench.control.get("axis.powered")["axis.powered"] is False
+    said = rig("reset", "--yes", *bench.settings(), folder=served.folder)
+    assert said.code == 0, said.err
+    assert "the axis was homed" in said.out
+    served.becomes("idle")
+
+
+def test_a_killed_service_leaves_a_bench_that_one_command_recovers(served: Served) -> None:
+    lease = served.ask("POST", "/api/v1/control/lease", {"holder": "test", "ttl_s": 30.0})["lease_id"]
+    request = {"kind": "track", "session": "known", "forces_N": [2.0], "seconds": 60.0}
+    served.ask("POST", "/api/v1/jobs", request, lease)
+    pressed(served.bench, 1.5)
+    served.running.kill()
+    said = rig("reset", "--yes", *served.bench.settings(), folder=served.folder)
+    assert said.code == 0, said.err
+    assert served.bench.control.number("tip.force_N") == 0.0
