@@ -1,8 +1,10 @@
 """`rig serve`: the HTTP service and its page over one bench."""
 
+import asyncio
 import contextlib
 import os
 import socket
+import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -20,11 +22,16 @@ from rig.errors import UsageError
 
 
 class Announced(uvicorn.Server):
-    """Prints its address once it listens."""
+    """Prints its address once it listens and the bench has started, or has not been able to."""
+
+    def __init__(self, config: uvicorn.Config, settled: threading.Event) -> None:
+        super().__init__(config)
+        self._settled = settled
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Starts, then says where."""
         await super().startup(sockets)
+        await asyncio.to_thread(self._settled.wait)
         if self.started:
             console.print(f"http://{self.config.host}:{self.config.port}/", highlight=False)
 
@@ -47,10 +54,12 @@ def serve(
         )
     settings = wiring_from(config, overrides)
     with _listening(host, port) as listening, bench_for(settings, refuses=False) as (wiring, _):
-        application = build(Service(wiring, sessions, protocols, f"http://{_in_url(host)}:{port}"))
+        service = Service(wiring, sessions, protocols, f"http://{_in_url(host)}:{port}")
+        application = build(service, meanwhile=True)
         # The server hands on the Ctrl-C that ended it, after an orderly end.
         with contextlib.suppress(KeyboardInterrupt):
-            Announced(uvicorn.Config(application, host=host, port=port, **server_settings())).run([listening])
+            server = uvicorn.Config(application, host=host, port=port, **server_settings())
+            Announced(server, service.settled).run([listening])
 
 
 def _in_url(host: str) -> str:

@@ -1,5 +1,6 @@
 """The application: routes, page, problems, and who may talk to it."""
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -19,14 +20,21 @@ PAGE = Path(__file__).parent / "page"
 INVALID = 422
 
 
-def build(service: Service) -> FastAPI:
-    """The service's application; the bench is connected with it and disconnected with it."""
+def build(service: Service, meanwhile: bool = False) -> FastAPI:
+    """The service's application; the bench is connected with it and disconnected with it.
+
+    With ``meanwhile`` requests are answered while the bench still starts, which homes the axis: so that it can be seen,
+    and stopped.
+    """
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001 - the signature of a lifespan
-        service.connect()
+        starting = asyncio.create_task(asyncio.to_thread(service.connect))
+        if not meanwhile:
+            await starting
         yield
-        service.disconnect()
+        await starting
+        await asyncio.to_thread(service.disconnect)
 
     app = FastAPI(
         title="tissue-rig",

@@ -57,6 +57,8 @@ class Service:
         self.wiring, self.sessions, self.protocols = wiring, sessions, protocols
         self.id = uuid.uuid4().hex
         self.reason = "not connected yet"
+        self.settled = threading.Event()
+        """Set once the first attempt to connect has ended, well or not."""
         self.bench: Supervisor | None = None
         self.control = Control()
         self.jobs: dict[str, Job] = {}
@@ -83,14 +85,16 @@ class Service:
         bench.attended = self.attended
         try:
             bench.prepare()
+            self.reason = "the bench is starting: devices are opened and the axis is homed"
             self._coming = bench
             bench.start()
         except RigError as error:
             self.reason = str(error)
-            return
+        else:
+            self.bench, self.reason = bench, ""
         finally:
             self._coming = None
-        self.bench, self.reason = bench, ""
+            self.settled.set()
 
     def recover(self, consent: Consent) -> Recovered:
         """The way back after a crash, a fault or a stop, as far as ``consent`` goes; a dead loop is replaced."""

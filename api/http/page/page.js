@@ -63,8 +63,10 @@ function show(rig) {
   at("position").textContent = number(rig.position_mm, 2);
   at("mode").textContent = rig.mode || "--";
   at("reset").hidden = rig.state !== "stopped";
+  at("reset").disabled = Boolean(rig.job);
   at("retract").disabled = rig.state !== "idle";
   at("connect").hidden = rig.state !== "disconnected";
+  at("recover").hidden = rig.state === "idle" || rig.state === "running";
   at("loop").textContent = `loop: ${rig.ticks} turns, ${rig.missed} slots missed`;
   const mine = lease ? " (this page)" : "";
   at("control").textContent = rig.control.holder ? `in control: ${rig.control.holder}${mine}` : "nobody is in control";
@@ -162,6 +164,27 @@ function listen() {
   setInterval(showSilence, SILENCE_MS / 4);
 }
 
+function askConsent(told, question) {
+  const dialog = at("recovery");
+  at("recovery-told").replaceChildren(...told.map((line) => Object.assign(document.createElement("li"), { textContent: line })));
+  at("recovery-question").textContent = question;
+  dialog.returnValue = "no";
+  dialog.showModal();
+  return new Promise((resolve) => dialog.addEventListener("close", () => resolve(dialog.returnValue === "yes"), { once: true }));
+}
+
+// The service says what happened and what it needs consent for; nothing is done that was not agreed to by itself.
+async function recover() {
+  const consent = {};
+  for (;;) {
+    const found = await call("POST", "/recover", consent);
+    if (!found.open.length) return found.ready ? `recovered: ${found.done.join("; ") || "nothing had to be done"}` : `recovered, but ${found.missing}`;
+    const { act, question } = found.open[0];
+    if (!(await askConsent(found.happened, question))) return "not recovered: no consent was given";
+    consent[act] = true;
+  }
+}
+
 function suggestSession() {
   const now = new Date(), two = (n) => String(n).padStart(2, "0");
   at("session").value = `${now.getFullYear()}${two(now.getMonth() + 1)}${two(now.getDate())}-${two(now.getHours())}${two(now.getMinutes())}${two(now.getSeconds())}`;
@@ -171,6 +194,7 @@ at("job-stop").addEventListener("click", () => attempt(() => call("POST", `/jobs
 at("reset").addEventListener("click", () => attempt(() => inControl(async () => (await call("POST", "/estop/reset")).detail)));
 at("retract").addEventListener("click", () => attempt(() => inControl(async () => { await call("POST", "/jobs", { kind: "retract" }); return "retracting"; })));
 at("connect").addEventListener("click", () => attempt(() => inControl(() => call("POST", "/rig/connect"))));
+at("recover").addEventListener("click", () => attempt(() => inControl(recover)));
 at("release").addEventListener("click", () => attempt(release));
 window.addEventListener("pagehide", () => {
   if (lease) fetch(`${API}/control/lease`, { method: "DELETE", headers: { "X-Control-Lease": lease }, keepalive: true });

@@ -28,7 +28,7 @@ async function pressStop(kind) {
   const signal = AbortSignal.timeout(CONFIRM_MS), name = STOP_NAMES[kind];
   showStop("pending", `${name}: pending, waiting for the loop to confirm`);
   const ways = [askForStop(`/api/v1/${kind}`, signal)];
-  if (stopPort) ways.unshift(askForStop(`http://${location.hostname}:${stopPort}/${kind}`, signal));
+  if (stopPort) ways.unshift(askForStop(`http://127.0.0.1:${stopPort}/${kind}`, signal));
   try {
     showStop("confirmed", `${name}: confirmed by the loop: ${await Promise.any(ways)}`);
   } catch (error) {
