@@ -17,6 +17,7 @@ from drivers.roles import Identity
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, RigError
 from rig.recording.mcap_file import RecordingFailed
+from rig.recording.messages import Closed
 
 Metadata = Mapping[str, Mapping[str, str]]
 LOOK_S = 0.1
@@ -89,8 +90,8 @@ def record(bench: Supervisor, program: Program, file: Path, about: Metadata, tim
     except RigError as error:
         _close(bench, {"outcome": "failed", "cause": str(error)})
         raise
-    reply = _close(bench, _summary(outcome))
-    return Recorded(file, outcome, _counts(reply, "samples"), _counts(reply, "dropped"))
+    closed = _close(bench, _summary(outcome))
+    return Recorded(file, outcome, closed.samples if closed else {}, closed.dropped if closed else {})
 
 
 def _run_watched(bench: Supervisor, program: Program, timeout_s: float) -> Outcome:
@@ -119,12 +120,12 @@ def _watch(bench: Supervisor, over: threading.Event, failures: list[str]) -> Non
             return
 
 
-def _close(bench: Supervisor, summary: dict[str, str]) -> Mapping[str, object]:
+def _close(bench: Supervisor, summary: dict[str, str]) -> Closed | None:
     try:
-        return bench.recorder.close(summary) if bench.recorder else {}
+        return bench.recorder.close(summary) if bench.recorder else None
     except RecordingFailed:
         if summary["outcome"] == "failed":
-            return {}
+            return None
         raise
 
 
@@ -137,8 +138,3 @@ def _summary(outcome: Outcome) -> dict[str, str]:
         "force_zero_N": "" if outcome.zero_N is None else repr(outcome.zero_N),
         "contact": json.dumps({"method": CONTACT_METHOD} | asdict(outcome.touch)) if outcome.touch else "",
     }
-
-
-def _counts(reply: Mapping[str, object], kind: str) -> dict[str, int]:
-    counts = reply.get(kind)
-    return {str(name): int(number) for name, number in counts.items()} if isinstance(counts, Mapping) else {}

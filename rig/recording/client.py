@@ -5,13 +5,15 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from select import select
 from types import TracebackType
 from typing import Self
 
-from rig.recording.lines import Lines, encode, parse
+from rig.channel import Answer, Channel, Message, Received, Reply, pair
 from rig.recording.mcap_file import RecordingFailed
+from rig.recording.messages import FROM_RECORDER, Close, Closed, Failed, Open, Quit, Started
 
 START_TIMEOUT_S = 20.0
 OPEN_TIMEOUT_S = 20.0
@@ -26,22 +28,21 @@ class RecorderClient:
     def __init__(self, ring: Path, resume: bool = False) -> None:
         """Starts the process on ``ring``; ``resume`` hands what a dead recorder left there to the first recording."""
         self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
-        command = [sys.executable, "-P", "-m", "rig.recording.recorder", str(ring), *(["--resume"] if resume else [])]
+        mine, theirs = pair()
+        command = [sys.executable, "-P", "-m", "rig.recording.recorder", str(ring), str(theirs.fileno())]
         self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
+            [*command, *(["--resume"] if resume else [])],
+            pass_fds=[theirs.fileno()],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
             stderr=self._complaints,
-            bufsize=0,
             start_new_session=True,
         )
-        if self._process.stdin is None or self._process.stdout is None:
-            raise RecordingFailed("the recorder process has no pipes")
-        self._commands, self._replies = self._process.stdin, self._process.stdout
-        self._lines = Lines(self._replies.fileno())
+        theirs.close()
+        self._channel = Channel(mine, FROM_RECORDER)
         self._failure = self._end = ""
         try:
-            self._await("ready", "start", START_TIMEOUT_S)
+            self._await(lambda message: isinstance(message, Started), "start", START_TIMEOUT_S)
         except RecordingFailed:
             self.kill()
             raise
@@ -67,32 +68,30 @@ class RecorderClient:
     @property
     def failure(self) -> str:
         """Why the recording in progress failed, empty while it has not; never waits."""
-        if not self._replies.closed:
-            for line in self._lines.wait(0):
-                self._note(parse(line))
+        if not self._channel.lost:
+            for received in self._channel.receive_all():
+                self._note(received)
         return self._failure or ("" if self.alive else self._epitaph())
 
     def open(self, path: Path, metadata: Mapping[str, Mapping[str, str]]) -> None:
         """Starts a recording: everything published from now on goes to ``path`` (an existing file is refused)."""
         self._failure = ""
-        self._send({"open": str(path.absolute()), "metadata": {name: dict(items) for name, items in metadata.items()}})
-        self._await("opened", "open", OPEN_TIMEOUT_S)
+        record = {name: dict(items) for name, items in metadata.items()}
+        self._ask(Open(path=str(path.absolute()), metadata=record), "open", OPEN_TIMEOUT_S)
 
-    def close(self, summary: Mapping[str, str]) -> dict[str, object]:
-        """Finishes the recording with everything published until now.
-
-        Returns ``closed`` (path), ``samples``, ``dropped``, ``missing`` (per stream) and ``unreadable`` (number).
-        """
-        self._send({"close": dict(summary)})
-        return self._await("closed", "close", CLOSE_TIMEOUT_S)
+    def close(self, summary: Mapping[str, str]) -> Closed:
+        """Finishes the recording with everything published until now."""
+        closed = self._ask(Close(summary=dict(summary)), "close", CLOSE_TIMEOUT_S)
+        assert isinstance(closed, Closed)
+        return closed
 
     def quit(self) -> None:
         """Ends the process, finishing what is open; may be called twice and also after its death."""
-        if not self._commands.closed:
+        if not self._channel.lost:
+            self._channel.send(Quit())
             try:
-                self._commands.write(encode({"quit": True}))
                 self._process.wait(QUIT_TIMEOUT_S)
-            except (BrokenPipeError, subprocess.TimeoutExpired):
+            except subprocess.TimeoutExpired:
                 self._process.kill()
         self._release()
 
@@ -103,37 +102,39 @@ class RecorderClient:
 
     def _release(self) -> None:
         self._process.wait()
-        self._commands.close()
-        self._replies.close()
+        self._channel.close()
         self._end = self._epitaph()
         self._complaints.close()
 
-    def _send(self, message: dict[str, object]) -> None:
-        try:
-            if self._commands.closed:
-                raise BrokenPipeError
-            self._commands.write(encode(message))
-        except BrokenPipeError as error:
-            raise RecordingFailed(self._epitaph()) from error
+    def _ask(self, command: Message, name: str, timeout_s: float) -> Message:
+        if self._channel.lost:
+            raise RecordingFailed(self._epitaph())
+        number = self._channel.send(command)
+        if not number and not self._channel.lost:
+            raise RecordingFailed(f"the recorder cannot be told to {name}: the message is too large")
+        answer = self._await(lambda said: isinstance(said, Reply) and said.to == number, name, timeout_s)
+        if isinstance(answer, Answer):
+            raise RecordingFailed(answer.refused)
+        return answer
 
-    def _await(self, key: str, name: str, timeout_s: float) -> dict[str, object]:
+    def _await(self, wanted: Callable[[Message], bool], name: str, timeout_s: float) -> Message:
         deadline = time.monotonic() + timeout_s
-        while (left_s := deadline - time.monotonic()) > 0 and not self._lines.ended:
-            replies = [parse(line) for line in self._lines.wait(left_s)]
-            for reply in replies:
-                self._note(reply)
-            for reply in replies:
-                if key in reply:
-                    return reply
-                if reply.get("to") in (name, "line"):
-                    raise RecordingFailed(str(reply["failed"]))
-        if self._lines.ended:
+        while (left_s := deadline - time.monotonic()) > 0 and not self._channel.lost:
+            waiting = [] if self._channel.flush() else [self._channel]
+            select([self._channel], waiting, [], left_s)
+            for received in self._channel.receive_all():
+                self._note(received)
+                if wanted(received.message):
+                    return received.message
+                if name == "start" and self._failure:
+                    raise RecordingFailed(self._failure)
+        if self._channel.lost:
             raise RecordingFailed(self._epitaph())
         raise RecordingFailed(f"the recorder did not answer {name} within {timeout_s:g} s; the disk may be stalled")
 
-    def _note(self, reply: dict[str, object]) -> None:
-        if reply.get("to") == "recording":
-            self._failure = str(reply["failed"])
+    def _note(self, received: Received) -> None:
+        if isinstance(received.message, Failed):
+            self._failure = received.message.text
 
     def _epitaph(self) -> str:
         if self._end:

@@ -1,36 +1,33 @@
 """The recorder process: drains the ring and does all the waiting for the disk, so that the loop never has to.
 
-Started as ``python -m rig.recording.recorder RING``; commands come as JSON lines on standard input, replies go to
-standard output::
+Started as ``python -m rig.recording.recorder RING SOCKET_FD``; commands and replies are those of
+`rig.recording.messages`, over the channel at the other end of the socket.
 
-    {"open": "trial.mcap", "metadata": {...}}   -> {"opened": "trial.mcap", "unrecorded": 17}
-    {"close": {"outcome": "done"}}              -> {"closed": "trial.mcap", "samples": {...}, "dropped": {...}, ...}
-    {"quit": true}                              -> {"quit": true}
-
-A command that fails is answered by ``{"failed": sentence, "to": command}``; a disk that fails meanwhile is reported
-at once, ``"to": "recording"``, and again on close. Slots are given back to the loop only after their chunk has been
-handed to the system: a successor of a killed recorder (``--resume``) starts with the batch that was lost. When standard
-input ends, the supervisor is dead: the recorder goes on while the loop still writes, then finishes file and itself.
+A command that fails is answered with its reason; a disk that fails meanwhile is reported at once, and again on close.
+Slots are given back to the loop only after their chunk has been handed to the system: a successor of a killed recorder
+(``--resume``) starts with the batch that was lost. When the channel is closed, the supervisor is dead: the recorder
+goes on while the loop still writes, then finishes file and itself.
 """
 
 import argparse
 import contextlib
 import json
-import os
 import signal
+import socket
 import struct
 import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Mapping
 from pathlib import Path
+from select import select
 from typing import cast
 
+from rig.channel import Answer, Channel, Message, Received
 from rig.channels import BY_ID
 from rig.errors import RigError
-from rig.recording.lines import Lines, encode, parse
 from rig.recording.mcap_file import RecordingFailed, RecordingWriter
+from rig.recording.messages import TO_RECORDER, Close, Closed, Failed, Open, Opened, Quit, Started
 from rig.recording.ring import RingReader
 
 DRAIN_PERIOD_S = 0.02
@@ -85,22 +82,24 @@ class Recorder:
         """Whether a recording was opened and not closed, be it a failed one."""
         return self._writer is not None
 
-    def handle(self, command: Mapping[str, object]) -> dict[str, object]:
+    def handle(self, received: Received) -> Message:
         """Does what one command asks and says how it went."""
-        name = next((name for name in ("open", "close", "quit") if name in command), "")
+        number = received.id
         try:
-            if name == "open":
-                return self._open(Path(str(command["open"])), _texts(command.get("metadata")))
-            if name == "close":
-                return self._close(_strings(command["close"]))
-            if name == "quit":
-                return self.end("recorder told to quit") | {"quit": True}
+            match received.message:
+                case Open(path=path, metadata=metadata):
+                    return self._open(number, Path(path), metadata)
+                case Close(summary=summary):
+                    return self._close(number, summary)
+                case Quit():
+                    self.end("recorder told to quit")
+                    return Answer(to=number)
         except RigError as error:
-            return {"failed": str(error), "to": name}
-        return {"failed": f"unknown command {json.dumps(dict(command))[:200]}", "to": "line"}
+            return Answer(to=number, refused=str(error))
+        return Answer(to=number, refused="this is no command of a recorder")
 
-    def step(self, now_ns: int) -> dict[str, object]:
-        """Drains the ring and flushes when it is time; returns the news if the disk failed just now, else nothing."""
+    def step(self, now_ns: int) -> Failed | None:
+        """Drains the ring and flushes when it is time; returns the news if the disk failed just now."""
         self._ring.touch(now_ns)
         try:
             self._drain(BATCH)
@@ -109,14 +108,15 @@ class Recorder:
         except RecordingFailed as error:
             self._failure = str(error)
             self._ring.commit()
-            return {"failed": self._failure, "to": "recording"}
-        return {}
+            return Failed(text=self._failure)
+        return None
 
-    def end(self, outcome: str) -> dict[str, object]:
+    def end(self, outcome: str) -> None:
         """Finishes a recording that is still open."""
-        return self._close({"outcome": outcome}) if self._writer else {}
+        if self._writer:
+            self._close(0, {"outcome": outcome})
 
-    def _open(self, path: Path, metadata: dict[str, dict[str, str]]) -> dict[str, object]:
+    def _open(self, number: int, path: Path, metadata: dict[str, dict[str, str]]) -> Opened:
         if self._writer and not self._failure:
             raise RecordingFailed(f"{path}: {self._writer.path} is still being recorded; close it first")
         self._writer = None
@@ -126,9 +126,9 @@ class Recorder:
         self._writer = RecordingWriter(path, metadata)
         self._hold, self._failure, self._tally = False, "", Tally()
         unrecorded, self.unrecorded = self.unrecorded, 0
-        return {"opened": str(path), "unrecorded": unrecorded}
+        return Opened(to=number, path=str(path), unrecorded=unrecorded)
 
-    def _close(self, summary: dict[str, str]) -> dict[str, object]:
+    def _close(self, number: int, summary: dict[str, str]) -> Closed:
         if self._writer is None:
             raise RecordingFailed("nothing is being recorded; open a recording first")
         writer = self._writer
@@ -136,23 +136,26 @@ class Recorder:
             self._drain_to(self._ring.head)
             if self._failure:
                 raise RecordingFailed(self._failure)
-            counts = self._counts()
+            closed = self._counted(number, writer.path)
+            counts = closed.model_dump(exclude={"to", "path"})
             writer.finish({**summary, **{name: json.dumps(value) for name, value in counts.items()}})
         finally:
             self._writer, self._failure = None, ""
             writer.close()
             self._ring.commit()
-        return {"closed": str(writer.path), **counts}
+        return closed
 
-    def _counts(self) -> dict[str, object]:
+    def _counted(self, number: int, path: Path) -> Closed:
         dropped = Counter(self._ring.dropped)
         dropped.subtract(self._dropped)
-        return {
-            "samples": dict(self._tally.samples),
-            "dropped": {BY_ID[number].name: count for number, count in dropped.items() if count and number in BY_ID},
-            "missing": {name: count for name, count in self._tally.missing.items() if count},
-            "unreadable": self._tally.unreadable + self._ring.damaged - self._damaged,
-        }
+        return Closed(
+            to=number,
+            path=str(path),
+            samples=dict(self._tally.samples),
+            dropped={BY_ID[stream].name: count for stream, count in dropped.items() if count and stream in BY_ID},
+            missing={name: count for name, count in self._tally.missing.items() if count},
+            unreadable=self._tally.unreadable + self._ring.damaged - self._damaged,
+        )
 
     def _drain_to(self, head: int) -> None:
         while self._ring.position < head:
@@ -178,30 +181,22 @@ class Recorder:
         self._synced_ns = now_ns if sync else self._synced_ns
 
 
-def _strings(value: object) -> dict[str, str]:
-    if not isinstance(value, dict):
-        return {}
-    return {str(key): item if isinstance(item, str) else json.dumps(item) for key, item in value.items()}
-
-
-def _texts(value: object) -> dict[str, dict[str, str]]:
-    records = value if isinstance(value, dict) else {}
-    return {str(name): _strings(items) for name, items in records.items()}
-
-
-def run(ring: RingReader, recorder: Recorder, commands: Lines, reply_fd: int, ending: threading.Event) -> None:
+def run(ring: RingReader, recorder: Recorder, channel: Channel, ending: threading.Event) -> None:
     """Serves commands until told to quit, until supervisor and loop are both gone, or until ``ending`` is set."""
-    while not commands.ended:
+    while not channel.lost:
         if ending.is_set():
             with contextlib.suppress(RecordingFailed):
                 recorder.end("recorder ended by a signal")
             return
-        for line in commands.wait(DRAIN_PERIOD_S):
-            reply = recorder.handle(parse(line))
-            _reply(reply_fd, reply)
-            if "quit" in reply:
+        select([channel], [], [], DRAIN_PERIOD_S)
+        for received in channel.receive_all():
+            channel.send(recorder.handle(received))
+            if isinstance(received.message, Quit):
                 return
-        _reply(reply_fd, recorder.step(time.monotonic_ns()))
+        news = recorder.step(time.monotonic_ns())
+        if news:
+            channel.send(news)
+        channel.flush()
     _outlive(ring, recorder)
 
 
@@ -218,16 +213,11 @@ def _outlive(ring: RingReader, recorder: Recorder) -> None:
     ring.path.unlink(missing_ok=True)
 
 
-def _reply(fd: int, message: dict[str, object]) -> None:
-    if message:
-        with contextlib.suppress(BrokenPipeError):
-            os.write(fd, encode(message))
-
-
 def main(arguments: list[str]) -> int:
     """The process: attaches to the ring and runs; exit code 2 where there is no ring."""
     parser = argparse.ArgumentParser(prog="python -m rig.recording.recorder", description=__doc__)
     parser.add_argument("ring", type=Path)
+    parser.add_argument("socket", type=int, metavar="SOCKET_FD")
     parser.add_argument("--resume", action="store_true", help="keep what a predecessor left for the first recording")
     options = parser.parse_args(arguments)
     # Ctrl-C goes to the whole group of processes; the recorder ends when its supervisor says so or is gone.
@@ -236,14 +226,16 @@ def main(arguments: list[str]) -> int:
     ending = threading.Event()
     for number in (signal.SIGHUP, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())
+    channel = Channel(socket.socket(fileno=cast(int, options.socket)), TO_RECORDER)
     try:
         ring = RingReader.open(cast(Path, options.ring))
     except RigError as error:
-        _reply(sys.stdout.fileno(), {"failed": str(error), "to": "start"})
+        channel.send(Failed(text=str(error)))
         return error.exit_code
     ring.touch(time.monotonic_ns())
-    _reply(sys.stdout.fileno(), {"ready": os.getpid()})
-    run(ring, Recorder(ring, options.resume), Lines(sys.stdin.fileno()), sys.stdout.fileno(), ending)
+    channel.send(Started())
+    run(ring, Recorder(ring, options.resume), channel, ending)
+    channel.close()
     ring.close()
     return 0
 

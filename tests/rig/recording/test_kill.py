@@ -93,7 +93,7 @@ def test_a_killed_recorder_loses_at_most_its_last_batch_and_its_successor_has_th
         header.close()
     seqs = true_rows(read_recording(tmp_path / "last.mcap"))
     assert seqs[0] == following > 0
-    assert reply["samples"] == {"force": seqs.size}
+    assert reply.samples == {"force": seqs.size}
 
 
 def test_a_killed_loop_loses_nothing_it_had_published(tmp_path: Path) -> None:
@@ -112,8 +112,8 @@ def test_a_killed_loop_loses_nothing_it_had_published(tmp_path: Path) -> None:
             header.close()
         seqs = true_rows(read_recording(tmp_path / f"{number}.mcap"))
         assert (seqs == np.arange(published)).all()
-        assert reply["samples"] == {"force": published}
-        assert reply["dropped"] == reply["missing"] == {}
+        assert reply.samples == {"force": published}
+        assert reply.dropped == reply.missing == {}
 
 
 def test_a_killed_supervisor_leaves_a_finished_recording_and_no_ring(tmp_path: Path) -> None:

@@ -3,10 +3,13 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from rig.channel import Answer, Received
 from rig.channels import AXIS, EVENT, FORCE
+from rig.recording.messages import Close, Open, Quit
 from rig.recording.reader import read_recording
 from rig.recording.recorder import FLUSH_PERIOD_NS, Recorder
 from rig.recording.ring import RingReader, RingWriter
@@ -35,6 +38,15 @@ def recorder(reader: RingReader) -> Recorder:
     return Recorder(reader)
 
 
+def opened(recorder: Recorder, path: Path, metadata: dict[str, dict[str, str]] | None = None) -> dict[str, Any]:
+    command = Open(path=str(path), metadata=metadata or {})
+    return recorder.handle(Received(1, command)).model_dump()
+
+
+def closed(recorder: Recorder, **summary: str) -> dict[str, Any]:
+    return recorder.handle(Received(2, Close(summary=summary))).model_dump()
+
+
 def put_force(ring: RingWriter, *seqs: int) -> None:
     for seq in seqs:
         ring.put(FORCE.id, FORCE.pack(force(seq)))
@@ -49,14 +61,15 @@ def test_a_recording_holds_what_was_published_between_open_and_close(
 ) -> None:
     path = tmp_path / "a.mcap"
     put_force(ring, 0, 1)
-    assert recorder.handle({"open": str(path), "metadata": METADATA}) == {"opened": str(path), "unrecorded": 2}
+    assert opened(recorder, path, METADATA) == {"to": 1, "path": str(path), "unrecorded": 2}
     put_force(ring, 2, 3)
     ring.put(AXIS.id, AXIS.pack(axis(0)))
     ring.put(EVENT.id, EVENT.pack(event(0)))
-    reply = recorder.handle({"close": {"outcome": "done"}})
+    reply = closed(recorder, outcome="done")
     put_force(ring, 4)
     assert reply == {
-        "closed": str(path),
+        "to": 2,
+        "path": str(path),
         "samples": {"force": 2, "axis": 1, "event": 1},
         "dropped": {},
         "missing": {},
@@ -74,8 +87,8 @@ def test_samples_between_recordings_are_unrecorded_not_dropped(
     ring: RingWriter, recorder: Recorder, tmp_path: Path
 ) -> None:
     for name in ("a", "b"):
-        recorder.handle({"open": str(tmp_path / f"{name}.mcap"), "metadata": {}})
-        reply = recorder.handle({"close": {}})
+        opened(recorder, tmp_path / f"{name}.mcap")
+        reply = closed(recorder)
         assert reply["dropped"] == reply["missing"] == {}
         put_force(ring, *range(200))
         recorder.step(0)
@@ -83,18 +96,18 @@ def test_samples_between_recordings_are_unrecorded_not_dropped(
 
 
 def test_gaps_in_the_numbers_are_counted_as_missing(ring: RingWriter, recorder: Recorder, tmp_path: Path) -> None:
-    recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
+    opened(recorder, tmp_path / "a.mcap")
     put_force(ring, 5, 6, 9, 10, 12)
-    assert recorder.handle({"close": {}})["missing"] == {"force": 3}
+    assert closed(recorder)["missing"] == {"force": 3}
 
 
 def test_drops_during_a_recording_are_counted_per_stream(ring: RingWriter, recorder: Recorder, tmp_path: Path) -> None:
     put_force(ring, *range(300))
-    recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
+    opened(recorder, tmp_path / "a.mcap")
     assert ring.dropped == {FORCE.id: 44}
     put_force(ring, *range(300, 570))
     ring.put(AXIS.id, AXIS.pack(axis(0)))
-    reply = recorder.handle({"close": {}})
+    reply = closed(recorder)
     assert reply["dropped"] == {"force": 14, "axis": 1}
     assert reply["samples"] == {"force": 256}
 
@@ -103,7 +116,7 @@ def test_slots_are_given_back_only_after_their_chunk_is_in_the_file(
     ring: RingWriter, reader: RingReader, recorder: Recorder, tmp_path: Path
 ) -> None:
     path = tmp_path / "a.mcap"
-    recorder.handle({"open": str(path), "metadata": {}})
+    opened(recorder, path)
     now_ns = 10 * FLUSH_PERIOD_NS
     recorder.step(now_ns)
     put_force(ring, 0, 1, 2)
@@ -116,7 +129,7 @@ def test_slots_are_given_back_only_after_their_chunk_is_in_the_file(
 def test_a_successor_starts_with_the_batch_its_predecessor_lost(ring: RingWriter, tmp_path: Path) -> None:
     first = RingReader.open(ring.path)
     doomed = Recorder(first)
-    doomed.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
+    opened(doomed, tmp_path / "a.mcap")
     put_force(ring, 0, 1)
     doomed.step(FLUSH_PERIOD_NS)
     put_force(ring, 2, 3)
@@ -125,9 +138,9 @@ def test_a_successor_starts_with_the_batch_its_predecessor_lost(ring: RingWriter
     second = RingReader.open(ring.path)
     heir = Recorder(second, resume=True)
     heir.step(0)
-    heir.handle({"open": str(tmp_path / "b.mcap"), "metadata": {}})
+    opened(heir, tmp_path / "b.mcap")
     put_force(ring, 4)
-    heir.handle({"close": {}})
+    closed(heir)
     second.close()
     assert (seqs_in(tmp_path / "a.mcap"), seqs_in(tmp_path / "b.mcap")) == ([0, 1], [2, 3, 4])
 
@@ -141,8 +154,8 @@ def test_a_full_disk_is_told_at_once_and_again_on_close_and_the_next_recording_w
     ring: RingWriter, recorder: Recorder, tmp_path: Path
 ) -> None:
     path = tmp_path / "a.mcap"
-    recorder.handle({"open": str(path), "metadata": METADATA})
-    now_ns, news = 0, {}
+    opened(recorder, path, METADATA)
+    now_ns, news = 0, None
     with disk_of(12_000):
         for start in range(0, 10_000, 100):
             put_force(ring, *range(start, start + 100))
@@ -150,68 +163,65 @@ def test_a_full_disk_is_told_at_once_and_again_on_close_and_the_next_recording_w
             news = recorder.step(now_ns)
             if news:
                 break
-        assert news["to"] == "recording"
-        assert "File too large" in str(news["failed"])
-        assert recorder.step(now_ns + FLUSH_PERIOD_NS) == {}
-    assert recorder.handle({"close": {}}) == {"failed": news["failed"], "to": "close"}
+        assert news is not None
+        assert "File too large" in news.text
+        assert recorder.step(now_ns + FLUSH_PERIOD_NS) is None
+    assert closed(recorder) == {"to": 2, "refused": news.text, "stopped": False}
     kept = seqs_in(path)
     assert kept == list(range(len(kept)))
     assert len(kept) >= 100
-    assert "opened" in recorder.handle({"open": str(tmp_path / "b.mcap"), "metadata": {}})
+    assert "path" in opened(recorder, tmp_path / "b.mcap")
     put_force(ring, 1)
-    assert recorder.handle({"close": {}})["samples"] == {"force": 1}
+    assert closed(recorder)["samples"] == {"force": 1}
 
 
 def test_a_disk_that_fills_up_on_close_is_a_failed_close(ring: RingWriter, recorder: Recorder, tmp_path: Path) -> None:
-    recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
+    opened(recorder, tmp_path / "a.mcap")
     put_force(ring, *range(200))
     with disk_of(6_000):
-        reply = recorder.handle({"close": {}})
-    assert reply["to"] == "close"
+        reply = closed(recorder)
+    assert "File too large" in reply["refused"]
     assert not read_recording(tmp_path / "a.mcap").complete
 
 
 def test_samples_that_would_spoil_the_file_are_counted_and_left_out(
     ring: RingWriter, recorder: Recorder, tmp_path: Path
 ) -> None:
-    recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
+    opened(recorder, tmp_path / "a.mcap")
     ring.put(FORCE.id, b"short")
     ring.put(AXIS.id, FORCE.pack(force(0)))
     ring.put(EVENT.id, EVENT.pack(event(0))[:-30])
     ring.put(63, b"")
     put_force(ring, 0)
-    reply = recorder.handle({"close": {}})
+    reply = closed(recorder)
     assert (reply["unreadable"], reply["samples"]) == (4, {"force": 1})
     assert seqs_in(tmp_path / "a.mcap") == [0]
 
 
 def test_opening_twice_is_refused_and_the_first_goes_on(ring: RingWriter, recorder: Recorder, tmp_path: Path) -> None:
-    recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
-    reply = recorder.handle({"open": str(tmp_path / "b.mcap"), "metadata": {}})
-    assert reply["to"] == "open"
-    assert "still being recorded" in str(reply["failed"])
+    opened(recorder, tmp_path / "a.mcap")
+    reply = opened(recorder, tmp_path / "b.mcap")
+    assert "still being recorded" in reply["refused"]
     put_force(ring, 0)
-    assert recorder.handle({"close": {}})["samples"] == {"force": 1}
+    assert closed(recorder)["samples"] == {"force": 1}
 
 
 def test_an_existing_file_is_refused(recorder: Recorder, tmp_path: Path) -> None:
     (tmp_path / "a.mcap").write_bytes(b"mine")
-    assert "exists already" in str(recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})["failed"])
+    assert "exists already" in opened(recorder, tmp_path / "a.mcap")["refused"]
     assert not recorder.recording
     assert (tmp_path / "a.mcap").read_bytes() == b"mine"
 
 
-@pytest.mark.parametrize(
-    ("command", "to"), [({}, "line"), ({"dance": 1}, "line"), ({"close": {}}, "close"), ({"close": 7}, "close")]
-)
-def test_a_command_that_makes_no_sense_is_answered(recorder: Recorder, command: dict[str, object], to: str) -> None:
-    assert recorder.handle(command)["to"] == to
+def test_a_command_that_makes_no_sense_is_refused(recorder: Recorder) -> None:
+    assert closed(recorder)["refused"] == "nothing is being recorded; open a recording first"
+    stranger = recorder.handle(Received(3, Answer(to=1)))
+    assert stranger == Answer(to=3, refused="this is no command of a recorder")
 
 
 def test_quitting_finishes_the_open_recording(ring: RingWriter, recorder: Recorder, tmp_path: Path) -> None:
-    recorder.handle({"open": str(tmp_path / "a.mcap"), "metadata": {}})
+    opened(recorder, tmp_path / "a.mcap")
     put_force(ring, 0)
-    reply = recorder.handle({"quit": True})
-    assert reply["quit"] is True
+    assert recorder.handle(Received(3, Quit())) == Answer(to=3)
     recording = read_recording(tmp_path / "a.mcap")
     assert (recording.complete, recording.metadata["summary"]["outcome"]) == (True, "recorder told to quit")
