@@ -10,15 +10,30 @@ from typing import TYPE_CHECKING
 
 from controller.connections import of_axis, of_stream
 from controller.device_states import DeviceStatus, Observation, State
+from controller.devices import Devices
+from controller.health import IDENTICAL_LIMIT, StreamHealth
 from controller.safety import Action, Incident
 from controller.steps import Program, Retract
 from drivers.roles import Device
+from rig.config.wiring import Wiring
 
 if TYPE_CHECKING:
     from controller.bench_loop import BenchLoop
 
 STREAMS = {"force": "force", "axis": "axis", "tracker": "marker"}
 """Role to the name of its stream."""
+
+
+def unheard(wiring: Wiring, devices: Devices, stream: str) -> StreamHealth:
+    """The health of a stream before its first sample."""
+    loop = wiring.loop
+    if stream == "force":
+        identical = loop.missed_periods or IDENTICAL_LIMIT
+        return StreamHealth(devices.force.period_ns, round(wiring.stale_force_ms * 1e6), identical)
+    if stream == "axis":
+        return StreamHealth(devices.axis.period_ns, round(loop.stale_axis_ms * 1e6))
+    period_ns = devices.tracker.period_ns if devices.tracker else 1
+    return StreamHealth(period_ns, round(loop.stale_marker_ms * 1e6))
 
 
 def attend(loop: "BenchLoop", now_ns: int) -> None:

@@ -11,7 +11,7 @@ from controller.devices import Devices, openers
 from controller.first_touch import FirstTouch
 from controller.force_watch import ForceWatch, calibrated_zero
 from controller.giving_way import give_way
-from controller.health import IDENTICAL_LIMIT, Standstill, StreamHealth
+from controller.health import Standstill
 from controller.loop import Slot
 from controller.machine import Machine
 from controller.messages import Finished, Outcome, Status, StatusSaid, Stopped
@@ -90,7 +90,9 @@ class BenchLoop:
         self.watch = Watch()
         self._registration = Registration()
         self._standstill = Standstill()
-        self.health = {stream: self._unheard(stream) for stream in ("force", "axis", "marker")}
+        self.health = {
+            stream: attending.unheard(self.wiring, self.devices, stream) for stream in ("force", "axis", "marker")
+        }
         self.published = {"force": -1, "axis": -1, "tracker": -1}
         said = partial(attending.said, self)
         self.connections = Connections(devices.by_role(), opens or openers(wiring), said, now())
@@ -106,20 +108,9 @@ class BenchLoop:
         if held:
             self.machine.hold(Incident(Action.IMMEDIATE, "recovery", held))
 
-    def _unheard(self, stream: str) -> StreamHealth:
-        """The health of a stream before its first sample."""
-        devices, loop = self.devices, self.wiring.loop
-        if stream == "force":
-            identical = loop.missed_periods or IDENTICAL_LIMIT
-            return StreamHealth(devices.force.period_ns, round(self.wiring.stale_force_ms * 1e6), identical)
-        if stream == "axis":
-            return StreamHealth(devices.axis.period_ns, round(loop.stale_axis_ms * 1e6))
-        period_ns = devices.tracker.period_ns if devices.tracker else 1
-        return StreamHealth(period_ns, round(loop.stale_marker_ms * 1e6))
-
     def forget(self, stream: str) -> None:
         """What a device said before it was lost counts no more."""
-        self.health[stream] = self._unheard(stream)
+        self.health[stream] = attending.unheard(self.wiring, self.devices, stream)
         if stream == "force":
             self._force_watch = ForceWatch(self.devices.force.period_ns)
         elif stream == "marker":
@@ -288,15 +279,6 @@ class BenchLoop:
             self.devices.axis.enable()
         self.braked = False
         self.machine.acknowledge()
-
-    def regain(self, homed: bool = False) -> None:
-        """Torque on at the present position; ``homed``: where that is, the next report says."""
-        self.devices.axis.enable()
-        self.braked = False
-        if homed:
-            self.world.position_mm = math.nan
-            for stream in self.health:  # the loop stood still meanwhile, which is no fault of theirs
-                self.forget(stream)
 
     def close(self) -> None:
         """Leaves the devices there are now safe; they may not be those it began with."""

@@ -51,7 +51,7 @@ def _clear(loop: "BenchLoop") -> None:
 def _retract(loop: "BenchLoop") -> None:
     if not loop.devices.axis.referenced:
         raise UsageError("the axis has no reference: only homing can move it")
-    loop.regain()
+    _regain(loop)
     loop.machine.withdraw()
 
 
@@ -61,4 +61,13 @@ def _home(loop: "BenchLoop") -> None:
     if axis.referenced and not is_retracted(loop.world.position_mm, limits):
         raise UsageError(f"the tip stands at {loop.world.position_mm:.1f} mm: retract it before the axis is homed")
     axis.home()
-    loop.regain(homed=True)
+    _regain(loop)
+    loop.world.position_mm = math.nan  # the next report says where that is now
+    for stream in loop.health:  # the loop stood still meanwhile, which is no fault of theirs
+        loop.forget(stream)
+
+
+def _regain(loop: "BenchLoop") -> None:
+    """Torque on at the present position."""
+    loop.devices.axis.enable()
+    loop.braked = False
