@@ -33,14 +33,20 @@ class Inbox:
         self._channel, self._stops = channel, stops
         self.interruption = interruption or Interruption()
         self._asked: tuple[Request, ...] = ()
-        self._leaving = False
+        self._leaving = self._told_to_end = False
         self._refused = 0
         self.heard_ns = 0
+
+    def end(self) -> None:
+        """What moves is stopped and retracted, then the loop leaves; may be called by a signal's handler."""
+        self._leaving = self._told_to_end = True
 
     def collect(self, loop: BenchLoop) -> frozenset[str]:
         """All stops that were asked for, and one message at most; a refused one is answered with its reason."""
         self._asked = self._stops.take(loop.now())
         wanted = self._hear(loop)
+        if self._told_to_end and loop.machine.busy:
+            wanted |= {"stop"}
         return wanted.union(*(REQUESTS[request.kind] for request in self._asked)) if self._asked else wanted
 
     def confirm(self, loop: BenchLoop) -> None:

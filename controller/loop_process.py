@@ -73,6 +73,9 @@ def _serve(
                 with guard.moving():
                     held = _prepare(devices.axis, held)
             inbox = Inbox(channel, stops, interruption)
+            # A computer that shuts down, or a terminal that is closed, leaves the tip outside.
+            for number in (signal.SIGTERM, signal.SIGHUP):
+                signal.signal(number, lambda *_: inbox.end())
             _run(wiring, devices, ring, channel, inbox, granted, table, held)
     finally:
         ring.close()

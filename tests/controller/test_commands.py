@@ -7,6 +7,7 @@ import pytest
 
 from controller.commands import Inbox
 from controller.messages import FROM_LOOP, TO_LOOP, Finished, Lease, Note, Reset, Run, Shutdown, StatusSaid
+from controller.modes import Mode
 from controller.steps import Program
 from rig.channel import Answer, Channel, Message, encode, pair
 from tests.controller.fake_bench import APPROACH, HOLD, ZERO, FakeBench
@@ -59,6 +60,19 @@ def test_a_second_program_is_refused_by_its_id_and_the_first_goes_on(bench: Link
     assert taken == Answer(to=first)
     assert refused == Answer(to=second, refused="a program is already under way: stop it or wait for its end")
     assert bench.loop.machine.busy
+
+
+def test_a_loop_told_to_end_retracts_before_it_leaves(bench: Linked) -> None:
+    bench.mine.send(Run(program=Program(name="one", steps=(ZERO, APPROACH, HOLD))))
+    bench.until(lambda: bench.mode is Mode.COMPRESS)
+    inbox = bench.loop._commands
+    assert isinstance(inbox, Inbox)
+    inbox.end()
+    bench.cycle()
+    assert (bench.going, bench.mode) == (True, Mode.RETRACT)
+    bench.until(lambda: not bench.going)
+    assert bench.mode is Mode.SAFE
+    assert bench.force.true_N == 0
 
 
 def test_notes_resets_and_leave_are_answered_and_a_lease_is_not(bench: Linked) -> None:
