@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from api.cli.app import COMMANDS, build
-from rig.errors import UsageError
+from rig.errors import BadTrial, CheckFailed, SafetyStop, UsageError
 
 runner = CliRunner()
 
@@ -26,6 +26,13 @@ def test_help_of_the_whole_lists_every_command_with_its_whole_first_sentence() -
     for name in COMMANDS:
         (listed,) = re.findall(rf"^ *{name} +(.*)$", answer.output, re.MULTILINE)
         assert f"  {listed}\n" in runner.invoke(build(name), [name, "--help"], terminal_width=200).output
+
+
+def test_the_codes_a_command_ends_with_stand_in_the_help() -> None:
+    text = " ".join(runner.invoke(build(), ["--help"], terminal_width=200).output.split())
+    for error in (CheckFailed, UsageError, SafetyStop, BadTrial):
+        assert re.search(rf"\b{error.exit_code} \w+", text.partition("Exit codes: 0 ok")[2]), error
+    assert "4 a bad trial remained" in text
 
 
 def test_the_version_is_that_of_the_package() -> None:

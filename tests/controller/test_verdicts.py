@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from controller.experiments import capture as experiment
+from controller.experiments import tracked
 from controller.experiments.recorded import Recorded
+from controller.experiments.tracked import Tracked
+from controller.experiments.tracking import Followed
 from controller.experiments.verdicts import refuse_bad, remaining_bad, with_quality
 from controller.messages import Outcome
 from controller.operation import Operation
@@ -119,3 +122,11 @@ def test_a_trial_is_compared_with_those_before_that_reached_the_same_depth(tmp_p
     assert with_quality(entry, tmp_path, QualityLimits(), others).quality == "good"
     found = with_quality(entry, tmp_path, QualityLimits(), (*others, before))
     assert found.quality == "usable" and found.measured["peak_off"] == pytest.approx(0.5)
+
+
+def test_a_run_of_force_of_bad_quality_ends_with_the_same_code() -> None:
+    followed = Followed(rms_error_N=0.1, largest_error_N=0.2, amplitude_ratio=None, lag_s=None)
+    run = Tracked("track_001.mcap", "model.json", (), followed, 1, 0, 1, 0, "usable", ("axis: a gap of 58 ms",))
+    tracked.refuse_bad(run)
+    with pytest.raises(BadTrial, match=r"track_001.mcap is of bad quality: axis: a gap of 58 ms"):
+        tracked.refuse_bad(replace(run, quality="bad"))
