@@ -217,7 +217,7 @@ def test_a_sample_counts_once_however_often_the_loop_cycles() -> None:
 def test_the_touch_is_made_as_the_step_asks_and_the_axis_rests_for_it() -> None:
     run, here, _ = approached([1.0, 1.0, 1.0])
     assert run._touch is not None
-    assert tuple(run._touch._touching) == (0.2, 2, 0.5)
+    assert tuple(run._touch._touching) == (0.2, 2, 0.5, 5.0)
     assert run._touch._sound is False, "the guide had not slipped"
     assert here.setpoint.velocity_mm_s == 0.0
 
