@@ -172,6 +172,7 @@ class Supervisor:
         One that has not ended in time is stopped, and DeviceError raised; how it ended is then nobody's any more.
         """
         self.await_ready()
+        self.refuse_held()
         try:
             return self._loop().run(Run(program=program), timeout_s)
         except DeviceError:
@@ -306,7 +307,7 @@ class Supervisor:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._tip_left_in |= self._process.returncode not in ENDED_BY_ITSELF
+        self._tip_left_in |= self._process.poll() not in ENDED_BY_ITSELF
 
 
 def stopped(outcome: Outcome) -> SafetyStop:

@@ -37,6 +37,7 @@ def connected(wiring: Wiring) -> Iterator[Supervisor]:
             bench.prepare()
             attach(lambda kind: _press(bench, kind))
             bench.start()
+            bench.refuse_held()
             yield bench
         finally:
             bench.close()

@@ -37,7 +37,9 @@ def killed(running: Running, *whom: str) -> None:
         running.end()
 
 
-@pytest.mark.parametrize("whom", [("loop",), ("recorder",), ("command",), ("command", "loop", "recorder", "stop")])
+@pytest.mark.parametrize(
+    "whom", [("loop",), ("recorder",), ("command",), ("stop",), ("command", "loop", "recorder", "stop")]
+)
 def test_one_command_brings_the_tip_out_after_a_kill(bench: Stage, tmp_path: Path, whom: tuple[str, ...]) -> None:
     running = tracking(bench, tmp_path)
     killed(running, *whom)
