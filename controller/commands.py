@@ -14,6 +14,7 @@ from controller.safety import Action
 from controller.steps import Program
 from controller.stop.start import StartGuard
 from controller.stop.word import DEEDS, Deed, Kind, Request, Responder
+from drivers.epos4.walker import never
 from rig.channel import Answer, Channel, Received
 from rig.errors import RigError, SafetyStop, UsageError
 
@@ -121,8 +122,12 @@ class Inbox:
         """The loop stands still while the drive homes, so stops are taken beside it, as at its start."""
         with StartGuard(self._stops, loop.now) as guard:
             self.interruption.source = guard.interrupted
-            with guard.moving():
-                recovery_acts.do(loop, "home")
+            try:
+                with guard.moving():
+                    recovery_acts.do(loop, "home")
+            finally:
+                # A stop of this homing is none of what the drive is asked for later.
+                self.interruption.source = never
 
     def more(self, loop: BenchLoop) -> bool:
         """False once asked to leave, or left alone, and at rest."""

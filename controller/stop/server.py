@@ -26,9 +26,10 @@ from pathlib import Path
 
 from controller import realtime
 from controller.stop import http
-from controller.stop.keypad import Keys, Pad, open_device
-from controller.stop.word import LOOK_S, NOT_CONFIRMED, Answer, Keypad, Kind, Lane, Request, Requester, StopWord
-from rig.errors import DeviceError
+from controller.stop.keyboard import Keyboard
+from controller.stop.keypad import Keys
+from controller.stop.liveness import LoopLife
+from controller.stop.word import LOOK_S, NOT_CONFIRMED, Answer, Kind, Request, StopWord
 
 ROUTES = {"/estop": Kind.EMERGENCY, "/pain": Kind.PAIN, "/stop": Kind.STOP}
 # The slowest loop looks every 20 ms, and one that is 100 ms late stops by itself; a person waits no longer than this
@@ -40,9 +41,6 @@ IDLE_S = 60.0
 LINGER_S = 0.5
 LINGER_BYTES = 65_536
 CONNECTIONS = 64
-SILENT_NS = 200_000_000
-RETRY_S = 1.0
-ATTACH_S = 10.0
 LONGEST_WAIT_S = 0.2
 
 
@@ -77,7 +75,7 @@ class Server:
     """Serves sockets and keypad in one thread; ``turn`` waits at most a fifth of a second."""
 
     def __init__(
-        self, page: StopWord, listener: socket.socket, keyboard: "Keyboard", now: Callable[[], float] = time.monotonic
+        self, page: StopWord, listener: socket.socket, keyboard: Keyboard, now: Callable[[], float] = time.monotonic
     ) -> None:
         self._page, self._listener, self._keyboard, self._now = page, listener, keyboard, now
         self._requester = keyboard.requester
@@ -86,7 +84,7 @@ class Server:
         self._selector.register(listener, selectors.EVENT_READ, self._accept)
         self._connections: dict[int, Connection] = {}
         self._last: dict[str, object] | None = None
-        self.loop = LoopWatch(page, now)
+        self.loop = LoopLife(page, now)
 
     def watch(self, fd: int, ready: Callable[[], None]) -> None:
         """Calls ``ready`` whenever ``fd`` can be read."""
@@ -235,106 +233,6 @@ class Server:
         if self._connections.pop(connection.socket.fileno(), None):
             self._selector.unregister(connection.socket)
         connection.socket.close()
-
-
-class LoopWatch:
-    """Whether the loop's process lives."""
-
-    def __init__(self, page: StopWord, now: Callable[[], float]) -> None:
-        self._page, self._now = page, now
-        self._begun = now()
-        self._pid = 0
-        self._process = -1
-
-    @property
-    def gone(self) -> bool:
-        """Whether a loop was there and has ended."""
-        pid = self._page.loop_pid
-        if pid != self._pid:
-            self._follow(pid)
-        if self._process >= 0 and _ended(self._process):
-            os.close(self._process)
-            self._process = -1
-        return self._pid != 0 and self._process < 0
-
-    def over(self) -> bool:
-        """Whether nothing is left that could be stopped: it has ended, or has never come."""
-        return self.gone or (self._page.loop_pid == 0 and self._now() - self._begun > ATTACH_S)
-
-    def state(self) -> str:
-        """In a word."""
-        if self.gone:
-            return "gone"
-        if self._page.loop_beat_ns == 0:
-            return "starting"
-        silent = time.monotonic_ns() - self._page.loop_beat_ns > SILENT_NS
-        return "silent" if silent else "running"
-
-    def _follow(self, pid: int) -> None:
-        if self._process >= 0:
-            os.close(self._process)
-        self._pid = pid
-        try:
-            self._process = os.pidfd_open(pid)
-        except OSError:
-            self._process = -1
-
-
-def _ended(process: int) -> bool:
-    with selectors.DefaultSelector() as selector:
-        selector.register(process, selectors.EVENT_READ)
-        return bool(selector.select(0))
-
-
-class Keyboard:
-    """The keypad, if there is one: presses become requests; where it goes, it is looked for until it comes back."""
-
-    def __init__(self, page: StopWord, path: str, fd: int, keys: Keys, required: bool) -> None:
-        self._page, self._path, self._keys, self._required = page, path, keys, required
-        self.requester = Requester(page, Lane.STOP_PROCESS)
-        self.presses = 0
-        self._pad: Pad | None = Pad(path, fd) if path else None
-        self._new = self._pad is not None
-        self._retry_at = 0.0
-        page.show_keypad(Keypad.OK if path else Keypad.NONE)
-
-    def turn(self, selector: selectors.BaseSelector, now: float) -> None:
-        """Registers a new device, and looks for a lost one."""
-        if self._path and self._pad is None and now >= self._retry_at:
-            self._retry_at = now + RETRY_S
-            self._reopen()
-        if self._pad and self._new:
-            self._new = False
-            selector.register(self._pad.fd, selectors.EVENT_READ, lambda: self.read(selector))
-
-    def read(self, selector: selectors.BaseSelector) -> None:
-        """Takes the keys pressed."""
-        if self._pad is None:
-            return
-        try:
-            for code in self._pad.read():
-                self.presses += 1
-                self.requester.request(self._keys.kind(code))
-        except DeviceError as error:
-            selector.unregister(self._pad.fd)
-            self._pad.close()
-            self._pad = None
-            sys.stderr.write(f"{error}\n")
-            self._lost()
-
-    def _reopen(self) -> None:
-        try:
-            self._pad = Pad(self._path, open_device(self._path))
-        except DeviceError:
-            self._lost()
-        else:
-            self._new = True
-            self._page.show_keypad(Keypad.OK)
-
-    def _lost(self) -> None:
-        self._page.show_keypad(Keypad.LOST)
-        if self._required:
-            self.requester.request(Kind.KEYPAD_LOST)
 
 
 def serve(server: Server, parent: int, page: StopWord) -> None:

@@ -1,7 +1,11 @@
 """Stops at any moment in the loop: what is done, what is answered, and that nothing begins afterwards."""
 
+from typing import cast
+
 import pytest
 
+from controller.commands import Inbox
+from controller.messages import Recover
 from controller.modes import Mode
 from controller.stop.word import Deed
 from tests.controller.fake_bench import APPROACH, HOLD, LEAVE, PRESS, ZERO, FakeBench
@@ -132,3 +136,15 @@ def test_a_soft_stop_after_an_emergency_stop_leaves_the_axis_braked(verb: str) -
     bench.wait(0.5)
     assert deeds(bench) == [Deed.BRAKED, Deed.BRAKED]
     assert (bench.latched, bench.axis.position_mm) == ("emergency_stop", stood_mm)
+
+
+def test_a_stop_of_homing_on_consent_does_not_hinder_what_is_asked_later() -> None:
+    bench = FakeBench()
+    inbox = cast(Inbox, bench.loop._commands)
+    bench.say("pain")
+    bench.link.inbox.append(Recover(act="home"))
+    bench.cycle()
+    refused = bench.link.of("answer")[-1]
+    assert (refused["stopped"], "home" in bench.axis.calls) == (True, False)
+    assert not inbox.interruption()
+    assert deeds(bench) == [Deed.START_ENDED]
