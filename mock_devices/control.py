@@ -1,41 +1,59 @@
-"""The bench's control channel: one JSON object a line over TCP on this machine, one line back.
+"""The bench's control channel: requests over TCP on this machine, on the framed channel of `rig.channel`.
 
-    {"set": {"surface.position_mm": 22.0, "tissue.present": false}}     {"set": {...as they are now}}
-    {"get": ["tip.force_N", "time_s"]}                                  {"get": {"tip.force_N": 1.2, "time_s": 8.0}}
-    {"dials": true}                                                     {"dials": {name: meaning}}
-    {"fault": {"device": "force", "kind": "drop", "value": 0.2}}        {"fault": {...}}; value may be left out
-    {"faults": true}                                                    {"faults": {device: {kind: meaning}}}
-    {"hide": {"friction.level_N": 0.2}}                                 {"hide": [names]}; {} none, null defaults
-    {"truth": true}                                                     {"truth": {effect: {parameter: value}}}
-    {"synced_ns": true}                                                 {"synced_ns": [times]}; each is said once
-    {"sampled": "force"}                                                {"sampled": [[mark, time]]}; each is said once
+A request is a verb and its argument, and is answered with a value, or with a sentence where it cannot be fulfilled::
 
-A request that cannot be fulfilled is answered by {"error": sentence}.
+    set       {"surface.position_mm": 22.0, "tissue.present": false}    {...as they are now}
+    get       ["tip.force_N", "time_s"]                                 {"tip.force_N": 1.2, "time_s": 8.0}
+    dials     true                                                      {name: meaning}
+    fault     {"device": "force", "kind": "drop", "value": 0.2}         {...}; value may be left out
+    faults    true                                                      {device: {kind: meaning}}
+    hide      {"friction.level_N": 0.2}                                 [names]; {} none, null defaults
+    truth     true                                                      {effect: {parameter: value}}
+    synced_ns true                                                      [times]; each is said once
+    sampled   "force"                                                   [[mark, time]]; each is said once
 """
 
 import contextlib
-import json
 import socket
+import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from select import select
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
+
+from pydantic import JsonValue
+from pydantic_core import to_jsonable_python
 
 from mock_devices import dials
 from mock_devices.bench import Bench
 from mock_devices.faults import Fault, Value
 from mock_devices.names import known
 from mock_devices.physics.effects import parse_hidden
+from rig.channel import Answer, Channel, Message, Received, Reply
 from rig.errors import DeviceError, RigError, UsageError
 
-LINE_BYTES_MAX = 65536
 CLIENT_TIMEOUT_S = 10.0
-TIMES_A_LINE = 1000
+TIMES_AT_ONCE = 1000
 Time = TypeVar("Time")
 
-Answer = dict[str, Any]
 Faults = Mapping[str, Sequence[Mapping[str, Fault]]]
 Sampled = Mapping[str, deque[tuple[int, int]]]
+
+
+class Asked(Message):
+    """A request."""
+
+    TYPE: ClassVar[int] = 50
+    verb: str
+    argument: JsonValue
+
+
+class Told(Reply):
+    """Its answer."""
+
+    TYPE: ClassVar[int] = 51
+    value: JsonValue
 
 
 class Desk:
@@ -60,19 +78,9 @@ class Desk:
             "sampled": lambda role: _said_once(self._sampled[known(str(role), self._sampled, "sensor")]),
         }
 
-    def answer(self, line: bytes) -> bytes:
-        """The line to send back for ``line``; never raises."""
-        try:
-            request = json.loads(line)
-            if not isinstance(request, dict) or len(request) != 1:
-                raise UsageError('write one request a line, for example {"get": ["tip.force_N"]}')
-            ((verb, argument),) = request.items()
-            reply: Answer = {verb: self._verbs[known(verb, self._verbs, "request")](argument)}
-        except RigError as error:
-            reply = {"error": str(error)}
-        except ValueError:
-            reply = {"error": "the line is not JSON"}
-        return json.dumps(reply).encode() + b"\n"
+    def answer(self, verb: str, argument: Any) -> Any:
+        """What the request asks for; raises RigError where it cannot be fulfilled."""
+        return self._verbs[known(verb, self._verbs, "request")](argument)
 
     def _set(self, values: object) -> dict[str, Value]:
         wanted = _table(values, "set")
@@ -90,7 +98,7 @@ class Desk:
         self._bench.hide(parse_hidden(name if value is None else f"{name}={value}" for name, value in wanted))
         return list(self._bench.hidden)
 
-    def _fault(self, values: object) -> Answer:
+    def _fault(self, values: object) -> dict[str, Any]:
         request = _table(values, "fault")
         device = known(str(request.get("device", "")), self._faults, "device")
         kind = known(str(request.get("kind", "")), self._faults[device][0], f"fault of {device}")
@@ -106,7 +114,7 @@ class Desk:
 
 
 def _said_once(times: deque[Time]) -> list[Time]:
-    return [times.popleft() for _ in range(min(len(times), TIMES_A_LINE))]
+    return [times.popleft() for _ in range(min(len(times), TIMES_AT_ONCE))]
 
 
 def _table(values: object, verb: str) -> dict[str, Any]:
@@ -118,11 +126,11 @@ def _table(values: object, verb: str) -> dict[str, Any]:
 class ControlPort:
     """The listening end, never blocking; several clients may be connected."""
 
-    def __init__(self, answer: Callable[[bytes], bytes]) -> None:
+    def __init__(self, answer: Callable[[str, Any], Any]) -> None:
         self._answer = answer
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._listener.setblocking(False)
-        self._clients: dict[socket.socket, bytes] = {}
+        self._clients: list[Channel] = []
         self.endpoint = f"127.0.0.1:{self._listener.getsockname()[1]}"
 
     def filenos(self) -> list[int]:
@@ -132,28 +140,26 @@ class ControlPort:
     def receive(self) -> None:
         """Accepts who waits and answers what is complete."""
         with contextlib.suppress(OSError):
-            client, _ = self._listener.accept()
-            client.setblocking(False)
-            self._clients[client] = b""
+            self._clients.append(Channel(self._listener.accept()[0], [Asked]))
         for client in list(self._clients):
-            self._serve(client)
+            for received in client.receive_all():
+                client.send(self._reply(received))
+            client.flush()
+            if client.lost:
+                self._clients.remove(client)
+                client.close()
 
-    def _serve(self, client: socket.socket) -> None:
+    def _reply(self, received: Received) -> Message:
+        request = received.message
+        if not isinstance(request, Asked):
+            return Answer(to=received.id, refused="ask with a verb and an argument")
         try:
-            data = client.recv(LINE_BYTES_MAX)
-        except BlockingIOError:
-            return
-        except OSError:
-            data = b""
-        *lines, rest = (self._clients[client] + data).split(b"\n")
-        self._clients[client] = rest
-        try:
-            client.sendall(b"".join(self._answer(line) for line in lines))
-        except OSError:
-            data = b""
-        if not data or len(rest) > LINE_BYTES_MAX:
-            del self._clients[client]
-            client.close()
+            value = to_jsonable_python(self._answer(request.verb, request.argument))
+            return Told(to=received.id, value=value)
+        except RigError as error:
+            return Answer(to=received.id, refused=str(error))
+        except ValueError:  # a figure that is no number just now
+            return Answer(to=received.id, refused=f"{request.verb} has no value that can be told now")
 
     def close(self) -> None:
         """Hangs up on everybody."""
@@ -169,10 +175,9 @@ class BenchControl:
     def __init__(self, address: str) -> None:
         host, _, port = address.rpartition(":")
         try:
-            self._socket = socket.create_connection((host, int(port)), CLIENT_TIMEOUT_S)
+            self._channel = Channel(socket.create_connection((host, int(port)), CLIENT_TIMEOUT_S), [Told])
         except (OSError, ValueError) as error:
             raise DeviceError(f"{address}: no bench answers there ({error}); is `rig mock` running?") from error
-        self._file = self._socket.makefile("rb")
         self._address = address
 
     def __enter__(self) -> Self:
@@ -183,8 +188,7 @@ class BenchControl:
 
     def close(self) -> None:
         """Hangs up."""
-        self._file.close()
-        self._socket.close()
+        self._channel.close()
 
     def set(self, values: Mapping[str, Value]) -> dict[str, Value]:
         """Turns dials; returns them as they are now."""
@@ -225,15 +229,22 @@ class BenchControl:
         """
         return [(mark, time_ns) for mark, time_ns in self._ask("sampled", role)]
 
-    def _ask(self, verb: str, argument: object) -> Any:
-        try:
-            self._socket.sendall(json.dumps({verb: argument}).encode() + b"\n")
-            line = self._file.readline()
-        except OSError as error:
-            raise DeviceError(f"{self._address}: the bench does not answer {verb} ({error})") from error
-        if not line:
-            raise DeviceError(f"{self._address}: the bench hung up on {verb}; it has ended")
-        reply = json.loads(line)
-        if "error" in reply:
-            raise UsageError(reply["error"])
-        return reply[verb]
+    def _ask(self, verb: str, argument: Any) -> Any:
+        if self._channel.lost:
+            raise DeviceError(f"{self._address}: the bench hung up; it has ended")
+        number = self._channel.send(Asked(verb=verb, argument=argument))
+        deadline = time.monotonic() + CLIENT_TIMEOUT_S
+        while not self._channel.lost and (left_s := deadline - time.monotonic()) > 0:
+            writing = [] if self._channel.flush() else [self._channel]
+            select([self._channel], writing, [], left_s)
+            for received in self._channel.receive_all():
+                if isinstance(received.message, Reply) and received.message.to == number:
+                    return _value(received.message)
+        raise DeviceError(f"{self._address}: the bench hung up on {verb}, or does not answer; it has ended")
+
+
+def _value(reply: Reply) -> Any:
+    if isinstance(reply, Told):
+        return reply.value
+    assert isinstance(reply, Answer)
+    raise UsageError(reply.refused)

@@ -6,18 +6,19 @@ import threading
 import tomllib
 from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import mock_devices
-from mock_devices.control import BenchControl, ControlPort, Desk
+from mock_devices.control import Asked, BenchControl, ControlPort, Desk
 from mock_devices.faults import WIRE_FAULTS, FaultyWire, faults_of
 from mock_devices.parameters import Parameters, load_parameters
 from mock_devices.wire import PtyWire
-from rig.errors import DeviceError, UsageError
+from rig.channel import Frame, Parser, encode
+from rig.errors import DeviceError, RigError, UsageError
 from tests.mock_devices.playing import MS_NS, quiet_bench, settle
 
 
@@ -33,10 +34,12 @@ def desk(wire: FaultyWire) -> Desk:
     return Desk(quiet_bench(), {"force": [faults_of(wire, WIRE_FAULTS)]})
 
 
-def ask(desk: Desk, request: object) -> dict[str, Any]:
-    answer = desk.answer(json.dumps(request).encode())
-    assert answer.endswith(b"\n")
-    return dict(json.loads(answer))
+def ask(desk: Desk, request: dict[str, Any]) -> dict[str, Any]:
+    ((verb, argument),) = request.items()
+    try:
+        return dict(json.loads(json.dumps({verb: desk.answer(verb, argument)})))
+    except RigError as error:
+        return {"error": str(error)}
 
 
 def test_figures_are_read_by_name(desk: Desk) -> None:
@@ -117,16 +120,10 @@ def test_a_fault_takes_its_default_or_a_value(desk: Desk, wire: FaultyWire) -> N
         ({"fault": {"device": "laser", "kind": "cut"}}, "unknown device 'laser'; nearest valid device: force"),
         ({"fault": {"device": "force", "kind": "drop", "value": 7}}, "a number from 0 to 1"),
         ({"gett": []}, "unknown request 'gett'; nearest valid request: get"),
-        ({"get": [], "set": {}}, "one request a line"),
-        ([], "one request a line"),
     ],
 )
-def test_a_wrong_request_is_answered_by_one_sentence(desk: Desk, request_: object, sentence: str) -> None:
+def test_a_wrong_request_is_answered_by_one_sentence(desk: Desk, request_: dict[str, Any], sentence: str) -> None:
     assert sentence in ask(desk, request_)["error"]
-
-
-def test_what_is_not_json_is_answered_too(desk: Desk) -> None:
-    assert json.loads(desk.answer(b"\xff{")) == {"error": "the line is not JSON"}
 
 
 @contextmanager
@@ -158,20 +155,34 @@ def test_the_client_sets_gets_and_raises_what_the_bench_says(desk: Desk, wire: F
         control.fault("force", "drop", 0.5)
         assert wire.drop_share == 0.5
         assert "cut" in control.faults()["force"]
+        assert control.synced_ns() == []
         with pytest.raises(UsageError, match="nearest valid figure: time_s"):
             control.get("time")
 
 
-def test_a_request_may_come_in_pieces_and_a_client_that_talks_too_long_is_hung_up_on(desk: Desk) -> None:
+def test_a_request_may_come_in_pieces_and_what_is_none_is_refused(desk: Desk) -> None:
     with answered(desk) as address:
         host, _, number = address.partition(":")
         with socket.create_connection((host, int(number)), 5) as client:
-            client.sendall(b'{"get": ["tim')
-            client.sendall(b'e_s"]}\n{"truth"')
-            assert client.recv(1000) == b'{"get": {"time_s": 0.0}}\n'
-            with suppress(ConnectionResetError, BrokenPipeError):
-                client.sendall(b"x" * 200_000)
-                assert client.recv(1) == b""
+            frame = encode(7, Asked.TYPE, b'{"verb": "get", "argument": ["time_s"]}')
+            client.sendall(b"no frame at all, and longer than the head of one")
+            client.sendall(frame[:9])
+            client.sendall(frame[9:] + encode(8, Asked.TYPE, b"no JSON") + encode(9, 77, b"{}"))
+            parser, frames = Parser(), list[Frame]()
+            while len(frames) < 3:
+                frames += parser.feed(client.recv(1000))
+    said = {body["to"]: body for body in (json.loads(frame.body) for frame in frames)}
+    assert said[7] == {"to": 7, "value": {"time_s": 0.0}}
+    assert all(said[number]["refused"] for number in (8, 9))
+
+
+def test_a_bench_that_ends_is_said(desk: Desk) -> None:
+    with answered(desk) as address:
+        control = BenchControl(address)
+        control.get("time_s")
+    with pytest.raises(DeviceError, match="the bench hung up"):
+        control.get("time_s")
+    control.close()
 
 
 def test_no_bench_is_a_sentence() -> None:
