@@ -356,6 +356,7 @@ class BenchLoop:
             "missed": row.missed,
             "ticks": row.seq + 1,
             "force_N": _finite(row.force_N),
+            "peak_force_N": _finite(self.world.peak_force_N),
             "reference_N": _finite(row.reference_N),
             "position_mm": _finite(row.position_mm),
             "depth_mm": _finite(row.depth_mm),

@@ -94,6 +94,7 @@ class Machine:
         """One tick; returns the incident that has just stopped motion, if any."""
         watch.mode = self.mode
         self._note_rest()
+        self._note_peak()
         incident = self._evaluate(watch)
         if incident:
             self._stop(incident)
@@ -126,6 +127,11 @@ class Machine:
             world.rest_N = math.nan
         elif not world.load.force_N >= world.rest_N:
             world.rest_N = world.load.force_N
+
+    def _note_peak(self) -> None:
+        """The largest force of a program, what came after its stop until the tip is out of it included."""
+        if self.mode is not Mode.IDLE:
+            self.world.peak_force_N = max(self.world.peak_force_N, self.world.force_N)
 
     def _holds(self, incident: Incident) -> bool:
         """Whether a person asked for a stop at rest, where it is out of contact or another stop is in force already."""
@@ -162,7 +168,6 @@ class Machine:
 
     def _advance(self) -> Incident | None:
         world = self.world
-        world.peak_force_N = max(world.peak_force_N, world.force_N)
         assert self._run and self._program
         try:
             over = self._run.advance(world, (world.now_ns - self.step_start_ns) * 1e-9)

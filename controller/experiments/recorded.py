@@ -4,7 +4,7 @@ import json
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -107,7 +107,8 @@ def _run_watched(bench: Supervisor, program: Program, timeout_s: float) -> Outco
         watcher.join()
     if failures:
         raise RecordingFailed(failures[0])
-    return outcome
+    # A stop is told when it comes; force goes on rising until the axis stands.
+    return replace(outcome, peak_force_N=max(outcome.peak_force_N, bench.status.get("peak_force_N") or 0.0))
 
 
 def _watch(bench: Supervisor, over: threading.Event, failures: list[str]) -> None:

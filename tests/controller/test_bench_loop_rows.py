@@ -135,7 +135,7 @@ def test_status_comes_twenty_times_a_second_and_says_what_people_see() -> None:
     }  # fmt: skip
     assert set(last) == {
         "time_ns", "mode", "busy", "step", "health", "missed", "ticks", "force_N", "reference_N", "position_mm",
-        "depth_mm", "rates_Hz", "lost", "devices", "ready", "latched",
+        "depth_mm", "rates_Hz", "lost", "devices", "ready", "latched", "peak_force_N",
     }  # fmt: skip
 
 

@@ -230,3 +230,13 @@ def test_before_the_first_zero_load_counts_from_the_calibrations_zero() -> None:
     bench.force.sideways_N = (known.zero_N[0] + 3.0, known.zero_N[1] + 4.0, known.zero_N[2] + bench.force.zero_N)
     bench.wait(0.1)
     assert bench.loop.world.load.force_N == pytest.approx(5.0, abs=0.03)
+
+
+@PRODUCTS
+def test_the_peak_that_is_told_holds_what_came_after_the_stop(product: Product) -> None:
+    bench = stopped(PlantBench(product, linear(5.0)), *rammed(30.0))
+    at_the_stop_N = bench.link.of("finished")[-1]["peak_force_N"]
+    bench.wait(0.1)
+    told_N = bench.link.statuses[-1]["peak_force_N"]
+    assert at_the_stop_N < told_N - 1.0
+    assert told_N == pytest.approx(bench.true_peak_N, abs=0.3 if product is BOTA else 1.2)
