@@ -1,198 +1,41 @@
 """The supervisor with a played loop at the other end of a real channel, and with processes that are not there."""
 
 import os
-import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
 from pathlib import Path
-from socket import socket
-from typing import Any, cast
+from typing import cast
 
 import pytest
 
 from controller import supervisor as module
-from controller.claims import take
 from controller.messages import (
-    TO_LOOP,
     Failed,
-    Finished,
     Lease,
     Note,
     Outcome,
-    Ready,
-    Recover,
     Reset,
     Run,
     Shutdown,
     StatusSaid,
-    Survey,
-    Surveyed,
 )
 from controller.messages import Stopped as StoppedSaid
-from controller.recovery import Consent, Situation
-from controller.steps import Program, Zero
 from controller.stop.word import Kind
 from controller.supervisor import Supervisor, process_environment, stopped
-from rig.channel import Answer, Channel, Message, Received
+from rig.channel import Answer, Received
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, SafetyStop, UsageError
-
-PROGRAM = Program(name="zero", steps=(Zero(duration_s=0.1),))
-OUTCOME = Outcome("complete", "", 1.0, None, None)
-DEVICES = {"force": {"product": "p"}}
-
-
-class PlayedLoop(threading.Thread):
-    """The loop's end of the channel: answers what it is asked, and keeps it."""
-
-    def __init__(self, end: socket, around: "Surroundings") -> None:
-        super().__init__(daemon=True)
-        self.channel, self.around = Channel(end, TO_LOOP), around
-        self.heard: list[Message] = []
-        self.ended = threading.Event()
-
-    def run(self) -> None:
-        self.say(self.around.first)
-        self.say(StatusSaid(status=self.around.status))
-        while not self.ended.wait(0.001) and not self.channel.lost:
-            received = self.channel.receive()
-            if received:
-                self.heard.append(received.message)
-                self.around.reply(self, received)
-        self.channel.close()
-
-    def say(self, message: Message) -> None:
-        self.channel.send(message)
-
-    def of(self, kind: type[Message]) -> list[Any]:
-        return [message for message in self.heard if isinstance(message, kind)]
-
-
-@dataclass
-class FakeProcess:
-    """What stands for the loop's process: ends with its played loop, or hangs until it is killed."""
-
-    command: list[str]
-    options: dict[str, Any]
-    loop: PlayedLoop
-    around: "Surroundings"
-    pid: int = 4711
-    code: int | None = None
-    waits: list[float | None] = field(default_factory=list)
-    killed: bool = False
-
-    def poll(self) -> int | None:
-        return self.code
-
-    def wait(self, timeout: float | None = None) -> int:
-        self.waits.append(timeout)
-        if self.around.hangs and not self.killed:
-            raise subprocess.TimeoutExpired("loop", timeout or 0.0)
-        self.loop.join(5)
-        self.code = self.around.exit_code if self.code is None else self.code
-        return self.code
-
-    def kill(self) -> None:
-        self.killed = True
-        self.code = -signal.SIGKILL
-        self.loop.ended.set()
-
-
-@dataclass
-class FakeStops:
-    """The stop process: keeps what was asked of the word."""
-
-    wiring: Wiring
-    path: Path
-    port: int = 5151
-    asked: list[Kind] = field(default_factory=list)
-    closed: int = 0
-
-    @property
-    def requester(self) -> "FakeStops":
-        return self
-
-    def request(self, kind: Kind) -> None:
-        self.asked.append(kind)
-
-    def close(self) -> None:
-        self.closed += 1
-
-
-class FakeRecorder:
-    """The recorder's client: only its end matters here."""
-
-    def __init__(self, ring: Path) -> None:
-        self.ring, self.quits = ring, 0
-
-    def quit(self) -> None:
-        self.quits += 1
-
-
-def obedient(loop: PlayedLoop, received: Received) -> None:
-    match received.message:
-        case Run():
-            loop.say(Answer(to=received.id))
-            loop.say(Finished(program=received.id, outcome=OUTCOME))
-        case Shutdown():
-            loop.ended.set()
-        case Reset():
-            loop.say(Answer(to=received.id))
-            loop.say(StatusSaid(status={**loop.around.status, "latched": None}))
-
-
-@dataclass
-class Surroundings:
-    """What the supervisor finds around it."""
-
-    first: Message = field(default_factory=lambda: Ready(devices=DEVICES, realtime={"core": "1"}))
-    status: dict[str, Any] = field(default_factory=lambda: {"ready": True, "busy": False, "latched": None})
-    reply: Callable[[PlayedLoop, Received], None] = field(default=obedient)
-    exit_code: int = 0
-    hangs: bool = False
-    processes: list[FakeProcess] = field(default_factory=list)
-    stops: list[FakeStops] = field(default_factory=list)
-
-    @property
-    def process(self) -> FakeProcess:
-        return self.processes[-1]
-
-    @property
-    def loop(self) -> PlayedLoop:
-        return self.process.loop
-
-    def popen(self, command: list[str], **options: Any) -> FakeProcess:
-        loop = PlayedLoop(socket(fileno=os.dup(int(command[5]))), self)
-        self.processes.append(FakeProcess(command, options, loop, self))
-        loop.start()
-        return self.process
-
-    def stop_process(self, wiring: Wiring, path: Path) -> FakeStops:
-        self.stops.append(FakeStops(wiring, path))
-        return self.stops[-1]
-
-
-@pytest.fixture
-def around(monkeypatch: pytest.MonkeyPatch) -> Iterator[Surroundings]:
-    made = Surroundings()
-    monkeypatch.setattr(subprocess, "Popen", made.popen)
-    monkeypatch.setattr(module, "StopProcess", made.stop_process)
-    monkeypatch.setattr(module, "RecorderClient", FakeRecorder)
-    yield made
-    for process in made.processes:
-        process.loop.ended.set()
-
-
-def until(condition: Callable[[], bool], within_s: float = 3.0) -> None:
-    waits = threading.Event()
-    for _ in range(round(within_s / 0.005)):
-        if condition():
-            return
-        waits.wait(0.005)
-    raise AssertionError("it did not come")
+from tests.controller.played_loop import (
+    DEVICES,
+    OUTCOME,
+    PROGRAM,
+    FakeRecorder,
+    PlayedLoop,
+    Surroundings,
+    obedient,
+    until,
+)
 
 
 def ends_soon(around: Surroundings) -> None:
@@ -475,111 +318,3 @@ def test_children_get_one_thread_a_numerics_library_and_all_else_of_the_environm
     assert (environment["OPENBLAS_NUM_THREADS"], environment["OMP_NUM_THREADS"]) == ("1", "1")
     assert environment["RIG_TEST"] == "kept"
     assert environment["PATH"] == os.environ["PATH"]
-
-
-HELD = {"ready": False, "latched": {"code": "recovery", "text": "the drive was in fault", "action": "IMMEDIATE"}}
-
-
-def test_a_bench_that_waits_for_recovery_is_refused_to_whoever_did_not_come_for_it(around: Surroundings) -> None:
-    around.status = HELD
-    with pytest.raises(DeviceError, match="the drive was in fault; run `rig reset`"), Supervisor(Wiring()):
-        raise AssertionError("it was entered")
-    assert around.process.code == 0
-    with Supervisor(Wiring(), waiting=True) as bench:
-        assert bench.held == "the drive was in fault"
-    bench = Supervisor(Wiring())
-    bench.start()
-    with pytest.raises(DeviceError, match="run `rig reset`"):
-        bench.run(PROGRAM, 1.0)
-    assert around.loop.of(Run) == []
-    bench.close()
-    forget()
-
-
-def forget() -> None:
-    """As after a recovery: the next test's bench starts as usual."""
-    claim = take(Wiring())
-    claim.finished = True
-    claim.release()
-
-
-def held_of(around: Surroundings) -> str:
-    """What the loop was told to wait for."""
-    return around.process.command[7]
-
-
-def test_whoever_comes_for_recovery_moves_nothing_at_the_start(around: Surroundings) -> None:
-    with Supervisor(Wiring(), waiting=True):
-        assert held_of(around) == "the bench was started for recovery"
-
-
-@pytest.mark.parametrize(
-    ("status", "exit_code", "told"),
-    [
-        ({"ready": True, "latched": None}, 0, False),
-        ({"ready": True, "latched": None}, 1, False),
-        ({"ready": True, "latched": None}, -9, True),
-        ({"ready": True, "latched": {"code": "pain_stop", "action": "SOFT"}}, 0, False),
-        ({"ready": True, "latched": {"code": "emergency_stop", "action": "IMMEDIATE"}}, 0, True),
-    ],
-)
-def test_a_session_that_may_have_left_the_tip_inside_is_told_to_the_next(
-    around: Surroundings, status: dict[str, Any], exit_code: int, told: bool
-) -> None:
-    around.status, around.exit_code = status, exit_code
-    Supervisor(Wiring(), waiting=True).__enter__().close()
-    around.status, around.exit_code = {"ready": True, "latched": None}, 0
-    bench = Supervisor(Wiring())
-    bench.start()
-    assert ("did not end in order" in held_of(around)) is told
-    bench.close()
-    forget()
-
-
-def test_a_bench_in_use_by_another_process_is_refused_before_anything_is_started(around: Surroundings) -> None:
-    claim = take(Wiring())
-    with pytest.raises(DeviceError, match="is in use by"):
-        Supervisor(Wiring()).start()
-    assert (around.processes, around.stops) == ([], [])
-    claim.release()
-
-
-SITUATION = Situation("killed", "", "", (), True, False, True, 25.0, 5.0)
-
-
-def recovering(loop: PlayedLoop, received: Received) -> None:
-    match received.message:
-        case Survey():
-            out = bool(loop.of(Recover))
-            loop.say(Surveyed(to=received.id, situation=replace(SITUATION, retracted=out)))
-            loop.say(Answer(to=received.id))
-        case Recover():
-            loop.say(Answer(to=received.id))
-        case _:
-            obedient(loop, received)
-
-
-def test_a_recovery_is_a_conversation_with_the_loop_after_which_nothing_is_noted_any_more(around: Surroundings) -> None:
-    around.status, around.reply = HELD | {"devices": {"axis": {"state": "degraded", "detail": ""}}}, recovering
-    bench = Supervisor(Wiring(), waiting=True)
-    bench.start()
-    assert bench.recover(Consent()).open[0][0] == "retract"
-    around.status = {"ready": True, "devices": {"axis": {"state": "ok", "detail": ""}}}
-    assert bench.recover(Consent(retract=True)).ready
-    assert [act.act for act in around.loop.of(Recover)] == ["retract"]
-    assert len(around.loop.of(Reset)) == 1
-    bench.close()
-    with Supervisor(Wiring()):
-        assert held_of(around) == ""
-
-
-def test_an_act_that_the_loop_refuses_is_an_error_of_the_device(around: Surroundings) -> None:
-    def refuse(loop: PlayedLoop, received: Received) -> None:
-        if isinstance(received.message, Recover):
-            loop.say(Answer(to=received.id, refused="the fault is still there"))
-        else:
-            obedient(loop, received)
-
-    around.reply = refuse
-    with Supervisor(Wiring()) as bench, pytest.raises(DeviceError, match="the fault is still there"):
-        bench.act("clear")
