@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import mkdtemp
 
 import pytest
 
@@ -25,8 +26,10 @@ sys.stdin.read()
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    return tmp_path / "tissue-rig"
+    """The state folder, of this test's process alone."""
+    home = Path(mkdtemp(dir=tmp_path))
+    monkeypatch.setenv("XDG_STATE_HOME", str(home))
+    return home / "tissue-rig"
 
 
 def other_process(wiring: Wiring = WIRING) -> "subprocess.Popen[str]":

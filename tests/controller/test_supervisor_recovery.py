@@ -36,14 +36,6 @@ def test_a_bench_that_waits_for_recovery_is_refused_to_whoever_did_not_come_for_
         bench.run(PROGRAM, 1.0)
     assert around.loop.of(Run) == []
     bench.close()
-    forget()
-
-
-def forget() -> None:
-    """As after a recovery: the next test's bench starts as usual."""
-    claim = take(Wiring())
-    claim.finished = True
-    claim.release()
 
 
 def held_of(around: Surroundings) -> str:
@@ -76,7 +68,6 @@ def test_a_session_that_may_have_left_the_tip_inside_is_told_to_the_next(
     bench.start()
     assert ("did not end in order" in held_of(around)) is told
     bench.close()
-    forget()
 
 
 def test_a_bench_in_use_by_another_process_is_refused_before_anything_is_started(around: Surroundings) -> None:
