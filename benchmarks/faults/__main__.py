@@ -54,12 +54,13 @@ class Campaign:
 
     def _repeated(self, fault: Fault, number: int, plant: str, planted: str) -> Trial:
         """A trial whose run lives to see its fault; those that do not are said on stderr and done again."""
-        for _ in range(ATTEMPTS):
+        for attempt in range(1, ATTEMPTS + 1):
+            final = attempt == ATTEMPTS
             try:
                 with tempfile.TemporaryDirectory() as name:
-                    return trial(fault, number, self._options.seed, Path(name) / "session", plant, planted)
+                    return trial(fault, number, self._options.seed, Path(name) / "session", plant, planted, final)
             except (Spoilt, DeviceError) as cause:
-                print(f"{fault.name}: ended before its fault: {cause}", file=sys.stderr)
+                print(f"{fault.name}: done again: {cause}", file=sys.stderr)
         raise UsageError(f"{fault.name}: {ATTEMPTS} runs ended before their fault: is the computer busy?")
 
 

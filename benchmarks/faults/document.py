@@ -5,7 +5,7 @@ The results are those of `python -m benchmarks.faults --trials 1 --json docs/val
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from benchmarks.faults.catalogue import FAULTS
 from benchmarks.faults.fault import DRIVE, PROTOCOL, QUALITY, REFUSED, bounds
 from benchmarks.faults.hazards import HAZARDS, TESTS, Hazard
+from benchmarks.faults.plants import plants
 from benchmarks.faults.results import rate, read
 from benchmarks.faults.trial import Trial
 from controller.safety import TABLE, Action
@@ -58,10 +59,15 @@ What the software does is to stop early and say why, so that those are seldom ne
 def page(done: Sequence[Trial], date: str) -> str:
     """The whole document."""
     faults = [one for one in done if not one.plant]
-    plants = {one.plant for one in done if one.plant}
+    planted = {one.plant for one in done if one.plant}
     reported = {one.plant for one in done if one.plant and (one.unnoticed or one.unsafe)}
     return "\n".join(
-        [HEADER, _campaign(faults, date, len(plants), len(reported)), *(_section(one, faults) for one in HAZARDS)]
+        [
+            HEADER,
+            _campaign(faults, date, len(planted), len(reported)),
+            *_not_measured(faults, reported),
+            *(_section(one, faults) for one in HAZARDS),
+        ]
     )
 
 
@@ -79,6 +85,15 @@ Time to detect is from the fault, or from the moment at which what it leads to w
 the stop; 0 where it was foreseen. Peak is the tissue's own force in all trials that this check noticed; the limit was
 15 N. This is a simulated bench on one computer: what a real one does has to be measured there.
 """
+
+
+def _not_measured(done: Sequence[Trial], reported: Collection[str]) -> list[str]:
+    """What the results do not hold, said by name: a check without a figure is no measured check."""
+    measured = {one.noticed_by for one in done if not one.unnoticed}
+    missing = [code for code in TESTS if code not in measured]
+    unplanted = [name for name in plants() if name not in reported]
+    said = [("Not measured in these results", missing), ("Not planted in these results", unplanted)]
+    return [f"{what}: {', '.join(f'`{name}`' for name in names)}.\n" for what, names in said if names]
 
 
 def _section(hazard: Hazard, done: Sequence[Trial]) -> str:

@@ -12,10 +12,16 @@ FOLLOWS_NS = 100_000_000
 
 
 class Notice(NamedTuple):
-    """What stopped motion, and when (monotonic ns)."""
+    """What stopped motion, when (monotonic ns), and its sentence."""
 
     code: str
     at_ns: int
+    text: str = ""
+
+    @property
+    def is_stall(self) -> bool:
+        """Whether the sentence is of time alone, as where the computer stood still for a moment."""
+        return self.code == "loop_overrun" or "ms old (limit" in self.text
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,7 @@ def _first(outcome: Outcome) -> tuple[str, int | None]:
     if drive_ns is not None and drive_ns < outcome.happened_ns:
         drive_ns = None
     if outcome.stops and (drive_ns is None or outcome.stops[0].at_ns < drive_ns + FOLLOWS_NS):
-        return outcome.stops[0]
+        return outcome.stops[0].code, outcome.stops[0].at_ns
     if drive_ns is not None:
         return DRIVE, drive_ns
     if outcome.refusal or outcome.ended.refused:

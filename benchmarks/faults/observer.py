@@ -60,7 +60,7 @@ class Observer:
         elif self.unpowered_ns is None:
             self.unpowered_ns = now_ns
         incidents = self._rig.incidents if self._rig else []
-        self.notices += [Notice(one.code, now_ns) for one in incidents[len(self.notices) :]]
+        self.notices += [Notice(one.code, now_ns, one.text) for one in incidents[len(self.notices) :]]
         if self._onset and self.onset_ns is None and self._onset(truth):
             self.onset_ns = now_ns
 

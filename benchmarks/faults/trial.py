@@ -66,8 +66,14 @@ def wiring_for(fault: Fault) -> Wiring:
     return parse(Wiring, merged(Wiring().model_dump(mode="json"), [*STATED, *fault.settings]), fault.name)
 
 
-def trial(fault: Fault, number: int, seed: int, folder: Path, plant: str = "", planted: str = "") -> Trial:
-    """Runs ``fault`` once; ``planted`` are the checks that ``plant`` switches off in the loop."""
+def trial(
+    fault: Fault, number: int, seed: int, folder: Path, plant: str = "", planted: str = "", final: bool = True
+) -> Trial:
+    """Runs ``fault`` once; ``planted`` are the checks that ``plant`` switches off in the loop.
+
+    Raises Spoilt where the run did not live to see its fault, and, unless this is the ``final`` attempt, where a stall
+    of the computer stopped it before what is declared for the fault could.
+    """
     moment_s = random.Random(f"{seed} {fault.name} {number}").uniform(0.0, fault.latest_s)
     with (
         stage("--seed", str(seed + number)) as bench,
@@ -75,6 +81,8 @@ def trial(fault: Fault, number: int, seed: int, folder: Path, plant: str = "", p
     ):
         outcome = _outcome(fault, bench, folder, planted, observer, moment_s)
     found = evaluate(fault, outcome)
+    if found.unnoticed and not final and outcome.stops and outcome.stops[0].is_stall:
+        raise Spoilt(outcome.stops[0].text)
     over_N = max(0.0, observer.peak_N - MARGIN * wiring_for(fault).force_limit_N)
     unsafe = [outcome.moves, f"{over_N:.2f} N over the limit and its margin" if over_N else ""]
     return Trial(
@@ -182,7 +190,7 @@ def _wait(condition: Callable[[], bool]) -> None:
 def _recorded(folder: Path, happened_ns: int) -> list[Notice]:
     """What stopped motion, from the events of the recordings."""
     return [
-        Notice(event.code, event.capture_ns)
+        Notice(event.code, event.capture_ns, event.text)
         for file in sorted(folder.glob("*.mcap"))
         for event in read_recording(file).events
         if event.level >= STOPPING_LEVEL and event.capture_ns > happened_ns - CYCLE_NS

@@ -90,6 +90,15 @@ def test_torque_lost_before_the_fault_is_not_its_doing() -> None:
     assert evaluate(STOP, replace(SEEN, stops=(), happened_ns=MS, unpowered_ns=0)).by == ""
 
 
+@pytest.mark.parametrize(("code", "text", "is_stall"), [
+    ("loop_overrun", "the loop woke 120 ms late (limit 100 ms)", True),
+    ("axis_lost", "axis: newest sample is 51 ms old (limit 50 ms)", True), ("axis_lost", "axis lost: cable", False),
+    ("force_limit", "force 16.00 N is above limits.force_N, 15 N", False),
+])  # fmt: skip
+def test_a_stall_of_the_computer_is_known_by_its_sentence(code: str, text: str, is_stall: bool) -> None:
+    assert Notice(code, 0, text).is_stall is is_stall
+
+
 def test_what_is_turned_down_is_noticed_by_its_sentence() -> None:
     refused = replace(STOP, expected=(REFUSED,))
     assert evaluate(refused, replace(SEEN, stops=(), refusal="too large")).unnoticed == ""
