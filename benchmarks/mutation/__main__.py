@@ -51,7 +51,7 @@ MODULES = (
 # whole physics (a minute, and other tests run the same lines), and those that measure time, which trials share.
 LEFT_OUT = (
     "simulated", "extended_gain", "force_position", "laws", "comparison", "lines", "references", "registration",
-    "motion_and_grid", "commissioning", "force_calibration", "axis_calibration", "force_limit", "giving_way",
+    "motion_and_grid", "commissioning", "force_calibration", "axis_calibration", "force_limit",
 )  # fmt: skip
 TIMED = (
     "test_touch.py::test_a_portion_of_the_estimate_leaves_the_loop_its_cycle",
