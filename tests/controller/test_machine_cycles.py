@@ -210,6 +210,7 @@ def test_a_step_that_leads_out_of_the_workspace_is_stopped_at_its_end(target_mm:
     wanted = f"{end_mm + math.copysign(0.002, target_mm):.2f}"
     assert incident.text == f"the program leads to {wanted} mm, outside 0 to 60 mm"
     assert bench.ended == [("workspace", incident)]
+    assert bench.world.setpoint == Setpoint(end_mm, 0.0)
 
 
 def test_the_end_of_the_workspace_itself_may_be_reached() -> None:
@@ -269,6 +270,8 @@ def test_a_drive_without_power_stays_until_the_stop_is_acknowledged() -> None:
     assert bench.cycle("it pushes") is None
     bench.machine.acknowledge()
     assert bench.cycle("it pushes") is not None
+    bench.cycles_until(Mode.SAFE)
+    assert bench.cycle("it pushes") is not None, "and it leaves again and again"
 
 
 @pytest.mark.parametrize("code", ["pain_stop", "operator_stop"])
@@ -298,3 +301,15 @@ def test_a_persons_stop_while_the_tip_moves_retracts_wherever_it_is() -> None:
     bench.cycle("asked")
     assert bench.machine.mode is Mode.RETRACT
     assert bench.ended[0][0] == "pain_stop"
+
+
+def test_a_withdrawal_goes_to_the_end_of_the_workspace_from_where_the_tip_is() -> None:
+    bench = Cycled(position_min_mm=2.0)
+    bench.machine.hold(Incident(Action.IMMEDIATE, "recovery", "it was killed"))
+    bench.machine.stay()
+    bench.world.setpoint = Setpoint(50.0, 0.0)
+    bench.machine.withdraw()
+    assert (bench.machine.mode, bench.world.setpoint) == (Mode.RETRACT, Setpoint(20.0, 0.0))
+    assert not bench.machine._stays
+    bench.cycles_until(Mode.SAFE)
+    assert bench.world.setpoint == Setpoint(2.0, 0.0)

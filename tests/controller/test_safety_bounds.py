@@ -98,6 +98,8 @@ CASES = [
          "force 15.01 N is above the subject's pain threshold, 15 N"),
     Case("force_limit", {}, load(force_N=14.0, predicted_N=15.01),
          "force 14.00 N would be 15.01 N before the axis stands, above the subject's pain threshold, 15 N"),
+    Case("force_limit", {}, load(force_N=15.0, predicted_N=15.01),
+         "force 15.00 N would be 15.01 N before the axis stands, above the subject's pain threshold, 15 N"),
     Case("force_limit", load(force_N=12.0, predicted_N=12.0), load(force_N=12.01),
          "force 12.01 N is above limits.force_N, 12 N", wiring(limits={"force_N": 12.0})),
     Case("force_limit", load(force_N=12.0), load(force_N=12.01), "force 12.01 N is above limits.force_N, 12 N",
@@ -210,6 +212,13 @@ def test_at_rest_the_axis_gives_way_only_to_what_is_felt_now(code: str, mode: Mo
     much = {**load(force_N=49.0, predicted_N=49.0, torque_N_m=4.0, rate_N_s=4000.0), "rest_N": 1.0, "mode": mode}
     assert found(line_of(code), CASES[0], {**much, "force_age_ms": 4.0})
     assert found(line_of(code), CASES[0], {**much, **unfelt}) == ""
+
+
+@pytest.mark.parametrize(("code", "stops"), [("force_limit", False), ("torque_limit", False), ("force_rate", True)])
+def test_at_rest_without_a_zero_only_a_change_says_something(code: str, stops: bool) -> None:
+    much = {**load(force_N=49.0, predicted_N=49.0, torque_N_m=4.0, rate_N_s=4000.0), "mode": Mode.IDLE}
+    assert bool(found(line_of(code), CASES[0], {**much, "reference_zero": None})) is stops
+    assert found(line_of(code), CASES[0], {**much, "reference_zero": WRENCH})
 
 
 @pytest.mark.parametrize("code", ["force_limit", "torque_limit", "force_rate"])
