@@ -23,15 +23,23 @@ def listed(path: Path) -> dict[tuple[str, str], str]:
     return reasons
 
 
-def disagreements(results: Sequence[Result], reasons: Listed, mutants: Sequence[Mutant]) -> list[str]:
-    """Sentences: survivors that are not listed, listed ones that were killed, listed ones that are no mutants."""
-    wrong = []
-    for result in results:
-        mutant, key = result.mutant, (result.mutant.path, result.mutant.name)
-        if result.verdict.killed and key in reasons:
-            wrong.append(f"{mutant.path}:{mutant.place.line}: listed, but killed by {result.verdict.by}: {mutant.name}")
-        if not result.verdict.killed and key not in reasons:
-            wrong.append(f"{mutant.path}:{mutant.place.line}: survived and is not listed: {mutant.name}")
+def unlisted(results: Sequence[Result], reasons: Listed) -> list[str]:
+    """Sentences: mutants that survived and are not on the list."""
+    left = [result.mutant for result in results if not result.verdict.killed]
+    return [
+        f"{mutant.path}:{mutant.place.line}: survived and is not listed: {mutant.name}"
+        for mutant in left
+        if (mutant.path, mutant.name) not in reasons
+    ]
+
+
+def untrue(results: Sequence[Result], reasons: Listed, mutants: Sequence[Mutant]) -> list[str]:
+    """Sentences: what the list says of mutants that were killed, or that there are not."""
+    wrong = [
+        f"{mutant.path}:{mutant.place.line}: listed, but killed by {verdict.by}: {mutant.name}"
+        for mutant, verdict in ((result.mutant, result.verdict) for result in results)
+        if verdict.killed and (mutant.path, mutant.name) in reasons
+    ]
     paths = {mutant.path for mutant in mutants}
     gone = set(reasons) - {(mutant.path, mutant.name) for mutant in mutants}
     return wrong + [f"{path}: listed, but no mutant: {name}" for path, name in sorted(gone) if path in paths]
