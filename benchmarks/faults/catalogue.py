@@ -160,10 +160,15 @@ OPERATOR = (
 
 PROCESSES = (
     Fault("loop.killed", "press", (DRIVE,), acts.killed(acts.loop)),
-    Fault("loop.frozen", "press", (DRIVE,), acts.frozen(acts.loop)),
-    Fault("loop.late", "press", ("loop_overrun",), acts.frozen(acts.loop, LATE_S), settings=LATE),
+    Fault("loop.frozen", "press", (DRIVE,), acts.frozen(acts.loop), freezes=True),
+    Fault("loop.late", "press", ("loop_overrun",), acts.frozen(acts.loop, LATE_S), settings=LATE, freezes=True),
     Fault(
-        "bench.frozen", "press", ("axis_lost", "force_lost"), acts.frozen(acts.bench, 0.8), why="all devices at once"
+        "bench.frozen",
+        "press",
+        ("axis_lost", "force_lost"),
+        acts.frozen(acts.bench, 0.8),
+        freezes=True,
+        why="all devices at once",
     ),
     Fault("recorder.frozen", "press", ("recorder_stalled",), acts.frozen(acts.recorder), latest_s=0.5),
     Fault("recorder.killed", "press", ("operator_stop",), acts.killed(acts.recorder), within_s=RECORDER_GONE_S),

@@ -71,9 +71,9 @@ class Fault:
     the first moment after the fault at which ``onset`` holds for the bench's true figures. ``before``: it is brought
     about when the bench has started and no program yet. ``settings`` are of the wiring. Its moment is drawn from 0 to
     ``latest_s`` after the scenario is ready for it. ``apart``: the program that runs the bench is a process of its own.
-    ``keypad``: there is a foot switch. ``named`` are the measures of quality that may name it. ``within_s`` replaces
-    the bound of the table where the program outside the loop notices first. ``why`` says what it stands for, where its
-    name does not.
+    ``keypad``: there is a foot switch. ``freezes``: stalls are its own doing. ``named`` are the measures of quality
+    that may name it. ``within_s`` replaces the bound of the table where the program outside the loop notices first.
+    ``why`` says what it stands for, where its name does not.
     """
 
     name: str
@@ -88,6 +88,7 @@ class Fault:
     within_s: float | None = None
     named: tuple[str, ...] = ()
     keypad: bool = False
+    freezes: bool = False
     why: str = ""
 
 

@@ -81,7 +81,7 @@ def trial(
     ):
         outcome = _outcome(fault, bench, folder, planted, observer, moment_s)
     found = evaluate(fault, outcome)
-    if found.unnoticed and not final and outcome.stops and outcome.stops[0].is_stall:
+    if found.unnoticed and not (final or fault.freezes) and outcome.stops and outcome.stops[0].is_stall:
         raise Spoilt(outcome.stops[0].text)
     over_N = max(0.0, observer.peak_N - MARGIN * wiring_for(fault).force_limit_N)
     unsafe = [outcome.moves, f"{over_N:.2f} N over the limit and its margin" if over_N else ""]
