@@ -13,7 +13,7 @@ from types import CodeType, FunctionType, ModuleType
 
 import pytest
 
-from benchmarks.mutation.trials import KILLED, OPTIONS, SURVIVED, Budget, Trial, limited
+from benchmarks.mutation.trials import KILLED, OPTIONS, SURVIVED, Budget, Trial, limited, longest_s
 
 
 def function_of(module: ModuleType, scope: str) -> FunctionType | None:
@@ -79,7 +79,7 @@ class Collected:
             limited()
             os._exit(self._run(Budget(tests, self._seconds, tell), lambda: patch(function, tree, path), tests))
         os.close(tell)
-        return Trial(pid, told, time.monotonic())
+        return Trial(pid, told, time.monotonic(), longest_s(tests, self._seconds))
 
     def _run(self, budget: Budget, change: Callable[[], bool], tests: Sequence[str]) -> int:
         items = [self._items[test] for test in tests if test in self._items]

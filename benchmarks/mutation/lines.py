@@ -50,13 +50,13 @@ class Coverage:
     def noticing(self, path: str, line: int, at_import: bool) -> list[str]:
         """Tests that may notice a change of the statement there, those that take least time and run least code first.
 
-        What runs at import (constants, defaults) may be used anywhere: first come tests of the same file, then all.
+        What runs at import (constants, defaults) is for all tests of the same file; for all there are where none is.
         """
         near = self._quickest(test for test, lines in self.lines.items() if (path, line) in lines)
         if not at_import:
             return near
         same = self._quickest(test for test, lines in self.lines.items() if any(at == path for at, _ in lines))
-        return list(dict.fromkeys([*near, *same, *self._quickest(self.lines)]))
+        return list(dict.fromkeys([*near, *same])) or self._quickest(self.lines)
 
     def _quickest(self, tests: Iterable[str]) -> list[str]:
         # Tenths of a second are what the computer's other work may add to a test.

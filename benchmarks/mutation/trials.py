@@ -28,7 +28,7 @@ SLOWEST = 5.0
 LEAST_CPU_S = 2.0
 """CPU time a test may take: this and so many times what it took while it was traced. More is an endless loop."""
 LONGEST_S = 60.0
-"""A mutant that waits for ever takes no CPU time; whole trials take less than 20 s on a busy computer."""
+"""A mutant that waits for ever takes no CPU time: a trial may last this and so many times what its tests took."""
 MEMORY_BYTES = 8 << 30
 SURVIVED, KILLED, TIMED_OUT = 0, 1, 3
 # pytest itself is imported before the trial.
@@ -118,11 +118,12 @@ class Trial:
     pid: int
     told: int
     began: float
+    longest_s: float = LONGEST_S
 
     def poll(self) -> Verdict | None:
         """The verdict, once there is one; a trial that takes too long is ended here."""
         pid, status = os.waitpid(self.pid, os.WNOHANG)
-        late = time.monotonic() - self.began > LONGEST_S
+        late = time.monotonic() - self.began > self.longest_s
         if not pid and not late:
             return None
         if not pid:
@@ -158,7 +159,12 @@ def begin(path: Path, module: str, tree: ast.Module, tests: Sequence[str], secon
         os.setpgid(0, 0)
         os._exit(_run(instead, Budget(tests, seconds, tell), tests))
     os.close(tell)
-    return Trial(pid, told, time.monotonic())
+    return Trial(pid, told, time.monotonic(), longest_s(tests, seconds))
+
+
+def longest_s(tests: Iterable[str], seconds: Mapping[str, float]) -> float:
+    """How long a trial of these tests may last."""
+    return LONGEST_S + SLOWEST * sum(seconds.get(test, 1.0) for test in tests)
 
 
 def limited() -> None:

@@ -38,11 +38,12 @@ def test_each_statement_that_ran_is_named_by_its_first_line() -> None:
     assert ran(0) == (0, [3, 4, 6, 8, 9, 11, 13, 14, 16])
 
 
-def test_a_change_in_a_function_is_for_the_tests_that_run_it_and_a_constant_for_all_those_of_its_file_first() -> None:
+def test_a_change_in_a_function_is_for_the_tests_that_run_it_and_a_constant_for_those_of_its_file() -> None:
     tests = Coverage(
         lines={"slow": {("a.py", 1), ("a.py", 2)}, "quick": {("a.py", 1)}, "other": {("b.py", 1)}},
         seconds={"slow": 2.0, "quick": 0.1, "other": 0.0},
     )
     assert tests.noticing("a.py", 1, at_import=False) == ["quick", "slow"]
     assert tests.noticing("a.py", 2, at_import=False) == ["slow"]
-    assert tests.noticing("a.py", 7, at_import=True) == ["quick", "slow", "other"]
+    assert tests.noticing("a.py", 7, at_import=True) == ["quick", "slow"]
+    assert tests.noticing("c.py", 7, at_import=True) == ["other", "quick", "slow"]
