@@ -18,7 +18,7 @@ test: $(READY) browser
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n 2 --dist loadgroup
 
-# Mutants of what keeps the tip from hurting; or a sample of them, drawn by SEED.
+# Mutants of what keeps the tip from hurting; a sample of them, drawn by SEED, in every run of CI.
 mutants: $(READY)
 	$(BIN)/python -m benchmarks.mutation
 
