@@ -54,6 +54,11 @@ def dials(**values: Value) -> Act:
     return act
 
 
+def slipping_scale(live: Live) -> None:
+    """The tip's way over that of the axis is 1 + 2 pi / 50 where the axis sets out, unknown to any calibration."""
+    live.bench.control.hide({"position_ripple.amplitude_mm": 1.0, "position_ripple.period_mm": 50.0})
+
+
 def killed(pid_of: Callable[[Live], int]) -> Act:
     """SIGKILL."""
     return lambda live: os.kill(pid_of(live), signal.SIGKILL)

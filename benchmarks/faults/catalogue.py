@@ -67,6 +67,8 @@ AXIS = (
     Fault("axis.freeze", "press", ("axis_lost",), device("axis", "freeze")),
     Fault("axis.silent", "press", ("axis_lost",), device("axis", "silent")),
     Fault("axis.delay", "press", ("axis_lost", "drive_fault"), device("axis", "delay", 0.1)),
+    Fault("axis.scale", "hold", ("axis_scale",), acts.slipping_scale, _moves, before=True,
+          why="the tip goes an eighth farther than the axis says"),
     Fault("axis.frozen", "loading", ("axis_frozen",), device("axis", "frozen"), latest_s=0.3),
     Fault(
         "axis.astray", "hold", ("following_error",), several(RUNNING, device("axis", "astray", -30.0)),
@@ -199,24 +201,21 @@ TRIALS = (
     Fault("loop.stutters", "loading", (QUALITY,), acts.stuttering(acts.loop, 30, 0.015), latest_s=0.0,
           named=("cycles_missed",), why="half of the time it does not run"),
 )  # fmt: skip
-SCALE = ("axis_scale",)
 CONFIGURATION = (
     Fault("config.sign", "hold", (REFUSED,), acts.nothing, settings=("force.compression=positive",), before=True),
     Fault(
         "config.increments_double",
         "hold",
-        SCALE,
+        (REFUSED,),
         acts.nothing,
-        _moves,
         settings=("axis.increments_per_mm=4000",),
         before=True,
     ),
     Fault(
         "config.increments_half",
         "hold",
-        SCALE,
+        (REFUSED,),
         acts.nothing,
-        _moves,
         settings=("axis.increments_per_mm=1000",),
         before=True,
     ),
