@@ -229,6 +229,7 @@ class BenchLoop:
         watch.recorder_fill = self._ring.fill
         watch.recorder_silent_s = self._ring.reader_age_ns(now_ns) * 1e-9
         watch.supervisor_lost = self._channel.lost
+        watch.stop_silent_s = self._commands.stop_silent_s(now_ns)
         watch.operator_silent_s = (now_ns - self._commands.heard_ns) * 1e-9 if self._commands.heard_ns else 0.0
 
     def _command(self, now_ns: int) -> None:
@@ -346,7 +347,8 @@ class BenchLoop:
             self._channel.flush()
 
     def _status(self, row: LoopSample) -> Status:
-        latched = self.machine.latched
+        latched, watch = self.machine.latched, self.watch
+        lost = {"force": watch.force_lost, "axis": watch.axis_lost, "marker": watch.marker_lost}
         return {
             "time_ns": row.capture_ns,
             "mode": self.connections.shown_mode(Mode(row.mode)),
@@ -361,15 +363,7 @@ class BenchLoop:
             "position_mm": _finite(row.position_mm),
             "depth_mm": _finite(row.depth_mm),
             "rates_Hz": {name: round(stream.rate_Hz, 1) for name, stream in self.health.items()},
-            "lost": {
-                name: cause
-                for name, cause in (
-                    ("force", self.watch.force_lost),
-                    ("axis", self.watch.axis_lost),
-                    ("marker", self.watch.marker_lost),
-                )
-                if cause
-            },
+            "lost": {name: cause for name, cause in lost.items() if cause},
             "devices": attending.as_status(self.connections.statuses.items()),
             "ready": self.connections.ready,
             "latched": {"code": latched.code, "text": latched.text, "action": latched.action.name} if latched else None,
@@ -382,6 +376,9 @@ class Commands(Protocol):
     @property
     def heard_ns(self) -> int:
         """When the other end last said anything; 0 before that."""
+
+    def stop_silent_s(self, now_ns: int) -> float:
+        """Since the stop process last looked for presses [s]."""
 
     def collect(self, loop: BenchLoop) -> frozenset[str]:
         """Takes what has come, acts on it, and returns the stop requests among it."""

@@ -42,6 +42,10 @@ class Inbox:
         """What moves is stopped and retracted, then the loop leaves; may be called by a signal's handler."""
         self._leaving = self._told_to_end = True
 
+    def stop_silent_s(self, now_ns: int) -> float:
+        """Since the stop process last looked for presses [s]."""
+        return self._stops.server_silent_s(now_ns)
+
     def collect(self, loop: BenchLoop) -> frozenset[str]:
         """All stops that were asked for, and one message at most; a refused one is answered with its reason."""
         self._asked = self._stops.take(loop.now())

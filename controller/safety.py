@@ -61,6 +61,8 @@ RECORDER_S = check.RECORDER_SILENT_S + TURN_S
 TOUCH_S = 2.0
 # From the first motion: 2 mm of it at 1 mm/s, and one turn.
 SCALE_S = 2.0 + TURN_S
+# check.STOP_SILENT_S, and one turn.
+STOP_S = check.STOP_SILENT_S + TURN_S
 # The lease of 3 s, and one turn; what says by itself that nobody is there is faster.
 OPERATOR_S = 3.0 + TURN_S
 
@@ -87,6 +89,7 @@ TABLE: tuple[Check, ...] = (
     Check("patient_moved", Action.SOFT, check.patient_moved, PATIENT_S),
     Check("loop_overrun", Action.SOFT, check.loop_overrun, TURN_S),
     Check("recorder_stalled", Action.SOFT, check.recorder_stalled, RECORDER_S),
+    Check("stop_lost", Action.SOFT, check.stop_lost, STOP_S),
     Check("supervisor_lost", Action.SOFT, check.supervisor_lost, TURN_S),
     Check("operator_silent", Action.SOFT, check.operator_silent, OPERATOR_S),
 )

@@ -15,6 +15,8 @@ from rig.config.wiring import Wiring
 SCALE_TOLERANCE = 0.05
 RECORDER_FILL = 0.5
 RECORDER_SILENT_S = 3.0
+# Five of the stop process's longest waits; it has real-time priority where the loop has.
+STOP_SILENT_S = 1.0
 RETRACTING_MARGIN_MM = 1.0
 SPEED_MARGIN = 1.2
 
@@ -191,6 +193,16 @@ def recorder_stalled(world: World, watch: Watch, wiring: Wiring) -> str:
         return ""
     return (
         f"the recorder is silent for {watch.recorder_silent_s:.1f} s, its buffer {100 * watch.recorder_fill:.0f} % full"
+    )
+
+
+def stop_lost(world: World, watch: Watch, wiring: Wiring) -> str:
+    """The stop process is frozen or dead: a press would not be heard."""
+    if watch.stop_silent_s <= STOP_SILENT_S:
+        return ""
+    return (
+        f"the stop process is silent for {watch.stop_silent_s:.1f} s (limit {STOP_SILENT_S:g} s), so nobody could stop"
+        " what moves: start the bench again"
     )
 
 

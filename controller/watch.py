@@ -25,5 +25,6 @@ class Watch:
     recorder_fill: float = 0.0
     recorder_silent_s: float = 0.0
     supervisor_lost: bool = False
+    stop_silent_s: float = 0.0
     operator_silent_s: float = 0.0
     requests: frozenset[str] = frozenset()

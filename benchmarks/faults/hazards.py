@@ -49,9 +49,9 @@ HAZARDS = (
     Hazard(
         "A person wants to stop the motion and nothing happens",
         "nobody at the keyboard, a hung page, a busy service, a lost connection, a lease that ran out",
-        ("emergency_stop", "operator_stop", "pain_stop", "operator_silent"),
-        "All these ways end in software, and none of them knows that the stop process is frozen before somebody presses"
-        " (the page then says NOT CONFIRMED). The hardware emergency stop does not depend on it.",
+        ("emergency_stop", "operator_stop", "pain_stop", "stop_lost", "operator_silent"),
+        "All these ways end in software; for a second after the stop process froze a press is not heard (the page then"
+        " says NOT CONFIRMED). The hardware emergency stop does not depend on it.",
     ),
     Hazard(
         "The software itself stops, hangs or is late",
@@ -81,7 +81,8 @@ TESTS: dict[str, str] = {
         (
             "emergency_stop", "drive_fault", "axis_lost", "overspeed", "workspace", "following_error", "force_limit",
             "torque_limit", "pain_stop", "operator_stop", "force_lost", "force_invalid", "tracker_lost",
-            "patient_moved", "loop_overrun", "recorder_stalled", "supervisor_lost", "operator_silent",
+            "patient_moved", "loop_overrun", "recorder_stalled", "stop_lost", "supervisor_lost",
+            "operator_silent",
         ),
         IN_ITS_TIME,
     ),

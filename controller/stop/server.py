@@ -245,8 +245,10 @@ def serve(server: Server, parent: int, page: StopWord) -> None:
             server.unwatch(parent)
 
     server.watch(parent, hung_up)
+    page.beat(time.monotonic_ns())
     page.serve(os.getpid())
     while not (alone and server.loop.over()):
+        page.beat(time.monotonic_ns())
         server.turn()
 
 

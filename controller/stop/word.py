@@ -20,7 +20,7 @@ from rig.errors import DeviceError
 
 PAGE = 4096
 MAGIC = int.from_bytes(b"tissstop", "little")
-_MAGIC, _LOOP_PID, _LOOP_BEAT, _SERVER_PID, _KEYPAD = range(5)
+_MAGIC, _LOOP_PID, _LOOP_BEAT, _SERVER_PID, _KEYPAD, _SERVER_BEAT = range(6)
 _LANES, _LANE_WORDS = 16, 32
 _REQUESTS, _ANSWERS, _TIMES = 1, 9, 17
 _DEED_BITS = 4
@@ -163,6 +163,10 @@ class StopWord:
         """The stop process serves."""
         self.words[_SERVER_PID] = pid
 
+    def beat(self, now_ns: int) -> None:
+        """The stop process looks for presses."""
+        self.words[_SERVER_BEAT] = now_ns
+
     def show_keypad(self, state: Keypad) -> None:
         """Says how the keypad is."""
         self.words[_KEYPAD] = state
@@ -243,6 +247,10 @@ class Responder:
             if words[base] != seen:
                 self._collect(base)
         return tuple(self._pending.values()) if self._pending else ()
+
+    def server_silent_s(self, now_ns: int) -> float:
+        """Since the stop process last looked for presses [s]; it has before the loop comes."""
+        return (now_ns - self._words[_SERVER_BEAT]) * 1e-9
 
     def _collect(self, base: int) -> None:
         words = self._words

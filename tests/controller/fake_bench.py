@@ -203,7 +203,7 @@ class FakeBench:
         self.ring, self.link = FakeRing(), FakeLink()
         self.devices = Devices(self.force, self.axis, self.tracker if self.wiring.tracker else None)
         link = cast(Channel, self.link)
-        page = cast(StopWord, FakePage())
+        self.page = page = cast(StopWord, FakePage())
         self.stops, self.asked = Requester(page, Lane.STOP_PROCESS), list[Request]()
         # A bench is copied whole by some tests, and a lock cannot be.
         self.stops._lock = cast(threading.Lock, contextlib.nullcontext())
@@ -226,7 +226,7 @@ class FakeBench:
         self.start_ns = self.clock.now_ns
         self.going = True
         self.true_peak_N = 0.0
-        self.keep_lease = True
+        self.keep_lease = self.stop_process_lives = True
         self.cycles(settled)
 
     def _openers(self) -> dict[str, Callable[[], Device]]:
@@ -263,6 +263,8 @@ class FakeBench:
         self.axis.advance(wake_ns)
         self.clock.now_ns = wake_ns
         self._renew()
+        if self.stop_process_lives:
+            StopWord.beat(self.page, wake_ns)
         self.going = self.loop.tick(Slot(self.slot, due_ns, wake_ns, self.missed))
         self.clock.now_ns = wake_ns + self.execution_ns
         self.true_peak_N = max(self.true_peak_N, self.force.true_N)

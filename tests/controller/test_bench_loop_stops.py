@@ -79,6 +79,8 @@ FAULTS = [
           {"loop": {"missed_periods": 0, "stale_force_ms": 400.0, "stale_axis_ms": 400.0}}),
     Fault("recorder_stalled", knob("ring", fill=0.6), (0, 2), (0, 2), "60 % full"),
     Fault("recorder_stalled", knob("ring", silent_s=3.2), (0, 2), (0, 2), "silent for 3.2 s"),
+    Fault("stop_lost", lambda bench: setattr(bench, "stop_process_lives", False), (999, 1002), (999, 1002),
+          "the stop process is silent for 1.0 s"),
     Fault("supervisor_lost", knob("link", lost=True), (0, 2), (0, 2), "the program that started the loop is gone"),
     Fault("operator_silent", lambda bench: bench.say("unattended"), (0, 2), (0, 2), "not in control any more"),
     Fault("operator_silent", lambda bench: setattr(bench, "keep_lease", False), (2900, 3002), (2900, 3002),

@@ -27,6 +27,7 @@ from tests.controller.spring import APPROACH, PRESS, SURFACE_MM, ZERO, ZERO_N, S
         ({"wake_latency_ms": 500.0}, "loop_overrun"),
         ({"recorder_fill": 0.9}, "recorder_stalled"),
         ({"recorder_silent_s": 10.0}, "recorder_stalled"),
+        ({"stop_silent_s": 1.5}, "stop_lost"),
         ({"supervisor_lost": True}, "supervisor_lost"),
         ({"operator_silent_s": 4.0}, "operator_silent"),
         ({"requests": frozenset({"unattended"})}, "operator_silent"),

@@ -41,6 +41,7 @@ LINES = [
     ("patient_moved", SOFT, 0.3, False),
     ("loop_overrun", SOFT, 0.1, False),
     ("recorder_stalled", SOFT, 3.1, False),
+    ("stop_lost", SOFT, 1.1, False),
     ("supervisor_lost", SOFT, 0.1, False),
     ("operator_silent", SOFT, 3.1, False),
 ]
@@ -152,6 +153,8 @@ CASES = [
          "the recorder is silent for 0.0 s, its buffer 51 % full"),
     Case("recorder_stalled", {"recorder_silent_s": 3.0}, {"recorder_silent_s": 3.1},
          "the recorder is silent for 3.1 s, its buffer 0 % full"),
+    Case("stop_lost", {"stop_silent_s": 1.0}, {"stop_silent_s": 1.01},
+         "the stop process is silent for 1.0 s (limit 1 s), so nobody could stop what moves: start the bench again"),
     Case("supervisor_lost", {}, {"supervisor_lost": True}, "the program that started the loop is gone"),
     Case("operator_silent", {"operator_silent_s": 3.0}, {"operator_silent_s": 3.1},
          "the operator's program is silent for 3.1 s (lease 3 s)"),
@@ -277,5 +280,6 @@ def test_what_the_table_looks_at_is_well_until_the_loop_says_otherwise() -> None
         mode=Mode.IDLE, force_lost="", axis_lost="", marker_lost="", drive_fault="", force_valid=True,
         force_frozen=False, touch_wrong="", force_age_ms=0.0,
         axis_age_ms=0.0, marker_age_ms=0.0, limb_age_ms=0.0, wake_latency_ms=0.0,
-        recorder_fill=0.0, recorder_silent_s=0.0, supervisor_lost=False, operator_silent_s=0.0, requests=frozenset(),
+        recorder_fill=0.0, recorder_silent_s=0.0, stop_silent_s=0.0,
+        supervisor_lost=False, operator_silent_s=0.0, requests=frozenset(),
     )  # fmt: skip
