@@ -16,7 +16,7 @@ test: $(READY) browser
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2 --dist loadgroup
+	$(BIN)/pytest -n 2 --dist loadgroup --durations 25
 
 # Mutants of what keeps the tip from hurting; a sample of them, drawn by SEED, in every run of CI.
 mutants: $(READY)

@@ -17,6 +17,7 @@ from controller.modes import Mode
 from controller.motion import Setpoint, clamp
 from controller.touch import Touching, TouchRun
 from controller.world import World
+from rig.config.protocol import FORCE_LIMIT
 from rig.config.table import Table
 from rig.errors import SafetyStop
 
@@ -201,7 +202,7 @@ class Compress(Table):
     def advance(self, world: World, elapsed_s: float) -> bool:  # noqa: ARG002
         """One tick; the limit of force ends the step where it is."""
         if world.force_N > self.force_limit_N:
-            world.outcome = "force limit"
+            world.outcome = FORCE_LIMIT
             world.setpoint = Setpoint(world.setpoint.position_mm, 0.0)
             return True
         return world.go(world.surface_mm + self.depth_mm, self.speed_mm_s)

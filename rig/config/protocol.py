@@ -7,6 +7,8 @@ from pydantic import Field, model_validator
 from rig.config.quality import QualityLimits
 from rig.config.table import Table
 
+FORCE_LIMIT = "force limit"
+"""Outcome of a trial whose compression ended at the protocol's own limit of force."""
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 

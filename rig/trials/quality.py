@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 
 from pydantic import ValidationError
 
+from rig.config.protocol import FORCE_LIMIT
 from rig.config.quality import Bounds, QualityLimits
 from rig.errors import DataError
 from rig.recording.mcap_file import SUMMARY
@@ -155,7 +156,10 @@ def _of_loading(recording: Recording, limits: QualityLimits) -> Iterator[Measure
     if isinstance(curve, str):
         return
     reached_mm = measures.depth_mm(recording, curve.contact.position_mm)
-    off_mm = max(abs(reached_mm - asked_mm) - _uncertain_mm(curve.contact), 0.0)
+    # A loading that the protocol's own limit of force ended is as deep as it should be, unless it is deeper.
+    ended_early = recording.metadata.get(SUMMARY, {}).get("outcome") == FORCE_LIMIT
+    missed_mm = reached_mm - asked_mm if ended_early else abs(reached_mm - asked_mm)
+    off_mm = max(missed_mm - _uncertain_mm(curve.contact), 0.0)
     text = f"depth reached {reached_mm:.2f} of {asked_mm:g} mm: off by"
     yield Measure("depth_off_mm", off_mm, limits.depth_off_mm, text, " mm")
     lost = measures.loading_lost(curve, reached_mm)

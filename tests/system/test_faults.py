@@ -112,7 +112,7 @@ def test_a_second_user_is_told_that_the_bench_is_taken(bench: Stage, protocol: P
     pressed(bench)
     second = rig("capture", protocol, "--out", tmp_path / "second", *bench.settings(), folder=tmp_path)
     assert second.code == 1
-    assert "cannot be opened" in second.sentence
+    assert "is in use by" in second.sentence
     first.interrupt()
     assert first.end().code == 3
     freed(bench)

@@ -114,6 +114,15 @@ def test_what_is_planted_is_named_with_its_number(plant: Callable[[Tables], None
     assert any(re.search(reason, said) for said in found.reasons), found.reasons
 
 
+def test_a_loading_that_the_limit_of_force_ended_may_be_less_deep_and_not_deeper() -> None:
+    made = trial()
+    shallow(made.tables)
+    made.metadata["summary"]["outcome"] = "force limit"
+    assert not [reason for reason in evaluate_trial(made, LIMITS).reasons if "depth" in reason]
+    made.metadata["trial"]["depth_mm"] = "6.0"
+    assert [reason for reason in evaluate_trial(made, LIMITS).reasons if "depth reached 7.2" in reason]
+
+
 def test_a_surface_that_is_known_badly_is_said() -> None:
     wide = json.dumps({"surface_mm": 20.0, "low_mm": 19.5, "high_mm": 20.1})
     found = evaluate_trial(trial(contact=wide), LIMITS)
