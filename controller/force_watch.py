@@ -39,7 +39,7 @@ NOISE_GUARD = 3.0 * math.sqrt(2.0)
 # A zero taken while somebody moved must not blind the prediction; three times the noisier product's 0.05 N.
 LARGEST_NOISE_N = 0.15
 # Growth of tangent stiffness [1/mm]: the index law exponent of forearms is 0.1 to 0.25; linear tissue is stopped early.
-STIFFENING_1_MM = 0.25
+STIFFENING_PER_MM = 0.25
 # An axis sample this old is not extrapolated from any further.
 LONGEST_AHEAD_NS = 10_000_000
 
@@ -120,7 +120,7 @@ class ForceWatch:
             if travel_mm > LONGEST_TRAVEL_MM and stiffest_N_mm > 0.0:
                 break
             if travel_mm >= LEAST_TRAVEL_MM:
-                stiffening = 1.0 + STIFFENING_1_MM * 0.5 * (ahead_mm + travel_mm)
+                stiffening = 1.0 + STIFFENING_PER_MM * 0.5 * (ahead_mm + travel_mm)
                 stiffest_N_mm = max(stiffest_N_mm, (rise_N - guard_N) / travel_mm * stiffening)
         return stiffest_N_mm
 
