@@ -48,12 +48,13 @@ class Guard:
                 message = {**message, "headers": [*message["headers"], *self._headers]}
             await send(message)
 
-        refused = _refuse_caller(scope) or _refuse_stated_size(scope)
+        headers = _headers_of(scope)
+        refused = _refuse_caller(scope, headers) or _refuse_stated_size(headers)
         if refused:
             await refused(scope, receive, decorated)
             return
         try:
-            body = await asyncio.wait_for(_read_body(scope, receive), self._body_s)
+            body = await asyncio.wait_for(_read_body(headers, receive), self._body_s)
         except TooLarge:
             await _too_large(f"more than {LARGEST_BODY_BYTES}")(scope, receive, decorated)
         except TimeoutError:
@@ -63,9 +64,8 @@ class Guard:
             await self._app(scope, _replay(body, receive), decorated)
 
 
-def _refuse_caller(scope: Scope) -> Response | None:
+def _refuse_caller(scope: Scope, headers: Mapping[str, str]) -> Response | None:
     """No other site's page may move this bench: the host must be local, and so must the page that asks."""
-    headers = _headers_of(scope)
     stated = headers.get("host", "")
     host = urlsplit(f"//{stated}").hostname or ""
     address, _ = scope.get("server") or ("", 0)
@@ -77,8 +77,8 @@ def _refuse_caller(scope: Scope) -> Response | None:
     return None
 
 
-def _refuse_stated_size(scope: Scope) -> Response | None:
-    stated = _headers_of(scope).get("content-length", "0")
+def _refuse_stated_size(headers: Mapping[str, str]) -> Response | None:
+    stated = headers.get("content-length", "0")
     if not (stated.isascii() and stated.isdigit()):
         return problems.answer(400, "content-length", f"Content-Length {stated[:40]!r} is no number of bytes")
     return _too_large(stated) if int(stated) > LARGEST_BODY_BYTES else None
@@ -99,8 +99,7 @@ def _headers_of(scope: Scope) -> dict[str, str]:
     return {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]}
 
 
-async def _read_body(scope: Scope, receive: Receive) -> bytes:
-    headers = _headers_of(scope)
+async def _read_body(headers: Mapping[str, str], receive: Receive) -> bytes:
     if headers.get("content-length", "0") == "0" and "transfer-encoding" not in headers:
         return b""
     body = b""
