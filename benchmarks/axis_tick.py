@@ -1,7 +1,7 @@
-"""What one tick of the servo axis costs: `python -m benchmarks.axis_tick` prints poll + command, and the mock's side.
+"""What one cycle of the servo axis costs: `python -m benchmarks.axis_tick` prints poll + command, and the mock's side.
 
 The driver talks to the mock drive in another process over a pseudo-terminal at 1 kHz; the mock is then timed alone, in
-this process, on the bytes of such a tick. Times are of this machine in this run.
+this process, on the bytes of such a cycle. Times are of this machine in this run.
 """
 
 import math
@@ -33,13 +33,13 @@ def driver_tick() -> None:
         axis.move_to(10, 30)
         axis.enable()
         due_s = time.monotonic()
-        for tick in range(TICKS):
+        for cycle in range(TICKS):
             due_s += PERIOD_S
             time.sleep(max(due_s - time.monotonic(), 0))
             begun = time.perf_counter_ns()
             axis.poll(time.monotonic_ns())
             polled = time.perf_counter_ns()
-            axis.command(10 + math.sin(tick / 100), time.monotonic_ns())
+            axis.command(10 + math.sin(cycle / 100), time.monotonic_ns())
             commands.append(time.perf_counter_ns() - polled)
             polls.append(polled - begun)
         lost, fault = axis.counters.device_lost, axis.fault or "none"
@@ -47,7 +47,7 @@ def driver_tick() -> None:
     both = [poll + command for poll, command in zip(polls, commands, strict=True)]
     print(f"driver, poll:           {percentiles(polls)}")
     print(f"driver, command:        {percentiles(commands)}")
-    print(f"driver, poll + command: {percentiles(both)}; {TICKS} ticks, {lost} answers lost, fault: {fault}")
+    print(f"driver, poll + command: {percentiles(both)}; {TICKS} cycles, {lost} answers lost, fault: {fault}")
 
 
 def mock_tick() -> None:
@@ -58,9 +58,9 @@ def mock_tick() -> None:
     axis.home()
     axis.enable()
     times = []
-    for tick in range(TICKS):
+    for cycle in range(TICKS):
         stage.heard()
-        stage.wire.said = b"t20160F00%02X000000\rt0800\r" % (tick % 200)
+        stage.wire.said = b"t20160F00%02X000000\rt0800\r" % (cycle % 200)
         begun = time.perf_counter_ns()
         stage.mock.receive(stage.now())
         times.append(time.perf_counter_ns() - begun)

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from api.cli.stage import bench_process
-from controller.devices import open_force
-from controller.realtime import acquire
+from controller.devices.drivers import open_force
+from controller.loop.realtime import acquire
 from drivers.robotiq.codec import FRAME_NS, to_counts
 from drivers.roles import ForceSensor
 from mock_devices.control import BenchControl

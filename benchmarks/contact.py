@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.paired import Touch
+from controller.loop.paired_samples import Touch
 from tests.controller.limb import BOTA, FT300, Limb, LimbBench, Sensor, approached
 from tests.controller.spring import SURFACE_MM
 
@@ -55,15 +55,15 @@ def _row(
         f"{name:14s} {limb.a_N_mm:5g} {limb.b_per_mm:5g} {limb.B_N_s_mm:6g}"
         f"  {errors.mean():+8.3f} {errors.std():6.3f} {np.abs(errors).max():7.3f}"
         f"  {100 * held.mean():9.0f} % {within.mean():6.2f} {100 * np.mean(within <= PROMISED_MM):5.0f} %"
-        f" {np.mean([touch.touches for touch in touches]):6.1f} {np.mean([b.world.now_ns for b in runs]) * 1e-9:9.1f}",
+        f" {np.mean([touch.touches for touch in touches]):6.1f} {np.mean([b.state.now_ns for b in runs]) * 1e-9:9.1f}",
         flush=True,
     )
     return errors, held, within <= PROMISED_MM
 
 
 def _touch(bench: LimbBench) -> Touch:
-    assert bench.world.touch, bench.ended
-    return bench.world.touch
+    assert bench.state.touch, bench.ended
+    return bench.state.touch
 
 
 if __name__ == "__main__":

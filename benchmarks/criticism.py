@@ -48,8 +48,8 @@ def record(kind: str, seed: int) -> Record:
     """One session made, diagnosed and written down."""
     secrets = secrets_of(kind, seed)
     causes = {name: numbers for secret in secrets for name, numbers in secret.causes.items()}
-    bench, strokes = recorded(seed, Secret("all", causes, {}))
-    data = observe(session_of(bench, strokes, stated="contact_offset" in causes))
+    bench, cycles = recorded(seed, Secret("all", causes, {}))
+    data = observe(session_of(bench, cycles, stated="contact_offset" in causes))
     begin = time.process_time()
     result = diagnose(data)
     seconds = time.process_time() - begin

@@ -216,7 +216,7 @@ def summary(load: Load, period_us: float) -> Summary:
         "loop to drive's answer read p50 us": at(load.answered_us, 50),
         "loop to drive's answer read p99 us": at(load.answered_us, 99),
         "missed slots %": round(100 * load.missed / load.slots, 3) if load.slots else None,
-        "cyclictest over a slot %": round(100 * len(late) / len(load.reference_us), 3) if load.reference_us else None,
+        "cyclictest over a cycle %": round(100 * len(late) / len(load.reference_us), 3) if load.reference_us else None,
         "presses stopped by a stall": load.spoilt,
         "HTTP requests per s": round(load.requests / load.busy_s, 1) if load.busy_s else None,
     }

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from controller.devices import open_axis, open_force, open_tracker
+from controller.devices.drivers import open_axis, open_force, open_tracker
 from drivers.roles import Device, ForceSensor, Identity, MarkerTracker, ServoAxis
 from rig.channels import AxisSample, ForceSample, MarkerSample
 from rig.config.wiring import Wiring

@@ -11,12 +11,12 @@ from collections.abc import Callable
 from socket import socket
 
 from controller.claims import Claim, take
-from controller.loop_client import ANSWER_TIMEOUT_S, LoopClient
-from controller.messages import Lease, Note, Outcome, Ready, Recover, Reset, Run, Shutdown, Status, Stopped
-from controller.recovering import recover
-from controller.recovery import Act, Consent, Recovered, Situation
-from controller.safety import Action
-from controller.steps import Program
+from controller.loop.client import ANSWER_TIMEOUT_S, LoopClient
+from controller.loop.messages import Lease, Note, Outcome, Ready, Recover, Reset, Run, Shutdown, Status, Stopped
+from controller.loop.steps import Program
+from controller.recovery.conversation import recover
+from controller.recovery.situation import Act, Consent, Recovered, Situation
+from controller.safety.table import Action
 from controller.stop.client import StopProcess
 from controller.stop.word import Kind, Requester
 from rig.channel import Message, pair
@@ -25,7 +25,7 @@ from rig.errors import DeviceError, SafetyStop, UsageError
 from rig.recording.client import RecorderClient
 from rig.recording.ring import new_path, remove_abandoned
 
-LOOP_MODULE = "controller.loop_process"
+LOOP_MODULE = "controller.loop.process"
 START_TIMEOUT_S = 60.0
 LEAVE_TIMEOUT_S = 15.0
 # Homing over 60 mm at the 20 mm/s of the default, and twice that for a slower axis.

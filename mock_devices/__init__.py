@@ -1,1 +1,1 @@
-"""The stage set: the wire protocols of the real products, backed by one simulated bench."""
+"""The simulated bench: the wire protocols of the real products, backed by one simulated bench."""

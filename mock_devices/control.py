@@ -27,7 +27,7 @@ from pydantic_core import to_jsonable_python
 
 from mock_devices import dials
 from mock_devices.bench import Bench
-from mock_devices.faults import Fault, Value
+from mock_devices.faults.wires import Fault, Value
 from mock_devices.names import known
 from mock_devices.physics.effects import parse_hidden
 from rig.channel import Answer, Channel, Message, Received, Reply

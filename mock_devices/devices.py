@@ -9,15 +9,15 @@ from zlib import crc32
 
 from drivers.epos4.objects import SERIAL
 from mock_devices.bench import Bench
-from mock_devices.bota import BotaMock
-from mock_devices.device_faults import BOTA_FAULTS, EPOS4_FAULTS, NDI_FAULTS, ROBOTIQ_FAULTS
-from mock_devices.epos4 import Epos4Mock
-from mock_devices.faults import WIRE_FAULTS, Fault, FaultyWire, Kind, faults_of
-from mock_devices.ndi import NdiMock
+from mock_devices.bota.mock import BotaMock
+from mock_devices.epos4.mock import Epos4Mock
+from mock_devices.faults.devices import BOTA_FAULTS, EPOS4_FAULTS, NDI_FAULTS, ROBOTIQ_FAULTS
+from mock_devices.faults.sensing import CAMERA_FAULTS, SENSOR_FAULTS
+from mock_devices.faults.wires import WIRE_FAULTS, Fault, FaultyWire, Kind, faults_of
+from mock_devices.interfaces import Mock
+from mock_devices.ndi.mock import NdiMock
 from mock_devices.parameters import Axis, Parameters, Sensor
-from mock_devices.robotiq import RobotiqMock
-from mock_devices.sensing_faults import CAMERA_FAULTS, SENSOR_FAULTS
-from mock_devices.stage import Mock
+from mock_devices.robotiq.mock import RobotiqMock
 from mock_devices.wire import PtyWire, TcpWire, Wire
 
 ForceProduct = Literal["bota-sensone", "robotiq-ft300"]

@@ -19,14 +19,14 @@ from pathlib import Path
 from typing import Protocol
 
 from mock_devices.bench import Bench
-from mock_devices.bota import BotaMock
+from mock_devices.bota.mock import BotaMock
 from mock_devices.control import ControlPort, Desk
 from mock_devices.devices import FORCE_CHOICES, Device, Workshop
-from mock_devices.epos4 import Epos4Mock
-from mock_devices.faults import Fault
+from mock_devices.epos4.mock import Epos4Mock
+from mock_devices.faults.wires import Fault
 from mock_devices.parameters import Parameters, load_parameters
 from mock_devices.physics.effects import EFFECTS, complete, knobs, parse_hidden, statement
-from mock_devices.robotiq import RobotiqMock
+from mock_devices.robotiq.mock import RobotiqMock
 from rig.errors import RigError
 
 # A client's bytes that came during a stall were sent before its end: they are heard before time is caught up, or every

@@ -224,7 +224,7 @@ LOOP = Stream(4, "loop", LoopSample, STAMP | {
     "axis_age_ns": ("ns", "age of the newest axis sample when it was used"),
     "marker_age_ns": ("ns", "age of the newest tracker frame when it was used"),
     "health": ("1", "three bits a stream (alive, valid, on rate): force 0-2, axis 3-5, marker 6-8"),
-    "mode": ("1", "controller mode, see controller.modes.Mode"),
+    "mode": ("1", "controller mode, see controller.loop.modes.Mode"),
     "step": ("1", "index of the protocol step being executed; -1 without one"),
     "force_N": ("N", "compressive force from the reference zero"),
     "reference_N": ("N", "reference of the force loop; NaN outside contact mode"),
@@ -236,7 +236,7 @@ LOOP = Stream(4, "loop", LoopSample, STAMP | {
 })  # fmt: skip
 EVENT = Stream(5, "event", EventSample, STAMP | {
     "level": ("1", "10 note, 20 warning, 30 soft stop, 40 immediate stop"),
-    "code": ("1", "short name of what happened, a key of controller.safety or of the protocol"),
+    "code": ("1", "short name of what happened, a key of controller.safety.table or of the protocol"),
     "text": ("1", "one sentence for a person"),
 })  # fmt: skip
 

@@ -16,8 +16,8 @@ from typing import Any
 from drivers.can.slcan import CanFrame, SlcanDecoder, encode_frame
 from drivers.canopen.nmt import NmtState
 from drivers.ports import PortClosed
-from mock_devices.epos4 import Epos4Mock
-from mock_devices.stage import NEVER_NS
+from mock_devices.epos4.mock import Epos4Mock
+from mock_devices.interfaces import NEVER_NS
 from mock_devices.wire import PtyWire
 from tests.remote import MemoryWire, Remote, say
 

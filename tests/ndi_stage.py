@@ -16,8 +16,8 @@ from drivers.ndi.codec import encode_text
 from drivers.ndi.device import NdiTracker
 from drivers.ports import PortClosed
 from drivers.roles import MarkerTracker
-from mock_devices.ndi import NdiMock
-from mock_devices.stage import MarkerPose
+from mock_devices.interfaces import MarkerPose
+from mock_devices.ndi.mock import NdiMock
 from mock_devices.wire import PtyWire, TcpWire
 from rig.channels import MarkerSample
 from rig.config.wiring import Tracker

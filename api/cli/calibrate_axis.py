@@ -11,7 +11,7 @@ from api.cli.output import console, table
 from api.cli.stage import bench_for
 from controller.commissioning.axis import KnownBy, against_block, against_tracker, ahead_mm, known_direction
 from controller.commissioning.axis_moves import BACK_MM, SEARCH_MM, RestingAxis, steps_mm, touches_mm, travelled
-from controller.devices import start_devices
+from controller.devices.drivers import start_devices
 from drivers.roles import Identity
 from mock_devices.control import BenchControl
 from rig.config.calibration import AxisCalibration

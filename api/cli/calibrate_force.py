@@ -15,7 +15,7 @@ from api.cli.stage import bench_for
 from controller.commissioning.force import calibrate
 from controller.commissioning.readings import read
 from controller.commissioning.weights import Weights, parse_weights
-from controller.devices import open_force
+from controller.devices.drivers import open_force
 from mock_devices.control import BenchControl
 from rig.config.calibration import ForceCalibration
 from rig.config.force_map import CHANNELS

@@ -12,9 +12,9 @@ from controller.experiments import capture, comparison, tracked, tracking
 from controller.experiments.comparison import HEADER, Jump, Run
 from controller.experiments.recorded import Recorded
 from controller.experiments.references import Reference, Stairs
-from controller.gains import Choice, pi_gains
+from controller.law.gains import Choice, pi_gains
+from controller.loop.steps import Program
 from controller.operation import Operation
-from controller.steps import Program
 from rig.config.protocol import Indentation
 from rig.config.table import parse
 from rig.config.wiring import Wiring

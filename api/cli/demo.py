@@ -14,11 +14,11 @@ import typer
 
 from api.cli import live
 from api.cli.diagnose import run_diagnosis, save, show
+from api.cli.hidden_effect import Secret, draw
 from api.cli.motion import captured, follow, say_levels
 from api.cli.options import built_in
 from api.cli.output import console, write_json
 from api.cli.science import fit_session
-from api.cli.secret import Secret, draw
 from api.cli.stage import bench_for
 from controller.experiments import capture as experiment
 from controller.experiments import tracked

@@ -73,7 +73,7 @@ def protocol(
     Example: rig protocol check examples/diagnosis.toml --json check.json
     """
     result = check(load(Indentation, file), tracker, rate_hz)
-    console.print(f"{result.strokes} strokes in {result.duration_s:.0f} s", highlight=False)
+    console.print(f"{result.cycles} cycles in {result.duration_s:.0f} s", highlight=False)
     seen = [(name, measured(size, unit)) for name, (size, unit) in sorted(result.detectable.items())]
     console.print(table(("cause", "visible from"), seen, "On a limb and noise as the mock bench has them"))
     for reason, names in by_reason(result.not_testable):

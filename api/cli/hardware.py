@@ -13,8 +13,8 @@ from api.cli.output import console, table, write_json
 from api.cli.remote import RemoteBench
 from api.cli.stage import bench_for, bench_process
 from controller import doctor as examination
-from controller.attending import STREAMS
 from controller.claims import Holder, holder
+from controller.devices.takeover import STREAMS
 from controller.doctor import Finding
 from rig.errors import CheckFailed, DeviceError
 

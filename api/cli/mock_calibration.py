@@ -20,7 +20,7 @@ from controller.commissioning.axis_moves import Pace, RestingAxis, travelled
 from controller.commissioning.force import calibrate
 from controller.commissioning.readings import read
 from controller.commissioning.weights import Weights
-from controller.devices import open_force, start_devices
+from controller.devices.drivers import open_force, start_devices
 from mock_devices.control import BenchControl
 from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
 from rig.config.calibration_files import read_axis, read_force, text_of

@@ -17,8 +17,8 @@ from controller.experiments.comparison import CHOICES, choice_from, choices_from
 from controller.experiments.references import named
 from controller.experiments.tracked import Tracked
 from controller.experiments.verdicts import refuse_bad
+from controller.loop.steps import Program
 from controller.operation import Operation
-from controller.steps import Program
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load

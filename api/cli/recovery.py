@@ -13,7 +13,7 @@ from api.cli.output import console, write_json
 from api.cli.remote import RemoteBench
 from api.cli.stage import bench_for
 from controller.claims import holder
-from controller.recovery import ALL, Act, Consent, Recovered
+from controller.recovery.situation import ALL, Act, Consent, Recovered
 from controller.supervisor import Supervisor
 from rig.errors import CheckFailed, UsageError
 

@@ -6,7 +6,7 @@ from typing import Any, Self
 from urllib.error import HTTPError, URLError
 from urllib.request import Request, urlopen
 
-from controller.recovery import Consent, Recovered
+from controller.recovery.situation import Consent, Recovered
 from rig.errors import DeviceError
 
 # A recovery homes and retracts before it answers.

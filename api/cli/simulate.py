@@ -11,14 +11,14 @@ import typer
 
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import console, table, write_json
-from controller import simulated
 from controller.experiments import comparison, tracked, tracking
 from controller.experiments.references import named
-from controller.force_position import GainRow
-from controller.gains import Choice, margins
-from controller.modes import Mode
-from controller.simulated import SimulatedBench, Trace, limb_of
-from controller.steps import TrackForce
+from controller.law.force_position import GainRow
+from controller.law.gains import Choice, margins
+from controller.loop.modes import Mode
+from controller.loop.steps import TrackForce
+from controller.simulated import bench as simulated
+from controller.simulated.bench import SimulatedBench, Trace, limb_of
 from rig.config.wiring import Wiring
 from rig.errors import DataError
 from rig.tissue.model import Model, load_model
@@ -156,13 +156,13 @@ def _draw(trace: Trace, bench: SimulatedBench, out: Path, title: str) -> None:
 
 
 def _draw_bode(model: Model, wiring: Wiring, choice: Choice, stiffness: float, out: Path) -> None:
-    from controller import linear  # noqa: PLC0415 - python-control loads slowly
+    from controller.law import transfer_functions  # noqa: PLC0415 - python-control loads slowly
     from rig.report.control_figures import bode_figure  # noqa: PLC0415
     from rig.report.drawing import svg  # noqa: PLC0415
 
     design, curves = tracking.design_for(wiring), {}
     for row in _shown(model, wiring, choice):
         tangent = stiffness * model.tangent_N_mm(model.depth_mm(row.force_N))
-        loop = linear.bode(linear.open_loop(row, tangent, model.damping_N_s_mm, design))
+        loop = transfer_functions.bode(transfer_functions.open_loop(row, tangent, model.damping_N_s_mm, design))
         curves[f"{row.force_N:.1f} N"] = (loop.frequency_Hz, loop.gain, loop.phase_deg)
     (out / "bode.svg").write_text(svg(bode_figure(curves)))

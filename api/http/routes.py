@@ -29,7 +29,7 @@ from api.http.models import (
 )
 from api.http.problems import Refused, responses
 from api.http.service import Service
-from controller.recovery import Consent
+from controller.recovery.situation import Consent
 from controller.stop.word import Answer, Kind
 
 PREFIX = "/api/v1"

@@ -13,9 +13,9 @@ from api.http.problems import Refused
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.experiments.verdicts import remaining_bad
+from controller.loop.steps import Program, Retract
 from controller.operation import Operation, Progress
-from controller.recovery import Consent, Recovered
-from controller.steps import Program, Retract
+from controller.recovery.situation import Consent, Recovered
 from controller.stop.word import NOT_CONFIRMED, Answer, Kind
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation

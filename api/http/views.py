@@ -17,10 +17,10 @@ from api.http.models import (
     SessionView,
 )
 from api.http.service import Job, Service
+from controller.devices.health import ALIVE, ON_RATE, VALID
 from controller.experiments.capture import check
-from controller.health import ALIVE, ON_RATE, VALID
-from controller.messages import Status
-from controller.recovery import Recovered
+from controller.loop.messages import Status
+from controller.recovery.situation import Recovered
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load

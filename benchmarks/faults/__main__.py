@@ -23,7 +23,7 @@ from benchmarks.faults.fault import Fault
 from benchmarks.faults.plants import Plant, chosen
 from benchmarks.faults.results import HEADER, line, rate, read, write
 from benchmarks.faults.trial import Spoilt, Trial, trial
-from controller.safety import TABLE
+from controller.safety.table import TABLE
 from rig.errors import DeviceError, RigError, UsageError
 
 ATTEMPTS = 5

@@ -11,9 +11,9 @@ from functools import partial
 from http.client import HTTPConnection
 
 from benchmarks.faults.fault import Act, Live
-from controller.steps import Hold, Program
+from controller.loop.steps import Hold, Program
 from controller.stop.keypad import DOWN, EV_KEY, EVENT
-from mock_devices.faults import Value
+from mock_devices.faults.wires import Value
 from rig.config.stop import KEY_CODES
 
 LOOP, RECORDER = "loop_process", "rig.recording.recorder"

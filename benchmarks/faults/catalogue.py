@@ -6,7 +6,7 @@ from benchmarks.faults import acts
 from benchmarks.faults.acts import device, dials, several
 from benchmarks.faults.fault import DRIVE, NOBODY, PROTOCOL, QUALITY, REFUSED, Fault
 from benchmarks.faults.scenarios import REST_N, SEARCH_TO_MM, SURFACE_MM, Truth
-from controller.safety import TABLE, Check
+from controller.safety.table import TABLE, Check
 from rig.config.wiring import Limits
 
 DEPTH_LIMIT_MM = 10.0

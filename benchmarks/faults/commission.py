@@ -7,7 +7,7 @@ from api.cli.mock_calibration import READ_S, SETTLE_S, weights_on
 from controller.commissioning.force import calibrate
 from controller.commissioning.readings import read
 from controller.commissioning.weights import Weights
-from controller.devices import open_force
+from controller.devices.drivers import open_force
 from rig.config.wiring import Wiring
 from tests.system.stage import Stage
 

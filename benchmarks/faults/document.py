@@ -16,7 +16,7 @@ from benchmarks.faults.hazards import HAZARDS, TESTS, Hazard
 from benchmarks.faults.plants import plants
 from benchmarks.faults.results import rate, read
 from benchmarks.faults.trial import Trial
-from controller.safety import TABLE, Action
+from controller.safety.table import TABLE, Action
 from rig.errors import RigError
 from rig.recording.files import write_text
 
@@ -36,7 +36,7 @@ BESIDES = {
 }
 HEADER = """# Hazards, checks, and how fast they are
 
-This page is written by `python -m benchmarks.faults.document` from the safety table (`controller/safety.py`), the
+This page is written by `python -m benchmarks.faults.document` from the safety table (`controller/safety/table.py`), the
 declared hazards (`benchmarks/faults/hazards.py`) and the measured results in `docs/validation/faults.json`; a test
 holds it complete and current.
 

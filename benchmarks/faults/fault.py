@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.faults.scenarios import Truth
-from controller.safety import TABLE, Check
+from controller.safety.table import TABLE, Check
 from controller.supervisor import Supervisor
 from tests.system.stage import Stage, children
 

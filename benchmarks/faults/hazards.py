@@ -74,7 +74,7 @@ HAZARDS = (
     ),
 )
 
-LOOP = "tests/controller/test_bench_loop_stops.py"
+LOOP = "tests/controller/loop/test_bench_loop_stops.py"
 IN_ITS_TIME = f"{LOOP}::test_each_fault_is_told_in_its_time_and_stops_motion"
 TESTS: dict[str, str] = {
     **dict.fromkeys(
@@ -86,18 +86,18 @@ TESTS: dict[str, str] = {
         ),
         IN_ITS_TIME,
     ),
-    "axis_frozen": "tests/controller/test_safety.py::test_a_frozen_axis_is_stopped_at_once",
-    "pushed": "tests/controller/test_giving_way.py::test_at_rest_each_of_the_two_force_checks_is_needed",
-    "force_rate": "tests/controller/test_force_limit.py::test_a_rate_above_its_limit_stops_with_either_sensor",
-    "first_touch": "tests/controller/test_first_touch.py"
+    "axis_frozen": "tests/controller/safety/test_table.py::test_a_frozen_axis_is_stopped_at_once",
+    "pushed": "tests/controller/safety/test_giving_way.py::test_at_rest_each_of_the_two_force_checks_is_needed",
+    "force_rate": "tests/controller/safety/test_force_limit.py::test_a_rate_above_its_limit_stops_with_either_sensor",
+    "first_touch": "tests/controller/safety/test_first_touch.py"
     "::test_a_sign_that_turned_since_the_calibration_is_found_before_2_N_and_named",
-    "axis_scale": "tests/controller/test_axis_scale.py"
+    "axis_scale": "tests/controller/safety/test_axis_scale.py"
     "::test_a_wrong_scale_is_found_within_three_millimetres_and_before_contact",
     "depth_limit": f"{LOOP}::test_deeper_than_the_limit_is_told_at_the_limit",
     DRIVE: "tests/system/test_control_faults.py"
     "::test_a_killed_loop_in_contact_leaves_the_tip_stopped_within_two_heartbeats",
-    PROTOCOL: "tests/controller/test_machine.py::test_a_zero_far_from_the_first_one_is_refused",
-    REFUSED: "tests/controller/test_commissioning.py"
+    PROTOCOL: "tests/controller/loop/test_state_machine.py::test_a_zero_far_from_the_first_one_is_refused",
+    REFUSED: "tests/controller/commissioning/test_commissioning.py"
     "::test_a_wiring_that_contradicts_the_force_calibration_is_refused",
     QUALITY: "tests/rig/trials/test_quality.py::test_what_is_planted_is_named_with_its_number",
 }  # fmt: skip

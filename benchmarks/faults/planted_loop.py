@@ -13,9 +13,9 @@ from unittest.mock import patch
 
 from benchmarks.faults import scenarios
 from benchmarks.faults.fault import PROTOCOL, QUALITY
-from controller import loop_process, steps
 from controller.commissioning import refusals
-from controller.safety import TABLE, Check
+from controller.loop import process, steps
+from controller.safety.table import TABLE, Check
 
 MODULE = "benchmarks.faults.planted_loop"
 VARIABLE = "PLANTED"
@@ -47,7 +47,7 @@ def main() -> int:
     """Runs the loop without the planted checks."""
     codes = os.environ.get(VARIABLE, "").split(",")
     with replaced(codes):
-        return loop_process.main(sys.argv[1:], without(codes))
+        return process.main(sys.argv[1:], without(codes))
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from benchmarks.faults.catalogue import FAULTS, proofs
 from benchmarks.faults.fault import REFUSED, Fault
 from benchmarks.faults.planted_loop import CONTRADICTIONS
-from controller.safety import TABLE, Check
+from controller.safety.table import TABLE, Check
 from rig.errors import UsageError
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from controller.experiments import capture, tracked
 from controller.experiments.references import named
+from controller.loop.steps import Approach, Compress, MoveTo, Program, Retract, TrackForce, Zero
 from controller.operation import Operation
-from controller.steps import Approach, Compress, MoveTo, Program, Retract, TrackForce, Zero
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.quality import Bounds, QualityLimits

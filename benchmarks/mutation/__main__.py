@@ -1,4 +1,4 @@
-"""Mutation testing: `python -m benchmarks.mutation [--sample 60 --seed N] [--only controller/safety.py ...]`.
+"""Mutation testing: `python -m benchmarks.mutation [--sample 60 --seed N] [--only controller/safety/table.py ...]`.
 
 Each mutant is the code with one change; it is killed if a test fails with it. Prints what survived and is not listed in
 `survivors.toml`, and what is listed there but was killed or is no mutant any more. The last line is one JSON object.
@@ -28,21 +28,21 @@ LEAST_SHARE = 0.9
 ROOT = Path(__file__).resolve().parents[2]
 SURVIVORS = Path(__file__).with_name("survivors.toml")
 MODULES = (
-    "controller/safety.py",
-    "controller/safety_checks.py",
-    "controller/watch.py",
-    "controller/force_watch.py",
-    "controller/giving_way.py",
-    "controller/health.py",
-    "controller/bench_loop.py",
-    "controller/attending.py",
-    "controller/device_states.py",
-    "controller/commands.py",
-    "controller/machine.py",
-    "controller/steps.py",
-    "controller/touch.py",
+    "controller/safety/table.py",
+    "controller/safety/checks.py",
+    "controller/safety/inputs.py",
+    "controller/safety/load.py",
+    "controller/safety/giving_way.py",
+    "controller/devices/health.py",
+    "controller/loop/bench_loop.py",
+    "controller/devices/takeover.py",
+    "controller/devices/states.py",
+    "controller/loop/commands.py",
+    "controller/loop/state_machine.py",
+    "controller/loop/steps.py",
+    "controller/loop/touch.py",
     "controller/supervisor.py",
-    "controller/loop_client.py",
+    "controller/loop/client.py",
     "controller/stop/word.py",
     "controller/stop/start.py",
     "controller/stop/keypad.py",

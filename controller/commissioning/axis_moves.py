@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controller.commissioning.axis import Array, Place, ahead_mm, known_direction, refuse_first_step
-from controller.devices import Devices
+from controller.devices.drivers import Devices
 from rig.channels import MarkerSample
 from rig.errors import CheckFailed, DeviceError, SafetyStop
 

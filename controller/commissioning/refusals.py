@@ -5,7 +5,7 @@ A configuration that contradicts a calibration is refused; nothing is ever corre
 
 from datetime import datetime
 
-from controller.steps import Approach, Program
+from controller.loop.steps import Approach, Program
 from drivers.roles import Identity
 from rig.config.calibration import AxisCalibration, ForceCalibration
 from rig.config.wiring import MOCK_PORT, Wiring

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Literal
 
 import rig
-from controller.checks import refuse_beyond_limits
 from controller.experiments.indentation import Trial, attempts, longest_s, trials
 from controller.experiments.recorded import metadata, record, refuse_bench
 from controller.experiments.verdicts import with_quality, with_surface
 from controller.operation import Operation
+from controller.safety.program_limits import refuse_beyond_limits
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring

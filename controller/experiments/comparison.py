@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.gains import Choice
-from controller.modes import Mode
+from controller.law.gains import Choice
+from controller.loop.modes import Mode
 from rig.errors import DataError, UsageError
 
 Column = NDArray[np.float64]

@@ -4,8 +4,8 @@ import random
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from controller.steps import Approach, Compress, Dither, Hold, Program, Retract, Step, Zero
-from controller.touch import BACK_OFF_MM, TOUCH_MM
+from controller.loop.steps import Approach, Compress, Dither, Hold, Program, Retract, Step, Zero
+from controller.loop.touch import BACK_OFF_MM, TOUCH_MM
 from rig.config.protocol import Indentation
 
 # 366 portions, two a cycle at 1 kHz, and as much again for cycles missed.

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import rig
 from controller.commissioning.refusals import refuse_uncommissioned
-from controller.messages import Outcome
-from controller.steps import Program
+from controller.loop.messages import Outcome
+from controller.loop.steps import Program
 from controller.supervisor import Supervisor
 from drivers.roles import Identity
 from rig.config.wiring import Wiring
@@ -97,7 +97,7 @@ def record(bench: Supervisor, program: Program, file: Path, about: Metadata, tim
 def _run_watched(bench: Supervisor, program: Program, timeout_s: float) -> Outcome:
     over = threading.Event()
     failures: list[str] = []
-    watcher = threading.Thread(target=_watch, args=(bench, over, failures), name="recorder-watch", daemon=True)
+    watcher = threading.Thread(target=_inputs, args=(bench, over, failures), name="recorder-watch", daemon=True)
     watcher.start()
     try:
         outcome = bench.run(program, timeout_s)
@@ -111,7 +111,7 @@ def _run_watched(bench: Supervisor, program: Program, timeout_s: float) -> Outco
     return replace(outcome, peak_force_N=max(outcome.peak_force_N, bench.status.get("peak_force_N") or 0.0))
 
 
-def _watch(bench: Supervisor, over: threading.Event, failures: list[str]) -> None:
+def _inputs(bench: Supervisor, over: threading.Event, failures: list[str]) -> None:
     """Stops the motion as soon as the recorder fails: nothing moves unrecorded."""
     while not over.wait(LOOK_S):
         failure = bench.recorder.failure if bench.recorder else "the recorder is gone"

@@ -8,7 +8,7 @@ import numpy as np
 from controller.experiments import tracked
 from controller.experiments.recorded import Recorded
 from controller.experiments.references import Ramp
-from controller.steps import Program
+from controller.loop.steps import Program
 from controller.supervisor import Supervisor
 from rig.config.table import parse
 from rig.config.wiring import Wiring

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from controller.checks import refuse_beyond_limits
 from controller.experiments import tracking
 from controller.experiments.capture import new_session, refuse_used
 from controller.experiments.recorded import Recorded, metadata, record, refuse_bench
 from controller.experiments.references import Reference
 from controller.experiments.tracking import Followed, Plateau
 from controller.experiments.verdicts import with_quality, with_surface
-from controller.gains import Choice
+from controller.law.gains import Choice
+from controller.loop.steps import Program, TrackForce
 from controller.operation import Operation
-from controller.steps import Program, TrackForce
+from controller.safety.program_limits import refuse_beyond_limits
 from controller.supervisor import Supervisor
 from rig.channels import LoopSample
 from rig.config.quality import QualityLimits
@@ -39,7 +39,7 @@ class Tracked:
     followed: Followed
     samples: int
     dropped: int
-    ticks: int
+    cycles: int
     missed: int
     quality: str = ""
     reasons: tuple[str, ...] = ()
@@ -155,7 +155,7 @@ def evaluate(done: Recorded, model: str) -> Tracked:
         followed=tracking.followed(*columns),
         samples=sum(done.samples.values()),
         dropped=sum(done.dropped.values()),
-        ticks=last.seq - first.seq + 1,
+        cycles=last.seq - first.seq + 1,
         missed=last.missed - first.missed,
     )
 
@@ -169,7 +169,7 @@ def as_json(result: Tracked) -> dict[str, object]:
         "followed": asdict(result.followed),
         "samples": result.samples,
         "dropped": result.dropped,
-        "loop": {"ticks": result.ticks, "missed": result.missed},
+        "loop": {"ticks": result.cycles, "missed": result.missed},
         "quality": result.quality,
         "reasons": list(result.reasons),
     }

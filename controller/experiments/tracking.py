@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.experiments.references import Reference
-from controller.gains import Choice, Design, schedule
-from controller.modes import Mode
-from controller.steps import Approach, Hold, Program, Retract, TrackForce, Zero
+from controller.law.gains import Choice, Design, schedule
+from controller.loop.modes import Mode
+from controller.loop.steps import Approach, Hold, Program, Retract, TrackForce, Zero
 from rig.config.wiring import Wiring
 from rig.errors import DataError, UsageError
 from rig.tissue.model import Model

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from controller.messages import Outcome
+from controller.loop.messages import Outcome
 from rig.config.quality import QualityLimits
 from rig.errors import BadTrial, DataError
 from rig.recording.reader import read_recording

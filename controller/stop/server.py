@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 from http import HTTPStatus
 from pathlib import Path
 
-from controller import realtime
+from controller.loop import realtime
 from controller.stop import http
 from controller.stop.keyboard import Keyboard
 from controller.stop.keypad import Keys

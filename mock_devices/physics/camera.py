@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
+from mock_devices.interfaces import MarkerPose
 from mock_devices.parameters import Camera, Vector
 from mock_devices.physics import STEP_NS, STEP_S
 from mock_devices.physics.channels import Slips, moved
 from mock_devices.physics.sensor import normals
-from mock_devices.stage import MarkerPose
 
 HISTORY = 8192
 HALF_DEGREE_RAD = math.radians(0.5)

@@ -30,16 +30,16 @@ LIMB = {"stiffness_N_mm": 0.12, "stiffening_1_mm": 0.22, "viscosity_N_s_mm": 0.0
 THRESHOLD_NATS = 5.0
 ASSUMED_NATS = 50.0
 BLOCKS = {
-    "5 strokes at 4 to 30 mm/s": Protocol(speeds_mm_s=(4, 8, 12, 20, 30), trials=1, hold_s=0.2),
-    "5 strokes with a hold of 5 s": Protocol(speeds_mm_s=(20,), trials=5, hold_s=5.0),
-    "5 strokes with 1 s of dither, 0.25 mm at 6 Hz": Protocol(
+    "5 cycles at 4 to 30 mm/s": Protocol(speeds_mm_s=(4, 8, 12, 20, 30), trials=1, hold_s=0.2),
+    "5 cycles with a hold of 5 s": Protocol(speeds_mm_s=(20,), trials=5, hold_s=5.0),
+    "5 cycles with 1 s of dither, 0.25 mm at 6 Hz": Protocol(
         speeds_mm_s=(10,), trials=5, dither_amplitude_mm=0.25, dither_frequency_Hz=6, dither_s=1.0
     ),
-    "5 strokes with 1 s of dither, 0.1 mm at 20 Hz": Protocol(
+    "5 cycles with 1 s of dither, 0.1 mm at 20 Hz": Protocol(
         speeds_mm_s=(10,), trials=5, dither_amplitude_mm=0.1, dither_frequency_Hz=20, dither_s=1.0
     ),
-    "5 strokes with a stop at half depth": Protocol(speeds_mm_s=(10,), trials=5, depth_mm=4, second_depth_mm=8),
-    "5 strokes with a slow way out, 2 mm/s": Protocol(speeds_mm_s=(10,), trials=5, retract_speed_mm_s=2),
+    "5 cycles with a stop at half depth": Protocol(speeds_mm_s=(10,), trials=5, depth_mm=4, second_depth_mm=8),
+    "5 cycles with a slow way out, 2 mm/s": Protocol(speeds_mm_s=(10,), trials=5, retract_speed_mm_s=2),
 }
 NOT_SEPARABLE_NATS, SAFE_NATS = 3.0, 20.0
 
@@ -52,7 +52,7 @@ class Check:
     """
 
     duration_s: float
-    strokes: int
+    cycles: int
     detectable: Mapping[str, tuple[float, str]]
     not_testable: Mapping[str, str]
     names: tuple[str, ...]
@@ -73,7 +73,7 @@ class Check:
         """For the file."""
         return {
             "duration_s": self.duration_s,
-            "strokes": self.strokes,
+            "strokes": self.cycles,
             "detectable": {name: {"minimum": size, "unit": unit} for name, (size, unit) in self.detectable.items()},
             "not_testable": dict(self.not_testable),
             "not_separable": [
@@ -88,8 +88,8 @@ class Check:
 
 def check(protocol: Protocol, tracker: bool = True, force_rate_Hz: float = RATE_HZ) -> Check:
     """What ``protocol`` can show with a force sensor at this rate, with or without a tracker on the tip."""
-    strokes = planned(protocol, tracker, force_rate_Hz)
-    data = observe(Session("planned", tuple(strokes)))
+    cycles = planned(protocol, tracker, force_rate_Hz)
+    data = observe(Session("planned", tuple(cycles)))
     problem = Indentation(data)
     fit = noiseless(problem)
     t = tangents(fit, testable(problem))
@@ -104,30 +104,30 @@ def check(protocol: Protocol, tracker: bool = True, force_rate_Hz: float = RATE_
         if effect.name not in visible:
             reasons[effect.name] = "the simulation's own parameters imitate it completely in this experiment"
     names, confusion = confusability(t)
-    duration = float(strokes[-1].force_s[-1])
-    return Check(duration, len(strokes), visible, reasons, names, confusion)
+    duration = float(cycles[-1].force_s[-1])
+    return Check(duration, len(cycles), visible, reasons, names, confusion)
 
 
 def planned(protocol: Protocol, tracker: bool, rate_Hz: float) -> list[Streams]:
-    """The strokes the protocol would record, with the force the limb would answer, without noise."""
+    """The cycles the protocol would record, with the force the limb would answer, without noise."""
     rng = np.random.default_rng(protocol.seed)
     speeds = [speed for speed in protocol.speeds_mm_s for _ in range(protocol.trials)]
     order = rng.permutation(len(speeds)) if protocol.randomise else np.arange(len(speeds))
-    strokes, start = [], 0.0
+    cycles, start = [], 0.0
     for number, speed in enumerate(np.asarray(speeds)[order]):
-        time, position = stroke(protocol, float(speed), rate_Hz)
+        time, position = cycle(protocol, float(speed), rate_Hz)
         time = time + start
         frames = np.arange(time[0], time[-1], 1 / TRACKER_HZ)
         marker = np.zeros((len(frames), 3))
         marker[:, 0] = np.interp(frames, time, position)
         seen = (frames, marker) if tracker else (None, None)
-        strokes.append(Streams(f"stroke {number + 1}", time, np.zeros_like(time), time, position, *seen))
+        cycles.append(Streams(f"cycle {number + 1}", time, np.zeros_like(time), time, position, *seen))
         start = float(time[-1]) + protocol.rest_s
-    return strokes
+    return cycles
 
 
-def stroke(protocol: Protocol, speed: float, rate_Hz: float) -> tuple[Array, Array]:
-    """Time [s] and axis position [mm] of one stroke, corners rounded over 12 ms as a drive does."""
+def cycle(protocol: Protocol, speed: float, rate_Hz: float) -> tuple[Array, Array]:
+    """Time [s] and axis position [mm] of one cycle, corners rounded over 12 ms as a drive does."""
     top, touch = SURFACE_MM - protocol.clearance_mm, SURFACE_MM + 0.2
     back, deep = SURFACE_MM - protocol.run_up_mm, SURFACE_MM + protocol.depth_mm
     legs = [(top, protocol.air_dwell_s), (touch, (touch - top) / protocol.approach_speed_mm_s)]
@@ -169,7 +169,7 @@ def noiseless(problem: Indentation, limb: Mapping[str, float] = LIMB) -> Fit:
 
 
 def next_experiment(result: Diagnosis) -> dict[str, object] | None:
-    """The block of strokes that separates the first ambiguous set best, in nats a minute; else what is missing most.
+    """The block of cycles that separates the first ambiguous set best, in nats a minute; else what is missing most.
 
     Each block is taken alone, on the limb as fitted, with the named effect at the size found.
     """
@@ -186,8 +186,8 @@ def next_experiment(result: Diagnosis) -> dict[str, object] | None:
 
 def _rate(protocol: Protocol, found: Fit, pair: Sequence[str]) -> float:
     """Nats a minute by which a block tells the first of the pair, at its size, from the second."""
-    strokes = planned(protocol, tracker=True, rate_Hz=RATE_HZ)
-    problem = Indentation(observe(Session("block", tuple(strokes))))
+    cycles = planned(protocol, tracker=True, rate_Hz=RATE_HZ)
+    problem = Indentation(observe(Session("block", tuple(cycles))))
     base = {par.name: found.values[par.name] for par in problem.base if par.name in found.values}
     fit = noiseless(problem, {**base, "surface_mm": SURFACE_MM, "tip_zero_mm": 0.0})
     by_name = {effect.name: effect for effect in found.problem.effects}
@@ -199,7 +199,7 @@ def _rate(protocol: Protocol, found: Fit, pair: Sequence[str]) -> float:
     size = sum((found.values[par.name] - par.null) ** 2 for par in effect.amplitudes) / len(effect.amplitudes)
     rivals = groups.get(pair[1], [])
     left = min((_trace(t, groups[pair[0]][0], rival.columns) for rival in rivals), default=0.0)
-    minutes = float(strokes[-1].force_s[-1]) / 60
+    minutes = float(cycles[-1].force_s[-1]) / 60
     return 0.5 * size * left / minutes
 
 

@@ -171,7 +171,7 @@ def best_fit(problem: Problem, effects: Sequence[Effect], start: Values, whitene
     return max((t for t in tried if t is not None), key=level_of, default=None)
 
 
-def bold_fit(
+def low_noise_refit(
     problem: Problem, effects: Sequence[Effect], start: Values, whitener: Whitener, floor: float = -np.inf
 ) -> Fit | None:
     """A fit from noise too small to hide an effect in."""

@@ -128,7 +128,7 @@ class Indentation:
             "time in recording": drive.in_recording_s,
             "time since reversal": drive.since_reversal_s,
             "session time": drive.time_s,
-            "stroke number": drive.stroke,
+            "cycle number": drive.cycle,
             "speed": drive.speed_mm_s,
         }
         return given if drive.temperature_C is None else {**given, "temperature": drive.temperature_C}
@@ -136,7 +136,7 @@ class Indentation:
 
 UNITS = {
     "depth": "mm", "velocity": "mm/s", "acceleration": "mm/s2", "time in recording": "s", "time since reversal": "s",
-    "session time": "s", "stroke number": "1", "speed": "mm/s", "temperature": "degC", "force": "N",
+    "session time": "s", "cycle number": "1", "speed": "mm/s", "temperature": "degC", "force": "N",
 }  # fmt: skip
 
 
@@ -161,17 +161,17 @@ def missing(data: Observations) -> dict[str, str]:
             "um): record on a computer with less to do, and with real-time priority"
         )
     if drive.recordings < 4:
-        reasons["strokes"] = f"{drive.recordings} recordings are too few strokes; at least 4"
+        reasons["strokes"] = f"{drive.recordings} recordings are too few cycles; at least 4"
     if way_out(drive) < FEWEST_WAY_OUT:
         reasons["unloading"] = "the recordings do not show the way out; record the retraction too"
     loading = drive.speed_mm_s[drive.starts[:-1]]
     if loading.max() < 1.5 * max(float(loading.min()), 1e-9):
-        reasons["speeds"] = "all strokes have about one speed; use at least three, from slow to fast"
+        reasons["speeds"] = "all cycles have about one speed; use at least three, from slow to fast"
     return reasons
 
 
 def way_out(drive: Drive) -> float:
-    """How far the tip comes back from its deepest place, as a share of the stroke: the median recording's."""
+    """How far the tip comes back from its deepest place, as a share of the cycle: the median recording's."""
     shares = []
     for i, j in pairwise(drive.starts):
         place = drive.position_mm[i:j]

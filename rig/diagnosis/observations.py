@@ -283,7 +283,7 @@ def _joined(parts: Sequence[_Gridded]) -> tuple[Drive, Array, Array]:
         position_mm=position,
         velocity_mm_s=velocity,
         acceleration_mm_s2=acceleration,
-        stroke=recording.astype(float),
+        cycle=recording.astype(float),
         temperature_C=np.concatenate(temperatures) if len(temperatures) == len(parts) else None,
         tip_at=tip_at,
         tip_recording=tip_recording,

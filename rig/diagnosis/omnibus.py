@@ -27,7 +27,7 @@ WORTH_SHARE = 0.004
 MOST_UNNAMED = 0.1
 AMPLE_SHARE = 0.15
 RIDGE = 0.05
-BETWEEN = ("session time", "stroke number", "speed", "temperature")
+BETWEEN = ("session time", "cycle number", "speed", "temperature")
 FEWEST_BETWEEN = 8
 BETWEEN_DRAWS = 999
 BEATEN_NATS = 3.0
@@ -53,7 +53,7 @@ class Leftover:
 def bumps(variable: Array) -> Array:
     """Gaussian bumps between the outer permilles, beyond which they stay; (n, 6), none where nothing varies.
 
-    A fast stroke is over soon: a hundredth of the samples may hold all of the highest speed.
+    A fast cycle is over soon: a hundredth of the samples may hold all of the highest speed.
     """
     low, high = np.percentile(variable, [0.1, 99.9])
     if not high > low:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.diagnosis.answers import Diagnosis, answer, intervals, limits, summary, verdict_of
+from rig.diagnosis.cycles import in_cycles
 from rig.diagnosis.design import next_experiment
 from rig.diagnosis.fit import first_fit, refreshed
 from rig.diagnosis.gates import Finding
@@ -14,7 +15,6 @@ from rig.diagnosis.observations import Observations, Session, observe, rise_N
 from rig.diagnosis.omnibus import leftover
 from rig.diagnosis.problem import Problem
 from rig.diagnosis.search import Progress, search
-from rig.diagnosis.strokes import in_strokes
 from rig.errors import DataError
 
 FEWEST_RECORDINGS = 4
@@ -83,7 +83,7 @@ class Fault(NamedTuple):
     remedy: str
 
 
-RECORD = "record at least 6 strokes at three or more speeds, for example with examples/diagnosis.toml"
+RECORD = "record at least 6 cycles at three or more speeds, for example with examples/diagnosis.toml"
 
 
 SLOWEST_HZ, LONGEST_MM = 2.0, 300.0
@@ -133,7 +133,7 @@ def unusable(data: Observations) -> Fault | None:
     if data.drive.recordings < FEWEST_RECORDINGS:
         count = data.drive.recordings
         return Fault(
-            f"{count} recording{'s' * (count > 1)} of one stroke: a cause is judged on strokes left out, which takes "
+            f"{count} recording{'s' * (count > 1)} of one cycle: a cause is judged on cycles left out, which takes "
             f"at least {FEWEST_RECORDINGS}",
             RECORD,
         )
@@ -154,7 +154,7 @@ def cannot(simulation: Simulation, name: str, recordings: int, fault: Fault, qua
 def diagnose_session(session: Session, simulation: Simulation = "index", progress: Progress = silent) -> Diagnosis:
     """A session as it was read; one without a usable recording gets an answer too."""
     try:
-        data = observe(in_strokes(session) if len(session.recordings) < FEWEST_RECORDINGS else session)
+        data = observe(in_cycles(session) if len(session.recordings) < FEWEST_RECORDINGS else session)
     except DataError as error:
         reason = str(error).removeprefix(f"{session.name}: ").removesuffix("; run `rig verify` on it")
         return cannot(simulation, session.name, 0, Fault(reason, f"mend these files, or {RECORD}"), session.findings)

@@ -18,7 +18,7 @@ from rig.diagnosis.evidence import (
     linear_gains,
     tangents,
 )
-from rig.diagnosis.fit import Fit, attempt, best_fit, bold_fit, bold_view, fit, glance, least_squares, refreshed
+from rig.diagnosis.fit import Fit, attempt, best_fit, bold_view, fit, glance, least_squares, low_noise_refit, refreshed
 from rig.diagnosis.noise import Array
 from rig.diagnosis.omnibus import LEVEL, leftover
 from rig.diagnosis.problem import Effect, Problem, Values
@@ -134,8 +134,8 @@ def candidates(current: Fit, t: Tangents) -> list[Fit]:
     fits = [attempt(problem, effects, start, current.whitener) for effects, start in starts]
     loud = top > STANDS_OUT_NATS or leftover(current, np.random.default_rng(0)).p_value <= LEVEL
     hidden = [(effects, start) for effects, start in starts if not loud or effects[-1].mean_of]
-    fits += [bold_fit(problem, effects, start, current.whitener) for effects, start in hidden]
-    fits += second_look(current, t, ranked) if loud else []
+    fits += [low_noise_refit(problem, effects, start, current.whitener) for effects, start in hidden]
+    fits += rescreen(current, t, ranked) if loud else []
     living = [c for c in fits if c is not None and alive(c.effects[-1], c.values)]
     gains = [ahead(c, current) for c in living]
     best = max(gains, default=0.0)
@@ -147,7 +147,7 @@ def candidates(current: Fit, t: Tangents) -> list[Fit]:
     return sorted(polished, key=lambda candidate: -float(score(candidate).sum()))
 
 
-def second_look(current: Fit, t: Tangents, ranked: Sequence[tuple[float, Direction]]) -> list[Fit | None]:
+def rescreen(current: Fit, t: Tangents, ranked: Sequence[tuple[float, Direction]]) -> list[Fit | None]:
     """Fits from noise too small to have swallowed an effect: of the best, every peak of a scan, second beginnings.
 
     All are brought to their best under the same noise first; those that explain most there are fitted to the end.
@@ -166,7 +166,7 @@ def second_look(current: Fit, t: Tangents, ranked: Sequence[tuple[float, Directi
     ends = [(effect, glance(problem, (*current.effects, effect), start, bold.whitener)) for effect, start in starts]
     furthest = sorted(((effect, *end) for effect, end in ends if end is not None), key=lambda end: -end[2])
     return [
-        bold_fit(problem, (*current.effects, effect), values, current.whitener)
+        low_noise_refit(problem, (*current.effects, effect), values, current.whitener)
         for effect, values, _ in furthest[:FOLLOWED]
     ]
 

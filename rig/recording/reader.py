@@ -36,7 +36,7 @@ class Recording:
 
     @property
     def tracks_force(self) -> bool:
-        """Whether a force was tracked in it, rather than a stroke made."""
+        """Whether a force was tracked in it, rather than a cycle made."""
         return self.metadata.get("trial", {}).get("kind") == TRACKING
 
 

@@ -66,8 +66,8 @@ class Sensing(NamedTuple):
     filter_s: float = 0.0005
     noise_N: float = 0.005
     quantum_N: float = 0.001
-    delay_ticks: int = 1
-    every_ticks: int = 1
+    delay_cycles: int = 1
+    every_cycles: int = 1
 
 
 class AxisState(NamedTuple):

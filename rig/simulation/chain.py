@@ -182,7 +182,7 @@ def tissue(drive: Drive, tip: Tip, v: Fields) -> Array:
     inside, touching = contact(depth, velocity * drive.period_s)
     force = elastic(inside, v)
     if v["preconditioning_1"]:
-        force = force * (1 + v["preconditioning_1"] * np.exp(-drive.stroke / v["preconditioning_strokes_1"]))
+        force = force * (1 + v["preconditioning_1"] * np.exp(-drive.cycle / v["preconditioning_strokes_1"]))
     if v["temperature_1_K"] and drive.temperature_C is not None:
         force = force * (1 + v["temperature_1_K"] * (drive.temperature_C - drive.temperature_C.mean()))
     if one(v, "relaxation_1"):

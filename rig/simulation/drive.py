@@ -26,7 +26,7 @@ class Drive:
     position_mm: Array
     velocity_mm_s: Array
     acceleration_mm_s2: Array
-    stroke: Array  # number of the indentation in the session, from 0
+    cycle: Array  # number of the indentation in the session, from 0
     temperature_C: Array | None
     tip_at: Array
     tip_recording: Index

@@ -18,8 +18,8 @@ from rig.tissue.model import Model, Provenance, Quality, ValidRange
 from rig.tissue.rates import RateTest, rate_of
 from rig.tissue.registry import COMPARED
 from rig.trials.curves import Curve, loading_curve
+from rig.trials.cycles import cycle_of
 from rig.trials.quality import refusal
-from rig.trials.strokes import stroke_of
 
 Laws = Sequence[type[Law]]
 Known = Mapping[str, float]
@@ -122,7 +122,7 @@ def curves_of(session: Session) -> tuple[list[Curve], list[Skipped]]:
             if why:
                 skipped.append(Skipped(trial.name, why))
             elif not recording.tracks_force:
-                curve = loading_curve(stroke_of(trial.name, recording))
+                curve = loading_curve(cycle_of(trial.name, recording))
                 curves.append(replace(curve, subject=str(session.info.subject.get("id", ""))))
         except DataError as error:
             skipped.append(Skipped(trial.name, str(error)))

@@ -81,7 +81,7 @@ def _stiffening(depth_mm: FloatArray) -> FloatArray:
     return np.column_stack([depth_mm, depth_mm * np.exp(0.5 * depth_mm)])
 
 
-# A whole stroke says itself how its force grows.
+# A whole cycle says itself how its force grows.
 ANY_SHAPE = (Family(_powers, 0.0),)
 # A touch of a few tenths of a newton does not: limbs stiffen as the study's index law (b of 0.1 to 0.4 per mm).
 LIMB_SHAPE = (Family(_stiffening, 0.0), Family(_powers, POWERS_PENALTY))
@@ -179,7 +179,7 @@ def find_contact(
 ) -> Contact:
     """The contact within ``search_mm``.
 
-    ``position_mm`` and ``force_N``, shape (n,), are a stroke that begins in the air and ends shallow; force is zero in
+    ``position_mm`` and ``force_N``, shape (n,), are a cycle that begins in the air and ends shallow; force is zero in
     the air with standard deviation ``noise_N``.
     """
     search = ContactSearch(Loading(position_mm, force_N, np.ones(len(force_N))), search_mm, noise_N)

@@ -1,4 +1,4 @@
-"""From a stroke to a loading curve: force zeroed in the air, depth from contact, only while the tip moves steadily."""
+"""From a cycle to a loading curve: force zeroed in the air, depth from contact, only while the tip moves steadily."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rig.errors import DataError
 from rig.trials.contact import Contact, FloatArray, find_contact
-from rig.trials.strokes import Stroke
+from rig.trials.cycles import IndentationCycle
 
 LEAST_SAMPLES = 3
 LEAST_AIR_SAMPLES = 3
@@ -68,79 +68,79 @@ class Curve:
         return self.contact.lower_mm - found, self.contact.upper_mm - found
 
 
-def loading_curve(stroke: Stroke) -> Curve:
-    """The loading curve of a stroke that begins in the air, touches, and goes deeper at steady speed.
+def loading_curve(cycle: IndentationCycle) -> Curve:
+    """The loading curve of a cycle that begins in the air, touches, and goes deeper at steady speed.
 
     The last rise of force from the air to its peak counts, so an earlier touch (the search for contact) does not.
     Raises DataError where there is no contact, no air before it, or no steady loading after it.
     """
-    if len(stroke.force_N) < LEAST_SAMPLES:
-        raise DataError(f"{stroke.name}: {len(stroke.force_N)} samples; a curve needs at least {LEAST_SAMPLES}")
-    stroke, rise = _run_in(stroke, _rise(stroke))
-    zeroed, contact, noise_N = _zeroed(stroke, rise)
+    if len(cycle.force_N) < LEAST_SAMPLES:
+        raise DataError(f"{cycle.name}: {len(cycle.force_N)} samples; a curve needs at least {LEAST_SAMPLES}")
+    cycle, rise = _run_in(cycle, _rise(cycle))
+    zeroed, contact, noise_N = _zeroed(cycle, rise)
     wanted_mm_s = _wanted_speed(zeroed, rise)
     kept = _rising(zeroed, _steady(zeroed, rise, wanted_mm_s), noise_N)
     if kept[0] == rise.touch:
         air = np.arange(_descent(zeroed, rise.touch, contact.position_mm - AIR_KEPT_MM), rise.touch)
         kept = np.concatenate([air, kept])
     return Curve(
-        name=stroke.name,
-        speed_mm_s=stroke.speed_mm_s if np.isfinite(stroke.speed_mm_s) else float(f"{wanted_mm_s:.2g}"),
+        name=cycle.name,
+        speed_mm_s=cycle.speed_mm_s if np.isfinite(cycle.speed_mm_s) else float(f"{wanted_mm_s:.2g}"),
         depth_mm=zeroed.position_mm[kept] - contact.position_mm,
         force_N=zeroed.force_N[kept],
         rate_mm_s=_rate(zeroed.time_s[kept], zeroed.position_mm[kept], wanted_mm_s),
         contact=contact,
-        zero_N=float(stroke.force_N[0] - zeroed.force_N[0]),
+        zero_N=float(cycle.force_N[0] - zeroed.force_N[0]),
         noise_N=noise_N,
         time_s=zeroed.time_s[kept],
     )
 
 
 class _Rise(NamedTuple):
-    """Samples of the stroke at which force leaves the air for good and at which it peaks."""
+    """Samples of the cycle at which force leaves the air for good and at which it peaks."""
 
     touch: int
     peak: int
 
 
-def _rise(stroke: Stroke) -> _Rise:
+def _rise(cycle: IndentationCycle) -> _Rise:
     """The last rise from the air to the peak of force; the air is where the tip was highest before the peak."""
-    force_N = _despiked(stroke.force_N)
+    force_N = _despiked(cycle.force_N)
     peak = int(np.argmax(force_N))
-    before_mm, before_N = stroke.position_mm[: peak + 1], force_N[: peak + 1]
+    before_mm, before_N = cycle.position_mm[: peak + 1], force_N[: peak + 1]
     travel_mm = float(np.ptp(before_mm))
     high_N = before_N[before_mm <= before_mm.min() + HIGHEST_SHARE * travel_mm]
     zero_N, spread_N = _middle(high_N)
     height_N = float(force_N[peak]) - zero_N
     if height_N < max(10 * spread_N, LEAST_FORCE_N):
-        raise DataError(_no_contact(stroke, height_N, spread_N, zero_N - float(force_N.min())))
+        raise DataError(_no_contact(cycle, height_N, spread_N, zero_N - float(force_N.min())))
     air = np.flatnonzero(before_N < zero_N + max(6 * spread_N, ONSET_SHARE * height_N))
     if not len(air) or air[-1] + 1 < LEAST_AIR_SAMPLES:
         raise DataError(
-            f"{stroke.name}: no air part: force rises from the first sample, so it has no zero; start higher"
+            f"{cycle.name}: no air part: force rises from the first sample, so it has no zero; start higher"
         )
     return _Rise(int(air[-1]) + 1, peak)
 
 
-def _run_in(stroke: Stroke, rise: _Rise) -> tuple[Stroke, _Rise]:
-    """The stroke from where the tip runs in, if the guide rubs: force in the air then steps with motion, and stays.
+def _run_in(cycle: IndentationCycle, rise: _Rise) -> tuple[IndentationCycle, _Rise]:
+    """The cycle from where the tip runs in, if the guide rubs: force in the air then steps with motion, and stays.
 
     At rest or on the way up the guide rubs otherwise than on the way down, so the zero of loading is the run-in's own.
     """
-    turn = _descent(stroke, rise.touch, -np.inf)
-    way_mm = stroke.position_mm[turn : rise.peak + 1] - stroke.position_mm[turn]
+    turn = _descent(cycle, rise.touch, -np.inf)
+    way_mm = cycle.position_mm[turn : rise.peak + 1] - cycle.position_mm[turn]
     start, stop = np.searchsorted(np.maximum.accumulate(way_mm), (AIR_MARGIN_MM, HIGHEST_SHARE * way_mm[-1]))
-    moving_N = stroke.force_N[turn + start : turn + stop]
+    moving_N = cycle.force_N[turn + start : turn + stop]
     if min(len(moving_N), turn) < RUBBING_SAMPLES:
-        return stroke, rise
+        return cycle, rise
     level_N, spread_N = _middle(moving_N)
-    step_N = level_N - _middle(stroke.force_N[turn - RUBBING_SAMPLES : turn])[0]
+    step_N = level_N - _middle(cycle.force_N[turn - RUBBING_SAMPLES : turn])[0]
     early_N, late_N = (float(np.median(half)) for half in np.array_split(moving_N, 2))
     if abs(step_N) < RUBBING_SPREADS * spread_N or abs(late_N - early_N) > RUBBING_FLAT * abs(step_N):
-        return stroke, rise
+        return cycle, rise
     first = turn + int(start)
-    arrays = {name: getattr(stroke, name)[first:] for name in ("time_s", "force_N", "position_mm")}
-    shorter = replace(stroke, **arrays)
+    arrays = {name: getattr(cycle, name)[first:] for name in ("time_s", "force_N", "position_mm")}
+    shorter = replace(cycle, **arrays)
     return shorter, _rise(shorter)
 
 
@@ -150,35 +150,35 @@ def _despiked(values: FloatArray) -> FloatArray:
     return np.concatenate([values[:1], middle, values[-1:]])
 
 
-def _no_contact(stroke: Stroke, height_N: float, spread_N: float, fall_N: float) -> str:
+def _no_contact(cycle: IndentationCycle, height_N: float, spread_N: float, fall_N: float) -> str:
     if fall_N > max(10 * spread_N, LEAST_FORCE_N, height_N):
         return (
-            f"{stroke.name}: force falls by {fall_N:.2g} N where the tip goes in: the sign of compression is wrong; "
+            f"{cycle.name}: force falls by {fall_N:.2g} N where the tip goes in: the sign of compression is wrong; "
             "correct force.compression in rig.toml, or force_positive in session.toml"
         )
     return (
-        f"{stroke.name}: no contact: force rises by {max(height_N, 0):.2g} N at most "
+        f"{cycle.name}: no contact: force rises by {max(height_N, 0):.2g} N at most "
         f"(at least {max(10 * spread_N, LEAST_FORCE_N):.2g} N is needed to tell it from noise); go deeper"
     )
 
 
-def _zeroed(stroke: Stroke, rise: _Rise) -> tuple[Stroke, Contact, float]:
-    """The stroke less its zero, its contact, and the noise in the air; twice, since what is air depends on contact."""
-    _, contact, _ = _zeroed_above(stroke, rise, float(stroke.position_mm[rise.touch]))
-    return _zeroed_above(stroke, rise, contact.lower_mm)
+def _zeroed(cycle: IndentationCycle, rise: _Rise) -> tuple[IndentationCycle, Contact, float]:
+    """The cycle less its zero, its contact, and the noise in the air; twice, since what is air depends on contact."""
+    _, contact, _ = _zeroed_above(cycle, rise, float(cycle.position_mm[rise.touch]))
+    return _zeroed_above(cycle, rise, contact.lower_mm)
 
 
-def _zeroed_above(stroke: Stroke, rise: _Rise, surface_mm: float) -> tuple[Stroke, Contact, float]:
+def _zeroed_above(cycle: IndentationCycle, rise: _Rise, surface_mm: float) -> tuple[IndentationCycle, Contact, float]:
     """As ``_zeroed``: zero is the mean of what comes before the rise, clear of the surface, without wrong samples."""
-    air_N = stroke.force_N[: rise.touch][stroke.position_mm[: rise.touch] < surface_mm - AIR_MARGIN_MM]
+    air_N = cycle.force_N[: rise.touch][cycle.position_mm[: rise.touch] < surface_mm - AIR_MARGIN_MM]
     if len(air_N) < LEAST_AIR_SAMPLES:
         raise DataError(
-            f"{stroke.name}: no air part: {len(air_N)} samples are clearly above the surface "
+            f"{cycle.name}: no air part: {len(air_N)} samples are clearly above the surface "
             f"(at least {LEAST_AIR_SAMPLES} give a zero); start higher or rest before touching"
         )
     middle_N, spread_N = _middle(air_N)
     usual_N = air_N[np.abs(air_N - middle_N) <= OUTLIER_SPREADS * spread_N] if spread_N else air_N
-    zeroed, noise_N = replace(stroke, force_N=stroke.force_N - float(np.mean(usual_N))), float(np.std(usual_N))
+    zeroed, noise_N = replace(cycle, force_N=cycle.force_N - float(np.mean(usual_N))), float(np.std(usual_N))
     return zeroed, _contact(zeroed, rise, noise_N), noise_N
 
 
@@ -188,12 +188,12 @@ def _middle(values: FloatArray) -> tuple[float, float]:
     return middle, 1.4826 * float(np.median(np.abs(values - middle)))
 
 
-def _contact(stroke: Stroke, rise: _Rise, noise_N: float) -> Contact:
+def _contact(cycle: IndentationCycle, rise: _Rise, noise_N: float) -> Contact:
     """Contact searched from well above the first clear rise of force to the first sample in it."""
-    position_mm, force_N = stroke.position_mm, stroke.force_N
+    position_mm, force_N = cycle.position_mm, cycle.force_N
     touch_mm, peak_mm = float(position_mm[rise.touch]), float(position_mm[rise.peak])
     above_mm = max(SEARCH_SHARE * (peak_mm - touch_mm), LEAST_SEARCH_MM)
-    start = _descent(stroke, rise.touch, touch_mm - above_mm)
+    start = _descent(cycle, rise.touch, touch_mm - above_mm)
     deep = np.flatnonzero(force_N[rise.touch : rise.peak] > SHALLOW_SHARE * force_N[rise.peak])
     stop = rise.touch + max(int(deep[0]) if len(deep) else 0, LEAST_SAMPLES)
     stop = min(stop, rise.peak + 1)
@@ -202,27 +202,27 @@ def _contact(stroke: Stroke, rise: _Rise, noise_N: float) -> Contact:
     return find_contact(position_mm[start:stop], force_N[start:stop], search_mm, least_N)
 
 
-def _descent(stroke: Stroke, touch: int, from_mm: float) -> int:
+def _descent(cycle: IndentationCycle, touch: int, from_mm: float) -> int:
     """Where the way down to ``touch`` passes ``from_mm``, or where it begins if that is deeper."""
-    back_mm = stroke.position_mm[touch::-1]
+    back_mm = cycle.position_mm[touch::-1]
     turned = np.flatnonzero(back_mm > np.minimum.accumulate(back_mm) + TURN_MM)
     way_mm = back_mm[: turned[0]] if len(turned) else back_mm
     passed = np.flatnonzero(way_mm <= from_mm)
     return touch - int(passed[0] if len(passed) else np.argmin(way_mm))
 
 
-def _wanted_speed(stroke: Stroke, rise: _Rise) -> float:
+def _wanted_speed(cycle: IndentationCycle, rise: _Rise) -> float:
     """The speed asked for; where nobody said, the middle one by travel, so that holds do not count."""
     loading = slice(rise.touch, rise.peak + 1)
-    reached_mm = np.maximum.accumulate(stroke.position_mm[loading])
+    reached_mm = np.maximum.accumulate(cycle.position_mm[loading])
     if reached_mm[-1] - reached_mm[0] < LEAST_TRAVEL_MM:
         raise DataError(
-            f"{stroke.name}: no loading: force rises while the tip does not go deeper; check axis and clocks"
+            f"{cycle.name}: no loading: force rises while the tip does not go deeper; check axis and clocks"
         )
-    if np.isfinite(stroke.speed_mm_s):
-        return stroke.speed_mm_s
+    if np.isfinite(cycle.speed_mm_s):
+        return cycle.speed_mm_s
     marks_mm = np.linspace(reached_mm[0], reached_mm[-1], 41)
-    times_s = np.interp(marks_mm, *_increasing(reached_mm, stroke.time_s[loading]))
+    times_s = np.interp(marks_mm, *_increasing(reached_mm, cycle.time_s[loading]))
     return float(np.diff(marks_mm)[0] / np.median(np.diff(times_s)))
 
 
@@ -257,19 +257,19 @@ def _window_sums(values: FloatArray, first: NDArray[np.intp], last: NDArray[np.i
     return np.asarray(total[last] - total[first])
 
 
-def _steady(stroke: Stroke, rise: _Rise, wanted_mm_s: float) -> NDArray[np.intp]:
+def _steady(cycle: IndentationCycle, rise: _Rise, wanted_mm_s: float) -> NDArray[np.intp]:
     """Samples between contact and peak that move at the wanted speed, up to where the tip stops.
 
     Samples of another speed are left out; what follows them counts while the tip has gone on meanwhile (a stumble of
     the clock), and no longer where it has not (a hold).
     """
     span = slice(rise.touch, rise.peak + 1)
-    time_s, position_mm = stroke.time_s[span], stroke.position_mm[span]
-    rate_mm_s = _rate(stroke.time_s, stroke.position_mm, wanted_mm_s)[span]
+    time_s, position_mm = cycle.time_s[span], cycle.position_mm[span]
+    rate_mm_s = _rate(cycle.time_s, cycle.position_mm, wanted_mm_s)[span]
     steady = np.flatnonzero(np.abs(rate_mm_s - wanted_mm_s) <= STEADY_SHARE * wanted_mm_s)
     if not len(steady):
         raise DataError(
-            f"{stroke.name}: no loading at {wanted_mm_s:.3g} mm/s: between contact and peak the tip moved at "
+            f"{cycle.name}: no loading at {wanted_mm_s:.3g} mm/s: between contact and peak the tip moved at "
             f"{rate_mm_s.min():.3g} to {rate_mm_s.max():.3g} mm/s; correct the trial's speed_mm_s"
         )
     went_on = np.diff(position_mm[steady]) >= ON_SHARE * wanted_mm_s * np.diff(time_s[steady])
@@ -279,17 +279,17 @@ def _steady(stroke: Stroke, rise: _Rise, wanted_mm_s: float) -> NDArray[np.intp]
     return rise.touch + steady
 
 
-def _rising(stroke: Stroke, steady: NDArray[np.intp], noise_N: float) -> NDArray[np.intp]:
+def _rising(cycle: IndentationCycle, steady: NDArray[np.intp], noise_N: float) -> NDArray[np.intp]:
     """The samples up to where force has come as high as it does among them.
 
     Where the clock of force runs ahead of the axis', force stands still while the tip still seems to move.
     """
-    force_N = _despiked(stroke.force_N[steady]) if len(steady) >= LEAST_SAMPLES else stroke.force_N[steady]
+    force_N = _despiked(cycle.force_N[steady]) if len(steady) >= LEAST_SAMPLES else cycle.force_N[steady]
     top_N = float(force_N.max())
     top = int(np.argmax(force_N >= top_N - max(4 * noise_N, TOP_SHARE * top_N)))
     if top + 1 < LEAST_SAMPLES:
         raise DataError(
-            f"{stroke.name}: no loading: {top + 1} samples at steady speed with rising force "
+            f"{cycle.name}: no loading: {top + 1} samples at steady speed with rising force "
             f"(at least {LEAST_SAMPLES} are needed); record faster, go slower or deeper"
         )
     return steady[: top + 1]

@@ -19,7 +19,7 @@ from rig.recording.slope import tracker_slope
 from rig.trials import measures
 from rig.trials.contact import Contact
 from rig.trials.curves import Curve, loading_curve
-from rig.trials.strokes import stroke_of
+from rig.trials.cycles import cycle_of
 
 Verdict = Literal["good", "usable", "bad"]
 
@@ -87,7 +87,7 @@ def _answered(recording: Recording) -> bool:
 
 def _curve(recording: Recording) -> Curve | str:
     try:
-        return loading_curve(stroke_of(recording.path.stem, recording))
+        return loading_curve(cycle_of(recording.path.stem, recording))
     except DataError as error:
         return str(error)
 

@@ -13,7 +13,7 @@ from api.cli import hardware
 from api.cli.recovery import ask, converse
 from api.cli.remote import RemoteBench
 from controller.claims import Holder
-from controller.recovery import ALL, Act, Consent, Recovered
+from controller.recovery.situation import ALL, Act, Consent, Recovered
 from rig.errors import CheckFailed, DeviceError, UsageError
 
 HAPPENED = ("the drive is in fault: 0x8130",)

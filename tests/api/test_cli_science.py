@@ -17,8 +17,8 @@ from tests.rig.tissue.synthetic import Bench, index_force, write_made_session
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A session of two trials at two speeds."""
-    strokes = Bench(rate_Hz=500.0).strokes(trials=2, speeds_mm_s=(5.0, 20.0))
-    return write_made_session(tmp_path_factory.mktemp("made") / "session", strokes)
+    cycles = Bench(rate_Hz=500.0).cycles(trials=2, speeds_mm_s=(5.0, 20.0))
+    return write_made_session(tmp_path_factory.mktemp("made") / "session", cycles)
 
 
 def run(*arguments: str | Path) -> str:
@@ -123,8 +123,8 @@ def test_fit_refuses_what_it_cannot_do_in_one_sentence(
 
 def test_fit_of_several_subjects_needs_a_place_and_leaves_each_out(session: Path, tmp_path: Path) -> None:
     other = tmp_path / "other"
-    strokes = Bench(rate_Hz=500.0, force=index_force(a_N_mm=0.2)).strokes(trials=1, speeds_mm_s=(5.0, 20.0))
-    write_made_session(other, strokes, subject={"id": "8"})
+    cycles = Bench(rate_Hz=500.0, force=index_force(a_N_mm=0.2)).cycles(trials=1, speeds_mm_s=(5.0, 20.0))
+    write_made_session(other, cycles, subject={"id": "8"})
     with pytest.raises(UsageError, match=r"2 sessions have no one place for results: give a folder with --out"):
         run("fit", session, other)
     output = run("fit", session, other, "--out", tmp_path / "both", "--json", tmp_path / "fit.json")

@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 from api.http.app import build
 from api.http.service import Service
 from controller.operation import Operation
-from controller.recovery import Consent, Recovered
+from controller.recovery.situation import Consent, Recovered
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError
 

@@ -129,7 +129,7 @@ def test_one_bad_file_hides_no_other(tmp_path: Path) -> None:
 
 
 def test_the_quality_of_a_recording_stands_in_the_list(tmp_path: Path) -> None:
-    folder = write_made_session(tmp_path / "sessions" / "made", Bench().strokes(trials=1, speeds_mm_s=(10.0,)))
+    folder = write_made_session(tmp_path / "sessions" / "made", Bench().cycles(trials=1, speeds_mm_s=(10.0,)))
     info = open_session(folder).info
     reason = "force: a gap of 58 ms (good up to 20 ms)"
     write_session(folder, replace(info, trials=(replace(info.trials[0], quality="usable", reasons=(reason,)),)))

@@ -13,7 +13,7 @@ from benchmarks.faults.plants import chosen, plants
 from benchmarks.faults.results import interval
 from benchmarks.faults.scenarios import INDENTATION, SCENARIOS, Ended, beyond_good
 from benchmarks.faults.trial import wiring_for
-from controller.safety import TABLE
+from controller.safety.table import TABLE
 from rig.errors import UsageError
 
 MS = 1_000_000

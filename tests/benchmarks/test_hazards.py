@@ -8,7 +8,7 @@ import pytest
 from benchmarks.faults.document import BESIDES, PAGE, RESULTS, ROOT, page
 from benchmarks.faults.hazards import HAZARDS, TESTS
 from benchmarks.faults.results import read
-from controller.safety import TABLE
+from controller.safety.table import TABLE
 
 CODES = [*(line.code for line in TABLE), *BESIDES]
 

@@ -14,11 +14,12 @@ from dataclasses import dataclass, field
 from functools import cache, partial
 from typing import Any, cast
 
-from controller.bench_loop import BenchLoop
-from controller.commands import Inbox
-from controller.devices import Devices
-from controller.loop import Slot
-from controller.messages import (
+from controller.devices.drivers import Devices
+from controller.devices.reopening import Openers
+from controller.loop.bench_loop import BenchLoop
+from controller.loop.commands import Inbox
+from controller.loop.executive import Cycle
+from controller.loop.messages import (
     Finished,
     Lease,
     Note,
@@ -31,9 +32,8 @@ from controller.messages import (
     Survey,
     Surveyed,
 )
-from controller.modes import Mode
-from controller.reopening import Openers
-from controller.steps import Approach, Compress, Hold, Program, Retract, Step, Zero
+from controller.loop.modes import Mode
+from controller.loop.steps import Approach, Compress, Hold, Program, Retract, Step, Zero
 from controller.stop.word import PAGE, Kind, Lane, Request, Requester, Responder, StopWord
 from controller.stop.word import Answer as StopAnswer
 from drivers.roles import Device
@@ -221,7 +221,7 @@ class FakeBench:
             opens=Openers(self._openers(), _at_once),
             held=held,
         )
-        self.slot = self.missed = 0
+        self.cycle_number = self.missed = 0
         self.execution_ns = execution_ns
         self.start_ns = self.clock.now_ns
         self.going = True
@@ -258,22 +258,22 @@ class FakeBench:
 
     def cycle(self, late_ns: int = 0) -> bool:
         """One cycle, woken ``late_ns`` after it was due; whole periods of lateness are missed cycles."""
-        due_ns = self.start_ns + self.slot * self.period_ns
+        due_ns = self.start_ns + self.cycle_number * self.period_ns
         wake_ns = due_ns + late_ns
         self.axis.advance(wake_ns)
         self.clock.now_ns = wake_ns
         self._renew()
         if self.stop_process_lives:
             StopWord.beat(self.page, wake_ns)
-        self.going = self.loop.tick(Slot(self.slot, due_ns, wake_ns, self.missed))
+        self.going = self.loop.run_cycle(Cycle(self.cycle_number, due_ns, wake_ns, self.missed))
         self.clock.now_ns = wake_ns + self.execution_ns
         self.true_peak_N = max(self.true_peak_N, self.force.true_N)
         skipped = late_ns // self.period_ns
-        self.slot, self.missed = self.slot + 1 + skipped, self.missed + skipped
+        self.cycle_number, self.missed = self.cycle_number + 1 + skipped, self.missed + skipped
         return self.going
 
     def _renew(self) -> None:
-        if self.keep_lease and not self.link.inbox and self.slot % 100 == 0:
+        if self.keep_lease and not self.link.inbox and self.cycle_number % 100 == 0:
             self.say("lease")
 
     def cycles(self, count: int) -> None:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
-from controller.steps import Approach, Zero
+from controller.loop.steps import Approach, Zero
 from rig.config.wiring import Wiring
 from tests.controller.spring import SURFACE_MM, SpringBench
 
@@ -69,6 +69,6 @@ def approached(limb: Limb, sensor: Sensor, seed: int, touches: int = 3, rubbing_
     bench.sense()
     bench.run(
         Zero(duration_s=0.5), Approach(speed_mm_s=5.0, contact_force_N=0.05, search_to_mm=40.0, touches=touches),
-        ticks=200_000,
+        cycles=200_000,
     )  # fmt: skip
     return bench

@@ -12,11 +12,11 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from controller.bench_loop import BenchLoop
-from controller.commands import Inbox
-from controller.devices import Devices
-from controller.safety import TABLE, Check
-from controller.steps import Approach, Compress, Retract, Step
+from controller.devices.drivers import Devices
+from controller.loop.bench_loop import BenchLoop
+from controller.loop.commands import Inbox
+from controller.loop.steps import Approach, Compress, Retract, Step
+from controller.safety.table import TABLE, Check
 from rig.channel import Channel
 from rig.channels import ForceSample
 from rig.config.wiring import Wiring

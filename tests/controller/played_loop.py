@@ -10,7 +10,7 @@ from pathlib import Path
 from socket import socket
 from typing import Any
 
-from controller.messages import (
+from controller.loop.messages import (
     TO_LOOP,
     Finished,
     Outcome,
@@ -20,7 +20,7 @@ from controller.messages import (
     Shutdown,
     StatusSaid,
 )
-from controller.steps import Program, Zero
+from controller.loop.steps import Program, Zero
 from controller.stop.word import Kind
 from rig.channel import Answer, Channel, Message, Received
 from rig.config.wiring import Wiring

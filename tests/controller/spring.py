@@ -4,14 +4,14 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from controller.force_watch import NO_WRENCH, ForceWatch
-from controller.machine import Machine
-from controller.modes import Mode
-from controller.motion import Setpoint
-from controller.safety import TABLE, Action, Check, Incident
-from controller.steps import Approach, Compress, Program, Retract, Step, Zero
-from controller.watch import Watch
-from controller.world import World
+from controller.loop.modes import Mode
+from controller.loop.setpoint import Setpoint
+from controller.loop.state import LoopState
+from controller.loop.state_machine import MotionStateMachine
+from controller.loop.steps import Approach, Compress, Program, Retract, Step, Zero
+from controller.safety.inputs import SafetyInputs
+from controller.safety.load import NO_WRENCH, LoadMonitor
+from controller.safety.table import TABLE, Action, Check, Incident
 from rig.config.wiring import Subject, Wiring
 
 SURFACE_MM = 20.0
@@ -33,7 +33,7 @@ class SpringBench:
     table: tuple[Check, ...] = TABLE
     stiffness_N_mm: float = STIFFNESS_N_MM
     position_mm: float = 15.0
-    watch: Watch = field(default_factory=Watch)
+    inputs: SafetyInputs = field(default_factory=SafetyInputs)
     ended: list[tuple[str, Incident | None]] = field(default_factory=list)
     modes: list[Mode] = field(default_factory=list)
     forces_N: list[float] = field(default_factory=list)
@@ -45,15 +45,15 @@ class SpringBench:
     count: int = -1
 
     def __post_init__(self) -> None:
-        self.world = World(position_mm=self.position_mm)
-        self.machine = Machine(
-            self.wiring, self.world, lambda outcome, cause: self.ended.append((outcome, cause)), self.table
+        self.state = LoopState(position_mm=self.position_mm)
+        self.machine = MotionStateMachine(
+            self.wiring, self.state, lambda outcome, cause: self.ended.append((outcome, cause)), self.table
         )
-        self.force_watch = ForceWatch(self.every * 1_000_000)
+        self.load_monitor = LoadMonitor(self.every * 1_000_000)
         self.sense()
 
     def tissue_N(self, moved_mm: float) -> float:
-        """What presses on the tip that has ``moved_mm`` since the tick before."""
+        """What presses on the tip that has ``moved_mm`` since the cycle before."""
         return self.stiffness_N_mm * max(0.0, self.position_mm - SURFACE_MM)
 
     def converted_N(self, force_N: float) -> float:
@@ -62,45 +62,45 @@ class SpringBench:
 
     def sense(self) -> None:
         """What the bench shows of where the axis stands now."""
-        force_N = self.tissue_N(self.position_mm - self.world.position_mm)
-        if self.position_mm > self.world.position_mm:
+        force_N = self.tissue_N(self.position_mm - self.state.position_mm)
+        if self.position_mm > self.state.position_mm:
             force_N += self.rubbing_N
-        self.world.position_mm = self.position_mm
-        self.force_watch.axis(self.world.now_ns, self.position_mm)
+        self.state.position_mm = self.position_mm
+        self.load_monitor.axis(self.state.now_ns, self.position_mm)
         self.count += 1
         if self.count % self.every == 0:
-            self.world.force_samples += 1
-            self.world.raw_N = self.converted_N(force_N + ZERO_N)
-            self.world.wrench = (0.0, 0.0, -self.world.raw_N, 0.0, 0.0, 0.0)
-            self.force_watch.force(self.world.now_ns, self.world.wrench)
-            self.world.paired.force(self.world.now_ns, self.world.raw_N)
-        self.world.paired.axis(self.world.now_ns, self.position_mm)
-        self.world.force_N = self.world.raw_N - self.world.zero_N
-        going = self.world.setpoint if self.machine.busy else Setpoint(self.position_mm, 0.0)
-        self.world.load = self.force_watch.load(
-            self.world.now_ns, self.world.reference_zero or NO_WRENCH, self.world.noise_N, going,
-            self.world.acceleration_mm_s2,
+            self.state.force_samples += 1
+            self.state.raw_N = self.converted_N(force_N + ZERO_N)
+            self.state.wrench = (0.0, 0.0, -self.state.raw_N, 0.0, 0.0, 0.0)
+            self.load_monitor.force(self.state.now_ns, self.state.wrench)
+            self.state.paired.force(self.state.now_ns, self.state.raw_N)
+        self.state.paired.axis(self.state.now_ns, self.position_mm)
+        self.state.force_N = self.state.raw_N - self.state.zero_N
+        going = self.state.setpoint if self.machine.busy else Setpoint(self.position_mm, 0.0)
+        self.state.load = self.load_monitor.load(
+            self.state.now_ns, self.state.reference_zero or NO_WRENCH, self.state.noise_N, going,
+            self.state.acceleration_mm_s2,
         )  # fmt: skip
 
-    def tick(self) -> Incident | None:
+    def run_cycle(self) -> Incident | None:
         """One turn of the machine; the axis is where it is told to be at once."""
         self.sense()
-        incident = self.machine.update(self.watch)
-        self.watch.requests = frozenset()
+        incident = self.machine.update(self.inputs)
+        self.inputs.requests = frozenset()
         if not (incident and incident.action is Action.IMMEDIATE) and self.machine.mode is not Mode.SAFE:
-            self.position_mm = self.world.setpoint.position_mm
-        self.world.now_ns += 1_000_000
+            self.position_mm = self.state.setpoint.position_mm
+        self.state.now_ns += 1_000_000
         self.modes.append(self.machine.mode)
-        self.forces_N.append(self.world.force_N)
+        self.forces_N.append(self.state.force_N)
         self.positions_mm.append(self.position_mm)
         return incident
 
-    def run(self, *steps: Step, until: Callable[[], bool] | None = None, ticks: int = 30_000) -> None:
+    def run(self, *steps: Step, until: Callable[[], bool] | None = None, cycles: int = 30_000) -> None:
         """Ticks until the program is over, or ``until``."""
         if steps:
             self.machine.start(Program(name="test", steps=steps))
-        for _ in range(ticks):
-            self.tick()
+        for _ in range(cycles):
+            self.run_cycle()
             if until() if until else not self.machine.busy:
                 return
-        raise AssertionError(f"still {self.machine.mode.name} after {ticks} ticks")
+        raise AssertionError(f"still {self.machine.mode.name} after {cycles} ticks")

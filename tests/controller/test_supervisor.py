@@ -10,7 +10,7 @@ from typing import cast
 import pytest
 
 from controller import supervisor as module
-from controller.messages import (
+from controller.loop.messages import (
     Failed,
     Lease,
     Note,
@@ -20,7 +20,7 @@ from controller.messages import (
     Shutdown,
     StatusSaid,
 )
-from controller.messages import Stopped as StoppedSaid
+from controller.loop.messages import Stopped as StoppedSaid
 from controller.stop.word import Kind
 from controller.supervisor import Supervisor, process_environment, stopped
 from rig.channel import Answer, Received
@@ -52,7 +52,7 @@ def test_a_bench_is_a_stop_process_a_loop_with_its_words_and_a_recorder(around: 
     with Supervisor(wiring) as bench:
         process, stops = around.process, around.stops[0]
         ring = Path(process.command[4])
-        assert process.command[:3] == [sys.executable, "-m", "controller.loop_process"]
+        assert process.command[:3] == [sys.executable, "-m", "controller.loop.process"]
         assert Wiring.model_validate_json(process.command[3]) == wiring
         # Behind it the locks on the bench's ports, so that they last as long as the loop.
         assert process.options["pass_fds"][0] == int(process.command[5])

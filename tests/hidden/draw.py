@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.diagnosis.observations import Session, Streams
-from tests.hidden.truth import Bench, Hidden, Stroke, draw_bench, run
+from tests.hidden.truth import Bench, Hidden, IndentationCycle, draw_bench, run
 
 Truth = Mapping[str, float]
 
@@ -68,21 +68,21 @@ KNOWN = (
 UNKNOWN: Mapping[str, tuple[str, ...]] = {
     "unknown_depth_bump": ("depth", "force"),
     "unknown_speed_gain": ("velocity", "speed", "force"),
-    "unknown_session_step": ("session time", "stroke number", "temperature"),
+    "unknown_session_step": ("session time", "cycle number", "temperature"),
 }
 
 
-def recorded(seed: int, secret: Secret, strokes: int | None = None) -> tuple[Bench, list[Stroke]]:
+def recorded(seed: int, secret: Secret, cycles: int | None = None) -> tuple[Bench, list[IndentationCycle]]:
     """A session with the secret in it."""
     rng = np.random.default_rng([seed, 77])
-    bench = draw_bench(rng, strokes)
+    bench = draw_bench(rng, cycles)
     return bench, run(bench, Hidden(secret.causes), rng)
 
 
-def session_of(bench: Bench, strokes: list[Stroke], stated: bool = False) -> Session:
+def session_of(bench: Bench, cycles: list[IndentationCycle], stated: bool = False) -> Session:
     """What the analysis is given: the devices' numbers and, where asked, the surface as somebody wrote it down."""
     streams = [
         Streams(f"trial_{k:02d}", s.time_s, s.force_n, s.axis_time_s, s.axis_mm, s.frame_time_s, s.marker_mm, s.kelvin)
-        for k, s in enumerate(strokes)
+        for k, s in enumerate(cycles)
     ]
     return Session("hidden", tuple(streams), bench.surface if stated else None)

@@ -1,6 +1,6 @@
 """The other program: a rig and a limb integrated in time, with a hidden cause in them. Knows nothing of the fitter.
 
-All strokes of a session are stepped together, each with its own motor loop (mass, position and velocity gains, feed
+All cycles of a session are stepped together, each with its own motor loop (mass, position and velocity gains, feed
 forward), at 4 kHz, semi-implicit; effects act where they do in a machine. Noise is white plus two relaxation processes
 plus mains hum, quantised. Every session draws its own protocol.
 """
@@ -23,7 +23,7 @@ class Bench:
     b: float
     viscosity: float
     surface: float
-    speeds: Array  # one a stroke
+    speeds: Array  # one a cycle
     depths: Array
     hold_s: Array
     dwell_s: float
@@ -39,8 +39,8 @@ class Bench:
 
 
 @dataclass(frozen=True)
-class Stroke:
-    """What the devices of one stroke wrote down, on the session's clock."""
+class IndentationCycle:
+    """What the devices of one cycle wrote down, on the session's clock."""
 
     time_s: Array
     force_n: Array
@@ -62,9 +62,9 @@ class Hidden:
         return self.causes.get(cause, {}).get(number, 0.0)
 
 
-def draw_bench(rng: np.random.Generator, strokes: int | None = None) -> Bench:
+def draw_bench(rng: np.random.Generator, cycles: int | None = None) -> Bench:
     """A protocol and a limb nobody chose."""
-    count = strokes or int(rng.integers(10, 15))
+    count = cycles or int(rng.integers(10, 15))
     choices = np.sort(rng.uniform(4, 30, size=5))
     choices[0], choices[-1] = rng.uniform(4, 6), rng.uniform(24, 30)
     speeds = np.resize(choices, count)
@@ -81,7 +81,7 @@ def draw_bench(rng: np.random.Generator, strokes: int | None = None) -> Bench:
 
 
 def trajectory(bench: Bench) -> Array:
-    """Set-points, shape (steps, strokes): dwell, in, hold, out, dwell; acceleration limited by a moving mean."""
+    """Set-points, shape (steps, cycles): dwell, in, hold, out, dwell; acceleration limited by a moving mean."""
     top, rows = bench.surface - bench.clearance, []
     for speed, depth, hold in zip(bench.speeds, bench.depths, bench.hold_s, strict=True):
         way = bench.clearance + depth
@@ -113,7 +113,7 @@ def elastic(bench: Bench, hidden: Hidden, depth: Array) -> Array:
     return force
 
 
-def run(bench: Bench, hidden: Hidden, rng: np.random.Generator) -> list[Stroke]:
+def run(bench: Bench, hidden: Hidden, rng: np.random.Generator) -> list[IndentationCycle]:
     """Integrates the whole session and writes down what the devices saw."""
     path = trajectory(bench)
     steps, count = path.shape
@@ -149,7 +149,7 @@ def run(bench: Bench, hidden: Hidden, rng: np.random.Generator) -> list[Stroke]:
 
 
 class _State:
-    """Motor, lost motion, memory and sensor of all strokes."""
+    """Motor, lost motion, memory and sensor of all cycles."""
 
     def __init__(self, place: Array, count: int) -> None:
         self.place, self.speed = place, np.zeros(count)
@@ -224,11 +224,11 @@ class _State:
 def _written(
     bench: Bench, hidden: Hidden, rng: np.random.Generator, begin: Array, axis: Array, tip: Array, force: Array,
     warm: Array,
-) -> list[Stroke]:  # fmt: skip
+) -> list[IndentationCycle]:  # fmt: skip
     pick = slice(int(rng.integers(0, bench.sample_every)), None, bench.sample_every)
     direction = rng.normal(size=3)
     direction /= np.linalg.norm(direction)
-    strokes = []
+    cycles = []
     for i, start in enumerate(begin):
         time = start + np.arange(len(axis)) * STEP_S
         stamps = time[pick]
@@ -241,8 +241,8 @@ def _written(
         along = np.interp(frames - delay, time, tip[:, i])
         marker = np.array([30.0, -50.0, -1400.0]) + along[:, None] * direction + rng.normal(0, 0.05, (len(frames), 3))
         encoder = np.round(axis[pick, i] * 2000) / 2000
-        strokes.append(Stroke(stamps + late, reading, stamps, encoder, frames, marker, 25 + warm[pick, i]))
-    return strokes
+        cycles.append(IndentationCycle(stamps + late, reading, stamps, encoder, frames, marker, 25 + warm[pick, i]))
+    return cycles
 
 
 def force_noise(rng: np.random.Generator, time: Array, level: float) -> Array:

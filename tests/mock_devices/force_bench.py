@@ -9,9 +9,9 @@ from multiprocessing.connection import Connection
 from typing import Generic, Literal, TypeVar
 
 from drivers.roles import ForceSensor
-from mock_devices.bota import BotaMock
-from mock_devices.robotiq import RobotiqMock
-from mock_devices.stage import NEVER_NS, Mock
+from mock_devices.bota.mock import BotaMock
+from mock_devices.interfaces import NEVER_NS, Mock
+from mock_devices.robotiq.mock import RobotiqMock
 from mock_devices.wire import PtyWire
 from rig.channels import ForceSample
 from tests.remote import MemoryWire

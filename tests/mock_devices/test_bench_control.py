@@ -14,7 +14,7 @@ import pytest
 
 import mock_devices
 from mock_devices.control import Asked, BenchControl, ControlPort, Desk
-from mock_devices.faults import WIRE_FAULTS, FaultyWire, faults_of
+from mock_devices.faults.wires import WIRE_FAULTS, FaultyWire, faults_of
 from mock_devices.parameters import Parameters, load_parameters
 from mock_devices.wire import PtyWire
 from rig.channel import Frame, Parser, encode

@@ -57,7 +57,7 @@ def test_a_killed_loop_in_contact_leaves_the_tip_stopped_within_two_heartbeats(
     bench: Stage, tracking: Running, tmp_path: Path
 ) -> None:
     pressed(bench, 1.5)
-    (loop,) = children(tracking.process.pid, "controller.loop_process")
+    (loop,) = children(tracking.process.pid, "controller.loop.process")
     os.kill(loop, signal.SIGKILL)
     after = positions(bench, 1.0)
     killed_s, (_, final_mm) = after[0][0], after[-1]

@@ -12,7 +12,7 @@ from rig.recording.reader import read_recording
 from rig.recording.sessions import open_session
 from tests.system.stage import EXAMPLES, Running, Said, Stage, children, freed, pressed, rig, until
 
-LOOP, RECORDER = "controller.loop_process", "rig.recording.recorder"
+LOOP, RECORDER = "controller.loop.process", "rig.recording.recorder"
 SURFACE_MM = 20.0
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from api.cli.stage import _arguments, bench_for, bench_process
-from controller.devices import Devices, start_devices
+from controller.devices.drivers import Devices, start_devices
 from rig.config.wiring import Axis, Force, Tracker, Wiring
 
 WAIT_S = 10.0

@@ -115,7 +115,7 @@ def test_a_stop_that_nobody_confirms_sends_to_the_hardware_stop(
 ) -> None:
     process, _ = service
     state(page, "idle")
-    (loop,) = children(process.pid, "controller.loop_process")
+    (loop,) = children(process.pid, "controller.loop.process")
     (stops,) = children(process.pid, "controller.stop.server")
     for pid in (process.pid, loop, stops):
         os.kill(pid, signal.SIGSTOP)
@@ -133,7 +133,7 @@ def test_a_killed_loop_is_recovered_from_the_page_with_a_consent_for_each_act(
     page.select_option("#protocol", "slow")
     page.click("text=Start capture")
     pressed(bench)
-    (loop,) = children(service[0].pid, "controller.loop_process")
+    (loop,) = children(service[0].pid, "controller.loop.process")
     os.kill(loop, signal.SIGKILL)
     state(page, "disconnected")
     page.click("#recover")

@@ -11,7 +11,7 @@ from rig.recording.ring import new_path
 from tests.controller.models import index_model
 from tests.system.stage import Running, Stage, children, pressed, rig
 
-MODULES = {"loop": "controller.loop_process", "recorder": "rig.recording.recorder", "stop": "controller.stop.server"}
+MODULES = {"loop": "controller.loop.process", "recorder": "rig.recording.recorder", "stop": "controller.stop.server"}
 
 
 def tracking(bench: Stage, tmp_path: Path) -> Running:

@@ -16,7 +16,7 @@ from rig.recording.sessions import SessionInfo, write_session
 from tests.controller.models import index_model
 from tests.system.stage import PATIENCE_S, Running, Stage, children, free_port, pressed, rig, stage, until
 
-LOOP = "controller.loop_process"
+LOOP = "controller.loop.process"
 
 
 @dataclass(frozen=True)

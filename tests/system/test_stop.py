@@ -76,7 +76,7 @@ class Served:
     @property
     def loop(self) -> int:
         """Process number of the loop."""
-        (pid,) = children(self.running.process.pid, "controller.loop_process")
+        (pid,) = children(self.running.process.pid, "controller.loop.process")
         return pid
 
     @property

@@ -157,7 +157,7 @@ ZERO_DRIFT = Effect(
     (Par("zero_drift_N_h", "N/h", 0.0, -500.0, 500.0, 0.3, worth=0.1, meaning="drift of the zero"),),
     between=True,
     needs=frozenset({"strokes"}),
-    repair="let the sensor warm up and take the zero in the air before every stroke",
+    repair="let the sensor warm up and take the zero in the air before every cycle",
 )
 GAIN_ERROR = Effect(
     "gain_error",

@@ -80,7 +80,7 @@ RATE_LAW = Effect(
 )
 PRECONDITIONING = Effect(
     "preconditioning",
-    "the first strokes differ by {preconditioning_1:.1%}, fading over {preconditioning_strokes_1:.2g} strokes",
+    "the first cycles differ by {preconditioning_1:.1%}, fading over {preconditioning_strokes_1:.2g} strokes",
     (
         Par(
             "preconditioning_1",
@@ -90,14 +90,14 @@ PRECONDITIONING = Effect(
             3.0,
             0.02,
             worth=0.005,
-            meaning="gain of the first stroke against the last",
+            meaning="gain of the first cycle against the last",
         ),
     ),
-    (Par("preconditioning_strokes_1", "1", 3.0, 0.3, 30.0, 1.0, log=True, meaning="strokes to fade by 1/e"),),
+    (Par("preconditioning_strokes_1", "1", 3.0, 0.3, 30.0, 1.0, log=True, meaning="cycles to fade by 1/e"),),
     lambda *_: [{"preconditioning_strokes_1": n} for n in (1.0, 3.0, 8.0)],
     between=True,
     needs=frozenset({"strokes"}),
-    repair="precondition with several strokes before recording, or leave the first ones out",
+    repair="precondition with several cycles before recording, or leave the first ones out",
 )
 ADHESION = Effect(
     "adhesion",

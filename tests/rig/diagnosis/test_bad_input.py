@@ -8,11 +8,11 @@ import pytest
 
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.csv_table import read_table
+from rig.diagnosis.cycles import cut
 from rig.diagnosis.indentation import library
 from rig.diagnosis.observations import Session, Streams, beside_gaps
 from rig.diagnosis.run import diagnose_session
 from rig.diagnosis.sources import in_time, read_source
-from rig.diagnosis.strokes import cut
 from rig.errors import DataError
 from rig.recording.sessions import open_session, write_session
 from tests.data import recording
@@ -22,8 +22,8 @@ from tests.rig.tissue.synthetic import Bench, write_made_session
 
 @pytest.fixture(scope="module")
 def clean() -> Session:
-    bench, strokes = recorded(811, draw_secret(np.random.default_rng(1), "none"), 6)
-    return session_of(bench, strokes)
+    bench, cycles = recorded(811, draw_secret(np.random.default_rng(1), "none"), 6)
+    return session_of(bench, cycles)
 
 
 def changed(session: Session, **fields: object) -> Session:
@@ -87,7 +87,7 @@ def test_one_recording_of_wrong_sign_is_left_out_and_named(clean: Session) -> No
 def test_a_recording_that_is_a_copy_of_another_is_left_out_and_named(clean: Session) -> None:
     copies = tuple(replace(clean.recordings[0], name=f"copy {number}") for number in range(4))
     result = diagnose_session(replace(clean, recordings=copies))
-    nothing_named(result, "1 recording of one stroke")
+    nothing_named(result, "1 recording of one cycle")
     assert any(finding.text.endswith("it holds the same forces as copy 0") for finding in result.quality)
 
 
@@ -266,7 +266,7 @@ def test_what_the_index_law_gets_wrong_on_real_meat_is_relaxation() -> None:
 
 
 def test_a_trial_of_bad_quality_is_left_out_and_one_that_is_not_good_is_named(tmp_path: Path) -> None:
-    folder = write_made_session(tmp_path / "session", Bench().strokes(trials=3, speeds_mm_s=(10.0,)))
+    folder = write_made_session(tmp_path / "session", Bench().cycles(trials=3, speeds_mm_s=(10.0,)))
     info = open_session(folder).info
     bad, usable, good = info.trials
     marked = (

@@ -12,7 +12,7 @@ BASE = {"stiffness_N_mm": 0.2, "stiffening_1_mm": 0.2, "viscosity_N_s_mm": 0.01,
 
 
 def stroke_drive(speed_mm_s: float = 10.0, period_s: float = 0.004) -> Drive:
-    """Two equal strokes from 2 mm above the surface to 6 mm below it, hold, and out."""
+    """Two equal cycles from 2 mm above the surface to 6 mm below it, hold, and out."""
     corners = np.cumsum([0, 0.3, 8 / speed_mm_s, 0.5, 8 / speed_mm_s, 0.3])
     time = np.arange(0, corners[-1], period_s)
     position = np.interp(time, corners, [0, 0, 8, 8, 0, 0])

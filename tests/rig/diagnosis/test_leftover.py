@@ -43,9 +43,9 @@ def test_the_fastest_hundredth_of_the_samples_has_a_bump_of_its_own() -> None:
 
 
 def test_a_step_in_mid_session_is_predicted_better_by_a_step_than_by_a_trend() -> None:
-    stroke, rng = np.arange(12.0), np.random.default_rng(3)
-    level, step = np.ones(12), np.where(stroke >= 6, 1.0, 0.0)
-    stepped, drifted = 0.08 * step + 0.01 * rng.standard_normal(12), 0.01 * stroke + 0.01 * rng.standard_normal(12)
-    by_trend, by_step = np.column_stack([level, stroke]), np.column_stack([level, step])
+    cycle, rng = np.arange(12.0), np.random.default_rng(3)
+    level, step = np.ones(12), np.where(cycle >= 6, 1.0, 0.0)
+    stepped, drifted = 0.08 * step + 0.01 * rng.standard_normal(12), 0.01 * cycle + 0.01 * rng.standard_normal(12)
+    by_trend, by_step = np.column_stack([level, cycle]), np.column_stack([level, step])
     assert _left_out(by_step, stepped) > _left_out(by_trend, stepped) + 3
     assert _left_out(by_trend, drifted) > _left_out(by_step, drifted) + 3

@@ -31,7 +31,7 @@ def browser() -> Iterator[Browser]:
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The report on a small session."""
     folder = tmp_path_factory.mktemp("made") / "session"
-    write_made_session(folder, Bench(rate_Hz=500.0).strokes(trials=1, speeds_mm_s=(5.0, 30.0)))
+    write_made_session(folder, Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0, 30.0)))
     track_into(folder)
     write_report(folder, folder / "report.html")
     return folder / "report.html"

@@ -21,8 +21,8 @@ from tests.rig.tissue.synthetic import Bench
 @pytest.fixture(scope="module")
 def study() -> Study:
     """Two trials at two speeds."""
-    strokes = Bench(rate_Hz=500.0).strokes(trials=2, speeds_mm_s=(5.0, 20.0))
-    return study_curves("made", [loading_curve(stroke) for stroke in strokes])
+    cycles = Bench(rate_Hz=500.0).cycles(trials=2, speeds_mm_s=(5.0, 20.0))
+    return study_curves("made", [loading_curve(cycle) for cycle in cycles])
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=3000), st.sampled_from([10, 160, 300]))
@@ -65,7 +65,7 @@ def test_the_fit_figure_shows_every_trial_and_both_models(study: Study) -> None:
 
 
 def test_a_study_of_one_trial_is_drawn_without_left_out_errors() -> None:
-    alone = study_curves("one", [loading_curve(Bench().stroke(10.0))])
+    alone = study_curves("one", [loading_curve(Bench().cycle(10.0))])
     assert len(fit_figure(alone).axes[1].get_lines()) == 2
 
 

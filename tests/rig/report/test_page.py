@@ -64,7 +64,7 @@ class Page(HTMLParser):
 
 def track_into(folder: Path) -> None:
     """A force-tracking run of two seconds on 2 N."""
-    run = Bench().stroke(10.0, 1)
+    run = Bench().cycle(10.0, 1)
     streams = tables(run)
     loop = streams["loop"]
     loop["force_N"][500:] = 2.0 + 0.01 * np.sin(np.arange(len(loop) - 500) / 50)
@@ -79,9 +79,9 @@ def track_into(folder: Path) -> None:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A whole session: trials, tracking, and a subject who writes HTML."""
     folder = tmp_path_factory.mktemp("made") / "session"
-    strokes = Bench(rate_Hz=500.0).strokes(trials=1, speeds_mm_s=(5.0, 10.0, 20.0, 30.0))
+    cycles = Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0, 10.0, 20.0, 30.0))
     subject: dict[str, object] = {"id": "<script>alert(1)</script>", "site": 'fore & "arm"'}
-    write_made_session(folder, strokes, subject=subject, protocol={"name": "indentation", "speeds_mm_s": [5.0, 10.0]})
+    write_made_session(folder, cycles, subject=subject, protocol={"name": "indentation", "speeds_mm_s": [5.0, 10.0]})
     track_into(folder)
     return folder
 
@@ -161,18 +161,18 @@ def test_a_bench_of_real_ports_is_not_called_simulated(html: str) -> None:
 
 
 def test_a_bench_on_pseudo_terminals_is_called_simulated(tmp_path: Path) -> None:
-    stroke = Bench().stroke(10.0, 1)
-    folder = write_made_session(tmp_path / "session", [Bench().stroke(10.0, 2)])
-    about = metadata(stroke) | {"wiring": {"force": '{"port": "/dev/pts/4"}'}}
+    cycle = Bench().cycle(10.0, 1)
+    folder = write_made_session(tmp_path / "session", [Bench().cycle(10.0, 2)])
+    about = metadata(cycle) | {"wiring": {"force": '{"port": "/dev/pts/4"}'}}
     (folder / "trial_002.mcap").unlink()
-    write_recording(folder / "trial_002.mcap", tables(stroke), about)
+    write_recording(folder / "trial_002.mcap", tables(cycle), about)
     write_report(folder, tmp_path / "report.html")
     assert "Simulated bench: the devices were served on pseudo-terminals" in (tmp_path / "report.html").read_text()
 
 
 def test_a_session_without_curves_loop_tracking_or_devices_still_has_a_report(tmp_path: Path) -> None:
-    stroke = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).stroke(10.0, 1)
-    streams = {name: table for name, table in tables(stroke).items() if name != "loop"}
+    cycle = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).cycle(10.0, 1)
+    streams = {name: table for name, table in tables(cycle).items() if name != "loop"}
     folder = tmp_path / "session"
     folder.mkdir()
     write_recording(folder / "trial_001.mcap", streams, {"recording": {"kind": "import"}})
@@ -190,7 +190,7 @@ def test_a_session_without_curves_loop_tracking_or_devices_still_has_a_report(tm
 
 
 def test_damage_and_cuts_are_said_on_the_page(tmp_path: Path) -> None:
-    folder = write_made_session(tmp_path / "session", [Bench().stroke(10.0, 1), Bench().stroke(20.0, 2)])
+    folder = write_made_session(tmp_path / "session", [Bench().cycle(10.0, 1), Bench().cycle(20.0, 2)])
     cut = folder / "trial_002.mcap"
     cut.write_bytes(cut.read_bytes()[:-3000])
     (folder / "session.json").write_text("{")
@@ -203,7 +203,7 @@ def test_damage_and_cuts_are_said_on_the_page(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("content", ["{", "[]", '{"levels": 3}', '{"levels": [], "max_error_percent": "much"}'])
 def test_an_unreadable_tracking_result_is_one_line(tmp_path: Path, content: str) -> None:
-    folder = write_made_session(tmp_path / "session", [Bench().stroke(10.0, 1)])
+    folder = write_made_session(tmp_path / "session", [Bench().cycle(10.0, 1)])
     track_into(folder)
     (folder / "track.json").write_text(content)
     write_report(folder, tmp_path / "report.html")
@@ -213,8 +213,8 @@ def test_an_unreadable_tracking_result_is_one_line(tmp_path: Path, content: str)
 
 
 def test_a_tracking_run_without_contact_is_one_line(tmp_path: Path) -> None:
-    folder = write_made_session(tmp_path / "session", [Bench().stroke(10.0, 1)])
-    run = Bench().stroke(10.0, 5)
+    folder = write_made_session(tmp_path / "session", [Bench().cycle(10.0, 1)])
+    run = Bench().cycle(10.0, 5)
     write_recording(folder / "track_001.mcap", tables(run), metadata(run) | {"trial": {"kind": "tracking"}})
     write_report(folder, tmp_path / "report.html")
     assert "The tracking run track_001 never came into contact." in (tmp_path / "report.html").read_text()
@@ -234,7 +234,7 @@ def test_a_place_that_is_not_there_is_refused(folder: Path, tmp_path: Path) -> N
 
 
 def test_the_quality_of_each_trial_is_shown_and_why_it_is_not_good(tmp_path: Path) -> None:
-    folder = write_made_session(tmp_path / "session", Bench(rate_Hz=500.0).strokes(trials=2, speeds_mm_s=(10.0,)))
+    folder = write_made_session(tmp_path / "session", Bench(rate_Hz=500.0).cycles(trials=2, speeds_mm_s=(10.0,)))
     info = open_session(folder).info
     spoilt = replace(info.trials[0], quality="usable", reasons=("axis: a gap of 58 ms (good up to 20 ms)",))
     write_session(folder, replace(info, trials=(spoilt, replace(info.trials[1], quality="good"))))

@@ -17,7 +17,7 @@ from rig.recording.reader import Recording
 from rig.recording.sessions import SessionInfo, TrialInfo, write_session
 from rig.tissue.history import History
 from rig.tissue.laws import Law
-from rig.trials.strokes import Stroke
+from rig.trials.cycles import IndentationCycle
 
 Column = NDArray[np.float64]
 Force = Callable[[Column, Column], Column]
@@ -79,7 +79,7 @@ class Bench:
     dither_mm: float = 0.0
     second_depth_mm: float = 0.0
 
-    def stroke(self, speed_mm_s: float, seed: int = 0, nominal: bool = True) -> Stroke:
+    def cycle(self, speed_mm_s: float, seed: int = 0, nominal: bool = True) -> IndentationCycle:
         """One trial: rest, touch at 5 mm/s, back off 2 mm, press at the speed, hold, leave."""
         random = np.random.default_rng(seed)
         time_s, position_mm = self._path(speed_mm_s)
@@ -92,7 +92,7 @@ class Bench:
         )
         if self.quantum_N:
             measured_N = self.quantum_N * np.round(measured_N / self.quantum_N)
-        return Stroke(
+        return IndentationCycle(
             name=f"trial_{seed:03d}",
             speed_mm_s=speed_mm_s if nominal else float("nan"),
             time_s=taken_s - taken_s[0],
@@ -100,9 +100,9 @@ class Bench:
             position_mm=np.interp(taken_s + self.clock_s, seen_s, np.interp(seen_s, time_s, position_mm)),
         )
 
-    def strokes(self, trials: int = 3, speeds_mm_s: Sequence[float] = SPEEDS_MM_S) -> list[Stroke]:
-        """``trials`` strokes at each speed, with seeds of their own."""
-        return [self.stroke(speed, 100 * int(speed) + trial) for speed in speeds_mm_s for trial in range(trials)]
+    def cycles(self, trials: int = 3, speeds_mm_s: Sequence[float] = SPEEDS_MM_S) -> list[IndentationCycle]:
+        """``trials`` cycles at each speed, with seeds of their own."""
+        return [self.cycle(speed, 100 * int(speed) + trial) for speed in speeds_mm_s for trial in range(trials)]
 
     def _path(self, speed_mm_s: float) -> tuple[Column, Column]:
         start, top, deep = self.surface_mm - 5.0, self.surface_mm - 2.0, self.surface_mm + self.depth_mm
@@ -152,27 +152,27 @@ def _low_pass(values: Column, time_constant_s: float) -> Column:
 START_NS = 50_000_000_000
 
 
-def tables(stroke: Stroke, sign: float = -1.0) -> dict[str, NDArray[np.void]]:
-    """The streams a recorder would have kept of a stroke; force on fz, compression negative by default."""
-    times_ns = START_NS + np.round(stroke.time_s * 1e9).astype(np.int64)
+def tables(cycle: IndentationCycle, sign: float = -1.0) -> dict[str, NDArray[np.void]]:
+    """The streams a recorder would have kept of a cycle; force on fz, compression negative by default."""
+    times_ns = START_NS + np.round(cycle.time_s * 1e9).astype(np.int64)
     force, axis, loop = (np.zeros(len(times_ns), stream.dtype) for stream in (FORCE, AXIS, LOOP))
     for table in (force, axis, loop):
         table["seq"], table["capture_ns"], table["arrival_ns"] = np.arange(len(times_ns)), times_ns, times_ns + 300_000
-    force["fz_N"], force["valid"], force["temperature_C"] = sign * stroke.force_N, 1, 25.0
-    axis["position_mm"], axis["valid"] = stroke.position_mm, 1
+    force["fz_N"], force["valid"], force["temperature_C"] = sign * cycle.force_N, 1, 25.0
+    axis["position_mm"], axis["valid"] = cycle.position_mm, 1
     ticks = np.arange(len(times_ns))
     loop["slot"], loop["scheduled_ns"] = ticks, START_NS + 1_000_000 * ticks
     loop["wake_latency_ns"], loop["execution_ns"] = 20_000 + 1000 * (ticks % 50), 80_000 + 500 * (ticks % 40)
     loop["force_age_ns"], loop["axis_age_ns"], loop["marker_age_ns"] = 400_000, 900_000, (1 << 62)
-    loop["force_N"], loop["reference_N"] = stroke.force_N, np.nan
+    loop["force_N"], loop["reference_N"] = cycle.force_N, np.nan
     return {"force": force, "axis": axis, "loop": loop}
 
 
-def metadata(stroke: Stroke) -> dict[str, dict[str, str]]:
+def metadata(cycle: IndentationCycle) -> dict[str, dict[str, str]]:
     """What a captured trial says of itself, as far as curves and report ask."""
     return {
-        "recording": {"session": "made", "trial": stroke.name, "software": "tissue-rig 0.1.0"},
-        "trial": {"speed_mm_s": repr(stroke.speed_mm_s), "depth_mm": "8.0"},
+        "recording": {"session": "made", "trial": cycle.name, "software": "tissue-rig 0.1.0"},
+        "trial": {"speed_mm_s": repr(cycle.speed_mm_s), "depth_mm": "8.0"},
         "calibration": {"force_axis": "fz", "compression": "negative"},
         "devices": {"force": '{"product": "BFT-SENS", "serial": "000271", "firmware": "1.0.6"}'},
         "realtime": {"scheduler": "SCHED_FIFO 50", "memory": "locked"},
@@ -180,9 +180,9 @@ def metadata(stroke: Stroke) -> dict[str, dict[str, str]]:
     }
 
 
-def recording(stroke: Stroke, path: Path = Path("trial.mcap")) -> Recording:
+def recording(cycle: IndentationCycle, path: Path = Path("trial.mcap")) -> Recording:
     """The trial as a reader would give it."""
-    return Recording(path, metadata(stroke), tables(stroke), (), True, ())
+    return Recording(path, metadata(cycle), tables(cycle), (), True, ())
 
 
 def write_recording(
@@ -202,14 +202,14 @@ def write_recording(
         writer.close()
 
 
-def write_made_session(folder: Path, strokes: Sequence[Stroke], **about: dict[str, object]) -> Path:
-    """A session folder with one recording a stroke."""
+def write_made_session(folder: Path, cycles: Sequence[IndentationCycle], **about: dict[str, object]) -> Path:
+    """A session folder with one recording a cycle."""
     folder.mkdir(parents=True, exist_ok=True)
-    for stroke in strokes:
-        write_recording(folder / f"{stroke.name}.mcap", tables(stroke), metadata(stroke))
+    for cycle in cycles:
+        write_recording(folder / f"{cycle.name}.mcap", tables(cycle), metadata(cycle))
     trials = tuple(
         TrialInfo(s.name, f"{s.name}.mcap", s.speed_mm_s, 8.0, "complete", float(s.force_N.max()), {"force": 1}, {})
-        for s in strokes
+        for s in cycles
     )
     info = SessionInfo("made", "capture", "2026-01-02T10:00:00+00:00", "tissue-rig 0.1.0", trials=trials, **about)
     write_session(folder, info)

@@ -19,7 +19,7 @@ from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, along, index_force
 @pytest.fixture(scope="module")
 def curves() -> list[Curve]:
     """Three trials at each of five speeds on the default tissue."""
-    return [loading_curve(stroke) for stroke in Bench().strokes()]
+    return [loading_curve(cycle) for cycle in Bench().cycles()]
 
 
 def test_a_tissue_that_never_changes_is_recovered_to_a_percent(curves: list[Curve]) -> None:
@@ -37,7 +37,7 @@ def scattered(seed: int) -> list[Curve]:
         for trial in range(3):
             scatter = 1 + 0.02 * random.standard_normal(2)
             force = index_force(0.12 * scatter[0], 0.22 * scatter[1])
-            curves.append(loading_curve(Bench(force=force).stroke(speed_mm_s, 100 * int(speed_mm_s) + trial)))
+            curves.append(loading_curve(Bench(force=force).cycle(speed_mm_s, 100 * int(speed_mm_s) + trial)))
     return curves
 
 
@@ -60,7 +60,7 @@ def test_the_offsets_put_contact_where_the_surface_is(curves: list[Curve]) -> No
 
 def test_a_linear_tissue_gives_an_index_law_without_stiffening() -> None:
     bench = Bench(force=index_force(a_N_mm=0.6, b_per_mm=0.0, B_N_s_mm=0.004))
-    curves = [loading_curve(stroke) for stroke in bench.strokes(trials=2)]
+    curves = [loading_curve(cycle) for cycle in bench.cycles(trials=2)]
     constant, index = fit_law(Constant, curves), fit_law(Index, curves)
     assert constant.law.values == pytest.approx([0.6, 0.004], rel=0.03)
     assert index.law.values == pytest.approx([0.6, 0.0, 0.004], abs=0.01)
@@ -74,7 +74,7 @@ def test_a_law_that_does_not_fit_is_pushed_to_its_bound_and_says_so(curves: list
 
 
 def test_a_trial_weighs_the_same_whatever_its_speed() -> None:
-    curves = [loading_curve(Bench().stroke(speed)) for speed in (5.0, 30.0)]
+    curves = [loading_curve(Bench().cycle(speed)) for speed in (5.0, 30.0)]
     counts = np.bincount(Steps(curves).curve_of)
     assert len(curves[0].depth_mm) > 5 * len(curves[1].depth_mm)
     assert counts == pytest.approx([BINS, BINS], abs=2)
@@ -96,17 +96,17 @@ def test_a_fit_from_a_near_start_ends_at_the_same_place(curves: list[Curve]) -> 
 
 def test_sparse_imported_trials_are_enough() -> None:
     bench = Bench(rate_Hz=40.0, axis_rate_Hz=25.0, noise_N=0.02)
-    curves = [loading_curve(stroke) for stroke in bench.strokes(speeds_mm_s=(2.0, 5.0, 10.0))]
+    curves = [loading_curve(cycle) for cycle in bench.cycles(speeds_mm_s=(2.0, 5.0, 10.0))]
     assert fit_law(Index, curves).law.values == pytest.approx([0.12, 0.22, 0.01], rel=0.1)
 
 
 def test_a_clock_offset_between_force_and_axis_does_not_touch_the_parameters() -> None:
-    curves = [loading_curve(stroke) for stroke in Bench(clock_s=0.03).strokes(trials=2)]
+    curves = [loading_curve(cycle) for cycle in Bench(clock_s=0.03).cycles(trials=2)]
     assert fit_law(Index, curves).law.values == pytest.approx([0.12, 0.22, 0.01], rel=0.03)
 
 
 def test_one_trial_can_be_fitted_with_intervals_from_its_residuals() -> None:
-    curves = [loading_curve(Bench().stroke(30.0))]
+    curves = [loading_curve(Bench().cycle(30.0))]
     fit = fit_law(Index, curves)
     judged = judge(fit, curves, given_forces(curves), fit.offsets_mm)
     assert judged.interval_method.startswith("least squares")
@@ -147,7 +147,7 @@ def test_residuals_are_modelled_minus_measured(curves: list[Curve]) -> None:
     ids=["hunt_crossley", "sls", "qlv"],
 )
 def test_damping_that_grows_and_memory_are_recovered_from_loading_at_five_speeds(truth: Law, within: float) -> None:
-    curves = [loading_curve(stroke) for stroke in Bench(force=along(truth), noise_N=0.002).strokes(trials=1)]
+    curves = [loading_curve(cycle) for cycle in Bench(force=along(truth), noise_N=0.002).cycles(trials=1)]
     fit = fit_law(type(truth), curves)
     assert fit.law.values == pytest.approx(truth.values, rel=within)
     assert fit.rmse_N < 0.01
@@ -156,7 +156,7 @@ def test_damping_that_grows_and_memory_are_recovered_from_loading_at_five_speeds
 def test_a_law_with_more_parameters_than_the_tissue_shows_still_settles() -> None:
     """Fung's A and b on a straight line: only their product shows, so the fit walks along a valley."""
     bench = Bench(force=index_force(a_N_mm=0.6, b_per_mm=0.0, B_N_s_mm=0.01))
-    fit = fit_law(QuasiLinear, [loading_curve(stroke) for stroke in bench.strokes(trials=1)])
+    fit = fit_law(QuasiLinear, [loading_curve(cycle) for cycle in bench.cycles(trials=1)])
     assert fit.law.slope(np.array([0.0, 8.0])) == pytest.approx(0.6, rel=0.15)
     assert fit.rmse_N < 0.1
 
@@ -190,7 +190,7 @@ def test_no_curves_are_refused() -> None:
 
 
 def test_too_few_points_are_refused_with_their_number() -> None:
-    curve = loading_curve(Bench().stroke(5.0))
+    curve = loading_curve(Bench().cycle(5.0))
     few = np.array([0, 600, 1200])
     short = replace(curve, depth_mm=curve.depth_mm[few], force_N=curve.force_N[few], rate_mm_s=curve.rate_mm_s[few])
     with pytest.raises(DataError, match=r"[23] points in 1 trials are too few for the 3 parameters of the index law"):

@@ -70,7 +70,7 @@ def test_a_displacement_too_small_to_be_measured_has_no_percentage() -> None:
 
 
 def test_displacement_is_read_off_a_noisy_curve_to_hundredths() -> None:
-    curve = loading_curve(Bench(noise_N=0.03).stroke(10.0))
+    curve = loading_curve(Bench(noise_N=0.03).cycle(10.0))
     offset_mm = 20.0 - curve.contact.position_mm
     law = Index(a_N_mm=0.12, b_per_mm=0.22, B_N_s_mm=0.01)
     forces = np.array([0.5, 1.0, 2.0, 4.0])
@@ -92,7 +92,7 @@ def test_rows_are_even_and_end_where_every_whole_trial_arrives() -> None:
 
 
 def test_the_same_tissue_is_predicted_as_well_on_trials_and_speeds_left_out() -> None:
-    curves = [loading_curve(stroke) for stroke in Bench().strokes(trials=2)]
+    curves = [loading_curve(cycle) for cycle in Bench().cycles(trials=2)]
     fit = fit_law(Index, curves)
     judged = judge(fit, curves, given_forces(curves), fit.offsets_mm)
     for errors in (judged.fitted, judged.trials_left_out, judged.speeds_left_out):
@@ -104,8 +104,8 @@ def test_the_same_tissue_is_predicted_as_well_on_trials_and_speeds_left_out() ->
 
 def test_a_speed_with_a_tissue_of_its_own_is_judged_harder_when_it_is_left_out() -> None:
     soft, stiff = Bench(), Bench(force=index_force(a_N_mm=0.18))
-    curves = [loading_curve(stroke) for stroke in stiff.strokes(trials=2, speeds_mm_s=(15.0,))]
-    curves += [loading_curve(stroke) for stroke in soft.strokes(trials=2, speeds_mm_s=(5.0, 30.0))]
+    curves = [loading_curve(cycle) for cycle in stiff.cycles(trials=2, speeds_mm_s=(15.0,))]
+    curves += [loading_curve(cycle) for cycle in soft.cycles(trials=2, speeds_mm_s=(5.0, 30.0))]
     fit = fit_law(Index, curves)
     judged = judge(fit, curves, given_forces(curves), fit.offsets_mm)
     assert judged.speeds_left_out is not None
@@ -116,8 +116,8 @@ def test_a_speed_with_a_tissue_of_its_own_is_judged_harder_when_it_is_left_out()
 def test_scattered_trials_widen_the_intervals() -> None:
     random = np.random.default_rng(5)
     spread = [index_force(a_N_mm=0.12 * (1 + 0.1 * random.standard_normal())) for _ in range(8)]
-    alike = [loading_curve(Bench().stroke(10.0, seed)) for seed in range(8)]
-    apart = [loading_curve(Bench(force=force).stroke(10.0, seed)) for seed, force in enumerate(spread)]
+    alike = [loading_curve(Bench().cycle(10.0, seed)) for seed in range(8)]
+    apart = [loading_curve(Bench(force=force).cycle(10.0, seed)) for seed, force in enumerate(spread)]
     widths = []
     for curves in (alike, apart):
         fit = fit_law(Index, curves)
@@ -129,7 +129,7 @@ def test_scattered_trials_widen_the_intervals() -> None:
 @pytest.mark.parametrize("trials", [3, 5])
 def test_what_the_data_say_nothing_of_is_uncertain_by_its_whole_range(trials: int) -> None:
     """Tissue without memory leaves no branch to relax, so its time may be anything; by residuals and by leaving out."""
-    curves = [loading_curve(stroke) for stroke in Bench().strokes(trials=1)][:trials]
+    curves = [loading_curve(cycle) for cycle in Bench().cycles(trials=1)][:trials]
     fit = fit_law(StandardLinear, curves)
     assert fit.at_bounds[0] == "k1_N_mm"
     judged = judge(fit, curves, given_forces(curves), fit.offsets_mm)

@@ -18,8 +18,8 @@ BLOCK = Block((9, 9, 12), spacing_mm=2.0)
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    strokes = Bench(depth_mm=6.0).strokes(trials=2, speeds_mm_s=(5.0, 10.0, 20.0))
-    return study_curves("made", [loading_curve(stroke) for stroke in strokes])
+    cycles = Bench(depth_mm=6.0).cycles(trials=2, speeds_mm_s=(5.0, 10.0, 20.0))
+    return study_curves("made", [loading_curve(cycle) for cycle in cycles])
 
 
 @pytest.fixture(scope="module")

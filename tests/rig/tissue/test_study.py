@@ -25,10 +25,10 @@ from tests.rig.tissue.synthetic import Bench, index_force, metadata, tables, wri
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A session of two trials at three speeds, one trial in the air, and a run of force tracking."""
     folder = tmp_path_factory.mktemp("made") / "session"
-    air = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).stroke(10.0, 999)
-    strokes = Bench(rate_Hz=500.0).strokes(trials=2, speeds_mm_s=(5.0, 10.0, 30.0))
-    write_made_session(folder, [*strokes, air], subject={"id": "7", "site": "forearm"})
-    run = Bench().stroke(10.0, 1)
+    air = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).cycle(10.0, 999)
+    cycles = Bench(rate_Hz=500.0).cycles(trials=2, speeds_mm_s=(5.0, 10.0, 30.0))
+    write_made_session(folder, [*cycles, air], subject={"id": "7", "site": "forearm"})
+    run = Bench().cycle(10.0, 1)
     write_recording(folder / "track_001.mcap", tables(run), metadata(run) | {"trial": {"kind": "tracking"}})
     return folder
 
@@ -48,7 +48,7 @@ def test_every_trial_with_a_curve_counts_and_the_others_say_why_not(study: Study
 
 
 def test_a_trial_of_bad_quality_is_left_out_and_said(tmp_path: Path) -> None:
-    folder = write_made_session(tmp_path / "session", Bench().strokes(trials=2, speeds_mm_s=(10.0,)))
+    folder = write_made_session(tmp_path / "session", Bench().cycles(trials=2, speeds_mm_s=(10.0,)))
     session = open_session(folder)
     first, second = session.trials
     spoilt = replace(first, quality="bad", reasons=("force: a gap of 500 ms (good up to 20 ms)",))
@@ -86,7 +86,7 @@ def test_the_json_has_what_the_demonstration_quotes(study: Study) -> None:
 
 
 def test_the_json_says_null_where_nothing_could_be_left_out(tmp_path: Path) -> None:
-    study = study_session(open_session(write_made_session(tmp_path / "one", [Bench().stroke(10.0, 1)])))
+    study = study_session(open_session(write_made_session(tmp_path / "one", [Bench().cycle(10.0, 1)])))
     assert as_json(study)["index"]["held_out"] == {"trials": None, "speeds": None, "subjects": None}  # type: ignore[index]
     table = list(csv.DictReader(io.StringIO(as_csv(study))))
     assert table[0]["index_error_trial_left_out_mm"] == ""
@@ -140,8 +140,8 @@ def test_the_json_says_whether_speeds_differ(study: Study) -> None:
 def subject_session(folder: Path, subject: str, a_N_mm: float) -> Session:
     """Three trials at two speeds on a subject of its own."""
     bench = Bench(force=index_force(a_N_mm=a_N_mm), rate_Hz=500.0)
-    strokes = [bench.stroke(speed, number) for number, speed in enumerate((5.0, 20.0, 20.0))]
-    return open_session(write_made_session(folder / subject, strokes, subject={"id": subject}))
+    cycles = [bench.cycle(speed, number) for number, speed in enumerate((5.0, 20.0, 20.0))]
+    return open_session(write_made_session(folder / subject, cycles, subject={"id": subject}))
 
 
 def test_each_subject_is_left_out_where_there_are_several(tmp_path: Path) -> None:
@@ -187,16 +187,16 @@ def test_the_fingerprint_is_of_the_data(study: Study) -> None:
 
 
 def test_a_session_without_a_usable_trial_is_refused_with_the_first_reason(tmp_path: Path) -> None:
-    air = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).stroke(10.0, 3)
+    air = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).cycle(10.0, 3)
     session = open_session(write_made_session(tmp_path / "air", [air]))
     with pytest.raises(DataError, match=r"no trial gives a curve \(1 skipped\); first: trial_003: no contact"):
         study_session(session)
 
 
 def test_a_recording_that_was_never_finished_still_counts(tmp_path: Path) -> None:
-    stroke = Bench().stroke(10.0, 1)
-    folder = write_made_session(tmp_path / "cut", [Bench().stroke(10.0, 2)])
-    write_recording(folder / f"{stroke.name}.mcap", tables(stroke), metadata(stroke), finish=False)
+    cycle = Bench().cycle(10.0, 1)
+    folder = write_made_session(tmp_path / "cut", [Bench().cycle(10.0, 2)])
+    write_recording(folder / f"{cycle.name}.mcap", tables(cycle), metadata(cycle), finish=False)
     study = study_session(open_session(folder))
     assert {curve.name for curve in study.curves} == {"trial_001", "trial_002"}
 
@@ -213,7 +213,7 @@ def test_an_imported_session_of_streams_with_own_rates_and_clocks_is_fitted(tmp_
     (source / "session.toml").write_text('force_positive = "tension"\nposition_positive = "out"\n' if turned else "")
     bench, start_s = Bench(noise_N=0.02, quantum_N=0.0), 0.0
     for number, speed_mm_s in enumerate((5.0, 10.0, 20.0) * 2):
-        stroke = bench.stroke(speed_mm_s, number)
+        cycle = bench.cycle(speed_mm_s, number)
         trial = source / f"trial_{number:02d}"
         trial.mkdir()
         (trial / "trial.toml").write_text(f"speed_mm_s = {speed_mm_s}\ndepth_mm = 8.0\n")
@@ -221,12 +221,12 @@ def test_an_imported_session_of_streams_with_own_rates_and_clocks_is_fitted(tmp_
         write_csv(
             trial / "force.csv",
             "time_s,force_N",
-            [start_s + stroke.time_s[force] + 0.013, sign * stroke.force_N[force]],
+            [start_s + cycle.time_s[force] + 0.013, sign * cycle.force_N[force]],
         )
         write_csv(
-            trial / "axis.csv", "time_s,position_mm", [start_s + stroke.time_s[axis], sign * stroke.position_mm[axis]]
+            trial / "axis.csv", "time_s,position_mm", [start_s + cycle.time_s[axis], sign * cycle.position_mm[axis]]
         )
-        start_s += stroke.time_s[-1] + 5.0
+        start_s += cycle.time_s[-1] + 5.0
     session = import_session(source, tmp_path / "session", (), datetime(2026, 1, 2, tzinfo=UTC))
     study = study_session(session)
     assert len(study.curves) == 6

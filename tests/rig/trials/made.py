@@ -28,16 +28,16 @@ def trial(
 ) -> Recording:
     """A good trial of 8 mm, then ``plant`` works on its tables; ``said`` goes into the summary."""
     bench = bench or Bench()
-    stroke = bench.stroke(speed_mm_s, seed=7)
-    made = tables(stroke)
+    cycle = bench.cycle(speed_mm_s, seed=7)
+    made = tables(cycle)
     random = np.random.default_rng(3)
     for name in CHANNELS:
         if name != "fz_N":
             made["force"][name] = np.round(random.normal(0.2, 0.005, len(made["force"])), 3)
-    _steps(made, stroke.position_mm)
+    _steps(made, cycle.position_mm)
     made["marker"] = _marker(made["axis"], random)
     plant(made)
-    return Recording(Path("trial_001.mcap"), _said(metadata(stroke), bench, said), made, (), True, ())
+    return Recording(Path("trial_001.mcap"), _said(metadata(cycle), bench, said), made, (), True, ())
 
 
 def _said(about: dict[str, dict[str, str]], bench: Bench, said: dict[str, str]) -> dict[str, dict[str, str]]:

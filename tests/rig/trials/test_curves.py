@@ -11,7 +11,7 @@ import pytest
 from rig.errors import DataError
 from rig.trials.contact import find_contact
 from rig.trials.curves import loading_curve
-from rig.trials.strokes import Stroke, stroke_of
+from rig.trials.cycles import IndentationCycle, cycle_of
 from tests import data
 from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, index_force, recording, rubbing, tables
 
@@ -20,13 +20,13 @@ from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, index_force, recordin
 @pytest.mark.parametrize("B_N_s_mm", [0.0, 0.01])
 def test_the_true_surface_lies_in_the_interval_of_contact(speed_mm_s: float, B_N_s_mm: float) -> None:
     bench = Bench(force=index_force(a_N_mm=0.3, b_per_mm=0.15, B_N_s_mm=B_N_s_mm))
-    curve = loading_curve(bench.stroke(speed_mm_s))
+    curve = loading_curve(bench.cycle(speed_mm_s))
     assert curve.contact.lower_mm <= bench.surface_mm <= curve.contact.upper_mm
     assert abs(curve.contact.position_mm - bench.surface_mm) < 0.15
 
 
 def test_a_curve_spans_from_the_air_to_the_deepest_steady_point() -> None:
-    curve = loading_curve(Bench().stroke(10.0))
+    curve = loading_curve(Bench().cycle(10.0))
     assert curve.depth_mm[0] == pytest.approx(-0.5, abs=0.05)
     assert 7.7 < curve.max_depth_mm < 8.1
     assert curve.rate_mm_s[curve.depth_mm > 0] == pytest.approx(10.0, rel=0.02)
@@ -35,14 +35,14 @@ def test_a_curve_spans_from_the_air_to_the_deepest_steady_point() -> None:
 
 
 def test_speed_is_found_where_nobody_said_it() -> None:
-    assert loading_curve(Bench().stroke(15.0, nominal=False)).speed_mm_s == pytest.approx(15.0)
+    assert loading_curve(Bench().cycle(15.0, nominal=False)).speed_mm_s == pytest.approx(15.0)
 
 
 @pytest.mark.parametrize("speed_mm_s", SPEEDS_MM_S)
 @pytest.mark.parametrize("level_N", [0.05, 0.1, 0.3])
 def test_a_guide_that_rubs_moves_the_zero_and_neither_contact_nor_curve(speed_mm_s: float, level_N: float) -> None:
-    smooth = loading_curve(Bench().stroke(speed_mm_s))
-    rubbed = loading_curve(Bench(force=rubbing(level_N)).stroke(speed_mm_s))
+    smooth = loading_curve(Bench().cycle(speed_mm_s))
+    rubbed = loading_curve(Bench(force=rubbing(level_N)).cycle(speed_mm_s))
     assert rubbed.zero_N == pytest.approx(0.7 + level_N, abs=0.004)
     assert rubbed.contact.lower_mm <= Bench().surface_mm <= rubbed.contact.upper_mm
     at_mm = np.linspace(19.8, 27.5, 100)
@@ -51,25 +51,25 @@ def test_a_guide_that_rubs_moves_the_zero_and_neither_contact_nor_curve(speed_mm
 
 
 def test_holds_dither_and_a_second_depth_are_no_part_of_the_curve() -> None:
-    plain = loading_curve(Bench().stroke(10.0))
-    busy = loading_curve(Bench(dither_mm=0.3, second_depth_mm=10.0).stroke(10.0))
+    plain = loading_curve(Bench().cycle(10.0))
+    busy = loading_curve(Bench(dither_mm=0.3, second_depth_mm=10.0).cycle(10.0))
     assert busy.max_depth_mm == pytest.approx(plain.max_depth_mm, abs=0.1)
     assert len(busy.depth_mm) == pytest.approx(len(plain.depth_mm), abs=15)
 
 
 def test_a_wrong_single_sample_is_neither_contact_nor_peak() -> None:
-    stroke = Bench().stroke(10.0)
-    force = stroke.force_N.copy()
+    cycle = Bench().cycle(10.0)
+    force = cycle.force_N.copy()
     middle = int(np.argmax(force)) - 300
     force[200], force[middle], force[-50] = 9.0, 0.0, 50.0
-    spiked, clean = loading_curve(replace(stroke, force_N=force)), loading_curve(stroke)
+    spiked, clean = loading_curve(replace(cycle, force_N=force)), loading_curve(cycle)
     assert spiked.contact.position_mm == pytest.approx(clean.contact.position_mm, abs=0.05)
     assert spiked.max_depth_mm == pytest.approx(clean.max_depth_mm, abs=0.05)
 
 
 @pytest.mark.parametrize("rate_Hz", [1000.0, 100.0, 25.0, 10.0])
 def test_sparse_samples_give_a_wider_interval_that_still_holds_the_surface(rate_Hz: float) -> None:
-    curve = loading_curve(Bench(rate_Hz=rate_Hz, axis_rate_Hz=50.0).stroke(5.0))
+    curve = loading_curve(Bench(rate_Hz=rate_Hz, axis_rate_Hz=50.0).cycle(5.0))
     lower_mm, upper_mm = curve.contact.lower_mm, curve.contact.upper_mm
     assert lower_mm <= 20.0 <= upper_mm
     assert upper_mm - lower_mm < 0.2 + 4 * 5.0 / rate_Hz
@@ -77,7 +77,7 @@ def test_sparse_samples_give_a_wider_interval_that_still_holds_the_surface(rate_
 
 @pytest.mark.parametrize("clock_s", [-0.05, 0.05])
 def test_a_clock_offset_moves_contact_and_leaves_the_shape(clock_s: float) -> None:
-    straight, shifted = (loading_curve(Bench(clock_s=clock).stroke(20.0)) for clock in (0.0, clock_s))
+    straight, shifted = (loading_curve(Bench(clock_s=clock).cycle(20.0)) for clock in (0.0, clock_s))
     assert shifted.contact.position_mm - straight.contact.position_mm == pytest.approx(20 * clock_s, abs=0.1)
     for force_N in (1.0, 2.0, 4.0):
         depths = [float(np.interp(force_N, np.maximum.accumulate(c.force_N), c.depth_mm)) for c in (straight, shifted)]
@@ -85,7 +85,7 @@ def test_a_clock_offset_moves_contact_and_leaves_the_shape(clock_s: float) -> No
 
 
 def test_no_flat_end_remains_where_force_stops_before_the_tip_does() -> None:
-    curve = loading_curve(Bench(clock_s=-0.05).stroke(20.0))
+    curve = loading_curve(Bench(clock_s=-0.05).cycle(20.0))
     assert curve.force_N[-1] > 0.98 * curve.max_force_N
     assert np.count_nonzero(curve.force_N > 0.98 * curve.max_force_N) < 15
 
@@ -98,30 +98,30 @@ def test_contact_of_a_noiseless_jump_is_where_it_jumps() -> None:
     assert found.lower_mm < 10.0 < found.upper_mm
 
 
-def moved(stroke: Stroke, start: int) -> Stroke:
-    """The stroke from a sample on."""
+def moved(cycle: IndentationCycle, start: int) -> IndentationCycle:
+    """The cycle from a sample on."""
     return replace(
-        stroke, time_s=stroke.time_s[start:], force_N=stroke.force_N[start:], position_mm=stroke.position_mm[start:]
+        cycle, time_s=cycle.time_s[start:], force_N=cycle.force_N[start:], position_mm=cycle.position_mm[start:]
     )
 
 
 def test_a_stroke_in_the_air_has_no_contact() -> None:
-    stroke = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).stroke(10.0)
+    cycle = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).cycle(10.0)
     with pytest.raises(DataError, match=r"trial_000: no contact: force rises by .* N at most .* go deeper"):
-        loading_curve(stroke)
+        loading_curve(cycle)
 
 
 def test_force_of_the_wrong_sign_names_the_settings_that_turn_it() -> None:
-    stroke = Bench().stroke(10.0)
+    cycle = Bench().cycle(10.0)
     with pytest.raises(DataError, match=r"sign of compression is wrong; correct force.compression .* force_positive"):
-        loading_curve(replace(stroke, force_N=-stroke.force_N))
+        loading_curve(replace(cycle, force_N=-cycle.force_N))
 
 
 def test_a_stroke_that_begins_in_contact_has_no_air_part() -> None:
-    stroke = Bench().stroke(10.0)
-    pressed = int(np.argmax(stroke.position_mm > 21.0))
+    cycle = Bench().cycle(10.0)
+    pressed = int(np.argmax(cycle.position_mm > 21.0))
     with pytest.raises(DataError, match=r"no air part: \d+ samples are clearly above the surface \(at least 3"):
-        loading_curve(moved(stroke, pressed))
+        loading_curve(moved(cycle, pressed))
 
 
 @pytest.mark.parametrize("noise_N", [0.005, 0.05])
@@ -131,33 +131,33 @@ def test_gentle_and_hard_tissue_and_a_noisy_sensor_have_an_air_part(
 ) -> None:
     bench = Bench(force=index_force(a_N_mm, b_per_mm, 0.005), noise_N=noise_N)
     for speed_mm_s in SPEEDS_MM_S:
-        contact = loading_curve(bench.stroke(speed_mm_s)).contact
+        contact = loading_curve(bench.cycle(speed_mm_s)).contact
         assert contact.lower_mm - 0.1 <= 20.0 <= contact.upper_mm + 0.1
 
 
 def test_a_stroke_of_another_speed_than_said_names_both() -> None:
-    stroke = replace(Bench().stroke(5.0), speed_mm_s=30.0)
+    cycle = replace(Bench().cycle(5.0), speed_mm_s=30.0)
     with pytest.raises(
         DataError, match=r"no loading at 30 mm/s: .* the tip moved at .* to 5.* mm/s; correct the trial's"
     ):
-        loading_curve(stroke)
+        loading_curve(cycle)
 
 
 def test_too_few_samples_in_the_rise_are_refused_with_their_number() -> None:
-    stroke = Bench(depth_mm=4.0, rate_Hz=15.0, axis_rate_Hz=100.0).stroke(30.0)
+    cycle = Bench(depth_mm=4.0, rate_Hz=15.0, axis_rate_Hz=100.0).cycle(30.0)
     with pytest.raises(DataError, match=r"no loading: [12] samples .* \(at least 3 are needed\)"):
-        loading_curve(stroke)
+        loading_curve(cycle)
 
 
 def test_two_samples_are_no_trial() -> None:
     with pytest.raises(DataError, match=r"trial_000: 2 samples; a curve needs at least 3"):
-        loading_curve(moved(Bench().stroke(5.0), -2))
+        loading_curve(moved(Bench().cycle(5.0), -2))
 
 
 @pytest.mark.parametrize("nominal", [True, False])
 def test_a_tip_that_stands_while_force_rises_has_no_loading(nominal: bool) -> None:
-    stroke = Bench().stroke(10.0, nominal=nominal)
-    still = replace(stroke, position_mm=np.minimum(stroke.position_mm, 18.0))
+    cycle = Bench().cycle(10.0, nominal=nominal)
+    still = replace(cycle, position_mm=np.minimum(cycle.position_mm, 18.0))
     with pytest.raises(
         DataError, match=r"no loading: force rises while the tip does not go deeper; check axis and clocks"
     ):
@@ -168,67 +168,67 @@ def test_a_tip_that_stands_while_force_rises_has_no_loading(nominal: bool) -> No
 
 
 def test_compression_is_positive_whatever_sign_and_axis_the_sensor_has() -> None:
-    stroke = Bench().stroke(10.0)
-    made = recording(stroke)
-    aligned = stroke_of("trial", made)
-    assert aligned.force_N == pytest.approx(stroke.force_N)
-    assert aligned.position_mm == pytest.approx(stroke.position_mm, abs=1e-9)
+    cycle = Bench().cycle(10.0)
+    made = recording(cycle)
+    aligned = cycle_of("trial", made)
+    assert aligned.force_N == pytest.approx(cycle.force_N)
+    assert aligned.position_mm == pytest.approx(cycle.position_mm, abs=1e-9)
     assert aligned.speed_mm_s == 10.0
-    made.tables["force"]["fx_N"] = 3.0 * stroke.force_N
+    made.tables["force"]["fx_N"] = 3.0 * cycle.force_N
     made.metadata["calibration"] = {"force_axis": "fx", "compression": "positive"}
-    assert stroke_of("trial", made).force_N == pytest.approx(3.0 * stroke.force_N)
+    assert cycle_of("trial", made).force_N == pytest.approx(3.0 * cycle.force_N)
 
 
 def test_position_is_taken_at_the_capture_time_of_force() -> None:
-    made = recording(Bench().stroke(10.0))
+    made = recording(Bench().cycle(10.0))
     made.tables["axis"] = made.tables["axis"][::7]
     made.tables["axis"]["arrival_ns"] += 5_000_000
-    aligned, stroke = stroke_of("trial", made), Bench().stroke(10.0)
-    assert aligned.position_mm == pytest.approx(stroke.position_mm[: len(aligned.position_mm)], abs=0.05)
+    aligned, cycle = cycle_of("trial", made), Bench().cycle(10.0)
+    assert aligned.position_mm == pytest.approx(cycle.position_mm[: len(aligned.position_mm)], abs=0.05)
 
 
 def test_samples_the_device_does_not_vouch_for_are_left_out() -> None:
-    made = recording(Bench().stroke(10.0))
+    made = recording(Bench().cycle(10.0))
     made.tables["force"]["fz_N"][100:120] = np.nan
     made.tables["force"]["valid"][100:120] = 0
-    assert np.all(np.isfinite(stroke_of("trial", made).force_N))
+    assert np.all(np.isfinite(cycle_of("trial", made).force_N))
 
 
 def test_nan_in_a_valid_sample_is_refused_with_its_place() -> None:
-    made = recording(Bench().stroke(10.0))
+    made = recording(Bench().cycle(10.0))
     made.tables["force"]["fz_N"][100:102] = np.nan
     with pytest.raises(DataError, match=r"trial: force fz_N is not a number in 2 of \d+ samples, first at sample 100"):
-        stroke_of("trial", made)
+        cycle_of("trial", made)
 
 
 def test_a_missing_stream_is_named() -> None:
-    made = recording(Bench().stroke(10.0))
+    made = recording(Bench().cycle(10.0))
     del made.tables["axis"]
     with pytest.raises(DataError, match=r"trial: no axis samples; a curve needs force and axis"):
-        stroke_of("trial", made)
+        cycle_of("trial", made)
 
 
 def test_a_stream_without_a_valid_sample_is_named() -> None:
-    made = recording(Bench().stroke(10.0))
+    made = recording(Bench().cycle(10.0))
     made.tables["force"]["valid"] = 0
     with pytest.raises(DataError, match=r"trial: no valid force samples"):
-        stroke_of("trial", made)
+        cycle_of("trial", made)
 
 
 def test_times_that_go_back_are_refused() -> None:
-    made = recording(Bench().stroke(10.0))
+    made = recording(Bench().cycle(10.0))
     made.tables["axis"]["capture_ns"][50] -= 10_000_000
     with pytest.raises(DataError, match=r"axis times go backwards at sample 50"):
-        stroke_of("trial", made)
+        cycle_of("trial", made)
 
 
 def test_streams_of_different_times_do_not_overlap() -> None:
-    stroke = Bench().stroke(10.0)
-    made = recording(stroke)
-    made.tables.update(axis=tables(stroke)["axis"])
+    cycle = Bench().cycle(10.0)
+    made = recording(cycle)
+    made.tables.update(axis=tables(cycle)["axis"])
     made.tables["axis"]["capture_ns"] += 3_600_000_000_000
     with pytest.raises(DataError, match=r"force and axis do not overlap in time"):
-        stroke_of("trial", made)
+        cycle_of("trial", made)
 
 
 @pytest.mark.parametrize(
@@ -240,17 +240,17 @@ def test_streams_of_different_times_do_not_overlap() -> None:
     ],
 )
 def test_metadata_that_say_nothing_usable_are_refused(section: str, key: str, value: str, says: str) -> None:
-    made = recording(Bench().stroke(10.0))
+    made = recording(Bench().cycle(10.0))
     made.metadata[section][key] = value
     with pytest.raises(DataError, match=says):
-        stroke_of("trial", made)
+        cycle_of("trial", made)
 
 
 def test_real_recordings_of_a_testing_machine_give_curves_where_they_begin_in_the_air() -> None:
     curves, refused = [], []
-    for stroke in machine_strokes():
+    for cycle in machine_strokes():
         try:
-            curves.append(loading_curve(stroke))
+            curves.append(loading_curve(cycle))
         except DataError as error:
             refused.append(str(error))
     assert len(curves) > 20
@@ -258,11 +258,13 @@ def test_real_recordings_of_a_testing_machine_give_curves_where_they_begin_in_th
     assert all(curve.max_depth_mm > 1 and curve.max_force_N > 0.2 for curve in curves)
 
 
-def machine_strokes() -> list[Stroke]:
+def machine_strokes() -> list[IndentationCycle]:
     """Ramps on meat and silicone at 10 Hz, with no speed said; most begin at the surface, some above it."""
     rows: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
     with gzip.open(data.recording("perineal_indentation/recordings.csv.gz"), "rt") as file:
         for row in csv.DictReader(file):
             rows[row["recording"]].append((float(row["t_s"]), float(row["force_N"]), float(row["extension_mm"])))
     columns = {name: np.array(found).T for name, found in rows.items()}
-    return [Stroke(name, float("nan"), time_s, force, depth) for name, (time_s, force, depth) in columns.items()]
+    return [
+        IndentationCycle(name, float("nan"), time_s, force, depth) for name, (time_s, force, depth) in columns.items()
+    ]

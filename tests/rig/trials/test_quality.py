@@ -133,8 +133,8 @@ def test_a_surface_that_is_known_badly_is_said() -> None:
 
 def test_a_loading_of_which_a_fit_can_use_less_than_half_is_bad() -> None:
     """The finding: 3.2 of 8 mm were used, and nothing said so."""
-    stroke = Bench()
-    made = trial(bench=stroke)
+    cycle = Bench()
+    made = trial(bench=cycle)
     axis = made.tables["axis"]
     moving = np.flatnonzero(made.tables["loop"]["step"] == 3)
     late = moving[len(moving) // 3 :]

@@ -67,8 +67,8 @@ def test_a_quarter_hides_that_the_whole_block_leaves_symmetry_and_the_comparison
 
 @pytest.fixture(scope="module")
 def fitted() -> PerSpring:
-    strokes = Bench(depth_mm=6.0).strokes(trials=2, speeds_mm_s=(5.0, 20.0))
-    study = study_curves("made", [loading_curve(stroke) for stroke in strokes])
+    cycles = Bench(depth_mm=6.0).cycles(trials=2, speeds_mm_s=(5.0, 20.0))
+    study = study_curves("made", [loading_curve(cycle) for cycle in cycles])
     return per_spring(study, Block((9, 9, 12), spacing_mm=2.0), "stabilised", 6.2, lambda _stage, _share: None)
 
 

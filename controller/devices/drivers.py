@@ -1,0 +1,100 @@
+"""From one line of `rig.toml` to the driver that fills the role."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from controller.devices.reopening import Open, Openers
+from drivers.bota.device import BotaSensOne
+from drivers.epos4.device import Epos4Axis
+from drivers.epos4.walker import never
+from drivers.ndi.device import NdiTracker
+from drivers.ports import open_port
+from drivers.robotiq.device import RobotiqFt300
+from drivers.roles import Device, ForceSensor, MarkerTracker, ServoAxis
+from rig.config.wiring import Axis, Force, Limits, Tracker, Wiring
+
+Interrupted = Callable[[], bool]
+
+
+@dataclass(frozen=True)
+class Devices:
+    """The devices of one bench; ``tracker`` may be absent."""
+
+    force: ForceSensor
+    axis: ServoAxis
+    tracker: MarkerTracker | None
+
+    def by_role(self) -> dict[str, Device]:
+        """Those there are, by the name of their role."""
+        roles: dict[str, Device] = {"force": self.force, "axis": self.axis}
+        return roles | ({"tracker": self.tracker} if self.tracker else {})
+
+    def close(self) -> None:
+        """Leaves all of them safe, the axis first."""
+        self.axis.close()
+        self.force.close()
+        if self.tracker:
+            self.tracker.close()
+
+
+def open_force(config: Force) -> ForceSensor:
+    """The force sensor, not yet started; raises DeviceError where its port cannot be opened."""
+    if config.product == "robotiq-ft300":
+        return RobotiqFt300(partial(open_port, config.port), config)
+    return BotaSensOne(open_port(config.port, config.baud or BotaSensOne.DEFAULT_BAUD), config)
+
+
+def open_axis(config: Axis, limits: Limits, rate_Hz: float, interrupted: Interrupted = never) -> ServoAxis:
+    """The servo axis, not yet started, to be asked for a sample ``rate_Hz`` times a second.
+
+    ``interrupted`` is asked while it moves by itself; a yes brakes it.
+    """
+    return Epos4Axis(config, limits, rate_Hz=rate_Hz, interrupted=interrupted)
+
+
+def open_tracker(config: Tracker) -> MarkerTracker:
+    """The tracker, not yet started."""
+    return NdiTracker(partial(open_port, config.port), config)
+
+
+class Interruption:
+    """Whether the axis, while it moves by itself, is to be braked: asks ``source``, which is whoever looks just now."""
+
+    def __init__(self) -> None:
+        self.source: Interrupted = never
+
+    def __call__(self) -> bool:
+        """The answer of now."""
+        return self.source()
+
+
+def openers(wiring: Wiring, interrupted: Interrupted = never) -> Openers:
+    """How each device of the bench is opened again."""
+    by_role: dict[str, Open] = {
+        "force": lambda: open_force(wiring.force),
+        "axis": lambda: open_axis(wiring.axis, wiring.limits, wiring.loop.rate_Hz, interrupted),
+    }
+    tracker = wiring.tracker
+    return Openers(by_role | ({"tracker": lambda: open_tracker(tracker)} if tracker else {}))
+
+
+def start_devices(wiring: Wiring, interrupted: Interrupted = never) -> Devices:
+    """Opens and starts all devices; on any failure those already open are closed again, and DeviceError is raised."""
+    opened: list[Device] = []
+    try:
+        force = open_force(wiring.force)
+        opened.append(force)
+        force.start()
+        axis = open_axis(wiring.axis, wiring.limits, wiring.loop.rate_Hz, interrupted)
+        opened.append(axis)
+        axis.start()
+        tracker = open_tracker(wiring.tracker) if wiring.tracker else None
+        if tracker:
+            opened.append(tracker)
+            tracker.start()
+    except BaseException:
+        for device in reversed(opened):
+            device.close()
+        raise
+    return Devices(force, axis, tracker)

@@ -1,0 +1,82 @@
+"""Health of one stream in three bits: alive (young enough), valid (the device vouches for it), on rate.
+
+A position may stay the same for ever, and be right; what tells a frozen one is a set-point that goes on without it.
+"""
+
+import math
+from dataclasses import dataclass
+
+NEVER_NS = 1 << 62
+ALIVE, VALID, ON_RATE = 1, 2, 4
+IDENTICAL_LIMIT = 100
+STANDING_REPORTS = 10
+RATE_TOLERANCE = 0.2
+
+
+@dataclass(slots=True)
+class StreamHealth:
+    """Watches one stream; ``update`` is called once a sample, the rest once a cycle."""
+
+    period_ns: int
+    stale_ns: int
+    identical_limit: int = IDENTICAL_LIMIT
+    valid: bool = False
+    identical: int = 0
+    _last_arrival_ns: int = -NEVER_NS
+    _last_capture_ns: int = -NEVER_NS
+    _mean_period_ns: float = 0.0
+    _last_value: object = None
+
+    def update(self, capture_ns: int, arrival_ns: int, valid: bool, value: object) -> None:
+        """Takes note of one sample; ``value`` is what must not stay the same for ever."""
+        if self._last_capture_ns > -NEVER_NS:
+            step_ns = capture_ns - self._last_capture_ns
+            self._mean_period_ns += 0.02 * (step_ns - self._mean_period_ns)
+        else:
+            self._mean_period_ns = self.period_ns
+        self._last_capture_ns, self._last_arrival_ns, self.valid = capture_ns, arrival_ns, valid
+        self.identical = self.identical + 1 if value == self._last_value else 0
+        self._last_value = value
+
+    def age_ns(self, now_ns: int) -> int:
+        """Since the newest sample was taken; a huge number before the first."""
+        return now_ns - self._last_capture_ns
+
+    def alive(self, now_ns: int) -> bool:
+        """Whether the newest sample still counts."""
+        return self.age_ns(now_ns) < self.stale_ns
+
+    @property
+    def frozen(self) -> bool:
+        """The same value too often in a row for a converter with noise."""
+        return self.identical > self.identical_limit
+
+    @property
+    def rate_Hz(self) -> float:
+        """Mean rate of the last fifty samples or so."""
+        return 1e9 / self._mean_period_ns if self._mean_period_ns > 0 else 0.0
+
+    def bits(self, now_ns: int) -> int:
+        """The three bits."""
+        on_rate = abs(self._mean_period_ns - self.period_ns) < RATE_TOLERANCE * self.period_ns
+        return ALIVE * self.alive(now_ns) | VALID * self.valid | ON_RATE * on_rate
+
+
+@dataclass(slots=True)
+class Standstill:
+    """How far a set-point went while the axis named one and the same place; ``update`` is called once a report."""
+
+    _position_mm: float = math.nan
+    _setpoint_mm: float = math.nan
+    _reports: int = 0
+
+    def update(self, position_mm: float, setpoint_mm: float) -> float:
+        """Way of the set-point since the place last changed [mm]; 0 until ten reports in a row name the same."""
+        if position_mm != self._position_mm:
+            self._position_mm, self._setpoint_mm, self._reports = position_mm, setpoint_mm, 0
+        self._reports += 1
+        return abs(setpoint_mm - self._setpoint_mm) if self._reports > STANDING_REPORTS else 0.0
+
+    def begin(self) -> None:
+        """What came before counts no more: a new program sets out from where the axis is."""
+        self._position_mm = math.nan

@@ -1,0 +1,1 @@
+"""The force law, its gains from the tissue model, and its reference."""

@@ -1,0 +1,1 @@
+"""The loop's process: cyclic executive, state machine, steps, and the channel to its supervisor."""

@@ -1,0 +1,129 @@
+"""What supervisor and loop say to each other over their channel, and how a program ended."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from controller.loop.paired_samples import Touch
+from controller.loop.steps import Program
+from controller.recovery.situation import Act, Situation
+from rig.channel import Message, Reply
+
+Status = dict[str, Any]
+"""The loop as of one moment, for people to see; what decides anything has a message of its own."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a program ended."""
+
+    outcome: str
+    cause: str
+    peak_force_N: float
+    surface_mm: float | None
+    zero_N: float | None
+    touch: Touch | None = None
+
+    @property
+    def stopped(self) -> bool:
+        """Whether a limit, a person or a fault ended it."""
+        return bool(self.cause)
+
+
+class Run(Message):
+    """Execute this; the id of the message is the program's, and its outcome carries it."""
+
+    TYPE: ClassVar[int] = 10
+    program: Program
+
+
+class Reset(Message):
+    """A stop is acknowledged."""
+
+    TYPE: ClassVar[int] = 12
+
+
+class Note(Message):
+    """For the event stream."""
+
+    TYPE: ClassVar[int] = 13
+    code: str
+    text: str
+
+
+class Lease(Message):
+    """The operator's program lives, and whether the operator is ``attending``."""
+
+    TYPE: ClassVar[int] = 14
+    attending: bool
+
+
+class Shutdown(Message):
+    """End as soon as nothing moves."""
+
+    TYPE: ClassVar[int] = 15
+
+
+class Ready(Message):
+    """What the loop found when it started."""
+
+    TYPE: ClassVar[int] = 20
+    devices: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    realtime: dict[str, str] = Field(default_factory=dict)
+
+
+class Failed(Message):
+    """The loop ends; ``stopped``: because someone stopped it."""
+
+    TYPE: ClassVar[int] = 21
+    text: str
+    stopped: bool = False
+
+
+class StatusSaid(Message):
+    """The newest status."""
+
+    TYPE: ClassVar[int] = 22
+    status: Status
+
+
+class Stopped(Message):
+    """Motion was stopped; ``action`` is the name of what was done."""
+
+    TYPE: ClassVar[int] = 23
+    code: str
+    text: str
+    action: str
+
+
+class Finished(Message):
+    """The program with id ``program`` has ended."""
+
+    TYPE: ClassVar[int] = 24
+    program: int
+    outcome: Outcome
+
+
+class Survey(Message):
+    """Say how things stand, for recovery."""
+
+    TYPE: ClassVar[int] = 16
+
+
+class Recover(Message):
+    """Do one act of recovery."""
+
+    TYPE: ClassVar[int] = 17
+    act: Act
+
+
+class Surveyed(Reply):
+    """How things stand."""
+
+    TYPE: ClassVar[int] = 25
+    situation: Situation
+
+
+TO_LOOP = (Run, Reset, Note, Lease, Shutdown, Survey, Recover)
+FROM_LOOP = (Ready, Failed, StatusSaid, Stopped, Finished, Surveyed)

@@ -1,0 +1,1 @@
+"""The way back after a crash or a fault: how things stand, consent, acts."""

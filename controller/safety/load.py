@@ -1,0 +1,157 @@
+"""The load on the tip, whatever the configuration calls it: norm of all channels, its rate, and where it is going.
+
+A stop takes a while: the newest sample is old when it is looked at, the axis follows its set-point late, and needs a
+distance to stand. Until then the load goes on rising by stiffness times way. So what counts is the peak that would be
+reached if the axis were stopped now:
+
+    peak = load + k (set-point - position at the sample's capture + v |v| / (2 a))
+
+k is the stiffest of the secants from earlier samples to the newest, each less what noise alone may give, and raised by
+what tissue stiffens on the way. Where a limb pushes while the axis stands, load + rate x age of the sample counts.
+"""
+
+import math
+from collections import deque
+from typing import NamedTuple, TypeAlias
+
+from controller.loop.setpoint import Setpoint
+from rig.config.wiring import Wiring
+
+Wrench: TypeAlias = tuple[float, float, float, float, float, float]
+"""fx, fy, fz [N], mx, my, mz [N m], in the sensor's frame."""
+NO_WRENCH: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NAN_WRENCH: Wrench = (math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+
+# Rate from two and a half periods, so that three samples are in it, and never less than 10 ms: at 1 kHz the noise of
+# 0.005 N is then 1 N/s, a thousandth of the limit.
+RATE_WINDOW_NS = 10_000_000
+RATE_PERIODS = 2.5
+# How far back secants reach: the axis travels LEAST_TRAVEL_MM in it from 1 mm/s on, below which a stop takes 0.01 mm.
+STIFFNESS_WINDOW_NS = 60_000_000
+# Below this, force over travel is a limb that moves, not tissue that is stiff; a following error at rest is 0.02 mm.
+LEAST_TRAVEL_MM = 0.05
+# Beyond this a secant says what the tissue was, not what it is.
+LONGEST_TRAVEL_MM = 0.7
+# Samples between the ends of the secants, spread evenly on a logarithmic scale: all sixty would cost the loop 30 us.
+LAGS = (1, 2, 3, 5, 8, 13, 21, 34, 55)
+# Three standard deviations of a difference of two samples.
+NOISE_GUARD = 3.0 * math.sqrt(2.0)
+# A zero taken while somebody moved must not blind the prediction; three times the noisier product's 0.05 N.
+LARGEST_NOISE_N = 0.15
+# Growth of tangent stiffness [1/mm]: the index law exponent of forearms is 0.1 to 0.25; linear tissue is stopped early.
+STIFFENING_PER_MM = 0.25
+# An axis sample this old is not extrapolated from any further.
+LONGEST_AHEAD_NS = 10_000_000
+
+
+class Load(NamedTuple):
+    """What the tip bears: norms from the reference zero [N], [N m], rate [N/s], stiffness [N/mm], peak foreseen [N]."""
+
+    force_N: float
+    torque_N_m: float
+    rate_N_s: float
+    stiffness_N_mm: float
+    predicted_N: float
+
+
+UNKNOWN = Load(math.nan, math.nan, 0.0, 0.0, math.nan)
+
+
+class _Sample(NamedTuple):
+    capture_ns: int
+    position_mm: float
+    wrench: Wrench
+
+
+class LoadMonitor:
+    """Fed with every axis and force sample; ``load`` is asked once a cycle."""
+
+    def __init__(self, period_ns: int) -> None:
+        self._filter_ns = period_ns // 2  # what is sampled at a rate was filtered for it, about half a period long
+        self._rate_ns = max(RATE_WINDOW_NS, round(RATE_PERIODS * period_ns))
+        self._kept_ns = max(STIFFNESS_WINDOW_NS, self._rate_ns)
+        self._axis: deque[tuple[int, float]] = deque(maxlen=64)
+        self._samples: deque[_Sample] = deque()
+
+    def axis(self, capture_ns: int, position_mm: float) -> None:
+        """One sample of the axis."""
+        self._axis.append((capture_ns, position_mm))
+
+    def force(self, capture_ns: int, wrench: Wrench) -> None:
+        """One sample of the force sensor, uncorrected."""
+        samples = self._samples
+        samples.append(_Sample(capture_ns, self._position(capture_ns - self._filter_ns), wrench))
+        while capture_ns - samples[0].capture_ns > self._kept_ns and len(samples) > 3:
+            samples.popleft()
+
+    def load(self, now_ns: int, zero: Wrench, noise_N: float, setpoint: Setpoint, acceleration_mm_s2: float) -> Load:
+        """The load now, and its peak if the axis were told now to stop; NaN before the first sample."""
+        if not self._samples:
+            return UNKNOWN
+        newest = self._samples[-1]
+        load_N, rate_N_s = _force(newest.wrench, zero), self._rate()
+        velocity_mm_s = setpoint.velocity_mm_s
+        ahead_mm = setpoint.position_mm - newest.position_mm
+        ahead_mm += velocity_mm_s * abs(velocity_mm_s) / (2.0 * acceleration_mm_s2)
+        stiffness_N_mm = self._stiffness(zero, noise_N, max(ahead_mm, 0.0))
+        rise_N = stiffness_N_mm * max(ahead_mm, 0.0)
+        pushed_N = max(rate_N_s, 0.0) * (now_ns - newest.capture_ns) * 1e-9
+        return Load(load_N, _torque(newest.wrench, zero), rate_N_s, stiffness_N_mm, load_N + max(rise_N, pushed_N))
+
+    def _rate(self) -> float:
+        """Change of the force vector over the window [N/s], as a norm: direction and sign do not matter."""
+        samples, newest = self._samples, self._samples[-1]
+        first = next(sample for sample in samples if newest.capture_ns - sample.capture_ns <= self._rate_ns)
+        span_ns = newest.capture_ns - first.capture_ns
+        return _force(newest.wrench, first.wrench) / span_ns * 1e9 if span_ns > self._rate_ns // 2 else 0.0
+
+    def _stiffness(self, zero: Wrench, noise_N: float, ahead_mm: float) -> float:
+        """Tangent stiffness on the way of ``ahead_mm`` before the tip [N/mm], never negative."""
+        samples, newest = self._samples, self._samples[-1]
+        load_N, guard_N = _force(newest.wrench, zero), NOISE_GUARD * min(noise_N, LARGEST_NOISE_N)
+        stiffest_N_mm = 0.0
+        for lag in LAGS:
+            if lag >= len(samples):
+                break
+            then = samples[-1 - lag]
+            travel_mm, rise_N = newest.position_mm - then.position_mm, load_N - _force(then.wrench, zero)
+            if travel_mm < 0.0:
+                travel_mm, rise_N = -travel_mm, -rise_N
+            if travel_mm > LONGEST_TRAVEL_MM and stiffest_N_mm > 0.0:
+                break
+            if travel_mm >= LEAST_TRAVEL_MM:
+                stiffening = 1.0 + STIFFENING_PER_MM * 0.5 * (ahead_mm + travel_mm)
+                stiffest_N_mm = max(stiffest_N_mm, (rise_N - guard_N) / travel_mm * stiffening)
+        return stiffest_N_mm
+
+    def _position(self, capture_ns: int) -> float:
+        """The axis at ``capture_ns``: between its samples, or ahead of the newest as it last moved [mm]."""
+        axis = self._axis
+        if not axis:
+            return math.nan
+        after = axis[-1]
+        for before in reversed(axis):
+            if before[0] <= capture_ns and before is not after:
+                return _between(before, after, min(capture_ns, axis[-1][0] + LONGEST_AHEAD_NS))
+            if before[0] > capture_ns:
+                after = before
+        return after[1]
+
+
+def calibrated_zero(wiring: Wiring) -> Wrench:
+    """What counts as no load until the first zero of a session: the calibration's zero, else nothing at all."""
+    known = wiring.calibration.of_force
+    return (*known.zero_N, *known.zero_N_m) if known else NO_WRENCH
+
+
+def _between(before: tuple[int, float], after: tuple[int, float], at_ns: int) -> float:
+    share = (at_ns - before[0]) / (after[0] - before[0]) if after[0] > before[0] else 1.0
+    return before[1] + share * (after[1] - before[1])
+
+
+def _force(wrench: Wrench, zero: Wrench) -> float:
+    return math.dist(wrench[:3], zero[:3])
+
+
+def _torque(wrench: Wrench, zero: Wrench) -> float:
+    return math.dist(wrench[3:], zero[3:])

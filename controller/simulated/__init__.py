@@ -1,0 +1,1 @@
+"""The bench on a virtual clock, the loop's own functions compiled."""

@@ -1,0 +1,1 @@
+"""CANopen as a mock node speaks it."""

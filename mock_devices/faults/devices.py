@@ -1,0 +1,155 @@
+"""What can go wrong inside the devices, by name: each sets one attribute of the mock that plays the device."""
+
+from collections.abc import Mapping
+
+from mock_devices.bota.mock import BotaMock
+from mock_devices.epos4.mock import Epos4Mock
+from mock_devices.faults.wires import Kind, Value, as_number, as_switch
+from mock_devices.ndi.mock import NdiMock
+from mock_devices.robotiq.mock import RobotiqMock
+from rig.errors import UsageError
+
+ASTRAY_LARGEST_MM_S = 500.0
+AnySensor = BotaMock | RobotiqMock
+
+
+def _whole(value: Value, high: int) -> int:
+    return round(as_number(value, 0, high))
+
+
+def _sensor_silent(sensor: AnySensor, value: Value) -> None:
+    sensor.silent = as_switch(value)
+
+
+def _sensor_frozen(sensor: AnySensor, value: Value) -> None:
+    sensor.frozen = as_switch(value)
+
+
+def _sensor_invalid(sensor: AnySensor, value: Value) -> None:
+    sensor.invalid = as_switch(value)
+
+
+def _sensor_stranger(sensor: AnySensor, value: Value) -> None:
+    sensor.wrong_identity = as_switch(value)
+
+
+def _sensor_corrupt(sensor: AnySensor, value: Value) -> None:
+    sensor.corrupt_every = _whole(value, 1_000_000)
+
+
+def _refuse(sensor: BotaMock, value: Value) -> None:
+    if not isinstance(value, str):
+        raise UsageError(f"this fault takes the letters of the commands to refuse, not {value!r}")
+    sensor.refuse = value
+
+
+def _mute_start(sensor: RobotiqMock, value: Value) -> None:
+    sensor.mute_start = as_switch(value)
+
+
+def _deaf(sensor: RobotiqMock, value: Value) -> None:
+    sensor.deaf = as_switch(value)
+
+
+def _refuse_stream(sensor: RobotiqMock, value: Value) -> None:
+    sensor.refuse_stream = as_switch(value)
+
+
+def _tracker_silent(tracker: NdiMock, value: Value) -> None:
+    tracker.silent = as_switch(value)
+
+
+def _tracker_frozen(tracker: NdiMock, value: Value) -> None:
+    tracker.frozen = as_switch(value)
+
+
+def _tracker_corrupt(tracker: NdiMock, value: Value) -> None:
+    tracker.corrupt_every = _whole(value, 1_000_000)
+
+
+def _missing(tracker: NdiMock, value: Value) -> None:
+    tracker.missing = _tools(value)
+
+
+def _unplugged(tracker: NdiMock, value: Value) -> None:
+    tracker.unplugged = _tools(value)
+
+
+def _tools(value: Value) -> set[int]:
+    """No tool for false, the tool of that index otherwise."""
+    return set() if value is False else {_whole(value, 23)}
+
+
+def _error_reply(tracker: NdiMock, value: Value) -> None:
+    tracker.error_reply = None if value is False else _whole(value, 0xFF)
+
+
+def _axis_silent(axis: Epos4Mock, value: Value) -> None:
+    axis.silent = as_switch(value)
+
+
+def _axis_frozen(axis: Epos4Mock, value: Value) -> None:
+    axis.frozen = as_switch(value)
+
+
+def _axis_stranger(axis: Epos4Mock, value: Value) -> None:
+    axis.wrong_identity = as_switch(value)
+
+
+def _axis_unguarded(axis: Epos4Mock, value: Value) -> None:
+    axis.unguarded = as_switch(value)
+
+
+def _astray(axis: Epos4Mock, value: Value) -> None:
+    axis.lead_astray(as_number(value, -ASTRAY_LARGEST_MM_S, ASTRAY_LARGEST_MM_S))
+
+
+def _error(axis: Epos4Mock, value: Value) -> None:
+    axis.inject_fault(_whole(value, 0xFFFF))
+
+
+def _restart(axis: Epos4Mock, value: Value) -> None:
+    if as_switch(value):
+        axis.restart()
+
+
+def _lasting_error(axis: Epos4Mock, value: Value) -> None:
+    axis.inject_fault(_whole(value, 0xFFFF), lasting=True)
+
+
+BOTA_FAULTS: Mapping[str, Kind[BotaMock]] = {
+    "silent": Kind("sends nothing", True, _sensor_silent),
+    "frozen": Kind("repeats the last forces under running time", True, _sensor_frozen),
+    "invalid": Kind("flags its measurements as invalid", True, _sensor_invalid),
+    "wrong_identity": Kind("prints another maker's name after a reset", True, _sensor_stranger),
+    "corrupt_every": Kind("spoils the checksum of every n-th frame; 0: none", 10, _sensor_corrupt),
+    "refuse": Kind("answers these commands with code 1", "R", _refuse),
+}
+ROBOTIQ_FAULTS: Mapping[str, Kind[RobotiqMock]] = {
+    "silent": Kind("sends nothing", True, _sensor_silent),
+    "frozen": Kind("repeats the last forces", True, _sensor_frozen),
+    "invalid": Kind("gives the converter's end on all channels", True, _sensor_invalid),
+    "wrong_identity": Kind("has firmware letters that are no force sensor's", True, _sensor_stranger),
+    "corrupt_every": Kind("spoils the checksum of every n-th frame; 0: none", 10, _sensor_corrupt),
+    "mute_start": Kind("starts the stream without answering", True, _mute_start),
+    "deaf": Kind("streams on whatever comes", True, _deaf),
+    "refuse_stream": Kind("answers the start of the stream with exception 3", True, _refuse_stream),
+}
+NDI_FAULTS: Mapping[str, Kind[NdiMock]] = {
+    "silent": Kind("answers nothing", True, _tracker_silent),
+    "frozen": Kind("answers, but the frame number stands still", True, _tracker_frozen),
+    "corrupt_every": Kind("one bit is wrong in every n-th reply; 0: none", 10, _tracker_corrupt),
+    "missing": Kind("the tool of this index is MISSING; false: none", 0, _missing),
+    "unplugged": Kind("the tool of this index is pulled out of its port; false: none", 0, _unplugged),
+    "error_reply": Kind("answers TX and BX with this ERROR code; false: none", 0x0D, _error_reply),
+}
+EPOS4_FAULTS: Mapping[str, Kind[Epos4Mock]] = {
+    "silent": Kind("neither hears nor sends anything", True, _axis_silent),
+    "frozen": Kind("repeats the position it had", True, _axis_frozen),
+    "wrong_identity": Kind("has another maker and product", True, _axis_stranger),
+    "unguarded": Kind("watches neither heartbeats nor its own limits any more", True, _axis_unguarded),
+    "astray": Kind("its set-points run away from those that were sent at this speed, mm/s; 0: no more", 10.0, _astray),
+    "error": Kind("this error happens once (0x603F code, for example 0x8611 following error)", 0x8611, _error),
+    "restart": Kind("loses its power for a moment, and with it reference, limits and torque", True, _restart),
+    "lasting_error": Kind("this error comes back at each reset; 0: its cause is gone", 0x3210, _lasting_error),
+}

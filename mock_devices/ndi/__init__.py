@@ -1,0 +1,1 @@
+"""Mock of NDI's Polaris and Vega."""

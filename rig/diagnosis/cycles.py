@@ -1,0 +1,74 @@
+"""A long recording of several cycles as several recordings, so that cycles can be left out in turn."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from rig.diagnosis.gates import Finding
+from rig.diagnosis.observations import Session, Streams, ordered
+from rig.simulation.drive import Array
+
+UP, DEEP = 0.25, 0.6
+AT_REST = 0.02
+AIR_SHARE = 0.05
+
+
+def in_cycles(session: Session) -> Session:
+    """The session with every recording cut in the air between its cycles; as it was where none has two."""
+    parts = [part for streams in session.recordings for part in cut(streams)]
+    if len(parts) == len(session.recordings):
+        return session
+    text = f"{len(session.recordings)} recordings were cut into {len(parts)} cycles, in the air between them"
+    finding = Finding(session.recordings[0].name, "session", "cut", text)
+    return replace(session, recordings=tuple(parts), findings=(*session.findings, finding))
+
+
+def cut(streams: Streams) -> list[Streams]:
+    """The cycles of a recording, each from the middle of the rest before it to that after it."""
+    time_s, place_mm = ordered(streams.axis_s, streams.axis_mm)
+    if not len(time_s):
+        return [streams]
+    cuts = [at for at in lifts(time_s, place_mm) if in_the_air(streams, at)]
+    edges = [-np.inf, *cuts, np.inf]
+    return [between(streams, number, start, stop) for number, (start, stop) in enumerate(pairwise(edges), start=1)]
+
+
+def lifts(time_s: Array, place_mm: Array) -> list[float]:
+    """When the tip rests highest between two cycles [s]; a cycle goes below 60 % of the travel, a lift above 25 %."""
+    travel = (place_mm - place_mm.min()) / max(float(np.ptp(place_mm)), 1e-12)
+    marks = np.flatnonzero((travel > DEEP) | (travel < UP))
+    leaves = np.flatnonzero(np.diff((travel[marks] > DEEP).astype(int)))
+    found = []
+    for out, back in pairwise(leaves):
+        if travel[marks[out]] > DEEP:
+            up = np.arange(marks[out] + 1, marks[back] + 1)
+            rest = up[travel[up] < travel[up].min() + AT_REST]
+            found.append(float(time_s[rest[len(rest) // 2]]))
+    return found
+
+
+def in_the_air(streams: Streams, at_s: float) -> bool:
+    """Whether force is at its lowest at a time: a tissue still pressed remembers the cycle before."""
+    low_N, high_N = np.nanquantile(streams.force_N, [0.01, 0.99])
+    near = int(np.argmin(np.abs(streams.force_s - at_s)))
+    around_N = float(np.nanmedian(streams.force_N[max(near - 5, 0) : near + 6]))
+    return bool(around_N < low_N + AIR_SHARE * (high_N - low_N) + 1e-12)
+
+
+def between(streams: Streams, number: int, start_s: float, stop_s: float) -> Streams:
+    """The part of a recording between two times."""
+    force, axis = ((t >= start_s) & (t < stop_s) for t in (streams.force_s, streams.axis_s))
+    part = replace(
+        streams,
+        name=streams.name if (start_s, stop_s) == (-np.inf, np.inf) else f"{streams.name}, cycle {number}",
+        force_s=streams.force_s[force],
+        force_N=streams.force_N[force],
+        axis_s=streams.axis_s[axis],
+        axis_mm=streams.axis_mm[axis],
+        temperature_C=None if streams.temperature_C is None else streams.temperature_C[force],
+    )
+    if streams.marker_s is None or streams.marker_mm is None:
+        return part
+    seen = (streams.marker_s >= start_s) & (streams.marker_s < stop_s)
+    return replace(part, marker_s=streams.marker_s[seen], marker_mm=streams.marker_mm[seen])

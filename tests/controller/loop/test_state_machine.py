@@ -1,0 +1,224 @@
+"""The state machine of one cycle, driven on an injected clock against a spring instead of a bench."""
+
+import math
+
+import pytest
+
+from controller.law.force_position import GainRow
+from controller.law.gains import pi_gains
+from controller.loop.modes import Mode
+from controller.loop.steps import Approach, Compress, Dither, Hold, MoveTo, Program, Retract, Step, TrackForce, Zero
+from controller.safety.program_limits import refuse_beyond_limits
+from rig.config.wiring import Limits, Wiring
+from rig.errors import UsageError
+from tests.controller.law.test_force_position import DESIGN
+from tests.controller.spring import (
+    APPROACH,
+    LEAVE,
+    PRESS,
+    STIFFNESS_N_MM,
+    SURFACE_MM,
+    WIRING,
+    ZERO,
+    ZERO_N,
+    SpringBench,
+)
+
+
+def gains() -> tuple[GainRow, ...]:
+    proportional, integral = pi_gains(STIFFNESS_N_MM, 0.0, DESIGN)
+    return tuple(
+        GainRow(
+            force_N=force,
+            depth_mm=force / STIFFNESS_N_MM,
+            tangent_N_mm=STIFFNESS_N_MM,
+            proportional_mm_N=proportional,
+            integral_mm_N_s=integral,
+        )
+        for force in (0.0, 9.0)
+    )
+
+
+def touching(**speeds: float) -> Approach:
+    return APPROACH.model_copy(update={"touches": 2, **speeds})
+
+
+def track(*points: tuple[float, float]) -> TrackForce:
+    return TrackForce(times_s=tuple(t for t, _ in points), forces_N=tuple(f for _, f in points), gains=gains())
+
+
+def test_a_trial_zeroes_finds_the_surface_presses_to_depth_and_leaves() -> None:
+    bench = SpringBench()
+    bench.run(ZERO, APPROACH, PRESS, Hold(duration_s=0.1), LEAVE)
+    assert bench.ended == [("complete", None)]
+    assert bench.state.zero_N == pytest.approx(ZERO_N)
+    assert bench.state.surface_mm == pytest.approx(SURFACE_MM, abs=0.1)
+    assert bench.state.peak_force_N == pytest.approx(5.0, abs=0.15)
+    assert bench.position_mm == pytest.approx(bench.state.surface_mm - 5.0)
+    order = list(dict.fromkeys(bench.modes))
+    assert order == [Mode.FREE, Mode.APPROACH, Mode.COMPRESS, Mode.RETRACT, Mode.IDLE]
+
+
+def test_the_force_limit_of_the_protocol_ends_the_compression_but_not_the_trial() -> None:
+    bench = SpringBench()
+    bench.run(ZERO, APPROACH, Compress(depth_mm=5.0, speed_mm_s=20.0, force_limit_N=2.0), LEAVE)
+    assert bench.ended == [("force limit", None)]
+    assert bench.state.peak_force_N == pytest.approx(2.0, abs=0.1)
+    assert bench.machine.mode is Mode.IDLE
+
+
+def test_force_tracking_reaches_its_reference_without_leaving_contact() -> None:
+    bench = SpringBench()
+    bench.run(ZERO, APPROACH, track((0.0, 0.05), (0.3, 3.0), (2.0, 3.0)), LEAVE)
+    contact = [force for force, mode in zip(bench.forces_N, bench.modes, strict=True) if mode is Mode.CONTACT]
+    assert bench.ended == [("complete", None)]
+    assert contact[-1] == pytest.approx(3.0, abs=0.01)
+    assert max(contact) < 3.2
+
+
+def test_a_limb_that_goes_away_is_followed_slowly_not_chased() -> None:
+    bench = SpringBench()
+    reach = track((0.0, 0.05), (0.3, 3.0), (20.0, 3.0))
+    bench.run(ZERO, APPROACH, reach, until=lambda: bench.state.force_N > 2.9)
+    bench.stiffness_N_mm = 0.0
+    before_mm = bench.position_mm
+    for _ in range(100):
+        bench.run_cycle()
+    assert 0.0 < bench.position_mm - before_mm <= 0.1 * reach.search_speed_mm_s + 1e-9
+
+
+def test_while_the_force_is_late_the_tip_stands_still() -> None:
+    bench = SpringBench()
+    bench.run(ZERO, APPROACH, track((0.0, 0.05), (3.0, 3.0)), until=lambda: bench.state.force_N > 1.0)
+    bench.state.force_late, before_mm = True, bench.position_mm
+    for _ in range(20):
+        bench.run_cycle()
+    assert bench.position_mm == pytest.approx(before_mm, abs=0.01)
+    bench.state.force_late = False
+    bench.run()
+    assert bench.ended == [("complete", None)]
+
+
+def test_a_guide_that_rubs_is_no_contact_and_the_surface_is_found_below_it() -> None:
+    bench = SpringBench(rubbing_N=0.3)
+    bench.run(ZERO, APPROACH)
+    assert bench.ended == [("complete", None)]
+    assert bench.state.surface_mm == pytest.approx(SURFACE_MM, abs=0.1)
+
+
+def test_tissue_met_in_the_first_half_millimetre_is_found_within_half_a_newton() -> None:
+    bench = SpringBench(position_mm=SURFACE_MM - 0.1, stiffness_N_mm=3.0)
+    bench.run(ZERO, APPROACH)
+    assert bench.state.peak_force_N < 0.5 + APPROACH.contact_force_N + 0.1
+
+
+def test_a_sensor_too_slow_to_see_the_run_in_leaves_the_threshold_as_it_was_asked_for() -> None:
+    state, run = SpringBench().state, APPROACH.begin()
+    for place_mm, waits_for_N in ((10.0, 0.55), (10.2, 0.55), (10.8, 0.05)):
+        state.position_mm, state.force_samples = place_mm, state.force_samples + 1
+        assert not run.advance(state, 0.0)
+        assert run.threshold_N(state) == pytest.approx(waits_for_N)
+
+
+@pytest.mark.parametrize(
+    ("noise_N", "waits_for_N"), [(0.0, 0.05), (0.005, 0.05), (0.02, 0.2), (0.05, 0.5), (0.2, 1.0), (0.5, 2.0)]
+)
+def test_contact_is_detected_at_ten_times_the_noise_but_no_more_than_noise_asks_for(
+    noise_N: float, waits_for_N: float
+) -> None:
+    """What is pressed to tell the surface is 1 N at most; four times the noise is what noise alone does not reach."""
+    state, run = SpringBench().state, APPROACH.begin()
+    for place_mm in (10.0, 10.3, 10.8):
+        state.position_mm, state.force_samples, state.force_N = place_mm, state.force_samples + 1, 0.0
+        run.advance(state, 0.0)
+    state.noise_N = noise_N
+    assert run.threshold_N(state) == pytest.approx(waits_for_N)
+
+
+def test_no_contact_within_the_search_retracts_and_says_so() -> None:
+    bench = SpringBench(stiffness_N_mm=0.0)
+    bench.run(ZERO, Approach(speed_mm_s=20.0, contact_force_N=0.05, search_to_mm=30.0))
+    outcome, cause = bench.ended[0]
+    assert outcome == "protocol"
+    assert cause is not None and "no contact down to 30 mm" in cause.text
+    assert bench.machine.mode is Mode.SAFE
+    assert bench.position_mm == pytest.approx(20.0, abs=0.5)
+
+
+def test_a_zero_far_from_the_first_one_is_refused() -> None:
+    bench = SpringBench()
+    bench.run(ZERO)
+    bench.position_mm = SURFACE_MM + 2.0
+    bench.sense()
+    bench.run(ZERO)
+    assert "since the first zero" in bench.machine.latched.text if bench.machine.latched else False
+
+
+@pytest.mark.parametrize(
+    ("steps", "reason"),
+    [
+        ((ZERO, APPROACH, Compress(depth_mm=16.0, speed_mm_s=5.0, force_limit_N=5.0)), "depth 16 mm is above"),
+        ((ZERO, APPROACH, Compress(depth_mm=5.0, speed_mm_s=99.0, force_limit_N=5.0)), "speed 99 mm/s is above"),
+        ((ZERO, APPROACH, Compress(depth_mm=5.0, speed_mm_s=5.0, force_limit_N=12.0)), "force_limit_N 12 N is above"),
+        ((ZERO, APPROACH, track((0.0, 0.0), (1.0, 9.5))), "the largest force of the model, 9 N"),
+        ((ZERO, APPROACH, track((1.0, 1.0), (0.0, 1.0))), "times go backwards"),
+        ((ZERO, MoveTo(position_mm=70.0, speed_mm_s=5.0)), "position 70 mm is outside 0 to 60 mm"),
+        ((ZERO, Retract(clearance_mm=1.0, speed_mm_s=30.0)), "retract speed 30 mm/s is above"),
+        ((ZERO, APPROACH, Dither(amplitude_mm=1.0, frequency_Hz=20.0, duration_s=1.0)), "speed of the dither"),
+        ((ZERO, touching(touch_speed_mm_s=99.0)), "touch speed 99 mm/s is above limits.speed_mm_s, 60 mm/s"),
+        ((ZERO, touching(back_off_mm_s=30.0)), "back-off speed 30 mm/s is above limits.retract_speed_mm_s, 20 mm/s"),
+        ((APPROACH, PRESS), "the first step must be a zero"),
+        ((ZERO, PRESS), "no approach comes before it"),
+    ],
+)
+def test_a_program_beyond_the_limits_is_refused_with_the_number_and_its_bound(
+    steps: tuple[Step, ...], reason: str
+) -> None:
+    with pytest.raises(UsageError, match=reason.replace("(", r"\(")):
+        refuse_beyond_limits(Program(name="test", steps=steps), WIRING)
+
+
+def test_a_program_within_the_limits_is_accepted() -> None:
+    refuse_beyond_limits(Program(name="test", steps=(ZERO, APPROACH, PRESS, LEAVE)), WIRING)
+
+
+def test_limits_that_contradict_each_other_are_refused_with_both_numbers() -> None:
+    with pytest.raises(ValueError, match="position_min_mm 10 is not below position_max_mm 5"):
+        Limits(position_min_mm=10.0, position_max_mm=5.0)
+    with pytest.raises(ValueError, match="retract_speed_mm_s 80 is above speed_mm_s 60"):
+        Limits(retract_speed_mm_s=80.0)
+
+
+def test_dither_starts_and_ends_where_it_began() -> None:
+    bench = SpringBench()
+    wobble = Dither(amplitude_mm=0.5, frequency_Hz=5.0, duration_s=0.5)
+    bench.run(ZERO, APPROACH, PRESS, wobble, until=lambda: bench.machine.step_index == 3)
+    centre_mm = bench.position_mm
+    positions = []
+    while bench.machine.busy:
+        bench.run_cycle()
+        positions.append(bench.position_mm)
+    assert positions[-1] == pytest.approx(centre_mm, abs=1e-6)
+    assert max(positions) - centre_mm == pytest.approx(0.5, abs=0.01)
+    assert not math.isnan(bench.state.surface_mm)
+
+
+def test_a_program_may_start_a_count_beyond_the_end_of_the_workspace() -> None:
+    bench = SpringBench(position_mm=-0.0005)
+    bench.run(ZERO, MoveTo(position_mm=5.0, speed_mm_s=20.0))
+    assert bench.ended == [("complete", None)]
+
+
+def test_a_step_that_leads_out_of_the_workspace_is_stopped_before_the_drive_is_asked() -> None:
+    bench = SpringBench(wiring=Wiring(limits=Limits(position_max_mm=22.0)))
+    bench.run(ZERO, APPROACH, PRESS)
+    assert bench.ended[0][0] == "workspace"
+    assert bench.machine.mode is Mode.SAFE
+
+
+@pytest.mark.parametrize(("every", "noise_N"), [(1, 0.005), (10, 0.05), (10, 0.2)])
+def test_a_slow_and_noisy_sensor_finds_the_surface_and_not_its_own_noise(every: int, noise_N: float) -> None:
+    bench = SpringBench(position_mm=5.0, every=every, noise_N=noise_N)
+    bench.run(Zero(duration_s=1.0), APPROACH, LEAVE)
+    assert bench.ended == [("complete", None)]
+    assert bench.state.surface_mm == pytest.approx(SURFACE_MM, abs=0.01 + noise_N)

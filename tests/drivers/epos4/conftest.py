@@ -1,0 +1,28 @@
+"""The servo axis against the mock drive in one process, started and homed."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from drivers.epos4.device import Epos4Axis
+from tests.drivers.epos4.sessions import axis_on
+from tests.epos4_stage import Stage
+
+
+@pytest.fixture
+def stage() -> Stage:
+    return Stage()
+
+
+@pytest.fixture
+def axis(stage: Stage) -> Iterator[Epos4Axis]:
+    axis = axis_on(stage)
+    axis.start()
+    yield axis
+    axis.close()
+
+
+@pytest.fixture
+def homed(axis: Epos4Axis) -> Epos4Axis:
+    axis.home()
+    return axis

@@ -1,0 +1,217 @@
+"""Sessions of the servo axis against the mock drive in one process, on a clock that only waiting moves."""
+
+import math
+
+import pytest
+
+from drivers.epos4.device import Epos4Axis
+from rig.channels import AxisSample
+from rig.config.wiring import Limits
+from rig.errors import DeviceError, SafetyStop
+from tests.drivers.epos4.sessions import axis_on, tick
+from tests.epos4_stage import Stage
+
+
+def test_the_drive_says_who_it_is(axis: Epos4Axis) -> None:
+    identity = axis.identity
+    assert (identity.product, identity.serial, identity.firmware) == ("maxon EPOS4 61500000", "62014711", "0170")
+    assert axis.period_ns == 1_000_000
+    assert axis.fileno() == 99
+
+
+def test_after_start_the_drive_has_its_limits_and_no_torque(stage: Stage, axis: Epos4Axis) -> None:
+    values = stage.mock.dictionary.values
+    assert not stage.plant.powered
+    assert (values[0x607D, 1], values[0x607D, 2]) == (-1000, 121_000)
+    assert values[0x6065, 0] == 4000
+    assert values[0x1016, 1] == 127 << 16 | 100
+    assert stage.plant.current_limit_A == 5.0
+    assert not axis.enabled
+    assert axis.fault == ""
+
+
+def test_limits_are_in_the_drive_before_the_first_controlword_that_gives_torque(stage: Stage) -> None:
+    axis = axis_on(stage)
+    axis.start()
+    axis.home()
+    requests = [frame.data for frame in stage.sent if frame.can_id == 0x601]
+    enabling = [at for at, data in enumerate(requests) if data[:3] == b"\x2b\x40\x60" and data[4] & 0x0F == 0x0F]
+    limits = [at for at, data in enumerate(requests) if data[:3] in (b"\x23\x7d\x60", b"\x23\x65\x60", b"\x23\x85\x60")]
+    assert len(limits) == 4
+    assert max(limits) < min(enabling)
+    axis.close()
+
+
+def test_homing_finds_the_switch_and_makes_it_zero(stage: Stage, axis: Epos4Axis) -> None:
+    axis.home()
+    assert abs(stage.plant.position_mm) < 0.05
+    assert stage.mock.drive.position == pytest.approx(stage.plant.position_mm * 2000, abs=60)
+
+
+@pytest.mark.parametrize("method", [1, 17, 33, 34, 37])
+def test_homing_ends_at_zero_by_every_method_the_stage_allows(method: int) -> None:
+    stage = Stage(position_mm=3.0)
+    axis = axis_on(stage, homing_method=method)
+    axis.start()
+    axis.home()
+    stage.run(0.1)
+    assert stage.mock.drive.position == pytest.approx(0, abs=20)
+    axis.close()
+
+
+def test_homing_against_a_stop_ends_where_the_current_rises() -> None:
+    stage = Stage(position_mm=3.0)
+    stage.plant.stop_mm = -2.0
+    axis = axis_on(stage, homing_method=-4)
+    axis.start()
+    axis.home()
+    stage.run(0.1)
+    assert stage.plant.position_mm == pytest.approx(-2.0, abs=0.02)
+    assert stage.mock.drive.position == pytest.approx(0, abs=40)
+    axis.close()
+
+
+def test_homing_starts_by_leaving_the_switch_where_it_stands_on_it() -> None:
+    stage = Stage(position_mm=-1.0)
+    axis = axis_on(stage)
+    axis.start()
+    axis.home()
+    assert abs(stage.plant.position_mm) < 0.05
+    axis.close()
+
+
+def test_homing_again_is_not_fooled_by_the_first_one(stage: Stage, homed: Epos4Axis) -> None:
+    homed.move_to(20, 50)
+    homed.home()
+    assert abs(stage.plant.position_mm) < 0.05
+
+
+def test_homing_without_a_switch_ends_at_its_deadline_and_the_axis_stops(stage: Stage, axis: Epos4Axis) -> None:
+    stage.plant.has_switch = False
+    with pytest.raises(DeviceError, match=r"homing by method 17 found no reference within 9\.5 s \(no fault\)"):
+        axis.home()
+    stage.run(0.2)
+    before = stage.plant.position_mm
+    stage.run(0.2)
+    assert stage.plant.position_mm == pytest.approx(before, abs=1e-6)
+
+
+def test_homing_by_a_switch_that_is_not_there_is_an_error_at_once(stage: Stage) -> None:
+    axis = axis_on(stage, homing_method=7)
+    axis.start()
+    begun_ns = stage.now()
+    with pytest.raises(DeviceError, match="homing by method 7 found no reference"):
+        axis.home()
+    assert stage.now() - begun_ns < 100_000_000
+    axis.close()
+
+
+def test_a_profile_move_ends_where_and_when_it_should(stage: Stage, homed: Epos4Axis) -> None:
+    begun_ns = stage.now()
+    homed.move_to(30, 30)
+    stage.run(0.1)
+    assert stage.plant.position_mm == pytest.approx(30, abs=0.01)
+    assert (stage.now() - begun_ns) / 1e9 == pytest.approx(1.0 + 0.015 + 0.1, abs=0.05)
+    assert not homed.enabled
+
+
+def test_a_turned_axis_goes_into_the_tissue_all_the_same() -> None:
+    stage = Stage(increments_per_mm=-2000.0)
+    axis = axis_on(stage, direction=-1, homing_method=18)
+    axis.start()
+    axis.home()
+    axis.move_to(10, 30)
+    axis.enable()
+    for _ in range(100):
+        samples = tick(stage, axis, 10.0)
+    assert stage.plant.position_mm == pytest.approx(10, abs=0.01)
+    assert samples[-1].position_mm == pytest.approx(10, abs=0.01)
+    for _ in range(20):
+        samples = tick(stage, axis, 10.5)
+    assert samples[-1].velocity_mm_s > 1
+    assert samples[-1].current_A > 0
+    axis.close()
+
+
+def test_cyclic_positions_follow_a_sine_and_every_set_point_is_answered(stage: Stage, homed: Epos4Axis) -> None:
+    homed.move_to(10, 30)
+    homed.enable()
+    assert homed.enabled
+    samples: list[AxisSample] = []
+    for step in range(2000):
+        samples += tick(stage, homed, 10 + 2 * math.sin(2 * math.pi * step / 1000))
+    assert homed.enabled
+    assert len(samples) == 1999
+    assert [sample.seq for sample in samples] == list(range(1999))
+    assert all(sample.arrival_ns - sample.capture_ns == 1_000_000 for sample in samples)
+    assert all(sample.valid for sample in samples)
+    positions = [sample.position_mm for sample in samples[1000:]]
+    assert max(positions) == pytest.approx(12, abs=0.05)
+    assert min(positions) == pytest.approx(8, abs=0.05)
+    assert max(sample.velocity_mm_s for sample in samples) == pytest.approx(4 * math.pi, rel=0.05)
+    assert homed.counters.device_lost == 0
+    assert homed.counters.discarded_bytes == 0
+
+
+def test_a_request_brings_a_sample_and_commands_nothing(stage: Stage, axis: Epos4Axis) -> None:
+    before = len(stage.sent)
+    axis.request(stage.now())
+    stage.run(0.001)
+    [sample] = axis.poll(stage.now())
+    assert sample.position_mm == 0.0
+    assert [frame.can_id for frame in stage.sent[before:]] == [0x080, 0x77F]
+
+
+def test_enabling_does_not_move_the_axis(stage: Stage, homed: Epos4Axis) -> None:
+    homed.move_to(10, 30)
+    for _ in range(10):
+        stage.run(0.02)
+        homed.poll(stage.now())
+    before = stage.plant.position_mm
+    homed.enable()
+    stage.run(0.04)
+    assert stage.plant.position_mm == pytest.approx(before, abs=0.001)
+
+
+@pytest.mark.parametrize("position_mm", [-0.06, 60.06, 1000.0, math.nan, math.inf, -math.inf])
+def test_a_position_beyond_the_limits_is_refused_and_nothing_is_sent(
+    stage: Stage, homed: Epos4Axis, position_mm: float
+) -> None:
+    homed.enable()
+    before = len(stage.sent)
+    with pytest.raises(SafetyStop, match=r"refused to go to .* mm; .* are 0 and 60 mm"):
+        homed.command(position_mm, stage.now())
+    with pytest.raises(SafetyStop, match="refused"):
+        homed.move_to(position_mm, 10)
+    assert [frame for frame in stage.sent[before:] if frame.can_id == 0x201] == []
+
+
+def test_a_hold_at_the_limit_may_ripple(stage: Stage, homed: Epos4Axis) -> None:
+    homed.enable()
+    homed.command(-0.03, stage.now())
+    stage.run(0.05)
+    assert homed.fault == ""
+    assert stage.mock.dictionary.values[0x607A, 0] == 0
+
+
+@pytest.mark.parametrize("speed_mm_s", [0, -5, 60.1, math.nan])
+def test_a_speed_beyond_the_limit_is_refused(homed: Epos4Axis, speed_mm_s: float) -> None:
+    with pytest.raises(SafetyStop, match=r"refused to move at .* limits.speed_mm_s is 60 mm/s"):
+        homed.move_to(10, speed_mm_s)
+
+
+def test_without_a_reference_there_is_no_torque(stage: Stage, axis: Epos4Axis) -> None:
+    with pytest.raises(DeviceError, match="enabling needs one; home the axis first"):
+        axis.enable()
+    with pytest.raises(DeviceError, match="moving needs one; home the axis first"):
+        axis.move_to(10, 10)
+    assert not stage.plant.powered
+
+
+def test_an_axis_outside_its_limits_is_not_enabled(stage: Stage) -> None:
+    axis = axis_on(stage, Limits(position_min_mm=5, position_max_mm=60))
+    axis.start()
+    axis.home()
+    with pytest.raises(SafetyStop, match="are 5 and 60 mm"):
+        axis.enable()
+    axis.close()
