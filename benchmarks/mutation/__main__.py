@@ -30,6 +30,7 @@ SURVIVORS = Path(__file__).with_name("survivors.toml")
 MODULES = (
     "controller/safety/table.py",
     "controller/safety/checks.py",
+    "controller/safety/first_touch.py",
     "controller/safety/inputs.py",
     "controller/safety/load.py",
     "controller/safety/giving_way.py",
@@ -47,22 +48,25 @@ MODULES = (
     "controller/stop/start.py",
     "controller/stop/keypad.py",
     "controller/stop/http.py",
+    "controller/stop/client.py",
+    "controller/stop/keyboard.py",
+    "controller/stop/liveness.py",
+    "controller/stop/server.py",
 )
+FOLDER = "tests/controller"
 # Left out of the tests that are to notice: those of the compiled control law and of its design, of calibrations, of
 # whole physics (a minute, and other tests run the same lines), and those that measure time, which trials share.
 LEFT_OUT = (
-    "simulated", "extended_gain", "force_position", "laws", "comparison", "lines", "references", "registration",
-    "motion_and_grid", "commissioning", "force_calibration", "axis_calibration", "force_limit",
+    "commissioning", "experiments", "law", "simulated", "loop/test_registration.py", "loop/test_setpoint_and_grid.py",
+    "safety/test_force_limit.py",
 )  # fmt: skip
 TIMED = (
-    "test_touch.py::test_a_portion_of_the_estimate_leaves_the_loop_its_cycle",
+    "loop/test_touch.py::test_a_portion_of_the_estimate_leaves_the_loop_its_cycle",
     "stop/test_word.py::test_a_look_without_a_request_costs_the_loop_less_than_two_microseconds",
 )
-FOLDER = "tests/controller"
 TESTS = (
     FOLDER,
-    f"--ignore={FOLDER}/stop/test_server.py",  # sockets, threads and waits of a process of its own
-    *(f"--ignore={FOLDER}/test_{name}.py" for name in LEFT_OUT),
+    *(f"--ignore={FOLDER}/{part}" for part in LEFT_OUT),
     *(f"--deselect={FOLDER}/{test}" for test in TIMED),
 )
 

@@ -27,10 +27,9 @@ def enums_of(paths: Iterable[Path]) -> dict[str, list[str]]:
 
 def mutants_of(path: Path, shown: str, enums: Enums) -> list[Mutant]:
     """All mutants of one file, in the order of its edits; equal names of one scope are numbered."""
-    found = [
-        (edit.place, f"{edit.place.scope or 'module'}: {edit.name}")
-        for edit in edits(ast.parse(path.read_text()), enums)
-    ]
+    # All edits first: to name one, the tree they are found by is changed for a moment.
+    found = [(edit.place, f"{edit.place.scope or 'module'}: {edit.name}")
+             for edit in list(edits(ast.parse(path.read_text()), enums))]  # fmt: skip
     seen: Counter[str] = Counter()
     mutants = []
     for number, (place, name) in enumerate(found):

@@ -47,3 +47,10 @@ def test_a_change_in_a_function_is_for_the_tests_that_run_it_and_a_constant_for_
     assert tests.noticing("a.py", 2, at_import=False) == ["slow"]
     assert tests.noticing("a.py", 7, at_import=True) == ["quick", "slow"]
     assert tests.noticing("c.py", 7, at_import=True) == ["other", "quick", "slow"]
+
+
+def test_a_second_case_of_a_test_comes_after_others_and_what_takes_too_long_not_at_all() -> None:
+    seconds = {"a[1]": 0.5, "a[2]": 0.5, "a[3]": 0.5, "b": 0.6, "c": 7.0, "d": 7.1}
+    tests = Coverage(lines={test: {("a.py", 1)} for test in seconds}, seconds=seconds)
+    # 0.5, 0.6, 2 times 0.5 and 3 times 0.5 s; c begins after 2.1 s of the 8 s there are, d after 9.1 s.
+    assert tests.noticing("a.py", 1, at_import=False) == ["a[1]", "b", "a[2]", "a[3]", "c"]

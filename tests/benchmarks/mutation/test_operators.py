@@ -1,11 +1,12 @@
 """What is mutated and what is not, on sources of a line or two; expected mutants are written out by hand."""
 
 import ast
+from pathlib import Path
 
 import pytest
 
 from benchmarks.mutation.edits import edits
-from benchmarks.mutation.mutants import mutated
+from benchmarks.mutation.mutants import mutants_of, mutated
 
 ENUMS = {"Action": ("SOFT", "IMMEDIATE")}
 
@@ -85,3 +86,15 @@ def test_a_case_of_a_match_is_left_out_and_so_is_a_bound_in_an_annotation_mutate
 def test_defaults_of_functions_and_bodies_of_properties_are_mutated() -> None:
     source = "class A:\n\n    @property\n    def p(self, x=1):\n        return self.a + x"
     assert changes(source) == [source.replace("x=1", "x=2"), source.replace("a +", "a -")]
+
+
+def test_the_name_of_a_mutant_says_what_is_tried(tmp_path: Path) -> None:
+    """To name a mutant that leaves out an argument must not hide those of the next argument."""
+    path, source = tmp_path / "a.py", "def f(a):\n    g(k=1, m=2, n=a)\n    return h(a, a)"
+    path.write_text(source)
+    found = mutants_of(path, "a.py", ENUMS)
+    assert [mutant.number for mutant in found] == list(range(len(changes(source))))
+    tried = {mutant.name: ast.unparse(mutated(source, mutant.number, ENUMS)).splitlines() for mutant in found}
+    assert tried["f: g(k=1, m=2, n=a) -> g(k=1, n=a)"][1] == "    g(k=1, n=a)"
+    assert tried["f: h(a, a) -> h(None, a)"][2] == "    return h(None, a)"
+    assert tried["f: h(a, a) -> h(a)"][2] == "    return h(a)"
