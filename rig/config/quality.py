@@ -41,8 +41,8 @@ class QualityLimits(Table):
     # A channel without noise is not connected; without one of six the tip still presses along another.
     dead_channels: Bounds = Field(default=Bounds(good=0.0), description="force channels that never change")
     # Promised are 0.2 mm; beyond a quarter of the study's 8 mm depth means nothing.
-    contact_within_mm: Bounds = Field(default=Bounds(good=0.3, bad=2.0), description="half of contact's 95 % interval")
-    depth_off_mm: Bounds = Field(default=Bounds(good=0.3, bad=2.0), description="depth reached less depth asked")
+    contact_within_mm: Bounds = Field(default=Bounds(good=0.2, bad=2.0), description="half of contact's 95 % interval")
+    depth_off_mm: Bounds = Field(default=Bounds(good=0.2, bad=2.0), description="depth reached less depth asked")
     # The first and last tenth of a millimetre of 8 are run-up and stop.
     loading_lost: Bounds = Field(default=Bounds(good=0.1, bad=0.5), description="share of the loading no fit can use")
     # 5 % are 0.4 mm in 8; screw and camera agree to 0.5 %.

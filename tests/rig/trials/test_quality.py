@@ -127,7 +127,7 @@ def test_a_surface_that_is_known_badly_is_said() -> None:
     wide = json.dumps({"surface_mm": 20.0, "low_mm": 19.5, "high_mm": 20.1})
     found = evaluate_trial(trial(contact=wide), LIMITS)
     assert found.verdict == "usable"
-    assert found.reasons == ("the surface is known no better than +- 0.5 mm (good up to 0.3 mm)",)
+    assert found.reasons == ("the surface is known no better than +- 0.5 mm (good up to 0.2 mm)",)
     assert evaluate_trial(trial(contact=wide.replace("19.5", "16")), LIMITS).verdict == "bad"
 
 
