@@ -17,7 +17,7 @@ from controller.law import force_position
 from controller.law.force_position import Columns, Memory, Settings
 from controller.loop import setpoint
 from controller.loop.setpoint import Setpoint
-from controller.simulated.compiled import compiled
+from rig.machine_code import compiled
 from rig.simulation import axis_plant
 from rig.simulation.axis_plant import AxisState, Limb, Motor, PositionLoop, Sensing
 

@@ -5,20 +5,20 @@ therefore named after the contents of all kernel files, and stale machine code c
 """
 
 import hashlib
-import os
 import tempfile
 from pathlib import Path
 
 from numba import config
 
+from rig.machine_code import code_folder
+
 _SOURCES = ("numba_types.py", "rows.py", "cells.py", "kernels.py", "steps.py")
 
 
 def kernel_folder() -> Path:
-    """Folder for the present sources: below NUMBA_CACHE_DIR, else XDG_CACHE_HOME, else ~/.cache."""
+    """Folder for the present sources."""
     digest = hashlib.sha256(b"".join((Path(__file__).parent / name).read_bytes() for name in _SOURCES)).hexdigest()[:16]
-    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    return Path(base).expanduser() / "tissue-rig" / f"kernels-{digest}"
+    return code_folder() / f"kernels-{digest}"
 
 
 def keep_compiled_kernels() -> None:
