@@ -49,7 +49,7 @@ def test_one_long_recording_is_judged_by_its_strokes(clean: Session) -> None:
     assert result.verdict == "adequate"
     assert result.recordings == 6
     assert "friction" in result.detectable
-    assert any("cut into 6 strokes" in finding.text for finding in result.quality)
+    assert any("cut into 6 cycles" in finding.text for finding in result.quality)
 
 
 def test_strokes_that_never_leave_the_tissue_are_not_cut(clean: Session) -> None:
