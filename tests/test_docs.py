@@ -19,10 +19,16 @@ import pytest
 from tests.system.stage import free_port
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(page for page in DOCS.rglob("*.md") if "_build" not in page.parts)]
+EXECUTED = [page for page in PAGES if "```sh\n" in page.read_text()]
 BLOCK = re.compile(r"```sh\n(.*?)```", re.DOTALL)
 SERVING = ("rig mock", "rig serve")
 LINE_TIMEOUT_S = 300
+
+
+def name(page: Path) -> str:
+    return str(page.relative_to(ROOT))
 
 
 def commands(page: Path) -> list[str]:
@@ -66,14 +72,22 @@ def run(command: str, folder: Path) -> None:
 
 
 def check_make(command: str) -> None:
-    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     assert set(shlex.split(command)[1:]) <= targets, command
+
+
+def test_pages_in_folders_are_found_and_their_commands_too() -> None:
+    named = [command for page in EXECUTED for command in commands(page)]
+    for page, command in (("README.md", "make demo"), ("docs/tutorial/first-bench.md", "rig verify sessions/first")):
+        assert command in commands(ROOT / page)
+        assert ROOT / page in EXECUTED
+        assert command in named
 
 
 @pytest.mark.bench
 @pytest.mark.xdist_group("commands")
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", EXECUTED, ids=name)
 def test_every_command_of_the_page_works_in_order(page: Path, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     for command in commands(page):
@@ -85,7 +99,7 @@ def test_every_command_of_the_page_works_in_order(page: Path, tmp_path: Path) ->
             run(command, tmp_path)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=name)
 def test_every_link_to_a_file_leads_somewhere(page: Path) -> None:
     links = re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text())
     missing = [link for link in links if "://" not in link and not (page.parent / link).exists()]
@@ -93,6 +107,6 @@ def test_every_link_to_a_file_leads_somewhere(page: Path) -> None:
 
 
 def test_every_dependency_has_its_line() -> None:
-    listed = set(re.findall(r"[a-z0-9-]+", (ROOT / "docs" / "dependencies.md").read_text()))
+    listed = set(re.findall(r"[a-z0-9-]+", (DOCS / "reference" / "dependencies.md").read_text()))
     named = set(re.findall(r'^  "([a-z0-9-]+)[>=\[]', (ROOT / "pyproject.toml").read_text(), re.MULTILINE))
     assert named and named <= listed, sorted(named - listed)

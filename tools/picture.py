@@ -1,4 +1,4 @@
-"""Takes the README's picture: ``python -m docs.picture demo/report.html docs/figures/report.png``."""
+"""Takes the README's picture: ``python -m tools.picture demo/report.html docs/figures/report.png``."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Makes the figures of docs/tissue.md: ``python docs/tissue_figures.py SESSION docs/figures`` (two minutes).
+"""Makes the figures of the page on tissue: ``python -m tools.tissue_figures SESSION docs/figures`` (two minutes).
 
 SESSION is any session with indentations; ``rig demo`` makes one in ``demo/session``. Prints the sweeps the page quotes.
 """

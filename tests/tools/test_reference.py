@@ -1,0 +1,77 @@
+"""The reference names every key with its bounds and every command; a page cannot name a part that does not exist."""
+
+from collections.abc import Iterator
+from typing import Literal, get_args
+
+import pytest
+from pydantic import BaseModel, Field
+
+from api.cli.app import COMMANDS
+from rig.config.protocol import Indentation
+from rig.config.table import Table
+from rig.config.wiring import Wiring
+from tools.keys import tables
+from tools.reference import fill
+
+
+class Spring(Table):
+    """A spring with ``stiffness``."""
+
+    stiffness_N_mm: float = Field(gt=0, lt=5, description="of the spring")
+    kind: Literal["linear", "index"] = "index"
+
+
+class Bench(Table):
+    """Two springs and a list."""
+
+    left: Spring = Spring(stiffness_N_mm=1.0)
+    right: Spring | None = None
+    names: tuple[str, ...] = Field(default=(), max_length=3)
+    count: int
+
+
+def keys(model: type[BaseModel]) -> Iterator[tuple[type[BaseModel], str]]:
+    for name, field in model.model_fields.items():
+        yield model, name
+        for part in (field.annotation, *get_args(field.annotation)):
+            if isinstance(part, type) and issubclass(part, BaseModel):
+                yield from keys(part)
+
+
+def test_a_row_has_value_bounds_default_and_meaning() -> None:
+    text = tables(Bench, {"Spring.stiffness_N_mm": "never above 4 N/mm: it breaks"})
+    assert "| `count` | whole number | required | |" in text
+    assert "| `names` | list of: text, at most 3 | `[]` | |" in text
+    assert "| `stiffness_N_mm` | number, > 0, < 5 | required | of the spring; never above 4 N/mm: it breaks |" in text
+    assert '| `kind` | `"linear"`, `"index"` | `"index"` | |' in text
+
+
+def test_a_table_that_two_keys_lead_to_stands_once() -> None:
+    text = tables(Bench, {})
+    assert text.count("## `Spring`") == 1
+    assert "A spring with `stiffness`." in text
+
+
+@pytest.mark.parametrize(("mark", "model"), [("wiring", Wiring), ("protocol", Indentation)])
+def test_every_key_of_the_models_stands_in_the_reference(mark: str, model: type[BaseModel]) -> None:
+    text = fill(f"<!-- generated: {mark} -->")
+    named = list(keys(model))
+    assert len(named) > 20
+    missing = [name for owner, name in named if f"| `{name}` |" not in text and f"`{name}`\n" not in text]
+    assert not missing
+
+
+def test_a_maximum_stands_beside_its_key() -> None:
+    assert "never above 50 N: ISO/TS 15066" in fill("<!-- generated: wiring -->")
+
+
+def test_every_command_stands_in_the_reference_with_its_help() -> None:
+    text = fill("before\n\n<!-- generated: commands -->\n\nafter")
+    for name in COMMANDS:
+        assert f"## rig {name}\n" in text
+        assert f"Usage: rig {name} " in text
+
+
+def test_a_mark_without_a_generator_is_an_error() -> None:
+    with pytest.raises(KeyError):
+        fill("<!-- generated: nothing -->")

@@ -1,0 +1,122 @@
+"""The reference of keys: every table of a configuration file with its keys, written from the models that read it."""
+
+import inspect
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Any, get_args
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+Schema = Mapping[str, Any]
+
+WORDS = {"string": "text", "integer": "whole number", "number": "number", "boolean": "true or false", "null": "absent"}
+FORMATS = {"path": "path", "date-time": "date and time"}
+BOUNDS = {
+    "minimum": "≥ {}",
+    "exclusiveMinimum": "> {}",
+    "maximum": "≤ {}",
+    "exclusiveMaximum": "< {}",
+    "minItems": "at least {}",
+    "maxItems": "at most {}",
+    "minLength": "not shorter than {}",
+}
+HEADER = "| key | value | default | meaning |\n|---|---|---|---|"
+
+
+def tables(root: type[BaseModel], largest: Mapping[str, str]) -> str:
+    """Markdown of ``root`` and all tables in it; ``largest`` says of a dotted key what it may never exceed, and why."""
+    return "\n".join(_table(model, heading, largest) for model, heading in _headings(root).items())
+
+
+def _headings(root: type[BaseModel]) -> dict[type[BaseModel], str]:
+    """Each table once: under its path in the file, or under its own name where several paths lead to it."""
+    nested = list(_nested(root, ""))
+    counted = Counter(model for _, model in nested)
+    return {root: ""} | {model: path if counted[model] == 1 else model.__name__ for path, model in nested}
+
+
+def _nested(model: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseModel]]]:
+    for name, field in model.model_fields.items():
+        for inner in _models(field.annotation):
+            here = f"{path}.{name}" if path else name
+            yield here, inner
+            yield from _nested(inner, here)
+
+
+def _models(annotation: object) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for argument in get_args(annotation) for model in _models(argument)]
+
+
+def _table(model: type[BaseModel], heading: str, largest: Mapping[str, str]) -> str:
+    schema = model.model_json_schema()
+    rows = [
+        _row(name, field, schema, largest.get(f"{heading}.{name}", ""))
+        for name, field in model.model_fields.items()
+        if heading or not _is_section(field)
+    ]
+    head = [f"## `{heading}`", ""] if heading else []
+    return "\n".join([*head, inspect.getdoc(model) or "", "", *([HEADER, *rows, ""] if rows else [])]).replace(
+        "``", "`"
+    )
+
+
+def _is_section(field: FieldInfo) -> bool:
+    return bool(_models(field.annotation))
+
+
+def _row(name: str, field: FieldInfo, schema: Schema, largest: str) -> str:
+    value = _value(schema["properties"][name], schema.get("$defs", {}))
+    meaning = "; ".join(part for part in (field.description or "", largest) if part)
+    return f"| `{name}` | {value} | {_default(field)} | {meaning} |".replace("  ", " ")
+
+
+def _value(said: Schema, definitions: Schema) -> str:
+    if "$ref" in said:
+        return _value(definitions[said["$ref"].rpartition("/")[2]], definitions)
+    for choice in ("anyOf", "oneOf"):
+        if choice in said:
+            return " or ".join(dict.fromkeys(_value(one, definitions) for one in said[choice]))
+    if "enum" in said or "const" in said:
+        return ", ".join(f"`{_toml(one)}`" for one in said.get("enum", [said.get("const")]))
+    return _kind(said, definitions)
+
+
+def _kind(said: Schema, definitions: Schema) -> str:
+    match said:
+        case {"type": "array", "prefixItems": [first, *rest]}:
+            return f"{1 + len(rest)} of: {_value(first, definitions)}"
+        case {"type": "array", "items": items}:
+            return f"list of: {_value(items, definitions)}{_bounds(said)}"
+        case {"type": "object", "additionalProperties": dict(value)}:
+            return f"table of: {_value(value, definitions)}"
+        case {"type": "object", "title": title}:
+            return f"table `{title}`"
+        case {"format": form}:
+            return FORMATS[form]
+        case _:
+            return f"{WORDS[said['type']]}{_bounds(said)}"
+
+
+def _bounds(said: Schema) -> str:
+    found = [words.format(said[name]) for name, words in BOUNDS.items() if name in said]
+    return f", {', '.join(found)}" if found else ""
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "required"
+    default = field.get_default(call_default_factory=True)
+    if default is None:
+        return "absent"
+    return f"`{_toml(default)}`"
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, BaseModel):
+        keys = value.model_dump(mode="json", exclude_none=True).items()
+        return f"{{{', '.join(f'{name} = {_toml(one)}' for name, one in keys)}}}"
+    return json.dumps(value, default=str, ensure_ascii=False)

@@ -1,0 +1,59 @@
+"""Sphinx extension: a line ``<!-- generated: NAME -->`` of a page is replaced by what the program itself says.
+
+Nothing of the reference is written by hand twice: keys come from the models that read the files, commands from the
+command line's own help.
+"""
+
+import re
+from collections.abc import Callable
+
+from sphinx.application import Sphinx
+from sphinx.util.typing import ExtensionMetadata
+from typer.testing import CliRunner
+
+from api.cli.app import COMMANDS, build
+from rig.config.maxima import MAXIMA
+from rig.config.protocol import Indentation
+from rig.config.wiring import Wiring
+from tools.keys import tables
+
+MARK = re.compile(r"^<!-- generated: ([a-z-]+) -->$", re.MULTILINE)
+HELP_COLUMNS = 100
+
+
+def wiring() -> str:
+    """Every key of `rig.toml`, with what none may exceed."""
+    return tables(Wiring, {key: f"never above {value:g} {unit}: {reason}" for key, value, unit, reason in MAXIMA})
+
+
+def protocol() -> str:
+    """Every key of a protocol."""
+    return tables(Indentation, {})
+
+
+def commands() -> str:
+    """The help of every command."""
+    return "\n".join(f"## rig {name}\n\n```text\n{_help(name)}\n```\n" for name in sorted(COMMANDS))
+
+
+def _help(name: str) -> str:
+    answer = CliRunner().invoke(build(name), [name, "--help"], prog_name="rig", terminal_width=HELP_COLUMNS)
+    return answer.output.strip()
+
+
+GENERATORS: dict[str, Callable[[], str]] = {"wiring": wiring, "protocol": protocol, "commands": commands}
+
+
+def fill(text: str) -> str:
+    """``text`` with every mark replaced; a mark that names no generator is a KeyError."""
+    return MARK.sub(lambda mark: GENERATORS[mark[1]](), text)
+
+
+def _on_source_read(_app: Sphinx, _page: str, source: list[str]) -> None:
+    source[0] = fill(source[0])
+
+
+def setup(app: Sphinx) -> ExtensionMetadata:
+    """Fills pages as Sphinx reads them."""
+    app.connect("source-read", _on_source_read)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
