@@ -11,6 +11,7 @@ from api.cli.output import console, table
 from api.cli.stage import bench_for
 from controller.commissioning.axis import KnownBy, against_block, against_tracker, ahead_mm, known_direction
 from controller.commissioning.axis_moves import BACK_MM, SEARCH_MM, RestingAxis, steps_mm, touches_mm, travelled
+from controller.commissioning.stoppable import stoppable
 from controller.devices.drivers import start_devices
 from drivers.roles import Identity
 from mock_devices.control import BenchControl
@@ -41,7 +42,7 @@ def calibrate_axis(wiring: Wiring, asked: AxisAsked, person: Person) -> AxisCali
     _check(wiring, asked)
     if wiring.axis.port != MOCK_PORT:
         asked = _confirmed(asked, person)
-        console.print("the axis homes and moves now; Ctrl-C stops it", highlight=False)
+        console.print("the axis homes and moves now", highlight=False)
     with bench_for(wiring, approaches=False) as (live, endpoints):
         alone = endpoints if wiring.axis.port == MOCK_PORT else {}
         found = _by_block(live, asked, person, alone) if asked.gauge_block_mm else _by_tracker(live, asked, person)
@@ -90,10 +91,13 @@ def _number(text: str) -> float:
 
 @contextmanager
 def _resting(wiring: Wiring) -> Iterator[tuple[RestingAxis, Identity]]:
-    """Devices started and the axis homed; whatever happens, they are closed, which stops it."""
-    with claimed(wiring, moves=True), closing(start_devices(wiring)) as devices:
-        devices.axis.home()
-        yield RestingAxis(devices), devices.axis.identity
+    """Devices started and the axis homed; a stop brakes it, and whatever happens the devices are closed."""
+    with claimed(wiring, moves=True), stoppable(wiring) as (guard, port):
+        console.print(f"stop: Ctrl-C, the foot switch, or POST http://127.0.0.1:{port}/estop", highlight=False)
+        with closing(start_devices(wiring, guard.interrupted)) as devices:
+            with guard.moving():
+                devices.axis.home()
+            yield RestingAxis(devices, guard.moving), devices.axis.identity
 
 
 def _by_tracker(wiring: Wiring, asked: AxisAsked, person: Person) -> AxisCalibration:

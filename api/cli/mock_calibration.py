@@ -125,7 +125,7 @@ def _measured_axis(wiring: Wiring, endpoints: dict[str, Any]) -> AxisCalibration
         devices = start_devices(wiring)
         try:
             devices.axis.home()
-            places = travelled(RestingAxis(devices, PACE), places_mm)
+            places = travelled(RestingAxis(devices, pace=PACE), places_mm)
         except DeviceError:
             # What the computer was too late for must not be found in fault by what comes next.
             with contextlib.suppress(RigError):

@@ -6,6 +6,7 @@ No loop runs meanwhile: between two moves everything is read, and what presses o
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import NamedTuple
 
 import numpy as np
@@ -45,21 +46,23 @@ PACE = Pace()
 
 
 class RestingAxis:
-    """Devices that are started and an axis that is homed; ``reference_N`` is the force when nothing touched."""
+    """Devices that are started and an axis that is homed; ``moving`` is around whatever moves it."""
 
     def __init__(
         self,
         devices: Devices,
+        moving: Callable[[], AbstractContextManager[None]] = nullcontext,
         pace: Pace = PACE,
         now: Callable[[], int] = time.monotonic_ns,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self._devices, self._pace, self._now, self._sleep = devices, pace, now, sleep
+        self._devices, self._moving, self._pace, self._now, self._sleep = devices, moving, pace, now, sleep
         self._reference_N: Array | None = None
 
     def go(self, position_mm: float) -> None:
-        """By the drive's own profile, to rest."""
-        self._devices.axis.move_to(position_mm, self._pace.speed_mm_s)
+        """By the drive's own profile, to rest; raises SafetyStop where a stop was asked for."""
+        with self._moving():
+            self._devices.axis.move_to(position_mm, self._pace.speed_mm_s)
 
     def place(self) -> Place:
         """Where everything is, at rest; raises SafetyStop where something presses on the tip."""

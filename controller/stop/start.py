@@ -1,4 +1,4 @@
-"""Stops while the bench starts: until the loop cycles, a thread looks at the stop word and answers it.
+"""Stops while no loop runs, at the start and in a calibration: a thread looks at the stop word and answers it.
 
 The axis is braked by who moves it: the driver, which asks ``interrupted`` while it waits.
 """
@@ -14,11 +14,11 @@ from controller.stop.word import Deed, Responder
 from rig.errors import SafetyStop
 
 LOOK_S = 0.002
-SENTENCE = "stopped by a person while the bench started: nothing moves; start it again when that is safe"
+SENTENCE = "stopped by a person: nothing moves; start again when that is safe"
 
 
 class StartGuard:
-    """``with StartGuard(responder) as guard:`` around all that comes before the first cycle."""
+    """``with StartGuard(responder) as guard:`` around all that happens without a loop."""
 
     def __init__(self, responder: Responder, now: Callable[[], int] = time.monotonic_ns) -> None:
         self._responder, self._now = responder, now

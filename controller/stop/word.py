@@ -59,7 +59,7 @@ DEEDS = {
     Deed.RETRACTING: "retracting",
     Deed.BRAKED: "braked",
     Deed.START_ENDED: "nothing was moving: the bench does not start",
-    Deed.START_BRAKED: "braked during homing: the bench does not start",
+    Deed.START_BRAKED: "braked while the drive moved by itself: nothing starts",
     Deed.AXIS_LOST: "the axis does not answer the loop",
 }
 NOT_CONFIRMED = "NOT CONFIRMED: use the hardware stop"

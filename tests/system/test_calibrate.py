@@ -14,9 +14,11 @@ from controller.commissioning.refusals import contradictions
 from rig.config.calibration_files import read_force, text_of
 from rig.errors import CheckFailed
 from tests.calibrations import force_calibration
-from tests.system.stage import EXAMPLES, Running, Said, Stage, rig
+from tests.system.stage import EXAMPLES, PATIENCE_S, Running, Said, Stage, rig, until
+from tests.system.test_stop import asked
 
 WEIGHTS = ["--weights", "2 N,5 N,10 N", "--load", "pressed", "--pause", "0.3"]
+PORT = re.compile(r"POST http://127.0.0.1:(\d+)/estop")
 REQUEST = re.compile(r"put (\d+) N on the tip|take every weight off")
 
 
@@ -132,6 +134,23 @@ def test_its_scale_comes_out_of_a_gauge_block_too(tmp_path: Path) -> None:
     result = json.loads((tmp_path / "result.json").read_text())
     assert result["scale"] == pytest.approx(1.0, abs=0.005)
     assert (result["reference"], result["direction_known_by"]) == ("gauge block", "contact")
+
+
+def test_a_press_stops_the_axis_while_it_is_calibrated(bench: Stage, tmp_path: Path) -> None:
+    settings = bench.settings("tracker.product=ndi-polaris")
+    running = Running(["calibrate", "axis", *settings, "--clear", "--toward-limb"], tmp_path)
+    assert running.process.stdout
+    port = int(next(found[1] for line in running.process.stdout if (found := PORT.search(line))))
+
+    def moves() -> bool:
+        return abs(float(bench.control.get("axis.velocity_mm_s")["axis.velocity_mm_s"])) > 1.0
+
+    until(moves, PATIENCE_S, "the axis under way")
+    assert asked(port, "/estop")[1]["done"] == "braked while the drive moved by itself: nothing starts"
+    ended = running.end()
+    assert ended.code == 3 and "stopped on request" in ended.sentence
+    assert not moves() and bench.control.get("axis.powered")["axis.powered"] is False
+    assert not list(tmp_path.rglob("*.json"))
 
 
 @pytest.mark.parametrize(
