@@ -1,16 +1,27 @@
-"""What is under way, in the one form that the command line, HTTP and the page all show."""
+"""Work under way, in the one form that the command line, HTTP and the page all show."""
 
 import threading
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Literal
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal, TypeVar
+
+from rig.errors import RigError, SafetyStop
 
 State = Literal["running", "succeeded", "failed", "stopped"]
+T = TypeVar("T")
+
+
+class Cancelled(RigError):
+    """A computation was asked to end before its end, and has."""
 
 
 @dataclass(frozen=True)
 class Progress:
-    """A snapshot of an operation."""
+    """A snapshot. ``time_left_s`` is what the rest takes at the pace so far; None before the first part is done.
+
+    ``log`` is what it said, a sentence each; ``result`` is what it returned, once it has succeeded.
+    """
 
     name: str
     state: State = "running"
@@ -18,40 +29,82 @@ class Progress:
     total: float = 1.0
     unit: str = ""
     message: str = ""
-    result: Mapping[str, object] = field(default_factory=dict)
+    time_left_s: float | None = None
+    log: tuple[str, ...] = ()
+    result: object = None
 
 
 class Operation:
-    """A named piece of work with progress and a way to stop it; safe to read and stop from any thread."""
+    """A named piece of work with progress, a log and a way to cancel it; safe to read and cancel from any thread.
 
-    def __init__(self, name: str, total: float = 1.0, unit: str = "") -> None:
+    ``watch`` is called with the newest snapshot after each change, in the thread that works.
+    """
+
+    def __init__(
+        self, name: str, total: float = 1.0, unit: str = "", now_s: Callable[[], float] = time.monotonic
+    ) -> None:
         self._lock = threading.Lock()
         self._progress = Progress(name, total=total, unit=unit)
-        self._stop = threading.Event()
+        self._cancel = threading.Event()
+        self._now_s = now_s
+        self._began_s = self._advanced_s = now_s()
+        self.watch: Callable[[Progress], object] = lambda _: None
 
     @property
     def progress(self) -> Progress:
         """How it stands now."""
         with self._lock:
-            return self._progress
+            return replace(self._progress, time_left_s=self._time_left_s())
+
+    def _time_left_s(self) -> float | None:
+        now = self._progress
+        if now.state != "running" or not now.done:
+            return None
+        took_s = self._advanced_s - self._began_s
+        return max(0.0, took_s * (now.total - now.done) / now.done - (self._now_s() - self._advanced_s))
 
     def advance(self, done: float, message: str) -> None:
-        """Says how far it is."""
+        """Says how far it is, and what comes now."""
+        self._advanced_s = self._now_s()
         self._change(done=done, message=message)
 
-    def finish(self, state: State, message: str, result: Mapping[str, object] | None = None) -> None:
-        """Says how it ended."""
-        self._change(state=state, message=message, result=result or {})
+    def step(self, message: str, share: float) -> None:
+        """``advance`` to a share of the whole, for work that only computes: raises Cancelled where it is to end."""
+        if self.cancelled:
+            raise Cancelled(f"{self._progress.name} was cancelled before: {message}")
+        self.advance(share * self._progress.total, message)
+
+    def say(self, *sentences: str) -> None:
+        """Adds to the log."""
+        self._change(log=(*self._progress.log, *sentences))
+
+    def run(self, work: Callable[[], T]) -> T:
+        """What ``work`` returns or raises, and how that ended in the snapshot."""
+        try:
+            result = work()
+        except (SafetyStop, Cancelled, KeyboardInterrupt) as stop:
+            self._change(state="stopped", message=str(stop) or "interrupted")
+            raise
+        except RigError as error:
+            self._change(state="failed", message=str(error))
+            raise
+        except BaseException as error:
+            text = f"the job met an error of its own: {type(error).__name__}: {error}"
+            self._change(state="failed", message=text)
+            raise
+        self._change(state="succeeded", message="done", result=result)
+        return result
 
     def _change(self, **changes: object) -> None:
         with self._lock:
             self._progress = replace(self._progress, **changes)  # type: ignore[arg-type]
+        self.watch(self.progress)
 
-    def stop(self) -> None:
+    def cancel(self) -> None:
         """Asks it to end soon."""
-        self._stop.set()
+        self._cancel.set()
 
     @property
-    def stopping(self) -> bool:
+    def cancelled(self) -> bool:
         """Whether it was asked to end."""
-        return self._stop.is_set()
+        return self._cancel.is_set()

@@ -137,7 +137,7 @@ def _indented(wiring: Wiring, out: Path, subject: str, attempt: int = 1) -> Path
     folder = folder if attempt == 1 else folder.with_name(f"{folder.name}-{attempt}")
     try:
         with bench_for(bench_of(wiring, _who(subject))) as (plugged, _), live.connected(plugged) as bench:
-            capture.capture(bench, LEARNING, folder, Operation("learn"), lambda _: None)
+            capture.capture(bench, LEARNING, folder, Operation("learn"))
     except (SafetyStop, DeviceError) as cause:
         if attempt == ATTEMPTS:
             raise

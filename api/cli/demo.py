@@ -15,11 +15,12 @@ import typer
 from api.cli import live
 from api.cli.diagnose import run_diagnosis, save, show
 from api.cli.hidden_effect import Secret, draw
-from api.cli.motion import captured, follow, say_levels
+from api.cli.motion import captured, followed, say_levels
 from api.cli.options import built_in
 from api.cli.output import console, write_json
 from api.cli.science import fit_session
 from api.cli.stage import bench_for
+from api.operations.motion import TrackRequest
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.experiments.tracked import Tracked
@@ -132,7 +133,7 @@ def _clear(out: Path) -> None:
 def _track(bench: Supervisor, session: Path) -> Tracked:
     model = load_model(session / MODEL)
     program = tracked.plan(forces_within(model.valid.force_N), SECONDS, model, bench.wiring)
-    return follow(bench, program, session, str(MODEL))
+    return followed(bench, TrackRequest(program, str(MODEL)), session).run
 
 
 def forces_within(largest_N: float) -> tuple[float, ...]:

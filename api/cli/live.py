@@ -13,7 +13,9 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from api.cli.keys import stop_keys
+from api.cli.output import console
 from controller.operation import Operation
+from controller.operation import Progress as Snapshot
 from controller.stop.word import NOT_CONFIRMED, Kind
 from controller.supervisor import Supervisor
 from rig.config.wiring import Wiring
@@ -58,12 +60,13 @@ def _press(bench: Supervisor, kind: Kind) -> None:
 
 def run(bench: Supervisor, operation: Operation, work: Callable[[], T]) -> T:
     """Runs ``work`` in a thread while the terminal shows how it goes; returns or raises what ``work`` does."""
+    operation.watch = printed(operation)
     results: list[T] = []
     errors: list[BaseException] = []
 
     def worker() -> None:
         try:
-            results.append(work())
+            results.append(operation.run(work))
         except BaseException as error:
             errors.append(error)
 
@@ -77,17 +80,35 @@ def run(bench: Supervisor, operation: Operation, work: Callable[[], T]) -> T:
     return results[0]
 
 
+def printed(operation: Operation) -> Callable[[Snapshot], None]:
+    """What ``operation`` says from now on, on the terminal, a line each."""
+    told = len(operation.progress.log)
+
+    def watch(now: Snapshot) -> None:
+        nonlocal told
+        for sentence in now.log[told:]:
+            console.print(sentence, highlight=False, markup=False, soft_wrap=True)
+        told = len(now.log)
+
+    return watch
+
+
 def _show(bench: Supervisor, operation: Operation, thread: threading.Thread) -> None:
-    console = Console(stderr=True)
+    screen = Console(stderr=True)
     columns = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()]
-    with Progress(*columns, TextColumn("{task.fields[live]}"), console=console, disable=not console.is_terminal) as bar:
+    with Progress(*columns, TextColumn("{task.fields[live]}"), console=screen, disable=not screen.is_terminal) as bar:
         task = bar.add_task(operation.progress.name, live="")
-        if console.is_terminal:
+        if screen.is_terminal:
             bar.print(KEYS)
         while thread.is_alive():
             thread.join(LOOK_S)
             now = operation.progress
-            bar.update(task, completed=now.done, total=now.total, description=now.message, live=live_text(bench))
+            bar.update(task, completed=now.done, total=now.total, description=now.message, live=_live(bench, now))
+
+
+def _live(bench: Supervisor, now: Snapshot) -> str:
+    left = "" if now.time_left_s is None else f"  {now.time_left_s:.0f} s left"
+    return live_text(bench) + left
 
 
 def live_text(bench: Supervisor) -> str:
@@ -112,7 +133,7 @@ def _interrupt_stops(bench: Supervisor, operation: Operation) -> Iterator[None]:
     def interrupted(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature of a handler
         if number == signal.SIGHUP:
             _leave_terminal()
-        operation.stop()
+        operation.cancel()
         with contextlib.suppress(DeviceError):
             bench.stop()
 

@@ -1,6 +1,5 @@
 """Commands that move: capture and track."""
 
-import math
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -11,6 +10,8 @@ from api.cli import live
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import console, table, write_json
 from api.cli.stage import bench_for
+from api.operations import motion
+from api.operations.motion import Captured, TrackRequest, TrackResult
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.experiments.comparison import CHOICES, choice_from, choices_from
@@ -24,7 +25,6 @@ from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
-from rig.recording.sessions import SessionInfo, TrialInfo, plain
 from rig.tissue.model import load_model
 
 Out = Annotated[Path, typer.Option("--out", help="New folder for the session.")]
@@ -49,58 +49,15 @@ def capture(
     experiment.check(plan, wiring)
     experiment.refuse_used(out)
     with bench_for(wiring) as (live_wiring, _), live.connected(live_wiring) as bench:
-        info = captured(bench, plan, out)
-    write_json(json_file, summary(info, out))
-    refuse_bad(info)
+        found = captured(bench, plan, out)
+    write_json(json_file, found)
+    refuse_bad(found.info)
 
 
-def captured(bench: Supervisor, plan: Indentation, out: Path) -> SessionInfo:
+def captured(bench: Supervisor, plan: Indentation, out: Path) -> Captured:
     """The session, with progress on the terminal and a summary line a trial."""
-    total = len(plan.speeds_mm_s) * plan.trials
-    operation = Operation("capture", total=total, unit="trials")
-    return live.run(bench, operation, lambda: experiment.capture(bench, plan, out, operation, _say))
-
-
-def _say(trial: TrialInfo) -> None:
-    samples, dropped = sum(trial.samples.values()), sum(trial.dropped.values())
-    console.print(
-        f"{trial.name}  {trial.speed_mm_s:5g} mm/s  {_surface(trial)}  peak {trial.peak_force_N:6.2f} N"
-        f"  {samples:7d} samples  {dropped} dropped  {trial.outcome}  {trial.quality}",
-        highlight=False,
-        soft_wrap=True,
-    )
-    for reason in trial.reasons:
-        console.print(f"    {reason}", highlight=False, markup=False, soft_wrap=True)
-
-
-def _surface(trial: TrialInfo) -> str:
-    """Where the surface was found, and how far its 95 % interval reaches."""
-    within_mm = max(trial.surface_high_mm - trial.surface_mm, trial.surface_mm - trial.surface_low_mm)
-    return "no surface" if math.isnan(trial.surface_mm) else f"surface {trial.surface_mm:6.2f} +-{within_mm:.2f} mm"
-
-
-def summary(info: SessionInfo, folder: Path) -> dict[str, object]:
-    """The result of a capture as JSON."""
-    return {
-        "session": str(folder),
-        "recordings": len(info.trials),
-        "samples": sum(sum(trial.samples.values()) for trial in info.trials),
-        "dropped": sum(sum(trial.dropped.values()) for trial in info.trials),
-        "trials": [
-            {
-                "name": t.name,
-                "speed_mm_s": t.speed_mm_s,
-                "outcome": t.outcome,
-                "peak_force_N": t.peak_force_N,
-                "quality": t.quality,
-                "reasons": list(t.reasons),
-                "measured": plain(t.measured),
-                "repeats": t.repeats,
-                "surface_mm": plain([t.surface_mm, t.surface_low_mm, t.surface_high_mm]),
-            }
-            for t in info.trials
-        ],
-    }
+    operation = motion.of_capture(plan)
+    return live.run(bench, operation, lambda: motion.capture(operation, bench, plan, out))
 
 
 def track(
@@ -146,43 +103,36 @@ def track(
 
 def _tracked(wiring: Wiring, folder: Path, asked: "Asked", against: Path | None, json_file: Path | None) -> None:
     """One run, after one with the other model where there is one; all is checked before anything is opened."""
-    program = _planned(wiring, asked)
-    other = _planned(wiring, asked._replace(model=against)) if against else None
+    wanted = TrackRequest(_planned(wiring, asked), str(asked.model))
+    other = TrackRequest(_planned(wiring, asked._replace(model=against)), str(against)) if against else None
     tracked.refuse_foreign(folder)
     with bench_for(wiring) as (live_wiring, _), live.connected(live_wiring) as bench:
-        before = follow(bench, other, folder, str(against)) if other else None
-        result = follow(bench, program, folder, str(asked.model))
-    say_levels(result)
-    say_quality(result)
+        found = followed(bench, wanted, folder, other)
+    say_levels(found.run)
+    console.print("quality: " + "; ".join([found.run.quality, *found.run.reasons]), highlight=False, markup=False)
     console.print(f"recorded in {folder}", highlight=False)
-    write_json(json_file, tracked.as_json(result) | (say_gain(before, result) if before else {}))
-    for run in (before, result):
+    if found.before and found.reduction is not None:
+        say_gain(found.before, found.run, found.reduction)
+    write_json(json_file, found.as_json())
+    for run in (found.before, found.run):
         if run is not None:
             tracked.refuse_bad(run)
 
 
-def say_quality(result: Tracked) -> None:
-    """The verdict on the recording, and why it is not good."""
-    console.print("quality: " + "; ".join([result.quality, *result.reasons]), highlight=False, markup=False)
+def followed(bench: Supervisor, wanted: TrackRequest, folder: Path, against: TrackRequest | None = None) -> TrackResult:
+    """Force tracked into ``folder``, watched on the terminal."""
+    operation = Operation("track", total=2 if against else 1, unit="runs")
+    return live.run(bench, operation, lambda: motion.track(operation, bench, wanted, folder, against))
 
 
-def follow(bench: Supervisor, program: Program, folder: Path, model: str) -> Tracked:
-    """One tracking run into ``folder``, watched on the terminal."""
-    operation = Operation("track", total=1, unit="runs")
-    return live.run(bench, operation, lambda: tracked.run(bench, program, folder, model, operation))
-
-
-def say_gain(before: Tracked, after: Tracked) -> dict[str, object]:
-    """Prints and returns what one model gains over another on the same bench and reference, jumps included."""
+def say_gain(before: Tracked, after: Tracked, reduction: float) -> None:
+    """What one model gains over another on the same bench and reference, jumps included."""
     old_N, new_N = before.followed.rms_error_N, after.followed.rms_error_N
-    reduction = 1 - new_N / old_N
     console.print(
         f"rms error over the whole run: {old_N:.4f} N with {before.model}, {new_N:.4f} N with {after.model}"
         f" ({100 * reduction:+.0f} % less)",
         highlight=False,
     )
-    gain = {"rms_error_before_N": old_N, "rms_error_after_N": new_N, "reduction": reduction}
-    return {"against": tracked.as_json(before), "gain": gain}
 
 
 class Asked(NamedTuple):

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from pydantic import BaseModel
 from rich.console import Console
 from rich.table import Table
 
@@ -22,13 +23,14 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]], title: str = "")
     return found
 
 
-def write_json(path: Path | None, value: Mapping[str, object]) -> None:
+def write_json(path: Path | None, value: Mapping[str, object] | BaseModel) -> None:
     """Writes ``value`` to ``path``, whole or not at all; without a path does nothing."""
     if path is None:
         return
+    text = value.model_dump_json(indent=2) if isinstance(value, BaseModel) else json.dumps(value, indent=2)
     partial = path.with_name(path.name + ".part")
     try:
-        partial.write_text(json.dumps(value, indent=2) + "\n")
+        partial.write_text(text + "\n")
         partial.replace(path)
     except OSError as error:
         raise UsageError(f"{path}: cannot be written: {error.strerror}") from error

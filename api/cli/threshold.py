@@ -10,6 +10,8 @@ from api.cli import live
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import console, write_json
 from api.cli.stage import bench_for
+from api.operations import motion
+from api.operations.motion import TrackRequest
 from controller.experiments import threshold as experiment
 from controller.experiments import tracked
 from controller.operation import Operation
@@ -32,11 +34,11 @@ def threshold(
     Example: rig threshold --model sessions/first/fit/model.json --up-to 10
     """
     wiring, fitted = wiring_from(config, overrides), load_model(model)
-    program = experiment.plan(up_to, rate, fitted, wiring)
+    ramp = TrackRequest(experiment.plan(up_to, rate, fitted, wiring), str(model))
     tracked.refuse_foreign(out)
     with bench_for(wiring) as (live_wiring, _), live.connected(live_wiring) as bench:
         operation = Operation("threshold", total=1, unit="ramps")
-        found = live.run(bench, operation, lambda: experiment.run(bench, program, up_to, out, str(model)))
+        found = live.run(bench, operation, lambda: motion.threshold(operation, bench, ramp, up_to, out))
     if found.force_N is None:
         console.print(f"no pain stop up to {up_to:g} N: the threshold lies above", highlight=False)
     else:

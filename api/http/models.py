@@ -97,6 +97,8 @@ class JobView(BaseModel):
     total: float
     unit: str
     message: str
+    time_left_s: float | None = Field(description="at the pace so far; null before the first part is done")
+    log: list[str] = Field(description="what it said so far; empty where the bench is shown, see /jobs/{id}")
     result: dict[str, object]
 
 

@@ -1,19 +1,20 @@
 """What the routes call: one bench, at most one job, stops that never wait for either."""
 
 import asyncio
+import contextlib
 import threading
 import time
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from api.http.lease import Control
 from api.http.problems import Refused
+from api.operations import motion
+from api.operations.motion import TrackRequest
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
-from controller.experiments.verdicts import remaining_bad
-from controller.loop.steps import Program, Retract
 from controller.operation import Operation, Progress
 from controller.recovery.situation import Consent, Recovered
 from controller.stop.word import NOT_CONFIRMED, Answer, Kind
@@ -21,16 +22,13 @@ from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.config.wiring import Wiring
-from rig.errors import DeviceError, RigError, SafetyStop, UsageError
+from rig.errors import RigError, UsageError
 from rig.tissue.model import load_model
 
 MODEL = Path("fit") / "model.json"
 # As long as the stop process itself waits for the loop.
 CONFIRM_S = 0.5
 LOOK_S = 0.001
-RETRACT_MM = 20.0
-RETRACT_MM_S = 10.0
-RETRACT_TIMEOUT_S = 60.0
 
 
 @dataclass(frozen=True)
@@ -146,14 +144,8 @@ class Service:
         experiment.check(plan, self.wiring)
         if folder.exists():
             raise Refused(409, "session-exists", f"session {session} exists; recordings are never overwritten")
-        operation = Operation(f"capture {plan.name}", total=len(plan.speeds_mm_s) * plan.trials, unit="trials")
-
-        def work() -> Mapping[str, object]:
-            info = experiment.capture(bench, plan, folder, operation, lambda _: None)
-            bad = [trial.name for trial in remaining_bad(info)]
-            return {"session": session, "trials": len(info.trials), "bad": bad}
-
-        return self._start("capture", lease, operation, work)
+        operation = motion.of_capture(plan)
+        return self._start("capture", lease, operation, lambda: motion.capture(operation, bench, plan, folder))
 
     def track(self, lease: str, session: str, forces_N: list[float], seconds: float) -> Job:
         """Starts force tracking with the model of ``session``."""
@@ -161,32 +153,16 @@ class Service:
         file = folder / MODEL
         if not file.is_file():
             raise Refused(409, "no-model", f"session {session} has no fitted model; run `rig fit {folder}` first")
-        program = tracked.plan(forces_N, seconds, load_model(file), self.wiring)
+        wanted = TrackRequest(tracked.plan(forces_N, seconds, load_model(file), self.wiring), str(MODEL))
         operation = Operation("track", total=1, unit="runs")
-        return self._start(
-            "track",
-            lease,
-            operation,
-            lambda: tracked.as_json(tracked.run(bench, program, folder, str(MODEL), operation)),
-        )
+        return self._start("track", lease, operation, lambda: motion.track(operation, bench, wanted, folder))
 
     def retract(self, lease: str) -> Job:
         """Moves the tip out of wherever a stop left it."""
-        bench, limits = self.the_bench(), self.wiring.limits
-        leave = Retract(clearance_mm=RETRACT_MM, speed_mm_s=min(RETRACT_MM_S, limits.retract_speed_mm_s))
-        floored = leave.model_copy(update={"floor_mm": limits.position_min_mm})
-        program = Program(name="retract", steps=(floored,))
-        operation = Operation("retract", total=1, unit="moves")
+        bench, operation = self.the_bench(), Operation("retract", total=1, unit="moves")
+        return self._start("retract", lease, operation, lambda: motion.retract(operation, bench))
 
-        def work() -> Mapping[str, object]:
-            outcome = bench.run(program, RETRACT_TIMEOUT_S)
-            if outcome.stopped:
-                raise SafetyStop(f"stopped: {outcome.cause}")
-            return {"outcome": outcome.outcome}
-
-        return self._start("retract", lease, operation, work)
-
-    def _start(self, kind: str, lease: str, operation: Operation, work: Callable[[], Mapping[str, object]]) -> Job:
+    def _start(self, kind: str, lease: str, operation: Operation, work: Callable[[], object]) -> Job:
         with self._starting:
             busy = self.running
             if busy:
@@ -213,7 +189,7 @@ class Service:
         """Soft stop of that job and no other; a job that has ended stays as it is."""
         job = self.job(identifier)
         if job.progress.state == "running":
-            job.operation.stop()
+            job.operation.cancel()
             self.the_bench().stop()
         return job
 
@@ -222,7 +198,7 @@ class Service:
         bench = self.stoppable()
         request = bench.stops.request(kind)
         for job in list(self.jobs.values()):
-            job.operation.stop()
+            job.operation.cancel()
         deadline = time.monotonic() + CONFIRM_S
         while (answer := bench.stops.answer(request)) is None and time.monotonic() < deadline:
             await asyncio.sleep(LOOK_S)
@@ -246,15 +222,7 @@ class Service:
             raise Refused(409, "cause-not-cleared", str(error)) from error
 
 
-def _work(operation: Operation, work: Callable[[], Mapping[str, object]]) -> None:
-    try:
-        result = work()
-    except SafetyStop as stop:
-        operation.finish("stopped", str(stop))
-    except (DeviceError, RigError) as error:
-        operation.finish("failed", str(error))
-    except Exception as error:  # a job's thread has nobody above it: its failure is shown as the job's
-        operation.finish("failed", f"the job met an error of its own: {type(error).__name__}: {error}")
-        raise
-    else:
-        operation.finish("succeeded", "done", result)
+def _work(operation: Operation, work: Callable[[], object]) -> None:
+    """In a job's thread, which has nobody above it: how the work failed is shown as the job's."""
+    with contextlib.suppress(RigError):
+        operation.run(work)

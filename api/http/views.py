@@ -4,6 +4,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
+from pydantic import BaseModel
+
 from api.http.lease import Lease
 from api.http.models import (
     ControlView,
@@ -17,6 +19,7 @@ from api.http.models import (
     SessionView,
 )
 from api.http.service import Job, Service
+from api.operations.motion import TrackResult
 from controller.devices.health import ALIVE, ON_RATE, VALID
 from controller.experiments.capture import check
 from controller.loop.messages import Status
@@ -44,8 +47,17 @@ def job(job: Job) -> JobView:
         total=now.total,
         unit=now.unit,
         message=now.message,
-        result=dict(now.result),
+        time_left_s=now.time_left_s,
+        log=list(now.log),
+        result=_result(now.result),
     )
+
+
+def _result(found: object) -> dict[str, object]:
+    """A result as JSON; none while there is none."""
+    if isinstance(found, TrackResult):
+        return dict(found.as_json())
+    return found.model_dump(mode="json") if isinstance(found, BaseModel) else {}
 
 
 def rig(service: Service) -> RigView:
@@ -78,7 +90,7 @@ def rig(service: Service) -> RigView:
             "speed_mm_s": limits.speed_mm_s,
         },
         control=control(service),
-        job=job(running) if running else None,
+        job=job(running).model_copy(update={"log": []}) if running else None,
     )
 
 

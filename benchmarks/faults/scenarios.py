@@ -89,7 +89,7 @@ def _touch() -> tuple[Zero, MoveTo, Approach]:
 
 
 def _indent(rig: Supervisor, folder: Path) -> Ended:
-    info = capture.capture(rig, INDENTATION, folder, Operation("campaign"), lambda _: None)
+    info = capture.capture(rig, INDENTATION, folder, Operation("campaign"))
     trial = info.trials[-1]
     return Ended(trial.outcome, trial.quality, beyond_good(trial.measured, INDENTATION.quality))
 

@@ -1,6 +1,6 @@
 """A session of trials: each into its own recording, the session's index rewritten after each."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -9,17 +9,15 @@ from typing import Literal
 import rig
 from controller.experiments.indentation import Trial, attempts, longest_s, trials
 from controller.experiments.recorded import metadata, record, refuse_bench
-from controller.experiments.verdicts import with_quality, with_surface
+from controller.experiments.verdicts import sentences, with_quality, with_surface
 from controller.operation import Operation
 from controller.safety.program_limits import refuse_beyond_limits
-from controller.supervisor import Supervisor
+from controller.supervisor import Supervisor, stopped
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring
 from rig.errors import RigError, SafetyStop, UsageError
 from rig.recording.files import make_folder, refuse_unwritable
 from rig.recording.sessions import SESSION_FILE, SessionInfo, TrialInfo, write_session
-
-Report = Callable[[TrialInfo], None]
 
 
 def check(protocol: Indentation, wiring: Wiring) -> None:
@@ -61,9 +59,7 @@ def new_session(
     return info
 
 
-def capture(
-    bench: Supervisor, protocol: Indentation, folder: Path, operation: Operation, report: Report
-) -> SessionInfo:
+def capture(bench: Supervisor, protocol: Indentation, folder: Path, operation: Operation) -> SessionInfo:
     """Runs all trials, bad ones again; raises SafetyStop, with everything recorded kept, where a trial was stopped."""
     check(protocol, bench.wiring)
     planned = trials(protocol)
@@ -75,10 +71,10 @@ def capture(
             result, cause = _run(bench, attempt, protocol, folder, info)
             info = replace(info, trials=(*info.trials, result))
             write_session(folder, info)
-            report(result)
+            operation.say(*sentences(result))
             if cause is not None:
                 raise cause
-            if operation.stopping:
+            if operation.cancelled:
                 raise SafetyStop(f"stopped by the operator after {trial.index} of {len(planned)} trials")
             if result.quality != "bad":
                 break
@@ -121,4 +117,4 @@ def _run(
         dropped=done.dropped,
     ).sealed(folder)
     result = with_quality(result, folder, protocol.quality, info.trials)
-    return result, SafetyStop(f"stopped: {outcome.cause}") if outcome.stopped else None
+    return result, stopped(outcome) if outcome.stopped else None

@@ -9,10 +9,10 @@ from controller.experiments import tracked
 from controller.experiments.recorded import Recorded
 from controller.experiments.references import Ramp
 from controller.loop.steps import Program
-from controller.supervisor import Supervisor
+from controller.supervisor import Supervisor, stopped
 from rig.config.table import parse
 from rig.config.wiring import Wiring
-from rig.errors import SafetyStop, UsageError
+from rig.errors import UsageError
 from rig.recording.reader import read_recording
 from rig.tissue.model import Model
 
@@ -42,7 +42,7 @@ def run(bench: Supervisor, program: Program, up_to_N: float, folder: Path, model
     """Plays the ramp into a recording; any stop but the subject's own raises SafetyStop."""
     done = tracked.recorded_run(bench, program, folder, model)
     if done.outcome.stopped and done.outcome.outcome != PAIN:
-        raise SafetyStop(f"stopped: {done.outcome.cause}")
+        raise stopped(done.outcome)
     return Threshold(force_at_stop(done), up_to_N, done.file.name)
 
 

@@ -14,13 +14,12 @@ from controller.experiments.tracking import Followed, Plateau
 from controller.experiments.verdicts import with_quality, with_surface
 from controller.law.gains import Choice
 from controller.loop.steps import Program, TrackForce
-from controller.operation import Operation
 from controller.safety.program_limits import refuse_beyond_limits
-from controller.supervisor import Supervisor
+from controller.supervisor import Supervisor, stopped
 from rig.channels import LoopSample
 from rig.config.quality import QualityLimits
 from rig.config.wiring import Wiring
-from rig.errors import BadTrial, SafetyStop, UsageError
+from rig.errors import BadTrial, UsageError
 from rig.recording.reader import TRACKING, read_recording
 from rig.recording.sessions import SESSION_FILE, TrialInfo, open_session, write_session
 from rig.tissue.model import Model
@@ -81,19 +80,17 @@ def plan_reference(
     return program
 
 
-def run(bench: Supervisor, program: Program, folder: Path, model: str, operation: Operation) -> Tracked:
+def run(bench: Supervisor, program: Program, folder: Path, model: str) -> Tracked:
     """Tracks, records into ``folder`` (an existing session or a new one), and reads the result from the recording.
 
     Raises SafetyStop, with the recording kept, where the run was stopped.
     """
-    operation.advance(0, program.name)
     done = recorded_run(bench, program, folder, model)
     if done.outcome.stopped:
-        raise SafetyStop(f"stopped: {done.outcome.cause}")
+        raise stopped(done.outcome)
     entry = open_session(folder).trial(done.file.stem)
     result = replace(evaluate(done, model), quality=entry.quality, reasons=entry.reasons)
     write_result(folder, result)
-    operation.advance(1, "done")
     return result
 
 

@@ -1,5 +1,6 @@
 """The quality verdict of what was just recorded, and the end of a command whose trials stayed bad."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -32,6 +33,22 @@ def with_quality(trial: TrialInfo, folder: Path, limits: QualityLimits, before: 
     except DataError as error:
         found = TrialQuality("bad", (str(error),))
     return replace(trial, quality=found.verdict, reasons=found.reasons, measured=dict(found.measured))
+
+
+def sentences(trial: TrialInfo) -> tuple[str, ...]:
+    """A line on the trial, and one a reason of its verdict."""
+    samples, dropped = sum(trial.samples.values()), sum(trial.dropped.values())
+    line = (
+        f"{trial.name}  {trial.speed_mm_s:5g} mm/s  {_surface(trial)}  peak {trial.peak_force_N:6.2f} N"
+        f"  {samples:7d} samples  {dropped} dropped  {trial.outcome}  {trial.quality}"
+    )
+    return (line, *(f"    {reason}" for reason in trial.reasons))
+
+
+def _surface(trial: TrialInfo) -> str:
+    """Where the surface was found, and how far its 95 % interval reaches."""
+    within_mm = max(trial.surface_high_mm - trial.surface_mm, trial.surface_mm - trial.surface_low_mm)
+    return "no surface" if math.isnan(trial.surface_mm) else f"surface {trial.surface_mm:6.2f} +-{within_mm:.2f} mm"
 
 
 def remaining_bad(info: SessionInfo) -> tuple[TrialInfo, ...]:

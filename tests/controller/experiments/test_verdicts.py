@@ -66,7 +66,7 @@ def captured(folder: Path, recorder: FakeRecorder, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(experiment, "record", recorder)
     protocol = Indentation(speeds_mm_s=(10.0,), trials=2, quality=QualityLimits(repeats=repeats))
     bench = cast(Supervisor, WiredOnly())
-    return experiment.capture(bench, protocol, folder, Operation("capture", total=2, unit="trials"), lambda _: None)
+    return experiment.capture(bench, protocol, folder, Operation("capture", total=2, unit="trials"))
 
 
 def test_a_bad_trial_is_made_again_and_kept_and_marked(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:

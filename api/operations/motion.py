@@ -1,0 +1,153 @@
+"""What moves the tip of a running bench: capture, track, threshold, retract."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from controller.experiments import capture as experiment
+from controller.experiments import threshold as ramp
+from controller.experiments import tracked
+from controller.experiments.threshold import Threshold
+from controller.experiments.tracked import Tracked
+from controller.experiments.verdicts import remaining_bad
+from controller.loop.steps import Program, Retract
+from controller.operation import Operation
+from controller.supervisor import Supervisor, stopped
+from rig.config.protocol import Indentation
+from rig.errors import SafetyStop
+from rig.recording.sessions import Number, SessionInfo, TrialInfo
+
+# Out of any depth that a protocol may reach, and slow enough to see it coming.
+RETRACT_MM = 20.0
+RETRACT_MM_S = 10.0
+RETRACT_TIMEOUT_S = 60.0
+
+
+class CapturedTrial(BaseModel):
+    """One trial; ``surface_mm`` is where the surface was found, and the ends of its 95 % interval."""
+
+    model_config = ConfigDict(frozen=True)
+
+    name: str
+    speed_mm_s: Number
+    outcome: str
+    peak_force_N: Number
+    quality: str
+    reasons: tuple[str, ...]
+    measured: dict[str, Number]
+    repeats: str
+    surface_mm: tuple[Number, Number, Number]
+
+
+class Captured(BaseModel):
+    """A session as it was recorded, and the names of trials that stayed bad."""
+
+    model_config = ConfigDict(frozen=True)
+
+    info: SessionInfo = Field(exclude=True)
+    session: str
+    recordings: int
+    samples: int
+    dropped: int
+    trials: tuple[CapturedTrial, ...]
+    bad: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class TrackRequest:
+    """A program of force tracking, and the file of the model that its gains are from."""
+
+    program: Program
+    model: str
+
+
+@dataclass(frozen=True)
+class TrackResult:
+    """A run, and one with another model before it on the same bench, where that was wanted."""
+
+    run: Tracked
+    before: Tracked | None = None
+
+    @property
+    def reduction(self) -> float | None:
+        """By how much of the other model's rms error this one's is smaller, jumps included."""
+        return None if self.before is None else 1 - self.run.followed.rms_error_N / self.before.followed.rms_error_N
+
+    def as_json(self) -> Mapping[str, object]:
+        """As `rig track --json` has it."""
+        if self.before is None:
+            return tracked.as_json(self.run)
+        gain = {
+            "rms_error_before_N": self.before.followed.rms_error_N,
+            "rms_error_after_N": self.run.followed.rms_error_N,
+            "reduction": self.reduction,
+        }
+        return tracked.as_json(self.run) | {"against": tracked.as_json(self.before), "gain": gain}
+
+
+class Retracted(BaseModel):
+    """How a retraction ended."""
+
+    outcome: str
+
+
+def of_capture(protocol: Indentation) -> Operation:
+    """The operation that ``capture`` is to report to."""
+    return Operation(f"capture {protocol.name}", total=len(protocol.speeds_mm_s) * protocol.trials, unit="trials")
+
+
+def capture(operation: Operation, bench: Supervisor, protocol: Indentation, folder: Path) -> Captured:
+    """Records the protocol's trials into the new session ``folder``; SafetyStop, with what there is kept, at a stop."""
+    info = experiment.capture(bench, protocol, folder, operation)
+    return Captured(
+        info=info,
+        session=str(folder),
+        recordings=len(info.trials),
+        samples=sum(sum(trial.samples.values()) for trial in info.trials),
+        dropped=sum(sum(trial.dropped.values()) for trial in info.trials),
+        trials=tuple(map(_captured, info.trials)),
+        bad=tuple(trial.name for trial in remaining_bad(info)),
+    )
+
+
+def _captured(trial: TrialInfo) -> CapturedTrial:
+    surface_mm = (trial.surface_mm, trial.surface_low_mm, trial.surface_high_mm)
+    return CapturedTrial.model_validate(asdict(trial) | {"surface_mm": surface_mm})
+
+
+def track(
+    operation: Operation, bench: Supervisor, wanted: TrackRequest, folder: Path, against: TrackRequest | None = None
+) -> TrackResult:
+    """Tracks force into the session ``folder``, first ``against`` another model; SafetyStop at a stop."""
+    before = _track(operation, bench, against, folder) if against else None
+    if operation.cancelled:
+        raise SafetyStop("stopped by the operator before the second run")
+    return TrackResult(_track(operation, bench, wanted, folder), before)
+
+
+def _track(operation: Operation, bench: Supervisor, wanted: TrackRequest, folder: Path) -> Tracked:
+    done = operation.progress.done
+    operation.advance(done, wanted.program.name)
+    found = tracked.run(bench, wanted.program, folder, wanted.model)
+    operation.advance(done + 1, "done")
+    return found
+
+
+def threshold(operation: Operation, bench: Supervisor, wanted: TrackRequest, up_to_N: float, folder: Path) -> Threshold:
+    """Raises force until the subject stops it, into the session ``folder``; SafetyStop at any other stop."""
+    operation.advance(0, wanted.program.name)
+    return ramp.run(bench, wanted.program, up_to_N, folder, wanted.model)
+
+
+def retract(operation: Operation, bench: Supervisor) -> Retracted:
+    """Moves the tip out of wherever a stop left it, at most to the end of the workspace."""
+    limits = bench.wiring.limits
+    speed_mm_s = min(RETRACT_MM_S, limits.retract_speed_mm_s)
+    leave = Retract(clearance_mm=RETRACT_MM, speed_mm_s=speed_mm_s, floor_mm=limits.position_min_mm)
+    operation.advance(0, "retract")
+    outcome = bench.run(Program(name="retract", steps=(leave,)), RETRACT_TIMEOUT_S)
+    if outcome.stopped:
+        raise stopped(outcome)
+    return Retracted(outcome=outcome.outcome)
