@@ -1,6 +1,5 @@
 """From a folder of axis recordings to a diagnosis, and the simulation error on the recording left out."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -8,12 +7,12 @@ import scipy.io
 
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.axis import AxisProblem, AxisRecording, force_error_percent, motion_of
-from rig.diagnosis.csv_table import read_table
 from rig.diagnosis.gates import inspect_stream
 from rig.diagnosis.run import judge, silent
 from rig.diagnosis.search import Progress
 from rig.diagnosis.simulated import Simulated
 from rig.errors import DataError
+from rig.recording.csv_columns import read_header, read_usable
 
 NAMES = {
     "time_s": ("t", "time_s"),
@@ -86,6 +85,4 @@ def _mat(path: Path) -> dict[str, np.ndarray[tuple[int, ...], np.dtype[np.float6
 
 
 def _csv(path: Path) -> dict[str, np.ndarray[tuple[int, ...], np.dtype[np.float64]]]:
-    with path.open(newline="") as file:
-        header = [name.strip() for name in next(csv.reader(file), [])]
-    return read_table(path, {name: name for name in header})[0]
+    return read_usable(path, {name: name for name in read_header(path)}).columns

@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.table import load
-from rig.diagnosis.csv_table import read_table
 from rig.diagnosis.gates import Finding
 from rig.diagnosis.observations import Session, Streams
 from rig.diagnosis.stacked import from_stacked, stacked_file
 from rig.errors import DataError, RigError
-from rig.recording.csv_columns import TOOL
+from rig.recording.csv_columns import TOOL, read_usable
 from rig.recording.import_format import EXPORTED, FIELDS, OPTIONAL, SessionTable, TrialTable, column_names
 from rig.recording.reader import Recording
 from rig.recording.sessions import open_session
@@ -135,8 +134,9 @@ def _read_trial(
         if stream in OPTIONAL and not file.exists():
             continue
         try:
-            read[stream], remark = read_table(file, names[stream], EXPORTED[stream])
-            findings += [Finding(path.name, stream, "text", remark)] if remark else []
+            found = read_usable(file, names[stream], EXPORTED[stream])
+            read[stream] = found.columns
+            findings += [Finding(path.name, stream, "text", found.remark)] if found.remark else []
         except DataError as error:
             findings.append(Finding(path.name, stream, "unreadable", str(error)))
     return read, findings

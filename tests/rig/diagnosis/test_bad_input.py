@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from rig.diagnosis.answers import Diagnosis
-from rig.diagnosis.csv_table import read_table
 from rig.diagnosis.cycles import cut
 from rig.diagnosis.indentation import library
 from rig.diagnosis.observations import Session, Streams, beside_gaps
 from rig.diagnosis.run import diagnose_session
 from rig.diagnosis.sources import in_time, read_source
 from rig.errors import DataError
+from rig.recording.csv_columns import read_usable
 from rig.recording.sessions import open_session, write_session
 from tests.data import recording
 from tests.hidden.draw import draw_secret, recorded, session_of
@@ -139,7 +139,7 @@ def test_samples_that_hold_no_number_are_counted(clean: Session) -> None:
 def test_a_word_among_numbers_is_named_with_its_line(tmp_path: Path) -> None:
     file = tmp_path / "force.csv"
     file.write_text('"time_s","force_N"\n0,1\n0.1,OVERLOAD\n0.2\n0.3,inf\n')
-    columns, remark = read_table(file, {"time_s": "time_s", "force_N": "force_N"})
+    columns, remark, _ = read_usable(file, {"time_s": "time_s", "force_N": "force_N"})
     assert columns["time_s"].tolist() == [0, 0.1, 0.2, 0.3]
     assert np.isnan(columns["force_N"]).tolist() == [False, True, True, False]
     assert remark == "force.csv line 3, column force_N: 'OVERLOAD' is no number; left out"
@@ -255,6 +255,13 @@ def test_recordings_stacked_in_one_file_are_told_apart_and_chosen_by_name(clean:
     assert "2 of 4 recordings" in chosen.findings[0].text
     with pytest.raises(DataError, match="no recording matches"):
         read_source(tmp_path, only="pork*")
+    whole = read_source(tmp_path).recordings[1]
+    (tmp_path / "stacked.csv").write_text("\n".join([*lines, "beef|1,9,OVERLOAD,2", "beef|1"]) + "\n")
+    spoilt = read_source(tmp_path)
+    assert [finding.text for finding in spoilt.findings if finding.kind == "text"] == [
+        f"stacked.csv line {len(lines) + 1}, column force_N: 'OVERLOAD' is no number; left out"
+    ]
+    np.testing.assert_array_equal(spoilt.recordings[1].force_N, [*whole.force_N, np.nan, np.nan])
 
 
 def test_what_the_index_law_gets_wrong_on_real_meat_is_relaxation() -> None:
