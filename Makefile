@@ -6,7 +6,7 @@ READY := $(VENV)/ready
 # Modules are compiled once, not by each of the processes that a bench is made of.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test docs mutants mutants-sample lock clean
+.PHONY: demo test docs package wheels mutants mutants-sample lock clean
 
 demo: $(READY)
 	$(BIN)/rig demo --out demo
@@ -21,6 +21,23 @@ test: $(READY) browser
 docs: $(READY)
 	$(BIN)/python -m sphinx -b html -W --keep-going -q -d $(VENV)/doctrees docs docs/_build
 	$(BIN)/python -m tools.offline docs/_build
+
+# Wheel and source distribution are installed where there is no checkout, and the demonstration runs from there.
+package: $(READY)
+	rm -rf dist
+	$(BIN)/uv build --quiet --python $(BIN)/python --no-build-isolation --out-dir dist
+	$(BIN)/python -m tools.packaged dist
+
+# All that is locked comes as wheels, for each Python and machine; two clients of the tracker, which only tests use, are
+# pure Python and published as source.
+PYTHONS := 3.11 3.12 3.13
+PLATFORMS := x86_64-manylinux_2_28 aarch64-manylinux_2_28
+AS_SOURCE := scikit-surgerycore scikit-surgerynditracker
+wheels: $(READY)
+	@set -e; for python in $(PYTHONS); do for platform in $(PLATFORMS); do \
+	  $(BIN)/uv pip install --quiet --dry-run --require-hashes --target $(VENV)/none --python-version $$python \
+	    --python-platform $$platform --only-binary :all: $(AS_SOURCE:%=--no-binary %) -r requirements.lock; \
+	  echo "Python $$python on $$platform: the lock resolves to wheels"; done; done
 
 # Mutants of what keeps the tip from hurting; a sample of them, drawn by SEED, in every run of CI.
 mutants: $(READY)
