@@ -6,7 +6,7 @@ READY := $(VENV)/ready
 # Modules are compiled once, not by each of the processes that a bench is made of.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test docs package wheels mutants mutants-sample lock clean
+.PHONY: demo test check docs package wheels mutants mutants-sample lock clean
 
 demo: $(READY)
 	$(BIN)/rig demo --out demo
@@ -17,6 +17,14 @@ test: $(READY) browser
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n 2 --dist loadgroup --durations 25
+
+# What to run before each commit, in less than half a minute: all checks, and the tests of what changed.
+check: $(READY)
+	$(BIN)/ruff check --quiet .
+	$(BIN)/ruff format --quiet --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo >$(VENV)/contracts || { cat $(VENV)/contracts; exit 1; }
+	$(BIN)/python -m tools.changed_tests
 
 docs: $(READY)
 	$(BIN)/python -m sphinx -b html -W --keep-going -q -d $(VENV)/doctrees docs docs/_build
