@@ -52,7 +52,7 @@ def _row(
     held = np.array([touch.low_mm <= SURFACE_MM <= touch.high_mm for touch in touches])
     within = np.array([touch.within_mm for touch in touches])
     print(
-        f"{name:14s} {limb.a_N_mm:5g} {limb.b_per_mm:5g} {limb.B_N_s_mm:6g}"
+        f"{name:14s} {limb.a_N_mm:5g} {limb.b_per_mm:5g} {limb.damping_N_s_mm:6g}"
         f"  {errors.mean():+8.3f} {errors.std():6.3f} {np.abs(errors).max():7.3f}"
         f"  {100 * held.mean():9.0f} % {within.mean():6.2f} {100 * np.mean(within <= PROMISED_MM):5.0f} %"
         f" {np.mean([touch.touches for touch in touches]):6.1f} {np.mean([b.state.now_ns for b in runs]) * 1e-9:9.1f}",

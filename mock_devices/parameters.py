@@ -34,9 +34,9 @@ class Axis(Table):
     travel_min_mm: float = Field(default=-3.0, description="mechanical stop behind the reference switch at 0")
     travel_max_mm: float = 70.0
     start_mm: float = Field(default=5.0, description="where the carriage stands when the bench starts")
-    position_gain_1_s: Positive = 120.0
-    velocity_gain_1_s: Positive = Field(default=480.0, description="four times the position gain is critical damping")
-    integral_gain_1_s2: NotNegative = 1500.0
+    position_gain_per_s: Positive = 120.0
+    velocity_gain_per_s: Positive = Field(default=480.0, description="four times the position gain is critical damping")
+    integral_gain_per_s2: NotNegative = 1500.0
     velocity_feed_forward: Share = 1.0
     acceleration_feed_forward: Share = 1.0
     interpolation_s: Positive = Field(default=0.001, description="time over which the drive goes to a new set-point")
@@ -54,8 +54,8 @@ class Tissue(Table):
     """The limb under the tip: F = scale a x exp(b x) + B v, never negative, nothing in the air; an inclusion adds."""
 
     a_N_mm: NotNegative = 0.12
-    b_1_mm: float = Field(default=0.22, ge=0, le=2)
-    B_N_s_mm: float = Field(default=0.01, ge=0, le=1)
+    b_per_mm: float = Field(default=0.22, ge=0, le=2)
+    damping_N_s_mm: float = Field(default=0.01, ge=0, le=1)
     stiffness_scale: NotNegative = 1.0
     inclusion_mm: NotNegative = Field(default=4.0, description="depth at which something stiff begins")
     inclusion_N_mm: NotNegative = Field(default=0.0, description="what it adds per millimetre; 0: there is none")

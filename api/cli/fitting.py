@@ -135,7 +135,7 @@ def rate_sentence(rate: RateTest) -> str:
     """What the comparison of speeds found, and what it says of the study's B."""
     low, high = rate.effect_interval_N
     return (
-        f"speed: B = {rate.B_N_s_mm:.4g} N s/mm (95 %: {rate.interval[0]:.4g} to {rate.interval[1]:.4g}, "
+        f"speed: B = {rate.damping_N_s_mm:.4g} N s/mm (95 %: {rate.interval[0]:.4g} to {rate.interval[1]:.4g}, "
         f"p = {rate.p_value:.3g}, {rate.trials} trials); slowest to fastest {rate.effect_N:.3g} N ({low:.3g} to "
         f"{high:.3g} N), scatter of trials {rate.spread_N:.2g} N; the study's {STUDY_B_N_S_MM:g} N s/mm would be "
         f"{rate.study_effect_N:.3g} N: {'excluded' if rate.excludes_study else 'not excluded'}"

@@ -67,7 +67,7 @@ class Settings(NamedTuple):
     lag_s: float
     ahead_mm_s: float
     forgetting: float
-    drift_1_s: float
+    drift_per_s: float
     drift_limit_mm_s: float
     relaxing_1: float = 0.0
     relaxing_s: float = 1.0
@@ -220,7 +220,7 @@ def increment(
     integral = interpolate(table.force_N, table.integral_mm_N_s, force_N) / scale
     tangent_N_mm = scale * interpolate(table.force_N, table.tangent_N_mm, force_N)
     feedback_mm = proportional * (error_N - memory.error_N) + integral * error_N * dt_s
-    drift_mm_s = memory.drift_mm_s + settings.drift_1_s * feedback_mm
+    drift_mm_s = memory.drift_mm_s + settings.drift_per_s * feedback_mm
     drift_mm_s = min(max(drift_mm_s, -settings.drift_limit_mm_s), settings.drift_limit_mm_s)
     return ahead.depth_mm - memory.ahead.depth_mm + feedback_mm + drift_mm_s * dt_s, Memory(
         error_N,

@@ -294,10 +294,10 @@ class TrackForce(Table):
     @property
     def settings(self) -> Settings:
         """What of this step the law wants to know; the surface is believed to move no faster than the search."""
-        drift_1_s = 2 * math.pi * self.drift_Hz
+        drift_per_s = 2 * math.pi * self.drift_Hz
         first, second = (*self.memory, (0.0, 1.0), (0.0, 1.0))[:2]
         return Settings(
-            self.damping_N_s_mm, self.lag_s, self.ahead_mm_s, self.forgetting, drift_1_s, self.search_speed_mm_s,
+            self.damping_N_s_mm, self.lag_s, self.ahead_mm_s, self.forgetting, drift_per_s, self.search_speed_mm_s,
             *first, *second, self.friction_N, self.friction_mm,
         )  # fmt: skip
 

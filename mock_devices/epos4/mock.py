@@ -73,7 +73,7 @@ class Epos4Mock(OnWire):
         self._moved_ns = start_ns
         self._now_ns = start_ns
         self._consumed: dict[int, int] = {}
-        self._scale, self._astray_1_s, self._astray_since_ns = increments_per_mm, 0.0, start_ns
+        self._scale, self._astray_per_s, self._astray_since_ns = increments_per_mm, 0.0, start_ns
         self.synced_ns: deque[int] = deque(maxlen=SYNCS_KEPT)
         """When SYNCs were taken, by ``clock_ns`` where there is one; whoever wants them takes them out."""
         self._clock_ns = clock_ns
@@ -116,7 +116,7 @@ class Epos4Mock(OnWire):
 
     def lead_astray(self, speed_mm_s: float) -> None:
         """From now on set-points run away from those that were sent, until 0."""
-        self._astray_1_s, self._astray_since_ns = speed_mm_s * self._scale, self._now_ns
+        self._astray_per_s, self._astray_since_ns = speed_mm_s * self._scale, self._now_ns
 
     def restart(self) -> None:
         """Loses its power for a moment: no torque, no reference, and settings as from the factory."""
@@ -171,7 +171,7 @@ class Epos4Mock(OnWire):
                 self._pdo.sync()
         elif can_id in self._pdo.rpdos:
             if self.nmt is NmtState.OPERATIONAL:
-                self.drive.astray = self._astray_1_s * (self._now_ns - self._astray_since_ns) * 1e-9
+                self.drive.astray = self._astray_per_s * (self._now_ns - self._astray_since_ns) * 1e-9
                 self._pdo.take(can_id, data)
         elif can_id == SDO_REQUEST_ID + self.node:
             if self.nmt in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL):

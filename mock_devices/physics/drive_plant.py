@@ -82,13 +82,13 @@ class DrivePlant:
         axis = self._axis
         velocity, accel = self._follow()
         error = self._reference - self._x
-        wanted = axis.velocity_feed_forward * velocity + axis.position_gain_1_s * error + self._integral_mm_s
+        wanted = axis.velocity_feed_forward * velocity + axis.position_gain_per_s * error + self._integral_mm_s
         force_N = (
-            axis.velocity_gain_1_s * (wanted - self._v) + axis.acceleration_feed_forward * accel
+            axis.velocity_gain_per_s * (wanted - self._v) + axis.acceleration_feed_forward * accel
         ) / self._accel_per_N
         limit_N = self.current_limit_A * axis.force_per_current_N_A
         if -limit_N < force_N < limit_N:
-            self._integral_mm_s += axis.integral_gain_1_s2 * error * STEP_S
+            self._integral_mm_s += axis.integral_gain_per_s2 * error * STEP_S
             return force_N
         return limit_N if force_N > 0 else -limit_N
 

@@ -82,12 +82,12 @@ class GainError(Reading):
 class Temperature(Reading):
     """The gain follows the sensor's temperature: force x (1 + k (T - T0))."""
 
-    gain_1_K: float = knob(0.02, -0.2, 0.2, "k")
+    gain_per_K: float = knob(0.02, -0.2, 0.2, "k")
     reference_C: float = knob(25.0, -20, 80, "T0")
 
     def __call__(self, force_N: float, _time_s: float, temperature_C: float) -> float:
         """The force as converted."""
-        return force_N * (1 + self.gain_1_K * (temperature_C - self.reference_C))
+        return force_N * (1 + self.gain_per_K * (temperature_C - self.reference_C))
 
 
 @dataclass

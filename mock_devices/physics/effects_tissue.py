@@ -20,13 +20,13 @@ class ElasticLaw(Elastic):
     weight_1: float = knob(1.0, 0, 1, "0: index law, 1: wholly the other law")
     exponent_1: float = knob(2.0, 0.5, 5, "n of the power law x^n")
     fung_share_1: float = knob(0.0, 0, 1, "0: power law, 1: Fung's exp(b x) - 1")
-    fung_1_mm: float = knob(0.3, 0.01, 2, "b of Fung's law")
+    fung_per_mm: float = knob(0.3, 0.01, 2, "b of Fung's law")
     match_depth_mm: float = knob(8.0, 0.5, 20, "where both laws give the same force")
 
     def __call__(self, law: Callable[[float], float], depth_mm: float) -> float:
         """Newtons at ``depth_mm``."""
         power = math.pow(depth_mm / self.match_depth_mm, self.exponent_1)
-        fung = math.expm1(self.fung_1_mm * depth_mm) / math.expm1(self.fung_1_mm * self.match_depth_mm)
+        fung = math.expm1(self.fung_per_mm * depth_mm) / math.expm1(self.fung_per_mm * self.match_depth_mm)
         other = law(self.match_depth_mm) * ((1 - self.fung_share_1) * power + self.fung_share_1 * fung)
         return (1 - self.weight_1) * law(depth_mm) + self.weight_1 * other
 

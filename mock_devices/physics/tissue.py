@@ -38,7 +38,7 @@ class TissueLaw:
         self.stiffness_scale = tissue.stiffness_scale
         self.present = tissue.present
         self.inclusion_mm, self.inclusion_N_mm = tissue.inclusion_mm, tissue.inclusion_N_mm
-        self._a, self._b, self._viscosity = tissue.a_N_mm, tissue.b_1_mm, tissue.B_N_s_mm
+        self._a, self._b, self._viscosity = tissue.a_N_mm, tissue.b_per_mm, tissue.damping_N_s_mm
 
     def elastic_N(self, depth_mm: float) -> float:
         """The index law at rest, without any hidden effect."""

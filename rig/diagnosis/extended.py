@@ -1,25 +1,17 @@
 """The simulation with its named causes as a model that the control takes at once."""
 
 import hashlib
-from collections.abc import Mapping
 
 import numpy as np
 
 import rig
-from rig.diagnosis.answers import Answer, Diagnosis
+from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.fit import Fit
 from rig.diagnosis.indentation import Indentation
 from rig.errors import DataError
 from rig.tissue.laws_extended import Extended
 from rig.tissue.model import Effect, Interval, Model, Provenance, Quality, ValidRange
 
-# The law's parameter and the simulation's, which have the same unit.
-LAW = {
-    "a_N_mm": "stiffness_N_mm", "b_per_mm": "stiffening_1_mm", "B_N_s_mm": "viscosity_N_s_mm",
-    "n_1": "elastic_exponent_1", "q_per_mm": "elastic_quadratic_1_mm", "s_per_mm3": "substrate_1_mm3",
-    "r_1": "relaxation_1", "tau_s": "relaxation_tau_s", "c_mm_N": "frame_compliance_mm_N",
-    "friction_N": "friction_N", "friction_length_mm": "friction_length_mm",
-}  # fmt: skip
 ELASTIC = "in the force-depth curve: gains and inverse model"
 USED = {
     "stiffening": ELASTIC,
@@ -38,26 +30,26 @@ def extended_model(result: Diagnosis) -> Model:
     if result.search is None or not isinstance(result.search.after.problem, Indentation):
         raise DataError(f"{result.session}: nothing was fitted, so there is no extended model")
     fit = result.search.after
-    law = Extended.clipped(**{name: fit.values[there] for name, there in LAW.items()})
+    law = Extended.clipped(**{name: fit.values[name] for name in Extended.bounds})
     covariance = covariance_of(fit)
     return Model(
         law=law,
         covariance=covariance,
-        intervals={p.name: _interval(result, LAW[p.name], p.value) for p in law.parameters},
+        intervals={p.name: _interval(result, p.name, p.value) for p in law.parameters},
         interval_level=0.95,
         interval_method="joint fit, recordings as units",
         valid=_valid(fit, law),
         data=_provenance(fit, result.session),
         quality=_quality(fit, law),
-        effects=tuple(_effect(finding) for finding in result.findings),
+        effects=_effects(result, fit),
     )
 
 
 def covariance_of(fit: Fit) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     """Covariance of the law's parameters, shape (11, 11); 0 where one was not free. Logarithms are carried through."""
     free = {par.name: k for k, par in enumerate(fit.free)}
-    covariance = np.zeros((len(LAW), len(LAW)))
-    there = [(k, free[name]) for k, name in enumerate(LAW.values()) if name in free]
+    covariance = np.zeros((len(Extended.bounds), len(Extended.bounds)))
+    there = [(k, free[name]) for k, name in enumerate(Extended.bounds) if name in free]
     scale = {at: fit.values[fit.free[at].name] if fit.free[at].log else 1.0 for _, at in there}
     for k, one in there:
         for j, other in there:
@@ -113,21 +105,18 @@ def _quality(fit: Fit, law: Extended) -> Quality:
     )
 
 
-def _effect(finding: Answer) -> Effect:
-    name = finding.effects[0]
-    parameters: Mapping[str, Interval] = {
-        key: Interval(value=i.value, unit=_unit(key), low=float(i.low), high=float(i.high))
-        for key, i in finding.parameters.items()
-    }
-    return Effect(name=name, statement=finding.statement, parameters=dict(parameters), used=USED.get(name, UNUSED))
-
-
-UNITS = {"1_mm3": "1/mm^3", "1_mm": "1/mm", "mm_N": "mm/N", "N_h": "N/h", "1_K": "1/K"}
-
-
-def _unit(name: str) -> str:
-    """The unit a parameter's name ends in."""
-    for ending, unit in UNITS.items():
-        if name.endswith("_" + ending):
-            return unit
-    return name.rpartition("_")[2]
+def _effects(result: Diagnosis, fit: Fit) -> tuple[Effect, ...]:
+    pars = (par for effect in fit.problem.effects for par in effect.pars)
+    units = {par.name.replace("_sin_mm", "_mm"): par.unit for par in pars}
+    return tuple(
+        Effect(
+            name=found.effects[0],
+            statement=found.statement,
+            parameters={
+                name: Interval(value=i.value, unit=units[name], low=float(i.low), high=float(i.high))
+                for name, i in found.parameters.items()
+            },
+            used=USED.get(found.effects[0], UNUSED),
+        )
+        for found in result.findings
+    )

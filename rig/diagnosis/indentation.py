@@ -16,8 +16,8 @@ from rig.diagnosis.problem import Array, Channel, Effect, Fields, Par, Scatter, 
 from rig.simulation.chain import NULLS, respond
 from rig.simulation.drive import SETTLE_MM_S, Drive
 
-STIFFNESS = Par("stiffness_N_mm", "N/mm", 0.5, 1e-5, 1e3, 0.1, log=True, meaning="stiffness at contact")
-VISCOSITY = Par("viscosity_N_s_mm", "N s/mm", 0.0, -1.0, 10.0, 0.005, meaning="damping")
+STIFFNESS = Par("a_N_mm", "N/mm", 0.5, 1e-5, 1e3, 0.1, log=True, meaning="stiffness at contact")
+VISCOSITY = Par("damping_N_s_mm", "N s/mm", 0.0, -1.0, 10.0, 0.005, meaning="damping")
 SURFACE = Par("surface_mm", "mm", 0.0, -1e4, 1e4, 0.05, meaning="axis position of the surface")
 ZERO = Par("zero_N", "N", 0.0, -1e3, 1e3, 0.02, meaning="force zero")
 TIP_ZERO = Par("tip_zero_mm", "mm", 0.0, -1e4, 1e4, 0.05, meaning="tracker zero along the axis")
@@ -141,7 +141,7 @@ UNITS = {
 
 
 def _scaled(values: Fields, share: Array) -> Fields:
-    return {**values, "stiffness_N_mm": values["stiffness_N_mm"] * np.exp(np.clip(share, -2.0, 2.0))}
+    return {**values, "a_N_mm": values["a_N_mm"] * np.exp(np.clip(share, -2.0, 2.0))}
 
 
 def missing(data: Observations) -> dict[str, str]:
@@ -194,8 +194,8 @@ def coarse_start(data: Observations, stiffening: bool) -> dict[str, float]:
             solution, *_ = np.linalg.lstsq(columns, force, rcond=None)
             error = float(np.sum((force - columns @ solution) ** 2))
             if error < best[0] and solution[0] > 0:
-                found = dict(zip(("stiffness_N_mm", "viscosity_N_s_mm", "zero_N"), map(float, solution), strict=True))
-                best = error, {**NULLS, **found, "stiffening_1_mm": growth, "surface_mm": float(surface)}
+                found = dict(zip(("a_N_mm", "damping_N_s_mm", "zero_N"), map(float, solution), strict=True))
+                best = error, {**NULLS, **found, "b_per_mm": growth, "surface_mm": float(surface)}
     return best[1]
 
 

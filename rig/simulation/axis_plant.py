@@ -42,9 +42,9 @@ class Motor(NamedTuple):
 class PositionLoop(NamedTuple):
     """The drive's own loop; ``smoothing_s`` is the time constant of each of its two set-point filters."""
 
-    position_gain_1_s: float = 120.0
-    velocity_gain_1_s: float = 480.0
-    integral_gain_1_s2: float = 1500.0
+    position_gain_per_s: float = 120.0
+    velocity_gain_per_s: float = 480.0
+    integral_gain_per_s2: float = 1500.0
     smoothing_s: float = 0.003
     current_s: float = 0.0005
 
@@ -117,12 +117,12 @@ def wanted_current(
     """Current the position loop asks for [A], within its limit, and the integral after this step."""
     per_rad = motor.lead_mm / (2 * math.pi)
     error_mm = state.reference_mm - state.position_mm
-    wanted_mm_s = state.reference_mm_s + loop.position_gain_1_s * error_mm + state.integral_mm_s
-    lacking = loop.velocity_gain_1_s * (wanted_mm_s - state.speed_rad_s * per_rad) + acceleration_mm_s2
+    wanted_mm_s = state.reference_mm_s + loop.position_gain_per_s * error_mm + state.integral_mm_s
+    lacking = loop.velocity_gain_per_s * (wanted_mm_s - state.speed_rad_s * per_rad) + acceleration_mm_s2
     current_A = motor.inertia_kg_m2 * lacking / per_rad / motor.torque_N_m_A
     limit = motor.current_limit_A
     if -limit < current_A < limit:
-        return current_A, state.integral_mm_s + loop.integral_gain_1_s2 * error_mm * STEP_S
+        return current_A, state.integral_mm_s + loop.integral_gain_per_s2 * error_mm * STEP_S
     return min(max(current_A, -limit), limit), state.integral_mm_s
 
 

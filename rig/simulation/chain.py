@@ -13,23 +13,23 @@ from rig.simulation.drive import Array, Drive
 from rig.simulation.scans import dahl, high_pass, low_pass, play
 
 NULLS: dict[str, float] = {
-    "stiffness_N_mm": 0.5,
-    "stiffening_1_mm": 0.0,
-    "viscosity_N_s_mm": 0.0,
+    "a_N_mm": 0.5,
+    "b_per_mm": 0.0,
+    "damping_N_s_mm": 0.0,
     "surface_mm": 0.0,
     "zero_N": 0.0,
     "tip_zero_mm": 0.0,
-    "elastic_exponent_1": 1.0,
-    "elastic_quadratic_1_mm": 0.0,
-    "substrate_1_mm3": 0.0,
-    "rate_exponent_1": 1.0,
-    "relaxation_1": 0.0,
-    "relaxation_tau_s": 1.0,
-    "preconditioning_1": 0.0,
-    "preconditioning_strokes_1": 3.0,
+    "exponent": 1.0,
+    "quadratic_per_mm": 0.0,
+    "substrate_per_mm3": 0.0,
+    "rate_exponent": 1.0,
+    "relaxation_ratio": 0.0,
+    "tau_s": 1.0,
+    "preconditioning_gain": 0.0,
+    "preconditioning_cycles": 3.0,
     "adhesion_N": 0.0,
     "adhesion_length_mm": 1.0,
-    "temperature_1_K": 0.0,
+    "temperature_per_K": 0.0,
     "contact_offset_mm": 0.0,
     "surface_motion_sin_mm": 0.0,
     "surface_motion_cos_mm": 0.0,
@@ -41,10 +41,10 @@ NULLS: dict[str, float] = {
     "ripple_pitch_mm": 2.0,
     "friction_N": 0.0,
     "friction_length_mm": 0.1,
-    "friction_start_1": 0.0,
+    "friction_start": 0.0,
     "tip_inertia_kg": 0.0,
     "filter_lag_s": 0.0,
-    "gain_error_1": 0.0,
+    "gain_error": 0.0,
     "zero_drift_N_h": 0.0,
     "time_offset_s": 0.0,
     "tracker_latency_s": 0.0,
@@ -149,14 +149,14 @@ def contact(depth_mm: Array, travel_mm: Array) -> tuple[Array, Array]:
 def elastic(depth_mm: Array, v: Fields) -> Array:
     """Index law a x exp(b x), times (x / 5 mm)^(n-1), 1 + q x and 1 + s x^3 where these are off their null [N]."""
     inside = np.maximum(depth_mm, 0.0)
-    growth = np.minimum(v["stiffening_1_mm"] * inside, LARGEST_EXPONENT)
-    force = v["stiffness_N_mm"] * inside * np.exp(growth)
-    if v["elastic_exponent_1"] != 1:
-        force = force * (np.maximum(inside, 1e-6) / REFERENCE_DEPTH_MM) ** (v["elastic_exponent_1"] - 1)
-    if v["elastic_quadratic_1_mm"]:
-        force = force * (1 + v["elastic_quadratic_1_mm"] * inside)
-    if v["substrate_1_mm3"]:
-        force = force * (1 + v["substrate_1_mm3"] * inside**3)
+    growth = np.minimum(v["b_per_mm"] * inside, LARGEST_EXPONENT)
+    force = v["a_N_mm"] * inside * np.exp(growth)
+    if v["exponent"] != 1:
+        force = force * (np.maximum(inside, 1e-6) / REFERENCE_DEPTH_MM) ** (v["exponent"] - 1)
+    if v["quadratic_per_mm"]:
+        force = force * (1 + v["quadratic_per_mm"] * inside)
+    if v["substrate_per_mm3"]:
+        force = force * (1 + v["substrate_per_mm3"] * inside**3)
     return np.asarray(force)
 
 
@@ -167,11 +167,11 @@ def _tangent(depth_mm: Array, v: Fields) -> Array:
 
 def viscous(velocity_mm_s: Array, v: Fields) -> Array:
     """Rate term: B v, or B v0 |v/v0|^n with v0 = 10 mm/s for an exponent off its null [N]."""
-    if v["rate_exponent_1"] == 1:
-        return np.asarray(v["viscosity_N_s_mm"] * velocity_mm_s)
+    if v["rate_exponent"] == 1:
+        return np.asarray(v["damping_N_s_mm"] * velocity_mm_s)
     ratio = np.abs(velocity_mm_s) / REFERENCE_SPEED_MM_S
-    law = np.sign(velocity_mm_s) * np.maximum(ratio, 1e-9) ** v["rate_exponent_1"]
-    return np.asarray(v["viscosity_N_s_mm"] * REFERENCE_SPEED_MM_S * law)
+    law = np.sign(velocity_mm_s) * np.maximum(ratio, 1e-9) ** v["rate_exponent"]
+    return np.asarray(v["damping_N_s_mm"] * REFERENCE_SPEED_MM_S * law)
 
 
 def tissue(drive: Drive, tip: Tip, v: Fields) -> Array:
@@ -181,12 +181,12 @@ def tissue(drive: Drive, tip: Tip, v: Fields) -> Array:
     velocity = tip.velocity_mm_s if isinstance(moving, float) else tip.velocity_mm_s - drive.rate(moving)
     inside, touching = contact(depth, velocity * drive.period_s)
     force = elastic(inside, v)
-    if v["preconditioning_1"]:
-        force = force * (1 + v["preconditioning_1"] * np.exp(-drive.cycle / v["preconditioning_strokes_1"]))
-    if v["temperature_1_K"] and drive.temperature_C is not None:
-        force = force * (1 + v["temperature_1_K"] * (drive.temperature_C - drive.temperature_C.mean()))
-    if one(v, "relaxation_1"):
-        force = force + one(v, "relaxation_1") * high_pass(force, drive.time_s, drive.first, one(v, "relaxation_tau_s"))
+    if v["preconditioning_gain"]:
+        force = force * (1 + v["preconditioning_gain"] * np.exp(-drive.cycle / v["preconditioning_cycles"]))
+    if v["temperature_per_K"] and drive.temperature_C is not None:
+        force = force * (1 + v["temperature_per_K"] * (drive.temperature_C - drive.temperature_C.mean()))
+    if one(v, "relaxation_ratio"):
+        force = force + one(v, "relaxation_ratio") * high_pass(force, drive.time_s, drive.first, one(v, "tau_s"))
     force = force + touching * viscous(velocity, v)
     # Nothing holds tip and tissue together but adhesion: the rest can only push.
     return np.maximum(force, 0.0) + adhesion(tip, depth, drive, v)
@@ -205,7 +205,7 @@ def friction(drive: Drive, tip: Tip, v: Fields) -> Array | float:
     """Guide in front of the sensor: Dahl friction [N]."""
     if not one(v, "friction_N"):
         return 0.0
-    state = dahl(tip.position_mm, drive.first, one(v, "friction_length_mm"), one(v, "friction_start_1"))
+    state = dahl(tip.position_mm, drive.first, one(v, "friction_length_mm"), one(v, "friction_start"))
     return one(v, "friction_N") * state
 
 
@@ -220,7 +220,7 @@ def sensor(drive: Drive, force_N: Array, v: Fields) -> Array:
         force_N = low_pass(force_N, drive.time_s, drive.first, one(v, "filter_lag_s"))
     middle_s = 0.5 * (drive.time_s[0] + drive.time_s[-1])
     drift = one(v, "zero_drift_N_h") * (drive.time_s - middle_s) / 3600
-    return np.asarray(force_N * (1 + one(v, "gain_error_1")) + v["zero_N"] + drift)
+    return np.asarray(force_N * (1 + one(v, "gain_error")) + v["zero_N"] + drift)
 
 
 def time_stamps(drive: Drive, force_N: Array, v: Fields) -> Array:

@@ -178,16 +178,16 @@ class Law(ABC):
 class Damped(Law):
     """An elastic law and one damping for all depths: F = elastic(x) + B v."""
 
-    B_N_s_mm: float
+    damping_N_s_mm: float
 
     def damping(self, depth_mm: FloatArray) -> FloatArray:
         """B."""
-        return np.full_like(depth_mm, self.B_N_s_mm)
+        return np.full_like(depth_mm, self.damping_N_s_mm)
 
     def depth(self, force_N: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
         """The elastic inverse of F - B v."""
         force, rate = np.broadcast_arrays(np.asarray(force_N, float), np.asarray(rate_mm_s, float))
-        return self.elastic_inverse(np.maximum(force - self.B_N_s_mm * rate, 0.0))
+        return self.elastic_inverse(np.maximum(force - self.damping_N_s_mm * rate, 0.0))
 
 
 class Linear(Law):
@@ -238,7 +238,7 @@ class Constant(Linear, Damped):
     formula: ClassVar[str] = "F = k x + B v"
     bounds: ClassVar[Mapping[str, Bounds]] = {
         "k_N_mm": Bounds("N/mm", 1e-6, 1e4, "stiffness"),
-        "B_N_s_mm": DAMPING,
+        "damping_N_s_mm": DAMPING,
     }
 
     k_N_mm: float
@@ -251,7 +251,7 @@ class Constant(Linear, Damped):
     @classmethod
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """The line through contact and the data's centre of least squares, without damping."""
-        return cls.clipped(k_N_mm=straight(depth_mm, force_N), B_N_s_mm=0.0)
+        return cls.clipped(k_N_mm=straight(depth_mm, force_N), damping_N_s_mm=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,7 +267,7 @@ class Index(Damped):
     bounds: ClassVar[Mapping[str, Bounds]] = {
         "a_N_mm": Bounds("N/mm", 1e-6, 1e4, "secant stiffness at contact"),
         "b_per_mm": Bounds("1/mm", 0.0, 5.0, "stiffening per depth"),
-        "B_N_s_mm": DAMPING,
+        "damping_N_s_mm": DAMPING,
     }
 
     a_N_mm: float
@@ -277,7 +277,7 @@ class Index(Damped):
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """The straight line ln(F/x) = ln a + b x, weighted with force, without damping."""
         slope, level = np.polyfit(depth_mm, np.log(force_N / depth_mm), 1, w=force_N)
-        return cls.clipped(a_N_mm=float(np.exp(level)), b_per_mm=slope, B_N_s_mm=0.0)
+        return cls.clipped(a_N_mm=float(np.exp(level)), b_per_mm=slope, damping_N_s_mm=0.0)
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """a x exp(b x)."""

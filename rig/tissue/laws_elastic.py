@@ -26,7 +26,7 @@ class Quadratic(Damped):
     bounds: ClassVar[Mapping[str, Bounds]] = {
         "a_N_mm": Bounds("N/mm", 1e-6, 1e4, "stiffness at contact"),
         "c_N_mm2": Bounds("N/mm^2", 0.0, 1e3, "stiffening per depth"),
-        "B_N_s_mm": DAMPING,
+        "damping_N_s_mm": DAMPING,
     }
 
     a_N_mm: float
@@ -36,7 +36,7 @@ class Quadratic(Damped):
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """Linear least squares."""
         (a, c), *_ = np.linalg.lstsq(np.column_stack([depth_mm, depth_mm**2]), force_N, rcond=None)
-        return cls.clipped(a_N_mm=a, c_N_mm2=c, B_N_s_mm=0.0)
+        return cls.clipped(a_N_mm=a, c_N_mm2=c, damping_N_s_mm=0.0)
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """a x + c x^2."""
@@ -56,19 +56,19 @@ class PowerShape(Law):
     """Force at rest a x^n; n = 1.5 is Hertz's sphere, n = 2 the cone and any tip pushed in deep."""
 
     a_N_mmn: float
-    n: float
+    exponent: float
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """a x^n."""
-        return np.asarray(self.a_N_mmn * depth_mm**self.n)
+        return np.asarray(self.a_N_mmn * depth_mm**self.exponent)
 
     def slope(self, depth_mm: FloatArray) -> FloatArray:
         """n a x^(n-1)."""
-        return np.asarray(self.n * self.a_N_mmn * depth_mm ** (self.n - 1.0))
+        return np.asarray(self.exponent * self.a_N_mmn * depth_mm ** (self.exponent - 1.0))
 
     def elastic_inverse(self, force_N: FloatArray) -> FloatArray:
         """(F/a)^(1/n)."""
-        return np.asarray((force_N / self.a_N_mmn) ** (1.0 / self.n))
+        return np.asarray((force_N / self.a_N_mmn) ** (1.0 / self.exponent))
 
 
 def power_near(depth_mm: FloatArray, force_N: FloatArray) -> tuple[float, float]:
@@ -83,13 +83,13 @@ class Power(PowerShape, Damped):
 
     name: ClassVar[str] = "power"
     formula: ClassVar[str] = "F = a x^n + B v"
-    bounds: ClassVar[Mapping[str, Bounds]] = {"a_N_mmn": FORCE_AT_1_MM, "n": EXPONENT, "B_N_s_mm": DAMPING}
+    bounds: ClassVar[Mapping[str, Bounds]] = {"a_N_mmn": FORCE_AT_1_MM, "exponent": EXPONENT, "damping_N_s_mm": DAMPING}
 
     @classmethod
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """The straight line through logarithms, without damping."""
         a, n = power_near(depth_mm, force_N)
-        return cls.clipped(a_N_mmn=a, n=n, B_N_s_mm=0.0)
+        return cls.clipped(a_N_mmn=a, exponent=n, damping_N_s_mm=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,13 +127,13 @@ class Fung(FungShape, Damped):
 
     name: ClassVar[str] = "fung"
     formula: ClassVar[str] = "F = A (exp(b x) - 1) + B v"
-    bounds: ClassVar[Mapping[str, Bounds]] = {"A_N": FORCE_SCALE, "b_per_mm": STIFFENING, "B_N_s_mm": DAMPING}
+    bounds: ClassVar[Mapping[str, Bounds]] = {"A_N": FORCE_SCALE, "b_per_mm": STIFFENING, "damping_N_s_mm": DAMPING}
 
     @classmethod
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """From two depths, without damping."""
         scale_N, b_per_mm = fung_near(depth_mm, force_N)
-        return cls.clipped(A_N=scale_N, b_per_mm=b_per_mm, B_N_s_mm=0.0)
+        return cls.clipped(A_N=scale_N, b_per_mm=b_per_mm, damping_N_s_mm=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,7 +151,7 @@ class Layer(Linear, Damped):
         "radius_mm": Bounds("mm", 0.1, 100.0, "radius of the tip"),
         "thickness_mm": Bounds("mm", 0.1, 1e4, "tissue above the bone"),
         "poisson_ratio": Bounds("1", 0.0, 0.5, "Poisson's ratio"),
-        "B_N_s_mm": DAMPING,
+        "damping_N_s_mm": DAMPING,
     }
     known: ClassVar[Mapping[str, float]] = {"radius_mm": 3.0, "thickness_mm": 39.0, "poisson_ratio": 0.45}
 
@@ -172,5 +172,5 @@ class Layer(Linear, Damped):
     @classmethod
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """E from the line through contact, for the tip and layer known."""
-        soft = cls(E_MPa=1.0, B_N_s_mm=0.0, **cls.known)
-        return cls.clipped(E_MPa=straight(depth_mm, force_N) / soft.stiffness_N_mm, B_N_s_mm=0.0, **cls.known)
+        soft = cls(E_MPa=1.0, damping_N_s_mm=0.0, **cls.known)
+        return cls.clipped(E_MPa=straight(depth_mm, force_N) / soft.stiffness_N_mm, damping_N_s_mm=0.0, **cls.known)

@@ -30,29 +30,29 @@ class Extended(Damped):
     bounds: ClassVar[Mapping[str, Bounds]] = {
         "a_N_mm": Bounds("N/mm", 1e-6, 1e4, "secant stiffness at contact"),
         "b_per_mm": Bounds("1/mm", -0.5, 5.0, "stiffening per depth"),
-        "B_N_s_mm": DAMPING,
-        "n_1": Bounds("1", 0.2, 4.0, "exponent"),
-        "q_per_mm": Bounds("1/mm", -0.15, 50.0, "polynomial stiffening"),
-        "s_per_mm3": Bounds("1/mm^3", 0.0, 0.05, "stiffening by what lies below"),
-        "r_1": Bounds("1", 0.0, 30.0, "force that relaxes over force at rest"),
+        "damping_N_s_mm": DAMPING,
+        "exponent": Bounds("1", 0.2, 4.0, "exponent"),
+        "quadratic_per_mm": Bounds("1/mm", -0.15, 50.0, "polynomial stiffening"),
+        "substrate_per_mm3": Bounds("1/mm^3", 0.0, 0.05, "stiffening by what lies below"),
+        "relaxation_ratio": Bounds("1", 0.0, 30.0, "force that relaxes over force at rest"),
         "tau_s": Bounds("s", 1e-3, 1e3, "time of relaxation"),
-        "c_mm_N": Bounds("mm/N", 0.0, 0.8, "compliance of the frame"),
+        "frame_compliance_mm_N": Bounds("mm/N", 0.0, 0.8, "compliance of the frame"),
         "friction_N": Bounds("N", 0.0, 20.0, "friction of the guide in front of the sensor"),
         "friction_length_mm": Bounds("mm", 1e-3, 10.0, "travel over which friction builds up"),
     }
     known: ClassVar[Mapping[str, float]] = {
-        "n_1": 1.0, "q_per_mm": 0.0, "s_per_mm3": 0.0, "r_1": 0.0, "tau_s": 1.0, "c_mm_N": 0.0, "friction_N": 0.0,
-        "friction_length_mm": 0.1,
+        "exponent": 1.0, "quadratic_per_mm": 0.0, "substrate_per_mm3": 0.0, "relaxation_ratio": 0.0, "tau_s": 1.0,
+        "frame_compliance_mm_N": 0.0, "friction_N": 0.0, "friction_length_mm": 0.1,
     }  # fmt: skip
 
     a_N_mm: float
     b_per_mm: float
-    n_1: float = 1.0
-    q_per_mm: float = 0.0
-    s_per_mm3: float = 0.0
-    r_1: float = 0.0
+    exponent: float = 1.0
+    quadratic_per_mm: float = 0.0
+    substrate_per_mm3: float = 0.0
+    relaxation_ratio: float = 0.0
     tau_s: float = 1.0
-    c_mm_N: float = 0.0
+    frame_compliance_mm_N: float = 0.0
     friction_N: float = 0.0
     friction_length_mm: float = 0.1
 
@@ -60,12 +60,12 @@ class Extended(Damped):
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """The index law's guess, nothing extended."""
         index = Index.guess(depth_mm, force_N)
-        return cls(a_N_mm=index.a_N_mm, b_per_mm=index.b_per_mm, B_N_s_mm=index.B_N_s_mm)
+        return cls(a_N_mm=index.a_N_mm, b_per_mm=index.b_per_mm, damping_N_s_mm=index.damping_N_s_mm)
 
     @property
     def terms(self) -> tuple[Term, ...]:
         """One, where the tissue relaxes."""
-        return (Term(self.r_1, self.tau_s),) if self.r_1 else ()
+        return (Term(self.relaxation_ratio, self.tau_s),) if self.relaxation_ratio else ()
 
     @property
     def friction(self) -> tuple[float, float]:
@@ -75,20 +75,22 @@ class Extended(Damped):
     def depth(self, force_N: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
         """By bisection between the depths at which the force is reached suddenly and at rest."""
         force, rate = np.broadcast_arrays(np.asarray(force_N, float), np.asarray(rate_mm_s, float))
-        held = np.maximum(force - self.B_N_s_mm * rate, 0.0)
+        held = np.maximum(force - self.damping_N_s_mm * rate, 0.0)
         low_mm, high_mm = self.elastic_inverse(held / self.sudden), self.elastic_inverse(held)
         return bisect(lambda depth_mm: self.force(depth_mm, rate), force, low_mm, high_mm) if self.terms else high_mm
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """The tissue's force; with a compliant frame where tissue and frame carry the same."""
-        if not self.c_mm_N:
+        if not self.frame_compliance_mm_N:
             return self._tissue(depth_mm)
-        tip_mm = bisect(lambda x: x + self.c_mm_N * self._tissue(x), depth_mm, np.zeros_like(depth_mm), depth_mm)
+        tip_mm = bisect(
+            lambda x: x + self.frame_compliance_mm_N * self._tissue(x), depth_mm, np.zeros_like(depth_mm), depth_mm
+        )
         return self._tissue(tip_mm)
 
     def _tissue(self, tip_mm: FloatArray) -> FloatArray:
-        bent = np.maximum(tip_mm, 1e-9) ** (self.n_1 - 1) / REFERENCE_MM ** (self.n_1 - 1)
-        added = (1 + self.q_per_mm * tip_mm) * (1 + self.s_per_mm3 * tip_mm**3)
+        bent = np.maximum(tip_mm, 1e-9) ** (self.exponent - 1) / REFERENCE_MM ** (self.exponent - 1)
+        added = (1 + self.quadratic_per_mm * tip_mm) * (1 + self.substrate_per_mm3 * tip_mm**3)
         return np.asarray(self.a_N_mm * tip_mm * np.exp(self.b_per_mm * tip_mm) * bent * added)
 
     def slope(self, depth_mm: FloatArray) -> FloatArray:
@@ -102,4 +104,4 @@ class Extended(Damped):
         force = np.asarray(force_N, float)
         with np.errstate(over="ignore"):
             tip_mm = bisect(self._tissue, force, np.zeros_like(force), np.full_like(force, DEEPEST_MM))
-        return np.asarray(tip_mm + self.c_mm_N * force)
+        return np.asarray(tip_mm + self.frame_compliance_mm_N * force)

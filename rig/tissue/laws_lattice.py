@@ -68,7 +68,7 @@ class LatticeConstant(LatticeLaw):
 
     name: ClassVar[str] = "lattice constant"
     formula: ClassVar[str] = "F = k phi(x) + B v"
-    bounds: ClassVar[Mapping[str, Bounds]] = {"k_N_mm": STIFFNESS, "B_N_s_mm": DAMPING}
+    bounds: ClassVar[Mapping[str, Bounds]] = {"k_N_mm": STIFFNESS, "damping_N_s_mm": DAMPING}
 
     k_N_mm: float
 
@@ -76,7 +76,7 @@ class LatticeConstant(LatticeLaw):
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """Linear least squares."""
         carried_mm = cls.phi(depth_mm)
-        return cls.clipped(k_N_mm=float(carried_mm @ force_N / (carried_mm @ carried_mm)), B_N_s_mm=0.0)
+        return cls.clipped(k_N_mm=float(carried_mm @ force_N / (carried_mm @ carried_mm)), damping_N_s_mm=0.0)
 
     def spring_N_mm(self, depth_mm: FloatArray) -> FloatArray:
         """k."""
@@ -96,7 +96,7 @@ class LatticeIndex(LatticeLaw):
     bounds: ClassVar[Mapping[str, Bounds]] = {
         "a_N_mm": STIFFNESS,
         "b_per_mm": Bounds("1/mm", -2.0, 5.0, "stiffening per depth"),
-        "B_N_s_mm": DAMPING,
+        "damping_N_s_mm": DAMPING,
     }
 
     a_N_mm: float
@@ -106,7 +106,7 @@ class LatticeIndex(LatticeLaw):
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """The straight line ln(F/phi) = ln a + b x, weighted with force."""
         b, level = np.polyfit(depth_mm, np.log(force_N / cls.phi(depth_mm)), 1, w=force_N)
-        return cls.clipped(a_N_mm=float(np.exp(level)), b_per_mm=b, B_N_s_mm=0.0)
+        return cls.clipped(a_N_mm=float(np.exp(level)), b_per_mm=b, damping_N_s_mm=0.0)
 
     def spring_N_mm(self, depth_mm: FloatArray) -> FloatArray:
         """a exp(b x)."""

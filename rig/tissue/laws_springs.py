@@ -53,7 +53,7 @@ class LatticeSprings(Damped):
     bounds: ClassVar[Mapping[str, Bounds]] = {
         "a_N_mm": STIFFNESS,
         "b": Bounds("1", 0.0, 40.0, "stiffening per strain of a spring"),
-        "B_N_s_mm": DAMPING,
+        "damping_N_s_mm": DAMPING,
     }
     surface: ClassVar[Surface]
 
@@ -66,7 +66,7 @@ class LatticeSprings(Damped):
         grid = np.linspace(0.0, cls.surface.largest_b, GUESSES)
         tried = [project(force_N, cls.surface(depth_mm, b)) for b in grid]
         best = int(np.argmin([misfit for _, misfit in tried]))
-        return cls.clipped(a_N_mm=tried[best][0], b=float(grid[best]), B_N_s_mm=0.0)
+        return cls.clipped(a_N_mm=tried[best][0], b=float(grid[best]), damping_N_s_mm=0.0)
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """a phi(x; b)."""

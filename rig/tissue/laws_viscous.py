@@ -37,7 +37,7 @@ class HuntCrossley(PowerShape):
     formula: ClassVar[str] = "F = a x^n + lambda x^n v"
     bounds: ClassVar[Mapping[str, Bounds]] = {
         "a_N_mmn": FORCE_AT_1_MM,
-        "n": EXPONENT,
+        "exponent": EXPONENT,
         "lambda_N_s_mmn1": Bounds("N s/mm^(n+1)", 0.0, 1e3, "damping at 1 mm"),
     }
 
@@ -47,22 +47,22 @@ class HuntCrossley(PowerShape):
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """The power law without damping."""
         a, n = power_near(depth_mm, force_N)
-        return cls.clipped(a_N_mmn=a, n=n, lambda_N_s_mmn1=0.0)
+        return cls.clipped(a_N_mmn=a, exponent=n, lambda_N_s_mmn1=0.0)
 
     def damping(self, depth_mm: FloatArray) -> FloatArray:
         """lambda x^n."""
-        return np.asarray(self.lambda_N_s_mmn1 * depth_mm**self.n)
+        return np.asarray(self.lambda_N_s_mmn1 * depth_mm**self.exponent)
 
     def damping_slope(self, depth_mm: FloatArray) -> FloatArray:
         """n lambda x^(n-1)."""
-        return np.asarray(self.n * self.lambda_N_s_mmn1 * depth_mm ** (self.n - 1.0))
+        return np.asarray(self.exponent * self.lambda_N_s_mmn1 * depth_mm ** (self.exponent - 1.0))
 
     def depth(self, force_N: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
         """(F / (a + lambda v))^(1/n); 0 where the tip leaves so fast that nothing presses on it."""
         force, rate = np.broadcast_arrays(np.asarray(force_N, float), np.asarray(rate_mm_s, float))
         factor = self.a_N_mmn + self.lambda_N_s_mmn1 * rate
         reached = np.maximum(force, 0.0) / np.where(factor > 0, factor, np.inf)
-        return np.asarray(reached ** (1.0 / self.n))
+        return np.asarray(reached ** (1.0 / self.exponent))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,18 +161,23 @@ class QuasiLinear(FungShape, Relaxing):
 
     name: ClassVar[str] = "qlv"
     formula: ClassVar[str] = "F = int (1 + r exp(-(t-s)/tau)) d[A (exp(b x(s)) - 1)]"
-    bounds: ClassVar[Mapping[str, Bounds]] = {"A_N": FORCE_SCALE, "b_per_mm": STIFFENING, "r": RATIO, "tau_s": TAU}
+    bounds: ClassVar[Mapping[str, Bounds]] = {
+        "A_N": FORCE_SCALE,
+        "b_per_mm": STIFFENING,
+        "relaxation_ratio": RATIO,
+        "tau_s": TAU,
+    }
 
-    r: float
+    relaxation_ratio: float
     tau_s: float
 
     @classmethod
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """The elastic law near the data, a fifth of its force relaxing."""
         scale_N, b_per_mm = fung_near(depth_mm, force_N)
-        return cls.clipped(A_N=scale_N / 1.25, b_per_mm=b_per_mm, r=0.25, tau_s=0.3)
+        return cls.clipped(A_N=scale_N / 1.25, b_per_mm=b_per_mm, relaxation_ratio=0.25, tau_s=0.3)
 
     @property
     def terms(self) -> tuple[Term, ...]:
         """r over tau."""
-        return (Term(self.r, self.tau_s),)
+        return (Term(self.relaxation_ratio, self.tau_s),)

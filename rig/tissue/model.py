@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -16,9 +16,20 @@ from rig.tissue.laws import FloatArray, Law
 from rig.tissue.registry import law_named
 
 FORMAT: Literal["tissue-rig model"] = "tissue-rig model"
-VERSION: Literal[1] = 1
+VERSION: Literal[2] = 2
+# Parameters of version 1 under their names of today; values and units are the same.
+RENAMED = {
+    "B_N_s_mm": "damping_N_s_mm", "n": "exponent", "n_1": "exponent", "q_per_mm": "quadratic_per_mm",
+    "s_per_mm3": "substrate_per_mm3", "r": "relaxation_ratio", "r_1": "relaxation_ratio",
+    "c_mm_N": "frame_compliance_mm_N", "stiffening_1_mm": "b_per_mm", "elastic_exponent_1": "exponent",
+    "elastic_quadratic_1_mm": "quadratic_per_mm", "substrate_1_mm3": "substrate_per_mm3",
+    "rate_exponent_1": "rate_exponent", "relaxation_1": "relaxation_ratio", "relaxation_tau_s": "tau_s",
+    "preconditioning_1": "preconditioning_gain", "preconditioning_strokes_1": "preconditioning_cycles",
+    "temperature_1_K": "temperature_per_K", "friction_start_1": "friction_start", "gain_error_1": "gain_error",
+}  # fmt: skip
 
 NotNegative = Annotated[float, Field(ge=0)]
+T = TypeVar("T")
 
 
 class ValidRange(Table):
@@ -89,7 +100,7 @@ class _File(Table):
     """`model.json` as it stands on disk."""
 
     format: Literal["tissue-rig model"]
-    version: Literal[1]
+    version: Literal[1, 2]
     law: str
     formula: str
     parameters: dict[str, float]
@@ -192,15 +203,29 @@ def load_model(path: Path) -> Model:
         raise UsageError(f"{path}: cannot be read as JSON: {error}; fit the session again") from error
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise UsageError(f"{path}: is not a tissue model (no format {FORMAT!r}); `rig fit SESSION` writes one")
-    if values.get("version") != VERSION:
+    if values.get("version") not in (1, VERSION):
         raise UsageError(
-            f"{path}: model version {values.get('version')!r} is not the {VERSION} read here; fit the session again"
+            f"{path}: model version {values.get('version')!r} is neither 1 nor {VERSION}, which are read here; fit the "
+            "session again"
         )
-    file = parse(_File, values, str(path))
+    file = _renamed(parse(_File, values, str(path)))
     try:
         return _model(file)
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error
+
+
+def _renamed(file: _File) -> _File:
+    """The file as version 2 has it."""
+    if file.version == VERSION:
+        return file
+    tables = {name: _today(getattr(file, name)) for name in ("parameters", "units", "standard_errors", "intervals")}
+    effects = tuple(effect.model_copy(update={"parameters": _today(effect.parameters)}) for effect in file.effects)
+    return file.model_copy(update={**tables, "effects": effects, "version": VERSION})
+
+
+def _today(table: Mapping[str, T]) -> dict[str, T]:
+    return {RENAMED.get(name, name): value for name, value in table.items()}
 
 
 def _model(file: _File) -> Model:

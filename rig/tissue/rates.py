@@ -30,7 +30,7 @@ class RateTest:
     ``effect_N`` is the force that B makes between slowest and fastest speed; ``spread_N`` the scatter of trials.
     """
 
-    B_N_s_mm: float
+    damping_N_s_mm: float
     interval: tuple[float, float]
     p_value: float
     trials: int

@@ -70,7 +70,7 @@ def test_fit_takes_what_a_diagnosis_named_as_known(session: Path, tmp_path: Path
         "--laws",
         "extended",
         "--known",
-        "c_mm_N=0.05",
+        "frame_compliance_mm_N=0.05",
         "--model",
         "extended",
     )
@@ -79,7 +79,7 @@ def test_fit_takes_what_a_diagnosis_named_as_known(session: Path, tmp_path: Path
     law = load_model(tmp_path / "second" / "model.json").law
     assert law.name == "extended"
     assert law.values == pytest.approx(load_model(named).law.values)
-    assert re.search(r"c_mm_N +│ 0.05 +│ known", output)
+    assert re.search(r"frame_compliance_mm_N +│ 0.05 +│ known", output)
 
 
 def test_fit_prints_many_laws_in_80_columns_without_a_cell_broken(session: Path, tmp_path: Path) -> None:
@@ -100,7 +100,7 @@ BAD = [
     (["--laws", "cubic"], r"no tissue law is called 'cubic'; choose one of .*fung.*sls"),
     (["--with", "nowhere.json"], r"nowhere.json: no such file"),
     (["--model", "cubic"], r"no tissue law is called 'cubic'"),
-    (["--known", "k=1"], r"--known k=1: the laws compared have k_N_mm, B_N_s_mm, a_N_mm, b_per_mm; add --laws"),
+    (["--known", "k=1"], r"--known k=1: the laws compared have k_N_mm, damping_N_s_mm, a_N_mm, b_per_mm; add --laws"),
     (["--known", "k_N_mm=soft"], r"--known k_N_mm=soft: write k_N_mm=NUMBER"),
     (["--known", "k_N_mm=nan"], r"--known k_N_mm=nan: constant takes 1e-06 to 10000 N/mm"),
     (["--known", "k_N_mm=0"], r"--known k_N_mm=0: constant takes 1e-06 to 10000 N/mm"),

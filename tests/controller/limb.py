@@ -14,14 +14,14 @@ class Limb:
 
     a_N_mm: float = 0.12
     b_per_mm: float = 0.22
-    B_N_s_mm: float = 0.01
+    damping_N_s_mm: float = 0.01
 
     def force_N(self, depth_mm: float, speed_mm_s: float) -> float:
         """Never pulls."""
         if depth_mm <= 0:
             return 0.0
         elastic_N = self.a_N_mm * depth_mm * math.exp(self.b_per_mm * depth_mm)
-        return max(elastic_N + self.B_N_s_mm * speed_mm_s, 0.0)
+        return max(elastic_N + self.damping_N_s_mm * speed_mm_s, 0.0)
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from rig.tissue.laws import Index
 from rig.tissue.model import Model, Provenance, Quality, ValidRange
 
 
-def index_model(a_N_mm: float, b_per_mm: float, B_N_s_mm: float, force_N: float = 12.0) -> Model:
+def index_model(a_N_mm: float, b_per_mm: float, damping_N_s_mm: float, force_N: float = 12.0) -> Model:
     """The index law as if fitted up to ``force_N``."""
-    law = Index(a_N_mm=a_N_mm, b_per_mm=b_per_mm, B_N_s_mm=B_N_s_mm)
+    law = Index(a_N_mm=a_N_mm, b_per_mm=b_per_mm, damping_N_s_mm=damping_N_s_mm)
     return Model(
         law=law,
         covariance=np.zeros((3, 3)),

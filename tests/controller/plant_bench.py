@@ -57,11 +57,11 @@ def linear(stiffness_N_mm: float) -> Limb:
     return curve(lambda depth_mm: stiffness_N_mm * depth_mm)
 
 
-def exponential(stiffness_N_mm: float, at_N: float, b_1_mm: float = 0.25) -> Limb:
+def exponential(stiffness_N_mm: float, at_N: float, b_per_mm: float = 0.25) -> Limb:
     """F = a x exp(b x) with a tangent of ``stiffness_N_mm`` where the force is ``at_N``: b + 1 / x = k / F."""
-    depth_mm = 1.0 / (stiffness_N_mm / at_N - b_1_mm)
-    a_N_mm = at_N / depth_mm * math.exp(-b_1_mm * depth_mm)
-    return curve(lambda mm: a_N_mm * mm * math.exp(min(b_1_mm * mm, 12.0)))
+    depth_mm = 1.0 / (stiffness_N_mm / at_N - b_per_mm)
+    a_N_mm = at_N / depth_mm * math.exp(-b_per_mm * depth_mm)
+    return curve(lambda mm: a_N_mm * mm * math.exp(min(b_per_mm * mm, 12.0)))
 
 
 @dataclass

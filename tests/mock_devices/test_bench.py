@@ -283,7 +283,7 @@ def test_a_skipped_gap_passes_without_physics() -> None:
 
 
 def test_parameters_shape_the_bench() -> None:
-    stiff = quiet_bench(tissue=Tissue(a_N_mm=0.5, b_1_mm=0.0, B_N_s_mm=0.0), surface=Surface(position_mm=12.0))
+    stiff = quiet_bench(tissue=Tissue(a_N_mm=0.5, b_per_mm=0.0, damping_N_s_mm=0.0), surface=Surface(position_mm=12.0))
     settle(stiff, 14.0, 3.0)
     assert stiff.contact_N == pytest.approx(1.0, abs=1e-3)
     slow = quiet_bench(axis=Axis(smoothing_s=0.02))

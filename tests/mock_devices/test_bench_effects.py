@@ -22,7 +22,7 @@ def test_the_library_has_exactly_the_agreed_names() -> None:
 
 @pytest.mark.parametrize("effect", NAMES)
 def test_every_parameter_carries_its_unit_and_its_default_lies_within_its_bounds(effect: str) -> None:
-    units = ("_N", "_mm", "_s", "_Hz", "_rad", "_kg", "_C", "_1", "_mm_N", "_N_h", "_1_K", "_1_mm")
+    units = ("_N", "_mm", "_s", "_Hz", "_rad", "_kg", "_C", "_1", "_mm_N", "_N_h", "_per_K", "_per_mm")
     assert statement(effect)
     for name, knob in knobs(effect).items():
         assert name.endswith(units)
@@ -216,7 +216,7 @@ def test_position_ripple_repeats_with_the_lead_of_the_screw() -> None:
 
 def test_temperature_changes_the_gain_as_the_sensor_warms_up() -> None:
     warming = QUIET.model_copy(update={"warm_up_K": 10.0, "warm_up_s": 0.5})
-    bench = quiet_bench({"temperature": {"gain_1_K": 0.01, "reference_C": 25.0}}, force=warming)
+    bench = quiet_bench({"temperature": {"gain_per_K": 0.01, "reference_C": 25.0}}, force=warming)
     trace = settle(bench, SURFACE_MM + 8, 5.0)
     assert trace.force_N[-1] / trace.contact_N[-1] == pytest.approx(1.10, abs=1e-3)
 
@@ -226,7 +226,7 @@ def test_temperature_changes_the_gain_as_the_sensor_warms_up() -> None:
     [
         ({"exponent_1": 2.0}, 0.25),
         ({"exponent_1": 1.0}, 0.5),
-        ({"fung_share_1": 1.0, "fung_1_mm": 0.3}, math.expm1(1.2) / math.expm1(2.4)),
+        ({"fung_share_1": 1.0, "fung_per_mm": 0.3}, math.expm1(1.2) / math.expm1(2.4)),
     ],
 )
 def test_elastic_law_has_another_shape_but_the_same_force_where_it_is_matched(

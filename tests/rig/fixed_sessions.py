@@ -45,7 +45,7 @@ Figures = Mapping[str, object]
 
 def write_captured(folder: Path) -> Path:
     """Five trials on tissue, one through a guide with friction, one in the air, one with invalid samples, one run."""
-    air = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).cycle(10.0, 999)
+    air = Bench(force=index_force(a_N_mm=1e-6, damping_N_s_mm=0.0)).cycle(10.0, 999)
     cycles = Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0, 10.0, 15.0, 30.0))
     rubbed = Bench(force=rubbing(0.2), rate_Hz=500.0).cycle(10.0, 77)
     write_made_session(folder, [*cycles, rubbed, air], subject={"id": "7", "site": "forearm"})

@@ -55,7 +55,7 @@ def test_what_was_hidden_is_named_with_its_size_and_a_gain(made: Path) -> None:
     assert said["truth"]["effect"] == "relaxation"
     assert said["named"], said["statement"]
     finding = next(found for found in said["findings"] if "relaxation" in found["effects"])
-    for truth, name in (("strength_1", "relaxation_1"), ("time_constant_s", "relaxation_tau_s")):
+    for truth, name in (("strength_1", "relaxation_ratio"), ("time_constant_s", "tau_s")):
         interval = finding["parameters"][name]
         # Time stamps that jitter on a busy computer are no part of the interval.
         slack = 0.05 * said["truth"]["parameters"][truth]
@@ -65,7 +65,7 @@ def test_what_was_hidden_is_named_with_its_size_and_a_gain(made: Path) -> None:
 
 def test_the_extended_model_relaxes_and_is_a_model_like_any_other(made: Path) -> None:
     model = load_model(made / "session" / "diagnosis" / "model.json")
-    assert {p.name: p.value for p in model.law.parameters}["r_1"] > 0.05
+    assert {p.name: p.value for p in model.law.parameters}["relaxation_ratio"] > 0.05
     assert any(effect.name == "relaxation" and effect.used for effect in model.effects)
 
 

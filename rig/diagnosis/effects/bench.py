@@ -8,7 +8,7 @@ from rig.diagnosis.effects.scan import PEAKS, peaks
 from rig.diagnosis.problem import Array, Effect, Par, Problem, Values
 
 LOWEST_HZ, HIGHEST_HZ = 0.08, 3.0
-PITCHES_1_MM = np.linspace(1 / 10, 1 / 0.5, 60)
+PITCHES_PER_MM = np.linspace(1 / 10, 1 / 0.5, 60)
 NUDGE_MM = 0.02
 FEWEST_PERIODS = 2.5
 
@@ -39,7 +39,7 @@ def _ripple_starts(problem: Problem, values: Values, residual: Array) -> Sequenc
     if not touching.any():
         return [{"ripple_pitch_mm": pitch} for pitch in (1.0, 2.0)]
     longest = np.ptp(position[touching]) / FEWEST_PERIODS
-    found = peaks(position, match, energy, PITCHES_1_MM[1 / max(longest, 0.5) <= PITCHES_1_MM])
+    found = peaks(position, match, energy, PITCHES_PER_MM[1 / max(longest, 0.5) <= PITCHES_PER_MM])
     return [{"ripple_pitch_mm": 1 / f} for f in found]
 
 
@@ -48,7 +48,7 @@ def _surface_tries(problem: Problem) -> float:
 
 
 def _ripple_tries(_: Problem) -> float:
-    return max(1.0, len(PITCHES_1_MM) / 3 / PEAKS)
+    return max(1.0, len(PITCHES_PER_MM) / 3 / PEAKS)
 
 
 def _pair(stem: str, meaning: str, worth_mm: float) -> tuple[Par, Par]:
@@ -74,7 +74,7 @@ FRAME_COMPLIANCE = Effect(
     (Par("frame_compliance_mm_N", "mm/N", 0.0, 0.0, 0.8, 0.005, worth=0.002, meaning="tip behind encoder per force"),),
     one_sided=True,
     needs=frozenset({"tracker", "depth"}),
-    aliases=("stiffness_N_mm", "stiffening_1_mm"),
+    aliases=("a_N_mm", "b_per_mm"),
     repair="brace the frame, measure the tip itself, or keep the compliance in the model",
 )
 POSITION_RIPPLE = Effect(
@@ -114,9 +114,9 @@ FRICTION = Effect(
     (
         Par("friction_length_mm", "mm", 0.1, 2e-3, 5.0, 1.0, log=True, may_end=True, meaning="travel to build it up"),
         # A recording begins where the way out of the one before has left the guide.
-        Par("friction_start_1", "1", 0.0, -1.0, 1.0, 0.2, may_end=True, meaning="share of it when a recording begins"),
+        Par("friction_start", "1", 0.0, -1.0, 1.0, 0.2, may_end=True, meaning="share of it when a recording begins"),
     ),
-    lambda *_: [{"friction_length_mm": mm, "friction_start_1": -0.5} for mm in (0.005, 0.03, 0.15, 0.6)],
+    lambda *_: [{"friction_length_mm": mm, "friction_start": -0.5} for mm in (0.005, 0.03, 0.15, 0.6)],
     one_sided=True,
     needs=frozenset({"unloading"}),
     repair="clean and align the guide, or put the sensor at the tip",
@@ -161,10 +161,10 @@ ZERO_DRIFT = Effect(
 )
 GAIN_ERROR = Effect(
     "gain_error",
-    "the force reads {gain_error_1:.2%} too high",
-    (Par("gain_error_1", "1", 0.0, -0.5, 0.5, 0.01, worth=0.005, meaning="relative error of the force gain"),),
+    "the force reads {gain_error:.2%} too high",
+    (Par("gain_error", "1", 0.0, -0.5, 0.5, 0.01, worth=0.005, meaning="relative error of the force gain"),),
     needs=frozenset({"weight"}),
-    aliases=("stiffness_N_mm", "viscosity_N_s_mm"),
+    aliases=("a_N_mm", "damping_N_s_mm"),
     repair="calibrate with a known weight",
 )
 BENCH_EFFECTS = (

@@ -2,37 +2,37 @@
 
 from rig.diagnosis.problem import Effect, Par
 
-EXPONENT = Par("elastic_exponent_1", "1", 1.0, 0.2, 4.0, 0.05, worth=0.03, meaning="exponent n of (x / 5 mm)^(n-1)")
-STIFFENING = Par("stiffening_1_mm", "1/mm", 0.0, -0.5, 3.0, 0.02, worth=0.005, meaning="growth of stiffness with depth")
+EXPONENT = Par("exponent", "1", 1.0, 0.2, 4.0, 0.05, worth=0.03, meaning="exponent n of (x / 5 mm)^(n-1)")
+STIFFENING = Par("b_per_mm", "1/mm", 0.0, -0.5, 3.0, 0.02, worth=0.005, meaning="growth of stiffness with depth")
 
 STIFFENING_EFFECT = Effect(
     "stiffening",
-    "the tissue stiffens with depth: stiffness grows as exp(x {stiffening_1_mm:.3g}/mm) instead of being constant",
+    "the tissue stiffens with depth: stiffness grows as exp(x {b_per_mm:.3g}/mm) instead of being constant",
     (STIFFENING,),
     one_sided=True,
     repair="use the index model (stiffness as a function of depth) for gains and feed-forward",
 )
 ELASTIC_LAW = Effect(
     "elastic_law",
-    "another elastic law fits better: a power law, growing with depth as x^{elastic_exponent_1:.3g} times the rest",
+    "another elastic law fits better: a power law, growing with depth as x^{exponent:.3g} times the rest",
     (EXPONENT,),
     through="depth",
     repair="fit the law named here (`rig fit` offers it) and use it in place of the index law",
 )
 QUADRATIC_LAW = Effect(
     "elastic_law",
-    "another elastic law fits better: a polynomial, with an extra factor 1 + {elastic_quadratic_1_mm:.3g} x",
-    (Par("elastic_quadratic_1_mm", "1/mm", 0.0, -0.15, 50.0, 0.02, worth=0.01, meaning="q of the factor 1 + q x"),),
-    begin={"elastic_quadratic_1_mm": 0.4, "stiffening_1_mm": 0.05},
+    "another elastic law fits better: a polynomial, with an extra factor 1 + {quadratic_per_mm:.3g} x",
+    (Par("quadratic_per_mm", "1/mm", 0.0, -0.15, 50.0, 0.02, worth=0.01, meaning="q of the factor 1 + q x"),),
+    begin={"quadratic_per_mm": 0.4, "b_per_mm": 0.05},
     through="depth",
     repair="fit the law named here (`rig fit` offers it) and use it in place of the index law",
 )
 SUBSTRATE = Effect(
     "substrate",
-    "something stiff lies below: the force grows by 1 + {substrate_1_mm3:.3g} x^3",
+    "something stiff lies below: the force grows by 1 + {substrate_per_mm3:.3g} x^3",
     (
         Par(
-            "substrate_1_mm3",
+            "substrate_per_mm3",
             "1/mm^3",
             0.0,
             0.0,
@@ -49,11 +49,11 @@ SUBSTRATE = Effect(
 )
 RELAXATION = Effect(
     "relaxation",
-    "the tissue relaxes: a transient of {relaxation_1:.3g} times the lasting elastic force "
-    "dies out in {relaxation_tau_s:.3g} s",
+    "the tissue relaxes: a transient of {relaxation_ratio:.3g} times the lasting elastic force "
+    "dies out in {tau_s:.3g} s",
     (
         Par(
-            "relaxation_1",
+            "relaxation_ratio",
             "1",
             0.0,
             0.0,
@@ -64,26 +64,26 @@ RELAXATION = Effect(
             meaning="transient over lasting elastic force",
         ),
     ),
-    (Par("relaxation_tau_s", "s", 1.0, 0.005, 100.0, 1.0, log=True, meaning="time constant"),),
-    lambda *_: [{"relaxation_tau_s": tau} for tau in (0.02, 0.06, 0.2, 0.6, 2.0, 6.0, 20.0)],
-    begin={"relaxation_1": 1.0, "relaxation_tau_s": 2.0, "stiffening_1_mm": 0.05},
+    (Par("tau_s", "s", 1.0, 0.005, 100.0, 1.0, log=True, meaning="time constant"),),
+    lambda *_: [{"tau_s": tau} for tau in (0.02, 0.06, 0.2, 0.6, 2.0, 6.0, 20.0)],
+    begin={"relaxation_ratio": 1.0, "tau_s": 2.0, "b_per_mm": 0.05},
     one_sided=True,
     needs=frozenset({"depth"}),
     repair="use the model with memory; wait out the time constant before reading a static force",
 )
 RATE_LAW = Effect(
     "rate_law",
-    "the viscous force does not grow in proportion to speed but as speed^{rate_exponent_1:.3g}",
-    (Par("rate_exponent_1", "1", 1.0, 0.05, 2.5, 0.1, worth=0.04, meaning="exponent of speed"),),
+    "the viscous force does not grow in proportion to speed but as speed^{rate_exponent:.3g}",
+    (Par("rate_exponent", "1", 1.0, 0.05, 2.5, 0.1, worth=0.04, meaning="exponent of speed"),),
     needs=frozenset({"speeds"}),
     repair="use the power law of speed in the model",
 )
 PRECONDITIONING = Effect(
     "preconditioning",
-    "the first cycles differ by {preconditioning_1:.1%}, fading over {preconditioning_strokes_1:.2g} strokes",
+    "the first cycles differ by {preconditioning_gain:.1%}, fading over {preconditioning_cycles:.2g} cycles",
     (
         Par(
-            "preconditioning_1",
+            "preconditioning_gain",
             "1",
             0.0,
             -0.9,
@@ -93,8 +93,8 @@ PRECONDITIONING = Effect(
             meaning="gain of the first cycle against the last",
         ),
     ),
-    (Par("preconditioning_strokes_1", "1", 3.0, 0.3, 30.0, 1.0, log=True, meaning="cycles to fade by 1/e"),),
-    lambda *_: [{"preconditioning_strokes_1": n} for n in (1.0, 3.0, 8.0)],
+    (Par("preconditioning_cycles", "1", 3.0, 0.3, 30.0, 1.0, log=True, meaning="cycles to fade by 1/e"),),
+    lambda *_: [{"preconditioning_cycles": n} for n in (1.0, 3.0, 8.0)],
     between=True,
     needs=frozenset({"strokes"}),
     repair="precondition with several cycles before recording, or leave the first ones out",
@@ -111,8 +111,19 @@ ADHESION = Effect(
 )
 TEMPERATURE = Effect(
     "temperature",
-    "the force changes by {temperature_1_K:.2%} per kelvin of the sensor's temperature",
-    (Par("temperature_1_K", "1/K", 0.0, -0.3, 0.3, 0.005, worth=0.001, meaning="relative change of force per kelvin"),),
+    "the force changes by {temperature_per_K:.2%} per kelvin of the sensor's temperature",
+    (
+        Par(
+            "temperature_per_K",
+            "1/K",
+            0.0,
+            -0.3,
+            0.3,
+            0.005,
+            worth=0.001,
+            meaning="relative change of force per kelvin",
+        ),
+    ),
     between=True,
     needs=frozenset({"temperature"}),
     repair="let the sensor warm up, or calibrate its temperature coefficient",

@@ -19,7 +19,7 @@ from tests.mock_devices.playing import settle
 MS_NS = 1_000_000
 # A command takes two cycles to the axis, a force one to the loop.
 COMMAND_TICKS, LATE_TICKS = 2, 1
-LIMB = {"a_N_mm": 0.12, "b_per_mm": 0.22, "B_N_s_mm": 0.01}
+LIMB = {"a_N_mm": 0.12, "b_per_mm": 0.22, "damping_N_s_mm": 0.01}
 FRICTION = {"level_N": 0.2, "slip_length_mm": 0.05}
 
 

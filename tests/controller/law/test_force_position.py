@@ -23,7 +23,7 @@ from rig.errors import UsageError
 from tests.controller.models import index_model
 
 DESIGN = Design(bandwidth_Hz=34.0, delay_s=0.004, crossover_Hz=8.0, phase_margin_deg=60.0)
-PLAIN = Settings(damping_N_s_mm=0.0, lag_s=0.0, ahead_mm_s=0.0, forgetting=0.0, drift_1_s=0.0, drift_limit_mm_s=5.0)
+PLAIN = Settings(damping_N_s_mm=0.0, lag_s=0.0, ahead_mm_s=0.0, forgetting=0.0, drift_per_s=0.0, drift_limit_mm_s=5.0)
 AHEAD = PLAIN._replace(ahead_mm_s=1000.0)
 
 

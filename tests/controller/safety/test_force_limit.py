@@ -84,7 +84,7 @@ def test_without_the_check_a_wrong_channel_presses_as_deep_as_the_search_goes() 
 
 RAMPS_N = (0.1, 13.5, 13.5, 0.5, 13.5, 13.5)
 SINE_N = (0.1, *(7.0 + 6.5 * math.sin(0.2 * math.pi * at) for at in range(40)))
-TRACKED = index_model(a_N_mm=0.5, b_per_mm=0.1, B_N_s_mm=0.0, force_N=15.0)
+TRACKED = index_model(a_N_mm=0.5, b_per_mm=0.1, damping_N_s_mm=0.0, force_N=15.0)
 
 
 def tracking(product: Product, forces_N: tuple[float, ...], every_s: float) -> TrackForce:

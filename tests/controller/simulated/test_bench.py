@@ -36,7 +36,7 @@ def subject(name: str) -> Model:
     from api.cli.comparison import SUBJECTS  # noqa: PLC0415
 
     tissue = load_parameters(SUBJECTS / f"{name}.toml").tissue
-    return index_model(tissue.a_N_mm, tissue.b_1_mm, tissue.B_N_s_mm, force_N=11.0)
+    return index_model(tissue.a_N_mm, tissue.b_per_mm, tissue.damping_N_s_mm, force_N=11.0)
 
 
 SUBJECT_NAMES = ("soft", "average", "lean", "firm", "tense")
@@ -171,7 +171,7 @@ def response(force_N: list[float], command_mm: list[float], frequency_Hz: float)
 def test_the_plant_answers_as_the_mock_benchs_drive_and_as_the_design_assumes(frequency_Hz: int) -> None:
     swing = [0.2 * math.sin(2 * math.pi * frequency_Hz * cycle * 1e-3) for cycle in range(1500)]
     parameters = Parameters.model_validate(
-        {"tissue": {"a_N_mm": 1.0, "b_1_mm": 0.0, "B_N_s_mm": 0.0}, "axis": {"start_mm": 25.0},
+        {"tissue": {"a_N_mm": 1.0, "b_per_mm": 0.0, "damping_N_s_mm": 0.0}, "axis": {"start_mm": 25.0},
          "force": {"noise_N": 0.0, "quantum_N": 0.0, "compression": "positive"}}
     )  # fmt: skip
     mock, measured = Bench(parameters), []

@@ -8,7 +8,7 @@ from rig.diagnosis.problem import Effect
 from rig.simulation.chain import NULLS, respond
 from rig.simulation.drive import Array, Drive
 
-BASE = {"stiffness_N_mm": 0.2, "stiffening_1_mm": 0.2, "viscosity_N_s_mm": 0.01, "surface_mm": 2.0, "zero_N": 0.1}
+BASE = {"a_N_mm": 0.2, "b_per_mm": 0.2, "damping_N_s_mm": 0.01, "surface_mm": 2.0, "zero_N": 0.1}
 
 
 def stroke_drive(speed_mm_s: float = 10.0, period_s: float = 0.004) -> Drive:
@@ -63,7 +63,7 @@ def test_without_any_effect_the_force_is_the_study_s_law() -> None:
 
 def test_a_compliant_frame_keeps_the_tip_behind_by_compliance_times_force() -> None:
     drive = stroke_drive()
-    response = respond(drive, {**BASE, "frame_compliance_mm_N": 0.05, "viscosity_N_s_mm": 0.0})
+    response = respond(drive, {**BASE, "frame_compliance_mm_N": 0.05, "damping_N_s_mm": 0.0})
     at_rest = np.abs(drive.velocity_mm_s) < 1e-9
     behind = drive.at_tracker(np.where(at_rest, drive.position_mm - 0.05 * (response.force_N - 0.1), np.nan))
     seen = np.isfinite(behind)
@@ -80,7 +80,7 @@ def test_a_time_offset_delays_the_force_by_itself() -> None:
 
 def test_relaxation_lowers_the_force_in_the_hold_and_nowhere_before_contact() -> None:
     drive = stroke_drive()
-    change = force_with(relaxation_1=0.3, relaxation_tau_s=0.3) - force_with()
+    change = force_with(relaxation_ratio=0.3, tau_s=0.3) - force_with()
     hold = (drive.position_mm > 7.99) & (drive.recording == 0)
     assert np.all(np.diff(change[hold]) < 0)
     np.testing.assert_allclose(change[drive.in_recording_s < 0.4], 0, atol=1e-12)

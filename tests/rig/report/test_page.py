@@ -171,7 +171,7 @@ def test_a_bench_on_pseudo_terminals_is_called_simulated(tmp_path: Path) -> None
 
 
 def test_a_session_without_curves_loop_tracking_or_devices_still_has_a_report(tmp_path: Path) -> None:
-    cycle = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).cycle(10.0, 1)
+    cycle = Bench(force=index_force(a_N_mm=1e-6, damping_N_s_mm=0.0)).cycle(10.0, 1)
     streams = {name: table for name, table in tables(cycle).items() if name != "loop"}
     folder = tmp_path / "session"
     folder.mkdir()

@@ -25,13 +25,13 @@ STEP_S = 1e-4
 SPEEDS_MM_S = (5.0, 10.0, 15.0, 20.0, 30.0)
 
 
-def index_force(a_N_mm: float = 0.12, b_per_mm: float = 0.22, B_N_s_mm: float = 0.01) -> Force:
+def index_force(a_N_mm: float = 0.12, b_per_mm: float = 0.22, damping_N_s_mm: float = 0.01) -> Force:
     """Tissue that stiffens as the study says."""
 
     def force(depth_mm: Column, rate_mm_s: Column) -> Column:
         inside = depth_mm > 0
         depth = np.where(inside, depth_mm, 0.0)
-        total = np.where(inside, a_N_mm * depth * np.exp(b_per_mm * depth) + B_N_s_mm * rate_mm_s, 0.0)
+        total = np.where(inside, a_N_mm * depth * np.exp(b_per_mm * depth) + damping_N_s_mm * rate_mm_s, 0.0)
         return np.maximum(total, 0.0)
 
     return force

@@ -42,7 +42,7 @@ def scattered(seed: int) -> list[Curve]:
 
 
 def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
-    truth, held = {"a_N_mm": 0.12, "b_per_mm": 0.22, "B_N_s_mm": 0.01}, []
+    truth, held = {"a_N_mm": 0.12, "b_per_mm": 0.22, "damping_N_s_mm": 0.01}, []
     for seed in range(6):
         curves = scattered(seed)
         fit = fit_law(Index, curves)
@@ -59,7 +59,7 @@ def test_the_offsets_put_contact_where_the_surface_is(curves: list[Curve]) -> No
 
 
 def test_a_linear_tissue_gives_an_index_law_without_stiffening() -> None:
-    bench = Bench(force=index_force(a_N_mm=0.6, b_per_mm=0.0, B_N_s_mm=0.004))
+    bench = Bench(force=index_force(a_N_mm=0.6, b_per_mm=0.0, damping_N_s_mm=0.004))
     curves = [loading_curve(cycle) for cycle in bench.cycles(trials=2)]
     constant, index = fit_law(Constant, curves), fit_law(Index, curves)
     assert constant.law.values == pytest.approx([0.6, 0.004], rel=0.03)
@@ -69,7 +69,7 @@ def test_a_linear_tissue_gives_an_index_law_without_stiffening() -> None:
 
 def test_a_law_that_does_not_fit_is_pushed_to_its_bound_and_says_so(curves: list[Curve]) -> None:
     fit = fit_law(Constant, curves)
-    assert fit.at_bounds == ("B_N_s_mm",)
+    assert fit.at_bounds == ("damping_N_s_mm",)
     assert fit.rmse_N > 20 * fit_law(Index, curves).rmse_N
 
 
@@ -90,7 +90,7 @@ def test_offsets_stay_within_what_contact_allows(curves: list[Curve]) -> None:
 
 def test_a_fit_from_a_near_start_ends_at_the_same_place(curves: list[Curve]) -> None:
     fit = fit_law(Index, curves)
-    near = replace(fit, law=Index(a_N_mm=0.2, b_per_mm=0.1, B_N_s_mm=0.05), offsets_mm=np.zeros(len(curves)))
+    near = replace(fit, law=Index(a_N_mm=0.2, b_per_mm=0.1, damping_N_s_mm=0.05), offsets_mm=np.zeros(len(curves)))
     assert fit_law(Index, curves, near).law.values == pytest.approx(fit.law.values, rel=1e-3)
 
 
@@ -117,7 +117,7 @@ def test_one_trial_can_be_fitted_with_intervals_from_its_residuals() -> None:
 
 
 def test_a_left_out_trial_finds_its_contact_from_its_first_quarter_of_force(curves: list[Curve]) -> None:
-    law = Index(a_N_mm=0.12, b_per_mm=0.22, B_N_s_mm=0.01)
+    law = Index(a_N_mm=0.12, b_per_mm=0.22, damping_N_s_mm=0.01)
     for curve in curves:
         assert curve.contact.position_mm + early_offset(law, curve) == pytest.approx(20.0, abs=0.06)
     curve = curves[0]
@@ -128,7 +128,7 @@ def test_a_left_out_trial_finds_its_contact_from_its_first_quarter_of_force(curv
 
 
 def test_residuals_are_modelled_minus_measured(curves: list[Curve]) -> None:
-    law = Index(a_N_mm=0.12, b_per_mm=0.22, B_N_s_mm=0.01)
+    law = Index(a_N_mm=0.12, b_per_mm=0.22, damping_N_s_mm=0.01)
     higher = replace(curves[0], force_N=curves[0].force_N + 0.5)
     offset_mm = 20.0 - curves[0].contact.position_mm
     depths, residuals = residual_force(law, higher, offset_mm)
@@ -140,9 +140,9 @@ def test_residuals_are_modelled_minus_measured(curves: list[Curve]) -> None:
     ("truth", "within"),
     [
         # Where force starts without a slope, contact is seen less sharply, and that moves force at 1 mm.
-        (HuntCrossley(a_N_mmn=0.1, n=1.7, lambda_N_s_mmn1=0.0015), 0.2),
+        (HuntCrossley(a_N_mmn=0.1, exponent=1.7, lambda_N_s_mmn1=0.0015), 0.2),
         (StandardLinear(k_N_mm=0.4, k1_N_mm=0.3, tau_s=0.2), 0.05),
-        (QuasiLinear(A_N=0.4, b_per_mm=0.3, r=0.5, tau_s=0.2), 0.1),
+        (QuasiLinear(A_N=0.4, b_per_mm=0.3, relaxation_ratio=0.5, tau_s=0.2), 0.1),
     ],
     ids=["hunt_crossley", "sls", "qlv"],
 )
@@ -155,7 +155,7 @@ def test_damping_that_grows_and_memory_are_recovered_from_loading_at_five_speeds
 
 def test_a_law_with_more_parameters_than_the_tissue_shows_still_settles() -> None:
     """Fung's A and b on a straight line: only their product shows, so the fit walks along a valley."""
-    bench = Bench(force=index_force(a_N_mm=0.6, b_per_mm=0.0, B_N_s_mm=0.01))
+    bench = Bench(force=index_force(a_N_mm=0.6, b_per_mm=0.0, damping_N_s_mm=0.01))
     fit = fit_law(QuasiLinear, [loading_curve(cycle) for cycle in bench.cycles(trials=1)])
     assert fit.law.slope(np.array([0.0, 8.0])) == pytest.approx(0.6, rel=0.15)
     assert fit.rmse_N < 0.1
@@ -171,7 +171,7 @@ def test_every_law_can_be_fitted(curves: list[Curve]) -> None:
 def test_a_known_parameter_keeps_its_value_and_has_no_interval(curves: list[Curve]) -> None:
     fit = fit_law(Layer, curves, known={"thickness_mm": 20.0})
     assert fit.law.values[1:4] == pytest.approx([3.0, 20.0, 0.45])
-    assert fit.at_bounds == ("B_N_s_mm",)
+    assert fit.at_bounds == ("damping_N_s_mm",)
     constant = fit_law(Constant, curves)
     assert fit.law.tangent_stiffness(1.0) == pytest.approx(constant.law.tangent_stiffness(1.0), rel=1e-4)
     judged = judge(fit, curves, given_forces(curves), fit.offsets_mm)
@@ -180,7 +180,7 @@ def test_a_known_parameter_keeps_its_value_and_has_no_interval(curves: list[Curv
 
 
 def test_a_parameter_the_law_has_not_cannot_be_known(curves: list[Curve]) -> None:
-    with pytest.raises(UsageError, match=r"the index law has no parameter k; it has a_N_mm, b_per_mm, B_N_s_mm"):
+    with pytest.raises(UsageError, match=r"the index law has no parameter k; it has a_N_mm, b_per_mm, damping_N_s_mm"):
         fit_law(Index, curves, known={"k": 1.0})
 
 

@@ -48,7 +48,7 @@ def test_outside_its_range_it_refuses(ratio: float, nu: float) -> None:
 
 
 def test_the_layer_law_is_a_flat_punch_on_deep_tissue_where_the_layer_is_thick() -> None:
-    thick = Layer(E_MPa=0.05, radius_mm=3.0, thickness_mm=5000.0, poisson_ratio=0.3, B_N_s_mm=0.0)
+    thick = Layer(E_MPa=0.05, radius_mm=3.0, thickness_mm=5000.0, poisson_ratio=0.3, damping_N_s_mm=0.0)
     assert thick.force(2.0) == pytest.approx(2 * 3.0 * 0.05 / (1 - 0.3**2) * 2.0, rel=2e-3)
     thin = replace(thick, thickness_mm=15.0)
     assert thin.tangent_stiffness(1.0) == pytest.approx(
@@ -58,4 +58,4 @@ def test_the_layer_law_is_a_flat_punch_on_deep_tissue_where_the_layer_is_thick()
 
 def test_a_tip_too_wide_for_its_layer_is_refused() -> None:
     with pytest.raises(UsageError, match=r"tip radius over tissue thickness is 4; .* not above 3"):
-        Layer(E_MPa=0.05, radius_mm=4.0, thickness_mm=1.0, poisson_ratio=0.3, B_N_s_mm=0.0)
+        Layer(E_MPa=0.05, radius_mm=4.0, thickness_mm=1.0, poisson_ratio=0.3, damping_N_s_mm=0.0)

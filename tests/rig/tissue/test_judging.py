@@ -36,7 +36,7 @@ def test_the_studys_own_numbers_come_out_of_the_studys_own_rows() -> None:
 def test_the_error_of_a_row_is_a_displacement_at_a_force() -> None:
     depth = [0.01 * step for step in range(1, 1001)]
     curve = made_curve(depth, [0.5 * x for x in depth])
-    law = Constant(k_N_mm=0.4, B_N_s_mm=0.02)
+    law = Constant(k_N_mm=0.4, damping_N_s_mm=0.02)
     errors = errors_of([Prediction(curve, law, offset_mm=0.0, origin_mm=0.0)], np.array([1.0, 2.0, 4.0]))
     assert errors.measured_mm[0] == pytest.approx([2.0, 4.0, 8.0])
     assert errors.predicted_mm[0] == pytest.approx([(1 - 0.2) / 0.4, (2 - 0.2) / 0.4, (4 - 0.2) / 0.4])
@@ -48,7 +48,7 @@ def test_the_error_of_a_row_is_a_displacement_at_a_force() -> None:
 
 def test_the_origin_changes_the_percentage_and_not_the_error() -> None:
     depth = [0.01 * step for step in range(1, 1001)]
-    curve, law = made_curve(depth, [0.5 * x for x in depth]), Constant(k_N_mm=0.4, B_N_s_mm=0.0)
+    curve, law = made_curve(depth, [0.5 * x for x in depth]), Constant(k_N_mm=0.4, damping_N_s_mm=0.0)
     plain, shifted = (errors_of([Prediction(curve, law, 0.1, origin)], np.array([2.0])) for origin in (0.0, 0.5))
     assert plain.error_mm == pytest.approx(shifted.error_mm)
     assert shifted.error_percent[0, 0] / plain.error_percent[0, 0] == pytest.approx(4.0 / 3.5)
@@ -56,7 +56,9 @@ def test_the_origin_changes_the_percentage_and_not_the_error() -> None:
 
 def test_rows_that_a_curve_did_not_reach_do_not_count() -> None:
     curve = made_curve([0.5, 1.0, 2.0], [0.5, 1.0, 2.0])
-    errors = errors_of([Prediction(curve, Constant(k_N_mm=1.0, B_N_s_mm=0.0), 0.0, 0.0)], np.array([0.1, 1.5, 3.0]))
+    errors = errors_of(
+        [Prediction(curve, Constant(k_N_mm=1.0, damping_N_s_mm=0.0), 0.0, 0.0)], np.array([0.1, 1.5, 3.0])
+    )
     assert np.isnan(errors.measured_mm[0]).tolist() == [True, False, True]
     assert [row.force_N for row in rows(errors)] == [1.5]
 
@@ -72,7 +74,7 @@ def test_a_displacement_too_small_to_be_measured_has_no_percentage() -> None:
 def test_displacement_is_read_off_a_noisy_curve_to_hundredths() -> None:
     curve = loading_curve(Bench(noise_N=0.03).cycle(10.0))
     offset_mm = 20.0 - curve.contact.position_mm
-    law = Index(a_N_mm=0.12, b_per_mm=0.22, B_N_s_mm=0.01)
+    law = Index(a_N_mm=0.12, b_per_mm=0.22, damping_N_s_mm=0.01)
     forces = np.array([0.5, 1.0, 2.0, 4.0])
     assert displacement_at(curve, forces) - offset_mm == pytest.approx(law.depth(forces, 10.0), abs=0.05)
 

@@ -47,7 +47,7 @@ def test_the_control_table_gives_tangent_above_secant_and_the_damping_that_was_p
 
 def test_the_speed_test_finds_the_damping_that_was_put_in(study: Study) -> None:
     assert study.rate is not None
-    assert study.rate.B_N_s_mm == pytest.approx(0.01, abs=0.003)
+    assert study.rate.damping_N_s_mm == pytest.approx(0.01, abs=0.003)
     assert study.rate.excludes_study
 
 

@@ -14,13 +14,13 @@ from rig.tissue.registry import LAWS, law_named
 depths_mm = st.floats(0.001, 15.0)
 rates_mm_s = st.floats(0.0, 60.0)
 laws: st.SearchStrategy[Law] = st.one_of(
-    st.builds(Constant, k_N_mm=st.floats(0.01, 20), B_N_s_mm=st.floats(0, 0.1)),
-    st.builds(Index, a_N_mm=st.floats(0.01, 5), b_per_mm=st.floats(0, 0.6), B_N_s_mm=st.floats(0, 0.1)),
+    st.builds(Constant, k_N_mm=st.floats(0.01, 20), damping_N_s_mm=st.floats(0, 0.1)),
+    st.builds(Index, a_N_mm=st.floats(0.01, 5), b_per_mm=st.floats(0, 0.6), damping_N_s_mm=st.floats(0, 0.1)),
 )
 
 
 def test_the_index_law_at_numbers_one_can_check_with_a_pencil() -> None:
-    law = Index(a_N_mm=0.5, b_per_mm=0.2, B_N_s_mm=0.01)
+    law = Index(a_N_mm=0.5, b_per_mm=0.2, damping_N_s_mm=0.01)
     assert law.force(5.0) == pytest.approx(0.5 * 5 * math.e)
     assert law.force(5.0, 30.0) == pytest.approx(0.5 * 5 * math.e + 0.3)
     assert law.secant_stiffness(5.0) == pytest.approx(0.5 * math.e)
@@ -28,14 +28,14 @@ def test_the_index_law_at_numbers_one_can_check_with_a_pencil() -> None:
 
 
 def test_the_tangent_exceeds_the_secant_by_one_plus_b_x() -> None:
-    law = Index(a_N_mm=0.12, b_per_mm=0.22, B_N_s_mm=0.0)
+    law = Index(a_N_mm=0.12, b_per_mm=0.22, damping_N_s_mm=0.0)
     depth = np.linspace(0.1, 10, 30)
     ratio = law.tangent_stiffness(depth) / law.secant_stiffness(depth)
     assert ratio == pytest.approx(1 + 0.22 * depth)
 
 
 def test_the_constant_law_has_one_stiffness() -> None:
-    law = Constant(k_N_mm=0.8, B_N_s_mm=0.02)
+    law = Constant(k_N_mm=0.8, damping_N_s_mm=0.02)
     assert law.force([0.0, 2.0, 5.0], 10.0) == pytest.approx([0.2, 1.8, 4.2])
     assert law.tangent_stiffness([0.0, 7.0]) == pytest.approx([0.8, 0.8])
     assert law.secant_stiffness([0.0, 7.0]) == pytest.approx([0.8, 0.8])
@@ -73,27 +73,27 @@ def test_the_secant_times_depth_is_the_force_at_rest(law: Law, depth_mm: float) 
 
 
 def test_a_force_that_contact_alone_exceeds_needs_no_depth() -> None:
-    law = Index(a_N_mm=0.12, b_per_mm=0.22, B_N_s_mm=0.01)
+    law = Index(a_N_mm=0.12, b_per_mm=0.22, damping_N_s_mm=0.01)
     assert law.depth([-1.0, 0.0, 0.2], 30.0) == pytest.approx([0, 0, 0])
 
 
 def test_the_inverse_is_as_good_without_stiffening_as_with_very_little() -> None:
     for b in (0.0, 1e-13, 1e-10, 1e-7):
-        law = Index(a_N_mm=0.5, b_per_mm=b, B_N_s_mm=0.0)
+        law = Index(a_N_mm=0.5, b_per_mm=b, damping_N_s_mm=0.0)
         assert law.depth(law.force([0.0, 1.0, 9.0])) == pytest.approx([0.0, 1.0, 9.0], rel=1e-6)
 
 
 def test_depths_and_rates_broadcast() -> None:
-    law = Index(a_N_mm=0.12, b_per_mm=0.22, B_N_s_mm=0.01)
+    law = Index(a_N_mm=0.12, b_per_mm=0.22, damping_N_s_mm=0.01)
     assert law.force(np.ones((4, 1)), np.ones(3)).shape == (4, 3)
     assert law.depth(np.ones((2, 5))).shape == (2, 5)
     assert law.force(1.0).shape == ()
 
 
 def test_parameters_come_with_units_and_bounds_and_rebuild_the_law() -> None:
-    law = Index(a_N_mm=0.12, b_per_mm=0.22, B_N_s_mm=0.01)
+    law = Index(a_N_mm=0.12, b_per_mm=0.22, damping_N_s_mm=0.01)
     assert [(p.name, p.value, p.unit) for p in law.parameters] == [
-        ("a_N_mm", 0.12, "N/mm"), ("b_per_mm", 0.22, "1/mm"), ("B_N_s_mm", 0.01, "N s/mm")
+        ("a_N_mm", 0.12, "N/mm"), ("b_per_mm", 0.22, "1/mm"), ("damping_N_s_mm", 0.01, "N s/mm")
     ]  # fmt: skip
     assert Index.from_values(law.values) == law
     assert all(p.lower <= p.value <= p.upper for p in law.parameters)
@@ -102,17 +102,20 @@ def test_parameters_come_with_units_and_bounds_and_rebuild_the_law() -> None:
 @pytest.mark.parametrize("value", [-0.1, 0.0, math.nan, math.inf])
 def test_a_stiffness_no_tissue_has_is_refused_with_its_bounds(value: float) -> None:
     with pytest.raises(UsageError, match=r"constant law: k_N_mm = .* is outside 1e-06 to 10000 N/mm"):
-        Constant(k_N_mm=value, B_N_s_mm=0.0)
+        Constant(k_N_mm=value, damping_N_s_mm=0.0)
 
 
 def test_negative_damping_is_refused() -> None:
-    with pytest.raises(UsageError, match=r"B_N_s_mm = -0.01 N s/mm is outside 0 to 10"):
-        Index(a_N_mm=0.1, b_per_mm=0.1, B_N_s_mm=-0.01)
+    with pytest.raises(UsageError, match=r"damping_N_s_mm = -0.01 N s/mm is outside 0 to 10"):
+        Index(a_N_mm=0.1, b_per_mm=0.1, damping_N_s_mm=-0.01)
 
 
 @pytest.mark.parametrize("kind", [Constant, Index])
 def test_the_guess_finds_noiseless_data_at_once(kind: type[Law]) -> None:
-    truth = {"constant": Constant(k_N_mm=0.7, B_N_s_mm=0.0), "index": Index(a_N_mm=0.2, b_per_mm=0.15, B_N_s_mm=0.0)}
+    truth = {
+        "constant": Constant(k_N_mm=0.7, damping_N_s_mm=0.0),
+        "index": Index(a_N_mm=0.2, b_per_mm=0.15, damping_N_s_mm=0.0),
+    }
     law, depth = truth[kind.name], np.linspace(0.5, 8, 40)
     assert kind.guess(depth, law.force(depth)).values == pytest.approx(law.values, rel=1e-9, abs=1e-12)
 

@@ -12,11 +12,11 @@ from rig.tissue.laws_viscous import HuntCrossley, Prony, QuasiLinear, StandardLi
 
 SLS = StandardLinear(k_N_mm=0.5, k1_N_mm=0.2, tau_s=0.4)
 PRONY = Prony(k_N_mm=0.5, k1_N_mm=0.1, tau1_s=0.05, k2_N_mm=0.2, tau2_s=1.5)
-QLV = QuasiLinear(A_N=0.3, b_per_mm=0.3, r=0.4, tau_s=0.5)
+QLV = QuasiLinear(A_N=0.3, b_per_mm=0.3, relaxation_ratio=0.4, tau_s=0.5)
 
 
 def test_hunt_crossley_does_not_jump_at_contact_and_its_damping_grows_with_depth() -> None:
-    law = HuntCrossley(a_N_mmn=0.2, n=1.5, lambda_N_s_mmn1=0.004)
+    law = HuntCrossley(a_N_mmn=0.2, exponent=1.5, lambda_N_s_mmn1=0.004)
     assert law.force(4.0, 10.0) == pytest.approx(0.2 * 8 + 0.004 * 8 * 10)
     assert law.force(0.0, 30.0) == 0
     assert law.damping(np.array([1.0, 4.0])) == pytest.approx([0.004, 0.032])
@@ -25,7 +25,7 @@ def test_hunt_crossley_does_not_jump_at_contact_and_its_damping_grows_with_depth
 
 def test_hunt_crossley_loses_to_a_bounce_what_its_damping_takes() -> None:
     """The cycle x = X sin(pi t / T): loss = int lambda x^n v^2 dt, twice the way in."""
-    law, deep_mm, whole_s = HuntCrossley(a_N_mmn=0.2, n=2.0, lambda_N_s_mmn1=0.004), 5.0, 1.0
+    law, deep_mm, whole_s = HuntCrossley(a_N_mmn=0.2, exponent=2.0, lambda_N_s_mmn1=0.004), 5.0, 1.0
     time_s = np.linspace(0.0, whole_s, 20_001)
     phase = np.pi * time_s / whole_s
     depth_mm, rate_mm_s = deep_mm * np.sin(phase), deep_mm * np.pi / whole_s * np.cos(phase)

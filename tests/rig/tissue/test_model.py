@@ -16,9 +16,9 @@ from rig.tissue.model import Model, Provenance, Quality, ValidRange, load_model
 from tests.rig.tissue.examples import EXAMPLES
 
 MODEL = Model(
-    law=Index(a_N_mm=0.12, b_per_mm=0.22, B_N_s_mm=0.01),
+    law=Index(a_N_mm=0.12, b_per_mm=0.22, damping_N_s_mm=0.01),
     covariance=np.diag([1e-6, 4e-6, 9e-8]),
-    intervals={"a_N_mm": (0.118, 0.122), "b_per_mm": (0.216, 0.224), "B_N_s_mm": (0.0094, 0.0106)},
+    intervals={"a_N_mm": (0.118, 0.122), "b_per_mm": (0.216, 0.224), "damping_N_s_mm": (0.0094, 0.0106)},
     interval_level=0.95,
     interval_method="jackknife over trials",
     valid=ValidRange(depth_mm=8.0, force_N=5.6, speeds_mm_s=(5.0, 30.0)),
@@ -42,7 +42,7 @@ def test_a_model_survives_its_file(file: Path) -> None:
     assert (read.intervals, read.valid, read.data, read.quality) == (
         MODEL.intervals, MODEL.valid, MODEL.data, MODEL.quality
     )  # fmt: skip
-    assert read.standard_errors == pytest.approx({"a_N_mm": 1e-3, "b_per_mm": 2e-3, "B_N_s_mm": 3e-4})
+    assert read.standard_errors == pytest.approx({"a_N_mm": 1e-3, "b_per_mm": 2e-3, "damping_N_s_mm": 3e-4})
 
 
 @pytest.mark.parametrize("law", EXAMPLES, ids=[law.name for law in EXAMPLES])
@@ -77,8 +77,43 @@ def test_a_force_beyond_the_fitted_range_is_refused_with_that_range() -> None:
 def test_the_file_says_units_and_formula_for_readers_without_this_program(file: Path) -> None:
     values = json.loads(file.read_text())
     assert values["formula"] == "F = a x exp(b x) + B v"
-    assert values["units"] == {"a_N_mm": "N/mm", "b_per_mm": "1/mm", "B_N_s_mm": "N s/mm"}
-    assert (values["format"], values["version"]) == ("tissue-rig model", 1)
+    assert values["units"] == {"a_N_mm": "N/mm", "b_per_mm": "1/mm", "damping_N_s_mm": "N s/mm"}
+    assert (values["format"], values["version"]) == ("tissue-rig model", 2)
+
+
+VERSION_1 = Path(__file__).parent / "version_1"
+NAMES_OF_VERSION_1 = {
+    "index": "a_N_mm b_per_mm damping_N_s_mm",
+    "hunt_crossley": "a_N_mmn exponent lambda_N_s_mmn1",
+    "qlv": "A_N b_per_mm relaxation_ratio tau_s",
+    "extended": "a_N_mm b_per_mm damping_N_s_mm exponent quadratic_per_mm substrate_per_mm3 relaxation_ratio tau_s "
+    "frame_compliance_mm_N friction_N friction_length_mm",
+}
+
+
+@pytest.mark.parametrize("law", NAMES_OF_VERSION_1)
+def test_a_model_of_version_1_is_read_with_the_names_of_today(law: str, tmp_path: Path) -> None:
+    path, names = VERSION_1 / f"{law}.json", NAMES_OF_VERSION_1[law].split()
+    kept, model = json.loads(path.read_text()), load_model(path)
+    assert {p.name: p.value for p in model.law.parameters} == dict(zip(names, kept["parameters"].values(), strict=True))
+    assert [p.unit for p in model.law.parameters] == list(kept["units"].values())
+    assert list(model.intervals.values()) == [tuple(interval) for interval in kept["intervals"].values()]
+    assert model.standard_errors == pytest.approx(dict(zip(names, kept["standard_errors"].values(), strict=True)))
+    model.save(tmp_path / "model.json")
+    assert json.loads((tmp_path / "model.json").read_text())["version"] == 2
+    assert load_model(tmp_path / "model.json").law == model.law
+
+
+def test_what_a_diagnosis_of_version_1_named_has_the_names_of_today_too() -> None:
+    (effect,) = load_model(VERSION_1 / "extended.json").effects
+    assert {name: value.unit for name, value in effect.parameters.items()} == {"relaxation_ratio": "1", "tau_s": "s"}
+
+
+def test_version_2_does_not_know_the_names_of_version_1(tmp_path: Path) -> None:
+    values = json.loads((VERSION_1 / "index.json").read_text()) | {"version": 2}
+    (tmp_path / "model.json").write_text(json.dumps(values))
+    with pytest.raises(UsageError, match="parameters of the index law are a_N_mm, b_per_mm, damping_N_s_mm; the file"):
+        load_model(tmp_path / "model.json")
 
 
 def test_a_failed_write_leaves_no_half_file(tmp_path: Path) -> None:
@@ -96,8 +131,8 @@ BAD: list[tuple[str, Edit, str]] = [
         r"unknown key valid.depth; nearest valid key: depth_mm",
     ),
     ("other format", lambda v: v.update(format="recipe"), r"is not a tissue model"),
-    ("other version", lambda v: v.update(version=2), r"model version 2 is not the 1 read here"),
-    ("no version", lambda v: v.pop("version"), r"model version None is not the 1"),
+    ("other version", lambda v: v.update(version=3), r"model version 3 is neither 1 nor 2"),
+    ("no version", lambda v: v.pop("version"), r"model version None is neither"),
     ("unknown law", lambda v: v.update(law="cubic"), r"no tissue law is called 'cubic'"),
     (
         "missing parameter",

@@ -51,7 +51,7 @@ def test_the_study_s_damping_would_be_seen_at_once() -> None:
 def test_the_effect_is_given_in_newtons_with_its_interval() -> None:
     found = rate_test(five_by_five(0.01))
     low, high = found.effect_interval_N
-    assert found.effect_N == pytest.approx(25.0 * found.B_N_s_mm)
+    assert found.effect_N == pytest.approx(25.0 * found.damping_N_s_mm)
     assert low < 0.25 < high
     assert high - low == pytest.approx(25.0 * (found.interval[1] - found.interval[0]))
 
@@ -60,7 +60,7 @@ def test_a_subject_is_compared_with_itself() -> None:
     """A stiff subject measured fast and a soft one measured slowly are no damping."""
     soft = [curve(speed, 0.01, 0.0, number, "soft", 0.05) for number, speed in enumerate((5.0, 5.0, 5.0, 10.0))]
     stiff = [curve(speed, 0.01, 0.0, number, "stiff", 0.2) for number, speed in enumerate((20.0, 30.0, 30.0, 30.0))]
-    assert rate_test([*soft, *stiff]).B_N_s_mm == pytest.approx(0.01, abs=1e-9)
+    assert rate_test([*soft, *stiff]).damping_N_s_mm == pytest.approx(0.01, abs=1e-9)
 
 
 def test_the_share_of_shuffles_is_what_chance_gives() -> None:

@@ -25,7 +25,7 @@ from tests.rig.tissue.synthetic import Bench, index_force, metadata, tables, wri
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A session of two trials at three speeds, one trial in the air, and a run of force tracking."""
     folder = tmp_path_factory.mktemp("made") / "session"
-    air = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).cycle(10.0, 999)
+    air = Bench(force=index_force(a_N_mm=1e-6, damping_N_s_mm=0.0)).cycle(10.0, 999)
     cycles = Bench(rate_Hz=500.0).cycles(trials=2, speeds_mm_s=(5.0, 10.0, 30.0))
     write_made_session(folder, [*cycles, air], subject={"id": "7", "site": "forearm"})
     run = Bench().cycle(10.0, 1)
@@ -76,9 +76,9 @@ def test_all_laws_are_judged_on_the_same_measured_displacements(study: Study) ->
 def test_the_json_has_what_the_demonstration_quotes(study: Study) -> None:
     values = json.loads(json.dumps(as_json(study), allow_nan=False))
     assert values["constant"]["max_error_percent"] > values["index"]["max_error_percent"] > 0
-    assert set(values["index"]["parameters"]) == {"a_N_mm", "b_per_mm", "B_N_s_mm"}
+    assert set(values["index"]["parameters"]) == {"a_N_mm", "b_per_mm", "damping_N_s_mm"}
     assert values["index"]["parameters"]["a_N_mm"]["unit"] == "N/mm"
-    assert values["constant"]["parameters"]["B_N_s_mm"]["at_bound"] is True
+    assert values["constant"]["parameters"]["damping_N_s_mm"]["at_bound"] is True
     assert values["index"]["held_out"]["trials"]["max_error_mm"] > 0
     assert values["index"]["held_out"]["speeds"]["rmse_N"] > 0
     assert len(values["index"]["rows"]) == len(values["force_N"]) == 10
@@ -121,7 +121,7 @@ def test_the_table_a_controller_reads_is_in_the_json_and_in_the_model(study: Stu
     assert [row.force_N for row in model.control] == pytest.approx(study.force_N)
     values = json.loads(json.dumps(as_json(study)))
     assert values["index"]["control"] == [row.model_dump() for row in model.control]
-    law, low_B, high_B = model.law, *model.intervals["B_N_s_mm"]
+    law, low_B, high_B = model.law, *model.intervals["damping_N_s_mm"]
     for row in model.control:
         assert float(law.force(row.depth_mm)) == pytest.approx(row.force_N)
         assert row.secant_N_mm == pytest.approx(row.force_N / row.depth_mm)
@@ -157,7 +157,7 @@ def test_each_subject_is_left_out_where_there_are_several(tmp_path: Path) -> Non
     table = list(csv.DictReader(io.StringIO(as_csv(study))))
     assert float(table[0]["index_error_subject_left_out_mm"]) > 0
     assert study.rate is not None
-    assert study.rate.B_N_s_mm == pytest.approx(0.01, abs=0.003)
+    assert study.rate.damping_N_s_mm == pytest.approx(0.01, abs=0.003)
 
 
 def test_two_sessions_of_one_subject_leave_no_subject_out(tmp_path: Path) -> None:
@@ -187,7 +187,7 @@ def test_the_fingerprint_is_of_the_data(study: Study) -> None:
 
 
 def test_a_session_without_a_usable_trial_is_refused_with_the_first_reason(tmp_path: Path) -> None:
-    air = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).cycle(10.0, 3)
+    air = Bench(force=index_force(a_N_mm=1e-6, damping_N_s_mm=0.0)).cycle(10.0, 3)
     session = open_session(write_made_session(tmp_path / "air", [air]))
     with pytest.raises(DataError, match=r"no trial gives a curve \(1 skipped\); first: trial_003: no contact"):
         study_session(session)

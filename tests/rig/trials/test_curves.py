@@ -17,9 +17,9 @@ from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, index_force, recordin
 
 
 @pytest.mark.parametrize("speed_mm_s", SPEEDS_MM_S)
-@pytest.mark.parametrize("B_N_s_mm", [0.0, 0.01])
-def test_the_true_surface_lies_in_the_interval_of_contact(speed_mm_s: float, B_N_s_mm: float) -> None:
-    bench = Bench(force=index_force(a_N_mm=0.3, b_per_mm=0.15, B_N_s_mm=B_N_s_mm))
+@pytest.mark.parametrize("damping_N_s_mm", [0.0, 0.01])
+def test_the_true_surface_lies_in_the_interval_of_contact(speed_mm_s: float, damping_N_s_mm: float) -> None:
+    bench = Bench(force=index_force(a_N_mm=0.3, b_per_mm=0.15, damping_N_s_mm=damping_N_s_mm))
     curve = loading_curve(bench.cycle(speed_mm_s))
     assert curve.contact.lower_mm <= bench.surface_mm <= curve.contact.upper_mm
     assert abs(curve.contact.position_mm - bench.surface_mm) < 0.15
@@ -106,7 +106,7 @@ def moved(cycle: IndentationCycle, start: int) -> IndentationCycle:
 
 
 def test_a_stroke_in_the_air_has_no_contact() -> None:
-    cycle = Bench(force=index_force(a_N_mm=1e-6, B_N_s_mm=0.0)).cycle(10.0)
+    cycle = Bench(force=index_force(a_N_mm=1e-6, damping_N_s_mm=0.0)).cycle(10.0)
     with pytest.raises(DataError, match=r"trial_000: no contact: force rises by .* N at most .* go deeper"):
         loading_curve(cycle)
 
