@@ -68,11 +68,15 @@ class Operation:
         self._advanced_s = self._now_s()
         self._change(done=done, message=message)
 
-    def step(self, message: str, share: float) -> None:
-        """``advance`` to a share of the whole, for work that only computes: raises Cancelled where it is to end."""
+    def step(self, message: str, done: float) -> None:
+        """``advance`` for work that can end at once: raises Cancelled where it was asked to."""
+        self.refuse_cancelled(message)
+        self.advance(done, message)
+
+    def refuse_cancelled(self, message: str) -> None:
+        """Raises Cancelled, with what comes no more, where it was asked to end."""
         if self.cancelled:
             raise Cancelled(f"{self._progress.name} was cancelled before: {message}")
-        self.advance(share * self._progress.total, message)
 
     def say(self, *sentences: str) -> None:
         """Adds to the log."""

@@ -1,27 +1,28 @@
 """Guides a person through a calibration of the axis; the mock bench needs nobody, and nothing is in its way."""
 
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
-from datetime import UTC, datetime
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from api.cli.asking import Person
-from api.cli.claimed import claimed
+from api.cli.live import here
 from api.cli.output import console, table
 from api.cli.stage import bench_for
-from controller.commissioning.axis import KnownBy, against_block, against_tracker, ahead_mm, known_direction
-from controller.commissioning.axis_moves import BACK_MM, SEARCH_MM, RestingAxis, steps_mm, touches_mm, travelled
-from controller.commissioning.stoppable import stoppable
-from controller.devices.drivers import start_devices
-from drivers.roles import Identity
+from api.operations.calibrate import (
+    AxisTravel,
+    GaugeBlock,
+    axis_by_block,
+    axis_by_tracker,
+    refuse_block,
+    refuse_outside,
+    refuse_travel,
+)
+from controller.operation import Operation
 from mock_devices.control import BenchControl
 from rig.config.calibration import AxisCalibration
 from rig.config.wiring import MOCK_PORT, Wiring
-from rig.errors import CheckFailed, UsageError
+from rig.errors import UsageError
 
-# A camera of 0.1 mm then knows the slope to a fifth of the 1 % that is allowed.
-LEAST_TRAVEL_MM = 8.0
-STEPS = 4
 # Half a millimetre in front of what is touched.
 NEAR_MM = 0.5
 
@@ -40,34 +41,29 @@ class AxisAsked(NamedTuple):
 def calibrate_axis(wiring: Wiring, asked: AxisAsked, person: Person) -> AxisCalibration:
     """The calibration, and what it says on the terminal; raises CheckFailed with what is wrong."""
     _check(wiring, asked)
-    if wiring.axis.port != MOCK_PORT:
+    mock = wiring.axis.port == MOCK_PORT
+    if not mock:
         asked = _confirmed(asked, person)
         console.print("the axis homes and moves now", highlight=False)
+    operation = Operation("calibrate axis")
     with bench_for(wiring, approaches=False) as (live, endpoints):
-        alone = endpoints if wiring.axis.port == MOCK_PORT else {}
-        found = _by_block(live, asked, person, alone) if asked.gauge_block_mm else _by_tracker(live, asked, person)
+        if asked.gauge_block_mm:
+            found = _by_block(operation, live, asked, person, endpoints if mock else {})
+        else:
+            travel = AxisTravel(asked.from_mm, asked.to_mm)
+            found = here(operation, lambda: axis_by_tracker(operation, live, travel, lambda: _toward(asked, person)))
     _say(found)
     return found
 
 
 def _check(wiring: Wiring, asked: AxisAsked) -> None:
     """Raises UsageError, before anything is opened, for what cannot be done."""
-    limits = wiring.limits
-    if asked.gauge_block_mm is None and wiring.tracker is None:
-        raise UsageError("there is no [tracker] to compare the axis with: give --gauge-block-mm")
-    ends_mm = (asked.from_mm, asked.to_mm)
-    if asked.gauge_block_mm and asked.near_mm is not None:
-        ends_mm = (asked.near_mm - asked.gauge_block_mm - BACK_MM, asked.near_mm + SEARCH_MM)
-    for end_mm in ends_mm:
-        if not limits.position_min_mm <= end_mm <= limits.position_max_mm:
-            raise UsageError(
-                f"the axis would go to {end_mm:g} mm, outside {limits.position_min_mm:g} to {limits.position_max_mm:g}"
-                " mm of [limits]; give --from-mm, --to-mm or --near-mm"
-            )
-    if asked.gauge_block_mm is None and asked.to_mm - asked.from_mm < LEAST_TRAVEL_MM:
-        raise UsageError(
-            f"--from-mm {asked.from_mm:g} --to-mm {asked.to_mm:g}: {LEAST_TRAVEL_MM:g} mm of travel or more are needed"
-        )
+    if asked.gauge_block_mm is None:
+        refuse_travel(AxisTravel(asked.from_mm, asked.to_mm), wiring)
+    elif asked.near_mm is not None:
+        refuse_block(GaugeBlock(asked.gauge_block_mm, asked.near_mm), wiring)
+    else:
+        refuse_outside((asked.from_mm, asked.to_mm), wiring)
 
 
 def _confirmed(asked: AxisAsked, person: Person) -> AxisAsked:
@@ -89,46 +85,21 @@ def _number(text: str) -> float:
         raise UsageError(f"{text!r} is no number of millimetres; give --near-mm") from error
 
 
-@contextmanager
-def _resting(wiring: Wiring) -> Iterator[tuple[RestingAxis, Identity]]:
-    """Devices started and the axis homed; a stop brakes it, and whatever happens the devices are closed."""
-    with claimed(wiring, moves=True), stoppable(wiring) as (guard, port):
-        console.print(f"stop: Ctrl-C, the foot switch, or POST http://127.0.0.1:{port}/estop", highlight=False)
-        with closing(start_devices(wiring, guard.interrupted)) as devices:
-            with guard.moving():
-                devices.axis.home()
-            yield RestingAxis(devices, guard.moving), devices.axis.identity
-
-
-def _by_tracker(wiring: Wiring, asked: AxisAsked, person: Person) -> AxisCalibration:
-    with _resting(wiring) as (axis, drive):
-        places = travelled(axis, steps_mm(asked.from_mm, asked.to_mm, STEPS))
-    known_by = known_direction(ahead_mm(places)) or _said_direction(asked, person)
-    return against_tracker(drive, wiring.axis, places, known_by, datetime.now(UTC))
-
-
-def _said_direction(asked: AxisAsked, person: Person) -> KnownBy:
+def _toward(asked: AxisAsked, person: Person) -> bool:
     """The tracker cannot tell it without a marker on the limb."""
-    toward = asked.toward_limb
-    if toward is None:
-        question = "no marker on the limb tells it: did the tip first go towards the limb's place (yes or no)"
-        toward = person.answer(question, "--toward-limb or --away-from-limb") == "yes"
-    if not toward:
-        raise CheckFailed("the tip went away from the limb where the position grows: turn axis.direction")
-    return "operator"
+    if asked.toward_limb is not None:
+        return asked.toward_limb
+    question = "no marker on the limb tells it: did the tip first go towards the limb's place (yes or no)"
+    return person.answer(question, "--toward-limb or --away-from-limb") == "yes"
 
 
-def _by_block(wiring: Wiring, asked: AxisAsked, person: Person, endpoints: dict[str, Any]) -> AxisCalibration:
+def _by_block(
+    operation: Operation, wiring: Wiring, asked: AxisAsked, person: Person, endpoints: dict[str, Any]
+) -> AxisCalibration:
     gauge_mm = asked.gauge_block_mm or 0.0
-    with _block(person, endpoints, gauge_mm) as (known_mm, put), _resting(wiring) as (axis, drive):
-        near_mm = known_mm if asked.near_mm is None else asked.near_mm
-        axis.go(asked.from_mm)
-        axis.place()
-        table_mm = touches_mm(axis, near_mm)
-        axis.go(near_mm - gauge_mm - BACK_MM)
-        axis.wait_for(put)
-        block_mm = touches_mm(axis, near_mm - gauge_mm)
-    return against_block(drive, wiring.axis, table_mm, block_mm, gauge_mm, datetime.now(UTC))
+    with _block(person, endpoints, gauge_mm) as (known_mm, put):
+        block = GaugeBlock(gauge_mm, known_mm if asked.near_mm is None else asked.near_mm)
+        return here(operation, lambda: axis_by_block(operation, wiring, asked.from_mm, block, put))
 
 
 @contextmanager

@@ -1,21 +1,15 @@
 """Guides a person through a force calibration; the mock bench puts weights on its own tip instead."""
 
-from collections.abc import Callable
-from contextlib import closing
-from datetime import UTC, datetime
 from typing import Literal, NamedTuple
 
 from api.cli.asking import Person
-from api.cli.claimed import claimed
-from api.cli.mock_calibration import READ_S as MOCK_READ_S
-from api.cli.mock_calibration import SETTLE_S as MOCK_SETTLE_S
-from api.cli.mock_calibration import mock_weights, weights_on
+from api.cli.live import here
+from api.cli.mock_calibration import BY_ITSELF, mock_weights, weights_on
 from api.cli.output import console, table
 from api.cli.stage import bench_for
-from controller.commissioning.force import calibrate
-from controller.commissioning.readings import read
+from api.operations.calibrate import calibrate_force as measure
+from api.operations.calibrate import of_force
 from controller.commissioning.weights import Weights, parse_weights
-from controller.devices.drivers import open_force
 from mock_devices.control import BenchControl
 from rig.config.calibration import ForceCalibration
 from rig.config.force_map import CHANNELS
@@ -23,8 +17,6 @@ from rig.config.wiring import MOCK_PORT, Wiring
 from rig.errors import UsageError
 
 Load = Literal["pressed", "hung"]
-# A weight put on by hand swings for half a second; a second of readings then averages breath and traffic.
-READ_S, SETTLE_S = 1.0, 0.5
 
 
 class ForceAsked(NamedTuple):
@@ -40,15 +32,17 @@ def calibrate_force(wiring: Wiring, asked: ForceAsked, person: Person) -> ForceC
     """The calibration, and what it says on the terminal; raises CheckFailed with what is wrong."""
     if wiring.force.port == MOCK_PORT:
         weights = _weights(wiring, asked, person) if asked.weights else mock_weights(wiring, asked.load == "hung")
+        operation = of_force(weights)
         with (
             bench_for(wiring, approaches=False) as (live, endpoints),
             BenchControl(endpoints["control"]) as control,
             weights_on(control) as put_on,
         ):
-            found = _measured(live, weights, put_on, MOCK_READ_S, MOCK_SETTLE_S)
+            found = here(operation, lambda: measure(operation, live, weights, put_on, BY_ITSELF))
     else:
         weights = _weights(wiring, asked, person)
-        found = _measured(wiring, weights, lambda load_N: person.do(_request(load_N)), READ_S, SETTLE_S)
+        operation = of_force(weights)
+        found = here(operation, lambda: measure(operation, wiring, weights, lambda N: person.do(_request(N))))
     _say(found)
     return found
 
@@ -63,21 +57,6 @@ def _weights(wiring: Wiring, asked: ForceAsked, person: Person) -> Weights:
             raise UsageError(f"{said!r}: answer pressed or hung, or give --load")
         load = "hung" if said == "hung" else "pressed"
     return parse_weights(text, load == "hung", asked.tolerance, wiring.limits.force_N, asked.gravity_m_s2)
-
-
-def _measured(
-    wiring: Wiring, weights: Weights, put_on: Callable[[float], None], read_s: float, settle_s: float
-) -> ForceCalibration:
-    with claimed(wiring, moves=False), closing(open_force(wiring.force)) as sensor:
-        sensor.start()
-        return calibrate(
-            sensor.identity,
-            wiring.force,
-            weights,
-            put_on,
-            lambda: read(sensor, wiring.force.product, read_s, settle_s),
-            datetime.now(UTC),
-        )
 
 
 def _request(load_N: float) -> str:

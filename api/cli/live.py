@@ -80,6 +80,12 @@ def run(bench: Supervisor, operation: Operation, work: Callable[[], T]) -> T:
     return results[0]
 
 
+def here(operation: Operation, work: Callable[[], T]) -> T:
+    """Runs ``work`` in this thread, which Ctrl-C ends at once; what the operation says is printed."""
+    operation.watch = printed(operation)
+    return operation.run(work)
+
+
 def printed(operation: Operation) -> Callable[[Snapshot], None]:
     """What ``operation`` says from now on, on the terminal, a line each."""
     told = len(operation.progress.log)

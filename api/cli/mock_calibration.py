@@ -7,20 +7,18 @@ it goes wrong.
 
 import contextlib
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import typer
 
+from api.operations.calibrate import ReadingTime, measured_force, of_force
 from controller.claims import state_folder
 from controller.commissioning.axis import against_tracker, ahead_mm, known_direction
 from controller.commissioning.axis_moves import Pace, RestingAxis, travelled
-from controller.commissioning.force import calibrate
-from controller.commissioning.readings import read
 from controller.commissioning.weights import Weights
-from controller.devices.drivers import open_force, start_devices
+from controller.devices.drivers import start_devices
 from mock_devices.control import BenchControl
 from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
 from rig.config.calibration_files import read_axis, read_force, text_of
@@ -31,7 +29,7 @@ from rig.recording.files import make_folder, write_text
 # Shares of limits.force_N; weights of the mock bench are exact.
 SHARES = (0.1, 0.25, 0.5)
 # Ten samples of the slower sensor; its filter and the tip's own take a few milliseconds.
-READ_S, SETTLE_S = 0.12, 0.05
+BY_ITSELF = ReadingTime(settle_s=0.05, read_s=0.12)
 # The simulated camera is 15 ms late; 18 frames at each place know the slope to 0.2 %.
 PACE = Pace(speed_mm_s=20.0, settle_s=0.15, read_s=0.3)
 AXIS_STEPS_MM = (2.0, 14.0, 2.0)
@@ -98,21 +96,13 @@ def mock_weights(wiring: Wiring, hung: bool = False) -> Weights:
 
 
 def _measured_force(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibration:
+    weights = mock_weights(wiring)
     with (
         BenchControl(endpoints["control"]) as control,
         _nothing_hidden(control),
         weights_on(control) as put_on,
-        closing(open_force(wiring.force)) as sensor,
     ):
-        sensor.start()
-        return calibrate(
-            sensor.identity,
-            wiring.force,
-            mock_weights(wiring),
-            put_on,
-            lambda: read(sensor, wiring.force.product, READ_S, SETTLE_S),
-            datetime.now(UTC),
-        )
+        return measured_force(of_force(weights), wiring.force, weights, put_on, BY_ITSELF)
 
 
 def _measured_axis(wiring: Wiring, endpoints: dict[str, Any]) -> AxisCalibration | None:

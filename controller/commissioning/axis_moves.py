@@ -5,7 +5,7 @@ No loop runs meanwhile: between two moves everything is read, and what presses o
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import NamedTuple
 
@@ -134,7 +134,7 @@ def steps_mm(from_mm: float, to_mm: float, count: int) -> list[float]:
     return [*up, *up[-2::-1]]
 
 
-def travelled(axis: RestingAxis, positions_mm: Sequence[float]) -> list[Place]:
+def travelled(axis: RestingAxis, positions_mm: Iterable[float]) -> list[Place]:
     """Where it stands, then ``positions_mm``; CheckFailed with the first step where scale or sense is wrong."""
     places = [_seen(axis.place())]
     checked = False

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from api.cli.claimed import claimed
+from api.operations.claimed import claimed
 from controller.claims import take
 from rig.config.wiring import Axis, Force, Wiring
 from rig.errors import DeviceError, UsageError

@@ -1,4 +1,4 @@
-"""The bench for one command that has no loop: nobody else uses its ports meanwhile."""
+"""The bench for one operation that has no loop: nobody else uses its ports meanwhile."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

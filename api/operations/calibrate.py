@@ -1,0 +1,176 @@
+"""The force sensor against known weights, and the axis against tracker or gauge block; nobody else has the bench."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from datetime import UTC, datetime
+from itertools import count
+from typing import NamedTuple
+
+from api.operations.claimed import claimed
+from controller.commissioning.axis import KnownBy, against_block, against_tracker, ahead_mm, known_direction
+from controller.commissioning.axis_moves import BACK_MM, SEARCH_MM, RestingAxis, steps_mm, touches_mm, travelled
+from controller.commissioning.force import calibrate
+from controller.commissioning.readings import read
+from controller.commissioning.stoppable import stoppable
+from controller.commissioning.weights import Weights
+from controller.devices.drivers import open_force, start_devices
+from controller.operation import Operation
+from drivers.roles import Identity
+from rig.config.calibration import AxisCalibration, ForceCalibration
+from rig.config.wiring import Force, Wiring
+from rig.errors import CheckFailed, UsageError
+
+# A camera of 0.1 mm then knows the slope to a fifth of the 1 % that is allowed.
+LEAST_TRAVEL_MM = 8.0
+STEPS = 4
+
+
+class ReadingTime(NamedTuple):
+    """How long each load rests before it is read, and how long it is read.
+
+    A weight put on by hand swings for half a second; a second of readings then averages breath and traffic.
+    """
+
+    settle_s: float = 0.5
+    read_s: float = 1.0
+
+
+BY_HAND = ReadingTime()
+
+
+class AxisTravel(NamedTuple):
+    """Where the axis begins and how far it goes, in the air."""
+
+    from_mm: float
+    to_mm: float
+
+
+class GaugeBlock(NamedTuple):
+    """A block of known height, and the axis position just before the table that it will lie on."""
+
+    height_mm: float
+    near_mm: float
+
+
+def of_force(weights: Weights) -> Operation:
+    """The operation that ``calibrate_force`` is to report to."""
+    return Operation("calibrate force", total=len(weights.sequence_N), unit="loads")
+
+
+def calibrate_force(
+    operation: Operation,
+    wiring: Wiring,
+    weights: Weights,
+    put_on: Callable[[float], object],
+    rest: ReadingTime = BY_HAND,
+) -> ForceCalibration:
+    """The calibration under ``weights``, each load [N] by ``put_on``; CheckFailed says what is wrong. Nothing moves."""
+    with claimed(wiring, moves=False):
+        return measured_force(operation, wiring.force, weights, put_on, rest)
+
+
+def measured_force(
+    operation: Operation, config: Force, weights: Weights, put_on: Callable[[float], object], rest: ReadingTime
+) -> ForceCalibration:
+    """The same for a caller who has the bench already."""
+    number = count()
+
+    def apply(load_N: float) -> None:
+        operation.step(f"{load_N:g} N", next(number))
+        put_on(load_N)
+
+    with closing(open_force(config)) as sensor:
+        sensor.start()
+        return calibrate(
+            sensor.identity,
+            config,
+            weights,
+            apply,
+            lambda: read(sensor, config.product, rest.read_s, rest.settle_s),
+            datetime.now(UTC),
+        )
+
+
+def refuse_travel(travel: AxisTravel, wiring: Wiring) -> None:
+    """Raises UsageError, before anything is opened, for what the tracker cannot judge."""
+    if wiring.tracker is None:
+        raise UsageError("there is no [tracker] to compare the axis with: give --gauge-block-mm")
+    refuse_outside(travel, wiring)
+    if travel.to_mm - travel.from_mm < LEAST_TRAVEL_MM:
+        raise UsageError(
+            f"--from-mm {travel.from_mm:g} --to-mm {travel.to_mm:g}: {LEAST_TRAVEL_MM:g} mm of travel or more are"
+            " needed"
+        )
+
+
+def refuse_block(block: GaugeBlock, wiring: Wiring) -> None:
+    """Raises UsageError where the search for table and block would leave the workspace."""
+    refuse_outside((block.near_mm - block.height_mm - BACK_MM, block.near_mm + SEARCH_MM), wiring)
+
+
+def refuse_outside(ends_mm: tuple[float, float], wiring: Wiring) -> None:
+    """Raises UsageError where an end lies outside the workspace."""
+    limits = wiring.limits
+    for end_mm in ends_mm:
+        if not limits.position_min_mm <= end_mm <= limits.position_max_mm:
+            raise UsageError(
+                f"the axis would go to {end_mm:g} mm, outside {limits.position_min_mm:g} to {limits.position_max_mm:g}"
+                " mm of [limits]; give --from-mm, --to-mm or --near-mm"
+            )
+
+
+@contextmanager
+def _resting(operation: Operation, wiring: Wiring) -> Iterator[tuple[RestingAxis, Identity]]:
+    """Devices started and the axis homed; a stop brakes it, and whatever happens the devices are closed."""
+    with claimed(wiring, moves=True), stoppable(wiring) as (guard, port):
+        operation.say(f"stop: Ctrl-C, the foot switch, or POST http://127.0.0.1:{port}/estop")
+
+        @contextmanager
+        def moving() -> Iterator[None]:
+            operation.refuse_cancelled("the next move")
+            with guard.moving():
+                yield
+
+        with closing(start_devices(wiring, guard.interrupted)) as devices:
+            with moving():
+                devices.axis.home()
+            yield RestingAxis(devices, moving), devices.axis.identity
+
+
+def axis_by_tracker(
+    operation: Operation, wiring: Wiring, travel: AxisTravel, toward_limb: Callable[[], bool]
+) -> AxisCalibration:
+    """The axis against the tracker; where no marker on the limb tells it, ``toward_limb`` says where the tip went."""
+    refuse_travel(travel, wiring)
+    with _resting(operation, wiring) as (axis, drive):
+        places = travelled(axis, _told(operation, steps_mm(travel.from_mm, travel.to_mm, STEPS)))
+    known_by = known_direction(ahead_mm(places)) or _said(toward_limb)
+    return against_tracker(drive, wiring.axis, places, known_by, datetime.now(UTC))
+
+
+def _told(operation: Operation, positions_mm: Sequence[float]) -> Iterator[float]:
+    for number, position_mm in enumerate(positions_mm):
+        operation.advance(number / len(positions_mm), f"{position_mm:g} mm")
+        yield position_mm
+
+
+def _said(toward_limb: Callable[[], bool]) -> KnownBy:
+    if not toward_limb():
+        raise CheckFailed("the tip went away from the limb where the position grows: turn axis.direction")
+    return "operator"
+
+
+def axis_by_block(
+    operation: Operation, wiring: Wiring, from_mm: float, block: GaugeBlock, put: Callable[[], object]
+) -> AxisCalibration:
+    """The axis against a gauge block, which ``put`` lays on the table while the axis waits."""
+    with _resting(operation, wiring) as (axis, drive):
+        axis.go(from_mm)
+        axis.place()
+        operation.advance(0.0, "table")
+        table_mm = touches_mm(axis, block.near_mm)
+        axis.go(block.near_mm - block.height_mm - BACK_MM)
+        axis.wait_for(put)
+        operation.advance(0.5, "block")
+        block_mm = touches_mm(axis, block.near_mm - block.height_mm)
+    return against_block(drive, wiring.axis, table_mm, block_mm, block.height_mm, datetime.now(UTC))
