@@ -10,9 +10,12 @@ from typing import Any, ClassVar
 import pytest
 
 from api.cli import hardware
-from api.cli.recovery import ask, converse
+from api.cli.live import here
+from api.cli.recovery import ask
 from api.cli.remote import RemoteBench
+from api.operations.reset import Ask, Recover, reset
 from controller.claims import Holder
+from controller.operation import Cancelled, Operation
 from controller.recovery.situation import ALL, Act, Consent, Recovered
 from rig.errors import CheckFailed, DeviceError, UsageError
 
@@ -26,6 +29,12 @@ def patient(consent: Consent) -> Recovered:
         if not consent.to(act):
             return Recovered(HAPPENED, (), ((act, question),), "")
     return Recovered(HAPPENED, ("the fault was cleared", "the tip moved out"), (), "")
+
+
+def converse(recover: Recover, agreed: Consent, ask: Ask) -> Recovered:
+    """As the command does it, which prints what is said."""
+    operation = Operation("reset")
+    return here(operation, lambda: reset(operation, recover, agreed, ask))
 
 
 def test_each_consent_is_asked_for_once_and_then_it_is_done(capsys: pytest.CaptureFixture[str]) -> None:
@@ -52,6 +61,23 @@ def test_what_was_agreed_to_beforehand_is_not_asked() -> None:
 def test_a_no_ends_it() -> None:
     with pytest.raises(CheckFailed, match="not agreed to: may the tip move out"):
         converse(patient, Consent(clear=True), lambda _act, _question: False)
+
+
+def test_one_that_is_cancelled_while_it_asks_does_nothing_more() -> None:
+    operation, consents = Operation("reset"), list[Consent]()
+
+    def recover(consent: Consent) -> Recovered:
+        consents.append(consent)
+        return patient(consent)
+
+    def cancel(_act: Act, _question: str) -> bool:
+        operation.cancel()
+        return True
+
+    with pytest.raises(Cancelled):
+        operation.run(lambda: reset(operation, recover, Consent(), cancel))
+    assert consents == [Consent()] and operation.progress.state == "stopped"
+    assert operation.progress.log == HAPPENED
 
 
 def test_without_a_terminal_the_question_names_the_option(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,27 @@
+"""The way back after a crash, a fault or a stop: what happened, and one consent for each thing that is done."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from controller.operation import Operation
+from controller.recovery.situation import Act, Consent, Recovered
+from rig.errors import CheckFailed
+
+Recover = Callable[[Consent], Recovered]
+Ask = Callable[[Act, str], bool]
+
+
+def reset(operation: Operation, recover: Recover, agreed: Consent, ask: Ask) -> Recovered:
+    """Recovers as far as is agreed to, and asks for what is not; raises CheckFailed after a no, Cancelled between."""
+    found = recover(agreed)
+    operation.say(*found.happened)
+    while found.open:
+        operation.say(*found.done)
+        for act, question in found.open:
+            if not ask(act, question):
+                raise CheckFailed(f"not agreed to: {question} Nothing more was done")
+            agreed = replace(agreed, **{act: True})
+        operation.refuse_cancelled("what was agreed to")
+        found = recover(agreed)
+    operation.say(*found.done, found.missing or "the bench is ready")
+    return found
