@@ -89,12 +89,19 @@ def braked(_: object) -> Iterator[tuple[object, int]]:
     yield SimpleNamespace(moving=nullcontext, interrupted=lambda: False), 4711
 
 
-def test_an_axis_calibration_that_is_cancelled_moves_no_further(monkeypatch: pytest.MonkeyPatch) -> None:
-    axis, closed = FakeAxis(), list[str]()
-    devices = SimpleNamespace(axis=axis, close=lambda: closed.append("closed"))
+@pytest.fixture
+def axis(monkeypatch: pytest.MonkeyPatch) -> FakeAxis:
+    found = FakeAxis()
+    devices = SimpleNamespace(axis=found, close=lambda: found.moves.append("closed"))
     monkeypatch.setattr(calibrate, "claimed", lambda *_, **__: nullcontext())
     monkeypatch.setattr(calibrate, "stoppable", braked)
     monkeypatch.setattr(calibrate, "start_devices", lambda *_: devices)
+    return found
+
+
+def test_an_axis_calibration_that_is_cancelled_moves_no_further(
+    axis: FakeAxis, monkeypatch: pytest.MonkeyPatch
+) -> None:
     operation = Operation("calibrate axis")
 
     def place(resting: RestingAxis) -> None:
@@ -105,8 +112,29 @@ def test_an_axis_calibration_that_is_cancelled_moves_no_further(monkeypatch: pyt
     monkeypatch.setattr(calibrate, "travelled", lambda resting, _: place(resting))
     with pytest.raises(Cancelled, match="cancelled before: the next move"):
         calibrate.axis_by_tracker(operation, Wiring(), AxisTravel(2.0, 14.0), lambda: True)
-    assert axis.moves == ["home", 5.0] and closed == ["closed"]
+    assert axis.moves == ["home", 5.0, "closed"]
     assert operation.progress.log == ("stop: Ctrl-C, the foot switch, or POST http://127.0.0.1:4711/estop",)
+
+
+def test_the_block_is_laid_between_the_searches_for_table_and_block(
+    axis: FakeAxis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def touches(_: RestingAxis, near_mm: float) -> list[float]:
+        axis.moves.append(f"search from {near_mm:g}")
+        return [near_mm + 0.5] * 3
+
+    monkeypatch.setattr(calibrate, "touches_mm", touches)
+    monkeypatch.setattr(RestingAxis, "place", lambda _: None)
+    monkeypatch.setattr(RestingAxis, "wait_for", lambda _, act: act())
+    operation = Operation("calibrate axis")
+    found = calibrate.axis_by_block(
+        operation, Wiring(), 2.0, GaugeBlock(10.0, 30.0), lambda: axis.moves.append("the block is laid")
+    )
+    assert axis.moves == [
+        "home", 2.0, "search from 30", 19.0, "the block is laid", "search from 20", "closed"
+    ]  # fmt: skip
+    assert found.scale == pytest.approx(1.0) and found.direction_known_by == "contact"
+    assert operation.progress.done == 0.5
 
 
 @pytest.mark.parametrize(("block", "end"), [(GaugeBlock(10.0, 8.0), "-3 mm"), (GaugeBlock(1.0, 57.0), "62 mm")])
