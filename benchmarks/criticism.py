@@ -59,7 +59,7 @@ def record(kind: str, seed: int) -> Record:
         "expected": {secret.name: dict(secret.expected) for secret in secrets},
         "verdict": result.verdict, "depends_on": list(result.depends_on),
         "left": None if result.after is None else asdict(result.after),
-        "findings": [finding.as_json() for finding in result.findings],
+        "findings": [asdict(finding) for finding in result.findings],
         "naive": naive(result.search), "cpu_s": round(seconds, 1),
     }  # fmt: skip
 

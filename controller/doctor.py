@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -12,6 +11,7 @@ from drivers.roles import Device, ForceSensor, Identity, MarkerTracker, ServoAxi
 from rig.channels import AxisSample, ForceSample, MarkerSample
 from rig.config.wiring import Wiring
 from rig.errors import RigError
+from rig.results.recorded import DeviceReport
 
 LISTEN_S = 2.0
 PERIOD_S = 0.001
@@ -23,22 +23,7 @@ AnyDevice = TypeVar("AnyDevice", bound=Device)
 Listen = Callable[[AnyDevice, float], Samples]
 
 
-@dataclass(frozen=True)
-class Finding:
-    """What was seen of one device; ``problem`` is empty if it is fit for use."""
-
-    role: str
-    product: str = ""
-    serial: str = ""
-    firmware: str = ""
-    rate_Hz: float = 0.0
-    noise: str = ""
-    latency_ms: float = 0.0
-    range: str = ""
-    problem: str = ""
-
-
-def examine(wiring: Wiring, seconds: float = LISTEN_S) -> tuple[Finding, ...]:
+def examine(wiring: Wiring, seconds: float = LISTEN_S) -> tuple[DeviceReport, ...]:
     """One finding a configured device; a device that fails is a finding with a problem, not an error."""
     findings = [
         _look("force", lambda: open_force(wiring.force), _poll_force, seconds),
@@ -50,7 +35,7 @@ def examine(wiring: Wiring, seconds: float = LISTEN_S) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-def _look(role: str, opener: Callable[[], AnyDevice], listen: Listen[AnyDevice], seconds: float) -> Finding:
+def _look(role: str, opener: Callable[[], AnyDevice], listen: Listen[AnyDevice], seconds: float) -> DeviceReport:
     try:
         device = opener()
         try:
@@ -59,7 +44,7 @@ def _look(role: str, opener: Callable[[], AnyDevice], listen: Listen[AnyDevice],
         finally:
             device.close()
     except RigError as error:
-        return Finding(role, problem=str(error))
+        return DeviceReport(role=role, problem=str(error))
     return _finding(role, device.identity, 1e9 / device.period_ns, samples)
 
 
@@ -88,18 +73,19 @@ def _poll_axis(device: ServoAxis, seconds: float) -> Samples:
     return _listen(ask, seconds)
 
 
-def _finding(role: str, identity: Identity, nominal_Hz: float, samples: Samples) -> Finding:
-    about = Finding(role, identity.product, identity.serial, identity.firmware)
+def _finding(role: str, identity: Identity, nominal_Hz: float, samples: Samples) -> DeviceReport:
+    about = DeviceReport(role=role, product=identity.product, serial=identity.serial, firmware=identity.firmware)
     valid = [sample for sample in samples if sample.valid]
     if len(valid) < 2:
-        return replace(about, problem=f"{len(samples)} samples came, {len(valid)} of them valid")
+        return about.model_copy(update={"problem": f"{len(samples)} samples came, {len(valid)} of them valid"})
     captures = np.unique([sample.capture_ns for sample in samples])
     rate_Hz = (len(captures) - 1) / ((captures[-1] - captures[0]) * 1e-9)
     latency_ms = float(np.median([sample.arrival_ns - sample.capture_ns for sample in samples])) * 1e-6
     noise, extent = _spread(valid)
     slow = role != "axis" and abs(rate_Hz - nominal_Hz) > RATE_TOLERANCE * nominal_Hz
     problem = f"rate {rate_Hz:.1f} Hz is not the {nominal_Hz:.1f} Hz asked for" if slow else ""
-    return replace(about, rate_Hz=rate_Hz, latency_ms=latency_ms, noise=noise, range=extent, problem=problem)
+    seen = {"rate_Hz": float(rate_Hz), "latency_ms": latency_ms, "noise": noise, "range": extent, "problem": problem}
+    return about.model_copy(update=seen)
 
 
 def _spread(samples: Samples) -> tuple[str, str]:

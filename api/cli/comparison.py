@@ -6,10 +6,10 @@ from pathlib import Path
 
 import mock_devices
 from api.cli import live
-from api.cli.output import console, table
+from api.cli.output import console, say, show
 from api.cli.stage import bench_for
 from controller.experiments import capture, comparison, tracked, tracking
-from controller.experiments.comparison import HEADER, Jump, Run
+from controller.experiments.comparison import compared_run
 from controller.experiments.recorded import Recorded
 from controller.experiments.references import Reference, Stairs
 from controller.law.gains import Choice, pi_gains
@@ -23,6 +23,8 @@ from rig.recording.reader import read_recording
 from rig.recording.sessions import open_session
 from rig.report.control_figures import comparison_figure
 from rig.report.drawing import svg
+from rig.results.tables import run_table
+from rig.results.tracking import ComparedRun, CompareResult, Jump
 from rig.tissue.model import Model, load_model
 from rig.tissue.study import model_of, study_session
 
@@ -42,21 +44,20 @@ ATTEMPTS = 3
 
 def compare(
     wiring: Wiring, out: Path, subjects: Sequence[str], choices: Sequence[Choice], reference: Reference
-) -> dict[str, object]:
+) -> CompareResult:
     """Runs all of it on mock benches, prints the table, and returns its JSON."""
     check(wiring, out, subjects, reference)
-    runs: list[Run] = []
+    runs: list[ComparedRun] = []
     models: dict[str, dict[str, float]] = {}
     for subject in subjects:
         model = learnt(wiring, out, subject)
         models[subject] = {parameter.name: parameter.value for parameter in model.law.parameters}
         for run in _on_subject(wiring, out, subject, model, choices, reference):
             runs.append(run)
-            console.print("  ".join(cell for cell in comparison.rows([run])[0] if cell), highlight=False)
-    cells = [row[: len(HEADER)] for row in comparison.rows(runs)]
-    console.print(table(HEADER, cells, title=f"Worst of {reference.name}; over %: overshoot of the jump"))
+            say(["  ".join([*run_table([run]).rows[0], run.stopped]).rstrip()])
+    show(run_table(runs, reference.name))
     _draw(runs, out)
-    return {"reference": reference.name, "models": models, "runs": [run.as_json() for run in runs]}
+    return CompareResult(reference=reference.name, models=models, runs=tuple(runs))
 
 
 def check(wiring: Wiring, out: Path, subjects: Sequence[str], reference: Reference) -> None:
@@ -97,9 +98,9 @@ def _learning_folder(out: Path, subject: str) -> Path:
     return out / f"learn-{_who(subject)}"
 
 
-def _draw(runs: Sequence[Run], out: Path) -> None:
+def _draw(runs: Sequence[ComparedRun], out: Path) -> None:
     subjects, choices = dict.fromkeys(run.subject for run in runs), dict.fromkeys(run.gains for run in runs)
-    found = {(run.subject, run.gains): run.worst for run in runs}
+    found = {(run.subject, run.gains): run.worst.model_dump() for run in runs}
 
     def heights(figure: str) -> dict[str, list[float]]:
         return {choice: [_height(found[subject, choice][figure]) for subject in subjects] for choice in choices}
@@ -148,25 +149,27 @@ def _indented(wiring: Wiring, out: Path, subject: str, attempt: int = 1) -> Path
 
 def _on_subject(
     wiring: Wiring, out: Path, subject: str, model: Model, choices: Sequence[Choice], reference: Reference
-) -> Iterator[Run]:
+) -> Iterator[ComparedRun]:
     for choice in choices:
         try:
             program = tracked.plan_reference(reference, model, wiring, choice)
         except UsageError as refusal:
-            yield Run(subject, choice, (), str(refusal))
+            yield compared_run(subject, choice, (), str(refusal))
         else:
             yield _tracked(wiring, out, subject, choice, program)
 
 
-def _tracked(wiring: Wiring, out: Path, subject: str, choice: Choice, program: Program, attempt: int = 1) -> Run:
+def _tracked(
+    wiring: Wiring, out: Path, subject: str, choice: Choice, program: Program, attempt: int = 1
+) -> ComparedRun:
     """One run on a bench of its own; what a stall of the computer stopped is said, and done again."""
     try:
         with bench_for(bench_of(wiring, subject)) as (plugged, _), live.connected(plugged) as bench:
             done = tracked.recorded_run(bench, program, out / subject, str(_model_file(out, subject)))
     except DeviceError as cause:
-        found, stalled = Run(subject, choice, (), str(cause)), True
+        found, stalled = compared_run(subject, choice, (), str(cause)), True
     else:
-        found = Run(subject, choice, _jumps(done), done.outcome.cause)
+        found = compared_run(subject, choice, _jumps(done), done.outcome.cause)
         stalled = done.outcome.outcome in STALLED
     if not stalled or attempt == ATTEMPTS:
         return found

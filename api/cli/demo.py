@@ -5,7 +5,6 @@ A cause is hidden in the bench, drawn at random; the analysis is not told, and t
 
 import secrets
 import shutil
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -13,27 +12,29 @@ import numpy as np
 import typer
 
 from api.cli import live
-from api.cli.diagnose import run_diagnosis, save, show
+from api.cli.diagnose import run_diagnosis, save, show_diagnosis
 from api.cli.hidden_effect import Secret, draw
 from api.cli.motion import captured, followed, say_levels
 from api.cli.options import built_in
-from api.cli.output import console, write_json
+from api.cli.output import console
 from api.cli.science import fit_session
 from api.cli.stage import bench_for
 from api.operations.motion import TrackRequest
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
-from controller.experiments.tracked import Tracked
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.diagnosis.answers import Diagnosis
-from rig.diagnosis.files import FOLDER, TRUTH
 from rig.errors import CheckFailed, UsageError
 from rig.recording.files import write_text
 from rig.recording.sessions import derive, open_session
 from rig.recording.verify import verify
 from rig.report.page import write_report
+from rig.results.demo import DemoDiagnosis, DemoSummary, DemoTracking, HiddenTruth, RecordingCounts
+from rig.results.diagnosis import FOLDER, TRUTH, DiagnosisResult
+from rig.results.fit import FitResult
+from rig.results.tracking import LoopCount, TrackResult
 from rig.tissue.model import load_model
 
 PLAN = Indentation(
@@ -60,17 +61,6 @@ ProtocolOption = Annotated[
     Path | None, typer.Option(help="Recorded instead of a short one, for example examples/diagnosis.toml (4 minutes).")
 ]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for session, report and summary.")]
-
-
-@dataclass(frozen=True)
-class Counts:
-    """What all recordings of the session hold and lost."""
-
-    recordings: int
-    samples: int
-    dropped: int
-    missed: int
-    ticks: int
 
 
 def demo(
@@ -101,14 +91,14 @@ def demo(
     say_levels(result)
     console.rule("diagnose: what the simulation gets wrong")
     diagnosis = run_diagnosis(session, "index")
-    show(diagnosis)
+    show_diagnosis(DiagnosisResult.model_validate(diagnosis))
     save(diagnosis, session / FOLDER)
     console.rule("verify and report")
     counts = _verified(session)
     derive(session)
     write_text(session / FOLDER / TRUTH, secret.sentence(diagnosis) + "\n")
     write_report(session, out / REPORT)
-    write_json(out / SUMMARY, _summary(counts, fitted, result) | {"diagnosis": _diagnosis(diagnosis, secret, seed)})
+    _summary(counts, fitted, result, _diagnosis(diagnosis, secret, seed)).write(out / SUMMARY)
     console.print(
         f"{counts.recordings} recordings, {counts.samples} samples, {counts.dropped} dropped", highlight=False
     )
@@ -130,10 +120,10 @@ def _clear(out: Path) -> None:
     out.mkdir(parents=True)
 
 
-def _track(bench: Supervisor, session: Path) -> Tracked:
+def _track(bench: Supervisor, session: Path) -> TrackResult:
     model = load_model(session / MODEL)
     program = tracked.plan(forces_within(model.valid.force_N), SECONDS, model, bench.wiring)
-    return followed(bench, TrackRequest(program, str(MODEL)), session).run
+    return followed(bench, TrackRequest(program, str(MODEL)), session)
 
 
 def forces_within(largest_N: float) -> tuple[float, ...]:
@@ -143,19 +133,19 @@ def forces_within(largest_N: float) -> tuple[float, ...]:
     return tuple(round(force_N / FORCES_N[-1] * 0.85 * largest_N, 2) for force_N in FORCES_N)
 
 
-def _diagnosis(result: Diagnosis, secret: Secret, seed: int) -> dict[str, object]:
+def _diagnosis(result: Diagnosis, secret: Secret, seed: int) -> DemoDiagnosis:
     """What was said, and last what is true."""
-    return {
-        "verdict": result.verdict,
-        "statement": result.statement,
-        "findings": [finding.as_json() for finding in result.findings],
-        "named": any(secret.effect in finding.effects for finding in result.findings),
-        "seed": seed,
-        "truth": secret.as_json(),
-    }
+    return DemoDiagnosis(
+        verdict=result.verdict,
+        statement=result.statement,
+        findings=result.findings,
+        named=any(secret.effect in finding.effects for finding in result.findings),
+        seed=seed,
+        truth=HiddenTruth(effect=secret.effect, parameters=secret.knobs),
+    )
 
 
-def _verified(session: Path) -> Counts:
+def _verified(session: Path) -> RecordingCounts:
     """Raises CheckFailed where a recording is not complete."""
     opened = open_session(session)
     verdicts = [verify(opened.path(trial.name)) for trial in opened.trials]
@@ -163,22 +153,18 @@ def _verified(session: Path) -> Counts:
     if bad:
         raise CheckFailed("; ".join(bad))
     loops = [opened.recording(trial.name).tables["loop"] for trial in opened.trials]
-    return Counts(
+    return RecordingCounts(
         recordings=len(verdicts),
         samples=sum(stream.samples for verdict in verdicts for stream in verdict.streams.values()),
         dropped=sum(stream.dropped for verdict in verdicts for stream in verdict.streams.values()),
-        missed=sum(int(rows["missed"][-1] - rows["missed"][0]) for rows in loops),
-        ticks=sum(len(rows) for rows in loops),
+        loop=LoopCount(
+            ticks=sum(len(rows) for rows in loops),
+            missed=sum(int(rows["missed"][-1] - rows["missed"][0]) for rows in loops),
+        ),
     )
 
 
-def _summary(counts: Counts, fitted: dict[str, object], result: Tracked) -> dict[str, object]:
-    tracking = tracked.as_json(result)
-    return {
-        "recordings": counts.recordings,
-        "samples": counts.samples,
-        "dropped": counts.dropped,
-        "loop": {"missed": counts.missed, "ticks": counts.ticks},
-        "fit": fitted,
-        "tracking": {key: tracking[key] for key in ("max_error_percent", "rms_error_N", "levels")},
-    }
+def _summary(
+    counts: RecordingCounts, fitted: FitResult, tracking: TrackResult, diagnosis: DemoDiagnosis
+) -> DemoSummary:
+    return DemoSummary(**dict(counts), fit=fitted, tracking=DemoTracking.model_validate(tracking), diagnosis=diagnosis)

@@ -3,7 +3,6 @@
 import contextlib
 import json
 import sys
-from dataclasses import asdict
 from typing import Annotated, Any
 
 import typer
@@ -15,8 +14,8 @@ from api.cli.stage import bench_for, bench_process
 from controller import doctor as examination
 from controller.claims import Holder, holder
 from controller.devices.takeover import STREAMS
-from controller.doctor import Finding
 from rig.errors import CheckFailed, DeviceError
+from rig.results.recorded import DeviceReport, DoctorResult
 
 
 def mock(
@@ -60,7 +59,7 @@ def _lines(endpoints: dict[str, Any]) -> str:
     )
 
 
-def _row(finding: examination.Finding) -> tuple[str, ...]:
+def _row(finding: DeviceReport) -> tuple[str, ...]:
     if not finding.product:
         return finding.role, "not heard"
     device = f"{finding.product}, serial {finding.serial}, firmware {finding.firmware}"
@@ -68,7 +67,7 @@ def _row(finding: examination.Finding) -> tuple[str, ...]:
     return finding.role, device, f"{finding.rate_Hz:.1f}", finding.noise, latency, finding.range
 
 
-def _as_served(held: Holder) -> tuple[Finding, ...]:
+def _as_served(held: Holder) -> tuple[DeviceReport, ...]:
     """What the service that uses the bench says of each device; raises DeviceError where it is no service."""
     if not held.address:
         raise DeviceError(held.sentence)
@@ -79,10 +78,10 @@ def _as_served(held: Holder) -> tuple[Finding, ...]:
     return tuple(_finding(role, device, state["rates_Hz"]) for role, device in state["devices"].items())
 
 
-def _finding(role: str, device: dict[str, Any], rates_Hz: dict[str, float]) -> Finding:
+def _finding(role: str, device: dict[str, Any], rates_Hz: dict[str, float]) -> DeviceReport:
     state = device.get("state", "unknown")
-    return Finding(
-        role,
+    return DeviceReport(
+        role=role,
         product=str(device["product"]),
         serial=str(device["serial"]),
         firmware=str(device["firmware"]),
@@ -107,7 +106,7 @@ def doctor(config: ConfigOption = None, overrides: SetOption = None, json_file: 
             findings = examination.examine(live_wiring)
     header = ("role", "device", "rate Hz", "noise", "latency ms", "range seen")
     console.print(table(header, map(_row, findings), title="Devices"))
-    write_json(json_file, {"devices": [asdict(finding) for finding in findings]})
+    write_json(json_file, DoctorResult(devices=findings))
     broken = [f"{finding.role}: {finding.problem}" for finding in findings if finding.problem]
     if broken:
         raise CheckFailed("; ".join(broken))

@@ -67,15 +67,11 @@ class Secret:
             f"{found.low:.4g} to {found.high:.4g} {inside} the truth."
         )
 
-    def as_json(self) -> dict[str, object]:
-        """For the summary."""
-        return {"effect": self.effect, "parameters": dict(self.knobs)}
-
 
 def draw(rng: np.random.Generator, protocol: Indentation) -> Secret:
     """One cause the protocol can see, its size well beyond the smallest visible one."""
     visible = check(protocol).detectable
-    least = {name: MARGIN * visible[name][0] for name, kind in KINDS.items() if name in visible}
+    least = {name: MARGIN * visible[name].minimum for name, kind in KINDS.items() if name in visible}
     names = sorted(name for name, size in least.items() if size < KINDS[name].high)
     effect = str(rng.choice(names))
     kind = KINDS[effect]

@@ -8,15 +8,14 @@ import typer
 
 from api.cli import live
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
-from api.cli.output import console, table, write_json
+from api.cli.output import console, say, show, write_json
 from api.cli.stage import bench_for
 from api.operations import motion
-from api.operations.motion import Captured, TrackRequest, TrackResult
+from api.operations.motion import Captured, TrackRequest
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.experiments.comparison import CHOICES, choice_from, choices_from
 from controller.experiments.references import named
-from controller.experiments.tracked import Tracked
 from controller.experiments.verdicts import refuse_bad
 from controller.loop.steps import Program
 from controller.operation import Operation
@@ -25,6 +24,8 @@ from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
+from rig.results.tables import followed_sentence, gain_sentence, level_table
+from rig.results.tracking import CompareResult, TrackResult
 from rig.tissue.model import load_model
 
 Out = Annotated[Path, typer.Option("--out", help="New folder for the session.")]
@@ -108,13 +109,13 @@ def _tracked(wiring: Wiring, folder: Path, asked: "Asked", against: Path | None,
     tracked.refuse_foreign(folder)
     with bench_for(wiring) as (live_wiring, _), live.connected(live_wiring) as bench:
         found = followed(bench, wanted, folder, other)
-    say_levels(found.run)
-    console.print("quality: " + "; ".join([found.run.quality, *found.run.reasons]), highlight=False, markup=False)
+    say_levels(found)
+    say(["quality: " + "; ".join([found.quality, *found.reasons])])
     console.print(f"recorded in {folder}", highlight=False)
-    if found.before and found.reduction is not None:
-        say_gain(found.before, found.run, found.reduction)
-    write_json(json_file, found.as_json())
-    for run in (found.before, found.run):
+    if found.gain:
+        say([gain_sentence(found)])
+    write_json(json_file, found)
+    for run in (found.against, found):
         if run is not None:
             tracked.refuse_bad(run)
 
@@ -123,16 +124,6 @@ def followed(bench: Supervisor, wanted: TrackRequest, folder: Path, against: Tra
     """Force tracked into ``folder``, watched on the terminal."""
     operation = Operation("track", total=2 if against else 1, unit="runs")
     return live.run(bench, operation, lambda: motion.track(operation, bench, wanted, folder, against))
-
-
-def say_gain(before: Tracked, after: Tracked, reduction: float) -> None:
-    """What one model gains over another on the same bench and reference, jumps included."""
-    old_N, new_N = before.followed.rms_error_N, after.followed.rms_error_N
-    console.print(
-        f"rms error over the whole run: {old_N:.4f} N with {before.model}, {new_N:.4f} N with {after.model}"
-        f" ({100 * reduction:+.0f} % less)",
-        highlight=False,
-    )
 
 
 class Asked(NamedTuple):
@@ -162,7 +153,7 @@ def _planned(wiring: Wiring, asked: Asked) -> Program:
     return tracked.plan(tracked.forces(asked.force), seconds, fitted, wiring, choice)
 
 
-def _compared(wiring: Wiring, folder: Path, asked: Asked) -> dict[str, object]:
+def _compared(wiring: Wiring, folder: Path, asked: Asked) -> CompareResult:
     from api.cli import comparison  # noqa: PLC0415 - fitting is loaded only where it is used
 
     if asked.model or asked.reference:
@@ -173,8 +164,8 @@ def _compared(wiring: Wiring, folder: Path, asked: Asked) -> dict[str, object]:
     return comparison.compare(wiring, folder, subjects, choices, jumps)
 
 
-def say_levels(result: Tracked) -> None:
+def say_levels(result: TrackResult) -> None:
     """The table of given and actual force."""
     if result.levels:
-        console.print(table(*tracked.table(result), title="Given and actual force in N"))
-    console.print(tracked.sentence(result), highlight=False)
+        show(level_table(result.levels))
+    say([followed_sentence(result.followed)])

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rig.errors import UsageError
+from rig.results.tables import TextTable
 
 console = Console()
 
@@ -21,6 +22,17 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]], title: str = "")
     for row in rows:
         found.add_row(*row)
     return found
+
+
+def show(found: TextTable) -> None:
+    """Prints a result's table."""
+    console.print(table(found.header, found.rows, found.title))
+
+
+def say(sentences: Iterable[str]) -> None:
+    """One line each."""
+    for sentence in sentences:
+        console.print(sentence, highlight=False, markup=False)
 
 
 def write_json(path: Path | None, value: Mapping[str, object] | BaseModel) -> None:

@@ -4,7 +4,6 @@ import contextlib
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
@@ -20,8 +19,9 @@ from rig.recording.files import make_folder
 from rig.recording.import_format import FIELDS
 from rig.recording.importing import import_session
 from rig.recording.reader import read_recording
-from rig.recording.sessions import TrialInfo, open_session, plain
+from rig.recording.sessions import TrialInfo, open_session
 from rig.recording.verify import Verdict
+from rig.results.recorded import ExportResult, ImportResult, RecordingResult, VerifiedTrial, VerifyResult
 from rig.trials.quality import TrialQuality, quality_of
 
 SUFFIXES: Mapping[Format, str] = {"csv": "csv", "parquet": "parquet", "hdf5": "session.h5", "mat": "session.mat"}
@@ -47,17 +47,8 @@ def verify(
     for sentence in [*remarks, *(verdict.sentence for verdict in verdicts if not verdict.ok)]:
         console.print(sentence, markup=False, highlight=False, soft_wrap=True)
     bad = [verdict.path.stem for verdict in verdicts if not verdict.ok]
-    write_json(
-        json_file,
-        {
-            "ok": not bad and not remarks,
-            "remarks": list(remarks),
-            "recordings": {
-                verdict.path.stem: _verdict_values(verdict) | _quality_values(qualities.get(verdict.path.stem))
-                for verdict in verdicts
-            },
-        },
-    )
+    checked = {verdict.path.stem: _verified(verdict, qualities.get(verdict.path.stem)) for verdict in verdicts}
+    write_json(json_file, VerifyResult(ok=not bad and not remarks, remarks=remarks, recordings=checked))
     if bad or remarks:
         raise CheckFailed(
             f"{path}: {len(bad)} of {len(verdicts)} recordings are not complete"
@@ -86,10 +77,12 @@ def _qualities(path: Path, verdicts: list[Verdict]) -> dict[str, TrialQuality]:
     return {name: quality for name, quality in found.items() if quality is not None}
 
 
-def _quality_values(quality: TrialQuality | None) -> dict[str, object]:
+def _verified(verdict: Verdict, quality: TrialQuality | None) -> VerifiedTrial:
+    found = VerifiedTrial.model_validate(verdict)
     if quality is None:
-        return {"quality": "", "reasons": [], "measured": {}}
-    return {"quality": quality.verdict, "reasons": list(quality.reasons), "measured": plain(quality.measured)}
+        return found
+    said = {"quality": quality.verdict, "reasons": quality.reasons, "measured": quality.measured}
+    return VerifiedTrial.model_validate(found.model_dump() | said)
 
 
 def _verdict(path: Path) -> Verdict:
@@ -117,17 +110,6 @@ def _verdict_table(verdicts: list[Verdict]) -> object:
     return table(["recording", "state", "stream", "samples", "rate Hz", "faults"], rows)
 
 
-def _verdict_values(verdict: Verdict) -> dict[str, object]:
-    streams = {name: plain(asdict(stream)) for name, stream in verdict.streams.items()}
-    return {
-        "state": verdict.state,
-        "ok": verdict.ok,
-        "sentence": verdict.sentence,
-        "damage": list(verdict.damage),
-        "streams": streams,
-    }
-
-
 def repair(
     recording: Annotated[Path, typer.Argument(help="A recording that `rig verify` found incomplete or damaged.")],
     out: Annotated[Path, typer.Option("--out", help="New recording to write; the old one is not touched.")],
@@ -140,7 +122,7 @@ def repair(
     verdict = verification.repair(recording, out)
     console.print(_verdict_table([verdict]))
     console.print(verdict.sentence, markup=False, highlight=False, soft_wrap=True)
-    write_json(json_file, _verdict_values(verdict))
+    write_json(json_file, RecordingResult.model_validate(verdict))
 
 
 def import_(
@@ -169,7 +151,7 @@ def import_(
     samples = {name: sum(trial.samples.get(name, 0) for trial in session.trials) for name in FIELDS}
     write_json(
         json_file,
-        {"session": str(out), "recordings": len(session.trials), "samples": samples, "remarks": list(session.remarks)},
+        ImportResult(session=str(out), recordings=len(session.trials), samples=samples, remarks=session.remarks),
     )
 
 
@@ -198,12 +180,12 @@ def export_(
     """
     chosen = _formats(formats or list(FORMATS))
     opened = open_session(session)
-    written: dict[str, object] = {}
+    written: dict[str, str] = {}
     make_folder(out)
     for format in chosen:
         written[format] = str(export(opened, format, out / SUFFIXES[format]))
         console.print(f"{format:8s}{written[format]}", highlight=False, soft_wrap=True)
-    write_json(json_file, {"session": str(session), "written": written})
+    write_json(json_file, ExportResult(session=str(session), written=written))
 
 
 def _formats(asked: list[str]) -> list[Format]:

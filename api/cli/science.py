@@ -7,6 +7,7 @@ import typer
 
 from api.cli.options import JsonOption
 from api.cli.output import console, write_json
+from rig.results.fit import FitResult
 
 FOLDER = "Session folder, as `rig capture` or `rig import` makes it."
 SessionArgument = Annotated[Path, typer.Argument(help=FOLDER)]
@@ -42,7 +43,7 @@ def fit(
 ) -> None:
     """Fits constant stiffness, the index model and other tissue laws to sessions, and says how wrong each is.
 
-    Writes fit.png, fit.svg, residuals.png, table.csv and model.json. Errors are taken on the trials fitted and on
+    Writes fit.json, pictures, table.csv and model.json. Errors are taken on the trials fitted and on
     trials, speeds and, with several sessions, subjects left out.
 
     Example: rig fit sessions/first --laws fung,qlv --json fit.json
@@ -56,8 +57,8 @@ def fit(
     write_json(json_file, fit_and_write(session, out, wanted, simulated))
 
 
-def fit_session(session: Path) -> dict[str, object]:
-    """Fits, prints and writes; the result as `rig fit --json` gives it."""
+def fit_session(session: Path) -> FitResult:
+    """Fits, prints and writes; the result as it is saved."""
     from api.cli.fitting import fit_and_write  # noqa: PLC0415
 
     return fit_and_write([session])

@@ -1,8 +1,7 @@
 """`rig simulate`: a reference on a tissue model, before anything real moves."""
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +9,7 @@ import numpy as np
 import typer
 
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
-from api.cli.output import console, table, write_json
+from api.cli.output import console, say, show, write_json
 from controller.experiments import comparison, tracked, tracking
 from controller.experiments.references import named
 from controller.law.force_position import GainRow
@@ -21,6 +20,8 @@ from controller.simulated import bench as simulated
 from controller.simulated.bench import SimulatedBench, Trace, limb_of
 from rig.config.wiring import Wiring
 from rig.errors import DataError
+from rig.results.tables import margin_table, simulation_sentence
+from rig.results.tracking import Jump, LoopMargins, SimulateResult
 from rig.tissue.model import Model, load_model
 
 PLAYS = 3
@@ -55,11 +56,9 @@ def simulate(
     program = tracked.plan_reference(asked, fitted, wiring, choice)
     bench = SimulatedBench(limb_of(fitted, stiffness, breathing))
     trace, times_real_time = _timed(lambda: simulated.run(program, wiring, bench))
-    loop = _margins(fitted, wiring, choice, stiffness)
-    result = {
-        "reference": asked.name, "gains": choice, "times_real_time": times_real_time, **_figures(trace), "margins": loop
-    }  # fmt: skip
-    _say(result, loop)
+    result = _result(trace, times_real_time, asked.name, choice, _margins(fitted, wiring, choice, stiffness))
+    show(margin_table(result.margins))
+    say([simulation_sentence(result)])
     _draw(trace, bench, out, f"{asked.name}, {choice} gains")
     _draw_bode(fitted, wiring, choice, stiffness, out)
     console.print(f"simulation.svg, simulation.png and bode.svg are in {out}", highlight=False)
@@ -79,27 +78,24 @@ def _timed(play: Callable[[], Trace]) -> tuple[Trace, float]:
     return trace, float(trace.time_s[-1] / min(took_s))
 
 
-def _figures(trace: Trace) -> dict[str, object]:
+def _result(
+    trace: Trace, times_real_time: float, reference: str, choice: Choice, loop: Sequence[LoopMargins]
+) -> SimulateResult:
     on = (trace.mode == Mode.CONTACT) & np.isfinite(trace.reference_N)
-    return {
-        "jumps": [asdict(jump) for jump in _jumps(trace)],
-        "duration_s": float(trace.time_s[-1]),
-        "rms_error_N": float(np.sqrt(np.mean((trace.force_N[on] - trace.reference_N[on]) ** 2))),
-        "peak_force_N": float(np.max(trace.force_N)),
-        "largest_voltage_V": float(np.max(np.abs(trace.voltage_V[on]))),
-    }
-
-
-def _say(result: Mapping[str, object], loop: list[dict[str, float]]) -> None:
-    console.print(table(("force N", "tangent N/mm", "crossover Hz", "phase margin deg", "gain margin"), _rows(loop)))
-    console.print(
-        f"{result['reference']}: rms error {result['rms_error_N']:.3f} N, peak {result['peak_force_N']:.2f} N,"
-        f" {result['times_real_time']:.0f} times real time",
-        highlight=False,
+    return SimulateResult(
+        reference=reference,
+        gains=choice,
+        times_real_time=times_real_time,
+        jumps=_jumps(trace),
+        duration_s=float(trace.time_s[-1]),
+        rms_error_N=float(np.sqrt(np.mean((trace.force_N[on] - trace.reference_N[on]) ** 2))),
+        peak_force_N=float(np.max(trace.force_N)),
+        largest_voltage_V=float(np.max(np.abs(trace.voltage_V[on]))),
+        margins=tuple(loop),
     )
 
 
-def _jumps(trace: Trace) -> tuple[comparison.Jump, ...]:
+def _jumps(trace: Trace) -> tuple[Jump, ...]:
     """What a jump of the reference leads to; none where it has no jump."""
     try:
         return comparison.jumps(trace.time_s, trace.reference_N, trace.sensed_N, trace.mode)
@@ -111,13 +107,13 @@ def _law(model: Model, wiring: Wiring, choice: Choice) -> TrackForce:
     return tracking.force_law(model, wiring, choice, adapt=False)
 
 
-def _margins(model: Model, wiring: Wiring, choice: Choice, stiffness: float) -> list[dict[str, float]]:
+def _margins(model: Model, wiring: Wiring, choice: Choice, stiffness: float) -> list[LoopMargins]:
     """Margins with the gains of each force, on tissue ``stiffness`` times as stiff as the model."""
     design, found = tracking.design_for(wiring), []
     for row in _shown(model, wiring, choice):
         tangent = stiffness * model.tangent_N_mm(model.depth_mm(row.force_N))
         loop = margins((row.proportional_mm_N, row.integral_mm_N_s), tangent, model.damping_N_s_mm, design)
-        found.append({"force_N": row.force_N, "tangent_N_mm": tangent, **loop._asdict()})
+        found.append(LoopMargins(force_N=row.force_N, tangent_N_mm=tangent, **loop._asdict()))
     return found
 
 
@@ -125,16 +121,6 @@ def _shown(model: Model, wiring: Wiring, choice: Choice) -> list[GainRow]:
     rows = _law(model, wiring, choice).gains
     forces = [force for force in SHOWN_N if force <= model.valid.force_N]
     return [min(rows, key=lambda row: abs(row.force_N - force)) for force in forces]
-
-
-def _rows(loop: list[dict[str, float]]) -> list[tuple[str, ...]]:
-    return [
-        (
-            f"{row['force_N']:.2f}", f"{row['tangent_N_mm']:.2f}", f"{row['crossover_Hz']:.1f}",
-            f"{row['phase_deg']:.0f}", f"{row['gain']:.1f}",
-        )
-        for row in loop
-    ]  # fmt: skip
 
 
 def _draw(trace: Trace, bench: SimulatedBench, out: Path, title: str) -> None:

@@ -1,6 +1,5 @@
 """`rig threshold`: the force at which the subject stops a slow ramp."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -43,4 +42,4 @@ def threshold(
         console.print(f"no pain stop up to {up_to:g} N: the threshold lies above", highlight=False)
     else:
         console.print(f"[subject]\npain_threshold_N = {found.force_N:.1f}", highlight=False, markup=False)
-    write_json(json_file, asdict(found))
+    write_json(json_file, found)

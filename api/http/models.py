@@ -4,6 +4,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from rig.results.recorded import CaptureResult
+from rig.results.tracking import Retracted, TrackResult
+
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
 
 
@@ -99,7 +102,7 @@ class JobView(BaseModel):
     message: str
     time_left_s: float | None = Field(description="at the pace so far; null before the first part is done")
     log: list[str] = Field(description="what it said so far; empty where the bench is shown, see /jobs/{id}")
-    result: dict[str, object]
+    result: CaptureResult | TrackResult | Retracted | None = Field(description="once it has succeeded")
 
 
 class Info(BaseModel):

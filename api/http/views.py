@@ -4,8 +4,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel
-
 from api.http.lease import Lease
 from api.http.models import (
     ControlView,
@@ -19,7 +17,6 @@ from api.http.models import (
     SessionView,
 )
 from api.http.service import Job, Service
-from api.operations.motion import TrackResult
 from controller.devices.health import ALIVE, ON_RATE, VALID
 from controller.experiments.capture import check
 from controller.loop.messages import Status
@@ -29,6 +26,8 @@ from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.errors import RigError
 from rig.recording.sessions import TrialInfo, read_listing
+from rig.results.recorded import CaptureResult
+from rig.results.tracking import Retracted, TrackResult
 
 State = Literal["disconnected", "not ready", "idle", "running", "stopped"]
 STREAMS = ("force", "axis", "marker")
@@ -49,15 +48,8 @@ def job(job: Job) -> JobView:
         message=now.message,
         time_left_s=now.time_left_s,
         log=list(now.log),
-        result=_result(now.result),
+        result=now.result if isinstance(now.result, CaptureResult | TrackResult | Retracted) else None,
     )
-
-
-def _result(found: object) -> dict[str, object]:
-    """A result as JSON; none while there is none."""
-    if isinstance(found, TrackResult):
-        return dict(found.as_json())
-    return found.model_dump(mode="json") if isinstance(found, BaseModel) else {}
 
 
 def rig(service: Service) -> RigView:

@@ -1,23 +1,22 @@
 """What moves the tip of a running bench: capture, track, threshold, retract."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from controller.experiments import capture as experiment
 from controller.experiments import threshold as ramp
 from controller.experiments import tracked
-from controller.experiments.threshold import Threshold
-from controller.experiments.tracked import Tracked
 from controller.experiments.verdicts import remaining_bad
 from controller.loop.steps import Program, Retract
 from controller.operation import Operation
 from controller.supervisor import Supervisor, stopped
 from rig.config.protocol import Indentation
 from rig.errors import SafetyStop
-from rig.recording.sessions import Number, SessionInfo, TrialInfo
+from rig.recording.sessions import SessionInfo
+from rig.results.recorded import CaptureResult, captured_trial
+from rig.results.tracking import Retracted, Threshold, TrackResult, compared
 
 # Out of any depth that a protocol may reach, and slow enough to see it coming.
 RETRACT_MM = 20.0
@@ -25,34 +24,10 @@ RETRACT_MM_S = 10.0
 RETRACT_TIMEOUT_S = 60.0
 
 
-class CapturedTrial(BaseModel):
-    """One trial; ``surface_mm`` is where the surface was found, and the ends of its 95 % interval."""
-
-    model_config = ConfigDict(frozen=True)
-
-    name: str
-    speed_mm_s: Number
-    outcome: str
-    peak_force_N: Number
-    quality: str
-    reasons: tuple[str, ...]
-    measured: dict[str, Number]
-    repeats: str
-    surface_mm: tuple[Number, Number, Number]
-
-
-class Captured(BaseModel):
-    """A session as it was recorded, and the names of trials that stayed bad."""
-
-    model_config = ConfigDict(frozen=True)
+class Captured(CaptureResult):
+    """A session as it was recorded."""
 
     info: SessionInfo = Field(exclude=True)
-    session: str
-    recordings: int
-    samples: int
-    dropped: int
-    trials: tuple[CapturedTrial, ...]
-    bad: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -61,36 +36,6 @@ class TrackRequest:
 
     program: Program
     model: str
-
-
-@dataclass(frozen=True)
-class TrackResult:
-    """A run, and one with another model before it on the same bench, where that was wanted."""
-
-    run: Tracked
-    before: Tracked | None = None
-
-    @property
-    def reduction(self) -> float | None:
-        """By how much of the other model's rms error this one's is smaller, jumps included."""
-        return None if self.before is None else 1 - self.run.followed.rms_error_N / self.before.followed.rms_error_N
-
-    def as_json(self) -> Mapping[str, object]:
-        """As `rig track --json` has it."""
-        if self.before is None:
-            return tracked.as_json(self.run)
-        gain = {
-            "rms_error_before_N": self.before.followed.rms_error_N,
-            "rms_error_after_N": self.run.followed.rms_error_N,
-            "reduction": self.reduction,
-        }
-        return tracked.as_json(self.run) | {"against": tracked.as_json(self.before), "gain": gain}
-
-
-class Retracted(BaseModel):
-    """How a retraction ended."""
-
-    outcome: str
 
 
 def of_capture(protocol: Indentation) -> Operation:
@@ -107,14 +52,9 @@ def capture(operation: Operation, bench: Supervisor, protocol: Indentation, fold
         recordings=len(info.trials),
         samples=sum(sum(trial.samples.values()) for trial in info.trials),
         dropped=sum(sum(trial.dropped.values()) for trial in info.trials),
-        trials=tuple(map(_captured, info.trials)),
+        trials=tuple(map(captured_trial, info.trials)),
         bad=tuple(trial.name for trial in remaining_bad(info)),
     )
-
-
-def _captured(trial: TrialInfo) -> CapturedTrial:
-    surface_mm = (trial.surface_mm, trial.surface_low_mm, trial.surface_high_mm)
-    return CapturedTrial.model_validate(asdict(trial) | {"surface_mm": surface_mm})
 
 
 def track(
@@ -124,10 +64,11 @@ def track(
     before = _track(operation, bench, against, folder) if against else None
     if operation.cancelled:
         raise SafetyStop("stopped by the operator before the second run")
-    return TrackResult(_track(operation, bench, wanted, folder), before)
+    found = _track(operation, bench, wanted, folder)
+    return compared(before, found) if before else found
 
 
-def _track(operation: Operation, bench: Supervisor, wanted: TrackRequest, folder: Path) -> Tracked:
+def _track(operation: Operation, bench: Supervisor, wanted: TrackRequest, folder: Path) -> TrackResult:
     done = operation.progress.done
     operation.advance(done, wanted.program.name)
     found = tracked.run(bench, wanted.program, folder, wanted.model)

@@ -4,7 +4,6 @@ The force judged is the mean of SMOOTH_S around each sample, so that it is the t
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from controller.law.gains import Choice
 from controller.loop.modes import Mode
 from rig.errors import DataError, UsageError
+from rig.results.tracking import ComparedRun, Jump, WorstJump
 
 Column = NDArray[np.float64]
 
@@ -24,53 +24,17 @@ REMAINS_S = 0.2
 LEAST_JUMP_N = 0.2
 
 
-@dataclass(frozen=True)
-class Jump:
-    """One jump of the reference; shares are of its height, ``error_percent`` of the force given.
-
-    ``error_N`` is the mean and ``largest_error_N`` the largest error over the last STEADY_S; ``settling_s`` is None
-    where force is not within 2 % of the jump for the last REMAINS_S.
-    """
-
-    from_N: float
-    to_N: float
-    actual_N: float
-    error_N: float
-    error_percent: float
-    largest_error_N: float
-    overshoot_percent: float
-    settling_s: float | None
-
-
-@dataclass(frozen=True)
-class Run:
-    """All jumps of one choice on one subject; ``stopped`` is the sentence of what ended it early, if anything did."""
-
-    subject: str
-    gains: str
-    jumps: tuple[Jump, ...]
-    stopped: str = ""
-
-    @property
-    def worst(self) -> dict[str, float | None]:
-        """The largest of each figure; settling None where any jump did not settle."""
-        settling = [jump.settling_s for jump in self.jumps]
-        return {
-            "error_N": max((abs(jump.error_N) for jump in self.jumps), default=None),
-            "error_percent": max((abs(jump.error_percent) for jump in self.jumps), default=None),
-            "largest_error_N": max((jump.largest_error_N for jump in self.jumps), default=None),
-            "overshoot_percent": max((jump.overshoot_percent for jump in self.jumps), default=None),
-            "settling_s": None
-            if None in settling or not settling
-            else max(settled for settled in settling if settled is not None),
-        }
-
-    def as_json(self) -> dict[str, object]:
-        """Everything, for `rig track --table --json`."""
-        jumps = [asdict(jump) for jump in self.jumps]
-        return {
-            "subject": self.subject, "gains": self.gains, "stopped": self.stopped, "worst": self.worst, "jumps": jumps
-        }  # fmt: skip
+def compared_run(subject: str, gains: str, jumps: Sequence[Jump], stopped: str = "") -> ComparedRun:
+    """A run with the worst of its jumps."""
+    settling = [jump.settling_s for jump in jumps]
+    worst = WorstJump(
+        error_N=max((abs(jump.error_N) for jump in jumps), default=None),
+        error_percent=max((abs(jump.error_percent) for jump in jumps), default=None),
+        largest_error_N=max((jump.largest_error_N for jump in jumps), default=None),
+        overshoot_percent=max((jump.overshoot_percent for jump in jumps), default=None),
+        settling_s=None if None in settling else max((found for found in settling if found is not None), default=None),
+    )
+    return ComparedRun(subject=subject, gains=gains, stopped=stopped, worst=worst, jumps=tuple(jumps))
 
 
 def jumps(time_s: Column, reference_N: Column, force_N: Column, mode: NDArray[np.int64]) -> tuple[Jump, ...]:
@@ -127,22 +91,3 @@ def choice_from(text: str) -> Choice:
     if len(found) > 1:
         raise UsageError(f"--gains {text}: one choice for one run; --table compares several")
     return found[0]
-
-
-HEADER = ("subject", "gains", "error N", "error %", "largest N", "over %", "settle s")
-
-
-def rows(runs: Sequence[Run]) -> list[tuple[str, ...]]:
-    """The worst of each run, for people, as ``HEADER`` says; last what stopped it."""
-    return [_row(run) for run in runs]
-
-
-def _row(run: Run) -> tuple[str, ...]:
-    worst = run.worst
-    digits = {"error_N": 4, "error_percent": 2, "largest_error_N": 3, "overshoot_percent": 1, "settling_s": 2}
-    cells = [_figure(worst[name], places) for name, places in digits.items()]
-    return (run.subject, run.gains, *cells, run.stopped)
-
-
-def _figure(value: float | None, places: int) -> str:
-    return "--" if value is None else f"{value:.{places}f}"

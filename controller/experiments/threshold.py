@@ -1,6 +1,5 @@
 """The subject's pain threshold: force rises slowly until the subject stops it; the force then is the answer."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,20 +13,12 @@ from rig.config.table import parse
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
 from rig.recording.reader import read_recording
+from rig.results.tracking import Threshold
 from rig.tissue.model import Model
 
 PAIN = "pain_stop"
 BASE_N = 0.5
 BEFORE_NS = 50_000_000
-
-
-@dataclass(frozen=True)
-class Threshold:
-    """Where the subject stopped the ramp; ``force_N`` is None where it ended at ``up_to_N`` without a stop."""
-
-    force_N: float | None
-    up_to_N: float
-    recording: str
 
 
 def plan(up_to_N: float, rate_N_s: float, model: Model, wiring: Wiring) -> Program:
@@ -43,7 +34,7 @@ def run(bench: Supervisor, program: Program, up_to_N: float, folder: Path, model
     done = tracked.recorded_run(bench, program, folder, model)
     if done.outcome.stopped and done.outcome.outcome != PAIN:
         raise stopped(done.outcome)
-    return Threshold(force_at_stop(done), up_to_N, done.file.name)
+    return Threshold(force_N=force_at_stop(done), up_to_N=up_to_N, recording=done.file.name)
 
 
 def force_at_stop(done: Recorded) -> float | None:

@@ -1,16 +1,15 @@
 """A run of force tracking into a recording, and what it says of the loop."""
 
-import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from statistics import fmean
 
 from controller.experiments import tracking
 from controller.experiments.capture import new_session, refuse_used
 from controller.experiments.recorded import Recorded, metadata, record, refuse_bench
 from controller.experiments.references import Reference
-from controller.experiments.tracking import Followed, Plateau
 from controller.experiments.verdicts import with_quality, with_surface
 from controller.law.gains import Choice
 from controller.loop.steps import Program, TrackForce
@@ -22,26 +21,10 @@ from rig.config.wiring import Wiring
 from rig.errors import BadTrial, UsageError
 from rig.recording.reader import TRACKING, read_recording
 from rig.recording.sessions import SESSION_FILE, TrialInfo, open_session, write_session
+from rig.results.tracking import FILE, LoopCount, TrackResult
 from rig.tissue.model import Model
 
-RESULT = "track.json"
 MARGIN_S = 60.0
-
-
-@dataclass(frozen=True)
-class Tracked:
-    """Given and actual force, level by level, and where it is recorded."""
-
-    recording: str
-    model: str
-    levels: tuple[Plateau, ...]
-    followed: Followed
-    samples: int
-    dropped: int
-    cycles: int
-    missed: int
-    quality: str = ""
-    reasons: tuple[str, ...] = ()
 
 
 def forces(text: str) -> tuple[float, ...]:
@@ -80,7 +63,7 @@ def plan_reference(
     return program
 
 
-def run(bench: Supervisor, program: Program, folder: Path, model: str) -> Tracked:
+def run(bench: Supervisor, program: Program, folder: Path, model: str) -> TrackResult:
     """Tracks, records into ``folder`` (an existing session or a new one), and reads the result from the recording.
 
     Raises SafetyStop, with the recording kept, where the run was stopped.
@@ -89,8 +72,8 @@ def run(bench: Supervisor, program: Program, folder: Path, model: str) -> Tracke
     if done.outcome.stopped:
         raise stopped(done.outcome)
     entry = open_session(folder).trial(done.file.stem)
-    result = replace(evaluate(done, model), quality=entry.quality, reasons=entry.reasons)
-    write_result(folder, result)
+    result = evaluate(done, model).model_copy(update={"quality": entry.quality, "reasons": entry.reasons})
+    result.write(folder / FILE)
     return result
 
 
@@ -140,77 +123,26 @@ def _free_name(folder: Path) -> str:
     return f"track_{number:03d}"
 
 
-def evaluate(done: Recorded, model: str) -> Tracked:
+def evaluate(done: Recorded, model: str) -> TrackResult:
     """The levels of a finished run, from its loop stream."""
     loop = read_recording(done.file).tables["loop"]
     columns = (loop["capture_ns"] * 1e-9, loop["reference_N"], loop["force_N"], loop["mode"])
     first, last = (LoopSample(*row) for row in (loop[0].tolist(), loop[-1].tolist()))
-    return Tracked(
+    levels = tracking.plateaus(*columns)
+    return TrackResult(
         recording=done.file.name,
         model=model,
-        levels=tracking.plateaus(*columns),
+        max_error_percent=max((level.max_error_percent for level in levels), default=None),
+        rms_error_N=math.sqrt(fmean(level.rms_error_N**2 for level in levels)) if levels else None,
+        levels=levels,
         followed=tracking.followed(*columns),
         samples=sum(done.samples.values()),
         dropped=sum(done.dropped.values()),
-        cycles=last.seq - first.seq + 1,
-        missed=last.missed - first.missed,
+        loop=LoopCount(ticks=last.seq - first.seq + 1, missed=last.missed - first.missed),
     )
 
 
-def as_json(result: Tracked) -> dict[str, object]:
-    """The result as `rig track --json` and `track.json` hold it."""
-    return {
-        "recording": result.recording,
-        "model": result.model,
-        **tracking.summary(result.levels),
-        "followed": asdict(result.followed),
-        "samples": result.samples,
-        "dropped": result.dropped,
-        "loop": {"ticks": result.cycles, "missed": result.missed},
-        "quality": result.quality,
-        "reasons": list(result.reasons),
-    }
-
-
-def write_result(folder: Path, result: Tracked) -> None:
-    """`track.json` beside the recording, whole or not at all."""
-    partial = folder / (RESULT + ".part")
-    partial.write_text(json.dumps(as_json(result), indent=2) + "\n")
-    partial.replace(folder / RESULT)
-
-
-def refuse_bad(result: Tracked) -> None:
+def refuse_bad(result: TrackResult) -> None:
     """Raises BadTrial where the run's quality is bad."""
     if result.quality == "bad":
         raise BadTrial(f"{result.recording} is of bad quality: {'; '.join(result.reasons)}; mend that and track again")
-
-
-def table(result: Tracked) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows of given and actual force, for people."""
-    header = ("given", "actual", "error", "error %", "largest", "rms", "overshoot %", "settling s")
-    return header, [_row(level) for level in result.levels]
-
-
-def sentence(result: Tracked) -> str:
-    """The whole run in one line, for references that do not rest."""
-    whole = result.followed
-    moving = (
-        ""
-        if whole.amplitude_ratio is None or whole.lag_s is None
-        else f", amplitude {100 * whole.amplitude_ratio:.1f} % of the reference, {1000 * whole.lag_s:.0f} ms late"
-    )
-    return f"error of the whole run: rms {whole.rms_error_N:.3f} N, largest {whole.largest_error_N:.3f} N{moving}"
-
-
-def _row(level: Plateau) -> tuple[str, ...]:
-    settling = "--" if level.settling_s is None else f"{level.settling_s:.2f}"
-    return (
-        f"{level.given_N:.2f}",
-        f"{level.actual_N:.3f}",
-        f"{level.error_N:+.3f}",
-        f"{level.error_percent:+.2f}",
-        f"{level.max_error_N:.3f}",
-        f"{level.rms_error_N:.3f}",
-        f"{level.overshoot_percent:.1f}",
-        settling,
-    )

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +14,7 @@ from controller.loop.modes import Mode
 from controller.loop.steps import Approach, Hold, Program, Retract, TrackForce, Zero
 from rig.config.wiring import Wiring
 from rig.errors import DataError, UsageError
+from rig.results.tracking import Followed, Plateau
 from rig.tissue.model import Model
 
 LEAD_N_S, LEAD_HOLD_S = 2.0, 0.5
@@ -32,21 +33,6 @@ APPROACH_MM_S = 5.0
 CONTACT_N = 0.05
 
 Column = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Plateau:
-    """Given and actual force on one level of the reference; the first ``SETTLE_S`` of it are not counted."""
-
-    given_N: float
-    actual_N: float
-    error_N: float
-    error_percent: float
-    max_error_N: float
-    max_error_percent: float
-    rms_error_N: float
-    overshoot_percent: float
-    settling_s: float | None
 
 
 def program(
@@ -204,19 +190,6 @@ def plateaus(time_s: Column, reference_N: Column, force_N: Column, mode: NDArray
     return tuple(_plateau(time_s[a:b], float(reference_N[a]), smooth_N[a:b]) for a, b in spans)
 
 
-@dataclass(frozen=True)
-class Followed:
-    """How well force followed a moving reference, over all contact after LEAD_HOLD_S.
-
-    ``amplitude_ratio`` and ``lag_s`` are those at the reference's strongest frequency; None where it has none.
-    """
-
-    rms_error_N: float
-    largest_error_N: float
-    amplitude_ratio: float | None
-    lag_s: float | None
-
-
 def followed(time_s: Column, reference_N: Column, force_N: Column, mode: NDArray[np.int64]) -> Followed:
     """The whole run at once, from columns of the loop stream; raises DataError where the recording has no tracking."""
     on = (mode == Mode.CONTACT) & np.isfinite(reference_N)
@@ -224,8 +197,13 @@ def followed(time_s: Column, reference_N: Column, force_N: Column, mode: NDArray
         raise DataError("the recording has no force tracking: no row is in contact mode")
     time_s, reference_N, force_N = time_s[on], reference_N[on], force_N[on]
     error_N = (force_N - reference_N)[time_s > time_s[0] + LEAD_HOLD_S]
-    ratio = _ratio(time_s[len(time_s) // 3 :], reference_N[len(time_s) // 3 :], force_N[len(time_s) // 3 :])
-    return Followed(float(np.sqrt(np.mean(error_N**2))), float(np.max(np.abs(error_N))), *ratio)
+    ratio, lag_s = _ratio(time_s[len(time_s) // 3 :], reference_N[len(time_s) // 3 :], force_N[len(time_s) // 3 :])
+    return Followed(
+        rms_error_N=float(np.sqrt(np.mean(error_N**2))),
+        largest_error_N=float(np.max(np.abs(error_N))),
+        amplitude_ratio=ratio,
+        lag_s=lag_s,
+    )
 
 
 def _ratio(time_s: Column, reference_N: Column, force_N: Column) -> tuple[float | None, float | None]:
@@ -270,12 +248,3 @@ def _settling(time_s: Column, inside: NDArray[np.bool_]) -> float | None:
 def _moving_mean(values: Column, width: int) -> Column:
     padded = np.concatenate([np.full(width - 1, values[0]), values])
     return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
-
-
-def summary(levels: Sequence[Plateau]) -> dict[str, object]:
-    """The tracking result as JSON: overall figures and one row a level."""
-    return {
-        "max_error_percent": max((level.max_error_percent for level in levels), default=None),
-        "rms_error_N": float(np.sqrt(np.mean([level.rms_error_N**2 for level in levels]))) if levels else None,
-        "levels": [asdict(level) for level in levels],
-    }

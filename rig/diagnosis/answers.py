@@ -2,11 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 from scipy.special import stdtrit
 
+from rig.diagnosis.estimates import (
+    ErrorGain,
+    Estimate,
+    NamedCause,
+    NextExperiment,
+    SimulationError,
+    SmallestSize,
+    Unexplained,
+    Verdict,
+)
 from rig.diagnosis.evidence import Tangents, held_out_square_error, information, is_alias, jackknife
 from rig.diagnosis.fit import Fit, least_squares
 from rig.diagnosis.gates import Finding
@@ -14,9 +23,7 @@ from rig.diagnosis.noise import Array
 from rig.diagnosis.omnibus import Leftover, beaten, judged_leftover
 from rig.diagnosis.problem import Effect, Par, Problem
 from rig.diagnosis.search import Named, Search, imitated, testable
-from rig.diagnosis.simulated import Simulated
 
-Verdict = Literal["adequate", "explained", "unexplained"]
 POWER_SD = 0.84  # 80 % power
 LEAVING_OUT_NATS = 1.0
 # Operators on a grid of 4 ms are not exact: development seeds gave sizes up to 1 % off within far tighter intervals.
@@ -33,70 +40,6 @@ LEAST_LEFT_N = 0.0003
 
 
 @dataclass(frozen=True)
-class Interval:
-    """A value with its 95 % interval; ``at_bound`` where the fit was stopped by a bound and says little of the size."""
-
-    value: float
-    low: float
-    high: float
-    at_bound: bool = False
-
-    def as_json(self) -> dict[str, float | bool]:
-        """For the file."""
-        stopped: dict[str, float | bool] = {"at_bound": True} if self.at_bound else {}
-        return {"value": self.value, "low": self.low, "high": self.high} | stopped
-
-
-@dataclass(frozen=True)
-class Gain:
-    """Error on recordings left out, before and after, and the relative reduction with its interval."""
-
-    unit: str
-    before: float
-    after: float
-    reduction: Interval
-
-    def as_json(self) -> dict[str, float]:
-        """For the file."""
-        return {
-            f"rmse_before_{self.unit}": self.before,
-            f"rmse_after_{self.unit}": self.after,
-            "reduction": self.reduction.value,
-            "low": self.reduction.low,
-            "high": self.reduction.high,
-        }
-
-
-@dataclass(frozen=True)
-class Answer:
-    """One named cause (or a set that the data cannot tell apart)."""
-
-    effects: tuple[str, ...]
-    statement: str
-    confidence: float
-    parameters: Mapping[str, Interval]
-    gain: Gain
-    nats: float
-    p_value: float
-    repair: str
-    provisional: bool
-
-    def as_json(self) -> dict[str, object]:
-        """For the file."""
-        return {
-            "effects": list(self.effects),
-            "statement": self.statement,
-            "confidence": self.confidence,
-            "parameters": {name: interval.as_json() for name, interval in self.parameters.items()},
-            "gain": self.gain.as_json(),
-            "evidence_nats": self.nats,
-            "p_value": self.p_value,
-            "repair": self.repair,
-            "provisional": self.provisional,
-        }
-
-
-@dataclass(frozen=True)
 class Diagnosis:
     """Everything `rig diagnose` says."""
 
@@ -105,44 +48,30 @@ class Diagnosis:
     recordings: int
     verdict: Verdict
     statement: str
-    findings: tuple[Answer, ...]
+    findings: tuple[NamedCause, ...]
     depends_on: tuple[str, ...]
     leftover_p: float | None
-    detectable: Mapping[str, tuple[float, str]]
+    detectable: Mapping[str, SmallestSize]
     not_testable: Mapping[str, str]
-    next_experiment: Mapping[str, object] | None
+    next_experiment: NextExperiment | None
     quality: tuple[Finding, ...]
-    base: Mapping[str, Interval] = field(default_factory=dict)
+    base: Mapping[str, Estimate] = field(default_factory=dict)
     search: Search | None = None
     before: Leftover | None = None
     after: Leftover | None = None
-    simulated: tuple[Simulated, ...] = ()
+    simulated: tuple[SimulationError, ...] = ()
 
-    def with_simulated(self, simulated: tuple[Simulated, ...]) -> "Diagnosis":
+    @property
+    def unexplained(self) -> Unexplained | None:
+        """What is left, where no known cause explains it."""
+        return Unexplained(self.depends_on, self.leftover_p) if self.verdict == "unexplained" else None
+
+    def with_simulated(self, simulated: tuple[SimulationError, ...]) -> "Diagnosis":
         """The same with errors of whole simulations."""
         return replace(self, simulated=simulated)
 
-    def as_json(self) -> dict[str, object]:
-        """What the file holds."""
-        left = {"depends_on": list(self.depends_on), "p_value": self.leftover_p}
-        return {
-            "verdict": self.verdict,
-            "statement": self.statement,
-            "simulation": self.simulation,
-            "session": self.session,
-            "recordings": self.recordings,
-            "findings": [finding.as_json() for finding in self.findings],
-            "unexplained": left if self.verdict == "unexplained" else None,
-            "detectable": {name: {"minimum": size, "unit": unit} for name, (size, unit) in self.detectable.items()},
-            "not_testable": dict(self.not_testable),
-            "next_experiment": self.next_experiment,
-            "data_quality": [finding._asdict() for finding in self.quality],
-            "parameters": {name: interval.as_json() for name, interval in self.base.items()},
-            "simulation_error": [item._asdict() for item in self.simulated],
-        }
 
-
-def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Interval]:
+def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Estimate]:
     """95 % intervals with Student's t on recordings, the wider of curvature and jackknife; a pair becomes its size.
 
     To amplitudes 1.5 % is added, in quadrature: what the operators themselves are good for.
@@ -150,11 +79,11 @@ def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Interval]:
     wide = float(stdtrit(max(fit.problem.recordings - 1, 1), 0.975))
     covariances = fit.covariance, jackknife(fit)
     place = {par.name: k for k, par in enumerate(fit.free)}
-    found: dict[str, Interval] = {}
+    found: dict[str, Estimate] = {}
     for par in wanted:
         value = fit.values[par.name]
         if par.name not in place:
-            found[par.name] = Interval(value, par.low, par.high)
+            found[par.name] = Estimate(value, par.low, par.high)
         elif par.name.endswith("_sin_mm"):
             found[par.name.replace("_sin_mm", "_mm")] = _amplitude(fit, par.name, place, wide, covariances)
         elif not par.name.endswith("_cos_mm"):
@@ -163,34 +92,33 @@ def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Interval]:
             half = min(half, LARGEST_LOG) if par.log else half
             half = float(np.hypot(half, OPERATOR_SHARE * abs(value - par.null))) if par.worth else half
             low, high = (value / np.exp(half), value * np.exp(half)) if par.log else (value - half, value + half)
-            found[par.name] = Interval(value, max(low, par.low), min(high, par.high), stopped(par, value))
+            found[par.name] = Estimate(value, max(low, par.low), min(high, par.high), stopped(par, value))
     return found
 
 
 def stopped(par: Par, value: float) -> bool:
     """Whether a size has gone all the way from its null to a bound."""
     bound = par.high if value > par.null else par.low
-    return bool(par.worth) and abs(value - par.null) >= NEAR_BOUND * abs(bound - par.null)
+    return bool(par.worth and abs(value - par.null) >= NEAR_BOUND * abs(bound - par.null))
 
 
-def _amplitude(fit: Fit, sine: str, place: Mapping[str, int], wide: float, covariances: Sequence[Array]) -> Interval:
+def _amplitude(fit: Fit, sine: str, place: Mapping[str, int], wide: float, covariances: Sequence[Array]) -> Estimate:
     pair = np.array([fit.values[sine], fit.values[sine.replace("_sin_", "_cos_")]])
     index = [place[sine], place[sine.replace("_sin_", "_cos_")]]
     size = float(np.hypot(*pair))
     variance = max(float(pair @ c[np.ix_(index, index)] @ pair) for c in covariances) / max(size**2, 1e-300)
     half = float(np.hypot(wide * np.sqrt(variance), OPERATOR_SHARE * size))
-    return Interval(size, max(size - half, 0.0), size + half)
+    return Estimate(size, max(size - half, 0.0), size + half)
 
 
-def gain_of(before: Fit, after: Fit) -> Gain:
+def gain_of(before: Fit, after: Fit) -> ErrorGain:
     """Held-out error of two models, each at its least-squares best, with a bootstrap over recordings."""
     old, new = (held_out_square_error(least_squares(model)) for model in (before, after))
     picks = np.random.default_rng(0).integers(0, len(old), size=(DRAWS, len(old)))
     reductions = 1 - np.sqrt(new[picks].mean(axis=1) / np.maximum(old[picks].mean(axis=1), 1e-300))
     low, high = np.percentile(reductions, [2.5, 97.5])
     rmse = float(np.sqrt(old.mean())), float(np.sqrt(new.mean()))
-    reduction = Interval(1 - rmse[1] / max(rmse[0], 1e-300), float(low), float(high))
-    return Gain(before.problem.channels[0].unit, *rmse, reduction)
+    return ErrorGain(*rmse, 1 - rmse[1] / max(rmse[0], 1e-300), float(low), float(high))
 
 
 def sentence(effect: Effect, values: Mapping[str, float]) -> str:
@@ -199,10 +127,10 @@ def sentence(effect: Effect, values: Mapping[str, float]) -> str:
     return effect.statement.format(**values, amplitude=float(np.hypot.reduce(pair)))
 
 
-def answer(named: Named, after: Fit, provisional: bool) -> Answer:
+def answer(named: Named, after: Fit, provisional: bool) -> NamedCause:
     """One finding of the final model."""
     effect = named.effect
-    return Answer(
+    return NamedCause(
         (effect.name, *named.rivals),
         sentence(effect, after.values),
         named.share * (PROVISIONAL_SHARE if provisional else 1.0),
@@ -215,7 +143,7 @@ def answer(named: Named, after: Fit, provisional: bool) -> Answer:
     )
 
 
-def smallest_visible(t: Tangents, threshold: float) -> dict[str, tuple[float, str]]:
+def smallest_visible(t: Tangents, threshold: float) -> dict[str, SmallestSize]:
     """Amplitude that would have been named with 80 % probability, by effect; the median over its shapes."""
     needed = np.sqrt(2 * (threshold + LEAVING_OUT_NATS)) + POWER_SD
     sizes: dict[str, list[float]] = {}
@@ -229,11 +157,11 @@ def smallest_visible(t: Tangents, threshold: float) -> dict[str, tuple[float, st
     result = {}
     for name, found in sizes.items():
         par = effects[name].amplitudes[0]
-        result[name] = (max(float(np.median(found)), par.worth), par.unit)
+        result[name] = SmallestSize(max(float(np.median(found)), par.worth), par.unit)
     return result
 
 
-def limits(problem: Problem, search: Search) -> tuple[dict[str, tuple[float, str]], dict[str, str]]:
+def limits(problem: Problem, search: Search) -> tuple[dict[str, SmallestSize], dict[str, str]]:
     """What could have been seen, and what not and why."""
     reasons = {
         effect.name: problem.offers[need]
@@ -249,9 +177,9 @@ def limits(problem: Problem, search: Search) -> tuple[dict[str, tuple[float, str
             continue
         if effect.name not in visible:
             reasons[effect.name] = "the simulation's own parameters imitate it completely in this experiment"
-        elif visible[effect.name][0] > par.high - par.null:
-            size, unit = visible.pop(effect.name)
-            reasons[effect.name] = f"only {size:.2g} {unit} or more would have shown in this experiment"
+        elif visible[effect.name].minimum > par.high - par.null:
+            size = visible.pop(effect.name)
+            reasons[effect.name] = f"only {size.minimum:.2g} {size.unit} or more would have shown in this experiment"
     return visible, reasons
 
 
@@ -285,7 +213,7 @@ def left_to_chance(fit: Fit) -> float:
     return float(np.sqrt(held_out_square_error(least_squares(fit)).mean())) / max(spread, 1e-300)
 
 
-def summary(verdict: Verdict, findings: Sequence[Answer], depends_on: Sequence[str], simulation: str) -> str:
+def summary(verdict: Verdict, findings: Sequence[NamedCause], depends_on: Sequence[str], simulation: str) -> str:
     """One sentence for a person."""
     if verdict == "adequate":
         return f"The {simulation} simulation explains these recordings to within their noise; nothing else is needed."

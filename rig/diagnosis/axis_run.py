@@ -7,10 +7,10 @@ import scipy.io
 
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.axis import AxisProblem, AxisRecording, force_error_percent, motion_of
+from rig.diagnosis.estimates import SimulationError
 from rig.diagnosis.gates import inspect_stream
 from rig.diagnosis.run import judge, silent
 from rig.diagnosis.search import Progress
-from rig.diagnosis.simulated import Simulated
 from rig.errors import DataError
 from rig.recording.csv_columns import read_header, read_usable
 
@@ -51,7 +51,8 @@ def diagnose_axis(recordings: list[AxisRecording], name: str, progress: Progress
         return result
     before, after = result.search.before.values, result.search.after.values
     simulated = tuple(
-        Simulated(r.name, r is first, force_error_percent(r, before), force_error_percent(r, after)) for r in recordings
+        SimulationError(r.name, r is first, force_error_percent(r, before), force_error_percent(r, after))
+        for r in recordings
     )
     return result.with_simulated(simulated)
 

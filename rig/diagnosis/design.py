@@ -11,6 +11,7 @@ import numpy as np
 
 from rig.config.protocol import Indentation as Protocol
 from rig.diagnosis.answers import Diagnosis, smallest_visible
+from rig.diagnosis.estimates import NextExperiment, SmallestSize
 from rig.diagnosis.evidence import Direction, Tangents, information, is_alias, tangents
 from rig.diagnosis.fit import Fit, assemble
 from rig.diagnosis.indentation import Indentation
@@ -53,7 +54,7 @@ class Check:
 
     duration_s: float
     cycles: int
-    detectable: Mapping[str, tuple[float, str]]
+    detectable: Mapping[str, SmallestSize]
     not_testable: Mapping[str, str]
     names: tuple[str, ...]
     confusion: Array
@@ -68,22 +69,6 @@ class Check:
                 if left < SAFE_NATS:
                     found.append((one, self.names[j], left))
         return sorted(found, key=lambda pair: pair[2])
-
-    def as_json(self) -> dict[str, object]:
-        """For the file."""
-        return {
-            "duration_s": self.duration_s,
-            "strokes": self.cycles,
-            "detectable": {name: {"minimum": size, "unit": unit} for name, (size, unit) in self.detectable.items()},
-            "not_testable": dict(self.not_testable),
-            "not_separable": [
-                {"pair": [one, other], "nats": left} for one, other, left in self.pairs if left < NOT_SEPARABLE_NATS
-            ],
-            "ambiguous": [
-                {"pair": [one, other], "nats": left} for one, other, left in self.pairs if left >= NOT_SEPARABLE_NATS
-            ],
-            "confusion_nats": {"of": ASSUMED_NATS, "names": list(self.names), "matrix": self.confusion.tolist()},
-        }
 
 
 def check(protocol: Protocol, tracker: bool = True, force_rate_Hz: float = RATE_HZ) -> Check:
@@ -168,7 +153,7 @@ def noiseless(problem: Indentation, limb: Mapping[str, float] = LIMB) -> Fit:
     return assemble(problem, (), values, Whitener(problem, noise, scatter, secants, blind))
 
 
-def next_experiment(result: Diagnosis) -> dict[str, object] | None:
+def next_experiment(result: Diagnosis) -> NextExperiment | None:
     """The block of cycles that separates the first ambiguous set best, in nats a minute; else what is missing most.
 
     Each block is taken alone, on the limb as fitted, with the named effect at the size found.
@@ -176,12 +161,12 @@ def next_experiment(result: Diagnosis) -> dict[str, object] | None:
     open_sets = [finding.effects for finding in result.findings if len(finding.effects) > 1]
     if not open_sets or result.search is None:
         if "frame_compliance" in result.not_testable and "tracker" in result.not_testable["frame_compliance"]:
-            return {"do": "record again with a tracker on the tip", "separates": [], "nats_per_minute": None}
+            return NextExperiment("record again with a tracker on the tip")
         return None
     pair = open_sets[0][:2]
     rates = {name: _rate(block, result.search.after, pair) for name, block in BLOCKS.items()}
     best = max(rates, key=lambda name: rates[name])
-    return {"do": best, "separates": list(pair), "nats_per_minute": rates[best], "menu": rates}
+    return NextExperiment(best, pair, rates[best], rates)
 
 
 def _rate(protocol: Protocol, found: Fit, pair: Sequence[str]) -> float:

@@ -1,6 +1,6 @@
 """Data-quality gates, passed before any fit: what is wrong with the numbers themselves, in words."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,8 @@ FROZEN_S = 0.25
 JITTER = 0.25
 
 
-class Finding(NamedTuple):
+@dataclass(frozen=True)
+class Finding:
     """One thing wrong with one stream: where first seen, what, in a sentence, in how many recordings."""
 
     recording: str

@@ -8,6 +8,7 @@ import numpy as np
 from rig.diagnosis.answers import Diagnosis, answer, intervals, limits, summary, verdict_of
 from rig.diagnosis.cycles import in_cycles
 from rig.diagnosis.design import next_experiment
+from rig.diagnosis.estimates import NextExperiment
 from rig.diagnosis.fit import first_fit, refreshed
 from rig.diagnosis.gates import Finding
 from rig.diagnosis.indentation import Indentation, Simulation, library
@@ -51,7 +52,7 @@ def judge(
     findings = tuple(
         sorted(
             (answer(named, search_result.after, verdict == "unexplained") for named in search_result.named),
-            key=lambda found: -found.nats,
+            key=lambda found: -found.evidence_nats,
         )
     )
     visible, reasons = limits(problem, search_result)
@@ -147,7 +148,7 @@ def cannot(simulation: Simulation, name: str, recordings: int, fault: Fault, qua
         statement=f"Nothing could be judged: {fault.reason}. This says neither that the simulation is right nor wrong.",
         findings=(), depends_on=(), leftover_p=None, detectable={},
         not_testable={effect.name: fault.reason for effect in library(simulation)},
-        next_experiment={"do": fault.remedy, "separates": [], "nats_per_minute": None}, quality=quality,
+        next_experiment=NextExperiment(fault.remedy), quality=quality,
     )  # fmt: skip
 
 

@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.diagnosis.files import FOLDER, PICTURES, RESULT, TRUTH
+from rig.errors import UsageError
 from rig.report.drawing import inlined
 from rig.report.markup import figure, paragraph, section, table
-from rig.report.values import json_table, listed, number
+from rig.results.diagnosis import FILE, FOLDER, PICTURES, TRUTH, DiagnosisResult
+from rig.results.diagnosis_tables import further_sentences, gain_sentence, named_table, not_found_table
 
 TITLE = "What the simulation gets wrong"
 CAPTIONS = {
@@ -23,27 +24,22 @@ CAPTIONS = {
 
 @dataclass(frozen=True)
 class Diagnosed:
-    """What `rig diagnose` left in a session: its JSON, its pictures as SVG by name, and what a demonstration hid."""
+    """What `rig diagnose` left in a session: its result, its pictures as SVG by name, and what a demonstration hid."""
 
-    result: Mapping[str, object]
+    result: DiagnosisResult
     pictures: Mapping[str, str]
     truth: str
-
-    @property
-    def statement(self) -> str:
-        """The whole in one sentence."""
-        return str(self.result.get("statement", ""))
 
 
 def read_diagnosis(session: Path) -> Diagnosed | str:
     """The diagnosis in the session's folder, or the sentence that says why there is none."""
     folder = session / FOLDER
     try:
-        result = json_table((folder / RESULT).read_text())
+        result = DiagnosisResult.read(folder / FILE)
     except OSError:
         return f"This session was not diagnosed; `rig diagnose {session}` does it."
-    if "verdict" not in result:
-        return f"{folder / RESULT} holds no diagnosis; run `rig diagnose {session}` again."
+    except UsageError as error:
+        return f"{error}; run `rig diagnose {session}` again."
     drawn = {name: folder / f"{name}.svg" for name in PICTURES}
     truth = folder / TRUTH
     pictures = {name: path.read_text() for name, path in drawn.items() if path.exists()}
@@ -55,63 +51,16 @@ def diagnosis_section(found: Diagnosed | str) -> str:
     if isinstance(found, str):
         return section(TITLE, paragraph(found, "missing"))
     result = found.result
-    pieces = [paragraph(found.statement)]
-    rows = [_row(item) for item in listed(result.get("findings"))]
-    if rows:
-        header = ("cause", "parameters, 95 % interval", "repair", "error before", "after", "reduction, %")
-        pieces.append(table(header, rows, "Named; errors are those on recordings left out", words=3))
+    pieces = [paragraph(result.statement)]
+    if result.findings:
+        pieces += [table(named_table(result)), *map(paragraph, map(gain_sentence, result.findings))]
     pieces += [
         figure(inlined(text, f"diagnosis-{name}", CAPTIONS[name]), CAPTIONS[name])
         for name, text in found.pictures.items()
     ]
-    pieces.append(_visible(result))
-    untested = result.get("not_testable")
-    if isinstance(untested, Mapping) and untested:
-        pieces.append(table(("cannot be tested", "why"), [(str(k), str(v)) for k, v in untested.items()], words=2))
-    after = result.get("next_experiment")
-    if isinstance(after, Mapping):
-        pieces.append(paragraph(f"Next experiment: {after.get('do', '')}."))
+    if result.detectable:
+        pieces.append(table(not_found_table(result)))
+    pieces += map(paragraph, further_sentences(result))
     if found.truth:
         pieces.append(paragraph(f"The truth, which the analysis was not told. {found.truth}", "note"))
     return section(TITLE, *pieces)
-
-
-def _row(item: Mapping[str, object]) -> tuple[str, ...]:
-    effects, parameters, gain = item.get("effects"), item.get("parameters"), item.get("gain")
-    named = " or ".join(map(str, effects)) if isinstance(effects, list) else ""
-    sizes = parameters.items() if isinstance(parameters, Mapping) else ()
-    values = ", ".join(f"{name} {_interval(value)}" for name, value in sizes)
-    found = gain if isinstance(gain, Mapping) else {}
-    before, after = (
-        next((value for key, value in found.items() if key.startswith(start)), None)
-        for start in ("rmse_before", "rmse_after")
-    )
-    reduction = number(found, "reduction")
-    return (
-        named, values, str(item.get("repair", "")), _shown(before, ".4f"), _shown(after, ".4f"),
-        "\u2013" if reduction is None else f"{100 * reduction:.0f}",
-    )  # fmt: skip
-
-
-def _interval(value: object) -> str:
-    if not isinstance(value, Mapping):
-        return ""
-    return (
-        f"{_shown(value.get('value'), '.4g')} ({_shown(value.get('low'), '.4g')} to {_shown(value.get('high'), '.4g')})"
-    )
-
-
-def _shown(value: object, form: str) -> str:
-    return format(value, form) if isinstance(value, int | float) else "\u2013"
-
-
-def _visible(result: Mapping[str, object]) -> str:
-    seen = result.get("detectable")
-    if not isinstance(seen, Mapping) or not seen:
-        return ""
-    rows = [
-        (str(name), f"{_shown(item.get('minimum'), '.3g')} {item.get('unit', '')}")
-        for name, item in seen.items()
-        if isinstance(item, Mapping)
-    ]
-    return table(("not found", "would have been named from"), rows, words=2)

@@ -4,6 +4,7 @@ import io
 import re
 from html import escape
 from itertools import pairwise
+from pathlib import Path
 from typing import Literal
 
 import matplotlib
@@ -12,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from rig.recording.files import whole_file, write_text
 from rig.tissue.laws import FloatArray
 
 INK, QUIET, GRID, PAPER = "#1d2430", "#5f6b7a", "#d9dee5", "#ffffff"
@@ -102,6 +104,13 @@ def svg(figure: Figure) -> str:
     with matplotlib.rc_context({"svg.fonttype": "path", "svg.hashsalt": "tissue-rig"}):
         figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     return out.getvalue()
+
+
+def save_figure(figure: Figure, folder: Path, name: str) -> None:
+    """Writes NAME.png and NAME.svg in ``folder``."""
+    with whole_file(folder / f"{name}.png", overwrite=True) as scratch:
+        scratch.write_bytes(png(figure))
+    write_text(folder / f"{name}.svg", svg(figure))
 
 
 def inline_svg(figure: Figure, name: str, alt: str) -> str:

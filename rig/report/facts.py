@@ -7,17 +7,17 @@ from typing import TypeVar
 
 import numpy as np
 
-from rig.errors import DataError, RigError
+from rig.errors import DataError, RigError, UsageError
 from rig.recording.reader import Recording
 from rig.recording.sessions import Session, TrialInfo, open_session
 from rig.recording.verify import Verdict, verify
 from rig.report.diagnosed import Diagnosed, read_diagnosis
 from rig.report.figures import Tracked
+from rig.report.fitted import Fitted, read_fit
 from rig.report.values import json_table
+from rig.results.tracking import FILE, TrackResult
 from rig.tissue.laws import FloatArray
-from rig.tissue.study import Study, study_session
 
-TRACK_FILE = "track.json"
 AGES = {"force": "force_age_ns", "axis": "axis_age_ns", "marker": "marker_age_ns"}
 # An input that never came has no age; the loop says so with a number no age can be.
 OLDEST_NS = 3_600_000_000_000
@@ -52,7 +52,7 @@ class TrackingFacts:
     """A force-tracking run: its columns, and what `rig track` said of it."""
 
     run: Tracked
-    result: Mapping[str, object]
+    result: TrackResult | str
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Facts:
 
     session: Session
     trials: tuple[TrialFacts, ...]
-    study: Study | str
+    fit: Fitted | str
     tracking: TrackingFacts | str
     loop: LoopFacts | str
     devices: Mapping[str, Mapping[str, object]]
@@ -78,7 +78,7 @@ def gather(folder: Path) -> Facts:
     return Facts(
         session=session,
         trials=tuple(_trial(session, info) for info in session.trials),
-        study=_study(session),
+        fit=read_fit(session),
         tracking=_tracking(session, recordings),
         loop=_loop(list(recordings.values())),
         devices={role: json_table(text) for role, text in metadata.get("devices", {}).items() if role != "crc32"},
@@ -107,13 +107,6 @@ def _trial(session: Session, info: TrialInfo) -> TrialFacts:
     return TrialFacts(info, verdict, samples, sum(stream.dropped for stream in verdict.streams.values()))
 
 
-def _study(session: Session) -> Study | str:
-    try:
-        return study_session(session)
-    except DataError as error:
-        return f"No fit: {error}."
-
-
 def _tracking(session: Session, recordings: Mapping[str, Recording]) -> TrackingFacts | str:
     runs = [name for name, recording in recordings.items() if recording.tracks_force]
     if not runs:
@@ -123,14 +116,14 @@ def _tracking(session: Session, recordings: Mapping[str, Recording]) -> Tracking
     if not len(loop):
         return f"The tracking run {runs[-1]} never came into contact."
     time_s = (loop["capture_ns"] - loop["capture_ns"][0]) * 1e-9
-    return TrackingFacts(Tracked(time_s, loop["reference_N"], loop["force_N"]), _result(session.folder / TRACK_FILE))
+    return TrackingFacts(Tracked(time_s, loop["reference_N"], loop["force_N"]), _result(session.folder / FILE))
 
 
-def _result(path: Path) -> Mapping[str, object]:
+def _result(path: Path) -> TrackResult | str:
     try:
-        return json_table(path.read_text())
-    except OSError:
-        return {}
+        return TrackResult.read(path)
+    except (OSError, UsageError) as error:
+        return f"No table of reference and actual force: {error}."
 
 
 def _loop(recordings: Sequence[Recording]) -> LoopFacts | str:

@@ -115,7 +115,7 @@ def _errors(axes: Axes, study: Study) -> None:
 
 
 def _percent(errors: Errors) -> tuple[FloatArray, FloatArray]:
-    found = [(row.force_N, row.error_percent) for row in rows(errors) if np.isfinite(row.error_percent)]
+    found = [(row.force_N, row.error_percent) for row in rows(errors) if row.error_percent is not None]
     x, y = zip(*found, strict=True)
     return np.array(x), np.array(y)
 

@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
+from rig.results.tables import TextTable
+
 
 def text(value: object) -> str:
     """``value`` as harmless text."""
@@ -28,15 +30,17 @@ def cards(values: Iterable[tuple[str, str, str]]) -> str:
     return f'<div class="cards">{items}</div>'
 
 
-def table(header: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "", words: int = 1) -> str:
-    """A table whose first ``words`` columns are text and the others numbers."""
-    head = "".join(f"<th{_class(_kind(i, words))}>{text(name)}</th>" for i, name in enumerate(header))
-    body = "".join(
-        "<tr>" + "".join(f"<td{_class(_kind(i, words))}>{text(cell)}</td>" for i, cell in enumerate(row)) + "</tr>"
-        for row in rows
-    )
-    title = f"<caption>{text(caption)}</caption>" if caption else ""
+def table(shown: TextTable) -> str:
+    """A table; what is not in its first columns of words stands to the right, as numbers do."""
+    kinds = ["" if column < shown.words else "number" for column in range(len(shown.header))]
+    head = _cells("th", shown.header, kinds)
+    body = "".join(f"<tr>{_cells('td', row, kinds)}</tr>" for row in shown.rows)
+    title = f"<caption>{text(shown.title)}</caption>" if shown.title else ""
     return f'<div class="table"><table>{title}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _cells(tag: str, cells: Sequence[str], kinds: Sequence[str]) -> str:
+    return "".join(f"<{tag}{_class(kind)}>{text(cell)}</{tag}>" for cell, kind in zip(cells, kinds, strict=True))
 
 
 def pairs(values: Mapping[str, object]) -> str:
@@ -52,10 +56,6 @@ def figure(svg: str, caption: str) -> str:
 def details(summary: str, *pieces: str) -> str:
     """A part that is folded away on the screen."""
     return f"<details><summary>{text(summary)}</summary>{''.join(pieces)}</details>"
-
-
-def _kind(column: int, words: int) -> str:
-    return "" if column < words else "number"
 
 
 def _class(kind: str) -> str:

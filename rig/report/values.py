@@ -13,17 +13,6 @@ def json_table(text: str) -> Mapping[str, object]:
     return value if isinstance(value, dict) else {"": value}
 
 
-def number(values: Mapping[str, object], key: str) -> float | None:
-    """A number, or None."""
-    value = values.get(key)
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
-
-
-def listed(value: object) -> list[Mapping[str, object]]:
-    """The objects of a list."""
-    return [item for item in value if isinstance(item, Mapping)] if isinstance(value, list) else []
-
-
 def of_many(noun: str, count: int) -> str:
     """The noun for that many: ``recording`` of one, ``recordings`` of two."""
     return noun if count == 1 else f"{noun}s"

@@ -6,7 +6,7 @@ import numpy as np
 
 from rig.tissue.judging import Judged
 from rig.tissue.laws import FloatArray, Law
-from rig.tissue.model import ControlRow
+from rig.tissue.summary import ControlRow
 
 STEP = 1e-6
 

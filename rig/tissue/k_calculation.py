@@ -6,7 +6,6 @@ Both are here, so they can be compared.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import stdtrit
@@ -17,37 +16,12 @@ from rig.tissue.lattice.springs import Springs
 from rig.tissue.lattice.state import Loaded
 from rig.tissue.lattice.sweep import RELATIVE_TOLERANCE, Sweep
 from rig.tissue.laws import FloatArray
+from rig.tissue.summary import IndexFit, KPoint
 
 LEVEL = 0.95
 _LEAST_POINTS = 4
 _MOST_SIMULATIONS = 30
 _FORCE_TOLERANCE = 1e-4
-
-
-@dataclass(frozen=True)
-class KPoint:
-    """One force of the study's table; ``k_loop_N_mm`` is None where the search was not run."""
-
-    force_N: float
-    depth_mm: float
-    k_exact_N_mm: float
-    k_loop_N_mm: float | None = None
-    simulations: int = 0
-
-
-@dataclass(frozen=True)
-class IndexFit:
-    """k(x) = a exp(b x) through the points (least squares on ln k), with Student's intervals."""
-
-    a_N_mm: float
-    b_per_mm: float
-    a_interval: tuple[float, float]
-    b_interval: tuple[float, float]
-    r_squared: float
-
-    def __call__(self, depth_mm: FloatArray) -> FloatArray:
-        """k(x) in N/mm."""
-        return np.asarray(self.a_N_mm * np.exp(self.b_per_mm * depth_mm))
 
 
 def check_points(force_N: FloatArray, depth_mm: FloatArray) -> None:

@@ -11,15 +11,15 @@ from rig.errors import DataError
 from rig.tissue.control_table import control_rows
 from rig.tissue.fitting import fit_law
 from rig.tissue.judging import Judged, judge
-from rig.tissue.k_calculation import IndexFit, KPoint, exact_k, fit_index, study_loop
+from rig.tissue.k_calculation import exact_k, fit_index, study_loop
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.springs import Mode, Springs
 from rig.tissue.lattice.sweep import DEFAULT_STEP_MM, Sweep, sweep
 from rig.tissue.laws_lattice import lattice_laws
-from rig.tissue.model import ControlRow
 from rig.tissue.per_spring import PerSpring, Progress, per_spring
 from rig.tissue.registry import RIVALS
 from rig.tissue.study import Study, rows
+from rig.tissue.summary import ControlRow, IndexFit, KPoint
 
 _DEPTH_MARGIN = 1.02
 _DEEPEST_SHARE = 0.85

@@ -14,6 +14,7 @@ from rig.errors import DataError, UsageError
 from rig.recording.files import write_text
 from rig.tissue.laws import FloatArray, Law
 from rig.tissue.registry import law_named
+from rig.tissue.summary import ControlRow, NotNegative
 
 FORMAT: Literal["tissue-rig model"] = "tissue-rig model"
 VERSION: Literal[2] = 2
@@ -28,7 +29,6 @@ RENAMED = {
     "temperature_1_K": "temperature_per_K", "friction_start_1": "friction_start", "gain_error_1": "gain_error",
 }  # fmt: skip
 
-NotNegative = Annotated[float, Field(ge=0)]
 T = TypeVar("T")
 
 
@@ -68,23 +68,6 @@ class Interval(Table):
     unit: str
     low: float
     high: float
-
-
-class ControlRow(Table):
-    """One force: the depth at rest, stiffness from contact (secant) and for a small move (tangent), and damping.
-
-    The gain of a force loop is the tangent, not the secant that the study lists as K.
-    """
-
-    force_N: NotNegative
-    depth_mm: NotNegative
-    secant_N_mm: NotNegative
-    tangent_N_mm: NotNegative
-    tangent_low_N_mm: NotNegative
-    tangent_high_N_mm: NotNegative
-    damping_N_s_mm: NotNegative
-    damping_low_N_s_mm: NotNegative
-    damping_high_N_s_mm: NotNegative
 
 
 class Effect(Table):

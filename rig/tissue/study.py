@@ -3,7 +3,6 @@
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,28 +16,13 @@ from rig.tissue.laws import FloatArray, Law
 from rig.tissue.model import Model, Provenance, Quality, ValidRange
 from rig.tissue.rates import RateTest, rate_of
 from rig.tissue.registry import COMPARED
+from rig.tissue.summary import Row, Skipped, SpeedSummary
 from rig.trials.curves import Curve, loading_curve
 from rig.trials.cycles import cycle_of
 from rig.trials.quality import refusal
 
 Laws = Sequence[type[Law]]
 Known = Mapping[str, float]
-
-
-class Skipped(NamedTuple):
-    """A trial that gave no curve, and the sentence that says why."""
-
-    trial: str
-    reason: str
-
-
-class SpeedSummary(NamedTuple):
-    """What was measured at one speed; depth and force are the largest of its trials."""
-
-    speed_mm_s: float
-    trials: int
-    max_depth_mm: float
-    max_force_N: float
 
 
 @dataclass(frozen=True)
@@ -99,7 +83,7 @@ def study_sessions(sessions: Sequence[Session], laws: Laws = COMPARED, known: Kn
         place = str(session.folder)
         found, missing = _curves_or_refusal(session)
         curves += [replace(curve, name=f"{place}/{curve.name}") for curve in found]
-        skipped += [Skipped(f"{place}/{trial}", reason) for trial, reason in missing]
+        skipped += [Skipped(f"{place}/{one.trial}", one.reason) for one in missing]
     return study_curves(", ".join(session.info.id for session in sessions), curves, skipped, laws, known)
 
 
@@ -196,17 +180,6 @@ def fingerprint(curves: Sequence[Curve]) -> str:
     return digest.hexdigest()
 
 
-class Row(NamedTuple):
-    """One given force in the study's table: means over the trials that reached it, and the worst trial's error."""
-
-    force_N: float
-    measured_mm: float
-    measured_spread_mm: float
-    predicted_mm: float
-    error_mm: float
-    error_percent: float
-
-
 def rows(errors: Errors) -> list[Row]:
     """One row a given force; spread is the standard deviation over trials."""
     found = []
@@ -223,7 +196,7 @@ def rows(errors: Errors) -> list[Row]:
                 float(measured[reached].std()),
                 float(predicted[reached].mean()),
                 float(errors.error_mm[reached, index].max()),
-                float(np.nanmax(percent)) if np.isfinite(percent).any() else float("nan"),
+                float(np.nanmax(percent)) if np.isfinite(percent).any() else None,
             )
         )
     return found

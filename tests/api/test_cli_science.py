@@ -34,7 +34,7 @@ def test_fit_writes_picture_table_and_model_beside_the_session(session: Path, tm
     assert values["model"] == str(session / "fit" / "model.json")
     assert values["constant"]["max_error_percent"] > 10 * values["index"]["max_error_percent"]
     assert {path.name for path in (session / "fit").iterdir()} == {
-        "fit.png", "fit.svg", "residuals.png", "table.csv", "model.json"
+        "fit.json", "fit.png", "fit.svg", "residuals.png", "residuals.svg", "table.csv", "model.json"
     }  # fmt: skip
     assert (session / "fit" / "fit.png").read_bytes().startswith(b"\x89PNG")
     assert load_model(session / "fit" / "model.json").law.name == "index"

@@ -12,12 +12,14 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from dataclasses import astuple
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
-from rig.diagnosis.answers import Diagnosis, Interval
+from rig.diagnosis.answers import Diagnosis
+from rig.diagnosis.estimates import Estimate
 from rig.diagnosis.observations import observe
 from rig.diagnosis.run import diagnose_session
 from rig.diagnosis.sources import read_source
@@ -125,20 +127,20 @@ def of_diagnosis(result: Diagnosis) -> Figures:
         "verdict": result.verdict,
         "recordings": result.recordings,
         "base": [_interval(found) for found in result.base.values()],
-        "detectable": {name: size for name, (size, _) in sorted(result.detectable.items())},
+        "detectable": {name: size.minimum for name, size in sorted(result.detectable.items())},
         "named": [
             {
                 "causes": list(found.effects),
-                "evidence": [found.nats, found.p_value, found.confidence],
+                "evidence": [found.evidence_nats, found.p_value, found.confidence],
                 "parameters": [_interval(size) for size in found.parameters.values()],
-                "gain": [found.gain.before, found.gain.after, *_interval(found.gain.reduction)],
+                "gain": list(astuple(found.gain)),
             }
             for found in result.findings
         ],
     }
 
 
-def _interval(found: Interval) -> list[float]:
+def _interval(found: Estimate) -> list[float]:
     return [found.value, found.low, found.high]
 
 
@@ -146,7 +148,7 @@ def of_study(study: Study) -> Figures:
     """The fit's figures, without its words."""
     return {
         "curves": {curve.name: of_curve(curve) for curve in study.curves},
-        "skipped": [name for name, _ in study.skipped],
+        "skipped": [one.trial for one in study.skipped],
         "force_N": study.force_N.tolist(),
         "closest": study.closest,
         "laws": {name: _judged(judged) for name, judged in study.judged.items()},

@@ -9,8 +9,6 @@ from api.operations import motion
 from api.operations.motion import TrackRequest
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
-from controller.experiments.tracked import Tracked
-from controller.experiments.tracking import Followed
 from controller.loop.messages import Outcome
 from controller.loop.steps import Program, Retract
 from controller.operation import Operation
@@ -19,6 +17,7 @@ from rig.config.protocol import Indentation
 from rig.config.quality import QualityLimits
 from rig.config.wiring import Limits, Wiring
 from rig.errors import SafetyStop
+from rig.results.tracking import Followed, LoopCount, TrackResult
 from tests.controller.experiments.test_verdicts import BAD, GOOD, FakeRecorder
 
 PLAN = Indentation(name="short", speeds_mm_s=(10.0,), trials=2, quality=QualityLimits(repeats=1))
@@ -82,9 +81,12 @@ def test_a_capture_that_is_cancelled_keeps_the_trials_so_far(folder: Path, monke
     assert sorted(path.name for path in folder.glob("*.mcap")) == ["trial_001.mcap"]
 
 
-def followed(rms_error_N: float) -> Tracked:
-    whole = Followed(rms_error_N=rms_error_N, largest_error_N=1.0, amplitude_ratio=None, lag_s=None)
-    return Tracked("track_001.mcap", "model.json", (), whole, 1, 0, 1, 0)
+def followed(rms_error_N: float) -> TrackResult:
+    return TrackResult(
+        recording="track_001.mcap", model="model.json", max_error_percent=None, rms_error_N=None, levels=(),
+        followed=Followed(rms_error_N=rms_error_N, largest_error_N=1.0, amplitude_ratio=None, lag_s=None),
+        samples=1, dropped=0, loop=LoopCount(ticks=1, missed=0),
+    )  # fmt: skip
 
 
 def requests() -> tuple[TrackRequest, TrackRequest]:
@@ -98,19 +100,18 @@ def test_what_a_model_gains_over_another_is_part_of_the_result(tmp_path: Path, m
     new, old = requests()
     operation = Operation("track", total=2, unit="runs")
     found = motion.track(operation, bench(), new, tmp_path, old)
-    assert found.reduction == pytest.approx(0.75)
-    assert found.as_json()["gain"] == {
+    assert found.model_dump()["gain"] == {
         "rms_error_before_N": 0.4, "rms_error_after_N": 0.1, "reduction": pytest.approx(0.75)
     }  # fmt: skip
     assert operation.progress.done == 2
     alone = motion.track(Operation("track"), bench(), new, tmp_path)
-    assert alone.reduction is None and "gain" not in alone.as_json()
+    assert alone.gain is None and alone.against is None
 
 
 def test_a_comparison_that_is_cancelled_starts_no_second_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     operation, runs = Operation("track", total=2, unit="runs"), list[str]()
 
-    def run(_bench: object, _program: object, _folder: Path, model: str) -> Tracked:
+    def run(_bench: object, _program: object, _folder: Path, model: str) -> TrackResult:
         runs.append(model)
         operation.cancel()
         return followed(0.1)

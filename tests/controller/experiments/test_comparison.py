@@ -7,9 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from controller.experiments import comparison, tracking
-from controller.experiments.comparison import Run, choices_from
+from controller.experiments.comparison import choices_from, compared_run
 from controller.loop.modes import Mode
 from rig.errors import DataError, UsageError
+from rig.results.tables import run_table
 
 Column = NDArray[np.float64]
 TIME_S = np.arange(3000, dtype=np.float64) * 1e-3
@@ -48,10 +49,10 @@ def test_a_jump_down_overshoots_downwards() -> None:
 def test_force_that_leaves_the_band_again_has_not_settled() -> None:
     swinging = 1.0 + 0.05 * np.sin(2 * np.pi * TIME_S[:2000])
     (jump,) = comparison.jumps(TIME_S, STEP_N, after(swinging), CONTACT)
-    run = Run("firm", "tangent", (jump,))
+    run = compared_run("firm", "tangent", (jump,))
     assert jump.settling_s is None
-    assert run.worst["settling_s"] is None
-    assert comparison.rows([run])[0][6] == "--"
+    assert run.worst.settling_s is None
+    assert run_table([run]).rows[0][6] == "–"
 
 
 def test_the_response_to_the_next_jump_does_not_count_as_error_of_this_one() -> None:

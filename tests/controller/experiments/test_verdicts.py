@@ -10,8 +10,6 @@ import pytest
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.experiments.recorded import Recorded
-from controller.experiments.tracked import Tracked
-from controller.experiments.tracking import Followed
 from controller.experiments.verdicts import refuse_bad, remaining_bad, with_quality
 from controller.loop.messages import Outcome
 from controller.operation import Operation
@@ -21,6 +19,7 @@ from rig.config.quality import QualityLimits
 from rig.config.wiring import Wiring
 from rig.errors import BadTrial, SafetyStop
 from rig.recording.sessions import SessionInfo, TrialInfo, open_session
+from rig.results.tracking import Followed, LoopCount, TrackResult
 from tests.rig.tissue.synthetic import Bench, metadata, tables, write_recording
 
 NOISY = ("fx_N", "fy_N", "mx_N_m", "my_N_m", "mz_N_m")
@@ -126,7 +125,11 @@ def test_a_trial_is_compared_with_those_before_that_reached_the_same_depth(tmp_p
 
 def test_a_run_of_force_of_bad_quality_ends_with_the_same_code() -> None:
     followed = Followed(rms_error_N=0.1, largest_error_N=0.2, amplitude_ratio=None, lag_s=None)
-    run = Tracked("track_001.mcap", "model.json", (), followed, 1, 0, 1, 0, "usable", ("axis: a gap of 58 ms",))
+    run = TrackResult(
+        recording="track_001.mcap", model="model.json", max_error_percent=None, rms_error_N=None, levels=(),
+        followed=followed, samples=1, dropped=0, loop=LoopCount(ticks=1, missed=0), quality="usable",
+        reasons=("axis: a gap of 58 ms",),
+    )  # fmt: skip
     tracked.refuse_bad(run)
     with pytest.raises(BadTrial, match=r"track_001.mcap is of bad quality: axis: a gap of 58 ms"):
-        tracked.refuse_bad(replace(run, quality="bad"))
+        tracked.refuse_bad(run.model_copy(update={"quality": "bad"}))

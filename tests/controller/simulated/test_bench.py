@@ -45,7 +45,7 @@ SUBJECT_NAMES = ("soft", "average", "lean", "firm", "tense")
 def worst(step: TrackForce, bench: SimulatedBench, rest_s: float = 0.0) -> dict[str, float | None]:
     trace = follow(step, np.concatenate([np.full(round(1000 * rest_s), STAIRS_N[0]), STAIRS_N]), bench)
     jumps = comparison.jumps(trace.time_s, trace.reference_N, trace.sensed_N, trace.mode)
-    return comparison.Run("", "", jumps).worst
+    return comparison.compared_run("", "", jumps).worst.model_dump()
 
 
 def law(name: str, choice: Choice = "tangent", adapt: bool = False) -> TrackForce:

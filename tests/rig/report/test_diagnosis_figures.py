@@ -2,14 +2,15 @@
 
 from dataclasses import replace
 
-from rig.diagnosis.answers import Answer, Diagnosis, Gain, Interval
+from rig.diagnosis.answers import Diagnosis
+from rig.diagnosis.estimates import ErrorGain, NamedCause
 from rig.diagnosis.omnibus import Leftover
 from rig.report.diagnosis_figures import offending
 
 BEFORE = Leftover({"velocity": 300.0, "depth": 80.0}, {}, 0.002)
 AFTER = Leftover({"velocity": 1.0, "depth": 75.0}, {}, 0.4)
-RUBS = Answer(
-    ("friction",), "the guide rubs", 0.99, {}, Gain("N", 0.07, 0.01, Interval(0.85, 0.8, 0.9)), 900.0, 0.002, "", False
+RUBS = NamedCause(
+    ("friction",), "the guide rubs", 0.99, {}, ErrorGain(0.07, 0.01, 0.85, 0.8, 0.9), 900.0, 0.002, "", False
 )
 FOUND = Diagnosis(
     session="s", simulation="index", recordings=10, verdict="explained", statement="", findings=(RUBS,), depends_on=(),

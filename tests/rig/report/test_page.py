@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from api.cli.fitting import Wanted, fit_and_write
 from rig.errors import DataError, UsageError
 from rig.recording.sessions import SessionInfo, TrialInfo, open_session, write_session
 from rig.report.page import write_report
@@ -18,6 +19,13 @@ VOID = {"meta", "link", "br", "img", "hr", "input"}
 LEVEL = {
     "given_N": 2.0, "actual_N": 2.001, "error_N": 0.001, "error_percent": 0.05, "max_error_N": 0.01,
     "max_error_percent": 0.5, "rms_error_N": 0.004, "overshoot_percent": 1.2, "settling_s": None,
+}  # fmt: skip
+
+
+TRACKED = {
+    "recording": "track_001.mcap", "model": "fit/model.json", "max_error_percent": 0.5, "rms_error_N": 0.004,
+    "levels": [LEVEL], "samples": 2000, "dropped": 0, "loop": {"ticks": 2000, "missed": 0}, "quality": "good",
+    "followed": {"rms_error_N": 0.02, "largest_error_N": 0.4, "amplitude_ratio": None, "lag_s": None},
 }  # fmt: skip
 
 
@@ -71,8 +79,7 @@ def track_into(folder: Path) -> None:
     loop["reference_N"][500:] = 2.0
     loop["missed"][800:] = 3
     write_recording(folder / "track_001.mcap", streams, metadata(run) | {"trial": {"kind": "tracking"}})
-    result = {"max_error_percent": 0.5, "rms_error_N": 0.004, "levels": [LEVEL]}
-    (folder / "track.json").write_text(json.dumps(result))
+    (folder / "track.json").write_text(json.dumps(TRACKED))
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +89,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     cycles = Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0, 10.0, 20.0, 30.0))
     subject: dict[str, object] = {"id": "<script>alert(1)</script>", "site": 'fore & "arm"'}
     write_made_session(folder, cycles, subject=subject, protocol={"name": "indentation", "speeds_mm_s": [5.0, 10.0]})
+    fit_and_write([folder], wanted=Wanted.from_options("layer", ["thickness_mm=30"], "layer"))
     track_into(folder)
     return folder
 
@@ -97,7 +105,7 @@ def test_the_page_is_well_formed_and_has_all_parts(html: str) -> None:
     page = Page(html)
     assert page.open == []
     assert page.headings[1:] == [
-        "Force and displacement", "Constant stiffness and index model", "Force tracking",
+        "Force and displacement", "Tissue laws compared", "Force tracking",
         "What the simulation gets wrong", "The loop", "What was recorded", "Bench, subject and protocol",
     ]  # fmt: skip
     assert page.tags.count("svg") == 4
@@ -106,7 +114,7 @@ def test_the_page_is_well_formed_and_has_all_parts(html: str) -> None:
 def test_the_headline_says_what_came_out(html: str) -> None:
     headline = Page(html).headings[0]
     assert re.fullmatch(
-        r"The index model predicts displacement on left\u2011out trials within [\d.]+ mm \([\d.]+ %\), "
+        r"The index law predicts displacement on left\u2011out trials within [\d.]+ mm \([\d.]+ %\), "
         r"constant stiffness within [\d.]+ mm \([\d.]+ %\); force was tracked within 0.5 %",
         headline.replace("\u00a0", " "),
     )
@@ -139,7 +147,7 @@ def test_recordings_devices_and_privileges_are_listed(html: str) -> None:
     assert "0 dropped samples" in words
 
 
-def test_tracking_is_a_table_of_given_and_actual_force(html: str) -> None:
+def test_tracking_is_a_table_of_reference_and_actual_force(html: str) -> None:
     words = Page(html).words
     assert "2.00 2.001 +0.001 +0.05 0.010 0.0040 1.2 –" in words
     assert "0.5 % worst force-tracking error 0.004 N rms" in words
@@ -182,7 +190,7 @@ def test_a_session_without_curves_loop_tracking_or_devices_still_has_a_report(tm
     page = Page((tmp_path / "report.html").read_text())
     assert page.headings[0] == "1 recording, without a fit"
     for said in (
-        "No fit: ", "no contact", "No force was tracked in this session", "No loop ran in this session",
+        "This session was not fitted; `rig fit", "No force was tracked in this session", "No loop ran in this session",
         "The recordings name no device", "No protocol: imported data", "0 dropped samples",
     ):  # fmt: skip
         assert said in page.words
@@ -208,7 +216,7 @@ def test_an_unreadable_tracking_result_is_one_line(tmp_path: Path, content: str)
     (folder / "track.json").write_text(content)
     write_report(folder, tmp_path / "report.html")
     page = Page((tmp_path / "report.html").read_text())
-    assert "No table of given and actual force" in page.words
+    assert "No table of reference and actual force" in page.words
     assert "tracked within" not in page.headings[0]
 
 

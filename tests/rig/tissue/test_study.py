@@ -13,11 +13,14 @@ import pytest
 from rig.errors import DataError, UsageError
 from rig.recording.importing import import_session
 from rig.recording.sessions import Session, open_session, write_session
+from rig.results.csv import as_csv
+from rig.results.fit import FitResult
+from rig.results.study import fit_result
 from rig.tissue.laws_viscous import QuasiLinear
 from rig.tissue.model import load_model
 from rig.tissue.registry import COMPARED
-from rig.tissue.results import as_csv, as_json
 from rig.tissue.study import Study, fingerprint, model_of, rows, study_curves, study_session, study_sessions
+from rig.tissue.summary import Skipped
 from tests.rig.tissue.synthetic import Bench, index_force, metadata, tables, write_made_session, write_recording
 
 
@@ -39,11 +42,16 @@ def study(folder: Path) -> Study:
     return study_session(open_session(folder))
 
 
+def result_of(study: Study) -> FitResult:
+    """The study as `rig fit` saves it."""
+    return fit_result(study, "model.json", "index", {}, {})
+
+
 def test_every_trial_with_a_curve_counts_and_the_others_say_why_not(study: Study) -> None:
     assert [curve.name for curve in study.curves] == [
         "trial_500", "trial_501", "trial_1000", "trial_1001", "trial_3000", "trial_3001"
     ]  # fmt: skip
-    assert [trial for trial, _ in study.skipped] == ["trial_999"]
+    assert [one.trial for one in study.skipped] == ["trial_999"]
     assert "no contact" in study.skipped[0].reason
 
 
@@ -55,9 +63,8 @@ def test_a_trial_of_bad_quality_is_left_out_and_said(tmp_path: Path) -> None:
     write_session(folder, replace(session.info, trials=(spoilt, replace(second, quality="usable"))))
     study = study_session(open_session(folder))
     assert [curve.name for curve in study.curves] == [second.name]
-    assert study.skipped == (
-        (first.name, "left out, its quality is bad: force: a gap of 500 ms (good up to 20 ms)"),
-    )  # fmt: skip
+    why = "left out, its quality is bad: force: a gap of 500 ms (good up to 20 ms)"
+    assert study.skipped == (Skipped(first.name, why),)
 
 
 def test_the_index_law_is_closest_on_tissue_that_follows_it(study: Study) -> None:
@@ -74,7 +81,7 @@ def test_all_laws_are_judged_on_the_same_measured_displacements(study: Study) ->
 
 
 def test_the_json_has_what_the_demonstration_quotes(study: Study) -> None:
-    values = json.loads(json.dumps(as_json(study), allow_nan=False))
+    values = json.loads(result_of(study).model_dump_json())
     assert values["constant"]["max_error_percent"] > values["index"]["max_error_percent"] > 0
     assert set(values["index"]["parameters"]) == {"a_N_mm", "b_per_mm", "damping_N_s_mm"}
     assert values["index"]["parameters"]["a_N_mm"]["unit"] == "N/mm"
@@ -87,13 +94,13 @@ def test_the_json_has_what_the_demonstration_quotes(study: Study) -> None:
 
 def test_the_json_says_null_where_nothing_could_be_left_out(tmp_path: Path) -> None:
     study = study_session(open_session(write_made_session(tmp_path / "one", [Bench().cycle(10.0, 1)])))
-    assert as_json(study)["index"]["held_out"] == {"trials": None, "speeds": None, "subjects": None}  # type: ignore[index]
-    table = list(csv.DictReader(io.StringIO(as_csv(study))))
+    assert result_of(study).laws["index"].held_out.model_dump() == {"trials": None, "speeds": None, "subjects": None}
+    table = list(csv.DictReader(io.StringIO(as_csv(result_of(study)))))
     assert table[0]["index_error_trial_left_out_mm"] == ""
 
 
 def test_the_csv_has_one_row_a_force_and_the_worst_trial_s_errors(study: Study) -> None:
-    table = list(csv.DictReader(io.StringIO(as_csv(study))))
+    table = list(csv.DictReader(io.StringIO(as_csv(result_of(study)))))
     found = rows(study.judged["index"].fitted)
     assert [float(row["force_N"]) for row in table] == pytest.approx(study.force_N, rel=1e-5)
     assert [float(row["index_error_mm"]) for row in table] == pytest.approx([row.error_mm for row in found], rel=1e-4)
@@ -119,7 +126,7 @@ def test_the_table_a_controller_reads_is_in_the_json_and_in_the_model(study: Stu
     model_of(study, "index", {}).save(tmp_path / "model.json")
     model = load_model(tmp_path / "model.json")
     assert [row.force_N for row in model.control] == pytest.approx(study.force_N)
-    values = json.loads(json.dumps(as_json(study)))
+    values = json.loads(result_of(study).model_dump_json())
     assert values["index"]["control"] == [row.model_dump() for row in model.control]
     law, low_B, high_B = model.law, *model.intervals["damping_N_s_mm"]
     for row in model.control:
@@ -131,7 +138,7 @@ def test_the_table_a_controller_reads_is_in_the_json_and_in_the_model(study: Stu
 
 
 def test_the_json_says_whether_speeds_differ(study: Study) -> None:
-    rate = json.loads(json.dumps(as_json(study)))["rate"]
+    rate = json.loads(result_of(study).model_dump_json())["rate"]
     assert rate["interval"][0] < 0.01 < rate["interval"][1]
     assert rate["excludes_study"] is True
     assert rate["effect_interval_N"][0] < rate["effect_N"] < rate["effect_interval_N"][1]
@@ -152,9 +159,10 @@ def test_each_subject_is_left_out_where_there_are_several(tmp_path: Path) -> Non
     assert judged.trials_left_out is not None
     assert judged.subjects_left_out.measured_mm.shape == (9, 10)
     assert judged.subjects_left_out.rmse_N > 1.2 * judged.trials_left_out.rmse_N
-    assert as_json(study)["index"]["held_out"]["subjects"]["rmse_N"] == judged.subjects_left_out.rmse_N  # type: ignore[index]
+    held_out = result_of(study).laws["index"].held_out.subjects
+    assert held_out is not None and held_out.rmse_N == judged.subjects_left_out.rmse_N
     assert study.curves[0].name == f"{tmp_path / 'soft'}/trial_000"
-    table = list(csv.DictReader(io.StringIO(as_csv(study))))
+    table = list(csv.DictReader(io.StringIO(as_csv(result_of(study)))))
     assert float(table[0]["index_error_subject_left_out_mm"]) > 0
     assert study.rate is not None
     assert study.rate.damping_N_s_mm == pytest.approx(0.01, abs=0.003)
@@ -176,8 +184,8 @@ def test_a_session_given_twice_is_refused(tmp_path: Path) -> None:
 def test_other_laws_are_judged_beside_the_study_s_two(study: Study) -> None:
     more = study_curves("made", study.curves, laws=[*COMPARED, QuasiLinear], known={"tau_s": 0.5})
     assert list(more.judged) == ["constant", "index", "qlv"]
-    values = as_json(more)["qlv"]["parameters"]["tau_s"]  # type: ignore[index]
-    assert (values["value"], values["known"], values["standard_error"]) == (0.5, True, 0.0)
+    tau = result_of(more).laws["qlv"].parameters["tau_s"]
+    assert (tau.value, tau.known, tau.standard_error) == (0.5, True, 0.0)
     assert more.judged["index"].law == study.judged["index"].law
 
 

@@ -1,0 +1,41 @@
+"""The root of all results: frozen, read from what science computed, one JSON form."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Self, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+
+from rig.errors import UsageError
+from rig.recording.files import write_text
+
+Value = TypeVar("Value")
+
+
+def known(value: Value) -> Value | None:
+    """``value``; None for NaN and infinities, which stand for what nobody knows."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+Number = Annotated[float | None, BeforeValidator(known)]
+"""A number that may be unknown: NaN and infinities become None, which is null in JSON."""
+
+
+class Result(BaseModel):
+    """A result; fields carry their unit in the name. Objects with the same attributes are taken as they are."""
+
+    model_config = ConfigDict(frozen=True, from_attributes=True, allow_inf_nan=False)
+
+    def write(self, path: Path) -> None:
+        """Writes the JSON, whole or not at all."""
+        write_text(path, self.model_dump_json(indent=2) + "\n")
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """What ``write`` wrote; raises OSError where there is no such file, UsageError where it is another."""
+        try:
+            return cls.model_validate_json(path.read_bytes())
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(map(str, first["loc"])) or "the file"
+            raise UsageError(f"{path}: holds no {cls.__name__}: {place}: {first['msg']}") from error

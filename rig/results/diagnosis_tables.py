@@ -1,0 +1,98 @@
+"""A diagnosis, and a protocol check, in tables and sentences: once, for terminal and HTML alike."""
+
+from collections.abc import Iterator, Mapping
+from itertools import chain, repeat
+
+from rig.diagnosis.estimates import NamedCause, NextExperiment, SimulationError, SmallestSize
+from rig.diagnosis.gates import Finding
+from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
+from rig.results.tables import TextTable
+
+# Janot, Gautier, Brunot, "Data Set and Reference Models of EMPS", 2019: symmetric model, closed-loop simulation.
+PUBLISHED = {"DATA_EMPS": "; published 5.85 %", "DATA_EMPS_PULSES": "; published 8.94 %"}
+
+
+def named_table(result: DiagnosisResult) -> TextTable:
+    """The causes named, with their sizes."""
+    rows = [
+        (cause, name, f"{found.value:.4g}", f"{found.low:.4g} to {found.high:.4g}{', at its bound' * found.at_bound}")
+        for finding in result.findings
+        for cause, (name, found) in zip(_once(" or ".join(finding.effects)), finding.parameters.items(), strict=False)
+    ]
+    title = "Named" if result.verdict == "explained" else "Named provisionally"
+    return TextTable(title, ("cause", "parameter", "value", "95 % interval"), rows, words=2)
+
+
+def _once(text: str) -> Iterator[str]:
+    """``text``, then nothing for ever: a name beside the first of its rows."""
+    return chain([text], repeat(""))
+
+
+def gain_sentence(finding: NamedCause) -> str:
+    """What a named cause takes off the error, and what repairs it."""
+    gain = finding.gain
+    return (
+        f"{finding.effects[0]}: error on recordings left out {gain.rmse_before_N:.4f} -> {gain.rmse_after_N:.4f} N "
+        f"({100 * gain.reduction:.0f} % less, {100 * gain.low:.0f} to {100 * gain.high:.0f}), "
+        f"{finding.evidence_nats:.0f} nats; {finding.repair}"
+    )
+
+
+def detectable_table(found: Mapping[str, SmallestSize], title: str, header: str) -> TextTable:
+    """From what size each cause would be named."""
+    rows = [(name, f"{size.minimum:.3g} {size.unit}".removesuffix(" 1")) for name, size in sorted(found.items())]
+    return TextTable(title, ("cause", header), rows, words=2)
+
+
+def not_found_table(result: DiagnosisResult) -> TextTable:
+    """The causes that were looked for and not found."""
+    return detectable_table(result.detectable, "Not found", "would have been named from")
+
+
+def further_sentences(result: DiagnosisResult) -> list[str]:
+    """What could not be tested, what the data show of themselves, and what to do next."""
+    said = untestable_sentences(result.not_testable)
+    if not result.parameters:
+        said = [f"cannot be tested: any of the {len(result.not_testable)} causes, for this reason"]
+    said += [_in_closed_loop(item) for item in result.simulation_error]
+    said += [_of_the_data(finding) for finding in result.data_quality]
+    return said + ([next_sentence(result.next_experiment)] if result.next_experiment else [])
+
+
+def untestable_sentences(reasons: Mapping[str, str]) -> list[str]:
+    """Each reason once, with the causes it holds for."""
+    return [
+        f"cannot be tested: {', '.join(sorted(name for name, why in reasons.items() if why == reason))}: {reason}"
+        for reason in dict.fromkeys(reasons.values())
+    ]
+
+
+def _of_the_data(finding: Finding) -> str:
+    others = f" (and in {finding.recordings - 1} more)" if finding.recordings > 1 else ""
+    return f"data: {f'{finding.recording} ' if finding.recording else ''}{finding.text}{others}"
+
+
+def _in_closed_loop(item: SimulationError) -> str:
+    which = "fitted" if item.fitted else "left out"
+    return (
+        f"closed-loop force error, {item.recording} ({which}): "
+        f"{item.before_percent:.2f} % -> {item.after_percent:.2f} %{PUBLISHED.get(item.recording, '')}"
+    )
+
+
+def next_sentence(experiment: NextExperiment) -> str:
+    """The next experiment as a sentence."""
+    said = f"next experiment: {experiment.do}"
+    if experiment.nats_per_minute is None:
+        return said
+    causes = " from ".join(experiment.separates)
+    return f"{said}, which separates {causes} at {experiment.nats_per_minute:.1f} nats a minute"
+
+
+def check_tables(result: ProtocolCheckResult) -> list[TextTable]:
+    """What the protocol can show, and the pairs it cannot separate safely."""
+    title = "On a limb and noise as the mock bench has them"
+    tables = [detectable_table(result.detectable, title, "visible from")]
+    pairs = [(*one.pair, f"{one.nats:.1f}") for one in (*result.not_separable, *result.ambiguous)]
+    header = ("cause", "imitated by", f"nats left of {result.confusion_nats.of:g}")
+    return tables + ([TextTable("Hard to separate (safe from 20)", header, pairs, words=2)] if pairs else [])

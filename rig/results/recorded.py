@@ -1,0 +1,118 @@
+"""What commands on recordings say: capture, verify, repair, import, export, doctor."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+from pydantic import Field
+
+from rig.recording.sessions import TrialInfo
+from rig.results.base import Number, Result
+
+Quality = Literal["", "good", "usable", "bad"]
+
+
+class CapturedTrial(Result):
+    """One trial of a capture; ``surface_mm`` is where the surface was found, with its 95 % interval."""
+
+    name: str
+    speed_mm_s: Number
+    outcome: str
+    peak_force_N: Number
+    quality: Quality
+    reasons: tuple[str, ...]
+    measured: Mapping[str, Number]
+    repeats: str
+    surface_mm: tuple[Number, Number, Number]
+
+
+def captured_trial(info: TrialInfo) -> CapturedTrial:
+    """What a session lists of a trial."""
+    surface_mm = (info.surface_mm, info.surface_low_mm, info.surface_high_mm)
+    return CapturedTrial.model_validate({**vars(info), "surface_mm": surface_mm})
+
+
+class CaptureResult(Result):
+    """A session that was captured."""
+
+    session: str
+    recordings: int
+    samples: int
+    dropped: int
+    trials: tuple[CapturedTrial, ...]
+    bad: tuple[str, ...] = Field(default=(), description="trials that stayed bad, however often they were made again")
+
+
+class StreamResult(Result):
+    """One stream of a recording: what is there, and what is known not to be; see `rig.recording.verify`."""
+
+    samples: int
+    first_seq: int
+    last_seq: int
+    missing: int
+    duplicates: int
+    out_of_order: int
+    dropped: int
+    lost: int
+    rate_Hz: Number
+
+
+class RecordingResult(Result):
+    """What a recording proves about itself."""
+
+    state: Literal["complete", "incomplete", "damaged"]
+    ok: bool
+    sentence: str
+    damage: tuple[str, ...]
+    streams: Mapping[str, StreamResult]
+
+
+class VerifiedTrial(RecordingResult):
+    """A recording with the quality of its trial; empty where nobody judged it."""
+
+    quality: Quality = ""
+    reasons: tuple[str, ...] = ()
+    measured: Mapping[str, Number] = {}
+
+
+class VerifyResult(Result):
+    """Whether a session, or one recording, is whole."""
+
+    ok: bool
+    remarks: tuple[str, ...]
+    recordings: Mapping[str, VerifiedTrial]
+
+
+class ImportResult(Result):
+    """A session that was made of measured files; ``samples`` by stream."""
+
+    session: str
+    recordings: int
+    samples: Mapping[str, int]
+    remarks: tuple[str, ...]
+
+
+class ExportResult(Result):
+    """What was written, by format."""
+
+    session: str
+    written: Mapping[str, str]
+
+
+class DeviceReport(Result):
+    """What was seen of one device; ``problem`` is empty if it is fit for use."""
+
+    role: str
+    product: str = ""
+    serial: str = ""
+    firmware: str = ""
+    rate_Hz: float = 0.0
+    noise: str = ""
+    latency_ms: float = 0.0
+    range: str = ""
+    problem: str = ""
+
+
+class DoctorResult(Result):
+    """All devices of the bench."""
+
+    devices: tuple[DeviceReport, ...]

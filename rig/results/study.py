@@ -1,0 +1,73 @@
+"""From a study of tissue laws to its result."""
+
+import math
+from collections.abc import Mapping
+
+from rig.results.fit import DisplacementErrors, FitResult, HeldOut, LawResult, ParameterResult
+from rig.tissue.control_table import control_rows
+from rig.tissue.judging import LEVEL, Errors, Judged
+from rig.tissue.laws import FloatArray
+from rig.tissue.study import Known, Study, rows
+
+
+def fit_result(study: Study, model: str, model_law: str, known: Known, recordings: Mapping[str, str]) -> FitResult:
+    """The study as it is saved; ``model`` is the file that holds ``model_law``, ``recordings`` name and hash."""
+    fields: dict[str, object] = {
+        "session": study.session,
+        "trials": [curve.name for curve in study.curves],
+        "skipped": study.skipped,
+        "speeds": study.speeds,
+        "force_N": study.force_N.tolist(),
+        "closest": study.closest,
+        "rate": study.rate,
+        "model": model,
+        "model_law": model_law,
+        "known": known,
+        "recordings": recordings,
+    }
+    laws = {name: law_result(judged, study.force_N) for name, judged in study.judged.items()}
+    return FitResult.model_validate(fields | laws)
+
+
+def law_result(judged: Judged, force_N: FloatArray) -> LawResult:
+    """A fitted law with its errors, and with what it means to a force loop at each force [N]."""
+    fitted, left_out = judged.fitted, (judged.trials_left_out, judged.speeds_left_out, judged.subjects_left_out)
+    trials, speeds, subjects = map(errors_result, left_out)
+    return LawResult(
+        max_error_mm=fitted.max_error_mm,
+        max_error_percent=fitted.max_error_percent,
+        rmse_N=fitted.rmse_N,
+        rows=tuple(rows(fitted)),
+        formula=judged.law.formula,
+        parameters=_parameters(judged),
+        interval_level=LEVEL,
+        interval_method=judged.interval_method,
+        held_out=HeldOut(trials=trials, speeds=speeds, subjects=subjects),
+        control=control_rows(judged, force_N),
+    )
+
+
+def errors_result(errors: Errors | None) -> DisplacementErrors | None:
+    """The errors as a result holds them; None where nothing could be left out."""
+    if errors is None:
+        return None
+    return DisplacementErrors(
+        max_error_mm=errors.max_error_mm,
+        max_error_percent=errors.max_error_percent,
+        rmse_N=errors.rmse_N,
+        rows=tuple(rows(errors)),
+    )
+
+
+def _parameters(judged: Judged) -> dict[str, ParameterResult]:
+    return {
+        p.name: ParameterResult(
+            value=p.value,
+            unit=p.unit,
+            standard_error=math.sqrt(judged.covariance[i, i]),
+            interval=judged.intervals[p.name],
+            at_bound=p.name in judged.fit.at_bounds,
+            known=p.name in judged.fit.known,
+        )
+        for i, p in enumerate(judged.law.parameters)
+    }

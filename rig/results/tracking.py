@@ -1,0 +1,158 @@
+"""What force tracking found: runs on the bench, gains compared, simulations, and the subject's threshold."""
+
+from collections.abc import Mapping
+
+from pydantic import Field
+
+from rig.results.base import Result
+
+FILE = "track.json"
+
+
+class Plateau(Result):
+    """Reference and actual force on one level of the reference; the first second of it is not counted."""
+
+    given_N: float
+    actual_N: float
+    error_N: float
+    error_percent: float
+    max_error_N: float
+    max_error_percent: float
+    rms_error_N: float
+    overshoot_percent: float
+    settling_s: float | None
+
+
+class Followed(Result):
+    """How well force followed a moving reference, over all contact after the lead-in.
+
+    ``amplitude_ratio`` and ``lag_s`` are those at the reference's strongest frequency; None where it has none.
+    """
+
+    rms_error_N: float
+    largest_error_N: float
+    amplitude_ratio: float | None
+    lag_s: float | None
+
+
+class LoopCount(Result):
+    """Cycles of the loop during the run, and those it missed."""
+
+    ticks: int
+    missed: int
+
+
+class TrackingGain(Result):
+    """What one model gains over another on the same bench and reference, jumps included."""
+
+    rms_error_before_N: float
+    rms_error_after_N: float
+    reduction: float
+
+
+class TrackResult(Result):
+    """Reference and actual force, level by level, and where it is recorded."""
+
+    recording: str
+    model: str
+    max_error_percent: float | None
+    rms_error_N: float | None
+    levels: tuple[Plateau, ...]
+    followed: Followed
+    samples: int
+    dropped: int
+    loop: LoopCount
+    quality: str = ""
+    reasons: tuple[str, ...] = ()
+    against: "TrackResult | None" = Field(default=None, description="the run with the other model, where there is one")
+    gain: TrackingGain | None = None
+
+
+def compared(before: TrackResult, after: TrackResult) -> TrackResult:
+    """``after`` with the run ``before`` it, of another model, and what it gains over that."""
+    old_N, new_N = before.followed.rms_error_N, after.followed.rms_error_N
+    gain = TrackingGain(rms_error_before_N=old_N, rms_error_after_N=new_N, reduction=1 - new_N / old_N)
+    return after.model_copy(update={"against": before, "gain": gain})
+
+
+class Jump(Result):
+    """One jump of the reference; shares are of its height, ``error_percent`` of the force given.
+
+    ``error_N`` is the mean and ``largest_error_N`` the largest error over the last half second; ``settling_s`` is None
+    where force is not within 2 % of the jump for the last 0.2 s.
+    """
+
+    from_N: float
+    to_N: float
+    actual_N: float
+    error_N: float
+    error_percent: float
+    largest_error_N: float
+    overshoot_percent: float
+    settling_s: float | None
+
+
+class WorstJump(Result):
+    """The largest of each figure; settling None where any jump did not settle."""
+
+    error_N: float | None
+    error_percent: float | None
+    largest_error_N: float | None
+    overshoot_percent: float | None
+    settling_s: float | None
+
+
+class ComparedRun(Result):
+    """All jumps of one choice of gains on one subject; ``stopped`` is the sentence of what ended it early, if any."""
+
+    subject: str
+    gains: str
+    stopped: str
+    worst: WorstJump
+    jumps: tuple[Jump, ...]
+
+
+class CompareResult(Result):
+    """Every choice of gains on simulated subjects; ``models`` are the parameters learnt of each."""
+
+    reference: str
+    models: Mapping[str, Mapping[str, float]]
+    runs: tuple[ComparedRun, ...]
+
+
+class LoopMargins(Result):
+    """Stability margins of the force loop at one force."""
+
+    force_N: float
+    tangent_N_mm: float
+    crossover_Hz: float
+    phase_deg: float
+    gain: float
+
+
+class SimulateResult(Result):
+    """A reference played on a tissue model."""
+
+    reference: str
+    gains: str
+    times_real_time: float
+    jumps: tuple[Jump, ...]
+    duration_s: float
+    rms_error_N: float
+    peak_force_N: float
+    largest_voltage_V: float
+    margins: tuple[LoopMargins, ...]
+
+
+class Threshold(Result):
+    """Where the subject stopped the ramp; ``force_N`` is None where it ended at ``up_to_N`` without a stop."""
+
+    force_N: float | None
+    up_to_N: float
+    recording: str
+
+
+class Retracted(Result):
+    """How a retraction ended."""
+
+    outcome: str
