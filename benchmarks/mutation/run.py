@@ -36,9 +36,9 @@ class Subject:
 
     @cached_property
     def enums(self) -> dict[str, list[str]]:
-        """Enumerations that stand beside the mutated files."""
-        return enums_of(path for folder in {(self.root / path).parent for path in self.paths}
-                        for path in sorted(folder.glob("*.py")))  # fmt: skip
+        """Enumerations of the packages that the mutated files are of, whichever of the files are tried."""
+        packages = sorted({self.root / Path(path).parts[0] for path in self.paths})
+        return enums_of(path for package in packages for path in sorted(package.rglob("*.py")))
 
     @cached_property
     def mutants(self) -> list[Mutant]:

@@ -22,20 +22,19 @@ class StreamHealth:
     identical_limit: int = IDENTICAL_LIMIT
     valid: bool = False
     identical: int = 0
-    _last_arrival_ns: int = -NEVER_NS
     _last_capture_ns: int = -NEVER_NS
     _mean_period_ns: float = 0.0
     _last_value: object = None
 
-    def update(self, capture_ns: int, arrival_ns: int, valid: bool, value: object) -> None:
-        """Takes note of one sample; ``value`` is what must not stay the same for ever."""
+    def update(self, capture_ns: int, valid: bool, value: object = None) -> None:
+        """Takes note of one sample; ``value`` is what must not stay the same for ever, None where anything may."""
         if self._last_capture_ns > -NEVER_NS:
             step_ns = capture_ns - self._last_capture_ns
             self._mean_period_ns += 0.02 * (step_ns - self._mean_period_ns)
         else:
             self._mean_period_ns = self.period_ns
-        self._last_capture_ns, self._last_arrival_ns, self.valid = capture_ns, arrival_ns, valid
-        self.identical = self.identical + 1 if value == self._last_value else 0
+        self._last_capture_ns, self.valid = capture_ns, valid
+        self.identical = self.identical + 1 if value is not None and value == self._last_value else 0
         self._last_value = value
 
     def age_ns(self, now_ns: int) -> int:

@@ -96,7 +96,7 @@ class BenchLoop:
         self.published = {"force": -1, "axis": -1, "tracker": -1}
         said = partial(takeover.said, self)
         self.connections = Connections(devices.by_role(), opens or openers(wiring), said, now())
-        self._status_every = max(1, round(STATUS_EVERY_S / period_s))
+        self._status_every = round(STATUS_EVERY_S / period_s)
         self._cycles = self._events = self._program = 0
         self._load_monitor = LoadMonitor(devices.force.period_ns)
         self._first_touch = FirstTouch(wiring)
@@ -177,7 +177,7 @@ class BenchLoop:
         self._load_monitor.force(sample.capture_ns, self.state.wrench)
         if sample.valid:
             self.state.paired.force(sample.capture_ns, self.state.raw_N)
-        self.health["force"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample[4:10])
+        self.health["force"].update(sample.capture_ns, bool(sample.valid), sample[4:10])
 
     def _take_axis(self, sample: AxisSample) -> None:
         state = self.state
@@ -191,15 +191,15 @@ class BenchLoop:
         self._load_monitor.axis(sample.capture_ns, sample.position_mm)
         if self.devices.tracker:
             self._registration.axis(sample.capture_ns, sample.position_mm)
-        self.health["axis"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample.seq)
+        self.health["axis"].update(sample.capture_ns, bool(sample.valid))
 
     def _take_marker(self, sample: MarkerSample) -> None:
         self._ring.put(MARKER.id, MARKER.pack(sample))
         self.published["tracker"] = sample.seq
         if sample.tool == 0:
-            self.health["marker"].update(sample.capture_ns, sample.arrival_ns, bool(sample.valid), sample.frame)
-        if sample.valid and math.isfinite(sample.x_mm + sample.y_mm + sample.z_mm):
-            at = Point(sample.x_mm, sample.y_mm, sample.z_mm)
+            self.health["marker"].update(sample.capture_ns, bool(sample.valid))
+        at = Point(sample.x_mm, sample.y_mm, sample.z_mm)
+        if sample.valid and all(map(math.isfinite, at)):
             if sample.tool == TIP:
                 self._registration.tip(sample.frame, sample.capture_ns, at)
             elif sample.tool == ARM:

@@ -52,7 +52,7 @@ class Inbox:
         wanted = self._hear(loop)
         if self._told_to_end and loop.machine.busy:
             wanted |= {"stop"}
-        return wanted.union(*(REQUESTS[request.kind] for request in self._asked)) if self._asked else wanted
+        return wanted.union(*(REQUESTS[request.kind] for request in self._asked))
 
     def confirm(self, loop: BenchLoop) -> None:
         """Answers the stops taken in this cycle with what was done; one that nothing came of stays asked for."""

@@ -12,7 +12,7 @@ import numpy as np
 from controller.loop.paired_samples import Touch
 from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
-from rig.trials.contact import LIMB_SHAPE, Contact, ContactSearch, Loading, find_contact
+from rig.trials.contact import LIMB_SHAPE, Contact, ContactSearch, Loading
 
 LEAST_ROWS = 8
 AIR_MM = 0.3
@@ -120,10 +120,11 @@ def _search(loading: Loading, noise_N: float) -> ContactSearch | None:
     return ContactSearch(loading, (first_mm + air_mm, last_mm), noise_N, LIMB_SHAPE, levelled=False, rounds=ROUNDS)
 
 
-def warm_up() -> None:
-    """Runs the estimator once, before anything moves: what a first call loads and allocates takes milliseconds."""
-    depth_mm = np.linspace(-1.0, 1.0, 50)
-    find_contact(depth_mm, np.maximum(depth_mm, 0.0), (-0.5, 0.5), 0.01)
-    search = _search(Loading(depth_mm, np.maximum(depth_mm, 0.0), np.ones(50)), 0.01)
-    while search and not search.advance():
+def warm_up() -> Contact:
+    """Estimates a surface at 0 mm before anything moves: what a first call loads and allocates takes milliseconds."""
+    depth_mm = np.linspace(-1.0, 1.0)
+    search = _search(Loading(depth_mm, np.maximum(depth_mm, 0.0), np.ones_like(depth_mm)), 0.01)
+    assert search
+    while not search.advance():
         pass
+    return search.contact

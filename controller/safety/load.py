@@ -95,7 +95,7 @@ class LoadMonitor:
         ahead_mm += velocity_mm_s * abs(velocity_mm_s) / (2.0 * acceleration_mm_s2)
         stiffness_N_mm = self._stiffness(zero, noise_N, max(ahead_mm, 0.0))
         rise_N = stiffness_N_mm * max(ahead_mm, 0.0)
-        pushed_N = max(rate_N_s, 0.0) * (now_ns - newest.capture_ns) * 1e-9
+        pushed_N = rate_N_s * (now_ns - newest.capture_ns) * 1e-9
         return Load(load_N, _torque(newest.wrench, zero), rate_N_s, stiffness_N_mm, load_N + max(rise_N, pushed_N))
 
     def _rate(self) -> float:

@@ -34,6 +34,7 @@ from controller.loop.messages import (
 )
 from controller.loop.modes import Mode
 from controller.loop.steps import Approach, Compress, Hold, Program, Retract, Step, Zero
+from controller.safety.table import TABLE, Check
 from controller.stop.word import PAGE, Kind, Lane, Request, Requester, Responder, StopWord
 from controller.stop.word import Answer as StopAnswer
 from drivers.roles import Device
@@ -80,6 +81,7 @@ class FakeRing:
 
     fill: float = 0.0
     silent_s: float = 0.0
+    asked_ns: int = 0
     rows: dict[int, list[tuple[Any, ...]]] = field(default_factory=lambda: {stream: [] for stream in BY_ID})
 
     def put(self, stream_id: int, body: bytes) -> None:
@@ -88,6 +90,7 @@ class FakeRing:
 
     def reader_age_ns(self, now_ns: int) -> int:
         """As long as the test says."""
+        self.asked_ns = now_ns
         return round(self.silent_s * 1e9)
 
     @property
@@ -190,6 +193,7 @@ class FakeBench:
         execution_ns: int = 50_000,
         settled: int = SETTLED_CYCLES,
         held: str = "",
+        table: tuple[Check, ...] = TABLE,
     ) -> None:
         self.wiring = with_calibration(wiring or wired(), FakeForce.__name__, "1")
         self.clock = Clock()
@@ -218,6 +222,7 @@ class FakeBench:
             link,
             inbox,
             self.clock,
+            table,
             opens=Openers(self._openers(), _at_once),
             held=held,
         )

@@ -9,12 +9,14 @@ from typing import cast
 
 import pytest
 
+from controller import claims
 from controller import supervisor as module
 from controller.loop.messages import (
     Failed,
     Lease,
     Note,
     Outcome,
+    Ready,
     Reset,
     Run,
     Shutdown,
@@ -318,3 +320,50 @@ def test_children_get_one_thread_a_numerics_library_and_all_else_of_the_environm
     assert (environment["OPENBLAS_NUM_THREADS"], environment["OMP_NUM_THREADS"]) == ("1", "1")
     assert environment["RIG_TEST"] == "kept"
     assert environment["PATH"] == os.environ["PATH"]
+
+
+def test_what_a_start_takes_comes_in_its_order_and_from_the_wiring(
+    around: Surroundings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[object] = []
+
+    def take(wiring: Wiring, address: str) -> claims.Claim:
+        done.append((wiring, address))
+        return claims.take(wiring, address)
+
+    monkeypatch.setattr(module, "remove_abandoned", lambda: done.append("remove_abandoned"))
+    monkeypatch.setattr(module, "take", take)
+    wiring = Wiring()
+    bench = Supervisor(wiring, address="http://127.0.0.1:8000")
+    assert bench.ready == Ready()
+    with bench:
+        assert done == ["remove_abandoned", (wiring, "http://127.0.0.1:8000")]
+        assert around.stops[0].wiring is wiring
+        (lease,) = [thread for thread in threading.enumerate() if thread.name == "lease"]
+        assert lease.daemon, "a thread that waits must not keep a command from ending"
+
+
+def test_a_loop_that_ended_is_waited_for_no_longer_than_five_seconds(around: Surroundings) -> None:
+    with Supervisor(Wiring()) as bench:
+        around.loop.ended.set()
+        assert bench._exit_text() == "exit code 0"
+        assert around.process.waits[0] == 5
+
+
+def test_a_program_waits_until_every_device_is_ready(around: Surroundings) -> None:
+    with Supervisor(Wiring()) as bench:
+        around.loop.say(StatusSaid(status={"ready": False, "busy": False, "latched": None}))
+        until(lambda: not bench.status["ready"])
+        late = threading.Timer(0.2, lambda: around.loop.say(StatusSaid(status=around.status)))
+        late.start()
+        bench.run(PROGRAM, 5.0)
+        assert not late.is_alive()
+
+
+def test_waiting_for_devices_ends(around: Surroundings) -> None:
+    with Supervisor(Wiring()) as bench:
+        around.loop.say(StatusSaid(status={"ready": False, "busy": False, "latched": None}))
+        until(lambda: not bench.status["ready"])
+        assert bench.await_ready(0.05) is False
+        around.loop.say(StatusSaid(status={"ready": False, "busy": False, "latched": {"code": "recovery"}}))
+        assert bench.await_ready(5.0) is True

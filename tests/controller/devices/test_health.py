@@ -13,7 +13,7 @@ ALIVE, VALID, ON_RATE = 1, 2, 4
 def fed(*times_ms: float, valid: bool = True, period_ms: int = 10, stale_ms: int = 40) -> StreamHealth:
     health = StreamHealth(period_ms * MS, stale_ms * MS)
     for time_ms in times_ms:
-        health.update(round(time_ms * MS), round(time_ms * MS), valid, time_ms)
+        health.update(round(time_ms * MS), valid, time_ms)
     return health
 
 
@@ -75,25 +75,32 @@ def test_a_value_is_frozen_when_it_came_more_often_than_the_limit_again() -> Non
     health = StreamHealth(MS, 4 * MS)
     frozen = []
     for number in range(103):
-        health.update(number * MS, number * MS, True, 1.0)
+        health.update(number * MS, True, 1.0)
         frozen.append(health.frozen)
     assert frozen == [False] * 101 + [True] * 2
-    health.update(104 * MS, 104 * MS, True, 1.1)
+    health.update(104 * MS, True, 1.1)
+    assert (health.frozen, health.identical) == (False, 0)
+
+
+def test_a_stream_that_says_no_value_is_never_frozen() -> None:
+    health = StreamHealth(MS, 4 * MS, 2)
+    for number in range(10):
+        health.update(number * MS, True)
     assert (health.frozen, health.identical) == (False, 0)
 
 
 def test_a_first_value_repeats_nothing() -> None:
     health = StreamHealth(MS, 4 * MS, 0)
-    health.update(0, 0, True, 0.0)
+    health.update(0, True, 0.0)
     assert not health.frozen
-    health.update(MS, MS, True, 0.0)
+    health.update(MS, True, 0.0)
     assert health.frozen
 
 
 def test_a_stream_starts_well_at_any_time_of_the_clock() -> None:
     health = StreamHealth(MS, 4 * MS)
     for number in range(2):
-        health.update((1 << 60) + number * MS, (1 << 60) + number * MS, True, number)
+        health.update((1 << 60) + number * MS, True, number)
     assert health.rate_Hz == pytest.approx(1000.0)
 
 

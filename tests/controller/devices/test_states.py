@@ -91,3 +91,13 @@ def test_a_refusal_names_the_first_device_that_is_needed_and_not_ok_and_the_next
 @pytest.mark.parametrize("state", [state for state in State if state is not State.OK])
 def test_every_state_that_refuses_has_a_next_step(state: State) -> None:
     assert refusal({"force": DeviceStatus(state, "why", 0)}, ["force"]).endswith(NEXT_STEPS[state])
+
+
+def test_a_silence_is_told_with_its_bound() -> None:
+    assert after((1.0, WELL), (9.0, Observation(2 * S))).detail == "no sample for more than 1 s"
+
+
+def test_a_device_that_was_opened_late_has_its_five_seconds_too() -> None:
+    begun = connecting(1000 * S)
+    assert after((1004.9, Observation(None)), before=begun).state is State.CONNECTING
+    assert after((1005.0, Observation(None)), before=begun).state is State.LOST

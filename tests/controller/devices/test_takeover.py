@@ -5,8 +5,11 @@ from dataclasses import replace
 
 import pytest
 
+from controller.devices import takeover
+from controller.devices.states import DeviceStatus, State
 from controller.loop.modes import Mode
-from tests.controller.fake_bench import APPROACH, HOLD, LEAVE, ZERO, FakeBench
+from controller.safety.table import Action, Incident
+from tests.controller.fake_bench import APPROACH, HOLD, LEAVE, ZERO, FakeBench, wired
 from tests.controller.fake_devices import FakeAxis, FakeForce, FakeTracker
 
 
@@ -205,7 +208,7 @@ def test_a_spare_is_closed_where_the_loop_ends_during_its_start() -> None:
     bench.until(lambda: bool(works), within_s=3.0)
     spare = FakeTracker(bench.clock, bench.tracker.period_ns, axis=bench.axis)
     bench.spares["tracker"] = spare
-    way._abandoned = True
+    bench.loop.close()
     works[0]()
     assert spare.closed
 
@@ -226,3 +229,76 @@ def test_devices_are_replaced_one_by_one() -> None:
     bench.spares["force"], bench.force.cut = spare_force(bench), "the line is gone"
     bench.until(lambda: bench.loop.devices.force is not before.force, within_s=3.0)
     assert bench.loop.devices == replace(before, force=bench.loop.devices.force)
+
+
+@pytest.mark.parametrize(("missed_periods", "identical"), [(2, 2), (7, 7), (0, 100)])
+def test_a_frozen_sensor_is_told_after_as_many_samples_as_may_be_missed(missed_periods: int, identical: int) -> None:
+    loop = {"missed_periods": missed_periods} | ({} if missed_periods else {"stale_force_ms": 40.0})
+    bench = FakeBench(wired(loop=loop), settled=0)
+    assert bench.loop.health["force"].identical_limit == identical
+
+
+@pytest.mark.parametrize(
+    ("state", "level"),
+    [(State.OK, 10), (State.CONNECTING, 10), (State.DEGRADED, 20), (State.LOST, 20), (State.RECONNECTING, 20),
+     (State.FAULT, 20)],
+)  # fmt: skip
+def test_a_state_that_needs_somebody_is_a_warning_and_any_other_a_note(state: State, level: int) -> None:
+    bench = FakeBench(settled=0)
+    for detail in ("NO POWER: X", ""):
+        takeover.said(bench.loop, "force", DeviceStatus(state, detail, 0))
+    told = [(event.code, event.level, event.text) for event in bench.ring.events]
+    assert told == [("device_state", level, f"force {state}: NO POWER: X"), ("device_state", level, f"force {state}")]
+
+
+def test_a_status_shows_state_detail_and_since_when_by_role() -> None:
+    assert takeover.as_status([("axis", DeviceStatus(State.LOST, "cable", 7))]) == {
+        "axis": {"state": "lost", "detail": "cable", "since_ns": 7}
+    }
+
+
+def test_without_checks_that_stop_an_axis_that_comes_back_is_held_all_the_same() -> None:
+    bench = FakeBench(table=())
+    bench.axis.cut = "the line is gone"
+    bench.cycles(40)
+    spare = spare_axis(bench)
+    replaced_axis(bench, spare)
+    bench.until(lambda: bench.loop.devices.axis is spare, within_s=3.0)
+    text = "the axis was lost and is back, without torque"
+    assert bench.loop.machine.latched == Incident(Action.IMMEDIATE, "axis_returned", text)
+    assert bench.mode is Mode.SAFE
+
+
+def test_a_sensor_that_comes_back_is_heard_anew_and_holds_nothing() -> None:
+    bench = FakeBench(table=())
+    bench.force.cut = "the line is gone"
+    bench.cycles(40)
+    spare = spare_force(bench)
+    spare.period_ns = 2_000_000
+    bench.spares["force"] = spare
+    bench.until(lambda: bench.loop.devices.force is spare, within_s=3.0)
+    assert bench.loop.health["force"].period_ns == 2_000_000
+    assert bench.loop.inputs.force_lost == ""
+    assert (bench.latched, bench.mode) == ("", Mode.IDLE)
+
+
+def test_a_silent_driver_is_asked_nothing_once_its_successor_is_being_opened() -> None:
+    bench = FakeBench(table=())
+    works: list[Callable[[], None]] = []
+    bench.loop.connections._ways_back["force"]._spawn = works.append
+    bench.force.silent = True
+    bench.until(lambda: bool(works), within_s=5.0)
+    assert bench.loop.inputs.force_lost == "no sample for more than 1 s"
+    bench.force.calls.clear()
+    bench.cycles(5)
+    assert bench.force.calls == []
+
+
+def test_only_a_program_of_nothing_but_leaving_needs_the_axis_alone() -> None:
+    bench = FakeBench(table=())
+    bench.force.cut = "the line is gone"
+    bench.cycles(2)
+    bench.begin(LEAVE, HOLD)
+    assert "force is lost: the line is gone" in refusals(bench)[-1]
+    bench.begin(LEAVE)
+    assert bench.loop.machine.busy

@@ -1,16 +1,22 @@
 """What the loop does with messages: each is answered by its id, and none stops it from cycling."""
 
+import threading
 from collections.abc import Iterator
-from typing import cast
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
-from controller.loop.commands import Inbox
+from controller.loop.bench_loop import BenchLoop
+from controller.loop.commands import Inbox, _deed
 from controller.loop.messages import FROM_LOOP, TO_LOOP, Finished, Lease, Note, Reset, Run, Shutdown, StatusSaid
 from controller.loop.modes import Mode
-from controller.loop.steps import Program
+from controller.loop.steps import MoveTo, Program
+from controller.safety.table import Action, Incident
+from controller.stop.word import Deed, Kind, Request
 from rig.channel import Answer, Channel, Message, encode, pair
-from tests.controller.fake_bench import APPROACH, HOLD, ZERO, FakeBench
+from tests.calibrations import axis_calibration
+from tests.controller.fake_bench import APPROACH, HOLD, LEAVE, ZERO, FakeBench
 
 
 class Linked(FakeBench):
@@ -95,6 +101,7 @@ def test_notes_resets_and_leave_are_answered_and_a_lease_is_not(bench: Linked) -
         encode(9, Run.TYPE, b" " * 400_001),
         encode(9, Run.TYPE, b'{"program": ' + b"[" * 5000),
     ],
+    ids=["no JSON", "no steps", "no such type", "too long", "too deep"],
 )
 def test_a_message_that_is_none_is_refused_counted_and_noted_and_the_loop_cycles_on(
     bench: Linked, frame: bytes
@@ -132,3 +139,154 @@ def test_a_flood_of_noise_costs_no_cycle(bench: Linked) -> None:
     bench.raw.send(b"\x00" * 60_000)
     bench.cycles(10)
     assert len(bench.ring.loop) == before + 10
+
+
+def events(bench: FakeBench) -> list[tuple[str, int, str]]:
+    return [(event.code, event.level, event.text) for event in bench.ring.events if event.code != "device_state"]
+
+
+def test_a_note_and_a_reset_are_events() -> None:
+    bench = FakeBench()
+    bench.say("note", code="a", text="b")
+    bench.say("reset")
+    bench.cycles(3)
+    assert events(bench) == [("a", 10, "b"), ("reset", 10, "stop acknowledged")]
+
+
+def test_what_is_refused_is_a_warning_with_the_sentence_that_answers_it() -> None:
+    bench = FakeBench()
+    bench.begin(HOLD)
+    bench.begin(HOLD)
+    sentence = "a program is already under way: stop it or wait for its end"
+    assert events(bench) == [("program_start", 10, "test"), ("refused", 20, sentence)]
+    assert bench.link.of("answer")[-1]["refused"] == sentence
+
+
+def test_messages_that_are_none_are_counted_from_the_first() -> None:
+    bench = FakeBench()
+    for refused in (1, 1, 3):
+        bench.link.refused = refused
+        bench.cycle()
+    text = "{} messages to the loop were not understood so far"
+    assert events(bench) == [("refused", 20, text.format(1)), ("refused", 20, text.format(3))]
+
+
+def test_of_a_channel_that_is_lost_nothing_is_read() -> None:
+    bench = FakeBench()
+    bench.say("note", code="a", text="b")
+    bench.link.lost, before = True, bench.link.received
+    bench.cycles(2)
+    assert (bench.link.received - before, [event for event in events(bench) if event[0] == "a"]) == (0, [])
+
+
+def test_the_lease_counts_from_the_cycle_that_heard_a_message() -> None:
+    bench = FakeBench(settled=0)
+    bench.keep_lease = False
+    bench.cycle()
+    assert cast(Inbox, bench.loop._commands).heard_ns == 0
+    bench.say("lease")
+    bench.cycle()
+    assert cast(Inbox, bench.loop._commands).heard_ns == bench.ring.loop[-2].capture_ns
+
+
+def test_the_look_at_the_stop_word_is_of_the_loops_own_time() -> None:
+    bench = FakeBench()
+    bench.cycle()
+    assert bench.page.words[2] == bench.ring.loop[-1].capture_ns
+
+
+def test_stops_that_come_together_are_all_heard() -> None:
+    bench = FakeBench()
+    bench.begin(LEAVE)
+    inbox = cast(Inbox, bench.loop._commands)
+    inbox.end()
+    for verb in ("unattended", "pain", "keypad"):
+        bench.say(verb)
+    assert inbox.collect(bench.loop) == {"unattended", "stop", "pain", "keypad"}
+
+
+def test_a_stop_is_answered_in_its_cycle_as_an_event_too_and_none_where_none_was_asked() -> None:
+    bench = FakeBench()
+    bench.say("stop")
+    bench.say("pain")
+    bench.cycles(3)
+    told = [event for event in events(bench) if event[0] == "stop_answered"]
+    held = "nothing was moving: the axis stays where it is"
+    assert sorted(told) == [("stop_answered", 10, f"PAIN 2: {held}"), ("stop_answered", 10, f"STOP 1: {held}")]
+
+
+def loop_as(**values: Any) -> BenchLoop:
+    """Of a loop what decides about its answer."""
+    given: dict[str, Any] = {"axis_lost": "", "braked": False, "mode": Mode.RETRACT, "latched": None, **values}
+    machine = SimpleNamespace(mode=given["mode"], latched=given["latched"])
+    inputs = SimpleNamespace(axis_lost=given["axis_lost"])
+    return cast(BenchLoop, SimpleNamespace(inputs=inputs, braked=given["braked"], machine=machine))
+
+
+STOPPED = Incident(Action.SOFT, "operator_stop", "stopped")
+SOFT, HARD = Request(1, Kind.STOP), Request(2, Kind.EMERGENCY)
+
+
+@pytest.mark.parametrize(
+    ("values", "asked", "deed"),
+    [
+        ({"axis_lost": "cable", "braked": True, "mode": Mode.SAFE}, (SOFT,), Deed.AXIS_LOST),
+        ({"braked": True, "mode": Mode.SAFE}, (SOFT,), Deed.BRAKED),
+        ({"mode": Mode.SAFE}, (HARD,), Deed.HELD),
+        ({"mode": Mode.IDLE}, (HARD,), Deed.HELD),
+        ({"mode": Mode.FREE}, (SOFT,), None),
+        ({}, (SOFT,), None),
+        ({"latched": STOPPED}, (SOFT,), Deed.RETRACTING),
+        ({"latched": STOPPED}, (HARD,), None),
+        ({"latched": STOPPED}, (SOFT, HARD), None),
+        ({}, (HARD,), None),
+    ],
+)
+def test_what_is_answered_is_what_is_done(
+    values: dict[str, Any], asked: tuple[Request, ...], deed: Deed | None
+) -> None:
+    assert _deed(loop_as(**values), asked) is deed
+
+
+def test_a_program_beyond_the_limits_is_refused_before_anything_moves() -> None:
+    bench = FakeBench()
+    bench.begin(ZERO, MoveTo(position_mm=500.0, speed_mm_s=10.0))
+    assert "500" in bench.link.of("answer")[-1]["refused"]
+    assert bench.mode is Mode.IDLE
+
+
+def test_a_program_with_a_device_that_is_not_the_calibrated_one_is_refused() -> None:
+    bench = FakeBench()
+    known = bench.wiring.calibration.model_copy(update={"of_axis": axis_calibration("A1")})
+    bench.loop.wiring = bench.wiring.model_copy(update={"calibration": known})
+    bench.force.serial = "2"
+    bench.begin(ZERO, APPROACH)
+    refused = bench.link.of("answer")[-1]["refused"]
+    assert "FakeForce 1, but FakeForce 2 answered" in refused
+    assert "EPOS4 A1, but FakeAxis 1 answered" in refused
+    assert bench.mode is Mode.IDLE
+
+
+def test_a_stop_during_homing_reaches_the_drive_and_none_after_it() -> None:
+    """The guard looks at the stop word on the loop's own clock, and the drive asks the guard while it homes."""
+    bench = FakeBench()
+    inbox = cast(Inbox, bench.loop._commands)
+    heard: list[bool] = []
+    home = bench.axis.home
+
+    def homes() -> None:
+        bench.say("estop")
+        deadline = 1000
+        while not inbox.interruption() and deadline:
+            deadline -= 1
+            threading.Event().wait(0.001)
+        heard.append(inbox.interruption())
+        home()
+
+    bench.axis.home, bench.axis.referenced = homes, False  # type: ignore[method-assign]
+    bench.say("recover", act="home")
+    bench.cycle()
+    assert heard == [True]
+    assert not inbox.interruption()
+    answer = bench.stop_answers()[0]
+    assert answer and answer.time_ns == bench.clock.now_ns - bench.execution_ns

@@ -7,8 +7,11 @@ import pytest
 from controller.law.force_position import GainRow
 from controller.law.gains import pi_gains
 from controller.loop.modes import Mode
+from controller.loop.setpoint import Setpoint
+from controller.loop.state import LoopState
 from controller.loop.steps import Approach, Compress, Dither, Hold, MoveTo, Program, Retract, Step, TrackForce, Zero
 from controller.safety.program_limits import refuse_beyond_limits
+from controller.safety.table import Action, Incident
 from rig.config.wiring import Limits, Wiring
 from rig.errors import UsageError
 from tests.controller.law.test_force_position import DESIGN
@@ -222,3 +225,39 @@ def test_a_slow_and_noisy_sensor_finds_the_surface_and_not_its_own_noise(every: 
     bench.run(Zero(duration_s=1.0), APPROACH, LEAVE)
     assert bench.ended == [("complete", None)]
     assert bench.state.surface_mm == pytest.approx(SURFACE_MM, abs=0.01 + noise_N)
+
+
+def test_at_rest_no_peak_is_noted_and_on_the_way_it_is() -> None:
+    bench = SpringBench()
+    bench.state.force_N = 5.0
+    bench.machine.update(bench.inputs)
+    assert bench.state.peak_force_N == 0.0
+    bench.machine.start(Program(name="test", steps=(ZERO,)))
+    bench.state.force_N = 4.0
+    bench.machine.update(bench.inputs)
+    assert bench.state.peak_force_N == 4.0
+
+
+@pytest.mark.parametrize(("position_mm", "retreats"), [(5.2, False), (5.6, True)])
+def test_in_the_last_half_millimetre_of_the_way_a_limb_that_pushes_can_be_given_no_more(
+    position_mm: float, retreats: bool
+) -> None:
+    bench = SpringBench(wiring=Wiring(limits=Limits(position_min_mm=5.0)), position_mm=position_mm)
+    bench.machine.hold(Incident(Action.SOFT, "operator_stop", "stopped"))
+    bench.machine.update(bench.inputs)
+    bench.state.load = bench.state.load._replace(force_N=200.0, predicted_N=200.0)
+    assert (bench.machine.update(bench.inputs) is not None) is retreats
+
+
+def test_a_step_that_leads_to_no_place_is_stopped_where_the_axis_is() -> None:
+    class Nowhere(Hold):
+        def advance(self, state: LoopState, elapsed_s: float) -> bool:
+            state.setpoint = Setpoint(math.nan, 0.0)
+            return False
+
+    bench = SpringBench(wiring=Wiring(limits=Limits(position_min_mm=5.0)))
+    bench.machine.start(Program(name="test", steps=(Hold(duration_s=1.0),)))
+    bench.machine._run = Nowhere(duration_s=1.0)
+    bench.run_cycle()
+    assert bench.state.setpoint == Setpoint(15.0, 0.0)
+    assert bench.machine.latched and bench.machine.latched.code == "workspace"

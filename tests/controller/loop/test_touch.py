@@ -84,6 +84,13 @@ def test_the_tip_rests_while_the_surface_is_estimated() -> None:
     assert 100 < cycles < 400
 
 
+def test_what_warms_up_is_the_estimate_of_an_approach_and_it_is_right() -> None:
+    contact = warm_up()
+    # Fifty places 0.04 mm apart on 1 N/mm from 0 mm; the search names a place to a fraction of that.
+    assert contact.position_mm == pytest.approx(0.0, abs=0.02)
+    assert contact.low_mm < 0.0 < contact.high_mm
+
+
 def test_a_portion_of_the_estimate_leaves_the_loop_its_cycle() -> None:
     warm_up()
     bench = SpringBench(noise_N=0.005)

@@ -198,3 +198,33 @@ def test_until_the_first_zero_load_counts_from_the_calibrations() -> None:
 def test_constants_are_those_that_the_documentation_states() -> None:
     assert load_monitor.LAGS == (1, 2, 3, 5, 8, 13, 21, 34, 55)
     assert all(math.isnan(value) for value in load_monitor.NAN_WRENCH) and len(load_monitor.NAN_WRENCH) == 6
+
+
+def sampled(*rows: tuple[float, float, float]) -> LoadMonitor:
+    """Samples (time in ms, position in mm where it was taken, force in N) of a sensor of 1 kHz."""
+    monitor = LoadMonitor(MS)
+    for at_ms, position_mm, force_N in rows:
+        monitor.axis(round((at_ms - 0.5) * MS), position_mm)
+        monitor.axis(round((at_ms - 0.5) * MS), position_mm)
+        monitor.force(round(at_ms * MS), along(force_N))
+    return monitor
+
+
+@pytest.mark.parametrize(
+    ("rows", "travel_mm", "slope_N_mm"),
+    [
+        # 0.05 mm is enough way for a secant, and less is none.
+        ([(0.0, 0.0, 0.0), (1.0, 0.05, 0.1)], 0.05, 2.0),
+        ([(0.0, 0.0, 0.0), (1.0, 0.049, 0.1)], 0.0, 0.0),
+        # The last way of 0.5 N/mm is the newest; 0.7 mm back still counts, farther does not where a nearer one told.
+        ([(0.0, 0.0, 0.0), (1.0, 0.6, 0.95), (2.0, 0.7, 1.0)], 0.7, 1.0 / 0.7),
+        ([(0.0, 0.0, 0.0), (1.0, 0.7, 3.95), (2.0, 0.8, 4.0)], 0.1, 0.5),
+        # After a gap the three newest samples are left, however old.
+        ([(0.0, 0.0, 0.0), (1000.0, 0.1, 1.0), (2000.0, 0.2, 1.1)], 0.2, 5.5),
+    ],
+)
+def test_stiffness_is_the_steepest_secant_of_the_ways_that_count(
+    rows: list[tuple[float, float, float]], travel_mm: float, slope_N_mm: float
+) -> None:
+    stiffness_N_mm = sampled(*rows)._stiffness(NO_WRENCH, 0.0, 0.0)
+    assert stiffness_N_mm == pytest.approx(slope_N_mm * (1.0 + 0.25 * 0.5 * travel_mm))

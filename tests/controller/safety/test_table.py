@@ -110,7 +110,7 @@ def test_a_converter_that_repeats_itself_for_more_than_two_periods_is_frozen() -
     health = StreamHealth(1_000_000, 4_000_000, 2)
     frozen = []
     for number, value in enumerate([1.0, 1.0, 1.0, 1.1, 1.1, 1.1, 1.1]):
-        health.update(number * 1_000_000, number * 1_000_000, True, value)
+        health.update(number * 1_000_000, True, value)
         frozen.append(health.frozen)
     assert frozen == [False] * 6 + [True]
 
