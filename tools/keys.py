@@ -27,14 +27,24 @@ HEADER = "| key | value | default | meaning |\n|---|---|---|---|"
 
 def tables(root: type[BaseModel], largest: Mapping[str, str]) -> str:
     """Markdown of ``root`` and all tables in it; ``largest`` says of a dotted key what it may never exceed, and why."""
-    return "\n".join(_table(model, heading, largest) for model, heading in _headings(root).items())
+    places = _places(root)
+    shared = Counter(places.values())
+    return "\n".join(
+        _table(model, place, _variant(model) if shared[place] > 1 else "", largest) for model, place in places.items()
+    )
 
 
-def _headings(root: type[BaseModel]) -> dict[type[BaseModel], str]:
+def _places(root: type[BaseModel]) -> dict[type[BaseModel], str]:
     """Each table once: under its path in the file, or under its own name where several paths lead to it."""
     nested = list(_nested(root, ""))
     counted = Counter(model for _, model in nested)
     return {root: ""} | {model: path if counted[model] == 1 else model.__name__ for path, model in nested}
+
+
+def _variant(model: type[BaseModel]) -> str:
+    """What tells this table from others in the same place: its one key that has one value only."""
+    said = model.model_json_schema()["properties"]
+    return next(f": {name} = `{_toml(one['const'])}`" for name, one in said.items() if "const" in one)
 
 
 def _nested(model: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseModel]]]:
@@ -51,14 +61,14 @@ def _models(annotation: object) -> list[type[BaseModel]]:
     return [model for argument in get_args(annotation) for model in _models(argument)]
 
 
-def _table(model: type[BaseModel], heading: str, largest: Mapping[str, str]) -> str:
+def _table(model: type[BaseModel], place: str, variant: str, largest: Mapping[str, str]) -> str:
     schema = model.model_json_schema()
     rows = [
-        _row(name, field, schema, largest.get(f"{heading}.{name}", ""))
+        _row(name, field, schema, largest.get(f"{place}.{name}", ""))
         for name, field in model.model_fields.items()
-        if heading or not _is_section(field)
+        if place or not _is_section(field)
     ]
-    head = [f"## `{heading}`", ""] if heading else []
+    head = [f"## `{place}`{variant}", ""] if place else []
     return "\n".join([*head, inspect.getdoc(model) or "", "", *([HEADER, *rows, ""] if rows else [])]).replace(
         "``", "`"
     )

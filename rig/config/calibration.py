@@ -136,8 +136,8 @@ class Calibration(Table):
     axis: Path | None = Field(default=None, description="file that `rig calibrate axis` wrote")
     max_age_days: Positive = Field(default=365.0, description="makers of force sensors ask for one each year")
     max_uncertainty: Positive = Field(default=0.02, description="relative standard uncertainty of force and of scale")
-    of_force: ForceCalibration | None = None
-    of_axis: AxisCalibration | None = None
+    of_force: ForceCalibration | None = Field(default=None, description="read from the file that force names")
+    of_axis: AxisCalibration | None = Field(default=None, description="read from the file that axis names")
 
     def unfit(self, now: datetime) -> list[str]:
         """Why a calibration may not be used at ``now``, one sentence each; empty if both may, or there is none."""

@@ -12,8 +12,8 @@ NotNegative = Annotated[float, Field(ge=0)]
 class Bounds(Table):
     """Good up to ``good``, bad above ``bad``, usable between; without ``bad`` it makes no trial bad."""
 
-    good: NotNegative
-    bad: NotNegative | None = None
+    good: NotNegative = Field(description="largest value of a good trial")
+    bad: NotNegative | None = Field(default=None, description="largest value of a usable trial")
 
     @model_validator(mode="after")
     def _agree(self) -> Self:

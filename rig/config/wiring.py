@@ -78,7 +78,7 @@ class Tracker(Table):
 class Loop(Table):
     """The cyclic executive."""
 
-    rate_Hz: float = Field(default=1000.0, ge=50, le=2000)
+    rate_Hz: float = Field(default=1000.0, ge=50, le=2000, description="cycles a second")
     priority: int = Field(default=50, ge=0, le=98, description="SCHED_FIFO priority asked for; 0: none")
     stale_force_ms: Positive = Field(default=50.0, description="age at which a force sample no longer counts")
     stale_axis_ms: Positive = Field(default=50.0, description="age at which an axis sample no longer counts")
@@ -92,9 +92,13 @@ class Loop(Table):
         default=3.0, ge=0, description="the operator's program must show itself this often; 0: not asked"
     )
     overrun_ms: Positive = Field(default=100.0, description="a wake-up later than this stops motion")
-    gains: Literal["tangent", "secant", "constant", "admittance"] = "tangent"
+    gains: Literal["tangent", "secant", "constant", "admittance"] = Field(
+        default="tangent", description="stiffness that sets the gains; all but tangent are for comparison"
+    )
     crossover_Hz: Positive = Field(default=18.0, description="at most a fiftieth of the force sensor's rate is used")
-    phase_margin_deg: float = Field(default=55.0, gt=20, lt=90)
+    phase_margin_deg: float = Field(
+        default=55.0, gt=20, lt=90, description="at the crossover, for which gains are solved"
+    )
     drift_Hz: float = Field(
         default=3.0, ge=0, description="corner of the second integral, for a moving surface; 0: none"
     )
@@ -104,8 +108,8 @@ class Loop(Table):
 class Limits(Table):
     """What stops motion; checked before it and during it."""
 
-    force_N: Positive = 20.0
-    force_rate_N_s: Positive = 1000.0
+    force_N: Positive = Field(default=20.0, description="norm of the three force channels, from the reference zero")
+    force_rate_N_s: Positive = Field(default=1000.0, description="how fast the force vector may change")
     # Friction of 0.3 under 15 N, 0.1 m in front of the sensor, gives 0.45 N m; more is a tip that is levered.
     torque_N_m: Positive = Field(default=0.5, description="norm of the sensor's moments, from the reference zero")
     # A third of the default pain threshold, and ten times the drift in the air that is accepted.
@@ -113,12 +117,12 @@ class Limits(Table):
     when_pushed: Literal["retreat", "release"] = Field(
         default="retreat", description="at rest: away from the limb, or without power where a limb can push the axis"
     )
-    depth_mm: Positive = 15.0
-    position_min_mm: float = Field(default=0.0, ge=-500)
-    position_max_mm: float = 60.0
+    depth_mm: Positive = Field(default=15.0, description="from the surface")
+    position_min_mm: float = Field(default=0.0, ge=-500, description="end of the workspace away from the limb")
+    position_max_mm: float = Field(default=60.0, description="end of the workspace towards the limb")
     patient_mm: Positive = Field(default=10.0, description="how far the limb may move against the robot in a program")
-    speed_mm_s: Positive = 60.0
-    retract_speed_mm_s: Positive = 20.0
+    speed_mm_s: Positive = Field(default=60.0, description="of the axis, in either direction")
+    retract_speed_mm_s: Positive = Field(default=20.0, description="at which a stop brings the tip out")
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
@@ -134,16 +138,18 @@ class Limits(Table):
 class Subject(Table):
     """Who lies under the tip."""
 
-    id: str = "phantom"
-    site: str = "forearm"
-    pain_threshold_N: Positive = 15.0
+    id: str = Field(default="phantom", description="a code, no person's name; kept with each recording")
+    site: str = Field(default="forearm", description="where the tip presses, kept with each recording")
+    pain_threshold_N: Positive = Field(default=15.0, description="the lower of it and limits.force_N holds")
 
 
 class Mock(Table):
     """Where ports are ``mock``: what the simulated bench is made of."""
 
-    parameters: Path | None = None
-    hide: tuple[str, ...] = ()
+    parameters: Path | None = Field(
+        default=None, description="TOML file of a simulated subject; absent: the built-in one"
+    )
+    hide: tuple[str, ...] = Field(default=(), description="effects hidden from the analysis, as friction.level_N=0.2")
 
 
 class Wiring(Table):

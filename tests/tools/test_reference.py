@@ -1,15 +1,18 @@
 """The reference names every key with its bounds and every command; a page cannot name a part that does not exist."""
 
 from collections.abc import Iterator
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import pytest
 from pydantic import BaseModel, Field
 
 from api.cli.app import COMMANDS
+from rig.config.calibration import Calibration
 from rig.config.protocol import Indentation
+from rig.config.quality import Bounds, QualityLimits
+from rig.config.stop import Stop
 from rig.config.table import Table
-from rig.config.wiring import Wiring
+from rig.config.wiring import Limits, Loop, Mock, Subject, Wiring
 from tools.keys import tables
 from tools.reference import fill
 
@@ -28,6 +31,26 @@ class Bench(Table):
     right: Spring | None = None
     names: tuple[str, ...] = Field(default=(), max_length=3)
     count: int
+
+
+class Left(Table):
+    """A sensor that is read from the left."""
+
+    product: Literal["left"] = "left"
+    port: str
+
+
+class Right(Table):
+    """A sensor that is read from the right."""
+
+    product: Literal["right"] = "right"
+    address: str
+
+
+class Choice(Table):
+    """One sensor or the other."""
+
+    sensor: Annotated[Left | Right, Field(discriminator="product")]
 
 
 def keys(model: type[BaseModel]) -> Iterator[tuple[type[BaseModel], str]]:
@@ -52,6 +75,13 @@ def test_a_table_that_two_keys_lead_to_stands_once() -> None:
     assert "A spring with `stiffness`." in text
 
 
+def test_tables_that_stand_in_one_place_are_told_apart() -> None:
+    text = tables(Choice, {"sensor.port": "never on Sundays"})
+    assert '## `sensor`: product = `"left"`' in text
+    assert '## `sensor`: product = `"right"`' in text
+    assert "| `port` | text | required | never on Sundays |" in text
+
+
 @pytest.mark.parametrize(("mark", "model"), [("wiring", Wiring), ("protocol", Indentation)])
 def test_every_key_of_the_models_stands_in_the_reference(mark: str, model: type[BaseModel]) -> None:
     text = fill(f"<!-- generated: {mark} -->")
@@ -59,6 +89,12 @@ def test_every_key_of_the_models_stands_in_the_reference(mark: str, model: type[
     assert len(named) > 20
     missing = [name for owner, name in named if f"| `{name}` |" not in text and f"`{name}`\n" not in text]
     assert not missing
+
+
+@pytest.mark.parametrize("model", [Indentation, QualityLimits, Bounds, Loop, Limits, Subject, Mock, Stop, Calibration])
+def test_every_key_that_a_person_writes_has_a_meaning(model: type[BaseModel]) -> None:
+    silent = [name for name, field in model.model_fields.items() if not field.description and name != "quality"]
+    assert not silent
 
 
 def test_a_maximum_stands_beside_its_key() -> None:
