@@ -8,8 +8,8 @@ import math
 import time
 
 from drivers.epos4.device import Epos4Axis
+from mock_devices.testing.epos4 import DriveBench, remote_drive
 from rig.config.wiring import Axis, Limits
-from tests.epos4_stage import Stage, remote_mock
 
 TICKS = 5000
 PERIOD_S = 0.001
@@ -26,8 +26,8 @@ def driver_tick() -> None:
     """``poll`` and ``command`` of a session that follows a sine."""
     polls: list[int] = []
     commands: list[int] = []
-    with remote_mock() as mock:
-        axis = Epos4Axis(Axis(port=mock.port), Limits())
+    with remote_drive() as mock:
+        axis = Epos4Axis(Axis(port=mock.address), Limits())
         axis.start()
         axis.home()
         axis.move_to(10, 30)
@@ -52,7 +52,7 @@ def driver_tick() -> None:
 
 def mock_tick() -> None:
     """RPDO and SYNC in, two TPDOs and two acknowledgements out, without the pseudo-terminal."""
-    stage = Stage()
+    stage = DriveBench()
     axis = Epos4Axis(Axis(port="memory"), Limits(), stage.now, open_link=stage.open)
     axis.start()
     axis.home()

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.loop.paired_samples import Touch
-from tests.controller.limb import BOTA, FT300, Limb, LimbBench, Sensor, approached
-from tests.controller.spring import SURFACE_MM
+from mock_devices.testing.limb_bench import BOTA, FT300, Limb, LimbBench, Sensor, approached
+from mock_devices.testing.spring_bench import SURFACE_MM
 
 LIMBS = (
     Limb(0.12, 0.22, 0.01), Limb(0.05, 0.0, 0.0), Limb(0.05, 0.3, 0.01), Limb(0.5, 0.2, 0.0),

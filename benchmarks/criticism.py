@@ -24,9 +24,9 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import beta
 
 from benchmarks.criticism_naive import naive
+from benchmarks.hidden.draw import KNOWN, UNKNOWN, Secret, draw_secret, recorded, session_of
 from rig.diagnosis.observations import observe
 from rig.diagnosis.run import diagnose
-from tests.hidden.draw import KNOWN, UNKNOWN, Secret, draw_secret, recorded, session_of
 
 KINDS = ("clean", "single", "pairs", "unknown")
 BINS = 5

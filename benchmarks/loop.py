@@ -32,11 +32,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mock_devices.control import BenchControl
+from mock_devices.testing.commands import RIG, ROOT, ServedBench, served_bench
 from rig.channels import AXIS
 from rig.config.wiring import Loop
 from rig.recording.files import write_text
 from rig.recording.reader import read_recording
-from tests.system.stage import RIG, ROOT, Stage, stage
 
 PORT = 8123
 CLIENTS = 4
@@ -71,7 +71,7 @@ class Load:
 class Service:
     """`rig serve` in a process of its own, asked over HTTP."""
 
-    def __init__(self, bench: Stage, folder: Path, hold_s: float) -> None:
+    def __init__(self, bench: ServedBench, folder: Path, hold_s: float) -> None:
         (folder / "protocols").mkdir()
         (folder / "protocols" / "hold.toml").write_text(PROTOCOL.format(hold_s=hold_s))
         command = [*RIG, "serve", "--port", str(PORT), "--sessions", str(folder / "sessions"), "--protocols",
@@ -232,7 +232,7 @@ def measure(seconds: float, rounds: int, report: Callable[[dict[str, Summary]], 
     if shutil.which("cyclictest") is None:
         print("cyclictest is not here (Debian: apt install rt-tests): no ratios", file=sys.stderr)
     with (
-        tempfile.TemporaryDirectory() as name, stage("--seed", "1") as bench,
+        tempfile.TemporaryDirectory() as name, served_bench("--seed", "1") as bench,
         contextlib.closing(Service(bench, Path(name), seconds)) as service,
     ):  # fmt: skip
         for turn in range(rounds):
@@ -241,7 +241,7 @@ def measure(seconds: float, rounds: int, report: Callable[[dict[str, Summary]], 
             report({kind: summary(load, 1e6 / settings.rate_Hz) for kind, load in loads.items()})
 
 
-def phase(bench: Stage, service: Service, load: Load, name: str, seconds: float, hammered_s: float) -> None:
+def phase(bench: ServedBench, service: Service, load: Load, name: str, seconds: float, hammered_s: float) -> None:
     """One press with its recording, then cyclictest, under one load."""
     with hammered(load, hammered_s), contextlib.closing(Arrivals(bench.endpoints["control"])) as arrivals:
         recording = service.press(name)

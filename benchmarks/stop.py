@@ -25,8 +25,8 @@ from pathlib import Path
 
 import numpy as np
 
+from mock_devices.testing.commands import RIG, ROOT, ServedBench, free_port, served_bench
 from rig.recording.files import write_text
-from tests.system.stage import RIG, ROOT, Stage, free_port, stage
 
 STREAMS, REQUESTS_HZ, LISTING_EVERY = 50, 200, 10
 BODY_BYTES, CHUNK = 1_000_000_000, 65_536
@@ -45,7 +45,11 @@ def main() -> int:
     options = parser.parse_args()
     if options.load:
         return put_under_load(options.load)
-    with stage("--seed", "1") as bench, tempfile.TemporaryDirectory() as folder, served(bench, Path(folder)) as service:
+    with (
+        served_bench("--seed", "1") as bench,
+        tempfile.TemporaryDirectory() as folder,
+        served(bench, Path(folder)) as service,
+    ):
         found = measured(*service, options.presses)
     result = {name: summary(times) for name, times in found.items()}
     for name, row in result.items():
@@ -58,7 +62,7 @@ def main() -> int:
 
 
 @contextlib.contextmanager
-def served(bench: Stage, folder: Path) -> Iterator[tuple[int, int, int]]:
+def served(bench: ServedBench, folder: Path) -> Iterator[tuple[int, int, int]]:
     """The service: its process, its port and the stop process' port."""
     port = free_port()
     command = [*RIG, "serve", "--port", str(port), "--sessions", str(folder), "--protocols", str(ROOT / "examples")]

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 if TYPE_CHECKING:
-    from tests.mock_devices.force_bench import Bench, Served
+    from mock_devices.testing.force import ForceBench, ServedMock
 
 # One thread for each worker, and for all that it starts: more wait for one another, and take three times the time.
 # It is read when numpy is loaded, which is later than this.
@@ -33,23 +33,23 @@ def state_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def force_bench() -> Iterator["Bench"]:
+def force_bench() -> Iterator["ForceBench"]:
     """The process in which mocks of force sensors live, one at a time."""
-    from tests.mock_devices.force_bench import bench_process  # noqa: PLC0415 - loads numpy
+    from mock_devices.testing.force import bench_process  # noqa: PLC0415 - loads numpy
 
     with bench_process() as bench:
         yield bench
 
 
 @pytest.fixture
-def bota(force_bench: "Bench") -> Iterator["Served"]:
+def bota(force_bench: "ForceBench") -> Iterator["ServedMock"]:
     """A mock of the Bota SensONE, just powered, on a pseudo-terminal."""
     with force_bench.serve("bota") as served:
         yield served
 
 
 @pytest.fixture
-def robotiq(force_bench: "Bench") -> Iterator["Served"]:
+def robotiq(force_bench: "ForceBench") -> Iterator["ServedMock"]:
     """A mock of the Robotiq FT 300, just powered, on a pseudo-terminal."""
     with force_bench.serve("robotiq") as served:
         yield served

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.system.stage import free_port
+from mock_devices.testing.commands import free_port
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

@@ -3,14 +3,14 @@
 from api.cli.mock_calibration import BY_ITSELF, weights_on
 from api.operations.calibrate import measured_force, of_force
 from controller.commissioning.weights import Weights
+from mock_devices.testing.commands import ServedBench
 from rig.config.wiring import Wiring
-from tests.system.stage import Stage
 
 SCENARIO = "commission"
 LOADS_N = (2.0, 5.0, 10.0)
 
 
-def commission(wiring: Wiring, bench: Stage) -> None:
+def commission(wiring: Wiring, bench: ServedBench) -> None:
     """Calibrates; raises RigError where it is refused."""
     weights = Weights(LOADS_N, uncertainty=0.0)
     with weights_on(bench.control) as put_on:

@@ -9,7 +9,7 @@ from pathlib import Path
 from benchmarks.faults.scenarios import Truth
 from controller.safety.table import TABLE, Check
 from controller.supervisor import Supervisor
-from tests.system.stage import Stage, children
+from mock_devices.testing.commands import ServedBench, children
 
 DRIVE = "drive_guard"
 """The drive itself: it misses our heartbeats, stops and brakes."""
@@ -32,7 +32,7 @@ PROTOCOL_S = 0.5
 class Live:
     """What a fault acts on: the bench, the program that runs it, its process number, and its foot switch (a FIFO)."""
 
-    bench: Stage
+    bench: ServedBench
     pid: int
     rig: Supervisor | None = None
     keypad: Path = Path()

@@ -16,9 +16,9 @@ from benchmarks.faults.commission import commission
 from benchmarks.faults.fault import Fault, Live
 from benchmarks.faults.scenarios import SCENARIOS, Ended
 from controller.supervisor import LOOP_MODULE, Supervisor
+from mock_devices.testing.commands import ServedBench
 from rig.config.wiring import Wiring
 from rig.errors import RigError, UsageError
-from tests.system.stage import Stage
 
 LONGEST_S = 60.0
 
@@ -93,7 +93,7 @@ class Apart(Program):
 
 
 @contextlib.contextmanager
-def program(bench: Stage, wiring: Wiring, fault: Fault, folder: Path, planted: str = "") -> Iterator[Program]:
+def program(bench: ServedBench, wiring: Wiring, fault: Fault, folder: Path, planted: str = "") -> Iterator[Program]:
     """The program for ``fault`` with its bench ready; the loop lacks the checks ``planted`` (codes with commas)."""
     module = planted_loop.MODULE if planted else LOOP_MODULE
     with _environment(planted):
@@ -108,7 +108,7 @@ def program(bench: Stage, wiring: Wiring, fault: Fault, folder: Path, planted: s
 
 
 @contextlib.contextmanager
-def _apart(bench: Stage, wiring: Wiring, fault: Fault, folder: Path, module: str) -> Iterator[Program]:
+def _apart(bench: ServedBench, wiring: Wiring, fault: Fault, folder: Path, module: str) -> Iterator[Program]:
     process = subprocess.Popen(
         [sys.executable, "-m", "benchmarks.faults.operator"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )

@@ -11,10 +11,10 @@ from controller.experiments.references import named
 from controller.loop.steps import Approach, Compress, MoveTo, Program, Retract, TrackForce, Zero
 from controller.operation import Operation
 from controller.supervisor import Supervisor
+from mock_devices.testing.models import index_model
 from rig.config.protocol import Indentation
 from rig.config.quality import Bounds, QualityLimits
 from rig.config.wiring import Wiring
-from tests.controller.models import index_model
 
 Truth = dict[str, float]
 """Figures of the bench by name, as `rig mock` tells them."""

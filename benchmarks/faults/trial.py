@@ -15,11 +15,11 @@ from benchmarks.faults.fault import DRIVE, Fault, at_once
 from benchmarks.faults.observer import Observer
 from benchmarks.faults.program import Program, program
 from benchmarks.faults.scenarios import SCENARIOS, Ended
+from mock_devices.testing.commands import ServedBench, served_bench
 from rig.config.table import merged, parse
 from rig.config.wiring import Wiring
 from rig.errors import RigError
 from rig.recording.reader import read_recording
-from tests.system.stage import Stage, stage
 
 # Every limit of a real bench is stated, so that none is as patient as a mock device gets it; only missed samples are
 # counted by age, because the bench is a process of the same computer.
@@ -76,7 +76,7 @@ def trial(
     """
     moment_s = random.Random(f"{seed} {fault.name} {number}").uniform(0.0, fault.latest_s)
     with (
-        stage("--seed", str(seed + number)) as bench,
+        served_bench("--seed", str(seed + number)) as bench,
         contextlib.closing(Observer(bench.endpoints["control"])) as observer,
     ):
         outcome = _outcome(fault, bench, folder, planted, observer, moment_s)
@@ -103,7 +103,9 @@ def trial(
     )
 
 
-def _outcome(fault: Fault, bench: Stage, folder: Path, planted: str, observer: Observer, moment_s: float) -> Outcome:
+def _outcome(
+    fault: Fault, bench: ServedBench, folder: Path, planted: str, observer: Observer, moment_s: float
+) -> Outcome:
     happened_ns, refusal, unpowered_ns, notices = time.monotonic_ns(), "", None, list[Notice]()
     try:
         wiring = plugged(_with_keypad(wiring_for(fault), fault, folder), bench.endpoints)
@@ -205,7 +207,7 @@ def _complete(folder: Path) -> bool:
     return all(recording.complete and not recording.damage for recording in recordings)
 
 
-def _end(bench: Stage) -> tuple[str, str]:
+def _end(bench: ServedBench) -> tuple[str, str]:
     """Where it ended, and what is unsafe about it: the way out takes a while, but it has an end."""
     until_s = time.monotonic() + WAY_OUT_S
     moved_mm = _moved_mm(bench)
@@ -217,7 +219,7 @@ def _end(bench: Stage) -> tuple[str, str]:
     return place, f"still moves, {moved_mm:.2f} mm in {REST_S:g} s" if moved_mm > STILL_MM else ""
 
 
-def _moved_mm(bench: Stage) -> float:
+def _moved_mm(bench: ServedBench) -> float:
     before_mm = bench.control.number("tip.position_mm")
     time.sleep(REST_S)
     return abs(bench.control.number("tip.position_mm") - before_mm)

@@ -23,7 +23,7 @@ from controller.safety.inputs import SafetyInputs
 from controller.safety.load import Load
 from controller.safety.table import Incident
 from controller.simulated import segments
-from controller.simulated.segments import Bench, Bounds, Clock, Move, Plant, Speeds, Stretch, Zeros, hold_compiled
+from controller.simulated.segments import Bench, Bounds, Move, Plant, Speeds, Stretch, Timing, Zeros, hold_compiled
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed
 from rig.simulation import axis_plant
@@ -170,7 +170,7 @@ class _Playback:
         asked_N = force_profile.along(self._law[2], elapsed_s)
         done, state.memory = segments.track(
             self._now, state.memory, self._law[1], step.settings, asked_N, self._drawn(len(asked_N)),
-            self._plant, Clock(self._cycle, self._period_s, steps), self._zeros(), _speeds(step, self._period_s),
+            self._plant, Timing(self._cycle, self._period_s, steps), self._zeros(), _speeds(step, self._period_s),
             self._bounds(),
         )  # fmt: skip
         cycles = done.rows.shape[1]
@@ -180,7 +180,7 @@ class _Playback:
 
     def _travel(self, target_mm: float, speed_mm_s: float, until_N: float, steps: int) -> None:
         move = Move(target_mm, speed_mm_s, self._state.acceleration_mm_s2, until_N)
-        clock = Clock(self._cycle, self._period_s, steps)
+        clock = Timing(self._cycle, self._period_s, steps)
         noise = self._drawn(LONGEST_STRETCH)
         done = segments.travel(self._now, move, noise, self._plant, clock, self._zeros(), self._bounds())
         if self._state.paired.collecting:
@@ -229,7 +229,7 @@ def follow(step: TrackForce, reference_N: Column, bench: SimulatedBench, dt_s: f
     done, _ = segments.track(
         start, force_position.begin(table, 0.0, 0.0, step.friction_N), table, step.settings, reference_N, noise,
         Plant(bench.motor, bench.loop, bench.limb, bench.sensing),
-        Clock(0, dt_s, round(dt_s / axis_plant.STEP_S)), Zeros(0.0, 0.0, surface_mm), _speeds(step, dt_s), Bounds(),
+        Timing(0, dt_s, round(dt_s / axis_plant.STEP_S)), Zeros(0.0, 0.0, surface_mm), _speeds(step, dt_s), Bounds(),
     )  # fmt: skip
     time_s, mode = np.arange(len(reference_N), dtype=np.float64) * dt_s, np.full(len(reference_N), int(Mode.CONTACT))
     return Trace(time_s, mode, reference_N, *done.rows)

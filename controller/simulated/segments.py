@@ -35,7 +35,7 @@ class Bounds(NamedTuple):
     high_mm: float = math.inf
 
 
-class Clock(NamedTuple):
+class Timing(NamedTuple):
     """Number of the stretch's first cycle, time between cycles, and the plant's steps in it."""
 
     cycle: int
@@ -106,7 +106,7 @@ def beyond(bounds: Bounds, zeros: Zeros, raw_N: float, bench_position_mm: float,
 
 def _track(
     bench: Bench, memory: Memory, table: Columns, settings: Settings, reference_N: Column, noise: Column, plant: Plant,
-    clock: Clock, zeros: Zeros, speeds: Speeds, bounds: Bounds,
+    clock: Timing, zeros: Zeros, speeds: Speeds, bounds: Bounds,
 ) -> tuple[Column, AxisState, Column, float, float, float, Memory]:  # fmt: skip
     motor, loop, limb, sensing = plant
     state, past, held_N, setpoint = bench
@@ -135,7 +135,7 @@ def _track(
 
 
 def _travel(
-    bench: Bench, move: Move, noise: Column, plant: Plant, clock: Clock, zeros: Zeros, bounds: Bounds
+    bench: Bench, move: Move, noise: Column, plant: Plant, clock: Timing, zeros: Zeros, bounds: Bounds
 ) -> tuple[Column, AxisState, Column, float, float, float]:
     motor, loop, limb, sensing = plant
     state, past, held_N, setpoint = bench
@@ -197,7 +197,7 @@ def _traveller() -> Callable[..., tuple[Column, AxisState, Column, float, float,
 
 def track(
     bench: Bench, memory: Memory, table: Columns, settings: Settings, reference_N: Column, noise: Column, plant: Plant,
-    clock: Clock, zeros: Zeros, speeds: Speeds, bounds: Bounds,
+    clock: Timing, zeros: Zeros, speeds: Speeds, bounds: Bounds,
 ) -> tuple[Stretch, Memory]:  # fmt: skip
     """The force law along ``reference_N`` of shape (cycles,), or less of it."""
     rows, state, sensed, held_N, position_mm, velocity_mm_s, after = _tracker()(
@@ -207,7 +207,7 @@ def track(
 
 
 def travel(
-    bench: Bench, move: Move, noise: Column, plant: Plant, clock: Clock, zeros: Zeros, bounds: Bounds
+    bench: Bench, move: Move, noise: Column, plant: Plant, clock: Timing, zeros: Zeros, bounds: Bounds
 ) -> Stretch:
     """A move in the air for as many cycles as ``noise`` has, or less."""
     rows, state, sensed, held_N, position_mm, velocity_mm_s = _traveller()(

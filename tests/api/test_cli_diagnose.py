@@ -9,11 +9,11 @@ import pytest
 from typer.testing import CliRunner
 
 from api.cli.app import build
+from benchmarks.hidden.draw import draw_secret, recorded, session_of
 from controller.experiments import tracked
 from rig.config.wiring import Wiring
 from rig.report.diagnosed import Diagnosed, diagnosis_section, read_diagnosis
 from rig.tissue.model import load_model
-from tests.hidden.draw import draw_secret, recorded, session_of
 from tests.rig.diagnosis.test_bad_input import write_csv
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -9,17 +9,11 @@ from api.http.app import build
 from api.http.lease import Control
 from api.http.problems import Refused
 from api.http.service import Service
+from mock_devices.testing.clock import Clock
 from rig.config.wiring import Force, Wiring
 
 HEADER = "X-Control-Lease"
 CAPTURE = {"kind": "capture", "protocol": "indentation", "session": "a"}
-
-
-class Clock:
-    now_s = 100.0
-
-    def __call__(self) -> float:
-        return self.now_s
 
 
 @pytest.fixture
@@ -38,7 +32,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Service, 
 @pytest.fixture
 def client(served: tuple[Service, TestClient], clock: Clock) -> TestClient:
     service, client = served
-    service.control = Control(clock)
+    service.control = Control(clock.seconds)
     return client
 
 
@@ -59,9 +53,9 @@ def test_a_second_user_is_refused_and_told_who_is_in_control(client: TestClient)
 
 def test_a_lease_that_is_not_renewed_runs_out_and_the_next_user_may_have_it(client: TestClient, clock: Clock) -> None:
     first = taken(client, "Ann")
-    clock.now_s += 4.9
+    clock.advance(4.9)
     assert client.put("/api/v1/control/lease", headers=first).json()["left_s"] == pytest.approx(5.0)
-    clock.now_s += 5.0
+    clock.advance(5.0)
     late = client.put("/api/v1/control/lease", headers=first)
     assert (late.status_code, late.json()["code"]) == (409, "no-lease")
     assert "that lease is not in force; nobody is in control" in late.json()["detail"]

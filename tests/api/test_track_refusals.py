@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 from api.cli import motion
 from api.cli.app import build
 from api.cli.demo import forces_within
+from mock_devices.testing.models import index_model
 from rig.errors import UsageError
-from tests.controller.models import index_model
 
 runner = CliRunner()
 

@@ -38,6 +38,7 @@ from controller.safety.table import TABLE, Check
 from controller.stop.word import PAGE, Kind, Lane, Request, Requester, Responder, StopWord
 from controller.stop.word import Answer as StopAnswer
 from drivers.roles import Device
+from mock_devices.testing.clock import Clock
 from rig.channel import Answer, Channel, Message, Received
 from rig.channels import (
     AXIS,
@@ -55,7 +56,7 @@ from rig.channels import (
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError
 from tests.calibrations import with_calibration
-from tests.controller.fake_devices import Clock, FakeAxis, FakeDevice, FakeForce, FakeTracker
+from tests.controller.fake_devices import FakeAxis, FakeDevice, FakeForce, FakeTracker
 
 ZERO = Zero(duration_s=0.2)
 APPROACH = Approach(speed_mm_s=5.0, contact_force_N=0.05, search_to_mm=40.0)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from drivers.roles import Identity, LinkCounters
+from mock_devices.testing.clock import Clock
 from rig.channels import AxisSample, ForceSample, MarkerSample
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError
@@ -22,16 +23,6 @@ SURFACE_MM = 20.0
 STIFFNESS_N_MM = 1.0
 DITHER_N = (0.0, 0.001, -0.001)
 """Noise of the converter, the same every three samples: without any, three samples are a frozen sensor."""
-
-
-@dataclass
-class Clock:
-    """Monotonic time that goes on only where a test says so."""
-
-    now_ns: int = 1_000_000_000
-
-    def __call__(self) -> int:
-        return self.now_ns
 
 
 @dataclass

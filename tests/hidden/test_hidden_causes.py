@@ -7,10 +7,10 @@ exchanged since. How often such sessions are answered rightly is counted by ``be
 import numpy as np
 import pytest
 
+from benchmarks.hidden.draw import KNOWN, UNKNOWN, Secret, draw_secret, recorded, session_of
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.observations import observe
 from rig.diagnosis.run import diagnose
-from tests.hidden.draw import KNOWN, UNKNOWN, Secret, draw_secret, recorded, session_of
 
 STROKES = 10
 KNOWN_SEEDS = (501, 503, 504, 505, 9001, 9002, 9003, 9004)

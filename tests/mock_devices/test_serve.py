@@ -23,8 +23,9 @@ from mock_devices.control import BenchControl
 from mock_devices.devices import Workshop
 from mock_devices.parameters import Parameters
 from mock_devices.serve import Server, effects_table
+from mock_devices.testing.clock import Clock
+from mock_devices.testing.force import collect
 from rig.config.wiring import Axis, Force, Limits
-from tests.mock_devices.force_bench import collect
 
 COMMAND = [sys.executable, "-m", "mock_devices.serve", "--tracker-tcp-port", "0"]
 FRAME = 37
@@ -201,18 +202,11 @@ def test_the_list_of_effects_names_each_parameter_with_default_and_bounds() -> N
     assert "    friction.level_N=0.2    0 to 5: Coulomb level\n" in effects_table()
 
 
-class Clock:
-    now_ns = 0
-
-    def __call__(self) -> int:
-        return self.now_ns
-
-
-class Stage:
+class ServerBench:
     """A server on an injected clock, and the client's end of its force sensor's line."""
 
     def __init__(self) -> None:
-        self.clock = Clock()
+        self.clock = Clock(0)
         self.bench = Bench(Parameters.model_validate({"tracker": {"tcp_port": 0}, "force": {"counter_drift_ppm": 0.0}}))
         devices = Workshop(self.bench, 0, self.clock, seed=0).devices(("bota-sensone",))
         self.line, self.axis = devices[0].wire, devices[1]
@@ -242,9 +236,9 @@ class Stage:
 
 
 @pytest.fixture
-def stage() -> Iterator[Stage]:
+def stage() -> Iterator[ServerBench]:
     """Past its boot text, streaming at 100 Hz since 0.3 s."""
-    stage = Stage()
+    stage = ServerBench()
     try:
         stage.pass_ms(300)
         stage.say(b"C")
@@ -256,20 +250,20 @@ def stage() -> Iterator[Stage]:
         stage.server.close()
 
 
-def test_each_mock_acts_at_its_own_time_after_physics_has_come_there(stage: Stage) -> None:
+def test_each_mock_acts_at_its_own_time_after_physics_has_come_there(stage: ServerBench) -> None:
     stage.pass_ms(105)
     assert stage.frames(10) == 10
     assert 0.400 <= stage.bench.time_s <= 0.405
 
 
-def test_a_short_stall_is_caught_up_sample_by_sample(stage: Stage) -> None:
+def test_a_short_stall_is_caught_up_sample_by_sample(stage: ServerBench) -> None:
     stage.pass_ms(900)
     assert stage.frames(90) == 90
     assert stage.bench.time_s == pytest.approx(1.2, abs=0.01)
 
 
 def test_after_a_long_stall_physics_goes_on_from_now_and_says_so(
-    stage: Stage, capsys: pytest.CaptureFixture[str]
+    stage: ServerBench, capsys: pytest.CaptureFixture[str]
 ) -> None:
     stage.pass_ms(5000)
     assert stage.bench.time_s == pytest.approx(0.3)
@@ -281,13 +275,13 @@ def test_after_a_long_stall_physics_goes_on_from_now_and_says_so(
     assert stage.bench.time_s == pytest.approx(0.4, abs=0.01)
 
 
-def test_bytes_that_came_during_a_stall_are_heard_before_time_is_caught_up(stage: Stage) -> None:
+def test_bytes_that_came_during_a_stall_are_heard_before_time_is_caught_up(stage: ServerBench) -> None:
     stage.clock.now_ns += 500_000_000
     assert stage.say(b"C") == b"r,0,C,0\r\n"
 
 
 def test_what_the_axis_was_told_during_a_stall_is_heard_evenly_over_it(
-    stage: Stage, monkeypatch: pytest.MonkeyPatch
+    stage: ServerBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mock, line, told_ns = stage.axis.mock, stage.axis.wire, list[int]()
     hear = mock.receive

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.hidden.draw import draw_secret, recorded
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.estimates import Estimate
 from rig.diagnosis.observations import observe
@@ -29,7 +30,6 @@ from rig.tissue.judging import Errors, Judged
 from rig.tissue.study import Study, study_session
 from rig.trials.curves import Curve
 from tests import data
-from tests.hidden.draw import draw_secret, recorded
 from tests.rig.tissue.synthetic import (
     Bench,
     index_force,

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.system.stage import Running, Stage, stage
+from mock_devices.testing.commands import Running, ServedBench, served_bench
 
 
 @pytest.hookimpl(tryfirst=True)  # before the tests are dealt out to workers by group
@@ -26,7 +26,7 @@ def nothing_left_running() -> Iterator[None]:
 
 
 @pytest.fixture
-def bench() -> Iterator[Stage]:
+def bench() -> Iterator[ServedBench]:
     """A fresh mock bench."""
-    with stage("--seed", "1") as served:
+    with served_bench("--seed", "1") as served:
         yield served

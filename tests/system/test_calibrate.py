@@ -11,10 +11,10 @@ from api.cli.mock_calibration import force_file
 from api.cli.options import built_in
 from api.cli.stage import plugged
 from controller.commissioning.refusals import contradictions
+from mock_devices.testing.commands import EXAMPLES, PATIENCE_S, Running, Said, ServedBench, rig, until
 from rig.config.calibration_files import read_force, text_of
 from rig.errors import CheckFailed
 from tests.calibrations import force_calibration
-from tests.system.stage import EXAMPLES, PATIENCE_S, Running, Said, Stage, rig, until
 from tests.system.test_stop import asked
 
 WEIGHTS = ["--weights", "2 N,5 N,10 N", "--load", "pressed", "--pause", "0.3"]
@@ -22,7 +22,7 @@ PORT = re.compile(r"POST http://127.0.0.1:(\d+)/estop")
 REQUEST = re.compile(r"put (\d+) N on the tip|take every weight off")
 
 
-def guided(bench: Stage, folder: Path, *options: str) -> Said:
+def guided(bench: ServedBench, folder: Path, *options: str) -> Said:
     """The command, and somebody who puts on what it asks for."""
     port = f"force.port={bench.endpoints['force']['serial']}"
     running = Running(["calibrate", "force", "--set", port, *WEIGHTS, *options], folder)
@@ -37,7 +37,7 @@ def guided(bench: Stage, folder: Path, *options: str) -> Said:
     return Said(ended.code, said, ended.err)
 
 
-def test_a_person_is_led_through_and_the_file_and_its_line_are_there(bench: Stage, tmp_path: Path) -> None:
+def test_a_person_is_led_through_and_the_file_and_its_line_are_there(bench: ServedBench, tmp_path: Path) -> None:
     said = guided(bench, tmp_path, "--json", "result.json")
     assert said.code == 0, said.err
     result = json.loads((tmp_path / "result.json").read_text())
@@ -63,7 +63,7 @@ def test_a_person_is_led_through_and_the_file_and_its_line_are_there(bench: Stag
     ],
 )
 def test_a_sensor_that_is_wrong_is_named_with_the_first_weight_and_nothing_is_written(
-    bench: Stage, tmp_path: Path, fault: str, value: float | bool, sentence: str
+    bench: ServedBench, tmp_path: Path, fault: str, value: float | bool, sentence: str
 ) -> None:
     bench.control.fault("force", fault, value)
     said = guided(bench, tmp_path)
@@ -73,7 +73,7 @@ def test_a_sensor_that_is_wrong_is_named_with_the_first_weight_and_nothing_is_wr
 
 
 def test_a_mock_bench_is_calibrated_once_without_what_is_hidden_in_it(
-    bench: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    bench: ServedBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     bench.control.hide({"gain_error.gain_1": 0.2})
@@ -92,7 +92,7 @@ def test_a_mock_bench_is_calibrated_once_without_what_is_hidden_in_it(
 
 
 def test_a_wiring_with_a_wrong_scale_is_refused_by_the_first_run_and_by_later_ones(
-    bench: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    bench: ServedBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     wrong = built_in(["axis.increments_per_mm=4000"])
@@ -105,7 +105,9 @@ def test_a_wiring_with_a_wrong_scale_is_refused_by_the_first_run_and_by_later_on
     ]
 
 
-def test_the_calibration_of_another_sensor_moves_nothing_and_leaves_no_session(bench: Stage, tmp_path: Path) -> None:
+def test_the_calibration_of_another_sensor_moves_nothing_and_leaves_no_session(
+    bench: ServedBench, tmp_path: Path
+) -> None:
     (tmp_path / "other.json").write_text(text_of(force_calibration(serial="000999")))
     settings = bench.settings(f"calibration.force={tmp_path / 'other.json'}")
     said = rig("capture", EXAMPLES / "quick.toml", "--out", tmp_path / "session", *settings, folder=tmp_path)
@@ -136,7 +138,7 @@ def test_its_scale_comes_out_of_a_gauge_block_too(tmp_path: Path) -> None:
     assert (result["reference"], result["direction_known_by"]) == ("gauge block", "contact")
 
 
-def test_a_press_stops_the_axis_while_it_is_calibrated(bench: Stage, tmp_path: Path) -> None:
+def test_a_press_stops_the_axis_while_it_is_calibrated(bench: ServedBench, tmp_path: Path) -> None:
     settings = bench.settings("tracker.product=ndi-polaris")
     running = Running(["calibrate", "axis", *settings, "--clear", "--toward-limb"], tmp_path)
     assert running.process.stdout

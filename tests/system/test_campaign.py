@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.system.stage import ROOT
+from mock_devices.testing.commands import ROOT
 
 
 def campaign(*options: str | Path) -> tuple[int, dict[str, int], str]:

@@ -11,17 +11,17 @@ import pytest
 from api.cli.stage import plugged
 from controller.experiments import threshold
 from controller.supervisor import Supervisor
+from mock_devices.testing.commands import PATIENT, Running, ServedBench, children, freed, pressed
+from mock_devices.testing.models import index_model
 from rig.config.table import merged, parse
 from rig.config.wiring import Wiring
 from rig.recording.reader import read_recording
-from tests.controller.models import index_model
-from tests.system.stage import PATIENT, Running, Stage, children, freed, pressed
 
 HEARTBEAT_S = 0.2
 
 
 @pytest.fixture
-def tracking(bench: Stage, tmp_path: Path) -> Running:
+def tracking(bench: ServedBench, tmp_path: Path) -> Running:
     """A press of 1 to 3 N, over and over, so that the tip moves whenever something happens."""
     model = tmp_path / "model.json"
     index_model(0.12, 0.22, 0.01, force_N=11.0).save(model)
@@ -44,7 +44,7 @@ def causes(tmp_path: Path) -> str:
     return " ".join(f"{event.code}: {event.text}" for event in events)
 
 
-def positions(bench: Stage, for_s: float) -> list[tuple[float, float]]:
+def positions(bench: ServedBench, for_s: float) -> list[tuple[float, float]]:
     """Bench time and true axis position, as often as the bench answers."""
     found: list[tuple[float, float]] = []
     while not found or found[-1][0] < found[0][0] + for_s:
@@ -54,7 +54,7 @@ def positions(bench: Stage, for_s: float) -> list[tuple[float, float]]:
 
 
 def test_a_killed_loop_in_contact_leaves_the_tip_stopped_within_two_heartbeats(
-    bench: Stage, tracking: Running, tmp_path: Path
+    bench: ServedBench, tracking: Running, tmp_path: Path
 ) -> None:
     pressed(bench, 1.5)
     (loop,) = children(tracking.process.pid, "controller.loop.process")
@@ -68,7 +68,7 @@ def test_a_killed_loop_in_contact_leaves_the_tip_stopped_within_two_heartbeats(
 
 
 def test_a_command_that_is_suspended_loses_its_lease_and_the_tip_retracts(
-    bench: Stage, tracking: Running, tmp_path: Path
+    bench: ServedBench, tracking: Running, tmp_path: Path
 ) -> None:
     pressed(bench)
     tracking.process.send_signal(signal.SIGSTOP)
@@ -80,7 +80,7 @@ def test_a_command_that_is_suspended_loses_its_lease_and_the_tip_retracts(
     assert "operator_silent" in causes(tmp_path)
 
 
-def test_a_threshold_session_ends_where_the_subject_stops_it(bench: Stage, tmp_path: Path) -> None:
+def test_a_threshold_session_ends_where_the_subject_stops_it(bench: ServedBench, tmp_path: Path) -> None:
     model = index_model(0.12, 0.22, 0.01, force_N=11.0)
     wiring = plugged(parse(Wiring, merged({}, PATIENT), "PATIENT"), bench.endpoints)
     program = threshold.plan(8.0, 1.0, model, wiring)
@@ -102,7 +102,7 @@ def test_a_threshold_session_ends_where_the_subject_stops_it(bench: Stage, tmp_p
     freed(bench)
 
 
-def test_a_limb_that_is_pulled_away_ends_the_run(bench: Stage, tracking: Running, tmp_path: Path) -> None:
+def test_a_limb_that_is_pulled_away_ends_the_run(bench: ServedBench, tracking: Running, tmp_path: Path) -> None:
     pressed(bench)
     bench.control.set({"surface.position_mm": 34.0})
     said = tracking.end()

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, sync_playwright
 
+from mock_devices.testing.commands import rig
 from rig.tissue.model import load_model
 from tests.system.browser import find, launch
-from tests.system.stage import rig
 
 pytestmark = [pytest.mark.timeout(300), pytest.mark.xdist_group("commands")]
 LARGEST_STEADY_ERROR_PERCENT = 5.0

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from mock_devices.testing.commands import EXAMPLES, Running, Said, ServedBench, children, freed, pressed, rig, until
 from rig.recording.reader import read_recording
 from rig.recording.sessions import open_session
-from tests.system.stage import EXAMPLES, Running, Said, Stage, children, freed, pressed, rig, until
 
 LOOP, RECORDER = "controller.loop.process", "rig.recording.recorder"
 SURFACE_MM = 20.0
@@ -27,11 +27,11 @@ def protocol(tmp_path: Path) -> Path:
     return path
 
 
-def capture(bench: Stage, protocol: Path, tmp_path: Path, *more: str) -> Running:
+def capture(bench: ServedBench, protocol: Path, tmp_path: Path, *more: str) -> Running:
     return Running(["capture", protocol, "--out", tmp_path / "session", *bench.settings(*more)], tmp_path)
 
 
-def at_rest(bench: Stage) -> None:
+def at_rest(bench: ServedBench) -> None:
     first = bench.control.number("axis.position_mm")
     time.sleep(0.3)
     assert bench.control.number("axis.position_mm") == pytest.approx(first, abs=0.02)
@@ -54,27 +54,27 @@ def recorded_cause(tmp_path: Path) -> str:
 # --- before anything moves -------------------------------------------------------------------------------------------
 
 
-def test_a_port_that_does_not_exist(bench: Stage, protocol: Path, tmp_path: Path) -> None:
+def test_a_port_that_does_not_exist(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
     said = capture(bench, protocol, tmp_path, "force.port=/dev/ttyUSB99").end()
     assert said.code == 1
     assert "/dev/ttyUSB99: cannot be opened" in said.sentence
     assert not (tmp_path / "session").exists()
 
 
-def test_a_tracker_that_is_absent(bench: Stage, protocol: Path, tmp_path: Path) -> None:
+def test_a_tracker_that_is_absent(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
     said = capture(bench, protocol, tmp_path, "tracker.port=tcp://127.0.0.1:9").end()
     assert said.code == 1
     assert "tcp://127.0.0.1:9: no connection" in said.sentence
 
 
-def test_the_wrong_device_behind_a_port(bench: Stage, protocol: Path, tmp_path: Path) -> None:
+def test_the_wrong_device_behind_a_port(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
     ports = bench.endpoints
     said = capture(bench, protocol, tmp_path, f"force.port={ports['tracker']['serial']}").end()
     assert said.code == 1
     assert "Bota" in said.sentence or "bota" in said.sentence
 
 
-def test_a_device_that_is_silent(bench: Stage, protocol: Path, tmp_path: Path) -> None:
+def test_a_device_that_is_silent(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
     bench.control.fault("axis", "silent", True)
     said = capture(bench, protocol, tmp_path).end()
     assert said.code == 1
@@ -107,7 +107,7 @@ def test_a_protocol_beyond_the_limits_is_refused_before_anything_is_opened(tmp_p
     assert not (tmp_path / "session").exists()
 
 
-def test_a_second_user_is_told_that_the_bench_is_taken(bench: Stage, protocol: Path, tmp_path: Path) -> None:
+def test_a_second_user_is_told_that_the_bench_is_taken(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
     first = capture(bench, protocol, tmp_path)
     pressed(bench)
     second = rig("capture", protocol, "--out", tmp_path / "second", *bench.settings(), folder=tmp_path)
@@ -132,7 +132,7 @@ def test_a_second_user_is_told_that_the_bench_is_taken(bench: Stage, protocol: P
     ],
 )
 def test_a_lost_input_retracts_and_says_which(
-    bench: Stage, protocol: Path, tmp_path: Path, device: str, kind: str, words: tuple[str, ...]
+    bench: ServedBench, protocol: Path, tmp_path: Path, device: str, kind: str, words: tuple[str, ...]
 ) -> None:
     running = capture(bench, protocol, tmp_path)
     pressed(bench)
@@ -143,7 +143,7 @@ def test_a_lost_input_retracts_and_says_which(
 
 
 def test_a_cut_cable_of_the_axis_ends_with_the_drive_stopped_by_itself(
-    bench: Stage, protocol: Path, tmp_path: Path
+    bench: ServedBench, protocol: Path, tmp_path: Path
 ) -> None:
     running = capture(bench, protocol, tmp_path)
     pressed(bench)
@@ -152,7 +152,7 @@ def test_a_cut_cable_of_the_axis_ends_with_the_drive_stopped_by_itself(
     at_rest(bench)
 
 
-def test_an_axis_that_goes_on_naming_one_place_is_stopped(bench: Stage, protocol: Path, tmp_path: Path) -> None:
+def test_an_axis_that_goes_on_naming_one_place_is_stopped(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
     running = capture(bench, protocol, tmp_path)
     pressed(bench)
     bench.control.fault("axis", "frozen", True)
@@ -160,7 +160,7 @@ def test_an_axis_that_goes_on_naming_one_place_is_stopped(bench: Stage, protocol
     at_rest(bench)
 
 
-def test_a_drive_fault_stops_at_once(bench: Stage, protocol: Path, tmp_path: Path) -> None:
+def test_a_drive_fault_stops_at_once(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
     running = capture(bench, protocol, tmp_path)
     pressed(bench)
     bench.control.fault("axis", "error", 0x2310)
@@ -168,7 +168,7 @@ def test_a_drive_fault_stops_at_once(bench: Stage, protocol: Path, tmp_path: Pat
     at_rest(bench)
 
 
-def test_the_limb_pressing_back_beyond_the_limit_retracts(bench: Stage, protocol: Path, tmp_path: Path) -> None:
+def test_the_limb_pressing_back_beyond_the_limit_retracts(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
     running = capture(bench, protocol, tmp_path, "limits.force_N=13")
     pressed(bench, 4.0)
     bench.control.set({"tissue.stiffness_scale": 4.0})
@@ -176,7 +176,7 @@ def test_the_limb_pressing_back_beyond_the_limit_retracts(bench: Stage, protocol
     ended_safely(running.end(), tmp_path, 3, "force", "limits.force_N, 13 N")
 
 
-def test_ctrl_c_retracts_and_keeps_what_was_recorded(bench: Stage, protocol: Path, tmp_path: Path) -> None:
+def test_ctrl_c_retracts_and_keeps_what_was_recorded(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
     running = capture(bench, protocol, tmp_path)
     pressed(bench)
     running.interrupt()
@@ -186,7 +186,7 @@ def test_ctrl_c_retracts_and_keeps_what_was_recorded(bench: Stage, protocol: Pat
 
 
 @pytest.mark.parametrize(("key", "cause"), [("p", "pain stop"), (" ", "emergency stop"), ("s", "by the operator")])
-def test_a_key_in_the_terminal_stops(bench: Stage, protocol: Path, tmp_path: Path, key: str, cause: str) -> None:
+def test_a_key_in_the_terminal_stops(bench: ServedBench, protocol: Path, tmp_path: Path, key: str, cause: str) -> None:
     ours, theirs = os.openpty()
     arguments: list[str | Path] = ["capture", protocol, "--out", tmp_path / "session", *bench.settings()]
     running = Running(arguments, tmp_path, stdin=theirs)
@@ -198,7 +198,9 @@ def test_a_key_in_the_terminal_stops(bench: Stage, protocol: Path, tmp_path: Pat
     os.close(theirs)
 
 
-def test_a_full_disk_stops_the_motion_and_keeps_the_good_part(bench: Stage, protocol: Path, tmp_path: Path) -> None:
+def test_a_full_disk_stops_the_motion_and_keeps_the_good_part(
+    bench: ServedBench, protocol: Path, tmp_path: Path
+) -> None:
     running = capture(bench, protocol, tmp_path)
     pressed(bench)
     (recorder,) = children(running.process.pid, RECORDER)
@@ -208,7 +210,7 @@ def test_a_full_disk_stops_the_motion_and_keeps_the_good_part(bench: Stage, prot
 
 
 def test_a_killed_loop_leaves_a_stopped_drive_and_an_open_recording(
-    bench: Stage, protocol: Path, tmp_path: Path
+    bench: ServedBench, protocol: Path, tmp_path: Path
 ) -> None:
     running = capture(bench, protocol, tmp_path)
     pressed(bench)
@@ -218,7 +220,7 @@ def test_a_killed_loop_leaves_a_stopped_drive_and_an_open_recording(
     at_rest(bench)
 
 
-def test_a_killed_recorder_stops_the_motion(bench: Stage, protocol: Path, tmp_path: Path) -> None:
+def test_a_killed_recorder_stops_the_motion(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
     running = capture(bench, protocol, tmp_path)
     pressed(bench)
     (recorder,) = children(running.process.pid, RECORDER)
@@ -228,7 +230,7 @@ def test_a_killed_recorder_stops_the_motion(bench: Stage, protocol: Path, tmp_pa
 
 
 def test_a_killed_command_leaves_a_retracted_tip_and_a_finished_recording(
-    bench: Stage, protocol: Path, tmp_path: Path
+    bench: ServedBench, protocol: Path, tmp_path: Path
 ) -> None:
     running = capture(bench, protocol, tmp_path)
     pressed(bench)

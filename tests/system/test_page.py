@@ -10,15 +10,15 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect, sync_playwright
 
+from mock_devices.testing.commands import PATIENCE_S, RIG, ROOT, ServedBench, children, free_port, freed, pressed
 from tests.system.browser import find, launch
-from tests.system.stage import PATIENCE_S, RIG, ROOT, Stage, children, free_port, freed, pressed
 from tests.system.test_service import SHORT, SLOW
 
 expect.set_options(timeout=PATIENCE_S * 1000)
 
 
 @pytest.fixture
-def service(bench: Stage, tmp_path: Path) -> Iterator[tuple["subprocess.Popen[str]", str]]:
+def service(bench: ServedBench, tmp_path: Path) -> Iterator[tuple["subprocess.Popen[str]", str]]:
     """A served bench, and where its page is."""
     find()
     (tmp_path / "protocols").mkdir()
@@ -54,7 +54,7 @@ def state(page: Page, name: str) -> None:
 
 
 @pytest.mark.timeout(200)
-def test_a_person_runs_a_protocol_stops_it_and_finds_the_recordings(page: Page, bench: Stage) -> None:
+def test_a_person_runs_a_protocol_stops_it_and_finds_the_recordings(page: Page, bench: ServedBench) -> None:
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     state(page, "idle")
@@ -91,7 +91,7 @@ def test_a_person_runs_a_protocol_stops_it_and_finds_the_recordings(page: Page, 
 
 @pytest.mark.timeout(200)
 def test_the_stop_is_confirmed_with_six_more_tabs_and_a_service_that_stands_still(
-    page: Page, service: tuple["subprocess.Popen[str]", str], bench: Stage
+    page: Page, service: tuple["subprocess.Popen[str]", str], bench: ServedBench
 ) -> None:
     process, address = service
     state(page, "idle")
@@ -127,7 +127,7 @@ def test_a_stop_that_nobody_confirms_sends_to_the_hardware_stop(
 
 @pytest.mark.timeout(200)
 def test_a_killed_loop_is_recovered_from_the_page_with_a_consent_for_each_act(
-    page: Page, service: tuple["subprocess.Popen[str]", str], bench: Stage
+    page: Page, service: tuple["subprocess.Popen[str]", str], bench: ServedBench
 ) -> None:
     state(page, "idle")
     page.select_option("#protocol", "slow")

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from mock_devices.testing.commands import Running, ServedBench, children, pressed, rig
+from mock_devices.testing.models import index_model
 from rig.recording.ring import new_path
-from tests.controller.models import index_model
-from tests.system.stage import Running, Stage, children, pressed, rig
 
 MODULES = {"loop": "controller.loop.process", "recorder": "rig.recording.recorder", "stop": "controller.stop.server"}
 
 
-def tracking(bench: Stage, tmp_path: Path) -> Running:
+def tracking(bench: ServedBench, tmp_path: Path) -> Running:
     """A force held in contact."""
     model = tmp_path / "model.json"
     index_model(0.12, 0.22, 0.01, force_N=11.0).save(model)
@@ -40,7 +40,7 @@ def killed(running: Running, *whom: str) -> None:
 @pytest.mark.parametrize(
     "whom", [("loop",), ("recorder",), ("command",), ("stop",), ("command", "loop", "recorder", "stop")]
 )
-def test_one_command_brings_the_tip_out_after_a_kill(bench: Stage, tmp_path: Path, whom: tuple[str, ...]) -> None:
+def test_one_command_brings_the_tip_out_after_a_kill(bench: ServedBench, tmp_path: Path, whom: tuple[str, ...]) -> None:
     running = tracking(bench, tmp_path)
     killed(running, *whom)
     if whom == ("stop",):
@@ -60,7 +60,7 @@ def test_one_command_brings_the_tip_out_after_a_kill(bench: Stage, tmp_path: Pat
     assert not list(new_path().parent.glob(f"{mine}*"))
 
 
-def test_after_a_crash_nothing_moves_before_somebody_agrees(bench: Stage, tmp_path: Path) -> None:
+def test_after_a_crash_nothing_moves_before_somebody_agrees(bench: ServedBench, tmp_path: Path) -> None:
     killed(tracking(bench, tmp_path), "command", "loop")
     before_mm = bench.control.number("axis.position_mm")
     said = rig("track", "--model", tmp_path / "model.json", "--force", "1", "--out", tmp_path / "next",

@@ -4,69 +4,37 @@ import json
 import os
 import signal
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-from urllib.error import URLError
-from urllib.request import Request, urlopen
 
 import pytest
 
+from mock_devices.testing.commands import (
+    PATIENCE_S,
+    pressed,
+    rig,
+    served_bench,
+    until,
+)
+from mock_devices.testing.models import index_model
+from mock_devices.testing.service import ServedRig
 from rig.recording.sessions import SessionInfo, write_session
-from tests.controller.models import index_model
-from tests.system.stage import PATIENCE_S, Running, Stage, children, free_port, pressed, rig, stage, until
-
-LOOP = "controller.loop.process"
-
-
-@dataclass(frozen=True)
-class Served:
-    """A bench, and `rig serve` on it."""
-
-    bench: Stage
-    running: Running
-    address: str
-    folder: Path
-
-    def ask(self, method: str, path: str, body: object = None, lease: str = "") -> dict[str, Any]:
-        """One request."""
-        data = None if body is None else json.dumps(body).encode()
-        headers = {"Content-Type": "application/json", "X-Control-Lease": lease}
-        with urlopen(Request(self.address + path, data, headers, method=method), timeout=30) as reply:
-            found: dict[str, Any] = json.load(reply)
-        return found
-
-    @property
-    def rig(self) -> dict[str, Any]:
-        """The bench as it shows it; empty while it does not listen yet."""
-        try:
-            return self.ask("GET", "/api/v1/rig")
-        except (URLError, OSError):
-            return {}
-
-    def becomes(self, state: str) -> None:
-        """Waits for that state."""
-        until(lambda: self.rig.get("state") == state, PATIENCE_S, f"the service being {state}")
 
 
 @pytest.fixture
-def served(tmp_path: Path) -> Iterator[Served]:
+def served(tmp_path: Path) -> Iterator[ServedRig]:
     (tmp_path / "links").mkdir()
     (tmp_path / "sessions" / "known" / "fit").mkdir(parents=True)
     index_model(0.12, 0.22, 0.01, force_N=11.0).save(tmp_path / "sessions" / "known" / "fit" / "model.json")
     write_session(tmp_path / "sessions" / "known", SessionInfo("known", "track", "2026-01-01T00:00:00Z", "test"))
-    port = free_port()
-    with stage("--seed", "1", "--links", str(tmp_path / "links")) as bench:
-        running = Running(["serve", "--port", str(port), *bench.settings()], tmp_path)
-        found = Served(bench, running, f"http://127.0.0.1:{port}", tmp_path)
-        found.becomes("idle")
+    with served_bench("--seed", "1", "--links", str(tmp_path / "links")) as bench:
+        found = ServedRig(bench, tmp_path, bench.settings())
         yield found
-        if running.process.poll() is None:
-            running.interrupt()
-            running.end()
+        if found.running.process.poll() is None:
+            found.running.interrupt()
+            found.running.end()
 
 
-def test_beside_a_service_nobody_disturbs_it_and_what_was_lost_comes_back(served: Served) -> None:
+def test_beside_a_service_nobody_disturbs_it_and_what_was_lost_comes_back(served: ServedRig) -> None:
     bench, settings = served.bench, served.bench.settings()
     seen = rig("doctor", *settings, "--json", "doctor.json", folder=served.folder)
     assert seen.code == 0, seen.err
@@ -88,9 +56,9 @@ def test_beside_a_service_nobody_disturbs_it_and_what_was_lost_comes_back(served
         assert served.rig["devices"][role]["state"] == "ok"
 
 
-def test_a_loop_killed_under_a_service_is_recovered_through_it(served: Served) -> None:
+def test_a_loop_killed_under_a_service_is_recovered_through_it(served: ServedRig) -> None:
     bench = served.bench
-    (loop,) = children(served.running.process.pid, LOOP)
+    loop = served.loop
     os.kill(loop, signal.SIGKILL)
     served.becomes("disconnected")
     said = rig("reset", "--yes", *bench.settings(), folder=served.folder)
@@ -110,10 +78,10 @@ def test_a_loop_killed_under_a_service_is_recovered_through_it(served: Served) -
     served.becomes("idle")
 
 
-def test_a_killed_service_leaves_a_bench_that_one_command_recovers(served: Served) -> None:
-    lease = served.ask("POST", "/api/v1/control/lease", {"holder": "test", "ttl_s": 30.0})["lease_id"]
+def test_a_killed_service_leaves_a_bench_that_one_command_recovers(served: ServedRig) -> None:
+    lease = served.lease()
     request = {"kind": "track", "session": "known", "forces_N": [2.0], "seconds": 60.0}
-    served.ask("POST", "/api/v1/jobs", request, lease)
+    served.ask("POST", "/jobs", request, lease)
     pressed(served.bench, 1.5)
     served.running.kill()
     said = rig("reset", "--yes", *served.bench.settings(), folder=served.folder)

@@ -5,15 +5,15 @@ from pathlib import Path
 
 import pytest
 
+from mock_devices.testing.commands import EXAMPLES, Running, ServedBench, rig
 from rig.recording.reader import read_recording
 from rig.recording.sessions import open_session
-from tests.system.stage import EXAMPLES, Running, Stage, rig
 
 pytestmark = pytest.mark.xdist_group("commands")
 SURFACE_MM = 20.0
 
 
-def test_one_line_exchanges_the_force_sensor(bench: Stage, tmp_path: Path) -> None:
+def test_one_line_exchanges_the_force_sensor(bench: ServedBench, tmp_path: Path) -> None:
     port = bench.endpoints["force_modbus"]["serial"]
     settings = bench.settings("force.product=robotiq-ft300", f"force.port={port}")
     said = rig("capture", EXAMPLES / "quick.toml", "--out", tmp_path / "session", *settings, folder=tmp_path)
@@ -28,7 +28,7 @@ def test_one_line_exchanges_the_force_sensor(bench: Stage, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("product", ["bota-sensone", "robotiq-ft300"])
-def test_8_mm_are_8_mm_with_either_sensor(bench: Stage, tmp_path: Path, product: str) -> None:
+def test_8_mm_are_8_mm_with_either_sensor(bench: ServedBench, tmp_path: Path, product: str) -> None:
     """Depth is the bench's own: how far the true tip went below the true surface."""
     role = {"bota-sensone": "force", "robotiq-ft300": "force_modbus"}[product]
     settings = bench.settings(f"force.product={product}", f"force.port={bench.endpoints[role]['serial']}")

@@ -12,8 +12,9 @@ from api.cli.stage import plugged
 from api.http.app import build
 from api.http.lease import Control
 from api.http.service import Service
+from mock_devices.testing.clock import Clock
+from mock_devices.testing.commands import PATIENCE_S, PATIENT, ServedBench, freed, pressed, served_bench, until
 from rig.recording.reader import read_recording
-from tests.system.stage import PATIENCE_S, PATIENT, Stage, freed, pressed, stage, until
 
 SLOW = (
     'kind = "indentation"\nspeeds_mm_s = [5]\ntrials = 1\ndepth_mm = 6\nair_dwell_s = 0.2\napproach_speed_mm_s = 20\n'
@@ -22,37 +23,28 @@ SLOW = (
 SHORT = SLOW.replace("hold_s = 30", "hold_s = 0.1").replace("speeds_mm_s = [5]", "speeds_mm_s = [20]")
 
 
-class Clock:
-    """The lease's clock: it stands still, however long a test takes, unless the test moves it."""
-
-    now_s = 0.0
-
-    def __call__(self) -> float:
-        return self.now_s
-
-
 @pytest.fixture(scope="module")
 def clock() -> Clock:
     return Clock()
 
 
 @pytest.fixture(scope="module")
-def served(clock: Clock, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Stage, TestClient, Path]]:
+def served(clock: Clock, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[ServedBench, TestClient, Path]]:
     folder = tmp_path_factory.mktemp("service")
     (folder / "protocols").mkdir()
     (folder / "protocols" / "slow.toml").write_text(SLOW)
     (folder / "protocols" / "short.toml").write_text(SHORT)
-    with stage("--seed", "2") as bench:
+    with served_bench("--seed", "2") as bench:
         service = Service(
             plugged(built_in(["loop.lease_s=1", *PATIENT]), bench.endpoints), folder / "sessions", folder / "protocols"
         )
-        service.control = Control(clock)
+        service.control = Control(clock.seconds)
         with TestClient(build(service), base_url="http://127.0.0.1:8000") as client:
             yield bench, client, folder
 
 
 @pytest.fixture(autouse=True)
-def in_control(served: tuple[Stage, TestClient, Path]) -> Iterator[None]:
+def in_control(served: tuple[ServedBench, TestClient, Path]) -> Iterator[None]:
     """Every test takes the lease, and gives it back."""
     _, client, _ = served
     taken = client.post("/api/v1/control/lease", json={"holder": "test", "ttl_s": 30.0})
@@ -79,7 +71,7 @@ def reset(client: TestClient) -> None:
     assert client.get("/api/v1/rig").json()["state"] == "idle"
 
 
-def test_the_bench_is_shown_with_its_devices_and_their_health(served: tuple[Stage, TestClient, Path]) -> None:
+def test_the_bench_is_shown_with_its_devices_and_their_health(served: tuple[ServedBench, TestClient, Path]) -> None:
     _, client, _ = served
     until(lambda: client.get("/api/v1/rig").json()["ticks"] > 300, PATIENCE_S, "a running loop")
     rig = client.get("/api/v1/rig").json()
@@ -89,7 +81,7 @@ def test_the_bench_is_shown_with_its_devices_and_their_health(served: tuple[Stag
 
 
 def test_a_capture_runs_as_a_job_and_its_recording_can_be_downloaded(
-    served: tuple[Stage, TestClient, Path], tmp_path: Path
+    served: tuple[ServedBench, TestClient, Path], tmp_path: Path
 ) -> None:
     _, client, _ = served
     job = ended(client, start(client, "short", "first"))
@@ -104,14 +96,14 @@ def test_a_capture_runs_as_a_job_and_its_recording_can_be_downloaded(
     assert (part.status_code, part.content) == (206, b"\x89MCAP0\r\n")
 
 
-def test_a_session_is_never_overwritten(served: tuple[Stage, TestClient, Path]) -> None:
+def test_a_session_is_never_overwritten(served: tuple[ServedBench, TestClient, Path]) -> None:
     _, client, folder = served
     (folder / "sessions" / "taken").mkdir(parents=True)
     answer = client.post("/api/v1/jobs", json={"kind": "capture", "protocol": "short", "session": "taken"})
     assert (answer.status_code, answer.json()["code"]) == (409, "session-exists")
 
 
-def test_one_job_at_a_time_and_a_stop_names_its_job(served: tuple[Stage, TestClient, Path]) -> None:
+def test_one_job_at_a_time_and_a_stop_names_its_job(served: tuple[ServedBench, TestClient, Path]) -> None:
     bench, client, _ = served
     job = start(client, "slow", "second")
     pressed(bench)
@@ -127,7 +119,7 @@ def test_one_job_at_a_time_and_a_stop_names_its_job(served: tuple[Stage, TestCli
 
 
 def test_the_emergency_stop_holds_until_acknowledged_and_moves_nothing_then(
-    served: tuple[Stage, TestClient, Path],
+    served: tuple[ServedBench, TestClient, Path],
 ) -> None:
     bench, client, _ = served
     job = start(client, "slow", "fourth")
@@ -150,7 +142,7 @@ def test_the_emergency_stop_holds_until_acknowledged_and_moves_nothing_then(
     freed(bench)
 
 
-def test_the_subjects_pain_stop_retracts(served: tuple[Stage, TestClient, Path]) -> None:
+def test_the_subjects_pain_stop_retracts(served: tuple[ServedBench, TestClient, Path]) -> None:
     bench, client, folder = served
     bench.control.set({"tissue.present": False})
     assert client.post("/api/v1/pain").json()["detail"] == "nothing was moving: the axis stays where it is"
@@ -168,12 +160,12 @@ def test_the_subjects_pain_stop_retracts(served: tuple[Stage, TestClient, Path])
 
 
 def test_a_user_who_does_not_renew_the_lease_is_retracted_from(
-    served: tuple[Stage, TestClient, Path], clock: Clock
+    served: tuple[ServedBench, TestClient, Path], clock: Clock
 ) -> None:
     bench, client, folder = served
     job = start(client, "slow", "seventh")
     pressed(bench)
-    clock.now_s += 31.0
+    clock.advance(31.0)
     freed(bench)
     assert ended(client, job)["state"] == "stopped"
     events = read_recording(folder / "sessions" / "seventh" / "trial_001.mcap").events
@@ -183,7 +175,7 @@ def test_a_user_who_does_not_renew_the_lease_is_retracted_from(
     reset(client)
 
 
-def test_live_values_come_as_server_sent_events(served: tuple[Stage, TestClient, Path]) -> None:
+def test_live_values_come_as_server_sent_events(served: tuple[ServedBench, TestClient, Path]) -> None:
     _, client, _ = served
     app = client.app
     assert app is not None

@@ -7,7 +7,6 @@ import signal
 import struct
 import threading
 import time
-import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,18 @@ from api.cli.options import built_in
 from api.cli.stage import plugged
 from controller.stop.word import NOT_CONFIRMED, Deed, Kind
 from controller.supervisor import Supervisor
+from mock_devices.testing.commands import (
+    PATIENCE_S,
+    PATIENT,
+    Running,
+    ServedBench,
+    children,
+    freed,
+    pressed,
+    until,
+)
+from mock_devices.testing.service import ServedRig
 from rig.errors import SafetyStop
-from tests.system.stage import PATIENCE_S, PATIENT, Running, Stage, children, free_port, freed, pressed, until
 
 SLOW = (
     'kind = "indentation"\nspeeds_mm_s = [5]\ntrials = 1\ndepth_mm = 6\nair_dwell_s = 0.2\napproach_speed_mm_s = 20\n'
@@ -36,81 +45,47 @@ def asked(port: int, path: str, method: str = "POST") -> tuple[int, dict[str, An
     return status, said
 
 
-class Served:
-    """`rig serve` over the bench, with its stop process at a port of the test's choice."""
+def stop_port(served: ServedRig) -> int:
+    return int(served.ask("GET", "/info")["stop_port"])
 
-    def __init__(self, bench: Stage, folder: Path, *settings: str) -> None:
-        self.bench, self.port, self.stop_port = bench, free_port(), 0
-        (folder / "protocols").mkdir()
-        (folder / "protocols" / "slow.toml").write_text(SLOW)
-        folders = ("--protocols", folder / "protocols", "--sessions", folder / "sessions")
-        plugged_in = bench.settings("stop.port=0", "loop.lease_s=2", *settings)
-        self.running = Running(["serve", "--port", str(self.port), *folders, *plugged_in], folder)
-        until(self._answers, PATIENCE_S, "the service")
-        self.stop_port = self.call("GET", "/info")["stop_port"]
 
-    def _answers(self) -> bool:
-        assert self.running.process.poll() is None, self.running.end()
-        try:
-            return bool(self.call("GET", "/rig")["state"] == "idle")
-        except OSError:
-            return False
-
-    def call(self, method: str, path: str, body: object = None, lease: str = "") -> Any:
-        """A request to the service itself."""
-        request = urllib.request.Request(
-            f"http://127.0.0.1:{self.port}/api/v1{path}",
-            method=method,
-            data=json.dumps(body).encode() if body is not None else None,
-            headers={"Content-Type": "application/json", "X-Control-Lease": lease},
-        )
-        with urllib.request.urlopen(request, timeout=10) as answer:
-            return json.loads(answer.read())
-
-    def press(self) -> None:
-        """Starts a capture and waits until the tip presses."""
-        lease = self.call("POST", "/control/lease", {"holder": "test", "ttl_s": 30.0})["lease_id"]
-        self.call("POST", "/jobs", {"kind": "capture", "protocol": "slow", "session": "one"}, lease)
-        pressed(self.bench)
-
-    @property
-    def loop(self) -> int:
-        """Process number of the loop."""
-        (pid,) = children(self.running.process.pid, "controller.loop.process")
-        return pid
-
-    @property
-    def stop_process(self) -> int:
-        """Process number of the stop process."""
-        (pid,) = children(self.running.process.pid, "controller.stop.server")
-        return pid
+def press(served: ServedRig) -> None:
+    """Starts a capture and waits until the tip presses."""
+    served.ask("POST", "/jobs", {"kind": "capture", "protocol": "slow", "session": "one"}, served.lease())
+    pressed(served.bench)
 
 
 @pytest.fixture
-def served(bench: Stage, tmp_path: Path) -> Iterator[Served]:
-    service = Served(bench, tmp_path)
+def served(bench: ServedBench, tmp_path: Path) -> Iterator[ServedRig]:
+    """The service, with its stop process at a port of its own choice."""
+    (tmp_path / "protocols").mkdir()
+    (tmp_path / "protocols" / "slow.toml").write_text(SLOW)
+    folders = ("--protocols", tmp_path / "protocols", "--sessions", tmp_path / "sessions")
+    service = ServedRig(bench, tmp_path, [*folders, *bench.settings("stop.port=0", "loop.lease_s=2")])
     yield service
     os.kill(service.running.process.pid, signal.SIGCONT)
 
 
-def test_with_the_service_suspended_a_press_is_confirmed_and_the_tip_leaves(bench: Stage, served: Served) -> None:
-    served.press()
+def test_with_the_service_suspended_a_press_is_confirmed_and_the_tip_leaves(
+    bench: ServedBench, served: ServedRig
+) -> None:
+    press(served)
     served.running.process.send_signal(signal.SIGSTOP)
-    status, said = asked(served.stop_port, "/pain")
+    status, said = asked(stop_port(served), "/pain")
     assert (status, said["confirmed"], said["done"]) == (200, True, "retracting")
-    status, again = asked(served.stop_port, "/pain")
+    status, again = asked(stop_port(served), "/pain")
     assert (status, again["id"], again["confirmed"]) == (200, said["id"] + 1, True)
     freed(bench)
-    assert asked(served.stop_port, "/estop")[1]["done"] == "braked"
+    assert asked(stop_port(served), "/estop")[1]["done"] == "braked"
 
 
 def test_with_the_service_killed_a_press_is_confirmed_and_the_process_ends_with_the_loop(
-    bench: Stage, served: Served
+    bench: ServedBench, served: ServedRig
 ) -> None:
-    served.press()
+    press(served)
     loop, stop_process = served.loop, served.stop_process
     os.kill(served.running.process.pid, signal.SIGKILL)
-    status, said = asked(served.stop_port, "/estop")
+    status, said = asked(stop_port(served), "/estop")
     assert (status, said["confirmed"]) == (200, True)
     until(lambda: not _alive(loop) and not _alive(stop_process), PATIENCE_S, "both ended")
 
@@ -124,18 +99,18 @@ def _alive(pid: int) -> bool:
 
 
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGSTOP])
-def test_with_the_loop_killed_or_frozen_nothing_is_confirmed(served: Served, end: signal.Signals) -> None:
+def test_with_the_loop_killed_or_frozen_nothing_is_confirmed(served: ServedRig, end: signal.Signals) -> None:
     loop = served.loop
     os.kill(loop, end)
     began = time.monotonic()
-    status, said = asked(served.stop_port, "/estop")
+    status, said = asked(stop_port(served), "/estop")
     os.kill(loop, signal.SIGCONT) if end is signal.SIGSTOP else None
     assert time.monotonic() - began < 1.5
     assert (status, said["confirmed"]) == (504, False)
     assert said["done"].startswith(NOT_CONFIRMED)
 
 
-def test_a_stop_while_the_axis_homes_brakes_it_and_ends_the_start(bench: Stage) -> None:
+def test_a_stop_while_the_axis_homes_brakes_it_and_ends_the_start(bench: ServedBench) -> None:
     bench.control.set({"surface.position_mm": 60.0})
     settings = [*PATIENT, "stop.port=0", "axis.homing_speed_mm_s=2"]
     supervisor = Supervisor(plugged(built_in(settings), bench.endpoints))
@@ -162,7 +137,7 @@ def test_a_stop_while_the_axis_homes_brakes_it_and_ends_the_start(bench: Stage) 
     assert bench.control.get("axis.powered")["axis.powered"] is False
 
 
-def test_a_foot_switch_retracts_and_the_supervisors_own_lane_answers_too(bench: Stage, tmp_path: Path) -> None:
+def test_a_foot_switch_retracts_and_the_supervisors_own_lane_answers_too(bench: ServedBench, tmp_path: Path) -> None:
     pad = tmp_path / "pad"
     os.mkfifo(pad)
     writer = os.open(pad, os.O_RDWR)
@@ -181,7 +156,9 @@ def test_a_foot_switch_retracts_and_the_supervisors_own_lane_answers_too(bench: 
 
 
 @pytest.mark.parametrize("key", [b"p", b" ", b"s"])
-def test_a_key_pressed_before_the_bench_is_up_keeps_it_from_starting(bench: Stage, tmp_path: Path, key: bytes) -> None:
+def test_a_key_pressed_before_the_bench_is_up_keeps_it_from_starting(
+    bench: ServedBench, tmp_path: Path, key: bytes
+) -> None:
     keyboard, terminal = os.openpty()
     os.write(keyboard, key)
     (tmp_path / "slow.toml").write_text(SLOW)

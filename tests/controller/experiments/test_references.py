@@ -8,9 +8,9 @@ from controller.experiments import tracking
 from controller.experiments.references import named
 from controller.loop.steps import TrackForce
 from controller.safety.program_limits import refuse_beyond_limits
+from mock_devices.testing.models import index_model
 from rig.config.wiring import Axis, Loop, Wiring
 from rig.errors import UsageError
-from tests.controller.models import index_model
 
 MODEL = index_model(0.12, 0.22, 0.01, force_N=11.0)
 

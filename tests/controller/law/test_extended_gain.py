@@ -9,11 +9,11 @@ from controller.experiments.tracking import force_law
 from controller.law import force_position
 from mock_devices.bench import Bench
 from mock_devices.parameters import Parameters
+from mock_devices.testing.models import index_model
 from rig.config.wiring import Wiring
 from rig.tissue.laws import Index
 from rig.tissue.laws_extended import Extended
 from rig.tissue.model import Model
-from tests.controller.models import index_model
 from tests.mock_devices.playing import settle
 
 MS_NS = 1_000_000

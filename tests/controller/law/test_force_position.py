@@ -19,8 +19,8 @@ from controller.law.force_position import (
     interpolate,
 )
 from controller.law.gains import Design, margins, pi_gains, schedule
+from mock_devices.testing.models import index_model
 from rig.errors import UsageError
-from tests.controller.models import index_model
 
 DESIGN = Design(bandwidth_Hz=34.0, delay_s=0.004, crossover_Hz=8.0, phase_margin_deg=60.0)
 PLAIN = Settings(damping_N_s_mm=0.0, lag_s=0.0, ahead_mm_s=0.0, forgetting=0.0, drift_per_s=0.0, drift_limit_mm_s=5.0)

@@ -6,10 +6,10 @@ import pytest
 
 from api.cli.options import built_in
 from controller.experiments.tracking import force_law
+from mock_devices.testing.models import index_model
 from rig.errors import UsageError
 from rig.tissue.laws import Law
 from rig.tissue.model import ValidRange
-from tests.controller.models import index_model
 from tests.rig.tissue.examples import EXAMPLES
 
 SOFT_AT_CONTACT = {"power", "hunt_crossley"}

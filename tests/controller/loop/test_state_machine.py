@@ -12,10 +12,7 @@ from controller.loop.state import LoopState
 from controller.loop.steps import Approach, Compress, Dither, Hold, MoveTo, Program, Retract, Step, TrackForce, Zero
 from controller.safety.program_limits import refuse_beyond_limits
 from controller.safety.table import Action, Incident
-from rig.config.wiring import Limits, Wiring
-from rig.errors import UsageError
-from tests.controller.law.test_force_position import DESIGN
-from tests.controller.spring import (
+from mock_devices.testing.spring_bench import (
     APPROACH,
     LEAVE,
     PRESS,
@@ -26,6 +23,9 @@ from tests.controller.spring import (
     ZERO_N,
     SpringBench,
 )
+from rig.config.wiring import Limits, Wiring
+from rig.errors import UsageError
+from tests.controller.law.test_force_position import DESIGN
 
 
 def gains() -> tuple[GainRow, ...]:

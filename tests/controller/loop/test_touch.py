@@ -12,8 +12,8 @@ from controller.loop.modes import Mode
 from controller.loop.paired_samples import ROWS, PairedSamples
 from controller.loop.steps import Zero
 from controller.loop.touch import warm_up
-from tests.controller.limb import BOTA, FT300, Limb, Sensor, approached
-from tests.controller.spring import APPROACH, PRESS, SURFACE_MM, SpringBench
+from mock_devices.testing.limb_bench import BOTA, FT300, Limb, Sensor, approached
+from mock_devices.testing.spring_bench import APPROACH, PRESS, SURFACE_MM, SpringBench
 
 FIRM = Limb(0.5, 0.2, 0.0)
 SENSORS = pytest.mark.parametrize("sensor", [BOTA, FT300])

@@ -13,11 +13,11 @@ from controller.loop.steps import Approach, Hold, Step, TrackForce
 from controller.safety.inputs import SafetyInputs
 from controller.safety.load import NO_WRENCH, LoadMonitor
 from controller.safety.table import TABLE, evaluate
+from mock_devices.testing.models import index_model
+from mock_devices.testing.spring_bench import WIRING
 from rig.simulation.axis_plant import Limb
 from tests.controller.fake_bench import ZERO, wired
-from tests.controller.models import index_model
 from tests.controller.plant_bench import BOTA, FT300, PlantBench, Product, curve, exponential, linear, rammed
-from tests.controller.spring import WIRING
 
 LIMIT_N, BOUND_N = 15.0, 16.5
 PRODUCTS = pytest.mark.parametrize("product", [BOTA, FT300], ids=["1 kHz", "100 Hz"])

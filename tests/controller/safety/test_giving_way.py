@@ -9,10 +9,11 @@ from controller.safety.giving_way import give_way
 from controller.safety.inputs import SafetyInputs
 from controller.safety.load import NO_WRENCH, Load
 from controller.safety.table import TABLE, Check, evaluate
+from mock_devices.testing.clock import Clock
 from rig.config.wiring import Limits, Wiring
 from rig.errors import DeviceError
 from tests.controller.fake_bench import ZERO, FakeBench, wired
-from tests.controller.fake_devices import Clock, FakeAxis
+from tests.controller.fake_devices import FakeAxis
 from tests.controller.plant_bench import BOTA, FT300, PlantBench, Product, linear
 
 PRODUCTS = pytest.mark.parametrize("product", [BOTA, FT300], ids=["1 kHz", "100 Hz"])

@@ -8,8 +8,8 @@ from controller.devices.health import Standstill, StreamHealth
 from controller.loop.modes import Mode
 from controller.loop.steps import Hold, MoveTo
 from controller.safety.table import TABLE, Action
+from mock_devices.testing.spring_bench import APPROACH, PRESS, SURFACE_MM, ZERO, ZERO_N, SpringBench
 from rig.config.wiring import Wiring
-from tests.controller.spring import APPROACH, PRESS, SURFACE_MM, ZERO, ZERO_N, SpringBench
 
 
 @pytest.mark.parametrize(

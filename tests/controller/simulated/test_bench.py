@@ -18,12 +18,12 @@ from controller.simulated.bench import MOTOR, POSITION_LOOP, SENSING, SimulatedB
 from controller.simulated.segments import hold_compiled
 from mock_devices.bench import Bench
 from mock_devices.parameters import Parameters, load_parameters
+from mock_devices.testing.models import index_model
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed
 from rig.simulation import axis_plant
 from rig.simulation.axis_plant import Limb, at_rest
 from rig.tissue.model import Model
-from tests.controller.models import index_model
 
 WIRING = Wiring()
 STAIRS_N = np.repeat([1.0, *range(1, 11)], 1500).astype(float)

@@ -13,11 +13,11 @@ from drivers.bota.codec import Frame, encode_frame
 from drivers.bota.device import BotaSensOne
 from drivers.ports import PortClosed, open_port
 from drivers.roles import Identity
+from mock_devices.testing.clock import long_ago
+from mock_devices.testing.force import WRENCH, ServedMock, await_silence, collect
 from rig.config.wiring import Force
 from rig.errors import DeviceError, UsageError
 from tests.drivers.scripted_port import ScriptedPort
-from tests.mock_devices.force_bench import WRENCH, Served, await_silence, collect
-from tests.remote import long_ago
 
 BOOT = b"c,0,1,0,4\r\nApp Init\r\nname: BFT-SENS-SER-M8\r\nS/N: 000271\r\nFW version: 1.0.6\r\n"
 PERIOD_US = 996
@@ -299,14 +299,14 @@ def test_close_takes_the_sensor_out_of_run_mode_and_may_be_called_twice() -> Non
         sensor.poll(0)
 
 
-def opened(mock: Served, config: Force | None = None) -> BotaSensOne:
+def opened(mock: ServedMock, config: Force | None = None) -> BotaSensOne:
     return BotaSensOne(open_port(mock.endpoint, BotaSensOne.DEFAULT_BAUD), config or Force())
 
 
 @pytest.mark.bench
 @pytest.mark.xdist_group("wire")
 class TestAgainstTheMockInAnotherProcess:
-    def test_a_session_streams_at_its_rate_and_accounts_for_every_frame(self, bota: Served) -> None:
+    def test_a_session_streams_at_its_rate_and_accounts_for_every_frame(self, bota: ServedMock) -> None:
         sensor = opened(bota)
         sensor.start()
         samples = collect(sensor, lambda got: len(got) >= 500)
@@ -318,7 +318,7 @@ class TestAgainstTheMockInAnotherProcess:
         assert sensor.counters.frames == len(samples)
         assert all(early.capture_ns <= late.capture_ns for early, late in pairwise(samples))
 
-    def test_an_abandoned_session_is_taken_over_while_it_streams(self, bota: Served) -> None:
+    def test_an_abandoned_session_is_taken_over_while_it_streams(self, bota: ServedMock) -> None:
         first = open_port(bota.endpoint, BotaSensOne.DEFAULT_BAUD)
         abandoned = BotaSensOne(first, Force())
         abandoned.start()
@@ -330,7 +330,7 @@ class TestAgainstTheMockInAnotherProcess:
         assert sensor.period_ns == 2_500_000
         assert all(sample.valid for sample in samples)
 
-    def test_another_load_and_another_status_arrive(self, bota: Served) -> None:
+    def test_another_load_and_another_status_arrive(self, bota: ServedMock) -> None:
         sensor = opened(bota)
         sensor.start()
         bota.load(0.0, 0.0, -12.5, 0.0, 0.0, 0.0)
@@ -340,7 +340,7 @@ class TestAgainstTheMockInAnotherProcess:
         sensor.close()
         assert samples[-1].status == 4
 
-    def test_spoilt_checksums_are_counted_and_seen_as_lost(self, bota: Served) -> None:
+    def test_spoilt_checksums_are_counted_and_seen_as_lost(self, bota: ServedMock) -> None:
         sensor = opened(bota)
         sensor.start()
         bota.set(corrupt_every=5)
@@ -348,7 +348,7 @@ class TestAgainstTheMockInAnotherProcess:
         sensor.close()
         assert sensor.counters.device_lost >= sensor.counters.checksum_errors - 1
 
-    def test_a_sensor_that_falls_silent_gives_no_samples_and_no_error(self, bota: Served) -> None:
+    def test_a_sensor_that_falls_silent_gives_no_samples_and_no_error(self, bota: ServedMock) -> None:
         sensor = opened(bota)
         sensor.start()
         bota.set(silent=True)
@@ -358,7 +358,7 @@ class TestAgainstTheMockInAnotherProcess:
         sensor.close()
         assert sensor.counters.device_lost >= 1
 
-    def test_a_cut_cable_raises_and_close_stays_quiet(self, bota: Served) -> None:
+    def test_a_cut_cable_raises_and_close_stays_quiet(self, bota: ServedMock) -> None:
         sensor = opened(bota)
         sensor.start()
         bota.cut()
@@ -368,7 +368,7 @@ class TestAgainstTheMockInAnotherProcess:
         sensor.close()
 
     def test_a_second_close_does_not_write_into_the_file_that_got_the_lines_number(
-        self, bota: Served, tmp_path: Path
+        self, bota: ServedMock, tmp_path: Path
     ) -> None:
         sensor = opened(bota)
         number = sensor.fileno()
@@ -383,7 +383,7 @@ class TestAgainstTheMockInAnotherProcess:
         os.close(number)
         assert (tmp_path / "other").read_bytes() == b""
 
-    def test_a_silent_device_a_wrong_device_and_a_refusal_each_end_the_start(self, bota: Served) -> None:
+    def test_a_silent_device_a_wrong_device_and_a_refusal_each_end_the_start(self, bota: ServedMock) -> None:
         bota.set(wrong_identity=True)
         with pytest.raises(DeviceError, match="not a Bota sensor"):
             self._start(bota)
@@ -394,7 +394,7 @@ class TestAgainstTheMockInAnotherProcess:
         with pytest.raises(DeviceError, match="nothing came"):
             self._start(bota)
 
-    def _start(self, bota: Served) -> None:
+    def _start(self, bota: ServedMock) -> None:
         sensor = opened(bota)
         try:
             sensor.start()

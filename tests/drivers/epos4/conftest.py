@@ -5,17 +5,17 @@ from collections.abc import Iterator
 import pytest
 
 from drivers.epos4.device import Epos4Axis
+from mock_devices.testing.epos4 import DriveBench
 from tests.drivers.epos4.sessions import axis_on
-from tests.epos4_stage import Stage
 
 
 @pytest.fixture
-def stage() -> Stage:
-    return Stage()
+def stage() -> DriveBench:
+    return DriveBench()
 
 
 @pytest.fixture
-def axis(stage: Stage) -> Iterator[Epos4Axis]:
+def axis(stage: DriveBench) -> Iterator[Epos4Axis]:
     axis = axis_on(stage)
     axis.start()
     yield axis

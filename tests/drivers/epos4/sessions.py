@@ -3,16 +3,16 @@
 from typing import Any
 
 from drivers.epos4.device import Epos4Axis
+from mock_devices.testing.epos4 import DriveBench
 from rig.channels import AxisSample
 from rig.config.wiring import Axis, Limits
-from tests.epos4_stage import Stage
 
 
-def axis_on(stage: Stage, limits: Limits | None = None, **config: Any) -> Epos4Axis:
+def axis_on(stage: DriveBench, limits: Limits | None = None, **config: Any) -> Epos4Axis:
     return Epos4Axis(Axis(port="memory", **config), limits or Limits(), stage.now, open_link=stage.open)
 
 
-def tick(stage: Stage, axis: Epos4Axis, position_mm: float) -> list[AxisSample]:
+def tick(stage: DriveBench, axis: Epos4Axis, position_mm: float) -> list[AxisSample]:
     """One turn of a loop at 1 kHz."""
     stage.run(0.001)
     samples = axis.poll(stage.now())

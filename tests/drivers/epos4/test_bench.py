@@ -21,10 +21,11 @@ from drivers.epos4 import objects
 from drivers.epos4.device import Epos4Axis
 from drivers.epos4.node import Node
 from drivers.ports import PortClosed, SerialPort
+from mock_devices.testing.epos4 import remote_drive
+from mock_devices.testing.remote import RemoteMock
 from rig.channels import AxisSample
 from rig.config.wiring import Axis, Limits
 from rig.errors import DeviceError, UsageError
-from tests.epos4_stage import RemoteMock, remote_mock
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
 PATIENCE_S = 10.0
@@ -50,7 +51,7 @@ while True:
 
 @pytest.fixture
 def mock() -> Iterator[RemoteMock]:
-    with remote_mock() as mock:
+    with remote_drive() as mock:
         yield mock
 
 
@@ -64,7 +65,7 @@ def axis(mock: RemoteMock) -> Iterator[Epos4Axis]:
 
 def config_of(mock: RemoteMock, **config: Any) -> Axis:
     """Heartbeats are slow here: a shared machine may stop any process for a while."""
-    return Axis(port=mock.port, heartbeat_ms=HEARTBEAT_MS, **config)
+    return Axis(port=mock.address, heartbeat_ms=HEARTBEAT_MS, **config)
 
 
 def turn(axis: Epos4Axis, position_mm: float) -> list[AxisSample]:
@@ -143,7 +144,7 @@ def test_a_quick_stop_holds_the_axis_where_it_is(mock: RemoteMock, axis: Epos4Ax
 
 
 def test_a_drive_stops_by_itself_when_the_host_is_killed(mock: RemoteMock) -> None:
-    host = subprocess.Popen([sys.executable, "-c", MOVING_HOST, mock.port], stdout=subprocess.PIPE, text=True)
+    host = subprocess.Popen([sys.executable, "-c", MOVING_HOST, mock.address], stdout=subprocess.PIPE, text=True)
     try:
         assert host.stdout is not None
         assert host.stdout.readline() == "moving\n"
@@ -156,7 +157,7 @@ def test_a_drive_stops_by_itself_when_the_host_is_killed(mock: RemoteMock) -> No
         host.wait(PATIENCE_S)
         if host.stdout:
             host.stdout.close()
-    link = SlcanLink(mock.port, 1_000_000)
+    link = SlcanLink(mock.address, 1_000_000)
     try:
         node = Node(link, 1, 126, 1000, "the drive")
         deadline = time.monotonic() + PATIENCE_S
@@ -177,7 +178,7 @@ def test_a_cut_cable_ends_in_one_sentence(mock: RemoteMock, axis: Epos4Axis) -> 
     axis.enable()
     turn(axis, 0.0)
     mock.order(cut=True)
-    with pytest.raises(DeviceError, match=rf"{mock.port}: the CAN adapter is gone \(.*\); check its cable"):
+    with pytest.raises(DeviceError, match=rf"{mock.address}: the CAN adapter is gone \(.*\); check its cable"):
         for _ in range(100):
             turn(axis, 0.0)
     axis.close()
@@ -186,10 +187,10 @@ def test_a_cut_cable_ends_in_one_sentence(mock: RemoteMock, axis: Epos4Axis) -> 
 def test_a_second_session_is_refused_before_it_disturbs_the_first(mock: RemoteMock, axis: Epos4Axis) -> None:
     axis.home()
     axis.enable()
-    with pytest.raises(DeviceError, match=rf"{mock.port}: is in use by another session; close that one first"):
+    with pytest.raises(DeviceError, match=rf"{mock.address}: is in use by another session; close that one first"):
         Epos4Axis(config_of(mock), Limits()).start()
     with pytest.raises(DeviceError, match="cannot be opened"):
-        SerialPort(mock.port, 115200)
+        SerialPort(mock.address, 115200)
     for _ in range(20):
         turn(axis, 0.0)
     assert axis.enabled
@@ -269,7 +270,7 @@ def test_a_line_on_which_another_device_streams_is_no_adapter() -> None:
 
 
 def test_a_link_speaks_frames_both_ways_and_says_when_it_is_gone(mock: RemoteMock) -> None:
-    link = SlcanLink(mock.port, 1_000_000)
+    link = SlcanLink(mock.address, 1_000_000)
     try:
         link.send(CanFrame(0x601, bytes.fromhex("4018100100000000")))
         frames: list[CanFrame] = []

@@ -4,14 +4,14 @@ import pytest
 
 from drivers.epos4.device import Epos4Axis
 from drivers.epos4.node import TRIES
+from mock_devices.testing.epos4 import DriveBench
 from rig.errors import DeviceError
 from tests.drivers.epos4.sessions import axis_on
-from tests.epos4_stage import Stage
 
 COMMAND_DIGIT, INDEX_DIGIT, VALUE_DIGIT = 16, 12, 8
 
 
-def started(stage: Stage) -> Epos4Axis:
+def started(stage: DriveBench) -> Epos4Axis:
     axis = axis_on(stage)
     axis.start()
     return axis
@@ -19,7 +19,7 @@ def started(stage: Stage) -> Epos4Axis:
 
 @pytest.fixture(scope="module")
 def answers() -> int:
-    stage = Stage()
+    stage = DriveBench()
     started(stage)
     return stage.answers
 
@@ -31,7 +31,7 @@ def test_any_one_damaged_answer_is_asked_for_again(answers: int, digit: int, bec
     """A line that is none, an answer to nothing, another object's, and one that is right but for its value."""
     assert answers > 90
     for number in range(1, answers + 1):
-        stage = Stage()
+        stage = DriveBench()
         stage.spoil, stage.digit, stage.becomes = {number}, digit, becomes
         axis = started(stage)
         axis.home()
@@ -40,7 +40,7 @@ def test_any_one_damaged_answer_is_asked_for_again(answers: int, digit: int, bec
 
 
 def test_an_answer_that_never_comes_right_is_told_after_three_tries(answers: int) -> None:
-    stage = Stage()
+    stage = DriveBench()
     stage.spoil = set(range(answers // 2, answers // 2 + TRIES))
     with pytest.raises(DeviceError, match=r"does not answer: .* took longer than 1 s, tries: 3; check its power"):
         started(stage)
@@ -49,7 +49,7 @@ def test_an_answer_that_never_comes_right_is_told_after_three_tries(answers: int
 def test_a_drive_left_enabled_is_made_safe_although_an_answer_to_its_controlword_is_lost() -> None:
     """The order is not repeated: the state says what became of it."""
     for lost in range(1, 40):
-        stage = Stage()
+        stage = DriveBench()
         first = started(stage)
         first.home()
         first.enable()

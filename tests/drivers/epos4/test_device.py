@@ -5,11 +5,11 @@ import math
 import pytest
 
 from drivers.epos4.device import Epos4Axis
+from mock_devices.testing.epos4 import DriveBench
 from rig.channels import AxisSample
 from rig.config.wiring import Limits
 from rig.errors import DeviceError, SafetyStop
 from tests.drivers.epos4.sessions import axis_on, tick
-from tests.epos4_stage import Stage
 
 
 def test_the_drive_says_who_it_is(axis: Epos4Axis) -> None:
@@ -19,7 +19,7 @@ def test_the_drive_says_who_it_is(axis: Epos4Axis) -> None:
     assert axis.fileno() == 99
 
 
-def test_after_start_the_drive_has_its_limits_and_no_torque(stage: Stage, axis: Epos4Axis) -> None:
+def test_after_start_the_drive_has_its_limits_and_no_torque(stage: DriveBench, axis: Epos4Axis) -> None:
     values = stage.mock.dictionary.values
     assert not stage.plant.powered
     assert (values[0x607D, 1], values[0x607D, 2]) == (-1000, 121_000)
@@ -30,7 +30,7 @@ def test_after_start_the_drive_has_its_limits_and_no_torque(stage: Stage, axis: 
     assert axis.fault == ""
 
 
-def test_limits_are_in_the_drive_before_the_first_controlword_that_gives_torque(stage: Stage) -> None:
+def test_limits_are_in_the_drive_before_the_first_controlword_that_gives_torque(stage: DriveBench) -> None:
     axis = axis_on(stage)
     axis.start()
     axis.home()
@@ -42,7 +42,7 @@ def test_limits_are_in_the_drive_before_the_first_controlword_that_gives_torque(
     axis.close()
 
 
-def test_homing_finds_the_switch_and_makes_it_zero(stage: Stage, axis: Epos4Axis) -> None:
+def test_homing_finds_the_switch_and_makes_it_zero(stage: DriveBench, axis: Epos4Axis) -> None:
     axis.home()
     assert abs(stage.plant.position_mm) < 0.05
     assert stage.mock.drive.position == pytest.approx(stage.plant.position_mm * 2000, abs=60)
@@ -50,7 +50,7 @@ def test_homing_finds_the_switch_and_makes_it_zero(stage: Stage, axis: Epos4Axis
 
 @pytest.mark.parametrize("method", [1, 17, 33, 34, 37])
 def test_homing_ends_at_zero_by_every_method_the_stage_allows(method: int) -> None:
-    stage = Stage(position_mm=3.0)
+    stage = DriveBench(position_mm=3.0)
     axis = axis_on(stage, homing_method=method)
     axis.start()
     axis.home()
@@ -60,7 +60,7 @@ def test_homing_ends_at_zero_by_every_method_the_stage_allows(method: int) -> No
 
 
 def test_homing_against_a_stop_ends_where_the_current_rises() -> None:
-    stage = Stage(position_mm=3.0)
+    stage = DriveBench(position_mm=3.0)
     stage.plant.stop_mm = -2.0
     axis = axis_on(stage, homing_method=-4)
     axis.start()
@@ -72,7 +72,7 @@ def test_homing_against_a_stop_ends_where_the_current_rises() -> None:
 
 
 def test_homing_starts_by_leaving_the_switch_where_it_stands_on_it() -> None:
-    stage = Stage(position_mm=-1.0)
+    stage = DriveBench(position_mm=-1.0)
     axis = axis_on(stage)
     axis.start()
     axis.home()
@@ -80,13 +80,13 @@ def test_homing_starts_by_leaving_the_switch_where_it_stands_on_it() -> None:
     axis.close()
 
 
-def test_homing_again_is_not_fooled_by_the_first_one(stage: Stage, homed: Epos4Axis) -> None:
+def test_homing_again_is_not_fooled_by_the_first_one(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.move_to(20, 50)
     homed.home()
     assert abs(stage.plant.position_mm) < 0.05
 
 
-def test_homing_without_a_switch_ends_at_its_deadline_and_the_axis_stops(stage: Stage, axis: Epos4Axis) -> None:
+def test_homing_without_a_switch_ends_at_its_deadline_and_the_axis_stops(stage: DriveBench, axis: Epos4Axis) -> None:
     stage.plant.has_switch = False
     with pytest.raises(DeviceError, match=r"homing by method 17 found no reference within 9\.5 s \(no fault\)"):
         axis.home()
@@ -96,7 +96,7 @@ def test_homing_without_a_switch_ends_at_its_deadline_and_the_axis_stops(stage: 
     assert stage.plant.position_mm == pytest.approx(before, abs=1e-6)
 
 
-def test_homing_by_a_switch_that_is_not_there_is_an_error_at_once(stage: Stage) -> None:
+def test_homing_by_a_switch_that_is_not_there_is_an_error_at_once(stage: DriveBench) -> None:
     axis = axis_on(stage, homing_method=7)
     axis.start()
     begun_ns = stage.now()
@@ -106,7 +106,7 @@ def test_homing_by_a_switch_that_is_not_there_is_an_error_at_once(stage: Stage) 
     axis.close()
 
 
-def test_a_profile_move_ends_where_and_when_it_should(stage: Stage, homed: Epos4Axis) -> None:
+def test_a_profile_move_ends_where_and_when_it_should(stage: DriveBench, homed: Epos4Axis) -> None:
     begun_ns = stage.now()
     homed.move_to(30, 30)
     stage.run(0.1)
@@ -116,7 +116,7 @@ def test_a_profile_move_ends_where_and_when_it_should(stage: Stage, homed: Epos4
 
 
 def test_a_turned_axis_goes_into_the_tissue_all_the_same() -> None:
-    stage = Stage(increments_per_mm=-2000.0)
+    stage = DriveBench(increments_per_mm=-2000.0)
     axis = axis_on(stage, direction=-1, homing_method=18)
     axis.start()
     axis.home()
@@ -133,7 +133,7 @@ def test_a_turned_axis_goes_into_the_tissue_all_the_same() -> None:
     axis.close()
 
 
-def test_cyclic_positions_follow_a_sine_and_every_set_point_is_answered(stage: Stage, homed: Epos4Axis) -> None:
+def test_cyclic_positions_follow_a_sine_and_every_set_point_is_answered(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.move_to(10, 30)
     homed.enable()
     assert homed.enabled
@@ -153,7 +153,7 @@ def test_cyclic_positions_follow_a_sine_and_every_set_point_is_answered(stage: S
     assert homed.counters.discarded_bytes == 0
 
 
-def test_a_request_brings_a_sample_and_commands_nothing(stage: Stage, axis: Epos4Axis) -> None:
+def test_a_request_brings_a_sample_and_commands_nothing(stage: DriveBench, axis: Epos4Axis) -> None:
     before = len(stage.sent)
     axis.request(stage.now())
     stage.run(0.001)
@@ -162,7 +162,7 @@ def test_a_request_brings_a_sample_and_commands_nothing(stage: Stage, axis: Epos
     assert [frame.can_id for frame in stage.sent[before:]] == [0x080, 0x77F]
 
 
-def test_enabling_does_not_move_the_axis(stage: Stage, homed: Epos4Axis) -> None:
+def test_enabling_does_not_move_the_axis(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.move_to(10, 30)
     for _ in range(10):
         stage.run(0.02)
@@ -175,7 +175,7 @@ def test_enabling_does_not_move_the_axis(stage: Stage, homed: Epos4Axis) -> None
 
 @pytest.mark.parametrize("position_mm", [-0.06, 60.06, 1000.0, math.nan, math.inf, -math.inf])
 def test_a_position_beyond_the_limits_is_refused_and_nothing_is_sent(
-    stage: Stage, homed: Epos4Axis, position_mm: float
+    stage: DriveBench, homed: Epos4Axis, position_mm: float
 ) -> None:
     homed.enable()
     before = len(stage.sent)
@@ -186,7 +186,7 @@ def test_a_position_beyond_the_limits_is_refused_and_nothing_is_sent(
     assert [frame for frame in stage.sent[before:] if frame.can_id == 0x201] == []
 
 
-def test_a_hold_at_the_limit_may_ripple(stage: Stage, homed: Epos4Axis) -> None:
+def test_a_hold_at_the_limit_may_ripple(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.enable()
     homed.command(-0.03, stage.now())
     stage.run(0.05)
@@ -200,7 +200,7 @@ def test_a_speed_beyond_the_limit_is_refused(homed: Epos4Axis, speed_mm_s: float
         homed.move_to(10, speed_mm_s)
 
 
-def test_without_a_reference_there_is_no_torque(stage: Stage, axis: Epos4Axis) -> None:
+def test_without_a_reference_there_is_no_torque(stage: DriveBench, axis: Epos4Axis) -> None:
     with pytest.raises(DeviceError, match="enabling needs one; home the axis first"):
         axis.enable()
     with pytest.raises(DeviceError, match="moving needs one; home the axis first"):
@@ -208,7 +208,7 @@ def test_without_a_reference_there_is_no_torque(stage: Stage, axis: Epos4Axis) -
     assert not stage.plant.powered
 
 
-def test_an_axis_outside_its_limits_is_not_enabled(stage: Stage) -> None:
+def test_an_axis_outside_its_limits_is_not_enabled(stage: DriveBench) -> None:
     axis = axis_on(stage, Limits(position_min_mm=5, position_max_mm=60))
     axis.start()
     axis.home()

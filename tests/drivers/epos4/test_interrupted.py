@@ -5,15 +5,15 @@ from collections.abc import Callable
 import pytest
 
 from drivers.epos4.device import Epos4Axis
+from mock_devices.testing.epos4 import MS, DriveBench
 from rig.config.wiring import Axis, Limits
 from rig.errors import SafetyStop
-from tests.epos4_stage import MS, Stage
 
 RAMP_MS = 15
 """20 mm/s at 2000 mm/s2 is 10 ms; the plant lags by its time constant."""
 
 
-def axis_on(stage: Stage, interrupted: Callable[[], bool]) -> Epos4Axis:
+def axis_on(stage: DriveBench, interrupted: Callable[[], bool]) -> Epos4Axis:
     axis = Epos4Axis(Axis(port="memory"), Limits(), stage.now, open_link=stage.open, interrupted=interrupted)
     axis.start()
     return axis
@@ -21,7 +21,7 @@ def axis_on(stage: Stage, interrupted: Callable[[], bool]) -> Epos4Axis:
 
 @pytest.mark.parametrize("after_ms", [0, 20, 60, 100, 200, 300])
 def test_a_stop_at_any_moment_of_homing_brakes_the_axis(after_ms: int) -> None:
-    stage = Stage(position_mm=8.0)
+    stage = DriveBench(position_mm=8.0)
     begun_ns = stage.now()
     axis = axis_on(stage, lambda: stage.now() >= begun_ns + after_ms * MS)
     begun_ns = stage.now()
@@ -37,7 +37,7 @@ def test_a_stop_at_any_moment_of_homing_brakes_the_axis(after_ms: int) -> None:
 
 
 def test_a_stop_during_a_profile_move_and_while_it_is_enabled_brakes_too() -> None:
-    stage = Stage(position_mm=8.0)
+    stage = DriveBench(position_mm=8.0)
     pressed: list[bool] = []
     axis = axis_on(stage, lambda: bool(pressed) and stage.now() >= at_ns)
     at_ns = 0
@@ -54,7 +54,7 @@ def test_a_stop_during_a_profile_move_and_while_it_is_enabled_brakes_too() -> No
 
 
 def test_closing_is_not_interrupted() -> None:
-    stage = Stage(position_mm=8.0)
+    stage = DriveBench(position_mm=8.0)
     axis = axis_on(stage, lambda: True)
     with pytest.raises(SafetyStop):
         axis.home()

@@ -10,13 +10,13 @@ from drivers.can.slcan import CanFrame, encode_frame
 from drivers.epos4.device import Epos4Axis
 from mock_devices.canopen.sdo_server import SdoAbort
 from mock_devices.interfaces import NEVER_NS
+from mock_devices.testing.epos4 import DriveBench, HostDied
 from rig.channels import AxisSample
 from rig.errors import DeviceError
 from tests.drivers.epos4.sessions import axis_on, tick
-from tests.epos4_stage import HostDied, Stage
 
 
-def test_a_quick_stop_brakes_by_the_ramp_and_holds(stage: Stage, homed: Epos4Axis) -> None:
+def test_a_quick_stop_brakes_by_the_ramp_and_holds(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.move_to(10, 30)
     homed.enable()
     position_mm = 10.0
@@ -34,7 +34,9 @@ def test_a_quick_stop_brakes_by_the_ramp_and_holds(stage: Stage, homed: Epos4Axi
     assert 0 < overrun_mm < 50**2 / 2 / 2000 + 0.1
 
 
-def test_after_a_quick_stop_set_points_move_nothing_until_it_is_enabled_again(stage: Stage, homed: Epos4Axis) -> None:
+def test_after_a_quick_stop_set_points_move_nothing_until_it_is_enabled_again(
+    stage: DriveBench, homed: Epos4Axis
+) -> None:
     homed.enable()
     homed.quick_stop()
     for _ in range(50):
@@ -47,7 +49,7 @@ def test_after_a_quick_stop_set_points_move_nothing_until_it_is_enabled_again(st
     assert stage.plant.position_mm == pytest.approx(1.0, abs=0.01)
 
 
-def test_powered_off_it_has_no_torque_until_it_is_enabled_again(stage: Stage, homed: Epos4Axis) -> None:
+def test_powered_off_it_has_no_torque_until_it_is_enabled_again(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.enable()
     homed.power_off()
     enabled = [homed.enabled]
@@ -59,7 +61,7 @@ def test_powered_off_it_has_no_torque_until_it_is_enabled_again(stage: Stage, ho
     assert [*powered, stage.plant.powered] == [False, True]
 
 
-def test_a_step_beyond_the_window_is_a_following_error_and_the_axis_stops(stage: Stage, homed: Epos4Axis) -> None:
+def test_a_step_beyond_the_window_is_a_following_error_and_the_axis_stops(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.move_to(10, 30)
     homed.enable()
     tick(stage, homed, 15.0)
@@ -72,7 +74,7 @@ def test_a_step_beyond_the_window_is_a_following_error_and_the_axis_stops(stage:
     assert stage.plant.position_mm < 12.5
 
 
-def test_a_fault_is_reset_only_when_asked_and_then_the_axis_works_again(stage: Stage, homed: Epos4Axis) -> None:
+def test_a_fault_is_reset_only_when_asked_and_then_the_axis_works_again(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.enable()
     stage.mock.inject_fault(0x2310)
     for _ in range(20):
@@ -89,7 +91,9 @@ def test_a_fault_is_reset_only_when_asked_and_then_the_axis_works_again(stage: S
     assert tick(stage, homed, 0.0)[0].valid
 
 
-def test_resetting_waits_for_a_heartbeat_only_where_the_drive_left_operational(stage: Stage, homed: Epos4Axis) -> None:
+def test_resetting_waits_for_a_heartbeat_only_where_the_drive_left_operational(
+    stage: DriveBench, homed: Epos4Axis
+) -> None:
     stage.mock.inject_fault(0x2310)
     begun_ns = stage.now()
     homed.reset_fault()
@@ -98,7 +102,7 @@ def test_resetting_waits_for_a_heartbeat_only_where_the_drive_left_operational(s
     assert len(homed.poll(stage.now())) == 1
 
 
-def test_a_fault_whose_cause_stays_is_not_reset(stage: Stage, homed: Epos4Axis) -> None:
+def test_a_fault_whose_cause_stays_is_not_reset(stage: DriveBench, homed: Epos4Axis) -> None:
     stage.mock.inject_fault(0x8A88, lasting=True)
     with pytest.raises(DeviceError, match="the fault is still there: 0x8A88 safe torque off; remove its cause"):
         homed.reset_fault()
@@ -108,13 +112,13 @@ def test_a_fault_whose_cause_stays_is_not_reset(stage: Stage, homed: Epos4Axis) 
     assert homed.fault == ""
 
 
-def test_resetting_without_a_fault_only_takes_the_torque(stage: Stage, homed: Epos4Axis) -> None:
+def test_resetting_without_a_fault_only_takes_the_torque(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.reset_fault()
     assert homed.fault == ""
     assert not stage.plant.powered
 
 
-def test_a_fault_during_a_move_ends_it_with_its_name(stage: Stage, homed: Epos4Axis) -> None:
+def test_a_fault_during_a_move_ends_it_with_its_name(stage: DriveBench, homed: Epos4Axis) -> None:
     stage.plant.stop_mm = 0.0
     homed.move_to(5, 30)
     stage.plant.stop_mm = 4.0
@@ -122,13 +126,13 @@ def test_a_fault_during_a_move_ends_it_with_its_name(stage: Stage, homed: Epos4A
         homed.move_to(1, 10)
 
 
-def test_a_fault_during_homing_ends_it_with_its_name(stage: Stage, axis: Epos4Axis) -> None:
+def test_a_fault_during_homing_ends_it_with_its_name(stage: DriveBench, axis: Epos4Axis) -> None:
     stage.plant.stop_mm = 5.0
     with pytest.raises(DeviceError, match=r"homing by method 17 found no reference .*0x8611 following error"):
         axis.home()
 
 
-def test_a_host_that_falls_silent_makes_the_drive_stop_by_itself(stage: Stage, homed: Epos4Axis) -> None:
+def test_a_host_that_falls_silent_makes_the_drive_stop_by_itself(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.move_to(10, 30)
     homed.enable()
     tick(stage, homed, 10.0)
@@ -146,7 +150,7 @@ def test_a_host_that_falls_silent_makes_the_drive_stop_by_itself(stage: Stage, h
 
 @pytest.mark.parametrize("move", [Epos4Axis.home, lambda axis: axis.move_to(50, 50)])
 def test_a_host_that_dies_during_a_move_stops_the_axis(
-    stage: Stage, homed: Epos4Axis, move: Callable[[Epos4Axis], None]
+    stage: DriveBench, homed: Epos4Axis, move: Callable[[Epos4Axis], None]
 ) -> None:
     homed.move_to(30, 50)
     stage.dies_at_ns = stage.now() + 100_000_000
@@ -159,7 +163,7 @@ def test_a_host_that_dies_during_a_move_stops_the_axis(
     stage.dies_at_ns = NEVER_NS
 
 
-def test_the_drive_does_not_watch_the_host_before_the_first_poll(stage: Stage, axis: Epos4Axis) -> None:
+def test_the_drive_does_not_watch_the_host_before_the_first_poll(stage: DriveBench, axis: Epos4Axis) -> None:
     stage.run(5.0)
     axis.poll(stage.now())
     assert axis.fault == ""
@@ -168,7 +172,7 @@ def test_the_drive_does_not_watch_the_host_before_the_first_poll(stage: Stage, a
     assert axis.fault == "0x8130 the host's heartbeat was missing"
 
 
-def test_a_silent_drive_is_lost_after_three_heartbeats(stage: Stage, homed: Epos4Axis) -> None:
+def test_a_silent_drive_is_lost_after_three_heartbeats(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.enable()
     tick(stage, homed, 0.0)
     stage.mock.silent = True
@@ -179,14 +183,14 @@ def test_a_silent_drive_is_lost_after_three_heartbeats(stage: Stage, homed: Epos
             tick(stage, homed, 0.0)
 
 
-def test_a_drive_that_restarts_by_itself_is_an_error(stage: Stage, homed: Epos4Axis) -> None:
+def test_a_drive_that_restarts_by_itself_is_an_error(stage: DriveBench, homed: Epos4Axis) -> None:
     stage.send(CanFrame(0, b"\x81\x01"))
     stage.run(0.06)
     with pytest.raises(DeviceError, match="restarted by itself and lost its limits"):
         homed.poll(stage.now())
 
 
-def test_a_cut_cable_is_one_sentence_and_closing_does_not_raise(stage: Stage, homed: Epos4Axis) -> None:
+def test_a_cut_cable_is_one_sentence_and_closing_does_not_raise(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.enable()
     stage.cut = True
     with pytest.raises(DeviceError, match="the CAN adapter is gone"):
@@ -197,7 +201,7 @@ def test_a_cut_cable_is_one_sentence_and_closing_does_not_raise(stage: Stage, ho
     assert stage.closed
 
 
-def test_lost_answers_are_counted_and_numbers_stay_contiguous(stage: Stage, homed: Epos4Axis) -> None:
+def test_lost_answers_are_counted_and_numbers_stay_contiguous(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.enable()
     samples = []
     for step in range(1000):
@@ -209,7 +213,7 @@ def test_lost_answers_are_counted_and_numbers_stay_contiguous(stage: Stage, home
     assert [sample.seq for sample in samples] == list(range(997))
 
 
-def test_what_the_adapter_refuses_is_counted(stage: Stage, homed: Epos4Axis) -> None:
+def test_what_the_adapter_refuses_is_counted(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.enable()
     stage.say(b"nonsense\r")
     tick(stage, homed, 0.0)
@@ -217,7 +221,7 @@ def test_what_the_adapter_refuses_is_counted(stage: Stage, homed: Epos4Axis) -> 
     assert homed.counters.device_lost == 1
 
 
-def test_a_position_that_stands_still_is_reported_as_it_is(stage: Stage, homed: Epos4Axis) -> None:
+def test_a_position_that_stands_still_is_reported_as_it_is(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.move_to(10, 30)
     homed.enable()
     stage.mock.frozen = True
@@ -226,7 +230,7 @@ def test_a_position_that_stands_still_is_reported_as_it_is(stage: Stage, homed: 
     assert stage.plant.position_mm == pytest.approx(10.4, abs=0.05)
 
 
-def test_a_silent_node_is_one_sentence(stage: Stage) -> None:
+def test_a_silent_node_is_one_sentence(stage: DriveBench) -> None:
     stage.mock.silent = True
     with pytest.raises(DeviceError, match=r"servo axis on memory, node 1: does not answer: reading object 1018:01"):
         axis_on(stage).start()
@@ -234,19 +238,19 @@ def test_a_silent_node_is_one_sentence(stage: Stage) -> None:
 
 
 def test_a_drive_that_still_boots_is_waited_for() -> None:
-    stage = Stage(booted=False)
+    stage = DriveBench(booted=False)
     axis = axis_on(stage)
     axis.start()
     assert axis.identity.serial == "62014711"
     axis.close()
 
 
-def test_another_node_number_is_a_silent_node(stage: Stage) -> None:
+def test_another_node_number_is_a_silent_node(stage: DriveBench) -> None:
     with pytest.raises(DeviceError, match="node 2: does not answer"):
         axis_on(stage, node=2).start()
 
 
-def test_another_device_is_named_and_left_alone(stage: Stage) -> None:
+def test_another_device_is_named_and_left_alone(stage: DriveBench) -> None:
     stage.mock.wrong_identity = True
     with pytest.raises(DeviceError, match=r"is not a maxon EPOS4: .* vendor 0x24a, product 0x00010002 instead of 0xfb"):
         axis_on(stage).start()
@@ -255,20 +259,20 @@ def test_another_device_is_named_and_left_alone(stage: Stage) -> None:
     assert stage.closed
 
 
-def test_a_drive_without_cyclic_positions_is_refused(stage: Stage) -> None:
+def test_a_drive_without_cyclic_positions_is_refused(stage: DriveBench) -> None:
     stage.mock.dictionary.values[0x6502, 0] = 0x325
     with pytest.raises(DeviceError, match=r"lacks modes \[8\] \(object 6502 is 0x325\)"):
         axis_on(stage).start()
 
 
-def test_a_limit_the_drive_does_not_keep_is_noticed(stage: Stage) -> None:
+def test_a_limit_the_drive_does_not_keep_is_noticed(stage: DriveBench) -> None:
     stage.mock.dictionary.live[0x607D, 2] = lambda: 2_000_000
     with pytest.raises(DeviceError, match=r"object 607D:02 .* was set to 121000 and reads back as 2000000"):
         axis_on(stage).start()
     assert not stage.plant.powered
 
 
-def test_a_parameter_the_drive_refuses_is_named(stage: Stage) -> None:
+def test_a_parameter_the_drive_refuses_is_named(stage: DriveBench) -> None:
     def refuse(_value: int) -> None:
         raise SdoAbort(0x06090030)
 
@@ -277,7 +281,7 @@ def test_a_parameter_the_drive_refuses_is_named(stage: Stage) -> None:
         axis_on(stage).start()
 
 
-def test_a_fault_from_before_is_known_after_start(stage: Stage) -> None:
+def test_a_fault_from_before_is_known_after_start(stage: DriveBench) -> None:
     stage.mock.inject_fault(0x3210)
     axis = axis_on(stage)
     axis.start()
@@ -287,7 +291,7 @@ def test_a_fault_from_before_is_known_after_start(stage: Stage) -> None:
     axis.close()
 
 
-def test_starting_finds_a_moving_axis_and_stops_it_first(stage: Stage) -> None:
+def test_starting_finds_a_moving_axis_and_stops_it_first(stage: DriveBench) -> None:
     first = axis_on(stage)
     first.start()
     first.home()
@@ -298,7 +302,7 @@ def test_starting_finds_a_moving_axis_and_stops_it_first(stage: Stage) -> None:
     second.close()
 
 
-def test_closing_stops_a_moving_axis_takes_the_torque_and_ends_the_watch(stage: Stage, homed: Epos4Axis) -> None:
+def test_closing_stops_a_moving_axis_takes_the_torque_and_ends_the_watch(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.enable()
     for step in range(200):
         tick(stage, homed, 0.05 * step)
@@ -311,7 +315,7 @@ def test_closing_stops_a_moving_axis_takes_the_torque_and_ends_the_watch(stage: 
     assert stage.mock.dictionary.value(0x603F) == 0
 
 
-def test_a_closed_or_unstarted_axis_says_so(stage: Stage, axis: Epos4Axis) -> None:
+def test_a_closed_or_unstarted_axis_says_so(stage: DriveBench, axis: Epos4Axis) -> None:
     axis.close()
     for call in (axis.home, axis.enable, axis.quick_stop, axis.fileno, lambda: axis.poll(0)):
         with pytest.raises(DeviceError, match="is not started or was closed"):
@@ -325,7 +329,7 @@ STRANGE = st.builds(CanFrame, st.sampled_from((0x081, 0x181, 0x281, 0x381, 0x581
 
 @given(frames=st.lists(STRANGE, max_size=30), noise=st.binary(max_size=30))
 def test_whatever_the_bus_brings_only_a_device_error_comes_out(frames: list[CanFrame], noise: bytes) -> None:
-    stage = Stage()
+    stage = DriveBench()
     axis = axis_on(stage)
     axis.start()
     for frame in frames:
@@ -338,14 +342,16 @@ def test_whatever_the_bus_brings_only_a_device_error_comes_out(frames: list[CanF
     axis.close()
 
 
-def test_the_errors_a_drive_remembers_are_told_in_words_newest_first(stage: Stage, homed: Epos4Axis) -> None:
+def test_the_errors_a_drive_remembers_are_told_in_words_newest_first(stage: DriveBench, homed: Epos4Axis) -> None:
     assert homed.history() == ()
     stage.mock.inject_fault(0x2310)
     stage.mock.inject_fault(0x8611)
     assert homed.history() == ("0x8611 following error", "0x2310 overcurrent")
 
 
-def test_a_drive_that_lost_its_power_has_no_reference_when_it_is_opened_again(stage: Stage, homed: Epos4Axis) -> None:
+def test_a_drive_that_lost_its_power_has_no_reference_when_it_is_opened_again(
+    stage: DriveBench, homed: Epos4Axis
+) -> None:
     homed.enable()
     tick(stage, homed, 0.0)
     tick(stage, homed, 0.0)
@@ -362,7 +368,7 @@ def test_a_drive_that_lost_its_power_has_no_reference_when_it_is_opened_again(st
     assert (before, homed.referenced, homed.enabled) == (True, False, False)
 
 
-def test_numbers_go_on_where_the_driver_before_left_off(stage: Stage, homed: Epos4Axis) -> None:
+def test_numbers_go_on_where_the_driver_before_left_off(stage: DriveBench, homed: Epos4Axis) -> None:
     homed.enable()
     last = [sample.seq for _ in range(5) for sample in tick(stage, homed, 0.0)][-1]
     homed.close()

@@ -6,14 +6,14 @@ from pathlib import Path
 import pytest
 
 from drivers.ndi import codec
-from tests.ndi_stage import Stage, run, started
+from mock_devices.testing.ndi import TrackerBench, run, started
 
 ROM = b"NDI\0".ljust(1024, b"\x07")
 
 
 @pytest.fixture
-def stage() -> Iterator[Stage]:
-    stage = Stage()
+def stage() -> Iterator[TrackerBench]:
+    stage = TrackerBench()
     yield stage
     stage.release()
 
@@ -26,7 +26,7 @@ def roms(tmp_path: Path) -> tuple[Path, Path]:
     return paths
 
 
-def said(stage: Stage, *commands: str) -> list[str]:
+def said(stage: TrackerBench, *commands: str) -> list[str]:
     """What the tracker answers to another client's commands."""
     answers = []
     for command in commands:
@@ -37,11 +37,11 @@ def said(stage: Stage, *commands: str) -> list[str]:
     return answers
 
 
-def handles(stage: Stage) -> str:
+def handles(stage: TrackerBench) -> str:
     return said(stage, "PHSR:00")[0][:2]
 
 
-def other_client(stage: Stage) -> None:
+def other_client(stage: TrackerBench) -> None:
     """As scikit-surgerynditracker does it: loads, enables, tracks, stops, and frees nothing."""
     said(stage, "INIT:")
     for _ in range(2):
@@ -52,22 +52,22 @@ def other_client(stage: Stage) -> None:
     assert said(stage, "TSTART:80", "TSTOP:") == ["OKAY", "OKAY"]
 
 
-def killed_while_loading(stage: Stage) -> None:
+def killed_while_loading(stage: TrackerBench) -> None:
     said(stage, "INIT:", "PHRQ:*********1****", f"PVWR:030000{ROM[:64].hex().upper()}")
 
 
-def killed_while_tracking(stage: Stage) -> None:
+def killed_while_tracking(stage: TrackerBench) -> None:
     other_client(stage)
     said(stage, "TSTART:")
 
 
-BEFORE: tuple[Callable[[Stage], None], ...] = (other_client, killed_while_loading, killed_while_tracking)
+BEFORE: tuple[Callable[[TrackerBench], None], ...] = (other_client, killed_while_loading, killed_while_tracking)
 
 
 @pytest.mark.parametrize("before", [*BEFORE, lambda stage: [session(stage) for session in BEFORE * 3]])
 @pytest.mark.parametrize("with_roms", [False, True])
 def test_it_starts_and_sees_both_tools(
-    stage: Stage, roms: tuple[Path, Path], before: Callable[[Stage], None], with_roms: bool
+    stage: TrackerBench, roms: tuple[Path, Path], before: Callable[[TrackerBench], None], with_roms: bool
 ) -> None:
     before(stage)
     device = started(stage, roms=roms if with_roms else ())
@@ -75,7 +75,9 @@ def test_it_starts_and_sees_both_tools(
     device.close()
 
 
-def test_closing_frees_what_was_loaded_and_leaves_the_ports_as_they_were(stage: Stage, roms: tuple[Path, Path]) -> None:
+def test_closing_frees_what_was_loaded_and_leaves_the_ports_as_they_were(
+    stage: TrackerBench, roms: tuple[Path, Path]
+) -> None:
     said(stage, "INIT:")
     assert handles(stage) == "02"
     for _ in range(3):
@@ -91,14 +93,16 @@ def freed(*numbers: int) -> list[bytes]:
     return [codec.encode_command("PHF", f"{number:02X}") for number in numbers]
 
 
-def test_a_start_that_fails_while_loading_frees_what_it_had_loaded(stage: Stage, roms: tuple[Path, Path]) -> None:
+def test_a_start_that_fails_while_loading_frees_what_it_had_loaded(
+    stage: TrackerBench, roms: tuple[Path, Path]
+) -> None:
     stage.canned = {"PENA": "ERROR0E"}
     with pytest.raises(Exception, match="refused PENA"):
         started(stage, roms=roms)
     assert stage.commands[-2:] == freed(3, 4)
 
 
-def test_after_our_sessions_another_client_finds_its_markers(stage: Stage, roms: tuple[Path, Path]) -> None:
+def test_after_our_sessions_another_client_finds_its_markers(stage: TrackerBench, roms: tuple[Path, Path]) -> None:
     """And after its own: what an earlier session left does not keep the later one's tools from the camera."""
     started(stage, roms=roms).close()
     for _ in range(3):

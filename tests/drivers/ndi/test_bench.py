@@ -10,17 +10,18 @@ import pytest
 
 from drivers.ndi.device import NdiTracker
 from drivers.ports import PortClosed, open_port
+from mock_devices.testing.ndi import ARM, TIP, remote_tracker
+from mock_devices.testing.remote import RemoteMock
 from rig.channels import MarkerSample
 from rig.config.wiring import Tracker
 from rig.errors import DeviceError
-from tests.ndi_stage import ARM, TIP, RemoteMock, remote_mock
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
 
 
 @pytest.fixture(params=["serial", "tcp"])
 def mock(request: pytest.FixtureRequest) -> Iterator[RemoteMock]:
-    with remote_mock(request.param) as mock:
+    with remote_tracker(request.param) as mock:
         yield mock
 
 

@@ -8,22 +8,22 @@ import pytest
 
 from drivers.ndi.device import LOST_AFTER_NS, REPLY_TIMEOUT_NS, NdiTracker
 from drivers.ports import PortClosed
+from mock_devices.testing.ndi import ARM, MS, TIP, TrackerBench, run, started
 from rig.config.wiring import Tracker
 from rig.errors import DeviceError
-from tests.ndi_stage import ARM, MS, TIP, Stage, run, started
 
 FRAME_NS = 1_000_000_000 // 60
 
 
 @pytest.fixture
-def stage() -> Iterator[Stage]:
-    stage = Stage()
+def stage() -> Iterator[TrackerBench]:
+    stage = TrackerBench()
     yield stage
     stage.release()
 
 
 @pytest.mark.parametrize("reply", ["BX", "TX"])
-def test_each_frame_brings_one_sample_a_tool(stage: Stage, reply: str) -> None:
+def test_each_frame_brings_one_sample_a_tool(stage: TrackerBench, reply: str) -> None:
     device = started(stage, reply=reply)
     samples = run(stage, device, 100, 1100)
     frames = sorted({sample.frame for sample in samples})
@@ -35,7 +35,7 @@ def test_each_frame_brings_one_sample_a_tool(stage: Stage, reply: str) -> None:
 
 
 @pytest.mark.parametrize("reply", ["BX", "TX"])
-def test_a_sample_carries_pose_tool_and_fit_error(stage: Stage, reply: str) -> None:
+def test_a_sample_carries_pose_tool_and_fit_error(stage: TrackerBench, reply: str) -> None:
     tip, arm = run(stage, started(stage, reply=reply), 100, 130)[:2]
     assert (tip.tool, arm.tool) == (0, 1)
     assert (tip.x_mm, tip.y_mm, tip.z_mm) == TIP[:3]
@@ -44,19 +44,19 @@ def test_a_sample_carries_pose_tool_and_fit_error(stage: Stage, reply: str) -> N
     assert (tip.valid, arm.valid) == (1, 1)
 
 
-def test_sequence_numbers_have_no_hole(stage: Stage) -> None:
+def test_sequence_numbers_have_no_hole(stage: TrackerBench) -> None:
     samples = run(stage, started(stage), 100, 600)
     assert [sample.seq for sample in samples] == list(range(len(samples)))
 
 
-def test_a_new_frame_is_met_within_four_milliseconds(stage: Stage) -> None:
+def test_a_new_frame_is_met_within_four_milliseconds(stage: TrackerBench) -> None:
     """Of the injected clock: the questions come closer together when a frame is due."""
     for sample in run(stage, started(stage), 100, 1100)[2:]:
         became_available_ns = sample.frame * 1_000_000_000 // 60
         assert 0 <= sample.arrival_ns - became_available_ns <= 4 * MS
 
 
-def test_capture_times_are_a_frame_apart_and_never_after_arrival(stage: Stage) -> None:
+def test_capture_times_are_a_frame_apart_and_never_after_arrival(stage: TrackerBench) -> None:
     samples = run(stage, started(stage), 100, 3100)[0::2]
     assert all(sample.capture_ns <= sample.arrival_ns for sample in samples)
     late = samples[60:]
@@ -64,7 +64,7 @@ def test_capture_times_are_a_frame_apart_and_never_after_arrival(stage: Stage) -
     assert all(abs(step - FRAME_NS) < 0.1 * MS for step in steps)
 
 
-def test_a_question_asked_late_is_dated_when_it_went_out(stage: Stage) -> None:
+def test_a_question_asked_late_is_dated_when_it_went_out(stage: TrackerBench) -> None:
     """A host that stops for 8 ms before each question would take the frames for that much older than they are."""
     device = NdiTracker(stage.open, Tracker(), lambda: 10**9)
     device.start()
@@ -73,30 +73,30 @@ def test_a_question_asked_late_is_dated_when_it_went_out(stage: Stage) -> None:
     assert [sample.capture_ns for sample in device.poll(10**9 + MS)] == [10**9, 10**9]
 
 
-def test_capture_times_of_each_tool_differ(stage: Stage) -> None:
+def test_capture_times_of_each_tool_differ(stage: TrackerBench) -> None:
     samples = run(stage, started(stage), 100, 1100)
     for tool in (0, 1):
         captures = [sample.capture_ns for sample in samples if sample.tool == tool]
         assert all(late > early for early, late in itertools.pairwise(captures))
 
 
-def test_the_known_latency_lies_between_capture_and_arrival(stage: Stage) -> None:
+def test_the_known_latency_lies_between_capture_and_arrival(stage: TrackerBench) -> None:
     plain = run(stage, started(stage), 100, 600)[-1]
-    other = Stage()
+    other = TrackerBench()
     late = run(other, started(other, latency_ms=20.0), 100, 600)[-1]
     other.release()
     assert plain.frame == late.frame
     assert plain.capture_ns - late.capture_ns == 20 * MS
 
 
-def test_the_questions_are_no_more_than_three_a_frame(stage: Stage) -> None:
+def test_the_questions_are_no_more_than_three_a_frame(stage: TrackerBench) -> None:
     device = started(stage)
     asked = len(stage.commands)
     run(stage, device, 100, 1100)
     assert 60 <= len(stage.commands) - asked <= 3 * 60
 
 
-def test_a_missing_tool_is_invalid_and_its_pose_is_no_number(stage: Stage) -> None:
+def test_a_missing_tool_is_invalid_and_its_pose_is_no_number(stage: TrackerBench) -> None:
     device = started(stage)
     stage.mock.missing = {1}
     tip, arm = run(stage, device, 100, 130)[:2]
@@ -105,14 +105,14 @@ def test_a_missing_tool_is_invalid_and_its_pose_is_no_number(stage: Stage) -> No
     assert all(math.isnan(value) for value in arm[5:13])
 
 
-def test_a_tool_hidden_from_the_camera_is_missing(stage: Stage) -> None:
+def test_a_tool_hidden_from_the_camera_is_missing(stage: TrackerBench) -> None:
     device = started(stage)
     stage.plant.view = [None, ARM]
     assert [sample.valid for sample in run(stage, device, 100, 130)[:2]] == [0, 1]
 
 
 @pytest.mark.parametrize("reply", ["BX", "TX"])
-def test_a_tool_pulled_out_is_invalid_in_the_frames_of_the_others(stage: Stage, reply: str) -> None:
+def test_a_tool_pulled_out_is_invalid_in_the_frames_of_the_others(stage: TrackerBench, reply: str) -> None:
     device = started(stage, reply=reply)
     stage.mock.unplugged = {0}
     tip, arm = run(stage, device, 100, 130)[:2]
@@ -120,7 +120,7 @@ def test_a_tool_pulled_out_is_invalid_in_the_frames_of_the_others(stage: Stage, 
     assert tip.frame == arm.frame
 
 
-def test_frames_passed_over_are_counted_as_lost(stage: Stage) -> None:
+def test_frames_passed_over_are_counted_as_lost(stage: TrackerBench) -> None:
     device = started(stage)
     run(stage, device, 100, 200)
     samples = run(stage, device, 400, 500)
@@ -128,7 +128,7 @@ def test_frames_passed_over_are_counted_as_lost(stage: Stage) -> None:
     assert device.counters.frames + device.counters.device_lost == samples[-1].frame - 5
 
 
-def test_at_20_Hz_every_third_number_is_a_frame(stage: Stage) -> None:
+def test_at_20_Hz_every_third_number_is_a_frame(stage: TrackerBench) -> None:
     device = started(stage, rate_Hz=20.0)
     assert device.period_ns == 50 * MS
     for third in range(2, 40):
@@ -141,7 +141,7 @@ def test_at_20_Hz_every_third_number_is_a_frame(stage: Stage) -> None:
     assert device.counters.device_lost == 0
 
 
-def test_a_frame_number_that_stands_still_brings_nothing(stage: Stage) -> None:
+def test_a_frame_number_that_stands_still_brings_nothing(stage: TrackerBench) -> None:
     device = started(stage)
     run(stage, device, 100, 200)
     stage.mock.frozen = True
@@ -149,7 +149,7 @@ def test_a_frame_number_that_stands_still_brings_nothing(stage: Stage) -> None:
     assert run(stage, device, 210, 3000) == []
 
 
-def test_a_damaged_reply_is_counted_and_asked_for_again_at_once(stage: Stage) -> None:
+def test_a_damaged_reply_is_counted_and_asked_for_again_at_once(stage: TrackerBench) -> None:
     device = started(stage)
     stage.mock.corrupt_every = 5
     samples = run(stage, device, 100, 1100)
@@ -159,7 +159,7 @@ def test_a_damaged_reply_is_counted_and_asked_for_again_at_once(stage: Stage) ->
     assert len(samples) >= 2 * 59
 
 
-def test_a_reply_that_never_comes_is_asked_for_again(stage: Stage) -> None:
+def test_a_reply_that_never_comes_is_asked_for_again(stage: TrackerBench) -> None:
     device = started(stage)
     run(stage, device, 100, 200)
     stage.mock.silent = True
@@ -170,7 +170,7 @@ def test_a_reply_that_never_comes_is_asked_for_again(stage: Stage) -> None:
     assert run(stage, device, 500, 500 + REPLY_TIMEOUT_NS // MS + 20)
 
 
-def test_a_tracker_silent_after_start_is_lost(stage: Stage) -> None:
+def test_a_tracker_silent_after_start_is_lost(stage: TrackerBench) -> None:
     device = started(stage)
     run(stage, device, 100, 200)
     stage.mock.silent = True
@@ -178,7 +178,7 @@ def test_a_tracker_silent_after_start_is_lost(stage: Stage) -> None:
         run(stage, device, 200, 200 + 2 * LOST_AFTER_NS // MS)
 
 
-def test_a_tracker_that_sends_only_damaged_replies_is_lost(stage: Stage) -> None:
+def test_a_tracker_that_sends_only_damaged_replies_is_lost(stage: TrackerBench) -> None:
     device = started(stage)
     run(stage, device, 100, 200)
     stage.mock.corrupt_every = 1
@@ -187,13 +187,13 @@ def test_a_tracker_that_sends_only_damaged_replies_is_lost(stage: Stage) -> None
     assert device.counters.checksum_errors > 100
 
 
-def test_a_pause_of_the_host_is_no_loss_of_the_tracker(stage: Stage) -> None:
+def test_a_pause_of_the_host_is_no_loss_of_the_tracker(stage: TrackerBench) -> None:
     device = started(stage)
     run(stage, device, 100, 200)
     assert run(stage, device, 60_000, 60_100)
 
 
-def test_an_error_reply_is_told_in_words(stage: Stage) -> None:
+def test_an_error_reply_is_told_in_words(stage: TrackerBench) -> None:
     device = started(stage)
     run(stage, device, 100, 200)
     stage.mock.error_reply = 0x0C
@@ -201,7 +201,7 @@ def test_an_error_reply_is_told_in_words(stage: Stage) -> None:
         run(stage, device, 200, 300)
 
 
-def test_a_tracker_that_restarts_by_itself_is_told(stage: Stage) -> None:
+def test_a_tracker_that_restarts_by_itself_is_told(stage: TrackerBench) -> None:
     device = started(stage)
     run(stage, device, 100, 200)
     stage.wire.sent.append(b"RESETBE6F\r")
@@ -209,7 +209,7 @@ def test_a_tracker_that_restarts_by_itself_is_told(stage: Stage) -> None:
         run(stage, device, 200, 300)
 
 
-def test_a_cut_cable_ends_the_poll(stage: Stage) -> None:
+def test_a_cut_cable_ends_the_poll(stage: TrackerBench) -> None:
     device = started(stage)
     run(stage, device, 100, 200)
     stage.cut = True
@@ -217,7 +217,7 @@ def test_a_cut_cable_ends_the_poll(stage: Stage) -> None:
         run(stage, device, 200, 300)
 
 
-def test_a_reply_that_is_no_tracking_data_is_counted_and_asked_for_again(stage: Stage) -> None:
+def test_a_reply_that_is_no_tracking_data_is_counted_and_asked_for_again(stage: TrackerBench) -> None:
     device = started(stage)
     run(stage, device, 100, 200)
     discarded = device.counters.discarded_bytes

@@ -7,19 +7,19 @@ from pathlib import Path
 import pytest
 
 from drivers.ndi.device import NdiTracker
+from mock_devices.testing.ndi import TrackerBench, run, started
 from rig.config.wiring import Tracker
 from rig.errors import DeviceError, UsageError
-from tests.ndi_stage import Stage, run, started
 
 
 @pytest.fixture
-def stage() -> Iterator[Stage]:
-    stage = Stage()
+def stage() -> Iterator[TrackerBench]:
+    stage = TrackerBench()
     yield stage
     stage.release()
 
 
-def test_start_over_tcp_follows_the_manual(stage: Stage) -> None:
+def test_start_over_tcp_follows_the_manual(stage: TrackerBench) -> None:
     started(stage)
     assert stage.commands == [
         b"INIT:E3A5\r",
@@ -39,7 +39,7 @@ def test_start_over_tcp_follows_the_manual(stage: Stage) -> None:
 
 
 def test_over_a_serial_line_the_speed_is_raised_and_given_back() -> None:
-    stage = Stage(address="/dev/memory")
+    stage = TrackerBench(address="/dev/memory")
     device = started(stage)
     assert stage.bauds == [9600, 115200]
     assert b"COMM:500000048\r" in stage.commands
@@ -48,7 +48,7 @@ def test_over_a_serial_line_the_speed_is_raised_and_given_back() -> None:
     stage.release()
 
 
-def test_the_tracker_tells_who_it_is(stage: Stage) -> None:
+def test_the_tracker_tells_who_it_is(stage: TrackerBench) -> None:
     identity = started(stage).identity
     assert identity.product == "Polaris Vega Control Firmware"
     assert identity.serial == "P9-00001"
@@ -56,14 +56,14 @@ def test_the_tracker_tells_who_it_is(stage: Stage) -> None:
     assert identity.settings["freeze_tag"] == "Polaris Vega 024"
 
 
-def test_before_start_there_is_no_identity_and_no_port(stage: Stage) -> None:
+def test_before_start_there_is_no_identity_and_no_port(stage: TrackerBench) -> None:
     device = NdiTracker(stage.open, Tracker())
     for use in (lambda: device.identity, device.fileno, lambda: device.poll(0)):
         with pytest.raises(DeviceError, match="not started; call start first"):
             use()
 
 
-def test_tool_definitions_are_loaded_in_the_order_of_the_tools(stage: Stage, tmp_path: Path) -> None:
+def test_tool_definitions_are_loaded_in_the_order_of_the_tools(stage: TrackerBench, tmp_path: Path) -> None:
     roms = []
     for name in ("tip", "arm"):
         path = tmp_path / f"{name}.rom"
@@ -78,7 +78,7 @@ def test_tool_definitions_are_loaded_in_the_order_of_the_tools(stage: Stage, tmp
     assert [sample.valid for sample in run(stage, device, 130, 160)[:2]] == [1, 1]
 
 
-def test_definitions_of_an_earlier_session_are_freed_first(stage: Stage, tmp_path: Path) -> None:
+def test_definitions_of_an_earlier_session_are_freed_first(stage: TrackerBench, tmp_path: Path) -> None:
     path = tmp_path / "tip.rom"
     path.write_bytes(b"NDI\0")
     for _ in range(30):
@@ -92,7 +92,7 @@ def test_definitions_of_an_earlier_session_are_freed_first(stage: Stage, tmp_pat
     [(None, "cannot be read: No such file"), (b"a picture", "not a tool definition")],
 )
 def test_a_bad_tool_definition_is_refused_before_the_port_is_opened(
-    stage: Stage, tmp_path: Path, content: bytes | None, message: str
+    stage: TrackerBench, tmp_path: Path, content: bytes | None, message: str
 ) -> None:
     path = tmp_path / "tip.rom"
     if content:
@@ -102,18 +102,18 @@ def test_a_bad_tool_definition_is_refused_before_the_port_is_opened(
     assert stage.bauds == []
 
 
-def test_each_tool_needs_its_definition(stage: Stage, tmp_path: Path) -> None:
+def test_each_tool_needs_its_definition(stage: TrackerBench, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"tracker.roms: 1 files for 2 tools \(tip, arm\)"):
         started(stage, roms=(tmp_path / "tip.rom",))
 
 
-def test_more_tools_named_than_plugged_in_are_told(stage: Stage) -> None:
+def test_more_tools_named_than_plugged_in_are_told(stage: TrackerBench) -> None:
     with pytest.raises(DeviceError, match="2 tools are enabled where the configuration names 3"):
         started(stage, tools=("tip", "arm", "couch"))
     assert stage.closed
 
 
-def test_another_device_behind_the_port_is_told(stage: Stage) -> None:
+def test_another_device_behind_the_port_is_told(stage: TrackerBench) -> None:
     stage.canned = {"VER": "V1013"}
     with pytest.raises(DeviceError, match="VER answered 'V1013', which is no NDI position sensor; check the port"):
         started(stage)
@@ -130,7 +130,7 @@ def test_another_device_behind_the_port_is_told(stage: Stage) -> None:
     ],
 )
 def test_a_refusal_during_start_is_told_and_closes_the_port(
-    stage: Stage, command: str, answer: str, message: str
+    stage: TrackerBench, command: str, answer: str, message: str
 ) -> None:
     stage.canned = {command: answer}
     with pytest.raises(DeviceError, match=message):
@@ -138,12 +138,12 @@ def test_a_refusal_during_start_is_told_and_closes_the_port(
     assert stage.closed
 
 
-def test_a_warning_during_start_is_kept(stage: Stage) -> None:
+def test_a_warning_during_start_is_kept(stage: TrackerBench) -> None:
     stage.canned = {"TSTART": "WARNING"}
     assert started(stage).identity.settings["warnings"] == "TSTART:"
 
 
-def test_old_firmware_without_information_is_known_by_its_freeze_tag(stage: Stage) -> None:
+def test_old_firmware_without_information_is_known_by_its_freeze_tag(stage: TrackerBench) -> None:
     stage.canned = {"GETINFO": "ERROR01"}
     assert started(stage).identity.firmware == "Polaris Vega 024"
 
@@ -156,7 +156,7 @@ def leaping() -> Callable[[], int]:
 
 @pytest.mark.parametrize("address", ["tcp://memory:1", "/dev/memory"])
 def test_a_silent_port_is_told(address: str) -> None:
-    stage = Stage(address=address)
+    stage = TrackerBench(address=address)
     stage.mock.silent = True
     stage.heeds_break = False
     device = NdiTracker(stage.open, Tracker(), now=leaping())
@@ -166,14 +166,14 @@ def test_a_silent_port_is_told(address: str) -> None:
     stage.release()
 
 
-def test_a_port_full_of_other_bytes_is_told(stage: Stage) -> None:
+def test_a_port_full_of_other_bytes_is_told(stage: TrackerBench) -> None:
     stage.canned = {"INIT": "z\r" * 300}
     with pytest.raises(DeviceError, match="INIT brought 605 bytes but no reply of an NDI tracker"):
         started(stage)
 
 
 def test_a_tracker_left_at_another_speed_is_brought_back_by_a_break() -> None:
-    stage = Stage(address="/dev/memory")
+    stage = TrackerBench(address="/dev/memory")
     stage.speed = 115200
     device = started(stage)
     assert stage.commands[:3] == [b"INIT:E3A5\r", b"<break>", b"INIT:E3A5\r"]
@@ -183,7 +183,7 @@ def test_a_tracker_left_at_another_speed_is_brought_back_by_a_break() -> None:
 
 
 def test_a_tracker_left_fast_is_found_where_the_line_loses_breaks() -> None:
-    stage = Stage(address="/dev/memory")
+    stage = TrackerBench(address="/dev/memory")
     stage.speed = 115200
     stage.heeds_break = False
     device = started(stage)
@@ -192,7 +192,7 @@ def test_a_tracker_left_fast_is_found_where_the_line_loses_breaks() -> None:
     stage.release()
 
 
-def test_close_stops_tracking_once_and_may_be_called_twice(stage: Stage) -> None:
+def test_close_stops_tracking_once_and_may_be_called_twice(stage: TrackerBench) -> None:
     device = started(stage)
     run(stage, device, 100, 200)
     device.close()
@@ -202,14 +202,14 @@ def test_close_stops_tracking_once_and_may_be_called_twice(stage: Stage) -> None
     assert stage.closed
 
 
-def test_close_does_not_raise_on_a_cut_cable(stage: Stage) -> None:
+def test_close_does_not_raise_on_a_cut_cable(stage: TrackerBench) -> None:
     device = started(stage)
     stage.cut = True
     device.close()
     assert stage.closed
 
 
-def test_it_can_be_started_again_and_its_numbers_go_on(stage: Stage) -> None:
+def test_it_can_be_started_again_and_its_numbers_go_on(stage: TrackerBench) -> None:
     device = started(stage)
     before = run(stage, device, 100, 200)
     device.close()
@@ -217,7 +217,7 @@ def test_it_can_be_started_again_and_its_numbers_go_on(stage: Stage) -> None:
     assert run(stage, device, 200, 300)[0].seq == before[-1].seq + 1
 
 
-def test_a_tracker_left_tracking_by_a_host_that_died_is_taken_over(stage: Stage) -> None:
+def test_a_tracker_left_tracking_by_a_host_that_died_is_taken_over(stage: TrackerBench) -> None:
     run(stage, started(stage), 100, 200)
     assert run(stage, started(stage), 200, 300)[0].valid == 1
 
@@ -225,7 +225,7 @@ def test_a_tracker_left_tracking_by_a_host_that_died_is_taken_over(stage: Stage)
 ROM_COMMANDS = 2 * 17
 
 
-def with_roms(stage: Stage, folder: Path) -> NdiTracker:
+def with_roms(stage: TrackerBench, folder: Path) -> NdiTracker:
     paths = (folder / "tip.rom", folder / "arm.rom")
     for path in paths:
         path.write_bytes(b"NDI\0")
@@ -237,7 +237,7 @@ def with_roms(stage: Stage, folder: Path) -> NdiTracker:
 def test_any_one_reply_or_command_damaged_during_start_is_said_again(address: str, fault: str, tmp_path: Path) -> None:
     """Each in turn, tool definitions included; only the change of speed is not said again, nor need be."""
     for number in range(1, 100):
-        stage = Stage(address=address)
+        stage = TrackerBench(address=address)
         setattr(stage, fault, {number})
         device = with_roms(stage, tmp_path)
         if number > len(stage.commands):
@@ -252,7 +252,7 @@ def test_any_one_reply_or_command_damaged_during_start_is_said_again(address: st
     assert number > ROM_COMMANDS
 
 
-def test_three_damaged_replies_in_a_row_are_told_as_what_they_are(stage: Stage) -> None:
+def test_three_damaged_replies_in_a_row_are_told_as_what_they_are(stage: TrackerBench) -> None:
     stage.spoil = {2, 3, 4}
     with pytest.raises(DeviceError, match=r"VER brought .* bytes but no reply .* and a good checksum"):
         started(stage)

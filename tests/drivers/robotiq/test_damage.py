@@ -12,10 +12,10 @@ from drivers.robotiq import device
 from drivers.robotiq.codec import START_STREAM, STREAM_STARTED, encode_frame
 from drivers.robotiq.device import RobotiqFt300
 from mock_devices.robotiq.mock import RobotiqMock
+from mock_devices.testing.force import StillPlant
 from mock_devices.wire import TcpWire
 from rig.config.wiring import Force
 from tests.drivers.scripted_port import ScriptedPort
-from tests.mock_devices.force_bench import StillPlant
 
 
 class SpoilingWire(TcpWire):

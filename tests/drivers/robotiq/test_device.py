@@ -12,11 +12,11 @@ from drivers.robotiq import device
 from drivers.robotiq.codec import FRAME_NS, STOP_BURST, encode_frame, with_crc
 from drivers.robotiq.device import RobotiqFt300
 from drivers.roles import Identity
+from mock_devices.testing.clock import long_ago
+from mock_devices.testing.force import WAIT_S, WRENCH, ServedMock, await_silence, collect
 from rig.config.wiring import Force
 from rig.errors import DeviceError, UsageError
 from tests.drivers.scripted_port import ScriptedPort
-from tests.mock_devices.force_bench import WAIT_S, WRENCH, Served, await_silence, collect
-from tests.remote import long_ago
 
 FRAME = encode_frame([125, -250, -775, 125, -250, 500])
 PERIOD_NS = 10_000_000
@@ -154,14 +154,14 @@ def test_settings_that_cannot_be_had_are_refused_before_the_port_is_opened(confi
         RobotiqFt300(opener, config)
 
 
-def opened(mock: Served) -> RobotiqFt300:
+def opened(mock: ServedMock) -> RobotiqFt300:
     return RobotiqFt300(partial(open_port, mock.endpoint), Force())
 
 
 @pytest.mark.bench
 @pytest.mark.xdist_group("wire")
 class TestAgainstTheMockInAnotherProcess:
-    def test_a_session_identifies_the_sensor_and_streams(self, robotiq: Served) -> None:
+    def test_a_session_identifies_the_sensor_and_streams(self, robotiq: ServedMock) -> None:
         sensor = opened(robotiq)
         sensor.start()
         samples = collect(sensor, lambda got: len(got) >= 50)
@@ -182,7 +182,7 @@ class TestAgainstTheMockInAnotherProcess:
         assert all(sample.valid for sample in samples)
         assert sensor.counters.discarded_bytes == 0
 
-    def test_a_stream_left_running_is_stopped_and_started_again(self, robotiq: Served) -> None:
+    def test_a_stream_left_running_is_stopped_and_started_again(self, robotiq: ServedMock) -> None:
         ports: list[Port] = []
 
         def opener(baud: int) -> Port:
@@ -196,7 +196,7 @@ class TestAgainstTheMockInAnotherProcess:
         assert len(collect(sensor, lambda got: len(got) >= 10)) >= 10
         sensor.close()
 
-    def test_close_leaves_a_sensor_that_answers_modbus_again(self, robotiq: Served) -> None:
+    def test_close_leaves_a_sensor_that_answers_modbus_again(self, robotiq: ServedMock) -> None:
         for _ in range(2):
             sensor = opened(robotiq)
             sensor.start()
@@ -208,17 +208,17 @@ class TestAgainstTheMockInAnotherProcess:
         port.close()
         assert answer.endswith(expected)
 
-    def test_a_start_without_an_answer_counts_if_frames_come(self, robotiq: Served) -> None:
+    def test_a_start_without_an_answer_counts_if_frames_come(self, robotiq: ServedMock) -> None:
         robotiq.set(mute_start=True)
         sensor = opened(robotiq)
         sensor.start()
         assert len(collect(sensor, lambda got: len(got) >= 5)) >= 5
         sensor.close()
 
-    def test_a_refused_start_is_one_sentence(self, robotiq: Served) -> None:
+    def test_a_refused_start_is_one_sentence(self, robotiq: ServedMock) -> None:
         self._fails(robotiq, "refused to start its stream with Modbus exception 3", refuse_stream=True)
 
-    def test_a_sensor_that_cannot_be_stopped_is_one_sentence(self, robotiq: Served) -> None:
+    def test_a_sensor_that_cannot_be_stopped_is_one_sentence(self, robotiq: ServedMock) -> None:
         sensor = opened(robotiq)
         sensor.start()
         robotiq.set(deaf=True)
@@ -228,23 +228,23 @@ class TestAgainstTheMockInAnotherProcess:
             sensor.start()
         sensor.close()
 
-    def test_a_device_that_is_no_force_sensor_is_one_sentence(self, robotiq: Served) -> None:
+    def test_a_device_that_is_no_force_sensor_is_one_sentence(self, robotiq: ServedMock) -> None:
         self._fails(robotiq, "firmware 'KMS-2.0.4' is not that of a force sensor", wrong_identity=True)
 
-    def test_a_silent_device_is_one_sentence(self, robotiq: Served) -> None:
+    def test_a_silent_device_is_one_sentence(self, robotiq: ServedMock) -> None:
         self._fails(robotiq, "no Modbus answer from slave 9, registers 500 to 502 in 3 tries of 0.4 s", silent=True)
 
-    def _fails(self, robotiq: Served, sentence: str, **knobs: bool) -> None:
+    def _fails(self, robotiq: ServedMock, sentence: str, **knobs: bool) -> None:
         robotiq.set(**knobs)
         sensor = opened(robotiq)
         with pytest.raises(DeviceError, match=sentence):
             sensor.start()
         sensor.close()
 
-    def test_another_product_behind_the_port_is_one_sentence(self, bota: Served) -> None:
+    def test_another_product_behind_the_port_is_one_sentence(self, bota: ServedMock) -> None:
         self._fails(bota, "no Modbus answer")
 
-    def test_a_sensor_that_falls_silent_gives_no_samples_and_no_error(self, robotiq: Served) -> None:
+    def test_a_sensor_that_falls_silent_gives_no_samples_and_no_error(self, robotiq: ServedMock) -> None:
         sensor = opened(robotiq)
         sensor.start()
         robotiq.set(silent=True)
@@ -253,14 +253,14 @@ class TestAgainstTheMockInAnotherProcess:
         collect(sensor, lambda got: len(got) >= 1)
         sensor.close()
 
-    def test_spoilt_checksums_are_counted(self, robotiq: Served) -> None:
+    def test_spoilt_checksums_are_counted(self, robotiq: ServedMock) -> None:
         sensor = opened(robotiq)
         sensor.start()
         robotiq.set(corrupt_every=4)
         collect(sensor, lambda _: sensor.counters.checksum_errors >= 5)
         sensor.close()
 
-    def test_a_cut_cable_raises_and_close_stays_quiet(self, robotiq: Served) -> None:
+    def test_a_cut_cable_raises_and_close_stays_quiet(self, robotiq: ServedMock) -> None:
         sensor = opened(robotiq)
         sensor.start()
         robotiq.cut()

@@ -9,15 +9,15 @@ from drivers.bota.codec import Decoder, Frame
 from drivers.roles import LinkCounters
 from mock_devices.bota.mock import BOOT_NS, BotaMock, Command, CommandParser
 from mock_devices.interfaces import NEVER_NS, Mock
-from tests.mock_devices.force_bench import WRENCH, MemoryStage, Served, StillPlant
-from tests.remote import MemoryWire
+from mock_devices.testing.force import WRENCH, SensorBench, ServedMock, StillPlant
+from mock_devices.testing.wire import MemoryWire
 
 START_NS = 5_000_000_000
 SECOND_NS = 1_000_000_000
 BOOT = b"c,0,1,0,4\r\nApp Init\r\nname: BFT-SENS-SER-M8\r\nS/N: 000271\r\nFW version: 1.0.6\r\n"
 
 
-class Stage(MemoryStage[BotaMock]):
+class BotaBench(SensorBench[BotaMock]):
     """A booted mock."""
 
     def __init__(self, drift_ppm: float = 0.0) -> None:
@@ -34,7 +34,7 @@ class Stage(MemoryStage[BotaMock]):
 
 
 def test_it_is_a_mock_of_the_stage() -> None:
-    mock: Mock = Stage().mock
+    mock: Mock = BotaBench().mock
     assert (mock.name, mock.endpoints(), mock.filenos(), mock.due_ns) == ("force", {"serial": "/memory"}, [], NEVER_NS)
 
 
@@ -51,7 +51,7 @@ def test_power_prints_who_it_is_after_booting_and_then_waits() -> None:
 
 @pytest.mark.parametrize(("reset", "answer"), [(b"#", b""), (b"I", b"r,0,I,0\r\n")])
 def test_both_resets_boot_again_and_lose_what_is_said_meanwhile(reset: bytes, answer: bytes) -> None:
-    stage = Stage()
+    stage = BotaBench()
     stage.run()
     assert stage.say(reset) == answer
     assert stage.say(b"C") == b""
@@ -60,7 +60,7 @@ def test_both_resets_boot_again_and_lose_what_is_said_meanwhile(reset: bytes, an
 
 
 def test_settings_are_acknowledged_in_configuration_mode() -> None:
-    stage = Stage()
+    stage = BotaBench()
     assert stage.say(b"Cc,0,1,0,4") == b"r,0,C,0\r\nr,0,c,0\r\n"
     assert stage.say(b"f,51,0,0,1") == b"r,0,f,0\r\n"
     assert stage.say(b"b, 0.000,-1.500, 0.000,12.345, 0.000, 0.000") == b"r,0,b,0\r\n"
@@ -70,7 +70,7 @@ def test_settings_are_acknowledged_in_configuration_mode() -> None:
 
 
 def test_settings_are_refused_outside_configuration_mode() -> None:
-    stage = Stage()
+    stage = BotaBench()
     assert stage.say(b"f,51,0,0,1") == b"r,0,f,1\r\n"
     stage.run()
     assert stage.say(b"c,0,1,0,4s") == b"r,0,c,1\r\nr,0,s,1\r\n"
@@ -78,19 +78,19 @@ def test_settings_are_refused_outside_configuration_mode() -> None:
 
 @pytest.mark.parametrize("wrong", [b"c,0,1,1,4", b"c,0,1,0,9", b"f,50,0,0,1", b"f,513,0,0,1", b"f,51R", b"c,,C", b"f;"])
 def test_settings_that_are_wrong_are_refused(wrong: bytes) -> None:
-    stage = Stage()
+    stage = BotaBench()
     stage.say(b"C")
     assert stage.say(wrong + b"R").startswith(f"r,0,{wrong[:1].decode()},1\r\n".encode())
 
 
 def test_commands_are_understood_one_character_at_a_time() -> None:
-    stage = Stage()
+    stage = BotaBench()
     answers = b"".join(stage.say(bytes([byte])) for byte in b"Cc,0,1,0,4f,512,0,0,1R")
     assert answers == b"r,0,C,0\r\nr,0,c,0\r\nr,0,f,0\r\nr,0,R,0\r\n"
 
 
 def test_line_ends_and_noise_between_commands_are_ignored() -> None:
-    assert Stage().say(b"\r\n?\xffC\r\n") == b"r,0,C,0\r\n"
+    assert BotaBench().say(b"\r\n?\xffC\r\n") == b"r,0,C,0\r\n"
 
 
 @given(st.binary(max_size=300))
@@ -103,13 +103,13 @@ def test_the_parser_holds_at_most_a_command_whatever_comes(noise: bytes) -> None
 
 @pytest.mark.parametrize(("sinc", "rate_Hz"), [(51, 1003), (64, 800), (128, 400), (205, 249), (256, 200), (512, 100)])
 def test_the_filter_sets_the_rate(sinc: int, rate_Hz: int) -> None:
-    stage = Stage()
+    stage = BotaBench()
     stage.say(f"Cf,{sinc},0,0,1R".encode())
     assert len(stage.frames(SECOND_NS)) == rate_Hz
 
 
 def test_frames_carry_the_plants_load_and_the_sensors_own_time() -> None:
-    stage = Stage()
+    stage = BotaBench()
     stage.run()
     first, second = stage.frames(20_000_000)
     booted_us = BOOT_NS // 1000
@@ -118,7 +118,7 @@ def test_frames_carry_the_plants_load_and_the_sensors_own_time() -> None:
 
 
 def test_when_samples_were_taken_is_kept_on_the_benchs_clock() -> None:
-    stage = Stage(drift_ppm=20_000)
+    stage = BotaBench(drift_ppm=20_000)
     begun_ns = stage.now_ns
     stage.run()
     frames = stage.frames(30_000_000)
@@ -129,7 +129,7 @@ def test_when_samples_were_taken_is_kept_on_the_benchs_clock() -> None:
 
 
 def test_a_fast_clock_gives_more_frames_and_more_microseconds() -> None:
-    stage = Stage(drift_ppm=20_000)
+    stage = BotaBench(drift_ppm=20_000)
     stage.run()
     frames = stage.frames(10 * SECOND_NS)
     assert len(frames) == 1020
@@ -137,14 +137,14 @@ def test_a_fast_clock_gives_more_frames_and_more_microseconds() -> None:
 
 
 def test_the_sensors_clock_wraps_at_32_bits() -> None:
-    stage = Stage()
+    stage = BotaBench()
     stage.now_ns = START_NS + (2**32 - 15_000) * 1000
     stage.run()
     assert [frame.time_us for frame in stage.frames(20_000_000)] == [2**32 - 5_000, 5_000]
 
 
 def test_status_bits_tell_overrange_invalid_and_raw_readings() -> None:
-    stage = Stage()
+    stage = BotaBench()
     stage.run()
     stage.plant.over = True
     assert [frame.status for frame in stage.frames(10_000_000)] == [2]
@@ -156,7 +156,7 @@ def test_status_bits_tell_overrange_invalid_and_raw_readings() -> None:
 
 
 def test_a_frozen_sensor_repeats_its_forces_under_running_time() -> None:
-    stage = Stage()
+    stage = BotaBench()
     stage.run()
     stage.frames(10_000_000)
     stage.mock.frozen = True
@@ -167,7 +167,7 @@ def test_a_frozen_sensor_repeats_its_forces_under_running_time() -> None:
 
 
 def test_a_silent_sensor_neither_streams_nor_answers_but_goes_on_counting() -> None:
-    stage = Stage()
+    stage = BotaBench()
     stage.run()
     (before,) = stage.frames(10_000_000)
     stage.mock.silent = True
@@ -178,7 +178,7 @@ def test_a_silent_sensor_neither_streams_nor_answers_but_goes_on_counting() -> N
 
 
 def test_every_nth_checksum_can_be_spoilt() -> None:
-    stage = Stage()
+    stage = BotaBench()
     stage.mock.corrupt_every = 3
     stage.run()
     counters = LinkCounters()
@@ -187,7 +187,7 @@ def test_every_nth_checksum_can_be_spoilt() -> None:
 
 
 def test_a_wrong_identity_shows_after_a_reset_and_a_refusal_in_its_answer() -> None:
-    stage = Stage()
+    stage = BotaBench()
     stage.mock.wrong_identity = True
     stage.mock.refuse = "f"
     stage.say(b"#")
@@ -196,7 +196,7 @@ def test_a_wrong_identity_shows_after_a_reset_and_a_refusal_in_its_answer() -> N
 
 
 def test_a_late_tick_sends_every_frame_that_was_due() -> None:
-    stage = Stage()
+    stage = BotaBench()
     stage.run()
     late_ns = stage.now_ns + 35_000_000
     while stage.mock.due_ns <= late_ns:
@@ -207,14 +207,14 @@ def test_a_late_tick_sends_every_frame_that_was_due() -> None:
 
 
 def test_close_cuts_the_wire() -> None:
-    stage = Stage()
+    stage = BotaBench()
     stage.mock.close()
     assert stage.wire.closed
 
 
 @pytest.mark.bench
 @pytest.mark.xdist_group("wire")
-def test_a_client_that_follows_the_makers_example_gets_frames(bota: Served) -> None:
+def test_a_client_that_follows_the_makers_example_gets_frames(bota: ServedMock) -> None:
     """The steps of `bota_serial_example.py`, with pyserial and nothing of ours but the served bytes."""
     with serial.Serial(bota.endpoint, 460_800, timeout=10) as line:
         line.write(b"#")

@@ -12,7 +12,8 @@ from can.interfaces.slcan import slcanBus
 from canopen.objectdictionary import ODRecord, ODVariable, datatypes
 
 from drivers.epos4.objects import OBJECTS, TEXT, Entry
-from tests.epos4_stage import RemoteMock, remote_mock
+from mock_devices.testing.epos4 import remote_drive
+from mock_devices.testing.remote import RemoteMock
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
 TYPES = {
@@ -58,14 +59,14 @@ def eventually(condition: Callable[[], bool]) -> None:
 
 @pytest.fixture
 def mock() -> Iterator[RemoteMock]:
-    with remote_mock() as mock:
+    with remote_drive() as mock:
         yield mock
 
 
 @pytest.fixture
 def network(mock: RemoteMock) -> Iterator[canopen.Network]:
     network = canopen.Network()
-    network.connect(interface="slcan", channel=mock.port, bitrate=1_000_000, sleep_after_open=0, timeout=0.01)
+    network.connect(interface="slcan", channel=mock.address, bitrate=1_000_000, sleep_after_open=0, timeout=0.01)
     network.check()
     yield network
     network.sync.stop()  # type: ignore[no-untyped-call]
@@ -82,7 +83,7 @@ def node(network: canopen.Network) -> canopen.RemoteNode:
 
 
 def test_python_can_finds_an_adapter_and_a_node_behind_it(mock: RemoteMock) -> None:
-    with can.Bus(interface="slcan", channel=mock.port, bitrate=1_000_000, sleep_after_open=0, timeout=0.01) as bus:
+    with can.Bus(interface="slcan", channel=mock.address, bitrate=1_000_000, sleep_after_open=0, timeout=0.01) as bus:
         assert isinstance(bus, slcanBus)
         bus.flush()
         assert bus.get_version(PATIENCE_S) == (10, 13)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from drivers.can.slcan import CanFrame
 from drivers.epos4.objects import OBJECTS
-from tests.epos4_stage import Stage
+from mock_devices.testing.epos4 import DriveBench
 from tests.mock_devices.epos4.wire import exchange, status, upload
 
 FRAMES = st.tuples(
@@ -27,7 +27,7 @@ MODES = st.sampled_from([1, 3, 6, 8, 9]).map(lambda mode: (0x601, struct.pack("<
 
 @given(frames=st.lists(st.one_of(FRAMES, ORDERS, WRITES, WORDS, MODES), max_size=60))
 def test_no_frames_whatever_break_the_drive_and_a_reset_makes_it_as_new(frames: list[tuple[int, bytes]]) -> None:
-    stage = Stage()
+    stage = DriveBench()
     for can_id, data in frames:
         stage.send(CanFrame(can_id, data))
         stage.run(0.003)
@@ -40,7 +40,7 @@ def test_no_frames_whatever_break_the_drive_and_a_reset_makes_it_as_new(frames: 
 
 @given(chunks=st.lists(st.binary(max_size=60), max_size=20))
 def test_no_bytes_whatever_break_the_adapter(chunks: list[bytes]) -> None:
-    stage = Stage()
+    stage = DriveBench()
     for chunk in chunks:
         stage.say(chunk)
     stage.say(b"\rC\rS8\rO\r")

@@ -5,19 +5,19 @@ from itertools import pairwise
 
 import pytest
 
-from tests.epos4_stage import LaggingPlant, Stage
+from mock_devices.testing.epos4 import DriveBench, LaggingPlant
 from tests.mock_devices.epos4.wire import control, download, enabled, exchange, follow, status, upload
 
 
 @pytest.fixture
-def stage() -> Stage:
-    return Stage()
+def stage() -> DriveBench:
+    return DriveBench()
 
 
 # The state machine
 
 
-def test_the_walk_up_and_down(stage: Stage) -> None:
+def test_the_walk_up_and_down(stage: DriveBench) -> None:
     walk = [control(stage, word) & 0x6F for word in (0x06, 0x07, 0x0F)]
     assert walk == [0x21, 0x23, 0x27]
     control(stage, 0x07)
@@ -27,16 +27,16 @@ def test_the_walk_up_and_down(stage: Stage) -> None:
     assert [control(stage, word) & 0x6F for word in (0x06, 0x00)] == [0x21, 0x40]
 
 
-def test_enable_operation_goes_through_switched_on_by_itself(stage: Stage) -> None:
+def test_enable_operation_goes_through_switched_on_by_itself(stage: DriveBench) -> None:
     assert [control(stage, word) & 0x6F for word in (0x06, 0x0F)] == [0x21, 0x27]
 
 
 @pytest.mark.parametrize("word", [0x07, 0x0F, 0x00, 0x02, 0x80])
-def test_nothing_but_shutdown_leads_out_of_switch_on_disabled(stage: Stage, word: int) -> None:
+def test_nothing_but_shutdown_leads_out_of_switch_on_disabled(stage: DriveBench, word: int) -> None:
     assert control(stage, word) & 0x4F == 0x40
 
 
-def test_a_quick_stop_holds_and_enable_leads_back(stage: Stage) -> None:
+def test_a_quick_stop_holds_and_enable_leads_back(stage: DriveBench) -> None:
     enabled(stage, 1)
     assert control(stage, 0x0B) & 0x6F == 0x07
     stage.run(0.05)
@@ -47,7 +47,7 @@ def test_a_quick_stop_holds_and_enable_leads_back(stage: Stage) -> None:
     assert not stage.plant.powered
 
 
-def test_a_fault_is_reset_by_the_edge_and_not_by_the_level(stage: Stage) -> None:
+def test_a_fault_is_reset_by_the_edge_and_not_by_the_level(stage: DriveBench) -> None:
     stage.mock.inject_fault(0x2310)
     assert control(stage, 0x80) & 0x4F == 0x40
     stage.mock.inject_fault(0x2310)
@@ -55,7 +55,7 @@ def test_a_fault_is_reset_by_the_edge_and_not_by_the_level(stage: Stage) -> None
     assert control(stage, 0x00, 0x80) & 0x4F == 0x40
 
 
-def test_errors_and_their_reset_are_sent_as_emergencies(stage: Stage) -> None:
+def test_errors_and_their_reset_are_sent_as_emergencies(stage: DriveBench) -> None:
     stage.heard()
     stage.mock.inject_fault(0x2310)
     assert stage.heard() == b"t08181023020000000000\r"
@@ -63,7 +63,7 @@ def test_errors_and_their_reset_are_sent_as_emergencies(stage: Stage) -> None:
 
 
 @pytest.mark.parametrize(("code", "still_powered"), [(0x2310, False), (0x8A88, False), (0x8611, True), (0x8120, True)])
-def test_an_error_cuts_the_torque_or_brakes_first(stage: Stage, code: int, still_powered: bool) -> None:
+def test_an_error_cuts_the_torque_or_brakes_first(stage: DriveBench, code: int, still_powered: bool) -> None:
     enabled(stage, 1)
     stage.mock.inject_fault(code)
     assert status(stage) & 0x4F == (0x0F if still_powered else 0x08)
@@ -72,7 +72,7 @@ def test_an_error_cuts_the_torque_or_brakes_first(stage: Stage, code: int, still
     assert status(stage) & 0x4F == 0x08
 
 
-def test_option_codes_may_ask_for_no_ramp(stage: Stage) -> None:
+def test_option_codes_may_ask_for_no_ramp(stage: DriveBench) -> None:
     assert download(stage, 0x605E, 0, 2, 0) == 0
     assert download(stage, 0x6007, 0, 2, 2) == 0
     for code in (0x8611, 0x8130):
@@ -85,7 +85,7 @@ def test_option_codes_may_ask_for_no_ramp(stage: Stage) -> None:
 # Motion
 
 
-def test_a_profile_is_a_trapezoid_with_the_handshake_of_its_mode(stage: Stage) -> None:
+def test_a_profile_is_a_trapezoid_with_the_handshake_of_its_mode(stage: DriveBench) -> None:
     for index, value in ((0x6081, 240), (0x6083, 6000), (0x6084, 6000), (0x607A, 20_000)):
         download(stage, index, 0, 4, value)
     enabled(stage, 1)
@@ -101,7 +101,7 @@ def test_a_profile_is_a_trapezoid_with_the_handshake_of_its_mode(stage: Stage) -
     assert len([speed for speed in speeds if speed > 19.9]) == pytest.approx(460, abs=30)
 
 
-def test_a_relative_set_point_and_one_that_waits(stage: Stage) -> None:
+def test_a_relative_set_point_and_one_that_waits(stage: DriveBench) -> None:
     download(stage, 0x6081, 0, 4, 600)
     enabled(stage, 1)
     download(stage, 0x607A, 0, 4, 2000)
@@ -113,7 +113,7 @@ def test_a_relative_set_point_and_one_that_waits(stage: Stage) -> None:
     assert stage.plant.position_mm == pytest.approx(8 + 1.5, abs=0.01)
 
 
-def test_halt_brakes_and_its_end_goes_on(stage: Stage) -> None:
+def test_halt_brakes_and_its_end_goes_on(stage: DriveBench) -> None:
     download(stage, 0x607A, 0, 4, 40_000)
     enabled(stage, 1)
     control(stage, 0x1F, 0x0F)
@@ -127,7 +127,7 @@ def test_halt_brakes_and_its_end_goes_on(stage: Stage) -> None:
     assert stage.plant.position_mm == pytest.approx(28, abs=0.02)
 
 
-def test_a_set_point_beyond_the_software_limit_is_an_error(stage: Stage) -> None:
+def test_a_set_point_beyond_the_software_limit_is_an_error(stage: DriveBench) -> None:
     download(stage, 0x607D, 2, 4, 10_000)
     download(stage, 0x607A, 0, 4, 10_001)
     enabled(stage, 1)
@@ -135,7 +135,7 @@ def test_a_set_point_beyond_the_software_limit_is_an_error(stage: Stage) -> None
     assert upload(stage, 0x603F, kind="H") == 0x8A82
 
 
-def test_running_out_of_the_software_limit_is_an_error(stage: Stage) -> None:
+def test_running_out_of_the_software_limit_is_an_error(stage: DriveBench) -> None:
     download(stage, 0x607D, 2, 4, 4000)
     download(stage, 0x60FF, 0, 4, 240)
     enabled(stage, 3)
@@ -144,7 +144,7 @@ def test_running_out_of_the_software_limit_is_an_error(stage: Stage) -> None:
     assert stage.plant.position_mm == pytest.approx(8 + 2.0, abs=0.6)
 
 
-def test_an_unguarded_drive_runs_out_of_its_software_limit(stage: Stage) -> None:
+def test_an_unguarded_drive_runs_out_of_its_software_limit(stage: DriveBench) -> None:
     stage.mock.unguarded = True
     download(stage, 0x607D, 2, 4, 4000)
     download(stage, 0x60FF, 0, 4, 240)
@@ -153,7 +153,7 @@ def test_an_unguarded_drive_runs_out_of_its_software_limit(stage: Stage) -> None
     assert upload(stage, 0x603F, kind="H") == 0
 
 
-def test_a_velocity_is_reached_with_the_profile_acceleration(stage: Stage) -> None:
+def test_a_velocity_is_reached_with_the_profile_acceleration(stage: DriveBench) -> None:
     download(stage, 0x60FF, 0, 4, -120)
     enabled(stage, 3)
     positions = follow(stage, 0.5)
@@ -162,7 +162,7 @@ def test_a_velocity_is_reached_with_the_profile_acceleration(stage: Stage) -> No
     assert upload(stage, 0x606C) == pytest.approx(-120, abs=1)
 
 
-def test_cyclic_positions_are_followed_at_once(stage: Stage) -> None:
+def test_cyclic_positions_are_followed_at_once(stage: DriveBench) -> None:
     enabled(stage, 8)
     assert status(stage) & 0x1000
     for step in range(500):
@@ -172,7 +172,7 @@ def test_cyclic_positions_are_followed_at_once(stage: Stage) -> None:
     assert upload(stage, 0x603F, kind="H") == 0
 
 
-def test_set_points_led_astray_take_the_carriage_with_them_until_the_drive_stops_by_itself(stage: Stage) -> None:
+def test_set_points_led_astray_take_the_carriage_with_them_until_the_drive_stops_by_itself(stage: DriveBench) -> None:
     enabled(stage, 8)
     stage.mock.unguarded = True
     set_point = b"t40160F0000000000\r"
@@ -187,7 +187,7 @@ def test_set_points_led_astray_take_the_carriage_with_them_until_the_drive_stops
     assert stopped[-1] == pytest.approx(stopped[-100], abs=0.001)
 
 
-def test_a_carriage_that_is_held_is_a_following_error_even_without_sync(stage: Stage) -> None:
+def test_a_carriage_that_is_held_is_a_following_error_even_without_sync(stage: DriveBench) -> None:
     enabled(stage, 8)
     stage.plant.position_mm += 1.5
     stage.plant.stop_mm = stage.plant.position_mm
@@ -196,7 +196,7 @@ def test_a_carriage_that_is_held_is_a_following_error_even_without_sync(stage: S
     assert status(stage) & 0x2000
 
 
-def test_homing_drives_onto_the_switch_and_leaves_it_slowly(stage: Stage) -> None:
+def test_homing_drives_onto_the_switch_and_leaves_it_slowly(stage: DriveBench) -> None:
     for index, sub, size, value in ((0x6098, 0, 1, 17), (0x6099, 1, 4, 240), (0x6099, 2, 4, 12), (0x609A, 0, 4, 24000)):
         download(stage, index, sub, size, value)
     enabled(stage, 6)
@@ -208,7 +208,7 @@ def test_homing_drives_onto_the_switch_and_leaves_it_slowly(stage: Stage) -> Non
     assert abs(upload(stage, 0x6064)) < 20
 
 
-def test_home_may_lie_away_from_the_switch(stage: Stage) -> None:
+def test_home_may_lie_away_from_the_switch(stage: DriveBench) -> None:
     for index, sub, size, value in ((0x6098, 0, 1, 17), (0x6099, 1, 4, 240), (0x6099, 2, 4, 60), (0x609A, 0, 4, 24000)):
         download(stage, index, sub, size, value)
     download(stage, 0x30B1, 0, 4, 4000)
@@ -220,7 +220,7 @@ def test_home_may_lie_away_from_the_switch(stage: Stage) -> None:
     assert upload(stage, 0x6064) == pytest.approx(100, abs=4)
 
 
-def test_a_missing_host_really_stops_the_carriage(stage: Stage) -> None:
+def test_a_missing_host_really_stops_the_carriage(stage: DriveBench) -> None:
     exchange(stage, b"t00020101\r")
     download(stage, 0x1016, 1, 4, 127 << 16 | 40)
     download(stage, 0x607A, 0, 4, 100_000)

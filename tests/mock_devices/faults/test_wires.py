@@ -10,16 +10,10 @@ from mock_devices.devices import FORCE_CHOICES, Workshop
 from mock_devices.faults.wires import WIRE_FAULTS, FaultyWire, as_number, faults_of
 from mock_devices.interfaces import NEVER_NS
 from mock_devices.parameters import Parameters
+from mock_devices.testing.clock import Clock
+from mock_devices.testing.wire import MemoryWire
 from mock_devices.wire import PtyWire, TcpWire
 from rig.errors import DeviceError, UsageError
-from tests.remote import MemoryWire
-
-
-class Clock:
-    now_ns = 0
-
-    def __call__(self) -> int:
-        return self.now_ns
 
 
 @pytest.fixture
@@ -29,7 +23,7 @@ def inside() -> MemoryWire:
 
 @pytest.fixture
 def clock() -> Clock:
-    return Clock()
+    return Clock(0)
 
 
 @pytest.fixture

@@ -16,8 +16,9 @@ import pytest
 
 from drivers.ndi.device import NdiTracker
 from drivers.ports import open_port
+from mock_devices.testing.ndi import remote_tracker
+from mock_devices.testing.remote import RemoteMock
 from rig.config.wiring import Tracker
-from tests.ndi_stage import RemoteMock, remote_mock
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
 
@@ -83,7 +84,7 @@ ARM_WIRE = [1.0, 0.0, 0.0, 0.0, -250.0, 100.0, -1500.0]
 
 @pytest.fixture(params=["serial", "tcp"])
 def remote(request: pytest.FixtureRequest) -> Iterator[RemoteMock]:
-    with remote_mock(request.param) as mock:
+    with remote_tracker(request.param) as mock:
         yield mock
 
 
@@ -139,7 +140,7 @@ def test_scikit_surgery_tracks_over_both_wires(remote: RemoteMock, tmp_path: Pat
 
 
 def test_scikit_surgery_sees_a_missing_tool(tmp_path: Path) -> None:
-    with remote_mock("serial") as mock:
+    with remote_tracker("serial") as mock:
         mock.fault("missing", [1])
         rom = tmp_path / "any.rom"
         rom.write_bytes(b"NDI\0")
@@ -154,7 +155,7 @@ def test_scikit_surgery_tracks_in_each_of_its_sessions_and_our_driver_starts_aft
 
     By TX: ndicapi reads a BX reply as text, and the length of one with four tools (171) is no UTF-8.
     """
-    with remote_mock("tcp") as mock:
+    with remote_tracker("tcp") as mock:
         mock.fault("freeze_tag", "Polaris Vega 008")
         roms = [tmp_path / name for name in ("tip.rom", "arm.rom")]
         for rom in roms:

@@ -7,9 +7,9 @@ import pytest
 from drivers.ndi import replies
 from drivers.ndi.codec import BinaryReply, ReplyDecoder, TextReply, encode_command
 from mock_devices.ndi.mock import MAX_COMMAND, NdiMock
+from mock_devices.testing.ndi import ARM, TIP, StillPlant
+from mock_devices.testing.wire import MemoryWire
 from mock_devices.wire import PtyWire, TcpWire
-from tests.ndi_stage import ARM, TIP, StillPlant
-from tests.remote import MemoryWire
 
 
 class Desk:

@@ -25,8 +25,8 @@ from drivers.robotiq.codec import (
 from drivers.roles import LinkCounters
 from mock_devices.interfaces import NEVER_NS, Mock
 from mock_devices.robotiq.mock import REQUEST_BYTES_MAX, RequestFinder, RobotiqMock
-from tests.mock_devices.force_bench import WRENCH, MemoryStage, Served, StillPlant
-from tests.remote import MemoryWire
+from mock_devices.testing.force import WRENCH, SensorBench, ServedMock, StillPlant
+from mock_devices.testing.wire import MemoryWire
 
 START_NS = 7_000_000_000
 PERIOD_NS = 10_000_000
@@ -34,7 +34,7 @@ READ_FORCES = bytes.fromhex("09 03 00 B4 00 06 84 A6")
 FORCES = with_crc(bytes.fromhex("09 03 0C 007D FF06 FCF9 007D FF06 01F4"))
 
 
-class Stage(MemoryStage[RobotiqMock]):
+class RobotiqBench(SensorBench[RobotiqMock]):
     """A mock just powered."""
 
     def __init__(self, drift_ppm: float = 0.0, serial_number: int = 1234) -> None:
@@ -53,12 +53,12 @@ def exception(function: int, code: int) -> bytes:
 
 
 def test_it_is_a_mock_of_the_stage() -> None:
-    mock: Mock = Stage().mock
+    mock: Mock = RobotiqBench().mock
     assert (mock.name, mock.endpoints(), mock.filenos(), mock.due_ns) == ("force", {"serial": "/memory"}, [], NEVER_NS)
 
 
 def test_the_manuals_requests_are_answered() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     assert stage.say(bytes.fromhex("09 03 00 B4 00 01 C5 64")) == with_crc(bytes.fromhex("09 03 02 00 7D"))
     assert stage.say(READ_FORCES) == FORCES
 
@@ -75,11 +75,11 @@ def test_the_manuals_requests_are_answered() -> None:
 )
 def test_the_register_map(address: int, count: int, data: str) -> None:
     body = bytes([9, 3, 2 * count]) + bytes.fromhex(data)
-    assert Stage().say(encode_read(address, count)) == with_crc(body)
+    assert RobotiqBench().say(encode_read(address, count)) == with_crc(body)
 
 
 def test_a_large_serial_number_has_its_low_word_first() -> None:
-    assert Stage(serial_number=80871424).say(encode_read(512, 2))[3:7] == bytes.fromhex("0000 04D2")
+    assert RobotiqBench(serial_number=80871424).say(encode_read(512, 2))[3:7] == bytes.fromhex("0000 04D2")
 
 
 @pytest.mark.parametrize(
@@ -99,33 +99,33 @@ def test_a_large_serial_number_has_its_low_word_first() -> None:
     ],
 )
 def test_requests_that_cannot_be_served_get_an_exception(request_: bytes, function: int, code: int) -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     assert stage.say(request_) == exception(function, code)
     assert not stage.mock.streaming
 
 
 @pytest.mark.parametrize("slave", [0, 1, 8, 10, 247])
 def test_requests_to_other_slaves_are_met_with_silence(slave: int) -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     hidden = with_crc(bytes([slave, 16, 0, 0, 0, 4, 8]) + READ_FORCES)
     assert stage.say(hidden) == b""
     assert stage.say(READ_FORCES) == FORCES
 
 
 def test_a_wrong_checksum_is_met_with_silence() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     assert stage.say(READ_FORCES[:-1] + b"\x00") == b""
     assert stage.say(READ_FORCES) == FORCES
 
 
 @pytest.mark.parametrize("cut", range(len(READ_FORCES) + 1))
 def test_a_request_may_be_split_at_every_byte(cut: int) -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     assert stage.say(READ_FORCES[:cut]) + stage.say(READ_FORCES[cut:]) == FORCES
 
 
 def test_noise_before_a_request_is_passed_over() -> None:
-    assert Stage().say(b"\xff" * 300 + b"\x09\x10\x01\x9a" + READ_FORCES) == FORCES
+    assert RobotiqBench().say(b"\xff" * 300 + b"\x09\x10\x01\x9a" + READ_FORCES) == FORCES
 
 
 @given(st.lists(st.binary(max_size=100), max_size=20))
@@ -138,13 +138,13 @@ def test_the_slave_holds_at_most_a_request_whatever_comes(chunks: list[bytes]) -
 
 
 def test_the_stream_starts_with_an_answer_and_runs_at_100_frames_a_second() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     stage.stream()
     assert stage.frames(1_000_000_000 + FRAME_NS) == [Wrench(*WRENCH)] * 100
 
 
 def test_a_frame_arrives_when_it_has_passed_the_line() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     stage.stream()
     assert stage.wait(PERIOD_NS) == b""
     stage.plant.load = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -153,7 +153,7 @@ def test_a_frame_arrives_when_it_has_passed_the_line() -> None:
 
 
 def test_when_samples_were_taken_is_kept_on_the_benchs_clock() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     begun_ns = stage.now_ns
     stage.stream()
     stage.wait(2 * PERIOD_NS)
@@ -162,13 +162,13 @@ def test_when_samples_were_taken_is_kept_on_the_benchs_clock() -> None:
 
 
 def test_a_fast_clock_gives_more_frames() -> None:
-    stage = Stage(drift_ppm=20_000)
+    stage = RobotiqBench(drift_ppm=20_000)
     stage.stream()
     assert len(stage.frames(10_000_000_000 + FRAME_NS)) == 1020
 
 
 def test_a_streaming_sensor_is_deaf_to_modbus() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     assert stage.say(START_STREAM + READ_FORCES) == STREAM_STARTED
     assert stage.say(READ_FORCES) == b""
     assert stage.mock.streaming
@@ -176,7 +176,7 @@ def test_a_streaming_sensor_is_deaf_to_modbus() -> None:
 
 @pytest.mark.parametrize("cut", [0, 1, 25, 49, 50])
 def test_a_burst_stops_the_stream_and_modbus_works_again(cut: int) -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     stage.stream()
     stage.wait(PERIOD_NS)
     assert stage.say(STOP_BURST[:cut]) + stage.say(STOP_BURST[cut:]) == b""
@@ -187,14 +187,14 @@ def test_a_burst_stops_the_stream_and_modbus_works_again(cut: int) -> None:
 
 
 def test_a_burst_that_is_too_short_or_interrupted_does_not_stop_the_stream() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     stage.stream()
     stage.say(STOP_BURST[:-1] + b"\x00" + STOP_BURST[:-1])
     assert stage.mock.streaming
 
 
 def test_a_frozen_sensor_repeats_its_forces() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     assert stage.say(READ_FORCES) == FORCES
     stage.mock.frozen = True
     stage.plant.load = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -204,14 +204,14 @@ def test_a_frozen_sensor_repeats_its_forces() -> None:
 
 
 def test_an_invalid_sensor_gives_the_end_of_its_converter() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     stage.mock.invalid = True
     stage.stream()
     assert stage.frames(20_000_000) == [Wrench(327.67, 327.67, 327.67, 32.767, 32.767, 32.767)]
 
 
 def test_every_nth_checksum_can_be_spoilt() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     stage.mock.corrupt_every = 3
     stage.stream()
     counters = LinkCounters()
@@ -220,7 +220,7 @@ def test_every_nth_checksum_can_be_spoilt() -> None:
 
 
 def test_a_silent_sensor_neither_answers_nor_streams() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     stage.mock.silent = True
     assert stage.say(READ_FORCES) == b""
     assert stage.say(START_STREAM) == b""
@@ -230,7 +230,7 @@ def test_a_silent_sensor_neither_answers_nor_streams() -> None:
 
 
 def test_start_can_go_unanswered_or_be_refused_and_a_deaf_sensor_streams_on() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     stage.mock.refuse_stream = True
     assert stage.say(START_STREAM) == exception(16, 3)
     stage.mock.refuse_stream = False
@@ -242,13 +242,13 @@ def test_start_can_go_unanswered_or_be_refused_and_a_deaf_sensor_streams_on() ->
 
 
 def test_a_wrong_identity_shows_in_the_firmware() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     stage.mock.wrong_identity = True
     assert stage.say(encode_read(500, 1)) == with_crc(b"\x09\x03\x02KM")
 
 
 def test_close_cuts_the_wire() -> None:
-    stage = Stage()
+    stage = RobotiqBench()
     stage.mock.close()
     assert stage.wire.closed
 
@@ -258,7 +258,7 @@ def test_close_cuts_the_wire() -> None:
 class TestThirdPartyClients:
     """Clients written elsewhere use the mock, in another process, unchanged."""
 
-    def test_minimalmodbus_reads_registers_and_starts_the_stream(self, robotiq: Served) -> None:
+    def test_minimalmodbus_reads_registers_and_starts_the_stream(self, robotiq: ServedMock) -> None:
         instrument = minimalmodbus.Instrument(robotiq.endpoint, 9)
         line = instrument.serial
         line.baudrate, line.timeout = 19_200, 1.0
@@ -273,14 +273,14 @@ class TestThirdPartyClients:
         line.close()
         assert Decoder(LinkCounters()).feed(frame) == [Wrench(*WRENCH)]
 
-    def test_minimalmodbus_hears_nothing_from_another_slave(self, robotiq: Served) -> None:
+    def test_minimalmodbus_hears_nothing_from_another_slave(self, robotiq: ServedMock) -> None:
         instrument = minimalmodbus.Instrument(robotiq.endpoint, 8)
         instrument.serial.baudrate, instrument.serial.timeout = 19_200, 0.2
         with pytest.raises(minimalmodbus.NoResponseError):
             instrument.read_register(180)
         instrument.serial.close()
 
-    def test_pymodbus_reads_registers_and_gets_exceptions(self, robotiq: Served) -> None:
+    def test_pymodbus_reads_registers_and_gets_exceptions(self, robotiq: ServedMock) -> None:
         client = ModbusSerialClient(robotiq.endpoint, baudrate=19_200, timeout=2)
         assert client.connect()
         forces = client.read_holding_registers(180, count=6, device_id=9).registers
@@ -289,7 +289,7 @@ class TestThirdPartyClients:
         assert struct.unpack(">6h", struct.pack(">6H", *forces)) == (125, -250, -775, 125, -250, 500)
         assert (refused.isError(), refused.exception_code) == (True, 2)
 
-    def test_pymodbus_stops_a_stream_and_reads_again(self, robotiq: Served) -> None:
+    def test_pymodbus_stops_a_stream_and_reads_again(self, robotiq: ServedMock) -> None:
         with closing(ModbusSerialClient(robotiq.endpoint, baudrate=19_200, timeout=5)) as client:
             assert client.connect()
             assert not client.write_registers(410, [0x0200], device_id=9).isError()

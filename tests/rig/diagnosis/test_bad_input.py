@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.hidden.draw import draw_secret, recorded, session_of
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.cycles import cut
 from rig.diagnosis.estimates import Unexplained
@@ -18,7 +19,6 @@ from rig.recording.csv_columns import read_usable
 from rig.recording.sessions import open_session, write_session
 from rig.results.diagnosis import DiagnosisResult
 from tests.data import recording
-from tests.hidden.draw import draw_secret, recorded, session_of
 from tests.rig.tissue.synthetic import Bench, write_made_session
 
 

@@ -1,11 +1,11 @@
 """Swaps put a wrong beginning right as far as they go, and what is named is what the final model holds."""
 
+from benchmarks.hidden.draw import Secret, recorded, session_of
 from rig.diagnosis.effects.bench import FRICTION, TIME_OFFSET, TIP_INERTIA, ZERO_DRIFT
 from rig.diagnosis.fit import first_fit, fit, refreshed
 from rig.diagnosis.indentation import Indentation
 from rig.diagnosis.observations import observe
 from rig.diagnosis.search import swapped
-from tests.hidden.draw import Secret, recorded, session_of
 
 
 def test_every_cause_named_after_two_swaps_is_in_the_model() -> None:

@@ -7,13 +7,13 @@ import numpy as np
 
 from drivers.bota.codec import Frame, encode_frame
 from drivers.bota.device import BotaSensOne
+from mock_devices.testing.clock import long_ago
 from rig.channels import FORCE
 from rig.config.wiring import Force
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.reader import read_recording
 from rig.recording.verify import verify
 from tests.drivers.scripted_port import ScriptedPort
-from tests.remote import long_ago
 
 MS = 1_000_000
 # Reads of a host that stalls: when, and how many frames have come since the one before.

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.hidden.truth import Bench, Hidden, IndentationCycle, draw_bench, run
 from rig.diagnosis.observations import Session, Streams
-from tests.hidden.truth import Bench, Hidden, IndentationCycle, draw_bench, run
 
 Truth = Mapping[str, float]
 

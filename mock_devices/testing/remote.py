@@ -1,26 +1,35 @@
-"""A mock in another process, spoken to line by line, and a wire in memory for one in this process."""
+"""A mock in another process, in real time, spoken to line by line."""
 
 import contextlib
 import json
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
 
-class Remote:
+class RemoteMock:
     """The process ``python -m MODULE``: it prints its endpoints, then answers each order; every line is JSON."""
 
     def __init__(self, module: str, *arguments: str) -> None:
         self._process = subprocess.Popen(
             [sys.executable, "-m", module, *arguments],
-            cwd=Path(__file__).parents[1],
+            cwd=Path(__file__).parents[2],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
         )
         self.endpoints: dict[str, str] = self._answer()
+
+    @property
+    def address(self) -> str:
+        """Where a driver finds it."""
+        served = self.endpoints
+        return served.get("serial") or served.get("slcan") or f"tcp://{served['tcp']}"
+
+    def fault(self, name: str, value: object = True) -> None:
+        """Sets a fault and waits until it is set."""
+        self.order(fault=name, value=value)
 
     def order(self, **order: object) -> dict[str, Any]:
         """Sends an order and returns what is answered once it is obeyed."""
@@ -48,37 +57,3 @@ def say(answer: object) -> None:
     """The other end: one line of JSON."""
     sys.stdout.write(json.dumps(answer) + "\n")
     sys.stdout.flush()
-
-
-def long_ago() -> int:
-    """A running clock, behind every time that a test names [ns]."""
-    return time.monotonic_ns() - (1 << 60)
-
-
-class MemoryWire:
-    """A wire without a kernel: what the client says waits in ``said``, what the mock wrote stands in ``sent``."""
-
-    def __init__(self, endpoint: str = "memory") -> None:
-        self.endpoint = endpoint
-        self.said = b""
-        self.sent: list[bytes] = []
-        self.closed = False
-
-    def filenos(self) -> list[int]:
-        return []
-
-    def read(self) -> bytes:
-        said, self.said = self.said, b""
-        return said
-
-    def write(self, data: bytes) -> None:
-        self.sent.append(data)
-
-    def close(self) -> None:
-        self.closed = True
-
-    def take(self) -> bytes:
-        """What the mock wrote since the last call."""
-        data = b"".join(self.sent)
-        self.sent.clear()
-        return data

@@ -12,9 +12,9 @@ from drivers.roles import ForceSensor
 from mock_devices.bota.mock import BotaMock
 from mock_devices.interfaces import NEVER_NS, Mock
 from mock_devices.robotiq.mock import RobotiqMock
+from mock_devices.testing.wire import MemoryWire
 from mock_devices.wire import PtyWire
 from rig.channels import ForceSample
-from tests.remote import MemoryWire
 
 Product = Literal["bota", "robotiq"]
 Knobs = dict[str, bool | int | str]
@@ -39,7 +39,7 @@ class StillPlant:
         return self.over
 
 
-class MemoryStage(Generic[AnyMock]):
+class SensorBench(Generic[AnyMock]):
     """A mock on a wire in memory, with the clock in the test's hand."""
 
     def __init__(self, mock: AnyMock, wire: MemoryWire, now_ns: int) -> None:
@@ -60,7 +60,7 @@ class MemoryStage(Generic[AnyMock]):
         return self.wire.take()
 
 
-class Served:
+class ServedMock:
     """The test's hand on the mock in the other process."""
 
     def __init__(self, endpoint: str, ask: Callable[[object], object]) -> None:
@@ -80,16 +80,16 @@ class Served:
         self._ask("cut")
 
 
-class Bench:
+class ForceBench:
     """A process in which mocks live, one at a time and in real time."""
 
     def __init__(self, control: Connection) -> None:
         self._control = control
 
     @contextmanager
-    def serve(self, product: Product) -> Iterator[Served]:
+    def serve(self, product: Product) -> Iterator[ServedMock]:
         """A new mock, just powered, on a new pseudo-terminal, until the block ends."""
-        yield Served(str(self._ask(product)), self._ask)
+        yield ServedMock(str(self._ask(product)), self._ask)
         self._ask("cut")
 
     def _ask(self, what: object) -> object:
@@ -118,7 +118,7 @@ def await_silence(sensor: ForceSensor) -> None:
 
 
 @contextmanager
-def bench_process() -> Iterator[Bench]:
+def bench_process() -> Iterator[ForceBench]:
     """The process, until the block ends."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
@@ -126,7 +126,7 @@ def bench_process() -> Iterator[Bench]:
     process.start()
     there.close()
     try:
-        yield Bench(here)
+        yield ForceBench(here)
     finally:
         here.close()
         process.join(10)

@@ -37,7 +37,7 @@ PATIENCE_S = 60.0
 
 
 @dataclass(frozen=True)
-class Stage:
+class ServedBench:
     """Endpoints of a served bench and its control channel."""
 
     endpoints: dict[str, Any]
@@ -60,7 +60,7 @@ class Stage:
 
 
 @contextlib.contextmanager
-def stage(*options: str) -> Iterator[Stage]:
+def served_bench(*options: str) -> Iterator[ServedBench]:
     """A bench served with ``options`` until the block ends."""
     command = [
         sys.executable,
@@ -78,7 +78,7 @@ def stage(*options: str) -> Iterator[Stage]:
     try:
         endpoints = json.loads(process.stdout.readline())
         with BenchControl(endpoints["control"]) as control:
-            served = Stage(endpoints, control)
+            served = ServedBench(endpoints, control)
             served.calibrated()  # kept from then on: a fault that a test brings about must not meet the first time
             yield served
     finally:
@@ -143,7 +143,7 @@ class Running:
         return Said(self.process.returncode, out, err)
 
 
-def pressed(bench: Stage, force_N: float = 1.0) -> None:
+def pressed(bench: ServedBench, force_N: float = 1.0) -> None:
     """Waits until the tip presses with ``force_N``; a command that ended before that fails with what it said."""
 
     def there() -> bool:
@@ -154,7 +154,7 @@ def pressed(bench: Stage, force_N: float = 1.0) -> None:
     until(there, PATIENCE_S, f"the tip pressing with {force_N} N")
 
 
-def freed(bench: Stage) -> None:
+def freed(bench: ServedBench) -> None:
     """Waits until the tip is out of the tissue."""
     until(lambda: bench.control.number("tip.force_N") == 0.0, PATIENCE_S, "the tip out of contact")
 

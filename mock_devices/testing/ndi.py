@@ -1,7 +1,7 @@
-"""The tracker mock on a stage of its own: in this process on an injected clock, or in another one in real time.
+"""The tracker mock for tests: in this process on an injected clock, or in another one in real time.
 
-The other process is started as ``python -m tests.ndi_stage serial|tcp polaris|vega``. It prints its endpoint as one
-line of JSON; each line it reads sets one fault: ``{"fault": "missing", "value": [0]}``; ``cut`` cuts the wire.
+The other process is ``python -m mock_devices.testing.ndi serial|tcp polaris|vega``. It prints its endpoint as one line
+of JSON; each line it reads sets one fault: ``{"fault": "missing", "value": [0]}``; ``cut`` cuts the wire.
 """
 
 import contextlib
@@ -18,10 +18,12 @@ from drivers.ports import PortClosed
 from drivers.roles import MarkerTracker
 from mock_devices.interfaces import MarkerPose
 from mock_devices.ndi.mock import NdiMock
+from mock_devices.testing.clock import long_ago
+from mock_devices.testing.remote import RemoteMock, say
+from mock_devices.testing.wire import MemoryWire
 from mock_devices.wire import PtyWire, TcpWire
 from rig.channels import MarkerSample
 from rig.config.wiring import Tracker
-from tests.remote import MemoryWire, Remote, long_ago, say
 
 MS = 1_000_000
 
@@ -39,7 +41,7 @@ class StillPlant:
         return self.view
 
 
-class Stage:
+class TrackerBench:
     """A mock and the port to it in one process; frames pass only by ``run_until``.
 
     ``canned`` answers a command by another text than the mock's. On a serial address bytes at the wrong speed are lost;
@@ -63,7 +65,7 @@ class Stage:
         self.cut = False
         self._readable = os.eventfd(0, os.EFD_NONBLOCK)
 
-    def open(self, baud: int) -> "Stage":
+    def open(self, baud: int) -> "TrackerBench":
         self.bauds.append(baud)
         self.closed = False
         return self
@@ -123,40 +125,25 @@ def flipped(message: bytes) -> bytes:
     return message[:middle] + bytes([message[middle] ^ 0x01]) + message[middle + 1 :]
 
 
-def started(stage: Stage, **settings: Any) -> NdiTracker:
-    device = NdiTracker(stage.open, Tracker(**settings), long_ago)
+def started(bench: TrackerBench, **settings: Any) -> NdiTracker:
+    """The driver on that bench, after its start."""
+    device = NdiTracker(bench.open, Tracker(**settings), long_ago)
     device.start()
     return device
 
 
-def run(stage: Stage, device: MarkerTracker, start_ms: int, end_ms: int) -> list[MarkerSample]:
+def run(bench: TrackerBench, device: MarkerTracker, start_ms: int, end_ms: int) -> list[MarkerSample]:
     """Polls each millisecond, as the loop does."""
     samples: list[MarkerSample] = []
     for tick in range(start_ms, end_ms):
-        stage.run_until(tick * MS)
+        bench.run_until(tick * MS)
         samples += device.poll(tick * MS)
     return samples
 
 
-class RemoteMock(Remote):
-    """The mock in another process."""
-
-    def __init__(self, link: str, kind: str) -> None:
-        super().__init__("tests.ndi_stage", link, kind)
-
-    @property
-    def address(self) -> str:
-        """As the drivers write it."""
-        return self.endpoints.get("serial") or f"tcp://{self.endpoints['tcp']}"
-
-    def fault(self, name: str, value: object = True) -> None:
-        """Sets a fault and waits until it is set."""
-        self.order(fault=name, value=value)
-
-
-def remote_mock(link: str = "serial", kind: str = "vega") -> contextlib.closing[RemoteMock]:
-    """The mock until the block ends."""
-    return contextlib.closing(RemoteMock(link, kind))
+def remote_tracker(link: str = "serial", kind: str = "vega") -> contextlib.closing[RemoteMock]:
+    """The mock in another process until the block ends."""
+    return contextlib.closing(RemoteMock("mock_devices.testing.ndi", link, kind))
 
 
 def _set_fault(mock: NdiMock, name: str, value: Any) -> None:
@@ -180,6 +167,7 @@ def _set_fault(mock: NdiMock, name: str, value: Any) -> None:
 
 
 def serve(link: str, kind: str) -> None:
+    """The mock in this process until its input ends."""
     wire = PtyWire() if link == "serial" else TcpWire()
     mock = NdiMock(wire, StillPlant(), time.monotonic_ns(), kind="vega" if kind == "vega" else "polaris")
     say(mock.endpoints())

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass, field
 
 from controller.loop.steps import Approach, Zero
+from mock_devices.testing.spring_bench import SURFACE_MM, SpringBench
 from rig.config.wiring import Wiring
-from tests.controller.spring import SURFACE_MM, SpringBench
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
-"""The drive mock on a stage of its own: in this process on an injected clock, or in another one in real time.
+"""The drive mock for tests: in this process on an injected clock, or in another one in real time.
 
-The other process is started as ``python -m tests.epos4_stage``. It prints its endpoint as one line of JSON; each line
-it reads sets or asks something: ``{"set": "silent", "value": true}``, ``{"fault": 9040}``, ``{"cut": true}``,
+The other process is ``python -m mock_devices.testing.epos4``. It prints its endpoint as one line of JSON; each line it
+reads sets or asks something: ``{"set": "silent", "value": true}``, ``{"fault": 9040}``, ``{"cut": true}``,
 ``{"ask": true}``, and is answered by one line with the plant's state.
 """
 
@@ -18,8 +18,9 @@ from drivers.canopen.nmt import NmtState
 from drivers.ports import PortClosed
 from mock_devices.epos4.mock import Epos4Mock
 from mock_devices.interfaces import NEVER_NS
+from mock_devices.testing.remote import RemoteMock, say
+from mock_devices.testing.wire import MemoryWire
 from mock_devices.wire import PtyWire
-from tests.remote import MemoryWire, Remote, say
 
 MS = 1_000_000
 TIME_CONSTANT_S = 1 / (2 * math.pi * 25)
@@ -61,7 +62,7 @@ class HostDied(Exception):
     """The client's process is no more."""
 
 
-class Stage:
+class DriveBench:
     """A mock, its plant and the link to it in one process; time passes only in ``wait`` and ``run``.
 
     Is itself the CanLink of the driver. ``cut`` is a cable pulled out; ``drop`` swallows that many answers to come;
@@ -87,7 +88,7 @@ class Stage:
         self.run(0.1 if booted else 0.0)
         self.wire.sent.clear()
 
-    def open(self, path: str, bitrate: int, now: object) -> "Stage":
+    def open(self, path: str, bitrate: int, now: object) -> "DriveBench":
         self.closed = False
         return self
 
@@ -152,17 +153,9 @@ class Stage:
             self.mock.tick(until_ns)
 
 
-class RemoteMock(Remote):
-    """The mock in another process."""
-
-    def __init__(self) -> None:
-        super().__init__("tests.epos4_stage")
-        self.port = self.endpoints["slcan"]
-
-
-def remote_mock() -> contextlib.closing[RemoteMock]:
-    """The mock until the block ends."""
-    return contextlib.closing(RemoteMock())
+def remote_drive() -> contextlib.closing[RemoteMock]:
+    """The mock in another process until the block ends."""
+    return contextlib.closing(RemoteMock("mock_devices.testing.epos4"))
 
 
 def _obey(mock: Epos4Mock, plant: LaggingPlant, order: dict[str, Any]) -> dict[str, object]:

@@ -1,0 +1,68 @@
+"""`rig serve` over a served bench."""
+
+import json
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from urllib.request import Request, urlopen
+
+from mock_devices.testing.commands import PATIENCE_S, Running, ServedBench, children, free_port, until
+
+ANSWER_S = 30.0  # connecting a device is waited for, and a busy computer
+
+
+class ServedRig:
+    """A bench, the service on it, and requests to it; it is idle once this is made."""
+
+    def __init__(self, bench: ServedBench, folder: Path, arguments: Sequence[str | Path]) -> None:
+        self.bench, self.folder, self.port = bench, folder, free_port()
+        self.running = Running(["serve", "--port", str(self.port), *arguments], folder, subprocess.DEVNULL)
+        self.becomes("idle")
+
+    @property
+    def address(self) -> str:
+        """Where it listens."""
+        return f"http://127.0.0.1:{self.port}"
+
+    def ask(self, method: str, path: str, body: object = None, lease: str = "") -> Any:
+        """One request; ``path`` is what follows /api/v1."""
+        data = None if body is None else json.dumps(body).encode()
+        headers = {"Content-Type": "application/json", "X-Control-Lease": lease}
+        request = Request(f"{self.address}/api/v1{path}", data, headers, method=method)
+        with urlopen(request, timeout=ANSWER_S) as answer:
+            return json.load(answer)
+
+    def lease(self) -> str:
+        """The right to move, for 30 s."""
+        return str(self.ask("POST", "/control/lease", {"holder": "test", "ttl_s": 30.0})["lease_id"])
+
+    @property
+    def rig(self) -> dict[str, Any]:
+        """The bench as it shows it; empty while it does not listen yet."""
+        try:
+            shown: dict[str, Any] = self.ask("GET", "/rig")
+        except OSError:
+            return {}
+        return shown
+
+    def becomes(self, state: str) -> None:
+        """Waits for that state; fails with what a service that ended has said."""
+
+        def there() -> bool:
+            assert self.running.process.poll() is None, self.running.end()
+            return self.rig.get("state") == state
+
+        until(there, PATIENCE_S, f"the service being {state}")
+
+    @property
+    def loop(self) -> int:
+        """Process number of the loop."""
+        (pid,) = children(self.running.process.pid, "controller.loop.process")
+        return pid
+
+    @property
+    def stop_process(self) -> int:
+        """Process number of the stop process."""
+        (pid,) = children(self.running.process.pid, "controller.stop.server")
+        return pid
