@@ -16,9 +16,13 @@ from rig.config.maxima import MAXIMA
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring
 from tools.keys import tables
+from tools.schemas import WRITTEN
 
 MARK = re.compile(r"^<!-- generated: ([a-z-]+) -->$", re.MULTILINE)
 HELP_COLUMNS = 100
+COMMANDS_OF = {
+    "compare": "track --table", "diagnosis": "diagnose", "lattice": "fit --lattice", "protocol-check": "protocol check"
+}  # fmt: skip
 
 
 def wiring() -> str:
@@ -41,7 +45,18 @@ def _help(name: str) -> str:
     return answer.output.strip()
 
 
-GENERATORS: dict[str, Callable[[], str]] = {"wiring": wiring, "protocol": protocol, "commands": commands}
+def schemas() -> str:
+    """A row each result: the command, and its schema as a file to take away."""
+    return "\n".join(_schema_row(name) for name in WRITTEN)
+
+
+def _schema_row(name: str) -> str:
+    return f"| `rig {COMMANDS_OF.get(name, name)}` | {{download}}`{name} <schemas/{name}.schema.json>` |"
+
+
+GENERATORS: dict[str, Callable[[], str]] = {
+    "wiring": wiring, "protocol": protocol, "commands": commands, "schemas": schemas
+}  # fmt: skip
 
 
 def fill(text: str) -> str:

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -255,3 +256,36 @@ def test_the_quality_of_each_trial_is_shown_and_why_it_is_not_good(tmp_path: Pat
 def test_a_folder_without_a_session_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"no session here"):
         write_report(tmp_path, tmp_path / "report.html")
+
+
+def test_the_fit_shown_is_the_one_that_was_asked_for(html: str) -> None:
+    words = Page(html).words
+    assert "Given, not fitted: thickness_mm = 30." in words
+    assert "layer thickness_mm 30 known mm" in words
+    assert "K and B for control (layer)" in words
+
+
+def test_the_report_reads_the_saved_fit_and_computes_nothing_again(folder: Path, tmp_path: Path) -> None:
+    again = tmp_path / "session"
+    shutil.copytree(folder, again)
+    saved = json.loads((again / "fit" / "fit.json").read_text())
+    saved["index"]["parameters"]["a_N_mm"]["value"] = 4321.0
+    (again / "fit" / "fit.json").write_text(json.dumps(saved))
+    write_report(again, again / "report.html")
+    assert "a_N_mm 4321" in Page((again / "report.html").read_text()).words
+
+
+def test_a_fit_that_is_older_than_its_session_says_so(folder: Path, tmp_path: Path) -> None:
+    again = tmp_path / "session"
+    shutil.copytree(folder, again)
+    assert "run `rig fit` again" not in Page((folder / "report.html").read_text()).words
+    info = open_session(again).info
+    first, second, third, *rest = info.trials
+    changed, later = replace(second, sha256="0" * 64), replace(third, name="trial_later")
+    write_session(again, replace(info, trials=(changed, later, *rest)))
+    (again / first.file).unlink()
+    write_report(again, again / "report.html")
+    words = Page((again / "report.html").read_text()).words
+    assert f"{first.name}, which the fit was made from, is not in the session" in words
+    assert f"{second.name} was changed after the fit" in words
+    assert "trial_later was recorded after the fit and is not in it" in words

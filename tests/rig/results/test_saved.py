@@ -1,0 +1,85 @@
+"""A saved result reads back as it was, says null where a number is unknown, and is refused where it is none."""
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from rig.errors import UsageError
+from rig.results.base import Number, Result
+from rig.results.diagnosis import DiagnosisResult
+from rig.results.fit import FitResult
+from rig.results.study import fit_result
+from rig.results.tracking import Followed, LoopCount, TrackResult, compared
+from rig.tissue.study import study_curves
+from rig.trials.curves import loading_curve
+from tests.rig.tissue.synthetic import Bench
+
+OLD_DIAGNOSIS = {
+    "verdict": "unexplained", "statement": "Something is left.", "simulation": "index", "session": "first",
+    "recordings": 6, "unexplained": {"depends_on": ["velocity"], "p_value": None}, "not_testable": {},
+    "findings": [{
+        "effects": ["friction"], "statement": "it rubs", "confidence": 0.2, "provisional": True, "repair": "clean it",
+        "parameters": {"friction_N": {"value": 0.1, "low": 0.09, "high": 0.11}}, "evidence_nats": 12.0, "p_value": 0.01,
+        "gain": {"rmse_before_N": 0.04, "rmse_after_N": 0.02, "reduction": 0.5, "low": 0.4, "high": 0.6},
+    }],
+    "detectable": {"backlash": {"minimum": 0.02, "unit": "mm"}},
+    "next_experiment": {"do": "record again", "separates": [], "nats_per_minute": None},
+    "data_quality": [{"recording": "", "stream": "force", "kind": "gap", "text": "1 gap", "recordings": 1}],
+    "parameters": {}, "simulation_error": [],
+}  # fmt: skip
+
+
+class Measured(Result):
+    value_N: Number
+
+
+@pytest.mark.parametrize("unknown", [math.nan, math.inf, None])
+def test_what_nobody_knows_is_null(unknown: float | None) -> None:
+    assert json.loads(Measured(value_N=unknown).model_dump_json()) == {"value_N": None}
+
+
+def test_a_fit_reads_back_with_its_laws_in_their_order(tmp_path: Path) -> None:
+    curves = [loading_curve(cycle) for cycle in Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0, 20.0))]
+    saved = fit_result(study_curves("made", curves), "model.json", "index", {"a_N_mm": 0.1}, {"trial_500": "ab"})
+    saved.write(tmp_path / "fit.json")
+    read = FitResult.read(tmp_path / "fit.json")
+    assert read == saved
+    assert list(read.laws) == ["constant", "index"]
+    assert read.laws["index"].rows[-1].force_N == pytest.approx(read.force_N[-1])
+
+
+def test_a_diagnosis_of_an_earlier_version_is_still_read(tmp_path: Path) -> None:
+    (tmp_path / "diagnosis.json").write_text(json.dumps(OLD_DIAGNOSIS))
+    read = DiagnosisResult.read(tmp_path / "diagnosis.json")
+    assert read.findings[0].parameters["friction_N"].high == 0.11
+    written = json.loads(read.model_dump_json())
+    assert {key: written[key] for key in OLD_DIAGNOSIS if key not in ("findings", "next_experiment")} == {
+        key: value for key, value in OLD_DIAGNOSIS.items() if key not in ("findings", "next_experiment")
+    }
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [("{", "the file: Invalid JSON"), ("[]", "the file: Input should be an object"), ('{"session": 1}', "session: ")],
+)
+def test_another_file_is_refused_with_the_place(tmp_path: Path, content: str, says: str) -> None:
+    (tmp_path / "fit.json").write_text(content)
+    with pytest.raises(UsageError, match=f"fit.json: holds no FitResult: {says}"):
+        FitResult.read(tmp_path / "fit.json")
+
+
+def run_with(model: str, rms_error_N: float) -> TrackResult:
+    followed = Followed(rms_error_N=rms_error_N, largest_error_N=1.0, amplitude_ratio=None, lag_s=None)
+    return TrackResult(
+        recording="track_001.mcap", model=model, max_error_percent=None, rms_error_N=None, levels=(),
+        followed=followed, samples=1, dropped=0, loop=LoopCount(ticks=1, missed=0),
+    )  # fmt: skip
+
+
+def test_a_tracked_comparison_keeps_both_runs_and_the_gain(tmp_path: Path) -> None:
+    compared(run_with("old.json", 0.4), run_with("new.json", 0.1)).write(tmp_path / "track.json")
+    read = TrackResult.read(tmp_path / "track.json")
+    assert read.against is not None and (read.model, read.against.model) == ("new.json", "old.json")
+    assert read.gain is not None and read.gain.reduction == pytest.approx(0.75)

@@ -1,0 +1,61 @@
+"""Writes the JSON Schema of every result: `python -m tools.schemas docs/reference/schemas`."""
+
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from rig.results.base import Result
+from rig.results.demo import DemoSummary
+from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
+from rig.results.fit import FitResult, LatticeResult
+from rig.results.recorded import (
+    CaptureResult,
+    DoctorResult,
+    ExportResult,
+    ImportResult,
+    RecordingResult,
+    VerifyResult,
+)
+from rig.results.tracking import CompareResult, SimulateResult, Threshold, TrackResult
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+WRITTEN: Mapping[str, type[Result]] = {
+    "capture": CaptureResult,
+    "compare": CompareResult,
+    "demo": DemoSummary,
+    "diagnosis": DiagnosisResult,
+    "doctor": DoctorResult,
+    "export": ExportResult,
+    "fit": FitResult,
+    "import": ImportResult,
+    "lattice": LatticeResult,
+    "protocol-check": ProtocolCheckResult,
+    "repair": RecordingResult,
+    "simulate": SimulateResult,
+    "threshold": Threshold,
+    "track": TrackResult,
+    "verify": VerifyResult,
+}
+
+
+def schemas() -> dict[str, str]:
+    """The text of each schema by file name."""
+    return {f"{name}.schema.json": _schema(kind) for name, kind in WRITTEN.items()}
+
+
+def _schema(kind: type[Result]) -> str:
+    return json.dumps({"$schema": DIALECT, **kind.model_json_schema(mode="serialization")}, indent=1) + "\n"
+
+
+def main(folder: Path) -> None:
+    """Replaces the schemas in ``folder``."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.schema.json"):
+        old.unlink()
+    for name, text in schemas().items():
+        (folder / name).write_text(text)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
