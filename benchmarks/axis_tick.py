@@ -9,7 +9,8 @@ import time
 
 from drivers.epos4.device import Epos4Axis
 from mock_devices.testing.epos4 import DriveBench, remote_drive
-from rig.config.wiring import Axis, Limits
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Limits
 
 TICKS = 5000
 PERIOD_S = 0.001
@@ -27,7 +28,7 @@ def driver_tick() -> None:
     polls: list[int] = []
     commands: list[int] = []
     with remote_drive() as mock:
-        axis = Epos4Axis(Axis(port=mock.address), Limits())
+        axis = Epos4Axis(Epos4Wiring(port=mock.address), Limits())
         axis.start()
         axis.home()
         axis.move_to(10, 30)
@@ -53,7 +54,7 @@ def driver_tick() -> None:
 def mock_tick() -> None:
     """RPDO and SYNC in, two TPDOs and two acknowledgements out, without the pseudo-terminal."""
     stage = DriveBench()
-    axis = Epos4Axis(Axis(port="memory"), Limits(), stage.now, open_link=stage.open)
+    axis = Epos4Axis(Epos4Wiring(port="memory"), Limits(), stage.now, open_link=stage.open)
     axis.start()
     axis.home()
     axis.enable()

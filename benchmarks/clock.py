@@ -30,12 +30,12 @@ from drivers.robotiq.codec import FRAME_NS, to_counts
 from drivers.roles import ForceSensor
 from mock_devices.control import BenchControl
 from rig.channels import ForceSample
-from rig.config.wiring import Force, Loop, Wiring
+from rig.config.products.registry import FORCE_SENSORS
+from rig.config.wiring import Loop, Wiring
 
 PERIOD_S = 0.001
 COLLECT_S = 0.5
 LIMIT_MS = 0.2
-ROLES = {"bota-sensone": "force", "robotiq-ft300": "force_modbus"}
 KNOWN_NS = {"bota-sensone": 0, "robotiq-ft300": FRAME_NS}
 
 
@@ -111,11 +111,13 @@ def percentiles(values: NDArray[np.float64], *shares: float) -> list[float]:
 
 def measured(product: str, load: str, seconds: float, priority: int) -> Row:
     """One run on a bench of its own; takes the process' priority, and what it starts would inherit that."""
-    role = ROLES[product]
+    kind = FORCE_SENSORS[product]
+    assert kind.mock
+    role = kind.mock.role
     with contextlib.ExitStack() as stack:
         _, endpoints = stack.enter_context(bench_process(Wiring(), both_sensors=True))
         control = stack.enter_context(BenchControl(endpoints["control"]))
-        config = Force.model_validate({"product": product, "port": endpoints[role]["serial"]})
+        config = kind(port=kind.mock.address(endpoints))
         sensor = stack.enter_context(contextlib.closing(open_force(config)))
         acquire(priority)
         sensor.start()
@@ -160,7 +162,7 @@ def main() -> int:
     names = ("samples", "unmatched", "not_increasing", "error_p50", "error_p99", "error_max", "arrival_p50",
              "arrival_p99", "plain_p99")  # fmt: skip
     sys.stdout.write(f"{'times in ms':22}" + "".join(f"{name:>15}" for name in names) + "\n")
-    for product in ROLES:
+    for product in KNOWN_NS:
         for load in ("idle", "loaded"):
             with busy(load), alone() as process:
                 rows.append(process.submit(measured, product, load, options.seconds, options.priority).result())

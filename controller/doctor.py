@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -9,6 +10,8 @@ import numpy as np
 from controller.devices.drivers import open_axis, open_force, open_tracker
 from drivers.roles import Device, ForceSensor, Identity, MarkerTracker, ServoAxis
 from rig.channels import AxisSample, ForceSample, MarkerSample
+from rig.config.force_map import CHANNELS
+from rig.config.products.roles import Product
 from rig.config.wiring import Wiring
 from rig.errors import RigError
 from rig.results.recorded import DeviceReport
@@ -20,32 +23,35 @@ RATE_TOLERANCE = 0.1
 AnySample = ForceSample | AxisSample | MarkerSample
 Samples = Sequence[AnySample]
 AnyDevice = TypeVar("AnyDevice", bound=Device)
-Listen = Callable[[AnyDevice, float], Samples]
+Listen = Callable[[AnyDevice], Samples]
 
 
 def examine(wiring: Wiring, seconds: float = LISTEN_S) -> tuple[DeviceReport, ...]:
     """One finding a configured device; a device that fails is a finding with a problem, not an error."""
+    force, axis, tracker = wiring.force, wiring.axis, wiring.tracker
+    channel = CHANNELS.index(force.axis)
     findings = [
-        _look("force", lambda: open_force(wiring.force), _poll_force, seconds),
-        _look("axis", lambda: open_axis(wiring.axis, wiring.limits, 1 / PERIOD_S), _poll_axis, seconds),
+        _look("force", force, lambda: open_force(force), partial(_poll_force, seconds), channel),
+        _look("axis", axis, lambda: open_axis(axis, wiring.limits, 1 / PERIOD_S), partial(_poll_axis, seconds)),
     ]
-    tracker = wiring.tracker
     if tracker:
-        findings.append(_look("tracker", lambda: open_tracker(tracker), _poll_tracker, seconds))
+        findings.append(_look("tracker", tracker, lambda: open_tracker(tracker), partial(_poll_tracker, seconds)))
     return tuple(findings)
 
 
-def _look(role: str, opener: Callable[[], AnyDevice], listen: Listen[AnyDevice], seconds: float) -> DeviceReport:
+def _look(
+    role: str, config: Product, opener: Callable[[], AnyDevice], listen: Listen[AnyDevice], channel: int = 0
+) -> DeviceReport:
     try:
         device = opener()
         try:
             device.start()
-            samples = listen(device, seconds)
+            samples = listen(device)
         finally:
             device.close()
     except RigError as error:
-        return DeviceReport(role=role, problem=str(error))
-    return _finding(role, device.identity, 1e9 / device.period_ns, samples)
+        return DeviceReport(role=role, problem=str(error), advice=config.advice)
+    return _finding(role, device.identity, 1e9 / device.period_ns, samples, channel)
 
 
 def _listen(poll: Callable[[int], Samples], seconds: float) -> Samples:
@@ -57,15 +63,15 @@ def _listen(poll: Callable[[int], Samples], seconds: float) -> Samples:
     return found
 
 
-def _poll_force(device: ForceSensor, seconds: float) -> Samples:
+def _poll_force(seconds: float, device: ForceSensor) -> Samples:
     return _listen(device.poll, seconds)
 
 
-def _poll_tracker(device: MarkerTracker, seconds: float) -> Samples:
+def _poll_tracker(seconds: float, device: MarkerTracker) -> Samples:
     return _listen(device.poll, seconds)
 
 
-def _poll_axis(device: ServoAxis, seconds: float) -> Samples:
+def _poll_axis(seconds: float, device: ServoAxis) -> Samples:
     def ask(now_ns: int) -> Samples:
         device.request(now_ns)
         return device.poll(now_ns)
@@ -73,7 +79,7 @@ def _poll_axis(device: ServoAxis, seconds: float) -> Samples:
     return _listen(ask, seconds)
 
 
-def _finding(role: str, identity: Identity, nominal_Hz: float, samples: Samples) -> DeviceReport:
+def _finding(role: str, identity: Identity, nominal_Hz: float, samples: Samples, channel: int) -> DeviceReport:
     about = DeviceReport(role=role, product=identity.product, serial=identity.serial, firmware=identity.firmware)
     valid = [sample for sample in samples if sample.valid]
     if len(valid) < 2:
@@ -81,18 +87,18 @@ def _finding(role: str, identity: Identity, nominal_Hz: float, samples: Samples)
     captures = np.unique([sample.capture_ns for sample in samples])
     rate_Hz = (len(captures) - 1) / ((captures[-1] - captures[0]) * 1e-9)
     latency_ms = float(np.median([sample.arrival_ns - sample.capture_ns for sample in samples])) * 1e-6
-    noise, extent = _spread(valid)
+    noise, extent = _spread(valid, channel)
     slow = role != "axis" and abs(rate_Hz - nominal_Hz) > RATE_TOLERANCE * nominal_Hz
     problem = f"rate {rate_Hz:.1f} Hz is not the {nominal_Hz:.1f} Hz asked for" if slow else ""
     seen = {"rate_Hz": float(rate_Hz), "latency_ms": latency_ms, "noise": noise, "range": extent, "problem": problem}
     return about.model_copy(update=seen)
 
 
-def _spread(samples: Samples) -> tuple[str, str]:
-    """Noise and range in words: force along z, position, or the first tool's depth axis."""
+def _spread(samples: Samples, channel: int) -> tuple[str, str]:
+    """Noise and range in words: force along the configured channel, position, or the first tool's depth axis."""
     first = samples[0]
     if isinstance(first, ForceSample):
-        values, unit = np.array([s.fz_N for s in samples if isinstance(s, ForceSample)]), "N"
+        values, unit = np.array([s[4:7][channel] for s in samples if isinstance(s, ForceSample)]), "N"
     elif isinstance(first, AxisSample):
         values, unit = np.array([s.position_mm for s in samples if isinstance(s, AxisSample)]), "mm"
     else:

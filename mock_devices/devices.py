@@ -1,10 +1,11 @@
 """All products of the bench on their wires: each mock with its plant, its wire and the faults either can have."""
 
 import random
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, TypeVar
+from pkgutil import resolve_name
+from typing import TypeVar
 from zlib import crc32
 
 from drivers.epos4.objects import SERIAL
@@ -19,17 +20,18 @@ from mock_devices.ndi.mock import NdiMock
 from mock_devices.parameters import Axis, Parameters, Sensor
 from mock_devices.robotiq.mock import RobotiqMock
 from mock_devices.wire import PtyWire, TcpWire, Wire
+from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS
+from rig.config.products.roles import Product
 
-ForceProduct = Literal["bota-sensone", "robotiq-ft300"]
 AnyMock = TypeVar("AnyMock", bound=Mock)
 TOOLS = ("tip", "arm")
 BOTA_NUMBER, ROBOTIQ_NUMBER, AXIS_NUMBER = 271, 1234, int(SERIAL.default)
 # Six digits are what the Bota sensor prints.
 OTHER_DEVICES = 900_000
-FORCE_CHOICES: dict[str, tuple[ForceProduct, ...]] = {
-    "both": ("bota-sensone", "robotiq-ft300"),
-    "bota-sensone": ("bota-sensone",),
-    "robotiq-ft300": ("robotiq-ft300",),
+# The force sensors that the bench can play, and all of them at once.
+FORCE_CHOICES: dict[str, tuple[type[Product], ...]] = {
+    "both": tuple(sensor for sensor in FORCE_SENSORS.values() if sensor.mock),
+    **{name: (sensor,) for name, sensor in FORCE_SENSORS.items() if sensor.mock},
 }
 
 
@@ -56,27 +58,31 @@ class Workshop:
         self._clock_ns = clock_ns
         self._rng = random.Random(seed)
 
-    def devices(self, products: tuple[ForceProduct, ...]) -> list[Device]:
-        """The force sensors in ``products``, the axis, and the camera on both of its wires."""
-        sensors = {"bota-sensone": self._bota, "robotiq-ft300": self._robotiq}
-        return [*(sensors[product]() for product in products), self._axis(), *self._camera()]
+    def devices(self, sensors: Iterable[type[Product]]) -> list[Device]:
+        """Those ``sensors``, and every axis and tracker there is."""
+        products = [*sensors, *AXES.values(), *TRACKERS.values()]
+        makers = [resolve_name(product.mock.maker) for product in products if product.mock]
+        return [device for maker in makers for device in maker(self)]
 
-    def _bota(self) -> Device:
+    def bota(self) -> list[Device]:
+        """The SensONE."""
         wire = self._faulty(self._line("force"))
         drift_ppm = self._bench.parameters.force.counter_drift_ppm
         number = number_of(self._bench.parameters.force, Parameters().force, BOTA_NUMBER)
         mock = BotaMock(wire, self._bench.force, self._start_ns, drift_ppm, f"{number:06d}")
-        return _device("force", mock, wire, BOTA_FAULTS, faults_of(self._bench.force, SENSOR_FAULTS))
+        return [_device("force", mock, wire, BOTA_FAULTS, faults_of(self._bench.force, SENSOR_FAULTS))]
 
-    def _robotiq(self) -> Device:
+    def robotiq(self) -> list[Device]:
+        """The FT 300."""
         wire = self._faulty(self._line("force_modbus"))
         drift_ppm = self._bench.parameters.force_modbus.counter_drift_ppm
         number = number_of(self._bench.parameters.force_modbus, Parameters().force_modbus, ROBOTIQ_NUMBER)
         mock = RobotiqMock(wire, self._bench.force_modbus, self._start_ns, drift_ppm, number)
         inside = faults_of(self._bench.force_modbus, SENSOR_FAULTS)
-        return _device("force_modbus", mock, wire, ROBOTIQ_FAULTS, inside)
+        return [_device("force_modbus", mock, wire, ROBOTIQ_FAULTS, inside)]
 
-    def _axis(self) -> Device:
+    def epos4(self) -> list[Device]:
+        """The drive."""
         wire = self._faulty(self._line("axis"))
         axis = self._bench.parameters.axis
         per_rev = abs(axis.increments_per_mm) * axis.lead_mm
@@ -84,9 +90,10 @@ class Workshop:
         mock = Epos4Mock(
             wire, self._bench.axis, self._start_ns, axis.node, axis.increments_per_mm, per_rev, self._clock_ns, number
         )
-        return _device("axis", mock, wire, EPOS4_FAULTS)
+        return [_device("axis", mock, wire, EPOS4_FAULTS)]
 
-    def _camera(self) -> list[Device]:
+    def ndi(self) -> list[Device]:
+        """The camera on both of its wires."""
         serial = self._faulty(self._line("tracker"))
         tcp = self._faulty(_listen(self._bench.parameters.tracker.tcp_port))
         tracker = self._bench.tracker

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from api.cli.app import COMMANDS, build
 from rig.config.maxima import MAXIMA
+from rig.config.products.registry import AXES
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring
 from tools.keys import tables
@@ -27,7 +28,8 @@ COMMANDS_OF = {
 
 def wiring() -> str:
     """Every key of `rig.toml`, with what none may exceed."""
-    return tables(Wiring, {key: f"never above {value:g} {unit}: {reason}" for key, value, unit, reason in MAXIMA})
+    largest = (*MAXIMA, *(maximum for axis in AXES.values() for maximum in axis().maxima))
+    return tables(Wiring, {key: f"never above {value:g} {unit}: {reason}" for key, value, unit, reason in largest})
 
 
 def protocol() -> str:

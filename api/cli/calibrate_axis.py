@@ -20,7 +20,8 @@ from api.operations.calibrate import (
 from controller.operation import Operation
 from mock_devices.control import BenchControl
 from rig.config.calibration import AxisCalibration
-from rig.config.wiring import MOCK_PORT, Wiring
+from rig.config.products.roles import MOCK_PORT
+from rig.config.wiring import Wiring
 from rig.errors import UsageError
 
 # Half a millimetre in front of what is touched.

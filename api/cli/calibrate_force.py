@@ -13,7 +13,8 @@ from controller.commissioning.weights import Weights, parse_weights
 from mock_devices.control import BenchControl
 from rig.config.calibration import ForceCalibration
 from rig.config.force_map import CHANNELS
-from rig.config.wiring import MOCK_PORT, Wiring
+from rig.config.products.roles import MOCK_PORT
+from rig.config.wiring import Wiring
 from rig.errors import UsageError
 
 Load = Literal["pressed", "hung"]

@@ -14,6 +14,7 @@ from api.cli.stage import bench_for, bench_process
 from controller import doctor as examination
 from controller.claims import Holder, holder
 from controller.devices.takeover import STREAMS
+from rig.config.products.registry import ROLES
 from rig.errors import CheckFailed, DeviceError
 from rig.results.recorded import DeviceReport, DoctorResult
 
@@ -43,25 +44,20 @@ def mock(
 
 def _lines(endpoints: dict[str, Any]) -> str:
     """Endpoints for a person, as the lines of a wiring file."""
-    late = endpoints["latency_ms"]
-    return "\n".join(
-        [
-            "# the mock bench is ready; Ctrl-C ends it",
-            f'force.port = "{endpoints["force"]["serial"]}"            # bota-sensone',
-            f'force.port = "{endpoints["force_modbus"]["serial"]}"            # robotiq-ft300',
-            f'axis.port = "{endpoints["axis"]["slcan"]}"',
-            f'tracker.port = "tcp://{endpoints["tracker"]["tcp"]}"',
-            f"force.latency_ms = {late['force']:g}            # {late['force_modbus']:g} with robotiq-ft300",
-            f"tracker.latency_ms = {late['tracker']:g}",
-            f"# control channel: {endpoints['control']}",
-            "",
-        ]
-    )
+    lines = ["# the mock bench is ready; Ctrl-C ends it"]
+    for role, products in ROLES.items():
+        for name, product in products.items():
+            if product.mock is None:
+                continue
+            lines.append(f'{role}.port = "{product.mock.address(endpoints)}"            # {name}')
+            if product.mock.role in endpoints["latency_ms"]:
+                lines.append(f"{role}.latency_ms = {endpoints['latency_ms'][product.mock.role]:g}            # {name}")
+    return "\n".join([*lines, f"# control channel: {endpoints['control']}", ""])
 
 
 def _row(finding: DeviceReport) -> tuple[str, ...]:
     if not finding.product:
-        return finding.role, "not heard"
+        return finding.role, f"not heard; look at {finding.advice}" if finding.advice else "not heard"
     device = f"{finding.product}, serial {finding.serial}, firmware {finding.firmware}"
     latency = f"{finding.latency_ms:.2f}" if finding.latency_ms else ""
     return finding.role, device, f"{finding.rate_Hz:.1f}", finding.noise, latency, finding.range

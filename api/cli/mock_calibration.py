@@ -22,6 +22,7 @@ from controller.devices.drivers import start_devices
 from mock_devices.control import BenchControl
 from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
 from rig.config.calibration_files import read_axis, read_force, text_of
+from rig.config.products.roles import Product
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, RigError, UsageError
 from rig.recording.files import make_folder, write_text
@@ -35,20 +36,15 @@ PACE = Pace(speed_mm_s=20.0, settle_s=0.15, read_s=0.3)
 AXIS_STEPS_MM = (2.0, 14.0, 2.0)
 
 
-def role_of(product: str) -> str:
-    """The force sensor's role among the endpoints of the mock bench."""
-    return "force_modbus" if product == "robotiq-ft300" else "force"
-
-
 def force_file(wiring: Wiring, endpoints: dict[str, Any]) -> Path:
-    """Where the calibration of this mock sensor is kept: another serial number, another file."""
-    product = wiring.force.product
-    return state_folder() / f"{product}-{endpoints['serials'][role_of(product)]}.json"
+    """Where the calibration of this mock sensor is kept."""
+    return _file(wiring.force, endpoints)
 
 
-def axis_file(wiring: Wiring, endpoints: dict[str, Any]) -> Path:
-    """Where the calibration of this mock axis is kept."""
-    return state_folder() / f"{wiring.axis.product}-{endpoints['serials']['axis']}.json"
+def _file(device: Product, endpoints: dict[str, Any]) -> Path:
+    """Another serial number, another file."""
+    assert device.mock, "only what the mock bench serves is calibrated by itself"
+    return state_folder() / f"{device.product}-{endpoints['serials'][device.mock.role]}.json"
 
 
 def mock_force_calibration(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibration:
@@ -69,7 +65,7 @@ def mock_axis_calibration(wiring: Wiring, endpoints: dict[str, Any]) -> AxisCali
     None where a marker is out of view or the limb's does not tell the sense, where the workspace is too short, and
     where the computer was too busy for it: the approach does not need it.
     """
-    file = axis_file(wiring, endpoints)
+    file = _file(wiring.axis, endpoints)
     with contextlib.suppress(UsageError):
         known = read_axis(file)
         if _fit(Calibration(of_axis=known), wiring):

@@ -8,24 +8,15 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from typing import Any
 
-from api.cli.mock_calibration import mock_axis_calibration, mock_force_calibration, role_of
+from api.cli.mock_calibration import mock_axis_calibration, mock_force_calibration
 from api.cli.options import calibrated
 from controller.commissioning.refusals import refuse_uncalibrated
-from rig.config.wiring import MOCK_PORT, Wiring
+from rig.config.products.roles import MOCK_PORT, Force, Product, Tracker
+from rig.config.wiring import Wiring
 from rig.errors import UsageError
 
 # Below the loop: a simulated device must not wait for the desktop either, but never keeps the loop waiting.
 BENCH_PRIORITY = 10
-# A simulated device is one more process of a busy computer: without real-time priority it may come a few tenths of a
-# second late where a real one does not. An axis that stands still for 400 ms falls behind by 12 mm at 30 mm/s.
-PATIENCE: dict[str, dict[str, dict[str, float]]] = {
-    "force": {"loop": {"missed_periods": 0, "stale_force_ms": 400.0, "overrun_ms": 400.0}},
-    "axis": {
-        "loop": {"stale_axis_ms": 400.0, "overrun_ms": 400.0},
-        "axis": {"heartbeat_ms": 200, "following_error_mm": 12.0},
-    },
-    "tracker": {"loop": {"stale_marker_ms": 500.0}},
-}
 
 
 def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, both_sensors: bool) -> list[str]:
@@ -108,28 +99,36 @@ def at_endpoints(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
 
     Where the wiring states no latency for a mock device, it takes what the device's data sheet would say.
     """
-    wiring = patient(wiring)
-    force, axis, tracker, stated = wiring.force, wiring.axis, wiring.tracker, endpoints["latency_ms"]
-    if force.port == MOCK_PORT:
-        role = role_of(force.product)
-        known = {"port": endpoints[role]["serial"], "latency_ms": force.latency_ms or stated[role]}
-        force = force.model_copy(update=known)
-    if axis.port == MOCK_PORT:
-        axis = axis.model_copy(update={"port": endpoints["axis"]["slcan"]})
-    if tracker and tracker.port == MOCK_PORT:
-        known = {"port": "tcp://" + endpoints["tracker"]["tcp"], "latency_ms": tracker.latency_ms or stated["tracker"]}
-        tracker = tracker.model_copy(update=known)
-    return wiring.model_copy(update={"force": force, "axis": axis, "tracker": tracker})
+    live = patient(wiring)
+    devices = {role: _served(device, endpoints) for role, device in mocks(live).items()}
+    return live.model_copy(update=devices)
+
+
+def mocks(wiring: Wiring) -> dict[str, Product]:
+    """The devices that the mock bench is to serve, by role; raises UsageError where it cannot serve one."""
+    found: dict[str, Product] = {}
+    for role, device in (("force", wiring.force), ("axis", wiring.axis), ("tracker", wiring.tracker)):
+        if device is None or device.port != MOCK_PORT:
+            continue
+        if device.mock is None:
+            raise UsageError(f"{role}.port mock: the mock bench has no {device.product}; give the port of a real one")
+        found[role] = device
+    return found
+
+
+def _served(device: Product, endpoints: dict[str, Any]) -> Product:
+    assert device.mock
+    known: dict[str, object] = {"port": device.mock.address(endpoints)}
+    stated_ms = endpoints["latency_ms"].get(device.mock.role)
+    if isinstance(device, Force | Tracker):
+        known["latency_ms"] = device.latency_ms or stated_ms
+    return device.model_copy(update=known)
 
 
 def patient(wiring: Wiring) -> Wiring:
     """``wiring`` with limits of time that mock devices can keep; what the wiring itself states is kept."""
-    tables = {"force": wiring.force, "axis": wiring.axis, "tracker": wiring.tracker}
-    for role, sections in PATIENCE.items():
-        device = tables[role]
-        if device is None or device.port != MOCK_PORT:
-            continue
-        for section, values in sections.items():
+    for device in mocks(wiring).values():
+        for section, values in device.patience.items():
             table = getattr(wiring, section)
             unsaid = {key: value for key, value in values.items() if key not in table.model_fields_set}
             wiring = wiring.model_copy(update={section: table.model_copy(update=unsaid)})

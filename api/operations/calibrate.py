@@ -17,7 +17,8 @@ from controller.devices.drivers import open_force, start_devices
 from controller.operation import Operation
 from drivers.roles import Identity
 from rig.config.calibration import AxisCalibration, ForceCalibration
-from rig.config.wiring import Force, Wiring
+from rig.config.products.roles import Force
+from rig.config.wiring import Wiring
 from rig.errors import CheckFailed, UsageError
 
 # A camera of 0.1 mm then knows the slope to a fifth of the 1 % that is allowed.

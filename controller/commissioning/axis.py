@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from drivers.roles import Identity
 from rig.config.calibration import LARGEST_SCALE_ERROR, AxisCalibration, AxisStep
-from rig.config.wiring import Axis
+from rig.config.products.roles import Axis
 from rig.errors import CheckFailed
 from rig.recording.slope import COVERAGE, slope_of
 

@@ -18,7 +18,7 @@ from controller.commissioning.weights import Weights
 from drivers.roles import Identity
 from rig.config.calibration import ForceCalibration, Load, Uncertainty
 from rig.config.force_map import CHANNELS, ForceMap, Matrix, Vector
-from rig.config.wiring import Force
+from rig.config.products.roles import Force
 from rig.errors import CheckFailed
 
 FloatArray = NDArray[np.float64]

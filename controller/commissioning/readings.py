@@ -8,7 +8,7 @@ import numpy as np
 
 from drivers.roles import ForceSensor
 from rig.channels import ForceSample
-from rig.config.maxima import RANGES
+from rig.config.products.registry import FORCE_SENSORS
 from rig.errors import CheckFailed, DeviceError
 
 # Fewer would not tell noise from a swinging weight.
@@ -46,7 +46,7 @@ def reading_of(samples: Sequence[ForceSample], product: str) -> Reading:
     if len(samples) < FEWEST_SAMPLES:
         raise DeviceError(f"{product} gave {len(samples)} samples, {FEWEST_SAMPLES} are needed; run `rig doctor`")
     values = np.array([sample[4:10] for sample in samples])
-    at_end = np.abs(values[:, :3]).max(axis=1) >= RANGES[product].force_N
+    at_end = np.abs(values[:, :3]).max(axis=1) >= FORCE_SENSORS[product].range_N
     spoilt = int(np.count_nonzero(at_end | ~np.array([bool(sample.valid) for sample in samples])))
     if spoilt:
         raise CheckFailed(

@@ -8,7 +8,8 @@ from datetime import datetime
 from controller.loop.steps import Approach, Program
 from drivers.roles import Identity
 from rig.config.calibration import AxisCalibration, ForceCalibration
-from rig.config.wiring import MOCK_PORT, Wiring
+from rig.config.products.roles import MOCK_PORT
+from rig.config.wiring import Wiring
 from rig.errors import UsageError
 
 # Counts of the encoder to the millimetre are a whole number or a short decimal; this allows for its last digit.

@@ -2,17 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from pkgutil import resolve_name
 
 from controller.devices.reopening import Open, Openers
-from drivers.bota.device import BotaSensOne
-from drivers.epos4.device import Epos4Axis
 from drivers.epos4.walker import never
-from drivers.ndi.device import NdiTracker
-from drivers.ports import open_port
-from drivers.robotiq.device import RobotiqFt300
 from drivers.roles import Device, ForceSensor, MarkerTracker, ServoAxis
-from rig.config.wiring import Axis, Force, Limits, Tracker, Wiring
+from rig.config.products.roles import Axis, Force, Tracker
+from rig.config.wiring import Limits, Wiring
 
 Interrupted = Callable[[], bool]
 
@@ -40,9 +36,8 @@ class Devices:
 
 def open_force(config: Force) -> ForceSensor:
     """The force sensor, not yet started; raises DeviceError where its port cannot be opened."""
-    if config.product == "robotiq-ft300":
-        return RobotiqFt300(partial(open_port, config.port), config)
-    return BotaSensOne(open_port(config.port, config.baud or BotaSensOne.DEFAULT_BAUD), config)
+    sensor: ForceSensor = resolve_name(config.driver)(config)
+    return sensor
 
 
 def open_axis(config: Axis, limits: Limits, rate_Hz: float, interrupted: Interrupted = never) -> ServoAxis:
@@ -50,12 +45,14 @@ def open_axis(config: Axis, limits: Limits, rate_Hz: float, interrupted: Interru
 
     ``interrupted`` is asked while it moves by itself; a yes brakes it.
     """
-    return Epos4Axis(config, limits, rate_Hz=rate_Hz, interrupted=interrupted)
+    axis: ServoAxis = resolve_name(config.driver)(config, limits, rate_Hz=rate_Hz, interrupted=interrupted)
+    return axis
 
 
 def open_tracker(config: Tracker) -> MarkerTracker:
     """The tracker, not yet started."""
-    return NdiTracker(partial(open_port, config.port), config)
+    tracker: MarkerTracker = resolve_name(config.driver)(config)
+    return tracker
 
 
 class Interruption:

@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING
 
-from controller.recovery.situation import Act, Situation, homes_outward, is_retracted
+from controller.recovery.situation import Act, Situation, is_retracted
 from controller.safety.table import Action
 from rig.errors import UsageError
 
@@ -24,7 +24,7 @@ def survey(loop: "BenchLoop") -> Situation:
         history=() if lost else axis.history(),
         referenced=referenced,
         retracted=referenced and is_retracted(state.position_mm, loop.wiring.limits),
-        outward=homes_outward(loop.wiring.axis),
+        outward=loop.wiring.axis.homes_outward,
         position_mm=state.position_mm if referenced else None,
         force_N=None if loop.inputs.force_lost or not math.isfinite(force_N) else force_N,
     )

@@ -8,14 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from rig.config.wiring import Axis, Limits
+from rig.config.wiring import Limits
 
 # A hold ripples by hundredths of a millimetre; no tissue is that near to home.
 RETRACTED_MM = 1.0
-# Methods of CiA 402-2 (6098) that search for a switch or stop, by the direction in which they begin. Those that take
-# the next index or the present position (33, 34, 37) would make any place the home, also one in the tissue.
-NEGATIVE_METHODS = (-4, -2, 1, 11, 17, 27)
-POSITIVE_METHODS = (-3, -1, 2, 7, 18, 23)
 
 Act = Literal["clear", "retract", "home"]
 ACTS: tuple[Act, ...] = ("clear", "retract", "home")
@@ -115,11 +111,6 @@ def questions(now: Situation, consent: Consent) -> tuple[tuple[Act, str], ...]:
 def is_retracted(position_mm: float, limits: Limits) -> bool:
     """Whether the tip stands at the outer end of its way."""
     return position_mm <= limits.position_min_mm + RETRACTED_MM
-
-
-def homes_outward(axis: Axis) -> bool:
-    """Whether the search for the reference leads out of the tissue."""
-    return axis.homing_method in (NEGATIVE_METHODS if axis.direction == 1 else POSITIVE_METHODS)
 
 
 def options(acts: Sequence[Act]) -> str:

@@ -32,10 +32,10 @@ from drivers.bota.codec import (
     rate_Hz,
     sinc_for,
 )
-from drivers.ports import Port, read_until
+from drivers.ports import Port, open_port, read_until
 from drivers.roles import Identity, LinkCounters
 from rig.channels import ForceSample
-from rig.config.wiring import Force
+from rig.config.products.bota_sensone import BotaWiring
 from rig.errors import DeviceError, UsageError
 from rig.timing import ClockMap, Unwrapper
 
@@ -68,7 +68,7 @@ class BotaSensOne:
 
     DEFAULT_BAUD: ClassVar = DEFAULT_BAUD
 
-    def __init__(self, port: Port, config: Force, now: Callable[[], int] = time.monotonic_ns) -> None:
+    def __init__(self, port: Port, config: BotaWiring, now: Callable[[], int] = time.monotonic_ns) -> None:
         self.counters = LinkCounters()
         self._port = port
         self._now = now
@@ -232,6 +232,11 @@ class BotaSensOne:
         return f"{PRODUCT} at {self._port.address}: {what}"
 
 
+def open_sensor(config: BotaWiring) -> BotaSensOne:
+    """The sensor at the configured port, not yet started; raises DeviceError where that cannot be opened."""
+    return BotaSensOne(open_port(config.port, config.baud or DEFAULT_BAUD), config)
+
+
 class _Misheard(DeviceError):
     """What came back is not what should; no checksum tells whether either way was damaged."""
 
@@ -244,7 +249,7 @@ def _repeated(say: Callable[[], Said]) -> Said:
     return say()
 
 
-def _line_settings(config: Force) -> tuple[int, int]:
+def _line_settings(config: BotaWiring) -> tuple[int, int]:
     """Baud and filter length; raises UsageError where one is unknown or the line too slow for the other."""
     baud = config.baud or DEFAULT_BAUD
     if baud not in BAUD_CODES:

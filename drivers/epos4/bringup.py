@@ -7,7 +7,8 @@ from drivers.canopen.nmt import NmtCommand, NmtState
 from drivers.epos4 import objects, setup
 from drivers.epos4.node import TRIES, Node
 from drivers.roles import Identity
-from rig.config.wiring import Axis, Limits
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Limits
 from rig.errors import DeviceError
 
 VENDOR, PRODUCT_FAMILY = 0xFB, 0x6150
@@ -36,7 +37,7 @@ def identify(node: Node) -> Identity:
     )
 
 
-def configure(node: Node, config: Axis, limits: Limits) -> None:
+def configure(node: Node, config: Epos4Wiring, limits: Limits) -> None:
     """Writes limits, stops, heartbeats and PDOs, then reads all of it back; raises DeviceError where one differs."""
     writes = setup.parameters(config, limits) + setup.process_data(config)
     for entry, value in writes:
@@ -47,7 +48,7 @@ def configure(node: Node, config: Axis, limits: Limits) -> None:
             raise DeviceError(f"{node.name}: {entry} was set to {value} and reads back as {got}; restart the drive")
 
 
-def go_operational(node: Node, config: Axis, now: Callable[[], int]) -> None:
+def go_operational(node: Node, config: Epos4Wiring, now: Callable[[], int]) -> None:
     """Starts the node and waits until its heartbeat says so; raises DeviceError where it does not."""
     node.state = None
     node.order(NmtCommand.START)

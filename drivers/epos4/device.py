@@ -23,7 +23,8 @@ from drivers.epos4.samples import SampleBuilder
 from drivers.epos4.walker import REACTION_S, Walker, never
 from drivers.roles import Identity, LinkCounters
 from rig.channels import AxisSample
-from rig.config.wiring import Axis, Limits
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Limits
 from rig.errors import DeviceError, RigError, SafetyStop
 
 HOMING_START_S = 0.05
@@ -43,7 +44,7 @@ class Epos4Axis:
 
     def __init__(
         self,
-        config: Axis,
+        config: Epos4Wiring,
         limits: Limits,
         now: Callable[[], int] = time.monotonic_ns,
         rate_Hz: float = 1000.0,

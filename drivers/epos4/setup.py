@@ -3,7 +3,8 @@
 from drivers.epos4 import objects
 from drivers.epos4.codec import Units, pdo_maps
 from drivers.epos4.objects import DISABLED, Entry
-from rig.config.wiring import Axis, Limits
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Limits
 
 HOST_NODES = (127, 126)
 LIMIT_MARGIN_MM = 0.5
@@ -15,23 +16,23 @@ HOST_MISSES = 2
 DRIVE_MISSES = 3
 
 
-def host_node(config: Axis) -> int:
+def host_node(config: Epos4Wiring) -> int:
     """The number under which the host sends its heartbeat: 127, or 126 where the drive is 127."""
     return HOST_NODES[config.node == HOST_NODES[0]]
 
 
-def host_heartbeat_limit_ms(config: Axis) -> int:
+def host_heartbeat_limit_ms(config: Epos4Wiring) -> int:
     """Silence of the host after which the drive stops: two periods, but 20 ms more than one, as the maker advises."""
     return max(HOST_MISSES * config.heartbeat_ms, config.heartbeat_ms + LEAST_CONSUMER_MARGIN_MS)
 
 
-def drive_heartbeat_limit_ns(config: Axis) -> int:
+def drive_heartbeat_limit_ns(config: Epos4Wiring) -> int:
     """Silence of the drive after which it counts as lost: three periods, but 20 ms more than one."""
     limit_ms = max(DRIVE_MISSES * config.heartbeat_ms, config.heartbeat_ms + LEAST_CONSUMER_MARGIN_MS)
     return limit_ms * 1_000_000
 
 
-def units(config: Axis) -> Units:
+def units(config: Epos4Wiring) -> Units:
     """Scale of the configured axis."""
     return Units(config.increments_per_mm, config.increments_per_rev, config.direction)
 
@@ -43,7 +44,7 @@ def drive_limits(limits: Limits, scale: Units) -> tuple[int, int]:
     return low, high
 
 
-def parameters(config: Axis, limits: Limits) -> list[tuple[Entry, int]]:
+def parameters(config: Epos4Wiring, limits: Limits) -> list[tuple[Entry, int]]:
     """Limits, stops, speeds and heartbeats; all of it is read back after it was written.
 
     The interpolation time stays 0: otherwise a single late set-point is a fault (8250), and the host is no real-time
@@ -77,7 +78,7 @@ def parameters(config: Axis, limits: Limits) -> list[tuple[Entry, int]]:
     ]
 
 
-def process_data(config: Axis) -> list[tuple[Entry, int]]:
+def process_data(config: Epos4Wiring) -> list[tuple[Entry, int]]:
     """Writes that configure the PDOs, in their order."""
     return [write for pdo in pdo_maps(config.node) for write in pdo.writes()]
 

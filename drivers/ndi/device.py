@@ -8,13 +8,14 @@ import contextlib
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from drivers.ndi import codec, replies, startup
 from drivers.ndi.frames import FrameReader
-from drivers.ports import Port
+from drivers.ports import Port, open_port
 from drivers.roles import Identity, LinkCounters
 from rig.channels import MarkerSample
-from rig.config.wiring import Tracker
+from rig.config.products.ndi_polaris import PolarisWiring
 from rig.errors import DeviceError
 
 REPLY_TIMEOUT_NS = 200_000_000
@@ -31,7 +32,7 @@ class NdiTracker:
     """
 
     def __init__(
-        self, open_port: Callable[[int], Port], config: Tracker, now: Callable[[], int] = time.monotonic_ns
+        self, open_port: Callable[[int], Port], config: PolarisWiring, now: Callable[[], int] = time.monotonic_ns
     ) -> None:
         self.counters = LinkCounters()
         self._open_port = open_port
@@ -178,3 +179,8 @@ class NdiTracker:
         if reply.text == "RESET":
             raise DeviceError(f"{self._port.address}: the tracker has restarted by itself; check its power")
         return replies.parse_tx(reply.text)
+
+
+def open_tracker(config: PolarisWiring) -> NdiTracker:
+    """The tracker at the configured port, which ``start`` opens."""
+    return NdiTracker(partial(open_port, config.port), config)

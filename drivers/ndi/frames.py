@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from drivers.ndi.replies import Pose, ToolReading, TrackingReply
 from drivers.roles import LinkCounters
 from rig.channels import MarkerSample
-from rig.config.wiring import Tracker
+from rig.config.products.ndi_polaris import PolarisWiring
 from rig.timing import ClockMap, Unwrapper
 
 COUNTER_HZ = 60
@@ -23,7 +23,9 @@ class FrameReader:
     number jumped over it.
     """
 
-    def __init__(self, handles: Sequence[int], config: Tracker, counters: LinkCounters, next_seq: int = 0) -> None:
+    def __init__(
+        self, handles: Sequence[int], config: PolarisWiring, counters: LinkCounters, next_seq: int = 0
+    ) -> None:
         self.next_seq = next_seq
         self._handles = tuple(handles)
         self._step = max(1, round(COUNTER_HZ / config.rate_Hz))

@@ -10,12 +10,13 @@ import select
 import time
 from collections.abc import Callable, Sequence
 from contextlib import closing, suppress
+from functools import partial
 from typing import ClassVar
 
 from pymodbus.client import ModbusSerialClient
 from pymodbus.exceptions import ModbusException
 
-from drivers.ports import Port, read_until
+from drivers.ports import Port, open_port, read_until
 from drivers.robotiq.codec import (
     DEFAULT_BAUD,
     FIRMWARE,
@@ -37,8 +38,8 @@ from drivers.robotiq.codec import (
 from drivers.robotiq.frame_clock import LISTEN_NS, PERIOD_NS, FrameClock
 from drivers.roles import Identity, LinkCounters
 from rig.channels import ForceSample
-from rig.config.wiring import Force
-from rig.errors import DeviceError, UsageError
+from rig.config.products.robotiq_ft300 import Ft300Wiring
+from rig.errors import DeviceError
 
 PRODUCT = "robotiq-ft300"
 FIRMWARE_LETTER = "F"
@@ -66,16 +67,15 @@ Timed = tuple[int, Wrench]
 class RobotiqFt300:
     """Owns the line from construction to ``close``; ``open_port`` opens it at a given baud.
 
-    The rate is fixed: ``config.rate_Hz`` is taken as the most that is wanted, and ``period_ns`` tells what there is.
-    Raises UsageError where less than 100 Hz or another baud is asked for, DeviceError where the port cannot be opened.
+    The rate is fixed: ``config.rate_Hz`` is the most that is wanted, and ``period_ns`` tells what there is. Raises
+    DeviceError where the port cannot be opened.
     """
 
     DEFAULT_BAUD: ClassVar = DEFAULT_BAUD
 
     def __init__(
-        self, open_port: Callable[[int], Port], config: Force, now: Callable[[], int] = time.monotonic_ns
+        self, open_port: Callable[[int], Port], config: Ft300Wiring, now: Callable[[], int] = time.monotonic_ns
     ) -> None:
-        _check(config)
         self.counters = LinkCounters()
         self._open_port = open_port
         self._now = now
@@ -226,14 +226,9 @@ class RobotiqFt300:
         return DeviceError(f"{PRODUCT} at {self._port.address}: {what}")
 
 
-def _check(config: Force) -> None:
-    if config.baud not in (0, DEFAULT_BAUD):
-        raise UsageError(f"force.baud {config.baud}: a {PRODUCT} talks at {DEFAULT_BAUD} baud only; write 0")
-    if config.rate_Hz < 0.99 * STREAM_HZ:
-        raise UsageError(
-            f"force.rate_Hz {config.rate_Hz:g}: a {PRODUCT} streams at {STREAM_HZ} Hz and no slower; "
-            f"write {STREAM_HZ} or more"
-        )
+def open_sensor(config: Ft300Wiring) -> RobotiqFt300:
+    """The sensor at the configured port, not yet started; raises DeviceError where that cannot be opened."""
+    return RobotiqFt300(partial(open_port, config.port), config)
 
 
 def _started_or_refused(text: bytes) -> bool:

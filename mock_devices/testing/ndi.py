@@ -23,7 +23,7 @@ from mock_devices.testing.remote import RemoteMock, say
 from mock_devices.testing.wire import MemoryWire
 from mock_devices.wire import PtyWire, TcpWire
 from rig.channels import MarkerSample
-from rig.config.wiring import Tracker
+from rig.config.products.ndi_polaris import PolarisWiring
 
 MS = 1_000_000
 
@@ -127,7 +127,7 @@ def flipped(message: bytes) -> bytes:
 
 def started(bench: TrackerBench, **settings: Any) -> NdiTracker:
     """The driver on that bench, after its start."""
-    device = NdiTracker(bench.open, Tracker(**settings), long_ago)
+    device = NdiTracker(bench.open, PolarisWiring(**settings), long_ago)
     device.start()
     return device
 

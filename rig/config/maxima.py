@@ -1,6 +1,6 @@
 """What no configuration may exceed: each maximum with its source. A bench that needs more is another bench."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 
@@ -12,16 +12,6 @@ class Maximum(NamedTuple):
     unit: str
     reason: str
 
-
-class SensorRange(NamedTuple):
-    """What a force sensor can measure: force [N] and moment [N m] of each channel."""
-
-    force_N: float
-    torque_N_m: float
-
-
-# Robotiq's manual of the FT 300. The SensONE's variants differ: what the simulated one has; yours has a data sheet.
-RANGES = {"bota-sensone": SensorRange(100.0, 5.0), "robotiq-ft300": SensorRange(300.0, 30.0)}
 
 # 180 N/cm2 on 0.28 cm2 are 51 N.
 _PRESSURE = "ISO/TS 15066:2016, Table A.2, allows the forearm 180 N/cm2 at rest, which a tip of 6 mm reaches at 51 N"
@@ -39,10 +29,8 @@ MAXIMA: tuple[Maximum, ...] = (
     Maximum("limits.position_max_mm", 500.0, "mm", "no axis of a bench for one limb is longer"),
     Maximum("axis.following_error_mm", 30.0, "mm", _WAY),
     Maximum("axis.standstill_mm", 3.0, "mm", "ten reports of an axis asked 100 times a second, at 30 mm/s"),
-    Maximum("axis.current_limit_A", 15.0, "A", "EPOS4 50/5: 5 A continuous, 15 A for seconds"),
     Maximum("axis.acceleration_mm_s2", 10_000.0, "mm/s2", "a third of what 5 A give a carriage of 8 kg, 26 m/s2"),
     Maximum("axis.homing_speed_mm_s", 50.0, "mm/s", "the drive homes by itself, without a look at the force"),
-    Maximum("axis.heartbeat_ms", 500.0, "ms", "alone, the drive stands within two of them: a second"),
     Maximum("loop.stale_force_ms", 1000.0, "ms", _WAY),
     Maximum("loop.stale_axis_ms", 1000.0, "ms", _WAY),
     Maximum("loop.stale_marker_ms", 2000.0, "ms", "half a breath: a limb unseen for longer may lie elsewhere"),
@@ -52,10 +40,10 @@ MAXIMA: tuple[Maximum, ...] = (
 )
 
 
-def beyond(product: str, tables: Mapping[str, object]) -> list[str]:
-    """What of ``tables`` (section to table) is above its maximum with that force sensor, one sentence each."""
+def beyond(tables: Mapping[str, object], of_products: Iterable[Maximum]) -> list[str]:
+    """What of ``tables`` (section to table) is above its maximum, the products' own included, one sentence each."""
     found = []
-    least = {maximum.key: maximum for maximum in sorted((*_measurable(product), *MAXIMA), key=_largest_first)}
+    least = {maximum.key: maximum for maximum in sorted((*of_products, *MAXIMA), key=_largest_first)}
     for key, value, unit, reason in least.values():
         section, _, name = key.partition(".")
         given = getattr(tables[section], name)
@@ -66,10 +54,3 @@ def beyond(product: str, tables: Mapping[str, object]) -> list[str]:
 
 def _largest_first(maximum: Maximum) -> float:
     return -maximum.value
-
-
-def _measurable(product: str) -> tuple[Maximum, Maximum]:
-    """A limit beyond what the sensor can measure is none."""
-    force_N, torque_N_m = RANGES[product]
-    reason = f"a {product} measures no more"
-    return Maximum("limits.force_N", force_N, "N", reason), Maximum("limits.torque_N_m", torque_N_m, "N m", reason)

@@ -1,8 +1,8 @@
 """Strict TOML tables: an unknown key is an error that names the nearest valid one, a bad value says where and why."""
 
-import difflib
+import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails, to_json
 
 from rig.errors import UsageError
+from rig.registry import nearest
 
 
 class Table(BaseModel):
@@ -73,19 +74,36 @@ def _value(text: str) -> object:
 
 
 def _sentence(kind: type[BaseModel], detail: ErrorDetails) -> str:
-    location = [str(part) for part in detail["loc"]]
+    location, table = _located(kind, [str(part) for part in detail["loc"]])
     place = ".".join(location)
     if detail["type"] == "extra_forbidden":
-        keys = _keys(kind, location[:-1])
-        near = difflib.get_close_matches(location[-1], keys, n=1, cutoff=0.0)
-        return f"unknown key {place}; nearest valid key: {near[0] if near else ', '.join(keys)}"
+        return f"unknown key {place}; nearest valid key: {nearest(location[-1], sorted(table.model_fields))}"
+    if detail["type"] == "union_tag_invalid":
+        tag, known = str(detail["ctx"]["tag"]), re.findall("'(.*?)'", detail["ctx"]["expected_tags"])
+        return f"{place}.product: unknown product {tag!r}; nearest: {nearest(tag, known)}; all: {', '.join(known)}"
     got = "" if isinstance(detail["input"], dict | BaseModel) else f" (got {detail['input']!r})"
     return f"{place and f'{place}: '}{detail['msg'].removeprefix('Value error, ')}{got}"
 
 
-def _keys(kind: type[BaseModel], sections: list[str]) -> list[str]:
-    for section in sections:
-        annotation = kind.model_fields[section].annotation
-        choices = [annotation, *get_args(annotation)]
-        kind = next(choice for choice in choices if isinstance(choice, type) and issubclass(choice, BaseModel))
-    return sorted(kind.model_fields)
+def _located(kind: type[BaseModel], location: list[str]) -> tuple[list[str], type[BaseModel]]:
+    """The way to a key as it stands in the file, which says nothing of products, and the table that has the key."""
+    place, choices = list[str](), [kind]
+    for part in location:
+        chosen = [table for table in choices if part == _product(table)]
+        if not chosen:
+            place.append(part)
+            field = choices[0].model_fields.get(part)
+            chosen = list(_tables(field.annotation)) if field else []
+        choices = chosen or choices
+    return place, choices[0]
+
+
+def _product(table: type[BaseModel]) -> object:
+    return table.model_fields["product"].default if "product" in table.model_fields else None
+
+
+def _tables(annotation: object) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _tables(inner)

@@ -1,78 +1,28 @@
 """`rig.toml`: which products stand on the bench, where they are plugged in, and what must never be exceeded."""
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeAlias
 
 from pydantic import Field, model_validator
 
 from rig.config.calibration import Calibration
 from rig.config.force_map import UNIT, ForceMap
 from rig.config.maxima import beyond
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.products.ndi_polaris import PolarisWiring
+from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS, choice_of
+from rig.config.products.roles import MOCK_PORT, Axis, Force, Tracker
 from rig.config.stop import Stop
 from rig.config.table import Table
 
 Positive = Annotated[float, Field(gt=0)]
-MOCK_PORT = "mock"
-# Products whose rate is fixed, whatever rate is asked for.
-FIXED_HZ = {"robotiq-ft300": 100.0}
-
-
-class Force(Table):
-    """The force sensor. ``product`` is the one line that chooses it."""
-
-    product: Literal["bota-sensone", "robotiq-ft300"] = "bota-sensone"
-    port: str = MOCK_PORT
-    baud: int = Field(default=0, ge=0, description="0: the product's own default")
-    rate_Hz: float = Field(default=1000, ge=10, le=1010)
-    axis: Literal["fx", "fy", "fz"] = "fz"
-    compression: Literal["positive", "negative"] = Field(
-        default="negative", description="sign the sensor gives to compression"
-    )
-    latency_ms: float = Field(default=0.0, ge=0, le=100, description="known smallest delay from capture to arrival")
-
-    @property
-    def sampled_Hz(self) -> float:
-        """Samples a second that really come."""
-        return min(self.rate_Hz, FIXED_HZ.get(self.product, self.rate_Hz))
-
-
-class Axis(Table):
-    """The servo axis behind a CAN adapter."""
-
-    product: Literal["maxon-epos4"] = "maxon-epos4"
-    port: str = MOCK_PORT
-    interface: Literal["slcan"] = "slcan"
-    bitrate: int = 1_000_000
-    node: int = Field(default=1, ge=1, le=127)
-    increments_per_mm: Positive = 2000.0
-    increments_per_rev: Positive = Field(default=10_000.0, description="four times the encoder's lines; scales rpm")
-    direction: Literal[1, -1] = Field(default=1, description="1: increments grow into the tissue")
-    homing_method: Literal[-4, -3, -2, -1, 1, 2, 7, 11, 17, 18, 23, 27, 33, 34, 37] = 17
-    homing_speed_mm_s: Positive = 20.0
-    heartbeat_ms: int = Field(default=50, ge=5, description="period of the heartbeat each side sends")
-    following_error_mm: Positive = 2.0
-    standstill_mm: Positive = Field(
-        default=0.3, description="how far the set-point may go while ten reports of the axis name the same place"
-    )
-    current_limit_A: Positive = 5.0
-    acceleration_mm_s2: Positive = 2000.0
-    bandwidth_Hz: Positive = Field(default=34.0, description="-3 dB of the drive's position loop, for the gains")
-    holds_unpowered: bool = Field(
-        default=True, description="a brake or a self-locking screw: without power a limb cannot push it back"
-    )
-    delay_ms: float = Field(default=4.0, ge=0, description="from command to motion, sensor included")
-
-
-class Tracker(Table):
-    """The marker tracker; leave the table out where there is none."""
-
-    product: Literal["ndi-polaris"] = "ndi-polaris"
-    port: str = MOCK_PORT
-    reply: Literal["BX", "TX"] = "BX"
-    tools: tuple[str, ...] = Field(default=("tip", "arm"), min_length=1)
-    roms: tuple[Path, ...] = Field(default=(), description="one .rom file a tool; empty: tools already in ports")
-    rate_Hz: Positive = 60.0
-    latency_ms: float = Field(default=0.0, ge=0, le=200)
+if TYPE_CHECKING:
+    AnyForce: TypeAlias = Force
+    AnyAxis: TypeAlias = Axis
+    AnyTracker: TypeAlias = Tracker
+else:
+    AnyForce, AnyAxis, AnyTracker = choice_of(FORCE_SENSORS), choice_of(AXES), choice_of(TRACKERS)
 
 
 class Loop(Table):
@@ -155,9 +105,9 @@ class Mock(Table):
 class Wiring(Table):
     """The whole of `rig.toml`."""
 
-    force: Force = Force()
-    axis: Axis = Axis()
-    tracker: Tracker | None = Tracker()
+    force: AnyForce = BotaWiring()
+    axis: AnyAxis = Epos4Wiring()
+    tracker: AnyTracker | None = PolarisWiring()
     loop: Loop = Loop()
     limits: Limits = Limits()
     subject: Subject = Subject()
@@ -186,7 +136,7 @@ class Wiring(Table):
     @model_validator(mode="after")
     def _within_maxima(self) -> Self:
         tables = {"limits": self.limits, "subject": self.subject, "axis": self.axis, "loop": self.loop}
-        reasons = beyond(self.force.product, tables)
+        reasons = beyond(tables, (*self.force.maxima, *self.axis.maxima))
         if reasons:
             raise ValueError("; ".join(reasons))
         return self

@@ -99,7 +99,7 @@ class ExportResult(Result):
 
 
 class DeviceReport(Result):
-    """What was seen of one device; ``problem`` is empty if it is fit for use."""
+    """What was seen of one device; ``problem`` is empty if it is fit for use, ``advice`` is where to look if silent."""
 
     role: str
     product: str = ""
@@ -110,6 +110,7 @@ class DeviceReport(Result):
     latency_ms: float = 0.0
     range: str = ""
     problem: str = ""
+    advice: str = ""
 
 
 class DoctorResult(Result):

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from rig.config.wiring import Force, Loop, Tracker
+from rig.config.products.registry import FORCE_SENSORS, TRACKERS, read
+from rig.config.wiring import Loop
 from rig.errors import DataError
 from rig.recording.mcap_file import SUMMARY
 from rig.recording.reader import Recording
@@ -32,11 +33,11 @@ def nominal_Hz(recording: Recording) -> dict[str, float]:
     wiring = recording.metadata.get("wiring", {})
     try:
         rates = {
-            "force": Force.model_validate_json(wiring["force"]).sampled_Hz,
+            "force": read(FORCE_SENSORS, wiring["force"]).sampled_Hz,
             "axis": Loop.model_validate_json(wiring["loop"]).rate_Hz,
         }
         tracker = wiring.get("tracker", "null")
-        return rates | ({} if tracker == "null" else {"marker": Tracker.model_validate_json(tracker).rate_Hz})
+        return rates | ({} if tracker == "null" else {"marker": read(TRACKERS, tracker).rate_Hz})
     except (KeyError, ValidationError):
         return {}
 

@@ -10,7 +10,8 @@ from api.http.lease import Control
 from api.http.problems import Refused
 from api.http.service import Service
 from mock_devices.testing.clock import Clock
-from rig.config.wiring import Force, Wiring
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.wiring import Wiring
 
 HEADER = "X-Control-Lease"
 CAPTURE = {"kind": "capture", "protocol": "indentation", "session": "a"}
@@ -24,7 +25,7 @@ def clock() -> Clock:
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Service, TestClient]]:
     folder = tmp_path_factory.mktemp("service")
-    service = Service(Wiring(force=Force(port="/dev/no-such-sensor")), folder, folder)
+    service = Service(Wiring(force=BotaWiring(port="/dev/no-such-sensor")), folder, folder)
     with TestClient(build(service), base_url="http://127.0.0.1:8000") as client:
         yield service, client
 

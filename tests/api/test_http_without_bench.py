@@ -9,7 +9,9 @@ from fastapi.testclient import TestClient
 
 from api.http.app import build
 from api.http.service import Service
-from rig.config.wiring import Axis, Force, Wiring
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Wiring
 from rig.recording.sessions import open_session, write_session
 from tests.rig.tissue.synthetic import Bench, write_made_session
 
@@ -19,7 +21,9 @@ PROBLEM = "application/problem+json"
 
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
-    wiring = Wiring(force=Force(port="/dev/no-such-sensor"), axis=Axis(port="/dev/no-such-adapter"), tracker=None)
+    wiring = Wiring(
+        force=BotaWiring(port="/dev/no-such-sensor"), axis=Epos4Wiring(port="/dev/no-such-adapter"), tracker=None
+    )
     with TestClient(
         build(Service(wiring, tmp_path_factory.mktemp("sessions"), EXAMPLES)), base_url="http://127.0.0.1:8000"
     ) as client:
@@ -97,7 +101,7 @@ def test_protocols_beyond_the_limits_are_listed_with_the_refusal(tmp_path: Path)
     (protocols / "deep.toml").write_text('kind = "indentation"\ndepth_mm = 50\n')
     (protocols / "typo.toml").write_text('kind = "indentation"\ndepth_nm = 5\n')
     (protocols / "fine.toml").write_text('kind = "indentation"\ndepth_mm = 5\n')
-    wiring = Wiring(force=Force(port="/dev/no-such-sensor"))
+    wiring = Wiring(force=BotaWiring(port="/dev/no-such-sensor"))
     with TestClient(build(Service(wiring, tmp_path, protocols)), base_url="http://127.0.0.1:8000") as client:
         listed = {item["name"]: item["refusal"] for item in client.get("/api/v1/protocols").json()}
     assert listed["fine"] == ""
@@ -114,7 +118,7 @@ def test_one_bad_file_hides_no_other(tmp_path: Path) -> None:
     (sessions / "garbage" / "a.mcap").write_bytes(b"no recording at all")
     (sessions / "secret" / "b.mcap").symlink_to("/etc/hostname")
     with TestClient(
-        build(Service(Wiring(force=Force(port="/dev/no-such-sensor")), sessions, protocols)),
+        build(Service(Wiring(force=BotaWiring(port="/dev/no-such-sensor")), sessions, protocols)),
         base_url="http://127.0.0.1:8000",
     ) as client:
         listed = {item["name"]: item["refusal"] for item in client.get("/api/v1/protocols").json()}
@@ -133,7 +137,7 @@ def test_the_quality_of_a_recording_stands_in_the_list(tmp_path: Path) -> None:
     info = open_session(folder).info
     reason = "force: a gap of 58 ms (good up to 20 ms)"
     write_session(folder, replace(info, trials=(replace(info.trials[0], quality="usable", reasons=(reason,)),)))
-    app = build(Service(Wiring(force=Force(port="/dev/no-such-sensor")), tmp_path / "sessions", EXAMPLES))
+    app = build(Service(Wiring(force=BotaWiring(port="/dev/no-such-sensor")), tmp_path / "sessions", EXAMPLES))
     with TestClient(app, base_url="http://127.0.0.1:8000") as client:
         (session,) = client.get("/api/v1/recordings").json()
     found = {entry["file"]: (entry["quality"], entry["reasons"]) for entry in session["recordings"]}

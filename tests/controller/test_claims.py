@@ -9,11 +9,13 @@ from tempfile import mkdtemp
 import pytest
 
 from controller import claims
-from rig.config.wiring import Axis, Force, Wiring
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Wiring
 from rig.errors import DeviceError
 from rig.recording.ring import new_path, remove_abandoned
 
-WIRING = Wiring(axis=Axis(port="/dev/ttyAXIS"), force=Force(port="/dev/ttyFORCE"), tracker=None)
+WIRING = Wiring(axis=Epos4Wiring(port="/dev/ttyAXIS"), force=BotaWiring(port="/dev/ttyFORCE"), tracker=None)
 HOLD = """
 import sys
 from controller import claims
@@ -59,7 +61,7 @@ def test_a_bench_in_use_is_refused_naming_who_has_which_port() -> None:
 
 
 def test_one_port_in_common_is_enough() -> None:
-    process = other_process(WIRING.model_copy(update={"axis": Axis(port="/dev/ttyOTHER")}))
+    process = other_process(WIRING.model_copy(update={"axis": Epos4Wiring(port="/dev/ttyOTHER")}))
     try:
         with pytest.raises(DeviceError, match="/dev/ttyFORCE is in use"):
             claims.take(WIRING)
@@ -119,7 +121,7 @@ def test_a_loop_that_outlives_its_command_keeps_the_bench_until_it_has_left() ->
 
 def test_a_pseudo_terminal_opened_anew_is_another_bench() -> None:
     ours, theirs = os.openpty()
-    wiring = WIRING.model_copy(update={"axis": Axis(port=os.ttyname(theirs))})
+    wiring = WIRING.model_copy(update={"axis": Epos4Wiring(port=os.ttyname(theirs))})
     end(other_process(wiring))
     path = next(claims.state_folder().glob("*pts*"))
     claim = claims.take(wiring)

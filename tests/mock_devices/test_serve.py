@@ -25,7 +25,9 @@ from mock_devices.parameters import Parameters
 from mock_devices.serve import Server, effects_table
 from mock_devices.testing.clock import Clock
 from mock_devices.testing.force import collect
-from rig.config.wiring import Axis, Force, Limits
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Limits
 
 COMMAND = [sys.executable, "-m", "mock_devices.serve", "--tracker-tcp-port", "0"]
 FRAME = 37
@@ -122,7 +124,7 @@ def test_a_running_bench_is_read_turned_and_broken_through_its_control_channel()
 @pytest.mark.xdist_group("wire")
 def test_the_force_driver_gets_its_thousand_samples_a_second_from_the_bench() -> None:
     with started() as (_, endpoints), opened(endpoints["force"]["serial"]) as port:
-        sensor = BotaSensOne(port, Force(port=endpoints["force"]["serial"]))
+        sensor = BotaSensOne(port, BotaWiring(port=endpoints["force"]["serial"]))
         sensor.start()
         samples = collect(sensor, lambda got: len(got) >= 800)
         sensor.close()
@@ -135,7 +137,7 @@ def test_the_force_driver_gets_its_thousand_samples_a_second_from_the_bench() ->
 @pytest.mark.xdist_group("wire")
 def test_the_axis_driver_homes_and_moves_the_tip_into_the_tissue() -> None:
     with started() as (_, endpoints), BenchControl(endpoints["control"]) as control:
-        axis = Epos4Axis(Axis(port=endpoints["axis"]["slcan"], heartbeat_ms=1000), Limits())
+        axis = Epos4Axis(Epos4Wiring(port=endpoints["axis"]["slcan"], heartbeat_ms=1000), Limits())
         try:
             axis.start()
             axis.home()
@@ -208,7 +210,7 @@ class ServerBench:
     def __init__(self) -> None:
         self.clock = Clock(0)
         self.bench = Bench(Parameters.model_validate({"tracker": {"tcp_port": 0}, "force": {"counter_drift_ppm": 0.0}}))
-        devices = Workshop(self.bench, 0, self.clock, seed=0).devices(("bota-sensone",))
+        devices = Workshop(self.bench, 0, self.clock, seed=0).devices((BotaWiring,))
         self.line, self.axis = devices[0].wire, devices[1]
         self.server = Server(self.bench, devices, self.clock)
         self.port = open_port(self.line.endpoint, 460_800)

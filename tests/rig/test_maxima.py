@@ -5,7 +5,10 @@ import math
 import pytest
 
 from api.cli.stage import patient
-from rig.config.maxima import MAXIMA, RANGES, Maximum
+from rig.config.maxima import MAXIMA, Maximum
+from rig.config.products import maxon_epos4
+from rig.config.products.registry import FORCE_SENSORS
+from rig.config.products.roles import Force
 from rig.config.table import merged, parse
 from rig.config.wiring import Limits, Wiring
 from rig.errors import UsageError
@@ -16,7 +19,7 @@ def given(key: str, value: float) -> Wiring:
     return parse(Wiring, merged({}, [f"{key}={value:.0f}"]), "rig.toml")
 
 
-@pytest.mark.parametrize("maximum", MAXIMA, ids=lambda maximum: str(maximum.key))
+@pytest.mark.parametrize("maximum", [*MAXIMA, *maxon_epos4.MAXIMA], ids=lambda maximum: str(maximum.key))
 @pytest.mark.parametrize("more", [1.0, 1e9])
 def test_whatever_is_above_its_maximum_is_refused_with_key_value_maximum_and_reason(
     maximum: Maximum, more: float
@@ -54,9 +57,10 @@ def test_the_force_ceiling_is_the_pressure_that_a_tip_of_6_mm_may_put_on_a_forea
     assert 0.95 * allowed_N < ceilings[0] < allowed_N
 
 
-@pytest.mark.parametrize("product", RANGES)
-def test_a_limit_is_one_that_the_sensor_can_measure(product: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(RANGES, product, RANGES[product]._replace(force_N=18.0, torque_N_m=0.4))
+@pytest.mark.parametrize("sensor", FORCE_SENSORS.values(), ids=FORCE_SENSORS)
+def test_a_limit_is_one_that_the_sensor_can_measure(sensor: type[Force], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sensor, "range_N", 18.0)
+    product = sensor().product
     with pytest.raises(UsageError, match=rf"limits.force_N 20 N .* 18 N: a {product} measures no more"):
         parse(Wiring, merged({}, [f"force.product={product}"]), "rig.toml")
 

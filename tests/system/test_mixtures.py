@@ -10,14 +10,18 @@ import pytest
 
 from api.cli.stage import _arguments, bench_for, bench_process
 from controller.devices.drivers import Devices, start_devices
-from rig.config.wiring import Axis, Force, Tracker, Wiring
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.products.ndi_polaris import PolarisWiring
+from rig.config.products.registry import FORCE_SENSORS
+from rig.config.wiring import Wiring
 
 WAIT_S = 10.0
 MIXTURES = [mixture for mixture in product((False, True), repeat=3) if any(mixture) and not all(mixture)]
 
 
 def test_the_mock_bench_is_not_asked_for_a_product_that_only_the_real_device_is() -> None:
-    real = Force.model_construct(product="ati-axia", port="/dev/ttyUSB7")
+    real = BotaWiring.model_construct(product="ati-axia", port="/dev/ttyUSB7")
     asked = _arguments(Wiring.model_construct(force=real, mock=Wiring().mock), (), None, both_sensors=False)
     assert "ati-axia" not in asked
     assert _arguments(Wiring(), (), None, both_sensors=False)[-2:] == ["--force", "bota-sensone"]
@@ -38,9 +42,9 @@ def wired(real: dict[str, Any], force: bool, axis: bool, tracker: bool, sensor: 
         "tracker": "tcp://" + real["tracker"]["tcp"] if tracker else "mock",
     }
     return Wiring(
-        force=Force.model_validate({"product": sensor, "port": ports["force"]}),
-        axis=Axis(port=ports["axis"]),
-        tracker=Tracker(port=ports["tracker"]),
+        force=FORCE_SENSORS[sensor](port=ports["force"]),
+        axis=Epos4Wiring(port=ports["axis"]),
+        tracker=PolarisWiring(port=ports["tracker"]),
     )
 
 

@@ -8,6 +8,7 @@ from pydantic import BaseModel, Field
 
 from api.cli.app import COMMANDS
 from rig.config.calibration import Calibration
+from rig.config.products.registry import ROLES
 from rig.config.protocol import Indentation
 from rig.config.quality import Bounds, QualityLimits
 from rig.config.stop import Stop
@@ -15,6 +16,8 @@ from rig.config.table import Table
 from rig.config.wiring import Limits, Loop, Mock, Subject, Wiring
 from tools.keys import tables
 from tools.reference import fill
+
+PRODUCTS = [product for products in ROLES.values() for product in products.values()]
 
 
 class Spring(Table):
@@ -91,7 +94,9 @@ def test_every_key_of_the_models_stands_in_the_reference(mark: str, model: type[
     assert not missing
 
 
-@pytest.mark.parametrize("model", [Indentation, QualityLimits, Bounds, Loop, Limits, Subject, Mock, Stop, Calibration])
+@pytest.mark.parametrize(
+    "model", [*PRODUCTS, Indentation, QualityLimits, Bounds, Loop, Limits, Subject, Mock, Stop, Calibration]
+)
 def test_every_key_that_a_person_writes_has_a_meaning(model: type[BaseModel]) -> None:
     silent = [name for name, field in model.model_fields.items() if not field.description and name != "quality"]
     assert not silent
@@ -99,6 +104,12 @@ def test_every_key_that_a_person_writes_has_a_meaning(model: type[BaseModel]) ->
 
 def test_a_maximum_stands_beside_its_key() -> None:
     assert "never above 50 N: ISO/TS 15066" in fill("<!-- generated: wiring -->")
+
+
+def test_each_product_has_a_table_of_its_own_with_its_own_maxima() -> None:
+    said = fill("<!-- generated: wiring -->")
+    assert said.count("## `force`: product = ") == 2
+    assert "never above 15 A: EPOS4 50/5" in said
 
 
 def test_every_command_stands_in_the_reference_with_its_help() -> None:

@@ -6,10 +6,12 @@ import pytest
 
 from api.operations.claimed import claimed
 from controller.claims import take
-from rig.config.wiring import Axis, Force, Wiring
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Wiring
 from rig.errors import DeviceError, UsageError
 
-BENCH = Wiring(force=Force(port="/dev/ttyUSB0"), axis=Axis(port="/dev/ttyACM0"), tracker=None)
+BENCH = Wiring(force=BotaWiring(port="/dev/ttyUSB0"), axis=Epos4Wiring(port="/dev/ttyACM0"), tracker=None)
 
 
 @pytest.fixture(autouse=True)

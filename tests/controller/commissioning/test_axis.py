@@ -19,7 +19,7 @@ from controller.devices.drivers import Devices
 from drivers.roles import Identity
 from rig.channels import AxisSample, ForceSample, MarkerSample
 from rig.config.calibration import AxisCalibration
-from rig.config.wiring import Axis
+from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.errors import CheckFailed, DeviceError, SafetyStop
 
 NOW = datetime(2026, 3, 1, 9, 0, tzinfo=UTC)
@@ -40,7 +40,7 @@ def places(scale: float = 1.0) -> list[Place]:
 
 
 def calibrated(scale: float) -> AxisCalibration:
-    return against_tracker(DRIVE, Axis(), places(scale), "limb marker", NOW)
+    return against_tracker(DRIVE, Epos4Wiring(), places(scale), "limb marker", NOW)
 
 
 def test_places_go_up_in_even_steps_and_down_again() -> None:
@@ -85,7 +85,7 @@ def test_a_limb_marker_ahead_says_the_sense_one_behind_refuses_it_and_one_beside
 
 
 def test_a_gauge_block_gives_the_scale_of_two_contacts() -> None:
-    found = against_block(DRIVE, Axis(), [19.51, 19.50, 19.49], [9.52, 9.50, 9.48], 10.0, NOW)
+    found = against_block(DRIVE, Epos4Wiring(), [19.51, 19.50, 19.49], [9.52, 9.50, 9.48], 10.0, NOW)
     assert found.scale == pytest.approx(1.0)
     assert found.uncertainty == pytest.approx(np.hypot(0.01, 0.02) / 3**0.5 / 10.0)
     assert (found.reference, found.direction_known_by) == ("gauge block", "contact")
@@ -102,7 +102,7 @@ def test_a_gauge_block_gives_the_scale_of_two_contacts() -> None:
 )
 def test_contacts_that_do_not_give_the_block_are_refused(table: list[float], block: list[float], sentence: str) -> None:
     with pytest.raises(CheckFailed, match=sentence):
-        against_block(DRIVE, Axis(), table, block, 10.0, NOW)
+        against_block(DRIVE, Epos4Wiring(), table, block, 10.0, NOW)
 
 
 # The moves, on devices that are there at once
@@ -173,7 +173,7 @@ def resting(bench: AxisOf) -> RestingAxis:
 def test_the_axis_is_read_at_each_place() -> None:
     found = travelled(resting(AxisOf()), steps_mm(2.0, 14.0, 4))
     assert [one.axis_mm for one in found] == pytest.approx([0.0, *steps_mm(2.0, 14.0, 4)])
-    assert against_tracker(DRIVE, Axis(), found, "limb marker", NOW).scale == pytest.approx(1.0)
+    assert against_tracker(DRIVE, Epos4Wiring(), found, "limb marker", NOW).scale == pytest.approx(1.0)
 
 
 def test_a_wrong_scale_goes_no_farther_than_the_first_step() -> None:

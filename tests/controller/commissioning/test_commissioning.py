@@ -9,7 +9,9 @@ from controller.loop.steps import Approach, Program, Retract, Zero
 from drivers.roles import Identity
 from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration, Uncertainty
 from rig.config.force_map import ForceMap
-from rig.config.wiring import Axis, Force, Wiring
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Wiring
 from rig.errors import UsageError
 from tests.calibrations import axis_calibration, force_calibration
 from tests.controller.fake_bench import FakeBench, wired
@@ -26,7 +28,7 @@ OF_AXIS = axis_calibration(date=NOW)
 def wiring(
     of_force: ForceCalibration | None = OF_FORCE, of_axis: AxisCalibration | None = None, **tables: object
 ) -> Wiring:
-    tables = {"force": Force(port="/dev/ttyUSB0")} | tables
+    tables = {"force": BotaWiring(port="/dev/ttyUSB0")} | tables
     return Wiring.model_validate({"calibration": Calibration(of_force=of_force, of_axis=of_axis), **tables})
 
 
@@ -103,15 +105,15 @@ def test_one_less_certain_than_stated_is_refused() -> None:
     ],
 )
 def test_a_wiring_that_contradicts_the_force_calibration_is_refused(force: dict[str, str], sentence: str) -> None:
-    found = wiring(force=Force.model_validate({"port": "/dev/ttyUSB0", **force}))
+    found = wiring(force=BotaWiring.model_validate({"port": "/dev/ttyUSB0", **force}))
     with pytest.raises(UsageError, match=sentence):
         refused(found)
     with pytest.raises(UsageError, match=sentence):
         refuse_uncalibrated(found, NOW)
 
 
-@pytest.mark.parametrize("axis", [Axis(increments_per_mm=4000.0), Axis(direction=-1)])
-def test_a_wiring_that_contradicts_the_axis_calibration_is_refused(axis: Axis) -> None:
+@pytest.mark.parametrize("axis", [Epos4Wiring(increments_per_mm=4000.0), Epos4Wiring(direction=-1)])
+def test_a_wiring_that_contradicts_the_axis_calibration_is_refused(axis: Epos4Wiring) -> None:
     with pytest.raises(UsageError, match=r"the axis was calibrated with 2000 and 1"):
         refused(wiring(of_axis=OF_AXIS, axis=axis))
 

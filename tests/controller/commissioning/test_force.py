@@ -14,7 +14,7 @@ from mock_devices.bench import Bench
 from mock_devices.parameters import Parameters, Sensor
 from rig.channels import ForceSample
 from rig.config.calibration import ForceCalibration
-from rig.config.wiring import Force
+from rig.config.products.bota_sensone import BotaWiring
 from rig.errors import CheckFailed, DeviceError, UsageError
 
 MS_NS = 1_000_000
@@ -52,8 +52,8 @@ def person(**sensor: object) -> Person:
     return Person(Bench(Parameters(force=Sensor.model_validate(sensor)), seed=1))
 
 
-def calibrated(hand: Person, config: Force | None = None, weights: Weights = WEIGHTS) -> ForceCalibration:
-    return calibrate(SENSOR, config or Force(), weights, hand.apply, hand.read, TODAY)
+def calibrated(hand: Person, config: BotaWiring | None = None, weights: Weights = WEIGHTS) -> ForceCalibration:
+    return calibrate(SENSOR, config or BotaWiring(), weights, hand.apply, hand.read, TODAY)
 
 
 def test_a_sound_sensor_gives_its_gain_crosstalk_zero_and_noise() -> None:

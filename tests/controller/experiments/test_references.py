@@ -9,7 +9,8 @@ from controller.experiments.references import named
 from controller.loop.steps import TrackForce
 from controller.safety.program_limits import refuse_beyond_limits
 from mock_devices.testing.models import index_model
-from rig.config.wiring import Axis, Loop, Wiring
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Loop, Wiring
 from rig.errors import UsageError
 
 MODEL = index_model(0.12, 0.22, 0.01, force_N=11.0)
@@ -131,7 +132,7 @@ def test_a_reference_without_end_is_refused() -> None:
 
 
 def test_a_design_that_cannot_be_reached_is_refused() -> None:
-    wiring = Wiring(loop=Loop(crossover_Hz=20.0, phase_margin_deg=89.0), axis=Axis(delay_ms=20.0))
+    wiring = Wiring(loop=Loop(crossover_Hz=20.0, phase_margin_deg=89.0), axis=Epos4Wiring(delay_ms=20.0))
     stiff = index_model(2.0, 0.0, 0.0, force_N=11.0)
     with pytest.raises(UsageError, match=r"no PI law reaches 20 Hz with 89 deg at 2 N/mm: lower loop\.crossover_Hz"):
         tracking.following(named("step:5"), stiff, wiring)

@@ -9,8 +9,9 @@ import pytest
 from controller.loop.messages import Status
 from controller.loop.modes import Mode
 from controller.recovery.conversation import recover
-from controller.recovery.situation import ALL, Act, Consent, Situation, homes_outward, is_retracted, needed, questions
-from rig.config.wiring import Axis, Limits
+from controller.recovery.situation import ALL, Act, Consent, Situation, is_retracted, needed, questions
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Limits
 from rig.errors import DeviceError, SafetyStop
 from tests.controller.fake_bench import HOLD, ZERO, FakeBench
 
@@ -72,7 +73,7 @@ def test_what_happened_is_said_in_sentences() -> None:
 def test_only_a_search_for_a_switch_or_stop_on_the_outer_side_leads_out(
     method: Any, direction: Any, outward: bool
 ) -> None:
-    assert homes_outward(Axis(homing_method=method, direction=direction)) is outward
+    assert Epos4Wiring(homing_method=method, direction=direction).homes_outward is outward
 
 
 def test_the_tip_is_out_within_a_millimetre_of_the_end_of_its_way() -> None:

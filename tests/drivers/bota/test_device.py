@@ -15,7 +15,7 @@ from drivers.ports import PortClosed, open_port
 from drivers.roles import Identity
 from mock_devices.testing.clock import long_ago
 from mock_devices.testing.force import WRENCH, ServedMock, await_silence, collect
-from rig.config.wiring import Force
+from rig.config.products.bota_sensone import BotaWiring
 from rig.errors import DeviceError, UsageError
 from tests.drivers.scripted_port import ScriptedPort
 
@@ -37,10 +37,10 @@ def sensor_like(command: bytes) -> bytes:
 
 
 def started(
-    answer: Callable[[bytes], bytes] = sensor_like, config: Force | None = None
+    answer: Callable[[bytes], bytes] = sensor_like, config: BotaWiring | None = None
 ) -> tuple[BotaSensOne, ScriptedPort]:
     port = ScriptedPort(answer)
-    sensor = BotaSensOne(port, config or Force(), long_ago)
+    sensor = BotaSensOne(port, config or BotaWiring(), long_ago)
     try:
         sensor.start()
     except DeviceError:
@@ -88,7 +88,7 @@ def test_the_first_frame_waited_for_is_not_lost() -> None:
 
 
 def test_rate_and_baud_of_the_configuration_reach_the_sensor() -> None:
-    sensor, port = started(config=Force(rate_Hz=100, baud=115_200))
+    sensor, port = started(config=BotaWiring(rate_Hz=100, baud=115_200))
     assert port.written[2:4] == [b"c,0,1,0,2", b"f,512,0,0,1"]
     assert sensor.period_ns == 10_000_000
     sensor.close()
@@ -168,12 +168,12 @@ def test_a_sensor_that_never_vouches_for_a_reading_is_one_sentence() -> None:
 @pytest.mark.parametrize(
     ("config", "sentence"),
     [
-        (Force(rate_Hz=500), "1004, 800, 400, 250, 200, 100 Hz"),
-        (Force(baud=19_200), "takes 9600, 57600, 115200, 230400, 460800"),
-        (Force(rate_Hz=1000, baud=230_400), "230400 baud carries at most 623 frames/s"),
+        (BotaWiring(rate_Hz=500), "1004, 800, 400, 250, 200, 100 Hz"),
+        (BotaWiring(baud=19_200), "takes 9600, 57600, 115200, 230400, 460800"),
+        (BotaWiring(rate_Hz=1000, baud=230_400), "230400 baud carries at most 623 frames/s"),
     ],
 )
-def test_settings_that_cannot_be_had_are_refused_and_the_port_is_given_back(config: Force, sentence: str) -> None:
+def test_settings_that_cannot_be_had_are_refused_and_the_port_is_given_back(config: BotaWiring, sentence: str) -> None:
     port = ScriptedPort()
     with pytest.raises(UsageError, match=sentence):
         BotaSensOne(port, config)
@@ -194,7 +194,7 @@ def test_samples_are_numbered_without_gaps_and_carry_both_times(running: tuple[B
 
 
 def test_capture_precedes_arrival_by_the_configured_latency() -> None:
-    sensor, _ = started(config=Force(latency_ms=2.5))
+    sensor, _ = started(config=BotaWiring(latency_ms=2.5))
     (sample,) = sensor.poll(0)
     assert sample.arrival_ns - sample.capture_ns == 2_500_000
     sensor.close()
@@ -242,7 +242,7 @@ def test_a_frame_that_the_line_brings_twice_is_dropped_and_counted(running: tupl
 def test_frames_that_came_after_the_look_at_the_clock_are_dated_by_a_later_one() -> None:
     """A host stops for 5 ms between clock and read: dated by the clock alone, all frames since would be 5 ms early."""
     port, clock_ns = ScriptedPort(sensor_like), 10 * MS
-    sensor = BotaSensOne(port, Force(), lambda: clock_ns)
+    sensor = BotaSensOne(port, BotaWiring(), lambda: clock_ns)
     sensor.start()
     for number in range(1, 6):
         port.push(frame(1000 + number * PERIOD_US))
@@ -299,8 +299,8 @@ def test_close_takes_the_sensor_out_of_run_mode_and_may_be_called_twice() -> Non
         sensor.poll(0)
 
 
-def opened(mock: ServedMock, config: Force | None = None) -> BotaSensOne:
-    return BotaSensOne(open_port(mock.endpoint, BotaSensOne.DEFAULT_BAUD), config or Force())
+def opened(mock: ServedMock, config: BotaWiring | None = None) -> BotaSensOne:
+    return BotaSensOne(open_port(mock.endpoint, BotaSensOne.DEFAULT_BAUD), config or BotaWiring())
 
 
 @pytest.mark.bench
@@ -320,10 +320,10 @@ class TestAgainstTheMockInAnotherProcess:
 
     def test_an_abandoned_session_is_taken_over_while_it_streams(self, bota: ServedMock) -> None:
         first = open_port(bota.endpoint, BotaSensOne.DEFAULT_BAUD)
-        abandoned = BotaSensOne(first, Force())
+        abandoned = BotaSensOne(first, BotaWiring())
         abandoned.start()
         first.close()
-        sensor = opened(bota, Force(rate_Hz=400))
+        sensor = opened(bota, BotaWiring(rate_Hz=400))
         sensor.start()
         samples = collect(sensor, lambda got: len(got) >= 50)
         sensor.close()

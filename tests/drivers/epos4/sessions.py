@@ -5,11 +5,12 @@ from typing import Any
 from drivers.epos4.device import Epos4Axis
 from mock_devices.testing.epos4 import DriveBench
 from rig.channels import AxisSample
-from rig.config.wiring import Axis, Limits
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Limits
 
 
 def axis_on(stage: DriveBench, limits: Limits | None = None, **config: Any) -> Epos4Axis:
-    return Epos4Axis(Axis(port="memory", **config), limits or Limits(), stage.now, open_link=stage.open)
+    return Epos4Axis(Epos4Wiring(port="memory", **config), limits or Limits(), stage.now, open_link=stage.open)
 
 
 def tick(stage: DriveBench, axis: Epos4Axis, position_mm: float) -> list[AxisSample]:

@@ -24,7 +24,8 @@ from drivers.ports import PortClosed, SerialPort
 from mock_devices.testing.epos4 import remote_drive
 from mock_devices.testing.remote import RemoteMock
 from rig.channels import AxisSample
-from rig.config.wiring import Axis, Limits
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Limits
 from rig.errors import DeviceError, UsageError
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
@@ -34,8 +35,9 @@ TURN_S = 0.002
 MOVING_HOST = """
 import sys, time
 from drivers.epos4.device import Epos4Axis
-from rig.config.wiring import Axis, Limits
-axis = Epos4Axis(Axis(port=sys.argv[1], heartbeat_ms=200), Limits())
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Limits
+axis = Epos4Axis(Epos4Wiring(port=sys.argv[1], heartbeat_ms=200), Limits())
 axis.start()
 axis.home()
 axis.enable()
@@ -63,9 +65,9 @@ def axis(mock: RemoteMock) -> Iterator[Epos4Axis]:
     axis.close()
 
 
-def config_of(mock: RemoteMock, **config: Any) -> Axis:
+def config_of(mock: RemoteMock, **config: Any) -> Epos4Wiring:
     """Heartbeats are slow here: a shared machine may stop any process for a while."""
-    return Axis(port=mock.address, heartbeat_ms=HEARTBEAT_MS, **config)
+    return Epos4Wiring(port=mock.address, heartbeat_ms=HEARTBEAT_MS, **config)
 
 
 def turn(axis: Epos4Axis, position_mm: float) -> list[AxisSample]:

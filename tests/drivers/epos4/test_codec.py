@@ -25,7 +25,8 @@ from drivers.epos4.setup import (
     parameters,
     process_data,
 )
-from rig.config.wiring import Axis, Limits
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Limits
 
 SCREW = Units(increments_per_mm=2000, increments_per_rev=10_000)
 
@@ -87,7 +88,7 @@ def test_pdos_are_switched_off_cleared_filled_and_switched_on() -> None:
 
 
 def test_every_other_pdo_is_switched_off() -> None:
-    writes = expected(process_data(Axis(node=5)))
+    writes = expected(process_data(Epos4Wiring(node=5)))
     identifiers = {entry.index: value for entry, value in writes.items() if entry.name.endswith("identifier")}
     on = {index for index, value in identifiers.items() if not value & objects.DISABLED}
     assert set(identifiers) == {0x1400, 0x1401, 0x1402, 0x1403, 0x1800, 0x1801, 0x1802, 0x1803}
@@ -95,7 +96,7 @@ def test_every_other_pdo_is_switched_off() -> None:
 
 
 def test_limits_are_written_before_anything_else_and_the_watch_on_the_host_last() -> None:
-    axis = Axis(heartbeat_ms=50, current_limit_A=4, following_error_mm=1.5, acceleration_mm_s2=2000)
+    axis = Epos4Wiring(heartbeat_ms=50, current_limit_A=4, following_error_mm=1.5, acceleration_mm_s2=2000)
     limits = Limits(position_min_mm=2, position_max_mm=40, speed_mm_s=60)
     writes = [(entry.index, entry.sub, value) for entry, value in parameters(axis, limits)]
     assert writes[:8] == [
@@ -125,14 +126,14 @@ def test_limits_of_a_turned_axis_change_places() -> None:
 def test_silence_is_lost_after_two_or_three_periods_and_20_ms_at_least(
     period_ms: int, host_ms: int, drive_ms: int
 ) -> None:
-    axis = Axis(heartbeat_ms=period_ms)
+    axis = Epos4Wiring(heartbeat_ms=period_ms)
     assert host_heartbeat_limit_ms(axis) == host_ms
     assert drive_heartbeat_limit_ns(axis) == drive_ms * 1_000_000
 
 
 def test_the_host_gives_way_where_the_drive_has_its_number() -> None:
-    assert host_node(Axis(node=1)) == 127
-    assert host_node(Axis(node=127)) == 126
+    assert host_node(Epos4Wiring(node=1)) == 127
+    assert host_node(Epos4Wiring(node=127)) == 126
 
 
 def test_reading_back_an_identifier_may_show_the_flag_against_remote_requests() -> None:

@@ -6,7 +6,8 @@ import pytest
 
 from drivers.epos4.device import Epos4Axis
 from mock_devices.testing.epos4 import MS, DriveBench
-from rig.config.wiring import Axis, Limits
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Limits
 from rig.errors import SafetyStop
 
 RAMP_MS = 15
@@ -14,7 +15,7 @@ RAMP_MS = 15
 
 
 def axis_on(stage: DriveBench, interrupted: Callable[[], bool]) -> Epos4Axis:
-    axis = Epos4Axis(Axis(port="memory"), Limits(), stage.now, open_link=stage.open, interrupted=interrupted)
+    axis = Epos4Axis(Epos4Wiring(port="memory"), Limits(), stage.now, open_link=stage.open, interrupted=interrupted)
     axis.start()
     return axis
 

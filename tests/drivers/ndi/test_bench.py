@@ -13,7 +13,7 @@ from drivers.ports import PortClosed, open_port
 from mock_devices.testing.ndi import ARM, TIP, remote_tracker
 from mock_devices.testing.remote import RemoteMock
 from rig.channels import MarkerSample
-from rig.config.wiring import Tracker
+from rig.config.products.ndi_polaris import PolarisWiring
 from rig.errors import DeviceError
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
@@ -30,7 +30,7 @@ def start(mock: RemoteMock) -> Iterator[Callable[..., NdiTracker]]:
     devices: list[NdiTracker] = []
 
     def _start(**settings: Any) -> NdiTracker:
-        device = NdiTracker(partial(open_port, mock.address), Tracker(port=mock.address, **settings))
+        device = NdiTracker(partial(open_port, mock.address), PolarisWiring(port=mock.address, **settings))
         devices.append(device)
         device.start()
         return device

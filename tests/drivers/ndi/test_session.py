@@ -9,7 +9,7 @@ import pytest
 from drivers.ndi.device import LOST_AFTER_NS, REPLY_TIMEOUT_NS, NdiTracker
 from drivers.ports import PortClosed
 from mock_devices.testing.ndi import ARM, MS, TIP, TrackerBench, run, started
-from rig.config.wiring import Tracker
+from rig.config.products.ndi_polaris import PolarisWiring
 from rig.errors import DeviceError
 
 FRAME_NS = 1_000_000_000 // 60
@@ -66,7 +66,7 @@ def test_capture_times_are_a_frame_apart_and_never_after_arrival(stage: TrackerB
 
 def test_a_question_asked_late_is_dated_when_it_went_out(stage: TrackerBench) -> None:
     """A host that stops for 8 ms before each question would take the frames for that much older than they are."""
-    device = NdiTracker(stage.open, Tracker(), lambda: 10**9)
+    device = NdiTracker(stage.open, PolarisWiring(), lambda: 10**9)
     device.start()
     stage.run_until(100 * MS)
     assert not device.poll(10**9 - 8 * MS)

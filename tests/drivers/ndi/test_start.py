@@ -8,7 +8,7 @@ import pytest
 
 from drivers.ndi.device import NdiTracker
 from mock_devices.testing.ndi import TrackerBench, run, started
-from rig.config.wiring import Tracker
+from rig.config.products.ndi_polaris import PolarisWiring
 from rig.errors import DeviceError, UsageError
 
 
@@ -57,7 +57,7 @@ def test_the_tracker_tells_who_it_is(stage: TrackerBench) -> None:
 
 
 def test_before_start_there_is_no_identity_and_no_port(stage: TrackerBench) -> None:
-    device = NdiTracker(stage.open, Tracker())
+    device = NdiTracker(stage.open, PolarisWiring())
     for use in (lambda: device.identity, device.fileno, lambda: device.poll(0)):
         with pytest.raises(DeviceError, match="not started; call start first"):
             use()
@@ -159,7 +159,7 @@ def test_a_silent_port_is_told(address: str) -> None:
     stage = TrackerBench(address=address)
     stage.mock.silent = True
     stage.heeds_break = False
-    device = NdiTracker(stage.open, Tracker(), now=leaping())
+    device = NdiTracker(stage.open, PolarisWiring(), now=leaping())
     with pytest.raises(DeviceError, match=f"{address}: INIT brought no reply; check power, cable"):
         device.start()
     assert stage.closed

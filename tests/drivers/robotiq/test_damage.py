@@ -14,7 +14,7 @@ from drivers.robotiq.device import RobotiqFt300
 from mock_devices.robotiq.mock import RobotiqMock
 from mock_devices.testing.force import StillPlant
 from mock_devices.wire import TcpWire
-from rig.config.wiring import Force
+from rig.config.products.robotiq_ft300 import Ft300Wiring
 from tests.drivers.scripted_port import ScriptedPort
 
 
@@ -45,7 +45,7 @@ def test_any_one_damaged_answer_during_start_is_asked_for_again(spoilt: int) -> 
     mock, ended = RobotiqMock(SpoilingWire(spoilt), StillPlant(), time.monotonic_ns()), threading.Event()
     thread = threading.Thread(target=play, args=(mock, ended))
     thread.start()
-    sensor = RobotiqFt300(partial(open_port, f"tcp://{mock.endpoints()['tcp']}"), Force(product="robotiq-ft300"))
+    sensor = RobotiqFt300(partial(open_port, f"tcp://{mock.endpoints()['tcp']}"), Ft300Wiring())
     try:
         sensor.start()
         assert sensor.identity.serial == "FTS-1234"
@@ -65,7 +65,7 @@ def test_a_start_command_that_is_not_obeyed_is_said_again(monkeypatch: pytest.Mo
         heard.append(command)
         return STREAM_STARTED + encode_frame([0] * 6) if len(heard) == 2 else b""
 
-    sensor = RobotiqFt300(lambda _: ScriptedPort(deaf_once), Force(product="robotiq-ft300"))
+    sensor = RobotiqFt300(lambda _: ScriptedPort(deaf_once), Ft300Wiring())
     sensor._start_stream()
     assert heard == [START_STREAM] * 2
     sensor.close()

@@ -14,8 +14,8 @@ from drivers.robotiq.device import RobotiqFt300
 from drivers.roles import Identity
 from mock_devices.testing.clock import long_ago
 from mock_devices.testing.force import WAIT_S, WRENCH, ServedMock, await_silence, collect
-from rig.config.wiring import Force
-from rig.errors import DeviceError, UsageError
+from rig.config.products.robotiq_ft300 import Ft300Wiring
+from rig.errors import DeviceError
 from tests.drivers.scripted_port import ScriptedPort
 
 FRAME = encode_frame([125, -250, -775, 125, -250, 500])
@@ -27,7 +27,7 @@ ARRIVAL_NS = 10**15
 def listening() -> Iterator[tuple[RobotiqFt300, ScriptedPort]]:
     """A sensor whose line is in the test's hand, as if it already streamed."""
     port = ScriptedPort()
-    sensor = RobotiqFt300(lambda _: port, Force(latency_ms=1.5), long_ago)
+    sensor = RobotiqFt300(lambda _: port, Ft300Wiring(latency_ms=1.5), long_ago)
     yield sensor, port
     sensor.close()
 
@@ -105,7 +105,7 @@ def test_a_frame_lost_to_a_wrong_checksum_keeps_its_place(listening: tuple[Robot
 
 def test_close_stops_the_stream_and_may_be_called_twice() -> None:
     port = ScriptedPort()
-    sensor = RobotiqFt300(lambda _: port, Force())
+    sensor = RobotiqFt300(lambda _: port, Ft300Wiring())
     sensor.close()
     sensor.close()
     assert port.written == [STOP_BURST]
@@ -120,7 +120,7 @@ def test_the_port_is_opened_at_the_sensors_own_baud() -> None:
         bauds.append(baud)
         return port
 
-    RobotiqFt300(opener, Force(baud=19_200)).close()
+    RobotiqFt300(opener, Ft300Wiring(baud=19_200)).close()
     assert bauds == [19_200]
 
 
@@ -136,26 +136,14 @@ def test_a_line_that_never_falls_silent_is_one_sentence(monkeypatch: pytest.Monk
         monkeypatch.setattr(device, name, seconds)
     port = ChatterPort()
     port.push(b"always readable")
-    sensor = RobotiqFt300(lambda _: port, Force())
+    sensor = RobotiqFt300(lambda _: port, Ft300Wiring())
     with pytest.raises(DeviceError, match=r"robotiq-ft300 at /dev/scripted: still sends bytes after 0.05 s"):
         sensor.start()
     sensor.close()
 
 
-@pytest.mark.parametrize(
-    ("config", "sentence"),
-    [(Force(rate_Hz=50), "streams at 100 Hz and no slower"), (Force(baud=9_600), "talks at 19200 baud only")],
-)
-def test_settings_that_cannot_be_had_are_refused_before_the_port_is_opened(config: Force, sentence: str) -> None:
-    def opener(_: int) -> ScriptedPort:
-        raise AssertionError("opened")
-
-    with pytest.raises(UsageError, match=sentence):
-        RobotiqFt300(opener, config)
-
-
 def opened(mock: ServedMock) -> RobotiqFt300:
-    return RobotiqFt300(partial(open_port, mock.endpoint), Force())
+    return RobotiqFt300(partial(open_port, mock.endpoint), Ft300Wiring())
 
 
 @pytest.mark.bench
@@ -189,7 +177,7 @@ class TestAgainstTheMockInAnotherProcess:
             ports.append(open_port(robotiq.endpoint, baud))
             return ports[-1]
 
-        RobotiqFt300(opener, Force()).start()
+        RobotiqFt300(opener, Ft300Wiring()).start()
         ports[-1].close()
         sensor = opened(robotiq)
         sensor.start()

@@ -18,7 +18,7 @@ from drivers.ndi.device import NdiTracker
 from drivers.ports import open_port
 from mock_devices.testing.ndi import remote_tracker
 from mock_devices.testing.remote import RemoteMock
-from rig.config.wiring import Tracker
+from rig.config.products.ndi_polaris import PolarisWiring
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
 
@@ -166,7 +166,7 @@ def test_scikit_surgery_tracks_in_each_of_its_sessions_and_our_driver_starts_aft
         killed = SCIKIT_SURGERY.replace("tracker.stop_tracking()", "import os; os._exit(0)")
         with pytest.raises(IndexError):
             client(killed, mock, *map(str, roms), folder=pretended_ping(tmp_path))
-        device = NdiTracker(partial(open_port, mock.address), Tracker(port=mock.address))
+        device = NdiTracker(partial(open_port, mock.address), PolarisWiring(port=mock.address))
         device.start()
         seen: set[int] = set()
         deadline = time.monotonic() + 10

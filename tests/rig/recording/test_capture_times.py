@@ -9,7 +9,7 @@ from drivers.bota.codec import Frame, encode_frame
 from drivers.bota.device import BotaSensOne
 from mock_devices.testing.clock import long_ago
 from rig.channels import FORCE
-from rig.config.wiring import Force
+from rig.config.products.bota_sensone import BotaWiring
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.reader import read_recording
 from rig.recording.verify import verify
@@ -22,7 +22,7 @@ READS = [(20, 1), (20.01, 19), (21, 1), (62, 41), (62.001, 1), (63, 0), (64, 2),
 
 def test_a_stalling_host_records_capture_times_that_all_differ_and_go_upwards(tmp_path: Path) -> None:
     port = ScriptedPort()
-    sensor = BotaSensOne(port, Force(), long_ago)
+    sensor = BotaSensOne(port, BotaWiring(), long_ago)
     writer = RecordingWriter(tmp_path / "a.mcap", {})
     sent = 0
     for read_ms, frames in READS:

@@ -1,0 +1,1 @@
+"""The products that the bench knows, one declaration each."""

@@ -1,0 +1,52 @@
+"""Declarations by name: products, laws, causes. Each is registered once; a wrong name is answered with the nearest."""
+
+import difflib
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Generic, TypeVar
+
+from rig.errors import UsageError
+
+Item = TypeVar("Item")
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """The one of ``names``, of which there is one at least, that is most like ``name``."""
+    return difflib.get_close_matches(name, list(names), n=1, cutoff=0.0)[0]
+
+
+class Registry(Mapping[str, Item], Generic[Item]):
+    """Declarations in the order in which they were registered; ``what`` is what one of them is called in messages."""
+
+    def __init__(self, what: str, name_of: Callable[[Item], str], items: Iterable[Item] = ()) -> None:
+        self._what, self._name_of = what, name_of
+        self._items: dict[str, Item] = {}
+        for item in items:
+            self.register(item)
+
+    def register(self, item: Item) -> Item:
+        """Adds ``item`` and returns it; raises ValueError where its name is taken."""
+        name = self._name_of(item)
+        if name in self._items:
+            raise ValueError(f"there is a {self._what} {name!r} already")
+        self._items[name] = item
+        return item
+
+    def named(self, name: str) -> Item:
+        """The item called so; raises UsageError with the nearest name and all of them."""
+        if name not in self._items:
+            raise UsageError(
+                f"no {self._what} is called {name!r}; nearest: {nearest(name, self)}; all: {', '.join(sorted(self))}"
+            )
+        return self._items[name]
+
+    def __getitem__(self, name: str) -> Item:
+        """The item called so; raises KeyError."""
+        return self._items[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Names."""
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._items)
