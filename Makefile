@@ -6,7 +6,7 @@ READY := $(VENV)/ready
 # Modules are compiled once, not by each of the processes that a bench is made of.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test check docs package wheels mutants mutants-sample lock clean
+.PHONY: demo test check metrics docs package wheels mutants mutants-sample lock clean
 
 demo: $(READY)
 	$(BIN)/rig demo --out demo
@@ -25,6 +25,10 @@ check: $(READY)
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo >$(VENV)/contracts || { cat $(VENV)/contracts; exit 1; }
 	$(BIN)/python -m tools.changed_tests
+
+# How the source is built, each number beside its goal; the last line is JSON.
+metrics: $(READY)
+	@$(BIN)/python -m tools.metrics
 
 docs: $(READY)
 	$(BIN)/python -m sphinx -b html -W --keep-going -q -d $(VENV)/doctrees docs docs/_build

@@ -29,7 +29,7 @@ _DIGEST_BYTES = 32
 _COMPILERS = f"{sys.version} {numba.__version__} {llvmlite.__version__} {np.__version__}"
 
 
-def compiled(function: Function, parts: Mapping[str, Any] | None = None) -> Function:
+def compiled(function: Function, parts: Mapping[str, Callable[..., Any]] | None = None) -> Function:
     """``function`` compiled, its calls to module-level functions named in ``parts`` going to those given.
 
     ``parts`` are results of this function; the code is kept on disk.
@@ -37,7 +37,7 @@ def compiled(function: Function, parts: Mapping[str, Any] | None = None) -> Func
     assert isinstance(function, FunctionType)
     named = {**function.__globals__, **(parts or {})}
     dispatcher: Any = njit(FunctionType(function.__code__, named, function.__name__, function.__defaults__))
-    dispatcher.source = source_digest(function, {name: part.source for name, part in (parts or {}).items()})
+    dispatcher.source = source_digest(function, {name: vars(part)["source"] for name, part in (parts or {}).items()})
     dispatcher._cache = KeptCode(dispatcher.source)  # noqa: SLF001 - where `cache=True` puts numba's own
     return cast(Function, dispatcher)
 

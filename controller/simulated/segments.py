@@ -8,7 +8,7 @@ cycle the run without them. The functions compiled are those of the bench.
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -164,7 +164,7 @@ def _travel(
 @cache
 def hold_compiled() -> Callable[..., AxisState]:
     """`axis_plant.hold` as machine code."""
-    parts: dict[str, object] = {}
+    parts: dict[str, Callable[..., Any]] = {}
     for function in (axis_plant.surface, axis_plant.tissue_force, axis_plant.wanted_current, axis_plant.dry):
         parts[function.__name__] = compiled(function)
     parts["step"] = compiled(axis_plant.step, parts)
@@ -172,8 +172,8 @@ def hold_compiled() -> Callable[..., AxisState]:
 
 
 @cache
-def _parts() -> dict[str, object]:
-    law: dict[str, object] = {"interpolate": compiled(force_position.interpolate)}
+def _parts() -> dict[str, Callable[..., Any]]:
+    law: dict[str, Callable[..., Any]] = {"interpolate": compiled(force_position.interpolate)}
     law["foresee"] = compiled(force_position.foresee, law)
     law["adapt"] = compiled(force_position.adapt, law)
     return {
