@@ -179,9 +179,9 @@ ANY_TRACKER = ("tracker_lost", QUALITY)
 # A share of messages: when one of them is one too many is chance.
 BY_CHANCE_S = math.inf
 LOST = {
-    "axis": (ANY_AXIS, ("axis.gap_ms", "axis.rate_lost"), 0.1),
-    "force": (ANY_FORCE, ("force.samples_lost", "force.gap_ms", "force.rate_lost"), 0.1),
-    "tracker": (ANY_TRACKER, ("tracker_lost",), 0.3),
+    "axis": (ANY_AXIS, ("axis.gap_ms", "axis.rate_lost", "axis.wire_damage"), 0.1),
+    "force": (ANY_FORCE, ("force.samples_lost", "force.gap_ms", "force.rate_lost", "force.wire_damage"), 0.1),
+    "tracker": (ANY_TRACKER, ("tracker_lost", "tracker.wire_damage"), 0.3),
 }
 """By device: who may notice damage on its wire, the measures that name it, and the share of messages damaged."""
 WIRES = tuple(

@@ -28,7 +28,7 @@ class Observer:
         self._over = threading.Event()
         self._control = BenchControl(address)
         self._look()
-        self._thread = threading.Thread(target=self._inputs, name="observer", daemon=True)
+        self._thread = threading.Thread(target=self._poll, name="observer", daemon=True)
         self._thread.start()
 
     @property
@@ -44,7 +44,7 @@ class Observer:
         """From now on the first moment counts at which ``onset`` holds."""
         self._onset = onset
 
-    def _inputs(self) -> None:
+    def _poll(self) -> None:
         while not self._over.wait(POLL_S):
             try:
                 self._look()

@@ -97,7 +97,9 @@ def record(bench: Supervisor, program: Program, file: Path, about: Metadata, tim
 def _run_watched(bench: Supervisor, program: Program, timeout_s: float) -> Outcome:
     over = threading.Event()
     failures: list[str] = []
-    watcher = threading.Thread(target=_inputs, args=(bench, over, failures), name="recorder-watch", daemon=True)
+    watcher = threading.Thread(
+        target=_stop_without_recorder, args=(bench, over, failures), name="recorder-watch", daemon=True
+    )
     watcher.start()
     try:
         outcome = bench.run(program, timeout_s)
@@ -111,7 +113,7 @@ def _run_watched(bench: Supervisor, program: Program, timeout_s: float) -> Outco
     return replace(outcome, peak_force_N=max(outcome.peak_force_N, bench.status.get("peak_force_N") or 0.0))
 
 
-def _inputs(bench: Supervisor, over: threading.Event, failures: list[str]) -> None:
+def _stop_without_recorder(bench: Supervisor, over: threading.Event, failures: list[str]) -> None:
     """Stops the motion as soon as the recorder fails: nothing moves unrecorded."""
     while not over.wait(LOOK_S):
         failure = bench.recorder.failure if bench.recorder else "the recorder is gone"
@@ -138,4 +140,5 @@ def _summary(outcome: Outcome) -> dict[str, str]:
         "surface_mm": "" if outcome.surface_mm is None else repr(outcome.surface_mm),
         "force_zero_N": "" if outcome.zero_N is None else repr(outcome.zero_N),
         "contact": json.dumps({"method": CONTACT_METHOD} | asdict(outcome.touch)) if outcome.touch else "",
+        "wire_damage": json.dumps(dict(outcome.wire_damage)),
     }

@@ -10,6 +10,7 @@ from controller.devices.connections import Connections
 from controller.devices.drivers import Devices, openers
 from controller.devices.health import Standstill
 from controller.devices.reopening import Openers
+from controller.devices.wire_damage import WireDamage
 from controller.loop.executive import Cycle
 from controller.loop.messages import Finished, Outcome, Status, StatusSaid, Stopped
 from controller.loop.modes import AT_REST, Mode
@@ -89,7 +90,7 @@ class BenchLoop:
         self.machine = MotionStateMachine(wiring, self.state, self._finished, table)
         self.inputs = SafetyInputs()
         self._registration = Registration()
-        self._standstill = Standstill()
+        self._standstill, self._wire_damage = Standstill(), WireDamage()
         self.health = {
             stream: takeover.unheard(self.wiring, self.devices, stream) for stream in ("force", "axis", "marker")
         }
@@ -267,6 +268,7 @@ class BenchLoop:
     def start(self, program: Program, number: int) -> None:
         """Begins a program, whose outcome will carry ``number``; where the limb is now is where it should stay."""
         self._program = number
+        self._wire_damage.begin(self.devices.by_role())
         self._registration.begin()
         self._standstill.begin()
         self._first_touch.begin()
@@ -310,6 +312,7 @@ class BenchLoop:
             surface_mm=None if math.isnan(state.surface_mm) else state.surface_mm,
             zero_N=None if math.isnan(state.zero_N) else state.zero_N,
             touch=state.touch,
+            wire_damage=self._wire_damage.shares(self.devices.by_role()),
         )
         self._channel.send(Finished(program=self._program, outcome=outcome_of))
 

@@ -1,6 +1,7 @@
 """What supervisor and loop say to each other over their channel, and how a program ended."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from pydantic import Field
@@ -16,7 +17,7 @@ Status = dict[str, Any]
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a program ended."""
+    """How a program ended; ``wire_damage`` by role, see ``WireDamage``."""
 
     outcome: str
     cause: str
@@ -24,6 +25,7 @@ class Outcome:
     surface_mm: float | None
     zero_N: float | None
     touch: Touch | None = None
+    wire_damage: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def stopped(self) -> bool:

@@ -32,6 +32,9 @@ class QualityLimits(Table):
     rate_lost: Bounds = Field(default=Bounds(good=0.05, bad=0.3), description="share of the nominal rate not achieved")
     # One frame in five hundred; a cable that loses more is damaged, and at 5 % every tenth of a millimetre has a hole.
     samples_lost: Bounds = Field(default=Bounds(good=0.002, bad=0.05), description="share lost or marked invalid")
+    # What gets through a wire that brings noise is right but for one in 65,536 of what a 16-bit checksum lets pass;
+    # one byte in five hundred messages, as with losses, says that a cable or its shield is damaged.
+    wire_damage: Bounds = Field(default=Bounds(good=0.002), description="damaged or foreign bytes a message")
     # 20 ms are 0.6 mm at 30 mm/s, 0.4 s longer than any loading of 8 mm at 20 mm/s.
     gap_ms: Bounds = Field(default=Bounds(good=20.0, bad=400.0), description="longest time without a sample")
     # A clipped peak is no peak: none is good, and one in a hundred cuts the end off the loading.

@@ -79,6 +79,15 @@ def _dropped(recording: Recording) -> float:
         return 0.0
 
 
+def wire_damage(recording: Recording) -> dict[str, float]:
+    """By role, failed checksums and discarded bytes for each good message; empty where the loop did not say."""
+    try:
+        found = json.loads(recording.metadata.get(SUMMARY, {}).get("wire_damage", "{}"))
+        return {str(role): float(share) for role, share in found.items()}
+    except (ValueError, AttributeError, TypeError):
+        return {}
+
+
 def cycles_missed(recording: Recording) -> float:
     """Share of the loop's cycles that were not run."""
     slots = recording.tables["loop"]["slot"]

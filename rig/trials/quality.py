@@ -106,6 +106,9 @@ def _of_streams(recording: Recording, limits: QualityLimits) -> Iterator[Measure
         "cycles_missed", measures.cycles_missed(recording), limits.cycles_missed,
         "the loop missed of its cycles", " %", 100,
     )  # fmt: skip
+    for role, share in measures.wire_damage(recording).items():
+        text = f"{role}: damaged or foreign on its wire, bytes a message:"
+        yield Measure(f"{role}.wire_damage", share, limits.wire_damage, text)
     for stream in ("force", "axis"):
         lost = measures.rate_lost(recording, stream, rates[stream]) if stream in rates else math.nan
         yield Measure(f"{stream}.rate_lost", lost, limits.rate_lost, f"{stream}: below its nominal rate by", " %", 100)

@@ -4,6 +4,7 @@ import pytest
 
 from controller.loop.modes import Mode
 from controller.loop.steps import Compress
+from drivers.roles import LinkCounters
 from tests.controller.fake_bench import APPROACH, LEAVE, PRESS, ZERO, FakeBench, wired
 from tests.controller.fake_devices import SURFACE_MM, ZERO_N
 
@@ -56,3 +57,15 @@ def test_touches_stay_within_the_workspace_of_the_wiring() -> None:
     assert finished["surface_mm"] == pytest.approx(bench.force.surface_mm, abs=0.02)
     approaching = [row.command_mm for row in bench.ring.loop if row.mode == Mode.APPROACH]
     assert min(approaching) == pytest.approx(9.9)
+
+
+def test_an_outcome_says_what_each_wire_brought_besides_messages_while_it_ran() -> None:
+    bench = FakeBench()
+    bench.force.counters = LinkCounters(frames=100, checksum_errors=7, discarded_bytes=30)
+    bench.begin(ZERO)
+    bench.force.counters.frames += 50
+    bench.force.counters.checksum_errors += 2
+    bench.force.counters.discarded_bytes += 3
+    bench.until(lambda: bool(bench.link.of("finished")))
+    finished = bench.link.of("finished")[-1]
+    assert finished["wire_damage"] == {"force": 0.1, "axis": 0.0, "tracker": 0.0}

@@ -136,12 +136,12 @@ def test_a_limb_that_pushes_while_the_tip_rests_is_felt_before_the_limit(product
 
 @pytest.mark.parametrize(("period_ms", "samples"), [(1, 12), (10, 4), (40, 4)])
 def test_the_rate_of_force_is_measured_at_every_rate_of_the_sensor(period_ms: int, samples: int) -> None:
-    inputs = LoadMonitor(period_ms * 1_000_000)
-    inputs.axis(0, 0.0)
+    monitor = LoadMonitor(period_ms * 1_000_000)
+    monitor.axis(0, 0.0)
     for number in range(samples):
         at_ns = number * period_ms * 1_000_000
-        inputs.force(at_ns, (0.3 * at_ns * 1e-9 * 100, 0.0, -0.4 * at_ns * 1e-9 * 100, 0.0, 0.0, 0.0))
-    load = inputs.load(at_ns, NO_WRENCH, 0.0, Setpoint(0.0, 0.0), 2000.0)
+        monitor.force(at_ns, (0.3 * at_ns * 1e-9 * 100, 0.0, -0.4 * at_ns * 1e-9 * 100, 0.0, 0.0, 0.0))
+    load = monitor.load(at_ns, NO_WRENCH, 0.0, Setpoint(0.0, 0.0), 2000.0)
     assert load.rate_N_s == pytest.approx(50.0)
     assert load.predicted_N == pytest.approx(load.force_N)
 
@@ -156,15 +156,15 @@ def test_a_rate_above_its_limit_stops_with_either_sensor(product: Product) -> No
 
 def loaded(position_mm: float, ahead_mm: float, noise_N: float = 0.0, velocity_mm_s: float = 0.0) -> float:
     """Peak foreseen at 3 N/mm, seen by ten samples, the set-point so far ahead."""
-    inputs = LoadMonitor(1_000_000)
+    monitor = LoadMonitor(1_000_000)
     for number in range(10):
         place_mm = position_mm - 0.1 * (9 - number)
-        inputs.axis(number * 1_000_000 - 500_000, place_mm)
+        monitor.axis(number * 1_000_000 - 500_000, place_mm)
     for number in range(10):
         place_mm = position_mm - 0.1 * (9 - number)
-        inputs.force(number * 1_000_000, (0.0, 3.0 * place_mm, 0.0, 0.0, 0.0, 0.0))
+        monitor.force(number * 1_000_000, (0.0, 3.0 * place_mm, 0.0, 0.0, 0.0, 0.0))
     setpoint = Setpoint(position_mm + ahead_mm, velocity_mm_s)
-    return inputs.load(9_000_000, NO_WRENCH, noise_N, setpoint, 2000.0).predicted_N
+    return monitor.load(9_000_000, NO_WRENCH, noise_N, setpoint, 2000.0).predicted_N
 
 
 def test_the_peak_foreseen_is_load_and_stiffness_times_the_way_still_to_go() -> None:
@@ -187,8 +187,8 @@ def test_noise_makes_no_stiffness_and_a_restless_zero_does_not_blind_the_predict
 
 
 def test_before_the_first_sample_nothing_is_known_and_an_unknown_load_is_a_stop() -> None:
-    inputs = LoadMonitor(1_000_000)
-    assert math.isnan(inputs.load(0, NO_WRENCH, 0.0, Setpoint(0.0, 0.0), 2000.0).predicted_N)
+    monitor = LoadMonitor(1_000_000)
+    assert math.isnan(monitor.load(0, NO_WRENCH, 0.0, Setpoint(0.0, 0.0), 2000.0).predicted_N)
     incident = evaluate(LoopState(wrench=NO_WRENCH, position_mm=20.0), SafetyInputs(mode=Mode.APPROACH), WIRING)
     assert incident and incident.code == "force_limit"
 

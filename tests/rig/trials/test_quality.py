@@ -123,6 +123,14 @@ def test_a_loading_that_the_limit_of_force_ended_may_be_less_deep_and_not_deeper
     assert [reason for reason in evaluate_trial(made, LIMITS).reasons if "depth reached 7.2" in reason]
 
 
+def test_a_noisy_wire_is_said_though_nothing_is_lost() -> None:
+    made = trial()
+    made.metadata["summary"]["wire_damage"] = json.dumps({"force": 0.4, "axis": 0.002})
+    found = evaluate_trial(made, LIMITS)
+    assert found.verdict == "usable"
+    assert found.reasons == ("force: damaged or foreign on its wire, bytes a message: 0.4 (good up to 0.002)",)
+
+
 def test_a_surface_that_is_known_badly_is_said() -> None:
     wide = json.dumps({"surface_mm": 20.0, "low_mm": 19.5, "high_mm": 20.1})
     found = evaluate_trial(trial(contact=wide), LIMITS)
