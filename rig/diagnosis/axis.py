@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, filtfilt
 
-from rig.diagnosis.problem import Array, Channel, Effect, Fields, Par, Scatter, Values
+from rig.diagnosis.problem import Array, Channel, Effect, Par, Scatter, Values
+from rig.tissue.index_law import Fields
 
 CUT_HZ = 35.0
 THINNED_HZ = 100.0

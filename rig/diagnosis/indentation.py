@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from rig.diagnosis.effects.bench import BENCH_EFFECTS
 from rig.diagnosis.effects.tissue import STIFFENING, STIFFENING_EFFECT, TISSUE_EFFECTS
 from rig.diagnosis.observations import Observations
-from rig.diagnosis.problem import Array, Channel, Effect, Fields, Par, Scatter, Values
+from rig.diagnosis.problem import Array, Channel, Effect, Par, Scatter, Values
 from rig.simulation.chain import NULLS, respond
 from rig.simulation.drive import SETTLE_MM_S, Drive
+from rig.tissue.index_law import Fields, index_force
 
 STIFFNESS = Par("a_N_mm", "N/mm", 0.5, 1e-5, 1e3, 0.1, log=True, meaning="stiffness at contact")
 VISCOSITY = Par("damping_N_s_mm", "N s/mm", 0.0, -1.0, 10.0, 0.005, meaning="damping")
@@ -190,7 +191,7 @@ def coarse_start(data: Observations, stiffening: bool) -> dict[str, float]:
     for surface in surfaces:
         depth = np.maximum(x - surface, 0.0)
         for growth in _growths(depth, stiffening):
-            columns = np.stack([depth * np.exp(growth * depth), v * (depth > 0), np.ones_like(x)], axis=1)
+            columns = np.stack([index_force(depth, 1.0, growth), v * (depth > 0), np.ones_like(x)], axis=1)
             solution, *_ = np.linalg.lstsq(columns, force, rcond=None)
             error = float(np.sum((force - columns @ solution) ** 2))
             if error < best[0] and solution[0] > 0:

@@ -7,10 +7,11 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.tissue.index_law import Fields
+
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Values = Mapping[str, float]
-Fields = Mapping[str, float | Array]
 
 
 @dataclass(frozen=True)

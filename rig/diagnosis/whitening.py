@@ -18,7 +18,8 @@ from rig.diagnosis.noise import (
     judged,
     starts_of,
 )
-from rig.diagnosis.problem import Fields, Problem, Values
+from rig.diagnosis.problem import Problem, Values
+from rig.tissue.index_law import Fields
 
 SHIFT_ROUNDS = 6
 # Small: what a direction has beyond the scatter's own is judged to a thousandth of it and less.

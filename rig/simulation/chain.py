@@ -4,13 +4,15 @@ Every cause is one operator that vanishes at its null value, so to extend the si
 null. Operators are pure and vectorised over all recordings of a session.
 """
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from rig.simulation.drive import Array, Drive
-from rig.simulation.scans import dahl, high_pass, low_pass, play
+from rig.simulation.scans import dahl, play
+from rig.tissue.history import Term
+from rig.tissue.index_law import Fields, extended_force
+from rig.tissue.laws_extended import Extended
 
 NULLS: dict[str, float] = {
     "a_N_mm": 0.5,
@@ -19,12 +21,8 @@ NULLS: dict[str, float] = {
     "surface_mm": 0.0,
     "zero_N": 0.0,
     "tip_zero_mm": 0.0,
-    "exponent": 1.0,
-    "quadratic_per_mm": 0.0,
-    "substrate_per_mm3": 0.0,
+    **Extended.known,
     "rate_exponent": 1.0,
-    "relaxation_ratio": 0.0,
-    "tau_s": 1.0,
     "preconditioning_gain": 0.0,
     "preconditioning_cycles": 3.0,
     "adhesion_N": 0.0,
@@ -35,12 +33,9 @@ NULLS: dict[str, float] = {
     "surface_motion_cos_mm": 0.0,
     "surface_motion_Hz": 0.25,
     "backlash_mm": 0.0,
-    "frame_compliance_mm_N": 0.0,
     "ripple_sin_mm": 0.0,
     "ripple_cos_mm": 0.0,
     "ripple_pitch_mm": 2.0,
-    "friction_N": 0.0,
-    "friction_length_mm": 0.1,
     "friction_start": 0.0,
     "tip_inertia_kg": 0.0,
     "filter_lag_s": 0.0,
@@ -49,11 +44,7 @@ NULLS: dict[str, float] = {
     "time_offset_s": 0.0,
     "tracker_latency_s": 0.0,
 }
-# A parameter is one number, or one number a sample where it differs between recordings.
-Fields = Mapping[str, float | Array]
 REFERENCE_SPEED_MM_S = 10.0
-REFERENCE_DEPTH_MM = 5.0
-LARGEST_EXPONENT = 30.0
 COMPLIANCE_ITERATIONS = 4
 
 
@@ -147,17 +138,8 @@ def contact(depth_mm: Array, travel_mm: Array) -> tuple[Array, Array]:
 
 
 def elastic(depth_mm: Array, v: Fields) -> Array:
-    """Index law a x exp(b x), times (x / 5 mm)^(n-1), 1 + q x and 1 + s x^3 where these are off their null [N]."""
-    inside = np.maximum(depth_mm, 0.0)
-    growth = np.minimum(v["b_per_mm"] * inside, LARGEST_EXPONENT)
-    force = v["a_N_mm"] * inside * np.exp(growth)
-    if v["exponent"] != 1:
-        force = force * (np.maximum(inside, 1e-6) / REFERENCE_DEPTH_MM) ** (v["exponent"] - 1)
-    if v["quadratic_per_mm"]:
-        force = force * (1 + v["quadratic_per_mm"] * inside)
-    if v["substrate_per_mm3"]:
-        force = force * (1 + v["substrate_per_mm3"] * inside**3)
-    return np.asarray(force)
+    """The tissue's force at rest [N]; none outside."""
+    return extended_force(np.maximum(depth_mm, 0.0), v)
 
 
 def _tangent(depth_mm: Array, v: Fields) -> Array:
@@ -186,7 +168,7 @@ def tissue(drive: Drive, tip: Tip, v: Fields) -> Array:
     if v["temperature_per_K"] and drive.temperature_C is not None:
         force = force * (1 + v["temperature_per_K"] * (drive.temperature_C - drive.temperature_C.mean()))
     if one(v, "relaxation_ratio"):
-        force = force + one(v, "relaxation_ratio") * high_pass(force, drive.time_s, drive.first, one(v, "tau_s"))
+        force = drive.history.respond(force, [Term(one(v, "relaxation_ratio"), one(v, "tau_s"))])
     force = force + touching * viscous(velocity, v)
     # Nothing holds tip and tissue together but adhesion: the rest can only push.
     return np.maximum(force, 0.0) + adhesion(tip, depth, drive, v)
@@ -217,7 +199,7 @@ def on_sensor(drive: Drive, tip: Tip, v: Fields) -> Array:
 def sensor(drive: Drive, force_N: Array, v: Fields) -> Array:
     """Filter lag, gain, zero and its drift."""
     if one(v, "filter_lag_s") > 0:
-        force_N = low_pass(force_N, drive.time_s, drive.first, one(v, "filter_lag_s"))
+        force_N = force_N - drive.history.transient(force_N, one(v, "filter_lag_s"))
     middle_s = 0.5 * (drive.time_s[0] + drive.time_s[-1])
     drift = one(v, "zero_drift_N_h") * (drive.time_s - middle_s) / 3600
     return np.asarray(force_N * (1 + one(v, "gain_error")) + v["zero_N"] + drift)

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.tissue.history import History
+
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 SETTLE_MM_S = 0.3
@@ -53,6 +55,11 @@ class Drive:
         mark = np.zeros(self.size, bool)
         mark[self.starts[:-1]] = True
         return mark
+
+    @cached_property
+    def history(self) -> History:
+        """Each recording as a path of its own."""
+        return History(np.where(self.first, np.inf, np.diff(self.time_s, prepend=self.time_s[:1])))
 
     @cached_property
     def in_recording_s(self) -> Array:

@@ -18,6 +18,8 @@ from rig.errors import UsageError
 FloatArray = NDArray[np.float64]
 SMALLEST = np.finfo(float).tiny
 FORGOTTEN = 40.0
+# Of a shorter step 1 - exp(-h/tau) has fewer than ten digits; of longer ones fixed sessions keep it to the last digit.
+SUDDEN = 1e-6
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 
 
@@ -56,19 +58,20 @@ class History:
             raise UsageError(
                 f"{len(self.step_s)} times for {elastic_N.size} depths; a history has one time for each depth"
             )
-        rise_N = np.diff(elastic_N, prepend=elastic_N[:1])
-        return elastic_N + sum((ratio * self._kept(rise_N, tau_s) for ratio, tau_s in terms), np.zeros_like(elastic_N))
+        left_N = (ratio * self.transient(elastic_N, tau_s) for ratio, tau_s in terms)
+        return elastic_N + sum(left_N, np.zeros_like(elastic_N))
 
-    def _kept(self, rise_N: FloatArray, tau_s: float) -> FloatArray:
-        """q of one term."""
-        lengths = self.step_s / tau_s
-        return _chained(np.exp(-lengths), -np.expm1(-lengths) / lengths * rise_N)
+    def transient(self, signal: FloatArray, tau_s: float) -> FloatArray:
+        """What is left of a signal's changes, which die out with ``tau_s``: q above, shape (n,); signal - q lags it."""
+        decay = np.exp(-self.step_s / tau_s)
+        lost = np.where(self.step_s < SUDDEN * tau_s, -np.expm1(-self.step_s / tau_s), 1 - decay)
+        return recurrence(decay, lost * tau_s / self.step_s * np.diff(signal, prepend=signal[:1]))
 
 
-def _chained(decay: FloatArray, gain: FloatArray) -> FloatArray:
-    """q[n] = decay[n] q[n-1] + gain[n], from q = 0."""
-    decay, total, reach = decay.copy(), gain.copy(), 1
-    while reach < len(total):
+def recurrence(decay: FloatArray, source: FloatArray) -> FloatArray:
+    """y[n] = decay[n] y[n-1] + source[n], from y = 0; a decay of 0 begins anew."""
+    decay, total, reach = decay.copy(), source.copy(), 1
+    while reach < len(total) and np.any(decay > SMALLEST):
         total[reach:] += decay[reach:] * total[:-reach]
         decay[reach:] *= decay[:-reach]
         reach *= 2

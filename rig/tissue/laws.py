@@ -15,6 +15,7 @@ from scipy.special import lambertw
 
 from rig.errors import UsageError
 from rig.tissue.history import SMALLEST, History, Term, ramped
+from rig.tissue.index_law import index_force
 
 FloatArray = NDArray[np.float64]
 BISECTIONS = 60
@@ -281,7 +282,7 @@ class Index(Damped):
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """a x exp(b x)."""
-        return self.a_N_mm * depth_mm * np.exp(self.b_per_mm * depth_mm)
+        return index_force(depth_mm, self.a_N_mm, self.b_per_mm)
 
     def slope(self, depth_mm: FloatArray) -> FloatArray:
         """a (1 + b x) exp(b x)."""

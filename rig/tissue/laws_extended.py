@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.tissue.history import Term
+from rig.tissue.index_law import extended_force
 from rig.tissue.laws import DAMPING, Bounds, Damped, FloatArray, Index, bisect
 
-REFERENCE_MM = 5.0
 DEEPEST_MM = 200.0
 STEP_MM = 1e-5
 
@@ -81,17 +81,14 @@ class Extended(Damped):
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """The tissue's force; with a compliant frame where tissue and frame carry the same."""
-        if not self.frame_compliance_mm_N:
+        c_mm_N = self.frame_compliance_mm_N
+        if not c_mm_N:
             return self._tissue(depth_mm)
-        tip_mm = bisect(
-            lambda x: x + self.frame_compliance_mm_N * self._tissue(x), depth_mm, np.zeros_like(depth_mm), depth_mm
-        )
+        tip_mm = bisect(lambda x: x + c_mm_N * self._tissue(x), depth_mm, np.zeros_like(depth_mm), depth_mm)
         return self._tissue(tip_mm)
 
     def _tissue(self, tip_mm: FloatArray) -> FloatArray:
-        bent = np.maximum(tip_mm, 1e-9) ** (self.exponent - 1) / REFERENCE_MM ** (self.exponent - 1)
-        added = (1 + self.quadratic_per_mm * tip_mm) * (1 + self.substrate_per_mm3 * tip_mm**3)
-        return np.asarray(self.a_N_mm * tip_mm * np.exp(self.b_per_mm * tip_mm) * bent * added)
+        return extended_force(tip_mm, vars(self))
 
     def slope(self, depth_mm: FloatArray) -> FloatArray:
         """Central difference; one-sided at contact."""
@@ -102,6 +99,5 @@ class Extended(Damped):
     def elastic_inverse(self, force_N: FloatArray) -> FloatArray:
         """The tip's depth by bisection, and how far the frame gives way."""
         force = np.asarray(force_N, float)
-        with np.errstate(over="ignore"):
-            tip_mm = bisect(self._tissue, force, np.zeros_like(force), np.full_like(force, DEEPEST_MM))
+        tip_mm = bisect(self._tissue, force, np.zeros_like(force), np.full_like(force, DEEPEST_MM))
         return np.asarray(tip_mm + self.frame_compliance_mm_N * force)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from rig.errors import UsageError
+from rig.tissue.index_law import index_stiffness
 from rig.tissue.lattice.sweep import Sweep
 from rig.tissue.laws import DAMPING, Bounds, Damped, FloatArray, Law, bisect
 
@@ -110,7 +111,7 @@ class LatticeIndex(LatticeLaw):
 
     def spring_N_mm(self, depth_mm: FloatArray) -> FloatArray:
         """a exp(b x)."""
-        return self.a_N_mm * np.exp(self.b_per_mm * depth_mm)
+        return index_stiffness(depth_mm, self.a_N_mm, self.b_per_mm)
 
     def slope(self, depth_mm: FloatArray) -> FloatArray:
         """a exp(b x) (phi' + b phi): the tangent the loop sees."""

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rig.config.table import Table
+from rig.tissue.index_law import index_stiffness
 
 NotNegative = Annotated[float, Field(ge=0)]
 
@@ -85,4 +86,4 @@ class IndexFit:
 
     def __call__(self, depth_mm: NDArray[np.float64]) -> NDArray[np.float64]:
         """k(x) in N/mm."""
-        return np.asarray(self.a_N_mm * np.exp(self.b_per_mm * depth_mm))
+        return index_stiffness(depth_mm, self.a_N_mm, self.b_per_mm)

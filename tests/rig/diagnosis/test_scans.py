@@ -4,7 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.simulation.scans import dahl, high_pass, low_pass, play, recurrence
+from rig.simulation.scans import dahl, play
+from rig.tissue.history import History, recurrence
 
 
 def two_recordings(seed: int, count: int = 60) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -54,16 +55,7 @@ def test_dahl_friction_builds_up_over_its_length_and_turns_after_a_reversal() ->
     np.testing.assert_allclose(left - state, -np.exp(-np.cumsum(np.abs(np.diff(position, prepend=0.0))) / 0.1))
 
 
-def test_relaxation_of_a_ramp_is_the_textbook_exponential() -> None:
-    time = np.arange(1000, dtype=float) * 1e-3
-    first = np.zeros(1000, bool)
-    first[0] = True
-    tau = 0.2
-    np.testing.assert_allclose(high_pass(time, time, first, tau), tau * (1 - np.exp(-time / tau)), atol=1e-12)
-
-
-def test_a_lag_plus_its_high_pass_is_the_signal() -> None:
-    position, time, first = two_recordings(3)
-    np.testing.assert_allclose(
-        low_pass(position, time, first, 0.05) + high_pass(position, time, first, 0.05), position, atol=1e-12
-    )
+def test_relaxation_of_a_ramp_is_the_textbook_exponential_in_every_path_anew() -> None:
+    time_s, tau_s = np.arange(1000) * 1e-3, 0.2
+    ramps = History.at(time_s, time_s).transient(np.tile(time_s, 2), tau_s)
+    np.testing.assert_allclose(ramps, np.tile(tau_s * (1 - np.exp(-time_s / tau_s)), 2), atol=1e-12)

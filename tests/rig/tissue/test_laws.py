@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from rig.errors import UsageError
 from rig.tissue.laws import Constant, Index, Law
+from rig.tissue.laws_extended import Extended
 from rig.tissue.registry import LAWS, law_named
 
 depths_mm = st.floats(0.001, 15.0)
@@ -124,3 +125,12 @@ def test_laws_are_found_by_name_and_a_wrong_name_lists_them() -> None:
     assert LAWS["index"] is law_named("index") is Index
     with pytest.raises(UsageError, match=r"no tissue law is called 'indx'; choose one of .*constant.*index"):
         law_named("indx")
+
+
+def test_each_extension_multiplies_the_index_law_as_its_formula_says() -> None:
+    law = Extended(
+        a_N_mm=0.2, b_per_mm=0.1, damping_N_s_mm=0.0, exponent=1.3, quadratic_per_mm=0.05, substrate_per_mm3=1e-3
+    )
+    for x in (0.5, 2.0, 7.0):
+        expected = 0.2 * x * math.exp(0.1 * x) * (x / 5) ** 0.3 * (1 + 0.05 * x) * (1 + 1e-3 * x**3)
+        assert float(law.force(x)) == pytest.approx(expected, rel=1e-12)
