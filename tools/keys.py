@@ -1,27 +1,15 @@
 """The reference of keys: every table of a configuration file with its keys, written from the models that read it."""
 
 import inspect
-import json
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import Any, get_args
+from typing import get_args
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-Schema = Mapping[str, Any]
+from tools.words import Schema, toml, value_words
 
-WORDS = {"string": "text", "integer": "whole number", "number": "number", "boolean": "true or false", "null": "absent"}
-FORMATS = {"path": "path", "date-time": "date and time"}
-BOUNDS = {
-    "minimum": "≥ {}",
-    "exclusiveMinimum": "> {}",
-    "maximum": "≤ {}",
-    "exclusiveMaximum": "< {}",
-    "minItems": "at least {}",
-    "maxItems": "at most {}",
-    "minLength": "not shorter than {}",
-}
 HEADER = "| key | value | default | meaning |\n|---|---|---|---|"
 
 
@@ -44,7 +32,7 @@ def _places(root: type[BaseModel]) -> dict[type[BaseModel], str]:
 def _variant(model: type[BaseModel]) -> str:
     """What tells this table from others in the same place: its one key that has one value only."""
     said = model.model_json_schema()["properties"]
-    return next(f": {name} = `{_toml(one['const'])}`" for name, one in said.items() if "const" in one)
+    return next(f": {name} = `{toml(one['const'])}`" for name, one in said.items() if "const" in one)
 
 
 def _nested(model: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseModel]]]:
@@ -79,41 +67,9 @@ def _is_section(field: FieldInfo) -> bool:
 
 
 def _row(name: str, field: FieldInfo, schema: Schema, largest: str) -> str:
-    value = _value(schema["properties"][name], schema.get("$defs", {}))
+    value = value_words(schema["properties"][name], schema.get("$defs", {}))
     meaning = "; ".join(part for part in (field.description or "", largest) if part)
     return f"| `{name}` | {value} | {_default(field)} | {meaning} |".replace("  ", " ")
-
-
-def _value(said: Schema, definitions: Schema) -> str:
-    if "$ref" in said:
-        return _value(definitions[said["$ref"].rpartition("/")[2]], definitions)
-    for choice in ("anyOf", "oneOf"):
-        if choice in said:
-            return " or ".join(dict.fromkeys(_value(one, definitions) for one in said[choice]))
-    if "enum" in said or "const" in said:
-        return ", ".join(f"`{_toml(one)}`" for one in said.get("enum", [said.get("const")]))
-    return _kind(said, definitions)
-
-
-def _kind(said: Schema, definitions: Schema) -> str:
-    match said:
-        case {"type": "array", "prefixItems": [first, *rest]}:
-            return f"{1 + len(rest)} of: {_value(first, definitions)}"
-        case {"type": "array", "items": items}:
-            return f"list of: {_value(items, definitions)}{_bounds(said)}"
-        case {"type": "object", "additionalProperties": dict(value)}:
-            return f"table of: {_value(value, definitions)}"
-        case {"type": "object", "title": title}:
-            return f"table `{title}`"
-        case {"format": form}:
-            return FORMATS[form]
-        case _:
-            return f"{WORDS[said['type']]}{_bounds(said)}"
-
-
-def _bounds(said: Schema) -> str:
-    found = [words.format(said[name]) for name, words in BOUNDS.items() if name in said]
-    return f", {', '.join(found)}" if found else ""
 
 
 def _default(field: FieldInfo) -> str:
@@ -122,11 +78,4 @@ def _default(field: FieldInfo) -> str:
     default = field.get_default(call_default_factory=True)
     if default is None:
         return "absent"
-    return f"`{_toml(default)}`"
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, BaseModel):
-        keys = value.model_dump(mode="json", exclude_none=True).items()
-        return f"{{{', '.join(f'{name} = {_toml(one)}' for name, one in keys)}}}"
-    return json.dumps(value, default=str, ensure_ascii=False)
+    return f"`{toml(default)}`"

@@ -1,21 +1,25 @@
 """Sphinx extension: a line ``<!-- generated: NAME -->`` of a page is replaced by what the program itself says.
 
 Nothing of the reference is written by hand twice: keys come from the models that read the files, commands from the
-command line's own help.
+command line's own help, routes from the service's description.
 """
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 
 from sphinx.application import Sphinx
 from sphinx.util.typing import ExtensionMetadata
 from typer.testing import CliRunner
 
 from api.cli.app import COMMANDS, build
+from api.http import app as service
+from api.http.service import Service
 from rig.config.maxima import MAXIMA
 from rig.config.products.registry import AXES
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring
+from tools.http_routes import routes
 from tools.keys import tables
 from tools.schemas import WRITTEN
 
@@ -56,8 +60,14 @@ def _schema_row(name: str) -> str:
     return f"| `rig {COMMANDS_OF.get(name, name)}` | {{download}}`{name} <schemas/{name}.schema.json>` |"
 
 
+def http() -> str:
+    """Every route of the service; nothing is connected or written to say what it has."""
+    return routes(service.build(Service(Wiring(), Path("sessions"), Path("examples"))).openapi())
+
+
 GENERATORS: dict[str, Callable[[], str]] = {
-    "wiring": wiring, "protocol": protocol, "commands": commands, "schemas": schemas
+    "wiring": wiring, "protocol": protocol, "commands": commands, "schemas": schemas,
+    "http": http,
 }  # fmt: skip
 
 

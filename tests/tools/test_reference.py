@@ -119,6 +119,17 @@ def test_every_command_stands_in_the_reference_with_its_help() -> None:
         assert f"Usage: rig {name} " in text
 
 
+def test_every_route_stands_in_the_reference_with_body_and_answers() -> None:
+    text = fill("<!-- generated: http -->")
+    start = text.partition("## POST /api/v1/jobs\n")[2].partition("\n## ")[0]
+    assert "- `X-Control-Lease` (header): text" in start
+    assert "- body: table `CaptureRequest` or table `TrackRequest`" in start
+    assert "- 409: not in the present state" in start
+    for name in ("CaptureRequest", "LeaseView", "Problem"):
+        assert f"## `{name}`\n" in text
+    assert "## POST /api/v1/estop\n" in text
+
+
 def test_a_mark_without_a_generator_is_an_error() -> None:
     with pytest.raises(KeyError):
         fill("<!-- generated: nothing -->")
