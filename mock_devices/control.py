@@ -98,7 +98,7 @@ class Desk:
         self._bench.hide(parse_hidden(name if value is None else f"{name}={value}" for name, value in wanted))
         return list(self._bench.hidden)
 
-    def _fault(self, values: object) -> dict[str, Any]:
+    def _fault(self, values: object) -> dict[str, JsonValue]:
         request = _table(values, "fault")
         device = known(str(request.get("device", "")), self._faults, "device")
         kind = known(str(request.get("kind", "")), self._faults[device][0], f"fault of {device}")
@@ -117,7 +117,7 @@ def _said_once(times: deque[Time]) -> list[Time]:
     return [times.popleft() for _ in range(min(len(times), TIMES_AT_ONCE))]
 
 
-def _table(values: object, verb: str) -> dict[str, Any]:
+def _table(values: object, verb: str) -> Mapping[str, Any]:
     if not isinstance(values, dict):
         raise UsageError(f"{verb} takes an object of names and values, not {values!r}")
     return values

@@ -74,7 +74,7 @@ def _describe_problems(app: FastAPI) -> None:
     original = app.openapi
 
     def described() -> dict[str, Any]:
-        schema: dict[str, Any] = original()
+        schema = original()
         schemas = schema["components"]["schemas"]
         schemas["Problem"] = Problem.model_json_schema(ref_template="#/components/schemas/{model}")
         for unused in ("HTTPValidationError", "ValidationError"):

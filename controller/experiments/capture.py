@@ -6,6 +6,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
+from pydantic import JsonValue
+
 import rig
 from controller.experiments.indentation import Trial, attempts, longest_s, trials
 from controller.experiments.recorded import metadata, record, refuse_bench
@@ -41,7 +43,7 @@ def refuse_used(folder: Path) -> None:
 
 
 def new_session(
-    folder: Path, kind: Literal["capture", "track"], protocol: Mapping[str, object], wiring: Wiring
+    folder: Path, kind: Literal["capture", "track"], protocol: Mapping[str, JsonValue], wiring: Wiring
 ) -> SessionInfo:
     """An empty session in ``folder``; raises UsageError where there is one already."""
     refuse_used(folder)

@@ -22,6 +22,7 @@ from rig.simulation import axis_plant
 from rig.simulation.axis_plant import AxisState, Limb, Motor, PositionLoop, Sensing
 
 Column = NDArray[np.float64]
+Parts = dict[str, Callable[..., object]]
 ROWS = 6
 
 

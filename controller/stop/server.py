@@ -19,10 +19,11 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from pathlib import Path
+from typing import TypedDict
 
 from controller.loop import realtime
 from controller.stop import http
@@ -42,6 +43,25 @@ LINGER_S = 0.5
 LINGER_BYTES = 65_536
 CONNECTIONS = 64
 LONGEST_WAIT_S = 0.2
+
+
+class StopSaid(TypedDict):
+    """What became of a stop: the answer to whoever asked for it."""
+
+    id: int
+    kind: str
+    confirmed: bool
+    done: str
+    after_ms: float
+
+
+class StopState(TypedDict):
+    """How loop and keypad are, how often the keypad was pressed, and the stop asked for last."""
+
+    loop: str
+    keypad: str
+    presses: int
+    last: StopSaid | None
 
 
 @dataclass
@@ -83,7 +103,7 @@ class Server:
         listener.setblocking(False)
         self._selector.register(listener, selectors.EVENT_READ, self._accept)
         self._connections: dict[int, Connection] = {}
-        self._last: dict[str, object] | None = None
+        self._last: StopSaid | None = None
         self.loop = LoopLife(page, now)
 
     def watch(self, fd: int, ready: Callable[[], None]) -> None:
@@ -187,7 +207,7 @@ class Server:
         elif not stop and self._now() >= connection.deadline:
             self._drop(connection)
 
-    def _said(self, stop: Request, answer: Answer | None, after_s: float) -> dict[str, object]:
+    def _said(self, stop: Request, answer: Answer | None, after_s: float) -> StopSaid:
         confirmed = answer is not None and answer.confirmed
         why = answer.text if answer else "the loop's process is gone" if self.loop.gone else "the loop does not answer"
         return {
@@ -198,7 +218,7 @@ class Server:
             "after_ms": round(after_s * 1e3, 2),
         }
 
-    def state(self) -> dict[str, object]:
+    def state(self) -> StopState:
         """How loop and keypad are, and the stop asked for last."""
         return {
             "loop": self.loop.state(),
@@ -207,7 +227,7 @@ class Server:
             "last": self._last,
         }
 
-    def _reply(self, connection: Connection, status: HTTPStatus, body: dict[str, object] | None) -> None:
+    def _reply(self, connection: Connection, status: HTTPStatus, body: Mapping[str, object] | None) -> None:
         asked, connection.asked = connection.asked, None
         keep = bool(asked and asked.keep)
         origin = asked.headers.get("origin", "") if asked else ""

@@ -2,16 +2,15 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
-from rig.config.table import AnyTable, parse, read_toml
+from rig.config.table import AnyTable, TomlTable, parse, read_toml
 from rig.errors import UsageError
 
 
 def with_files(calibration: Calibration) -> Calibration:
     """``calibration`` with what its files hold; raises UsageError naming file and key where one is malformed."""
-    found: dict[str, object] = {}
+    found: dict[str, ForceCalibration | AxisCalibration] = {}
     if calibration.force:
         found["of_force"] = _read(ForceCalibration, calibration.force, "calibration.force")
     if calibration.axis:
@@ -39,7 +38,7 @@ def _read(kind: type[AnyTable], path: Path, role: str) -> AnyTable:
     return parse(kind, values, f"{role} {path}")
 
 
-def _read_json(path: Path, role: str) -> dict[str, Any]:
+def _read_json(path: Path, role: str) -> TomlTable:
     try:
         values = json.loads(path.read_text())
     except FileNotFoundError as error:

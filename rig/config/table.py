@@ -12,6 +12,9 @@ from pydantic_core import ErrorDetails, to_json
 from rig.errors import UsageError
 from rig.registry import nearest
 
+TomlTable = dict[str, Any]
+"""A file as it was read, before a model says what its keys mean."""
+
 
 class Table(BaseModel):
     """A TOML table: frozen, no unknown keys, no NaN or infinity; what is read is never turned from text into number."""
@@ -22,7 +25,7 @@ class Table(BaseModel):
 AnyTable = TypeVar("AnyTable", bound=Table)
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path) -> TomlTable:
     """The file's table; a missing or malformed file is one sentence."""
     try:
         return tomllib.loads(path.read_text())
@@ -50,7 +53,7 @@ def load(kind: type[AnyTable], path: Path, overrides: Iterable[str] = ()) -> Any
     return parse(kind, merged(read_toml(path), overrides), str(path))
 
 
-def merged(values: dict[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
+def merged(values: TomlTable, overrides: Iterable[str]) -> TomlTable:
     """``values`` with each ``section.key=value`` set; the value is TOML, or text where it is not."""
     for override in overrides:
         name, separator, text = override.partition("=")

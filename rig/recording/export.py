@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Literal, get_args
@@ -21,6 +21,7 @@ from rig.recording.sessions import Session, TrialInfo, plain
 from rig.recording.tables import Column, arrow_table, compression_N, filled, write_parquet
 
 Format = Literal["csv", "parquet", "hdf5", "mat"]
+MatValue = NDArray[np.generic] | str | float | Mapping[str, "MatValue"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 COLUMNS_FILE = "columns.csv"
 # MATLAB's own limits: names of at most 63 characters, files of version 5 below 2 GiB a variable.
@@ -157,20 +158,20 @@ def _mat(session: Session, out: Path) -> None:
         raise UsageError(
             f"{out}: {size >> 20} MiB are more than a MAT file holds; export hdf5, which MATLAB also reads"
         )
-    content: dict[str, object] = {"session": _information(session), "units": _units()}
+    content: dict[str, MatValue] = {"session": _information(session), "units": _units()}
     for trial in session.trials:
         content[_variable(trial.name, content)] = _struct(session, trial)
     with whole_file(out) as scratch:
         scipy.io.savemat(str(scratch), content, appendmat=False, long_field_names=True, do_compression=True)
 
 
-def _struct(session: Session, trial: TrialInfo) -> dict[str, object]:
+def _struct(session: Session, trial: TrialInfo) -> dict[str, MatValue]:
     recording = session.recording(trial.name)
-    streams = {
+    streams: dict[str, MatValue] = {
         stream.name: {name: _mat_column(column) for name, column in table.items()}
         for stream, table in filled(recording)
     }
-    facts = {"speed_mm_s": trial.speed_mm_s, "depth_mm": trial.depth_mm, "outcome": trial.outcome}
+    facts: dict[str, MatValue] = {"speed_mm_s": trial.speed_mm_s, "depth_mm": trial.depth_mm, "outcome": trial.outcome}
     return {**streams, **facts, "metadata": json.dumps(recording.metadata)}
 
 
@@ -184,7 +185,7 @@ def _units() -> dict[str, dict[str, str]]:
     return {stream.name: {name: unit for name, (unit, _) in stream.units.items()} for stream in STREAMS}
 
 
-def _variable(name: str, taken: dict[str, object]) -> str:
+def _variable(name: str, taken: Collection[str]) -> str:
     """``name`` as a MATLAB name that is not taken: letters, digits and underscores, a letter first."""
     base = re.sub(r"\W", "_", name, flags=re.ASCII)
     base = (base if base[:1].isalpha() else f"trial_{base}")[: MAT_NAME - 4]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from rig.config.table import Table
+from rig.config.table import Table, TomlTable
 from rig.errors import UsageError
 from rig.recording.csv_columns import TIME, TOOL
 
@@ -43,7 +43,7 @@ def _sense(words: dict[int, tuple[str, ...]], value: object) -> int:
 ForceSense = Annotated[Literal[1, -1], BeforeValidator(lambda value: _sense(_FORCE_WORDS, value))]
 PositionSense = Annotated[Literal[1, -1], BeforeValidator(lambda value: _sense(_POSITION_WORDS, value))]
 Positive = Annotated[float, Field(gt=0)]
-Facts = dict[str, object] | str
+Facts = TomlTable | str
 
 
 class SessionTable(Table):

@@ -11,6 +11,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from pydantic import JsonValue
+
 from rig.errors import DataError
 from rig.recording.mcap_file import SUMMARY
 from rig.recording.reader import Recording, read_recording
@@ -24,7 +26,7 @@ def file_sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def seal(table: Mapping[str, object]) -> dict[str, object]:
+def seal(table: Mapping[str, JsonValue]) -> Mapping[str, JsonValue]:
     """``table`` with the hash of everything else in it."""
     return {**table, SEAL: _table_sha256(table)}
 

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, TypeAdapter, ValidationError
+from pydantic import BeforeValidator, JsonValue, TypeAdapter, ValidationError
 
 from rig.errors import DataError, UsageError
 from rig.recording.files import write_text
@@ -21,6 +21,7 @@ from rig.recording.tables import write_parquet
 
 SESSION_FILE = "session.json"
 PARQUET_FOLDER = "parquet"
+JsonTable = dict[str, JsonValue]
 # JSON has no NaN: an unknown number is null in the file and NaN here.
 Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
 
@@ -63,10 +64,10 @@ class SessionInfo:
     kind: Literal["capture", "import", "track"]
     created: str
     software: str
-    protocol: dict[str, object] = field(default_factory=dict)
-    wiring: dict[str, object] = field(default_factory=dict)
-    subject: dict[str, object] = field(default_factory=dict)
-    notes: dict[str, object] = field(default_factory=dict)
+    protocol: JsonTable = field(default_factory=dict)
+    wiring: JsonTable = field(default_factory=dict)
+    subject: JsonTable = field(default_factory=dict)
+    notes: JsonTable = field(default_factory=dict)
     trials: tuple[TrialInfo, ...] = ()
 
 
@@ -113,11 +114,11 @@ def write_session(folder: Path, info: SessionInfo) -> None:
     write_text(folder / SESSION_FILE, json.dumps(seal(_plain_table(info)), indent=2, ensure_ascii=False) + "\n")
 
 
-def _plain_table(info: SessionInfo) -> dict[str, object]:
+def _plain_table(info: SessionInfo) -> JsonTable:
     return {name: plain(value) for name, value in asdict(info).items()}
 
 
-def plain(value: object) -> object:
+def plain(value: object) -> JsonValue:
     """``value`` as JSON can hold it: NaN and infinities as null, tuples as lists, other objects as text."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
@@ -205,21 +206,22 @@ def _info_from(first: Recording) -> SessionInfo:
     )
 
 
-def _nested(values: Mapping[str, str]) -> dict[str, object]:
+def _nested(values: Mapping[str, str]) -> JsonTable:
     """A metadata record with its JSON texts as values; a lone key ``json`` is the whole table."""
     found = {name: _value(text) for name, text in values.items()}
     whole = found.get("json")
     return {str(key): item for key, item in whole.items()} if isinstance(whole, dict) and len(found) == 1 else found
 
 
-def _value(text: str) -> object:
+def _value(text: str) -> JsonValue:
     # Only tables and lists are JSON; a subject called 7 stays a text.
     if not text.startswith(("{", "[")):
         return text
     try:
-        return json.loads(text)
+        found: JsonValue = json.loads(text)
     except ValueError:
         return text
+    return found
 
 
 def _trial_from(recording: Recording) -> TrialInfo:

@@ -18,7 +18,7 @@ from rig.errors import DataError, UsageError
 from rig.recording.export import FORMATS, Format, export
 from rig.recording.files import WriteFailed
 from rig.recording.importing import import_session
-from rig.recording.sessions import Session, SessionInfo, TrialInfo, open_session, write_session
+from rig.recording.sessions import JsonTable, Session, SessionInfo, TrialInfo, open_session, write_session
 from tests.rig.recording.conftest import WriteRecording, axis, event, force
 from tests.rig.recording.measured import NOW, run
 from tests.rig.recording.test_mcap_file import disk_of
@@ -31,7 +31,7 @@ def session(tmp_path: Path, write_recording: WriteRecording) -> Session:
     for name in names:
         write_recording(name, rows=150)
     trials = tuple(TrialInfo(name, f"{name}.mcap", 5.0, 8.0, "done", 4.5, {"force": 150}) for name in names)
-    subject: dict[str, object] = {"id": "7", "age": 31}
+    subject: JsonTable = {"id": "7", "age": 31}
     info = SessionInfo("s1", "capture", "2024-05-01T10:00:00", "tissue-rig", subject=subject, trials=trials)
     write_session(tmp_path, info)
     return open_session(tmp_path)

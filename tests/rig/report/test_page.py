@@ -12,7 +12,7 @@ import pytest
 
 from api.cli.fitting import Wanted, fit_and_write
 from rig.errors import DataError, UsageError
-from rig.recording.sessions import SessionInfo, TrialInfo, open_session, write_session
+from rig.recording.sessions import JsonTable, SessionInfo, TrialInfo, open_session, write_session
 from rig.report.page import write_report
 from tests.rig.tissue.synthetic import Bench, index_force, metadata, tables, write_made_session, write_recording
 
@@ -88,7 +88,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A whole session: trials, tracking, and a subject who writes HTML."""
     folder = tmp_path_factory.mktemp("made") / "session"
     cycles = Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0, 10.0, 20.0, 30.0))
-    subject: dict[str, object] = {"id": "<script>alert(1)</script>", "site": 'fore & "arm"'}
+    subject: JsonTable = {"id": "<script>alert(1)</script>", "site": 'fore & "arm"'}
     write_made_session(folder, cycles, subject=subject, protocol={"name": "indentation", "speeds_mm_s": [5.0, 10.0]})
     fit_and_write([folder], wanted=Wanted.from_options("layer", ["thickness_mm=30"], "layer"))
     track_into(folder)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rig.channels import AXIS, FORCE, LOOP, AxisSample, ForceSample, LoopSample
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.reader import Recording
-from rig.recording.sessions import SessionInfo, TrialInfo, write_session
+from rig.recording.sessions import JsonTable, SessionInfo, TrialInfo, write_session
 from rig.tissue.history import History
 from rig.tissue.laws import Law
 from rig.trials.cycles import IndentationCycle
@@ -202,7 +202,7 @@ def write_recording(
         writer.close()
 
 
-def write_made_session(folder: Path, cycles: Sequence[IndentationCycle], **about: dict[str, object]) -> Path:
+def write_made_session(folder: Path, cycles: Sequence[IndentationCycle], **about: JsonTable) -> Path:
     """A session folder with one recording a cycle."""
     folder.mkdir(parents=True, exist_ok=True)
     for cycle in cycles:
