@@ -270,7 +270,7 @@ class Supervisor:
         """Ends loop and recorder in order; may be called twice."""
         self._closing.set()
         latched = self.status.get("latched") or {}
-        self._tip_left_in |= latched.get("action") == Action.IMMEDIATE.name
+        self._tip_left_in = latched.get("action") == Action.IMMEDIATE.name
         if self.alive:
             try:
                 self.stop()

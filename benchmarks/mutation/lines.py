@@ -18,6 +18,7 @@ Line: TypeAlias = tuple[str, int]
 LONGEST_S = 8.0
 """Of tests for one mutant. All of them take 35 s, and that once for each of some 300 survivors were three hours; of 600
 mutants two were killed only by what comes later."""
+QUICK_S = 0.05
 
 
 def with_probes(tree: ast.Module) -> ast.Module:
@@ -46,7 +47,10 @@ def _mark(line: int) -> ast.stmt:
 
 @dataclass
 class Coverage:
-    """What was found out: statements run (by their first line) and seconds taken, by test, and what failed."""
+    """What was found out: statements run (by their first line) and CPU seconds taken, by test, and what failed.
+
+    Of a busy computer the clock on the wall would say which tests came when it was busiest.
+    """
 
     lines: dict[str, set[Line]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -55,14 +59,18 @@ class Coverage:
     def noticing(self, path: str, line: int, at_import: bool) -> list[str]:
         """Tests that may notice a change of the statement there, those that take least time and run least code first.
 
-        What runs at import (constants, defaults) is for all tests of the same file; for all there are where none is.
+        What runs at import (constants, defaults) is for all tests of the same file, and for the quick ones beside
+        those, for what a class declares is checked without a line of it; for all there are where none is.
         Of more tests than take ``LONGEST_S`` together, the first: what only others would notice counts as survived.
         """
         near = self._quickest(test for test, lines in self.lines.items() if (path, line) in lines)
         if not at_import:
             return self._affordable(near)
         same = self._quickest(test for test, lines in self.lines.items() if any(at == path for at, _ in lines))
-        return self._affordable(list(dict.fromkeys([*near, *same])) or self._quickest(self.lines))
+        found = self._affordable(list(dict.fromkeys([*near, *same])) or self._quickest(self.lines))
+        files = {test.partition("::")[0] for test in found}
+        beside = (test for test in self.lines if test.partition("::")[0] in files and self.seconds[test] < QUICK_S)
+        return list(dict.fromkeys([*found, *self._quickest(beside)]))
 
     def _affordable(self, tests: list[str]) -> list[str]:
         until = accumulate((self.seconds[test] for test in tests), initial=0.0)
@@ -71,7 +79,7 @@ class Coverage:
     def _quickest(self, tests: Iterable[str]) -> list[str]:
         """Of several cases of one test the second counts as twice as long, and so on: other tests notice other things.
 
-        Tenths of a second are what the computer's other work may add to a test.
+        Tenths of a second are what two runs of a test may differ by.
         """
         cases: Counter[str] = Counter()
         rank: dict[str, tuple[float, int, str]] = {}
@@ -94,11 +102,11 @@ class Observer:
         """Everything of one test."""
         for lines in self._ran.values():
             lines.clear()
-        began = time.perf_counter()
+        began_s = time.process_time()
         try:
             return (yield)
         finally:
-            self.tests.seconds[item.nodeid] = time.perf_counter() - began
+            self.tests.seconds[item.nodeid] = time.process_time() - began_s
             self.tests.lines[item.nodeid] = {(path, line) for path, lines in self._ran.items() for line in lines}
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:

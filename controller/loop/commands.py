@@ -56,7 +56,9 @@ class Inbox:
 
     def confirm(self, loop: BenchLoop) -> None:
         """Answers the stops taken in this cycle with what was done; one that nothing came of stays asked for."""
-        deed = _deed(loop, self._asked) if self._asked else None
+        if not self._asked:
+            return
+        deed = _deed(loop, self._asked)
         if deed is None:
             return
         now_ns = loop.now()

@@ -316,6 +316,8 @@ def test_children_get_one_thread_a_numerics_library_and_all_else_of_the_environm
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("RIG_TEST", "kept")
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
     environment = process_environment()
     assert (environment["OPENBLAS_NUM_THREADS"], environment["OMP_NUM_THREADS"]) == ("1", "1")
     assert environment["RIG_TEST"] == "kept"

@@ -54,3 +54,12 @@ def test_a_second_case_of_a_test_comes_after_others_and_what_takes_too_long_not_
     tests = Coverage(lines={test: {("a.py", 1)} for test in seconds}, seconds=seconds)
     # 0.5, 0.6, 2 times 0.5 and 3 times 0.5 s; c begins after 2.1 s of the 8 s there are, d after 9.1 s.
     assert tests.noticing("a.py", 1, at_import=False) == ["a[1]", "b", "a[2]", "a[3]", "c"]
+
+
+def test_a_declaration_is_also_for_quick_tests_beside_those_that_run_its_file() -> None:
+    tests = Coverage(
+        lines={"f.py::runs": {("a.py", 1)}, "f.py::declares": set(), "f.py::slow": set(), "g.py::other": set()},
+        seconds={"f.py::runs": 0.5, "f.py::declares": 0.01, "f.py::slow": 0.3, "g.py::other": 0.01},
+    )
+    assert tests.noticing("a.py", 7, at_import=True) == ["f.py::runs", "f.py::declares"]
+    assert tests.noticing("a.py", 1, at_import=False) == ["f.py::runs"]

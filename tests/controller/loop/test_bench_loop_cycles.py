@@ -16,7 +16,8 @@ from controller.loop.steps import Hold, Retract
 from controller.safety.inputs import SafetyInputs
 from controller.safety.load import UNKNOWN, LoadMonitor
 from controller.safety.table import Action, Incident
-from rig.channels import ForceSample
+from rig.channels import AxisSample, ForceSample
+from rig.errors import DeviceError
 from tests.controller.fake_bench import FakeBench, wired
 from tests.controller.fake_devices import ARM
 
@@ -230,7 +231,7 @@ def test_a_first_touch_is_looked_for_only_where_there_may_be_one() -> None:
 def test_each_surface_that_is_found_is_told_once() -> None:
     bench = FakeBench()
     first, second = (Touch(mm, mm - 0.1, mm + 0.1, mm, 0.1, 9, 0) for mm in (20.0, 21.0))
-    for touch in (None, first, first, None, second, second):
+    for touch in (None, first, None, second, second, second):
         bench.loop.state.touch = touch
         bench.cycle()
     assert events(bench) == [("contact", 10, touch.sentence) for touch in (first, second)]
@@ -321,11 +322,16 @@ def test_a_drive_that_cannot_give_way_is_left_braked_with_a_warning() -> None:
 
 def test_an_axis_that_fails_once_is_lost_with_the_reason() -> None:
     bench = FakeBench()
-    bench.axis.cut = "cable"
-    bench.cycle()
-    bench.axis.cut = ""
-    bench.cycle()
-    assert inputs(bench).axis_lost == "cable", "and asked nothing more"
+
+    def fails(now_ns: int) -> list[AxisSample]:
+        bench.axis.calls.append("poll")
+        raise DeviceError("no answer")
+
+    bench.axis.poll = fails  # type: ignore[method-assign]
+    bench.axis.calls.clear()
+    bench.cycles(3)
+    assert inputs(bench).axis_lost == "no answer"
+    assert bench.axis.calls == ["poll"], "and asked nothing more, a command included"
 
 
 def test_status_rounds_a_rate_to_tenths() -> None:

@@ -249,15 +249,18 @@ def test_in_the_last_half_millimetre_of_the_way_a_limb_that_pushes_can_be_given_
     assert (bench.machine.update(bench.inputs) is not None) is retreats
 
 
-def test_a_step_that_leads_to_no_place_is_stopped_where_the_axis_is() -> None:
-    class Nowhere(Hold):
+@pytest.mark.parametrize(("wanted_mm", "told_mm"), [(math.nan, 15.0), (99.0, 40.0), (-99.0, 5.0)])
+def test_a_step_that_leads_out_ends_at_the_end_of_the_way_and_one_to_no_place_where_the_axis_is(
+    wanted_mm: float, told_mm: float
+) -> None:
+    class Leads(Hold):
         def advance(self, state: LoopState, elapsed_s: float) -> bool:
-            state.setpoint = Setpoint(math.nan, 0.0)
+            state.setpoint = Setpoint(wanted_mm, 0.0)
             return False
 
-    bench = SpringBench(wiring=Wiring(limits=Limits(position_min_mm=5.0)))
+    bench = SpringBench(wiring=Wiring(limits=Limits(position_min_mm=5.0, position_max_mm=40.0)))
     bench.machine.start(Program(name="test", steps=(Hold(duration_s=1.0),)))
-    bench.machine._run = Nowhere(duration_s=1.0)
+    bench.machine._run = Leads(duration_s=1.0)
     bench.run_cycle()
-    assert bench.state.setpoint == Setpoint(15.0, 0.0)
+    assert bench.state.setpoint == Setpoint(told_mm, 0.0)
     assert bench.machine.latched and bench.machine.latched.code == "workspace"

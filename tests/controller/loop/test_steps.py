@@ -446,3 +446,49 @@ def test_a_retraction_leaves_from_the_surface_or_from_where_it_is_and_not_below_
 ) -> None:
     step = Retract(clearance_mm=5.0, speed_mm_s=10.0, floor_mm=floor_mm)
     assert step.target_mm(state(25.0, surface_mm=surface_mm)) == target_mm
+
+
+def test_the_noise_of_the_moment_is_its_rms_from_the_zero() -> None:
+    here, run = state(zero_N=math.nan), Zero(duration_s=0.01).begin()
+    for elapsed_s, moment_N_m in ((0.0, 0.006), (0.01, 0.0)):
+        over = run.advance(sampled(here, 0.8, (0.0, 0.0, -0.8, moment_N_m, 0.0, 0.0)), elapsed_s)
+    # 0.003 N m on either side of a mean of 0.003 N m.
+    assert over
+    assert here.noise_N_m == pytest.approx(0.003)
+
+
+def test_after_contact_every_cycle_is_the_touchs() -> None:
+    here, run = state(10.0), APPROACH.begin()
+    while run.searches:
+        run.advance(sampled(here, 5.0), 0.0)
+    assert run._touch
+    seen: list[LoopState] = []
+
+    def phase(state: LoopState) -> bool:
+        seen.append(state)
+        return False
+
+    run._touch._phase = phase
+    assert not run.advance(here, 0.0)
+    assert seen == [here]
+
+
+def test_the_law_is_told_where_the_tip_is_and_what_presses_on_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[tuple[Any, ...]] = []
+    begin, increment = force_position.begin, force_position.increment
+
+    def begins(*values: Any) -> Any:
+        told.append(values)
+        return begin(*values)
+
+    def goes_on(*values: Any) -> Any:
+        told.append(values)
+        return increment(*values)
+
+    monkeypatch.setattr(force_position, "begin", begins)
+    monkeypatch.setattr(force_position, "increment", goes_on)
+    step, here = tracking(friction_N=0.3), contacting(1.2)
+    step.begin().advance(here, 0.01)
+    (begun, asked) = told
+    assert begun[1:] == (1.2, 1.0, 0.3)
+    assert asked[2:] == (step.settings, pytest.approx(1.01), 1.2, 1.0, DT_S)
