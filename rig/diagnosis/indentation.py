@@ -18,7 +18,7 @@ from rig.simulation.drive import SETTLE_MM_S, Drive
 from rig.tissue.index_law import Fields, index_force
 
 STIFFNESS = Par("a_N_mm", "N/mm", 0.5, 1e-5, 1e3, 0.1, log=True, meaning="stiffness at contact")
-VISCOSITY = Par("damping_N_s_mm", "N s/mm", 0.0, -1.0, 10.0, 0.005, meaning="damping")
+DAMPING = Par("damping_N_s_mm", "N s/mm", 0.0, -1.0, 10.0, 0.005, meaning="damping")
 SURFACE = Par("surface_mm", "mm", 0.0, -1e4, 1e4, 0.05, meaning="axis position of the surface")
 ZERO = Par("zero_N", "N", 0.0, -1e3, 1e3, 0.02, meaning="force zero")
 TIP_ZERO = Par("tip_zero_mm", "mm", 0.0, -1e4, 1e4, 0.05, meaning="tracker zero along the axis")
@@ -66,7 +66,7 @@ class Indentation:
     @cached_property
     def base(self) -> tuple[Par, ...]:
         """What the simulation itself has free; a stated surface is taken at its word."""
-        pars = [STIFFNESS, *([STIFFENING] if self.simulation == "index" else []), VISCOSITY]
+        pars = [STIFFNESS, *([STIFFENING] if self.simulation == "index" else []), DAMPING]
         pars += [] if self.data.surface_mm is not None else [SURFACE]
         return (*pars, ZERO, *([TIP_ZERO] if self.data.has_tracker else []))
 
