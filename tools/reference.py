@@ -19,8 +19,10 @@ from rig.config.maxima import MAXIMA
 from rig.config.products.registry import AXES
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring
+from rig.tissue.registry import LAWS
 from tools.http_routes import routes
 from tools.keys import tables
+from tools.laws import laws as laws_of
 from tools.schemas import WRITTEN
 
 MARK = re.compile(r"^<!-- generated: ([a-z-]+) -->$", re.MULTILINE)
@@ -65,9 +67,15 @@ def http() -> str:
     return routes(service.build(Service(Wiring(), Path("sessions"), Path("examples"))).openapi())
 
 
+def laws() -> str:
+    """Every tissue law with its parameters."""
+    return laws_of(LAWS.values())
+
+
 GENERATORS: dict[str, Callable[[], str]] = {
     "wiring": wiring, "protocol": protocol, "commands": commands, "schemas": schemas,
     "http": http,
+    "laws": laws,
 }  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from rig.config.quality import Bounds, QualityLimits
 from rig.config.stop import Stop
 from rig.config.table import Table
 from rig.config.wiring import Limits, Loop, Mock, Subject, Wiring
+from rig.tissue.registry import LAWS
 from tools.keys import tables
 from tools.reference import fill
 
@@ -128,6 +129,15 @@ def test_every_route_stands_in_the_reference_with_body_and_answers() -> None:
     for name in ("CaptureRequest", "LeaseView", "Problem"):
         assert f"## `{name}`\n" in text
     assert "## POST /api/v1/estop\n" in text
+
+
+def test_a_law_stands_in_the_reference_with_units_bounds_and_what_is_given() -> None:
+    text = fill("<!-- generated: laws -->")
+    index = text.partition("## `index`\n")[2].partition("\n## ")[0]
+    assert "`F = a x exp(b x) + B v`" in index
+    assert "| `b_per_mm` | 1/mm | 0 | 5 | stiffening per depth | |" in index.replace("  ", " ")
+    assert "| `radius_mm` | mm | 0.1 | 100 | radius of the tip | 3 |" in text
+    assert all(f"## `{name}`\n" in text for name in LAWS)
 
 
 def test_a_mark_without_a_generator_is_an_error() -> None:
