@@ -97,7 +97,7 @@ def test_fit_of_every_law_draws_them_all(session: Path, tmp_path: Path) -> None:
 
 
 BAD = [
-    (["--laws", "cubic"], r"no tissue law is called 'cubic'; choose one of .*fung.*sls"),
+    (["--laws", "cubic"], r"no tissue law is called 'cubic'; nearest: .*; all: .*fung.*sls"),
     (["--with", "nowhere.json"], r"nowhere.json: no such file"),
     (["--model", "cubic"], r"no tissue law is called 'cubic'"),
     (["--known", "k=1"], r"--known k=1: the laws compared have k_N_mm, damping_N_s_mm, a_N_mm, b_per_mm; add --laws"),
