@@ -12,12 +12,12 @@ import numpy as np
 import typer
 
 from api.cli import live
-from api.cli.diagnose import run_diagnosis, save, show_diagnosis
+from api.cli.diagnose import diagnosed
+from api.cli.fitting import fitted as fit_session
 from api.cli.hidden_effect import Secret, draw
 from api.cli.motion import captured, followed, say_levels
 from api.cli.options import built_in
 from api.cli.output import console
-from api.cli.science import fit_session
 from api.cli.stage import bench_for
 from api.operations.motion import TrackRequest
 from controller.experiments import capture as experiment
@@ -25,7 +25,6 @@ from controller.experiments import tracked
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
-from rig.diagnosis.answers import Diagnosis
 from rig.errors import CheckFailed, UsageError
 from rig.recording.files import write_text
 from rig.recording.sessions import derive, open_session
@@ -85,14 +84,12 @@ def demo(
         console.rule(f"capture: {len(plan.speeds_mm_s)} speeds, {plan.trials} trials each")
         captured(bench, plan, session)
         console.rule("fit: constant stiffness against the index law")
-        fitted = fit_session(session)
+        fitted = fit_session([session])
         console.rule("track: gains from the tangent stiffness of the model")
         result = _track(bench, session)
     say_levels(result)
     console.rule("diagnose: what the simulation gets wrong")
-    diagnosis = run_diagnosis(session, "index")
-    show_diagnosis(DiagnosisResult.model_validate(diagnosis))
-    save(diagnosis, session / FOLDER)
+    diagnosis = diagnosed(session, out=session / FOLDER)
     console.rule("verify and report")
     counts = _verified(session)
     derive(session)
@@ -133,7 +130,7 @@ def forces_within(largest_N: float) -> tuple[float, ...]:
     return tuple(round(force_N / FORCES_N[-1] * 0.85 * largest_N, 2) for force_N in FORCES_N)
 
 
-def _diagnosis(result: Diagnosis, secret: Secret, seed: int) -> DemoDiagnosis:
+def _diagnosis(result: DiagnosisResult, secret: Secret, seed: int) -> DemoDiagnosis:
     """What was said, and last what is true."""
     return DemoDiagnosis(
         verdict=result.verdict,

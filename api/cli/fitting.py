@@ -1,56 +1,104 @@
-"""What `rig fit` prints and writes."""
+"""`rig fit`: tissue laws and the lattice on sessions."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Self
+from typing import Annotated
 
-from api.cli.output import console, say, show
+import typer
+
+from api.cli.live import compute
+from api.cli.options import JsonOption
+from api.cli.output import say, show, write_json
+from api.operations import fit as work
+from api.operations.fit import DEFAULT_LAWS, Lattice, Laws
 from rig.errors import UsageError
-from rig.recording.files import write_text
-from rig.recording.sessions import Session, open_session
-from rig.report.drawing import save_figure
-from rig.report.figures import fit_figure, residual_figure
-from rig.results.csv import as_csv
-from rig.results.fit import FILE, MODEL, FitResult, LatticeResult
-from rig.results.study import fit_result
+from rig.results.fit import FILE, FitResult, LatticeResult
 from rig.results.tables import (
     control_table,
     displacement_table,
+    lattice_errors_table,
+    lattice_sentences,
     law_errors_table,
     parameter_table,
     rate_sentence,
     speed_table,
+    spring_table,
 )
 from rig.tissue.laws import Law
 from rig.tissue.model import load_model
 from rig.tissue.registry import COMPARED, LAWS, law_named
-from rig.tissue.study import Study, model_of, study_sessions
 
-SAVED_LAW = "index"
+FOLDER_HELP = "Session folder, as `rig capture` or `rig import` makes it."
+SessionsArgument = Annotated[list[Path], typer.Argument(help=f"{FOLDER_HELP} Several: subjects compared.")]
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """Laws to compare, parameters taken as known, and the law to save."""
+def fit(
+    session: SessionsArgument,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for the results; else SESSION/fit.")] = None,
+    laws: Annotated[
+        str, typer.Option("--laws", help="Further laws to compare, with commas; `all` for every one there is.")
+    ] = "",
+    known: Annotated[
+        list[str] | None,
+        typer.Option("--known", help="A parameter not to be fitted: thickness_mm=25; may be repeated."),
+    ] = None,
+    model: Annotated[str, typer.Option("--model", help="The law that model.json holds.")] = "index",
+    extended: Annotated[
+        Path | None,
+        typer.Option("--with", help="Also the law of this model.json, with what `rig diagnose` named in it as known."),
+    ] = None,
+    lattice: Annotated[bool, typer.Option("--lattice", help="Also the mass-spring lattice, spring by spring.")] = False,
+    block: Annotated[
+        str, typer.Option("--block", help="Vertices of the lattice and their spacing in mm: 51x51x40@1, the study's.")
+    ] = "51x51x40@1",
+    springs: Annotated[
+        str, typer.Option("--springs", help="`stabilised` keeps cells from turning over; `study` is springs alone.")
+    ] = "stabilised",
+    per_spring: Annotated[
+        bool, typer.Option("--per-spring", help="The lattice, and stiffness a exp(b |strain|) in each of its springs.")
+    ] = False,
+    json_file: JsonOption = None,
+) -> None:
+    """Fits constant stiffness, the index model and other tissue laws to sessions, and says how wrong each is.
 
-    laws: Sequence[type[Law]] = COMPARED
-    known: Mapping[str, float] = field(default_factory=dict)
-    saved: str = SAVED_LAW
+    Writes fit.json, pictures, table.csv and model.json. Errors are taken on the trials fitted and on
+    trials, speeds and, with several sessions, subjects left out.
 
-    @classmethod
-    def from_options(cls, laws: str, known: Sequence[str], saved: str, model: Path | None = None) -> Self:
-        """From the command's options; raises UsageError for laws, parameters and a model file that are not.
+    Example: rig fit sessions/first --laws fung,qlv --json fit.json
 
-        The law of ``model`` is compared too, and what it takes as known it takes from there.
-        """
-        names = list(LAWS) if laws == "all" else [name.strip() for name in laws.split(",") if name.strip()]
-        found = {law.name: law for law in (*COMPARED, *map(law_named, names), law_named(saved))}
-        if model:
-            law = load_model(model).law
-            found[law.name] = law.held()
-        chosen = list(found.values())
-        return cls(chosen, dict(_known(text, chosen) for text in known), law_named(saved).name)
+    Example: rig fit sessions/second --with sessions/first/diagnosis/model.json
+    """
+    compared = laws_from(laws, known or [], model, extended)
+    simulated = _lattice(block, springs, per_spring) if lattice or per_spring else None
+    write_json(json_file, fitted(session, out, compared, simulated))
+
+
+def fitted(
+    folders: Sequence[Path], out: Path | None = None, laws: Laws = DEFAULT_LAWS, lattice: Lattice | None = None
+) -> FitResult:
+    """Fits and writes, with progress on a terminal, and shows what was found."""
+    operation, target = work.of_fit(lattice), work.target_of(folders, out)
+    result = compute(operation, lambda: work.fit(operation, folders, out, laws, lattice))
+    show_fit(result)
+    if result.lattice:
+        show_lattice(result.lattice)
+        say([f"lattice.png, lattice.svg and lattice.json are in {target}"])
+    say([f"{FILE}, fit.png, fit.svg, residuals.png, table.csv and model.json are in {target}"])
+    return result
+
+
+def laws_from(laws: str, known: Sequence[str], saved: str, model: Path | None = None) -> Laws:
+    """From the command's options; raises UsageError for laws, parameters and a model file that are not.
+
+    The law of ``model`` is compared too, and what it takes as known it takes from there.
+    """
+    names = list(LAWS) if laws == "all" else [name.strip() for name in laws.split(",") if name.strip()]
+    found = {law.name: law for law in (*COMPARED, *map(law_named, names), law_named(saved))}
+    if model:
+        law = load_model(model).law
+        found[law.name] = law.held()
+    chosen = list(found.values())
+    return Laws(chosen, dict(_known(text, chosen) for text in known), law_named(saved).name)
 
 
 def _known(text: str, laws: Sequence[type[Law]]) -> tuple[str, float]:
@@ -69,66 +117,10 @@ def _known(text: str, laws: Sequence[type[Law]]) -> tuple[str, float]:
     return name, value
 
 
-def fit_and_write(
-    folders: Sequence[Path],
-    out: Path | None = None,
-    wanted: Wanted | None = None,
-    lattice: tuple[str, str, bool] | None = None,
-) -> FitResult:
-    """Fits the sessions, prints tables, writes to ``out`` or the one session's fit/; all of it as it is saved.
+def _lattice(block: str, springs: str, stiffen: bool) -> Lattice:
+    from api.cli.lattice import lattice_from  # noqa: PLC0415 - compiled kernels take seconds to load
 
-    ``lattice`` are its block and springs as the command takes them, and whether each spring stiffens by itself; None
-    leaves it out.
-    """
-    wanted, target = wanted or Wanted(), _target(folders, out)
-    simulate = _lattice(*lattice) if lattice else None
-    sessions = [open_session(folder) for folder in folders]
-    with console.status("fitting"):
-        study = study_sessions(sessions, wanted.laws, wanted.known)
-    result = fit_result(study, str(target / MODEL), wanted.saved, wanted.known, _recordings(sessions))
-    show_fit(result)
-    if any(judged.law.friction[0] for judged in study.judged.values()):
-        say(["friction shows at reversals: curves of loading say nothing for or against it"])
-    _draw(study, target)
-    write_text(target / "table.csv", as_csv(result))
-    model_of(study, wanted.saved, sessions[0].info.subject if len(sessions) == 1 else {}).save(target / MODEL)
-    if simulate:
-        result = result.model_copy(update={"lattice": simulate(study, target)})
-    result.write(target / FILE)
-    say([f"{FILE}, fit.png, fit.svg, residuals.png, table.csv and model.json are in {target}"])
-    return result
-
-
-def _recordings(sessions: Sequence[Session]) -> dict[str, str]:
-    """The hash of each recording by its trial's name, as the study calls it."""
-    alone = len(sessions) == 1
-    return {
-        trial.name if alone else f"{session.folder}/{trial.name}": trial.sha256
-        for session in sessions
-        for trial in session.trials
-    }
-
-
-def _target(folders: Sequence[Path], out: Path | None) -> Path:
-    if out is None and len(folders) > 1:
-        raise UsageError(f"{len(folders)} sessions have no one place for results: give a folder with --out")
-    return out or folders[0] / "fit"
-
-
-def _lattice(block: str, springs: str, stiffen: bool) -> Callable[[Study, Path], LatticeResult]:
-    from api.cli.lattice import chosen, fit_lattice  # noqa: PLC0415 - compiled kernels take seconds to load
-
-    size, mode = chosen(block, springs)
-    return lambda study, target: fit_lattice(study, target, size, mode, stiffen=stiffen)
-
-
-def _draw(study: Study, target: Path) -> None:
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"{target}: cannot be made: {error.strerror}; give another --out") from error
-    for name, picture in (("fit", fit_figure(study)), ("residuals", residual_figure(study))):
-        save_figure(picture, target, name)
+    return lattice_from(block, springs, stiffen)
 
 
 def show_fit(result: FitResult) -> None:
@@ -142,8 +134,17 @@ def show_fit(result: FitResult) -> None:
     show(control_table(result.laws[result.model_law].control, result.model_law))
     if result.rate:
         say([rate_sentence(result.rate)])
+    say(result.remarks)
 
 
 def _pairs(names: Sequence[str]) -> list[Sequence[str]]:
     """Laws side by side, as many as 80 columns take."""
     return [names[at : at + 2] for at in range(0, len(names), 2)]
+
+
+def show_lattice(found: LatticeResult) -> None:
+    """The lattice for a person."""
+    show(spring_table(found))
+    say(lattice_sentences(found))
+    show(lattice_errors_table(found.models))
+    show(control_table(found.control, "lattice index"))

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.config.protocol import Indentation
-from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.design import check
+from rig.results.diagnosis import DiagnosisResult
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Secret:
         """The amplitude."""
         return next(iter(self.knobs.values()))
 
-    def sentence(self, result: Diagnosis) -> str:
+    def sentence(self, result: DiagnosisResult) -> str:
         """The truth, and how the diagnosis did."""
         hidden = f"Hidden was {self.effect} ({', '.join(f'{k} = {v:.4g}' for k, v in self.knobs.items())})"
         finding = next((found for found in result.findings if self.effect in found.effects), None)

@@ -80,6 +80,22 @@ def run(bench: Supervisor, operation: Operation, work: Callable[[], T]) -> T:
     return results[0]
 
 
+def compute(operation: Operation, work: Callable[[], T], prints: bool = True) -> T:
+    """``here``, with a bar that says how far it is; where this ``prints`` none, the log is the caller's."""
+    screen = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=screen, disable=not screen.is_terminal, transient=True) as bar:
+        task, say = bar.add_task(operation.progress.name, total=operation.progress.total), printed(operation)
+
+        def watch(now: Snapshot) -> None:
+            if prints:
+                say(now)
+            bar.update(task, description=now.message, completed=now.done)
+
+        operation.watch = watch
+        return operation.run(work)
+
+
 def here(operation: Operation, work: Callable[[], T]) -> T:
     """Runs ``work`` in this thread, which Ctrl-C ends at once; what the operation says is printed."""
     operation.watch = printed(operation)

@@ -1,7 +1,5 @@
 """Commands about what was recorded: verify, repair, import, export."""
 
-import contextlib
-import math
 import re
 from collections.abc import Iterable, Mapping
 from datetime import datetime
@@ -10,21 +8,18 @@ from typing import Annotated
 
 import typer
 
+from api.cli.live import compute
 from api.cli.options import JsonOption
-from api.cli.output import console, table, write_json
-from rig.errors import CheckFailed, DataError, UsageError
-from rig.recording import verify as verification
-from rig.recording.export import FORMATS, Format, export
-from rig.recording.files import make_folder
+from api.cli.output import console, show, table, write_json
+from api.operations import records
+from controller.operation import Operation
+from rig.errors import CheckFailed, UsageError
+from rig.recording.export import FORMATS, Format
 from rig.recording.import_format import FIELDS
-from rig.recording.importing import import_session
-from rig.recording.reader import read_recording
-from rig.recording.sessions import TrialInfo, open_session
-from rig.recording.verify import Verdict
-from rig.results.recorded import ExportResult, ImportResult, RecordingResult, VerifiedTrial, VerifyResult
-from rig.trials.quality import TrialQuality, quality_of
+from rig.recording.sessions import TrialInfo
+from rig.results.recorded import RecordingResult
+from rig.results.tables import TextTable
 
-SUFFIXES: Mapping[Format, str] = {"csv": "csv", "parquet": "parquet", "hdf5": "session.h5", "mat": "session.mat"}
 SessionArgument = Annotated[Path, typer.Argument(help="Session folder.")]
 
 
@@ -38,76 +33,45 @@ def verify(
 
     Example: rig verify sessions/first
     """
-    verdicts, remarks = _verdicts(path)
-    qualities = _qualities(path, verdicts)
-    console.print(_verdict_table(verdicts))
-    for name, quality in qualities.items():
-        said = "; ".join([f"{name}: quality {quality.verdict}", *quality.reasons])
-        console.print(said, markup=False, highlight=False, soft_wrap=True)
-    for sentence in [*remarks, *(verdict.sentence for verdict in verdicts if not verdict.ok)]:
-        console.print(sentence, markup=False, highlight=False, soft_wrap=True)
-    bad = [verdict.path.stem for verdict in verdicts if not verdict.ok]
-    checked = {verdict.path.stem: _verified(verdict, qualities.get(verdict.path.stem)) for verdict in verdicts}
-    write_json(json_file, VerifyResult(ok=not bad and not remarks, remarks=remarks, recordings=checked))
-    if bad or remarks:
+    operation = Operation("verify")
+    result = compute(operation, lambda: records.verify(operation, path))
+    show(recording_table(result.recordings))
+    for name, found in result.recordings.items():
+        if found.quality:
+            _print("; ".join([f"{name}: quality {found.quality}", *found.reasons]))
+    for sentence in [*result.remarks, *(found.sentence for found in result.recordings.values() if not found.ok)]:
+        _print(sentence)
+    write_json(json_file, result)
+    if not result.ok:
+        bad = [name for name, found in result.recordings.items() if not found.ok]
         raise CheckFailed(
-            f"{path}: {len(bad)} of {len(verdicts)} recordings are not complete"
+            f"{path}: {len(bad)} of {len(result.recordings)} recordings are not complete"
             + (f" ({', '.join(bad)})" if bad else "")
-            + (f"; {remarks[0]}" if remarks else "")
+            + (f"; {result.remarks[0]}" if result.remarks else "")
             + "; what is listed above is known, everything else is good"
         )
 
 
-def _verdicts(path: Path) -> tuple[list[Verdict], tuple[str, ...]]:
-    if path.is_file():
-        return [verification.verify(path)], ()
-    session = open_session(path)
-    verdicts = [_verdict(session.path(trial.name)) for trial in session.trials]
-    return verdicts, (*session.remarks, *session.mismatches)
+def _print(sentence: str) -> None:
+    console.print(sentence, markup=False, highlight=False, soft_wrap=True)
 
 
-def _qualities(path: Path, verdicts: list[Verdict]) -> dict[str, TrialQuality]:
-    """Of every trial that was made with bounds and can be read, by the name of its recording."""
-    listed = {} if path.is_file() else {trial.file: trial for trial in open_session(path).trials}
-    found = {}
-    for verdict in verdicts:
-        trial = listed.get(verdict.path.name, TrialInfo(verdict.path.stem, verdict.path.name, math.nan, math.nan, ""))
-        with contextlib.suppress(DataError):
-            found[verdict.path.stem] = quality_of(read_recording(verdict.path), trial)
-    return {name: quality for name, quality in found.items() if quality is not None}
-
-
-def _verified(verdict: Verdict, quality: TrialQuality | None) -> VerifiedTrial:
-    found = VerifiedTrial.model_validate(verdict)
-    if quality is None:
-        return found
-    said = {"quality": quality.verdict, "reasons": quality.reasons, "measured": quality.measured}
-    return VerifiedTrial.model_validate(found.model_dump() | said)
-
-
-def _verdict(path: Path) -> Verdict:
-    """What is no recording at all is damaged, and hides no other."""
-    try:
-        return verification.verify(path)
-    except DataError as error:
-        return Verdict(path, "damaged", str(error), damage=(str(error),))
-
-
-def _verdict_table(verdicts: list[Verdict]) -> object:
+def recording_table(recordings: Mapping[str, RecordingResult]) -> TextTable:
+    """What each stream of each recording holds, and what is wrong with it."""
     rows = [
         [
-            verdict.path.stem,
-            verdict.state,
             name,
-            str(stream.samples),
-            "" if math.isnan(stream.rate_Hz) else f"{stream.rate_Hz:.1f}",
-            ", ".join(f"{count} {fault}" for fault, count in stream.faults.items()) or "none",
+            recording.state,
+            stream,
+            str(found.samples),
+            "" if found.rate_Hz is None else f"{found.rate_Hz:.1f}",
+            ", ".join(f"{count} {fault}" for fault, count in found.faults.items()) or "none",
         ]
-        for verdict in verdicts
-        for name, stream in verdict.streams.items()
-        if stream.samples or stream.faults
+        for name, recording in recordings.items()
+        for stream, found in recording.streams.items()
+        if found.samples or found.faults
     ]
-    return table(["recording", "state", "stream", "samples", "rate Hz", "faults"], rows)
+    return TextTable("", ["recording", "state", "stream", "samples", "rate Hz", "faults"], rows)
 
 
 def repair(
@@ -119,10 +83,11 @@ def repair(
 
     Example: rig repair sessions/first/trial-03.mcap --out trial-03-good.mcap
     """
-    verdict = verification.repair(recording, out)
-    console.print(_verdict_table([verdict]))
-    console.print(verdict.sentence, markup=False, highlight=False, soft_wrap=True)
-    write_json(json_file, RecordingResult.model_validate(verdict))
+    operation = Operation("repair")
+    result = compute(operation, lambda: records.repair(operation, recording, out))
+    show(recording_table({out.stem: result}))
+    _print(result.sentence)
+    write_json(json_file, result)
 
 
 def import_(
@@ -144,15 +109,12 @@ def import_(
     Example: rig import measured/ --out sessions/measured --columns force.force_N=Fz
     """
     chosen = [column for item in columns or [] for column in re.split(r",(?=[\w.]+=)", item)]
-    session = import_session(folder, out, chosen, datetime.now().astimezone())
-    console.print(_trial_table(session.trials))
-    for remark in session.remarks:
-        console.print(remark, markup=False, highlight=False, soft_wrap=True)
-    samples = {name: sum(trial.samples.get(name, 0) for trial in session.trials) for name in FIELDS}
-    write_json(
-        json_file,
-        ImportResult(session=str(out), recordings=len(session.trials), samples=samples, remarks=session.remarks),
-    )
+    operation, now = Operation("import"), datetime.now().astimezone()
+    result = compute(operation, lambda: records.import_folder(operation, folder, out, chosen, now))
+    console.print(_trial_table(result.trials))
+    for remark in result.remarks:
+        _print(remark)
+    write_json(json_file, result)
 
 
 def _trial_table(trials: Iterable[TrialInfo]) -> object:
@@ -179,13 +141,8 @@ def export_(
     Example: rig export sessions/first --out exported --format hdf5
     """
     chosen = _formats(formats or list(FORMATS))
-    opened = open_session(session)
-    written: dict[str, str] = {}
-    make_folder(out)
-    for format in chosen:
-        written[format] = str(export(opened, format, out / SUFFIXES[format]))
-        console.print(f"{format:8s}{written[format]}", highlight=False, soft_wrap=True)
-    write_json(json_file, ExportResult(session=str(session), written=written))
+    operation = Operation("export")
+    write_json(json_file, compute(operation, lambda: records.export_session(operation, session, out, chosen)))
 
 
 def _formats(asked: list[str]) -> list[Format]:

@@ -9,9 +9,9 @@ from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.axis import AxisProblem, AxisRecording, force_error_percent, motion_of
 from rig.diagnosis.estimates import SimulationError
 from rig.diagnosis.gates import inspect_stream
-from rig.diagnosis.run import judge, silent
-from rig.diagnosis.search import Progress
+from rig.diagnosis.run import judge
 from rig.errors import DataError
+from rig.progress import Progress, silent
 from rig.recording.csv_columns import read_header, read_usable
 
 NAMES = {

@@ -15,14 +15,11 @@ from rig.diagnosis.indentation import Indentation, Simulation, library
 from rig.diagnosis.observations import Observations, Session, observe, rise_N
 from rig.diagnosis.omnibus import leftover
 from rig.diagnosis.problem import Problem
-from rig.diagnosis.search import Progress, search
+from rig.diagnosis.search import search
 from rig.errors import DataError
+from rig.progress import Progress, silent
 
 FEWEST_RECORDINGS = 4
-
-
-def silent(_: str, __: float) -> None:
-    """Progress nobody watches."""
 
 
 def diagnose(

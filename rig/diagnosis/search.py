@@ -1,6 +1,6 @@
 """From nothing to a set of named causes: forward steps, backward drop, swap pass, rivals of the final model."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +22,7 @@ from rig.diagnosis.fit import Fit, attempt, best_fit, bold_view, fit, glance, le
 from rig.diagnosis.noise import Array
 from rig.diagnosis.omnibus import LEVEL, leftover
 from rig.diagnosis.problem import Effect, Problem, Values
+from rig.progress import Progress
 
 ALPHA = 0.03
 SHORT_LIST = 5
@@ -38,8 +39,6 @@ STANDS_OUT_NATS = 3.0
 FOLLOWED = 5
 REACH_NATS = 20.0
 REACH_SHARE = 0.5
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)

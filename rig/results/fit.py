@@ -133,6 +133,7 @@ class FitResult(Result):
     model_law: str = Field(description="the law that file holds")
     known: Mapping[str, float] = Field(description="parameters that were given")
     recordings: Mapping[str, str] = Field(description="SHA-256 of each recording the fit was made from")
+    remarks: tuple[str, ...] = Field(default=(), description="what the curves cannot tell")
     lattice: LatticeResult | None = None
 
     @property

@@ -54,6 +54,7 @@ class StreamResult(Result):
     dropped: int
     lost: int
     rate_Hz: Number
+    faults: Mapping[str, int] = Field(default={}, exclude=True, description="what is wrong, by name")
 
 
 class RecordingResult(Result):
@@ -89,6 +90,7 @@ class ImportResult(Result):
     recordings: int
     samples: Mapping[str, int]
     remarks: tuple[str, ...]
+    trials: tuple[TrialInfo, ...] = Field(default=(), exclude=True)
 
 
 class ExportResult(Result):

@@ -9,6 +9,8 @@ from rig.tissue.judging import LEVEL, Errors, Judged
 from rig.tissue.laws import FloatArray
 from rig.tissue.study import Known, Study, rows
 
+FRICTION = "friction shows at reversals: curves of loading say nothing for or against it"
+
 
 def fit_result(study: Study, model: str, model_law: str, known: Known, recordings: Mapping[str, str]) -> FitResult:
     """The study as it is saved; ``model`` is the file that holds ``model_law``, ``recordings`` name and hash."""
@@ -24,6 +26,7 @@ def fit_result(study: Study, model: str, model_law: str, known: Known, recording
         "model_law": model_law,
         "known": known,
         "recordings": recordings,
+        "remarks": [FRICTION] if any(judged.law.friction[0] for judged in study.judged.values()) else [],
     }
     laws = {name: law_result(judged, study.force_N) for name, judged in study.judged.items()}
     return FitResult.model_validate(fields | laws)

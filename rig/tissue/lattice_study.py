@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.errors import DataError
+from rig.progress import Progress, silent
 from rig.tissue.control_table import control_rows
 from rig.tissue.fitting import fit_law
 from rig.tissue.judging import Judged, judge
@@ -16,7 +17,7 @@ from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.springs import Mode, Springs
 from rig.tissue.lattice.sweep import DEFAULT_STEP_MM, Sweep, sweep
 from rig.tissue.laws_lattice import lattice_laws
-from rig.tissue.per_spring import PerSpring, Progress, per_spring
+from rig.tissue.per_spring import PerSpring, per_spring
 from rig.tissue.registry import RIVALS
 from rig.tissue.study import Study, rows
 from rig.tissue.summary import ControlRow, IndexFit, KPoint
@@ -42,16 +43,15 @@ def lattice_study(
     block: Block,
     mode: Mode = "stabilised",
     search: bool = True,
-    progress: Progress | None = None,
+    tell: Progress = silent,
     stiffen: bool = False,
 ) -> LatticeStudy:
     """Sweep the block once, then everything else from phi; ``search`` also runs the study's loop for each force,
     ``stiffen`` also fits a and b of every spring.
 
-    ``progress(stage, share)`` is called as it goes. Raises UsageError where the block cannot carry the depths (with the
+    ``tell(stage, share)`` is called as it goes. Raises UsageError where the block cannot carry the depths (with the
     bound).
     """
-    tell = progress or _silent
     deepest_mm = _deepest(study, block)
     curve = _sweep(block, mode, deepest_mm, tell)
     table = rows(study.judged[study.closest].fitted)
@@ -89,7 +89,3 @@ def _sweep(block: Block, mode: Mode, deepest_mm: float, tell: Progress) -> Sweep
         DEFAULT_STEP_MM * block.spacing_mm,
         lambda d: tell("sweep of phi", d / deepest_mm),
     )
-
-
-def _silent(_stage: str, _share: float) -> None:
-    """Nobody watches."""

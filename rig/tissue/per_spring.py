@@ -1,10 +1,10 @@
 """The lattice whose springs stiffen each by itself, fitted to a session: a exp(b |strain|) in every spring."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig.progress import Progress
 from rig.tissue.fitting import fit_law
 from rig.tissue.judging import Judged, judge
 from rig.tissue.lattice.block import Block
@@ -15,7 +15,6 @@ from rig.tissue.laws import FloatArray
 from rig.tissue.laws_springs import springs_law
 from rig.tissue.study import Study
 
-Progress = Callable[[str, float], None]
 DEPTHS = 10
 CLOSER_TOGETHER = 1.5  # depths grow with this power: phi bends most where contact begins
 AGREES = 0.01

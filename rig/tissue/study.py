@@ -8,9 +8,10 @@ import numpy as np
 
 import rig
 from rig.errors import DataError, UsageError
+from rig.progress import Progress, silent
 from rig.recording.sessions import Session
 from rig.tissue.control_table import control_rows
-from rig.tissue.fitting import fit_law
+from rig.tissue.fitting import LawFit, fit_law
 from rig.tissue.judging import LEVEL, Errors, Judged, given_forces, judge
 from rig.tissue.laws import FloatArray, Law
 from rig.tissue.model import Model, Provenance, Quality, ValidRange
@@ -23,6 +24,8 @@ from rig.trials.quality import refusal
 
 Laws = Sequence[type[Law]]
 Known = Mapping[str, float]
+# Share of the time until every law is fitted once: evaluating fits it again without each trial and each speed.
+FITTING = 0.2
 
 
 @dataclass(frozen=True)
@@ -57,22 +60,26 @@ class Study:
         return self.judged[self.closest].fit.offsets_mm
 
 
-def study_session(session: Session, laws: Laws = COMPARED, known: Known | None = None) -> Study:
+def study_session(
+    session: Session, laws: Laws = COMPARED, known: Known | None = None, progress: Progress = silent
+) -> Study:
     """Reads every trial of ``session``, fits and judges; trials without a usable curve are skipped with their reason.
 
     Raises DataError where no trial gives a curve.
     """
     curves, skipped = _curves_or_refusal(session)
-    return study_curves(session.info.id, curves, skipped, laws, known)
+    return study_curves(session.info.id, curves, skipped, laws, known, progress)
 
 
-def study_sessions(sessions: Sequence[Session], laws: Laws = COMPARED, known: Known | None = None) -> Study:
+def study_sessions(
+    sessions: Sequence[Session], laws: Laws = COMPARED, known: Known | None = None, progress: Progress = silent
+) -> Study:
     """As ``study_session``, for sessions of several subjects at once: each subject is also left out in turn.
 
     A trial is then called by its session's folder and its own name.
     """
     if len(sessions) == 1:
-        return study_session(sessions[0], laws, known)
+        return study_session(sessions[0], laws, known, progress)
     places = [session.folder.resolve() for session in sessions]
     twice = [place for place in places if places.count(place) > 1]
     if twice:
@@ -84,7 +91,7 @@ def study_sessions(sessions: Sequence[Session], laws: Laws = COMPARED, known: Kn
         found, missing = _curves_or_refusal(session)
         curves += [replace(curve, name=f"{place}/{curve.name}") for curve in found]
         skipped += [Skipped(f"{place}/{one.trial}", one.reason) for one in missing]
-    return study_curves(", ".join(session.info.id for session in sessions), curves, skipped, laws, known)
+    return study_curves(", ".join(session.info.id for session in sessions), curves, skipped, laws, known, progress)
 
 
 def _curves_or_refusal(session: Session) -> tuple[list[Curve], list[Skipped]]:
@@ -119,12 +126,19 @@ def study_curves(
     skipped: Sequence[Skipped] = (),
     laws: Laws = COMPARED,
     known: Known | None = None,
+    progress: Progress = silent,
 ) -> Study:
     """Fits and judges ``laws`` on the same curves and rows, with parameters ``known`` where a law has them."""
-    fits = {law.name: fit_law(law, curves, known=_known(law, known or {})) for law in laws}
+    fits: dict[str, LawFit] = {}
+    for number, law in enumerate(laws):
+        progress(f"fitting {law.name}", FITTING * number / len(laws))
+        fits[law.name] = fit_law(law, curves, known=_known(law, known or {}))
     closest = min(fits, key=lambda name: fits[name].rmse_N)
     force_N = given_forces(curves)
-    judged = {name: judge(fit, curves, force_N, fits[closest].offsets_mm) for name, fit in fits.items()}
+    judged: dict[str, Judged] = {}
+    for number, (name, fit) in enumerate(fits.items()):
+        progress(f"evaluating {name}", FITTING + (1 - FITTING) * number / len(fits))
+        judged[name] = judge(fit, curves, force_N, fits[closest].offsets_mm)
     return Study(session, tuple(curves), tuple(skipped), force_N, judged, closest, rate_of(curves))
 
 

@@ -66,7 +66,7 @@ def test_one_stroke_is_answered_without_a_verdict_in_its_favour(folder: Path, tm
     (tmp_path / "one").mkdir()
     shutil.copytree(folder / "trial_0", tmp_path / "one" / "trial_0")
     said = run("diagnose", tmp_path / "one", "--json", tmp_path / "said.json")
-    assert said.startswith("unexplained: Nothing could be judged: 1 recording of one stroke")
+    assert said.startswith("unexplained: Nothing could be judged: 1 recording of one cycle")
     assert said.count("cannot be tested") == 1
     found = json.loads((tmp_path / "said.json").read_text())
     assert found["findings"] == [] and found["detectable"] == {}

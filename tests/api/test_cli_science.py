@@ -157,7 +157,7 @@ def test_springs_alone_are_refused_where_the_block_collapses(session: Path, tmp_
 
 def test_fit_refuses_a_place_that_is_a_file(session: Path, tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
-    with pytest.raises(UsageError, match=r"taken: cannot be made"):
+    with pytest.raises(UsageError, match=r"taken is a file, not a folder; give another place"):
         run("fit", session, "--out", tmp_path / "taken")
 
 

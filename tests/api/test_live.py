@@ -48,3 +48,16 @@ def test_what_an_operation_says_is_printed_as_it_stands(capsys: pytest.CaptureFi
 
     assert live.run(cast(Supervisor, StoppableBench()), operation, work) == 5
     assert capsys.readouterr().out == f"trial_001  [brackets]\n{long}\n"
+
+
+def test_ctrl_c_ends_a_computation_at_once() -> None:
+    operation, after = Operation("fit"), list[str]()
+
+    def work() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        threading.Event().wait(10.0)
+        after.append("went on")
+
+    with pytest.raises(KeyboardInterrupt):
+        live.compute(operation, work)
+    assert operation.progress.state == "stopped" and not after

@@ -9,7 +9,8 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
 
-from api.cli.fitting import fit_and_write
+from api.operations.fit import fit
+from controller.operation import Operation
 from rig.report.page import write_report
 from tests.rig.report.test_page import track_into
 from tests.rig.tissue.synthetic import Bench, write_made_session
@@ -34,7 +35,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("made") / "session"
     write_made_session(folder, Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0, 30.0)))
     track_into(folder)
-    fit_and_write([folder])
+    fit(Operation("fit"), [folder])
     write_report(folder, folder / "report.html")
     return folder / "report.html"
 

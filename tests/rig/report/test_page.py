@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from api.cli.fitting import Wanted, fit_and_write
+from api.cli.fitting import laws_from
+from api.operations.fit import fit
+from controller.operation import Operation
 from rig.errors import DataError, UsageError
 from rig.recording.sessions import JsonTable, SessionInfo, TrialInfo, open_session, write_session
 from rig.report.page import write_report
@@ -90,7 +92,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     cycles = Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0, 10.0, 20.0, 30.0))
     subject: JsonTable = {"id": "<script>alert(1)</script>", "site": 'fore & "arm"'}
     write_made_session(folder, cycles, subject=subject, protocol={"name": "indentation", "speeds_mm_s": [5.0, 10.0]})
-    fit_and_write([folder], wanted=Wanted.from_options("layer", ["thickness_mm=30"], "layer"))
+    fit(Operation("fit"), [folder], laws=laws_from("layer", ["thickness_mm=30"], "layer"))
     track_into(folder)
     return folder
 

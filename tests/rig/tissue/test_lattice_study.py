@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from api.cli.lattice import fit_lattice
+from api.operations.lattice import LatticeFit
 from rig.errors import DataError
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice_study import LatticeStudy, lattice_study
@@ -57,10 +57,13 @@ def test_curves_deeper_than_the_block_are_refused_with_the_bound(study: Study) -
 
 
 def test_the_command_writes_picture_and_numbers(study: Study, tmp_path: Path) -> None:
-    result = fit_lattice(study, tmp_path, BLOCK, search=True, stiffen=True)
+    told: list[str] = []
+    wanted = LatticeFit(BLOCK, stiffen=True)
+    result = wanted(study, tmp_path, lambda stage, _: told.append(stage))
+    assert len(set(told)) == wanted.stages
     assert (tmp_path / "lattice.png").read_bytes().startswith(b"\x89PNG")
     written = json.loads((tmp_path / "lattice.json").read_text())
-    assert written == json.loads(json.dumps(result))
+    assert written == result.model_dump(mode="json")
     for point in written["points"]:
         assert point["k_loop_N_mm"] == pytest.approx(point["k_exact_N_mm"], rel=0.01)
     assert written["models"]["lattice springs"]["parameters"]["b"] > 0.0

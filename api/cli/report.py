@@ -1,0 +1,22 @@
+"""`rig report`: the page about a session."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from api.cli.live import compute
+from api.operations import report as work
+from controller.operation import Operation
+
+
+def report(
+    session: Annotated[Path, typer.Argument(help="Session folder, as `rig capture` or `rig import` makes it.")],
+    out: Annotated[Path | None, typer.Option("--out", help="File to write; else SESSION/report.html.")] = None,
+) -> None:
+    """Writes one self-contained HTML page about a session; it needs no network.
+
+    Example: rig report sessions/first --out first.html
+    """
+    operation = Operation("report")
+    compute(operation, lambda: work.report(operation, session, out))

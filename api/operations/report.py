@@ -1,0 +1,15 @@
+"""The page about a session."""
+
+from pathlib import Path
+
+from controller.operation import Operation
+from rig.report.page import write_report
+
+
+def report(operation: Operation, session: Path, out: Path | None = None) -> Path:
+    """Writes one self-contained page about ``session`` to ``out``, else into the session; returns the file."""
+    target = out or session / "report.html"
+    operation.step("reading, fitting, drawing", 0.0)
+    write_report(session, target)
+    operation.say(f"{target} is written")
+    return target

@@ -1,0 +1,56 @@
+"""Operations on recordings: what they return and say, and what is left where they are cancelled."""
+
+from pathlib import Path
+
+import pytest
+
+from api.operations import records
+from controller.operation import Cancelled, Operation, Progress
+from rig.results.recorded import VerifyResult
+from tests.rig.tissue.synthetic import Bench, write_made_session
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    cycles = Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0, 20.0))
+    return write_made_session(tmp_path_factory.mktemp("made") / "session", cycles)
+
+
+def test_a_session_is_verified_recording_by_recording(session: Path) -> None:
+    operation, told = Operation("verify"), list[tuple[float, str]]()
+    operation.watch = lambda now: told.append((now.done, now.message))
+    found = records.verify(operation, session)
+    names = ["trial_500.mcap", "trial_2000.mcap"]
+    assert [message for _, message in told] == [*names, "the session's list of hashes"]
+    assert [done for done, _ in told] == [0.0, 0.5, 1.0]
+    assert list(found.recordings) == [name.removesuffix(".mcap") for name in names]
+    assert VerifyResult.model_validate_json(found.model_dump_json()).recordings == {
+        name: one.model_copy(
+            update={"streams": {key: s.model_copy(update={"faults": {}}) for key, s in one.streams.items()}}
+        )
+        for name, one in found.recordings.items()
+    }
+
+
+def test_what_is_no_recording_is_damaged_and_hides_no_other(session: Path, tmp_path: Path) -> None:
+    alone = records.verify(Operation("verify"), session / "trial_500.mcap")
+    assert list(alone.recordings) == ["trial_500"] and alone.remarks == ()
+    copied = write_made_session(tmp_path / "copied", Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0, 20.0)))
+    (copied / "trial_500.mcap").write_bytes(b"nothing of the kind")
+    found = records.verify(Operation("verify"), copied)
+    assert not found.ok
+    assert [one.state for one in found.recordings.values()] == ["damaged", alone.recordings["trial_500"].state]
+
+
+def test_an_export_that_is_cancelled_makes_no_further_format(session: Path, tmp_path: Path) -> None:
+    operation = Operation("export")
+
+    def watch(now: Progress) -> None:
+        if now.message == "csv":
+            operation.cancel()
+
+    operation.watch = watch
+    with pytest.raises(Cancelled, match="export was cancelled before: mat"):
+        operation.run(lambda: records.export_session(operation, session, tmp_path / "out", ["csv", "mat"]))
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["csv"]
+    assert operation.progress.log == (f"csv     {tmp_path / 'out' / 'csv'}",)
