@@ -21,6 +21,9 @@ from tools.reference import fill
 PRODUCTS = [product for products in ROLES.values() for product in products.values()]
 
 
+PRODUCTS = [product for products in ROLES.values() for product in products.values()]
+
+
 class Spring(Table):
     """A spring with ``stiffness``."""
 
