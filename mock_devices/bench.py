@@ -11,7 +11,7 @@ import numpy as np
 from mock_devices.parameters import Parameters
 from mock_devices.physics import STEP_NS, STEP_S
 from mock_devices.physics.camera import CameraPlant
-from mock_devices.physics.chain import Chain, Effect
+from mock_devices.physics.chain import Chain, HiddenEffect
 from mock_devices.physics.drive_plant import DrivePlant
 from mock_devices.physics.effects import Hidden, build, complete
 from mock_devices.physics.sensor import ForcePlant
@@ -37,7 +37,7 @@ class Bench:
         self.tip_mm, self.tip_speed_mm_s, self.contact_N = tip_mm, 0.0, 0.0
         self.weight_N = 0.0
         self.hidden: Hidden = {}
-        self._operators: dict[str, Effect] = {}
+        self._operators: dict[str, HiddenEffect] = {}
         self._chain = Chain()
         self._start_ns = start_ns
         self._steps = 0

@@ -27,7 +27,7 @@ from controller.simulated.segments import Bench, Bounds, Move, Plant, Speeds, St
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed
 from rig.simulation import axis_plant
-from rig.simulation.axis_plant import Limb, Motor, PositionLoop, Sensing, at_rest
+from rig.simulation.axis_plant import ForceSensing, ModelledLimb, Motor, PositionLoop, at_rest
 from rig.tissue.model import Model
 
 Column = NDArray[np.float64]
@@ -36,7 +36,7 @@ BEYOND = 2.0
 LONGEST_S = 600.0
 LONGEST_STRETCH = 10_000
 DRAWN = 20_000
-MOTOR, POSITION_LOOP, SENSING = Motor(), PositionLoop(), Sensing()
+MOTOR, POSITION_LOOP, SENSING = Motor(), PositionLoop(), ForceSensing()
 
 
 class Trace(NamedTuple):
@@ -57,18 +57,20 @@ class Trace(NamedTuple):
 class SimulatedBench:
     """The plant a program is played against."""
 
-    limb: Limb
+    limb: ModelledLimb
     motor: Motor = MOTOR
     loop: PositionLoop = POSITION_LOOP
-    sensing: Sensing = SENSING
+    sensing: ForceSensing = SENSING
     seed: int = 0
 
 
-def limb_of(model: Model, stiffness: float = 1.0, breathing_mm: float = 0.0, breathing_Hz: float = 0.25) -> Limb:
+def limb_of(
+    model: Model, stiffness: float = 1.0, breathing_mm: float = 0.0, breathing_Hz: float = 0.25
+) -> ModelledLimb:
     """The tissue a model describes, up to twice its depth, ``stiffness`` times as stiff."""
     depths = np.linspace(0.0, BEYOND * model.valid.depth_mm, CURVE_POINTS)
     forces = stiffness * np.asarray(model.law.force(depths))
-    return Limb(depths, forces, model.damping_N_s_mm, breathing_mm=breathing_mm, breathing_Hz=breathing_Hz)
+    return ModelledLimb(depths, forces, model.damping_N_s_mm, breathing_mm=breathing_mm, breathing_Hz=breathing_Hz)
 
 
 def run(program: Program, wiring: Wiring, bench: SimulatedBench, stretched: bool = True) -> Trace:

@@ -19,7 +19,7 @@ from controller.loop import setpoint
 from controller.loop.setpoint import Setpoint
 from rig.machine_code import compiled
 from rig.simulation import axis_plant
-from rig.simulation.axis_plant import AxisState, Limb, Motor, PositionLoop, Sensing
+from rig.simulation.axis_plant import AxisState, ForceSensing, ModelledLimb, Motor, PositionLoop
 
 Column = NDArray[np.float64]
 Parts = dict[str, Callable[..., object]]
@@ -83,8 +83,8 @@ class Plant(NamedTuple):
 
     motor: Motor
     loop: PositionLoop
-    limb: Limb
-    sensing: Sensing
+    limb: ModelledLimb
+    sensing: ForceSensing
 
 
 class Stretch(NamedTuple):

@@ -25,11 +25,11 @@ def knob(default: float, low: float, high: float, meaning: str) -> float:
 
 
 @dataclass
-class Effect:
+class HiddenEffect:
     """An operator in the chain; its dataclass fields made by ``knob`` are its parameters."""
 
 
-class Kinematic(Effect, ABC):
+class Kinematic(HiddenEffect, ABC):
     """Between encoder and tip."""
 
     @abstractmethod
@@ -37,7 +37,7 @@ class Kinematic(Effect, ABC):
         """Position of the tip's side, given that of the axis' side."""
 
 
-class Shift(Effect, ABC):
+class Shift(HiddenEffect, ABC):
     """Moves the surface."""
 
     @abstractmethod
@@ -45,7 +45,7 @@ class Shift(Effect, ABC):
         """Millimetres added to the surface's position."""
 
 
-class Elastic(Effect, ABC):
+class Elastic(HiddenEffect, ABC):
     """Replaces the elastic law."""
 
     @abstractmethod
@@ -53,7 +53,7 @@ class Elastic(Effect, ABC):
         """Newtons at ``depth_mm``, where ``law`` is the index law."""
 
 
-class Factor(Effect, ABC):
+class Factor(HiddenEffect, ABC):
     """Multiplies the elastic force; called in contact only."""
 
     @abstractmethod
@@ -61,7 +61,7 @@ class Factor(Effect, ABC):
         """The factor."""
 
 
-class Viscous(Effect, ABC):
+class Viscous(HiddenEffect, ABC):
     """Replaces the viscous term."""
 
     @abstractmethod
@@ -69,7 +69,7 @@ class Viscous(Effect, ABC):
         """Newtons at ``speed_mm_s`` into the tissue."""
 
 
-class Memory(Effect, ABC):
+class Hereditary(HiddenEffect, ABC):
     """Adds a force with a past; called at every step."""
 
     @abstractmethod
@@ -77,7 +77,7 @@ class Memory(Effect, ABC):
         """Newtons to add, given the elastic force now."""
 
 
-class Pull(Effect, ABC):
+class Pull(HiddenEffect, ABC):
     """Adds a force that may be tensile; called at every step."""
 
     @abstractmethod
@@ -85,7 +85,7 @@ class Pull(Effect, ABC):
         """Newtons to add, below zero for tension."""
 
 
-class Guide(Effect, ABC):
+class Guide(HiddenEffect, ABC):
     """Between tip and sensor."""
 
     @abstractmethod
@@ -93,7 +93,7 @@ class Guide(Effect, ABC):
         """Newtons the sensor sees besides the contact."""
 
 
-class Sensing(Effect, ABC):
+class Sensing(HiddenEffect, ABC):
     """On the way of the force to the converter; called at every step."""
 
     @abstractmethod
@@ -101,7 +101,7 @@ class Sensing(Effect, ABC):
         """The force as it comes out."""
 
 
-class Reading(Effect, ABC):
+class Reading(HiddenEffect, ABC):
     """In the converter; called once a sample."""
 
     @abstractmethod
@@ -109,7 +109,7 @@ class Reading(Effect, ABC):
         """The force as converted."""
 
 
-class Late(Effect):
+class Late(HiddenEffect):
     """Delays the camera."""
 
     delay_s: float
@@ -124,7 +124,7 @@ class Chain:
     elastic: Elastic | None = None
     factors: tuple[Factor, ...] = ()
     viscous: Viscous | None = None
-    memories: tuple[Memory, ...] = ()
+    memories: tuple[Hereditary, ...] = ()
     pulls: tuple[Pull, ...] = ()
     guide: tuple[Guide, ...] = ()
     sensing: tuple[Sensing, ...] = ()
@@ -137,7 +137,7 @@ class Chain:
         return bool(self.memories or self.pulls)
 
     @classmethod
-    def of(cls, effects: Iterable[Effect]) -> "Chain":
+    def of(cls, effects: Iterable[HiddenEffect]) -> "Chain":
         """The chain of ``effects``, which stand in the order of the library."""
         on = list(effects)
         return cls(
@@ -146,7 +146,7 @@ class Chain:
             elastic=next((effect for effect in on if isinstance(effect, Elastic)), None),
             factors=tuple(effect for effect in on if isinstance(effect, Factor)),
             viscous=next((effect for effect in on if isinstance(effect, Viscous)), None),
-            memories=tuple(effect for effect in on if isinstance(effect, Memory)),
+            memories=tuple(effect for effect in on if isinstance(effect, Hereditary)),
             pulls=tuple(effect for effect in on if isinstance(effect, Pull)),
             guide=tuple(effect for effect in on if isinstance(effect, Guide)),
             sensing=tuple(effect for effect in on if isinstance(effect, Sensing)),

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields
 
 from mock_devices.names import known
-from mock_devices.physics.chain import Effect, Knob
+from mock_devices.physics.chain import HiddenEffect, Knob
 from mock_devices.physics.effects_motion import (
     Backlash,
     ContactOffset,
@@ -39,7 +39,7 @@ from rig.errors import UsageError
 Hidden = dict[str, dict[str, float]]
 
 # The order is that of the chain: effects at the same place act one after the other as they stand here.
-EFFECTS: dict[str, type[Effect]] = {
+EFFECTS: dict[str, type[HiddenEffect]] = {
     "position_ripple": PositionRipple,
     "backlash": Backlash,
     "frame_compliance": FrameCompliance,
@@ -98,7 +98,7 @@ def complete(wanted: Mapping[str, Mapping[str, float]]) -> Hidden:
     return {effect: defaults(effect) | dict(wanted[effect]) for effect in EFFECTS if effect in wanted}
 
 
-def build(effect: str, values: Mapping[str, float]) -> Effect:
+def build(effect: str, values: Mapping[str, float]) -> HiddenEffect:
     """The operator of ``effect`` at rest."""
     return EFFECTS[effect](**values)
 

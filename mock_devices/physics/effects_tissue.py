@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from mock_devices.physics import STEP_S
-from mock_devices.physics.chain import Elastic, Factor, Memory, Pull, Viscous, knob
+from mock_devices.physics.chain import Elastic, Factor, Hereditary, Pull, Viscous, knob
 
 REFERENCE_MM_S = 10.0
 LINEAR_BELOW_MM_S = 0.5
@@ -85,7 +85,7 @@ class RateLaw(Viscous):
 
 
 @dataclass
-class Relaxation(Memory):
+class Relaxation(Hereditary):
     """A Prony term: q' = -q / tau + g dF/dt of the elastic force; q is added to it."""
 
     strength_1: float = knob(0.3, 0, 1.5, "g")

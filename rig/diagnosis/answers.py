@@ -21,7 +21,7 @@ from rig.diagnosis.fit import Fit, least_squares
 from rig.diagnosis.gates import Finding
 from rig.diagnosis.noise import Array
 from rig.diagnosis.omnibus import Leftover, beaten, judged_leftover
-from rig.diagnosis.problem import Effect, Par, Problem
+from rig.diagnosis.problem import Effect, InverseProblem, Par
 from rig.diagnosis.search import Named, Search, imitated, testable
 
 POWER_SD = 0.84  # 80 % power
@@ -161,7 +161,7 @@ def smallest_visible(t: Tangents, threshold: float) -> dict[str, SmallestSize]:
     return result
 
 
-def limits(problem: Problem, search: Search) -> tuple[dict[str, SmallestSize], dict[str, str]]:
+def limits(problem: InverseProblem, search: Search) -> tuple[dict[str, SmallestSize], dict[str, str]]:
     """What could have been seen, and what not and why."""
     reasons = {
         effect.name: problem.offers[need]

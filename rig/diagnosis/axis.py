@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, filtfilt
 
-from rig.diagnosis.problem import Array, Channel, Effect, Par, Scatter, Values
+from rig.diagnosis.problem import Array, Effect, Par, Scatter, Signal, Values
 from rig.tissue.index_law import Fields
 
 CUT_HZ = 35.0
@@ -125,11 +125,11 @@ class AxisProblem:
         return "axis"
 
     @cached_property
-    def channels(self) -> tuple[Channel, ...]:
+    def channels(self) -> tuple[Signal, ...]:
         """Drive force [N]."""
         count = len(self.motion.force)
         memory = MEMORY_S / float(np.median(np.diff(self.motion.time_s)))
-        return (Channel("force", "N", self.motion.force, np.arange(count) * BLOCKS // count, memory),)
+        return (Signal("force", "N", self.motion.force, np.arange(count) * BLOCKS // count, memory),)
 
     @property
     def recordings(self) -> int:

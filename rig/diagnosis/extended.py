@@ -10,7 +10,7 @@ from rig.diagnosis.fit import Fit
 from rig.diagnosis.indentation import Indentation
 from rig.errors import DataError
 from rig.tissue.laws_extended import Extended
-from rig.tissue.model import Effect, Interval, Model, Provenance, Quality, ValidRange
+from rig.tissue.model import Estimate, Model, NamedCause, Provenance, Quality, ValidRange
 
 ELASTIC = "in the force-depth curve: gains and inverse model"
 USED = {
@@ -105,15 +105,15 @@ def _quality(fit: Fit, law: Extended) -> Quality:
     )
 
 
-def _effects(result: Diagnosis, fit: Fit) -> tuple[Effect, ...]:
+def _effects(result: Diagnosis, fit: Fit) -> tuple[NamedCause, ...]:
     pars = (par for effect in fit.problem.effects for par in effect.pars)
     units = {par.name.replace("_sin_mm", "_mm"): par.unit for par in pars}
     return tuple(
-        Effect(
+        NamedCause(
             name=found.effects[0],
             statement=found.statement,
             parameters={
-                name: Interval(value=i.value, unit=units[name], low=float(i.low), high=float(i.high))
+                name: Estimate(value=i.value, unit=units[name], low=float(i.low), high=float(i.high))
                 for name, i in found.parameters.items()
             },
             used=USED.get(found.effects[0], UNUSED),

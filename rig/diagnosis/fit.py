@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.diagnosis.descent import descend, jacobian, on_bound, prior_precision
 from rig.diagnosis.noise import Array, Colour, Noise, starts_of
-from rig.diagnosis.problem import Effect, Par, Problem, Values
+from rig.diagnosis.problem import Effect, InverseProblem, Par, Values
 from rig.diagnosis.whitening import Whitener, estimate, optimistic, shifted
 
 LM_STEPS = 8
@@ -28,7 +28,7 @@ class Fit:
     (recordings, p), ``loss`` (recordings,) are sums of white rows; ``raw`` is the Jacobian of the first channel (n, p).
     """
 
-    problem: Problem
+    problem: InverseProblem
     effects: tuple[Effect, ...]
     values: Values
     whitener: Whitener
@@ -57,13 +57,13 @@ class Fit:
         return np.asarray(np.linalg.inv(self.hessian.sum(axis=0) + np.diag(prior_precision(self.free))))
 
 
-def free_parameters(problem: Problem, effects: Sequence[Effect]) -> tuple[Par, ...]:
+def free_parameters(problem: InverseProblem, effects: Sequence[Effect]) -> tuple[Par, ...]:
     """Base parameters and those of the effects."""
     return problem.base + tuple(par for effect in effects for par in effect.pars)
 
 
 def fit(
-    problem: Problem,
+    problem: InverseProblem,
     effects: Sequence[Effect],
     start: Values,
     whitener: Whitener | None = None,
@@ -122,7 +122,7 @@ def least_squares(model: Fit) -> Fit:
     return assemble(problem, model.effects, max(ends, key=lambda end: log_level(whitener, end)), whitener)
 
 
-def first_fit(problem: Problem) -> Fit:
+def first_fit(problem: InverseProblem) -> Fit:
     """The simulation as it is, from its first guess."""
     rough = fit(problem, (), problem.start())
     wider = [optimistic(problem, rough.values, rough.whitener, wide) for wide in (1.0, 10.0)]
@@ -132,7 +132,7 @@ def first_fit(problem: Problem) -> Fit:
 
 
 def attempt(
-    problem: Problem, effects: Sequence[Effect], start: Values, whitener: Whitener, floor: float = -np.inf
+    problem: InverseProblem, effects: Sequence[Effect], start: Values, whitener: Whitener, floor: float = -np.inf
 ) -> Fit | None:
     """A fit, or None where its numbers ran away: a candidate that cannot be fitted is no candidate."""
     try:
@@ -145,7 +145,7 @@ def attempt(
 
 
 def glance(
-    problem: Problem, effects: Sequence[Effect], start: Values, whitener: Whitener
+    problem: InverseProblem, effects: Sequence[Effect], start: Values, whitener: Whitener
 ) -> tuple[Values, float] | None:
     """Where a fit under this very noise ends, and how well it explains the readings there; None as for ``attempt``."""
     try:
@@ -158,21 +158,21 @@ def glance(
     return (values, reached) if np.isfinite(reached) else None
 
 
-def _anchored(problem: Problem, effects: Sequence[Effect], start: Values, whitener: Whitener) -> Values:
+def _anchored(problem: InverseProblem, effects: Sequence[Effect], start: Values, whitener: Whitener) -> Values:
     """Amplitudes fitted at the shapes given: a frequency must not run away while its amplitude is still nothing."""
     fixed = {par.name for par in effects[-1].shapes} if effects else set[str]()
     free = [par for par in free_parameters(problem, effects) if par.name not in fixed]
     return descend(free, start, whitener, LM_STEPS, confirm=False)[0] if fixed else start
 
 
-def best_fit(problem: Problem, effects: Sequence[Effect], start: Values, whitener: Whitener) -> Fit | None:
+def best_fit(problem: InverseProblem, effects: Sequence[Effect], start: Values, whitener: Whitener) -> Fit | None:
     """The better of two fits: from the noise of the model before, and from noise too small to hide an effect in."""
     tried = [attempt(problem, effects, start, w) for w in (whitener, optimistic(problem, start, whitener))]
     return max((t for t in tried if t is not None), key=level_of, default=None)
 
 
 def low_noise_refit(
-    problem: Problem, effects: Sequence[Effect], start: Values, whitener: Whitener, floor: float = -np.inf
+    problem: InverseProblem, effects: Sequence[Effect], start: Values, whitener: Whitener, floor: float = -np.inf
 ) -> Fit | None:
     """A fit from noise too small to hide an effect in."""
     return attempt(problem, effects, start, optimistic(problem, start, whitener), floor)
@@ -207,7 +207,7 @@ def _level_of_a_row(model: Fit) -> float:
     return level_of(model) / max(sum(int(np.count_nonzero(keep)) for keep in model.whitener.judged), 1)
 
 
-def assemble(problem: Problem, effects: Sequence[Effect], values: Values, whitener: Whitener) -> Fit:
+def assemble(problem: InverseProblem, effects: Sequence[Effect], values: Values, whitener: Whitener) -> Fit:
     """Per-recording sums at ``values``; parameters standing on a bound are held there."""
     prediction = whitener.predict(values)
     free = tuple(par for par in free_parameters(problem, effects) if not on_bound(par, values[par.name]))
@@ -233,7 +233,7 @@ def bounded(columns: Array) -> Array:
     return columns
 
 
-def by_recording(problem: Problem, columns: Array, white: Array) -> tuple[Array, Array, Array]:
+def by_recording(problem: InverseProblem, columns: Array, white: Array) -> tuple[Array, Array, Array]:
     """Sums over the rows of each recording: X'X (r, p, p), X'w (r, p), w'w (r,)."""
     count, width = problem.recordings, columns.shape[1]
     hessian, gradient, loss = np.zeros((count, width, width)), np.zeros((count, width)), np.zeros(count)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rig.diagnosis.effects.bench import BENCH_EFFECTS
 from rig.diagnosis.effects.tissue import STIFFENING, STIFFENING_EFFECT, TISSUE_EFFECTS
 from rig.diagnosis.observations import Observations
-from rig.diagnosis.problem import Array, Channel, Effect, Par, Scatter, Values
+from rig.diagnosis.problem import Array, Effect, Par, Scatter, Signal, Values
 from rig.simulation.chain import NULLS, respond
 from rig.simulation.drive import SETTLE_MM_S, Drive
 from rig.tissue.index_law import Fields, index_force
@@ -50,13 +50,13 @@ class Indentation:
         return self.simulation
 
     @cached_property
-    def channels(self) -> tuple[Channel, ...]:
+    def channels(self) -> tuple[Signal, ...]:
         """Force [N], and the tip [mm] where a tracker was there."""
         memory = MEMORY_S / self.data.drive.period_s
-        force = Channel("force", "N", self.data.force_N, self.data.drive.recording, memory)
+        force = Signal("force", "N", self.data.force_N, self.data.drive.recording, memory)
         if not self.data.has_tracker:
             return (force,)
-        return force, Channel("tip", "mm", self.data.tip_mm, self.data.drive.tip_recording)
+        return force, Signal("tip", "mm", self.data.tip_mm, self.data.drive.tip_recording)
 
     @property
     def recordings(self) -> int:

@@ -15,7 +15,7 @@ from rig.diagnosis.descent import prior_precision
 from rig.diagnosis.evidence import FEWEST_TO_FLIP, Tangents, chance, chance_draws, flipped_draws, held_out
 from rig.diagnosis.fit import Fit, by_recording
 from rig.diagnosis.noise import Array, starts_of
-from rig.diagnosis.problem import Effect, Problem
+from rig.diagnosis.problem import Effect, InverseProblem
 
 BUMPS = 6
 DRAWS = 200
@@ -197,7 +197,7 @@ def _left_out(columns: Array, shifts: Array) -> float:
     return float(-0.5 * len(shifts) * np.log(max(float(errors @ errors), 1e-300)))
 
 
-def _trends_and_steps(problem: Problem) -> tuple[Array, list[str]]:
+def _trends_and_steps(problem: InverseProblem) -> tuple[Array, list[str]]:
     """Patterns (patterns, recordings) of every variable that differs between recordings, and the variable of each."""
     recording, patterns, owners = problem.channels[0].recording, [np.empty((0, problem.recordings))], list[str]()
     for name, values in problem.variables().items():

@@ -52,8 +52,8 @@ class Effect:
     statement: str
     amplitudes: tuple[Par, ...]
     shapes: tuple[Par, ...] = ()
-    shape_starts: Callable[["Problem", Values, Array], Sequence[Values]] = lambda *_: ({},)
-    tries: Callable[["Problem"], float] = lambda _: 1.0
+    shape_starts: Callable[["InverseProblem", Values, Array], Sequence[Values]] = lambda *_: ({},)
+    tries: Callable[["InverseProblem"], float] = lambda _: 1.0
     begin: Values = field(default_factory=dict)
     one_sided: bool = False
     between: bool = False
@@ -74,7 +74,7 @@ class Effect:
         return self.amplitudes + self.shapes
 
 
-class Channel(NamedTuple):
+class Signal(NamedTuple):
     """One measured signal: name, unit, readings and the recording of each, shape (n,).
 
     Noise may remember at most ``memory`` samples; what lasts longer is an error to be explained.
@@ -96,7 +96,7 @@ class Scatter(NamedTuple):
     nudge: Callable[[Fields, Array], Fields]
 
 
-class Problem(Protocol):
+class InverseProblem(Protocol):
     """A system under criticism."""
 
     @property
@@ -104,7 +104,7 @@ class Problem(Protocol):
         """Name of the simulation that is judged."""
 
     @property
-    def channels(self) -> tuple[Channel, ...]:
+    def channels(self) -> tuple[Signal, ...]:
         """The first channel is the one whose prediction error is reported."""
 
     @property

@@ -14,7 +14,7 @@ from rig.diagnosis.gates import Finding
 from rig.diagnosis.indentation import Indentation, Simulation, library
 from rig.diagnosis.observations import Observations, Session, observe, rise_N
 from rig.diagnosis.omnibus import leftover
-from rig.diagnosis.problem import Problem
+from rig.diagnosis.problem import InverseProblem
 from rig.diagnosis.search import search
 from rig.errors import DataError
 from rig.progress import Progress, silent
@@ -35,7 +35,7 @@ def diagnose(
 
 
 def judge(
-    problem: Problem, name: str, quality: tuple[Finding, ...], seed: int = 1, progress: Progress = silent
+    problem: InverseProblem, name: str, quality: tuple[Finding, ...], seed: int = 1, progress: Progress = silent
 ) -> Diagnosis:
     """The same for any system under criticism."""
     rng = np.random.default_rng(seed)

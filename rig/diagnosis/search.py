@@ -21,7 +21,7 @@ from rig.diagnosis.evidence import (
 from rig.diagnosis.fit import Fit, attempt, best_fit, bold_view, fit, glance, least_squares, low_noise_refit, refreshed
 from rig.diagnosis.noise import Array
 from rig.diagnosis.omnibus import LEVEL, leftover
-from rig.diagnosis.problem import Effect, Problem, Values
+from rig.diagnosis.problem import Effect, InverseProblem, Values
 from rig.progress import Progress
 
 ALPHA = 0.03
@@ -70,17 +70,17 @@ class Search:
     bars: dict[str, float]
 
 
-def testable(problem: Problem) -> list[Effect]:
+def testable(problem: InverseProblem) -> list[Effect]:
     """Effects whose needs the data meet."""
     return [effect for effect in problem.effects if not effect.needs & problem.offers.keys()]
 
 
-def penalty(effect: Effect, problem: Problem) -> float:
+def penalty(effect: Effect, problem: InverseProblem) -> float:
     """Nats taken off for having scanned many shapes."""
     return float(np.log(effect.tries(problem)))
 
 
-def screened(t: Tangents, problem: Problem) -> list[tuple[float, Direction]]:
+def screened(t: Tangents, problem: InverseProblem) -> list[tuple[float, Direction]]:
     """Best direction of each effect by linear held-out gain, best effect first; structural aliases left out."""
     gains = linear_gains(t, t.gradient[None])[0]
     best: dict[str, tuple[float, Direction]] = {}
@@ -188,7 +188,7 @@ def alive(effect: Effect, values: Values) -> bool:
     return size >= effect.amplitudes[0].worth and not ended
 
 
-def search(problem: Problem, before: Fit, rng: np.random.Generator, progress: Progress) -> Search:
+def search(problem: InverseProblem, before: Fit, rng: np.random.Generator, progress: Progress) -> Search:
     """Forward steps while the best gain beats chance at 0.05 / 2^k, then drop and swap, then rivals."""
     current, bars, p_values, alone = before, dict[str, float](), dict[str, float](), True
     library = testable(problem)

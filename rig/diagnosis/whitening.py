@@ -18,7 +18,7 @@ from rig.diagnosis.noise import (
     judged,
     starts_of,
 )
-from rig.diagnosis.problem import Problem, Values
+from rig.diagnosis.problem import InverseProblem, Values
 from rig.tissue.index_law import Fields
 
 SHIFT_ROUNDS = 6
@@ -30,7 +30,7 @@ NUDGE = 1e-4
 class Whitener:
     """What turns raw rows of all channels into unit white rows; ``blind`` rows of the first are not judged."""
 
-    problem: Problem
+    problem: InverseProblem
     noise: Noise
     scatter: ScatterWhitener | None
     secants: Array
@@ -78,13 +78,13 @@ class Whitener:
         return total + (self.scatter.log_det if self.scatter is not None else 0.0)
 
 
-def _judged(problem: Problem, channel: int, order: int, blind: Mask) -> Mask:
+def _judged(problem: InverseProblem, channel: int, order: int, blind: Mask) -> Mask:
     recording = problem.channels[channel].recording
     starts = starts_of(recording, problem.recordings)
     return judged(len(recording), starts, order, blind if channel == 0 else None)
 
 
-def shifted(problem: Problem, values: Fields, shifts: Array) -> Fields:
+def shifted(problem: InverseProblem, values: Fields, shifts: Array) -> Fields:
     """Values (arrays on the first channel) with each recording's shifts (recordings, k) in them."""
     if not shifts.size:
         return values
@@ -94,13 +94,13 @@ def shifted(problem: Problem, values: Fields, shifts: Array) -> Fields:
     return values
 
 
-def quietest(problem: Problem, values: Values) -> Colour:
+def quietest(problem: InverseProblem, values: Values) -> Colour:
     """White noise as large as the residual's change from sample to sample."""
     residual = problem.channels[0].observed - problem.predict(values)[0]
     return Colour(np.empty(0), max(float(np.std(np.diff(residual))) / np.sqrt(2), 1e-9))
 
 
-def secants_of(problem: Problem, values: Values, shifts: Array, prediction: Array) -> Array:
+def secants_of(problem: InverseProblem, values: Values, shifts: Array, prediction: Array) -> Array:
     """Change of the first channel per unit of each scattering quantity, at the given shifts, shape (n, k)."""
     columns = []
     for k, scatter in enumerate(problem.scatter):
@@ -110,7 +110,7 @@ def secants_of(problem: Problem, values: Values, shifts: Array, prediction: Arra
     return np.stack(columns, axis=1)
 
 
-def optimistic(problem: Problem, values: Values, before: Whitener, wide: float = 1.0) -> Whitener:
+def optimistic(problem: InverseProblem, values: Values, before: Whitener, wide: float = 1.0) -> Whitener:
     """Noise as if the model were right: white, small scatter, no shifts, so that effects and not noise must explain.
 
     ``wide`` widens the scatter: different specimens are not one specimen touched again.
@@ -127,7 +127,7 @@ def optimistic(problem: Problem, values: Values, before: Whitener, wide: float =
     return Whitener(problem, noise, scatter, secants, before.blind)
 
 
-def estimate(problem: Problem, values: Values, before: Whitener) -> Whitener:
+def estimate(problem: InverseProblem, values: Values, before: Whitener) -> Whitener:
     """Noise from the residuals at ``values``: each recording's shifts, their scatter, and the colour of the rest.
 
     The model is linearised at each recording's own shifts (first-order conditional estimation, Lindstrom and Bates

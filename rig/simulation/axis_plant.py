@@ -49,7 +49,7 @@ class PositionLoop(NamedTuple):
     current_s: float = 0.0005
 
 
-class Limb(NamedTuple):
+class ModelledLimb(NamedTuple):
     """Force-depth curve as columns of shape (n,), damping, and a surface that breathes."""
 
     depth_mm: Values
@@ -60,7 +60,7 @@ class Limb(NamedTuple):
     breathing_Hz: float = 0.25
 
 
-class Sensing(NamedTuple):
+class ForceSensing(NamedTuple):
     """The force channel: its filter, whole ticks between capture and use, and ticks for which a sample stands."""
 
     filter_s: float = 0.0005
@@ -91,7 +91,7 @@ def at_rest(position_mm: float) -> AxisState:
     return AxisState(0.0, position_mm, position_mm, 0.0, 0.0, 0.0, 0.0, 0.0, position_mm, 0.0, 0.0)
 
 
-def surface(limb: Limb, time_s: float) -> tuple[float, float]:
+def surface(limb: ModelledLimb, time_s: float) -> tuple[float, float]:
     """Where the limb's surface is [mm], and its speed [mm/s]."""
     turn = 2 * math.pi * limb.breathing_Hz
     return (
@@ -100,7 +100,7 @@ def surface(limb: Limb, time_s: float) -> tuple[float, float]:
     )
 
 
-def tissue_force(limb: Limb, depth_mm: float, speed_mm_s: float) -> float:
+def tissue_force(limb: ModelledLimb, depth_mm: float, speed_mm_s: float) -> float:
     """Force on the tip [N], linear between the curve's points and beyond its last two; never a pull."""
     if depth_mm <= 0:
         return 0.0
@@ -134,7 +134,7 @@ def dry(speed: float, grip: float) -> float:
 
 
 def step(
-    state: AxisState, motor: Motor, loop: PositionLoop, limb: Limb, sensing: Sensing, target_mm: float
+    state: AxisState, motor: Motor, loop: PositionLoop, limb: ModelledLimb, sensing: ForceSensing, target_mm: float
 ) -> AxisState:
     """The axis STEP_S later, the set-point having been ``target_mm`` during it."""
     share = STEP_S / (STEP_S + loop.smoothing_s)
@@ -177,7 +177,13 @@ def step(
 
 
 def hold(
-    state: AxisState, motor: Motor, loop: PositionLoop, limb: Limb, sensing: Sensing, target_mm: float, steps: int
+    state: AxisState,
+    motor: Motor,
+    loop: PositionLoop,
+    limb: ModelledLimb,
+    sensing: ForceSensing,
+    target_mm: float,
+    steps: int,
 ) -> AxisState:
     """The axis ``steps`` steps later: the set-point is held, as between two ticks of the loop."""
     for _ in range(steps):
@@ -185,7 +191,7 @@ def hold(
     return state
 
 
-def reading(sensed_N: float, noise: float, sensing: Sensing) -> float:
+def reading(sensed_N: float, noise: float, sensing: ForceSensing) -> float:
     """What the converter gives, for a standard normal ``noise``."""
     value_N = sensed_N + noise * sensing.noise_N
     return round(value_N / sensing.quantum_N) * sensing.quantum_N if sensing.quantum_N > 0 else value_N

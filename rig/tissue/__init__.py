@@ -1,1 +1,1 @@
-"""Elastic, viscous and memory laws of tissue, and fitting them to recordings."""
+"""Elastic, viscous and relaxing laws of tissue, and fitting them to recordings."""

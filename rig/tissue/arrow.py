@@ -50,7 +50,7 @@ class Arrow(NamedTuple):
         return np.block([[self.corner, self.border], [self.border.T, np.diag(self.diagonal)]])
 
 
-class Problem(NamedTuple):
+class LeastSquares(NamedTuple):
     """``residuals`` gives shape (m,); ``curve_of``, shape (m,), says of each which curve it is of.
 
     ``holds``, shape (n,), are weights that pull the own parameters to zero: each adds hold * own^2 to the sum.
@@ -64,7 +64,7 @@ class Problem(NamedTuple):
     holds: FloatArray
 
 
-def minimise(problem: Problem, start: Values, evaluations: int) -> Values | None:
+def minimise(problem: LeastSquares, start: Values, evaluations: int) -> Values | None:
     """The values of least squares near ``start``; None where they are not reached in so many evaluations.
 
     In a valley, where the data cannot tell parameters apart, the sum hardly falls in the end: that is reached too.
@@ -93,7 +93,7 @@ def minimise(problem: Problem, start: Values, evaluations: int) -> Values | None
     return values if evaluations >= LONG_SEARCH and halfway - cost <= VALLEY * cost else None
 
 
-def normal_equations(problem: Problem, slopes: Slopes) -> Arrow:
+def normal_equations(problem: LeastSquares, slopes: Slopes) -> Arrow:
     """J'J with the holds, in blocks."""
     count = len(problem.holds)
     border = [np.bincount(problem.curve_of, column * slopes.own, count) for column in slopes.common.T]
@@ -101,7 +101,7 @@ def normal_equations(problem: Problem, slopes: Slopes) -> Arrow:
     return Arrow(np.einsum("ij,ik->jk", slopes.common, slopes.common), np.array(border), diagonal)
 
 
-def _step(problem: Problem, values: Values, residuals: FloatArray, slopes: Slopes, damping: float) -> Values:
+def _step(problem: LeastSquares, values: Values, residuals: FloatArray, slopes: Slopes, damping: float) -> Values:
     count = len(problem.holds)
     downhill = Values(
         -np.einsum("ij,i->j", slopes.common, residuals),
@@ -117,7 +117,7 @@ def _step(problem: Problem, values: Values, residuals: FloatArray, slopes: Slope
     return _clipped(problem, Values(*(v + s + t / 2 for v, s, t in zip(values, step, turn, strict=True))))
 
 
-def _bend(problem: Problem, values: Values, residuals: FloatArray, slopes: Slopes, step: Values) -> Values:
+def _bend(problem: LeastSquares, values: Values, residuals: FloatArray, slopes: Slopes, step: Values) -> Values:
     """-J' r'' with r'' the second derivative of the residuals along the step.
 
     It turns the step along a curved valley, which a straight one leaves at once.
@@ -156,9 +156,9 @@ def _free(values: FloatArray, downhill: FloatArray, lower: FloatArray, upper: Fl
     return np.asarray(~(((values <= lower) & (downhill < 0)) | ((values >= upper) & (downhill > 0))))
 
 
-def _clipped(problem: Problem, values: Values) -> Values:
+def _clipped(problem: LeastSquares, values: Values) -> Values:
     return Values(*(np.clip(v, low, up) for v, low, up in zip(values, problem.lower, problem.upper, strict=True)))
 
 
-def _cost(problem: Problem, values: Values, residuals: FloatArray) -> float:
+def _cost(problem: LeastSquares, values: Values, residuals: FloatArray) -> float:
     return float(np.sum(residuals**2) + np.sum(problem.holds * values.own**2))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from rig.errors import DataError, UsageError
-from rig.tissue.arrow import Problem, Slopes, Values, minimise, normal_equations
+from rig.tissue.arrow import LeastSquares, Slopes, Values, minimise, normal_equations
 from rig.tissue.history import History
 from rig.tissue.laws import FloatArray, Law
 from rig.trials.curves import Curve
@@ -117,7 +117,7 @@ def fit_law(
 
 def _solve(data: "_Data", start: Values, holds_N2_mm2: FloatArray) -> LawFit:
     """The fit with offsets held by these weights."""
-    problem = Problem(data.residuals, data.slopes, data.steps.curve_of, data.lower, data.upper, holds_N2_mm2)
+    problem = LeastSquares(data.residuals, data.slopes, data.steps.curve_of, data.lower, data.upper, holds_N2_mm2)
     found = minimise(problem, start, EVALUATIONS)
     if found is None:
         raise DataError(

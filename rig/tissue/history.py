@@ -1,4 +1,4 @@
-"""Memory of tissue: what a path of the tip through time leaves of earlier force (Fung's hereditary integral).
+"""Relaxation: what a path of the tip through time leaves of earlier force (Fung's hereditary integral).
 
 With elastic force e(t) and relaxation 1 + sum r_i exp(-t/tau_i), force is F = e + sum r_i q_i with q_i the integral of
 exp(-(t-s)/tau_i) de(s). Where e goes straight from sample to sample that is exact in steps: q <- exp(-h/tau) q +
@@ -53,7 +53,7 @@ class History:
         return cls(np.concatenate([np.diff(np.asarray(time, float), prepend=-np.inf) for time in times_s]))
 
     def respond(self, elastic_N: FloatArray, terms: Sequence[Term]) -> FloatArray:
-        """Force [N] with memory along the path, from the force at rest there, shape (n,)."""
+        """Force [N] with relaxation along the path, from the force at rest there, shape (n,)."""
         if elastic_N.shape != self.step_s.shape:
             raise UsageError(
                 f"{len(self.step_s)} times for {elastic_N.size} depths; a history has one time for each depth"
@@ -81,7 +81,7 @@ def recurrence(decay: FloatArray, source: FloatArray) -> FloatArray:
 def ramped(
     slope: Callable[[FloatArray], FloatArray], depth_mm: FloatArray, rate_mm_s: FloatArray, terms: Sequence[Term]
 ) -> FloatArray:
-    """What memory adds [N] at depths reached from contact at one speed each; ``slope`` is that of elastic force.
+    """What relaxation adds [N] at depths reached from contact at one speed each; ``slope`` is that of elastic force.
 
     sum r_i int_0^x exp(-u/(v tau_i)) slope(x-u) du, by Gauss and Legendre over what is not forgotten.
     """

@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 BISECTIONS = 60
 
 
-class Bounds(NamedTuple):
+class ParameterBounds(NamedTuple):
     """Unit of a parameter, what it may be, and what it means."""
 
     unit: str
@@ -40,7 +40,7 @@ class Parameter(NamedTuple):
     upper: float
 
 
-DAMPING = Bounds("N s/mm", 0.0, 10.0, "damping: force per speed of the tip")
+DAMPING = ParameterBounds("N s/mm", 0.0, 10.0, "damping: force per speed of the tip")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,14 +48,14 @@ class Law(ABC):
     """Force at depth x and speed v: F = int (1 + sum r_i exp(-(t-s)/tau_i)) de(x(s)) + damping(x) v; 0 for x < 0.
 
     Subclasses are frozen dataclasses whose fields are the parameters; they give the elastic part e (what is left when
-    the tip rests) for x >= 0, its derivative and its inverse, and damping or the ``terms`` of memory where there are
+    the tip rests) for x >= 0, its derivative and its inverse, and damping or the ``terms`` of relaxation if there are
     any. A parameter outside its bounds raises UsageError. ``known`` are parameters that a fit takes as given, with the
     value it takes unless told another.
     """
 
     name: ClassVar[str]
     formula: ClassVar[str]
-    bounds: ClassVar[Mapping[str, Bounds]]
+    bounds: ClassVar[Mapping[str, ParameterBounds]]
     known: ClassVar[Mapping[str, float]] = {}
 
     def __post_init__(self) -> None:
@@ -111,7 +111,7 @@ class Law(ABC):
 
     @abstractmethod
     def damping(self, depth_mm: FloatArray) -> FloatArray:
-        """dF/dv [N s/mm] for depths >= 0, same shape; what memory gives is not counted."""
+        """dF/dv [N s/mm] for depths >= 0, same shape; what relaxation gives is not counted."""
 
     @abstractmethod
     def depth(self, force_N: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
@@ -119,12 +119,12 @@ class Law(ABC):
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """What the tissue remembers; most laws remember nothing."""
+        """Terms of the relaxation; most laws have none."""
         return ()
 
     @property
     def friction(self) -> tuple[float, float]:
-        """Level [N] of a guide that rubs in front of the sensor, and the travel [mm] that builds it up."""
+        """Level [N] of linear-guide friction in front of the sensor, and the travel [mm] that builds it up."""
         return 0.0, 1.0
 
     @property
@@ -140,7 +140,7 @@ class Law(ABC):
         """Force [N] at depth [mm] and tip speed [mm/s], broadcast; zero outside the tissue.
 
         ``history`` makes the depths one path through time. Without it the tip has come from contact at the speed given
-        (at speed 0, or on the way out: infinitely slowly). Laws without memory give the same for both.
+        (at speed 0, or on the way out: infinitely slowly). Laws without relaxation give the same for both.
         """
         depth, rate = np.broadcast_arrays(np.asarray(depth_mm, float), np.asarray(rate_mm_s, float))
         reached = np.maximum(depth, 0.0)
@@ -161,8 +161,8 @@ class Law(ABC):
     def tangent_stiffness(self, depth_mm: ArrayLike) -> FloatArray:
         """dF/dx [N/mm] in a quick small move from rest, the plant's gain in a force loop; zero outside the tissue.
 
-        With memory that is the instantaneous one, (1 + sum r_i) ``slope``: a loop sees it where its crossover is faster
-        than the times of relaxation. ``slope`` is what is left of it at rest.
+        With relaxation that is the instantaneous one, (1 + sum r_i) ``slope``: a loop sees it where its crossover is
+        faster than the times of relaxation. ``slope`` is what is left of it at rest.
         """
         depth = np.asarray(depth_mm, float)
         return np.where(depth < 0, 0.0, self.sudden * self.slope(np.maximum(depth, 0.0)))
@@ -237,8 +237,8 @@ class Constant(Linear, Damped):
 
     name: ClassVar[str] = "constant"
     formula: ClassVar[str] = "F = k x + B v"
-    bounds: ClassVar[Mapping[str, Bounds]] = {
-        "k_N_mm": Bounds("N/mm", 1e-6, 1e4, "stiffness"),
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
+        "k_N_mm": ParameterBounds("N/mm", 1e-6, 1e4, "stiffness"),
         "damping_N_s_mm": DAMPING,
     }
 
@@ -265,9 +265,9 @@ class Index(Damped):
 
     name: ClassVar[str] = "index"
     formula: ClassVar[str] = "F = a x exp(b x) + B v"
-    bounds: ClassVar[Mapping[str, Bounds]] = {
-        "a_N_mm": Bounds("N/mm", 1e-6, 1e4, "secant stiffness at contact"),
-        "b_per_mm": Bounds("1/mm", 0.0, 5.0, "stiffening per depth"),
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
+        "a_N_mm": ParameterBounds("N/mm", 1e-6, 1e4, "secant stiffness at contact"),
+        "b_per_mm": ParameterBounds("1/mm", 0.0, 5.0, "stiffening per depth"),
         "damping_N_s_mm": DAMPING,
     }
 

@@ -1,4 +1,4 @@
-"""Elastic laws besides the study's two: rivals with as many parameters, and a thin layer on bone."""
+"""Elastic laws besides the study's two: alternatives with as many parameters, and a thin layer on bone."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,12 +7,12 @@ from typing import ClassVar, Self
 import numpy as np
 
 from rig.tissue.hayes import punch_stiffness_N_mm
-from rig.tissue.laws import DAMPING, Bounds, Damped, FloatArray, Law, Linear, straight
+from rig.tissue.laws import DAMPING, Damped, FloatArray, Law, Linear, ParameterBounds, straight
 
-FORCE_SCALE = Bounds("N", 1e-6, 1e5, "force scale")
-STIFFENING = Bounds("1/mm", 1e-4, 5.0, "stiffening per depth")
-FORCE_AT_1_MM = Bounds("N/mm^n", 1e-6, 1e4, "force at 1 mm")
-EXPONENT = Bounds("1", 1.0, 6.0, "exponent")
+FORCE_SCALE = ParameterBounds("N", 1e-6, 1e5, "force scale")
+STIFFENING = ParameterBounds("1/mm", 1e-4, 5.0, "stiffening per depth")
+FORCE_AT_1_MM = ParameterBounds("N/mm^n", 1e-6, 1e4, "force at 1 mm")
+EXPONENT = ParameterBounds("1", 1.0, 6.0, "exponent")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,9 +23,9 @@ class Quadratic(Damped):
 
     name: ClassVar[str] = "quadratic"
     formula: ClassVar[str] = "F = a x + c x^2 + B v"
-    bounds: ClassVar[Mapping[str, Bounds]] = {
-        "a_N_mm": Bounds("N/mm", 1e-6, 1e4, "stiffness at contact"),
-        "c_N_mm2": Bounds("N/mm^2", 0.0, 1e3, "stiffening per depth"),
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
+        "a_N_mm": ParameterBounds("N/mm", 1e-6, 1e4, "stiffness at contact"),
+        "c_N_mm2": ParameterBounds("N/mm^2", 0.0, 1e3, "stiffening per depth"),
         "damping_N_s_mm": DAMPING,
     }
 
@@ -83,7 +83,11 @@ class Power(PowerShape, Damped):
 
     name: ClassVar[str] = "power"
     formula: ClassVar[str] = "F = a x^n + B v"
-    bounds: ClassVar[Mapping[str, Bounds]] = {"a_N_mmn": FORCE_AT_1_MM, "exponent": EXPONENT, "damping_N_s_mm": DAMPING}
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
+        "a_N_mmn": FORCE_AT_1_MM,
+        "exponent": EXPONENT,
+        "damping_N_s_mm": DAMPING,
+    }
 
     @classmethod
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
@@ -127,7 +131,11 @@ class Fung(FungShape, Damped):
 
     name: ClassVar[str] = "fung"
     formula: ClassVar[str] = "F = A (exp(b x) - 1) + B v"
-    bounds: ClassVar[Mapping[str, Bounds]] = {"A_N": FORCE_SCALE, "b_per_mm": STIFFENING, "damping_N_s_mm": DAMPING}
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
+        "A_N": FORCE_SCALE,
+        "b_per_mm": STIFFENING,
+        "damping_N_s_mm": DAMPING,
+    }
 
     @classmethod
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
@@ -146,11 +154,11 @@ class Layer(Linear, Damped):
 
     name: ClassVar[str] = "layer"
     formula: ClassVar[str] = "F = 2 r E kappa(r/h, nu) x / (1 - nu^2) + B v"
-    bounds: ClassVar[Mapping[str, Bounds]] = {
-        "E_MPa": Bounds("MPa", 1e-6, 1e4, "Young's modulus"),
-        "radius_mm": Bounds("mm", 0.1, 100.0, "radius of the tip"),
-        "thickness_mm": Bounds("mm", 0.1, 1e4, "tissue above the bone"),
-        "poisson_ratio": Bounds("1", 0.0, 0.5, "Poisson's ratio"),
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
+        "E_MPa": ParameterBounds("MPa", 1e-6, 1e4, "Young's modulus"),
+        "radius_mm": ParameterBounds("mm", 0.1, 100.0, "radius of the tip"),
+        "thickness_mm": ParameterBounds("mm", 0.1, 1e4, "tissue above the bone"),
+        "poisson_ratio": ParameterBounds("1", 0.0, 0.5, "Poisson's ratio"),
         "damping_N_s_mm": DAMPING,
     }
     known: ClassVar[Mapping[str, float]] = {"radius_mm": 3.0, "thickness_mm": 39.0, "poisson_ratio": 0.45}

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rig.tissue.history import Term
 from rig.tissue.index_law import extended_force
-from rig.tissue.laws import DAMPING, Bounds, Damped, FloatArray, Index, bisect
+from rig.tissue.laws import DAMPING, Damped, FloatArray, Index, ParameterBounds, bisect
 
 DEEPEST_MM = 200.0
 STEP_MM = 1e-5
@@ -17,7 +17,7 @@ STEP_MM = 1e-5
 
 @dataclass(frozen=True, kw_only=True)
 class Extended(Damped):
-    """The index law, bent, with memory, behind a frame that gives way and a guide that rubs.
+    """The index law with extra factors and relaxation, behind a compliant frame and linear-guide friction.
 
     Depth is what the encoder shows: the tip is behind it by compliance times force. Friction (Dahl's, with its level
     and the travel over which it builds up) is a matter of direction and no part of the force at rest.
@@ -27,18 +27,18 @@ class Extended(Damped):
     formula: ClassVar[str] = (
         "F = int (1 + r exp(-(t-s)/tau)) d[a x exp(b x) (x / 5 mm)^(n-1) (1 + q x) (1 + s x^3)] + B v, x = depth - c F"
     )
-    bounds: ClassVar[Mapping[str, Bounds]] = {
-        "a_N_mm": Bounds("N/mm", 1e-6, 1e4, "secant stiffness at contact"),
-        "b_per_mm": Bounds("1/mm", -0.5, 5.0, "stiffening per depth"),
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
+        "a_N_mm": ParameterBounds("N/mm", 1e-6, 1e4, "secant stiffness at contact"),
+        "b_per_mm": ParameterBounds("1/mm", -0.5, 5.0, "stiffening per depth"),
         "damping_N_s_mm": DAMPING,
-        "exponent": Bounds("1", 0.2, 4.0, "exponent"),
-        "quadratic_per_mm": Bounds("1/mm", -0.15, 50.0, "polynomial stiffening"),
-        "substrate_per_mm3": Bounds("1/mm^3", 0.0, 0.05, "stiffening by what lies below"),
-        "relaxation_ratio": Bounds("1", 0.0, 30.0, "force that relaxes over force at rest"),
-        "tau_s": Bounds("s", 1e-3, 1e3, "time of relaxation"),
-        "frame_compliance_mm_N": Bounds("mm/N", 0.0, 0.8, "compliance of the frame"),
-        "friction_N": Bounds("N", 0.0, 20.0, "friction of the guide in front of the sensor"),
-        "friction_length_mm": Bounds("mm", 1e-3, 10.0, "travel over which friction builds up"),
+        "exponent": ParameterBounds("1", 0.2, 4.0, "exponent"),
+        "quadratic_per_mm": ParameterBounds("1/mm", -0.15, 50.0, "polynomial stiffening"),
+        "substrate_per_mm3": ParameterBounds("1/mm^3", 0.0, 0.05, "stiffening by what lies below"),
+        "relaxation_ratio": ParameterBounds("1", 0.0, 30.0, "force that relaxes over force at rest"),
+        "tau_s": ParameterBounds("s", 1e-3, 1e3, "time of relaxation"),
+        "frame_compliance_mm_N": ParameterBounds("mm/N", 0.0, 0.8, "compliance of the frame"),
+        "friction_N": ParameterBounds("N", 0.0, 20.0, "friction of the guide in front of the sensor"),
+        "friction_length_mm": ParameterBounds("mm", 1e-3, 10.0, "travel over which friction builds up"),
     }
     known: ClassVar[Mapping[str, float]] = {
         "exponent": 1.0, "quadratic_per_mm": 0.0, "substrate_per_mm3": 0.0, "relaxation_ratio": 0.0, "tau_s": 1.0,

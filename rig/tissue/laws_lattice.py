@@ -11,10 +11,10 @@ from scipy.interpolate import PchipInterpolator
 from rig.errors import UsageError
 from rig.tissue.index_law import index_stiffness
 from rig.tissue.lattice.sweep import Sweep
-from rig.tissue.laws import DAMPING, Bounds, Damped, FloatArray, Law, bisect
+from rig.tissue.laws import DAMPING, Damped, FloatArray, Law, ParameterBounds, bisect
 
 LEAST_DEPTHS = 4
-STIFFNESS = Bounds("N/mm", 1e-8, 1e3, "spring stiffness at contact")
+STIFFNESS = ParameterBounds("N/mm", 1e-8, 1e3, "spring stiffness at contact")
 FURTHER = 1.5
 
 
@@ -69,7 +69,7 @@ class LatticeConstant(LatticeLaw):
 
     name: ClassVar[str] = "lattice constant"
     formula: ClassVar[str] = "F = k phi(x) + B v"
-    bounds: ClassVar[Mapping[str, Bounds]] = {"k_N_mm": STIFFNESS, "damping_N_s_mm": DAMPING}
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {"k_N_mm": STIFFNESS, "damping_N_s_mm": DAMPING}
 
     k_N_mm: float
 
@@ -94,9 +94,9 @@ class LatticeIndex(LatticeLaw):
 
     name: ClassVar[str] = "lattice index"
     formula: ClassVar[str] = "F = a exp(b x) phi(x) + B v"
-    bounds: ClassVar[Mapping[str, Bounds]] = {
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
         "a_N_mm": STIFFNESS,
-        "b_per_mm": Bounds("1/mm", -2.0, 5.0, "stiffening per depth"),
+        "b_per_mm": ParameterBounds("1/mm", -2.0, 5.0, "stiffening per depth"),
         "damping_N_s_mm": DAMPING,
     }
 

@@ -8,20 +8,20 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from rig.tissue.lattice.newton import tangent_stiffness_N_mm
-from rig.tissue.lattice.ramp import Ramp, project
+from rig.tissue.lattice.ramp import DepthRamp, project
 from rig.tissue.lattice.state import Loaded
-from rig.tissue.laws import DAMPING, Bounds, Damped, FloatArray, Law, bisect
+from rig.tissue.laws import DAMPING, Damped, FloatArray, Law, ParameterBounds, bisect
 from rig.tissue.laws_lattice import FURTHER, STIFFNESS
 
 GUESSES = 100
 
 
-class Surface:
+class PhiSurface:
     """phi(d; b) and its slope: a bicubic spline of ln(phi/d), at d = 0 the tangent at rest, where b plays no part; past
     the last depth straight on.
     """
 
-    def __init__(self, ramp: Ramp) -> None:
+    def __init__(self, ramp: DepthRamp) -> None:
         rest_mm = tangent_stiffness_N_mm(Loaded(ramp.block, ramp.springs)) / ramp.springs.k_N_mm
         inside = np.log(ramp.phi_mm / ramp.depth_mm).T
         nodes = np.vstack([np.full_like(ramp.exponents, np.log(rest_mm)), inside])
@@ -50,12 +50,12 @@ class LatticeSprings(Damped):
 
     name: ClassVar[str] = "lattice springs"
     formula: ClassVar[str] = "F = a phi(x; b) + B v, spring by spring a exp(b |strain|)"
-    bounds: ClassVar[Mapping[str, Bounds]] = {
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
         "a_N_mm": STIFFNESS,
-        "b": Bounds("1", 0.0, 40.0, "stiffening per strain of a spring"),
+        "b": ParameterBounds("1", 0.0, 40.0, "stiffening per strain of a spring"),
         "damping_N_s_mm": DAMPING,
     }
-    surface: ClassVar[Surface]
+    surface: ClassVar[PhiSurface]
 
     a_N_mm: float
     b: float
@@ -82,8 +82,8 @@ class LatticeSprings(Damped):
         return bisect(self.elastic, force_N, np.zeros_like(force_N), deepest_mm)
 
 
-def springs_law(ramp: Ramp) -> type[Law]:
+def springs_law(ramp: DepthRamp) -> type[Law]:
     """The law with the ramp's phi; b is bounded by the ramp's largest."""
-    surface = Surface(ramp)
+    surface = PhiSurface(ramp)
     bounds = {**LatticeSprings.bounds, "b": LatticeSprings.bounds["b"]._replace(upper=surface.largest_b)}
     return type("LatticeSprings", (LatticeSprings,), {"surface": surface, "bounds": bounds})

@@ -1,4 +1,4 @@
-"""Laws whose force depends on how the tip came to its depth: damping that grows with depth, and memory."""
+"""Laws whose force depends on how the tip came to its depth: damping that grows with depth, and relaxation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.tissue.history import Term
-from rig.tissue.laws import Bounds, FloatArray, Law, Linear, bisect, straight
+from rig.tissue.laws import FloatArray, Law, Linear, ParameterBounds, bisect, straight
 from rig.tissue.laws_elastic import (
     EXPONENT,
     FORCE_AT_1_MM,
@@ -20,10 +20,10 @@ from rig.tissue.laws_elastic import (
     power_near,
 )
 
-STIFFNESS = Bounds("N/mm", 1e-6, 1e4, "stiffness at rest")
-BRANCH = Bounds("N/mm", 0.0, 1e4, "stiffness that relaxes")
-RATIO = Bounds("1", 0.0, 100.0, "force that relaxes over force at rest")
-TAU = Bounds("s", 1e-3, 1e3, "time of relaxation")
+STIFFNESS = ParameterBounds("N/mm", 1e-6, 1e4, "stiffness at rest")
+BRANCH = ParameterBounds("N/mm", 0.0, 1e4, "stiffness that relaxes")
+RATIO = ParameterBounds("1", 0.0, 100.0, "force that relaxes over force at rest")
+TAU = ParameterBounds("s", 1e-3, 1e3, "time of relaxation")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,10 +35,10 @@ class HuntCrossley(PowerShape):
 
     name: ClassVar[str] = "hunt_crossley"
     formula: ClassVar[str] = "F = a x^n + lambda x^n v"
-    bounds: ClassVar[Mapping[str, Bounds]] = {
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
         "a_N_mmn": FORCE_AT_1_MM,
         "exponent": EXPONENT,
-        "lambda_N_s_mmn1": Bounds("N s/mm^(n+1)", 0.0, 1e3, "damping at 1 mm"),
+        "lambda_N_s_mmn1": ParameterBounds("N s/mm^(n+1)", 0.0, 1e3, "damping at 1 mm"),
     }
 
     lambda_N_s_mmn1: float
@@ -73,7 +73,7 @@ class Relaxing(Law):
     """
 
     def damping(self, depth_mm: FloatArray) -> FloatArray:
-        """None besides memory."""
+        """None besides relaxation."""
         return np.zeros_like(depth_mm)
 
     def depth(self, force_N: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
@@ -93,7 +93,7 @@ class StandardLinear(Linear, Relaxing):
 
     name: ClassVar[str] = "sls"
     formula: ClassVar[str] = "F = k x + int k1 exp(-(t-s)/tau) dx(s)"
-    bounds: ClassVar[Mapping[str, Bounds]] = {"k_N_mm": STIFFNESS, "k1_N_mm": BRANCH, "tau_s": TAU}
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {"k_N_mm": STIFFNESS, "k1_N_mm": BRANCH, "tau_s": TAU}
 
     k_N_mm: float
     k1_N_mm: float
@@ -125,7 +125,7 @@ class Prony(Linear, Relaxing):
 
     name: ClassVar[str] = "prony"
     formula: ClassVar[str] = "F = k x + int (k1 exp(-(t-s)/tau1) + k2 exp(-(t-s)/tau2)) dx(s)"
-    bounds: ClassVar[Mapping[str, Bounds]] = {
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
         "k_N_mm": STIFFNESS, "k1_N_mm": BRANCH, "tau1_s": TAU, "k2_N_mm": BRANCH, "tau2_s": TAU
     }  # fmt: skip
 
@@ -161,7 +161,7 @@ class QuasiLinear(FungShape, Relaxing):
 
     name: ClassVar[str] = "qlv"
     formula: ClassVar[str] = "F = int (1 + r exp(-(t-s)/tau)) d[A (exp(b x(s)) - 1)]"
-    bounds: ClassVar[Mapping[str, Bounds]] = {
+    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
         "A_N": FORCE_SCALE,
         "b_per_mm": STIFFENING,
         "relaxation_ratio": RATIO,

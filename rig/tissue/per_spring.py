@@ -8,7 +8,7 @@ from rig.progress import Progress
 from rig.tissue.fitting import fit_law
 from rig.tissue.judging import Judged, judge
 from rig.tissue.lattice.block import Block
-from rig.tissue.lattice.ramp import Ramp, ramp
+from rig.tissue.lattice.ramp import DepthRamp, ramp
 from rig.tissue.lattice.springs import LARGEST_EXPONENT, Mode, Springs
 from rig.tissue.lattice.symmetry import shaken
 from rig.tissue.laws import FloatArray
@@ -28,7 +28,7 @@ class PerSpring:
     ``whole_mm`` ends at the first depth where the whole block differs by more than 1 %.
     """
 
-    ramp: Ramp
+    ramp: DepthRamp
     judged: Judged
     depth_mm: FloatArray
     quarter_mm: FloatArray

@@ -21,7 +21,7 @@ from rig.channel import Channel
 from rig.channels import ForceSample
 from rig.config.wiring import Wiring
 from rig.simulation import axis_plant
-from rig.simulation.axis_plant import AxisState, Limb, Motor, PositionLoop, Sensing, at_rest
+from rig.simulation.axis_plant import AxisState, ForceSensing, ModelledLimb, Motor, PositionLoop, at_rest
 from tests.calibrations import with_calibration
 from tests.controller.fake_bench import SETTLED_CYCLES, ZERO, FakeBench, wired
 from tests.controller.fake_devices import FakeAxis, FakeForce, Triple
@@ -46,18 +46,18 @@ BOTA = Product(1000.0, 0.0005, 1_500_000, 0.005, 0.001, 0.0002)
 FT300 = Product(100.0, 0.003, 10_000_000, 0.05, 0.01, 0.002)
 
 
-def curve(force_N: Callable[[float], float]) -> Limb:
+def curve(force_N: Callable[[float], float]) -> ModelledLimb:
     """Tissue whose force at a depth [mm] is ``force_N``."""
     depths = np.linspace(0.0, DEEPEST_MM, POINTS)
-    return Limb(tuple(depths), tuple(force_N(depth) for depth in depths), 0.0, surface_mm=SURFACE_MM)
+    return ModelledLimb(tuple(depths), tuple(force_N(depth) for depth in depths), 0.0, surface_mm=SURFACE_MM)
 
 
-def linear(stiffness_N_mm: float) -> Limb:
+def linear(stiffness_N_mm: float) -> ModelledLimb:
     """F = k x."""
     return curve(lambda depth_mm: stiffness_N_mm * depth_mm)
 
 
-def exponential(stiffness_N_mm: float, at_N: float, b_per_mm: float = 0.25) -> Limb:
+def exponential(stiffness_N_mm: float, at_N: float, b_per_mm: float = 0.25) -> ModelledLimb:
     """F = a x exp(b x) with a tangent of ``stiffness_N_mm`` where the force is ``at_N``: b + 1 / x = k / F."""
     depth_mm = 1.0 / (stiffness_N_mm / at_N - b_per_mm)
     a_N_mm = at_N / depth_mm * math.exp(-b_per_mm * depth_mm)
@@ -68,7 +68,7 @@ def exponential(stiffness_N_mm: float, at_N: float, b_per_mm: float = 0.25) -> L
 class PlantAxis(FakeAxis):
     """The axis as physics; ``limb`` is what its tip meets, shifted by ``surface_mm``."""
 
-    limb: Limb = field(default_factory=lambda: linear(1.0))
+    limb: ModelledLimb = field(default_factory=lambda: linear(1.0))
     filter_s: float = BOTA.filter_s
     state: AxisState = field(default_factory=lambda: at_rest(10.0))
     _stepped_ns: int = 0
@@ -79,7 +79,7 @@ class PlantAxis(FakeAxis):
         target_mm = self.state.reference_mm if math.isnan(self.target_mm) else self.target_mm
         while self._stepped_ns < now_ns:
             self.state = axis_plant.step(
-                self.state, Motor(), PositionLoop(), self.limb, Sensing(self.filter_s), target_mm
+                self.state, Motor(), PositionLoop(), self.limb, ForceSensing(self.filter_s), target_mm
             )
             self._stepped_ns += STEP_NS
         self.position_mm = self.state.position_mm
@@ -130,7 +130,7 @@ class PlantBench(FakeBench):
     def __init__(
         self,
         product: Product,
-        limb: Limb,
+        limb: ModelledLimb,
         wiring: Wiring | None = None,
         seed: int = 1,
         table: tuple[Check, ...] = TABLE,

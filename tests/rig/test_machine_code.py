@@ -176,10 +176,10 @@ def test_processes_that_meet_with_different_arguments_keep_each_its_own(tmp_path
 
 
 def test_what_simulation_compiles_is_loaded_the_second_time(folder: Path) -> None:
-    from rig.simulation.axis_plant import Limb, Motor, PositionLoop, Sensing, at_rest  # noqa: PLC0415
+    from rig.simulation.axis_plant import ForceSensing, ModelledLimb, Motor, PositionLoop, at_rest  # noqa: PLC0415
 
-    limb = Limb((0.0, 1.0), (0.0, 2.0), 0.0)
-    arguments = (at_rest(0.0), Motor(), PositionLoop(), limb, Sensing(), 0.5, 8)
+    limb = ModelledLimb((0.0, 1.0), (0.0, 2.0), 0.0)
+    arguments = (at_rest(0.0), Motor(), PositionLoop(), limb, ForceSensing(), 0.5, 8)
     fresh = segments.hold_compiled.__wrapped__  # without what is kept for this process
     first, second = fresh(), fresh()
     assert first(*arguments) == second(*arguments)

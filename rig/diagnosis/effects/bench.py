@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rig.diagnosis.effects.scan import PEAKS, peaks
-from rig.diagnosis.problem import Array, Effect, Par, Problem, Values
+from rig.diagnosis.problem import Array, Effect, InverseProblem, Par, Values
 
 LOWEST_HZ, HIGHEST_HZ = 0.08, 3.0
 PITCHES_PER_MM = np.linspace(1 / 10, 1 / 0.5, 60)
@@ -13,26 +13,26 @@ NUDGE_MM = 0.02
 FEWEST_PERIODS = 2.5
 
 
-def _match(problem: Problem, values: Values, residual: Array) -> tuple[Array, float]:
+def _match(problem: InverseProblem, values: Values, residual: Array) -> tuple[Array, float]:
     """Residual times its sensitivity to the surface, per sample, and the sensitivity's energy."""
     ahead = problem.predict({**values, "surface_mm": values["surface_mm"] + NUDGE_MM})[0]
     sensitivity = (ahead - problem.predict(values)[0]) / NUDGE_MM
     return residual * sensitivity, float(sensitivity @ sensitivity)
 
 
-def _frequencies(problem: Problem) -> Array:
+def _frequencies(problem: InverseProblem) -> Array:
     time_s = problem.variables()["session time"]
     span_s = float(np.ptp(time_s))
     return np.arange(LOWEST_HZ, HIGHEST_HZ, 0.5 / max(span_s, 5.0))
 
 
-def _surface_starts(problem: Problem, values: Values, residual: Array) -> Sequence[Values]:
+def _surface_starts(problem: InverseProblem, values: Values, residual: Array) -> Sequence[Values]:
     time_s = problem.variables()["session time"]
     found = peaks(time_s, *_match(problem, values, residual), _frequencies(problem))
     return [{"surface_motion_Hz": f} for f in found]
 
 
-def _ripple_starts(problem: Problem, values: Values, residual: Array) -> Sequence[Values]:
+def _ripple_starts(problem: InverseProblem, values: Values, residual: Array) -> Sequence[Values]:
     position = problem.variables()["depth"]
     match, energy = _match(problem, values, residual)
     touching = np.abs(match) > 0
@@ -43,11 +43,11 @@ def _ripple_starts(problem: Problem, values: Values, residual: Array) -> Sequenc
     return [{"ripple_pitch_mm": 1 / f} for f in found]
 
 
-def _surface_tries(problem: Problem) -> float:
+def _surface_tries(problem: InverseProblem) -> float:
     return max(1.0, len(_frequencies(problem)) / 2 / PEAKS)
 
 
-def _ripple_tries(_: Problem) -> float:
+def _ripple_tries(_: InverseProblem) -> float:
     return max(1.0, len(PITCHES_PER_MM) / 3 / PEAKS)
 
 

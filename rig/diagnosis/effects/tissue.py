@@ -1,4 +1,4 @@
-"""Causes that lie in the tissue: its elastic law, its memory, its rate dependence, its surface chemistry."""
+"""Causes that lie in the tissue: its elastic law, relaxation, rate dependence, its surface chemistry."""
 
 from rig.diagnosis.problem import Effect, Par
 
@@ -69,7 +69,7 @@ RELAXATION = Effect(
     begin={"relaxation_ratio": 1.0, "tau_s": 2.0, "b_per_mm": 0.05},
     one_sided=True,
     needs=frozenset({"depth"}),
-    repair="use the model with memory; wait out the time constant before reading a static force",
+    repair="use the model with relaxation; wait out the time constant before reading a static force",
 )
 RATE_LAW = Effect(
     "rate_law",

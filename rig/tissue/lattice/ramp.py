@@ -23,7 +23,7 @@ _LEAST_LEVELS = 4  # for the cubic
 
 
 @dataclass(frozen=True)
-class Ramp:
+class DepthRamp:
     """phi in mm, shape (n, m), at n exponents and m depths; the springs are those with b = 0."""
 
     block: Block
@@ -46,7 +46,7 @@ def ramp(
     depth_mm: Floats,
     force_N: Floats,
     progress: Callable[[float], None] | None = None,
-) -> Ramp:
+) -> DepthRamp:
     """Raise b from 0 until the forces (m,) at the depths (m,) are fitted worse again; ``progress(b)`` after each level.
 
     Raises DataError where the best b would be beyond what springs may have.
@@ -61,7 +61,7 @@ def ramp(
         if len(misfits) >= max(_LEAST_LEVELS, int(np.argmin(misfits)) + 1 + _PAST_BEST):
             phi = np.array([[point.reaction_N for point in points] for points in levels]) / springs.k_N_mm
             inverted = max(point.health.inverted_cells for points in levels for point in points)
-            return Ramp(block, replace(springs, b=0.0), np.array(exponents), depth_mm, phi, inverted)
+            return DepthRamp(block, replace(springs, b=0.0), np.array(exponents), depth_mm, phi, inverted)
     raise DataError(
         f"the curve rises faster than springs with an exponent of {LARGEST_EXPONENT:g} can follow: use the global k(x) "
         "of `rig fit --lattice`"

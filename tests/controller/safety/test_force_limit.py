@@ -15,7 +15,7 @@ from controller.safety.load import NO_WRENCH, LoadMonitor
 from controller.safety.table import TABLE, evaluate
 from mock_devices.testing.models import index_model
 from mock_devices.testing.spring_bench import WIRING
-from rig.simulation.axis_plant import Limb
+from rig.simulation.axis_plant import ModelledLimb
 from tests.controller.fake_bench import ZERO, wired
 from tests.controller.plant_bench import BOTA, FT300, PlantBench, Product, curve, exponential, linear, rammed
 
@@ -36,7 +36,7 @@ def stopped(bench: PlantBench, *steps: Step) -> PlantBench:
     "limb", [linear(1.0), linear(2.0), linear(5.0), exponential(5.0, LIMIT_N)], ids=["1", "2", "5", "to 5"]
 )
 def test_at_30_mm_s_on_tissue_up_to_5_N_mm_the_peak_stays_below_a_tenth_over_the_limit(
-    product: Product, limb: Limb, phase_mm: float
+    product: Product, limb: ModelledLimb, phase_mm: float
 ) -> None:
     bench = stopped(PlantBench(product, limb._replace(surface_mm=20.0 + phase_mm)), *rammed(30.0))
     assert bench.latched == "force_limit"

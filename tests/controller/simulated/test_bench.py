@@ -22,7 +22,7 @@ from mock_devices.testing.models import index_model
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed
 from rig.simulation import axis_plant
-from rig.simulation.axis_plant import Limb, at_rest
+from rig.simulation.axis_plant import ModelledLimb, at_rest
 from rig.tissue.model import Model
 
 WIRING = Wiring()
@@ -181,11 +181,13 @@ def test_the_plant_answers_as_the_mock_benchs_drive_and_as_the_design_assumes(fr
         measured.append(mock.force.wrench()[2])
         mock.axis.target(25.0 + mm)
     depths = [0.0, 100.0]
-    state, limb, ours = at_rest(25.0), Limb(depths, depths, 0.0), []
+    state, limb, ours = at_rest(25.0), ModelledLimb(depths, depths, 0.0), []
     hold = hold_compiled()
     for mm in swing:
         ours.append(state.sensed_N)
-        state = hold(state, MOTOR, POSITION_LOOP, Limb(np.array(depths), np.array(depths), 0.0), SENSING, 25.0 + mm, 8)
+        state = hold(
+            state, MOTOR, POSITION_LOOP, ModelledLimb(np.array(depths), np.array(depths), 0.0), SENSING, 25.0 + mm, 8
+        )
     theirs, mine = response(measured, swing, frequency_Hz), response(ours, swing, frequency_Hz)
     assert abs(mine) == pytest.approx(abs(theirs), rel=0.05)
     assert np.degrees(np.angle(mine / theirs)) == pytest.approx(0.0, abs=10.0)
@@ -196,7 +198,7 @@ def test_the_plant_answers_as_the_mock_benchs_drive_and_as_the_design_assumes(fr
 def test_the_motor_at_constant_voltage_runs_at_the_speed_its_back_emf_allows() -> None:
     """U = R i + Ke w with torque equal to friction, at rest electrically and mechanically."""
     motor = MOTOR._replace(supply_V=3.0, coulomb_N_m=0.0)
-    empty = Limb([0.0, 1.0], [0.0, 0.0], 0.0, surface_mm=1e6)
+    empty = ModelledLimb([0.0, 1.0], [0.0, 0.0], 0.0, surface_mm=1e6)
     state = at_rest(0.0)
     for _ in range(4000):
         state = axis_plant.step(state, motor, POSITION_LOOP, empty, SENSING, 1e5)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from rig.tissue.arrow import Problem, Slopes, Values, minimise, normal_equations
+from rig.tissue.arrow import LeastSquares, Slopes, Values, minimise, normal_equations
 
 Column = NDArray[np.float64]
 CURVES, POINTS = 4, 30
@@ -35,8 +35,8 @@ class Exponentials:
             np.column_stack([grown, a * (self.x - values.own[self.curve_of]) * grown]), np.asarray(-a * b * grown)
         )
 
-    def problem(self, upper_b: float = 5.0, reach: float = 1.0, hold: float = 0.5) -> Problem:
-        return Problem(
+    def problem(self, upper_b: float = 5.0, reach: float = 1.0, hold: float = 0.5) -> LeastSquares:
+        return LeastSquares(
             self.residuals, self.slopes, self.curve_of,
             lower=Values(np.array([0.0, 0.0]), np.full(CURVES, -reach)),
             upper=Values(np.array([9.0, upper_b]), np.full(CURVES, reach)),
@@ -47,7 +47,7 @@ class Exponentials:
 START = Values(np.array([1.0, 0.3]), np.zeros(CURVES))
 
 
-def dense(problem: Problem) -> Column:
+def dense(problem: LeastSquares) -> Column:
     """The same minimum by a solver that knows nothing of arrows."""
 
     def residuals(v: Column) -> Column:
