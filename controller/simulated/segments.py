@@ -22,7 +22,6 @@ from rig.simulation import axis_plant
 from rig.simulation.axis_plant import AxisState, ForceSensing, ModelledLimb, Motor, PositionLoop
 
 Column = NDArray[np.float64]
-Parts = dict[str, Callable[..., object]]
 ROWS = 6
 
 
