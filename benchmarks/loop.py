@@ -243,7 +243,7 @@ def measure(seconds: float, rounds: int, report: Callable[[dict[str, Summary]], 
 
 def phase(bench: ServedBench, service: Service, load: Load, name: str, seconds: float, hammered_s: float) -> None:
     """One press with its recording, then cyclictest, under one load."""
-    with hammered(load, hammered_s), contextlib.closing(Arrivals(bench.endpoints["control"])) as arrivals:
+    with hammered(load, hammered_s), contextlib.closing(Arrivals(bench.endpoints.control)) as arrivals:
         recording = service.press(name)
     if recording:
         take(load, recording, arrivals.found_ns)

@@ -8,7 +8,6 @@ import argparse
 import contextlib
 import ctypes
 import gc
-import json
 import os
 import select
 import signal
@@ -27,6 +26,7 @@ from mock_devices.faults.wires import Fault
 from mock_devices.parameters import Parameters, load_parameters
 from mock_devices.physics.effects import EFFECTS, complete, knobs, parse_hidden, statement
 from mock_devices.robotiq.mock import RobotiqMock
+from rig.config.endpoints import Endpoints
 from rig.errors import RigError
 
 # A client's bytes that came during a stall were sent before its end: they are heard before time is caught up, or every
@@ -69,26 +69,16 @@ class Server:
         sampled = {role: mock.sampled for role, mock in roles.items() if isinstance(mock, BotaMock | RobotiqMock)}
         self.control = ControlPort(Desk(bench, _by_role(devices), synced_ns, sampled).answer)
 
-    def endpoints(self) -> dict[str, object]:
-        """Address of each device by role and kind of port, of the control channel, this process' id, and latencies.
-
-        ``serials`` has the serial number of force sensors and axis by role. ``latency_ms`` is what a data sheet would
-        say of each device; what is hidden in the bench comes on top.
-        """
+    def endpoints(self) -> Endpoints:
+        """Where all of it is."""
         addresses: dict[str, dict[str, str]] = {}
+        serials: dict[str, str] = {}
         for device in self._devices:
             addresses.setdefault(device.role, {}).update(device.mock.endpoints())
-        return {
-            **addresses,
-            "control": self.control.endpoint,
-            "pid": os.getpid(),
-            "serials": {
-                device.role: device.mock.serial_number
-                for device in self._devices
-                if isinstance(device.mock, BotaMock | RobotiqMock | Epos4Mock)
-            },
-            "latency_ms": stated_latency_ms(self._bench.parameters),
-        }
+            if isinstance(device.mock, BotaMock | RobotiqMock | Epos4Mock):
+                serials[device.role] = device.mock.serial_number
+        about = {"control": self.control.endpoint, "pid": os.getpid(), "serials": serials}
+        return Endpoints.model_validate(addresses | about | {"latency_ms": stated_latency_ms(self._bench.parameters)})
 
     def serve(self, ended: Callable[[], bool], parent: int | None = None) -> None:
         """Plays until ``ended``, or until the pipe ``parent`` is closed at its other end."""
@@ -198,7 +188,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with contextlib.closing(server):
         _be_prompt(options.priority)
         server.turn([])
-        sys.stdout.write(json.dumps(server.endpoints()) + "\n")
+        sys.stdout.write(server.endpoints().model_dump_json() + "\n")
         sys.stdout.flush()
         server.serve(lambda: bool(ended), sys.stdin.fileno() if options.with_parent else None)
     return 0

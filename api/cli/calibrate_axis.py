@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from api.cli.asking import Person
 from api.cli.live import here
@@ -20,6 +20,7 @@ from api.operations.calibrate import (
 from controller.operation import Operation
 from mock_devices.control import BenchControl
 from rig.config.calibration import AxisCalibration
+from rig.config.endpoints import Endpoints
 from rig.config.products.roles import MOCK_PORT
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
@@ -49,7 +50,7 @@ def calibrate_axis(wiring: Wiring, asked: AxisAsked, person: Person) -> AxisCali
     operation = Operation("calibrate axis")
     with bench_for(wiring, approaches=False) as (live, endpoints):
         if asked.gauge_block_mm:
-            found = _by_block(operation, live, asked, person, endpoints if mock else {})
+            found = _by_block(operation, live, asked, person, endpoints if mock else None)
         else:
             travel = AxisTravel(asked.from_mm, asked.to_mm)
             found = here(operation, lambda: axis_by_tracker(operation, live, travel, lambda: _toward(asked, person)))
@@ -95,7 +96,7 @@ def _toward(asked: AxisAsked, person: Person) -> bool:
 
 
 def _by_block(
-    operation: Operation, wiring: Wiring, asked: AxisAsked, person: Person, endpoints: dict[str, Any]
+    operation: Operation, wiring: Wiring, asked: AxisAsked, person: Person, endpoints: Endpoints | None
 ) -> AxisCalibration:
     gauge_mm = asked.gauge_block_mm or 0.0
     with _block(person, endpoints, gauge_mm) as (known_mm, put):
@@ -104,12 +105,14 @@ def _by_block(
 
 
 @contextmanager
-def _block(person: Person, endpoints: dict[str, Any], gauge_mm: float) -> Iterator[tuple[float, Callable[[], object]]]:
+def _block(
+    person: Person, endpoints: Endpoints | None, gauge_mm: float
+) -> Iterator[tuple[float, Callable[[], object]]]:
     """Where the search begins, as far as it is known, and who puts the block there: a mock limb is its own."""
     if not endpoints:
         yield 0.0, lambda: person.do(f"put the gauge block of {gauge_mm:g} mm under the tip")
         return
-    with BenchControl(endpoints["control"]) as control:
+    with BenchControl(endpoints.control) as control:
         table_mm = control.number("surface.position_mm")
         yield table_mm - NEAR_MM, lambda: control.set({"surface.position_mm": table_mm - gauge_mm})
 

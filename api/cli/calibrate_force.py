@@ -34,12 +34,10 @@ def calibrate_force(wiring: Wiring, asked: ForceAsked, person: Person) -> ForceC
     if wiring.force.port == MOCK_PORT:
         weights = _weights(wiring, asked, person) if asked.weights else mock_weights(wiring, asked.load == "hung")
         operation = of_force(weights)
-        with (
-            bench_for(wiring, approaches=False) as (live, endpoints),
-            BenchControl(endpoints["control"]) as control,
-            weights_on(control) as put_on,
-        ):
-            found = here(operation, lambda: measure(operation, live, weights, put_on, BY_ITSELF))
+        with bench_for(wiring, approaches=False) as (live, endpoints):
+            assert endpoints
+            with BenchControl(endpoints.control) as control, weights_on(control) as put_on:
+                found = here(operation, lambda: measure(operation, live, weights, put_on, BY_ITSELF))
     else:
         weights = _weights(wiring, asked, person)
         operation = of_force(weights)

@@ -1,7 +1,6 @@
 """Commands about devices: mock and doctor."""
 
 import contextlib
-import json
 import sys
 from typing import Annotated, Any
 
@@ -14,6 +13,7 @@ from api.cli.stage import bench_for, bench_process
 from controller import doctor as examination
 from controller.claims import Holder, holder
 from controller.devices.takeover import STREAMS
+from rig.config.endpoints import Endpoints
 from rig.config.products.registry import ROLES
 from rig.errors import CheckFailed, DeviceError
 from rig.results.recorded import DeviceReport, DoctorResult
@@ -36,13 +36,13 @@ def mock(
         process,
         endpoints,
     ):
-        sys.stdout.write(json.dumps(endpoints) + "\n" if as_json else _lines(endpoints))
+        sys.stdout.write(endpoints.model_dump_json() + "\n" if as_json else _lines(endpoints))
         sys.stdout.flush()
         with contextlib.suppress(KeyboardInterrupt):
             process.wait()
 
 
-def _lines(endpoints: dict[str, Any]) -> str:
+def _lines(endpoints: Endpoints) -> str:
     """Endpoints for a person, as the lines of a wiring file."""
     lines = ["# the mock bench is ready; Ctrl-C ends it"]
     for role, products in ROLES.items():
@@ -50,9 +50,9 @@ def _lines(endpoints: dict[str, Any]) -> str:
             if product.mock is None:
                 continue
             lines.append(f'{role}.port = "{product.mock.address(endpoints)}"            # {name}')
-            if product.mock.role in endpoints["latency_ms"]:
-                lines.append(f"{role}.latency_ms = {endpoints['latency_ms'][product.mock.role]:g}            # {name}")
-    return "\n".join([*lines, f"# control channel: {endpoints['control']}", ""])
+            if product.mock.role in endpoints.latency_ms:
+                lines.append(f"{role}.latency_ms = {endpoints.latency_ms[product.mock.role]:g}            # {name}")
+    return "\n".join([*lines, f"# control channel: {endpoints.control}", ""])
 
 
 def _row(finding: DeviceReport) -> tuple[str, ...]:

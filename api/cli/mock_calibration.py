@@ -9,7 +9,6 @@ import contextlib
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import typer
 
@@ -22,6 +21,7 @@ from controller.devices.drivers import start_devices
 from mock_devices.control import BenchControl
 from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
 from rig.config.calibration_files import read_axis, read_force, text_of
+from rig.config.endpoints import Endpoints
 from rig.config.products.roles import Product
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, RigError, UsageError
@@ -36,18 +36,18 @@ PACE = Pace(speed_mm_s=20.0, settle_s=0.15, read_s=0.3)
 AXIS_STEPS_MM = (2.0, 14.0, 2.0)
 
 
-def force_file(wiring: Wiring, endpoints: dict[str, Any]) -> Path:
+def force_file(wiring: Wiring, endpoints: Endpoints) -> Path:
     """Where the calibration of this mock sensor is kept."""
     return _file(wiring.force, endpoints)
 
 
-def _file(device: Product, endpoints: dict[str, Any]) -> Path:
+def _file(device: Product, endpoints: Endpoints) -> Path:
     """Another serial number, another file."""
     assert device.mock, "only what the mock bench serves is calibrated by itself"
-    return state_folder() / f"{device.product}-{endpoints['serials'][device.mock.role]}.json"
+    return state_folder() / f"{device.product}-{endpoints.serials[device.mock.role]}.json"
 
 
-def mock_force_calibration(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibration:
+def mock_force_calibration(wiring: Wiring, endpoints: Endpoints) -> ForceCalibration:
     """The calibration of the mock sensor at ``wiring.force.port``, made now where there is none that may be used."""
     file = force_file(wiring, endpoints)
     with contextlib.suppress(UsageError):
@@ -59,7 +59,7 @@ def mock_force_calibration(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCa
     return made
 
 
-def mock_axis_calibration(wiring: Wiring, endpoints: dict[str, Any]) -> AxisCalibration | None:
+def mock_axis_calibration(wiring: Wiring, endpoints: Endpoints) -> AxisCalibration | None:
     """The calibration of the mock axis against the mock tracker, made now where there is none that may be used.
 
     None where a marker is out of view or the limb's does not tell the sense, where the workspace is too short, and
@@ -91,21 +91,21 @@ def mock_weights(wiring: Wiring, hung: bool = False) -> Weights:
     return Weights(tuple(share * largest_N for share in SHARES), uncertainty=0.0)
 
 
-def _measured_force(wiring: Wiring, endpoints: dict[str, Any]) -> ForceCalibration:
+def _measured_force(wiring: Wiring, endpoints: Endpoints) -> ForceCalibration:
     weights = mock_weights(wiring)
     with (
-        BenchControl(endpoints["control"]) as control,
+        BenchControl(endpoints.control) as control,
         _nothing_hidden(control),
         weights_on(control) as put_on,
     ):
         return measured_force(of_force(weights), wiring.force, weights, put_on, BY_ITSELF)
 
 
-def _measured_axis(wiring: Wiring, endpoints: dict[str, Any]) -> AxisCalibration | None:
+def _measured_axis(wiring: Wiring, endpoints: Endpoints) -> AxisCalibration | None:
     places_mm = [wiring.limits.position_min_mm + step_mm for step_mm in AXIS_STEPS_MM]
     if max(places_mm) > wiring.limits.position_max_mm:
         return None
-    with BenchControl(endpoints["control"]) as control, _nothing_hidden(control), _in_the_air(control):
+    with BenchControl(endpoints.control) as control, _nothing_hidden(control), _in_the_air(control):
         if not all(control.get("tracker.tip_in_view", "tracker.arm_in_view").values()):
             return None
         devices = start_devices(wiring)

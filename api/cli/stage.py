@@ -1,16 +1,15 @@
 """Starts the mock bench for ports that say `mock`, and puts its endpoints in their place."""
 
-import json
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
-from typing import Any
 
 from api.cli.mock_calibration import mock_axis_calibration, mock_force_calibration
 from api.cli.options import calibrated
 from controller.commissioning.refusals import refuse_uncalibrated
+from rig.config.endpoints import Endpoints
 from rig.config.products.roles import MOCK_PORT, Force, Product, Tracker
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
@@ -35,7 +34,7 @@ def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, both_sen
 @contextmanager
 def bench_process(
     wiring: Wiring, hide: tuple[str, ...] = (), seed: int | None = None, both_sensors: bool = False
-) -> Iterator[tuple["subprocess.Popen[str]", dict[str, Any]]]:
+) -> Iterator[tuple["subprocess.Popen[str]", Endpoints]]:
     """The mock bench as a process, and its endpoints; it ends with the block, or with this process."""
     process = subprocess.Popen(
         _arguments(wiring, hide, seed, both_sensors),
@@ -49,7 +48,7 @@ def bench_process(
         line = process.stdout.readline()
         if not line:
             raise UsageError("the mock bench did not start; its reason stands above")
-        yield process, json.loads(line)
+        yield process, Endpoints.model_validate_json(line)
     finally:
         process.stdin.close()
         process.wait(10)
@@ -59,7 +58,7 @@ def bench_process(
 @contextmanager
 def bench_for(
     wiring: Wiring, hide: tuple[str, ...] = (), approaches: bool = True, refuses: bool = True
-) -> Iterator[tuple[Wiring, dict[str, Any]]]:
+) -> Iterator[tuple[Wiring, Endpoints | None]]:
     """``wiring`` with real endpoints, and what the mock bench said; without a port `mock` there is no mock bench.
 
     Where it ``approaches``, calibrations are read and checked before anything is opened, and a mock sensor that has
@@ -70,7 +69,7 @@ def bench_for(
     if approaches and refuses:
         refuse_uncalibrated(wiring, datetime.now(UTC))
     if not wiring.uses_mock:
-        yield wiring, {}
+        yield wiring, None
         return
     with bench_process(wiring, hide) as (_, endpoints):
         live = plugged(wiring, endpoints) if approaches else at_endpoints(wiring, endpoints)
@@ -79,7 +78,7 @@ def bench_for(
         yield live, endpoints
 
 
-def plugged(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
+def plugged(wiring: Wiring, endpoints: Endpoints) -> Wiring:
     """``wiring`` on the mock bench's endpoints, with calibrations of what is a mock: its force sensor, and its axis.
 
     A calibration that the wiring brings along is kept, whosever it is. A mock axis is seen by the mock tracker alone.
@@ -94,7 +93,7 @@ def plugged(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
     return live.model_copy(update={"calibration": known})
 
 
-def at_endpoints(wiring: Wiring, endpoints: dict[str, Any]) -> Wiring:
+def at_endpoints(wiring: Wiring, endpoints: Endpoints) -> Wiring:
     """``wiring`` with each port `mock` replaced by the endpoint that serves it, and as patient as that needs.
 
     Where the wiring states no latency for a mock device, it takes what the device's data sheet would say.
@@ -116,10 +115,10 @@ def mocks(wiring: Wiring) -> dict[str, Product]:
     return found
 
 
-def _served(device: Product, endpoints: dict[str, Any]) -> Product:
+def _served(device: Product, endpoints: Endpoints) -> Product:
     assert device.mock
     known: dict[str, object] = {"port": device.mock.address(endpoints)}
-    stated_ms = endpoints["latency_ms"].get(device.mock.role)
+    stated_ms = endpoints.latency_ms.get(device.mock.role)
     if isinstance(device, Force | Tracker):
         known["latency_ms"] = device.latency_ms or stated_ms
     return device.model_copy(update=known)

@@ -114,7 +114,7 @@ def operator(live: Live) -> int:
 
 def bench(live: Live) -> int:
     """The process that plays all devices."""
-    return int(live.bench.endpoints["pid"])
+    return int(live.bench.endpoints.pid)
 
 
 def full_disk(live: Live) -> None:

@@ -77,7 +77,7 @@ def trial(
     moment_s = random.Random(f"{seed} {fault.name} {number}").uniform(0.0, fault.latest_s)
     with (
         served_bench("--seed", str(seed + number)) as bench,
-        contextlib.closing(Observer(bench.endpoints["control"])) as observer,
+        contextlib.closing(Observer(bench.endpoints.control)) as observer,
     ):
         outcome = _outcome(fault, bench, folder, planted, observer, moment_s)
     found = evaluate(fault, outcome)

@@ -1,7 +1,6 @@
 """A mock bench in a process of its own, and the `rig` command run against it as a user runs it."""
 
 import contextlib
-import json
 import os
 import signal
 import socket
@@ -17,6 +16,7 @@ from api.cli.mock_calibration import force_file
 from api.cli.options import built_in
 from api.cli.stage import plugged
 from mock_devices.control import BenchControl
+from rig.config.endpoints import Endpoints
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
@@ -40,14 +40,14 @@ PATIENCE_S = 60.0
 class ServedBench:
     """Endpoints of a served bench and its control channel."""
 
-    endpoints: dict[str, Any]
+    endpoints: Endpoints
     control: BenchControl
 
     def settings(self, *more: str) -> list[str]:
         """Options that plug a command into this bench and make it patient, its force sensor calibrated."""
-        force, axis, tracker = self.endpoints["force"], self.endpoints["axis"], self.endpoints["tracker"]
+        force, axis, tracker = (self.endpoints.devices[role] for role in ("force", "axis", "tracker"))
         ports = (f"force.port={force['serial']}", f"axis.port={axis['slcan']}", f"tracker.port=tcp://{tracker['tcp']}")
-        late = [f"{role}.latency_ms={self.endpoints['latency_ms'][role]}" for role in ("force", "tracker")]
+        late = [f"{role}.latency_ms={self.endpoints.latency_ms[role]}" for role in ("force", "tracker")]
         known = f"calibration.force={self.calibrated(*more)}"
         return [part for setting in (*ports, *late, known, *PATIENT, *more) for part in ("--set", setting)]
 
@@ -76,8 +76,8 @@ def served_bench(*options: str) -> Iterator[ServedBench]:
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert process.stdin and process.stdout
     try:
-        endpoints = json.loads(process.stdout.readline())
-        with BenchControl(endpoints["control"]) as control:
+        endpoints = Endpoints.model_validate_json(process.stdout.readline())
+        with BenchControl(endpoints.control) as control:
             served = ServedBench(endpoints, control)
             served.calibrated()  # kept from then on: a fault that a test brings about must not meet the first time
             yield served

@@ -19,15 +19,16 @@ from api.cli.options import built_in, calibrated, wiring_from
 from api.cli.stage import bench_for, plugged
 from rig.config.calibration import Calibration, Uncertainty
 from rig.config.calibration_files import read_force, text_of
+from rig.config.endpoints import Endpoints
 from rig.errors import CheckFailed, DeviceError, UsageError
 from tests.calibrations import axis_calibration, force_calibration
 
 runner = CliRunner()
-ENDPOINTS = {
+ENDPOINTS = Endpoints.model_validate({
     "force": {"serial": "/dev/pts/90"}, "force_modbus": {"serial": "/dev/pts/91"}, "axis": {"slcan": "/dev/pts/92"},
     "tracker": {"tcp": "127.0.0.1:8765"}, "control": "127.0.0.1:1", "latency_ms": {"force": 0.5, "force_modbus": 3.0,
-    "tracker": 15.0}, "serials": {"force": "000271", "force_modbus": "FTS-1234", "axis": "A1"},
-}  # fmt: skip
+    "tracker": 15.0}, "serials": {"force": "000271", "force_modbus": "FTS-1234", "axis": "A1"}, "pid": 1,
+})  # fmt: skip
 REAL = ["--set", "force.port=/dev/null"]
 
 
@@ -215,7 +216,9 @@ def test_it_is_made_once_where_none_may_be_used_and_said(
     endpoints = ENDPOINTS
     if why == "other sensor":
         stored()
-        endpoints = ENDPOINTS | {"serials": {"force": "000300", "force_modbus": "FTS-1234", "axis": "A1"}}
+        endpoints = ENDPOINTS.model_copy(
+            update={"serials": {"force": "000300", "force_modbus": "FTS-1234", "axis": "A1"}}
+        )
     elif why == "old":
         stored(datetime.now(UTC) - timedelta(days=400))
     elif why == "damaged":
@@ -225,7 +228,7 @@ def test_it_is_made_once_where_none_may_be_used_and_said(
 
     def make(*_: object) -> object:
         made.append("made")
-        return force_calibration(serial=endpoints["serials"]["force"])  # type: ignore[index]
+        return force_calibration(serial=endpoints.serials["force"])
 
     monkeypatch.setattr(mock_calibration, "_measured_force", make)
     for _ in range(2):

@@ -5,6 +5,7 @@ from pkgutil import resolve_name
 import pytest
 
 from mock_devices.devices import FORCE_CHOICES, Workshop
+from rig.config.endpoints import Endpoints
 from rig.config.products.registry import AXES, FORCE_SENSORS, ROLES, TRACKERS, choice_of, name_of, read
 from rig.config.products.robotiq_ft300 import Ft300Wiring
 from rig.config.products.roles import Product
@@ -35,8 +36,14 @@ def test_each_has_a_driver_and_says_where_to_look(role: str, product: type[Produ
 @each_product
 def test_each_mock_is_made_by_the_workshop(role: str, product: type[Product]) -> None:
     assert product.mock and resolve_name(product.mock.maker).__qualname__.startswith(Workshop.__name__)
-    endpoints = {product.mock.role: {product.mock.kind: "there"}}
-    assert product.mock.address(endpoints).endswith("there")
+    printed = {
+        "control": "",
+        "pid": 1,
+        "serials": {},
+        "latency_ms": {},
+        product.mock.role: {product.mock.kind: "there"},
+    }
+    assert product.mock.address(Endpoints.model_validate(printed)).endswith("there")
     assert role != "force" or FORCE_CHOICES[name_of(product)] == (product,)
 
 

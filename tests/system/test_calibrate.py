@@ -24,7 +24,7 @@ REQUEST = re.compile(r"put (\d+) N on the tip|take every weight off")
 
 def guided(bench: ServedBench, folder: Path, *options: str) -> Said:
     """The command, and somebody who puts on what it asks for."""
-    port = f"force.port={bench.endpoints['force']['serial']}"
+    port = f"force.port={bench.endpoints.devices['force']['serial']}"
     running = Running(["calibrate", "force", "--set", port, *WEIGHTS, *options], folder)
     assert running.process.stdout
     said = ""

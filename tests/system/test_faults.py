@@ -68,7 +68,7 @@ def test_a_tracker_that_is_absent(bench: ServedBench, protocol: Path, tmp_path: 
 
 
 def test_the_wrong_device_behind_a_port(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
-    ports = bench.endpoints
+    ports = bench.endpoints.devices
     said = capture(bench, protocol, tmp_path, f"force.port={ports['tracker']['serial']}").end()
     assert said.code == 1
     assert "Bota" in said.sentence or "bota" in said.sentence

@@ -4,12 +4,12 @@ import select
 import time
 from collections.abc import Iterator
 from itertools import product
-from typing import Any
 
 import pytest
 
 from api.cli.stage import _arguments, bench_for, bench_process
 from controller.devices.drivers import Devices, start_devices
+from rig.config.endpoints import Endpoints
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
@@ -28,18 +28,18 @@ def test_the_mock_bench_is_not_asked_for_a_product_that_only_the_real_device_is(
 
 
 @pytest.fixture(scope="module")
-def real() -> Iterator[dict[str, Any]]:
+def real() -> Iterator[Endpoints]:
     with bench_process(Wiring(), both_sensors=True) as (_, endpoints):
         yield endpoints
 
 
-def wired(real: dict[str, Any], force: bool, axis: bool, tracker: bool, sensor: str = "bota-sensone") -> Wiring:
+def wired(real: Endpoints, force: bool, axis: bool, tracker: bool, sensor: str = "bota-sensone") -> Wiring:
     """A wiring whose devices are real where true, mock where false."""
     role = "force" if sensor == "bota-sensone" else "force_modbus"
     ports = {
-        "force": real[role]["serial"] if force else "mock",
-        "axis": real["axis"]["slcan"] if axis else "mock",
-        "tracker": "tcp://" + real["tracker"]["tcp"] if tracker else "mock",
+        "force": real.devices[role]["serial"] if force else "mock",
+        "axis": real.devices["axis"]["slcan"] if axis else "mock",
+        "tracker": "tcp://" + real.devices["tracker"]["tcp"] if tracker else "mock",
     }
     return Wiring(
         force=FORCE_SENSORS[sensor](port=ports["force"]),
@@ -65,7 +65,7 @@ def heard(devices: Devices) -> set[str]:
 @pytest.mark.bench
 @pytest.mark.xdist_group("wire")
 @pytest.mark.parametrize(("force", "axis", "tracker"), MIXTURES)
-def test_every_mixture_starts_and_brings_samples(real: dict[str, Any], force: bool, axis: bool, tracker: bool) -> None:
+def test_every_mixture_starts_and_brings_samples(real: Endpoints, force: bool, axis: bool, tracker: bool) -> None:
     with bench_for(wired(real, force, axis, tracker), approaches=False) as (live, _):
         devices = start_devices(live)
         try:
@@ -77,7 +77,7 @@ def test_every_mixture_starts_and_brings_samples(real: dict[str, Any], force: bo
 @pytest.mark.bench
 @pytest.mark.xdist_group("wire")
 @pytest.mark.parametrize("force", [False, True])
-def test_so_does_the_other_force_sensor(real: dict[str, Any], force: bool) -> None:
+def test_so_does_the_other_force_sensor(real: Endpoints, force: bool) -> None:
     with bench_for(wired(real, force, not force, False, "robotiq-ft300"), approaches=False) as (live, _):
         devices = start_devices(live)
         try:

@@ -14,7 +14,7 @@ SURFACE_MM = 20.0
 
 
 def test_one_line_exchanges_the_force_sensor(bench: ServedBench, tmp_path: Path) -> None:
-    port = bench.endpoints["force_modbus"]["serial"]
+    port = bench.endpoints.devices["force_modbus"]["serial"]
     settings = bench.settings("force.product=robotiq-ft300", f"force.port={port}")
     said = rig("capture", EXAMPLES / "quick.toml", "--out", tmp_path / "session", *settings, folder=tmp_path)
     assert said.code == 0, said.err
@@ -31,7 +31,7 @@ def test_one_line_exchanges_the_force_sensor(bench: ServedBench, tmp_path: Path)
 def test_8_mm_are_8_mm_with_either_sensor(bench: ServedBench, tmp_path: Path, product: str) -> None:
     """Depth is the bench's own: how far the true tip went below the true surface."""
     role = {"bota-sensone": "force", "robotiq-ft300": "force_modbus"}[product]
-    settings = bench.settings(f"force.product={product}", f"force.port={bench.endpoints[role]['serial']}")
+    settings = bench.settings(f"force.product={product}", f"force.port={bench.endpoints.devices[role]['serial']}")
     (tmp_path / "one.toml").write_text("speeds_mm_s = [10]\ntrials = 1\ndepth_mm = 8\n")
     running = Running(["capture", tmp_path / "one.toml", "--out", tmp_path / "session", *settings], tmp_path)
     deepest_mm = 0.0

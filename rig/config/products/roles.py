@@ -5,10 +5,11 @@ and mock are named as ``module:object``, because they belong to packages that ar
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
+from rig.config.endpoints import Endpoints
 from rig.config.maxima import Maximum
 from rig.config.table import Table
 
@@ -27,9 +28,9 @@ class MockPort(NamedTuple):
     kind: str = "serial"
     scheme: str = ""
 
-    def address(self, endpoints: Mapping[str, Any]) -> str:
+    def address(self, endpoints: Endpoints) -> str:
         """The port that takes the place of `mock`, of the ``endpoints`` that the bench printed."""
-        return f"{self.scheme}{endpoints[self.role][self.kind]}"
+        return f"{self.scheme}{endpoints.devices[self.role][self.kind]}"
 
 
 class Product(Table):
