@@ -127,6 +127,7 @@ def show_fit(result: FitResult) -> None:
     """The fit for a person."""
     show(speed_table(result.speeds))
     say(f"skipped {one.trial}: {one.reason}" for one in result.skipped)
+    say(finding.sentence for finding in result.data_quality)
     for names in _pairs(list(result.laws)):
         show(displacement_table(result, names))
     show(law_errors_table(result.laws))

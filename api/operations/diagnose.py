@@ -10,11 +10,11 @@ from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.design import check
 from rig.diagnosis.extended import extended_model
 from rig.diagnosis.run import diagnose_session
-from rig.diagnosis.sources import read_source
 from rig.progress import Progress
 from rig.recording.files import make_folder, refuse_unwritable
 from rig.results.check import check_result
 from rig.results.diagnosis import FILE, MODEL, PICTURES, DiagnosisResult, ProtocolCheckResult
+from rig.trials.reading import read_trials
 
 Simulation = Literal["index", "constant", "axis"]
 
@@ -43,7 +43,7 @@ def _found(folder: Path, simulation: Simulation, columns: tuple[str, ...], only:
         from rig.diagnosis.axis_run import diagnose_axis_folder  # noqa: PLC0415
 
         return diagnose_axis_folder(folder, tell)
-    return diagnose_session(read_source(folder, columns, only), simulation, tell)
+    return diagnose_session(read_trials(folder, columns, only), simulation, tell)
 
 
 def _write(operation: Operation, found: Diagnosis, result: DiagnosisResult, out: Path) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.hidden.truth import Bench, Hidden, IndentationCycle, draw_bench, run
-from rig.diagnosis.observations import Session, Streams
+from rig.trials.trial import Trial, TrialSet
 
 Truth = Mapping[str, float]
 
@@ -79,10 +79,10 @@ def recorded(seed: int, secret: Secret, cycles: int | None = None) -> tuple[Benc
     return bench, run(bench, Hidden(secret.causes), rng)
 
 
-def session_of(bench: Bench, cycles: list[IndentationCycle], stated: bool = False) -> Session:
+def session_of(bench: Bench, cycles: list[IndentationCycle], stated: bool = False) -> TrialSet:
     """What the analysis is given: the devices' numbers and, where asked, the surface as somebody wrote it down."""
-    streams = [
-        Streams(f"trial_{k:02d}", s.time_s, s.force_n, s.axis_time_s, s.axis_mm, s.frame_time_s, s.marker_mm, s.kelvin)
+    trials = [
+        Trial(f"trial_{k:02d}", s.time_s, s.force_n, s.axis_time_s, s.axis_mm, s.frame_time_s, s.marker_mm, s.kelvin)
         for k, s in enumerate(cycles)
     ]
-    return Session("hidden", tuple(streams), bench.surface if stated else None)
+    return TrialSet("hidden", tuple(trials), bench.surface if stated else None)

@@ -18,11 +18,11 @@ from rig.diagnosis.estimates import (
 )
 from rig.diagnosis.evidence import Tangents, held_out_square_error, information, is_alias, jackknife
 from rig.diagnosis.fit import Fit, least_squares
-from rig.diagnosis.gates import Finding
 from rig.diagnosis.noise import Array
 from rig.diagnosis.omnibus import Leftover, beaten, judged_leftover
 from rig.diagnosis.problem import Effect, InverseProblem, Par
 from rig.diagnosis.search import Named, Search, imitated, testable
+from rig.trials.findings import Finding
 
 POWER_SD = 0.84  # 80 % power
 LEAVING_OUT_NATS = 1.0

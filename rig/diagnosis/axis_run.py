@@ -8,11 +8,11 @@ import scipy.io
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.axis import AxisProblem, AxisRecording, force_error_percent, motion_of
 from rig.diagnosis.estimates import SimulationError
-from rig.diagnosis.gates import inspect_stream
 from rig.diagnosis.run import judge
 from rig.errors import DataError
 from rig.progress import Progress, silent
 from rig.recording.csv_columns import read_header, read_usable
+from rig.trials.findings import inspect_stream
 
 NAMES = {
     "time_s": ("t", "time_s"),

@@ -5,33 +5,32 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.diagnosis.gates import Finding
-from rig.diagnosis.observations import Session, Streams, ordered
-from rig.simulation.drive import Array
+from rig.trials.findings import Array, Finding
+from rig.trials.trial import Trial, TrialSet, ordered
 
 UP, DEEP = 0.25, 0.6
 AT_REST = 0.02
 AIR_SHARE = 0.05
 
 
-def in_cycles(session: Session) -> Session:
+def in_cycles(session: TrialSet) -> TrialSet:
     """The session with every recording cut in the air between its cycles; as it was where none has two."""
-    parts = [part for streams in session.recordings for part in cut(streams)]
-    if len(parts) == len(session.recordings):
+    parts = [part for trial in session.trials for part in cut(trial)]
+    if len(parts) == len(session.trials):
         return session
-    text = f"{len(session.recordings)} recordings were cut into {len(parts)} cycles, in the air between them"
-    finding = Finding(session.recordings[0].name, "session", "cut", text)
-    return replace(session, recordings=tuple(parts), findings=(*session.findings, finding))
+    text = f"{len(session.trials)} recordings were cut into {len(parts)} cycles, in the air between them"
+    finding = Finding(session.trials[0].name, "session", "cut", text)
+    return replace(session, trials=tuple(parts), findings=(*session.findings, finding))
 
 
-def cut(streams: Streams) -> list[Streams]:
+def cut(trial: Trial) -> list[Trial]:
     """The cycles of a recording, each from the middle of the rest before it to that after it."""
-    time_s, place_mm = ordered(streams.axis_s, streams.axis_mm)
+    time_s, place_mm = ordered(trial.axis_s, trial.axis_mm)
     if not len(time_s):
-        return [streams]
-    cuts = [at for at in lifts(time_s, place_mm) if in_the_air(streams, at)]
+        return [trial]
+    cuts = [at for at in lifts(time_s, place_mm) if in_the_air(trial, at)]
     edges = [-np.inf, *cuts, np.inf]
-    return [between(streams, number, start, stop) for number, (start, stop) in enumerate(pairwise(edges), start=1)]
+    return [between(trial, number, start, stop) for number, (start, stop) in enumerate(pairwise(edges), start=1)]
 
 
 def lifts(time_s: Array, place_mm: Array) -> list[float]:
@@ -48,27 +47,27 @@ def lifts(time_s: Array, place_mm: Array) -> list[float]:
     return found
 
 
-def in_the_air(streams: Streams, at_s: float) -> bool:
+def in_the_air(trial: Trial, at_s: float) -> bool:
     """Whether force is at its lowest at a time: a tissue still pressed remembers the cycle before."""
-    low_N, high_N = np.nanquantile(streams.force_N, [0.01, 0.99])
-    near = int(np.argmin(np.abs(streams.force_s - at_s)))
-    around_N = float(np.nanmedian(streams.force_N[max(near - 5, 0) : near + 6]))
+    low_N, high_N = np.nanquantile(trial.force_N, [0.01, 0.99])
+    near = int(np.argmin(np.abs(trial.force_s - at_s)))
+    around_N = float(np.nanmedian(trial.force_N[max(near - 5, 0) : near + 6]))
     return bool(around_N < low_N + AIR_SHARE * (high_N - low_N) + 1e-12)
 
 
-def between(streams: Streams, number: int, start_s: float, stop_s: float) -> Streams:
+def between(trial: Trial, number: int, start_s: float, stop_s: float) -> Trial:
     """The part of a recording between two times."""
-    force, axis = ((t >= start_s) & (t < stop_s) for t in (streams.force_s, streams.axis_s))
+    force, axis = ((t >= start_s) & (t < stop_s) for t in (trial.force_s, trial.axis_s))
     part = replace(
-        streams,
-        name=streams.name if (start_s, stop_s) == (-np.inf, np.inf) else f"{streams.name}, cycle {number}",
-        force_s=streams.force_s[force],
-        force_N=streams.force_N[force],
-        axis_s=streams.axis_s[axis],
-        axis_mm=streams.axis_mm[axis],
-        temperature_C=None if streams.temperature_C is None else streams.temperature_C[force],
+        trial,
+        name=trial.name if (start_s, stop_s) == (-np.inf, np.inf) else f"{trial.name}, cycle {number}",
+        force_s=trial.force_s[force],
+        force_N=trial.force_N[force],
+        axis_s=trial.axis_s[axis],
+        axis_mm=trial.axis_mm[axis],
+        temperature_C=None if trial.temperature_C is None else trial.temperature_C[force],
     )
-    if streams.marker_s is None or streams.marker_mm is None:
+    if trial.marker_s is None or trial.marker_mm is None:
         return part
-    seen = (streams.marker_s >= start_s) & (streams.marker_s < stop_s)
-    return replace(part, marker_s=streams.marker_s[seen], marker_mm=streams.marker_mm[seen])
+    seen = (trial.marker_s >= start_s) & (trial.marker_s < stop_s)
+    return replace(part, marker_s=trial.marker_s[seen], marker_mm=trial.marker_mm[seen])

@@ -16,10 +16,11 @@ from rig.diagnosis.evidence import Direction, Tangents, information, is_alias, t
 from rig.diagnosis.fit import Fit, assemble
 from rig.diagnosis.indentation import Indentation
 from rig.diagnosis.noise import Array, Colour, Noise, ScatterWhitener, starts_of
-from rig.diagnosis.observations import Observations, Session, Streams, observe
+from rig.diagnosis.observations import Observations, observe
 from rig.diagnosis.search import testable
 from rig.diagnosis.whitening import Whitener, secants_of
 from rig.simulation.chain import NULLS, respond
+from rig.trials.trial import Trial, TrialSet
 
 RATE_HZ = 1000.0
 TRACKER_HZ = 60.0
@@ -74,7 +75,7 @@ class Check:
 def check(protocol: Protocol, tracker: bool = True, force_rate_Hz: float = RATE_HZ) -> Check:
     """What ``protocol`` can show with a force sensor at this rate, with or without a tracker on the tip."""
     cycles = planned(protocol, tracker, force_rate_Hz)
-    data = observe(Session("planned", tuple(cycles)))
+    data = observe(TrialSet("planned", tuple(cycles)))
     problem = Indentation(data)
     fit = noiseless(problem)
     t = tangents(fit, testable(problem))
@@ -93,7 +94,7 @@ def check(protocol: Protocol, tracker: bool = True, force_rate_Hz: float = RATE_
     return Check(duration, len(cycles), visible, reasons, names, confusion)
 
 
-def planned(protocol: Protocol, tracker: bool, rate_Hz: float) -> list[Streams]:
+def planned(protocol: Protocol, tracker: bool, rate_Hz: float) -> list[Trial]:
     """The cycles the protocol would record, with the force the limb would answer, without noise."""
     rng = np.random.default_rng(protocol.seed)
     speeds = [speed for speed in protocol.speeds_mm_s for _ in range(protocol.trials)]
@@ -106,7 +107,7 @@ def planned(protocol: Protocol, tracker: bool, rate_Hz: float) -> list[Streams]:
         marker = np.zeros((len(frames), 3))
         marker[:, 0] = np.interp(frames, time, position)
         seen = (frames, marker) if tracker else (None, None)
-        cycles.append(Streams(f"cycle {number + 1}", time, np.zeros_like(time), time, position, *seen))
+        cycles.append(Trial(f"cycle {number + 1}", time, np.zeros_like(time), time, position, *seen))
         start = float(time[-1]) + protocol.rest_s
     return cycles
 
@@ -172,7 +173,7 @@ def next_experiment(result: Diagnosis) -> NextExperiment | None:
 def _rate(protocol: Protocol, found: Fit, pair: Sequence[str]) -> float:
     """Nats a minute by which a block tells the first of the pair, at its size, from the second."""
     cycles = planned(protocol, tracker=True, rate_Hz=RATE_HZ)
-    problem = Indentation(observe(Session("block", tuple(cycles))))
+    problem = Indentation(observe(TrialSet("block", tuple(cycles))))
     base = {par.name: found.values[par.name] for par in problem.base if par.name in found.values}
     fit = noiseless(problem, {**base, "surface_mm": SURFACE_MM, "tip_zero_mm": 0.0})
     by_name = {effect.name: effect for effect in found.problem.effects}

@@ -13,46 +13,20 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import savgol_filter
 
-from rig.diagnosis.gates import Finding, at_the_end_of_range, in_order, inspect_stream
 from rig.errors import DataError
 from rig.simulation.drive import Array, Drive
+from rig.trials.findings import Finding, at_the_end_of_range, merged
+from rig.trials.trial import FEWEST_SAMPLES, Trial, TrialSet, cleaned, inspect, ordered
 
 WORKING_RATE_HZ = 250.0
 LOWEST_RATE_HZ = 100.0
 MOST_SAMPLES = 60_000
-FEWEST_SAMPLES = 20
 DERIVATIVE_SPANS_S = (0.008, 0.016)
 JITTER_MM = 0.0004
 JITTERY = 125.0, (0.024, 0.024)
 GAP_PERIODS, GAP_S = 3.0, 0.01
 MOST_TURN_MM_S = 12.0
-
-
-@dataclass(frozen=True)
-class Streams:
-    """Raw streams of one recording on one clock [s]; force positive in compression, position into the tissue.
-
-    ``marker_mm`` has shape (frames, 3), NaN where the tool was hidden; ``temperature_C`` goes with ``force_s``.
-    """
-
-    name: str
-    force_s: Array
-    force_N: Array
-    axis_s: Array
-    axis_mm: Array
-    marker_s: Array | None = None
-    marker_mm: Array | None = None
-    temperature_C: Array | None = None
-
-
-@dataclass(frozen=True)
-class Session:
-    """What is to be judged: recordings in the order they were made, and the surface where somebody stated it."""
-
-    name: str
-    recordings: tuple[Streams, ...]
-    surface_mm: float | None = None
-    findings: tuple[Finding, ...] = ()
+OMITTED = "recording left out: "
 
 
 @dataclass(frozen=True)
@@ -94,121 +68,79 @@ class _Gridded:
     unseen: NDArray[np.bool_]
 
 
-def observe(session: Session) -> Observations:
+def observe(session: TrialSet) -> Observations:
     """The session on its working grid; raises DataError where no recording can be used at all."""
-    findings = [*session.findings, *(finding for streams in session.recordings for finding in _inspect(streams))]
-    cleaned = {streams.name: _cleaned(streams) for streams in session.recordings}
-    lost = {name: clean for name, clean in cleaned.items() if isinstance(clean, str)}
-    usable = [clean for clean in cleaned.values() if isinstance(clean, Streams)]
+    findings = [*session.findings, *(finding for trial in session.trials for finding in inspect(trial))]
+    usable, lost = _cleaned(session)
     if not usable:
-        said = [*(f"{name}: {why}" for name, why in lost.items()), *(finding.text for finding in session.findings)]
+        said = [finding.text.removeprefix(OMITTED) for finding in (*lost, *session.findings)]
         why = said[0] if said else "there is none"
         raise DataError(f"{session.name}: no recording can be used ({why}); run `rig verify` on it")
-    findings += [Finding(name, "recording", "unusable", f"recording left out: {why}") for name, why in lost.items()]
+    findings += lost
     usable, copies = _without_copies(usable)
     usable, turned = _turned(usable)
     findings += [*copies, *turned]
-    rough_mm = float(np.median([jitter_mm(streams) for streams in usable]))
+    rough_mm = float(np.median([jitter_mm(trial) for trial in usable]))
     rate_Hz, spans_s = (WORKING_RATE_HZ, DERIVATIVE_SPANS_S) if rough_mm <= JITTER_MM else JITTERY
     period_s = working_period(usable, rate_Hz)
-    parts = [_on_grid(streams, period_s, spans_s) for streams in usable]
+    parts = [_on_grid(trial, period_s, spans_s) for trial in usable]
     parts.sort(key=lambda part: float(part.time_s[0]))
     drive, force, tip = _joined(parts)
     return Observations(
-        session.name, tuple(part.name for part in parts), drive, force, tip, session.surface_mm, _merged(findings),
+        session.name, tuple(part.name for part in parts), drive, force, tip, session.surface_mm, merged(findings),
         rough_mm, np.concatenate([part.unseen for part in parts]),
     )  # fmt: skip
 
 
-def jitter_mm(streams: Streams) -> float:
+def jitter_mm(trial: Trial) -> float:
     """How far positions typically lie off a smooth motion, as a standard deviation; of their third differences."""
-    rough = np.diff(streams.axis_mm, 3)
-    moving = np.abs(np.diff(streams.axis_mm))[1:-1] > 0
+    rough = np.diff(trial.axis_mm, 3)
+    moving = np.abs(np.diff(trial.axis_mm))[1:-1] > 0
     # Nine in ten lie within 1.645 standard deviations; the rest are corners of the motion.
     return float(np.quantile(np.abs(rough[moving]), 0.9)) / (1.645 * np.sqrt(20)) if moving.any() else 0.0
 
 
-def working_period(recordings: Sequence[Streams], rate_Hz: float = WORKING_RATE_HZ) -> float:
+def working_period(recordings: Sequence[Trial], rate_Hz: float = WORKING_RATE_HZ) -> float:
     """Grid period [s]: a whole number of force periods, near ``rate_Hz``, coarser only for very long sessions."""
-    native_s = float(np.median([np.median(np.diff(streams.force_s)) for streams in recordings]))
-    total_s = float(sum(streams.force_s[-1] - streams.force_s[0] for streams in recordings))
+    native_s = float(np.median([np.median(np.diff(trial.force_s)) for trial in recordings]))
+    total_s = float(sum(trial.force_s[-1] - trial.force_s[0] for trial in recordings))
     wanted_Hz = float(np.clip(MOST_SAMPLES / max(total_s, 1e-9), LOWEST_RATE_HZ, rate_Hz))
     return native_s * max(1, round(1 / wanted_Hz / native_s))
 
 
-def _inspect(streams: Streams) -> list[Finding]:
-    found = inspect_stream(streams.name, "force", streams.force_s, streams.force_N)
-    found += inspect_stream(streams.name, "axis", streams.axis_s, streams.axis_mm)
-    if streams.marker_s is not None and streams.marker_mm is not None:
-        found += inspect_stream(streams.name, "marker", streams.marker_s, streams.marker_mm[:, 0])
-    return found
+def _cleaned(session: TrialSet) -> tuple[list[Trial], list[Finding]]:
+    usable, lost = [], []
+    for trial in session.trials:
+        try:
+            usable.append(cleaned(trial))
+        except DataError as error:
+            lost.append(Finding(trial.name, "recording", "unusable", f"{OMITTED}{error}"))
+    return usable, lost
 
 
-def _merged(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """One finding a stream and kind: the first, with the number of recordings it was seen in."""
-    groups: dict[tuple[str, str], list[Finding]] = {}
-    for finding in findings:
-        groups.setdefault((finding.stream, finding.kind), []).append(finding)
-    return tuple(
-        Finding(group[0].recording, group[0].stream, group[0].kind, group[0].text, len(group))
-        for group in groups.values()
-    )
-
-
-def ordered(time_s: Array, *columns: Array) -> tuple[Array, ...]:
-    """Rows with finite values whose time lies after every earlier one: a clock that steps back loses those rows."""
-    finite = np.isfinite(time_s) & np.all([np.isfinite(c) for c in columns], axis=0)
-    time_s, columns = time_s[finite], tuple(c[finite] for c in columns)
-    if time_s.size == 0:
-        return (time_s, *columns)
-    keep = in_order(time_s)
-    return (time_s[keep], *(c[keep] for c in columns))
-
-
-def _cleaned(streams: Streams) -> Streams | str:
-    """The recording with ordered clocks, cut to the time both force and axis cover; why, where too little is left."""
-    temperature = streams.temperature_C
-    extra = () if temperature is None or not np.isfinite(temperature).all() else (temperature,)
-    force = ordered(streams.force_s, streams.force_N, *extra)
-    axis = ordered(streams.axis_s, streams.axis_mm)
-    for name, raw, kept in (("force", streams.force_s, force[0]), ("axis", streams.axis_s, axis[0])):
-        if kept.size < FEWEST_SAMPLES:
-            return f"{kept.size} of {raw.size} samples of {name} are numbers at growing times (limit {FEWEST_SAMPLES})"
-    inside = (force[0] >= axis[0][0]) & (force[0] <= axis[0][-1])
-    if np.count_nonzero(inside) < FEWEST_SAMPLES:
-        return (
-            f"force from {force[0][0]:g} to {force[0][-1]:g} s and axis from {axis[0][0]:g} to {axis[0][-1]:g} s have "
-            "no common time"
-        )
-    return Streams(
-        streams.name, force[0][inside], force[1][inside], axis[0], axis[1], streams.marker_s, streams.marker_mm,
-        force[2][inside] if extra else None,
-    )  # fmt: skip
-
-
-def _without_copies(usable: Sequence[Streams]) -> tuple[list[Streams], list[Finding]]:
+def _without_copies(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:
     """Each recording once: a copy would be left out and predicted from itself."""
-    first: dict[bytes, Streams] = {}
+    first: dict[bytes, Trial] = {}
     copies = []
-    for streams in usable:
-        of = first.setdefault(streams.force_N.tobytes(), streams)
-        if of is not streams and np.ptp(streams.force_N) > 0:
-            text = f"recording left out: it holds the same forces as {of.name}"
-            copies.append(Finding(streams.name, "recording", "copy", text))
+    for trial in usable:
+        of = first.setdefault(trial.force_N.tobytes(), trial)
+        if of is not trial and np.ptp(trial.force_N) > 0:
+            text = f"{OMITTED}it holds the same forces as {of.name}"
+            copies.append(Finding(trial.name, "recording", "copy", text))
     gone = {copy.recording for copy in copies}
-    return [streams for streams in usable if streams.name not in gone], copies
+    return [trial for trial in usable if trial.name not in gone], copies
 
 
-def _turned(usable: Sequence[Streams]) -> tuple[list[Streams], list[Finding]]:
+def _turned(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:
     """Without the few recordings in which force falls as the tip goes in while it rises in the others."""
     rises = np.array([rise_N(np.interp(s.force_s, s.axis_s, s.axis_mm), s.force_N) for s in usable])
     large = 0.5 * float(np.median(np.abs(rises)))
     falls = rises < -large
     if large == 0 or not 0 < np.count_nonzero(falls) < 0.5 * len(usable):
         return list(usable), []
-    text = "recording left out: its force falls as the tip goes in, and rises in the others: turn its sign"
-    gone = [Finding(streams.name, "recording", "sign", text) for streams, out in zip(usable, falls, strict=True) if out]
-    return [streams for streams, out in zip(usable, falls, strict=True) if not out], gone
+    text = f"{OMITTED}its force falls as the tip goes in, and rises in the others: turn its sign"
+    gone = [Finding(trial.name, "recording", "sign", text) for trial, out in zip(usable, falls, strict=True) if out]
+    return [trial for trial, out in zip(usable, falls, strict=True) if not out], gone
 
 
 def rise_N(place_mm: Array, force_N: Array) -> float:
@@ -217,30 +149,30 @@ def rise_N(place_mm: Array, force_N: Array) -> float:
     return float(np.median(force_N[deep]) - np.median(force_N[high]))
 
 
-def _on_grid(streams: Streams, period_s: float, spans_s: Sequence[float]) -> _Gridded:
+def _on_grid(trial: Trial, period_s: float, spans_s: Sequence[float]) -> _Gridded:
     """Force and motion at the force's stamps, then the same samples of all of them averaged window by window."""
-    native_s = float(np.median(np.diff(streams.force_s)))
+    native_s = float(np.median(np.diff(trial.force_s)))
     columns = [
-        streams.force_s, streams.force_N, *_motion(streams, streams.force_s, spans_s),
-        *([streams.temperature_C] if streams.temperature_C is not None else []),
+        trial.force_s, trial.force_N, *_motion(trial, trial.force_s, spans_s),
+        *([trial.temperature_C] if trial.temperature_C is not None else []),
     ]  # fmt: skip
-    window = np.floor((streams.force_s - streams.force_s[0]) / period_s + 0.5 * native_s / period_s).astype(np.int64)
+    window = np.floor((trial.force_s - trial.force_s[0]) / period_s + 0.5 * native_s / period_s).astype(np.int64)
     count = np.bincount(window)
     full = count >= max(1, round(0.5 * period_s / native_s))
     means = [np.bincount(window, column)[full] / count[full] for column in columns]
     time_s, temperature = means[0], means[5] if len(means) > 5 else None
     marker_s, marker_mm = np.empty(0), np.empty((0, 3))
-    if streams.marker_s is not None and streams.marker_mm is not None:
-        marker_s, *xyz = ordered(streams.marker_s, *streams.marker_mm.T)
+    if trial.marker_s is not None and trial.marker_mm is not None:
+        marker_s, *xyz = ordered(trial.marker_s, *trial.marker_mm.T)
         inside = (marker_s >= time_s[0]) & (marker_s <= time_s[-1])
         marker_s, marker_mm = marker_s[inside], np.array(xyz).T[inside]
-    unseen = beside_gaps(streams.axis_s, time_s, 0.5 * max(spans_s))
-    unseen |= np.bincount(window, at_the_end_of_range(streams.force_N))[full] > 0
+    unseen = beside_gaps(trial.axis_s, time_s, 0.5 * max(spans_s))
+    unseen |= np.bincount(window, at_the_end_of_range(trial.force_N))[full] > 0
     if spans_s[0] > DERIVATIVE_SPANS_S[0]:
         # Derivatives over long spans round off what turns within one.
         unseen |= np.abs(means[4]) * spans_s[0] > MOST_TURN_MM_S
     motion = means[1], means[2], means[3], means[4]
-    return _Gridded(streams.name, time_s, motion, temperature, marker_s, marker_mm, unseen)
+    return _Gridded(trial.name, time_s, motion, temperature, marker_s, marker_mm, unseen)
 
 
 def beside_gaps(axis_s: Array, at_s: Array, margin_s: float) -> NDArray[np.bool_]:
@@ -253,15 +185,15 @@ def beside_gaps(axis_s: Array, at_s: Array, margin_s: float) -> NDArray[np.bool_
     return np.asarray(np.cumsum(marks)[:-1] > 0)
 
 
-def _motion(streams: Streams, at_s: Array, spans_s: Sequence[float]) -> tuple[Array, Array, Array]:
+def _motion(trial: Trial, at_s: Array, spans_s: Sequence[float]) -> tuple[Array, Array, Array]:
     """Position, velocity, acceleration at the given times.
 
     Derivatives come from local quartics over ``spans_s`` (Savitzky and Golay 1964): differences of an encoder's steps
     would put noise into the simulation that no noise model of the force accounts for.
     """
-    motion = CubicSpline(streams.axis_s, streams.axis_mm)
-    period_s = float(np.median(np.diff(streams.axis_s)))
-    even_s = np.arange(streams.axis_s[0], streams.axis_s[-1], period_s)
+    motion = CubicSpline(trial.axis_s, trial.axis_mm)
+    period_s = float(np.median(np.diff(trial.axis_s)))
+    even_s = np.arange(trial.axis_s[0], trial.axis_s[-1], period_s)
     lengths = [max(5, 2 * round(0.5 * span_s / period_s) + 1) for span_s in spans_s]
     if len(even_s) <= max(lengths):
         return motion(at_s), motion(at_s, 1), motion(at_s, 2)

@@ -10,14 +10,15 @@ from rig.diagnosis.cycles import in_cycles
 from rig.diagnosis.design import next_experiment
 from rig.diagnosis.estimates import NextExperiment
 from rig.diagnosis.fit import first_fit, refreshed
-from rig.diagnosis.gates import Finding
 from rig.diagnosis.indentation import Indentation, Simulation, library
-from rig.diagnosis.observations import Observations, Session, observe, rise_N
+from rig.diagnosis.observations import Observations, observe, rise_N
 from rig.diagnosis.omnibus import leftover
 from rig.diagnosis.problem import InverseProblem
 from rig.diagnosis.search import search
 from rig.errors import DataError
 from rig.progress import Progress, silent
+from rig.trials.findings import Finding
+from rig.trials.trial import TrialSet
 
 FEWEST_RECORDINGS = 4
 
@@ -149,10 +150,10 @@ def cannot(simulation: Simulation, name: str, recordings: int, fault: Fault, qua
     )  # fmt: skip
 
 
-def diagnose_session(session: Session, simulation: Simulation = "index", progress: Progress = silent) -> Diagnosis:
+def diagnose_session(session: TrialSet, simulation: Simulation = "index", progress: Progress = silent) -> Diagnosis:
     """A session as it was read; one without a usable recording gets an answer too."""
     try:
-        data = observe(in_cycles(session) if len(session.recordings) < FEWEST_RECORDINGS else session)
+        data = observe(in_cycles(session) if len(session.trials) < FEWEST_RECORDINGS else session)
     except DataError as error:
         reason = str(error).removeprefix(f"{session.name}: ").removesuffix("; run `rig verify` on it")
         return cannot(simulation, session.name, 0, Fault(reason, f"mend these files, or {RECORD}"), session.findings)

@@ -89,6 +89,7 @@ def _curves(found: Fitted) -> str:
         table(speed_table(found.result.speeds)),
         *[paragraph(rate_sentence(rate)) for rate in (found.result.rate,) if rate],
         *[paragraph(f"Not used: {one.trial}: {one.reason}", "warning") for one in found.result.skipped],
+        *[paragraph(finding.sentence, "warning") for finding in found.result.data_quality],
     )
 
 

@@ -13,8 +13,8 @@ from rig.diagnosis.estimates import (
     Unexplained,
     Verdict,
 )
-from rig.diagnosis.gates import Finding
 from rig.results.base import Result
+from rig.trials.findings import Finding
 
 FOLDER, FILE, MODEL, TRUTH = "diagnosis", "diagnosis.json", "model.json", "truth.txt"
 PICTURES = ("simulation", "residuals", "evidence", "confusability")

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from itertools import chain, repeat
 
 from rig.diagnosis.estimates import NamedCause, NextExperiment, SimulationError, SmallestSize
-from rig.diagnosis.gates import Finding
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
 from rig.results.tables import TextTable
 
@@ -55,7 +54,7 @@ def further_sentences(result: DiagnosisResult) -> list[str]:
     if not result.parameters:
         said = [f"cannot be tested: any of the {len(result.not_testable)} causes, for this reason"]
     said += [_in_closed_loop(item) for item in result.simulation_error]
-    said += [_of_the_data(finding) for finding in result.data_quality]
+    said += [finding.sentence for finding in result.data_quality]
     return said + ([next_sentence(result.next_experiment)] if result.next_experiment else [])
 
 
@@ -65,11 +64,6 @@ def untestable_sentences(reasons: Mapping[str, str]) -> list[str]:
         f"cannot be tested: {', '.join(sorted(name for name, why in reasons.items() if why == reason))}: {reason}"
         for reason in dict.fromkeys(reasons.values())
     ]
-
-
-def _of_the_data(finding: Finding) -> str:
-    others = f" (and in {finding.recordings - 1} more)" if finding.recordings > 1 else ""
-    return f"data: {f'{finding.recording} ' if finding.recording else ''}{finding.text}{others}"
 
 
 def _in_closed_loop(item: SimulationError) -> str:

@@ -7,6 +7,7 @@ from pydantic import ConfigDict, Field
 
 from rig.results.base import Number, Result
 from rig.tissue.summary import ControlRow, IndexFit, KPoint, Row, Skipped, SpeedSummary
+from rig.trials.findings import Finding
 
 FOLDER, FILE, MODEL = "fit", "fit.json", "model.json"
 PICTURES = ("fit", "residuals", "lattice")
@@ -135,6 +136,7 @@ class FitResult(Result):
     recordings: Mapping[str, str] = Field(description="SHA-256 of each recording the fit was made from")
     remarks: tuple[str, ...] = Field(default=(), description="what the curves cannot tell")
     lattice: LatticeResult | None = None
+    data_quality: tuple[Finding, ...] = Field(default=(), description="samples of the trials that were left out")
 
     @property
     def laws(self) -> dict[str, LawResult]:

@@ -8,6 +8,7 @@ from rig.tissue.control_table import control_rows
 from rig.tissue.judging import LEVEL, Errors, Judged
 from rig.tissue.laws import FloatArray
 from rig.tissue.study import Known, Study, rows
+from rig.trials.findings import merged
 
 FRICTION = "friction shows at reversals: curves of loading say nothing for or against it"
 
@@ -27,6 +28,7 @@ def fit_result(study: Study, model: str, model_law: str, known: Known, recording
         "known": known,
         "recordings": recordings,
         "remarks": [FRICTION] if any(judged.law.friction[0] for judged in study.judged.values()) else [],
+        "data_quality": merged([finding for curve in study.curves for finding in curve.findings]),
     }
     laws = {name: law_result(judged, study.force_N) for name, judged in study.judged.items()}
     return FitResult.model_validate(fields | laws)

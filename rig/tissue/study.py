@@ -20,7 +20,9 @@ from rig.tissue.registry import COMPARED
 from rig.tissue.summary import Row, Skipped, SpeedSummary
 from rig.trials.curves import Curve, loading_curve
 from rig.trials.cycles import cycle_of
-from rig.trials.quality import refusal
+from rig.trials.findings import SAMPLES_LEFT_OUT, TRIAL_LEFT_OUT
+from rig.trials.reading import trials_of
+from rig.trials.trial import inspect
 
 Laws = Sequence[type[Law]]
 Known = Mapping[str, float]
@@ -97,26 +99,25 @@ def study_sessions(
 def _curves_or_refusal(session: Session) -> tuple[list[Curve], list[Skipped]]:
     curves, skipped = curves_of(session)
     if not curves:
-        reasons = skipped[0].reason if skipped else "there is no trial"
+        reasons = f"{skipped[0].trial}: {skipped[0].reason}" if skipped else "there is no trial"
         raise DataError(f"{session.folder}: no trial gives a curve ({len(skipped)} skipped); first: {reasons}")
     return curves, skipped
 
 
 def curves_of(session: Session) -> tuple[list[Curve], list[Skipped]]:
     """The loading curves of a session's trials, and those that have none or are bad; runs of force are neither."""
+    found = trials_of(session)
+    skipped = [Skipped(said.recording, said.text) for said in found.findings if said.kind in TRIAL_LEFT_OUT]
     curves: list[Curve] = []
-    skipped: list[Skipped] = []
-    for trial in session.trials:
+    for trial in found.trials:
         try:
-            recording = session.recording(trial.name)
-            why = "" if recording.tracks_force else refusal(recording, trial)
-            if why:
-                skipped.append(Skipped(trial.name, why))
-            elif not recording.tracks_force:
-                curve = loading_curve(cycle_of(trial.name, recording))
-                curves.append(replace(curve, subject=str(session.info.subject.get("id", ""))))
+            curve = loading_curve(cycle_of(trial))
         except DataError as error:
-            skipped.append(Skipped(trial.name, str(error)))
+            skipped.append(Skipped(trial.name, str(error).removeprefix(f"{trial.name}: ")))
+        else:
+            said = (*found.findings, *inspect(trial))
+            kept = tuple(f for f in said if f.recording == trial.name and f.kind in SAMPLES_LEFT_OUT)
+            curves.append(replace(curve, subject=str(session.info.subject.get("id", "")), findings=kept))
     return curves, skipped
 
 

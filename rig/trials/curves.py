@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from rig.errors import DataError
 from rig.trials.contact import Contact, FloatArray, find_contact
 from rig.trials.cycles import IndentationCycle
+from rig.trials.findings import Finding
 
 LEAST_SAMPLES = 3
 LEAST_AIR_SAMPLES = 3
@@ -37,7 +38,8 @@ class Curve:
     """Loading at steady speed, from just before contact to the deepest point; arrays have shape (n,).
 
     ``depth_mm`` counts from ``contact.position_mm``; ``zero_N`` was taken off; ``noise_N`` is the standard deviation
-    in the air. ``speed_mm_s`` is the speed asked for, or the speed found where nobody said.
+    in the air. ``speed_mm_s`` is the speed asked for, or the speed found where nobody said. ``findings`` say which
+    samples of the trial were left out.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Curve:
     noise_N: float
     time_s: FloatArray
     subject: str = ""
+    findings: tuple[Finding, ...] = ()
 
     @property
     def max_force_N(self) -> float:

@@ -20,6 +20,7 @@ from rig.trials import measures
 from rig.trials.contact import Contact
 from rig.trials.curves import Curve, loading_curve
 from rig.trials.cycles import cycle_of
+from rig.trials.recorded import trial_of
 
 Verdict = Literal["good", "usable", "bad"]
 
@@ -34,6 +35,12 @@ class TrialQuality:
     verdict: Verdict
     reasons: tuple[str, ...] = ()
     measured: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def sentence(self) -> str:
+        """The verdict with its reasons."""
+        left_out = ", left out" if self.verdict == "bad" else ""
+        return f"quality {self.verdict}{left_out}: {'; '.join(self.reasons)}"
 
 
 class Measure(NamedTuple):
@@ -87,7 +94,7 @@ def _answered(recording: Recording) -> bool:
 
 def _curve(recording: Recording) -> Curve | str:
     try:
-        return loading_curve(cycle_of(recording.path.stem, recording))
+        return loading_curve(cycle_of(trial_of(recording.path.stem, recording)))
     except DataError as error:
         return str(error)
 
@@ -208,11 +215,3 @@ def quality_of(recording: Recording, trial: TrialInfo) -> TrialQuality | None:
         return TrialQuality(trial.quality, trial.reasons, trial.measured)
     limits = limits_of(recording)
     return evaluate_trial(recording, limits) if limits else None
-
-
-def refusal(recording: Recording, trial: TrialInfo) -> str:
-    """Why no fit or diagnosis should use the trial; empty where it is good or usable, or nobody can tell."""
-    found = quality_of(recording, trial)
-    if found is None or found.verdict != "bad":
-        return ""
-    return f"left out, its quality is bad: {'; '.join(found.reasons)}"

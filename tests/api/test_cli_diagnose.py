@@ -31,8 +31,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Six strokes with friction in them as CSV files, diagnosed into the folder a session keeps its diagnosis in."""
     made = tmp_path_factory.mktemp("measured")
     bench, strokes = recorded(501, draw_secret(np.random.default_rng([501, 5]), "friction"), 6)
-    for k, streams in enumerate(session_of(bench, strokes).recordings):
-        write_csv(made / f"trial_{k}", streams)
+    for k, trial in enumerate(session_of(bench, strokes).trials):
+        write_csv(made / f"trial_{k}", trial)
     run("diagnose", made, "--out", made / "diagnosis", "--json", made / "said.json")
     return made
 

@@ -23,12 +23,12 @@ from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.estimates import Estimate
 from rig.diagnosis.observations import observe
 from rig.diagnosis.run import diagnose_session
-from rig.diagnosis.sources import read_source
 from rig.recording.importing import import_session
 from rig.recording.sessions import open_session
 from rig.tissue.judging import Errors, Judged
 from rig.tissue.study import Study, study_session
 from rig.trials.curves import Curve
+from rig.trials.reading import read_trials
 from tests import data
 from tests.rig.tissue.synthetic import (
     Bench,
@@ -105,12 +105,12 @@ def measured(_: Path) -> Figures:
 
 def diagnosed(folder: Path) -> Figures:
     """What is observed in a folder, and the diagnosis of it."""
-    return {**observed(folder), **of_diagnosis(diagnose_session(read_source(folder)))}
+    return {**observed(folder), **of_diagnosis(diagnose_session(read_trials(folder)))}
 
 
 def observed(folder: Path, only: str = "") -> Figures:
     """Sums over the working grid, and what was said of the data."""
-    seen = observe(read_source(folder, only=only))
+    seen = observe(read_trials(folder, only=only))
     drive = seen.drive
     arrays = (drive.time_s, drive.position_mm, drive.velocity_mm_s, seen.force_N, seen.tip_mm, drive.temperature_C)
     return {

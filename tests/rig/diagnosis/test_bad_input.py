@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,25 +12,27 @@ from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.cycles import cut
 from rig.diagnosis.estimates import Unexplained
 from rig.diagnosis.indentation import library
-from rig.diagnosis.observations import Session, Streams, beside_gaps
+from rig.diagnosis.observations import beside_gaps
 from rig.diagnosis.run import diagnose_session
-from rig.diagnosis.sources import in_time, read_source
 from rig.errors import DataError
 from rig.recording.csv_columns import read_usable
 from rig.recording.sessions import open_session, write_session
 from rig.results.diagnosis import DiagnosisResult
+from rig.trials.reading import read_trials
+from rig.trials.recorded import in_time
+from rig.trials.trial import Trial, TrialSet
 from tests.data import recording
 from tests.rig.tissue.synthetic import Bench, write_made_session
 
 
 @pytest.fixture(scope="module")
-def clean() -> Session:
+def clean() -> TrialSet:
     bench, cycles = recorded(811, draw_secret(np.random.default_rng(1), "none"), 6)
     return session_of(bench, cycles)
 
 
-def changed(session: Session, **fields: object) -> Session:
-    return replace(session, recordings=tuple(replace(streams, **fields) for streams in session.recordings))  # type: ignore[arg-type]
+def changed(session: TrialSet, **fields: object) -> TrialSet:
+    return replace(session, trials=tuple(replace(trial, **fields) for trial in session.trials))  # type: ignore[arg-type]
 
 
 def nothing_named(result: Diagnosis, because: str) -> None:
@@ -42,53 +45,54 @@ def nothing_named(result: Diagnosis, because: str) -> None:
 
 
 @pytest.mark.parametrize("count", [1, 3])
-def test_fewer_than_four_strokes_cannot_be_judged(clean: Session, count: int) -> None:
-    nothing_named(diagnose_session(replace(clean, recordings=clean.recordings[:count])), "takes at least 4")
+def test_fewer_than_four_strokes_cannot_be_judged(clean: TrialSet, count: int) -> None:
+    nothing_named(diagnose_session(replace(clean, trials=clean.trials[:count])), "takes at least 4")
 
 
-def test_one_long_recording_is_judged_by_its_strokes(clean: Session) -> None:
-    result = diagnose_session(replace(clean, recordings=(joined(clean.recordings),)))
+def test_one_long_recording_is_judged_by_its_strokes(clean: TrialSet) -> None:
+    result = diagnose_session(replace(clean, trials=(joined(clean.trials),)))
     assert result.verdict == "adequate"
     assert result.recordings == 6
     assert "friction" in result.detectable
     assert any("cut into 6 cycles" in finding.text for finding in result.quality)
 
 
-def test_strokes_that_never_leave_the_tissue_are_not_cut(clean: Session) -> None:
-    pressed = joined(clean.recordings)
+def test_strokes_that_never_leave_the_tissue_are_not_cut(clean: TrialSet) -> None:
+    pressed = joined(clean.trials)
     inside = replace(pressed, force_N=np.maximum(pressed.force_N, np.quantile(pressed.force_N, 0.8)))
     inside.force_N[:200] = 0.0
     assert len(cut(pressed)) == 6
     assert len(cut(inside)) == 1
 
 
-def joined(recordings: tuple[Streams, ...]) -> Streams:
+def joined(trials: tuple[Trial, ...]) -> Trial:
     fields = ("force_s", "force_N", "axis_s", "axis_mm", "marker_s", "marker_mm", "temperature_C")
-    return Streams("long", **{name: np.concatenate([getattr(r, name) for r in recordings]) for name in fields})
+    columns: dict[str, Any] = {name: np.concatenate([getattr(trial, name) for trial in trials]) for name in fields}
+    return Trial("long", **columns)
 
 
-def test_a_wrong_sign_of_force_is_said(clean: Session) -> None:
-    turned = tuple(replace(streams, force_N=-streams.force_N) for streams in clean.recordings)
-    nothing_named(diagnose_session(replace(clean, recordings=turned)), "wrong sign")
+def test_a_wrong_sign_of_force_is_said(clean: TrialSet) -> None:
+    turned = tuple(replace(trial, force_N=-trial.force_N) for trial in clean.trials)
+    nothing_named(diagnose_session(replace(clean, trials=turned)), "wrong sign")
 
 
-def test_a_wrong_sign_of_position_is_said(clean: Session) -> None:
-    turned = tuple(replace(streams, axis_mm=-streams.axis_mm) for streams in clean.recordings)
-    nothing_named(diagnose_session(replace(clean, recordings=turned)), "wrong sign")
+def test_a_wrong_sign_of_position_is_said(clean: TrialSet) -> None:
+    turned = tuple(replace(trial, axis_mm=-trial.axis_mm) for trial in clean.trials)
+    nothing_named(diagnose_session(replace(clean, trials=turned)), "wrong sign")
 
 
-def test_one_recording_of_wrong_sign_is_left_out_and_named(clean: Session) -> None:
-    turned = replace(clean.recordings[2], force_N=-clean.recordings[2].force_N)
-    result = diagnose_session(replace(clean, recordings=(*clean.recordings[:2], turned, *clean.recordings[3:])))
+def test_one_recording_of_wrong_sign_is_left_out_and_named(clean: TrialSet) -> None:
+    turned = replace(clean.trials[2], force_N=-clean.trials[2].force_N)
+    result = diagnose_session(replace(clean, trials=(*clean.trials[:2], turned, *clean.trials[3:])))
     assert (result.verdict, result.recordings) == ("adequate", 5)
     (said,) = [finding for finding in result.quality if finding.kind == "sign"]
     assert said.recording == turned.name
     assert said.text.endswith("turn its sign")
 
 
-def test_a_recording_that_is_a_copy_of_another_is_left_out_and_named(clean: Session) -> None:
-    copies = tuple(replace(clean.recordings[0], name=f"copy {number}") for number in range(4))
-    result = diagnose_session(replace(clean, recordings=copies))
+def test_a_recording_that_is_a_copy_of_another_is_left_out_and_named(clean: TrialSet) -> None:
+    copies = tuple(replace(clean.trials[0], name=f"copy {number}") for number in range(4))
+    result = diagnose_session(replace(clean, trials=copies))
     nothing_named(result, "1 recording of one cycle")
     assert any(finding.text.endswith("it holds the same forces as copy 0") for finding in result.quality)
 
@@ -101,39 +105,39 @@ def test_a_recording_that_is_a_copy_of_another_is_left_out_and_named(clean: Sess
         ("axis_mm", 1000.0, "limit 300 mm"),
     ],
 )
-def test_what_looks_like_another_unit_is_not_judged(clean: Session, field: str, factor: float, because: str) -> None:
-    scaled = tuple(replace(streams, **{field: factor * getattr(streams, field)}) for streams in clean.recordings)
-    nothing_named(diagnose_session(replace(clean, recordings=scaled)), because)
+def test_what_looks_like_another_unit_is_not_judged(clean: TrialSet, field: str, factor: float, because: str) -> None:
+    scaled = tuple(replace(trial, **{field: factor * getattr(trial, field)}) for trial in clean.trials)
+    nothing_named(diagnose_session(replace(clean, trials=scaled)), because)
 
 
-def test_time_in_milliseconds_is_not_judged(clean: Session) -> None:
+def test_time_in_milliseconds_is_not_judged(clean: TrialSet) -> None:
     slow = tuple(
-        replace(streams, force_s=1e3 * streams.force_s, axis_s=1e3 * streams.axis_s, marker_s=None, marker_mm=None)
-        for streams in clean.recordings
+        replace(trial, force_s=1e3 * trial.force_s, axis_s=1e3 * trial.axis_s, marker_s=None, marker_mm=None)
+        for trial in clean.trials
     )
-    nothing_named(diagnose_session(replace(clean, recordings=slow)), "times a second by its time stamps (limit 2)")
+    nothing_named(diagnose_session(replace(clean, trials=slow)), "times a second by its time stamps (limit 2)")
 
 
-def test_a_force_cut_off_by_the_sensors_range_is_not_judged_there(clean: Session) -> None:
-    largest_N = 0.7 * max(float(streams.force_N.max()) for streams in clean.recordings)
-    cut_off = tuple(replace(streams, force_N=np.minimum(streams.force_N, largest_N)) for streams in clean.recordings)
-    result = diagnose_session(replace(clean, recordings=cut_off))
+def test_a_force_cut_off_by_the_sensors_range_is_not_judged_there(clean: TrialSet) -> None:
+    largest_N = 0.7 * max(float(trial.force_N.max()) for trial in clean.trials)
+    cut_off = tuple(replace(trial, force_N=np.minimum(trial.force_N, largest_N)) for trial in clean.trials)
+    result = diagnose_session(replace(clean, trials=cut_off))
     assert result.findings == ()
     assert any(finding.kind == "saturation" and "not judged there" in finding.text for finding in result.quality)
 
 
-def test_a_recording_whose_streams_share_no_time_is_left_out_and_named(clean: Session) -> None:
-    away = replace(clean.recordings[0], axis_s=clean.recordings[0].axis_s + 1000.0)
-    result = diagnose_session(replace(clean, recordings=(away, *clean.recordings[1:])))
+def test_a_recording_whose_streams_share_no_time_is_left_out_and_named(clean: TrialSet) -> None:
+    away = replace(clean.trials[0], axis_s=clean.trials[0].axis_s + 1000.0)
+    result = diagnose_session(replace(clean, trials=(away, *clean.trials[1:])))
     assert result.recordings == 5
     assert any("have no common time" in finding.text for finding in result.quality)
 
 
-def test_samples_that_hold_no_number_are_counted(clean: Session) -> None:
-    first = clean.recordings[0]
+def test_samples_that_hold_no_number_are_counted(clean: TrialSet) -> None:
+    first = clean.trials[0]
     force_N = first.force_N.copy()
     force_N[[40, 50]] = np.nan
-    result = diagnose_session(replace(clean, recordings=(replace(first, force_N=force_N), *clean.recordings[1:])))
+    result = diagnose_session(replace(clean, trials=(replace(first, force_N=force_N), *clean.trials[1:])))
     (said,) = [finding for finding in result.quality if finding.kind == "number"]
     assert said.text == f"force: 2 of {len(force_N)} samples hold no number, first sample 41; left out"
 
@@ -147,40 +151,40 @@ def test_a_word_among_numbers_is_named_with_its_line(tmp_path: Path) -> None:
     assert remark == "force.csv line 3, column force_N: 'OVERLOAD' is no number; left out"
 
 
-def test_constant_force_is_no_experiment(clean: Session) -> None:
-    flat = tuple(replace(streams, force_N=np.ones_like(streams.force_N)) for streams in clean.recordings)
-    nothing_named(diagnose_session(replace(clean, recordings=flat)), "never changes")
+def test_constant_force_is_no_experiment(clean: TrialSet) -> None:
+    flat = tuple(replace(trial, force_N=np.ones_like(trial.force_N)) for trial in clean.trials)
+    nothing_named(diagnose_session(replace(clean, trials=flat)), "never changes")
 
 
-def test_no_recordings_at_all_is_an_answer_too(clean: Session) -> None:
-    nothing_named(diagnose_session(replace(clean, recordings=())), "no recording")
+def test_no_recordings_at_all_is_an_answer_too(clean: TrialSet) -> None:
+    nothing_named(diagnose_session(replace(clean, trials=())), "no recording")
 
 
-def test_without_a_tracker_what_needs_one_is_not_testable_and_the_rest_is(clean: Session) -> None:
+def test_without_a_tracker_what_needs_one_is_not_testable_and_the_rest_is(clean: TrialSet) -> None:
     result = diagnose_session(changed(clean, marker_s=None, marker_mm=None))
     assert "tip tracker" in result.not_testable["frame_compliance"]
     assert "friction" in result.detectable
     assert result.findings == ()
 
 
-def test_at_10_Hz_what_is_fast_is_not_testable(clean: Session) -> None:
-    slow = tuple(_slowed(streams, 10.0) for streams in clean.recordings)
-    result = diagnose_session(replace(clean, recordings=slow))
+def test_at_10_Hz_what_is_fast_is_not_testable(clean: TrialSet) -> None:
+    slow = tuple(_slowed(trial, 10.0) for trial in clean.trials)
+    result = diagnose_session(replace(clean, trials=slow))
     assert {"time_offset", "filter_lag", "tip_inertia"} <= result.not_testable.keys()
     assert result.findings == ()
 
 
-def test_without_the_way_out_what_needs_it_is_not_testable(clean: Session) -> None:
-    way_in = tuple(_cut_before_retraction(streams) for streams in clean.recordings)
-    result = diagnose_session(replace(clean, recordings=way_in))
+def test_without_the_way_out_what_needs_it_is_not_testable(clean: TrialSet) -> None:
+    way_in = tuple(_cut_before_retraction(trial) for trial in clean.trials)
+    result = diagnose_session(replace(clean, trials=way_in))
     assert {"friction", "backlash", "adhesion"} <= result.not_testable.keys()
 
 
-def test_a_clock_that_runs_backwards_is_said_and_its_samples_left_out(clean: Session) -> None:
-    first = clean.recordings[0]
+def test_a_clock_that_runs_backwards_is_said_and_its_samples_left_out(clean: TrialSet) -> None:
+    first = clean.trials[0]
     time = first.force_s.copy()
     time[500:520] -= 0.3
-    result = diagnose_session(replace(clean, recordings=(replace(first, force_s=time), *clean.recordings[1:])))
+    result = diagnose_session(replace(clean, trials=(replace(first, force_s=time), *clean.trials[1:])))
     assert any(finding.kind == "clock" for finding in result.quality)
     assert result.findings == ()
 
@@ -201,12 +205,12 @@ def test_beside_a_gap_of_the_axis_the_motion_is_not_judged() -> None:
     assert not beside_gaps(axis_s[:100], at_s, 0.008).any()
 
 
-def test_a_csv_folder_with_a_stream_missing_answers_with_the_rest(clean: Session, tmp_path: Path) -> None:
-    for k, streams in enumerate(clean.recordings[:5]):
-        write_csv(tmp_path / f"trial_{k}", streams)
+def test_a_csv_folder_with_a_stream_missing_answers_with_the_rest(clean: TrialSet, tmp_path: Path) -> None:
+    for k, trial in enumerate(clean.trials[:5]):
+        write_csv(tmp_path / f"trial_{k}", trial)
     (tmp_path / "trial_2" / "axis.csv").unlink()
-    session = read_source(tmp_path)
-    assert len(session.recordings) == 4
+    session = read_trials(tmp_path)
+    assert len(session.trials) == 4
     result = diagnose_session(session)
     assert any("axis.csv" in finding.text for finding in result.quality)
     assert result.recordings == 4
@@ -214,61 +218,61 @@ def test_a_csv_folder_with_a_stream_missing_answers_with_the_rest(clean: Session
 
 def test_a_folder_with_nothing_in_it_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="neither recordings"):
-        read_source(tmp_path)
+        read_trials(tmp_path)
 
 
-def _slowed(streams: Streams, rate_Hz: float) -> Streams:
-    step = round(1 / rate_Hz / float(np.median(np.diff(streams.force_s))))
+def _slowed(trial: Trial, rate_Hz: float) -> Trial:
+    step = round(1 / rate_Hz / float(np.median(np.diff(trial.force_s))))
     return replace(
-        streams, force_s=streams.force_s[::step], force_N=streams.force_N[::step], axis_s=streams.axis_s[::step],
-        axis_mm=streams.axis_mm[::step], temperature_C=None,
+        trial, force_s=trial.force_s[::step], force_N=trial.force_N[::step], axis_s=trial.axis_s[::step],
+        axis_mm=trial.axis_mm[::step], temperature_C=None,
     )  # fmt: skip
 
 
-def _cut_before_retraction(streams: Streams) -> Streams:
-    end = int(np.argmax(streams.axis_mm > streams.axis_mm.max() - 0.01)) + 50
+def _cut_before_retraction(trial: Trial) -> Trial:
+    end = int(np.argmax(trial.axis_mm > trial.axis_mm.max() - 0.01)) + 50
     return replace(
-        streams, force_s=streams.force_s[:end], force_N=streams.force_N[:end], axis_s=streams.axis_s[:end],
-        axis_mm=streams.axis_mm[:end], temperature_C=None,
+        trial, force_s=trial.force_s[:end], force_N=trial.force_N[:end], axis_s=trial.axis_s[:end],
+        axis_mm=trial.axis_mm[:end], temperature_C=None,
     )  # fmt: skip
 
 
-def write_csv(folder: Path, streams: Streams) -> None:
+def write_csv(folder: Path, trial: Trial) -> None:
     folder.mkdir()
     for name, header, columns in (
-        ("force", "time_s,force_N", (streams.force_s, streams.force_N)),
-        ("axis", "time_s,position_mm", (streams.axis_s, streams.axis_mm)),
+        ("force", "time_s,force_N", (trial.force_s, trial.force_N)),
+        ("axis", "time_s,position_mm", (trial.axis_s, trial.axis_mm)),
     ):
         rows = np.stack(columns, axis=1)
         np.savetxt(folder / f"{name}.csv", rows, delimiter=",", header=header, comments="", fmt="%.6f")
 
 
-def test_recordings_stacked_in_one_file_are_told_apart_and_chosen_by_name(clean: Session, tmp_path: Path) -> None:
+def test_recordings_stacked_in_one_file_are_told_apart_and_chosen_by_name(clean: TrialSet, tmp_path: Path) -> None:
     lines = ["recording,t_s,force_N,extension_mm"]
-    for k, streams in enumerate(clean.recordings[:2]):
-        place = np.interp(streams.force_s, streams.axis_s, streams.axis_mm)
-        rows = zip(streams.force_s[::100], streams.force_N[::100], place[::100], strict=True)
+    for k, trial in enumerate(clean.trials[:2]):
+        place = np.interp(trial.force_s, trial.axis_s, trial.axis_mm)
+        rows = zip(trial.force_s[::100], trial.force_N[::100], place[::100], strict=True)
         lines += [f"beef|{k},{t:.4f},{f:.4f},{x:.4f}" for t, f, x in rows]
         lines += [f"silicone|{k},0,0,0"]
     (tmp_path / "stacked.csv").write_text("\n".join(lines) + "\n")
-    assert [streams.name for streams in read_source(tmp_path).recordings] == ["beef|0", "beef|1"]
-    chosen = read_source(tmp_path, only="*|1")
-    assert [streams.name for streams in chosen.recordings] == ["beef|1", "silicone|1"]
+    assert [trial.name for trial in read_trials(tmp_path).trials] == ["beef|0", "beef|1"]
+    chosen = read_trials(tmp_path, only="*|1")
+    assert [trial.name for trial in chosen.trials] == ["beef|1", "silicone|1"]
     assert "2 of 4 recordings" in chosen.findings[0].text
     with pytest.raises(DataError, match="no recording matches"):
-        read_source(tmp_path, only="pork*")
-    whole = read_source(tmp_path).recordings[1]
+        read_trials(tmp_path, only="pork*")
+    whole = read_trials(tmp_path).trials[1]
     (tmp_path / "stacked.csv").write_text("\n".join([*lines, "beef|1,9,OVERLOAD,2", "beef|1"]) + "\n")
-    spoilt = read_source(tmp_path)
+    spoilt = read_trials(tmp_path)
     assert [finding.text for finding in spoilt.findings if finding.kind == "text"] == [
         f"stacked.csv line {len(lines) + 1}, column force_N: 'OVERLOAD' is no number; left out"
     ]
-    np.testing.assert_array_equal(spoilt.recordings[1].force_N, [*whole.force_N, np.nan, np.nan])
+    np.testing.assert_array_equal(spoilt.trials[1].force_N, [*whole.force_N, np.nan, np.nan])
 
 
 def test_what_the_index_law_gets_wrong_on_real_meat_is_relaxation() -> None:
     folder = recording("perineal_indentation")
-    result = diagnose_session(read_source(folder, only="230411_C_Ind*_RDG*"))
+    result = diagnose_session(read_trials(folder, only="230411_C_Ind*_RDG*"))
     assert "relaxation" in {effect for finding in result.findings for effect in finding.effects}, result.statement
     named = next(finding for finding in result.findings if finding.effects[0] == "relaxation")
     assert named.gain.reduction > 0.2
@@ -284,8 +288,8 @@ def test_a_trial_of_bad_quality_is_left_out_and_one_that_is_not_good_is_named(tm
         replace(good, quality="good"),
     )
     write_session(folder, replace(info, trials=marked))
-    session = read_source(folder)
-    assert [streams.name for streams in session.recordings] == [usable.name, good.name]
+    session = read_trials(folder)
+    assert [trial.name for trial in session.trials] == [usable.name, good.name]
     said = {finding.recording: finding.text for finding in session.findings}
     assert said[bad.name] == "quality bad, left out: force: a gap of 500 ms"
     assert said[usable.name] == "quality usable: the loop missed of its cycles 15 %"

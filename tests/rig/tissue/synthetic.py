@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.channels import AXIS, FORCE, LOOP, AxisSample, ForceSample, LoopSample
+from rig.channels import AXIS, FORCE, LOOP, MARKER, AxisSample, ForceSample, LoopSample
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.reader import Recording
 from rig.recording.sessions import JsonTable, SessionInfo, TrialInfo, write_session
@@ -182,7 +182,8 @@ def metadata(cycle: IndentationCycle) -> dict[str, dict[str, str]]:
 
 def recording(cycle: IndentationCycle, path: Path = Path("trial.mcap")) -> Recording:
     """The trial as a reader would give it."""
-    return Recording(path, metadata(cycle), tables(cycle), (), True, ())
+    streams = tables(cycle) | {"marker": np.zeros(0, MARKER.dtype)}
+    return Recording(path, metadata(cycle), streams, (), True, ())
 
 
 def write_recording(

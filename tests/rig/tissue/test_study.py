@@ -55,6 +55,23 @@ def test_every_trial_with_a_curve_counts_and_the_others_say_why_not(study: Study
     assert "no contact" in study.skipped[0].reason
 
 
+def test_samples_that_were_left_out_are_said_with_the_fit(tmp_path: Path) -> None:
+    first, second = Bench().cycles(trials=2, speeds_mm_s=(10.0,))
+    folder = write_made_session(tmp_path / "session", [first, second])
+    streams = tables(first)
+    streams["force"]["fz_N"][[40, 50]] = np.nan
+    streams["axis"]["arrival_ns"][100:300] += 5_000_000
+    (folder / f"{first.name}.mcap").unlink()
+    write_recording(folder / f"{first.name}.mcap", streams, metadata(first))
+    result = fit_result(study_session(open_session(folder)), "", "index", {}, {})
+    count, late = len(streams["force"]), 100 * 200 / len(streams["axis"])
+    assert [finding.sentence for finding in result.data_quality] == [
+        f"data: {first.name} axis: {late:.0f} % of the samples came more than 0.5 ms later than usual; "
+        "these were left out",
+        f"data: {first.name} force: 2 of {count} samples hold no number, first sample 41; left out",
+    ]
+
+
 def test_a_trial_of_bad_quality_is_left_out_and_said(tmp_path: Path) -> None:
     folder = write_made_session(tmp_path / "session", Bench().cycles(trials=2, speeds_mm_s=(10.0,)))
     session = open_session(folder)
@@ -63,7 +80,7 @@ def test_a_trial_of_bad_quality_is_left_out_and_said(tmp_path: Path) -> None:
     write_session(folder, replace(session.info, trials=(spoilt, replace(second, quality="usable"))))
     study = study_session(open_session(folder))
     assert [curve.name for curve in study.curves] == [second.name]
-    why = "left out, its quality is bad: force: a gap of 500 ms (good up to 20 ms)"
+    why = "quality bad, left out: force: a gap of 500 ms (good up to 20 ms)"
     assert study.skipped == (Skipped(first.name, why),)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from rig.config.quality import Bounds, QualityLimits
 from rig.recording.sessions import TrialInfo
-from rig.trials.quality import TrialQuality, evaluate_trial, quality_of, refusal
+from rig.trials.quality import TrialQuality, evaluate_trial, quality_of
 from tests.rig.tissue.synthetic import Bench
 from tests.rig.trials.made import HOLD_STEP, Tables, incomplete, trial
 
@@ -195,11 +195,10 @@ def test_the_session_decides_where_it_says_and_the_recording_where_it_does_not()
     from_recording = quality_of(made, silent)
     assert from_recording and from_recording.verdict == "usable"
     stated = replace(silent, quality="bad", reasons=("it says so",))
-    assert quality_of(made, stated) == TrialQuality("bad", ("it says so",), {})
-    assert refusal(made, stated) == "left out, its quality is bad: it says so"
-    assert refusal(made, silent) == ""
+    said = quality_of(made, stated)
+    assert said == TrialQuality("bad", ("it says so",), {}) and said.sentence == "quality bad, left out: it says so"
     foreign = replace(made, metadata={name: made.metadata[name] for name in ("trial", "calibration")})
-    assert quality_of(foreign, silent) is None and refusal(foreign, silent) == ""
+    assert quality_of(foreign, silent) is None
 
 
 @pytest.mark.parametrize(("gain", "verdict"), [(0.5, "usable"), (1.0, "good"), (1.15, "good"), (2.0, "usable")])

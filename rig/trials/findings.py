@@ -1,11 +1,17 @@
 """Data-quality gates, passed before any fit: what is wrong with the numbers themselves, in words."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+UNREADABLE, BAD = "unreadable", "quality_bad"
+# Kinds of finding for which a trial is left out before anything is computed.
+TRIAL_LEFT_OUT = frozenset({UNREADABLE, BAD})
+# Kinds of finding for which samples are left out.
+SAMPLES_LEFT_OUT = frozenset({"number", "clock", "late", "text"})
 FLAT_TOP_SAMPLES = 8
 COARSE_STEPS = 64
 FROZEN_S = 0.25
@@ -21,6 +27,20 @@ class Finding:
     kind: str
     text: str
     recordings: int = 1
+
+    @property
+    def sentence(self) -> str:
+        """Recording, what, and in how many more."""
+        others = f" (and in {self.recordings - 1} more)" if self.recordings > 1 else ""
+        return f"data: {f'{self.recording} ' if self.recording else ''}{self.text}{others}"
+
+
+def merged(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """One finding a stream and kind: the first, with the number of recordings it was seen in."""
+    groups: dict[tuple[str, str], list[Finding]] = {}
+    for finding in findings:
+        groups.setdefault((finding.stream, finding.kind), []).append(finding)
+    return tuple(replace(group[0], recordings=len(group)) for group in groups.values())
 
 
 def inspect_stream(recording: str, stream: str, time_s: Array, value: Array) -> list[Finding]:

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.diagnosis.gates import Finding
-from rig.diagnosis.observations import Session, Streams
 from rig.errors import DataError
 from rig.recording.csv_columns import read_header, read_usable
+from rig.trials.findings import Finding
+from rig.trials.trial import Trial, TrialSet
 
 NAME = "recording"
 # Headers a column may stand under, the project's own first.
@@ -23,7 +23,7 @@ def stacked_file(folder: Path) -> Path | None:
     return next((path for path in files if NAME in read_header(path)), None)
 
 
-def from_stacked(path: Path, columns: tuple[str, ...] = (), only: str = "") -> Session:
+def read_stacked(path: Path, columns: tuple[str, ...] = (), only: str = "") -> TrialSet:
     """The recordings whose names match ``only``; without it those of the first series (the name up to ``|``).
 
     They state no common clock and are laid one after the other. Raises DataError naming what is missing.
@@ -37,13 +37,13 @@ def from_stacked(path: Path, columns: tuple[str, ...] = (), only: str = "") -> S
         raise DataError(f"{path}: no recording matches {only!r}; they are called like {found[0]!r}")
     text = f"{len(chosen)} of {len(found)} recordings are judged, those matching {pattern!r}; choose others with --only"
     findings = (Finding("", "session", "chosen", text), *([Finding("", "session", "text", remark)] if remark else []))
-    streams, start_s = [], 0.0
+    trials, start_s = [], 0.0
     for name in chosen:
         time_s, force_N, position_mm = (column[of == name] for column in table.values())
         at_s = time_s - time_s[0] + start_s
-        streams.append(Streams(name, at_s, force_N, at_s, position_mm))
+        trials.append(Trial(name, at_s, force_N, at_s, position_mm))
         start_s = float(np.nanmax(at_s)) + GAP_S
-    return Session(path.parent.name, tuple(streams), findings=findings)
+    return TrialSet(path.parent.name, tuple(trials), findings=findings)
 
 
 def _names(path: Path, columns: tuple[str, ...]) -> dict[str, str]:

@@ -1,0 +1,66 @@
+"""One trial from its recording, as the devices vouch for it."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import DataError
+from rig.recording.reader import Recording
+from rig.recording.slope import TIP_TOOL
+from rig.recording.tables import compression_N
+from rig.trials.findings import Array, Finding
+from rig.trials.trial import Trial
+
+NS = 1e-9
+# A drive that is asked half a millisecond late has gone 15 um at 30 mm/s, a tenth of what contact is known to.
+LATE_NS = 500_000
+MOST_LATE = 0.01
+
+
+def trial_of(name: str, recording: Recording, start_ns: int | None = None) -> Trial:
+    """The trial in a recording, samples the devices vouch for, on a clock that starts at ``start_ns``, else with it.
+
+    The tip is tool 0 of the tracker. Raises DataError where the metadata do not say what was recorded.
+    """
+    force, axis, marker = (recording.tables[stream] for stream in ("force", "axis", "marker"))
+    sound, moving = force["valid"] != 0, (axis["valid"] != 0) & in_time(axis["capture_ns"], axis["arrival_ns"])
+    seen = (marker["tool"] == TIP_TOOL) & (marker["valid"] != 0)
+    temperature = force["temperature_C"][sound]
+    start = start_ns if start_ns is not None else int(force["capture_ns"][0]) if len(force) else 0
+    return Trial(
+        name,
+        (force["capture_ns"][sound] - start) * NS,
+        compression_N(recording)[sound],
+        (axis["capture_ns"][moving] - start) * NS,
+        axis["position_mm"][moving],
+        (marker["capture_ns"][seen] - start) * NS,
+        np.stack([marker[field][seen] for field in ("x_mm", "y_mm", "z_mm")], axis=1),
+        temperature if temperature.size and np.isfinite(temperature).all() else None,
+        _nominal_speed(name, recording.metadata),
+    )
+
+
+def _nominal_speed(name: str, metadata: Mapping[str, Mapping[str, str]]) -> float:
+    text = metadata.get("trial", {}).get("speed_mm_s", "nan")
+    try:
+        return float(text)
+    except ValueError as error:
+        raise DataError(f"{name}: trial speed_mm_s is {text!r}; it must be a number in mm/s") from error
+
+
+def late(name: str, axis: Mapping[str, Array] | NDArray[np.void]) -> list[Finding]:
+    """What to say of an axis whose samples came late; nothing below 1 %."""
+    share = 1 - float(np.mean(in_time(axis["capture_ns"], axis["arrival_ns"]))) if len(axis["capture_ns"]) else 0.0
+    text = f"axis: {100 * share:.0f} % of the samples came more than 0.5 ms later than usual; these were left out"
+    return [Finding(name, "axis", "late", text)] if share > MOST_LATE else []
+
+
+def in_time(capture_ns: NDArray[np.int64] | Array, arrival_ns: NDArray[np.int64] | Array) -> NDArray[np.bool_]:
+    """Samples that came no later than usual, within 0.5 ms.
+
+    A drive that is asked late tells where it is then, under the time it should have been asked; at the ends of a dither
+    that is always further back, and would pass for stiffer tissue there.
+    """
+    taken_ns = arrival_ns - capture_ns
+    return np.asarray(taken_ns < np.median(taken_ns) + LATE_NS) if len(taken_ns) else np.zeros(0, bool)
