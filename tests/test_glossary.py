@@ -6,8 +6,7 @@ from itertools import cycle
 from pathlib import Path
 
 from mock_devices.parameters import Tissue
-from rig.diagnosis.indentation import DAMPING, STIFFNESS, SURFACE, TIP_ZERO, ZERO, library
-from rig.simulation.chain import NULLS
+from rig.diagnosis.indentation import DAMPING, STIFFNESS, SURFACE, TIP_ZERO, ZERO, library, nulls
 from rig.tissue.laws import Law
 from rig.tissue.laws_lattice import LatticeConstant, LatticeIndex
 from rig.tissue.laws_springs import LatticeSprings
@@ -42,7 +41,7 @@ def ending(unit: str) -> str:
 
 def test_the_table_holds_every_parameter_with_the_unit_that_all_declare() -> None:
     assert {(name, unit) for name, unit in written().items()} == set(declared())
-    assert NULLS.keys() <= written().keys()
+    assert nulls().keys() <= written().keys()
 
 
 def test_a_name_ends_in_its_unit_and_one_without_dimension_in_none() -> None:

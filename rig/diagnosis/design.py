@@ -14,12 +14,12 @@ from rig.diagnosis.answers import Diagnosis, smallest_visible
 from rig.diagnosis.estimates import NextExperiment, SmallestSize
 from rig.diagnosis.evidence import Direction, Tangents, information, is_alias, tangents
 from rig.diagnosis.fit import Fit, assemble
-from rig.diagnosis.indentation import Indentation
+from rig.diagnosis.indentation import Indentation, nulls
 from rig.diagnosis.noise import Array, Colour, Noise, ScatterWhitener, starts_of
 from rig.diagnosis.observations import Observations, observe
 from rig.diagnosis.search import testable
 from rig.diagnosis.whitening import Whitener, secants_of
-from rig.simulation.chain import NULLS, respond
+from rig.simulation.chain import respond
 from rig.trials.trial import Trial, TrialSet
 
 RATE_HZ = 1000.0
@@ -138,7 +138,7 @@ def cycle(protocol: Protocol, speed: float, rate_Hz: float) -> tuple[Array, Arra
 
 def noiseless(problem: Indentation, limb: Mapping[str, float] = LIMB) -> Fit:
     """The simulation at the given limb, judged with the assumed noise, as if it had been fitted."""
-    values = {**NULLS, **limb}
+    values = {**nulls(), **limb}
     drive = problem.data.drive
     data = Observations(
         problem.data.name, problem.data.names, drive, respond(drive, values).force_N, problem.data.tip_mm, None

@@ -12,18 +12,6 @@ from rig.errors import DataError
 from rig.tissue.laws_extended import Extended
 from rig.tissue.model import Estimate, Model, NamedCause, Provenance, Quality, ValidRange
 
-ELASTIC = "in the force-depth curve: gains and inverse model"
-USED = {
-    "stiffening": ELASTIC,
-    "elastic_law": ELASTIC,
-    "substrate": ELASTIC,
-    "frame_compliance": ELASTIC,
-    "relaxation": "in the inverse model and, as sudden stiffness, in the gains",
-    "friction": "in the inverse model",
-    "rate_law": "its damping at 10 mm/s is in the gains and the inverse model",
-}
-UNUSED = "kept, and not used: it is no part of what the axis must do for a force"
-
 
 def extended_model(result: Diagnosis) -> Model:
     """The final model of a diagnosis of indentations; raises DataError where nothing could be fitted."""
@@ -107,6 +95,7 @@ def _quality(fit: Fit, law: Extended) -> Quality:
 
 def _effects(result: Diagnosis, fit: Fit) -> tuple[NamedCause, ...]:
     pars = (par for effect in fit.problem.effects for par in effect.pars)
+    control = {effect.name: effect.control for effect in fit.problem.effects}
     units = {par.name.replace("_sin_mm", "_mm"): par.unit for par in pars}
     return tuple(
         NamedCause(
@@ -116,7 +105,7 @@ def _effects(result: Diagnosis, fit: Fit) -> tuple[NamedCause, ...]:
                 name: Estimate(value=i.value, unit=units[name], low=float(i.low), high=float(i.high))
                 for name, i in found.parameters.items()
             },
-            used=USED.get(found.effects[0], UNUSED),
+            used=control[found.effects[0]],
         )
         for found in result.findings
     )

@@ -9,11 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.diagnosis.effects.bench import BENCH_EFFECTS
-from rig.diagnosis.effects.tissue import STIFFENING, STIFFENING_EFFECT, TISSUE_EFFECTS
+from rig.diagnosis.effects.registry import CAUSES
+from rig.diagnosis.effects.tissue import STIFFENING, STIFFENING_EFFECT
 from rig.diagnosis.observations import Observations
 from rig.diagnosis.problem import Array, Effect, Par, Scatter, Signal, Values
-from rig.simulation.chain import NULLS, respond
+from rig.simulation.chain import NULLS, Operator, respond
 from rig.simulation.drive import SETTLE_MM_S, Drive
 from rig.tissue.index_law import Fields, index_force
 
@@ -34,7 +34,12 @@ Simulation = Literal["index", "constant"]
 
 def library(simulation: Simulation) -> tuple[Effect, ...]:
     """All causes; ``stiffening`` only where the simulation has none."""
-    return (*TISSUE_EFFECTS, *BENCH_EFFECTS, *([STIFFENING_EFFECT] if simulation == "constant" else []))
+    return (*CAUSES.values(), *([STIFFENING_EFFECT] if simulation == "constant" else []))
+
+
+def nulls() -> dict[str, float]:
+    """Every parameter of the simulation and of the causes at its null."""
+    return {par.name: par.null for cause in CAUSES.values() for par in cause.pars} | NULLS
 
 
 @dataclass(frozen=True)
@@ -96,13 +101,21 @@ class Indentation:
             return {**values, "tip_zero_mm": float(np.median(self.data.tip_mm - self._encoder))}
         return values
 
+    @cached_property
+    def _nulls(self) -> Values:
+        return nulls()
+
+    @cached_property
+    def _operators(self) -> tuple[Operator, ...]:
+        return tuple(effect.operator for effect in self.effects if effect.operator)
+
     @property
     def _encoder(self) -> Array:
         return self.data.drive.at_tracker(self.data.drive.position_mm)
 
     def predict(self, values: Fields) -> tuple[Array, ...]:
         """Force, and tip where it was measured."""
-        response = respond(self.data.drive, values)
+        response = respond(self.data.drive, {**self._nulls, **values}, self._operators)
         return response if self.data.has_tracker else (response.force_N,)
 
     def blind(self, values: Fields) -> NDArray[np.bool_]:
@@ -187,7 +200,7 @@ def coarse_start(data: Observations, stiffening: bool) -> dict[str, float]:
     x, v, force = (a[::stride] for a in (data.drive.position_mm, data.drive.velocity_mm_s, data.force_N))
     low, high = np.percentile(x, [0.5, 99.5])
     surfaces = [data.surface_mm] if data.surface_mm is not None else np.linspace(low, high, 42)[:-3]
-    best: tuple[float, dict[str, float]] = (np.inf, dict(NULLS))
+    best: tuple[float, dict[str, float]] = (np.inf, nulls())
     for surface in surfaces:
         depth = np.maximum(x - surface, 0.0)
         for growth in _growths(depth, stiffening):
@@ -196,7 +209,7 @@ def coarse_start(data: Observations, stiffening: bool) -> dict[str, float]:
             error = float(np.sum((force - columns @ solution) ** 2))
             if error < best[0] and solution[0] > 0:
                 found = dict(zip(("a_N_mm", "damping_N_s_mm", "zero_N"), map(float, solution), strict=True))
-                best = error, {**NULLS, **found, "b_per_mm": growth, "surface_mm": float(surface)}
+                best = error, {**nulls(), **found, "b_per_mm": growth, "surface_mm": float(surface)}
     return best[1]
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.simulation.chain import Operator
 from rig.tissue.index_law import Fields
 
 Array = NDArray[np.float64]
@@ -45,7 +46,8 @@ class Effect:
     ``one_sided`` effects exist only above their null. ``between`` effects differ between recordings rather than inside
     them, so that without them they pass for scatter: they are always tried with a scatter of their own; ``mean_of`` is
     the scatter whose mean an effect is. ``through`` names the one variable an effect acts through, if it is one: two
-    such together may imitate a third that is unknown.
+    such together may imitate a third that is unknown. ``operator`` is what it does in the simulation, where that does
+    not know the cause itself. ``control`` says what it means for the control.
     """
 
     name: str
@@ -59,6 +61,8 @@ class Effect:
     between: bool = False
     mean_of: str = ""
     through: str = ""
+    operator: Operator | None = None
+    control: str = "kept, and not used: it is no part of what the axis must do for a force"
     needs: frozenset[str] = frozenset()
     aliases: tuple[str, ...] = ()
     repair: str = ""

@@ -1,15 +1,17 @@
 """The chain: measured motion -> kinematics -> environment -> tissue -> guide -> sensor -> time stamps.
 
-Every cause is one operator that vanishes at its null value, so to extend the simulation is to move one number off its
-null. Operators are pure and vectorised over all recordings of a session.
+Every cause vanishes at its null value, so to extend the simulation is to move one number off its null. Causes of the
+carriage and of the sensor bring operators of their own; those that act through tissue and guide stand here. All are
+pure and vectorised over all recordings of a session.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
 from rig.simulation.drive import Array, Drive
-from rig.simulation.scans import dahl, play
+from rig.simulation.scans import dahl
 from rig.tissue.history import Term
 from rig.tissue.index_law import Fields, extended_force
 from rig.tissue.laws_extended import Extended
@@ -32,20 +34,28 @@ NULLS: dict[str, float] = {
     "surface_motion_sin_mm": 0.0,
     "surface_motion_cos_mm": 0.0,
     "surface_motion_Hz": 0.25,
-    "backlash_mm": 0.0,
-    "ripple_sin_mm": 0.0,
-    "ripple_cos_mm": 0.0,
-    "ripple_pitch_mm": 2.0,
     "friction_start": 0.0,
     "tip_inertia_kg": 0.0,
-    "filter_lag_s": 0.0,
-    "gain_error": 0.0,
-    "zero_drift_N_h": 0.0,
-    "time_offset_s": 0.0,
     "tracker_latency_s": 0.0,
 }
 REFERENCE_SPEED_MM_S = 10.0
 COMPLIANCE_ITERATIONS = 4
+
+
+Stage = Literal["carriage", "sensing", "reading", "stamping"]
+STAGES: tuple[Stage, ...] = get_args(Stage)
+Series = Array | float
+
+
+class Operator(NamedTuple):
+    """What a cause does at one stage: ``act(drive, signal, values)`` gives the signal as it leaves, shape (n,).
+
+    Signals: at ``carriage``, carriage minus encoder [mm], 0.0 where there is no error; at ``sensing``, the force [N] on
+    the sensor, before its zero; at ``reading``, with its zero; at ``stamping``, as it carries its time stamps.
+    """
+
+    stage: Stage
+    act: Callable[[Drive, Series, Fields], Series]
 
 
 class Response(NamedTuple):
@@ -68,14 +78,24 @@ def one(v: Fields, name: str) -> float:
     return float(v[name])
 
 
-def respond(drive: Drive, values: Fields) -> Response:
-    """Sensor readings for the measured motion; parameters not in ``values`` are at their null."""
+def respond(drive: Drive, values: Fields, operators: Iterable[Operator] = ()) -> Response:
+    """Sensor readings for the measured motion; parameters not in ``values`` are at their null, those of operators not.
+
+    ``operators`` of one stage act in their order.
+    """
     v = {**NULLS, **values}
-    carriage = _moved(drive, ripple(drive, v) + backlash(drive, v))
+    by_stage = {stage: [operator for operator in operators if operator.stage == stage] for stage in STAGES}
+
+    def through(stage: Stage, signal: Series) -> Series:
+        for operator in by_stage[stage]:
+            signal = operator.act(drive, signal, v)
+        return signal
+
+    carriage = _moved(drive, through("carriage", 0.0))
     tip = compressed_frame(drive, carriage, v) if one(v, "frame_compliance_mm_N") else carriage
-    force = time_stamps(drive, sensor(drive, on_sensor(drive, tip, v), v), v)
+    force = through("sensing", on_sensor(drive, tip, v)) + v["zero_N"]
     seen = drive.at_tracker(tip.position_mm, one(v, "tracker_latency_s")) + v["tip_zero_mm"]
-    return Response(force, seen)
+    return Response(np.asarray(through("stamping", through("reading", force))), seen)
 
 
 def _moved(drive: Drive, offset: Array | float) -> Tip:
@@ -83,21 +103,6 @@ def _moved(drive: Drive, offset: Array | float) -> Tip:
         return Tip(drive.position_mm, drive.velocity_mm_s, drive.acceleration_mm_s2)
     rate = drive.rate(offset)
     return Tip(drive.position_mm + offset, drive.velocity_mm_s + rate, drive.acceleration_mm_s2 + drive.rate(rate))
-
-
-def ripple(drive: Drive, v: Fields) -> Array | float:
-    """Periodic error of the screw: carriage minus encoder [mm]."""
-    if not (v["ripple_sin_mm"] or v["ripple_cos_mm"]):
-        return 0.0
-    phase = 2 * np.pi * drive.position_mm / v["ripple_pitch_mm"]
-    return np.asarray(v["ripple_sin_mm"] * np.sin(phase) + v["ripple_cos_mm"] * np.cos(phase))
-
-
-def backlash(drive: Drive, v: Fields) -> Array | float:
-    """Lost motion: carriage minus encoder [mm], 0 in forward motion, the width when retracting."""
-    if one(v, "backlash_mm") <= 0:
-        return 0.0
-    return play(drive.position_mm, drive.first, one(v, "backlash_mm")) - drive.position_mm
 
 
 def compressed_frame(drive: Drive, carriage: Tip, v: Fields) -> Tip:
@@ -194,17 +199,3 @@ def friction(drive: Drive, tip: Tip, v: Fields) -> Array | float:
 def on_sensor(drive: Drive, tip: Tip, v: Fields) -> Array:
     """Force that reaches the sensor [N]: tissue, guide and the inertia of what moves in front of it."""
     return tissue(drive, tip, v) + friction(drive, tip, v) + 1e-3 * one(v, "tip_inertia_kg") * tip.acceleration_mm_s2
-
-
-def sensor(drive: Drive, force_N: Array, v: Fields) -> Array:
-    """Filter lag, gain, zero and its drift."""
-    if one(v, "filter_lag_s") > 0:
-        force_N = force_N - drive.history.transient(force_N, one(v, "filter_lag_s"))
-    middle_s = 0.5 * (drive.time_s[0] + drive.time_s[-1])
-    drift = one(v, "zero_drift_N_h") * (drive.time_s - middle_s) / 3600
-    return np.asarray(force_N * (1 + one(v, "gain_error")) + v["zero_N"] + drift)
-
-
-def time_stamps(drive: Drive, force_N: Array, v: Fields) -> Array:
-    """The force as it carries its time stamps: late by the offset."""
-    return drive.shifted(force_N, one(v, "time_offset_s")) if one(v, "time_offset_s") else force_N

@@ -6,6 +6,10 @@ import numpy as np
 
 from rig.diagnosis.effects.scan import PEAKS, peaks
 from rig.diagnosis.problem import Array, Effect, InverseProblem, Par, Values
+from rig.simulation.chain import Operator, Series, one
+from rig.simulation.drive import Drive
+from rig.simulation.scans import play
+from rig.tissue.index_law import Fields
 
 LOWEST_HZ, HIGHEST_HZ = 0.08, 3.0
 PITCHES_PER_MM = np.linspace(1 / 10, 1 / 0.5, 60)
@@ -58,6 +62,37 @@ def _pair(stem: str, meaning: str, worth_mm: float) -> tuple[Par, Par]:
     )
 
 
+def _backlash(drive: Drive, offset: Series, v: Fields) -> Series:
+    """Lost motion: 0 in forward motion, the width when retracting."""
+    width_mm = one(v, "backlash_mm")
+    if width_mm <= 0:
+        return offset
+    return offset + (play(drive.position_mm, drive.first, width_mm) - drive.position_mm)
+
+
+def _ripple(drive: Drive, offset: Series, v: Fields) -> Series:
+    if not (v["ripple_sin_mm"] or v["ripple_cos_mm"]):
+        return offset
+    phase = 2 * np.pi * drive.position_mm / v["ripple_pitch_mm"]
+    return offset + np.asarray(v["ripple_sin_mm"] * np.sin(phase) + v["ripple_cos_mm"] * np.cos(phase))
+
+
+def _filtered(drive: Drive, force_N: Series, v: Fields) -> Series:
+    lag_s = one(v, "filter_lag_s")
+    return force_N - drive.history.transient(np.asarray(force_N), lag_s) if lag_s > 0 else force_N
+
+
+def _drifted(drive: Drive, force_N: Series, v: Fields) -> Series:
+    middle_s = 0.5 * (drive.time_s[0] + drive.time_s[-1])
+    return np.asarray(force_N + one(v, "zero_drift_N_h") * (drive.time_s - middle_s) / 3600)
+
+
+def _late(drive: Drive, force_N: Series, v: Fields) -> Series:
+    late_s = one(v, "time_offset_s")
+    return drive.shifted(np.asarray(force_N), late_s) if late_s else force_N
+
+
+ELASTIC = "in the force-depth curve: gains and inverse model"
 BACKLASH = Effect(
     "backlash",
     "the tip follows the encoder with a dead band of {backlash_mm:.3g} mm",
@@ -65,6 +100,7 @@ BACKLASH = Effect(
     # The first micrometres of a dead band are no measure of it: at null the data may ask for less than none.
     begin={"backlash_mm": 0.15},
     one_sided=True,
+    operator=Operator("carriage", _backlash),
     needs=frozenset({"unloading"}),
     repair="preload or replace the nut; or measure the tip itself",
 )
@@ -75,6 +111,7 @@ FRAME_COMPLIANCE = Effect(
     one_sided=True,
     needs=frozenset({"tracker", "depth"}),
     aliases=("a_N_mm", "b_per_mm"),
+    control=ELASTIC,
     repair="brace the frame, measure the tip itself, or keep the compliance in the model",
 )
 POSITION_RIPPLE = Effect(
@@ -84,6 +121,7 @@ POSITION_RIPPLE = Effect(
     (Par("ripple_pitch_mm", "mm", 2.0, 0.2, 20.0, 0.02, meaning="period along the axis"),),
     _ripple_starts,
     _ripple_tries,
+    operator=Operator("carriage", _ripple),
     needs=frozenset({"depth"}),
     through="depth",
     repair="calibrate the screw error, or use an encoder on the carriage",
@@ -119,6 +157,7 @@ FRICTION = Effect(
     lambda *_: [{"friction_length_mm": mm, "friction_start": -0.5} for mm in (0.005, 0.03, 0.15, 0.6)],
     one_sided=True,
     needs=frozenset({"unloading"}),
+    control="in the inverse model",
     repair="clean and align the guide, or put the sensor at the tip",
 )
 TIP_INERTIA = Effect(
@@ -134,6 +173,7 @@ FILTER_LAG = Effect(
     "the force is low-passed with a time constant of {filter_lag_s:.3g} s",
     (Par("filter_lag_s", "s", 0.0, 0.0, 0.5, 0.002, worth=0.0007, meaning="time constant of a first-order filter"),),
     one_sided=True,
+    operator=Operator("sensing", _filtered),
     needs=frozenset({"fast"}),
     repair="raise the sensor's filter frequency, or filter the position alike",
 )
@@ -141,6 +181,7 @@ TIME_OFFSET = Effect(
     "time_offset",
     "the force's time stamps are off by {time_offset_s:+.3g} s against the position's (plus: late)",
     (Par("time_offset_s", "s", 0.0, -0.3, 0.3, 0.002, worth=0.0007, meaning="force stamps late"),),
+    operator=Operator("stamping", _late),
     needs=frozenset({"fast"}),
     repair="correct the sensor's latency in rig.toml, or stamp both in hardware",
 )
@@ -157,6 +198,7 @@ ZERO_DRIFT = Effect(
     (Par("zero_drift_N_h", "N/h", 0.0, -500.0, 500.0, 0.3, worth=0.1, meaning="drift of the zero"),),
     between=True,
     needs=frozenset({"strokes"}),
+    operator=Operator("reading", _drifted),
     repair="let the sensor warm up and take the zero in the air before every cycle",
 )
 GAIN_ERROR = Effect(
@@ -165,6 +207,7 @@ GAIN_ERROR = Effect(
     (Par("gain_error", "1", 0.0, -0.5, 0.5, 0.01, worth=0.005, meaning="relative error of the force gain"),),
     needs=frozenset({"weight"}),
     aliases=("a_N_mm", "damping_N_s_mm"),
+    operator=Operator("sensing", lambda _, force_N, v: force_N * (1 + one(v, "gain_error"))),
     repair="calibrate with a known weight",
 )
 BENCH_EFFECTS = (

@@ -1,5 +1,6 @@
 """Causes that lie in the tissue: its elastic law, relaxation, rate dependence, its surface chemistry."""
 
+from rig.diagnosis.effects.bench import ELASTIC
 from rig.diagnosis.problem import Effect, Par
 
 EXPONENT = Par("exponent", "1", 1.0, 0.2, 4.0, 0.05, worth=0.03, meaning="exponent n of (x / 5 mm)^(n-1)")
@@ -10,6 +11,7 @@ STIFFENING_EFFECT = Effect(
     "the tissue stiffens with depth: stiffness grows as exp(x {b_per_mm:.3g}/mm) instead of being constant",
     (STIFFENING,),
     one_sided=True,
+    control=ELASTIC,
     repair="use the index model (stiffness as a function of depth) for gains and feed-forward",
 )
 ELASTIC_LAW = Effect(
@@ -17,6 +19,7 @@ ELASTIC_LAW = Effect(
     "another elastic law fits better: a power law, growing with depth as x^{exponent:.3g} times the rest",
     (EXPONENT,),
     through="depth",
+    control=ELASTIC,
     repair="fit the law named here (`rig fit` offers it) and use it in place of the index law",
 )
 QUADRATIC_LAW = Effect(
@@ -25,6 +28,7 @@ QUADRATIC_LAW = Effect(
     (Par("quadratic_per_mm", "1/mm", 0.0, -0.15, 50.0, 0.02, worth=0.01, meaning="q of the factor 1 + q x"),),
     begin={"quadratic_per_mm": 0.4, "b_per_mm": 0.05},
     through="depth",
+    control=ELASTIC,
     repair="fit the law named here (`rig fit` offers it) and use it in place of the index law",
 )
 SUBSTRATE = Effect(
@@ -45,6 +49,7 @@ SUBSTRATE = Effect(
     one_sided=True,
     needs=frozenset({"depth"}),
     through="depth",
+    control=ELASTIC,
     repair="measure over thicker tissue, stay shallower, or keep the substrate term in the model",
 )
 RELAXATION = Effect(
@@ -69,6 +74,7 @@ RELAXATION = Effect(
     begin={"relaxation_ratio": 1.0, "tau_s": 2.0, "b_per_mm": 0.05},
     one_sided=True,
     needs=frozenset({"depth"}),
+    control="in the inverse model and, as sudden stiffness, in the gains",
     repair="use the model with relaxation; wait out the time constant before reading a static force",
 )
 RATE_LAW = Effect(
@@ -76,6 +82,7 @@ RATE_LAW = Effect(
     "the viscous force does not grow in proportion to speed but as speed^{rate_exponent:.3g}",
     (Par("rate_exponent", "1", 1.0, 0.05, 2.5, 0.1, worth=0.04, meaning="exponent of speed"),),
     needs=frozenset({"speeds"}),
+    control="its damping at 10 mm/s is in the gains and the inverse model",
     repair="use the power law of speed in the model",
 )
 PRECONDITIONING = Effect(

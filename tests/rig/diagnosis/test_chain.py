@@ -1,11 +1,13 @@
 """The chain: every effect vanishes at its null, and does what its statement says off it."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
-from rig.diagnosis.indentation import library
+from rig.diagnosis.indentation import library, nulls
 from rig.diagnosis.problem import Effect
-from rig.simulation.chain import NULLS, respond
+from rig.simulation import chain
 from rig.simulation.drive import Array, Drive
 
 BASE = {"a_N_mm": 0.2, "b_per_mm": 0.2, "damping_N_s_mm": 0.01, "surface_mm": 2.0, "zero_N": 0.1}
@@ -27,6 +29,14 @@ def stroke_drive(speed_mm_s: float = 10.0, period_s: float = 0.004) -> Drive:
     )  # fmt: skip
 
 
+OPERATORS = tuple(effect.operator for effect in library("index") if effect.operator)
+
+
+def respond(drive: Drive, values: Mapping[str, float]) -> chain.Response:
+    """What the sensors read with the operators of all causes."""
+    return chain.respond(drive, {**nulls(), **values}, OPERATORS)
+
+
 def force_with(**values: float) -> Array:
     """Force of the chain with these parameters beside the base."""
     return respond(stroke_drive(), {**BASE, **values}).force_N
@@ -35,13 +45,13 @@ def force_with(**values: float) -> Array:
 @pytest.mark.parametrize("effect", library("index"), ids=lambda effect: effect.key)
 def test_every_effect_vanishes_at_its_null_and_shows_off_it(effect: Effect) -> None:
     drive = stroke_drive()
-    nulls = {par.name: par.null for par in effect.pars}
-    assert all(NULLS[name] == value or par_is_shape(effect, name) for name, value in nulls.items())
-    plain, off = respond(drive, BASE), respond(drive, {**BASE, **nulls})
+    own = {par.name: par.null for par in effect.pars}
+    assert all(nulls()[name] == value or par_is_shape(effect, name) for name, value in own.items())
+    plain, off = respond(drive, BASE), respond(drive, {**BASE, **own})
     np.testing.assert_array_equal(plain.force_N, off.force_N)
     np.testing.assert_array_equal(plain.tip_mm, off.tip_mm)
     moved = respond(
-        drive, {**BASE, **nulls, effect.amplitudes[0].name: effect.amplitudes[0].null + effect.amplitudes[0].scale}
+        drive, {**BASE, **own, effect.amplitudes[0].name: effect.amplitudes[0].null + effect.amplitudes[0].scale}
     )
     change = np.abs(moved.force_N - plain.force_N).max() + np.abs(moved.tip_mm - plain.tip_mm).max()
     assert change > 1e-6
