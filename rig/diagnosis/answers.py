@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.special import stdtrit
 
 from rig.diagnosis.estimates import (
     ErrorGain,
@@ -22,6 +21,7 @@ from rig.diagnosis.noise import Array
 from rig.diagnosis.omnibus import Leftover, beaten, judged_leftover
 from rig.diagnosis.problem import Effect, InverseProblem, Par
 from rig.diagnosis.search import Named, Search, imitated, testable
+from rig.tissue.intervals import student_reach
 from rig.trials.findings import Finding
 
 POWER_SD = 0.84  # 80 % power
@@ -76,7 +76,7 @@ def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Estimate]:
 
     To amplitudes 1.5 % is added, in quadrature: what the operators themselves are good for.
     """
-    wide = float(stdtrit(max(fit.problem.recordings - 1, 1), 0.975))
+    wide = student_reach(fit.problem.recordings - 1)
     covariances = fit.covariance, jackknife(fit)
     place = {par.name: k for k, par in enumerate(fit.free)}
     found: dict[str, Estimate] = {}

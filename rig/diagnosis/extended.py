@@ -10,7 +10,7 @@ from rig.diagnosis.fit import Fit
 from rig.diagnosis.indentation import Indentation
 from rig.errors import DataError
 from rig.tissue.laws_extended import Extended
-from rig.tissue.model import Estimate, Model, NamedCause, Provenance, Quality, ValidRange
+from rig.tissue.model import Model, ModelCause, Provenance, Quality, UncertainValue, ValidRange
 
 
 def extended_model(result: Diagnosis) -> Model:
@@ -93,16 +93,16 @@ def _quality(fit: Fit, law: Extended) -> Quality:
     )
 
 
-def _effects(result: Diagnosis, fit: Fit) -> tuple[NamedCause, ...]:
+def _effects(result: Diagnosis, fit: Fit) -> tuple[ModelCause, ...]:
     pars = (par for effect in fit.problem.effects for par in effect.pars)
     control = {effect.name: effect.control for effect in fit.problem.effects}
     units = {par.name.replace("_sin_mm", "_mm"): par.unit for par in pars}
     return tuple(
-        NamedCause(
+        ModelCause(
             name=found.effects[0],
             statement=found.statement,
             parameters={
-                name: Estimate(value=i.value, unit=units[name], low=float(i.low), high=float(i.high))
+                name: UncertainValue(value=i.value, unit=units[name], low=float(i.low), high=float(i.high))
                 for name, i in found.parameters.items()
             },
             used=control[found.effects[0]],

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 
 from rig.results.fit import DisplacementErrors, FitResult, HeldOut, LawResult, ParameterResult
 from rig.tissue.control_table import control_rows
-from rig.tissue.judging import LEVEL, Errors, Judged
+from rig.tissue.intervals import LEVEL
+from rig.tissue.judging import Errors, Judged
 from rig.tissue.laws import FloatArray
 from rig.tissue.study import Known, Study, rows
 from rig.trials.findings import merged

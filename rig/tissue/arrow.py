@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from rig.tissue.laws import FloatArray
 
-TOLERANCE = 1e-12
-VALLEY = 1e-3
-LONG_SEARCH = 100
-LARGEST_TURN = 0.75
-PROBE = 0.1
-FIRST_DAMPING = 1e-3
-LARGEST_DAMPING = 1e10
+TOLERANCE = 1e-12  # of the cost: less than a sum of 1e4 squares in double precision can resolve
+# A search this long that gained less than a thousandth in its second half lies on the floor of a flat valley.
+VALLEY, LONG_SEARCH = 1e-3, 100
+LARGEST_TURN = 0.75  # Transtrum and Sethna (2012): beyond it the turn is no small correction of the step
+PROBE = 0.1  # of the step, likewise theirs
+FIRST_DAMPING = 1e-3  # Marquardt's
+LARGEST_DAMPING = 1e10  # shortens a step until nothing in double precision moves
 
 
 class Values(NamedTuple):

@@ -23,12 +23,12 @@ from rig.tissue.history import History
 from rig.tissue.laws import FloatArray, Law
 from rig.trials.curves import Curve
 
-BINS = 100
-EARLY_SHARE = 0.25
+BINS = 100  # steps of depth in a curve: 0.08 mm of 8 mm, wider than contact is known and narrower than any law bends
+EARLY_SHARE = 0.25  # of the largest force: enough points for an offset, too few to tell how the curve goes on
 EVALUATIONS = 300
-LEAST_DEPTH_MM = 0.1
-BOUND_REACH = 1e-8
-MOST_ALIKE = 0.99
+LEAST_DEPTH_MM = 0.1  # contact is known to a few hundredths: from here on force over depth means something
+BOUND_REACH = 1e-8  # the search holds a pushed parameter on its bound; this only forgives rounding
+MOST_ALIKE = 0.99  # of neighbours: keeps (1 + r)/(1 - r) finite where residuals are one smooth curve
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from rig.errors import UsageError
 
 FloatArray = NDArray[np.float64]
 SMALLEST = np.finfo(float).tiny
-FORGOTTEN = 40.0
+FORGOTTEN = 40.0  # times of relaxation: exp(-40) is lost in double precision
 # Of a shorter step 1 - exp(-h/tau) has fewer than ten digits; of longer ones fixed sessions keep it to the last digit.
 SUDDEN = 1e-6
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)

@@ -6,21 +6,21 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
-from scipy.special import stdtrit
 
 from rig.errors import DataError
 from rig.tissue.fitting import LawFit, early_offset, fit_law, residual_force
+from rig.tissue.intervals import student_reach
 from rig.tissue.laws import FloatArray, Law
 from rig.trials.curves import Curve
 
 ROWS = 10
-LEVEL = 0.95
-JACKKNIFE_GROUPS = 5
+JACKKNIFE_GROUPS = 5  # with fewer, Student's t reaches so far that an interval says nothing
 OVER_TRIALS, OVER_SUBJECTS = "jackknife over trials", "jackknife over subjects"
-UNKNOWN_SHARE = 0.3
+UNKNOWN_SHARE = 0.3  # of its range: a parameter drawn evenly from the whole of it deviates by 0.29
+# A parabola follows any law over half a millimetre; five samples leave two to average over.
 SMOOTH_MM = 0.5
 LEAST_SMOOTHED = 5
-LEAST_MEASURED_MM = 0.1
+LEAST_MEASURED_MM = 0.1  # a percentage of less is one of the uncertainty of contact
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def judge(fit: LawFit, curves: Sequence[Curve], force_N: FloatArray, origins_mm:
     return Judged(
         fit=fit,
         covariance=covariance,
-        reach=student_reach(groups),
+        reach=student_reach(groups - 1),
         intervals=_intervals(fit.law, covariance, groups),
         interval_method=method,
         fitted=errors_of(here, force_N),
@@ -232,14 +232,9 @@ def _with_unknown(covariance: FloatArray, from_residuals: FloatArray, law: Law) 
     return np.asarray(kept + np.diag(np.where(unknown, np.diag(from_residuals), 0.0)))
 
 
-def student_reach(groups: int) -> float:
-    """Standard errors from the middle of an interval at ``LEVEL`` to its end."""
-    return float(stdtrit(max(groups - 1, 1), (1 + LEVEL) / 2))
-
-
 def _intervals(law: Law, covariance: FloatArray, groups: int) -> dict[str, tuple[float, float]]:
     """Student's intervals at ``LEVEL``, kept inside each parameter's bounds."""
-    reach = student_reach(groups) * np.sqrt(np.diag(covariance))
+    reach = student_reach(groups - 1) * np.sqrt(np.diag(covariance))
     return {
         p.name: (max(p.value - r, p.lower), min(p.value + r, p.upper))
         for p, r in zip(law.parameters, map(float, reach), strict=True)

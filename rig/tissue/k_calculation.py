@@ -8,9 +8,9 @@ Both are here, so they can be compared.
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import stdtrit
 
 from rig.errors import DataError, UsageError
+from rig.tissue.intervals import student_reach
 from rig.tissue.lattice.fire import NotConverged, relax
 from rig.tissue.lattice.springs import Springs
 from rig.tissue.lattice.state import Loaded
@@ -18,10 +18,9 @@ from rig.tissue.lattice.sweep import RELATIVE_TOLERANCE, Sweep
 from rig.tissue.laws import FloatArray
 from rig.tissue.summary import IndexFit, KPoint
 
-LEVEL = 0.95
-_LEAST_POINTS = 4
+_LEAST_POINTS = 4  # two for a and b, two for an interval
 _MOST_SIMULATIONS = 30
-_FORCE_TOLERANCE = 1e-4
+_FORCE_TOLERANCE = 1e-4  # of the force: one step of a sensor that resolves 1 mN, at 10 N
 
 
 def check_points(force_N: FloatArray, depth_mm: FloatArray) -> None:
@@ -163,7 +162,7 @@ def fit_index(points: list[KPoint]) -> IndexFit:
     residual = y - design @ np.array([level, b])
     freedom = max(len(x) - 2, 1)
     covariance = np.linalg.inv(design.T @ design) * float(residual @ residual) / freedom
-    reach = float(stdtrit(freedom, (1.0 + LEVEL) / 2.0)) * np.sqrt(np.diag(covariance))
+    reach = student_reach(freedom) * np.sqrt(np.diag(covariance))
     spread = float(np.sum((y - y.mean()) ** 2))
     return IndexFit(
         float(np.exp(level)),

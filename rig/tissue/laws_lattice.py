@@ -13,7 +13,7 @@ from rig.tissue.index_law import index_stiffness
 from rig.tissue.lattice.sweep import Sweep
 from rig.tissue.laws import DAMPING, Damped, FloatArray, Law, ParameterBounds, bisect
 
-LEAST_DEPTHS = 4
+LEAST_DEPTHS = 4  # as many as a and b with an interval take
 STIFFNESS = ParameterBounds("N/mm", 1e-8, 1e3, "spring stiffness at contact")
 FURTHER = 1.5
 

@@ -61,7 +61,7 @@ class Quality(Table):
     held_out_max_error_percent: NotNegative | None = None
 
 
-class Estimate(Table):
+class UncertainValue(Table):
     """A value with its unit and 95 % interval."""
 
     value: float
@@ -70,12 +70,12 @@ class Estimate(Table):
     high: float
 
 
-class NamedCause(Table):
+class ModelCause(Table):
     """A cause that a diagnosis named in the data; ``used`` says what the control makes of it."""
 
     name: str
     statement: str
-    parameters: dict[str, Estimate]
+    parameters: dict[str, UncertainValue]
     used: str
 
 
@@ -97,7 +97,7 @@ class _File(Table):
     data: Provenance
     quality: Quality
     control: tuple[ControlRow, ...] = ()
-    effects: tuple[NamedCause, ...] = ()
+    effects: tuple[ModelCause, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class Model:
     data: Provenance
     quality: Quality
     control: tuple[ControlRow, ...] = ()
-    effects: tuple[NamedCause, ...] = ()
+    effects: tuple[ModelCause, ...] = ()
 
     @property
     def standard_errors(self) -> dict[str, float]:

@@ -9,18 +9,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from rig.errors import DataError
+from rig.tissue.intervals import student_reach
 from rig.tissue.laws import FloatArray
 from rig.trials.curves import Curve
 
-LEVEL = 0.95
-STUDY_B_N_S_MM = 1.3
+STUDY_B_N_S_MM = 1.3  # the study's, against which the session's is put
 _DEPTHS = 40
-_SHALLOWEST_MM = 0.2
+_SHALLOWEST_MM = 0.2  # above it a curve's uncertain contact makes the force
 _DRAWS = 2000
-ROUNDING = 1e-9
+ROUNDING = 1e-9  # the same sum in another order is no larger slope
 
 
 @dataclass(frozen=True)
@@ -122,5 +121,5 @@ def _slope(x: FloatArray, y: FloatArray, freedom: int) -> tuple[float, tuple[flo
     slope = float(x @ y / (x @ x))
     residual = y - slope * x
     error = float(np.sqrt(residual @ residual / freedom / (x @ x)))
-    reach = float(stdtrit(freedom, (1.0 + LEVEL) / 2.0)) * error
+    reach = student_reach(freedom) * error
     return slope, (slope - reach, slope + reach)

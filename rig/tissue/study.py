@@ -12,7 +12,8 @@ from rig.progress import Progress, silent
 from rig.recording.sessions import Session
 from rig.tissue.control_table import control_rows
 from rig.tissue.fitting import LawFit, fit_law
-from rig.tissue.judging import LEVEL, Errors, Judged, given_forces, judge
+from rig.tissue.intervals import LEVEL
+from rig.tissue.judging import Errors, Judged, given_forces, judge
 from rig.tissue.laws import FloatArray, Law
 from rig.tissue.model import Model, Provenance, Quality, ValidRange
 from rig.tissue.rates import RateTest, rate_of

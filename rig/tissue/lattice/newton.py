@@ -11,7 +11,7 @@ from rig.tissue.lattice.fire import NotConverged
 from rig.tissue.lattice.numba_types import Matrix
 from rig.tissue.lattice.state import Loaded, aligned_copy
 
-_LEAST_DAMPING = 1.0 / 64.0
+_LEAST_DAMPING = 1.0 / 64.0  # six halvings; where none helps, the step is taken and solved from anew
 
 
 class NegativeCurvature(RigError):
