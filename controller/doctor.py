@@ -14,6 +14,7 @@ from rig.config.force_map import CHANNELS
 from rig.config.products.roles import Product
 from rig.config.wiring import Wiring
 from rig.errors import RigError
+from rig.progress import Progress, silent
 from rig.results.recorded import DeviceReport
 
 LISTEN_S = 2.0
@@ -26,15 +27,17 @@ AnyDevice = TypeVar("AnyDevice", bound=Device)
 Listen = Callable[[AnyDevice], Samples]
 
 
-def examine(wiring: Wiring, seconds: float = LISTEN_S) -> tuple[DeviceReport, ...]:
+def examine(wiring: Wiring, seconds: float = LISTEN_S, tell: Progress = silent) -> tuple[DeviceReport, ...]:
     """One finding a configured device; a device that fails is a finding with a problem, not an error."""
     force, axis, tracker = wiring.force, wiring.axis, wiring.tracker
     channel = CHANNELS.index(force.axis)
-    findings = [
-        _look("force", force, lambda: open_force(force), partial(_poll_force, seconds), channel),
-        _look("axis", axis, lambda: open_axis(axis, wiring.limits, 1 / PERIOD_S), partial(_poll_axis, seconds)),
-    ]
+    tell("force", 0.0)
+    findings = [_look("force", force, lambda: open_force(force), partial(_poll_force, seconds), channel)]
+    tell("axis", 1 / 3)
+    opener = partial(open_axis, axis, wiring.limits, 1 / PERIOD_S)
+    findings.append(_look("axis", axis, opener, partial(_poll_axis, seconds)))
     if tracker:
+        tell("tracker", 2 / 3)
         findings.append(_look("tracker", tracker, lambda: open_tracker(tracker), partial(_poll_tracker, seconds)))
     return tuple(findings)
 

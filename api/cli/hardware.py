@@ -2,21 +2,21 @@
 
 import contextlib
 import sys
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
+from api.cli.live import compute, here
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import console, table, write_json
-from api.cli.remote import RemoteBench
 from api.cli.stage import bench_for, bench_process
-from controller import doctor as examination
-from controller.claims import Holder, holder
-from controller.devices.takeover import STREAMS
+from api.operations import doctor as work
+from controller.claims import holder
+from controller.operation import Operation
 from rig.config.endpoints import Endpoints
 from rig.config.products.registry import ROLES
-from rig.errors import CheckFailed, DeviceError
-from rig.results.recorded import DeviceReport, DoctorResult
+from rig.errors import CheckFailed
+from rig.results.recorded import DeviceReport
 
 
 def mock(
@@ -63,29 +63,6 @@ def _row(finding: DeviceReport) -> tuple[str, ...]:
     return finding.role, device, f"{finding.rate_Hz:.1f}", finding.noise, latency, finding.range
 
 
-def _as_served(held: Holder) -> tuple[DeviceReport, ...]:
-    """What the service that uses the bench says of each device; raises DeviceError where it is no service."""
-    if not held.address:
-        raise DeviceError(held.sentence)
-    state = RemoteBench(held.address).state()
-    console.print(f"as the service at {held.address} sees them", highlight=False)
-    if not state["devices"]:
-        raise CheckFailed(f"the service at {held.address} is {state['state']}: {state['reason']}")
-    return tuple(_finding(role, device, state["rates_Hz"]) for role, device in state["devices"].items())
-
-
-def _finding(role: str, device: dict[str, Any], rates_Hz: dict[str, float]) -> DeviceReport:
-    state = device.get("state", "unknown")
-    return DeviceReport(
-        role=role,
-        product=str(device["product"]),
-        serial=str(device["serial"]),
-        firmware=str(device["firmware"]),
-        rate_Hz=rates_Hz.get(STREAMS[role], 0.0),
-        problem="" if state == "ok" else f"{state}: {device.get('detail', '')}",
-    )
-
-
 def doctor(config: ConfigOption = None, overrides: SetOption = None, json_file: JsonOption = None) -> None:
     """Looks at each device without moving anything: identity, measured rate, noise, latency, range.
 
@@ -94,15 +71,15 @@ def doctor(config: ConfigOption = None, overrides: SetOption = None, json_file: 
     Example: rig doctor --config rig.toml
     """
     wiring = wiring_from(config, overrides)
-    held = holder(wiring)
+    held, operation = holder(wiring), Operation("doctor")
     if held:
-        findings = _as_served(held)
+        result = here(operation, lambda: work.doctor_served(operation, held))
     else:
         with bench_for(wiring, approaches=False) as (live_wiring, _):
-            findings = examination.examine(live_wiring)
+            result = compute(operation, lambda: work.doctor(operation, live_wiring))
     header = ("role", "device", "rate Hz", "noise", "latency ms", "range seen")
-    console.print(table(header, map(_row, findings), title="Devices"))
-    write_json(json_file, DoctorResult(devices=findings))
-    broken = [f"{finding.role}: {finding.problem}" for finding in findings if finding.problem]
+    console.print(table(header, map(_row, result.devices), title="Devices"))
+    write_json(json_file, result)
+    broken = [f"{found.role}: {found.problem}" for found in result.devices if found.problem]
     if broken:
         raise CheckFailed("; ".join(broken))

@@ -12,7 +12,7 @@ import pytest
 from api.cli import hardware
 from api.cli.live import here
 from api.cli.recovery import ask
-from api.cli.remote import RemoteBench
+from api.operations.remote import RemoteBench
 from api.operations.reset import Ask, Recover, reset
 from controller.claims import Holder
 from controller.operation import Cancelled, Operation
@@ -162,7 +162,7 @@ def test_the_doctor_asks_the_service_and_opens_nothing(
     service: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(hardware, "holder", lambda _wiring: held(service))
-    monkeypatch.setattr("controller.doctor.examine", lambda _wiring: pytest.fail("a device was opened"))
+    monkeypatch.setattr("controller.doctor.examine", lambda *_, **__: pytest.fail("a device was opened"))
     with pytest.raises(CheckFailed, match=r"^tracker: lost: silent$"):
         hardware.doctor(None, ["force.port=/dev/ttyF"], tmp_path / "doctor.json")
     devices = json.loads((tmp_path / "doctor.json").read_text())["devices"]
@@ -173,6 +173,6 @@ def test_the_doctor_asks_the_service_and_opens_nothing(
 
 def test_the_doctor_disturbs_no_capture(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hardware, "holder", lambda _wiring: held(""))
-    monkeypatch.setattr("controller.doctor.examine", lambda _wiring: pytest.fail("a device was opened"))
+    monkeypatch.setattr("controller.doctor.examine", lambda *_, **__: pytest.fail("a device was opened"))
     with pytest.raises(DeviceError, match=r"/dev/ttyAXIS is in use by `rig serve` \(process 1\) since noon"):
         hardware.doctor(None, ["force.port=/dev/ttyF"], None)

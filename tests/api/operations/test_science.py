@@ -8,8 +8,12 @@ from api.operations import diagnose as diagnosing
 from api.operations.diagnose import check_protocol, diagnose
 from api.operations.fit import Laws, fit, of_fit
 from api.operations.report import report
+from api.operations.simulate import SimulatedRun, simulate
+from controller.experiments.references import named
 from controller.operation import Cancelled, Operation, Progress
+from mock_devices.testing.models import index_model
 from rig.config.protocol import Indentation
+from rig.config.wiring import Wiring
 from rig.errors import UsageError
 from rig.results.fit import FitResult
 from rig.tissue.registry import law_named
@@ -79,3 +83,12 @@ def test_a_report_and_a_check_that_are_cancelled_write_nothing(session: Path, tm
     with pytest.raises(Cancelled):
         check_protocol(operation, Indentation(), True, 1000.0, tmp_path / "check")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_simulation_that_is_cancelled_draws_nothing(tmp_path: Path) -> None:
+    operation = Operation("simulate")
+    cancelled_at(operation, "playing, 1 of 3")
+    wanted = SimulatedRun(named("step:2"), index_model(0.12, 0.22, 0.01, force_N=11.0), "tangent")
+    with pytest.raises(Cancelled, match="simulate was cancelled before: playing, 2 of 3"):
+        operation.run(lambda: simulate(operation, Wiring(), wanted, tmp_path / "out"))
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,182 @@
+"""Every choice of gains on several subjects, each learnt first by indentation and fit."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+
+from controller.experiments import capture, comparison, tracked, tracking
+from controller.experiments.comparison import compared_run
+from controller.experiments.recorded import Recorded
+from controller.experiments.references import Reference
+from controller.law.gains import Choice, pi_gains
+from controller.loop.steps import Program
+from controller.operation import Operation
+from controller.supervisor import Supervisor
+from rig.config.protocol import Indentation
+from rig.config.wiring import Wiring
+from rig.errors import DataError, DeviceError, SafetyStop, UsageError
+from rig.recording.files import write_text
+from rig.recording.reader import read_recording
+from rig.recording.sessions import open_session
+from rig.report.control_figures import comparison_figure
+from rig.report.drawing import svg
+from rig.results.tables import run_table
+from rig.results.tracking import ComparedRun, CompareResult, Jump
+from rig.tissue.model import Model, load_model
+from rig.tissue.study import model_of, study_session
+
+LEARNING = Indentation(
+    name="learning", speeds_mm_s=(5.0, 15.0, 30.0), trials=1, depth_mm=14.0, air_dwell_s=0.3, approach_speed_mm_s=15.0,
+    hold_s=0.1, retract_speed_mm_s=20.0, clearance_mm=3.0, rest_s=0.1, force_limit_N=11.5,
+)  # fmt: skip
+LEARNT_N = 10.3
+# What stops a run where the computer, and not the gains, was late; such a run is done again.
+STALLED = ("axis_lost", "force_lost", "tracker_lost", "loop_overrun")
+ATTEMPTS = 3
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What is compared: ``subjects`` name whose tissue each has, ``bench`` is a running bench with a subject on it."""
+
+    wiring: Wiring
+    out: Path
+    subjects: Mapping[str, str]
+    choices: Sequence[Choice]
+    reference: Reference
+    bench: Callable[[str], AbstractContextManager[Supervisor]]
+
+    def model_file(self, subject: str) -> Path:
+        """Where the model learnt of the subject's tissue is kept."""
+        return self.out / f"{self.subjects[subject]}.json"
+
+    def learning_folder(self, subject: str) -> Path:
+        """The session it is learnt from."""
+        return self.out / f"learn-{self.subjects[subject]}"
+
+
+def refuse_comparison(wanted: Comparison) -> None:
+    """Raises UsageError, before any bench is started, for what would only be refused once a subject is learnt."""
+    wiring = wanted.wiring
+    _refuse_strong(max(wanted.reference.forces_N), wiring)
+    tracking.refuse_beyond_bench(wanted.reference, wiring)
+    # Without damping, which only helps, whether a law exists does not depend on stiffness: one tissue speaks for all.
+    pi_gains(1.0, 0.0, tracking.design_for(wiring))
+    capture.check(LEARNING, wiring)
+    for subject in wanted.subjects:
+        if wanted.model_file(subject).exists():
+            load_model(wanted.model_file(subject))
+        else:
+            capture.refuse_used(wanted.learning_folder(subject))
+
+
+def _refuse_strong(force_N: float, wiring: Wiring) -> None:
+    for limit_N, whose in ((LEARNT_N, "what the subjects are learnt to"), (wiring.force_limit_N, "the force limit")):
+        if force_N > limit_N:
+            raise UsageError(f"--force: {force_N:g} N is above {whose}, {limit_N:g} N")
+
+
+def of_comparison(wanted: Comparison) -> Operation:
+    """The operation that ``compare`` is to report to."""
+    return Operation("compare", total=len(wanted.subjects) * len(wanted.choices), unit="runs")
+
+
+def compare(operation: Operation, wanted: Comparison) -> CompareResult:
+    """Learns every subject and runs every choice on it; what a stall of the computer stopped is done again."""
+    refuse_comparison(wanted)
+    runs: list[ComparedRun] = []
+    models: dict[str, dict[str, float]] = {}
+    for subject in wanted.subjects:
+        operation.step(f"learning {subject}", len(runs))
+        model = _learnt(operation, wanted, subject)
+        models[subject] = {parameter.name: parameter.value for parameter in model.law.parameters}
+        for run in _on_subject(operation, wanted, subject, model, len(runs)):
+            runs.append(run)
+            operation.say("  ".join([*run_table([run]).rows[0], run.stopped]).rstrip())
+    _draw(runs, wanted.out)
+    return CompareResult(reference=wanted.reference.name, models=models, runs=tuple(runs))
+
+
+def _learnt(operation: Operation, wanted: Comparison, subject: str) -> Model:
+    """The model `rig fit` makes of an indentation of this subject, breath held; kept beside the runs."""
+    file = wanted.model_file(subject)
+    if file.exists():
+        return load_model(file)
+    session = open_session(_indented(operation, wanted, subject))
+    model = model_of(study_session(session), "index", session.info.subject)
+    model.save(file)
+    return model
+
+
+def _indented(operation: Operation, wanted: Comparison, subject: str, attempt: int = 1) -> Path:
+    """The session of the indentation; one that a stall of the computer stopped is kept, and done again beside it."""
+    folder = wanted.learning_folder(subject)
+    folder = folder if attempt == 1 else folder.with_name(f"{folder.name}-{attempt}")
+    try:
+        with wanted.bench(wanted.subjects[subject]) as bench:
+            capture.capture(bench, LEARNING, folder, Operation("learn"))
+    except (SafetyStop, DeviceError) as cause:
+        if attempt == ATTEMPTS:
+            raise
+        operation.say(f"{folder.name}: {cause}; once more")
+        return _indented(operation, wanted, subject, attempt + 1)
+    return folder
+
+
+def _on_subject(
+    operation: Operation, wanted: Comparison, subject: str, model: Model, done: int
+) -> Iterator[ComparedRun]:
+    for number, choice in enumerate(wanted.choices):
+        operation.step(f"{subject}, {choice} gains", done + number)
+        try:
+            program = tracked.plan_reference(wanted.reference, model, wanted.wiring, choice)
+        except UsageError as refusal:
+            yield compared_run(subject, choice, (), str(refusal))
+        else:
+            yield _tracked(operation, wanted, subject, choice, program)
+
+
+def _tracked(
+    operation: Operation, wanted: Comparison, subject: str, choice: Choice, program: Program, attempt: int = 1
+) -> ComparedRun:
+    """One run on a bench of its own; what a stall of the computer stopped is said, and done again."""
+    try:
+        with wanted.bench(subject) as bench:
+            done = tracked.recorded_run(bench, program, wanted.out / subject, str(wanted.model_file(subject)))
+    except DeviceError as cause:
+        found, stalled = compared_run(subject, choice, (), str(cause)), True
+    else:
+        found = compared_run(subject, choice, _jumps(done), done.outcome.cause)
+        stalled = done.outcome.outcome in STALLED
+    if not stalled or attempt == ATTEMPTS:
+        return found
+    operation.say(f"{subject}  {choice}: {found.stopped}; once more")
+    return _tracked(operation, wanted, subject, choice, program, attempt + 1)
+
+
+def _jumps(done: Recorded) -> tuple[Jump, ...]:
+    """What the recording shows; a run that was stopped may have been so before its first jump."""
+    loop = read_recording(done.file).tables["loop"]
+    try:
+        return comparison.jumps(loop["capture_ns"] * 1e-9, loop["reference_N"], loop["force_N"], loop["mode"])
+    except DataError:
+        if done.outcome.stopped:
+            return ()
+        raise
+
+
+def _draw(runs: Sequence[ComparedRun], out: Path) -> None:
+    subjects, choices = dict.fromkeys(run.subject for run in runs), dict.fromkeys(run.gains for run in runs)
+    found = {(run.subject, run.gains): run.worst.model_dump() for run in runs}
+
+    def heights(figure: str) -> dict[str, list[float]]:
+        return {choice: [_height(found[subject, choice][figure]) for subject in subjects] for choice in choices}
+
+    picture = comparison_figure(list(subjects), heights("overshoot_percent"), heights("settling_s"))
+    write_text(out / "comparison.svg", svg(picture))
+
+
+def _height(value: float | None) -> float:
+    return math.nan if value is None else value

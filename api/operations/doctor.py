@@ -1,0 +1,42 @@
+"""What is seen of each device: by looking at it, or by asking the service that uses the bench."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from api.operations.remote import RemoteBench
+from controller import doctor as examination
+from controller.claims import Holder
+from controller.devices.takeover import STREAMS
+from controller.operation import Operation
+from rig.config.wiring import Wiring
+from rig.errors import CheckFailed, DeviceError
+from rig.results.recorded import DeviceReport, DoctorResult
+
+
+def doctor(operation: Operation, wiring: Wiring) -> DoctorResult:
+    """Looks at each device for two seconds without moving anything; nobody else may use the bench."""
+    return DoctorResult(devices=examination.examine(wiring, tell=operation.step))
+
+
+def doctor_served(operation: Operation, held: Holder) -> DoctorResult:
+    """What the service that uses the bench says of each device; raises DeviceError where it is no service."""
+    if not held.address:
+        raise DeviceError(held.sentence)
+    state = RemoteBench(held.address).state()
+    operation.say(f"as the service at {held.address} sees them")
+    if not state["devices"]:
+        raise CheckFailed(f"the service at {held.address} is {state['state']}: {state['reason']}")
+    seen = state["devices"].items()
+    return DoctorResult(devices=tuple(_seen(role, device, state["rates_Hz"]) for role, device in seen))
+
+
+def _seen(role: str, device: Mapping[str, Any], rates_Hz: Mapping[str, float]) -> DeviceReport:
+    state = device.get("state", "unknown")
+    return DeviceReport(
+        role=role,
+        product=str(device["product"]),
+        serial=str(device["serial"]),
+        firmware=str(device["firmware"]),
+        rate_Hz=rates_Hz.get(STREAMS[role], 0.0),
+        problem="" if state == "ok" else f"{state}: {device.get('detail', '')}",
+    )
