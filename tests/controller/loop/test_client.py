@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import pytest
 
@@ -21,8 +22,11 @@ from controller.loop.messages import (
     Run,
     StatusSaid,
     Stopped,
+    Survey,
+    Surveyed,
 )
 from controller.loop.steps import Hold, Program, TrackForce
+from controller.recovery.situation import Situation
 from rig.channel import Answer, Channel, Message, Received, pair
 from rig.errors import DeviceError, SafetyStop, UsageError
 
@@ -184,3 +188,54 @@ def test_a_loop_that_reads_nothing_is_said_and_nobody_waits_for_ever(
     with pytest.raises(DeviceError, match="the loop takes no messages"):
         for _ in range(1000):
             loop.client.tell(track(2000))
+
+
+SITUATION = Situation("killed", "", "", (), True, False, True, 25.0, 5.0)
+
+
+def test_a_survey_is_the_one_that_was_asked_for(loop: PlayedLoop) -> None:
+    with ThreadPoolExecutor(1) as asking:
+        survey = asking.submit(loop.client.survey)
+        asked = loop.heard()
+        assert isinstance(asked.message, Survey)
+        loop.say(Surveyed(to=asked.id + 1, situation=replace(SITUATION, stopped="of another")))
+        loop.say(Surveyed(to=asked.id, situation=SITUATION))
+        loop.say(Answer(to=asked.id))
+        assert survey.result(PATIENCE_S) == SITUATION
+
+
+def test_a_survey_that_does_not_come_is_an_error(loop: PlayedLoop, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loop_client, "ANSWER_TIMEOUT_S", 0.2)
+    with ThreadPoolExecutor(1) as asking:
+        survey = asking.submit(loop.client.survey)
+        loop.say(Answer(to=loop.heard().id))
+        with pytest.raises(DeviceError, match=r"did not say how things stand within 0\.2 s"):
+            survey.result(PATIENCE_S)
+
+
+def test_a_refusal_because_of_a_stop_is_a_safety_stop(loop: PlayedLoop) -> None:
+    with ThreadPoolExecutor(1) as asking:
+        for stopped, error in ((True, SafetyStop), (False, UsageError)):
+            answer = asking.submit(loop.client.ask, Reset(), "a reset")
+            loop.say(Answer(to=loop.heard().id, refused="not now", stopped=stopped))
+            with pytest.raises(error, match="not now"):
+                answer.result(PATIENCE_S)
+
+
+def test_the_reader_is_a_daemon_that_ends_with_the_client(loop: PlayedLoop) -> None:
+    reader = loop.client._reader
+    assert (reader.name, reader.daemon, reader.is_alive()) == ("loop-reader", True, True)
+    loop.client.close()
+    assert not reader.is_alive()
+    assert loop.client.gone
+
+
+def test_of_what_nobody_came_for_the_newest_64_are_kept() -> None:
+    kept: dict[int, int] = {}
+    for number in range(100):
+        loop_client._keep(kept, number, number)
+    assert kept == {number: number for number in range(36, 100)}
+
+
+def test_limits_of_waiting() -> None:
+    assert (loop_client.ANSWER_TIMEOUT_S, loop_client.LISTEN_S, loop_client.KEPT) == (5.0, 0.5, 64)

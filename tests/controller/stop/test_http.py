@@ -121,3 +121,49 @@ def test_an_answer_says_its_length_and_who_may_read_it() -> None:
     assert b"Access-Control-Allow-Origin: http://127.0.0.1:8000" in head
     assert b"Access-Control" not in response(HTTPStatus.OK, {}, "", False)
     assert b"Connection: close" in response(HTTPStatus.OK, {}, "", False)
+
+
+@pytest.mark.parametrize(("version", "keep"), [("HTTP/1.1", True), ("HTTP/1.0", False)])
+def test_both_versions_are_spoken_and_only_the_newer_keeps_its_connection(version: str, keep: bool) -> None:
+    assert parsed(f"GET /state {version}\r\n\r\n".encode()).keep is keep
+
+
+def test_blanks_around_a_value_are_none_of_it_and_all_else_is() -> None:
+    assert parsed(b"GET /state HTTP/1.1\r\nA: \t XX-x \t\r\n\r\n").headers == {"a": "XX-x"}
+
+
+def test_a_head_may_have_as_many_bytes_as_are_said_and_no_more() -> None:
+    line = b"GET /state HTTP/1.1\r\nA: "
+    fitting = line + b"x" * (HEADER_BYTES - len(line))
+    parser = RequestParser()
+    parser.put(fitting)
+    assert not parser.whole
+    assert isinstance(fed(b"\r\n\r\n", parser), Request)
+    assert isinstance(fed(fitting + b"x\r\n\r\n"), Refusal)
+    assert len(parser._buffer) == 0
+    parser.put(b"x" * 5 * HEADER_BYTES)
+    assert len(parser._buffer) == 2 * HEADER_BYTES
+
+
+@pytest.mark.parametrize("headers", [{}, {"host": "localhost"}, {"host": "127.0.0.1:8001"}, {"host": "LOCALHOST:80"}])
+def test_who_names_no_host_or_this_computer_is_local(headers: dict[str, str]) -> None:
+    assert foreign(Request("POST", "/stop", headers, True)) is None
+
+
+@pytest.mark.parametrize("host", ["[", "", "XXXX"])
+def test_a_host_that_is_none_is_foreign_and_named_in_at_most_80_letters(host: str) -> None:
+    refusal = foreign(Request("POST", "/stop", {"host": host}, True))
+    name = host.lower() if host == "XXXX" else ""
+    assert refusal == Refusal(HTTPStatus.FORBIDDEN, f"the host name {name} is not this computer's")
+    long = foreign(Request("POST", "/stop", {"host": "h" * 81, "origin": ""}, True))
+    assert long and long.text == f"the host name {'h' * 80} is not this computer's"
+    page = foreign(Request("POST", "/stop", {"origin": "p" * 81}, True))
+    assert page and page.text == f"a page of {'p' * 80} may not stop this bench"
+
+
+def test_an_answer_says_its_length_and_whether_the_connection_stays() -> None:
+    assert response(HTTPStatus.NO_CONTENT, None, "", False).endswith(b"\r\nConnection: close\r\n\r\n")
+    assert b"Content-Length: 0\r\n" in response(HTTPStatus.NO_CONTENT, None, "", False)
+    kept = response(HTTPStatus.OK, {"a": 1}, "", True)
+    assert kept.endswith(b'\r\nConnection: keep-alive\r\n\r\n{"a": 1}\n')
+    assert b"Content-Length: 9\r\n" in kept

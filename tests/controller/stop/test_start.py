@@ -97,3 +97,10 @@ def test_without_a_stop_it_starts_and_what_comes_later_is_left_to_the_loop(page:
     request = asking.request(Kind.STOP)
     assert asking.confirmed(request, 0.05) is None
     assert responder.take(1) == (request,)
+
+
+def test_the_look_out_is_a_daemon_that_ends_with_the_start(page: StopWord) -> None:
+    with StartGuard(Responder(page)) as guard:
+        thread = guard._thread
+        assert (thread.name, thread.daemon, thread.is_alive()) == ("stop-word", True, True)
+    assert not thread.is_alive()

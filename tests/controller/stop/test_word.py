@@ -1,5 +1,7 @@
 """The stop word: every request is taken once, answered by its id, and none covers another."""
 
+import errno
+import os
 import threading
 import time
 import timeit
@@ -12,6 +14,7 @@ from hypothesis import strategies as st
 
 from controller.stop.word import DEEDS, Answer, Deed, Keypad, Kind, Lane, Request, Requester, Responder, StopWord
 from rig.errors import DeviceError
+from tests.controller.descriptors import open_files
 
 
 @pytest.fixture
@@ -116,6 +119,38 @@ def test_it_reaches_another_mapping_of_the_file_and_only_a_page_of_ours_is_opene
     with pytest.raises(DeviceError, match="cannot be created: File exists"):
         StopWord.create(page.path)
     assert page.path.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_page_keeps_no_descriptor_and_is_given_back_once(tmp_path: Path) -> None:
+    path, before = tmp_path / "d.stop", open_files()
+    page = StopWord.create(path)
+    other = StopWord.open(path)
+    assert (page.path, other.path) == (path, path)
+    other.close()
+    assert path.exists(), "others keep it"
+    for _ in range(2):
+        page.close(unlink=True)
+        assert not path.exists()
+    assert open_files() == before
+    with pytest.raises(DeviceError, match="the bench is not running"):
+        Requester(page, Lane.SUPERVISOR).request(Kind.STOP)
+
+
+def test_where_there_is_no_memory_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    before = open_files()
+    with pytest.raises(DeviceError, match="no memory for the stop word: No space left on device; free some"):
+        StopWord.create(tmp_path / "e.stop")
+    assert list(tmp_path.iterdir()) == []
+    assert open_files() == before
+
+
+def test_the_loop_knows_when_the_stop_process_looked_last(page: StopWord) -> None:
+    page.beat(1_000_000_000)
+    assert Responder(page).server_silent_s(3_500_000_000) == pytest.approx(2.5)
 
 
 def test_a_thread_waits_for_its_answer_and_no_longer_than_it_said(page: StopWord) -> None:
