@@ -9,7 +9,7 @@ from typing import Literal
 from pydantic import JsonValue
 
 import rig
-from controller.experiments.indentation import Trial, attempts, longest_s, trials
+from controller.experiments.indentation import PlannedTrial, attempts, longest_s, trials
 from controller.experiments.recorded import metadata, record, refuse_bench
 from controller.experiments.verdicts import sentences, with_quality, with_surface
 from controller.operation import Operation
@@ -85,7 +85,7 @@ def capture(bench: Supervisor, protocol: Indentation, folder: Path, operation: O
 
 
 def _run(
-    bench: Supervisor, trial: Trial, protocol: Indentation, folder: Path, info: SessionInfo
+    bench: Supervisor, trial: PlannedTrial, protocol: Indentation, folder: Path, info: SessionInfo
 ) -> tuple[TrialInfo, RigError | None]:
     about = {
         "trial": {

@@ -13,7 +13,7 @@ ESTIMATING_S = 0.4
 
 
 @dataclass(frozen=True)
-class Trial:
+class PlannedTrial:
     """One trial: its place in the session and what it does; ``repeats`` names the trial it makes again."""
 
     index: int
@@ -23,7 +23,7 @@ class Trial:
     repeats: str = ""
 
 
-def trials(protocol: Indentation) -> tuple[Trial, ...]:
+def trials(protocol: Indentation) -> tuple[PlannedTrial, ...]:
     """All trials of ``protocol`` in the order in which they are to be run; the order depends on the seed alone."""
     speeds = [speed for speed in protocol.speeds_mm_s for _ in range(protocol.trials)]
     if protocol.randomise:
@@ -31,17 +31,17 @@ def trials(protocol: Indentation) -> tuple[Trial, ...]:
     return tuple(_trial(index, speed, protocol) for index, speed in enumerate(speeds, start=1))
 
 
-def attempts(trial: Trial, repeats: int) -> Iterator[Trial]:
+def attempts(trial: PlannedTrial, repeats: int) -> Iterator[PlannedTrial]:
     """The trial, and as many repeats of it under names of their own."""
     yield trial
     for number in range(1, repeats + 1):
         yield replace(trial, name=f"{trial.name}_repeat_{number}", repeats=trial.name)
 
 
-def _trial(index: int, speed_mm_s: float, protocol: Indentation) -> Trial:
+def _trial(index: int, speed_mm_s: float, protocol: Indentation) -> PlannedTrial:
     name = f"trial_{index:03d}"
     program = Program(name=f"{name} at {speed_mm_s:g} mm/s", steps=tuple(_steps(speed_mm_s, protocol)))
-    return Trial(index, name, speed_mm_s, program)
+    return PlannedTrial(index, name, speed_mm_s, program)
 
 
 def _steps(speed_mm_s: float, protocol: Indentation) -> list[Step]:

@@ -37,8 +37,8 @@ PARALLEL_ROWS = 1_000_000
 
 
 @dataclass(frozen=True)
-class Trial:
-    """One trial as read: columns by stream and field, in the units and senses of the files."""
+class TrialFiles:
+    """One trial as its files have it: columns by stream and field, in the units and senses of the files."""
 
     name: str
     table: TrialTable
@@ -57,7 +57,7 @@ def import_session(folder: Path, out: Path, columns: Iterable[str], now: datetim
     if not (folder / "session.toml").exists():
         raise DataError(f"{folder}: no session.toml in it; examples/measured shows what an import folder holds")
     session = load(SessionTable, folder / "session.toml")
-    trials = read_trials(folder, names)
+    trials = read_files(folder, names)
     info = _info(folder, session, trials, now)
     with whole_folder(out) as scratch:
         _write_all(scratch, trials, session, info)
@@ -66,27 +66,27 @@ def import_session(folder: Path, out: Path, columns: Iterable[str], now: datetim
     return replace(written, remarks=(*written.remarks, *_overlaps(trials)))
 
 
-def read_trials(folder: Path, names: Mapping[str, Mapping[str, str]]) -> list[Trial]:
+def read_files(folder: Path, names: Mapping[str, Mapping[str, str]]) -> list[TrialFiles]:
     """All trials, in order of time; raises DataError for the first thing wrong in any of them."""
     found = sorted(path for path in folder.glob("trial_*") if path.is_dir())
     if not found:
         raise DataError(f"{folder}: no trial in it; each trial is a folder trial_NAME with force.csv and axis.csv")
-    trials = [_read_trial(path, names) for path in found]
+    trials = [_read_files(path, names) for path in found]
     _check_distinct(folder, trials)
     return sorted(trials, key=lambda trial: float(trial.streams["force"][TIME][0]))
 
 
-def _read_trial(path: Path, names: Mapping[str, Mapping[str, str]]) -> Trial:
+def _read_files(path: Path, names: Mapping[str, Mapping[str, str]]) -> TrialFiles:
     table = load(TrialTable, path / "trial.toml")
     streams = {
         stream: read_columns(path / f"{stream}.csv", names[stream], stream == "marker", EXPORTED[stream])
         for stream in FIELDS
         if stream not in OPTIONAL or (path / f"{stream}.csv").exists()
     }
-    return Trial(path.name, table, streams)
+    return TrialFiles(path.name, table, streams)
 
 
-def _check_distinct(folder: Path, trials: Iterable[Trial]) -> None:
+def _check_distinct(folder: Path, trials: Iterable[TrialFiles]) -> None:
     """No trial twice: neither under two spellings of its number, nor as a copy of its data."""
     numbers: dict[str, str] = {}
     contents: dict[str, str] = {}
@@ -99,7 +99,7 @@ def _check_distinct(folder: Path, trials: Iterable[Trial]) -> None:
             known[key] = trial.name
 
 
-def _overlaps(trials: Iterable[Trial]) -> list[str]:
+def _overlaps(trials: Iterable[TrialFiles]) -> list[str]:
     """Sentences for trials that start before the one before them has ended."""
     spans = [(trial.name, *trial.streams["force"][TIME][[0, -1]].tolist()) for trial in trials]
     return [
@@ -109,7 +109,7 @@ def _overlaps(trials: Iterable[Trial]) -> list[str]:
     ]
 
 
-def _info(folder: Path, session: SessionTable, trials: Iterable[Trial], now: datetime) -> SessionInfo:
+def _info(folder: Path, session: SessionTable, trials: Iterable[TrialFiles], now: datetime) -> SessionInfo:
     facts = session.model_dump(exclude={"id", "subject", "notes", "force_positive", "position_positive"})
     given = {name: value for name, value in facts.items() if value not in ("", None)}
     notes = session.notes if isinstance(session.notes, dict) else {"notes": session.notes}
@@ -125,7 +125,7 @@ def _info(folder: Path, session: SessionTable, trials: Iterable[Trial], now: dat
     )
 
 
-def _trial_info(trial: Trial, force_sense: int) -> TrialInfo:
+def _trial_info(trial: TrialFiles, force_sense: int) -> TrialInfo:
     return TrialInfo(
         name=trial.name,
         file=f"{trial.name}.mcap",
@@ -137,7 +137,7 @@ def _trial_info(trial: Trial, force_sense: int) -> TrialInfo:
     )
 
 
-def _write_all(folder: Path, trials: Sequence[Trial], session: SessionTable, info: SessionInfo) -> None:
+def _write_all(folder: Path, trials: Sequence[TrialFiles], session: SessionTable, info: SessionInfo) -> None:
     jobs = [(folder / f"{trial.name}.mcap", index, trial, session, info) for index, trial in enumerate(trials)]
     if sum(sum(item.samples.values()) for item in info.trials) < PARALLEL_ROWS:
         for job in jobs:
@@ -155,7 +155,7 @@ def _write_all(folder: Path, trials: Sequence[Trial], session: SessionTable, inf
             raise
 
 
-def _write(path: Path, index: int, trial: Trial, session: SessionTable, info: SessionInfo) -> None:
+def _write(path: Path, index: int, trial: TrialFiles, session: SessionTable, info: SessionInfo) -> None:
     rows = {stream: _rows(stream, columns, session) for stream, columns in trial.streams.items()}
     writer = RecordingWriter(path, _metadata(index, trial, session, info))
     try:
@@ -206,7 +206,7 @@ def _in_time_order(rows: Mapping[str, NDArray[np.void]]) -> Iterable[tuple[Strea
         taken[number] += size
 
 
-def _metadata(index: int, trial: Trial, session: SessionTable, info: SessionInfo) -> dict[str, dict[str, str]]:
+def _metadata(index: int, trial: TrialFiles, session: SessionTable, info: SessionInfo) -> dict[str, dict[str, str]]:
     surface_mm = session.surface_mm if trial.table.surface_mm is None else trial.table.surface_mm
     calibration = {"force_axis": "fz", "compression": "positive"}
     if surface_mm is not None:

@@ -11,24 +11,37 @@ from rig.trials.contact import Contact, FloatArray, find_contact
 from rig.trials.cycles import IndentationCycle
 from rig.trials.findings import Finding
 
+# Two samples always lie on a line; the third can contradict it.
 LEAST_SAMPLES = 3
+# The fewest that have a median and a spread about it.
 LEAST_AIR_SAMPLES = 3
+# Contact is known to 0.2 mm in a good trial (`contact_within_mm`); air begins half as much again above it.
 AIR_MARGIN_MM = 0.3
+# So that a fit may move contact by its interval and still see the air above it.
 AIR_KEPT_MM = 0.5
+# Five standard deviations of a sensor with 10 mN of noise.
 LEAST_FORCE_N = 0.05
+# Half of what contact is known to in a good trial: a shorter way has no depth that can be told.
 LEAST_TRAVEL_MM = 0.1
+# Of normal noise two samples in a thousand million lie further off.
 OUTLIER_SPREADS = 6
+# The clearance of a protocol (4 to 5 mm) is a quarter of its travel or more, so the highest tenth is air.
 HIGHEST_SHARE = 0.1
 ONSET_SHARE = 0.01
 SHALLOW_SHARE = 0.15
 SEARCH_SHARE = 1.0
+# Five times what contact is known to in a good trial.
 LEAST_SEARCH_MM = 1.0
+# What contact is known to in a good trial: a smaller way back is no turn, but dither and noise of the axis.
 TURN_MM = 0.2
 STEADY_SHARE = 0.3
+# Half of the way that the wanted speed makes: nearer to going on than to standing.
 ON_SHARE = 0.5
 TOP_SHARE = 0.005
 SPEED_BASE_MM = 0.5
+# A median over twenty samples is known to three tenths of their standard deviation.
 RUBBING_SAMPLES = 20
+# A step of two standard deviations of single samples is five of the difference of two medians over twenty.
 RUBBING_SPREADS = 2.0
 RUBBING_FLAT = 0.25
 
