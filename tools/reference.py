@@ -19,7 +19,9 @@ from rig.config.maxima import MAXIMA
 from rig.config.products.registry import AXES
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring
+from rig.diagnosis.effects.registry import CAUSES
 from rig.tissue.registry import LAWS
+from tools.causes import causes as causes_of
 from tools.http_routes import routes
 from tools.keys import tables
 from tools.laws import laws as laws_of
@@ -72,10 +74,16 @@ def laws() -> str:
     return laws_of(LAWS.values())
 
 
+def causes() -> str:
+    """Every cause that a diagnosis can name."""
+    return causes_of(list(CAUSES.values()))
+
+
 GENERATORS: dict[str, Callable[[], str]] = {
     "wiring": wiring, "protocol": protocol, "commands": commands, "schemas": schemas,
     "http": http,
     "laws": laws,
+    "causes": causes,
 }  # fmt: skip
 
 

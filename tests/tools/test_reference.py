@@ -14,6 +14,7 @@ from rig.config.quality import Bounds, QualityLimits
 from rig.config.stop import Stop
 from rig.config.table import Table
 from rig.config.wiring import Limits, Loop, Mock, Subject, Wiring
+from rig.diagnosis.effects.registry import CAUSES
 from rig.tissue.registry import LAWS
 from tools.keys import tables
 from tools.reference import fill
@@ -141,6 +142,17 @@ def test_a_law_stands_in_the_reference_with_units_bounds_and_what_is_given() -> 
     assert "| `b_per_mm` | 1/mm | 0 | 5 | stiffening per depth | |" in index.replace("  ", " ")
     assert "| `radius_mm` | mm | 0.1 | 100 | radius of the tip | 3 |" in text
     assert all(f"## `{name}`\n" in text for name in LAWS)
+
+
+def test_a_cause_stands_in_the_reference_with_its_smallest_size_and_what_to_do() -> None:
+    text = fill("<!-- generated: causes -->")
+    substrate = text.partition("## `substrate`\n")[2].partition("\n## ")[0]
+    assert "Something stiff lies below: the force grows by 1 + `substrate_per_mm3` x^3." in substrate
+    assert "- what to do: measure over thicker tissue" in substrate
+    assert "| `substrate_per_mm3` | 1/mm^3 | 0 | 0 | 0.05 | 2e-05 | growth of force by the cube of depth |" in substrate
+    assert "## `elastic_law` (exponent)\n" in text
+    assert "## `elastic_law` (quadratic_per_mm)\n" in text
+    assert all(f"| `{key}` |" in text for key in CAUSES)
 
 
 def test_a_mark_without_a_generator_is_an_error() -> None:
