@@ -1,5 +1,6 @@
 """`rig calibrate`: force sensor against known weights, axis against tracker or gauge block."""
 
+import os
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Literal
@@ -9,9 +10,9 @@ import typer
 from api.cli.asking import Person
 from api.cli.calibrate_axis import AxisAsked, calibrate_axis
 from api.cli.calibrate_force import ForceAsked, Load, calibrate_force
-from api.cli.calibration_output import keep, refuse_out, refuse_unfit
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_file, wiring_from
-from api.cli.output import write_json
+from api.cli.output import console, write_json
+from api.operations.calibrations import What, keep, refuse_out, refuse_unfit
 from rig.config.calibration import AxisCalibration, ForceCalibration
 from rig.errors import UsageError
 
@@ -70,8 +71,16 @@ def calibrate(
         way = AxisAsked(from_mm, to_mm, clear, toward_limb, gauge_block_mm, near_mm)
         found = calibrate_axis(wiring, way, Person(pause))
     refuse_unfit(wiring.calibration, found, datetime.now(UTC))
-    path = keep(what, found, out, (wiring_file(config) or Path()).parent)
+    path = keep(what, found, out)
+    say_use(what, path, (wiring_file(config) or Path()).parent)
     write_json(json_file, {"file": str(path), **found.model_dump(mode="json")})
+
+
+def say_use(what: What, path: Path, wiring_folder: Path) -> None:
+    """Where it is, and the lines of the wiring file that name it."""
+    named = os.path.relpath(path, wiring_folder)
+    for line in (f"written: {path}; the lines of rig.toml that use it:", f'[calibration]\n{what} = "{named}"'):
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
 def _refuse_options(context: typer.Context, others: tuple[str, ...], what: str) -> None:

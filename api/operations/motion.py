@@ -21,6 +21,7 @@ from rig.results.tracking import Retracted, Threshold, TrackResult, compared
 # Out of any depth that a protocol may reach, and slow enough to see it coming.
 RETRACT_MM = 20.0
 RETRACT_MM_S = 10.0
+# Where the wiring allows 1 mm/s, these take 20 s; whoever waits longer is told.
 RETRACT_TIMEOUT_S = 60.0
 
 

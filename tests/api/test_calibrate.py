@@ -12,11 +12,12 @@ from typer.testing import CliRunner
 from api.cli import mock_calibration
 from api.cli.app import build
 from api.cli.asking import Person
+from api.cli.calibrate import say_use
 from api.cli.calibrate_axis import AxisAsked, calibrate_axis
-from api.cli.calibration_output import keep, refuse_out, refuse_unfit
 from api.cli.mock_calibration import force_file
 from api.cli.options import built_in, calibrated, wiring_from
 from api.cli.stage import bench_for, plugged
+from api.operations.calibrations import keep, refuse_out, refuse_unfit
 from rig.config.calibration import Calibration, Uncertainty
 from rig.config.calibration_files import read_force, text_of
 from rig.config.endpoints import Endpoints
@@ -114,7 +115,8 @@ def test_a_calibration_is_written_whole_and_its_line_is_relative_to_the_wiring(
     own_state: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found = force_calibration(date=datetime(2026, 3, 1, 9, tzinfo=UTC))
-    path = keep("force", found, None, Path("bench"))
+    path = keep("force", found, None)
+    say_use("force", path, Path("bench"))
     assert path == Path("calibration/force-000271-20260301T090000Z.json")
     assert read_force(path) == found
     assert 'force = "../calibration/force-000271-20260301T090000Z.json"' in capsys.readouterr().out

@@ -1,11 +1,9 @@
-"""Where a new calibration goes, and the line of `rig.toml` that names it."""
+"""Where a new calibration is kept, and what keeps it from being."""
 
-import os
 from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
-from api.cli.output import console
 from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
 from rig.config.calibration_files import text_of
 from rig.errors import CheckFailed, UsageError
@@ -30,15 +28,12 @@ def refuse_unfit(stated: Calibration, found: ForceCalibration | AxisCalibration,
         raise CheckFailed("; ".join(reasons))
 
 
-def keep(what: What, found: ForceCalibration | AxisCalibration, out: Path | None, wiring_folder: Path) -> Path:
-    """Writes it, whole or not at all, and prints the line of the wiring file; returns the path."""
+def keep(what: What, found: ForceCalibration | AxisCalibration, out: Path | None) -> Path:
+    """Writes it, whole or not at all, to ``out`` or calibration/WHAT-SERIAL-TIME.json; returns the path."""
     path = out or FOLDER / f"{what}-{_plain(found.serial)}-{_stamp(found.date)}.json"
     make_folder(path.parent)
     with whole_file(path) as scratch:
         scratch.write_text(text_of(found), encoding="utf-8")
-    console.print(f"written: {path}; the lines of rig.toml that use it:", highlight=False, markup=False, soft_wrap=True)
-    named = os.path.relpath(path, wiring_folder)
-    console.print(f'[calibration]\n{what} = "{named}"', highlight=False, markup=False, soft_wrap=True)
     return path
 
 
