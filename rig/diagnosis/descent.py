@@ -63,7 +63,7 @@ def corrected(slopes: Sequence[Array], change: Sequence[Array], step: Array, fre
     return [slope + np.outer(seen - slope @ step, along) for slope, seen in zip(slopes, change, strict=True)]
 
 
-class Point(NamedTuple):
+class Iterate(NamedTuple):
     """Where a descent is: what the values predict, its white residual, half the residual's sum of squares."""
 
     values: Values
@@ -72,11 +72,11 @@ class Point(NamedTuple):
     cost: float
 
 
-def point_at(whitener: Whitener, values: Values) -> Point:
+def point_at(whitener: Whitener, values: Values) -> Iterate:
     """The point of ``values``."""
     prediction = whitener.predict(values)
     white = whitener.residual(prediction)
-    return Point(values, prediction, white, 0.5 * float(white @ white))
+    return Iterate(values, prediction, white, 0.5 * float(white @ white))
 
 
 def descend(
@@ -118,8 +118,8 @@ def descend(
 
 
 def downhill(
-    here: Point, free: Sequence[Par], whitener: Whitener, hessian: Array, slope: Array, damping: float, tries: int
-) -> tuple[Point | None, float]:
+    here: Iterate, free: Sequence[Par], whitener: Whitener, hessian: Array, slope: Array, damping: float, tries: int
+) -> tuple[Iterate | None, float]:
     """The first of ``tries`` ever more damped steps that leads down, or None; and the damping reached."""
     for _ in range(tries):
         scaled = hessian + np.diag(damping * np.diag(hessian) + prior_precision(free) + 1e-30)

@@ -14,7 +14,7 @@ from rig.diagnosis.answers import Diagnosis, smallest_visible
 from rig.diagnosis.estimates import NextExperiment, SmallestSize
 from rig.diagnosis.evidence import Direction, Tangents, information, is_alias, tangents
 from rig.diagnosis.fit import Fit, assemble
-from rig.diagnosis.indentation import Indentation, nulls
+from rig.diagnosis.indentation import IndentationProblem, nulls
 from rig.diagnosis.noise import Array, Colour, Noise, ScatterWhitener, starts_of
 from rig.diagnosis.observations import Observations, observe
 from rig.diagnosis.search import testable
@@ -47,7 +47,7 @@ NOT_SEPARABLE_NATS, SAFE_NATS = 3.0, 20.0
 
 
 @dataclass(frozen=True)
-class Check:
+class Detectability:
     """Answer of a protocol check: smallest amplitudes, reasons, confusability [nats], duration.
 
     ``confusion[e][f]`` is what is left of 50 nats of evidence for e once f, with everything else, imitates it.
@@ -72,11 +72,11 @@ class Check:
         return sorted(found, key=lambda pair: pair[2])
 
 
-def check(protocol: Protocol, tracker: bool = True, force_rate_Hz: float = RATE_HZ) -> Check:
+def check(protocol: Protocol, tracker: bool = True, force_rate_Hz: float = RATE_HZ) -> Detectability:
     """What ``protocol`` can show with a force sensor at this rate, with or without a tracker on the tip."""
     cycles = planned(protocol, tracker, force_rate_Hz)
     data = observe(TrialSet("planned", tuple(cycles)))
-    problem = Indentation(data)
+    problem = IndentationProblem(data)
     fit = noiseless(problem)
     t = tangents(fit, testable(problem))
     reasons = {
@@ -91,7 +91,7 @@ def check(protocol: Protocol, tracker: bool = True, force_rate_Hz: float = RATE_
             reasons[effect.name] = "the simulation's own parameters imitate it completely in this experiment"
     names, confusion = confusability(t)
     duration = float(cycles[-1].force_s[-1])
-    return Check(duration, len(cycles), visible, reasons, names, confusion)
+    return Detectability(duration, len(cycles), visible, reasons, names, confusion)
 
 
 def planned(protocol: Protocol, tracker: bool, rate_Hz: float) -> list[Trial]:
@@ -136,14 +136,14 @@ def cycle(protocol: Protocol, speed: float, rate_Hz: float) -> tuple[Array, Arra
     return time, np.convolve(padded, np.ones(width) / width, mode="valid")[1:]
 
 
-def noiseless(problem: Indentation, limb: Mapping[str, float] = LIMB) -> Fit:
+def noiseless(problem: IndentationProblem, limb: Mapping[str, float] = LIMB) -> Fit:
     """The simulation at the given limb, judged with the assumed noise, as if it had been fitted."""
     values = {**nulls(), **limb}
     drive = problem.data.drive
     data = Observations(
         problem.data.name, problem.data.names, drive, respond(drive, values).force_N, problem.data.tip_mm, None
     )
-    problem = Indentation(data, problem.simulation)
+    problem = IndentationProblem(data, problem.simulation)
     colours = [Colour(np.empty(0), FORCE_NOISE_N), Colour(np.empty(0), TRACKER_NOISE_MM)][: len(problem.channels)]
     noise = Noise(tuple(colours), SCATTER, np.zeros((problem.recordings, len(SCATTER))))
     blind = problem.blind(values)
@@ -173,7 +173,7 @@ def next_experiment(result: Diagnosis) -> NextExperiment | None:
 def _rate(protocol: Protocol, found: Fit, pair: Sequence[str]) -> float:
     """Nats a minute by which a block tells the first of the pair, at its size, from the second."""
     cycles = planned(protocol, tracker=True, rate_Hz=RATE_HZ)
-    problem = Indentation(observe(TrialSet("block", tuple(cycles))))
+    problem = IndentationProblem(observe(TrialSet("block", tuple(cycles))))
     base = {par.name: found.values[par.name] for par in problem.base if par.name in found.values}
     fit = noiseless(problem, {**base, "surface_mm": SURFACE_MM, "tip_zero_mm": 0.0})
     by_name = {effect.name: effect for effect in found.problem.effects}

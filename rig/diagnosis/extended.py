@@ -7,7 +7,7 @@ import numpy as np
 import rig
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.fit import Fit
-from rig.diagnosis.indentation import Indentation
+from rig.diagnosis.indentation import IndentationProblem
 from rig.errors import DataError
 from rig.tissue.laws_extended import Extended
 from rig.tissue.model import Model, ModelCause, Provenance, Quality, UncertainValue, ValidRange
@@ -15,7 +15,7 @@ from rig.tissue.model import Model, ModelCause, Provenance, Quality, UncertainVa
 
 def extended_model(result: Diagnosis) -> Model:
     """The final model of a diagnosis of indentations; raises DataError where nothing could be fitted."""
-    if result.search is None or not isinstance(result.search.after.problem, Indentation):
+    if result.search is None or not isinstance(result.search.after.problem, IndentationProblem):
         raise DataError(f"{result.session}: nothing was fitted, so there is no extended model")
     fit = result.search.after
     law = Extended.clipped(**{name: fit.values[name] for name in Extended.bounds})
@@ -54,13 +54,13 @@ def _interval(result: Diagnosis, name: str, value: float) -> tuple[float, float]
 
 
 def _depth_mm(fit: Fit) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    assert isinstance(fit.problem, Indentation)
+    assert isinstance(fit.problem, IndentationProblem)
     return np.asarray(fit.problem.data.drive.position_mm - fit.values["surface_mm"] - fit.values["contact_offset_mm"])
 
 
 def _valid(fit: Fit, law: Extended) -> ValidRange:
     """As deep as was recorded, and the force the law has there at rest."""
-    assert isinstance(fit.problem, Indentation)
+    assert isinstance(fit.problem, IndentationProblem)
     drive = fit.problem.data.drive
     deepest_mm = float(_depth_mm(fit).max())
     if not deepest_mm > 0:
@@ -72,7 +72,7 @@ def _valid(fit: Fit, law: Extended) -> ValidRange:
 
 
 def _provenance(fit: Fit, session: str) -> Provenance:
-    assert isinstance(fit.problem, Indentation)
+    assert isinstance(fit.problem, IndentationProblem)
     data = fit.problem.data
     digest = hashlib.sha256()
     for column in (data.drive.time_s, data.drive.position_mm, data.force_N):

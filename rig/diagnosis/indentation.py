@@ -14,7 +14,7 @@ from rig.diagnosis.effects.tissue import STIFFENING, STIFFENING_EFFECT
 from rig.diagnosis.observations import Observations
 from rig.diagnosis.problem import Array, Effect, Par, Scatter, Signal, Values
 from rig.simulation.chain import NULLS, Operator, respond
-from rig.simulation.drive import SETTLE_MM_S, Drive
+from rig.simulation.drive import SETTLE_MM_S, MeasuredMotion
 from rig.tissue.index_law import Fields, index_force
 
 STIFFNESS = Par("a_N_mm", "N/mm", 0.5, 1e-5, 1e3, 0.1, log=True, meaning="stiffness at contact")
@@ -43,7 +43,7 @@ def nulls() -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Indentation:
+class IndentationProblem:
     """Observations judged against the index or the constant-stiffness simulation."""
 
     data: Observations
@@ -184,7 +184,7 @@ def missing(data: Observations) -> dict[str, str]:
     return reasons
 
 
-def way_out(drive: Drive) -> float:
+def way_out(drive: MeasuredMotion) -> float:
     """How far the tip comes back from its deepest place, as a share of the cycle: the median recording's."""
     shares = []
     for i, j in pairwise(drive.starts):

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import savgol_filter
 
 from rig.errors import DataError
-from rig.simulation.drive import Array, Drive
+from rig.simulation.drive import Array, MeasuredMotion
 from rig.trials.findings import Finding, at_the_end_of_range, merged
 from rig.trials.trial import FEWEST_SAMPLES, Trial, TrialSet, cleaned, inspect, ordered
 
@@ -38,7 +38,7 @@ class Observations:
 
     name: str
     names: tuple[str, ...]
-    drive: Drive
+    drive: MeasuredMotion
     force_N: Array
     tip_mm: Array
     surface_mm: float | None
@@ -203,12 +203,12 @@ def _motion(trial: Trial, at_s: Array, spans_s: Sequence[float]) -> tuple[Array,
     return np.asarray(motion(at_s)), velocity, acceleration
 
 
-def _joined(parts: Sequence[_Gridded]) -> tuple[Drive, Array, Array]:
+def _joined(parts: Sequence[_Gridded]) -> tuple[MeasuredMotion, Array, Array]:
     recording = np.concatenate([np.full(len(part.time_s), i, np.int64) for i, part in enumerate(parts)])
     force, position, velocity, acceleration = (np.concatenate([part.columns[k] for part in parts]) for k in range(4))
     temperatures = [part.temperature_C for part in parts if part.temperature_C is not None]
     tip_mm, tip_at, tip_recording = _tips(parts, position)
-    drive = Drive(
+    drive = MeasuredMotion(
         time_s=np.concatenate([part.time_s for part in parts]),
         period_s=float(np.median(np.concatenate([np.diff(part.time_s) for part in parts]))),
         recording=recording,

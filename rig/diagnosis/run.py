@@ -10,7 +10,7 @@ from rig.diagnosis.cycles import in_cycles
 from rig.diagnosis.design import next_experiment
 from rig.diagnosis.estimates import NextExperiment
 from rig.diagnosis.fit import first_fit, refreshed
-from rig.diagnosis.indentation import Indentation, Simulation, library
+from rig.diagnosis.indentation import IndentationProblem, Simulation, library
 from rig.diagnosis.observations import Observations, observe, rise_N
 from rig.diagnosis.omnibus import leftover
 from rig.diagnosis.problem import InverseProblem
@@ -27,7 +27,7 @@ def diagnose(
     data: Observations, simulation: Simulation = "index", seed: int = 1, progress: Progress = silent
 ) -> Diagnosis:
     """What the simulation gets wrong on these recordings; never raises on data that merely say nothing."""
-    problem = Indentation(data, simulation)
+    problem = IndentationProblem(data, simulation)
     fault = unusable(data)
     if fault is not None:
         return cannot(simulation, data.name, data.drive.recordings, fault, data.findings)
@@ -75,7 +75,7 @@ def judge(
     )
 
 
-class Fault(NamedTuple):
+class Flaw(NamedTuple):
     """Why nothing can be judged, and what to do about it."""
 
     reason: str
@@ -90,18 +90,18 @@ SLOWEST_HZ, LONGEST_MM = 2.0, 300.0
 STIFFEST_N_MM, SOFTEST_N_MM = 100.0, 1e-4
 
 
-def _unit_fault(data: Observations) -> Fault | None:
+def _unit_fault(data: Observations) -> Flaw | None:
     """What looks like another unit than s, N or mm."""
     force_N, travel_mm = float(np.ptp(data.force_N)), float(np.ptp(data.drive.position_mm))
     if data.rate_Hz < SLOWEST_HZ:
-        return Fault(
+        return Flaw(
             f"force was sampled {data.rate_Hz:.3g} times a second by its time stamps (limit {SLOWEST_HZ:g})",
             "give time_s in seconds (divide milliseconds by 1000), or sample faster",
         )
     if travel_mm > LONGEST_MM:
-        return Fault(f"the axis travels {travel_mm:.4g} mm (limit {LONGEST_MM:g} mm)", "give position_mm in mm")
+        return Flaw(f"the axis travels {travel_mm:.4g} mm (limit {LONGEST_MM:g} mm)", "give position_mm in mm")
     if force_N and travel_mm and not SOFTEST_N_MM < force_N / travel_mm < STIFFEST_N_MM:
-        return Fault(
+        return Flaw(
             f"force changes by {force_N:.4g} N over {travel_mm:.4g} mm of travel (limits {SOFTEST_N_MM:g} to "
             f"{STIFFEST_N_MM:g} N/mm), which no tissue does",
             "give force_N in N and position_mm in mm",
@@ -109,7 +109,7 @@ def _unit_fault(data: Observations) -> Fault | None:
     return None
 
 
-def unusable(data: Observations) -> Fault | None:
+def unusable(data: Observations) -> Flaw | None:
     """Why nothing can be tested with these data; None where something can."""
     force, position = data.force_N, data.drive.position_mm
     odd = _unit_fault(data)
@@ -117,21 +117,21 @@ def unusable(data: Observations) -> Fault | None:
         return odd
     if np.ptp(force) == 0 or np.ptp(position) == 0:
         still = "force" if np.ptp(force) == 0 else "position"
-        return Fault(f"the {still} never changes, so the recordings carry no experiment", f"connect the {still} sensor")
+        return Flaw(f"the {still} never changes, so the recordings carry no experiment", f"connect the {still} sensor")
     # Third differences: at 10 Hz the first ones of a ramp are no noise.
     noise = float(np.median(np.abs(np.diff(force, 3)))) / (0.6745 * np.sqrt(20))
     rise = rise_N(position, force)
     if rise < 0 and -rise > 5 * noise:
-        return Fault(
+        return Flaw(
             "force falls as the tip goes in, so force or position has the wrong sign",
             "correct force_positive or position_positive in session.toml (force.compression in rig.toml for a capture) "
             "and diagnose again",
         )
     if rise < 5 * noise:
-        return Fault(f"the force rises by {rise:.3g} N from above to below, no more than its noise: no contact", RECORD)
+        return Flaw(f"the force rises by {rise:.3g} N from above to below, no more than its noise: no contact", RECORD)
     if data.drive.recordings < FEWEST_RECORDINGS:
         count = data.drive.recordings
-        return Fault(
+        return Flaw(
             f"{count} recording{'s' * (count > 1)} of one cycle: a cause is judged on cycles left out, which takes "
             f"at least {FEWEST_RECORDINGS}",
             RECORD,
@@ -139,7 +139,7 @@ def unusable(data: Observations) -> Fault | None:
     return None
 
 
-def cannot(simulation: Simulation, name: str, recordings: int, fault: Fault, quality: tuple[Finding, ...]) -> Diagnosis:
+def cannot(simulation: Simulation, name: str, recordings: int, fault: Flaw, quality: tuple[Finding, ...]) -> Diagnosis:
     """The answer where nothing can be judged: nothing is explained, no cause named, and each listed with the reason."""
     return Diagnosis(
         session=name, simulation=simulation, recordings=recordings, verdict="unexplained",
@@ -156,5 +156,5 @@ def diagnose_session(session: TrialSet, simulation: Simulation = "index", progre
         data = observe(in_cycles(session) if len(session.trials) < FEWEST_RECORDINGS else session)
     except DataError as error:
         reason = str(error).removeprefix(f"{session.name}: ").removesuffix("; run `rig verify` on it")
-        return cannot(simulation, session.name, 0, Fault(reason, f"mend these files, or {RECORD}"), session.findings)
+        return cannot(simulation, session.name, 0, Flaw(reason, f"mend these files, or {RECORD}"), session.findings)
     return diagnose(data, simulation, progress=progress)

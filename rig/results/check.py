@@ -1,10 +1,10 @@
 """From a protocol check to its result."""
 
-from rig.diagnosis.design import ASSUMED_NATS, NOT_SEPARABLE_NATS, Check
+from rig.diagnosis.design import ASSUMED_NATS, NOT_SEPARABLE_NATS, Detectability
 from rig.results.diagnosis import AmbiguousPair, Confusion, ProtocolCheckResult
 
 
-def check_result(found: Check) -> ProtocolCheckResult:
+def check_result(found: Detectability) -> ProtocolCheckResult:
     """The check as it is saved."""
     pairs = [AmbiguousPair(pair=(one, other), nats=left) for one, other, left in found.pairs]
     return ProtocolCheckResult(

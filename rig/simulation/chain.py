@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from rig.simulation.drive import Array, Drive
+from rig.simulation.drive import Array, MeasuredMotion
 from rig.simulation.scans import dahl
 from rig.tissue.history import Term
 from rig.tissue.index_law import Fields, extended_force
@@ -55,7 +55,7 @@ class Operator(NamedTuple):
     """
 
     stage: Stage
-    act: Callable[[Drive, Series, Fields], Series]
+    act: Callable[[MeasuredMotion, Series, Fields], Series]
 
 
 class Response(NamedTuple):
@@ -78,7 +78,7 @@ def one(v: Fields, name: str) -> float:
     return float(v[name])
 
 
-def respond(drive: Drive, values: Fields, operators: Iterable[Operator] = ()) -> Response:
+def respond(drive: MeasuredMotion, values: Fields, operators: Iterable[Operator] = ()) -> Response:
     """Sensor readings for the measured motion; parameters not in ``values`` are at their null, those of operators not.
 
     ``operators`` of one stage act in their order.
@@ -98,14 +98,14 @@ def respond(drive: Drive, values: Fields, operators: Iterable[Operator] = ()) ->
     return Response(np.asarray(through("stamping", through("reading", force))), seen)
 
 
-def _moved(drive: Drive, offset: Array | float) -> Tip:
+def _moved(drive: MeasuredMotion, offset: Array | float) -> Tip:
     if isinstance(offset, float):
         return Tip(drive.position_mm, drive.velocity_mm_s, drive.acceleration_mm_s2)
     rate = drive.rate(offset)
     return Tip(drive.position_mm + offset, drive.velocity_mm_s + rate, drive.acceleration_mm_s2 + drive.rate(rate))
 
 
-def compressed_frame(drive: Drive, carriage: Tip, v: Fields) -> Tip:
+def compressed_frame(drive: MeasuredMotion, carriage: Tip, v: Fields) -> Tip:
     """The tip stays behind the carriage by compliance times force: Newton with the elastic tangent, per sample."""
     compliance, tip = one(v, "frame_compliance_mm_N"), carriage
     for _ in range(COMPLIANCE_ITERATIONS):
@@ -120,13 +120,13 @@ def compressed_frame(drive: Drive, carriage: Tip, v: Fields) -> Tip:
     return tip
 
 
-def depth_of(drive: Drive, tip: Tip, v: Fields) -> Array:
+def depth_of(drive: MeasuredMotion, tip: Tip, v: Fields) -> Array:
     """Signed distance of the tip below the surface [mm]."""
     surface = v["surface_mm"] + v["contact_offset_mm"] + surface_motion(drive, v)
     return tip.position_mm - surface
 
 
-def surface_motion(drive: Drive, v: Fields) -> Array | float:
+def surface_motion(drive: MeasuredMotion, v: Fields) -> Array | float:
     """Breathing or pulse: displacement of the surface along the axis [mm] at session time."""
     if not (v["surface_motion_sin_mm"] or v["surface_motion_cos_mm"]):
         return 0.0
@@ -161,7 +161,7 @@ def viscous(velocity_mm_s: Array, v: Fields) -> Array:
     return np.asarray(v["damping_N_s_mm"] * REFERENCE_SPEED_MM_S * law)
 
 
-def tissue(drive: Drive, tip: Tip, v: Fields) -> Array:
+def tissue(drive: MeasuredMotion, tip: Tip, v: Fields) -> Array:
     """Force of the tissue on the tip [N]."""
     moving = surface_motion(drive, v)
     depth = tip.position_mm - (v["surface_mm"] + v["contact_offset_mm"] + moving)
@@ -179,7 +179,7 @@ def tissue(drive: Drive, tip: Tip, v: Fields) -> Array:
     return np.maximum(force, 0.0) + adhesion(tip, depth, drive, v)
 
 
-def adhesion(tip: Tip, depth_mm: Array, drive: Drive, v: Fields) -> Array | float:
+def adhesion(tip: Tip, depth_mm: Array, drive: MeasuredMotion, v: Fields) -> Array | float:
     """Pull on the way out, once the tip has touched: -Fad exp(-(d/l)^2) [N]."""
     if not one(v, "adhesion_N"):
         return 0.0
@@ -188,7 +188,7 @@ def adhesion(tip: Tip, depth_mm: Array, drive: Drive, v: Fields) -> Array | floa
     return np.asarray(-one(v, "adhesion_N") * np.exp(-((depth_mm / one(v, "adhesion_length_mm")) ** 2)) * leaving)
 
 
-def friction(drive: Drive, tip: Tip, v: Fields) -> Array | float:
+def friction(drive: MeasuredMotion, tip: Tip, v: Fields) -> Array | float:
     """Guide in front of the sensor: Dahl friction [N]."""
     if not one(v, "friction_N"):
         return 0.0
@@ -196,6 +196,6 @@ def friction(drive: Drive, tip: Tip, v: Fields) -> Array | float:
     return one(v, "friction_N") * state
 
 
-def on_sensor(drive: Drive, tip: Tip, v: Fields) -> Array:
+def on_sensor(drive: MeasuredMotion, tip: Tip, v: Fields) -> Array:
     """Force that reaches the sensor [N]: tissue, guide and the inertia of what moves in front of it."""
     return tissue(drive, tip, v) + friction(drive, tip, v) + 1e-3 * one(v, "tip_inertia_kg") * tip.acceleration_mm_s2

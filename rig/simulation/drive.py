@@ -15,7 +15,7 @@ SETTLE_MM_S = 0.3
 
 
 @dataclass(frozen=True)
-class Drive:
+class MeasuredMotion:
     """Motion of all recordings of a session, flat, one after another, each on its own uniform grid.
 
     All arrays have shape (n,) except those of the tip tracker, shape (m,): ``tip_at`` is where on the flat grid a frame

@@ -7,7 +7,7 @@ import numpy as np
 from rig.diagnosis.effects.scan import PEAKS, peaks
 from rig.diagnosis.problem import Array, Effect, InverseProblem, Par, Values
 from rig.simulation.chain import Operator, Series, one
-from rig.simulation.drive import Drive
+from rig.simulation.drive import MeasuredMotion
 from rig.simulation.scans import play
 from rig.tissue.index_law import Fields
 
@@ -62,7 +62,7 @@ def _pair(stem: str, meaning: str, worth_mm: float) -> tuple[Par, Par]:
     )
 
 
-def _backlash(drive: Drive, offset: Series, v: Fields) -> Series:
+def _backlash(drive: MeasuredMotion, offset: Series, v: Fields) -> Series:
     """Lost motion: 0 in forward motion, the width when retracting."""
     width_mm = one(v, "backlash_mm")
     if width_mm <= 0:
@@ -70,24 +70,24 @@ def _backlash(drive: Drive, offset: Series, v: Fields) -> Series:
     return offset + (play(drive.position_mm, drive.first, width_mm) - drive.position_mm)
 
 
-def _ripple(drive: Drive, offset: Series, v: Fields) -> Series:
+def _ripple(drive: MeasuredMotion, offset: Series, v: Fields) -> Series:
     if not (v["ripple_sin_mm"] or v["ripple_cos_mm"]):
         return offset
     phase = 2 * np.pi * drive.position_mm / v["ripple_pitch_mm"]
     return offset + np.asarray(v["ripple_sin_mm"] * np.sin(phase) + v["ripple_cos_mm"] * np.cos(phase))
 
 
-def _filtered(drive: Drive, force_N: Series, v: Fields) -> Series:
+def _filtered(drive: MeasuredMotion, force_N: Series, v: Fields) -> Series:
     lag_s = one(v, "filter_lag_s")
     return force_N - drive.history.transient(np.asarray(force_N), lag_s) if lag_s > 0 else force_N
 
 
-def _drifted(drive: Drive, force_N: Series, v: Fields) -> Series:
+def _drifted(drive: MeasuredMotion, force_N: Series, v: Fields) -> Series:
     middle_s = 0.5 * (drive.time_s[0] + drive.time_s[-1])
     return np.asarray(force_N + one(v, "zero_drift_N_h") * (drive.time_s - middle_s) / 3600)
 
 
-def _late(drive: Drive, force_N: Series, v: Fields) -> Series:
+def _late(drive: MeasuredMotion, force_N: Series, v: Fields) -> Series:
     late_s = one(v, "time_offset_s")
     return drive.shifted(np.asarray(force_N), late_s) if late_s else force_N
 

@@ -8,12 +8,12 @@ import pytest
 from rig.diagnosis.indentation import library, nulls
 from rig.diagnosis.problem import Effect
 from rig.simulation import chain
-from rig.simulation.drive import Array, Drive
+from rig.simulation.drive import Array, MeasuredMotion
 
 BASE = {"a_N_mm": 0.2, "b_per_mm": 0.2, "damping_N_s_mm": 0.01, "surface_mm": 2.0, "zero_N": 0.1}
 
 
-def stroke_drive(speed_mm_s: float = 10.0, period_s: float = 0.004) -> Drive:
+def stroke_drive(speed_mm_s: float = 10.0, period_s: float = 0.004) -> MeasuredMotion:
     """Two equal cycles from 2 mm above the surface to 6 mm below it, hold, and out."""
     corners = np.cumsum([0, 0.3, 8 / speed_mm_s, 0.5, 8 / speed_mm_s, 0.3])
     time = np.arange(0, corners[-1], period_s)
@@ -22,7 +22,7 @@ def stroke_drive(speed_mm_s: float = 10.0, period_s: float = 0.004) -> Drive:
     both = np.concatenate([time, time + 10])
     recording = np.repeat([0, 1], len(time)).astype(np.int64)
     frames = np.arange(0.5, len(both) - 1, 4.0)
-    return Drive(
+    return MeasuredMotion(
         both, period_s, recording, np.tile(position, 2), np.tile(velocity, 2),
         np.tile(np.gradient(velocity, period_s), 2), recording.astype(float), np.linspace(20, 25, len(both)),
         frames, recording[frames.astype(int)],
@@ -32,7 +32,7 @@ def stroke_drive(speed_mm_s: float = 10.0, period_s: float = 0.004) -> Drive:
 OPERATORS = tuple(effect.operator for effect in library("index") if effect.operator)
 
 
-def respond(drive: Drive, values: Mapping[str, float]) -> chain.Response:
+def respond(drive: MeasuredMotion, values: Mapping[str, float]) -> chain.Response:
     """What the sensors read with the operators of all causes."""
     return chain.respond(drive, {**nulls(), **values}, OPERATORS)
 

@@ -3,7 +3,7 @@
 from benchmarks.hidden.draw import Secret, recorded, session_of
 from rig.diagnosis.effects.bench import FRICTION, TIME_OFFSET, TIP_INERTIA, ZERO_DRIFT
 from rig.diagnosis.fit import first_fit, fit, refreshed
-from rig.diagnosis.indentation import Indentation
+from rig.diagnosis.indentation import IndentationProblem
 from rig.diagnosis.observations import observe
 from rig.diagnosis.search import swapped
 
@@ -11,7 +11,7 @@ from rig.diagnosis.search import swapped
 def test_every_cause_named_after_two_swaps_is_in_the_model() -> None:
     hidden = {"friction": {"newton": 0.2, "mm": 0.1}, "time_offset": {"s": 0.01}}
     bench, made = recorded(812, Secret("both", hidden, {}), 4)
-    problem = Indentation(observe(session_of(bench, made)), "index")
+    problem = IndentationProblem(observe(session_of(bench, made)), "index")
     wrong = (ZERO_DRIFT, TIP_INERTIA)
     start = {par.name: par.null + par.scale for effect in wrong for par in effect.pars}
     model = refreshed(fit(problem, wrong, {**first_fit(problem).values, **start}))
