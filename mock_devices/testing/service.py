@@ -13,12 +13,16 @@ ANSWER_S = 30.0  # connecting a device is waited for, and a busy computer
 
 
 class ServedRig:
-    """A bench, the service on it, and requests to it; it is idle once this is made."""
+    """A bench, the service on it, and requests to it; it is idle once this is made.
+
+    ``stop_port`` is where its stop process listens.
+    """
 
     def __init__(self, bench: ServedBench, folder: Path, arguments: Sequence[str | Path]) -> None:
         self.bench, self.folder, self.port = bench, folder, free_port()
         self.running = Running(["serve", "--port", str(self.port), *arguments], folder, subprocess.DEVNULL)
         self.becomes("idle")
+        self.stop_port = int(self.ask("GET", "/info")["stop_port"])
 
     @property
     def address(self) -> str:

@@ -45,10 +45,6 @@ def asked(port: int, path: str, method: str = "POST") -> tuple[int, dict[str, An
     return status, said
 
 
-def stop_port(served: ServedRig) -> int:
-    return int(served.ask("GET", "/info")["stop_port"])
-
-
 def press(served: ServedRig) -> None:
     """Starts a capture and waits until the tip presses."""
     served.ask("POST", "/jobs", {"kind": "capture", "protocol": "slow", "session": "one"}, served.lease())
@@ -71,12 +67,12 @@ def test_with_the_service_suspended_a_press_is_confirmed_and_the_tip_leaves(
 ) -> None:
     press(served)
     served.running.process.send_signal(signal.SIGSTOP)
-    status, said = asked(stop_port(served), "/pain")
+    status, said = asked(served.stop_port, "/pain")
     assert (status, said["confirmed"], said["done"]) == (200, True, "retracting")
-    status, again = asked(stop_port(served), "/pain")
+    status, again = asked(served.stop_port, "/pain")
     assert (status, again["id"], again["confirmed"]) == (200, said["id"] + 1, True)
     freed(bench)
-    assert asked(stop_port(served), "/estop")[1]["done"] == "braked"
+    assert asked(served.stop_port, "/estop")[1]["done"] == "braked"
 
 
 def test_with_the_service_killed_a_press_is_confirmed_and_the_process_ends_with_the_loop(
@@ -85,7 +81,7 @@ def test_with_the_service_killed_a_press_is_confirmed_and_the_process_ends_with_
     press(served)
     loop, stop_process = served.loop, served.stop_process
     os.kill(served.running.process.pid, signal.SIGKILL)
-    status, said = asked(stop_port(served), "/estop")
+    status, said = asked(served.stop_port, "/estop")
     assert (status, said["confirmed"]) == (200, True)
     until(lambda: not _alive(loop) and not _alive(stop_process), PATIENCE_S, "both ended")
 
@@ -103,7 +99,7 @@ def test_with_the_loop_killed_or_frozen_nothing_is_confirmed(served: ServedRig, 
     loop = served.loop
     os.kill(loop, end)
     began = time.monotonic()
-    status, said = asked(stop_port(served), "/estop")
+    status, said = asked(served.stop_port, "/estop")
     os.kill(loop, signal.SIGCONT) if end is signal.SIGSTOP else None
     assert time.monotonic() - began < 1.5
     assert (status, said["confirmed"]) == (504, False)
