@@ -1,3 +1,43 @@
-"""What the bench knows: channels, configuration, recordings, tissue models, simulation and report."""
+"""What the bench knows, and the interface for notebooks and scripts: ``rig.open("sessions/first")``.
 
-__version__ = "0.1.0"
+    >>> import rig
+    >>> session = rig.open("sessions/first")
+    >>> session.trial("trial_1").pandas("force")
+    >>> session.fit(laws=("fung",)).laws["index"].parameters["a_N_mm"].value
+
+What stands in ``__all__`` stays as it is within a major version. Importing this package loads nothing else; what needs
+numerics, Arrow or matplotlib loads them when it is called.
+"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.errors import RigError
+from rig.version import __version__
+
+if TYPE_CHECKING:
+    from rig.notebook import SessionData, TrialData, to_pandas
+
+__all__ = ["RigError", "SessionData", "TrialData", "__version__", "open", "to_pandas"]
+
+
+def open(folder: str | Path) -> "SessionData":
+    """The session in ``folder``, as `rig capture`, `rig track` or `rig import` wrote it.
+
+    Raises DataError where there is none.
+    """
+    from rig.notebook import open_folder  # noqa: PLC0415 - numerics and Arrow take a second to load
+
+    return open_folder(Path(folder))
+
+
+def __getattr__(name: str) -> object:
+    if name in __all__:
+        from rig import notebook  # noqa: PLC0415 - as above
+
+        return getattr(notebook, name)
+    raise AttributeError(f"module 'rig' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

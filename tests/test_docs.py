@@ -22,6 +22,8 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(page for page in DOCS.rglob("*.md") if "_build" not in page.parts)]
 EXECUTED = [page for page in PAGES if "```sh\n" in page.read_text()]
+NOTEBOOKS = [page for page in PAGES if "```python\n" in page.read_text()]
+CELL = re.compile(r"```python\n(.*?)```", re.DOTALL)
 BLOCK = re.compile(r"```sh\n(.*?)```", re.DOTALL)
 SERVING = ("rig mock", "rig serve")
 LINE_TIMEOUT_S = 300
@@ -97,6 +99,17 @@ def test_every_command_of_the_page_works_in_order(page: Path, tmp_path: Path) ->
             serve(command, tmp_path)
         else:
             run(command, tmp_path)
+
+
+@pytest.mark.parametrize("page", NOTEBOOKS, ids=name)
+def test_every_cell_of_a_notebook_runs_in_order(page: Path, tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    (tmp_path / "cells.py").write_text("\n".join(CELL.findall(page.read_text())))
+    run(f"MPLBACKEND=agg {shlex.quote(sys.executable)} -W error cells.py", tmp_path)
+
+
+def test_the_notebook_is_found() -> None:
+    assert DOCS / "tutorial" / "notebook.md" in NOTEBOOKS
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)

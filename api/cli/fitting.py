@@ -26,7 +26,7 @@ from rig.results.tables import (
 )
 from rig.tissue.laws import Law
 from rig.tissue.model import load_model
-from rig.tissue.registry import COMPARED, LAWS, law_named
+from rig.tissue.registry import COMPARED, LAWS, check_known, law_named
 
 FOLDER_HELP = "Session folder, as `rig capture` or `rig import` makes it."
 SessionsArgument = Annotated[list[Path], typer.Argument(help=f"{FOLDER_HELP} Several: subjects compared.")]
@@ -103,17 +103,14 @@ def laws_from(laws: str, known: Sequence[str], saved: str, model: Path | None = 
 
 def _known(text: str, laws: Sequence[type[Law]]) -> tuple[str, float]:
     name, _, number = text.partition("=")
-    names = dict.fromkeys(parameter for law in laws for parameter in law.bounds)
-    if name not in names:
-        raise UsageError(f"--known {text}: the laws compared have {', '.join(names)}; add --laws for others")
     try:
         value = float(number)
     except ValueError:
-        raise UsageError(f"--known {text}: write {name}=NUMBER") from None
-    for law in laws:
-        bounds = law.bounds.get(name)
-        if bounds and not bounds.lower <= value <= bounds.upper:
-            raise UsageError(f"--known {text}: {law.name} takes {bounds.lower:g} to {bounds.upper:g} {bounds.unit}")
+        raise UsageError(f"--known {text}: write NAME=NUMBER") from None
+    try:
+        check_known({name: value}, laws)
+    except UsageError as error:
+        raise UsageError(f"--known {error}") from None
     return name, value
 
 

@@ -4,13 +4,13 @@ import hashlib
 
 import numpy as np
 
-import rig
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.fit import Fit
 from rig.diagnosis.indentation import IndentationProblem
 from rig.errors import DataError
 from rig.tissue.laws_extended import Extended
 from rig.tissue.model import Model, ModelCause, Provenance, Quality, UncertainValue, ValidRange
+from rig.version import SOFTWARE
 
 
 def extended_model(result: Diagnosis) -> Model:
@@ -77,9 +77,7 @@ def _provenance(fit: Fit, session: str) -> Provenance:
     digest = hashlib.sha256()
     for column in (data.drive.time_s, data.drive.position_mm, data.force_N):
         digest.update(np.ascontiguousarray(column, "<f8").tobytes())
-    return Provenance(
-        session=session, trials=data.names, sha256=digest.hexdigest(), software=f"tissue-rig {rig.__version__}"
-    )
+    return Provenance(session=session, trials=data.names, sha256=digest.hexdigest(), software=SOFTWARE)
 
 
 def _quality(fit: Fit, law: Extended) -> Quality:

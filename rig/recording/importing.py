@@ -21,7 +21,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-import rig
 from rig.channels import AXIS, FORCE, MARKER, Stream
 from rig.config.table import load
 from rig.errors import DataError
@@ -30,6 +29,7 @@ from rig.recording.files import whole_folder
 from rig.recording.import_format import EXPORTED, FIELDS, OPTIONAL, SessionTable, TrialTable, column_names
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.sessions import Session, SessionInfo, TrialInfo, open_session, plain, write_session
+from rig.version import SOFTWARE
 
 STREAMS = {"force": FORCE, "axis": AXIS, "marker": MARKER}
 ROWS_PER_CHUNK = 1000
@@ -118,7 +118,7 @@ def _info(folder: Path, session: SessionTable, trials: Iterable[TrialFiles], now
         id=session.id or session.name or folder.resolve().name,
         kind="import",
         created=now.isoformat(),
-        software=f"tissue-rig {rig.__version__}",
+        software=SOFTWARE,
         subject={str(key): plain(value) for key, value in subject.items()},
         notes={str(key): plain(value) for key, value in (given | notes).items()},
         trials=tuple(_trial_info(trial, session.force_positive) for trial in trials),

@@ -3,12 +3,12 @@
 from pathlib import Path
 from string import Template
 
-import rig
 from rig.errors import UsageError
 from rig.recording.files import write_text
 from rig.report.facts import Facts, gather
 from rig.report.markup import paragraph, text
 from rig.report.sections import diagnosed, headline, key_figures, sections, simulated
+from rig.version import SOFTWARE
 
 TEMPLATE = Path(__file__).with_name("page.html")
 
@@ -34,6 +34,6 @@ def page(facts: Facts) -> str:
         simulated(facts),
         key_figures(facts),
     ]
-    foot = f"<footer>{text(f'Recorded by {info.software}; report by tissue-rig {rig.__version__}.')}</footer>"
+    foot = f"<footer>{text(f'Recorded by {info.software}; report by {SOFTWARE}.')}</footer>"
     body = "\n".join([*head, *sections(facts), foot])
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(title=text(f"{info.id}: report"), body=body)

@@ -151,9 +151,9 @@ class Model:
                 f"(depth up to {self.valid.depth_mm:.3g} mm): ask for less, or fit a session that goes deeper"
             )
 
-    def save(self, path: Path) -> None:
+    def save(self, path: str | Path) -> None:
         """Writes `model.json`, whole or not at all."""
-        write_text(path, json.dumps(self._file().model_dump(), indent=2) + "\n")
+        write_text(Path(path), json.dumps(self._file().model_dump(), indent=2) + "\n")
 
     def _file(self) -> _File:
         return _File(

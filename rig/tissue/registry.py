@@ -1,5 +1,8 @@
 """Every tissue law by its name, as `model.json` and `rig fit --laws` know it."""
 
+from collections.abc import Mapping, Sequence
+
+from rig.errors import UsageError
 from rig.registry import Registry
 from rig.tissue.laws import Constant, Index, Law
 from rig.tissue.laws_elastic import Fung, Layer, Power, Quadratic
@@ -16,3 +19,17 @@ ALSO = {"kelvin_voigt": Constant.name}
 def law_named(name: str) -> type[Law]:
     """The law's class; raises UsageError naming the laws there are."""
     return LAWS.named(ALSO.get(name, name))
+
+
+def check_known(known: Mapping[str, float], laws: Sequence[type[Law]]) -> None:
+    """Raises UsageError for a parameter that none of ``laws`` has, and for a value beyond a law's bounds."""
+    names = dict.fromkeys(parameter for law in laws for parameter in law.bounds)
+    for name, value in known.items():
+        if name not in names:
+            raise UsageError(f"{name}={value:g}: the laws compared have {', '.join(names)}; add others by laws")
+        for law in laws:
+            bounds = law.bounds.get(name)
+            if bounds and not bounds.lower <= value <= bounds.upper:
+                raise UsageError(
+                    f"{name}={value:g}: {law.name} takes {bounds.lower:g} to {bounds.upper:g} {bounds.unit}"
+                )

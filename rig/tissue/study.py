@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-import rig
 from rig.errors import DataError, UsageError
 from rig.progress import Progress, silent
 from rig.recording.sessions import Session
@@ -24,6 +23,7 @@ from rig.trials.cycles import cycle_of
 from rig.trials.findings import SAMPLES_LEFT_OUT, TRIAL_LEFT_OUT
 from rig.trials.reading import trials_of
 from rig.trials.trial import inspect
+from rig.version import SOFTWARE
 
 Laws = Sequence[type[Law]]
 Known = Mapping[str, float]
@@ -168,7 +168,7 @@ def model_of(study: Study, law: str, subject: Mapping[str, object]) -> Model:
             sha256=fingerprint(study.curves),
             subject=str(subject.get("id", "")),
             site=str(subject.get("site", "")),
-            software=f"tissue-rig {rig.__version__}",
+            software=SOFTWARE,
         ),
         quality=_quality(judged),
         control=control_rows(judged, study.force_N),
