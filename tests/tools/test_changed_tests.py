@@ -85,10 +85,11 @@ def test_on_main_the_last_commit_counts(checkout: Path) -> None:
 
 
 def test_what_time_does_not_suffice_for_is_skipped_and_said(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile("import time\ndef test_long(): time.sleep(0.2)\ndef test_left(): assert False\n")
+    pytester.makepyfile("def test_long(clock): clock.append(18.1)\ndef test_left(): assert False\n")
     pytester.makeconftest(
-        "import sys\nfrom tools.changed_tests import Deadline\n"
-        "def pytest_configure(config): config.pluginmanager.register(Deadline(0.1))\n"
+        "import pytest\nfrom tools.changed_tests import Deadline\nCLOCK = [0.0]\n"
+        "def pytest_configure(config): config.pluginmanager.register(Deadline(18.0, lambda: CLOCK[-1]))\n"
+        "@pytest.fixture\ndef clock(): return CLOCK\n"
     )
     answer = pytester.runpytest("-rs", "-p", "no:xdist")
     answer.assert_outcomes(passed=1, skipped=1)
