@@ -1,0 +1,110 @@
+"""A job shows what its operation says, how long it still takes, and what it returned."""
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.http.app import build
+from api.http.service import Service
+from api.operations import motion
+from controller.operation import Operation
+from rig.config.wiring import Wiring
+from rig.errors import SafetyStop
+from rig.results.tracking import Retracted
+from tests.api.test_http_recover import ScriptedBench
+
+Work = Callable[[Operation, object], Retracted]
+
+
+@pytest.fixture
+def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Service:
+    found = Service(Wiring(), tmp_path / "sessions", tmp_path)
+    monkeypatch.setattr(found, "connect", lambda: None)
+    found.bench = ScriptedBench()  # type: ignore[assignment]
+    return found
+
+
+@pytest.fixture
+def client(service: Service) -> TestClient:
+    """In control."""
+    found = TestClient(build(service), base_url="http://127.0.0.1:8000")
+    taken = found.post("/api/v1/control/lease", json={"holder": "test", "ttl_s": 30.0})
+    found.headers["X-Control-Lease"] = taken.json()["lease_id"]
+    return found
+
+
+def ended(client: TestClient, work: Work, monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
+    """A retraction that does ``work`` instead, once its thread has ended."""
+    monkeypatch.setattr(motion, "retract", work)
+    started = client.post("/api/v1/jobs", json={"kind": "retract"}).json()
+    for thread in threading.enumerate():
+        if thread.name == f"job-{started['id']}":
+            thread.join(10.0)
+    found: dict[str, object] = client.get(f"/api/v1/jobs/{started['id']}").json()
+    return found
+
+
+def test_a_job_shows_the_log_and_the_result_of_its_operation(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def work(operation: Operation, _bench: object) -> Retracted:
+        operation.say("the tip leaves", "the tip is out")
+        return Retracted(outcome="complete")
+
+    found = ended(client, work, monkeypatch)
+    assert (found["state"], found["message"], found["time_left_s"]) == ("succeeded", "done", None)
+    assert found["log"] == ["the tip leaves", "the tip is out"]
+    assert found["result"] == {"outcome": "complete"}
+
+
+def test_while_it_runs_the_bench_shows_its_time_left_and_not_its_log(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[dict[str, object]] = []
+
+    def work(operation: Operation, _bench: object) -> Retracted:
+        operation.say("a long log")
+        operation.advance(0.5, "half way")
+        shown.append(client.get("/api/v1/rig").json()["job"])
+        return Retracted(outcome="complete")
+
+    assert ended(client, work, monkeypatch)["log"] == ["a long log"]
+    (now,) = shown
+    assert (now["state"], now["message"], now["log"]) == ("running", "half way", [])
+    assert isinstance(now["time_left_s"], float) and 0 <= now["time_left_s"] < 10
+
+
+@pytest.mark.parametrize(
+    ("error", "state", "message"),
+    [
+        (SafetyStop("stopped: pain stop"), "stopped", "stopped: pain stop"),
+        (ValueError("odd"), "failed", "the job met an error of its own: ValueError: odd"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_job_that_does_not_succeed_says_why(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch, error: Exception, state: str, message: str
+) -> None:
+    def work(_operation: Operation, _bench: object) -> Retracted:
+        raise error
+
+    found = ended(client, work, monkeypatch)
+    assert (found["state"], found["message"], found["result"]) == (state, message, None)
+
+
+def test_a_job_that_is_stopped_is_cancelled_and_the_bench_stops(
+    client: TestClient, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stops: list[str] = []
+    monkeypatch.setattr(ScriptedBench, "stop", lambda _: stops.append("stop"), raising=False)
+
+    def work(operation: Operation, _bench: object) -> Retracted:
+        (job,) = service.jobs
+        client.post(f"/api/v1/jobs/{job}/stop")
+        assert operation.cancelled
+        raise SafetyStop("stopped by the operator")
+
+    assert ended(client, work, monkeypatch)["state"] == "stopped" and stops == ["stop"]
