@@ -117,11 +117,11 @@ def mocks(wiring: Wiring) -> dict[str, Product]:
 
 def _served(device: Product, endpoints: Endpoints) -> Product:
     assert device.mock
-    known: dict[str, object] = {"port": device.mock.address(endpoints)}
+    known = {"port": device.mock.address(endpoints)}
+    if not isinstance(device, Force | Tracker):
+        return device.model_copy(update=known)
     stated_ms = endpoints.latency_ms.get(device.mock.role)
-    if isinstance(device, Force | Tracker):
-        known["latency_ms"] = device.latency_ms or stated_ms
-    return device.model_copy(update=known)
+    return device.model_copy(update=known | {"latency_ms": device.latency_ms or stated_ms})
 
 
 def patient(wiring: Wiring) -> Wiring:

@@ -2,8 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
+from controller.loop.messages import DeviceView
 from rig.results.recorded import CaptureResult
 from rig.results.tracking import Retracted, TrackResult
 
@@ -132,7 +133,7 @@ class RigView(BaseModel):
     rates_Hz: dict[str, float]
     health: dict[str, dict[str, bool]] = Field(description="per stream: alive, valid, on_rate")
     lost: dict[str, str]
-    devices: dict[str, dict[str, object]] = Field(
+    devices: dict[str, DeviceView] = Field(
         description="per role: product, serial, firmware, settings; state (connecting, ok, degraded, lost,"
         " reconnecting, fault), detail, since_ns"
     )
@@ -146,7 +147,7 @@ class ProtocolView(BaseModel):
 
     name: str
     file: str
-    settings: dict[str, object]
+    settings: dict[str, JsonValue]
     refusal: str = Field(description="why it cannot be started on this bench; empty if it can")
 
 

@@ -19,7 +19,7 @@ from api.http.models import (
 from api.http.service import Job, Service
 from controller.devices.health import ALIVE, ON_RATE, VALID
 from controller.experiments.capture import check
-from controller.loop.messages import Status
+from controller.loop.messages import DeviceView, Status
 from controller.recovery.situation import Recovered
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
@@ -132,10 +132,10 @@ def _missing(status: Status) -> str:
     )
 
 
-def _devices(bench: Supervisor, status: Status) -> dict[str, dict[str, object]]:
+def _devices(bench: Supervisor, status: Status) -> dict[str, DeviceView]:
     """Who each device is, and how it is."""
     states = status.get("devices", {})
-    return {role: dict(identity) | states.get(role, {}) for role, identity in bench.ready.devices.items()}
+    return {role: {**identity, **states.get(role, {})} for role, identity in bench.ready.devices.items()}
 
 
 def _health(bits: int) -> dict[str, dict[str, bool]]:

@@ -1,12 +1,12 @@
 """What is seen of each device: by looking at it, or by asking the service that uses the bench."""
 
 from collections.abc import Mapping
-from typing import Any
 
 from api.operations.remote import RemoteBench
 from controller import doctor as examination
 from controller.claims import Holder
 from controller.devices.takeover import STREAMS
+from controller.loop.messages import DeviceView
 from controller.operation import Operation
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed, DeviceError
@@ -24,19 +24,19 @@ def doctor_served(operation: Operation, held: Holder) -> DoctorResult:
         raise DeviceError(held.sentence)
     state = RemoteBench(held.address).state()
     operation.say(f"as the service at {held.address} sees them")
-    if not state["devices"]:
-        raise CheckFailed(f"the service at {held.address} is {state['state']}: {state['reason']}")
-    seen = state["devices"].items()
-    return DoctorResult(devices=tuple(_seen(role, device, state["rates_Hz"]) for role, device in seen))
+    if not state.devices:
+        raise CheckFailed(f"the service at {held.address} is {state.state}: {state.reason}")
+    seen = state.devices.items()
+    return DoctorResult(devices=tuple(_seen(role, device, state.rates_Hz) for role, device in seen))
 
 
-def _seen(role: str, device: Mapping[str, Any], rates_Hz: Mapping[str, float]) -> DeviceReport:
+def _seen(role: str, device: DeviceView, rates_Hz: Mapping[str, float]) -> DeviceReport:
     state = device.get("state", "unknown")
     return DeviceReport(
         role=role,
-        product=str(device["product"]),
-        serial=str(device["serial"]),
-        firmware=str(device["firmware"]),
+        product=device.get("product", ""),
+        serial=device.get("serial", ""),
+        firmware=device.get("firmware", ""),
         rate_Hz=rates_Hz.get(STREAMS[role], 0.0),
         problem="" if state == "ok" else f"{state}: {device.get('detail', '')}",
     )

@@ -2,17 +2,52 @@
 
 import json
 from types import TracebackType
-from typing import Any, Self
+from typing import Self, TypeVar
 from urllib.error import HTTPError, URLError
 from urllib.request import Request, urlopen
 
-from controller.recovery.situation import Consent, Recovered
+from pydantic import BaseModel
+
+from controller.loop.messages import DeviceView
+from controller.recovery.situation import Act, Consent, Recovered
 from rig.errors import DeviceError
 
 # A recovery homes and retracts before it answers.
 ANSWER_S = 180.0
 HOLDER = "rig reset"
 LEASE_S = 30.0
+View = TypeVar("View", bound=BaseModel)
+
+
+class LeaseTaken(BaseModel):
+    """Of a lease, what this command needs; what else the service says is left aside, here as below."""
+
+    lease_id: str = ""
+
+
+class BenchSaid(BaseModel):
+    """The bench as the service shows it."""
+
+    state: str
+    reason: str
+    rates_Hz: dict[str, float]
+    devices: dict[str, DeviceView]
+
+
+class RecoveryQuestion(BaseModel):
+    """A consent that is needed."""
+
+    act: Act
+    question: str
+
+
+class RecoverySaid(BaseModel):
+    """How far recovery went."""
+
+    happened: tuple[str, ...]
+    done: tuple[str, ...]
+    open: tuple[RecoveryQuestion, ...]
+    missing: str
 
 
 class RemoteBench:
@@ -23,43 +58,43 @@ class RemoteBench:
         self._lease = ""
 
     def __enter__(self) -> Self:
-        taken = self._call("POST", "/api/v1/control/lease", {"holder": HOLDER, "ttl_s": LEASE_S})
-        self._lease = str(taken["lease_id"])
+        self._lease = self._call(
+            "POST", "/api/v1/control/lease", LeaseTaken, {"holder": HOLDER, "ttl_s": LEASE_S}
+        ).lease_id
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            self._call("DELETE", "/api/v1/control/lease")
+            self._call("DELETE", "/api/v1/control/lease", LeaseTaken)
         except DeviceError:
             if error is None:
                 raise
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> BenchSaid:
         """The bench as the service shows it."""
-        return self._call("GET", "/api/v1/rig")
+        return self._call("GET", "/api/v1/rig", BenchSaid)
 
     def recover(self, consent: Consent) -> Recovered:
         """The service's own recovery."""
         agreed = {"clear": consent.clear, "retract": consent.retract, "home": consent.home}
-        found = self._call("POST", "/api/v1/recover", agreed)
-        asked = tuple((question["act"], question["question"]) for question in found["open"])
-        return Recovered(tuple(found["happened"]), tuple(found["done"]), asked, found["missing"])
+        found = self._call("POST", "/api/v1/recover", RecoverySaid, agreed)
+        asked = tuple((question.act, question.question) for question in found.open)
+        return Recovered(found.happened, found.done, asked, found.missing)
 
-    def _call(self, method: str, path: str, body: object = None) -> dict[str, Any]:
+    def _call(self, method: str, path: str, kind: type[View], body: object = None) -> View:
         data = None if body is None else json.dumps(body).encode()
         headers = {"Content-Type": "application/json", "X-Control-Lease": self._lease}
         try:
             with urlopen(Request(self.address + path, data, headers, method=method), timeout=ANSWER_S) as reply:
-                answer: dict[str, Any] = json.load(reply)
+                return kind.model_validate_json(reply.read())
         except HTTPError as refusal:
             raise DeviceError(f"the service at {self.address} refuses: {_detail(refusal)}") from refusal
         except (URLError, OSError, ValueError) as error:
             raise DeviceError(
                 f"the service at {self.address} uses the bench and does not answer ({error}); end it, then try again"
             ) from error
-        return answer
 
 
 def _detail(refusal: HTTPError) -> str:

@@ -12,6 +12,7 @@ from controller.devices.connections import of_axis, of_stream
 from controller.devices.drivers import Devices
 from controller.devices.health import IDENTICAL_LIMIT, StreamHealth
 from controller.devices.states import DeviceStatus, Observation, State
+from controller.loop.messages import DeviceShown
 from controller.loop.steps import Program, Retract
 from controller.safety.table import Action, Incident
 from drivers.roles import Device
@@ -89,7 +90,7 @@ def said(loop: "BenchLoop", role: str, status: DeviceStatus) -> None:
     loop.event(level, "device_state", f"{role} {status.state}: {status.detail}".rstrip(": "), loop.state.now_ns)
 
 
-def as_status(statuses: Iterable[tuple[str, DeviceStatus]]) -> dict[str, dict[str, object]]:
+def as_status(statuses: Iterable[tuple[str, DeviceStatus]]) -> dict[str, DeviceShown]:
     """Role -> state, detail and since [ns], for the loop's status."""
     return {
         role: {"state": str(status.state), "detail": status.detail, "since_ns": status.since_ns}

@@ -2,17 +2,66 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from pydantic import Field
+from typing_extensions import TypedDict
 
 from controller.loop.paired_samples import Touch
 from controller.loop.steps import Program
 from controller.recovery.situation import Act, Situation
 from rig.channel import Message, Reply
 
-Status = dict[str, Any]
-"""The loop as of one moment, for people to see; what decides anything has a message of its own."""
+
+class DeviceFound(TypedDict, total=False):
+    """Who a device says it is."""
+
+    product: str
+    serial: str
+    firmware: str
+    settings: dict[str, str]
+
+
+class DeviceShown(TypedDict, total=False):
+    """How a device is, and since when [ns]."""
+
+    state: str
+    detail: str
+    since_ns: int
+
+
+class DeviceView(DeviceFound, DeviceShown, total=False):
+    """Who a device is, and how it is."""
+
+
+class Latched(TypedDict, total=False):
+    """What stopped motion; ``action`` is the name of what was done."""
+
+    code: str
+    text: str
+    action: str
+
+
+class Status(TypedDict, total=False):
+    """The loop as of one moment, for people to see; what decides anything has a message of its own."""
+
+    time_ns: int
+    mode: str
+    busy: bool
+    step: int
+    health: int
+    missed: int
+    ticks: int
+    force_N: float | None
+    peak_force_N: float | None
+    reference_N: float | None
+    position_mm: float | None
+    depth_mm: float | None
+    rates_Hz: dict[str, float]
+    lost: dict[str, str]
+    devices: dict[str, DeviceShown]
+    ready: bool
+    latched: Latched | None
 
 
 @dataclass(frozen=True)
@@ -71,7 +120,7 @@ class Ready(Message):
     """What the loop found when it started."""
 
     TYPE: ClassVar[int] = 20
-    devices: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    devices: dict[str, DeviceFound] = Field(default_factory=dict)
     realtime: dict[str, str] = Field(default_factory=dict)
 
 

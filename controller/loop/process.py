@@ -11,7 +11,6 @@ import signal
 import socket
 import sys
 import time
-from dataclasses import asdict
 from pathlib import Path
 
 from controller.devices.absent import start_what_answers
@@ -20,12 +19,12 @@ from controller.loop import realtime
 from controller.loop.bench_loop import BenchLoop
 from controller.loop.commands import Inbox
 from controller.loop.executive import Executive, sleep_then_spin
-from controller.loop.messages import TO_LOOP, Failed, Ready
+from controller.loop.messages import TO_LOOP, DeviceFound, Failed, Ready
 from controller.loop.touch import warm_up
 from controller.safety.table import TABLE, Check
 from controller.stop.start import StartGuard
 from controller.stop.word import Responder, StopWord
-from drivers.roles import ServoAxis
+from drivers.roles import Identity, ServoAxis
 from rig.channel import Channel
 from rig.config.wiring import Wiring
 from rig.errors import RigError, SafetyStop
@@ -91,6 +90,10 @@ def _prepare(axis: ServoAxis, held: str) -> str:
     return held
 
 
+def _found(device: Identity) -> DeviceFound:
+    return DeviceFound(product=device.product, serial=device.serial, firmware=device.firmware, settings=device.settings)
+
+
 def _run(
     wiring: Wiring,
     devices: Devices,
@@ -101,8 +104,8 @@ def _run(
     table: tuple[Check, ...],
     held: str,
 ) -> None:
-    identities = {role: asdict(device.identity) for role, device in devices.by_role().items()}
-    channel.send(Ready(devices=identities, realtime=granted))
+    found = {role: _found(device.identity) for role, device in devices.by_role().items()}
+    channel.send(Ready(devices=found, realtime=granted))
     opens = openers(wiring, inbox.interruption)
     loop = BenchLoop(wiring, devices, ring, channel, inbox, time.monotonic_ns, table, opens, held)
     pause = sleep_then_spin(realtime.spin_ns(granted))

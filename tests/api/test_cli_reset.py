@@ -97,12 +97,15 @@ class FakeService(BaseHTTPRequestHandler):
         body = json.loads(self.rfile.read(length)) if length else None
         self.requests.append((self.command, self.path, body, self.headers.get("X-Control-Lease", "")))
         answers = {
-            "/api/v1/control/lease": {"lease_id": "abc"},
+            "/api/v1/control/lease": {"lease_id": "abc", "holder": "h", "since": "noon", "ttl_s": 30.0, "left_s": 30.0},
             "/api/v1/recover": {
                 "happened": ["it fell"], "done": ["it stands"], "open": [], "missing": "", "ready": True
             },
             "/api/v1/rig": {
-                "state": "not ready", "reason": "", "rates_Hz": {"force": 1000.0, "axis": 999.0, "marker": 60.0},
+                "state": "not ready", "reason": "", "ready": False, "mode": "safe", "time_ns": 1, "force_N": None,
+                "reference_N": None, "position_mm": None, "depth_mm": None, "missed": 0, "ticks": 1, "health": {},
+                "lost": {}, "limits": {}, "control": {"holder": "", "since": "", "left_s": 0.0}, "job": None,
+                "rates_Hz": {"force": 1000.0, "axis": 999.0, "marker": 60.0},
                 "devices": {
                     "force": {"product": "BFT", "serial": "1", "firmware": "2", "state": "ok", "detail": ""},
                     "tracker": {"product": "NDI", "serial": "3", "firmware": "4", "state": "lost", "detail": "silent"},

@@ -8,6 +8,7 @@ from fastapi.testclient import TestClient
 
 from api.http.app import build
 from api.http.service import Service
+from controller.loop.messages import Status
 from controller.operation import Operation
 from controller.recovery.situation import Consent, Recovered
 from rig.config.wiring import Wiring
@@ -22,7 +23,7 @@ class ScriptedBench:
 
     def __init__(self, alive: bool = True) -> None:
         self.alive, self.consents, self.failure = alive, list[Consent](), ""
-        self.status: dict[str, Any] = {"mode": "safe", "ready": False}
+        self.status: Status = {"mode": "safe", "ready": False}
         self.ready = type("Ready", (), {"devices": {"force": {"product": "BFT"}, "axis": {"product": "EPOS4"}}})()
         self.stop_port = 0
 

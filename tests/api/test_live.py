@@ -3,11 +3,12 @@
 import os
 import signal
 import threading
-from typing import Any, cast
+from typing import cast
 
 import pytest
 
 from api.cli import live
+from controller.loop.messages import Status
 from controller.operation import Operation
 from controller.supervisor import Supervisor
 from rig.errors import SafetyStop
@@ -15,7 +16,7 @@ from rig.errors import SafetyStop
 
 class StoppableBench:
     def __init__(self) -> None:
-        self.status: dict[str, Any] = {}
+        self.status: Status = {}
         self.stopped = threading.Event()
 
     def stop(self) -> None:

@@ -27,6 +27,7 @@ from controller.loop.messages import (
     Reset,
     Run,
     Shutdown,
+    Status,
     StatusSaid,
     Stopped,
     Survey,
@@ -140,7 +141,7 @@ class FakeLink:
 
     inbox: deque[Message] = field(default_factory=deque)
     sent: list[Message] = field(default_factory=list)
-    statuses: list[dict[str, Any]] = field(default_factory=list)
+    statuses: list[Status] = field(default_factory=list)
     flushes: int = 0
     lost: bool = False
     refused: int = 0

@@ -12,12 +12,14 @@ from typing import Any
 
 from controller.loop.messages import (
     TO_LOOP,
+    DeviceFound,
     Finished,
     Outcome,
     Ready,
     Reset,
     Run,
     Shutdown,
+    Status,
     StatusSaid,
 )
 from controller.loop.steps import Program, Zero
@@ -27,7 +29,7 @@ from rig.config.wiring import Wiring
 
 PROGRAM = Program(name="zero", steps=(Zero(duration_s=0.1),))
 OUTCOME = Outcome("complete", "", 1.0, None, None)
-DEVICES = {"force": {"product": "p"}}
+DEVICES = {"force": DeviceFound(product="p")}
 
 
 class PlayedLoop(threading.Thread):
@@ -134,7 +136,7 @@ class Surroundings:
     """What the supervisor finds around it."""
 
     first: Message = field(default_factory=lambda: Ready(devices=DEVICES, realtime={"core": "1"}))
-    status: dict[str, Any] = field(default_factory=lambda: {"ready": True, "busy": False, "latched": None})
+    status: Status = field(default_factory=lambda: Status(ready=True, busy=False, latched=None))
     reply: Callable[[PlayedLoop, Received], None] = field(default=obedient)
     exit_code: int = 0
     hangs: bool = False

@@ -141,7 +141,8 @@ def test_a_foot_switch_retracts_and_the_supervisors_own_lane_answers_too(bench: 
     with Supervisor(wiring) as rig:
         os.write(writer, struct.pack("<qqHHi", 0, 0, 1, 48, 1))
         until(lambda: rig.status.get("latched"), PATIENCE_S, "the stop")
-        assert rig.status["latched"]["code"] == "pain_stop"
+        latched = rig.status["latched"]
+        assert latched and latched["code"] == "pain_stop"
         rig.reset()
         answer = rig.stops.confirmed(rig.stops.request(Kind.EMERGENCY), PATIENCE_S)
         assert answer is not None

@@ -90,7 +90,7 @@ class ScriptedBench:
     """Shows one situation after the other, a new one after each act."""
 
     situations: list[Situation]
-    status: Status = field(default_factory=lambda: {"devices": {"force": {"state": "ok", "detail": ""}}})
+    status: Status = field(default_factory=lambda: Status(devices={"force": {"state": "ok", "detail": ""}}))
     away: Iterable[str] = ()
     acts: list[str] = field(default_factory=list)
 
@@ -160,7 +160,7 @@ def test_an_axis_that_does_not_answer_is_named_with_the_next_step() -> None:
 
 
 def test_a_sensor_that_stays_away_is_named_and_the_bench_is_not_ready() -> None:
-    status = {"devices": {"force": {"state": "reconnecting", "detail": "unplugged"}}}
+    status: Status = {"devices": {"force": {"state": "reconnecting", "detail": "unplugged"}}}
     found = recover(ScriptedBench([WELL], status, away=["force"]), ALL)
     assert found.missing == "force is reconnecting: unplugged"
     assert not found.ready
@@ -200,7 +200,7 @@ def test_a_loop_on_a_drive_in_fault_moves_nothing_and_says_what_happened() -> No
     assert not bench.axis.commands
     assert bench.axis.position_mm == 25.0
     status = bench.link.statuses[-1]
-    assert status["latched"]["code"] == "recovery"
+    assert status["latched"] and status["latched"]["code"] == "recovery"
     assert status["devices"]["axis"]["state"] == "fault"
     assert not status["ready"]
     now = surveyed(bench)

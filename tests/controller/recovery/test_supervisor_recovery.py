@@ -1,7 +1,6 @@
 """The supervisor before and after a crash: what it refuses, what it notes for the next, and recovery with its loop."""
 
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -10,6 +9,7 @@ from controller.loop.messages import (
     Recover,
     Reset,
     Run,
+    Status,
     Survey,
     Surveyed,
 )
@@ -20,7 +20,9 @@ from rig.config.wiring import Wiring
 from rig.errors import DeviceError
 from tests.controller.played_loop import PROGRAM, PlayedLoop, Surroundings, obedient
 
-HELD = {"ready": False, "latched": {"code": "recovery", "text": "the drive was in fault", "action": "IMMEDIATE"}}
+HELD: Status = {
+    "ready": False, "latched": {"code": "recovery", "text": "the drive was in fault", "action": "IMMEDIATE"}
+}  # fmt: skip
 
 
 def test_a_bench_that_waits_for_recovery_is_refused_to_whoever_did_not_come_for_it(around: Surroundings) -> None:
@@ -59,7 +61,7 @@ def test_whoever_comes_for_recovery_moves_nothing_at_the_start(around: Surroundi
     ],
 )
 def test_a_session_that_may_have_left_the_tip_inside_is_told_to_the_next(
-    around: Surroundings, status: dict[str, Any], exit_code: int, told: bool
+    around: Surroundings, status: Status, exit_code: int, told: bool
 ) -> None:
     around.status, around.exit_code = status, exit_code
     Supervisor(Wiring(), waiting=True).__enter__().close()
@@ -94,7 +96,7 @@ def recovering(loop: PlayedLoop, received: Received) -> None:
 
 
 def test_a_recovery_is_a_conversation_with_the_loop_after_which_nothing_is_noted_any_more(around: Surroundings) -> None:
-    around.status, around.reply = HELD | {"devices": {"axis": {"state": "degraded", "detail": ""}}}, recovering
+    around.status, around.reply = {**HELD, "devices": {"axis": {"state": "degraded", "detail": ""}}}, recovering
     bench = Supervisor(Wiring(), waiting=True)
     bench.start()
     assert bench.recover(Consent()).open[0][0] == "retract"
