@@ -18,7 +18,7 @@ from rig.recording.sessions import Session, open_session
 from rig.recording.slope import TIP_TOOL
 from rig.trials.findings import UNREADABLE, Array, Finding
 from rig.trials.quality import quality_of
-from rig.trials.recorded import in_time, late, trial_of
+from rig.trials.recorded import in_time, late, shifted, start_ns, trial_of
 from rig.trials.stacked import read_stacked, stacked_file
 from rig.trials.trial import Trial, TrialSet
 
@@ -40,29 +40,29 @@ def read_trials(folder: Path, columns: tuple[str, ...] = (), only: str = "") -> 
 def trials_of(session: Session) -> TrialSet:
     """Every trial of a session that opens and is not bad, on the clock of the first; no runs of force tracking."""
     findings = [Finding("", "session", "incomplete", remark) for remark in session.remarks]
-    recordings = {}
-    for trial in session.trials:
+    trials, starts_ns, stated = [], [], set()
+    for info in session.trials:
         try:
-            recording = session.recording(trial.name)
-            found = None if recording.tracks_force else quality_of(recording, trial)
+            recording = session.recording(info.name)
+            if recording.tracks_force:
+                continue
+            found = quality_of(recording, info)
+            trial = trial_of(info.name, recording)
         except RigError as error:
-            findings.append(Finding(trial.name, "recording", UNREADABLE, str(error)))
+            findings.append(Finding(info.name, "recording", UNREADABLE, str(error)))
             continue
         if found and found.reasons:
-            findings.append(Finding(trial.name, "recording", f"quality_{found.verdict}", found.sentence))
-        if not recording.tracks_force and (found is None or found.verdict != "bad"):
-            recordings[trial.name] = recording
-    starts = [int(force["capture_ns"][0]) for r in recordings.values() if len(force := r.tables["force"])]
-    trials = []
-    for name, recording in recordings.items():
-        try:
-            trials.append(trial_of(name, recording, min(starts, default=0)))
-            findings += late(name, recording.tables["axis"])
-        except RigError as error:
-            findings.append(Finding(name, "recording", UNREADABLE, str(error)))
-    stated = {r.metadata.get("calibration", {}).get("surface_mm", "") for r in recordings.values()}
+            findings.append(Finding(info.name, "recording", f"quality_{found.verdict}", found.sentence))
+        if found is None or found.verdict != "bad":
+            trials.append(trial)
+            starts_ns.append(start_ns(recording))
+            findings += late(info.name, recording.tables["axis"])
+            stated.add(recording.metadata.get("calibration", {}).get("surface_mm", ""))
+    pairs = list(zip(trials, starts_ns, strict=True))
+    first_ns = min((start for trial, start in pairs if trial.force_s.size), default=0)
+    on_one_clock = (shifted(trial, start - first_ns) for trial, start in pairs)
     surface = float(stated.pop()) if len(stated) == 1 and "" not in stated else None
-    return TrialSet(session.folder.name, tuple(trials), surface, tuple(findings))
+    return TrialSet(session.folder.name, tuple(on_one_clock), surface, tuple(findings))
 
 
 def trials_in_csv(folder: Path, columns: tuple[str, ...] = ()) -> TrialSet:

@@ -1,6 +1,7 @@
 """One trial from its recording, as the devices vouch for it."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +19,8 @@ LATE_NS = 500_000
 MOST_LATE = 0.01
 
 
-def trial_of(name: str, recording: Recording, start_ns: int | None = None) -> Trial:
-    """The trial in a recording, samples the devices vouch for, on a clock that starts at ``start_ns``, else with it.
+def trial_of(name: str, recording: Recording) -> Trial:
+    """The trial in a recording, samples the devices vouch for, on a clock that starts with it.
 
     The tip is tool 0 of the tracker. Raises DataError where the metadata do not say what was recorded.
     """
@@ -27,7 +28,7 @@ def trial_of(name: str, recording: Recording, start_ns: int | None = None) -> Tr
     sound, moving = force["valid"] != 0, (axis["valid"] != 0) & in_time(axis["capture_ns"], axis["arrival_ns"])
     seen = (marker["tool"] == TIP_TOOL) & (marker["valid"] != 0)
     temperature = force["temperature_C"][sound]
-    start = start_ns if start_ns is not None else int(force["capture_ns"][0]) if len(force) else 0
+    start = start_ns(recording)
     return Trial(
         name,
         (force["capture_ns"][sound] - start) * NS,
@@ -39,6 +40,23 @@ def trial_of(name: str, recording: Recording, start_ns: int | None = None) -> Tr
         temperature if temperature.size and np.isfinite(temperature).all() else None,
         _nominal_speed(name, recording.metadata),
     )
+
+
+def start_ns(recording: Recording) -> int:
+    """When force was first sensed; 0 where it never was."""
+    force = recording.tables["force"]
+    return int(force["capture_ns"][0]) if len(force) else 0
+
+
+def shifted(trial: Trial, by_ns: int) -> Trial:
+    """The trial on a clock that started ``by_ns`` earlier; its times are whole nanoseconds, and stay so."""
+    force_s, axis_s = (_later(at_s, by_ns) for at_s in (trial.force_s, trial.axis_s))
+    marker_s = None if trial.marker_s is None else _later(trial.marker_s, by_ns)
+    return replace(trial, force_s=force_s, axis_s=axis_s, marker_s=marker_s)
+
+
+def _later(at_s: Array, by_ns: int) -> Array:
+    return np.asarray((np.rint(at_s / NS) + by_ns) * NS)
 
 
 def _nominal_speed(name: str, metadata: Mapping[str, Mapping[str, str]]) -> float:
