@@ -12,6 +12,7 @@ from sphinx.application import Sphinx
 from sphinx.util.typing import ExtensionMetadata
 from typer.testing import CliRunner
 
+import rig
 from api.cli.app import COMMANDS, build
 from api.http import app as service
 from api.http.service import Service
@@ -23,6 +24,7 @@ from rig.diagnosis.effects.registry import CAUSES
 from rig.tissue.registry import LAWS
 from tools.causes import causes as causes_of
 from tools.http_routes import routes
+from tools.interface import interface
 from tools.keys import tables
 from tools.laws import laws as laws_of
 from tools.schemas import WRITTEN
@@ -79,10 +81,16 @@ def causes() -> str:
     return causes_of(list(CAUSES.values()))
 
 
+def python() -> str:
+    """Everything that `import rig` offers."""
+    return interface(rig)
+
+
 GENERATORS: dict[str, Callable[[], str]] = {
     "wiring": wiring, "protocol": protocol, "commands": commands, "schemas": schemas,
     "http": http,
     "laws": laws,
+    "python": python,
     "causes": causes,
 }  # fmt: skip
 

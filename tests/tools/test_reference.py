@@ -155,6 +155,16 @@ def test_a_cause_stands_in_the_reference_with_its_smallest_size_and_what_to_do()
     assert all(f"| `{key}` |" in text for key in CAUSES)
 
 
+def test_what_import_rig_offers_stands_in_the_reference() -> None:
+    text = fill("<!-- generated: python -->")
+    assert "## `rig.open(folder: str | Path) -> SessionData`" in text
+    assert "Raises DataError where there is none." in text
+    trial = text.partition("## class `rig.TrialData`\n")[2].partition("\n## ")[0]
+    assert "### `arrow(stream: str='force') -> pa.Table`" in trial
+    assert "### `name`\n" in trial
+    assert "self" not in trial
+
+
 def test_a_mark_without_a_generator_is_an_error() -> None:
     with pytest.raises(KeyError):
         fill("<!-- generated: nothing -->")
