@@ -28,10 +28,10 @@ from pydantic_core import to_jsonable_python
 from mock_devices import dials
 from mock_devices.bench import Bench
 from mock_devices.faults.wires import Fault, Value
-from mock_devices.names import known
 from mock_devices.physics.effects import parse_hidden
 from rig.channel import Answer, Channel, Message, Received, Reply
 from rig.errors import DeviceError, RigError, UsageError
+from rig.registry import known
 
 CLIENT_TIMEOUT_S = 10.0
 TIMES_AT_ONCE = 1000

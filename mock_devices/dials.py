@@ -5,8 +5,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from mock_devices.bench import Bench
-from mock_devices.names import known
 from rig.errors import UsageError
+from rig.registry import known
 
 Value = float | bool
 

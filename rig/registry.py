@@ -14,6 +14,18 @@ def nearest(name: str, names: Iterable[str]) -> str:
     return difflib.get_close_matches(name, list(names), n=1, cutoff=0.0)[0]
 
 
+def known(name: str, names: Iterable[str], what: str) -> str:
+    """``name`` where it is one of ``names``; raises UsageError naming ``what`` it should be and the nearest one."""
+    choices = list(names)
+    if name in choices:
+        return name
+    if not choices:
+        raise UsageError(f"unknown {what} {name!r}; there is no {what} here")
+    raise UsageError(
+        f"unknown {what} {name!r}; nearest valid {what}: {nearest(name, choices)}; all: {', '.join(choices)}"
+    )
+
+
 class Registry(Mapping[str, Item], Generic[Item]):
     """Declarations in the order in which they were registered; ``what`` is what one of them is called in messages."""
 
@@ -33,11 +45,7 @@ class Registry(Mapping[str, Item], Generic[Item]):
 
     def named(self, name: str) -> Item:
         """The item called so; raises UsageError with the nearest name and all of them."""
-        if name not in self._items:
-            raise UsageError(
-                f"no {self._what} is called {name!r}; nearest: {nearest(name, self)}; all: {', '.join(sorted(self))}"
-            )
-        return self._items[name]
+        return self._items[known(name, self, self._what)]
 
     def __getitem__(self, name: str) -> Item:
         """The item called so; raises KeyError."""

@@ -7,7 +7,6 @@ defaults; ``friction`` alone takes all defaults.
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
 
-from mock_devices.names import known
 from mock_devices.physics.chain import HiddenEffect, Knob
 from mock_devices.physics.effects_motion import (
     Backlash,
@@ -35,6 +34,7 @@ from mock_devices.physics.effects_tissue import (
     Substrate,
 )
 from rig.errors import UsageError
+from rig.registry import known
 
 Hidden = dict[str, dict[str, float]]
 

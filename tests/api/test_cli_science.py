@@ -97,9 +97,9 @@ def test_fit_of_every_law_draws_them_all(session: Path, tmp_path: Path) -> None:
 
 
 BAD = [
-    (["--laws", "cubic"], r"no tissue law is called 'cubic'; nearest: .*; all: .*fung.*sls"),
+    (["--laws", "cubic"], r"unknown tissue law 'cubic'; nearest .*; all: .*fung.*sls"),
     (["--with", "nowhere.json"], r"nowhere.json: no such file"),
-    (["--model", "cubic"], r"no tissue law is called 'cubic'"),
+    (["--model", "cubic"], r"unknown tissue law 'cubic'"),
     (["--known", "k=1"], r"--known k=1: the laws compared have k_N_mm, damping_N_s_mm, a_N_mm, b_per_mm; add"),
     (["--known", "k_N_mm=soft"], r"--known k_N_mm=soft: write NAME=NUMBER"),
     (["--known", "k_N_mm=nan"], r"--known k_N_mm=nan: constant takes 1e-06 to 10000 N/mm"),

@@ -98,6 +98,6 @@ def test_a_name_is_registered_once() -> None:
     products = Registry[type[Product]]("force sensor", name_of, FORCE_SENSORS.values())
     with pytest.raises(ValueError, match="there is a force sensor 'robotiq-ft300' already"):
         products.register(Ft300Wiring)
-    with pytest.raises(UsageError, match=r"no force sensor is called 'bota'; nearest: bota-sensone; all: bota"):
+    with pytest.raises(UsageError, match=r"unknown force sensor 'bota'; nearest .*: bota-sensone; all: bota"):
         products.named("bota")
     assert choice_of({"one": Ft300Wiring}) is Ft300Wiring

@@ -123,7 +123,7 @@ def test_the_guess_finds_noiseless_data_at_once(kind: type[Law]) -> None:
 
 def test_laws_are_found_by_name_and_a_wrong_name_lists_them() -> None:
     assert LAWS["index"] is law_named("index") is Index
-    with pytest.raises(UsageError, match=r"no tissue law is called 'indx'; nearest: index; all: constant, .*index"):
+    with pytest.raises(UsageError, match=r"unknown tissue law 'indx'; nearest .*: index; all: constant, index"):
         law_named("indx")
 
 

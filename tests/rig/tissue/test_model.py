@@ -133,7 +133,7 @@ BAD: list[tuple[str, Edit, str]] = [
     ("other format", lambda v: v.update(format="recipe"), r"is not a tissue model"),
     ("other version", lambda v: v.update(version=3), r"model version 3 is neither 1 nor 2"),
     ("no version", lambda v: v.pop("version"), r"model version None is neither"),
-    ("unknown law", lambda v: v.update(law="cubic"), r"no tissue law is called 'cubic'"),
+    ("unknown law", lambda v: v.update(law="cubic"), r"unknown tissue law 'cubic'"),
     (
         "missing parameter",
         lambda v: v["parameters"].pop("a_N_mm"),
