@@ -142,9 +142,9 @@ def test_a_fit_is_made_once_for_results_and_pictures(session: SessionData, monke
     assert session.fit().closest
 
 
-def test_the_diagnosis_says_how_far_it_is_and_what_it_found(session: SessionData) -> None:
-    told: list[float] = []
-    found = session.diagnose(progress=lambda _, share: told.append(share))
-    assert found.recordings == len(session.trials)
-    assert found.statement
-    assert told == sorted(told)
+def test_the_diagnosis_of_too_few_trials_says_so(tmp_path: Path) -> None:
+    """A whole one is made by the notebook of the tutorial, which is run too."""
+    cycles = Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0,))
+    found = rig.open(write_made_session(tmp_path / "one", cycles)).diagnose()
+    assert (found.verdict, found.recordings) == ("unexplained", 1)
+    assert found.statement.startswith("Nothing could be judged: 1 recording of one")
