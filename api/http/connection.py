@@ -3,7 +3,7 @@
 import asyncio
 import socket
 import struct
-from typing import Any, ClassVar
+from typing import ClassVar, TypedDict
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
@@ -63,6 +63,15 @@ class ImpatientProtocol(H11Protocol):
             self._reading = None
 
 
-def server_settings() -> dict[str, Any]:
+class ServerSettings(TypedDict):
+    """Keywords of `uvicorn.Config`."""
+
+    http: type[ImpatientProtocol]
+    timeout_keep_alive: int
+    backlog: int
+    log_level: str
+
+
+def server_settings() -> ServerSettings:
     """What `uvicorn.Config` needs so that no client can hold the service up."""
     return {"http": ImpatientProtocol, "timeout_keep_alive": 5, "backlog": 128, "log_level": "warning"}

@@ -45,10 +45,9 @@ class ServedRig:
     def rig(self) -> dict[str, Any]:
         """The bench as it shows it; empty while it does not listen yet."""
         try:
-            shown: dict[str, Any] = self.ask("GET", "/rig")
+            return dict(self.ask("GET", "/rig"))
         except OSError:
             return {}
-        return shown
 
     def becomes(self, state: str) -> None:
         """Waits for that state; fails with what a service that ended has said."""

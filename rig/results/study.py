@@ -16,7 +16,9 @@ FRICTION = "friction shows at reversals: curves of loading say nothing for or ag
 
 def fit_result(study: Study, model: str, model_law: str, known: Known, recordings: Mapping[str, str]) -> FitResult:
     """The study as it is saved; ``model`` is the file that holds ``model_law``, ``recordings`` name and hash."""
-    fields: dict[str, object] = {
+    laws = {name: law_result(judged, study.force_N) for name, judged in study.judged.items()}
+    return FitResult.model_validate({
+        **laws,
         "session": study.session,
         "trials": [curve.name for curve in study.curves],
         "skipped": study.skipped,
@@ -30,9 +32,7 @@ def fit_result(study: Study, model: str, model_law: str, known: Known, recording
         "recordings": recordings,
         "remarks": [FRICTION] if any(judged.law.friction[0] for judged in study.judged.values()) else [],
         "data_quality": merged([finding for curve in study.curves for finding in curve.findings]),
-    }
-    laws = {name: law_result(judged, study.force_N) for name, judged in study.judged.items()}
-    return FitResult.model_validate(fields | laws)
+    })  # fmt: skip
 
 
 def law_result(judged: Judged, force_N: FloatArray) -> LawResult:
