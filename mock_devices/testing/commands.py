@@ -159,6 +159,14 @@ def freed(bench: ServedBench) -> None:
     until(lambda: bench.control.number("tip.force_N") == 0.0, PATIENCE_S, "the tip out of contact")
 
 
+def stands_still(bench: ServedBench, within_mm: float = 0.02) -> None:
+    """Sees that the axis does not move for 0.3 s of the bench's own time, however slow the computer is."""
+    stood_mm, until_s = bench.control.number("axis.position_mm"), bench.control.number("time_s") + 0.3
+    until(lambda: bench.control.number("time_s") > until_s, PATIENCE_S, "the bench 0.3 s on")
+    moved_mm = bench.control.number("axis.position_mm") - stood_mm
+    assert abs(moved_mm) <= within_mm, f"the axis moved by {moved_mm:.3f} mm"
+
+
 def rig(*arguments: str | Path, folder: Path, timeout_s: float = 90.0) -> Said:
     """Runs a `rig` command to its end."""
     return Running(arguments, folder).end(timeout_s)

@@ -3,12 +3,22 @@
 import os
 import resource
 import signal
-import time
 from pathlib import Path
 
 import pytest
 
-from mock_devices.testing.commands import EXAMPLES, Running, Said, ServedBench, children, freed, pressed, rig, until
+from mock_devices.testing.commands import (
+    EXAMPLES,
+    Running,
+    Said,
+    ServedBench,
+    children,
+    freed,
+    pressed,
+    rig,
+    stands_still,
+    until,
+)
 from rig.recording.reader import read_recording
 from rig.recording.sessions import open_session
 
@@ -29,12 +39,6 @@ def protocol(tmp_path: Path) -> Path:
 
 def capture(bench: ServedBench, protocol: Path, tmp_path: Path, *more: str) -> Running:
     return Running(["capture", protocol, "--out", tmp_path / "session", *bench.settings(*more)], tmp_path)
-
-
-def at_rest(bench: ServedBench) -> None:
-    first = bench.control.number("axis.position_mm")
-    time.sleep(0.3)
-    assert bench.control.number("axis.position_mm") == pytest.approx(first, abs=0.02)
 
 
 def ended_safely(said: Said, tmp_path: Path, code: int, *words: str) -> None:
@@ -149,7 +153,7 @@ def test_a_cut_cable_of_the_axis_ends_with_the_drive_stopped_by_itself(
     pressed(bench)
     bench.control.fault("axis", "cut", True)
     ended_safely(running.end(), tmp_path, 3, "axis lost")
-    at_rest(bench)
+    stands_still(bench)
 
 
 def test_an_axis_that_goes_on_naming_one_place_is_stopped(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
@@ -157,7 +161,7 @@ def test_an_axis_that_goes_on_naming_one_place_is_stopped(bench: ServedBench, pr
     pressed(bench)
     bench.control.fault("axis", "frozen", True)
     ended_safely(running.end(), tmp_path, 3, "position is frozen")
-    at_rest(bench)
+    stands_still(bench)
 
 
 def test_a_drive_fault_stops_at_once(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
@@ -165,7 +169,7 @@ def test_a_drive_fault_stops_at_once(bench: ServedBench, protocol: Path, tmp_pat
     pressed(bench)
     bench.control.fault("axis", "error", 0x2310)
     ended_safely(running.end(), tmp_path, 3, "drive reports")
-    at_rest(bench)
+    stands_still(bench)
 
 
 def test_the_limb_pressing_back_beyond_the_limit_retracts(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:
@@ -193,7 +197,7 @@ def test_a_key_in_the_terminal_stops(bench: ServedBench, protocol: Path, tmp_pat
     pressed(bench)
     os.write(ours, key.encode())
     ended_safely(running.end(), tmp_path, 3, cause)
-    at_rest(bench)
+    stands_still(bench)
     os.close(ours)
     os.close(theirs)
 
@@ -217,7 +221,7 @@ def test_a_killed_loop_leaves_a_stopped_drive_and_an_open_recording(
     (loop,) = children(running.process.pid, LOOP)
     os.kill(loop, signal.SIGKILL)
     ended_safely(running.end(), tmp_path, 1, "killed by signal 9")
-    at_rest(bench)
+    stands_still(bench)
 
 
 def test_a_killed_recorder_stops_the_motion(bench: ServedBench, protocol: Path, tmp_path: Path) -> None:

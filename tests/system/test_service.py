@@ -1,6 +1,5 @@
 """The service over a real mock bench: what a lab's UI does, in the order in which it does it."""
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,7 +12,16 @@ from api.http.app import build
 from api.http.lease import Control
 from api.http.service import Service
 from mock_devices.testing.clock import Clock
-from mock_devices.testing.commands import PATIENCE_S, PATIENT, ServedBench, freed, pressed, served_bench, until
+from mock_devices.testing.commands import (
+    PATIENCE_S,
+    PATIENT,
+    ServedBench,
+    freed,
+    pressed,
+    served_bench,
+    stands_still,
+    until,
+)
 from rig.recording.reader import read_recording
 
 SLOW = (
@@ -133,7 +141,7 @@ def test_the_emergency_stop_holds_until_acknowledged_and_moves_nothing_then(
     assert ended(client, refused.json()["id"])["state"] == "stopped"
     before_mm = bench.control.number("axis.position_mm")
     reset(client)
-    time.sleep(0.3)
+    stands_still(bench)
     assert bench.control.number("axis.position_mm") == pytest.approx(before_mm, abs=0.05)
     assert bench.control.number("tip.force_N") > 0.5
     out = client.post("/api/v1/jobs", json={"kind": "retract"})

@@ -25,6 +25,7 @@ from mock_devices.testing.commands import (
     children,
     freed,
     pressed,
+    stands_still,
     until,
 )
 from mock_devices.testing.service import ServedRig
@@ -127,9 +128,7 @@ def test_a_stop_while_the_axis_homes_brakes_it_and_ends_the_start(bench: ServedB
     starting.join(30)
     assert (status, said["done"]) == (200, "braked while the drive moved by itself: nothing starts")
     assert "stopped on request" in str(errors[0])
-    stood_mm = bench.control.number("axis.position_mm")
-    time.sleep(0.3)
-    assert bench.control.number("axis.position_mm") == pytest.approx(stood_mm, abs=0.02)
+    stands_still(bench)
     assert bench.control.get("axis.powered")["axis.powered"] is False
 
 
