@@ -1,5 +1,6 @@
 """Keys from input events: golden bytes of a keyboard, split reads, repeats, and devices that are none."""
 
+import fcntl
 import os
 import struct
 from pathlib import Path
@@ -13,6 +14,7 @@ from controller.stop.keypad import EventParser, Keys, Pad, open_device
 from controller.stop.word import Kind
 from rig.config.stop import Stop
 from rig.errors import DeviceError
+from tests.controller.descriptors import open_files
 
 # As `evtest` and the kernel's documentation lay them out: scan code, key b down, report; a repeat; its release.
 PRESSED_B = bytes.fromhex(
@@ -87,3 +89,20 @@ def test_a_pad_is_read_without_waiting_and_says_when_it_is_gone(tmp_path: Path) 
     with pytest.raises(DeviceError, match="the keypad is gone; plug it in again"):
         pad.read()
     pad.close()
+
+
+def test_a_device_is_taken_for_this_process_alone_and_given_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, asked = open_files(), list[tuple[int, int, int]]()
+    monkeypatch.setattr(fcntl, "ioctl", lambda *values: asked.append(values))
+    path = tmp_path / "pad"
+    os.mkfifo(path)
+    pad = Pad(str(path), open_device(str(path)))
+    # EVIOCGRAB of linux/input.h, _IOW('E', 0x90, int): no other program gets the keys.
+    assert asked == [(pad.fd, 0x40044590, 1)]
+    pad.close()
+    (tmp_path / "file").write_bytes(b"")
+    with pytest.raises(DeviceError, match="is no input device"):
+        open_device(str(tmp_path / "file"))
+    assert open_files() == before

@@ -332,3 +332,20 @@ def test_bounds_of_the_server() -> None:
     bounds = (module.CONFIRM_S, module.HEAD_S, module.IDLE_S, module.LINGER_S, module.LINGER_BYTES)
     assert bounds == (0.5, 2.0, 60.0, 0.5, 65_536)
     assert (module.CONNECTIONS, module.LONGEST_WAIT_S) == (64, 0.2)
+
+
+def test_a_client_that_is_gone_already_is_let_go_without_a_word(
+    served: Served, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def shutdown(_: int) -> None:
+        raise OSError("not connected")
+
+    gone = Connection(cast(socket.socket, SimpleNamespace(shutdown=shutdown)), 0.0)
+    served.server._linger(gone)
+    assert gone.lingering
+    served.client()
+    (waiting,) = served.connections
+    served.now += 60.0
+    served.server.turn()
+    served.server._drop(waiting)
+    assert (served.connections, capsys.readouterr().err) == ([], "")

@@ -104,3 +104,14 @@ def test_the_look_out_is_a_daemon_that_ends_with_the_start(page: StopWord) -> No
         thread = guard._thread
         assert (thread.name, thread.daemon, thread.is_alive()) == ("stop-word", True, True)
     assert not thread.is_alive()
+
+
+def test_a_stop_after_the_axis_has_homed_is_answered_while_the_bench_still_starts(page: StopWord) -> None:
+    asking = Requester(page, Lane.SUPERVISOR)
+    with StartGuard(Responder(page)) as guard:
+        with guard.moving():
+            pass
+        request = asking.request(Kind.PAIN)
+        guard.look()
+        answer = asking.answer(request)
+    assert answer and answer.deed is Deed.START_ENDED
