@@ -199,6 +199,7 @@ def test_a_program_leaves_its_events_and_its_outcome() -> None:
     assert outcome == {
         "outcome": "complete", "cause": "", "peak_force_N": state.peak_force_N, "surface_mm": state.surface_mm,
         "zero_N": pytest.approx(ZERO_N, abs=0.001), "touch": outcome["touch"],
+        "wire_damage": {"force": 0.0, "axis": 0.0, "tracker": 0.0},
     }  # fmt: skip
     assert outcome["touch"]["surface_mm"] == outcome["surface_mm"]
 
