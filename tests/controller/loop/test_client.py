@@ -239,3 +239,10 @@ def test_of_what_nobody_came_for_the_newest_64_are_kept() -> None:
 
 def test_limits_of_waiting() -> None:
     assert (loop_client.ANSWER_TIMEOUT_S, loop_client.LISTEN_S, loop_client.KEPT) == (5.0, 0.5, 64)
+
+
+def test_the_end_waits_for_two_looks_of_the_reader(loop: PlayedLoop, monkeypatch: pytest.MonkeyPatch) -> None:
+    waited_s: list[float | None] = []
+    monkeypatch.setattr(loop.client._reader, "join", waited_s.append)
+    loop.client.close()
+    assert waited_s == [1.0]
