@@ -243,6 +243,12 @@ def test_limits_of_waiting() -> None:
 
 def test_the_end_waits_for_two_looks_of_the_reader(loop: PlayedLoop, monkeypatch: pytest.MonkeyPatch) -> None:
     waited_s: list[float | None] = []
-    monkeypatch.setattr(loop.client._reader, "join", waited_s.append)
+    join = loop.client._reader.join
+
+    def joined(timeout: float | None = None) -> None:
+        waited_s.append(timeout)
+        join(timeout)
+
+    monkeypatch.setattr(loop.client._reader, "join", joined)
     loop.client.close()
     assert waited_s == [1.0]
