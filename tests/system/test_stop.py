@@ -15,6 +15,7 @@ import pytest
 
 from api.cli.options import built_in
 from api.cli.stage import plugged
+from controller.stop.start import SENTENCE
 from controller.stop.word import NOT_CONFIRMED, Deed, Kind
 from controller.supervisor import Supervisor
 from mock_devices.testing.commands import (
@@ -167,5 +168,5 @@ def test_a_key_pressed_before_the_bench_is_up_keeps_it_from_starting(
     os.close(keyboard)
     os.close(terminal)
     assert said.code == 3, said.err
-    assert "stopped by a person while the bench started" in said.sentence
+    assert SENTENCE in said.sentence
     assert bench.control.get("axis.powered")["axis.powered"] is False
