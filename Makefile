@@ -16,7 +16,7 @@ test: $(READY) browser
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n 3 --dist loadgroup --durations 25
+	$(BIN)/pytest -n 2 --dist loadgroup --durations 25
 
 # What to run before each commit, in less than half a minute: all checks, and the tests of what changed.
 check: $(READY)

@@ -130,14 +130,6 @@ def test_the_axis_of_the_mock_bench_is_calibrated_against_its_tracker(tmp_path: 
     assert f'[calibration]\naxis = "{result["file"]}"' in said.out
 
 
-def test_its_scale_comes_out_of_a_gauge_block_too(tmp_path: Path) -> None:
-    said = axis(tmp_path, "--gauge-block-mm", "10")
-    assert said.code == 0, said.err
-    result = json.loads((tmp_path / "result.json").read_text())
-    assert result["scale"] == pytest.approx(1.0, abs=0.005)
-    assert (result["reference"], result["direction_known_by"]) == ("gauge block", "contact")
-
-
 def test_a_press_stops_the_axis_while_it_is_calibrated(bench: ServedBench, tmp_path: Path) -> None:
     settings = bench.settings("tracker.product=ndi-polaris")
     running = Running(["calibrate", "axis", *settings, "--clear", "--toward-limb"], tmp_path)

@@ -252,3 +252,22 @@ def test_the_end_waits_for_two_looks_of_the_reader(loop: PlayedLoop, monkeypatch
     monkeypatch.setattr(loop.client._reader, "join", joined)
     loop.client.close()
     assert waited_s == [1.0]
+
+
+def test_what_was_told_has_gone_whenever_the_loop_reads_it(loop: PlayedLoop) -> None:
+    """Two programs are more than the socket holds: the rest of the second goes without another message."""
+    with ThreadPoolExecutor(1) as telling:
+        told = [telling.submit(loop.client.tell, track(4500)) for _ in range(2)]
+        time.sleep(0.1)
+        assert [loop.heard().id for _ in told] == [each.result(PATIENCE_S) for each in told]
+
+
+def test_an_answer_and_the_end_wake_whoever_waits_at_once(loop: PlayedLoop) -> None:
+    with ThreadPoolExecutor(1) as asking:
+        answer = asking.submit(loop.client.ask, Reset(), "a reset", 8.0)
+        loop.say(Answer(to=loop.heard().id))
+        assert answer.result(4.0) > 0
+        end = asking.submit(loop.client.wait_until, lambda _: False, 8.0)
+        time.sleep(0.1)
+        loop.channel.close()
+        assert end.result(4.0)
