@@ -130,3 +130,7 @@ def test_descriptor_0_is_one_too(page: StopWord, monkeypatch: pytest.MonkeyPatch
     assert (life.gone, closed) == (False, [0])
     ended[0] = True
     assert (life.gone, closed) == (True, [0, 0])
+
+
+def test_a_loop_that_missed_ten_of_its_slowest_cycles_is_silent_and_one_that_starts_has_ten_seconds() -> None:
+    assert (liveness.SILENT_NS * 1e-9 * 50.0, liveness.ATTACH_S) == (10.0, 10.0)
