@@ -6,20 +6,24 @@ READY := $(VENV)/ready
 # Modules are compiled once, not by each of the processes that a bench is made of.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test check metrics docs package wheels mutants mutants-sample lock clean
+.PHONY: demo test test-processes test-computing check metrics docs package wheels mutants mutants-sample lock clean
 
 demo: $(READY)
 	$(BIN)/rig demo --out demo
 
-# Tests that start processes wait most of their time; the others compute meanwhile, and give way where both want a core.
 test: $(READY) browser
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	nice -n 19 $(BIN)/pytest -n 2 -m "not bench" --durations 10 >$(VENV)/computing.log 2>&1 & computing=$$!; \
-	  $(BIN)/pytest -n 2 --dist loadgroup -m bench --durations 15; bench=$$?; \
-	  wait $$computing; computing=$$?; cat $(VENV)/computing.log; exit $$((bench + computing))
+	$(MAKE) --jobs 2 --keep-going --output-sync=line test-processes test-computing
+
+# Tests that start processes wait most of their time; the others compute meanwhile, and give way where both want a core.
+test-processes: $(READY)
+	$(BIN)/pytest -n 2 --dist loadgroup -m bench --durations 15
+
+test-computing: $(READY)
+	nice -n 19 $(BIN)/pytest -n 2 -m "not bench" --durations 10
 
 # What to run before each commit, in less than half a minute: all checks, and the tests of what changed.
 check: $(READY)
