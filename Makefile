@@ -16,14 +16,15 @@ test: $(READY) browser
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(MAKE) --jobs 2 --keep-going --output-sync=line test-processes test-computing
+	$(MAKE) --jobs 2 --keep-going test-processes test-computing
 
 # Tests that start processes wait most of their time; the others compute meanwhile, and give way where both want a core.
 test-processes: $(READY)
 	$(BIN)/pytest -n 2 --dist loadgroup -m bench --durations 15
 
 test-computing: $(READY)
-	nice -n 19 $(BIN)/pytest -n 2 -m "not bench" --durations 10
+	nice -n 19 $(BIN)/pytest -n 2 -m "not bench" --durations 10 >$(VENV)/computing.log 2>&1; code=$$?; \
+	  cat $(VENV)/computing.log; exit $$code
 
 # What to run before each commit, in less than half a minute: all checks, and the tests of what changed.
 check: $(READY)
