@@ -90,12 +90,15 @@ class Server:
 
     def turn(self, ready: Sequence[int]) -> None:
         """Brings time up to now and hears what came on the descriptors ``ready``."""
+        # Read before the clock: what comes while this process is held up after that belongs to the next turn.
+        told = b"" if set(self._axis.wire.filenos()).isdisjoint(ready) else self._axis.wire.read()
         now_ns = self._clock_ns()
         late = bool(ready) and now_ns - self._due_ns() > LATE_NS
         if late:
-            self._live_through(ready, now_ns)
+            self._live_through(ready, told, now_ns)
         self._catch_up(now_ns)
         if not late:
+            self._axis.wire.put_back(told)
             self._bench.advance(now_ns)
             self._hear(ready, now_ns)
 
@@ -117,13 +120,11 @@ class Server:
             left_s -= LEAD_S
         return select.select(descriptors, [], [], min(max(left_s, 0.0), NAP_S))[0]
 
-    def _live_through(self, ready: Sequence[int], now_ns: int) -> None:
-        """Hears what came during a stall, the axis' lines evenly from its beginning on."""
+    def _live_through(self, ready: Sequence[int], told: bytes, now_ns: int) -> None:
+        """Hears what came during a stall, what the axis was ``told`` line by line, evenly from its beginning on."""
         axis = self._axis.wire.filenos()
         self._hear([fileno for fileno in ready if fileno not in axis], now_ns)
-        if set(axis).isdisjoint(ready):
-            return
-        start_ns, lines = self._bench.now_ns, self._axis.wire.read().splitlines(keepends=True)
+        start_ns, lines = self._bench.now_ns, told.splitlines(keepends=True)
         stall_ns = now_ns - start_ns if now_ns - start_ns < GIVE_UP_NS else 0
         for number, line in enumerate(lines):
             told_ns = start_ns + stall_ns * number // len(lines)

@@ -307,3 +307,36 @@ def test_what_the_axis_was_told_during_a_stall_is_heard_evenly_over_it(
     assert len(told_ns) == 50
     assert steps_ns == pytest.approx([0, *[2_000_000] * 49], abs=300_000)
     assert stage.bench.now_ns == pytest.approx(stage.clock.now_ns, abs=5_000_000)
+
+
+def test_what_the_axis_was_told_while_a_turn_was_held_up_is_not_heard_all_at_once(
+    stage: ServerBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The process loses its core just after it has looked at the clock, and fifty lines come before it goes on."""
+    line, told_ns = stage.axis.wire, list[int]()
+    with opened(line.endpoint) as port:
+        port.write(b"C\rS8\rO\rt00020101\r")
+        assert select.select(line.filenos(), [], [], 5.0)[0]
+        stage.server.turn(line.filenos())
+        hear = stage.axis.mock.receive
+
+        def heard(now_ns: int) -> None:
+            told_ns.append(now_ns)
+            hear(now_ns)
+
+        def held_up() -> int:
+            looked_ns = stage.clock.now_ns
+            port.write(b"t0800\r" * 50)
+            await_bytes(line.filenos()[0], 300)
+            stage.clock.now_ns += 100_000_000
+            monkeypatch.setattr(stage.server, "_clock_ns", stage.clock)
+            return looked_ns
+
+        port.write(b"t0800\r")
+        assert select.select(line.filenos(), [], [], 5.0)[0]
+        monkeypatch.setattr(stage.axis.mock, "receive", heard)
+        monkeypatch.setattr(stage.server, "_clock_ns", held_up)
+        stage.server.turn(line.filenos())
+        stage.server.turn(line.filenos())
+    assert len(told_ns) == 51
+    assert np.diff(told_ns[1:]) == pytest.approx(2_000_000, abs=300_000)
