@@ -312,7 +312,7 @@ class Supervisor:
 
 def stopped(outcome: Outcome) -> SafetyStop:
     """The error that ends a command whose program was stopped."""
-    return SafetyStop(f"stopped: {outcome.cause}")
+    return SafetyStop(f"stopped: {outcome.cause}", outcome.outcome)
 
 
 def process_environment() -> dict[str, str]:

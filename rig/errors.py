@@ -29,9 +29,16 @@ class CheckFailed(RigError):
 
 
 class SafetyStop(RigError):
-    """Motion was stopped by a limit, a person or a lost input; acknowledge the cause before moving again."""
+    """Motion was stopped by a limit, a person or a lost input; acknowledge the cause before moving again.
+
+    ``code`` is the line of the safety table that stopped it, empty where none did.
+    """
 
     exit_code = 3
+
+    def __init__(self, message: str, code: str = "") -> None:
+        super().__init__(message)
+        self.code = code
 
 
 class BadTrial(RigError):

@@ -13,7 +13,8 @@ from controller.experiments.references import Reference
 from controller.law.gains import Choice, pi_gains
 from controller.loop.steps import Program
 from controller.operation import Operation
-from controller.supervisor import Supervisor
+from controller.safety.table import BY_PERSON
+from controller.supervisor import Supervisor, stopped
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring
 from rig.errors import DataError, DeviceError, SafetyStop, UsageError
@@ -84,7 +85,10 @@ def of_comparison(wanted: Comparison) -> Operation:
 
 
 def compare(operation: Operation, wanted: Comparison) -> CompareResult:
-    """Learns every subject and runs every choice on it; what a stall of the computer stopped is done again."""
+    """Learns every subject and runs every choice on it; what a stall of the computer stopped is done again.
+
+    Raises SafetyStop where a person stops a run, or a limit the learning: nothing moves after that.
+    """
     refuse_comparison(wanted)
     runs: list[ComparedRun] = []
     models: dict[str, dict[str, float]] = {}
@@ -118,7 +122,8 @@ def _indented(operation: Operation, wanted: Comparison, subject: str, attempt: i
         with wanted.bench(wanted.subjects[subject]) as bench:
             capture.capture(bench, LEARNING, folder, Operation("learn"))
     except (SafetyStop, DeviceError) as cause:
-        if attempt == ATTEMPTS:
+        stalled = isinstance(cause, DeviceError) or cause.code in STALLED
+        if not stalled or attempt == ATTEMPTS:
             raise
         operation.say(f"{folder.name}: {cause}; once more")
         return _indented(operation, wanted, subject, attempt + 1)
@@ -148,6 +153,8 @@ def _tracked(
     except DeviceError as cause:
         found, stalled = compared_run(subject, choice, (), str(cause)), True
     else:
+        if done.outcome.outcome in BY_PERSON:
+            raise stopped(done.outcome)
         found = compared_run(subject, choice, _jumps(done), done.outcome.cause)
         stalled = done.outcome.outcome in STALLED
     if not stalled or attempt == ATTEMPTS:

@@ -94,6 +94,9 @@ TABLE: tuple[Check, ...] = (
     Check("operator_silent", Action.SOFT, checks.operator_silent, OPERATOR_S),
 )
 
+# Whoever stops motion wants it stopped: nothing that would go on by itself after another stop goes on after these.
+BY_PERSON = frozenset({"emergency_stop", "pain_stop", "operator_stop"})
+
 
 def evaluate(
     state: LoopState,

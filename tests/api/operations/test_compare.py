@@ -9,7 +9,7 @@ import pytest
 
 from api.operations import compare as comparing
 from api.operations.compare import Comparison, compare, of_comparison
-from controller.experiments import tracked
+from controller.experiments import capture, tracked
 from controller.experiments.recorded import Recorded
 from controller.experiments.references import named
 from controller.law.gains import Choice
@@ -18,7 +18,7 @@ from controller.operation import Cancelled
 from controller.supervisor import Supervisor
 from mock_devices.testing.models import index_model
 from rig.config.wiring import Wiring
-from rig.errors import DeviceError
+from rig.errors import DeviceError, SafetyStop
 
 DONE = Outcome("complete", "", 5.0, 20.0, 0.0)
 LATE = Outcome("loop_overrun", "the loop was late", 5.0, 20.0, 0.0)
@@ -82,6 +82,33 @@ def test_one_that_stalls_each_time_is_given_up_with_its_reason(tmp_path: Path, m
     found = compare(of_comparison(wanted), wanted)
     assert [run.stopped for run in found.runs] == ["the loop was late", ""]
     assert runs.made == ["average"] * 3 + ["breathing"]
+
+
+@pytest.mark.parametrize("code", ["operator_stop", "pain_stop", "emergency_stop"])
+def test_a_persons_stop_ends_the_comparison(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str) -> None:
+    runs = PlayedRuns(Outcome(code, "stopped by the operator", 5.0, 20.0, 0.0))
+    monkeypatch.setattr(tracked, "recorded_run", runs)
+    wanted = comparison(tmp_path, "tangent", "constant")
+    with pytest.raises(SafetyStop, match="stopped: stopped by the operator"):
+        compare(of_comparison(wanted), wanted)
+    assert runs.made == ["average"]
+
+
+@pytest.mark.parametrize(("code", "attempts"), [("loop_overrun", 3), ("force_limit", 1), ("operator_stop", 1)])
+def test_learning_is_done_again_only_where_the_computer_was_late(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, attempts: int
+) -> None:
+    wanted, folders = comparison(tmp_path, "tangent"), list[str]()
+    (tmp_path / "average.json").unlink()
+
+    def stopped_capture(_bench: object, _protocol: object, folder: Path, _operation: object) -> None:
+        folders.append(folder.name)
+        raise SafetyStop("stopped", code)
+
+    monkeypatch.setattr(capture, "capture", stopped_capture)
+    with pytest.raises(SafetyStop, match="stopped"):
+        compare(of_comparison(wanted), wanted)
+    assert len(folders) == len(set(folders)) == attempts
 
 
 def test_one_that_is_cancelled_starts_no_further_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
