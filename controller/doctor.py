@@ -17,9 +17,9 @@ from rig.errors import RigError
 from rig.progress import Progress, silent
 from rig.results.recorded import DeviceReport
 
-LISTEN_S = 2.0
+LISTEN_S = 2.0  # 120 frames of a tracker, whose noise is then known to 7 %
 PERIOD_S = 0.001
-RATE_TOLERANCE = 0.1
+RATE_TOLERANCE = 0.1  # half of what lies between neighbouring rates of a sensor
 
 AnySample = ForceSample | AxisSample | MarkerSample
 Samples = Sequence[AnySample]

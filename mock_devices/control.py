@@ -34,7 +34,7 @@ from rig.errors import DeviceError, RigError, UsageError
 from rig.registry import known
 
 CLIENT_TIMEOUT_S = 10.0
-TIMES_AT_ONCE = 1000
+TIMES_AT_ONCE = 1000  # a second of 1 kHz: some 30 kB of JSON, a tenth of the largest message
 Time = TypeVar("Time")
 
 Faults = Mapping[str, Sequence[Mapping[str, Fault]]]

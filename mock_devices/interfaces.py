@@ -7,7 +7,7 @@ to note when it really took a SYNC.
 
 from typing import NamedTuple, Protocol
 
-NEVER_NS = 1 << 62
+NEVER_NS = 1 << 62  # after 146 years; its difference to any time still has 64 bits
 # Times of samples that a mock keeps for whoever asks: ten seconds at 1 kHz.
 SAMPLES_KEPT = 10_000
 

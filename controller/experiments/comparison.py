@@ -17,11 +17,14 @@ from rig.results.tracking import ComparedRun, Jump, WorstJump
 Column = NDArray[np.float64]
 
 CHOICES: tuple[Choice, ...] = ("tangent", "secant", "constant", "admittance")
+# Eleven samples of 1 kHz have 0.3 of one sample's noise, and are a fifth of a turn of the fastest loop
+# (`tracking.SAMPLES_A_TURN`).
 SMOOTH_S = 0.011
-SETTLED_SHARE = 0.02
+SETTLED_SHARE = 0.02  # the usual 2 % band of a settling time
+# A third of the 1.5 s of a stair; four turns of the fastest loop without leaving the band.
 STEADY_S = 0.5
 REMAINS_S = 0.2
-LEAST_JUMP_N = 0.2
+LEAST_JUMP_N = 0.2  # a fifth of the jumps compared (1 N), a hundred samples of the lead's 2 N/s
 
 
 def compared_run(subject: str, gains: str, jumps: Sequence[Jump], stopped: str = "") -> ComparedRun:

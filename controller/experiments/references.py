@@ -19,7 +19,7 @@ from rig.errors import DataError, UsageError
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 POINTS_A_PERIOD = 100
-MOST_POINTS = 4000
+MOST_POINTS = 4000  # half of the largest message to the loop (`rig.channel.MESSAGE_BYTES`), which reads it at rest
 
 
 @dataclass(frozen=True)

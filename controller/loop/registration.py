@@ -9,6 +9,7 @@ import math
 from collections import deque
 from typing import NamedTuple
 
+# With 20 frames of 0.06 mm noise the direction is then known to 6 mrad: 0.05 mm of apparent motion over as much again.
 LEAST_TRAVEL_MM = 8.0
 # With 20 frames of 0.06 mm noise the scale is then known within 0.06: enough to see a wrong gear before contact.
 SCALE_TRAVEL_MM = 2.0

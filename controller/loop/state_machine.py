@@ -16,7 +16,7 @@ from controller.safety.table import TABLE, Action, Check, Incident, evaluate
 from rig.config.wiring import Wiring
 from rig.errors import SafetyStop
 
-SAFE_CLEARANCE_MM = 10.0
+SAFE_CLEARANCE_MM = 10.0  # as far as a limb may move before it stops a program (`limits.patient_mm`)
 # Less way than this is none: the end of the workspace is where a retreat ends.
 LEAST_WAY_MM = 0.5
 MOVING = (Mode.FREE, Mode.APPROACH, Mode.COMPRESS, Mode.CONTACT, Mode.RETRACT)

@@ -22,9 +22,9 @@ from rig.config.table import Table
 from rig.errors import SafetyStop
 
 Positive = Annotated[float, Field(gt=0)]
-CONTACT_SAMPLES = 3
 # The loading up to ten times the noise tells where it began; noise alone reaches four times itself three times in a
 # row once in 10^13. More than 1 N is not pressed for that: the lowest pain thresholds of limbs are near 5 N.
+CONTACT_SAMPLES = 3
 TELLING_NOISE, CONTACT_NOISE, LARGEST_DETECTION_N = 10.0, 4.0, 1.0
 RUN_IN_MM = 0.5
 LARGEST_RUBBING_N = 0.5

@@ -9,7 +9,7 @@ from controller.loop.steps import Approach, Compress, Dither, Hold, MoveTo, Prog
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
 
-LONGEST_S = 3600.0
+LONGEST_S = 3600.0  # nobody holds a limb still for longer; more is a slip of the unit
 
 
 def refuse_beyond_limits(program: Program, wiring: Wiring) -> None:

@@ -22,8 +22,9 @@ PAGE = 4096
 MAGIC = int.from_bytes(b"tissstop", "little")
 _MAGIC, _LOOP_PID, _LOOP_BEAT, _SERVER_PID, _KEYPAD, _SERVER_BEAT = range(6)
 _LANES, _LANE_WORDS = 16, 32
+# After the newest id, eight words each: room for twice the kinds there are, within the lane.
 _REQUESTS, _ANSWERS, _TIMES = 1, 9, 17
-_DEED_BITS = 4
+_DEED_BITS = 4  # fifteen deeds, of which there are six; 60 bits are left for ids
 LOOK_S = 0.0005
 
 

@@ -20,13 +20,13 @@ from rig.errors import UsageError
 DEFAULT_BAUD = 460_800
 BAUD_CODES = {9_600: 0, 57_600: 1, 115_200: 2, 230_400: 3, 460_800: 4}
 BITS_PER_BYTE = 10
-COMMAND_BYTES_MAX = 64
+COMMAND_BYTES_MAX = 64  # what the maker's own driver allows a command
 
 HEADER = b"\xaa"
 FRAME_BYTES = 37
 CONVERTER_HZ = 51_200
 SINC_LENGTHS = (51, 64, 128, 205, 256, 512)
-RATE_TOLERANCE = 0.01
+RATE_TOLERANCE = 0.01  # the 1004 Hz of 51 samples are sold as 1000; the next rate is 20 % away
 
 CONFIG_MODE = b"C"
 RUN_MODE = b"R"

@@ -10,6 +10,7 @@ from binascii import hexlify, unhexlify
 from collections import deque
 from typing import NamedTuple
 
+# Lawicel's longest line: letter, extended identifier, length, eight bytes in hexadecimal, time stamp.
 LONGEST = 1 + 8 + 1 + 16 + 4
 BITRATE_COMMANDS = {
     10_000: "S0",
@@ -24,7 +25,7 @@ BITRATE_COMMANDS = {
 """Bit rates every adapter and python-can agree on; S7 means 800 kbit/s to the one and 750 to the other."""
 
 
-_PLAIN, _EXTENDED = 0x800, 0x2000_0000
+_PLAIN, _EXTENDED = 0x800, 0x2000_0000  # identifiers have 11 or 29 bits (ISO 11898-1)
 _KINDS = {b"t": (False, False), b"T": (True, False), b"r": (False, True), b"R": (True, True)}
 
 

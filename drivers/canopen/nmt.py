@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from drivers.can.slcan import CanFrame
 
+# Identifiers of the predefined connection set (CiA 301); a node's number is added to all but SYNC.
 SYNC = CanFrame(0x080)
 EMERGENCY_ID = 0x080
 TPDO_IDS = (0x180, 0x280, 0x380, 0x480)

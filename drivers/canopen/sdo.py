@@ -29,6 +29,7 @@ ABORT_TEXTS = {
 }
 TOGGLE_ABORT = 0x05030000
 COMMAND_ABORT = 0x05040001
+# Ends an upload without an end after 586 segments, about a second; the longest object read, a name, has tens of bytes.
 LONGEST = 4096
 
 

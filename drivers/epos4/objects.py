@@ -10,6 +10,7 @@ from typing import Literal
 
 U8, U16, U32, I8, I16, I32, TEXT = "B", "H", "I", "b", "h", "i", "s"
 Access = Literal["ro", "ro+", "rw", "rw+", "const"]
+# Ranges of INTEGER32 and UNSIGNED32 (CiA 301).
 I32_MIN, I32_MAX, U32_MAX = -(1 << 31), (1 << 31) - 1, (1 << 32) - 1
 
 
@@ -145,7 +146,7 @@ _OTHERS = (
     Entry(0x60FE, 1, "physical outputs", U32, "rw+"),
 )
 
-MAX_MAPPED = 12
+MAX_MAPPED = 12  # sub-indices of a mapping in the maker's electronic data sheet
 DISABLED = 1 << 31
 NO_RTR = 1 << 30
 RPDO_DEFAULTS = ((CONTROLWORD,), (CONTROLWORD, MODE), (CONTROLWORD, TARGET), (CONTROLWORD, TARGET_VELOCITY))

@@ -10,6 +10,8 @@ from drivers.epos4.cia402 import Status
 from drivers.epos4.codec import DriveState, Units, decode_motion_pdo, decode_state_pdo
 from rig.channels import AxisSample
 
+# Fifteen deliveries of a USB adapter: an answer still to come would be taken for the next SYNC's. Motion stops
+# sooner (`loop.stale_axis_ms`), so that only the count of losses waits for it.
 TIMEOUT_NS = 250_000_000
 SUSPICIONS = 50
 """Answers in a row that would fit the next SYNC as well before one is given up as lost."""

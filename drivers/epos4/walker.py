@@ -12,7 +12,7 @@ from rig.errors import DeviceError, SafetyStop
 REACTION_S = 1.0
 """How long a drive may take to do what takes no way: change state or mode, acknowledge a set-point."""
 POLL_S = 0.002
-STANDSTILL_RPM = 1
+STANDSTILL_RPM = 1  # the drive's own resolution of speed, by which a hold ripples
 
 
 def never() -> bool:

@@ -11,7 +11,7 @@ from rig.timing import ClockMap, Unwrapper
 
 COUNTER_HZ = 60
 """The frame counter advances at this rate whatever the rate of the tools (Vega API guide, frame number)."""
-_NO_FRAME = -1
+_NO_FRAME = -1  # below every counter, so that the newest of several is one that was seen
 _LONG_NS = 1 << 62
 _NO_POSE = Pose(*[math.nan] * 8)
 

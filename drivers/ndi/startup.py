@@ -31,7 +31,7 @@ TRIES = 3
 _MISHEARD = (0x01, 0x02, 0x03, 0x04)
 _INVALID_HANDLE, _WRONG_MODE = 0x08, 0x0C
 
-ROM_BYTES = 1024
+ROM_BYTES = 1024  # of a tool definition: PVWR writes 64 bytes at addresses up to 03C0 (Polaris API guide)
 _ROM_CHUNK = 64
 _ROM_MAGIC = b"NDI\0"
 _ALL, _STALE, _UNINITIALISED, _NOT_ENABLED, _ENABLED = "00", "01", "02", "03", "04"

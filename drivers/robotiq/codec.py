@@ -33,6 +33,7 @@ FRAME_BYTES = 16
 FRAME_NS = FRAME_BYTES * BITS_PER_BYTE * 1_000_000_000 // DEFAULT_BAUD
 STOP_BURST = b"\xff" * 50
 
+# Ranges as the maker states them; a count has a signed 16-bit register.
 FORCE_RANGE_N = 300.0
 MOMENT_RANGE_N_m = 30.0
 COUNTS_PER_N = 100

@@ -11,7 +11,7 @@ from mock_devices.interfaces import NEVER_NS
 
 INHIBIT_UNIT_NS = 100_000
 RPDOS, TPDOS = range(0x1400, 0x1404), range(0x1800, 0x1804)
-LAST_SYNCHRONOUS, ON_REQUEST = 240, 253
+LAST_SYNCHRONOUS, ON_REQUEST = 240, 253  # transmission types of CiA 301: up to it by SYNC, at 253 by remote frame
 BAD_PARAMETER, TOO_SHORT = 0x6320, 0x8210
 
 

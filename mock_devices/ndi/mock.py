@@ -16,7 +16,7 @@ from mock_devices.ndi.port_handles import PortHandles, Refused
 from mock_devices.wire import OnWire, Wire
 
 FRAME_HZ = 60
-MAX_COMMAND = 1024
+MAX_COMMAND = 1024  # the longest command, PVWR with its 64 bytes, has 144 characters: more is a line that never ends
 SYSTEM_PORT_UNOCCUPIED = 0x0080
 _COMMAND = re.compile(r"([A-Z0-9]+)(?:([: ])(.*))?", re.DOTALL)
 _COMM = re.compile(r"[0-7A][01][012][01][01]")

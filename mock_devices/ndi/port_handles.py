@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 IN_PORT, INITIALISED, ENABLED = 0x01, 0x10, 0x20
-ROM_BYTES = 1024
+ROM_BYTES = 1024  # what sixteen PVWR of 64 bytes fill (Polaris API guide)
 # What PHSR asks for: which status bits it looks at, and how they must be.
 _SEARCHES = {"00": (0x00, 0x00), "01": (0x01, 0x00), "02": (0x11, 0x01), "03": (0x31, 0x11), "04": (0x20, 0x20)}
 

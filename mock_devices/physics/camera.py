@@ -10,7 +10,7 @@ from mock_devices.physics import STEP_NS, STEP_S
 from mock_devices.physics.channels import Slips, moved
 from mock_devices.physics.sensor import normals
 
-HISTORY = 8192
+HISTORY = 8192  # steps: 2 s, twice the 0.5 s of latency and 0.4 s of hidden delay that a camera may have
 HALF_DEGREE_RAD = math.radians(0.5)
 
 

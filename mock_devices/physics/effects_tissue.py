@@ -8,9 +8,10 @@ from mock_devices.physics import STEP_S
 from mock_devices.physics.chain import Elastic, Factor, Hereditary, Pull, Viscous, knob
 
 REFERENCE_MM_S = 10.0
+# The slowest touch of a program; down to zero, a power or a step would chatter with the ripple of an axis at rest.
 LINEAR_BELOW_MM_S = 0.5
 FULL_PULL_MM_S = 0.5
-LETS_GO_LENGTHS = 3.0
+LETS_GO_LENGTHS = 3.0  # exp(-9) of the pull is left, a ten-thousandth
 
 
 @dataclass

@@ -34,7 +34,7 @@ from mock_devices.interfaces import NEVER_NS, SAMPLES_KEPT, SensorPlant
 from mock_devices.wire import OnWire, Wire
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
-READ_COUNT_MAX = 125
+READ_COUNT_MAX = 125  # registers in one answer (Modbus application protocol 1.1b3, 6.3)
 REQUEST_BYTES_MAX = 256
 FIXED_SIZE_FUNCTIONS = range(1, 7)
 COUNTED_FUNCTIONS = (15, 16)
