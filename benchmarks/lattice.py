@@ -18,8 +18,9 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from benchmarks import lattice_euler
 from benchmarks.lattice_rivals import NumpySlices, taichi_force, warp_force
-from rig.tissue.lattice import euler, fire
+from rig.tissue.lattice import fire
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.kernels import STEPS
 from rig.tissue.lattice.numba_types import Matrix
@@ -119,9 +120,13 @@ def equilibria() -> dict[str, tuple[float, int, float]]:
     springs = Springs.for_mode("study", 0.1)
     found = {}
     cases: tuple[tuple[str, Block, Callable[[Loaded], int]], ...] = (
-        ("study's scheme, full", Block(), lambda lattice: euler.run(lattice, euler.EulerScheme())),
+        ("study's scheme, full", Block(), lambda lattice: lattice_euler.run(lattice, lattice_euler.EulerScheme())),
         ("fire, full", Block(), lambda lattice: fire.relax(lattice, TOLERANCE_N)),
-        ("study's scheme, quarter", Block(quarter=True), lambda lattice: euler.run(lattice, euler.EulerScheme())),
+        (
+            "study's scheme, quarter",
+            Block(quarter=True),
+            lambda lattice: lattice_euler.run(lattice, lattice_euler.EulerScheme()),
+        ),
         ("fire, quarter", Block(quarter=True), lambda lattice: fire.relax(lattice, TOLERANCE_N)),
     )
     for name, block, solve in cases:

@@ -11,7 +11,9 @@ import numpy as np
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.fire import NotConverged
 from rig.tissue.lattice.springs import Springs
-from rig.tissue.lattice.symmetry import compare
+from rig.tissue.lattice.state import Loaded
+from rig.tissue.lattice.sweep import push
+from rig.tissue.lattice.symmetry import shaken
 
 CASES = (
     ("with cell volumes, constant k", Springs(1.0, 0.0, 1.0), 11.0, 1.0),
@@ -31,11 +33,15 @@ def main() -> None:
     for name, springs, deepest_mm, step_mm in CASES:
         print(f"{name}\n  depth mm   R/k quarter   R/k whole   difference   inverted cells, quarter and whole")
         depths = np.arange(step_mm, min(deepest_mm, options.deepest) + 1e-9, step_mm)
+        block = Block(tuple(options.nodes))
+        quarters = push(Loaded(block.as_quarter(), springs), depths)
+        wholes = shaken(block, springs, depths.tolist(), np.random.default_rng(1))
         try:
-            for row in compare(Block(tuple(options.nodes)), springs, depths.tolist(), np.random.default_rng(1)):
+            for quarter, whole in zip(quarters, wholes, strict=True):
+                difference = whole.reaction_N / quarter.reaction_N - 1.0
                 print(
-                    f"  {row.depth_mm:8.2f}   {row.quarter_mm:11.4f}   {row.whole_mm:9.4f}   "
-                    f"{100 * row.difference:8.3f} %   {row.quarter_inverted} {row.whole_inverted}",
+                    f"  {quarter.depth_mm:8.2f}   {quarter.reaction_N:11.4f}   {whole.reaction_N:9.4f}   "
+                    f"{100 * difference:8.3f} %   {quarter.inverted_cells} {whole.inverted_cells}",
                     flush=True,
                 )
         except NotConverged as error:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rig.errors import DataError, UsageError
+from rig.errors import DataError
 from rig.tissue.intervals import student_reach
 from rig.tissue.lattice.fire import NotConverged, relax
 from rig.tissue.lattice.springs import Springs
@@ -58,8 +58,6 @@ class Simulator:
     """Force in, depth out, for the lattice of a sweep with any k: what the study ran once per guess."""
 
     def __init__(self, sweep: Sweep) -> None:
-        if sweep.block.contact == "pressure":
-            raise UsageError('the search needs a rigid tip: use the contact "bonded" or "frictionless"')
         self._block = sweep.block.as_quarter()
         self._ratio = sweep.springs.cell_ratio
         self._lattice = Loaded(self._block, sweep.springs)

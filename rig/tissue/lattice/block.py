@@ -5,18 +5,15 @@ makes the block symmetric, so nodes along x and y are odd in number.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import UsageError
 from rig.tissue.lattice.kernels import Shape
-from rig.tissue.lattice.numba_types import Floats, Matrix
+from rig.tissue.lattice.numba_types import Matrix
 from rig.tissue.lattice.rows import FRONT, LONGEST_ROW, PAD
 
-Contact = Literal["bonded", "frictionless", "pressure"]
-Sides = Literal["free", "fixed"]
 _LANES = 8  # float64 values in the widest vector register; rows are padded to a multiple
 _MOST_NODES = 4_000_000  # 0.6 GB of state; larger blocks are a slip of the unit more often than a wish
 
@@ -26,17 +23,13 @@ class Block:
     """A block of ``nodes`` vertices with 18 neighbours each; the defaults are the study's (51 x 51 x 40, 1 mm, 6 mm
     tip).
 
-    ``quarter`` stores x >= 0, y >= 0 only and mirrors the rest. ``sides`` are the four lateral faces: held by the
-    tissue around (default) or free; the study does not say. ``contact``: "bonded" and "frictionless" are rigid discs
-    moved to a depth, "pressure" is the same force on each node under the tip, which is how the study's equation of
-    motion loads it.
+    ``quarter`` stores x >= 0, y >= 0 only and mirrors the rest. The tip is a rigid disc bonded to the nodes under it;
+    the four lateral faces are held by the tissue around, of which the study does not say anything.
     """
 
     nodes: tuple[int, int, int] = (51, 51, 40)
     spacing_mm: float = 1.0
     tip_diameter_mm: float = 6.0
-    contact: Contact = "bonded"
-    sides: Sides = "fixed"
     quarter: bool = False
 
     def __post_init__(self) -> None:
@@ -73,7 +66,7 @@ class Block:
 
     @property
     def copies(self) -> int:
-        """Whole block over stored block: factor on every force and energy."""
+        """Whole block over stored block: factor on every force."""
         return 4 if self.quarter else 1
 
     @property
@@ -127,32 +120,19 @@ class Block:
         self.inner(inside)[0] = under
         return np.flatnonzero(inside[0])
 
-    def multiplicity(self, nodes: NDArray[np.int64]) -> Floats:
-        """How often each stored node occurs in the whole block: 1, or 4, 2, 1 off, on one and on both mirror planes."""
-        if not self.quarter:
-            return np.ones(len(nodes))
-        rest = self.rest()
-        on_planes = (rest[0, nodes] == 0.0).astype(float) + (rest[1, nodes] == 0.0)
-        return np.asarray(4.0 / 2.0**on_planes)
-
     def free(self) -> Matrix:
         """1 where a node may move along a direction, 0 where the bone, the tip, a side or a mirror plane holds it."""
         free = self.allocate()
         inner = self.inner(free)
         inner[:] = 1.0
         inner[:, :, :, 0] = 0.0
-        if self.sides == "fixed":
-            inner[:, -1] = 0.0
-            inner[:, :, -1] = 0.0
+        inner[:, -1] = 0.0
+        inner[:, :, -1] = 0.0
         if self.quarter:
             inner[0, 0] = 0.0
             inner[1, :, 0] = 0.0
-        elif self.sides == "fixed":
+        else:
             inner[:, 0] = 0.0
             inner[:, :, 0] = 0.0
-        tip = self.tip_nodes()
-        if self.contact == "bonded":
-            free[:, tip] = 0.0
-        elif self.contact == "frictionless":
-            free[2, tip] = 0.0
+        free[:, self.tip_nodes()] = 0.0
         return free

@@ -10,8 +10,6 @@ rows: what the node itself gets, then its neighbours in the order of the edges. 
 octants hold a cell; ``low`` and ``high`` are the rows of the planes beside, with stiffness 0 where there is none.
 """
 
-import numpy as np
-
 from rig.tissue.lattice.numba_types import CELL, Floats, Matrix, part, row_kernel
 from rig.tissue.lattice.rows import PAD, WIDTH, Vector, at, between, dot, store
 
@@ -229,32 +227,3 @@ def cell_diagonal(
             _add(t, ra + c, curve, _squares(ga))
             _add(t, rb + c, curve, _squares(gb))
             _add(t, rd + c, curve, _squares(gd))
-
-
-@row_kernel(CELL)
-def cell_energy(
-    x: Matrix,
-    _u: Matrix,
-    p: int,
-    low: int,
-    high: int,
-    stride: int,
-    n: int,
-    kv_low: float,
-    kv_high: float,
-    volume: float,
-    t: Floats,
-    masks: Floats,
-    m: int,
-) -> None:
-    """Twice the energy in N mm, in the node's own first row (of a spring's energy each end gets the whole, too)."""
-    _clear(t, n)
-    for octant in range(8):
-        ea, eb, ed, s, kv, octant_mask, _ra, _rb, _rd = _corner(octant, p, low, high, stride, kv_low, kv_high, volume)
-        for c in range(n):
-            o = p + c
-            j = s * dot(between(x, o, ea + c), _cross(between(x, o, eb + c), between(x, o, ed + c)))
-            inside = max(j, SMALLEST_CORNER)
-            over = j - inside
-            value = inside - 1.0 - np.log(inside) + (1.0 - 1.0 / inside) * over + 0.5 * (over / inside) ** 2
-            t[at(_OWN + c)] += 2.0 * masks[at(m + octant_mask + c)] * kv * value

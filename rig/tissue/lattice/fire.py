@@ -3,8 +3,6 @@
 Masses are the Hessian's diagonal, so every part of the block is moved at its own largest stable pace whatever k is.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from rig.errors import RigError
@@ -20,12 +18,10 @@ class NotConverged(RigError):
     """A solver ran out of steps or out of numbers; the message says where it stood."""
 
 
-def relax(
-    lattice: Loaded, tolerance_N: float, most_steps: int = 20_000, watch: Callable[[int, float], None] | None = None
-) -> int:
+def relax(lattice: Loaded, tolerance_N: float, most_steps: int = 20_000) -> int:
     """Move the free nodes to equilibrium: every force component below ``tolerance_N``. Returns the number of steps.
 
-    ``watch(step, largest_force_N)`` is called every refresh of the pseudo-masses (20 steps). Raises `NotConverged`.
+    Raises `NotConverged`.
     """
     block = lattice.block
     v, inverse_mass = block.allocate(), block.allocate()
@@ -38,8 +34,6 @@ def relax(
         if step % REFRESH_STEPS == 0:
             np.maximum(lattice.diagonal(stiff), lattice.law.k, out=stiff)
             np.divide(lattice.free, stiff, out=inverse_mass)
-            if watch is not None:
-                watch(step, largest)
         f = lattice.force()
         largest = fire_step(x, flat_v, f.reshape(-1), flat_m, control, cap, lattice.slabs)
         if largest < tolerance_N:

@@ -1,4 +1,4 @@
-"""Sums over all springs and cells of the lattice: force, Hessian-vector product, Hessian diagonal, energy.
+"""Sums over all springs and cells of the lattice: force, Hessian-vector product, Hessian diagonal.
 
 Nine springs start at each node (three edges, six face diagonals), the other nine arrive; eight corners of cells meet at
 it. Each thread owns a slab of x planes and computes what reaches into it from the planes beside a second time, so no
@@ -58,7 +58,6 @@ class Sum(NamedTuple):
 FORCE = Sum(rows.constant_force, rows.exponential_force, cells.cell_force, -1.0)
 PRODUCT = Sum(rows.spring_product, rows.spring_product, cells.cell_product, -1.0)
 DIAGONAL = Sum(rows.spring_diagonal, rows.spring_diagonal, cells.cell_diagonal, 1.0)
-ENERGY = Sum(rows.spring_energy, rows.spring_energy, cells.cell_energy, 1.0)
 
 
 @piece
@@ -222,9 +221,9 @@ def _slab(what: Sum, x: Matrix, u: Matrix, f: Matrix, shape: Shape, law: Stiffne
 
 def assemble(what: Sum, x: Matrix, u: Matrix, f: Matrix, shape: Shape, law: Stiffness, slabs: int) -> None:
     """Fill ``f`` (3, N): force in N, or minus Hessian times ``u``, or a positive bound of the Hessian's diagonal in
-    N/mm, or in its first row twice the energy in N mm, shared among nodes.
+    N/mm.
 
     A mirrored block holds a quarter: nodes on one mirror plane carry half their springs, the corner line a quarter, so
-    forces and energy are a quarter of the whole.
+    forces are a quarter of the whole.
     """
     in_parts(_slab, [(what, x, u, f, shape, law, first, stop) for first, stop in cut(shape.nx, slabs)])

@@ -60,7 +60,7 @@ def ramp(
             progress(b)
         if len(misfits) >= max(_LEAST_LEVELS, int(np.argmin(misfits)) + 1 + _PAST_BEST):
             phi = np.array([[point.reaction_N for point in points] for points in levels]) / springs.k_N_mm
-            inverted = max(point.health.inverted_cells for points in levels for point in points)
+            inverted = max(point.inverted_cells for points in levels for point in points)
             return DepthRamp(block, replace(springs, b=0.0), np.array(exponents), depth_mm, phi, inverted)
     raise DataError(
         f"the curve rises faster than springs with an exponent of {LARGEST_EXPONENT:g} can follow: use the global k(x) "

@@ -177,35 +177,6 @@ def spring_diagonal(
         )
 
 
-@row_kernel(SPRING)
-def spring_energy(
-    x: Matrix,
-    _u: Matrix,
-    p: int,
-    q: int,
-    n: int,
-    k: float,
-    length: float,
-    b: float,
-    t: Floats,
-    out: int,
-    masks: Floats,
-    m: int,
-) -> None:
-    """Energy of each spring in N mm, in the first of three rows: k (r-L)^2 / 2, or k L^2 [(b e - 1) exp(b e) + 1] / b^2
-    with e = |r/L - 1|.
-    """
-    for c in range(n):
-        d = between(x, p + c, q + c)
-        e = abs(np.sqrt(dot(d, d) + TINY) / length - 1.0)
-        be = min(b * e, LARGEST_EXPONENT)
-        if be < 0.05:  # the closed form loses digits here; next term of the series is be^4/144 relative
-            shape = e * e * (0.5 + be * (1.0 / 3.0 + be * (0.125 + be * (1.0 / 30.0 + be / 144.0))))
-        else:
-            shape = ((be - 1.0) * vector_exp(be) + 1.0) / (b * b)
-        t[at(out + c)] = masks[at(m + c)] * k * length * length * shape
-
-
 @row_kernel(SUM)
 def add_three(f: Matrix, w: int, p: int, n: int, t: Floats, a: int, b: int, c: int, sign: float) -> None:
     """f[w, p:] += sign (three stretches of the buffer)."""

@@ -1,4 +1,4 @@
-"""One step of the two explicit solvers over all degrees of freedom, in compiled passes."""
+"""One step of FIRE over all degrees of freedom, in compiled passes."""
 
 import numpy as np
 
@@ -8,35 +8,9 @@ from rig.tissue.lattice.threads import cut, in_parts
 _LEAST_PART = 150_000  # values; handing out less costs more than it saves
 
 
-def _parts(size: int, count: int) -> list[tuple[int, int]]:
+def parts(size: int, count: int) -> list[tuple[int, int]]:
+    """Ranges of ``size`` values for at most ``count`` threads, none too small to be worth handing out."""
     return cut(size, max(1, min(count, size // _LEAST_PART)))
-
-
-@sum_loop
-def _euler_part(
-    x: Floats, v: Floats, f: Floats, inverse_mass: Floats, drag: float, h: float, new_velocity: bool
-) -> tuple[float, float]:
-    speed, acceleration = 0.0, 0.0
-    for c in range(x.shape[0]):
-        a = (f[c] - drag * v[c]) * inverse_mass[c]
-        before = v[c]
-        after = before + h * a
-        x[c] += h * (after if new_velocity else before)
-        v[c] = after
-        speed = max(speed, abs(after))
-        acceleration = max(acceleration, abs(a))
-    return speed, acceleration
-
-
-def euler_step(
-    x: Floats, v: Floats, f: Floats, inverse_mass: Floats, drag: float, h: float, new_velocity: bool, threads: int
-) -> tuple[float, float]:
-    """v += h a, x += h v (new or old v); a = (f - drag v)/m. Returns the largest speed and acceleration found."""
-    ranges = _parts(x.size, threads)
-    peaks = in_parts(
-        _euler_part, [(x[i:j], v[i:j], f[i:j], inverse_mass[i:j], drag, h, new_velocity) for i, j in ranges]
-    )
-    return max(speed for speed, _ in peaks), max(acceleration for _, acceleration in peaks)
 
 
 @sum_loop
@@ -73,7 +47,7 @@ def fire_step(
     ``control`` holds step h, mixing alpha, steps since the power was last negative, largest h. Masses scale the metric:
     speeds and forces are compared as sqrt(m) v and f / sqrt(m).
     """
-    ranges = _parts(x.size, threads)
+    ranges = parts(x.size, threads)
     sums = in_parts(_fire_sums, [(v[i:j], f[i:j], inverse_mass[i:j]) for i, j in ranges])
     power, force2, speed2 = (sum(part[column] for part in sums) for column in range(3))
     largest = max(part[3] for part in sums)

@@ -34,11 +34,6 @@ def test_the_stabilised_curve_rises_without_an_inverted_cell(stabilised: Sweep) 
     assert np.all(np.diff(stabilised.force_over_k_mm) > 0)
 
 
-def test_depth_at_undoes_phi(stabilised: Sweep) -> None:
-    depth = np.array([0.1, 0.9, 2.2, 2.9])
-    np.testing.assert_allclose(stabilised.depth_at(stabilised.phi_mm(depth)), depth, rtol=1e-9)
-
-
 def test_the_study_s_lattice_is_marked_from_the_first_sign_of_collapse_on(study: Sweep) -> None:
     assert study.collapse() is not None
     first = study.intact.index(False)
@@ -49,8 +44,6 @@ def test_the_study_s_lattice_is_marked_from_the_first_sign_of_collapse_on(study:
 def test_a_depth_past_collapse_is_refused_with_the_bound(study: Sweep) -> None:
     with pytest.raises(UsageError, match=rf"depth of 3.4 mm lies outside 0 ... {study.deepest_mm:.4g} mm.*stabilised"):
         study.phi_mm(3.4)
-    with pytest.raises(UsageError, match="force over spring stiffness"):
-        study.depth_at(1e3)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -0.1])
@@ -63,10 +56,3 @@ def test_depths_that_are_no_depths_are_refused(stabilised: Sweep, value: float) 
 def test_a_sweep_outside_the_block_is_refused(depth: float) -> None:
     with pytest.raises(UsageError, match="90 % of the block's height"):
         sweep(BLOCK, Springs(), depth)
-
-
-def test_the_pressure_contact_sweeps_over_loads() -> None:
-    block = Block((13, 13, 10), tip_diameter_mm=4.0, quarter=True, contact="pressure")
-    found = sweep(block, Springs.for_mode("stabilised"), 1.0)
-    assert found.depth_mm[-1] >= 1.0
-    assert found.phi_mm(0.8) < sweep(BLOCK, Springs.for_mode("stabilised"), 1.0).phi_mm(0.8)

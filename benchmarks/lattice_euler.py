@@ -7,19 +7,19 @@ its h = 0.01 s; in N, mm, s its mass unit is then the tonne, a million times the
 only the rest state means something.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from rig.errors import RigError, UsageError
 from rig.tissue.lattice.fire import NotConverged
+from rig.tissue.lattice.numba_types import Floats, sum_loop
 from rig.tissue.lattice.state import Loaded
-from rig.tissue.lattice.steps import euler_step
+from rig.tissue.lattice.steps import parts
+from rig.tissue.lattice.threads import in_parts
 
 _HIGHEST_MODE = 12.0  # largest eigenvalue of the 18-neighbour lattice over k, at the zone edge
 _CELL_MODE = 16.0  # bound on the volume term's share over kv: 8 corners of 8 cells, three edges each
-_WATCH_STEPS = 50
 _RUNAWAY = 1e6
 
 
@@ -71,16 +71,41 @@ READINGS: dict[str, EulerScheme] = {
 }
 
 
+@sum_loop
+def _step_part(
+    x: Floats, v: Floats, f: Floats, inverse_mass: Floats, drag: float, h: float, new_velocity: bool
+) -> tuple[float, float]:
+    speed, acceleration = 0.0, 0.0
+    for c in range(x.shape[0]):
+        a = (f[c] - drag * v[c]) * inverse_mass[c]
+        before = v[c]
+        after = before + h * a
+        x[c] += h * (after if new_velocity else before)
+        v[c] = after
+        speed = max(speed, abs(after))
+        acceleration = max(acceleration, abs(a))
+    return speed, acceleration
+
+
+def step_all(
+    x: Floats, v: Floats, f: Floats, inverse_mass: Floats, drag: float, h: float, new_velocity: bool, threads: int
+) -> tuple[float, float]:
+    """v += h a, x += h v (new or old v); a = (f - drag v)/m. Returns the largest speed and acceleration found."""
+    ranges = parts(x.size, threads)
+    peaks = in_parts(
+        _step_part, [(x[i:j], v[i:j], f[i:j], inverse_mass[i:j], drag, h, new_velocity) for i, j in ranges]
+    )
+    return max(speed for speed, _ in peaks), max(acceleration for _, acceleration in peaks)
+
+
 def run(
     lattice: Loaded,
     scheme: EulerScheme,
     most_steps: int = 20_000,
-    watch: Callable[[int, float, float], None] | None = None,
 ) -> int:
     """Step from rest until both thresholds are met; returns the number of steps.
 
-    ``watch(step, speed, acceleration)`` is called every 50 steps. Raises `Unstable` before the numbers overflow and
-    `NotConverged`.
+    Raises `Unstable` before the numbers overflow and `NotConverged`.
     """
     block = lattice.block
     v = block.allocate()
@@ -91,13 +116,11 @@ def run(
     runaway = _RUNAWAY * block.spacing_mm / scheme.step_s
     for step in range(most_steps):
         f = lattice.force()
-        speed, acceleration = euler_step(
+        speed, acceleration = step_all(
             x, flat_v, f.reshape(-1), flat_m, scheme.drag_N_s_mm, scheme.step_s, scheme.new_velocity, lattice.slabs
         )
         if not speed < runaway:
             raise _unstable(lattice, scheme, step + 1, speed)
-        if watch is not None and step % _WATCH_STEPS == 0:
-            watch(step, speed, acceleration)
         if speed < scheme.velocity_threshold_mm_s and acceleration < scheme.acceleration_threshold_mm_s2:
             lattice.force()
             return step + 1
