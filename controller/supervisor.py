@@ -53,7 +53,6 @@ class Supervisor:
         """
         self._waiting, self._address = waiting, address
         self._claim: Claim | None = None
-        self._tip_left_in = False
         self.wiring = wiring
         self._loop_module = loop_module
         self._ring_path = new_path()
@@ -270,14 +269,14 @@ class Supervisor:
         """Ends loop and recorder in order; may be called twice."""
         self._closing.set()
         latched = self.status.get("latched") or {}
-        self._tip_left_in = latched.get("action") == Action.IMMEDIATE.name
+        stopped_at_once = latched.get("action") == Action.IMMEDIATE.name
         if self.alive:
             try:
                 self.stop()
                 self._tell(Shutdown())
             except DeviceError:
                 pass
-        self._await_exit()
+        tip_left_in = self._killed() or stopped_at_once
         if self._client:
             self._client.close()
             self._client = None
@@ -287,27 +286,28 @@ class Supervisor:
         if self._stop:
             self._stop.close()
             self._stop = None
-        self._give_back()
+        self._give_back(tip_left_in)
         # A killed loop leaves its ring behind.
         self._ring_path.unlink(missing_ok=True)
 
-    def _give_back(self) -> None:
+    def _give_back(self, tip_left_in: bool) -> None:
         if self._claim is None:
             return
-        if self._tip_left_in:
+        if tip_left_in:
             self._claim.leave_note()
         self._claim.release()
         self._claim = None
 
-    def _await_exit(self) -> None:
+    def _killed(self) -> bool:
+        """Waits for the loop's end; whether it was ended, now or before, where it stood."""
         if self._process is None:
-            return
+            return False
         try:
             self._process.wait(LEAVE_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._tip_left_in |= self._process.poll() not in ENDED_BY_ITSELF
+        return self._process.poll() not in ENDED_BY_ITSELF
 
 
 def stopped(outcome: Outcome) -> SafetyStop:

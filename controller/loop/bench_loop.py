@@ -197,7 +197,7 @@ class BenchLoop:
     def _take_marker(self, sample: MarkerSample) -> None:
         self._ring.put(MARKER.id, MARKER.pack(sample))
         self.published["tracker"] = sample.seq
-        if sample.tool == 0:
+        if sample.tool == TIP:
             self.health["marker"].update(sample.capture_ns, bool(sample.valid))
         at = Point(sample.x_mm, sample.y_mm, sample.z_mm)
         if sample.valid and all(map(math.isfinite, at)):

@@ -147,17 +147,15 @@ class LoopClient:
             return self._channel.flush() or self._channel.lost
 
     def _listen(self) -> None:
-        while not self._channel.lost:
+        while not self._gone:
             select([self._channel], [], [], LISTEN_S)
             with self._sending:
                 received = self._channel.receive_all()
             with self._changed:
                 for item in received:
                     self._file(item)
+                self._gone = self._channel.lost
                 self._changed.notify_all()
-        with self._changed:
-            self._gone = True
-            self._changed.notify_all()
 
     def _file(self, received: Received) -> None:
         match received.message:

@@ -63,7 +63,7 @@ class FirstTouch:
         return ""
 
     def _wrong_way(self, wrench: Wrench, zero: Wrench, along_N: float, load_N: float) -> str:
-        changes = {name: now - before for name, now, before in zip(CHANNELS, wrench[:3], zero[:3], strict=True)}
+        changes = {name: wrench[place] - zero[place] for place, name in enumerate(CHANNELS)}
         name = max(changes, key=lambda channel: abs(changes[channel]))
         calibrated = f"compression is {self._compression} on {self._channel}"
         why = "the sign is wrong" if name == self._channel and along_N < 0 else "another channel answers"

@@ -67,6 +67,8 @@ def test_a_bench_is_a_stop_process_a_loop_with_its_words_and_a_recorder(around: 
         assert cast(FakeRecorder, bench.recorder).ring == ring
         assert (bench.alive, bench.loop_pid, bench.stop_port) == (True, 4711, 5151)
         assert bench.status["ready"] is True
+        user = claims.holder(wiring)
+        assert user and user.sentence.endswith("; end that first"), "nobody but this process reaches the bench"
     assert len(around.stops) == 1
 
 
@@ -273,6 +275,19 @@ def test_a_bench_whose_loop_fails_is_ended_with_its_sentence(around: Surrounding
     with pytest.raises(DeviceError, match="force sensor: no answer"):
         bench.start()
     assert (bench.alive, around.stops[0].closed, bench.recorder) == (False, 1, None)
+
+
+@pytest.mark.usefixtures("around")
+def test_a_start_that_came_to_no_loop_leaves_nothing_to_recover_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    def without_keypad(wiring: Wiring, path: Path) -> None:
+        raise DeviceError("stop.keypad: No such file or directory")
+
+    monkeypatch.setattr(module, "StopProcess", without_keypad)
+    with pytest.raises(DeviceError, match=r"stop\.keypad"):
+        Supervisor(Wiring()).start()
+    following = claims.take(Wiring())
+    assert following.unfinished == ""
+    following.release()
 
 
 def test_a_start_that_was_stopped_is_a_safety_stop(around: Surroundings) -> None:

@@ -59,6 +59,8 @@ def test_rest_is_looked_for_once_the_loop_has_had_time_to_say_that_it_moves(stat
     bench.wait_at_rest(7.0)
     assert closing.waited_s == [0.1]
     assert client.done == [(rests, 7.0)]
+    bench.wait_at_rest()
+    assert client.done[1] == (rests, 30.0)
 
 
 def test_an_act_of_recovery_is_waited_for_until_nothing_moves() -> None:

@@ -174,6 +174,14 @@ def test_only_a_limb_that_was_seen_can_be_missed() -> None:
     assert inputs(bench).limb_age_ms == pytest.approx((bench.ring.loop[-1].capture_ns - newest_ns) * 1e-6)
 
 
+@pytest.mark.parametrize(("hidden", "vouched_for"), [(0, False), (1, True)])
+def test_the_markers_health_is_the_tips(hidden: int, vouched_for: bool) -> None:
+    bench = FakeBench(settled=0)
+    bench.tracker.hidden = frozenset({hidden})
+    bench.cycles(40)
+    assert bool(bench.ring.loop[-1].health & 0b010_000_000) is vouched_for
+
+
 def test_only_a_person_who_was_heard_can_have_fallen_silent() -> None:
     bench = FakeBench(settled=0)
     bench.keep_lease = False

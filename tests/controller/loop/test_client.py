@@ -141,6 +141,7 @@ def test_a_loop_that_is_gone_is_said_with_how_it_went(loop: PlayedLoop) -> None:
 
 def test_status_incidents_and_what_was_found_are_kept(loop: PlayedLoop) -> None:
     found = Ready(devices={"axis": {"serial": "1"}}, realtime={"memory": "locked"})
+    assert loop.client.status == {}
     loop.say(found)
     assert loop.client.ready(PATIENCE_S) == found
     loop.say(Stopped(code="pain_stop", text="ow", action="SOFT"))

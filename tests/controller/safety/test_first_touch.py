@@ -1,11 +1,14 @@
 """The first touch of a program: a sensor that answers otherwise than it was calibrated is found out at about 1 N."""
 
+from dataclasses import replace
+
 import pytest
 
 from controller.loop.modes import Mode
 from controller.loop.state import LoopState
 from controller.loop.steps import Approach, Compress, Retract
 from controller.safety.first_touch import FirstTouch
+from controller.safety.load import Wrench
 from controller.safety.table import TABLE
 from tests.controller.fake_bench import ZERO, wired
 from tests.controller.plant_bench import BOTA, FT300, PlantBench, Product, linear
@@ -105,6 +108,10 @@ def state(fx_N: float, fz_N: float, my_N_m: float = 0.0, samples: int = 0) -> Lo
         ((0.0, -0.03, 0.0021), True),
         ((0.0, -0.03, 0.0019), False),
         ((0.0, -0.05, 0.0021), False),
+        ((0.0, 1.0, 0.0), True),
+        ((10.0, -7.0, 0.0), True),
+        ((0.0, 0.0, 0.002), True),
+        ((0.0, -0.04, 0.002), False),
     ],
 )
 def test_from_one_newton_on_seven_tenths_are_along_and_a_moment_comes_with_a_force(
@@ -123,3 +130,42 @@ def test_one_disturbed_sample_is_no_touch_and_a_confirmed_one_is_not_asked_again
     assert [touch.update(state(3.0, 0.0, samples=count)) for count in (11, 12, 13)] == [""] * 3
     touch.begin()
     assert [bool(touch.update(state(3.0, 0.0, samples=count))) for count in (14, 15)] == [False, True]
+
+
+@pytest.mark.parametrize(("moment_N_m", "wrong"), [(0.0031, True), (0.0029, False)])
+def test_a_moment_counts_from_three_times_its_noise_on(moment_N_m: float, wrong: bool) -> None:
+    touch, seen = FirstTouch(wired()), state(0.0, 0.0, moment_N_m)
+    said = [touch.update(replace(seen, noise_N_m=0.001, force_samples=count)) for count in (1, 2)]
+    assert [bool(sentence) for sentence in said] == [False, wrong]
+
+
+@pytest.mark.parametrize("seen", [(0.0, -1.0), (51**0.5, -7.0)])
+def test_one_newton_is_a_touch_and_seven_tenths_of_it_along_confirm_it(seen: tuple[float, float]) -> None:
+    touch = FirstTouch(wired())
+    said = [touch.update(state(*load, samples=count)) for count, load in enumerate([seen, (3.0, 0.0), (3.0, 0.0)], 1)]
+    assert said == [""] * 3
+
+
+def test_a_touch_after_one_disturbed_sample_is_a_touch() -> None:
+    touch = FirstTouch(wired())
+    assert touch.update(state(5.0, 0.0, samples=1)) == ""
+    assert touch.update(state(0.0, -2.0, samples=2)) == ""
+
+
+def wrong_after(zero: Wrench, wrench: Wrench) -> str:
+    """What is said of ``wrench`` where the sensor gave ``zero`` in the air."""
+    touch, along_N = FirstTouch(wired()), zero[2] - wrench[2]
+    seen = LoopState(wrench=wrench, zero=zero, force_N=along_N)
+    touch.update(replace(seen, force_samples=1))
+    return touch.update(replace(seen, force_samples=2))
+
+
+def test_what_a_channel_gives_is_told_from_its_zero() -> None:
+    said = wrong_after((-4.0, 1.0, 2.0, 0.0, 0.0, 0.0), (-4.1, 3.5, 1.9, 0.0, 0.0, 0.0))
+    assert said.startswith("the first touch gives +2.50 N on fy (0.10 of 2.50 N along), where")
+
+
+@pytest.mark.parametrize(("fz_N", "why"), [(-0.65, "another channel answers"), (0.65, "the sign is wrong")])
+def test_only_a_push_read_as_a_pull_is_a_wrong_sign(fz_N: float, why: str) -> None:
+    sideways_N = 0.95 * abs(fz_N)
+    assert why in wrong_after((0.0,) * 6, (sideways_N, -sideways_N, fz_N, 0.0, 0.0, 0.0))
