@@ -15,7 +15,7 @@ from rig.config.products.roles import Product
 from rig.config.wiring import Wiring
 from rig.errors import RigError
 from rig.progress import Progress, silent
-from rig.results.recorded import DeviceReport
+from rig.results.bench import DeviceReport
 
 LISTEN_S = 2.0  # 120 frames of a tracker, whose noise is then known to 7 %
 PERIOD_S = 0.001

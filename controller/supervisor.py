@@ -15,7 +15,7 @@ from controller.loop.client import ANSWER_TIMEOUT_S, LoopClient
 from controller.loop.messages import Lease, Note, Outcome, Ready, Recover, Reset, Run, Shutdown, Status, Stopped
 from controller.loop.steps import Program
 from controller.recovery.conversation import recover
-from controller.recovery.situation import Act, Consent, Recovered, Situation
+from controller.recovery.situation import Consent, Situation
 from controller.safety.table import Action
 from controller.stop.client import StopProcess
 from controller.stop.word import Kind, Requester
@@ -24,6 +24,7 @@ from rig.config.wiring import Wiring
 from rig.errors import DeviceError, SafetyStop, UsageError
 from rig.recording.client import RecorderClient
 from rig.recording.ring import new_path, remove_abandoned
+from rig.results.bench import Act, ResetResult
 
 LOOP_MODULE = "controller.loop.process"
 START_TIMEOUT_S = 60.0
@@ -247,7 +248,7 @@ class Supervisor:
             raise DeviceError(str(refusal)) from refusal
         self.wait_at_rest(ACT_TIMEOUT_S)
 
-    def recover(self, consent: Consent) -> Recovered:
+    def recover(self, consent: Consent) -> ResetResult:
         """The way back to a bench that can be used, as far as ``consent`` goes."""
         found = recover(self, consent)
         if self._claim and not found.open:

@@ -32,7 +32,8 @@ from tools.schemas import WRITTEN
 MARK = re.compile(r"^<!-- generated: ([a-z-]+) -->$", re.MULTILINE)
 HELP_COLUMNS = 100
 COMMANDS_OF = {
-    "compare": "track --table", "diagnosis": "diagnose", "lattice": "fit --lattice", "protocol-check": "protocol check"
+    "compare": "track --table", "diagnosis": "diagnose", "protocol-check": "protocol check",
+    "retract": "serve`, job `retract",
 }  # fmt: skip
 
 

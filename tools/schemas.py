@@ -6,22 +6,17 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from rig.results.base import Result
+from rig.results.bench import CalibrateResult, DoctorResult, ResetResult, RetractResult
 from rig.results.demo import DemoSummary
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
-from rig.results.fit import FitResult, LatticeResult
-from rig.results.recorded import (
-    CaptureResult,
-    DoctorResult,
-    ExportResult,
-    ImportResult,
-    RecordingResult,
-    VerifyResult,
-)
+from rig.results.fit import FitResult
+from rig.results.recorded import CaptureResult, ExportResult, ImportResult, RepairResult, ReportResult, VerifyResult
 from rig.results.tracking import CompareResult, SimulateResult, Threshold, TrackResult
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 WRITTEN: Mapping[str, type[Result]] = {
     "capture": CaptureResult,
+    "calibrate": CalibrateResult,
     "compare": CompareResult,
     "demo": DemoSummary,
     "diagnosis": DiagnosisResult,
@@ -29,9 +24,11 @@ WRITTEN: Mapping[str, type[Result]] = {
     "export": ExportResult,
     "fit": FitResult,
     "import": ImportResult,
-    "lattice": LatticeResult,
     "protocol-check": ProtocolCheckResult,
-    "repair": RecordingResult,
+    "repair": RepairResult,
+    "report": ReportResult,
+    "reset": ResetResult,
+    "retract": RetractResult,
     "simulate": SimulateResult,
     "threshold": Threshold,
     "track": TrackResult,

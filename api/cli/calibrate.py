@@ -15,6 +15,7 @@ from api.cli.output import console, write_json
 from api.operations.calibrations import What, keep, refuse_out, refuse_unfit
 from rig.config.calibration import AxisCalibration, ForceCalibration
 from rig.errors import UsageError
+from rig.results.bench import CalibrateResult
 
 OF_FORCE = ("weights", "load", "tolerance_percent", "gravity")
 OF_AXIS = ("from_mm", "to_mm", "clear", "toward_limb", "gauge_block_mm", "near_mm")
@@ -73,7 +74,7 @@ def calibrate(
     refuse_unfit(wiring.calibration, found, datetime.now(UTC))
     path = keep(what, found, out)
     say_use(what, path, (wiring_file(config) or Path()).parent)
-    write_json(json_file, {"file": str(path), **found.model_dump(mode="json")})
+    write_json(json_file, CalibrateResult(file=str(path), calibration=found))
 
 
 def say_use(what: What, path: Path, wiring_folder: Path) -> None:

@@ -82,7 +82,7 @@ def fitted(
     show_fit(result)
     if result.lattice:
         show_lattice(result.lattice)
-        say([f"lattice.png, lattice.svg and lattice.json are in {target}"])
+        say([f"lattice.png and lattice.svg are in {target}"])
     say([f"{FILE}, fit.png, fit.svg, residuals.png, table.csv and model.json are in {target}"])
     return result
 

@@ -16,7 +16,7 @@ from controller.operation import Operation
 from rig.config.endpoints import Endpoints
 from rig.config.products.registry import ROLES
 from rig.errors import CheckFailed
-from rig.results.recorded import DeviceReport
+from rig.results.bench import DeviceReport
 
 
 def mock(

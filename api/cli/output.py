@@ -1,14 +1,12 @@
 """What commands print and write: one console, one kind of table, JSON whole or not at all."""
 
-import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from pydantic import BaseModel
 from rich.console import Console
 from rich.table import Table
 
-from rig.errors import UsageError
+from rig.results.base import SavedResult
 from rig.results.tables import TextTable
 
 console = Console()
@@ -35,14 +33,7 @@ def say(sentences: Iterable[str]) -> None:
         console.print(sentence, highlight=False, markup=False)
 
 
-def write_json(path: Path | None, value: Mapping[str, object] | BaseModel) -> None:
+def write_json(path: Path | None, value: SavedResult) -> None:
     """Writes ``value`` to ``path``, whole or not at all; without a path does nothing."""
-    if path is None:
-        return
-    text = value.model_dump_json(indent=2) if isinstance(value, BaseModel) else json.dumps(value, indent=2)
-    partial = path.with_name(path.name + ".part")
-    try:
-        partial.write_text(text + "\n")
-        partial.replace(path)
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be written: {error.strerror}") from error
+    if path is not None:
+        value.write(path)

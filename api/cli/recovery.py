@@ -2,7 +2,6 @@
 
 import sys
 from contextlib import closing
-from dataclasses import asdict
 from typing import Annotated
 
 import typer
@@ -15,9 +14,10 @@ from api.operations.remote import RemoteBench
 from api.operations.reset import reset as recover
 from controller.claims import holder
 from controller.operation import Operation
-from controller.recovery.situation import ALL, Act, Consent
+from controller.recovery.situation import ALL, Consent
 from controller.supervisor import Supervisor
 from rig.errors import CheckFailed, UsageError
+from rig.results.bench import Act
 
 
 def reset(
@@ -49,7 +49,7 @@ def reset(
         ):
             bench.start()
             found = here(operation, lambda: recover(operation, bench.recover, agreed, ask))
-    write_json(json_file, asdict(found) | {"ready": found.ready})
+    write_json(json_file, found)
     if found.missing:
         raise CheckFailed(f"the axis is recovered, but {found.missing}")
 

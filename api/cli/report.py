@@ -6,6 +6,8 @@ from typing import Annotated
 import typer
 
 from api.cli.live import compute
+from api.cli.options import JsonOption
+from api.cli.output import write_json
 from api.operations import report as work
 from controller.operation import Operation
 
@@ -13,10 +15,11 @@ from controller.operation import Operation
 def report(
     session: Annotated[Path, typer.Argument(help="Session folder, as `rig capture` or `rig import` makes it.")],
     out: Annotated[Path | None, typer.Option("--out", help="File to write; else SESSION/report.html.")] = None,
+    json_file: JsonOption = None,
 ) -> None:
     """Writes one self-contained HTML page about a session; it needs no network.
 
     Example: rig report sessions/first --out first.html
     """
     operation = Operation("report")
-    compute(operation, lambda: work.report(operation, session, out))
+    write_json(json_file, compute(operation, lambda: work.report(operation, session, out)))

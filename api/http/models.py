@@ -5,8 +5,9 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from controller.loop.messages import DeviceView
+from rig.results.bench import RetractResult
 from rig.results.recorded import CaptureResult
-from rig.results.tracking import Retracted, TrackResult
+from rig.results.tracking import TrackResult
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
 
@@ -48,23 +49,6 @@ class RecoverRequest(Request):
     home: bool = Field(default=False, description="home the axis where it has no reference")
 
 
-class QuestionView(BaseModel):
-    """A consent that is needed."""
-
-    act: Literal["clear", "retract", "home"]
-    question: str
-
-
-class RecoveredView(BaseModel):
-    """How far recovery went."""
-
-    happened: list[str] = Field(description="what happened and how things stood, for a person")
-    done: list[str]
-    open: list[QuestionView] = Field(description="what must be agreed to before more is done")
-    missing: str = Field(description="devices that are still not ok; empty if none")
-    ready: bool = Field(description="the bench can be used again")
-
-
 class LeaseRequest(Request):
     """Takes control of the bench."""
 
@@ -103,7 +87,7 @@ class JobView(BaseModel):
     message: str
     time_left_s: float | None = Field(description="at the pace so far; null before the first part is done")
     log: list[str] = Field(description="what it said so far; empty where the bench is shown, see /jobs/{id}")
-    result: CaptureResult | TrackResult | Retracted | None = Field(description="once it has succeeded")
+    result: CaptureResult | TrackResult | RetractResult | None = Field(description="once it has succeeded")
 
 
 class Info(BaseModel):

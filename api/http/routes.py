@@ -20,7 +20,6 @@ from api.http.models import (
     LeaseView,
     Name,
     ProtocolView,
-    RecoveredView,
     RecoverRequest,
     RetractRequest,
     RigView,
@@ -31,6 +30,7 @@ from api.http.problems import Refused, responses
 from api.http.service import Service
 from controller.recovery.situation import Consent
 from controller.stop.word import Answer, Kind
+from rig.results.bench import ResetResult
 
 PREFIX = "/api/v1"
 MEDIA_TYPES = {".mcap": "application/octet-stream", ".json": "application/json", ".html": "text/html"}
@@ -130,9 +130,9 @@ def _recovery(router: APIRouter, service: Service) -> None:
         summary="After a crash, a fault or a stop: says what happened, and does what is agreed to",
         responses=responses(409, 503),
     )
-    def recover(request: RecoverRequest, lease: LeaseHeader = "") -> RecoveredView:
+    def recover(request: RecoverRequest, lease: LeaseHeader = "") -> ResetResult:
         service.control.check(lease)
-        return views.recovered(service.recover(Consent(request.clear, request.retract, request.home)))
+        return service.recover(Consent(request.clear, request.retract, request.home))
 
 
 def _done(service: Service, detail: str) -> Done:

@@ -16,13 +16,14 @@ from api.operations.motion import TrackRequest
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.operation import Operation, Progress
-from controller.recovery.situation import Consent, Recovered
+from controller.recovery.situation import Consent
 from controller.stop.word import NOT_CONFIRMED, Answer, Kind
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.config.wiring import Wiring
 from rig.errors import RigError, UsageError
+from rig.results.bench import ResetResult
 from rig.tissue.model import load_model
 
 MODEL = Path("fit") / "model.json"
@@ -94,7 +95,7 @@ class Service:
             self._coming = None
             self.settled.set()
 
-    def recover(self, consent: Consent) -> Recovered:
+    def recover(self, consent: Consent) -> ResetResult:
         """The way back after a crash, a fault or a stop, as far as ``consent`` goes; a dead loop is replaced."""
         with self._starting:
             if self.running:

@@ -10,9 +10,7 @@ from api.http.models import (
     JobView,
     LeaseView,
     ProtocolView,
-    QuestionView,
     RecordingView,
-    RecoveredView,
     RigView,
     SessionView,
 )
@@ -20,14 +18,14 @@ from api.http.service import Job, Service
 from controller.devices.health import ALIVE, ON_RATE, VALID
 from controller.experiments.capture import check
 from controller.loop.messages import DeviceView, Status
-from controller.recovery.situation import Recovered
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.errors import RigError
 from rig.recording.sessions import TrialInfo, read_listing
+from rig.results.bench import RetractResult
 from rig.results.recorded import CaptureResult
-from rig.results.tracking import Retracted, TrackResult
+from rig.results.tracking import TrackResult
 
 State = Literal["disconnected", "not ready", "idle", "running", "stopped"]
 STREAMS = ("force", "axis", "marker")
@@ -48,7 +46,7 @@ def job(job: Job) -> JobView:
         message=now.message,
         time_left_s=now.time_left_s,
         log=list(now.log),
-        result=now.result if isinstance(now.result, CaptureResult | TrackResult | Retracted) else None,
+        result=now.result if isinstance(now.result, CaptureResult | TrackResult | RetractResult) else None,
     )
 
 
@@ -83,17 +81,6 @@ def rig(service: Service) -> RigView:
         },
         control=control(service),
         job=job(running).model_copy(update={"log": []}) if running else None,
-    )
-
-
-def recovered(found: Recovered) -> RecoveredView:
-    """How far recovery went."""
-    return RecoveredView(
-        happened=list(found.happened),
-        done=list(found.done),
-        open=[QuestionView(act=act, question=question) for act, question in found.open],
-        missing=found.missing,
-        ready=found.ready,
     )
 
 

@@ -10,7 +10,7 @@ from controller.loop.messages import DeviceView
 from controller.operation import Operation
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed, DeviceError
-from rig.results.recorded import DeviceReport, DoctorResult
+from rig.results.bench import DeviceReport, DoctorResult
 
 
 def doctor(operation: Operation, wiring: Wiring) -> DoctorResult:

@@ -29,12 +29,10 @@ class LatticeFit:
         return 1 + self.search + 2 * self.stiffen
 
     def __call__(self, study: Study, target: Path, tell: Progress = silent) -> LatticeResult:
-        """Runs it and writes lattice.png, .svg and .json to ``target``.
+        """Runs it and writes lattice.png and .svg to ``target``.
 
         The first run on a machine compiles the kernels (a few seconds) and keeps them.
         """
         found = lattice_study(study, self.block, self.mode, self.search, tell, self.stiffen)
-        result = lattice_result(found)
         save_figure(lattice_figure(study, found), target, "lattice")
-        result.write(target / "lattice.json")
-        return result
+        return lattice_result(found)

@@ -15,8 +15,9 @@ from controller.supervisor import Supervisor, stopped
 from rig.config.protocol import Indentation
 from rig.errors import SafetyStop
 from rig.recording.sessions import SessionInfo
+from rig.results.bench import RetractResult
 from rig.results.recorded import CaptureResult, captured_trial
-from rig.results.tracking import Retracted, Threshold, TrackResult, compared
+from rig.results.tracking import Threshold, TrackResult, compared
 
 # Out of any depth that a protocol may reach, and slow enough to see it coming.
 RETRACT_MM = 20.0
@@ -83,7 +84,7 @@ def threshold(operation: Operation, bench: Supervisor, wanted: TrackRequest, up_
     return ramp.run(bench, wanted.program, up_to_N, folder, wanted.model)
 
 
-def retract(operation: Operation, bench: Supervisor) -> Retracted:
+def retract(operation: Operation, bench: Supervisor) -> RetractResult:
     """Moves the tip out of wherever a stop left it, at most to the end of the workspace."""
     limits = bench.wiring.limits
     speed_mm_s = min(RETRACT_MM_S, limits.retract_speed_mm_s)
@@ -92,4 +93,4 @@ def retract(operation: Operation, bench: Supervisor) -> Retracted:
     outcome = bench.run(Program(name="retract", steps=(leave,)), RETRACT_TIMEOUT_S)
     if outcome.stopped:
         raise stopped(outcome)
-    return Retracted(outcome=outcome.outcome)
+    return RetractResult(outcome=outcome.outcome)

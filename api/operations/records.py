@@ -16,7 +16,7 @@ from rig.recording.importing import import_session
 from rig.recording.reader import read_recording
 from rig.recording.sessions import TrialInfo, open_session
 from rig.recording.verify import Verdict
-from rig.results.recorded import ExportResult, ImportResult, RecordingResult, VerifiedTrial, VerifyResult
+from rig.results.recorded import ExportResult, ImportResult, RepairResult, VerifiedTrial, VerifyResult
 from rig.trials.quality import TrialQuality, quality_of
 
 SUFFIXES: Mapping[Format, str] = {"csv": "csv", "parquet": "parquet", "hdf5": "session.h5", "mat": "session.mat"}
@@ -65,10 +65,10 @@ def _quality(path: Path, trial: TrialInfo) -> TrialQuality | None:
     return None
 
 
-def repair(operation: Operation, recording: Path, out: Path) -> RecordingResult:
+def repair(operation: Operation, recording: Path, out: Path) -> RepairResult:
     """Saves every good sample of ``recording`` as the new recording ``out``."""
     operation.step(recording.name, 0.0)
-    return RecordingResult.model_validate(verification.repair(recording, out))
+    return RepairResult.model_validate(verification.repair(recording, out))
 
 
 def import_folder(operation: Operation, folder: Path, out: Path, columns: Sequence[str], now: datetime) -> ImportResult:

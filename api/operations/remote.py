@@ -1,6 +1,7 @@
 """The service that uses the bench, asked over HTTP by another command on the same computer."""
 
 import json
+from dataclasses import asdict
 from types import TracebackType
 from typing import Self, TypeVar
 from urllib.error import HTTPError, URLError
@@ -9,8 +10,9 @@ from urllib.request import Request, urlopen
 from pydantic import BaseModel
 
 from controller.loop.messages import DeviceView
-from controller.recovery.situation import Act, Consent, Recovered
+from controller.recovery.situation import Consent
 from rig.errors import DeviceError
+from rig.results.bench import ResetResult
 
 # A recovery homes and retracts before it answers.
 ANSWER_S = 180.0
@@ -32,22 +34,6 @@ class BenchSaid(BaseModel):
     reason: str
     rates_Hz: dict[str, float]
     devices: dict[str, DeviceView]
-
-
-class RecoveryQuestion(BaseModel):
-    """A consent that is needed."""
-
-    act: Act
-    question: str
-
-
-class RecoverySaid(BaseModel):
-    """How far recovery went."""
-
-    happened: tuple[str, ...]
-    done: tuple[str, ...]
-    open: tuple[RecoveryQuestion, ...]
-    missing: str
 
 
 class RemoteBench:
@@ -76,12 +62,9 @@ class RemoteBench:
         """The bench as the service shows it."""
         return self._call("GET", "/api/v1/rig", BenchSaid)
 
-    def recover(self, consent: Consent) -> Recovered:
+    def recover(self, consent: Consent) -> ResetResult:
         """The service's own recovery."""
-        agreed = {"clear": consent.clear, "retract": consent.retract, "home": consent.home}
-        found = self._call("POST", "/api/v1/recover", RecoverySaid, agreed)
-        asked = tuple((question.act, question.question) for question in found.open)
-        return Recovered(found.happened, found.done, asked, found.missing)
+        return self._call("POST", "/api/v1/recover", ResetResult, asdict(consent))
 
     def _call(self, method: str, path: str, kind: type[View], body: object = None) -> View:
         data = None if body is None else json.dumps(body).encode()

@@ -4,12 +4,13 @@ from pathlib import Path
 
 from controller.operation import Operation
 from rig.report.page import write_report
+from rig.results.recorded import ReportResult
 
 
-def report(operation: Operation, session: Path, out: Path | None = None) -> Path:
-    """Writes one self-contained page about ``session`` to ``out``, else into the session; returns the file."""
+def report(operation: Operation, session: Path, out: Path | None = None) -> ReportResult:
+    """Writes one self-contained page about ``session`` to ``out``, else into the session; returns where that is."""
     target = out or session / "report.html"
     operation.step("reading, fitting, drawing", 0.0)
     write_report(session, target)
     operation.say(f"{target} is written")
-    return target
+    return ReportResult(session=str(session), file=str(target))

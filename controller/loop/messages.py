@@ -9,8 +9,9 @@ from typing_extensions import TypedDict
 
 from controller.loop.paired_samples import Touch
 from controller.loop.steps import Program
-from controller.recovery.situation import Act, Situation
+from controller.recovery.situation import Situation
 from rig.channel import Message, Reply
+from rig.results.bench import Act
 
 
 class DeviceFound(TypedDict, total=False):

@@ -3,9 +3,10 @@
 import math
 from typing import TYPE_CHECKING
 
-from controller.recovery.situation import Act, Situation, is_retracted
+from controller.recovery.situation import Situation, is_retracted
 from controller.safety.table import Action
 from rig.errors import UsageError
+from rig.results.bench import Act
 
 if TYPE_CHECKING:
     from controller.loop.bench_loop import BenchLoop

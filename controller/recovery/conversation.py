@@ -1,10 +1,12 @@
 """Recovery as a conversation with a running loop: look, do what was agreed to, look again, until the bench is ready."""
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from controller.loop.messages import Status
-from controller.recovery.situation import Act, Consent, Recovered, Situation, needed, questions
+from controller.recovery.situation import Consent, Situation, needed, questions
 from rig.errors import DeviceError, SafetyStop
+from rig.results.bench import Act, ResetResult
 
 # A device that is opened again by itself answers within its longest pause and its start, 4 s each.
 AXIS_BACK_S = 15.0
@@ -42,7 +44,7 @@ class Bench(Protocol):
         """Whether the device is there within that time."""
 
 
-def recover(bench: Bench, consent: Consent) -> Recovered:
+def recover(bench: Bench, consent: Consent) -> ResetResult:
     """As far as ``consent`` goes; raises DeviceError or SafetyStop where something hinders what was agreed to."""
     bench.wait_at_rest()
     bench.await_device("axis", AXIS_BACK_S)
@@ -51,7 +53,7 @@ def recover(bench: Bench, consent: Consent) -> Recovered:
     while acts := needed(_answering(now)):
         asked = questions(now, consent)
         if asked:
-            return Recovered(first.sentences, tuple(SAID[act] for act in done), asked, "")
+            return ResetResult(happened=first.sentences, done=_said(done), open=asked)
         act = acts[-1]
         if act in done:
             raise SafetyStop(f"{SAID[act]}, and it is needed again; {'; '.join(now.sentences)}")
@@ -60,7 +62,11 @@ def recover(bench: Bench, consent: Consent) -> Recovered:
         now = bench.survey()
     if now.stopped or done:
         bench.reset()
-    return Recovered(first.sentences, tuple(SAID[act] for act in done), (), _missing(bench))
+    return ResetResult(happened=first.sentences, done=_said(done), missing=_missing(bench))
+
+
+def _said(done: Sequence[Act]) -> tuple[str, ...]:
+    return tuple(SAID[act] for act in done)
 
 
 def _answering(now: Situation) -> Situation:

@@ -4,17 +4,13 @@ Pure. The order is: clear the drive's fault, bring the tip out of the tissue, fi
 acknowledge. A valid reference is kept: nothing is homed without need, and nothing is homed with the tip inside.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 from rig.config.wiring import Limits
+from rig.results.bench import Act, Question
 
 # A hold ripples by hundredths of a millimetre; no tissue is that near to home.
 RETRACTED_MM = 1.0
-
-Act = Literal["clear", "retract", "home"]
-ACTS: tuple[Act, ...] = ("clear", "retract", "home")
 
 
 @dataclass(frozen=True)
@@ -66,21 +62,6 @@ class Consent:
 ALL = Consent(clear=True, retract=True, home=True)
 
 
-@dataclass(frozen=True)
-class Recovered:
-    """What came of it. ``open``: consents still needed, with the question for each; ``missing``: what is not ok."""
-
-    happened: tuple[str, ...]
-    done: tuple[str, ...]
-    open: tuple[tuple[Act, str], ...]
-    missing: str
-
-    @property
-    def ready(self) -> bool:
-        """Whether the bench can be used again."""
-        return not self.open and not self.missing
-
-
 def needed(now: Situation) -> tuple[Act, ...]:
     """The acts that are needed for the next thing to be done; none where only the acknowledgement is left."""
     if now.fault:
@@ -103,16 +84,11 @@ def question(act: Act, now: Situation) -> str:
     return "is the tip out of the tissue, and may the axis be homed? its search may lead into it"
 
 
-def questions(now: Situation, consent: Consent) -> tuple[tuple[Act, str], ...]:
+def questions(now: Situation, consent: Consent) -> tuple[Question, ...]:
     """The consents still needed for the next thing to be done."""
-    return tuple((act, question(act, now)) for act in needed(now) if not consent.to(act))
+    return tuple(Question(act=act, question=question(act, now)) for act in needed(now) if not consent.to(act))
 
 
 def is_retracted(position_mm: float, limits: Limits) -> bool:
     """Whether the tip stands at the outer end of its way."""
     return position_mm <= limits.position_min_mm + RETRACTED_MM
-
-
-def options(acts: Sequence[Act]) -> str:
-    """How a command line consents to them."""
-    return " and ".join(f"--{act}" for act in acts)

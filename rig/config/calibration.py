@@ -9,6 +9,7 @@ from pydantic import AwareDatetime, Field, model_validator
 from rig.config.force_map import UNIT, ForceChannel, ForceMap, Matrix, Sign, Vector
 from rig.config.table import Table
 
+VERSION = 1
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Name = Annotated[str, Field(min_length=1)]
@@ -50,6 +51,7 @@ class ForceCalibration(Table):
     these, ``matrix`` keeps the factory's, which is 1. Source of the uncertainties: JCGM 100:2008 (GUM), 4.2 and 4.3.
     """
 
+    version: int = Field(default=VERSION, description="of the file's format; files without one are of version 1")
     product: Name
     serial: str
     date: AwareDatetime
@@ -102,6 +104,7 @@ class AxisCalibration(Table):
     holds for the ``increments_per_mm`` and ``direction`` that were configured: a scale is checked, never corrected for.
     """
 
+    version: int = Field(default=VERSION, description="of the file's format; files without one are of version 1")
     product: Name
     serial: str
     date: AwareDatetime

@@ -3,8 +3,8 @@
 import json
 from pathlib import Path
 
-from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
-from rig.config.table import AnyTable, TomlTable, parse, read_toml
+from rig.config.calibration import VERSION, AxisCalibration, Calibration, ForceCalibration
+from rig.config.table import AnyTable, TomlTable, parse, read_toml, refuse_newer
 from rig.errors import UsageError
 
 
@@ -35,6 +35,7 @@ def read_axis(path: Path) -> AxisCalibration:
 
 def _read(kind: type[AnyTable], path: Path, role: str) -> AnyTable:
     values = read_toml(path) if path.suffix == ".toml" else _read_json(path, role)
+    refuse_newer(values, VERSION, f"{role} {path}")
     return parse(kind, values, f"{role} {path}")
 
 

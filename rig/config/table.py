@@ -48,6 +48,15 @@ def parse(kind: type[AnyTable], values: Mapping[str, Any], where: str) -> AnyTab
         raise UsageError(f"{where}: " + "; ".join(_sentence(kind, detail) for detail in error.errors())) from error
 
 
+def refuse_newer(values: object, known: int, where: str) -> None:
+    """Raises UsageError where ``values``, read from a file, state a version of its format above the one ``known``."""
+    version = values.get("version") if isinstance(values, dict) else None
+    if isinstance(version, int) and version > known:
+        raise UsageError(
+            f"{where}: format version {version} is newer than {known}, which this program reads; update tissue-rig"
+        )
+
+
 def load(kind: type[AnyTable], path: Path, overrides: Iterable[str] = ()) -> AnyTable:
     """The table in ``path`` with ``section.key=value`` overrides on top."""
     return parse(kind, merged(read_toml(path), overrides), str(path))

@@ -1,14 +1,18 @@
 """The root of all results: frozen, read from what science computed, one JSON form."""
 
+import json
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Self, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
+from rig.config.table import refuse_newer
 from rig.errors import UsageError
 from rig.recording.files import write_text
 
+VERSION = 1
 Value = TypeVar("Value")
 
 
@@ -26,15 +30,24 @@ class Result(BaseModel):
 
     model_config = ConfigDict(frozen=True, from_attributes=True, allow_inf_nan=False)
 
+
+class SavedResult(Result):
+    """A result that stands alone: what a command found, in a file or as an answer."""
+
+    version: int = Field(default=VERSION, description="of the format of all results; files without one are older")
+
     def write(self, path: Path) -> None:
         """Writes the JSON, whole or not at all."""
         write_text(path, self.model_dump_json(indent=2) + "\n")
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """What ``write`` wrote; raises OSError where there is no such file, UsageError where it is another."""
+        """What ``write`` wrote; raises OSError where there is no such file, UsageError where it is another or newer."""
+        text = path.read_bytes()
+        with suppress(ValueError, RecursionError):  # what is no JSON is said below
+            refuse_newer(json.loads(text), VERSION, str(path))
         try:
-            return cls.model_validate_json(path.read_bytes())
+            return cls.model_validate_json(text)
         except ValidationError as error:
             first = error.errors()[0]
             place = ".".join(map(str, first["loc"])) or "the file"

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from rig.diagnosis.estimates import NamedCause, Verdict
-from rig.results.base import Result
+from rig.results.base import Result, SavedResult
 from rig.results.fit import FitResult
 from rig.results.tracking import LoopCount, Plateau
 
@@ -43,7 +43,7 @@ class DemoDiagnosis(Result):
     truth: HiddenTruth
 
 
-class DemoSummary(RecordingCounts):
+class DemoSummary(SavedResult, RecordingCounts):
     """The whole demonstration."""
 
     fit: FitResult

@@ -13,14 +13,14 @@ from rig.diagnosis.estimates import (
     Unexplained,
     Verdict,
 )
-from rig.results.base import Result
+from rig.results.base import Result, SavedResult
 from rig.trials.findings import Finding
 
 FOLDER, FILE, MODEL, TRUTH = "diagnosis", "diagnosis.json", "model.json", "truth.txt"
 PICTURES = ("simulation", "residuals", "evidence", "confusability")
 
 
-class DiagnosisResult(Result):
+class DiagnosisResult(SavedResult):
     """What the simulation gets wrong on a session, the causes by name, and what they take off the error."""
 
     verdict: Verdict
@@ -57,7 +57,7 @@ class Confusion(Result):
     matrix: tuple[tuple[float, ...], ...]
 
 
-class ProtocolCheckResult(Result):
+class ProtocolCheckResult(SavedResult):
     """What a protocol can show before anything is recorded."""
 
     duration_s: float

@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import ConfigDict, Field
 
-from rig.results.base import Number, Result
+from rig.results.base import Number, Result, SavedResult
 from rig.tissue.summary import ControlRow, IndexFit, KPoint, Row, Skipped, SpeedSummary
 from rig.trials.findings import Finding
 
@@ -117,7 +117,7 @@ class LatticeResult(Result):
     per_spring: PerSpringResult | None
 
 
-class FitResult(Result):
+class FitResult(SavedResult):
     """Laws compared on the curves of one or more sessions; each law stands under its name."""
 
     model_config = ConfigDict(extra="allow")

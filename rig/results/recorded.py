@@ -1,4 +1,4 @@
-"""What commands on recordings say: capture, verify, repair, import, export, doctor."""
+"""What commands on recordings say: capture, verify, repair, import, export, report."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -6,7 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from rig.recording.sessions import TrialInfo
-from rig.results.base import Number, Result
+from rig.results.base import Number, Result, SavedResult
 
 Quality = Literal["", "good", "usable", "bad"]
 
@@ -31,7 +31,7 @@ def captured_trial(info: TrialInfo) -> CapturedTrial:
     return CapturedTrial.model_validate({**vars(info), "surface_mm": surface_mm})
 
 
-class CaptureResult(Result):
+class CaptureResult(SavedResult):
     """A session that was captured."""
 
     session: str
@@ -67,6 +67,10 @@ class RecordingResult(Result):
     streams: Mapping[str, StreamResult]
 
 
+class RepairResult(SavedResult, RecordingResult):
+    """The recording that was made of the good samples of another."""
+
+
 class VerifiedTrial(RecordingResult):
     """A recording with the quality of its trial; empty where nobody judged it."""
 
@@ -75,7 +79,7 @@ class VerifiedTrial(RecordingResult):
     measured: Mapping[str, Number] = {}
 
 
-class VerifyResult(Result):
+class VerifyResult(SavedResult):
     """Whether a session, or one recording, is whole."""
 
     ok: bool
@@ -83,7 +87,7 @@ class VerifyResult(Result):
     recordings: Mapping[str, VerifiedTrial]
 
 
-class ImportResult(Result):
+class ImportResult(SavedResult):
     """A session that was made of measured files; ``samples`` by stream."""
 
     session: str
@@ -93,29 +97,15 @@ class ImportResult(Result):
     trials: tuple[TrialInfo, ...] = Field(default=(), exclude=True)
 
 
-class ExportResult(Result):
+class ExportResult(SavedResult):
     """What was written, by format."""
 
     session: str
     written: Mapping[str, str]
 
 
-class DeviceReport(Result):
-    """What was seen of one device; ``problem`` is empty if it is fit for use, ``advice`` is where to look if silent."""
+class ReportResult(SavedResult):
+    """The page that was written about a session."""
 
-    role: str
-    product: str = ""
-    serial: str = ""
-    firmware: str = ""
-    rate_Hz: float = 0.0
-    noise: str = ""
-    latency_ms: float = 0.0
-    range: str = ""
-    problem: str = ""
-    advice: str = ""
-
-
-class DoctorResult(Result):
-    """All devices of the bench."""
-
-    devices: tuple[DeviceReport, ...]
+    session: str
+    file: str

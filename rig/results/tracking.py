@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from pydantic import Field
 
-from rig.results.base import Result
+from rig.results.base import Result, SavedResult
 
 FILE = "track.json"
 
@@ -50,7 +50,7 @@ class TrackingGain(Result):
     reduction: float
 
 
-class TrackResult(Result):
+class TrackResult(SavedResult):
     """Reference and actual force, level by level, and where it is recorded."""
 
     recording: str
@@ -112,7 +112,7 @@ class ComparedRun(Result):
     jumps: tuple[Jump, ...]
 
 
-class CompareResult(Result):
+class CompareResult(SavedResult):
     """Every choice of gains on simulated subjects; ``models`` are the parameters learnt of each."""
 
     reference: str
@@ -130,7 +130,7 @@ class LoopMargins(Result):
     gain: float
 
 
-class SimulateResult(Result):
+class SimulateResult(SavedResult):
     """A reference played on a tissue model."""
 
     reference: str
@@ -144,15 +144,9 @@ class SimulateResult(Result):
     margins: tuple[LoopMargins, ...]
 
 
-class Threshold(Result):
+class Threshold(SavedResult):
     """Where the subject stopped the ramp; ``force_N`` is None where it ended at ``up_to_N`` without a stop."""
 
     force_N: float | None
     up_to_N: float
     recording: str
-
-
-class Retracted(Result):
-    """How a retraction ended."""
-
-    outcome: str

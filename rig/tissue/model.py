@@ -9,7 +9,7 @@ from typing import Annotated, Literal, TypeVar
 import numpy as np
 from pydantic import Field
 
-from rig.config.table import Table, parse
+from rig.config.table import Table, parse, refuse_newer
 from rig.errors import DataError, UsageError
 from rig.recording.files import write_text
 from rig.tissue.laws import FloatArray, Law
@@ -186,11 +186,9 @@ def load_model(path: Path) -> Model:
         raise UsageError(f"{path}: cannot be read as JSON: {error}; fit the session again") from error
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise UsageError(f"{path}: is not a tissue model (no format {FORMAT!r}); `rig fit SESSION` writes one")
+    refuse_newer(values, VERSION, str(path))
     if values.get("version") not in (1, VERSION):
-        raise UsageError(
-            f"{path}: model version {values.get('version')!r} is neither 1 nor {VERSION}, which are read here; fit the "
-            "session again"
-        )
+        raise UsageError(f"{path}: states no version of its format, 1 or {VERSION}; fit the session again")
     file = _renamed(parse(_File, values, str(path)))
     try:
         return _model(file)

@@ -150,6 +150,7 @@ def test_calibration_paths_are_beside_the_wiring_file(own_state: Path) -> None:
         (lambda file: file.write_text("{"), "cannot be read as JSON"),
         (lambda file: file.write_text("[" * 100_000), "cannot be read as JSON"),
         (lambda file: file.write_text("[]"), "holds no calibration"),
+        (lambda file: edited(file, version=2), "format version 2 is newer than 1, which this program reads; update"),
         (lambda file: edited(file, serial=5), "serial: Input should be a valid string"),
         (lambda file: edited(file, date="2026-03-01T09:00:00"), "date: .*timezone"),
         (lambda file: edited(file, chanel="fz"), "unknown key chanel; nearest valid key: channel"),

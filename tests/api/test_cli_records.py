@@ -52,6 +52,7 @@ def test_import_prints_a_table_and_writes_its_result(source: Path, tmp_path: Pat
     assert result.exit_code == 0
     assert "trial_02" in result.output
     assert json.loads((tmp_path / "result.json").read_text()) == {
+        "version": 1,
         "session": str(tmp_path / "out"),
         "recordings": 2,
         "samples": {"force": 6, "axis": 6, "marker": 3},

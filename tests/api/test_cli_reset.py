@@ -16,22 +16,23 @@ from api.operations.remote import RemoteBench
 from api.operations.reset import Ask, Recover, reset
 from controller.claims import Holder
 from controller.operation import Cancelled, Operation
-from controller.recovery.situation import ALL, Act, Consent, Recovered
+from controller.recovery.situation import ALL, Consent
 from rig.errors import CheckFailed, DeviceError, UsageError
+from rig.results.bench import Act, Question, ResetResult
 
 HAPPENED = ("the drive is in fault: 0x8130",)
 QUESTIONS: dict[Act, str] = {"clear": "may the fault be cleared?", "retract": "may the tip move out?"}
 
 
-def patient(consent: Consent) -> Recovered:
+def patient(consent: Consent) -> ResetResult:
     """A bench that needs two consents, one after the other."""
     for act, question in QUESTIONS.items():
         if not consent.to(act):
-            return Recovered(HAPPENED, (), ((act, question),), "")
-    return Recovered(HAPPENED, ("the fault was cleared", "the tip moved out"), (), "")
+            return ResetResult(happened=HAPPENED, open=(Question(act=act, question=question),))
+    return ResetResult(happened=HAPPENED, done=("the fault was cleared", "the tip moved out"))
 
 
-def converse(recover: Recover, agreed: Consent, ask: Ask) -> Recovered:
+def converse(recover: Recover, agreed: Consent, ask: Ask) -> ResetResult:
     """As the command does it, which prints what is said."""
     operation = Operation("reset")
     return here(operation, lambda: reset(operation, recover, agreed, ask))
@@ -66,7 +67,7 @@ def test_a_no_ends_it() -> None:
 def test_one_that_is_cancelled_while_it_asks_does_nothing_more() -> None:
     operation, consents = Operation("reset"), list[Consent]()
 
-    def recover(consent: Consent) -> Recovered:
+    def recover(consent: Consent) -> ResetResult:
         consents.append(consent)
         return patient(consent)
 
@@ -137,7 +138,7 @@ def service() -> Iterator[str]:
 def test_a_service_is_asked_under_a_lease_that_is_given_back(service: str) -> None:
     with RemoteBench(service) as remote:
         found = remote.recover(Consent(clear=True))
-    assert found == Recovered(("it fell",), ("it stands",), (), "")
+    assert found == ResetResult(happened=("it fell",), done=("it stands",))
     assert [(method, path, lease) for method, path, _, lease in FakeService.requests] == [
         ("POST", "/api/v1/control/lease", ""),
         ("POST", "/api/v1/recover", "abc"),

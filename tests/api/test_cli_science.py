@@ -139,7 +139,7 @@ def test_the_lattice_is_fitted_to_an_imported_session(tmp_path: Path) -> None:
     run("import", source, "--out", tmp_path / "measured")
     block = ["--lattice", "--block", "9x9x12@2"]
     run("fit", tmp_path / "measured", *block, "--json", tmp_path / "fit.json")
-    assert {"model.json", "lattice.json", "lattice.png", "table.csv"} <= {
+    assert {"model.json", "fit.json", "lattice.png", "table.csv"} <= {
         path.name for path in (tmp_path / "measured" / "fit").iterdir()
     }
     found = json.loads((tmp_path / "fit.json").read_text())["lattice"]

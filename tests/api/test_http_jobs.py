@@ -13,10 +13,10 @@ from api.operations import motion
 from controller.operation import Operation
 from rig.config.wiring import Wiring
 from rig.errors import SafetyStop
-from rig.results.tracking import Retracted
+from rig.results.bench import RetractResult
 from tests.api.test_http_recover import ScriptedBench
 
-Work = Callable[[Operation, object], Retracted]
+Work = Callable[[Operation, object], RetractResult]
 
 
 @pytest.fixture
@@ -50,14 +50,14 @@ def ended(client: TestClient, work: Work, monkeypatch: pytest.MonkeyPatch) -> di
 def test_a_job_shows_the_log_and_the_result_of_its_operation(
     client: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def work(operation: Operation, _bench: object) -> Retracted:
+    def work(operation: Operation, _bench: object) -> RetractResult:
         operation.say("the tip leaves", "the tip is out")
-        return Retracted(outcome="complete")
+        return RetractResult(outcome="complete")
 
     found = ended(client, work, monkeypatch)
     assert (found["state"], found["message"], found["time_left_s"]) == ("succeeded", "done", None)
     assert found["log"] == ["the tip leaves", "the tip is out"]
-    assert found["result"] == {"outcome": "complete"}
+    assert found["result"] == {"version": 1, "outcome": "complete"}
 
 
 def test_while_it_runs_the_bench_shows_its_time_left_and_not_its_log(
@@ -65,11 +65,11 @@ def test_while_it_runs_the_bench_shows_its_time_left_and_not_its_log(
 ) -> None:
     shown: list[dict[str, object]] = []
 
-    def work(operation: Operation, _bench: object) -> Retracted:
+    def work(operation: Operation, _bench: object) -> RetractResult:
         operation.say("a long log")
         operation.advance(0.5, "half way")
         shown.append(client.get("/api/v1/rig").json()["job"])
-        return Retracted(outcome="complete")
+        return RetractResult(outcome="complete")
 
     assert ended(client, work, monkeypatch)["log"] == ["a long log"]
     (now,) = shown
@@ -88,7 +88,7 @@ def test_while_it_runs_the_bench_shows_its_time_left_and_not_its_log(
 def test_a_job_that_does_not_succeed_says_why(
     client: TestClient, monkeypatch: pytest.MonkeyPatch, error: Exception, state: str, message: str
 ) -> None:
-    def work(_operation: Operation, _bench: object) -> Retracted:
+    def work(_operation: Operation, _bench: object) -> RetractResult:
         raise error
 
     found = ended(client, work, monkeypatch)
@@ -101,7 +101,7 @@ def test_a_job_that_is_stopped_is_cancelled_and_the_bench_stops(
     stops: list[str] = []
     monkeypatch.setattr(ScriptedBench, "stop", lambda _: stops.append("stop"), raising=False)
 
-    def work(operation: Operation, _bench: object) -> Retracted:
+    def work(operation: Operation, _bench: object) -> RetractResult:
         (job,) = service.jobs
         client.post(f"/api/v1/jobs/{job}/stop")
         assert operation.cancelled

@@ -10,12 +10,14 @@ from api.http.app import build
 from api.http.service import Service
 from controller.loop.messages import Status
 from controller.operation import Operation
-from controller.recovery.situation import Consent, Recovered
+from controller.recovery.situation import Consent
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError
+from rig.results.bench import Question, ResetResult
 
-OPEN = Recovered(("the drive is in fault: 0x8130",), (), (("clear", "may the drive's fault be cleared?"),), "")
-DONE = Recovered(OPEN.happened, ("the drive's fault was cleared", "the tip moved out"), (), "")
+FAULT = ("the drive is in fault: 0x8130",)
+OPEN = ResetResult(happened=FAULT, open=(Question(act="clear", question="may the drive's fault be cleared?"),))
+DONE = ResetResult(happened=FAULT, done=("the drive's fault was cleared", "the tip moved out"))
 
 
 class ScriptedBench:
@@ -27,7 +29,7 @@ class ScriptedBench:
         self.ready = type("Ready", (), {"devices": {"force": {"product": "BFT"}, "axis": {"product": "EPOS4"}}})()
         self.stop_port = 0
 
-    def recover(self, consent: Consent) -> Recovered:
+    def recover(self, consent: Consent) -> ResetResult:
         self.consents.append(consent)
         if self.failure:
             raise DeviceError(self.failure)
@@ -61,7 +63,7 @@ def bench_of(service: Service) -> Any:
 def test_without_consent_the_answer_asks_and_with_it_says_what_was_done(client: TestClient, service: Service) -> None:
     asked = client.post("/api/v1/recover", json={}).json()
     assert asked == {
-        "happened": ["the drive is in fault: 0x8130"], "done": [], "missing": "", "ready": False,
+        "happened": ["the drive is in fault: 0x8130"], "done": [], "missing": "", "ready": False, "version": 1,
         "open": [{"act": "clear", "question": "may the drive's fault be cleared?"}],
     }  # fmt: skip
     done = client.post("/api/v1/recover", json={"clear": True, "retract": True, "home": True}).json()

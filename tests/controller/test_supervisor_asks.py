@@ -9,10 +9,11 @@ import pytest
 from controller import supervisor as module
 from controller.loop.client import LoopClient
 from controller.loop.messages import Recover, Status
-from controller.recovery.situation import Consent, Recovered
+from controller.recovery.situation import Consent
 from controller.supervisor import Supervisor
 from rig.channel import Message
 from rig.config.wiring import Wiring
+from rig.results.bench import Question, ResetResult
 from tests.controller.played_loop import Surroundings
 
 
@@ -109,11 +110,13 @@ def test_the_loop_is_to_come_between_the_stop_process_and_it(around: Surrounding
     assert to_come == [False, True, False]
 
 
-@pytest.mark.parametrize(("still_open", "finished"), [((), True), ((("home", "home it?"),), False)])
+@pytest.mark.parametrize(
+    ("still_open", "finished"), [((), True), ((Question(act="home", question="home it?"),), False)]
+)
 def test_a_recovery_to_its_end_settles_what_the_session_before_left(
     around: Surroundings, monkeypatch: pytest.MonkeyPatch, still_open: Any, finished: bool
 ) -> None:
-    found = Recovered((), (), still_open, "")
+    found = ResetResult(happened=(), open=still_open)
     monkeypatch.setattr(module, "recover", lambda *_: found)
     assert Supervisor(Wiring()).recover(Consent()) is found, "without a bench there is nothing to settle"
     with Supervisor(Wiring()) as bench:

@@ -125,6 +125,7 @@ def test_the_axis_of_the_mock_bench_is_calibrated_against_its_tracker(tmp_path: 
     said = axis(tmp_path)
     assert said.code == 0, said.err
     result = json.loads((tmp_path / "result.json").read_text())
+    result |= result["calibration"]
     assert result["scale"] == pytest.approx(1.0, abs=0.005)
     assert (result["direction"], result["direction_known_by"]) == (1, "limb marker")
     assert f'[calibration]\naxis = "{result["file"]}"' in said.out

@@ -9,10 +9,11 @@ import pytest
 from controller.loop.messages import Status
 from controller.loop.modes import Mode
 from controller.recovery.conversation import recover
-from controller.recovery.situation import ALL, Act, Consent, Situation, is_retracted, needed, questions
+from controller.recovery.situation import ALL, Consent, Situation, is_retracted, needed, questions
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.wiring import Limits
 from rig.errors import DeviceError, SafetyStop
+from rig.results.bench import Act, Question
 from tests.controller.fake_bench import HOLD, ZERO, FakeBench
 
 WELL = Situation("", "", "", (), True, True, True, 0.0, 0.1)
@@ -37,18 +38,20 @@ CRASHED = replace(
 )
 def test_one_thing_after_the_other_and_no_homing_without_need(now: Situation, acts: tuple[Act, ...]) -> None:
     assert needed(now) == acts
-    assert [act for act, _ in questions(now, Consent())] == list(acts)
+    assert [question.act for question in questions(now, Consent())] == list(acts)
     assert questions(now, ALL) == ()
 
 
 def test_a_question_names_what_it_is_about() -> None:
-    assert questions(CRASHED, Consent()) == (("clear", "may the drive's fault (0x8130 no heartbeat) be cleared?"),)
+    assert questions(CRASHED, Consent()) == (
+        Question(act="clear", question="may the drive's fault (0x8130 no heartbeat) be cleared?"),
+    )
     inside = replace(CRASHED, fault="")
     assert questions(inside, Consent()) == (
-        ("retract", "may the tip move out, from 25.3 mm to its end position?"),
-    )  # fmt: skip
+        Question(act="retract", question="may the tip move out, from 25.3 mm to its end position?"),
+    )
     inward = replace(inside, referenced=False, outward=False)
-    assert questions(inward, Consent())[0][1].startswith("is the tip out of the tissue")
+    assert questions(inward, Consent())[0].question.startswith("is the tip out of the tissue")
 
 
 def test_what_happened_is_said_in_sentences() -> None:
@@ -137,7 +140,7 @@ def test_without_a_consent_it_goes_no_further_and_asks(consent: Consent, acts: l
     bench = ScriptedBench(list(AFTER_A_CRASH))
     found = recover(bench, consent)
     assert bench.acts == acts
-    assert [act for act, _ in found.open] == [open_]
+    assert [question.act for question in found.open] == [open_]
     assert not found.ready
 
 

@@ -99,7 +99,7 @@ def test_a_recovery_is_a_conversation_with_the_loop_after_which_nothing_is_noted
     around.status, around.reply = {**HELD, "devices": {"axis": {"state": "degraded", "detail": ""}}}, recovering
     bench = Supervisor(Wiring(), waiting=True)
     bench.start()
-    assert bench.recover(Consent()).open[0][0] == "retract"
+    assert bench.recover(Consent()).open[0].act == "retract"
     around.status = {"ready": True, "devices": {"axis": {"state": "ok", "detail": ""}}}
     assert bench.recover(Consent(retract=True)).ready
     assert [act.act for act in around.loop.of(Recover)] == ["retract"]

@@ -70,6 +70,22 @@ def test_another_file_is_refused_with_the_place(tmp_path: Path, content: str, sa
         FitResult.read(tmp_path / "fit.json")
 
 
+@pytest.mark.parametrize("content", ['{"version": 2}', '{"version": 2, "session": 1, "laws": []}'])
+def test_a_file_of_a_newer_version_is_refused_in_one_sentence(tmp_path: Path, content: str) -> None:
+    (tmp_path / "fit.json").write_text(content)
+    with pytest.raises(UsageError, match=r"fit.json: format version 2 is newer than 1, .*; update tissue-rig$"):
+        FitResult.read(tmp_path / "fit.json")
+
+
+def test_every_file_states_the_version_that_is_checked(tmp_path: Path) -> None:
+    run_with("model.json", 0.4).write(tmp_path / "track.json")
+    stated = json.loads((tmp_path / "track.json").read_text())
+    assert stated["version"] == 1
+    del stated["version"]
+    (tmp_path / "track.json").write_text(json.dumps(stated))
+    assert TrackResult.read(tmp_path / "track.json") == run_with("model.json", 0.4)
+
+
 def run_with(model: str, rms_error_N: float) -> TrackResult:
     followed = Followed(rms_error_N=rms_error_N, largest_error_N=1.0, amplitude_ratio=None, lag_s=None)
     return TrackResult(

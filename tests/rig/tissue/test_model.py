@@ -131,8 +131,12 @@ BAD: list[tuple[str, Edit, str]] = [
         r"unknown key valid.depth; nearest valid key: depth_mm",
     ),
     ("other format", lambda v: v.update(format="recipe"), r"is not a tissue model"),
-    ("other version", lambda v: v.update(version=3), r"model version 3 is neither 1 nor 2"),
-    ("no version", lambda v: v.pop("version"), r"model version None is neither"),
+    (
+        "other version",
+        lambda v: v.update(version=3),
+        r"format version 3 is newer than 2, which this program reads",
+    ),
+    ("no version", lambda v: v.pop("version"), r"states no version of its format, 1 or 2"),
     ("unknown law", lambda v: v.update(law="cubic"), r"unknown tissue law 'cubic'"),
     (
         "missing parameter",
