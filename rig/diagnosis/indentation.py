@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from rig.diagnosis.effects.registry import CAUSES
 from rig.diagnosis.effects.tissue import STIFFENING, STIFFENING_EFFECT
 from rig.diagnosis.observations import Observations
-from rig.diagnosis.problem import Array, Effect, Par, Scatter, Signal, Values
-from rig.simulation.chain import NULLS, Operator, respond
+from rig.diagnosis.problem import Array, Effect, Par, Scatter, Signal, Values, operators
+from rig.simulation.chain import respond
 from rig.simulation.drive import SETTLE_MM_S, MeasuredMotion
 from rig.tissue.index_law import Fields, index_force
 
@@ -39,7 +39,8 @@ def library(simulation: Simulation) -> tuple[Effect, ...]:
 
 def nulls() -> dict[str, float]:
     """Every parameter of the simulation and of the causes at its null."""
-    return {par.name: par.null for cause in CAUSES.values() for par in cause.pars} | NULLS
+    own = (STIFFNESS, STIFFENING, DAMPING, SURFACE, ZERO, TIP_ZERO)
+    return {par.name: par.null for par in (*own, *(par for cause in CAUSES.values() for par in cause.pars))}
 
 
 @dataclass(frozen=True)
@@ -105,17 +106,14 @@ class IndentationProblem:
     def _nulls(self) -> Values:
         return nulls()
 
-    @cached_property
-    def _operators(self) -> tuple[Operator, ...]:
-        return tuple(effect.operator for effect in self.effects if effect.operator)
-
     @property
     def _encoder(self) -> Array:
         return self.data.drive.at_tracker(self.data.drive.position_mm)
 
     def predict(self, values: Fields) -> tuple[Array, ...]:
         """Force, and tip where it was measured."""
-        response = respond(self.data.drive, {**self._nulls, **values}, self._operators)
+        values = {**self._nulls, **values}
+        response = respond(self.data.drive, values, operators(self.effects, values))
         return response if self.data.has_tracker else (response.force_N,)
 
     def blind(self, values: Fields) -> NDArray[np.bool_]:

@@ -1,6 +1,6 @@
 """What the engine knows of a system: channels, a predictor, parameters, and effects as ways to leave a null value."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
@@ -46,8 +46,8 @@ class Effect:
     ``one_sided`` effects exist only above their null. ``between`` effects differ between recordings rather than inside
     them, so that without them they pass for scatter: they are always tried with a scatter of their own; ``mean_of`` is
     the scatter whose mean an effect is. ``through`` names the one variable an effect acts through, if it is one: two
-    such together may imitate a third that is unknown. ``operator`` is what it does in the simulation, where that does
-    not know the cause itself. ``control`` says what it means for the control.
+    such together may imitate a third that is unknown. ``operator`` is what it does in the simulation, None where it is
+    a parameter of the elastic law. ``control`` says what it means for the control.
     """
 
     name: str
@@ -76,6 +76,15 @@ class Effect:
     def pars(self) -> tuple[Par, ...]:
         """Amplitudes, then shapes."""
         return self.amplitudes + self.shapes
+
+
+def operators(causes: Iterable[Effect], values: Fields) -> list[Operator]:
+    """What the causes that are off their null do, in their order."""
+    return [
+        cause.operator
+        for cause in causes
+        if cause.operator and any(values[par.name] != par.null for par in cause.amplitudes)
+    ]
 
 
 class Signal(NamedTuple):

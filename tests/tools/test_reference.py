@@ -149,7 +149,7 @@ def test_a_cause_stands_in_the_reference_with_its_smallest_size_and_what_to_do()
     substrate = text.partition("## `substrate`\n")[2].partition("\n## ")[0]
     assert "Something stiff lies below: the force grows by 1 + `substrate_per_mm3` x^3." in substrate
     assert "- what to do: measure over thicker tissue" in substrate
-    assert "| `substrate_per_mm3` | 1/mm^3 | 0 | 0 | 0.05 | 2e-05 | growth of force by the cube of depth |" in substrate
+    assert "| `substrate_per_mm3` | 1/mm^3 | 0 | 0 | 0.05 | 2e-05 | growth of force by depth cubed |" in substrate
     assert "## `elastic_law` (exponent)\n" in text
     assert "## `elastic_law` (quadratic_per_mm)\n" in text
     assert all(f"| `{key}` |" in text for key in CAUSES)

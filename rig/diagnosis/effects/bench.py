@@ -6,9 +6,8 @@ import numpy as np
 
 from rig.diagnosis.effects.scan import PEAKS, peaks
 from rig.diagnosis.problem import Array, Effect, InverseProblem, Par, Values
-from rig.simulation.chain import Operator, Series, one
-from rig.simulation.drive import MeasuredMotion
-from rig.simulation.scans import play
+from rig.simulation.chain import Operator, Series, Tip, one
+from rig.simulation.scans import dahl, play
 from rig.tissue.index_law import Fields
 
 LOWEST_HZ, HIGHEST_HZ = 0.08, 3.0
@@ -62,34 +61,44 @@ def _pair(stem: str, meaning: str, worth_mm: float) -> tuple[Par, Par]:
     )
 
 
-def _backlash(drive: MeasuredMotion, offset: Series, v: Fields) -> Series:
+def _backlash(encoder: Tip, offset: Series, v: Fields) -> Series:
     """Lost motion: 0 in forward motion, the width when retracting."""
-    width_mm = one(v, "backlash_mm")
-    if width_mm <= 0:
-        return offset
-    return offset + (play(drive.position_mm, drive.first, width_mm) - drive.position_mm)
+    lost_mm = play(encoder.position_mm, encoder.drive.first, one(v, "backlash_mm")) - encoder.position_mm
+    return offset + lost_mm
 
 
-def _ripple(drive: MeasuredMotion, offset: Series, v: Fields) -> Series:
-    if not (v["ripple_sin_mm"] or v["ripple_cos_mm"]):
-        return offset
-    phase = 2 * np.pi * drive.position_mm / v["ripple_pitch_mm"]
-    return offset + np.asarray(v["ripple_sin_mm"] * np.sin(phase) + v["ripple_cos_mm"] * np.cos(phase))
+def _wave(stem: str, phase: Array, v: Fields) -> Array:
+    return np.asarray(v[f"{stem}_sin_mm"] * np.sin(phase) + v[f"{stem}_cos_mm"] * np.cos(phase))
 
 
-def _filtered(drive: MeasuredMotion, force_N: Series, v: Fields) -> Series:
-    lag_s = one(v, "filter_lag_s")
-    return force_N - drive.history.transient(np.asarray(force_N), lag_s) if lag_s > 0 else force_N
+def _ripple(encoder: Tip, offset: Series, v: Fields) -> Series:
+    return offset + _wave("ripple", 2 * np.pi * encoder.position_mm / v["ripple_pitch_mm"], v)
 
 
-def _drifted(drive: MeasuredMotion, force_N: Series, v: Fields) -> Series:
-    middle_s = 0.5 * (drive.time_s[0] + drive.time_s[-1])
-    return np.asarray(force_N + one(v, "zero_drift_N_h") * (drive.time_s - middle_s) / 3600)
+def _surface_motion(encoder: Tip, away: Series, v: Fields) -> Series:
+    return away + _wave("surface_motion", 2 * np.pi * v["surface_motion_Hz"] * encoder.drive.time_s, v)
 
 
-def _late(drive: MeasuredMotion, force_N: Series, v: Fields) -> Series:
-    late_s = one(v, "time_offset_s")
-    return drive.shifted(np.asarray(force_N), late_s) if late_s else force_N
+def _friction(tip: Tip, force_N: Series, v: Fields) -> Series:
+    state = dahl(tip.position_mm, tip.drive.first, one(v, "friction_length_mm"), one(v, "friction_start"))
+    return force_N + one(v, "friction_N") * state
+
+
+def _inertia(tip: Tip, force_N: Series, v: Fields) -> Series:
+    return force_N + 1e-3 * one(v, "tip_inertia_kg") * tip.acceleration_mm_s2
+
+
+def _filtered(tip: Tip, force_N: Series, v: Fields) -> Series:
+    return force_N - tip.drive.history.transient(np.asarray(force_N), one(v, "filter_lag_s"))
+
+
+def _drifted(tip: Tip, force_N: Series, v: Fields) -> Series:
+    time_s = tip.drive.time_s
+    return np.asarray(force_N + one(v, "zero_drift_N_h") * (time_s - 0.5 * (time_s[0] + time_s[-1])) / 3600)
+
+
+def _late(tip: Tip, force_N: Series, v: Fields) -> Series:
+    return tip.drive.shifted(np.asarray(force_N), one(v, "time_offset_s"))
 
 
 ELASTIC = "in the force-depth curve: gains and inverse model"
@@ -109,6 +118,7 @@ FRAME_COMPLIANCE = Effect(
     "the frame gives way by {frame_compliance_mm_N:.3g} mm per newton between encoder and tip",
     (Par("frame_compliance_mm_N", "mm/N", 0.0, 0.0, 0.8, 0.005, worth=0.002, meaning="tip behind encoder per force"),),
     one_sided=True,
+    operator=Operator("frame", lambda _, compliance_mm_N, v: compliance_mm_N + one(v, "frame_compliance_mm_N")),
     needs=frozenset({"tracker", "depth"}),
     aliases=("a_N_mm", "b_per_mm"),
     control=ELASTIC,
@@ -132,6 +142,7 @@ CONTACT_OFFSET = Effect(
     (Par("contact_offset_mm", "mm", 0.0, -8.0, 8.0, 0.05, worth=0.02, meaning="true surface minus stated surface"),),
     between=True,
     mean_of="touch",
+    operator=Operator("surface", lambda _, away_mm, v: away_mm + one(v, "contact_offset_mm")),
     needs=frozenset({"surface", "depth"}),
     repair="find the contact again, or correct the stated surface",
 )
@@ -142,6 +153,7 @@ SURFACE_MOTION = Effect(
     (Par("surface_motion_Hz", "Hz", 0.25, 0.05, 5.0, 0.002, meaning="frequency"),),
     _surface_starts,
     _surface_tries,
+    operator=Operator("surface", _surface_motion),
     needs=frozenset({"depth"}),
     repair="ask for held breath, or measure the limb with a marker and subtract it",
 )
@@ -156,6 +168,7 @@ FRICTION = Effect(
     ),
     lambda *_: [{"friction_length_mm": mm, "friction_start": -0.5} for mm in (0.005, 0.03, 0.15, 0.6)],
     one_sided=True,
+    operator=Operator("guide", _friction),
     needs=frozenset({"unloading"}),
     control="in the inverse model",
     repair="clean and align the guide, or put the sensor at the tip",
@@ -165,6 +178,7 @@ TIP_INERTIA = Effect(
     "a mass of {tip_inertia_kg:.3g} kg moves in front of the sensor",
     (Par("tip_inertia_kg", "kg", 0.0, 0.0, 5.0, 0.02, worth=0.005, meaning="mass in front of the sensor"),),
     one_sided=True,
+    operator=Operator("sensing", _inertia),
     needs=frozenset({"fast"}),
     repair="weigh what is mounted on the sensor and enter it in the calibration",
 )
@@ -189,6 +203,7 @@ TRACKER_LATENCY = Effect(
     "tracker_latency",
     "the tracker shows the tip {tracker_latency_s:.3g} s late",
     (Par("tracker_latency_s", "s", 0.0, -0.3, 0.5, 0.005, worth=0.001, meaning="tracker stamps late"),),
+    operator=Operator("tracking", lambda _, late_s, v: late_s + one(v, "tracker_latency_s")),
     needs=frozenset({"tracker"}),
     repair="set the tracker's latency_ms in rig.toml",
 )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.diagnosis.indentation import library, nulls
-from rig.diagnosis.problem import Effect
+from rig.diagnosis.problem import Effect, operators
 from rig.simulation import chain
 from rig.simulation.drive import Array, MeasuredMotion
 
@@ -29,12 +29,10 @@ def stroke_drive(speed_mm_s: float = 10.0, period_s: float = 0.004) -> MeasuredM
     )  # fmt: skip
 
 
-OPERATORS = tuple(effect.operator for effect in library("index") if effect.operator)
-
-
 def respond(drive: MeasuredMotion, values: Mapping[str, float]) -> chain.Response:
-    """What the sensors read with the operators of all causes."""
-    return chain.respond(drive, {**nulls(), **values}, OPERATORS)
+    """What the sensors read with the causes that are off their null."""
+    values = {**nulls(), **values}
+    return chain.respond(drive, values, operators(library("index"), values))
 
 
 def force_with(**values: float) -> Array:
