@@ -12,13 +12,13 @@ from socket import socket
 
 from controller.claims import Claim, take
 from controller.loop.client import ANSWER_TIMEOUT_S, LoopClient
-from controller.loop.messages import Lease, Note, Outcome, Ready, Recover, Reset, Run, Shutdown, Status, Stopped
+from controller.loop.messages import Heartbeat, Note, Outcome, Ready, Recover, Reset, Run, Shutdown, Status, Stopped
 from controller.loop.steps import Program
 from controller.recovery.conversation import recover
 from controller.recovery.situation import Consent, Situation
 from controller.safety.table import Action
 from controller.stop.client import StopProcess
-from controller.stop.word import Kind, Requester
+from controller.stop.word import Requester, StopReason
 from rig.channel import Message, pair
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, SafetyStop, UsageError
@@ -127,7 +127,7 @@ class Supervisor:
         period_s = (self.wiring.loop.lease_s or UNASKED_LEASE_S) / LEASE_SHARE
         while not self._closing.wait(period_s):
             try:
-                self._tell(Lease(attending=self.attended()))
+                self._tell(Heartbeat(attending=self.attended()))
             except DeviceError:
                 return
 
@@ -208,15 +208,15 @@ class Supervisor:
 
     def stop(self) -> None:
         """Soft stop by the operator: retract, then stay."""
-        self.stops.request(Kind.STOP)
+        self.stops.request(StopReason.STOP)
 
     def pain(self) -> None:
         """The subject's stop: retract, then stay."""
-        self.stops.request(Kind.PAIN)
+        self.stops.request(StopReason.PAIN)
 
     def estop(self) -> None:
         """Immediate stop by the drive's own ramp."""
-        self.stops.request(Kind.EMERGENCY)
+        self.stops.request(StopReason.EMERGENCY)
 
     def reset(self) -> None:
         """Acknowledges a stop and waits until the loop's status shows it; raises where the cause is still there."""

@@ -5,23 +5,27 @@ makes a frame; after a bad one the search goes on one byte later, and no good fr
 """
 
 from collections.abc import Callable
+from typing import Generic, TypeVar
 
 from drivers.roles import LinkCounters
 
+Decoded = TypeVar("Decoded")
 
-class FixedFrames:
-    """Holds less than one frame of bytes between calls, whatever comes.
 
-    ``is_good`` gets ``size`` bytes that begin with ``start`` and says whether their checksum is right. A checksum error
-    is counted where a frame was due, that is behind another one; every byte outside a good frame is counted as
-    discarded. ``gaps`` are the bytes discarded before each frame of the last ``feed``.
+class FrameDecoder(Generic[Decoded]):
+    """Holds less than one frame of bytes between calls, whatever comes, and never raises.
+
+    ``is_good`` gets ``size`` bytes that begin with ``start`` and says whether their checksum is right; ``decode`` gets
+    those that are good. A checksum error is counted where a frame was due, that is behind another one; every byte
+    outside a good frame is counted as discarded. ``gaps``: bytes discarded before each frame of the last ``feed``.
     """
 
-    def __init__(self, start: bytes, size: int, is_good: Callable[[bytes], bool], counters: LinkCounters) -> None:
-        self._start = start
-        self._size = size
-        self._is_good = is_good
-        self._counters = counters
+    def __init__(
+        self, start: bytes, size: int, is_good: Callable[[bytes], bool], decode: Callable[[bytes], Decoded],
+        counters: LinkCounters,
+    ) -> None:  # fmt: skip
+        self._start, self._size, self._counters = start, size, counters
+        self._is_good, self._decode = is_good, decode
         self.gaps: list[int] = []
         self._gap = 0
         self._rest = b""
@@ -32,8 +36,8 @@ class FixedFrames:
         """Bytes kept for the next call; always less than ``size``."""
         return len(self._rest)
 
-    def feed(self, data: bytes) -> list[bytes]:
-        """The good frames completed by ``data``, oldest first."""
+    def feed(self, data: bytes) -> list[Decoded]:
+        """What the good frames completed by ``data`` say, oldest first."""
         buffer = self._rest + data
         frames = []
         self.gaps = []
@@ -52,7 +56,7 @@ class FixedFrames:
         self._counters.frames += len(frames)
         self._rest = buffer[at:]
         self._due -= at
-        return frames
+        return [self._decode(frame) for frame in frames]
 
     def _candidate(self, buffer: bytes, at: int) -> int:
         """Where the next frame may begin at or behind ``at``; what lies before is discarded."""

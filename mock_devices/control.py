@@ -41,7 +41,7 @@ Faults = Mapping[str, Sequence[Mapping[str, Fault]]]
 Sampled = Mapping[str, deque[tuple[int, int]]]
 
 
-class Asked(Message):
+class ControlRequest(Message):
     """A request."""
 
     TYPE: ClassVar[int] = 50
@@ -49,14 +49,14 @@ class Asked(Message):
     argument: JsonValue
 
 
-class Told(Reply):
+class ControlReply(Reply):
     """Its answer."""
 
     TYPE: ClassVar[int] = 51
     value: JsonValue
 
 
-class Desk:
+class RequestHandler:
     """Answers requests on ``bench`` and on the ``faults`` of its devices; knows no sockets."""
 
     def __init__(
@@ -140,7 +140,7 @@ class ControlPort:
     def receive(self) -> None:
         """Accepts who waits and answers what is complete."""
         with contextlib.suppress(OSError):
-            self._clients.append(Channel(self._listener.accept()[0], [Asked]))
+            self._clients.append(Channel(self._listener.accept()[0], [ControlRequest]))
         for client in list(self._clients):
             for received in client.receive_all():
                 client.send(self._reply(received))
@@ -151,11 +151,11 @@ class ControlPort:
 
     def _reply(self, received: Received) -> Message:
         request = received.message
-        if not isinstance(request, Asked):
+        if not isinstance(request, ControlRequest):
             return Answer(to=received.id, refused="ask with a verb and an argument")
         try:
             value = to_jsonable_python(self._answer(request.verb, request.argument))
-            return Told(to=received.id, value=value)
+            return ControlReply(to=received.id, value=value)
         except RigError as error:
             return Answer(to=received.id, refused=str(error))
         except ValueError:  # a figure that is no number just now
@@ -175,7 +175,7 @@ class BenchControl:
     def __init__(self, address: str) -> None:
         host, _, port = address.rpartition(":")
         try:
-            self._channel = Channel(socket.create_connection((host, int(port)), CLIENT_TIMEOUT_S), [Told])
+            self._channel = Channel(socket.create_connection((host, int(port)), CLIENT_TIMEOUT_S), [ControlReply])
         except (OSError, ValueError) as error:
             raise DeviceError(f"{address}: no bench answers there ({error}); is `rig mock` running?") from error
         self._address = address
@@ -232,7 +232,7 @@ class BenchControl:
     def _ask(self, verb: str, argument: Any) -> Any:
         if self._channel.lost:
             raise DeviceError(f"{self._address}: the bench hung up; it has ended")
-        number = self._channel.send(Asked(verb=verb, argument=argument))
+        number = self._channel.send(ControlRequest(verb=verb, argument=argument))
         deadline = time.monotonic() + CLIENT_TIMEOUT_S
         while not self._channel.lost and (left_s := deadline - time.monotonic()) > 0:
             writing = [] if self._channel.flush() else [self._channel]
@@ -244,7 +244,7 @@ class BenchControl:
 
 
 def _value(reply: Reply) -> Any:
-    if isinstance(reply, Told):
+    if isinstance(reply, ControlReply):
         return reply.value
     assert isinstance(reply, Answer)
     raise UsageError(reply.refused)

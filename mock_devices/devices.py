@@ -14,8 +14,8 @@ from mock_devices.bota.mock import BotaMock
 from mock_devices.epos4.mock import Epos4Mock
 from mock_devices.faults.devices import BOTA_FAULTS, EPOS4_FAULTS, NDI_FAULTS, ROBOTIQ_FAULTS
 from mock_devices.faults.sensing import CAMERA_FAULTS, SENSOR_FAULTS
-from mock_devices.faults.wires import WIRE_FAULTS, Fault, FaultyWire, Kind, faults_of
-from mock_devices.interfaces import Mock
+from mock_devices.faults.wires import WIRE_FAULTS, Fault, FaultKind, FaultyWire, faults_of
+from mock_devices.interfaces import ProtocolMock
 from mock_devices.ndi.mock import NdiMock
 from mock_devices.parameters import Axis, Parameters, Sensor
 from mock_devices.robotiq.mock import RobotiqMock
@@ -23,7 +23,7 @@ from mock_devices.wire import PtyWire, TcpWire, Wire
 from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS
 from rig.config.products.roles import Product
 
-AnyMock = TypeVar("AnyMock", bound=Mock)
+AnyMock = TypeVar("AnyMock", bound=ProtocolMock)
 TOOLS = ("tip", "arm")
 BOTA_NUMBER, ROBOTIQ_NUMBER, AXIS_NUMBER = 271, 1234, int(SERIAL.default)
 # Six digits are what the Bota sensor prints.
@@ -36,16 +36,16 @@ FORCE_CHOICES: dict[str, tuple[type[Product], ...]] = {
 
 
 @dataclass(frozen=True)
-class Device:
+class MockDevice:
     """One product on one wire; ``role`` is where its endpoint stands among the bench's."""
 
     role: str
-    mock: Mock
+    mock: ProtocolMock
     wire: FaultyWire
     faults: dict[str, Fault]
 
 
-class Workshop:
+class DeviceFactory:
     """Builds devices on ``bench``; ``clock_ns`` times delayed writes, ``seed`` draws what wire faults spoil."""
 
     def __init__(
@@ -58,13 +58,13 @@ class Workshop:
         self._clock_ns = clock_ns
         self._rng = random.Random(seed)
 
-    def devices(self, sensors: Iterable[type[Product]]) -> list[Device]:
+    def devices(self, sensors: Iterable[type[Product]]) -> list[MockDevice]:
         """Those ``sensors``, and every axis and tracker there is."""
         products = [*sensors, *AXES.values(), *TRACKERS.values()]
         makers = [resolve_name(product.mock.maker) for product in products if product.mock]
         return [device for maker in makers for device in maker(self)]
 
-    def bota(self) -> list[Device]:
+    def bota(self) -> list[MockDevice]:
         """The SensONE."""
         wire = self._faulty(self._line("force"))
         drift_ppm = self._bench.parameters.force.counter_drift_ppm
@@ -72,7 +72,7 @@ class Workshop:
         mock = BotaMock(wire, self._bench.force, self._start_ns, drift_ppm, f"{number:06d}")
         return [_device("force", mock, wire, BOTA_FAULTS, faults_of(self._bench.force, SENSOR_FAULTS))]
 
-    def robotiq(self) -> list[Device]:
+    def robotiq(self) -> list[MockDevice]:
         """The FT 300."""
         wire = self._faulty(self._line("force_modbus"))
         drift_ppm = self._bench.parameters.force_modbus.counter_drift_ppm
@@ -81,7 +81,7 @@ class Workshop:
         inside = faults_of(self._bench.force_modbus, SENSOR_FAULTS)
         return [_device("force_modbus", mock, wire, ROBOTIQ_FAULTS, inside)]
 
-    def epos4(self) -> list[Device]:
+    def epos4(self) -> list[MockDevice]:
         """The drive."""
         wire = self._faulty(self._line("axis"))
         axis = self._bench.parameters.axis
@@ -92,7 +92,7 @@ class Workshop:
         )
         return [_device("axis", mock, wire, EPOS4_FAULTS)]
 
-    def ndi(self) -> list[Device]:
+    def ndi(self) -> list[MockDevice]:
         """The camera on both of its wires."""
         serial = self._faulty(self._line("tracker"))
         tcp = self._faulty(_listen(self._bench.parameters.tracker.tcp_port))
@@ -119,10 +119,10 @@ def _device(
     role: str,
     mock: AnyMock,
     wire: FaultyWire,
-    kinds: Mapping[str, Kind[AnyMock]],
+    kinds: Mapping[str, FaultKind[AnyMock]],
     inside: Mapping[str, Fault] | None = None,
-) -> Device:
-    return Device(role, mock, wire, faults_of(wire, WIRE_FAULTS) | faults_of(mock, kinds) | dict(inside or {}))
+) -> MockDevice:
+    return MockDevice(role, mock, wire, faults_of(wire, WIRE_FAULTS) | faults_of(mock, kinds) | dict(inside or {}))
 
 
 def _listen(port: int) -> TcpWire:

@@ -60,7 +60,7 @@ class TrackerPlant(Protocol):
         """Tools in view as of the frame delivered now: latency and noise included; order as in the bench file."""
 
 
-class Mock(Protocol):
+class ProtocolMock(Protocol):
     """One product on its wire."""
 
     name: str

@@ -19,8 +19,8 @@ from typing import Protocol
 
 from mock_devices.bench import Bench
 from mock_devices.bota.mock import BotaMock
-from mock_devices.control import ControlPort, Desk
-from mock_devices.devices import FORCE_CHOICES, Device, Workshop
+from mock_devices.control import ControlPort, RequestHandler
+from mock_devices.devices import FORCE_CHOICES, DeviceFactory, MockDevice
 from mock_devices.epos4.mock import Epos4Mock
 from mock_devices.faults.wires import Fault
 from mock_devices.parameters import Parameters, load_parameters
@@ -53,10 +53,10 @@ class Timed(Protocol):
         """Does what is due."""
 
 
-class Server:
+class MockServer:
     """Bench, devices and control channel on one clock."""
 
-    def __init__(self, bench: Bench, devices: Sequence[Device], clock_ns: Callable[[], int]) -> None:
+    def __init__(self, bench: Bench, devices: Sequence[MockDevice], clock_ns: Callable[[], int]) -> None:
         self._bench = bench
         self._mocks = [device.mock for device in devices]
         self._timed: list[Timed] = [*self._mocks, *(device.wire for device in devices)]
@@ -67,7 +67,7 @@ class Server:
         synced_ns = drives[0].synced_ns if drives else None
         roles = {device.role: device.mock for device in devices}
         sampled = {role: mock.sampled for role, mock in roles.items() if isinstance(mock, BotaMock | RobotiqMock)}
-        self.control = ControlPort(Desk(bench, _by_role(devices), synced_ns, sampled).answer)
+        self.control = ControlPort(RequestHandler(bench, _by_role(devices), synced_ns, sampled).answer)
 
     def endpoints(self) -> Endpoints:
         """Where all of it is."""
@@ -165,7 +165,7 @@ def stated_latency_ms(parameters: Parameters) -> dict[str, float]:
     }
 
 
-def _by_role(devices: Sequence[Device]) -> dict[str, list[dict[str, Fault]]]:
+def _by_role(devices: Sequence[MockDevice]) -> dict[str, list[dict[str, Fault]]]:
     roles: dict[str, list[dict[str, Fault]]] = {}
     for device in devices:
         roles.setdefault(device.role, []).append(dict(device.faults))
@@ -205,13 +205,13 @@ def effects_table() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _server(options: argparse.Namespace) -> Server:
+def _server(options: argparse.Namespace) -> MockServer:
     parameters = _parameters(options)
     start_ns = time.monotonic_ns() - POWERED_BEFORE_NS
     bench = Bench(parameters, options.seed, start_ns)
-    workshop = Workshop(bench, start_ns, time.monotonic_ns, options.seed, options.links)
-    devices = workshop.devices(FORCE_CHOICES[options.force])
-    return Server(bench, devices, time.monotonic_ns)
+    factory = DeviceFactory(bench, start_ns, time.monotonic_ns, options.seed, options.links)
+    devices = factory.devices(FORCE_CHOICES[options.force])
+    return MockServer(bench, devices, time.monotonic_ns)
 
 
 def _parameters(options: argparse.Namespace) -> Parameters:

@@ -14,12 +14,12 @@ import typer
 from api.cli import live
 from api.cli.diagnose import diagnosed
 from api.cli.fitting import fitted as fit_session
-from api.cli.hidden_effect import Secret, draw
+from api.cli.hidden_effect import HiddenCause, draw
 from api.cli.motion import captured, followed, say_levels
 from api.cli.options import built_in
 from api.cli.output import console
 from api.cli.stage import bench_for
-from api.operations.motion import TrackRequest
+from api.operations.motion import TrackPlan
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.supervisor import Supervisor
@@ -120,7 +120,7 @@ def _clear(out: Path) -> None:
 def _track(bench: Supervisor, session: Path) -> TrackResult:
     model = load_model(session / MODEL)
     program = tracked.plan(forces_within(model.valid.force_N), SECONDS, model, bench.wiring)
-    return followed(bench, TrackRequest(program, str(MODEL)), session)
+    return followed(bench, TrackPlan(program, str(MODEL)), session)
 
 
 def forces_within(largest_N: float) -> tuple[float, ...]:
@@ -130,7 +130,7 @@ def forces_within(largest_N: float) -> tuple[float, ...]:
     return tuple(round(force_N / FORCES_N[-1] * 0.85 * largest_N, 2) for force_N in FORCES_N)
 
 
-def _diagnosis(result: DiagnosisResult, secret: Secret, seed: int) -> DemoDiagnosis:
+def _diagnosis(result: DiagnosisResult, secret: HiddenCause, seed: int) -> DemoDiagnosis:
     """What was said, and last what is true."""
     return DemoDiagnosis(
         verdict=result.verdict,

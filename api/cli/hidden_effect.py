@@ -11,7 +11,7 @@ from rig.results.diagnosis import DiagnosisResult
 
 
 @dataclass(frozen=True)
-class Kind:
+class CauseRange:
     """A cause: its knob in the mock bench, its amplitude in the diagnosis, the range drawn from, further knobs."""
 
     knob: str
@@ -22,19 +22,19 @@ class Kind:
 
 
 # Small enough that fit and tracking stay what they are without it.
-KINDS = {
-    "friction": Kind("level_N", "friction_N", 0.05, 0.15, {"slip_length_mm": (0.03, 0.1)}),
-    "backlash": Kind("gap_mm", "backlash_mm", 0.06, 0.12, {}),
-    "relaxation": Kind("strength_1", "relaxation_ratio", 0.05, 0.1, {"time_constant_s": (0.2, 0.8)}),
-    "frame_compliance": Kind("compliance_mm_N", "frame_compliance_mm_N", 0.02, 0.05, {}),
-    "tracker_latency": Kind("delay_s", "tracker_latency_s", 0.015, 0.04, {}),
+CAUSES = {
+    "friction": CauseRange("level_N", "friction_N", 0.05, 0.15, {"slip_length_mm": (0.03, 0.1)}),
+    "backlash": CauseRange("gap_mm", "backlash_mm", 0.06, 0.12, {}),
+    "relaxation": CauseRange("strength_1", "relaxation_ratio", 0.05, 0.1, {"time_constant_s": (0.2, 0.8)}),
+    "frame_compliance": CauseRange("compliance_mm_N", "frame_compliance_mm_N", 0.02, 0.05, {}),
+    "tracker_latency": CauseRange("delay_s", "tracker_latency_s", 0.015, 0.04, {}),
 }
 # A cause is drawn no smaller than this many times what the protocol could just show.
 MARGIN = 3.0
 
 
 @dataclass(frozen=True)
-class Secret:
+class HiddenCause:
     """What is hidden: the cause, its knobs with their values, and what the diagnosis calls its amplitude."""
 
     effect: str
@@ -68,13 +68,15 @@ class Secret:
         )
 
 
-def draw(rng: np.random.Generator, protocol: Indentation) -> Secret:
+def draw(rng: np.random.Generator, protocol: Indentation) -> HiddenCause:
     """One cause the protocol can see, its size well beyond the smallest visible one."""
     visible = check(protocol).detectable
-    least = {name: MARGIN * visible[name].minimum for name, kind in KINDS.items() if name in visible}
-    names = sorted(name for name, size in least.items() if size < KINDS[name].high)
+    least = {name: MARGIN * visible[name].minimum for name in CAUSES if name in visible}
+    names = sorted(name for name, size in least.items() if size < CAUSES[name].high)
     effect = str(rng.choice(names))
-    kind = KINDS[effect]
-    size = float(rng.uniform(max(kind.low, least[effect]), kind.high))
-    further = {knob: float(rng.uniform(*ends)) for knob, ends in kind.further.items()}
-    return Secret(effect, {kind.knob: round(size, 5), **{k: round(v, 5) for k, v in further.items()}}, kind.parameter)
+    cause = CAUSES[effect]
+    size = float(rng.uniform(max(cause.low, least[effect]), cause.high))
+    further = {knob: float(rng.uniform(*ends)) for knob, ends in cause.further.items()}
+    return HiddenCause(
+        effect, {cause.knob: round(size, 5), **{k: round(v, 5) for k, v in further.items()}}, cause.parameter
+    )

@@ -10,12 +10,12 @@ import tty
 from collections.abc import Callable, Iterator
 from typing import Self
 
-from controller.stop.word import Kind
+from controller.stop.word import StopReason
 
-STOP_KEYS = {"p": Kind.PAIN, " ": Kind.EMERGENCY, "s": Kind.STOP}
+STOP_KEYS = {"p": StopReason.PAIN, " ": StopReason.EMERGENCY, "s": StopReason.STOP}
 LOOK_S = 0.1
 
-Press = Callable[[Kind], None]
+Press = Callable[[StopReason], None]
 
 
 class StopKeys:
@@ -24,7 +24,7 @@ class StopKeys:
     def __init__(self, fd: int) -> None:
         self._fd = fd
         self._lock = threading.Lock()
-        self._early: list[Kind] = []
+        self._early: list[StopReason] = []
         self._press: Press | None = None
         self._over = threading.Event()
         self._before = termios.tcgetattr(fd)
@@ -64,7 +64,7 @@ class StopKeys:
                 if key in STOP_KEYS:
                     self._take(STOP_KEYS[key])
 
-    def _take(self, kind: Kind) -> None:
+    def _take(self, kind: StopReason) -> None:
         with self._lock:
             if self._press:
                 self._press(kind)

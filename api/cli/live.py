@@ -16,7 +16,7 @@ from api.cli.keys import stop_keys
 from api.cli.output import console
 from controller.operation import Operation
 from controller.operation import Progress as Snapshot
-from controller.stop.word import NOT_CONFIRMED, Kind
+from controller.stop.word import NOT_CONFIRMED, StopReason
 from controller.supervisor import Supervisor
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError
@@ -24,7 +24,7 @@ from rig.errors import DeviceError
 LOOK_S = 0.1
 # As long as the stop process waits for the loop.
 CONFIRM_S = 0.5
-NAMES = {Kind.PAIN: "pain stop", Kind.EMERGENCY: "emergency stop", Kind.STOP: "stop"}
+NAMES = {StopReason.PAIN: "pain stop", StopReason.EMERGENCY: "emergency stop", StopReason.STOP: "stop"}
 KEYS = "keys: p pain stop, space emergency stop, s or Ctrl-C stop and retract"
 
 T = TypeVar("T")
@@ -45,7 +45,7 @@ def connected(wiring: Wiring) -> Iterator[Supervisor]:
             bench.close()
 
 
-def _press(bench: Supervisor, kind: Kind) -> None:
+def _press(bench: Supervisor, kind: StopReason) -> None:
     """Asks for the stop and says what the loop made of it."""
     try:
         coming = bench.loop_is_to_come

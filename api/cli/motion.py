@@ -11,7 +11,7 @@ from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import console, say, show, write_json
 from api.cli.stage import bench_for
 from api.operations import motion
-from api.operations.motion import Captured, TrackRequest
+from api.operations.motion import Captured, TrackPlan
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.experiments.comparison import CHOICES, choice_from, choices_from
@@ -92,7 +92,7 @@ def track(
     Example: rig track --model sessions/first/fit/model.json --force 1,2,5 --seconds 5 --json track.json
     """
     wiring = wiring_from(config, overrides)
-    asked = Asked(model, force, reference, seconds, gains, subjects)
+    asked = TrackOptions(model, force, reference, seconds, gains, subjects)
     if compare and against:
         raise UsageError("--table learns its own models: leave out --against")
     folder = out or Path("sessions") / f"track-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
@@ -102,10 +102,10 @@ def track(
         _tracked(wiring, folder, asked, against, json_file)
 
 
-def _tracked(wiring: Wiring, folder: Path, asked: "Asked", against: Path | None, json_file: Path | None) -> None:
+def _tracked(wiring: Wiring, folder: Path, asked: "TrackOptions", against: Path | None, json_file: Path | None) -> None:
     """One run, after one with the other model where there is one; all is checked before anything is opened."""
-    wanted = TrackRequest(_planned(wiring, asked), str(asked.model))
-    other = TrackRequest(_planned(wiring, asked._replace(model=against)), str(against)) if against else None
+    wanted = TrackPlan(_planned(wiring, asked), str(asked.model))
+    other = TrackPlan(_planned(wiring, asked._replace(model=against)), str(against)) if against else None
     tracked.refuse_foreign(folder)
     with bench_for(wiring) as (live_wiring, _), live.connected(live_wiring) as bench:
         found = followed(bench, wanted, folder, other)
@@ -120,13 +120,13 @@ def _tracked(wiring: Wiring, folder: Path, asked: "Asked", against: Path | None,
             tracked.refuse_bad(run)
 
 
-def followed(bench: Supervisor, wanted: TrackRequest, folder: Path, against: TrackRequest | None = None) -> TrackResult:
+def followed(bench: Supervisor, wanted: TrackPlan, folder: Path, against: TrackPlan | None = None) -> TrackResult:
     """Force tracked into ``folder``, watched on the terminal."""
     operation = Operation("track", total=2 if against else 1, unit="runs")
     return live.run(bench, operation, lambda: motion.track(operation, bench, wanted, folder, against))
 
 
-class Asked(NamedTuple):
+class TrackOptions(NamedTuple):
     """What `rig track` was asked for."""
 
     model: Path | None
@@ -137,7 +137,7 @@ class Asked(NamedTuple):
     subjects: str
 
 
-def _planned(wiring: Wiring, asked: Asked) -> Program:
+def _planned(wiring: Wiring, asked: TrackOptions) -> Program:
     """The program, checked before anything is opened."""
     if asked.model is None or bool(asked.force) == bool(asked.reference) or asked.subjects:
         raise UsageError("tracking needs --model, and either --force or --reference; or --table, which has --subjects")
@@ -153,7 +153,7 @@ def _planned(wiring: Wiring, asked: Asked) -> Program:
     return tracked.plan(tracked.forces(asked.force), seconds, fitted, wiring, choice)
 
 
-def _compared(wiring: Wiring, folder: Path, asked: Asked) -> CompareResult:
+def _compared(wiring: Wiring, folder: Path, asked: TrackOptions) -> CompareResult:
     from api.cli import comparison  # noqa: PLC0415 - fitting is loaded only where it is used
 
     if asked.model or asked.reference:

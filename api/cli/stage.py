@@ -10,7 +10,7 @@ from api.cli.mock_calibration import mock_axis_calibration, mock_force_calibrati
 from api.cli.options import calibrated
 from controller.commissioning.refusals import refuse_uncalibrated
 from rig.config.endpoints import Endpoints
-from rig.config.products.roles import MOCK_PORT, Force, Product, Tracker
+from rig.config.products.roles import MOCK_PORT, ForceProduct, Product, TrackerProduct
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
 
@@ -118,7 +118,7 @@ def mocks(wiring: Wiring) -> dict[str, Product]:
 def _served(device: Product, endpoints: Endpoints) -> Product:
     assert device.mock
     known = {"port": device.mock.address(endpoints)}
-    if not isinstance(device, Force | Tracker):
+    if not isinstance(device, ForceProduct | TrackerProduct):
         return device.model_copy(update=known)
     stated_ms = endpoints.latency_ms.get(device.mock.role)
     return device.model_copy(update=known | {"latency_ms": device.latency_ms or stated_ms})

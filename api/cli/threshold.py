@@ -10,7 +10,7 @@ from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import console, write_json
 from api.cli.stage import bench_for
 from api.operations import motion
-from api.operations.motion import TrackRequest
+from api.operations.motion import TrackPlan
 from controller.experiments import threshold as experiment
 from controller.experiments import tracked
 from controller.operation import Operation
@@ -33,7 +33,7 @@ def threshold(
     Example: rig threshold --model sessions/first/fit/model.json --up-to 10
     """
     wiring, fitted = wiring_from(config, overrides), load_model(model)
-    ramp = TrackRequest(experiment.plan(up_to, rate, fitted, wiring), str(model))
+    ramp = TrackPlan(experiment.plan(up_to, rate, fitted, wiring), str(model))
     tracked.refuse_foreign(out)
     with bench_for(wiring) as (live_wiring, _), live.connected(live_wiring) as bench:
         operation = Operation("threshold", total=1, unit="ramps")

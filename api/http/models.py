@@ -12,13 +12,13 @@ from rig.results.tracking import TrackResult
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
 
 
-class Request(BaseModel):
+class RequestBody(BaseModel):
     """Root of request bodies."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 
-class CaptureRequest(Request):
+class CaptureRequest(RequestBody):
     """Starts a protocol."""
 
     kind: Literal["capture"]
@@ -26,7 +26,7 @@ class CaptureRequest(Request):
     session: Name = Field(description="name of the new session folder")
 
 
-class TrackRequest(Request):
+class TrackRequest(RequestBody):
     """Tracks forces with gains from the model of a session."""
 
     kind: Literal["track"]
@@ -35,13 +35,13 @@ class TrackRequest(Request):
     seconds: Annotated[float, Field(gt=1, le=600)] = 10.0
 
 
-class RetractRequest(Request):
+class RetractRequest(RequestBody):
     """Moves out of the tissue, after a stop that was acknowledged."""
 
     kind: Literal["retract"]
 
 
-class RecoverRequest(Request):
+class RecoverRequest(RequestBody):
     """What is agreed to; without a consent that is needed, the answer asks for it and nothing is done."""
 
     clear: bool = Field(default=False, description="clear the drive's fault")
@@ -49,7 +49,7 @@ class RecoverRequest(Request):
     home: bool = Field(default=False, description="home the axis where it has no reference")
 
 
-class LeaseRequest(Request):
+class LeaseRequest(RequestBody):
     """Takes control of the bench."""
 
     holder: Annotated[str, Field(min_length=1, max_length=80, description="who this is, as others are told")]

@@ -23,7 +23,7 @@ class Problem(BaseModel):
     code: str = Field(description="short name for programs")
 
 
-class Refused(RigError):
+class RequestRefused(RigError):
     """A request that is right in itself but not in the present state; carries HTTP status and code."""
 
     def __init__(self, status: int, code: str, detail: str) -> None:
@@ -87,7 +87,7 @@ def install(app: FastAPI) -> None:
 
 def _ours(error: RigError) -> JSONResponse:
     match error:
-        case Refused():
+        case RequestRefused():
             return answer(error.status, error.code, str(error))
         case SafetyStop():
             return answer(409, "safety-stop", str(error))

@@ -26,10 +26,10 @@ from api.http.models import (
     SessionView,
     TrackRequest,
 )
-from api.http.problems import Refused, responses
+from api.http.problems import RequestRefused, responses
 from api.http.service import Service
 from controller.recovery.situation import Consent
-from controller.stop.word import Answer, Kind
+from controller.stop.word import StopOutcome, StopReason
 from rig.results.bench import ResetResult
 
 PREFIX = "/api/v1"
@@ -71,7 +71,7 @@ def _state(router: APIRouter, service: Service) -> None:
     def connect(lease: LeaseHeader = "") -> RigView:
         service.control.check(lease)
         if service.running:
-            raise Refused(409, "busy", "a job is under way")
+            raise RequestRefused(409, "busy", "a job is under way")
         service.connect()
         return views.rig(service)
 
@@ -111,11 +111,11 @@ def _control(router: APIRouter, service: Service) -> None:
 def _stops(router: APIRouter, service: Service) -> None:
     @router.post("/estop", summary="Software emergency stop: the drive's own quick stop", responses=responses(503, 504))
     async def emergency_stop() -> Done:
-        return _stopped(service, await service.stop(Kind.EMERGENCY))
+        return _stopped(service, await service.stop(StopReason.EMERGENCY))
 
     @router.post("/pain", summary="The subject's stop: retracts at safe speed", responses=responses(503, 504))
     async def pain() -> Done:
-        return _stopped(service, await service.stop(Kind.PAIN))
+        return _stopped(service, await service.stop(StopReason.PAIN))
 
     @router.post("/estop/reset", summary="Acknowledges a stop; moves nothing", responses=responses(409, 503))
     def reset(lease: LeaseHeader = "") -> Done:
@@ -139,7 +139,7 @@ def _done(service: Service, detail: str) -> Done:
     return Done(done=True, mode=views.rig(service).mode, detail=detail)
 
 
-def _stopped(service: Service, answer: Answer) -> Done:
+def _stopped(service: Service, answer: StopOutcome) -> Done:
     return _done(service, answer.text).model_copy(update={"id": answer.id})
 
 
@@ -188,7 +188,7 @@ def _recordings(router: APIRouter, service: Service) -> None:
         path = service.session(session) / file
         # A link may lead out of the session, to what nobody meant to serve.
         if not path.is_file() or path.is_symlink():
-            raise Refused(404, "no-such-recording", f"session {session} has no file {file}")
+            raise RequestRefused(404, "no-such-recording", f"session {session} has no file {file}")
         return FileResponse(path, media_type=_media_type(path), filename=f"{session}-{file}")
 
 

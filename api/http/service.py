@@ -9,15 +9,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from api.http.lease import Control
-from api.http.problems import Refused
+from api.http.lease import LeaseRegistry
+from api.http.problems import RequestRefused
 from api.operations import motion
-from api.operations.motion import TrackRequest
+from api.operations.motion import TrackPlan
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.operation import Operation, Progress
 from controller.recovery.situation import Consent
-from controller.stop.word import NOT_CONFIRMED, Answer, Kind
+from controller.stop.word import NOT_CONFIRMED, StopOutcome, StopReason
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
@@ -59,7 +59,7 @@ class Service:
         self.settled = threading.Event()
         """Set once the first attempt to connect has ended, well or not."""
         self.bench: Supervisor | None = None
-        self.control = Control()
+        self.control = LeaseRegistry()
         self.jobs: dict[str, Job] = {}
         self._coming: Supervisor | None = None
         self._starting = threading.Lock()
@@ -99,14 +99,14 @@ class Service:
         """The way back after a crash, a fault or a stop, as far as ``consent`` goes; a dead loop is replaced."""
         with self._starting:
             if self.running:
-                raise Refused(409, "busy", "a job is under way; stop it, then recover")
+                raise RequestRefused(409, "busy", "a job is under way; stop it, then recover")
             if not (self.bench and self.bench.alive):
                 self._start_bench(waiting=True)
             bench = self.the_bench()
             try:
                 return bench.recover(consent)
             except RigError as error:
-                raise Refused(409, "not-recovered", str(error)) from error
+                raise RequestRefused(409, "not-recovered", str(error)) from error
 
     def disconnect(self) -> None:
         """Ends loop and recorder."""
@@ -125,18 +125,18 @@ class Service:
         return job is None or self.control.holds(job.lease)
 
     def the_bench(self) -> Supervisor:
-        """The bench, or Refused with why there is none."""
+        """The bench, or RequestRefused with why there is none."""
         if self.bench is None:
-            raise Refused(503, "disconnected", f"the bench is not connected: {self.reason}")
+            raise RequestRefused(503, "disconnected", f"the bench is not connected: {self.reason}")
         if not self.bench.alive:
-            raise Refused(503, "disconnected", "the loop's process is gone; connect again")
+            raise RequestRefused(503, "disconnected", "the loop's process is gone; connect again")
         return self.bench
 
     def plan(self, name: str) -> Indentation:
         """The protocol called ``name``."""
         path = self.protocols / f"{name}.toml"
         if not path.is_file():
-            raise Refused(404, "no-such-protocol", f"no protocol {name} in {self.protocols}")
+            raise RequestRefused(404, "no-such-protocol", f"no protocol {name} in {self.protocols}")
         return load(Indentation, path)
 
     def capture(self, lease: str, protocol: str, session: str) -> Job:
@@ -144,7 +144,7 @@ class Service:
         plan, bench, folder = self.plan(protocol), self.the_bench(), self.sessions / session
         experiment.check(plan, self.wiring)
         if folder.exists():
-            raise Refused(409, "session-exists", f"session {session} exists; recordings are never overwritten")
+            raise RequestRefused(409, "session-exists", f"session {session} exists; recordings are never overwritten")
         operation = motion.of_capture(plan)
         return self._start("capture", lease, operation, lambda: motion.capture(operation, bench, plan, folder))
 
@@ -153,8 +153,10 @@ class Service:
         bench, folder = self.the_bench(), self.session(session)
         file = folder / MODEL
         if not file.is_file():
-            raise Refused(409, "no-model", f"session {session} has no fitted model; run `rig fit {folder}` first")
-        wanted = TrackRequest(tracked.plan(forces_N, seconds, load_model(file), self.wiring), str(MODEL))
+            raise RequestRefused(
+                409, "no-model", f"session {session} has no fitted model; run `rig fit {folder}` first"
+            )
+        wanted = TrackPlan(tracked.plan(forces_N, seconds, load_model(file), self.wiring), str(MODEL))
         operation = Operation("track", total=1, unit="runs")
         return self._start("track", lease, operation, lambda: motion.track(operation, bench, wanted, folder))
 
@@ -167,7 +169,7 @@ class Service:
         with self._starting:
             busy = self.running
             if busy:
-                raise Refused(409, "busy", f"{busy.progress.name} is under way (job {busy.id}); stop it or wait")
+                raise RequestRefused(409, "busy", f"{busy.progress.name} is under way (job {busy.id}); stop it or wait")
             job = Job(uuid.uuid4().hex[:12], kind, lease, operation)
             self.jobs[job.id] = job
         threading.Thread(target=_work, args=(operation, work), name=f"job-{job.id}", daemon=True).start()
@@ -176,14 +178,14 @@ class Service:
     def job(self, identifier: str) -> Job:
         """The job called ``identifier``."""
         if identifier not in self.jobs:
-            raise Refused(404, "no-such-job", f"no job {identifier} since this service started")
+            raise RequestRefused(404, "no-such-job", f"no job {identifier} since this service started")
         return self.jobs[identifier]
 
     def session(self, name: str) -> Path:
         """The folder of session ``name``."""
         folder = self.sessions / name
         if not folder.is_dir() or folder.resolve().parent != self.sessions.resolve():
-            raise Refused(404, "no-such-session", f"no session {name} in {self.sessions}")
+            raise RequestRefused(404, "no-such-session", f"no session {name} in {self.sessions}")
         return folder
 
     def stop_job(self, identifier: str) -> Job:
@@ -194,7 +196,7 @@ class Service:
             self.the_bench().stop()
         return job
 
-    async def stop(self, kind: Kind) -> Answer:
+    async def stop(self, kind: StopReason) -> StopOutcome:
         """Asks the loop itself to stop and returns what it did; raises 504 where it has not confirmed that in time."""
         bench = self.stoppable()
         request = bench.stops.request(kind)
@@ -205,22 +207,22 @@ class Service:
             await asyncio.sleep(LOOK_S)
         if answer is None or not answer.confirmed:
             why = answer.text if answer else "the loop does not answer"
-            raise Refused(504, "not-confirmed", f"{NOT_CONFIRMED} ({why})")
+            raise RequestRefused(504, "not-confirmed", f"{NOT_CONFIRMED} ({why})")
         return answer
 
     def stoppable(self) -> Supervisor:
-        """The bench, also one that is just starting and homes; Refused where there is none."""
+        """The bench, also one that is just starting and homes; RequestRefused where there is none."""
         return self._coming or self.the_bench()
 
     def reset(self) -> None:
         """Acknowledges a stop; never restarts motion."""
         bench = self.the_bench()
         if self.running:
-            raise Refused(409, "busy", "a job is still ending; wait for it, then reset")
+            raise RequestRefused(409, "busy", "a job is still ending; wait for it, then reset")
         try:
             bench.reset()
         except UsageError as error:
-            raise Refused(409, "cause-not-cleared", str(error)) from error
+            raise RequestRefused(409, "cause-not-cleared", str(error)) from error
 
 
 def _work(operation: Operation, work: Callable[[], object]) -> None:

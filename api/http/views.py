@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
-from api.http.lease import Lease
+from api.http.lease import ControlLease
 from api.http.models import (
     ControlView,
     JobView,
@@ -92,7 +92,7 @@ def control(service: Service) -> ControlView:
     return ControlView(holder=held.holder, since=held.since, left_s=service.control.left_s(held))
 
 
-def lease(service: Service, held: Lease) -> LeaseView:
+def lease(service: Service, held: ControlLease) -> LeaseView:
     """The lease for its holder."""
     left_s = service.control.left_s(held)
     return LeaseView(lease_id=held.id, holder=held.holder, since=held.since, ttl_s=held.ttl_s, left_s=left_s)

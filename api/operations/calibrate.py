@@ -17,7 +17,7 @@ from controller.devices.drivers import open_force, start_devices
 from controller.operation import Operation
 from drivers.roles import Identity
 from rig.config.calibration import AxisCalibration, ForceCalibration
-from rig.config.products.roles import Force
+from rig.config.products.roles import ForceProduct
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed, UsageError
 
@@ -71,7 +71,7 @@ def calibrate_force(
 
 
 def measured_force(
-    operation: Operation, config: Force, weights: Weights, put_on: Callable[[float], object], rest: ReadingTime
+    operation: Operation, config: ForceProduct, weights: Weights, put_on: Callable[[float], object], rest: ReadingTime
 ) -> ForceCalibration:
     """The same for a caller who has the bench already."""
     number = count()

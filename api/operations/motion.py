@@ -33,7 +33,7 @@ class Captured(CaptureResult):
 
 
 @dataclass(frozen=True)
-class TrackRequest:
+class TrackPlan:
     """A program of force tracking, and the file of the model that its gains are from."""
 
     program: Program
@@ -60,7 +60,7 @@ def capture(operation: Operation, bench: Supervisor, protocol: Indentation, fold
 
 
 def track(
-    operation: Operation, bench: Supervisor, wanted: TrackRequest, folder: Path, against: TrackRequest | None = None
+    operation: Operation, bench: Supervisor, wanted: TrackPlan, folder: Path, against: TrackPlan | None = None
 ) -> TrackResult:
     """Tracks force into the session ``folder``, first ``against`` another model; SafetyStop at a stop."""
     before = _track(operation, bench, against, folder) if against else None
@@ -70,7 +70,7 @@ def track(
     return compared(before, found) if before else found
 
 
-def _track(operation: Operation, bench: Supervisor, wanted: TrackRequest, folder: Path) -> TrackResult:
+def _track(operation: Operation, bench: Supervisor, wanted: TrackPlan, folder: Path) -> TrackResult:
     done = operation.progress.done
     operation.advance(done, wanted.program.name)
     found = tracked.run(bench, wanted.program, folder, wanted.model)
@@ -78,7 +78,7 @@ def _track(operation: Operation, bench: Supervisor, wanted: TrackRequest, folder
     return found
 
 
-def threshold(operation: Operation, bench: Supervisor, wanted: TrackRequest, up_to_N: float, folder: Path) -> Threshold:
+def threshold(operation: Operation, bench: Supervisor, wanted: TrackPlan, up_to_N: float, folder: Path) -> Threshold:
     """Raises force until the subject stops it, into the session ``folder``; SafetyStop at any other stop."""
     operation.advance(0, wanted.program.name)
     return ramp.run(bench, wanted.program, up_to_N, folder, wanted.model)

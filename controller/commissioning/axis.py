@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from drivers.roles import Identity
 from rig.config.calibration import LARGEST_SCALE_ERROR, AxisCalibration, AxisStep
-from rig.config.products.roles import Axis
+from rig.config.products.roles import AxisProduct
 from rig.errors import CheckFailed
 from rig.recording.slope import COVERAGE, slope_of
 
@@ -72,7 +72,7 @@ def known_direction(ahead: float | None) -> KnownBy | None:
 
 
 def against_tracker(
-    drive: Identity, config: Axis, places: Sequence[Place], known_by: KnownBy, now: datetime
+    drive: Identity, config: AxisProduct, places: Sequence[Place], known_by: KnownBy, now: datetime
 ) -> AxisCalibration:
     """The calibration that rests of the axis and the tip's marker give; raises CheckFailed where the scale is off."""
     frames = np.concatenate([place.tip_mm for place in places])
@@ -92,7 +92,12 @@ def against_tracker(
 
 
 def against_block(
-    drive: Identity, config: Axis, table_mm: Sequence[float], block_mm: Sequence[float], gauge_mm: float, now: datetime
+    drive: Identity,
+    config: AxisProduct,
+    table_mm: Sequence[float],
+    block_mm: Sequence[float],
+    gauge_mm: float,
+    now: datetime,
 ) -> AxisCalibration:
     """The calibration that positions at contact with the table, and with a block of ``gauge_mm`` on it, give."""
     table, block = float(np.mean(table_mm)), float(np.mean(block_mm))
@@ -110,7 +115,7 @@ def against_block(
 
 def _calibration(
     drive: Identity,
-    config: Axis,
+    config: AxisProduct,
     scale: float,
     deviation: float,
     steps: Sequence[AxisStep],

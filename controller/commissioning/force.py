@@ -18,7 +18,7 @@ from controller.commissioning.weights import Weights
 from drivers.roles import Identity
 from rig.config.calibration import ForceCalibration, Load, Uncertainty
 from rig.config.force_map import CHANNELS, ForceMap, Matrix, Vector
-from rig.config.products.roles import Force
+from rig.config.products.roles import ForceProduct
 from rig.errors import CheckFailed
 
 FloatArray = NDArray[np.float64]
@@ -49,7 +49,7 @@ class Measured:
 
 def calibrate(
     sensor: Identity,
-    config: Force,
+    config: ForceProduct,
     weights: Weights,
     apply: Callable[[float], None],
     read: Callable[[], Reading],
@@ -67,7 +67,7 @@ def calibrate(
 
 
 def calibration_of(
-    sensor: Identity, config: Force, weights: Weights, taken: Sequence[Measured], now: datetime
+    sensor: Identity, config: ForceProduct, weights: Weights, taken: Sequence[Measured], now: datetime
 ) -> ForceCalibration:
     """The calibration that readings under known loads give; the first and the last of them are unloaded."""
     loads = np.array([one.load_N for one in taken])
@@ -122,7 +122,7 @@ def _uncertainty(weights: Weights, loads: FloatArray, residuals_N: FloatArray, g
     return Uncertainty(combined=combined, repeatability=repeatability, weights=weights.uncertainty, linearity=linearity)
 
 
-def _refuse_wrong_channel(unloaded: Reading, now: Measured, config: Force) -> None:
+def _refuse_wrong_channel(unloaded: Reading, now: Measured, config: ForceProduct) -> None:
     """Dead, another channel, or the other direction: seen with the first weight, before heavier ones are asked for."""
     change_N = np.array(now.reading.mean[:3]) - np.array(unloaded.mean[:3])
     at, load_N = CHANNELS.index(config.axis), abs(now.load_N)
@@ -180,7 +180,7 @@ def _refuse_bent(taken: Sequence[Measured], loads: FloatArray, residuals_N: Floa
         )
 
 
-def _refuse_gain(gain: float, config: Force) -> None:
+def _refuse_gain(gain: float, config: ForceProduct) -> None:
     if abs(gain - 1) > LARGEST_GAIN_ERROR:
         raise CheckFailed(
             f"{config.axis} shows {gain:.3f} N a newton (limit 1 +- {LARGEST_GAIN_ERROR:g}): check weights, units and"

@@ -6,7 +6,7 @@ from dataclasses import replace
 from controller.devices import states
 from controller.devices.health import NEVER_NS, ON_RATE, StreamHealth
 from controller.devices.reopening import Openers, Reopening
-from controller.devices.states import DeviceStatus, Observation, State
+from controller.devices.states import DeviceState, DeviceStatus, Observation
 from controller.loop.modes import Mode
 from drivers.roles import Device, Identity, ServoAxis
 
@@ -54,13 +54,13 @@ class Connections:
     @property
     def ready(self) -> bool:
         """Whether every device is ok."""
-        return all(status.state is State.OK for status in self.statuses.values())
+        return all(status.state is DeviceState.OK for status in self.statuses.values())
 
     def shown_mode(self, mode: Mode) -> str:
         """The mode for people: idle only where every device is ok, else which are not."""
         if mode is not Mode.IDLE or self.ready:
             return mode.name.lower()
-        bad = [f"{role} {status.state}" for role, status in self.statuses.items() if status.state is not State.OK]
+        bad = [f"{role} {status.state}" for role, status in self.statuses.items() if status.state is not DeviceState.OK]
         return f"not ready: {', '.join(bad)}"
 
     def refusal(self, needed: Iterable[str] | None = None) -> str:
@@ -88,7 +88,7 @@ class Connections:
 
     def missing(self, seen: Mapping[str, Observation]) -> list[str]:
         """Roles whose link failed, or that have fallen silent."""
-        return [role for role in seen if seen[role].lost or self.statuses[role].state is State.LOST]
+        return [role for role in seen if seen[role].lost or self.statuses[role].state is DeviceState.LOST]
 
     def reopen(self, role: str, old: Device, next_seq: int, at_rest: bool, now_ns: int) -> Device | None:
         """One look after a missing device; returns the driver that takes its place once that runs."""

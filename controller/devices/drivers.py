@@ -7,7 +7,7 @@ from pkgutil import resolve_name
 from controller.devices.reopening import Open, Openers
 from drivers.epos4.walker import never
 from drivers.roles import Device, ForceSensor, MarkerTracker, ServoAxis
-from rig.config.products.roles import Axis, Force, Tracker
+from rig.config.products.roles import AxisProduct, ForceProduct, TrackerProduct
 from rig.config.wiring import Limits, Wiring
 
 Interrupted = Callable[[], bool]
@@ -34,13 +34,13 @@ class Devices:
             self.tracker.close()
 
 
-def open_force(config: Force) -> ForceSensor:
+def open_force(config: ForceProduct) -> ForceSensor:
     """The force sensor, not yet started; raises DeviceError where its port cannot be opened."""
     sensor: ForceSensor = resolve_name(config.driver)(config)
     return sensor
 
 
-def open_axis(config: Axis, limits: Limits, rate_Hz: float, interrupted: Interrupted = never) -> ServoAxis:
+def open_axis(config: AxisProduct, limits: Limits, rate_Hz: float, interrupted: Interrupted = never) -> ServoAxis:
     """The servo axis, not yet started, to be asked for a sample ``rate_Hz`` times a second.
 
     ``interrupted`` is asked while it moves by itself; a yes brakes it.
@@ -49,7 +49,7 @@ def open_axis(config: Axis, limits: Limits, rate_Hz: float, interrupted: Interru
     return axis
 
 
-def open_tracker(config: Tracker) -> MarkerTracker:
+def open_tracker(config: TrackerProduct) -> MarkerTracker:
     """The tracker, not yet started."""
     tracker: MarkerTracker = resolve_name(config.driver)(config)
     return tracker

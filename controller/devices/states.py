@@ -18,7 +18,7 @@ SILENT_NS = 1_000_000_000
 DEGRADED_NS = 1_000_000_000
 
 
-class State(StrEnum):
+class DeviceState(StrEnum):
     """States of a device."""
 
     CONNECTING = "connecting"
@@ -29,12 +29,12 @@ class State(StrEnum):
     FAULT = "fault"
 
 
-NEXT_STEPS: Mapping[State, str] = {
-    State.CONNECTING: "wait a moment, then start again",
-    State.DEGRADED: "`rig doctor` shows what it brings",
-    State.LOST: "check its power and cable, it comes back by itself once nothing moves",
-    State.RECONNECTING: "check its power and cable, it is opened again as soon as it answers",
-    State.FAULT: "`rig reset` says what happened and recovers",
+NEXT_STEPS: Mapping[DeviceState, str] = {
+    DeviceState.CONNECTING: "wait a moment, then start again",
+    DeviceState.DEGRADED: "`rig doctor` shows what it brings",
+    DeviceState.LOST: "check its power and cable, it comes back by itself once nothing moves",
+    DeviceState.RECONNECTING: "check its power and cable, it is opened again as soon as it answers",
+    DeviceState.FAULT: "`rig reset` says what happened and recovers",
 }
 
 
@@ -59,7 +59,7 @@ class Observation:
 class DeviceStatus:
     """State, why, and since when; ``imperfect_ns``: when its samples ceased to be as they should, None if they are."""
 
-    state: State
+    state: DeviceState
     detail: str
     since_ns: int
     imperfect_ns: int | None = None
@@ -67,7 +67,7 @@ class DeviceStatus:
 
 def connecting(now_ns: int) -> DeviceStatus:
     """A device that was just opened."""
-    return DeviceStatus(State.CONNECTING, "no sample yet", now_ns)
+    return DeviceStatus(DeviceState.CONNECTING, "no sample yet", now_ns)
 
 
 def following(before: DeviceStatus, seen: Observation, now_ns: int) -> DeviceStatus:
@@ -77,36 +77,36 @@ def following(before: DeviceStatus, seen: Observation, now_ns: int) -> DeviceSta
     return DeviceStatus(state, detail, before.since_ns if state is before.state else now_ns, imperfect_ns)
 
 
-def _state(before: DeviceStatus, seen: Observation, now_ns: int, imperfect_ns: int | None) -> tuple[State, str]:
+def _state(before: DeviceStatus, seen: Observation, now_ns: int, imperfect_ns: int | None) -> tuple[DeviceState, str]:
     if seen.fault:
-        return State.FAULT, seen.fault
+        return DeviceState.FAULT, seen.fault
     if seen.reopening:
-        return State.RECONNECTING, seen.lost
+        return DeviceState.RECONNECTING, seen.lost
     if seen.lost:
-        return State.LOST, seen.lost
+        return DeviceState.LOST, seen.lost
     if seen.age_ns is None:
         return _unheard(before, now_ns)
     if seen.age_ns > SILENT_NS:
-        return State.LOST, f"no sample for more than {SILENT_NS * 1e-9:g} s"
+        return DeviceState.LOST, f"no sample for more than {SILENT_NS * 1e-9:g} s"
     if seen.withheld:
-        return State.DEGRADED, seen.withheld
+        return DeviceState.DEGRADED, seen.withheld
     if imperfect_ns is not None and now_ns - imperfect_ns >= DEGRADED_NS:
-        return State.DEGRADED, seen.imperfect
-    return State.OK, ""
+        return DeviceState.DEGRADED, seen.imperfect
+    return DeviceState.OK, ""
 
 
-def _unheard(before: DeviceStatus, now_ns: int) -> tuple[State, str]:
+def _unheard(before: DeviceStatus, now_ns: int) -> tuple[DeviceState, str]:
     """Connecting for a while, then lost; lost until a sample comes."""
-    waits = before.state is not State.CONNECTING or now_ns - before.since_ns < CONNECTING_NS
-    if waits and before.state is not State.LOST:
-        return State.CONNECTING, "no sample yet"
-    return State.LOST, f"no sample within {CONNECTING_NS * 1e-9:g} s of its start"
+    waits = before.state is not DeviceState.CONNECTING or now_ns - before.since_ns < CONNECTING_NS
+    if waits and before.state is not DeviceState.LOST:
+        return DeviceState.CONNECTING, "no sample yet"
+    return DeviceState.LOST, f"no sample within {CONNECTING_NS * 1e-9:g} s of its start"
 
 
 def refusal(devices: Mapping[str, DeviceStatus], needed: Iterable[str]) -> str:
     """Why motion that needs those roles cannot start: the first that is not ok, and the next step; empty if all are."""
     for role in needed:
         status = devices[role]
-        if status.state is not State.OK:
+        if status.state is not DeviceState.OK:
             return f"{role} is {status.state}: {status.detail}; {NEXT_STEPS[status.state]}"
     return ""

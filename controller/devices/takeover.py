@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from controller.devices.connections import of_axis, of_stream
 from controller.devices.drivers import Devices
 from controller.devices.health import IDENTICAL_LIMIT, StreamHealth
-from controller.devices.states import DeviceStatus, Observation, State
+from controller.devices.states import DeviceState, DeviceStatus, Observation
 from controller.loop.messages import DeviceShown
 from controller.loop.steps import Program, Retract
 from controller.safety.table import Action, Incident
@@ -86,7 +86,7 @@ def refusal(loop: "BenchLoop", program: Program, now_ns: int) -> str:
 
 def said(loop: "BenchLoop", role: str, status: DeviceStatus) -> None:
     """Writes a change of state into the event stream."""
-    level = Action.NOTE if status.state in (State.OK, State.CONNECTING) else Action.WARNING
+    level = Action.NOTE if status.state in (DeviceState.OK, DeviceState.CONNECTING) else Action.WARNING
     loop.event(level, "device_state", f"{role} {status.state}: {status.detail}".rstrip(": "), loop.state.now_ns)
 
 

@@ -9,8 +9,8 @@ from typing import TypeVar
 
 from controller.loop.messages import (
     FROM_LOOP,
-    Failed,
     Finished,
+    LoopFailed,
     Outcome,
     Ready,
     Run,
@@ -44,7 +44,7 @@ class LoopClient:
         self._outcomes: dict[int, Outcome] = {}
         self._situations: dict[int, Situation] = {}
         self._ready: Ready | None = None
-        self._failed: Failed | None = None
+        self._failed: LoopFailed | None = None
         self._status: Status = {}
         self._stops: list[Stopped] = []
         self._gone = False
@@ -171,7 +171,7 @@ class LoopClient:
                 self._stops.append(stopped)
             case Ready() as ready:
                 self._ready = ready
-            case Failed() as failed:
+            case LoopFailed() as failed:
                 self._failed = failed
 
 

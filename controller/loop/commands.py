@@ -6,23 +6,23 @@ from controller.commissioning.refusals import refuse_uncommissioned
 from controller.devices.drivers import Interruption
 from controller.devices.takeover import refusal as missing_device
 from controller.loop.bench_loop import BenchLoop
-from controller.loop.messages import Lease, Note, Recover, Reset, Run, Shutdown, Survey, Surveyed
+from controller.loop.messages import Heartbeat, Note, Recover, Reset, Run, Shutdown, Survey, Surveyed
 from controller.loop.modes import Mode
 from controller.loop.steps import Program
 from controller.recovery import acts as recovery_acts
 from controller.safety.program_limits import refuse_beyond_limits
 from controller.safety.table import Action
 from controller.stop.start import StartGuard
-from controller.stop.word import DEEDS, Deed, Kind, Request, Responder
+from controller.stop.word import DEEDS, Deed, Responder, StopReason, StopRequest
 from drivers.epos4.walker import never
 from rig.channel import Answer, Channel, Received
 from rig.errors import RigError, SafetyStop, UsageError
 
 REQUESTS = {
-    Kind.STOP: frozenset({"stop"}),
-    Kind.PAIN: frozenset({"pain"}),
-    Kind.EMERGENCY: frozenset({"estop"}),
-    Kind.KEYPAD_LOST: frozenset({"stop", "keypad"}),
+    StopReason.STOP: frozenset({"stop"}),
+    StopReason.PAIN: frozenset({"pain"}),
+    StopReason.EMERGENCY: frozenset({"estop"}),
+    StopReason.KEYPAD_LOST: frozenset({"stop", "keypad"}),
 }
 """What each kind of stop is called in the safety table's checks."""
 
@@ -33,7 +33,7 @@ class Inbox:
     def __init__(self, channel: Channel, stops: Responder, interruption: Interruption | None = None) -> None:
         self._channel, self._stops = channel, stops
         self.interruption = interruption or Interruption()
-        self._asked: tuple[Request, ...] = ()
+        self._asked: tuple[StopRequest, ...] = ()
         self._leaving = self._told_to_end = False
         self._refused = 0
         self.heard_ns = 0
@@ -76,7 +76,7 @@ class Inbox:
 
     def _take(self, received: Received, loop: BenchLoop) -> frozenset[str]:
         self.heard_ns = loop.state.now_ns
-        if isinstance(received.message, Lease):
+        if isinstance(received.message, Heartbeat):
             return frozenset() if received.message.attending else frozenset({"unattended"})
         try:
             self._act(received, loop)
@@ -140,7 +140,7 @@ class Inbox:
         return loop.machine.busy or not (self._leaving or self._channel.lost)
 
 
-def _deed(loop: BenchLoop, asked: tuple[Request, ...]) -> Deed | None:
+def _deed(loop: BenchLoop, asked: tuple[StopRequest, ...]) -> Deed | None:
     if loop.inputs.axis_lost:
         return Deed.AXIS_LOST
     if loop.braked:
@@ -148,5 +148,5 @@ def _deed(loop: BenchLoop, asked: tuple[Request, ...]) -> Deed | None:
     if loop.machine.mode in (Mode.IDLE, Mode.SAFE):
         return Deed.HELD
     # Whoever asked for an emergency stop is not told that a retraction will do.
-    brake = any(request.kind is Kind.EMERGENCY for request in asked)
+    brake = any(request.kind is StopReason.EMERGENCY for request in asked)
     return Deed.RETRACTING if loop.machine.latched and not brake else None

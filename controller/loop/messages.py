@@ -104,7 +104,7 @@ class Note(Message):
     text: str
 
 
-class Lease(Message):
+class Heartbeat(Message):
     """The operator's program lives, and whether the operator is ``attending``."""
 
     TYPE: ClassVar[int] = 14
@@ -125,7 +125,7 @@ class Ready(Message):
     realtime: dict[str, str] = Field(default_factory=dict)
 
 
-class Failed(Message):
+class LoopFailed(Message):
     """The loop ends; ``stopped``: because someone stopped it."""
 
     TYPE: ClassVar[int] = 21
@@ -177,5 +177,5 @@ class Surveyed(Reply):
     situation: Situation
 
 
-TO_LOOP = (Run, Reset, Note, Lease, Shutdown, Survey, Recover)
-FROM_LOOP = (Ready, Failed, StatusSaid, Stopped, Finished, Surveyed)
+TO_LOOP = (Run, Reset, Note, Heartbeat, Shutdown, Survey, Recover)
+FROM_LOOP = (Ready, LoopFailed, StatusSaid, Stopped, Finished, Surveyed)

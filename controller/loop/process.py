@@ -19,7 +19,7 @@ from controller.loop import realtime
 from controller.loop.bench_loop import BenchLoop
 from controller.loop.commands import Inbox
 from controller.loop.executive import Executive, sleep_then_spin
-from controller.loop.messages import TO_LOOP, DeviceFound, Failed, Ready
+from controller.loop.messages import TO_LOOP, DeviceFound, LoopFailed, Ready
 from controller.loop.touch import warm_up
 from controller.safety.table import TABLE, Check
 from controller.stop.start import StartGuard
@@ -43,10 +43,10 @@ def main(arguments: list[str], table: tuple[Check, ...] = TABLE) -> int:
         with contextlib.closing(StopWord.open(Path(arguments[3]))) as page:
             _serve(wiring, Path(arguments[1]), channel, Responder(page), table, "".join(arguments[4:5]))
     except RigError as error:
-        channel.send(Failed(text=str(error), stopped=isinstance(error, SafetyStop)))
+        channel.send(LoopFailed(text=str(error), stopped=isinstance(error, SafetyStop)))
         return 1
     except Exception as error:  # the last word of a dying process: named, sent, and the devices are closed by then
-        channel.send(Failed(text=f"the loop met an error of its own: {type(error).__name__}: {error}"))
+        channel.send(LoopFailed(text=f"the loop met an error of its own: {type(error).__name__}: {error}"))
         raise
     finally:
         channel.close()

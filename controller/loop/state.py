@@ -7,7 +7,7 @@ from controller.law.force_position import Memory
 from controller.loop.paired_samples import PairedSamples, Touch
 from controller.loop.registration import Interval
 from controller.loop.setpoint import Setpoint, arrived, toward
-from controller.safety.load import NAN_WRENCH, UNKNOWN, Load, Wrench
+from controller.safety.load import NAN_WRENCH, UNKNOWN, TipLoad, Wrench
 
 
 @dataclass(slots=True)
@@ -27,7 +27,7 @@ class LoopState:
     wrench: Wrench = NAN_WRENCH
     zero: Wrench | None = None
     reference_zero: Wrench | None = None
-    load: Load = UNKNOWN
+    load: TipLoad = UNKNOWN
     rest_N: float = math.nan
     raw_N: float = math.nan
     force_samples: int = 0

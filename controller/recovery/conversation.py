@@ -18,7 +18,7 @@ SAID: dict[Act, str] = {
 }
 
 
-class Bench(Protocol):
+class RecoverableBench(Protocol):
     """What recovery asks of a running bench."""
 
     @property
@@ -44,7 +44,7 @@ class Bench(Protocol):
         """Whether the device is there within that time."""
 
 
-def recover(bench: Bench, consent: Consent) -> ResetResult:
+def recover(bench: RecoverableBench, consent: Consent) -> ResetResult:
     """As far as ``consent`` goes; raises DeviceError or SafetyStop where something hinders what was agreed to."""
     bench.wait_at_rest()
     bench.await_device("axis", AXIS_BACK_S)
@@ -75,7 +75,7 @@ def _answering(now: Situation) -> Situation:
     return now
 
 
-def _missing(bench: Bench) -> str:
+def _missing(bench: RecoverableBench) -> str:
     """Which devices are still not ok, after those that come back by themselves had time to."""
     bench.await_ready(SENSORS_BACK_S)
     devices = bench.status.get("devices", {})

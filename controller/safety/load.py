@@ -44,7 +44,7 @@ STIFFENING_PER_MM = 0.25
 LONGEST_AHEAD_NS = 10_000_000
 
 
-class Load(NamedTuple):
+class TipLoad(NamedTuple):
     """What the tip bears: norms from the reference zero [N], [N m], rate [N/s], stiffness [N/mm], peak foreseen [N]."""
 
     force_N: float
@@ -54,7 +54,7 @@ class Load(NamedTuple):
     predicted_N: float
 
 
-UNKNOWN = Load(math.nan, math.nan, 0.0, 0.0, math.nan)
+UNKNOWN = TipLoad(math.nan, math.nan, 0.0, 0.0, math.nan)
 
 
 class _Sample(NamedTuple):
@@ -84,7 +84,7 @@ class LoadMonitor:
         while capture_ns - samples[0].capture_ns > self._kept_ns and len(samples) > 3:
             samples.popleft()
 
-    def load(self, now_ns: int, zero: Wrench, noise_N: float, setpoint: Setpoint, acceleration_mm_s2: float) -> Load:
+    def load(self, now_ns: int, zero: Wrench, noise_N: float, setpoint: Setpoint, acceleration_mm_s2: float) -> TipLoad:
         """The load now, and its peak if the axis were told now to stop; NaN before the first sample."""
         if not self._samples:
             return UNKNOWN
@@ -96,7 +96,7 @@ class LoadMonitor:
         stiffness_N_mm = self._stiffness(zero, noise_N, max(ahead_mm, 0.0))
         rise_N = stiffness_N_mm * max(ahead_mm, 0.0)
         pushed_N = rate_N_s * (now_ns - newest.capture_ns) * 1e-9
-        return Load(load_N, _torque(newest.wrench, zero), rate_N_s, stiffness_N_mm, load_N + max(rise_N, pushed_N))
+        return TipLoad(load_N, _torque(newest.wrench, zero), rate_N_s, stiffness_N_mm, load_N + max(rise_N, pushed_N))
 
     def _rate(self) -> float:
         """Change of the force vector over the window [N/s], as a norm: direction and sign do not matter."""

@@ -20,10 +20,20 @@ from controller.loop.state import LoopState
 from controller.loop.state_machine import MotionStateMachine
 from controller.loop.steps import Approach, ApproachRun, Program, Retract, TrackForce
 from controller.safety.inputs import SafetyInputs
-from controller.safety.load import Load
+from controller.safety.load import TipLoad
 from controller.safety.table import Incident
 from controller.simulated import segments
-from controller.simulated.segments import Bench, Bounds, Move, Plant, Speeds, Stretch, Timing, Zeros, hold_compiled
+from controller.simulated.segments import (
+    BenchState,
+    InputBounds,
+    Move,
+    Plant,
+    Speeds,
+    Stretch,
+    Timing,
+    Zeros,
+    hold_compiled,
+)
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed
 from rig.simulation import axis_plant
@@ -89,7 +99,7 @@ class _Playback:
         self._plant = Plant(bench.motor, bench.loop, bench.limb, bench.sensing)
         start_mm = wiring.limits.position_min_mm + 10.0
         late = bench.sensing.delay_cycles + 1
-        self._now = Bench(at_rest(start_mm), np.zeros(late), 0.0, Setpoint(start_mm, 0.0))
+        self._now = BenchState(at_rest(start_mm), np.zeros(late), 0.0, Setpoint(start_mm, 0.0))
         self._cycle, self._random, self._noise = 0, np.random.default_rng(bench.seed), np.empty(0)
         self._parts: list[Column] = []
         self._ended: list[Incident | None] = []
@@ -120,7 +130,7 @@ class _Playback:
         state.now_ns, state.raw_N, state.force_samples = round(self._cycle * self._period_s * 1e9), held_N, self._cycle
         state.wrench = (0.0, 0.0, held_N, 0.0, 0.0, 0.0)
         load_N = abs(held_N - self._zeros().first_N)
-        state.load = Load(load_N, 0.0, 0.0, 0.0, load_N)
+        state.load = TipLoad(load_N, 0.0, 0.0, 0.0, load_N)
         state.force_N, state.position_mm = state.raw_N - state.zero_N, plant.position_mm
         state.following_mm = state.setpoint.position_mm - state.position_mm
         self._pair(self._cycle, state.raw_N, state.position_mm)
@@ -131,7 +141,7 @@ class _Playback:
         self._parts.append(np.array(row)[:, None])
         if machine.busy:
             plant = hold_compiled()(plant, *self._plant, command_mm, steps)
-            self._now = Bench(plant, np.append(sensed[1:], plant.sensed_N), held_N, state.setpoint)
+            self._now = BenchState(plant, np.append(sensed[1:], plant.sensed_N), held_N, state.setpoint)
         self._cycle += 1
         return machine.busy
 
@@ -206,9 +216,9 @@ class _Playback:
         first_N = state.reference_zero[2] if state.reference_zero else 0.0
         return Zeros(state.zero_N, first_N, state.surface_mm)
 
-    def _bounds(self) -> Bounds:
+    def _bounds(self) -> InputBounds:
         limits, axis = self._wiring.limits, self._wiring.axis
-        return Bounds(
+        return InputBounds(
             self._wiring.force_limit_N, limits.depth_mm, axis.following_error_mm,
             limits.position_min_mm, limits.position_max_mm,
         )  # fmt: skip
@@ -227,11 +237,12 @@ def follow(step: TrackForce, reference_N: Column, bench: SimulatedBench, dt_s: f
     table, surface_mm = _columns(step), bench.limb.surface_mm
     noise = np.random.default_rng(bench.seed).standard_normal(len(reference_N))
     late = bench.sensing.delay_cycles + 1
-    start = Bench(at_rest(surface_mm), np.zeros(late), 0.0, Setpoint(surface_mm, 0.0))
+    start = BenchState(at_rest(surface_mm), np.zeros(late), 0.0, Setpoint(surface_mm, 0.0))
     done, _ = segments.track(
         start, force_position.begin(table, 0.0, 0.0, step.friction_N), table, step.settings, reference_N, noise,
         Plant(bench.motor, bench.loop, bench.limb, bench.sensing),
-        Timing(0, dt_s, round(dt_s / axis_plant.STEP_S)), Zeros(0.0, 0.0, surface_mm), _speeds(step, dt_s), Bounds(),
+        Timing(0, dt_s, round(dt_s / axis_plant.STEP_S)), Zeros(0.0, 0.0, surface_mm), _speeds(step, dt_s),
+        InputBounds(),
     )  # fmt: skip
     time_s, mode = np.arange(len(reference_N), dtype=np.float64) * dt_s, np.full(len(reference_N), int(Mode.CONTACT))
     return Trace(time_s, mode, reference_N, *done.rows)

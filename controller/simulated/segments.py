@@ -25,7 +25,7 @@ Column = NDArray[np.float64]
 ROWS = 6
 
 
-class Bounds(NamedTuple):
+class InputBounds(NamedTuple):
     """What an input may be before the safety table has a word; force from the reference zero."""
 
     force_N: float = math.inf
@@ -68,7 +68,7 @@ class Move(NamedTuple):
     until_N: float
 
 
-class Bench(NamedTuple):
+class BenchState(NamedTuple):
     """All that has memory between two cycles: plant, readings under way (oldest first), the one in use, set-point."""
 
     state: AxisState
@@ -90,10 +90,10 @@ class Stretch(NamedTuple):
     """Ticks done; ``rows`` of shape (ROWS, cycles): tissue force, force sensed, command, position, voltage, current."""
 
     rows: Column
-    bench: Bench
+    bench: BenchState
 
 
-def beyond(bounds: Bounds, zeros: Zeros, raw_N: float, bench_position_mm: float, setpoint_mm: float) -> bool:
+def beyond(bounds: InputBounds, zeros: Zeros, raw_N: float, bench_position_mm: float, setpoint_mm: float) -> bool:
     """Whether the safety table would have a word."""
     return (
         abs(raw_N - zeros.first_N) > bounds.force_N
@@ -105,8 +105,8 @@ def beyond(bounds: Bounds, zeros: Zeros, raw_N: float, bench_position_mm: float,
 
 
 def _track(
-    bench: Bench, memory: Memory, table: Columns, settings: Settings, reference_N: Column, noise: Column, plant: Plant,
-    clock: Timing, zeros: Zeros, speeds: Speeds, bounds: Bounds,
+    bench: BenchState, memory: Memory, table: Columns, settings: Settings, reference_N: Column, noise: Column,
+    plant: Plant, clock: Timing, zeros: Zeros, speeds: Speeds, bounds: InputBounds,
 ) -> tuple[Column, AxisState, Column, float, float, float, Memory]:  # fmt: skip
     motor, loop, limb, sensing = plant
     state, past, held_N, setpoint = bench
@@ -135,7 +135,7 @@ def _track(
 
 
 def _travel(
-    bench: Bench, move: Move, noise: Column, plant: Plant, clock: Timing, zeros: Zeros, bounds: Bounds
+    bench: BenchState, move: Move, noise: Column, plant: Plant, clock: Timing, zeros: Zeros, bounds: InputBounds
 ) -> tuple[Column, AxisState, Column, float, float, float]:
     motor, loop, limb, sensing = plant
     state, past, held_N, setpoint = bench
@@ -196,24 +196,24 @@ def _traveller() -> Callable[..., tuple[Column, AxisState, Column, float, float,
 
 
 def track(
-    bench: Bench, memory: Memory, table: Columns, settings: Settings, reference_N: Column, noise: Column, plant: Plant,
-    clock: Timing, zeros: Zeros, speeds: Speeds, bounds: Bounds,
+    bench: BenchState, memory: Memory, table: Columns, settings: Settings, reference_N: Column, noise: Column,
+    plant: Plant, clock: Timing, zeros: Zeros, speeds: Speeds, bounds: InputBounds,
 ) -> tuple[Stretch, Memory]:  # fmt: skip
     """The force law along ``reference_N`` of shape (cycles,), or less of it."""
     rows, state, sensed, held_N, position_mm, velocity_mm_s, after = _tracker()(
         bench, memory, table, settings, reference_N, noise, plant, clock, zeros, speeds, bounds
     )
-    return Stretch(rows, Bench(state, sensed, held_N, Setpoint(position_mm, velocity_mm_s))), Memory(*after)
+    return Stretch(rows, BenchState(state, sensed, held_N, Setpoint(position_mm, velocity_mm_s))), Memory(*after)
 
 
 def travel(
-    bench: Bench, move: Move, noise: Column, plant: Plant, clock: Timing, zeros: Zeros, bounds: Bounds
+    bench: BenchState, move: Move, noise: Column, plant: Plant, clock: Timing, zeros: Zeros, bounds: InputBounds
 ) -> Stretch:
     """A move in the air for as many cycles as ``noise`` has, or less."""
     rows, state, sensed, held_N, position_mm, velocity_mm_s = _traveller()(
         bench, move, noise, plant, clock, zeros, bounds
     )
-    return Stretch(rows, Bench(state, sensed, held_N, Setpoint(position_mm, velocity_mm_s)))
+    return Stretch(rows, BenchState(state, sensed, held_N, Setpoint(position_mm, velocity_mm_s)))
 
 
 # Names that the stretches are bound to: the same functions, compiled where they are compiled.

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 from controller.stop.keypad import open_device
-from controller.stop.word import Kind, Lane, Requester, StopWord
+from controller.stop.word import Lane, Requester, StopReason, StopWord
 from rig.config.stop import Stop
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError
@@ -69,7 +69,7 @@ class StopProcess:
 
 
 def _settings(stop: Stop, loop_priority: int) -> str:
-    names = {"stop": Kind.STOP.name, "pain": Kind.PAIN.name, "emergency": Kind.EMERGENCY.name}
+    names = {"stop": StopReason.STOP.name, "pain": StopReason.PAIN.name, "emergency": StopReason.EMERGENCY.name}
     return json.dumps(
         {
             "keypad": stop.keypad,

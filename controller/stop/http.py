@@ -13,7 +13,7 @@ _END = b"\r\n\r\n"
 _TOKEN = re.compile(r"[!#$%&'*+.^_`|~0-9A-Za-z-]+")
 
 
-class Request(NamedTuple):
+class HttpRequest(NamedTuple):
     """A request's head; names of headers are in small letters."""
 
     method: str
@@ -50,7 +50,7 @@ class RequestParser:
         """Adds what has come; beyond what two heads may have it is dropped, and makes the second no request."""
         self._buffer = (self._buffer + data)[: 2 * HEADER_BYTES]
 
-    def following(self) -> Request | Refusal | None:
+    def following(self) -> HttpRequest | Refusal | None:
         """The next request that is whole, if one is; what follows it is kept."""
         head, found, rest = self._buffer.partition(_END)
         if len(head) > HEADER_BYTES:
@@ -61,7 +61,7 @@ class RequestParser:
         return _parse(head.decode("latin-1"))
 
 
-def _parse(head: str) -> Request | Refusal:
+def _parse(head: str) -> HttpRequest | Refusal:
     line, *fields = head.split("\r\n")
     parts = line.split(" ")
     malformed = Refusal(HTTPStatus.BAD_REQUEST, "this is no HTTP/1.1 request")
@@ -75,10 +75,10 @@ def _parse(head: str) -> Request | Refusal:
         headers[name.lower()] = value.strip(" \t")
     body = "transfer-encoding" in headers or headers.get("content-length", "0") != "0"
     keep = parts[2] == "HTTP/1.1" and headers.get("connection", "").lower() != "close" and not body
-    return Request(parts[0], parts[1].partition("?")[0], headers, keep)
+    return HttpRequest(parts[0], parts[1].partition("?")[0], headers, keep)
 
 
-def foreign(request: Request) -> Refusal | None:
+def foreign(request: HttpRequest) -> Refusal | None:
     """Why a request that is not of this computer's own pages or programs is refused; None for one that is."""
     host = _hostname("//" + request.headers.get("host", "localhost"))
     if host not in LOCAL:

@@ -4,7 +4,7 @@ import selectors
 import sys
 
 from controller.stop.keypad import Keys, Pad, open_device
-from controller.stop.word import Keypad, Kind, Lane, Requester, StopWord
+from controller.stop.word import Keypad, Lane, Requester, StopReason, StopWord
 from rig.errors import DeviceError
 
 # A plug that was pulled is back in a second or two; a stop acknowledged meanwhile is asked for again as soon.
@@ -59,4 +59,4 @@ class Keyboard:
     def _lost(self) -> None:
         self._page.show_keypad(Keypad.LOST)
         if self._required:
-            self.requester.request(Kind.KEYPAD_LOST)
+            self.requester.request(StopReason.KEYPAD_LOST)

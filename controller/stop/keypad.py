@@ -8,7 +8,7 @@ import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from controller.stop.word import Kind
+from controller.stop.word import StopReason
 from rig.errors import DeviceError
 
 # Seconds and microseconds of a 64-bit computer, type, code, value.
@@ -38,10 +38,10 @@ class EventParser:
 class Keys:
     """What each key asks for."""
 
-    by_code: Mapping[int, Kind]
-    other: Kind
+    by_code: Mapping[int, StopReason]
+    other: StopReason
 
-    def kind(self, code: int) -> Kind:
+    def kind(self, code: int) -> StopReason:
         """What key ``code`` asks for."""
         return self.by_code.get(code, self.other)
 

@@ -30,9 +30,9 @@ from controller.stop import http
 from controller.stop.keyboard import Keyboard
 from controller.stop.keypad import Keys
 from controller.stop.liveness import LoopLife
-from controller.stop.word import LOOK_S, NOT_CONFIRMED, Answer, Kind, Request, StopWord
+from controller.stop.word import LOOK_S, NOT_CONFIRMED, StopOutcome, StopReason, StopRequest, StopWord
 
-ROUTES = {"/estop": Kind.EMERGENCY, "/pain": Kind.PAIN, "/stop": Kind.STOP}
+ROUTES = {"/estop": StopReason.EMERGENCY, "/pain": StopReason.PAIN, "/stop": StopReason.STOP}
 # The slowest loop looks every 20 ms, and one that is 100 ms late stops by itself; a person waits no longer than this
 # before the hardware stop.
 CONFIRM_S = 0.5
@@ -71,8 +71,8 @@ class Connection:
     socket: socket.socket
     since: float
     parser: http.RequestParser = field(default_factory=http.RequestParser)
-    asked: http.Request | None = None
-    stop: Request | None = None
+    asked: http.HttpRequest | None = None
+    stop: StopRequest | None = None
     lingering: bool = False
     lingered_bytes: int = 0
 
@@ -91,7 +91,7 @@ class Connection:
         return self.since + (HEAD_S if self.parser.begun else IDLE_S)
 
 
-class Server:
+class StopServer:
     """Serves sockets and keypad in one thread; ``turn`` waits at most a fifth of a second."""
 
     def __init__(
@@ -173,15 +173,15 @@ class Server:
         if found is None:
             return
         connection.since = self._now()
-        connection.asked = found if isinstance(found, http.Request) else None
-        refusal = http.foreign(found) if isinstance(found, http.Request) else found
+        connection.asked = found if isinstance(found, http.HttpRequest) else None
+        refusal = http.foreign(found) if isinstance(found, http.HttpRequest) else found
         if refusal:
             connection.asked = None
             self._reply(connection, refusal.status, {"error": refusal.text})
-        elif isinstance(found, http.Request):
+        elif isinstance(found, http.HttpRequest):
             self._do(connection, found)
 
-    def _do(self, connection: Connection, request: http.Request) -> None:
+    def _do(self, connection: Connection, request: http.HttpRequest) -> None:
         kind = ROUTES.get(request.path)
         if request.method == "OPTIONS":
             self._reply(connection, HTTPStatus.NO_CONTENT, None)
@@ -207,7 +207,7 @@ class Server:
         elif not stop and self._now() >= connection.deadline:
             self._drop(connection)
 
-    def _said(self, stop: Request, answer: Answer | None, after_s: float) -> StopSaid:
+    def _said(self, stop: StopRequest, answer: StopOutcome | None, after_s: float) -> StopSaid:
         confirmed = answer is not None and answer.confirmed
         why = answer.text if answer else "the loop's process is gone" if self.loop.gone else "the loop does not answer"
         return {
@@ -255,7 +255,7 @@ class Server:
         connection.socket.close()
 
 
-def serve(server: Server, parent: int, page: StopWord) -> None:
+def serve(server: StopServer, parent: int, page: StopWord) -> None:
     """Until the loop has ended and the supervisor has closed the pipe ``parent``."""
     alone: list[bool] = []
 
@@ -280,9 +280,11 @@ def main(arguments: list[str]) -> int:
     settings = json.loads(arguments[3])
     realtime.raise_priority(settings["priority"])
     page = StopWord.open(Path(arguments[0]))
-    keys = Keys({int(code): Kind[kind] for code, kind in settings["keys"].items()}, Kind[settings["other_keys"]])
+    keys = Keys(
+        {int(code): StopReason[kind] for code, kind in settings["keys"].items()}, StopReason[settings["other_keys"]]
+    )
     keyboard = Keyboard(page, settings["keypad"], int(arguments[2]), keys, settings["keypad_required"])
-    server = Server(page, socket.socket(fileno=int(arguments[1])), keyboard)
+    server = StopServer(page, socket.socket(fileno=int(arguments[1])), keyboard)
     try:
         serve(server, sys.stdin.fileno(), page)
     finally:

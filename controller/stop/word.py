@@ -35,7 +35,7 @@ class Lane(IntEnum):
     SUPERVISOR = 1
 
 
-class Kind(IntEnum):
+class StopReason(IntEnum):
     """What is asked for: retract by the operator's or the subject's wish, brake at once, retract for lack of keys."""
 
     STOP = 0
@@ -74,14 +74,14 @@ class Keypad(IntEnum):
     LOST = 2
 
 
-class Request(NamedTuple):
+class StopRequest(NamedTuple):
     """A stop that was asked for."""
 
     id: int
-    kind: Kind
+    kind: StopReason
 
 
-class Answer(NamedTuple):
+class StopOutcome(NamedTuple):
     """What the loop did about a request, and when on the monotonic clock."""
 
     id: int
@@ -197,30 +197,30 @@ class Requester:
         self._words, self._base = page.words, _LANES + lane * _LANE_WORDS
         self._lock = threading.Lock()
 
-    def request(self, kind: Kind) -> Request:
+    def request(self, kind: StopReason) -> StopRequest:
         """Asks; the loop sees it in its next cycle. Raises DeviceError where the page was given back."""
         with self._lock, _open_page():
             number = self._words[self._base] + 1
             self._words[self._base + _REQUESTS + kind] = number
             self._words[self._base] = number
-        return Request(number, kind)
+        return StopRequest(number, kind)
 
-    def answer(self, request: Request) -> Answer | None:
+    def answer(self, request: StopRequest) -> StopOutcome | None:
         """What was done about ``request``, or a later one of its kind; None before that. Raises as ``request``."""
         with _open_page():
             word = self._words[self._base + _ANSWERS + request.kind]
             time_ns = self._words[self._base + _TIMES + request.kind]
         if word >> _DEED_BITS < request.id:
             return None
-        return Answer(request.id, Deed(word & ((1 << _DEED_BITS) - 1)), time_ns)
+        return StopOutcome(request.id, Deed(word & ((1 << _DEED_BITS) - 1)), time_ns)
 
     def confirmed(
         self,
-        request: Request,
+        request: StopRequest,
         within_s: float,
         now: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
-    ) -> Answer | None:
+    ) -> StopOutcome | None:
         """The answer to ``request``, waited for; None where it has not come within ``within_s``."""
         deadline = now() + within_s
         while (answer := self.answer(request)) is None and now() < deadline:
@@ -234,13 +234,13 @@ class Responder:
     def __init__(self, page: StopWord) -> None:
         self._words = page.words
         self._seen = {_LANES + lane * _LANE_WORDS: 0 for lane in Lane}
-        self._pending: dict[tuple[int, Kind], Request] = {}
+        self._pending: dict[tuple[int, StopReason], StopRequest] = {}
 
     def attach(self, pid: int) -> None:
         """The loop is there; what was asked before counts."""
         self._words[_LOOP_PID] = pid
 
-    def take(self, now_ns: int) -> tuple[Request, ...]:
+    def take(self, now_ns: int) -> tuple[StopRequest, ...]:
         """What has been asked and not answered yet; called every cycle."""
         words = self._words
         words[_LOOP_BEAT] = now_ns
@@ -256,10 +256,10 @@ class Responder:
     def _collect(self, base: int) -> None:
         words = self._words
         self._seen[base] = words[base]
-        for kind in Kind:
+        for kind in StopReason:
             number = words[base + _REQUESTS + kind]
             if number > words[base + _ANSWERS + kind] >> _DEED_BITS:
-                self._pending[base, kind] = Request(number, kind)
+                self._pending[base, kind] = StopRequest(number, kind)
 
     def answer(self, deed: Deed, now_ns: int) -> None:
         """Answers all that has been taken."""

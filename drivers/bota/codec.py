@@ -13,7 +13,7 @@ from enum import IntFlag
 from typing import NamedTuple
 
 from drivers.crc import crc16_x25
-from drivers.framing import FixedFrames
+from drivers.framing import FrameDecoder
 from drivers.roles import LinkCounters
 from rig.errors import UsageError
 
@@ -41,7 +41,7 @@ _SERIAL = re.compile(rb"S/N:\s([^\r\n]*)\r")
 _FIRMWARE = re.compile(rb"FW version:\s([^\r\n]*)\r")
 
 
-class Status(IntFlag):
+class StatusBits(IntFlag):
     """Bits of the status word; 4-15 are reserved."""
 
     SKIPPED_SAMPLES = 1
@@ -50,7 +50,7 @@ class Status(IntFlag):
     RAW = 8
 
 
-class Frame(NamedTuple):
+class ForceFrame(NamedTuple):
     """One reading, in the order of the wire."""
 
     status: int
@@ -110,26 +110,19 @@ def line_rate_Hz(baud: int) -> float:
     return baud / BITS_PER_BYTE / FRAME_BYTES
 
 
-def encode_frame(frame: Frame) -> bytes:
+def encode_frame(frame: ForceFrame) -> bytes:
     """The 37 bytes of a frame."""
     payload = _PAYLOAD.pack(*frame)
     return HEADER + payload + _CRC.pack(crc16_x25(payload))
 
 
-class Decoder:
-    """Frames out of any bytes: resynchronises on header and CRC, holds less than one frame, never raises."""
+def make_decoder(counters: LinkCounters) -> FrameDecoder[ForceFrame]:
+    """A new decoder of this product's frames."""
+    return FrameDecoder(HEADER, FRAME_BYTES, _is_good, _decode_frame, counters)
 
-    def __init__(self, counters: LinkCounters) -> None:
-        self._frames = FixedFrames(HEADER, FRAME_BYTES, _is_good, counters)
 
-    @property
-    def held(self) -> int:
-        """Bytes kept for the next call, less than one frame."""
-        return self._frames.held
-
-    def feed(self, data: bytes) -> list[Frame]:
-        """The readings completed by ``data``, oldest first."""
-        return [Frame._make(_PAYLOAD.unpack_from(raw, 1)) for raw in self._frames.feed(data)]
+def _decode_frame(raw: bytes) -> ForceFrame:
+    return ForceFrame._make(_PAYLOAD.unpack_from(raw, 1))
 
 
 def _is_good(raw: bytes) -> bool:

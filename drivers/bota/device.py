@@ -21,14 +21,14 @@ from drivers.bota.codec import (
     HARD_RESET,
     RUN_MODE,
     BootText,
-    Decoder,
-    Frame,
-    Status,
+    ForceFrame,
+    StatusBits,
     encode_communication,
     encode_filter,
     find_ack,
     find_boot_text,
     line_rate_Hz,
+    make_decoder,
     rate_Hz,
     sinc_for,
 )
@@ -41,7 +41,7 @@ from rig.timing import ClockMap, Unwrapper
 
 PRODUCT = "bota-sensone"
 NAME_PREFIX = "BFT"
-UNUSABLE = int(Status.OVERRANGE | Status.INVALID | Status.RAW)
+UNUSABLE = int(StatusBits.OVERRANGE | StatusBits.INVALID | StatusBits.RAW)
 # The maker's driver allows 2 s for the settings and 2 s for the rest of the text after a reset.
 BOOT_S = 4.0
 # A command and its answer are 30 characters, 31 ms at 9600 baud; the rest is for the host.
@@ -57,7 +57,7 @@ LISTEN_S = 0.25
 
 
 # A frame and the sensor's unwrapped clock [us].
-Timed = tuple[int, Frame]
+Timed = tuple[int, ForceFrame]
 
 
 class BotaSensOne:
@@ -127,7 +127,7 @@ class BotaSensOne:
 
     def _forget_clock(self) -> None:
         """The sensor's clock starts anew with every reset."""
-        self._decoder = Decoder(self.counters)
+        self._decoder = make_decoder(self.counters)
         self._unwrap = Unwrapper(32)
         self._clock.restart()
         self._last_us: int | None = None
@@ -184,13 +184,13 @@ class BotaSensOne:
             select.select([self._port.fileno()], [], [], min(left_s, LISTEN_S))
             data = self._port.read()
 
-    def _no_valid_frame(self, frames: Sequence[Frame], timeout_s: float) -> str:
+    def _no_valid_frame(self, frames: Sequence[ForceFrame], timeout_s: float) -> str:
         if not frames:
             return (
                 f"no frame within {timeout_s:.1f} s of run mode, {self.counters.discarded_bytes} bytes without "
                 "a good checksum; check cable and baud"
             )
-        status = Status(frames[-1].status)
+        status = StatusBits(frames[-1].status)
         return f"no valid reading within {timeout_s:.1f} s of run mode, status {status!r}; unload it and check power"
 
     def _take(self, data: bytes, arrival_ns: int) -> None:
@@ -206,7 +206,7 @@ class BotaSensOne:
         pairs = zip(timed, captures_ns, strict=True)
         return [self._sample(device_us, frame, capture_ns, arrival_ns) for (device_us, frame), capture_ns in pairs]
 
-    def _sample(self, device_us: int, frame: Frame, capture_ns: int, arrival_ns: int) -> ForceSample:
+    def _sample(self, device_us: int, frame: ForceFrame, capture_ns: int, arrival_ns: int) -> ForceSample:
         self.next_seq += 1
         valid = int(_is_valid(frame))
         return ForceSample(
@@ -263,7 +263,7 @@ def _line_settings(config: BotaWiring) -> tuple[int, int]:
     return baud, sinc
 
 
-def _is_valid(frame: Frame) -> bool:
+def _is_valid(frame: ForceFrame) -> bool:
     return not frame.status & UNUSABLE and math.isfinite(sum(frame[1:7]))
 
 

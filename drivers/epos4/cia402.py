@@ -10,8 +10,8 @@ STATE_MASK = 0x6F
 SHORT_MASK = 0x4F
 
 
-class State(Enum):
-    """States of the drive; UNKNOWN is a pattern that none of them has."""
+class PdsState(Enum):
+    """States of the power drive system (PDS); UNKNOWN is a pattern that none of them has."""
 
     NOT_READY = "not ready to switch on"
     SWITCH_ON_DISABLED = "switch on disabled"
@@ -32,7 +32,7 @@ class Goal(Enum):
     DISABLED = "without torque"
 
 
-class Control(IntEnum):
+class Controlword(IntEnum):
     """Controlwords, and the bits that modes add to them; combining them gives a plain integer."""
 
     DISABLE_VOLTAGE = 0x00
@@ -47,7 +47,7 @@ class Control(IntEnum):
     HALT = 0x100
 
 
-class Status(IntEnum):
+class Statusword(IntEnum):
     """Statusword bits beside the state; the meaning of bits 10, 12 and 13 is the mode's."""
 
     FAULT = 0x08
@@ -62,49 +62,51 @@ class Status(IntEnum):
 
 
 STATE_WORDS = {
-    State.NOT_READY: 0x00,
-    State.SWITCH_ON_DISABLED: 0x40,
-    State.READY: 0x21,
-    State.SWITCHED_ON: 0x23,
-    State.ENABLED: 0x27,
-    State.QUICK_STOP: 0x07,
-    State.FAULT_REACTION: 0x0F,
-    State.FAULT: 0x08,
+    PdsState.NOT_READY: 0x00,
+    PdsState.SWITCH_ON_DISABLED: 0x40,
+    PdsState.READY: 0x21,
+    PdsState.SWITCHED_ON: 0x23,
+    PdsState.ENABLED: 0x27,
+    PdsState.QUICK_STOP: 0x07,
+    PdsState.FAULT_REACTION: 0x0F,
+    PdsState.FAULT: 0x08,
 }
-_LONG = {word: state for state, word in STATE_WORDS.items() if word & 0x20 or state is State.QUICK_STOP}
+_LONG = {word: state for state, word in STATE_WORDS.items() if word & 0x20 or state is PdsState.QUICK_STOP}
 _SHORT = {word: state for state, word in STATE_WORDS.items() if state not in _LONG.values()}
 
-_WALK: dict[Goal, dict[State, int]] = {
+_WALK: dict[Goal, dict[PdsState, int]] = {
     Goal.ENABLED: {
-        State.SWITCH_ON_DISABLED: Control.SHUTDOWN,
-        State.READY: Control.SWITCH_ON,
-        State.SWITCHED_ON: Control.ENABLE_OPERATION,
-        State.ENABLED: Control.ENABLE_OPERATION,
-        State.QUICK_STOP: Control.ENABLE_OPERATION,
+        PdsState.SWITCH_ON_DISABLED: Controlword.SHUTDOWN,
+        PdsState.READY: Controlword.SWITCH_ON,
+        PdsState.SWITCHED_ON: Controlword.ENABLE_OPERATION,
+        PdsState.ENABLED: Controlword.ENABLE_OPERATION,
+        PdsState.QUICK_STOP: Controlword.ENABLE_OPERATION,
     },
     Goal.STOPPED: {
-        State.ENABLED: Control.QUICK_STOP,
-        State.QUICK_STOP: Control.QUICK_STOP,
+        PdsState.ENABLED: Controlword.QUICK_STOP,
+        PdsState.QUICK_STOP: Controlword.QUICK_STOP,
     },
     Goal.DISABLED: {
-        State.ENABLED: Control.SWITCH_ON,
+        PdsState.ENABLED: Controlword.SWITCH_ON,
     },
 }
 _AT = {
-    Goal.ENABLED: {State.ENABLED},
-    Goal.STOPPED: {State.QUICK_STOP, State.SWITCH_ON_DISABLED, State.READY, State.SWITCHED_ON, State.FAULT},
-    Goal.DISABLED: {State.SWITCH_ON_DISABLED, State.FAULT},
-}
+    Goal.ENABLED: {PdsState.ENABLED},
+    Goal.STOPPED: {
+        PdsState.QUICK_STOP, PdsState.SWITCH_ON_DISABLED, PdsState.READY, PdsState.SWITCHED_ON, PdsState.FAULT
+    },
+    Goal.DISABLED: {PdsState.SWITCH_ON_DISABLED, PdsState.FAULT},
+}  # fmt: skip
 
 
-def decode_state(status: int) -> State:
+def decode_state(status: int) -> PdsState:
     """The state in a statusword."""
-    return _LONG.get(status & STATE_MASK) or _SHORT.get(status & SHORT_MASK, State.UNKNOWN)
+    return _LONG.get(status & STATE_MASK) or _SHORT.get(status & SHORT_MASK, PdsState.UNKNOWN)
 
 
 def next_controlword(status: int, goal: Goal) -> int:
     """The controlword to send next; where nothing leads on, the one that takes the torque away."""
-    return int(_WALK[goal].get(decode_state(status), Control.DISABLE_VOLTAGE))
+    return int(_WALK[goal].get(decode_state(status), Controlword.DISABLE_VOLTAGE))
 
 
 def reached(status: int, goal: Goal) -> bool:
@@ -115,8 +117,8 @@ def reached(status: int, goal: Goal) -> bool:
 def obstacle(status: int, goal: Goal) -> str:
     """Why no controlword leads from here to ``goal``; empty where one does, or where waiting does."""
     state = decode_state(status)
-    if goal is Goal.ENABLED and state is State.FAULT:
+    if goal is Goal.ENABLED and state is PdsState.FAULT:
         return "the drive is in fault; remove the cause and reset the fault"
-    if state is State.UNKNOWN:
+    if state is PdsState.UNKNOWN:
         return f"statusword {status:#06x} has the pattern of no state"
     return ""

@@ -15,7 +15,7 @@ from drivers.can.slcan import CanFrame
 from drivers.canopen.nmt import RPDO_IDS, SYNC, TPDO_IDS, NmtCommand
 from drivers.epos4 import objects, setup
 from drivers.epos4.bringup import CYCLIC_POSITION, HOMING, PROFILE_POSITION, configure, go_operational, identify
-from drivers.epos4.cia402 import Control, Goal, State, Status
+from drivers.epos4.cia402 import Controlword, Goal, PdsState, Statusword
 from drivers.epos4.codec import encode_setpoint
 from drivers.epos4.faults import describe
 from drivers.epos4.node import Node
@@ -98,14 +98,14 @@ class Epos4Axis:
         return (
             walker is not None
             and walker.mode == CYCLIC_POSITION
-            and walker.controlword == Control.ENABLE_OPERATION
-            and walker.state is State.ENABLED
+            and walker.controlword == Controlword.ENABLE_OPERATION
+            and walker.state is PdsState.ENABLED
         )
 
     @property
     def referenced(self) -> bool:
         """Whether positions count from home, as the drive last said."""
-        return self._walker is not None and bool(self._walker.status & Status.REFERENCED)
+        return self._walker is not None and bool(self._walker.status & Statusword.REFERENCED)
 
     def fileno(self) -> int:
         """Descriptor of the adapter's serial line; raises DeviceError before ``start``."""
@@ -138,23 +138,23 @@ class Epos4Axis:
     def home(self) -> None:
         """Finds the reference by the configured method; raises DeviceError where it does not within the travel."""
         walker = self._started()
-        done = Status.ACKNOWLEDGE | Status.TARGET_REACHED
-        ended = Status.MODE_ERROR | Status.FAULT
+        done = Statusword.ACKNOWLEDGE | Statusword.TARGET_REACHED
+        ended = Statusword.MODE_ERROR | Statusword.FAULT
         with self._moving(walker):
             walker.set_mode(HOMING)
             walker.walk(Goal.ENABLED)
-            walker.control(Control.ENABLE_OPERATION)
-            walker.control(Control.ENABLE_OPERATION | Control.START)
+            walker.control(Controlword.ENABLE_OPERATION)
+            walker.control(Controlword.ENABLE_OPERATION | Controlword.START)
             walker.watch(HOMING_START_S, lambda status: not status & done)
             limit_s = self._homing_time_s()
             walker.watch(limit_s, lambda status: status & done == done or bool(status & ended))
-            found = walker.status & done == done and walker.status & Status.REFERENCED
+            found = walker.status & done == done and walker.status & Statusword.REFERENCED
             if walker.status & ended or not found:
                 raise DeviceError(
                     f"{self._name}: homing by method {self._config.homing_method} found no reference within "
                     f"{limit_s:.1f} s ({self.fault or 'no fault'}); check the reference switch"
                 )
-            walker.control(Control.ENABLE_OPERATION)
+            walker.control(Controlword.ENABLE_OPERATION)
 
     def move_to(self, position_mm: float, speed_mm_s: float) -> None:
         """Moves by the drive's own profile, waits for the end; raises SafetyStop beyond a limit, else DeviceError."""
@@ -170,13 +170,13 @@ class Epos4Axis:
             walker.walk(Goal.ENABLED)
             node.write(objects.PROFILE_VELOCITY, self._units.rpm(speed_mm_s))
             node.write(objects.TARGET, target)
-            walker.control(Control.ENABLE_OPERATION)
-            walker.control(Control.ENABLE_OPERATION | Control.START | Control.IMMEDIATELY)
-            walker.require(REACTION_S, Status.ACKNOWLEDGE, True, "the set-point was not acknowledged")
-            walker.control(Control.ENABLE_OPERATION)
-            walker.require(REACTION_S, Status.ACKNOWLEDGE, False, "the set-point's acknowledgement stays")
+            walker.control(Controlword.ENABLE_OPERATION)
+            walker.control(Controlword.ENABLE_OPERATION | Controlword.START | Controlword.IMMEDIATELY)
+            walker.require(REACTION_S, Statusword.ACKNOWLEDGE, True, "the set-point was not acknowledged")
+            walker.control(Controlword.ENABLE_OPERATION)
+            walker.require(REACTION_S, Statusword.ACKNOWLEDGE, False, "the set-point's acknowledgement stays")
             missed = f"{position_mm:g} mm at {speed_mm_s:g} mm/s was not reached"
-            walker.require(travel_s + REACTION_S, Status.TARGET_REACHED, True, missed)
+            walker.require(travel_s + REACTION_S, Statusword.TARGET_REACHED, True, missed)
         self._target = target
 
     def enable(self) -> None:
@@ -188,7 +188,7 @@ class Epos4Axis:
             walker.node.write(objects.TARGET, self._target)
             walker.set_mode(CYCLIC_POSITION)
             walker.walk(Goal.ENABLED)
-            walker.control(Control.ENABLE_OPERATION)
+            walker.control(Controlword.ENABLE_OPERATION)
 
     def poll(self, now_ns: int) -> Sequence[AxisSample]:
         """Samples since the last call; raises DeviceError where the drive's heartbeat is missing or it restarted."""
@@ -220,13 +220,13 @@ class Epos4Axis:
     def quick_stop(self) -> None:
         """Brakes by the drive's ramp and stays stopped, with torque, until ``enable``; does not wait."""
         walker = self._started()
-        walker.controlword = int(Control.QUICK_STOP)
+        walker.controlword = int(Controlword.QUICK_STOP)
         self._sync(walker, self._now())
 
     def power_off(self) -> None:
         """Without torque from the next PDO on, until ``enable``; does not wait."""
         walker = self._started()
-        walker.controlword = int(Control.DISABLE_VOLTAGE)
+        walker.controlword = int(Controlword.DISABLE_VOLTAGE)
         self._sync(walker, self._now())
 
     def history(self) -> tuple[str, ...]:
@@ -239,7 +239,7 @@ class Epos4Axis:
         """Acknowledges a fault; raises DeviceError where it is still there. The drive has no torque afterwards."""
         walker = self._started()
         walker.reset_fault()
-        if not walker.status & Status.REMOTE:
+        if not walker.status & Statusword.REMOTE:
             go_operational(walker.node, self._config, self._now)
 
     def close(self) -> None:
@@ -276,7 +276,7 @@ class Epos4Axis:
             )
 
     def _check_referenced(self, walker: Walker, what: str) -> None:
-        if not walker.read_status() & Status.REFERENCED:
+        if not walker.read_status() & Statusword.REFERENCED:
             raise DeviceError(f"{self._name}: has no reference, and {what} needs one; home the axis first")
 
     def _check_speed(self, speed_mm_s: float) -> None:

@@ -6,7 +6,7 @@ an answer was lost, every later one would also fit the SYNC after that, and this
 
 from collections import deque
 
-from drivers.epos4.cia402 import Status
+from drivers.epos4.cia402 import Statusword
 from drivers.epos4.codec import DriveState, Units, decode_motion_pdo, decode_state_pdo
 from rig.channels import AxisSample
 
@@ -84,7 +84,7 @@ class SampleBuilder:
         if sync_ns is None:
             return
         units = self._units
-        valid = 0 if state.status & Status.FAULT else 1
+        valid = 0 if state.status & Statusword.FAULT else 1
         current_A = units.direction * motion.current_mA / 1000
         self._ready.append(
             AxisSample(

@@ -4,7 +4,16 @@ import contextlib
 from collections.abc import Callable
 
 from drivers.epos4 import objects
-from drivers.epos4.cia402 import Control, Goal, State, Status, decode_state, next_controlword, obstacle, reached
+from drivers.epos4.cia402 import (
+    Controlword,
+    Goal,
+    PdsState,
+    Statusword,
+    decode_state,
+    next_controlword,
+    obstacle,
+    reached,
+)
 from drivers.epos4.faults import describe
 from drivers.epos4.node import NoAnswer, Node
 from rig.errors import DeviceError, SafetyStop
@@ -27,14 +36,14 @@ class Walker:
         self.node = node
         self.status = 0
         self.mode = 0
-        self.controlword = int(Control.DISABLE_VOLTAGE)
+        self.controlword = int(Controlword.DISABLE_VOLTAGE)
         self.interrupted: Callable[[], bool] = never
         """Asked in every wait; a yes ends the wait with SafetyStop."""
         self._now = now
         self._braking_s = braking_s
 
     @property
-    def state(self) -> State:
+    def state(self) -> PdsState:
         """State of the drive as last heard."""
         return decode_state(self.status)
 
@@ -44,7 +53,7 @@ class Walker:
         code = self.node.emergency.code
         if code:
             return describe(code)
-        return "fault without an emergency message" if self.status & Status.FAULT else ""
+        return "fault without an emergency message" if self.status & Statusword.FAULT else ""
 
     def read_status(self) -> int:
         """The statusword now."""
@@ -96,22 +105,22 @@ class Walker:
             self._pause()
         return True
 
-    def require(self, timeout_s: float, bit: Status, value: bool, otherwise: str) -> None:
+    def require(self, timeout_s: float, bit: Statusword, value: bool, otherwise: str) -> None:
         """Waits for a statusword bit while enabled; raises DeviceError, beginning ``otherwise``, where it fails to."""
 
         def over(status: int) -> bool:
-            return bool(status & bit) is value or decode_state(status) is not State.ENABLED
+            return bool(status & bit) is value or decode_state(status) is not PdsState.ENABLED
 
         in_time = self.watch(timeout_s, over)
-        if not in_time or self.state is not State.ENABLED:
+        if not in_time or self.state is not PdsState.ENABLED:
             why = self.fault or (f"in {self.state.value}" if in_time else f"within {timeout_s:.1f} s")
             raise DeviceError(f"{self.node.name}: {otherwise}: {why}; see what hinders the axis")
 
     def reset_fault(self) -> None:
         """One rising edge of the reset bit, then without torque; raises DeviceError where the fault is still there."""
-        for word in (Control.DISABLE_VOLTAGE, Control.FAULT_RESET, Control.DISABLE_VOLTAGE):
+        for word in (Controlword.DISABLE_VOLTAGE, Controlword.FAULT_RESET, Controlword.DISABLE_VOLTAGE):
             self.control(word)
-        gone = self.watch(REACTION_S, lambda status: not status & Status.FAULT)
+        gone = self.watch(REACTION_S, lambda status: not status & Statusword.FAULT)
         if not gone or self.node.read(objects.ERROR_REGISTER):
             code = self.node.read(objects.ERROR_CODE)
             raise DeviceError(f"{self.node.name}: the fault is still there: {describe(code)}; remove its cause first")
@@ -120,7 +129,7 @@ class Walker:
 
     def note_old_fault(self) -> None:
         """Takes over a fault that was there before anyone listened."""
-        if self.read_status() & Status.FAULT:
+        if self.read_status() & Statusword.FAULT:
             self.node.emergency = self.node.emergency._replace(code=self.node.read(objects.ERROR_CODE))
 
     def _pause(self) -> None:

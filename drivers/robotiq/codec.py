@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from drivers.crc import crc16_modbus
-from drivers.framing import FixedFrames
+from drivers.framing import FrameDecoder
 from drivers.roles import LinkCounters
 
 DEFAULT_BAUD = 19_200
@@ -129,25 +129,13 @@ def encode_frame(counts: Sequence[int]) -> bytes:
     return with_crc(STREAM_START + _STREAM.pack(*counts))
 
 
-class Decoder:
-    """Stream frames out of any bytes: resynchronises by checksum, holds less than one frame, never raises."""
+def make_decoder(counters: LinkCounters) -> FrameDecoder[Wrench]:
+    """A new decoder of this product's stream frames."""
+    return FrameDecoder(STREAM_START, FRAME_BYTES, is_intact, _decode_frame, counters)
 
-    def __init__(self, counters: LinkCounters) -> None:
-        self._frames = FixedFrames(STREAM_START, FRAME_BYTES, is_intact, counters)
 
-    @property
-    def held(self) -> int:
-        """Bytes kept for the next call, less than one frame."""
-        return self._frames.held
-
-    @property
-    def gaps(self) -> list[int]:
-        """Bytes discarded before each reading of the last ``feed``."""
-        return self._frames.gaps
-
-    def feed(self, data: bytes) -> list[Wrench]:
-        """The readings completed by ``data``, oldest first."""
-        return [_scaled(_STREAM.unpack_from(raw, len(STREAM_START))) for raw in self._frames.feed(data)]
+def _decode_frame(raw: bytes) -> Wrench:
+    return _scaled(_STREAM.unpack_from(raw, len(STREAM_START)))
 
 
 def _scaled(counts: Sequence[int]) -> Wrench:

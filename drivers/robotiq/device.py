@@ -28,11 +28,11 @@ from drivers.robotiq.codec import (
     STOP_BURST,
     STREAM_HZ,
     STREAM_STARTED,
-    Decoder,
     Wrench,
     decode_firmware,
     decode_forces,
     decode_serial_number,
+    make_decoder,
     refusal,
 )
 from drivers.robotiq.frame_clock import LISTEN_NS, PERIOD_NS, FrameClock
@@ -81,7 +81,7 @@ class RobotiqFt300:
         self._now = now
         self._port = open_port(DEFAULT_BAUD)
         self._clock = FrameClock(round(config.latency_ms * 1e6))
-        self._decoder = Decoder(self.counters)
+        self._decoder = make_decoder(self.counters)
         self._identity = Identity(PRODUCT, "", "")
         self.next_seq = 0
         self._taken: list[tuple[list[Timed], int]] = []
@@ -188,7 +188,7 @@ class RobotiqFt300:
         code = refusal(text)
         if code is not None:
             raise self._error(f"refused to start its stream with Modbus exception {code}; check its firmware")
-        self._decoder = Decoder(self.counters)
+        self._decoder = make_decoder(self.counters)
         self._clock.restart()
         self._taken = []
         self._take(text.replace(STREAM_STARTED, b"", 1), self._now())
@@ -232,7 +232,7 @@ def open_sensor(config: Ft300Wiring) -> RobotiqFt300:
 
 
 def _started_or_refused(text: bytes) -> bool:
-    return refusal(text) is not None or bool(Decoder(LinkCounters()).feed(text))
+    return refusal(text) is not None or bool(make_decoder(LinkCounters()).feed(text))
 
 
 def _described(wrench: Wrench) -> str:

@@ -10,7 +10,15 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
-from drivers.bota.codec import BAUD_CODES, COMMAND_BYTES_MAX, CONVERTER_HZ, SINC_LENGTHS, Frame, Status, encode_frame
+from drivers.bota.codec import (
+    BAUD_CODES,
+    COMMAND_BYTES_MAX,
+    CONVERTER_HZ,
+    SINC_LENGTHS,
+    ForceFrame,
+    StatusBits,
+    encode_frame,
+)
 from mock_devices.interfaces import NEVER_NS, SAMPLES_KEPT, SensorPlant
 from mock_devices.wire import OnWire, Wire
 
@@ -197,20 +205,20 @@ class BotaMock(OnWire):
             self._wrench = self._plant.wrench()
         time_us = round((self._due_ns - self._power_ns) * self._speed / 1000) & 0xFFFF_FFFF
         self.sampled.append((time_us, self._due_ns))
-        raw = encode_frame(Frame(self._status(), *self._wrench, time_us, self._plant.temperature_C))
+        raw = encode_frame(ForceFrame(self._status(), *self._wrench, time_us, self._plant.temperature_C))
         self._frames += 1
         if self.corrupt_every and self._frames % self.corrupt_every == 0:
             raw = raw[:-1] + bytes([raw[-1] ^ 0xFF])
         self._send(raw)
 
     def _status(self) -> int:
-        status = Status(0)
+        status = StatusBits(0)
         if self._plant.overrange():
-            status |= Status.OVERRANGE
+            status |= StatusBits.OVERRANGE
         if self.invalid:
-            status |= Status.INVALID
+            status |= StatusBits.INVALID
         if self._setup[1] == "0":
-            status |= Status.RAW
+            status |= StatusBits.RAW
         return int(status)
 
     def _send(self, data: bytes) -> None:

@@ -7,37 +7,37 @@ home is on it. Torque modes are refused, because an AxisPlant takes positions on
 import math
 from collections.abc import Callable, Iterator
 
-from drivers.epos4.cia402 import STATE_WORDS, Control, State, Status
+from drivers.epos4.cia402 import STATE_WORDS, Controlword, PdsState, Statusword
 from drivers.epos4.faults import FAULTS, UNKNOWN
 from drivers.epos4.objects import U32_MAX
 from mock_devices.canopen.sdo_server import SdoAbort
 from mock_devices.epos4.dictionary import Dictionary
-from mock_devices.epos4.motion import NEEDS_HOME_SWITCH, HomingSetup, Inputs, Ramp, homing
+from mock_devices.epos4.motion import NEEDS_HOME_SWITCH, HomingSetup, Inputs, TrapezoidalProfile, homing
 from mock_devices.interfaces import AxisPlant
 
 PROFILE_POSITION, PROFILE_VELOCITY, HOMING, CYCLIC_POSITION, CYCLIC_VELOCITY, CYCLIC_TORQUE = 1, 3, 6, 8, 9, 10
 MODES = (PROFILE_POSITION, PROFILE_VELOCITY, HOMING, CYCLIC_POSITION, CYCLIC_VELOCITY)
 STANDSTILL_RPM = 30  # the EPOS4's standstill window as delivered (object 30E0:1)
 HARDWARE_ABORT, RANGE_ABORT = 0x06060000, 0x06090030
-MODE_BITS = Status.TARGET_REACHED | Status.ACKNOWLEDGE | Status.MODE_ERROR
+MODE_BITS = Statusword.TARGET_REACHED | Statusword.ACKNOWLEDGE | Statusword.MODE_ERROR
 
 OFF, SHUTDOWN, SWITCH_ON, ENABLE, STOP = range(5)
 TRANSITIONS = {
-    (State.SWITCH_ON_DISABLED, SHUTDOWN): State.READY,
-    (State.READY, SWITCH_ON): State.SWITCHED_ON,
-    (State.READY, ENABLE): State.SWITCHED_ON,
-    (State.READY, OFF): State.SWITCH_ON_DISABLED,
-    (State.READY, STOP): State.SWITCH_ON_DISABLED,
-    (State.SWITCHED_ON, ENABLE): State.ENABLED,
-    (State.SWITCHED_ON, SHUTDOWN): State.READY,
-    (State.SWITCHED_ON, OFF): State.SWITCH_ON_DISABLED,
-    (State.SWITCHED_ON, STOP): State.SWITCH_ON_DISABLED,
-    (State.ENABLED, SWITCH_ON): State.SWITCHED_ON,
-    (State.ENABLED, SHUTDOWN): State.READY,
-    (State.ENABLED, OFF): State.SWITCH_ON_DISABLED,
-    (State.ENABLED, STOP): State.QUICK_STOP,
-    (State.QUICK_STOP, ENABLE): State.ENABLED,
-    (State.QUICK_STOP, OFF): State.SWITCH_ON_DISABLED,
+    (PdsState.SWITCH_ON_DISABLED, SHUTDOWN): PdsState.READY,
+    (PdsState.READY, SWITCH_ON): PdsState.SWITCHED_ON,
+    (PdsState.READY, ENABLE): PdsState.SWITCHED_ON,
+    (PdsState.READY, OFF): PdsState.SWITCH_ON_DISABLED,
+    (PdsState.READY, STOP): PdsState.SWITCH_ON_DISABLED,
+    (PdsState.SWITCHED_ON, ENABLE): PdsState.ENABLED,
+    (PdsState.SWITCHED_ON, SHUTDOWN): PdsState.READY,
+    (PdsState.SWITCHED_ON, OFF): PdsState.SWITCH_ON_DISABLED,
+    (PdsState.SWITCHED_ON, STOP): PdsState.SWITCH_ON_DISABLED,
+    (PdsState.ENABLED, SWITCH_ON): PdsState.SWITCHED_ON,
+    (PdsState.ENABLED, SHUTDOWN): PdsState.READY,
+    (PdsState.ENABLED, OFF): PdsState.SWITCH_ON_DISABLED,
+    (PdsState.ENABLED, STOP): PdsState.QUICK_STOP,
+    (PdsState.QUICK_STOP, ENABLE): PdsState.ENABLED,
+    (PdsState.QUICK_STOP, OFF): PdsState.SWITCH_ON_DISABLED,
 }
 
 
@@ -68,7 +68,7 @@ class Drive:
         increments_per_mm: float,
         increments_per_rev: float,
     ) -> None:
-        self.state = State.SWITCH_ON_DISABLED
+        self.state = PdsState.SWITCH_ON_DISABLED
         self.mode = PROFILE_POSITION
         self.remote = False
         self.cause = 0
@@ -80,7 +80,7 @@ class Drive:
         self._scale = increments_per_mm
         self._per_rpm = increments_per_rev / 60
         self._index_spacing = increments_per_rev
-        self._ramp = Ramp(0.0)
+        self._ramp = TrapezoidalProfile(0.0)
         self._inputs = Inputs()
         self._word = 0
         self._bits = 0
@@ -90,12 +90,12 @@ class Drive:
     def restart(self) -> None:
         """As after power-up: no torque, no reference, the counter at 0."""
         self._plant.power(False)
-        self.state = State.SWITCH_ON_DISABLED
+        self.state = PdsState.SWITCH_ON_DISABLED
         self.mode = PROFILE_POSITION
         self.cause = 0
         self._word = 0
         self._bits = 0
-        self._leaving: State | None = None
+        self._leaving: PdsState | None = None
         self._deceleration = 0.0
         self._goal: float | None = None
         self._queued: float | None = None
@@ -106,10 +106,10 @@ class Drive:
     @property
     def status(self) -> int:
         """The statusword."""
-        word = STATE_WORDS[self.state] | Status.VOLTAGE | self._bits
-        if self.state is State.ENABLED and self.mode in (CYCLIC_POSITION, CYCLIC_VELOCITY):
-            word |= Status.ACKNOWLEDGE
-        return int(word | Status.REMOTE if self.remote else word)
+        word = STATE_WORDS[self.state] | Statusword.VOLTAGE | self._bits
+        if self.state is PdsState.ENABLED and self.mode in (CYCLIC_POSITION, CYCLIC_VELOCITY):
+            word |= Statusword.ACKNOWLEDGE
+        return int(word | Statusword.REMOTE if self.remote else word)
 
     @property
     def position(self) -> int:
@@ -139,29 +139,29 @@ class Drive:
     @property
     def powered(self) -> bool:
         """Whether there is torque."""
-        return self.state in (State.ENABLED, State.QUICK_STOP, State.FAULT_REACTION)
+        return self.state in (PdsState.ENABLED, PdsState.QUICK_STOP, PdsState.FAULT_REACTION)
 
     @property
     def moving(self) -> bool:
         """Whether the drive makes its own profile now and wants a tick each millisecond."""
-        if self.state is State.ENABLED:
+        if self.state is PdsState.ENABLED:
             return self.mode != CYCLIC_POSITION or self._leaving is not None
-        return self.state is State.FAULT_REACTION or (self.state is State.QUICK_STOP and self._ramp.speed != 0)
+        return self.state is PdsState.FAULT_REACTION or (self.state is PdsState.QUICK_STOP and self._ramp.speed != 0)
 
     def control(self, word: int) -> None:
         """Object 6040 was written."""
-        if word == self._word and self.state is State.ENABLED:
+        if word == self._word and self.state is PdsState.ENABLED:
             return
         rising, falling = word & ~self._word, self._word & ~word
         self._word = word
-        if word & Control.FAULT_RESET:
-            if rising & Control.FAULT_RESET:
+        if word & Controlword.FAULT_RESET:
+            if rising & Controlword.FAULT_RESET:
                 self._reset_fault()
             return
         command = command_of(word)
         while (self.state, command) in TRANSITIONS and not self._leaving:
             self._go(TRANSITIONS[self.state, command])
-        if self.state is State.ENABLED and not self._leaving:
+        if self.state is PdsState.ENABLED and not self._leaving:
             self._mode_bits(rising, falling)
 
     def set_mode(self, mode: int) -> None:
@@ -180,7 +180,7 @@ class Drive:
 
     def set_target(self, increments: int) -> None:
         """Object 607A was written; only cyclic position mode acts on it at once."""
-        if self.mode != CYCLIC_POSITION or self.state is not State.ENABLED or self._leaving:
+        if self.mode != CYCLIC_POSITION or self.state is not PdsState.ENABLED or self._leaving:
             return
         if self._within(increments):
             self._ramp.position = increments + self.astray + self.zero
@@ -192,7 +192,7 @@ class Drive:
     def fault(self, code: int) -> None:
         """Error ``code`` happens now."""
         self._report(code)
-        if self.state is State.FAULT:
+        if self.state is PdsState.FAULT:
             return
         reaction = FAULTS.get(code, UNKNOWN).reaction
         option = {"off": 0, "abort connection": self._values[0x6007, 0], "fault reaction": self._values[0x605E, 0]}[
@@ -202,38 +202,38 @@ class Drive:
         ramps = {"abort connection": {3: 0x6085}, "fault reaction": {1: 0x6084, 2: 0x6085}}.get(reaction, {})
         if self.powered and option in ramps:
             self._brake(self._values[ramps[option], 0])
-            self.state = State.FAULT_REACTION
+            self.state = PdsState.FAULT_REACTION
         else:
-            self._cut(State.FAULT)
+            self._cut(PdsState.FAULT)
 
     def tick(self, dt_s: float) -> None:
         """Time passes: own profiles advance, ramps end, the following error is watched."""
-        if self.state in (State.FAULT_REACTION, State.QUICK_STOP) or self._leaving:
+        if self.state in (PdsState.FAULT_REACTION, PdsState.QUICK_STOP) or self._leaving:
             self._braked(dt_s)
-        elif self.state is State.ENABLED and self.mode != CYCLIC_POSITION:
+        elif self.state is PdsState.ENABLED and self.mode != CYCLIC_POSITION:
             self._advance(dt_s)
             self._aim()
         if self.powered:
             self._watch()
 
-    def _go(self, state: State) -> None:
-        if state is State.ENABLED:
+    def _go(self, state: PdsState) -> None:
+        if state is PdsState.ENABLED:
             self._enter_enabled()
-        elif self.state is State.ENABLED and state is State.QUICK_STOP:
+        elif self.state is PdsState.ENABLED and state is PdsState.QUICK_STOP:
             self._brake(self._values[0x6085, 0])
             self.state = state
-        elif self.state is State.ENABLED and self._values[0x605C if state is State.SWITCHED_ON else 0x605B, 0]:
+        elif self.state is PdsState.ENABLED and self._values[0x605C if state is PdsState.SWITCHED_ON else 0x605B, 0]:
             self._brake(self._values[0x6084, 0])
             self._leaving = state
         else:
             self._cut(state)
 
     def _enter_enabled(self) -> None:
-        if self.state is not State.QUICK_STOP:
-            self._ramp = Ramp(self._raw())
+        if self.state is not PdsState.QUICK_STOP:
+            self._ramp = TrapezoidalProfile(self._raw())
             self._plant.power(True)
             self._aim()
-        self.state = State.ENABLED
+        self.state = PdsState.ENABLED
         self._bits &= ~MODE_BITS
         self._goal = self._queued = self._homing = None
         self._inside = self._within(self.position)
@@ -253,55 +253,55 @@ class Drive:
             return
         if self._leaving:
             self._cut(self._leaving)
-        elif self.state is State.FAULT_REACTION:
-            self._cut(State.FAULT)
+        elif self.state is PdsState.FAULT_REACTION:
+            self._cut(PdsState.FAULT)
         else:
-            self._bits |= Status.TARGET_REACHED
+            self._bits |= Statusword.TARGET_REACHED
 
-    def _cut(self, state: State) -> None:
+    def _cut(self, state: PdsState) -> None:
         self._plant.power(False)
         self._leaving = None
-        self._bits &= ~(Status.TARGET_REACHED | Status.ACKNOWLEDGE)
+        self._bits &= ~(Statusword.TARGET_REACHED | Statusword.ACKNOWLEDGE)
         self.state = state
 
     def _reset_fault(self) -> None:
-        if self.state is not State.FAULT:
+        if self.state is not PdsState.FAULT:
             return
         if self.cause:
             self._report(self.cause)
         else:
-            self.state = State.SWITCH_ON_DISABLED
+            self.state = PdsState.SWITCH_ON_DISABLED
             self._bits &= ~MODE_BITS
             self._report(0)
 
     def _mode_bits(self, rising: int, falling: int) -> None:
         if self.mode == PROFILE_POSITION:
-            if rising & Control.START:
+            if rising & Controlword.START:
                 self._take_setpoint()
-            elif falling & Control.START and self._queued is None:
-                self._bits &= ~Status.ACKNOWLEDGE
-        elif self.mode == HOMING and rising & Control.START:
+            elif falling & Controlword.START and self._queued is None:
+                self._bits &= ~Statusword.ACKNOWLEDGE
+        elif self.mode == HOMING and rising & Controlword.START:
             self._start_homing()
 
     def _take_setpoint(self) -> None:
         target = self._values[0x607A, 0] + self.zero
-        if self._word & Control.RELATIVE:
+        if self._word & Controlword.RELATIVE:
             target += (self._ramp.position if self._goal is None else self._goal) - self.zero
         if not self._within(target - self.zero):
             self.fault(0x8A82)
-        elif self._goal is None or self._word & Control.IMMEDIATELY:
+        elif self._goal is None or self._word & Controlword.IMMEDIATELY:
             self._goal, self._queued = target, None
-            self._bits = self._bits & ~MODE_BITS | Status.ACKNOWLEDGE
+            self._bits = self._bits & ~MODE_BITS | Statusword.ACKNOWLEDGE
         elif self._queued is None:
             self._queued = target
-            self._bits |= Status.ACKNOWLEDGE
+            self._bits |= Statusword.ACKNOWLEDGE
 
     def _start_homing(self) -> None:
         values, rpm = self._values, self._per_rpm
-        self._bits &= ~(MODE_BITS | Status.REFERENCED)
+        self._bits &= ~(MODE_BITS | Statusword.REFERENCED)
         method = values[0x6098, 0]
         if method in NEEDS_HOME_SWITCH:
-            self._bits |= Status.MODE_ERROR
+            self._bits |= Statusword.MODE_ERROR
             return
         setup = HomingSetup(
             method,
@@ -316,10 +316,10 @@ class Drive:
         self._homing = homing(setup, self._ramp, self._inputs)
 
     def _advance(self, dt_s: float) -> None:
-        if self._word & Control.HALT:
-            self._bits &= ~Status.TARGET_REACHED
+        if self._word & Controlword.HALT:
+            self._bits &= ~Statusword.TARGET_REACHED
             if self._ramp.stop(self._values[0x6084, 0] * self._per_rpm, dt_s):
-                self._bits |= Status.TARGET_REACHED
+                self._bits |= Statusword.TARGET_REACHED
         elif self.mode == HOMING:
             self._home(dt_s)
         elif self.mode == PROFILE_POSITION:
@@ -336,9 +336,9 @@ class Drive:
         elif self._ramp.towards(self._goal, top, acceleration, deceleration, dt_s):
             self._goal, self._queued = self._queued, None
             if self._goal is None:
-                self._bits |= Status.TARGET_REACHED
-            elif not self._word & Control.START:
-                self._bits &= ~Status.ACKNOWLEDGE
+                self._bits |= Statusword.TARGET_REACHED
+            elif not self._word & Controlword.START:
+                self._bits &= ~Statusword.ACKNOWLEDGE
 
     def _at_velocity(self, dt_s: float) -> None:
         values, rpm = self._values, self._per_rpm
@@ -348,9 +348,9 @@ class Drive:
         acceleration = min(values[0x60C5 if cyclic else 0x6083, 0], values[0x60C5, 0]) * rpm
         deceleration = min(values[0x60C5 if cyclic else 0x6084, 0], values[0x60C5, 0]) * rpm
         if self._ramp.at_speed(speed, acceleration, deceleration, dt_s):
-            self._bits |= Status.TARGET_REACHED
+            self._bits |= Statusword.TARGET_REACHED
         else:
-            self._bits &= ~Status.TARGET_REACHED
+            self._bits &= ~Statusword.TARGET_REACHED
 
     def _home(self, dt_s: float) -> None:
         if self._homing is None:
@@ -362,7 +362,7 @@ class Drive:
             self.zero = home - self._values[0x30B0, 0]
             self._homing = None
             self._inside = self._within(self.position)
-            self._bits |= Status.TARGET_REACHED | Status.ACKNOWLEDGE | Status.REFERENCED
+            self._bits |= Statusword.TARGET_REACHED | Statusword.ACKNOWLEDGE | Statusword.REFERENCED
 
     def _sense(self, dt_s: float) -> None:
         inputs = self._inputs
@@ -385,12 +385,12 @@ class Drive:
         window = self._values[0x6065, 0]
         inside = self._within(raw - self.zero)
         left, self._inside = self._inside and not inside, inside
-        if self.state is State.FAULT_REACTION or self.unguarded:
+        if self.state is PdsState.FAULT_REACTION or self.unguarded:
             return
         if abs(self._ramp.position - raw) > window != U32_MAX:
             # The demand is where the axis cannot follow: it brakes from where it is.
             self._ramp.position = raw
             self.fault(0x8611)
-            self._bits |= Status.MODE_ERROR
+            self._bits |= Statusword.MODE_ERROR
         elif left and self.mode != HOMING:
             self.fault(0x8A82)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 
 @dataclass
-class Ramp:
+class TrapezoidalProfile:
     """Moves ``position`` so that speed and acceleration stay within their limits and the end is met at rest."""
 
     position: float
@@ -75,7 +75,7 @@ SEARCH_DIRECTION = {1: -1, 17: -1, 2: 1, 18: 1, -1: 1, -3: 1, -2: -1, -4: -1, 33
 WITH_INDEX = (1, 2, -1, -2, 33, 34)
 
 
-def homing(setup: HomingSetup, ramp: Ramp, inputs: Inputs) -> Iterator[float | None]:
+def homing(setup: HomingSetup, ramp: TrapezoidalProfile, inputs: Inputs) -> Iterator[float | None]:
     """Moves ``ramp`` a step an iteration; its last value is the position that becomes home, None before.
 
     Methods on a limit switch drive onto it fast, then leave it slowly: its edge is the reference (CiA 402, 1 2 17 18).
@@ -104,7 +104,7 @@ def homing(setup: HomingSetup, ramp: Ramp, inputs: Inputs) -> Iterator[float | N
 
 
 def _drive(
-    setup: HomingSetup, ramp: Ramp, inputs: Inputs, speed: float, until_switch: bool, direction: int
+    setup: HomingSetup, ramp: TrapezoidalProfile, inputs: Inputs, speed: float, until_switch: bool, direction: int
 ) -> Iterator[None]:
     """At ``speed`` until the limit switch in ``direction`` is on, or off again; then down to rest."""
     while (inputs.negative_switch if direction < 0 else inputs.positive_switch) is not until_switch:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from mock_devices.bota.mock import BotaMock
 from mock_devices.epos4.mock import Epos4Mock
-from mock_devices.faults.wires import Kind, Value, as_number, as_switch
+from mock_devices.faults.wires import FaultKind, Value, as_number, as_switch
 from mock_devices.ndi.mock import NdiMock
 from mock_devices.robotiq.mock import RobotiqMock
 from rig.errors import UsageError
@@ -117,39 +117,41 @@ def _lasting_error(axis: Epos4Mock, value: Value) -> None:
     axis.inject_fault(_whole(value, 0xFFFF), lasting=True)
 
 
-BOTA_FAULTS: Mapping[str, Kind[BotaMock]] = {
-    "silent": Kind("sends nothing", True, _sensor_silent),
-    "frozen": Kind("repeats the last forces under running time", True, _sensor_frozen),
-    "invalid": Kind("flags its measurements as invalid", True, _sensor_invalid),
-    "wrong_identity": Kind("prints another maker's name after a reset", True, _sensor_stranger),
-    "corrupt_every": Kind("spoils the checksum of every n-th frame; 0: none", 10, _sensor_corrupt),
-    "refuse": Kind("answers these commands with code 1", "R", _refuse),
+BOTA_FAULTS: Mapping[str, FaultKind[BotaMock]] = {
+    "silent": FaultKind("sends nothing", True, _sensor_silent),
+    "frozen": FaultKind("repeats the last forces under running time", True, _sensor_frozen),
+    "invalid": FaultKind("flags its measurements as invalid", True, _sensor_invalid),
+    "wrong_identity": FaultKind("prints another maker's name after a reset", True, _sensor_stranger),
+    "corrupt_every": FaultKind("spoils the checksum of every n-th frame; 0: none", 10, _sensor_corrupt),
+    "refuse": FaultKind("answers these commands with code 1", "R", _refuse),
 }
-ROBOTIQ_FAULTS: Mapping[str, Kind[RobotiqMock]] = {
-    "silent": Kind("sends nothing", True, _sensor_silent),
-    "frozen": Kind("repeats the last forces", True, _sensor_frozen),
-    "invalid": Kind("gives the converter's end on all channels", True, _sensor_invalid),
-    "wrong_identity": Kind("has firmware letters that are no force sensor's", True, _sensor_stranger),
-    "corrupt_every": Kind("spoils the checksum of every n-th frame; 0: none", 10, _sensor_corrupt),
-    "mute_start": Kind("starts the stream without answering", True, _mute_start),
-    "deaf": Kind("streams on whatever comes", True, _deaf),
-    "refuse_stream": Kind("answers the start of the stream with exception 3", True, _refuse_stream),
+ROBOTIQ_FAULTS: Mapping[str, FaultKind[RobotiqMock]] = {
+    "silent": FaultKind("sends nothing", True, _sensor_silent),
+    "frozen": FaultKind("repeats the last forces", True, _sensor_frozen),
+    "invalid": FaultKind("gives the converter's end on all channels", True, _sensor_invalid),
+    "wrong_identity": FaultKind("has firmware letters that are no force sensor's", True, _sensor_stranger),
+    "corrupt_every": FaultKind("spoils the checksum of every n-th frame; 0: none", 10, _sensor_corrupt),
+    "mute_start": FaultKind("starts the stream without answering", True, _mute_start),
+    "deaf": FaultKind("streams on whatever comes", True, _deaf),
+    "refuse_stream": FaultKind("answers the start of the stream with exception 3", True, _refuse_stream),
 }
-NDI_FAULTS: Mapping[str, Kind[NdiMock]] = {
-    "silent": Kind("answers nothing", True, _tracker_silent),
-    "frozen": Kind("answers, but the frame number stands still", True, _tracker_frozen),
-    "corrupt_every": Kind("one bit is wrong in every n-th reply; 0: none", 10, _tracker_corrupt),
-    "missing": Kind("the tool of this index is MISSING; false: none", 0, _missing),
-    "unplugged": Kind("the tool of this index is pulled out of its port; false: none", 0, _unplugged),
-    "error_reply": Kind("answers TX and BX with this ERROR code; false: none", 0x0D, _error_reply),
+NDI_FAULTS: Mapping[str, FaultKind[NdiMock]] = {
+    "silent": FaultKind("answers nothing", True, _tracker_silent),
+    "frozen": FaultKind("answers, but the frame number stands still", True, _tracker_frozen),
+    "corrupt_every": FaultKind("one bit is wrong in every n-th reply; 0: none", 10, _tracker_corrupt),
+    "missing": FaultKind("the tool of this index is MISSING; false: none", 0, _missing),
+    "unplugged": FaultKind("the tool of this index is pulled out of its port; false: none", 0, _unplugged),
+    "error_reply": FaultKind("answers TX and BX with this ERROR code; false: none", 0x0D, _error_reply),
 }
-EPOS4_FAULTS: Mapping[str, Kind[Epos4Mock]] = {
-    "silent": Kind("neither hears nor sends anything", True, _axis_silent),
-    "frozen": Kind("repeats the position it had", True, _axis_frozen),
-    "wrong_identity": Kind("has another maker and product", True, _axis_stranger),
-    "unguarded": Kind("watches neither heartbeats nor its own limits any more", True, _axis_unguarded),
-    "astray": Kind("its set-points run away from those that were sent at this speed, mm/s; 0: no more", 10.0, _astray),
-    "error": Kind("this error happens once (0x603F code, for example 0x8611 following error)", 0x8611, _error),
-    "restart": Kind("loses its power for a moment, and with it reference, limits and torque", True, _restart),
-    "lasting_error": Kind("this error comes back at each reset; 0: its cause is gone", 0x3210, _lasting_error),
+EPOS4_FAULTS: Mapping[str, FaultKind[Epos4Mock]] = {
+    "silent": FaultKind("neither hears nor sends anything", True, _axis_silent),
+    "frozen": FaultKind("repeats the position it had", True, _axis_frozen),
+    "wrong_identity": FaultKind("has another maker and product", True, _axis_stranger),
+    "unguarded": FaultKind("watches neither heartbeats nor its own limits any more", True, _axis_unguarded),
+    "astray": FaultKind(
+        "its set-points run away from those that were sent at this speed, mm/s; 0: no more", 10.0, _astray
+    ),
+    "error": FaultKind("this error happens once (0x603F code, for example 0x8611 following error)", 0x8611, _error),
+    "restart": FaultKind("loses its power for a moment, and with it reference, limits and torque", True, _restart),
+    "lasting_error": FaultKind("this error comes back at each reset; 0: its cause is gone", 0x3210, _lasting_error),
 }

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from mock_devices.faults.wires import Kind, Value, as_number, as_switch
+from mock_devices.faults.wires import FaultKind, Value, as_number, as_switch
 from mock_devices.physics.camera import CameraPlant
 from mock_devices.physics.channels import CHANNELS, Slips
 from mock_devices.physics.sensor import ForcePlant
@@ -58,17 +58,19 @@ def _slip(value: Value) -> float:
     return as_number(value, -SLIP_LARGEST_MM, SLIP_LARGEST_MM)
 
 
-SENSOR_FAULTS: Mapping[str, Kind[ForcePlant]] = {
-    "polarity": Kind("all channels have the other sign, as with the supply's wires exchanged", True, _polarity),
-    "gain": Kind("all channels answer a load with this many times what is true", 0.5, _gain),
-    "dead": Kind("the channel of this index answers no load (0 to 5: Fx Fy Fz Mx My Mz); false: none", 2, _dead),
-    "crossed": Kind("Fx Fy Fz come out one place further: Fz as Fx, Fx as Fy, Fy as Fz", True, _crossed),
-    "drift": Kind("the zero runs away from now on, N/s of compression shown; 0: it is back", 0.5, _drift),
-    "lever": Kind("the load acts this many mm beside the sensor's axis", 50.0, _lever),
-    "saturate": Kind("all force channels end at this many newtons, and flag it where the product can", 2.0, _saturate),
+SENSOR_FAULTS: Mapping[str, FaultKind[ForcePlant]] = {
+    "polarity": FaultKind("all channels have the other sign, as with the supply's wires exchanged", True, _polarity),
+    "gain": FaultKind("all channels answer a load with this many times what is true", 0.5, _gain),
+    "dead": FaultKind("the channel of this index answers no load (0 to 5: Fx Fy Fz Mx My Mz); false: none", 2, _dead),
+    "crossed": FaultKind("Fx Fy Fz come out one place further: Fz as Fx, Fx as Fy, Fy as Fz", True, _crossed),
+    "drift": FaultKind("the zero runs away from now on, N/s of compression shown; 0: it is back", 0.5, _drift),
+    "lever": FaultKind("the load acts this many mm beside the sensor's axis", 50.0, _lever),
+    "saturate": FaultKind(
+        "all force channels end at this many newtons, and flag it where the product can", 2.0, _saturate
+    ),
 }
-CAMERA_FAULTS: Mapping[str, Kind[CameraPlant]] = {
-    "tip_slips": Kind("the marker on the tip slips by this many mm across the axis", 5.0, _tip_slips),
-    "arm_slips": Kind("the marker on the limb slips by this many mm across the axis", 15.0, _arm_slips),
-    "pushed": Kind("the camera is pushed: both markers are seen this many mm aside", 15.0, _pushed),
+CAMERA_FAULTS: Mapping[str, FaultKind[CameraPlant]] = {
+    "tip_slips": FaultKind("the marker on the tip slips by this many mm across the axis", 5.0, _tip_slips),
+    "arm_slips": FaultKind("the marker on the limb slips by this many mm across the axis", 15.0, _arm_slips),
+    "pushed": FaultKind("the camera is pushed: both markers are seen this many mm aside", 15.0, _pushed),
 }

@@ -109,7 +109,7 @@ class Fault(NamedTuple):
     apply: Callable[[Value], None]
 
 
-class Kind(NamedTuple, Generic[Target]):
+class FaultKind(NamedTuple, Generic[Target]):
     """A fault that any wire, or any device of one product, can have."""
 
     meaning: str
@@ -121,7 +121,7 @@ class Kind(NamedTuple, Generic[Target]):
         return Fault(self.meaning, self.default, partial(self.apply, target))
 
 
-def faults_of(target: Target, kinds: Mapping[str, Kind[Target]]) -> dict[str, Fault]:
+def faults_of(target: Target, kinds: Mapping[str, FaultKind[Target]]) -> dict[str, Fault]:
     """All ``kinds`` for ``target``, by name."""
     return {name: kind.of(target) for name, kind in kinds.items()}
 
@@ -181,14 +181,14 @@ def _heal(wire: FaultyWire, value: Value) -> None:
         wire.heal()
 
 
-WIRE_FAULTS: Mapping[str, Kind[FaultyWire]] = {
-    "cut": Kind("the cable is pulled: the client sees a hang-up; for good", True, _cut),
-    "unplug": Kind("the cable is pulled, and with false plugged in again under the same address", True, _unplug),
-    "freeze": Kind("nothing passes any more in either direction, though the line stays open", True, _freeze),
-    "drop": Kind("this share of messages is lost", 0.1, _drop),
-    "corrupt": Kind("one bit is flipped in this share of messages", 0.1, _corrupt),
-    "truncate": Kind("this share of messages ends too early", 0.1, _truncate),
-    "garbage": Kind("this share of messages has random bytes in front of it", 0.1, _garbage),
-    "delay": Kind("messages arrive this many seconds late", 0.05, _delay),
-    "heal": Kind("the wire is well again, unless it was cut", True, _heal),
+WIRE_FAULTS: Mapping[str, FaultKind[FaultyWire]] = {
+    "cut": FaultKind("the cable is pulled: the client sees a hang-up; for good", True, _cut),
+    "unplug": FaultKind("the cable is pulled, and with false plugged in again under the same address", True, _unplug),
+    "freeze": FaultKind("nothing passes any more in either direction, though the line stays open", True, _freeze),
+    "drop": FaultKind("this share of messages is lost", 0.1, _drop),
+    "corrupt": FaultKind("one bit is flipped in this share of messages", 0.1, _corrupt),
+    "truncate": FaultKind("this share of messages ends too early", 0.1, _truncate),
+    "garbage": FaultKind("this share of messages has random bytes in front of it", 0.1, _garbage),
+    "delay": FaultKind("messages arrive this many seconds late", 0.05, _delay),
+    "heal": FaultKind("the wire is well again, unless it was cut", True, _heal),
 }

@@ -12,7 +12,7 @@ from drivers.crc import crc16_arc
 from drivers.ndi import replies
 from drivers.ndi.codec import encode_binary, encode_text
 from mock_devices.interfaces import MarkerPose, TrackerPlant
-from mock_devices.ndi.port_handles import PortHandles, Refused
+from mock_devices.ndi.port_handles import CommandRefused, PortHandles
 from mock_devices.wire import OnWire, Wire
 
 FRAME_HZ = 60
@@ -138,11 +138,11 @@ class NdiMock(OnWire):
             name, params = parse_command(line)
             modes, handler = self._commands.get(name, (None, None))
             if modes is None or handler is None:
-                raise Refused(0x01)
+                raise CommandRefused(0x01)
             if self._mode not in modes:
-                raise Refused(0x10 if self._mode == "reset" else 0x0C)
+                raise CommandRefused(0x10 if self._mode == "reset" else 0x0C)
             reply = handler(params)
-        except Refused as refusal:
+        except CommandRefused as refusal:
             reply = f"ERROR{refusal.code:02X}"
         return encode_binary(reply) if isinstance(reply, bytes) else encode_text(reply)
 
@@ -161,7 +161,7 @@ class NdiMock(OnWire):
         if params == "5":
             return self.freeze_tag.split()[-1]
         if params not in ("0", "4"):
-            raise Refused(0x07)
+            raise CommandRefused(0x07)
         return (
             f"{self._product}\nNDI S/N: {self._serial}\nCharacterization Date: 01/02/03\n"
             f"Freeze Tag: {self.freeze_tag}\nFreeze Date: 01/02/03\n(C) Northern Digital Inc.\n"
@@ -169,20 +169,20 @@ class NdiMock(OnWire):
 
     def _information(self, params: str) -> str:
         if params not in ("", _FIRMWARE, "Features.Firmware.*"):
-            raise Refused(0x34)
+            raise CommandRefused(0x34)
         return f"{_FIRMWARE}=007.000.012;3;1;0;12;;Current firmware revision number"
 
     def _communication(self, params: str) -> str:
         """A pseudo-terminal has no speed to change, a TCP connection has no COMM."""
         if self._is_tcp:
-            raise Refused(0x01)
+            raise CommandRefused(0x01)
         if not _COMM.fullmatch(params):
-            raise Refused(0x07)
+            raise CommandRefused(0x07)
         return "OKAY"
 
     def _start(self, params: str) -> str:
         if params not in ("", "40", "80"):
-            raise Refused(0x07)
+            raise CommandRefused(0x07)
         if params == "80":
             self._frame = 0
         self._mode = "tracking"
@@ -203,12 +203,12 @@ class NdiMock(OnWire):
     def _options(self, params: str) -> int:
         """Reply options; markers of their own (0002, 0004, 0008) the mock does not have."""
         if self.error_reply is not None:
-            raise Refused(self.error_reply)
+            raise CommandRefused(self.error_reply)
         if params and not _OPTIONS.fullmatch(params):
-            raise Refused(0x07)
+            raise CommandRefused(0x07)
         options = int(params or "0001", 16)
         if not options & replies.TRANSFORMS or options & ~_TRACKING_OPTIONS:
-            raise Refused(0x23)
+            raise CommandRefused(0x23)
         return options
 
     def _system_status(self) -> int:
@@ -236,16 +236,16 @@ class NdiMock(OnWire):
 
 
 def parse_command(line: bytes) -> tuple[str, str]:
-    """Name and parameters of a command without its CR; raises Refused: too long, unknown form, wrong checksum."""
+    """Name and parameters of a command without its CR; raises CommandRefused: too long, unknown form, checksum."""
     if len(line) > MAX_COMMAND:
-        raise Refused(0x02)
+        raise CommandRefused(0x02)
     text = line.decode("latin-1")
     match = _COMMAND.fullmatch(text)
     if not match:
-        raise Refused(0x01)
+        raise CommandRefused(0x01)
     name, separator, rest = match.groups(default="")
     if separator != ":":
         return name, rest.strip()
     if f"{crc16_arc(line[:-4]):04X}" != text[-4:]:
-        raise Refused(0x04)
+        raise CommandRefused(0x04)
     return name, text[len(name) + 1 : -4]

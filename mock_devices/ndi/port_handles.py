@@ -8,7 +8,7 @@ ROM_BYTES = 1024  # what sixteen PVWR of 64 bytes fill (Polaris API guide)
 _SEARCHES = {"00": (0x00, 0x00), "01": (0x01, 0x00), "02": (0x11, 0x01), "03": (0x31, 0x11), "04": (0x20, 0x20)}
 
 
-class Refused(Exception):
+class CommandRefused(Exception):
     """The command ends in this ERROR code."""
 
     def __init__(self, code: int) -> None:
@@ -70,7 +70,7 @@ class PortHandles:
     def search(self, params: str) -> str:
         """PHSR: all handles, or those to be freed, initialised, enabled, or enabled already."""
         if (params or "00") not in _SEARCHES:
-            raise Refused(0x23)
+            raise CommandRefused(0x23)
         mask, value = _SEARCHES[params or "00"]
         found = [(number, self.status(handle)) for number, handle in sorted(self._handles.items())]
         listed = [f"{number:02X}{status:03X}" for number, status in found if status & mask == value]
@@ -79,10 +79,10 @@ class PortHandles:
     def request(self, params: str) -> str:
         """PHRQ: a new handle for a definition to be written."""
         if len(params) != 14:
-            raise Refused(0x07)
+            raise CommandRefused(0x07)
         free = [number for number in range(1, 0x19) if number not in self._handles]
         if not free:
-            raise Refused(0x2D)
+            raise CommandRefused(0x2D)
         self._handles[free[0]] = Handle(free[0], None, wired=False)
         return f"{free[0]:02X}"
 
@@ -90,12 +90,12 @@ class PortHandles:
         """PVWR: 64 bytes of a definition at an address."""
         handle = self._find(params)
         if len(params) != 2 + 4 + 128:
-            raise Refused(0x07)
+            raise CommandRefused(0x07)
         address, data = _hex(params[2:6]), _hex(params[6:]).to_bytes(64)
         if address + 64 > ROM_BYTES:
-            raise Refused(0x23)
+            raise CommandRefused(0x23)
         if handle.wired:
-            raise Refused(0x2F)
+            raise CommandRefused(0x2F)
         if not handle.rom:
             handle.tool = self._next_tool()
         handle.rom = handle.rom.ljust(ROM_BYTES, b"\0")
@@ -111,7 +111,7 @@ class PortHandles:
         """PINIT."""
         handle = self._find(params)
         if not self.in_port(handle):
-            raise Refused(0x0D)
+            raise CommandRefused(0x0D)
         handle.initialised = True
         return "OKAY"
 
@@ -119,9 +119,9 @@ class PortHandles:
         """PENA: handle and tracking priority."""
         handle = self._find(params)
         if params[2:] not in ("S", "D", "B"):
-            raise Refused(0x09)
+            raise CommandRefused(0x09)
         if not handle.initialised:
-            raise Refused(0x0E)
+            raise CommandRefused(0x0E)
         handle.enabled = True
         return "OKAY"
 
@@ -129,7 +129,7 @@ class PortHandles:
         """PDIS; refused for a tool pulled out, as a Polaris does."""
         handle = self._find(params)
         if not self.in_port(handle):
-            raise Refused(0x08)
+            raise CommandRefused(0x08)
         handle.enabled = False
         return "OKAY"
 
@@ -147,7 +147,7 @@ class PortHandles:
         handle = self._find(params)
         options = _hex(params[2:] or "0001")
         if options == 0 or options & ~0x0025:
-            raise Refused(0x23)
+            raise CommandRefused(0x23)
         if not self.in_port(handle):
             return "UNOCCUPIED"
         basic = f"02000000{'tissue-rig':<12}001{handle.number:08X}{self.status(handle):02X}"
@@ -158,12 +158,12 @@ class PortHandles:
     def _find(self, params: str) -> Handle:
         number = _hex(params[:2])
         if number not in self._handles:
-            raise Refused(0x08)
+            raise CommandRefused(0x08)
         return self._handles[number]
 
 
 def _hex(digits: str) -> int:
     """A number in either case, as the clients of the maker and of others write it."""
     if not digits or set(digits) - set("0123456789ABCDEFabcdef"):
-        raise Refused(0x07)
+        raise CommandRefused(0x07)
     return int(digits, 16)

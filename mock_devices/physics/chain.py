@@ -101,7 +101,7 @@ class Sensing(HiddenEffect, ABC):
         """The force as it comes out."""
 
 
-class Reading(HiddenEffect, ABC):
+class Conversion(HiddenEffect, ABC):
     """In the converter; called once a sample."""
 
     @abstractmethod
@@ -128,7 +128,7 @@ class Chain:
     pulls: tuple[Pull, ...] = ()
     guide: tuple[Guide, ...] = ()
     sensing: tuple[Sensing, ...] = ()
-    readings: tuple[Reading, ...] = ()
+    readings: tuple[Conversion, ...] = ()
     camera_delay_s: float = 0.0
 
     @property
@@ -150,6 +150,6 @@ class Chain:
             pulls=tuple(effect for effect in on if isinstance(effect, Pull)),
             guide=tuple(effect for effect in on if isinstance(effect, Guide)),
             sensing=tuple(effect for effect in on if isinstance(effect, Sensing)),
-            readings=tuple(effect for effect in on if isinstance(effect, Reading)),
+            readings=tuple(effect for effect in on if isinstance(effect, Conversion)),
             camera_delay_s=sum(effect.delay_s for effect in on if isinstance(effect, Late)),
         )

@@ -5,7 +5,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from mock_devices.physics import STEP_S
-from mock_devices.physics.chain import Guide, Late, Reading, Sensing, knob
+from mock_devices.physics.chain import Conversion, Guide, Late, Sensing, knob
 
 KG_MM_S2_TO_N = 1e-3
 HOUR_S = 3600.0
@@ -68,7 +68,7 @@ class TimeOffset(Sensing):
 
 
 @dataclass
-class GainError(Reading):
+class GainError(Conversion):
     """A wrong calibration: force x (1 + e)."""
 
     gain_1: float = knob(0.05, -0.5, 0.5, "e")
@@ -79,7 +79,7 @@ class GainError(Reading):
 
 
 @dataclass
-class Temperature(Reading):
+class Temperature(Conversion):
     """The gain follows the sensor's temperature: force x (1 + k (T - T0))."""
 
     gain_per_K: float = knob(0.02, -0.2, 0.2, "k")
@@ -91,7 +91,7 @@ class Temperature(Reading):
 
 
 @dataclass
-class ZeroDrift(Reading):
+class ZeroDrift(Conversion):
     """The zero wanders with the time of the session."""
 
     rate_N_h: float = knob(3.0, -100, 100, "compression shown per hour without any")

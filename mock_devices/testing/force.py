@@ -10,7 +10,7 @@ from typing import Generic, Literal, TypeVar
 
 from drivers.roles import ForceSensor
 from mock_devices.bota.mock import BotaMock
-from mock_devices.interfaces import NEVER_NS, Mock
+from mock_devices.interfaces import NEVER_NS, ProtocolMock
 from mock_devices.robotiq.mock import RobotiqMock
 from mock_devices.testing.wire import MemoryWire
 from mock_devices.wire import PtyWire
@@ -18,7 +18,7 @@ from rig.channels import ForceSample
 
 Product = Literal["bota", "robotiq"]
 Knobs = dict[str, bool | int | str]
-AnyMock = TypeVar("AnyMock", bound=Mock)
+AnyMock = TypeVar("AnyMock", bound=ProtocolMock)
 WAIT_S = 20.0
 QUIET_S = 0.2
 WRENCH = (1.25, -2.5, -7.75, 0.125, -0.25, 0.5)

@@ -12,15 +12,15 @@ from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
 from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS, choice_of
-from rig.config.products.roles import MOCK_PORT, Axis, Force, Tracker
+from rig.config.products.roles import MOCK_PORT, AxisProduct, ForceProduct, TrackerProduct
 from rig.config.stop import Stop
 from rig.config.table import Table
 
 Positive = Annotated[float, Field(gt=0)]
 if TYPE_CHECKING:
-    AnyForce: TypeAlias = Force
-    AnyAxis: TypeAlias = Axis
-    AnyTracker: TypeAlias = Tracker
+    AnyForce: TypeAlias = ForceProduct
+    AnyAxis: TypeAlias = AxisProduct
+    AnyTracker: TypeAlias = TrackerProduct
 else:
     AnyForce, AnyAxis, AnyTracker = choice_of(FORCE_SENSORS), choice_of(AXES), choice_of(TRACKERS)
 
@@ -93,7 +93,7 @@ class Subject(Table):
     pain_threshold_N: Positive = Field(default=15.0, description="the lower of it and limits.force_N holds")
 
 
-class Mock(Table):
+class MockBenchSettings(Table):
     """Where ports are ``mock``: what the simulated bench is made of."""
 
     parameters: Path | None = Field(
@@ -112,7 +112,7 @@ class Wiring(Table):
     limits: Limits = Limits()
     subject: Subject = Subject()
     stop: Stop = Stop()
-    mock: Mock = Mock()
+    mock: MockBenchSettings = MockBenchSettings()
     calibration: Calibration = Calibration()
 
     @model_validator(mode="after")

@@ -13,7 +13,7 @@ from typing import Self
 
 from rig.channel import Answer, Channel, Message, Received, Reply, pair
 from rig.recording.mcap_file import RecordingFailed
-from rig.recording.messages import FROM_RECORDER, Close, Closed, Failed, Open, Quit, Started
+from rig.recording.messages import FROM_RECORDER, Close, Closed, Open, Quit, RecorderFailed, Started
 
 START_TIMEOUT_S = 20.0
 OPEN_TIMEOUT_S = 20.0
@@ -133,7 +133,7 @@ class RecorderClient:
         raise RecordingFailed(f"the recorder did not answer {name} within {timeout_s:g} s; the disk may be stalled")
 
     def _note(self, received: Received) -> None:
-        if isinstance(received.message, Failed):
+        if isinstance(received.message, RecorderFailed):
             self._failure = received.message.text
 
     def _epitaph(self) -> str:

@@ -51,7 +51,7 @@ class Started(Message):
     TYPE: ClassVar[int] = 35
 
 
-class Failed(Message):
+class RecorderFailed(Message):
     """The recorder did not start, or the disk failed meanwhile."""
 
     TYPE: ClassVar[int] = 36
@@ -59,4 +59,4 @@ class Failed(Message):
 
 
 TO_RECORDER = (Open, Close, Quit)
-FROM_RECORDER = (Opened, Closed, Started, Failed)
+FROM_RECORDER = (Opened, Closed, Started, RecorderFailed)

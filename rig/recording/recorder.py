@@ -27,7 +27,7 @@ from rig.channel import Answer, Channel, Message, Received
 from rig.channels import BY_ID
 from rig.errors import RigError
 from rig.recording.mcap_file import RecordingFailed, RecordingWriter
-from rig.recording.messages import TO_RECORDER, Close, Closed, Failed, Open, Opened, Quit, Started
+from rig.recording.messages import TO_RECORDER, Close, Closed, Open, Opened, Quit, RecorderFailed, Started
 from rig.recording.ring import RingReader
 
 DRAIN_PERIOD_S = 0.02
@@ -98,7 +98,7 @@ class Recorder:
             return Answer(to=number, refused=str(error))
         return Answer(to=number, refused="this is no command of a recorder")
 
-    def step(self, now_ns: int) -> Failed | None:
+    def step(self, now_ns: int) -> RecorderFailed | None:
         """Drains the ring and flushes when it is time; returns the news if the disk failed just now."""
         self._ring.touch(now_ns)
         try:
@@ -108,7 +108,7 @@ class Recorder:
         except RecordingFailed as error:
             self._failure = str(error)
             self._ring.commit()
-            return Failed(text=self._failure)
+            return RecorderFailed(text=self._failure)
         return None
 
     def end(self, outcome: str) -> None:
@@ -230,7 +230,7 @@ def main(arguments: list[str]) -> int:
     try:
         ring = RingReader.open(cast(Path, options.ring))
     except RigError as error:
-        channel.send(Failed(text=str(error)))
+        channel.send(RecorderFailed(text=str(error)))
         return error.exit_code
     ring.touch(time.monotonic_ns())
     channel.send(Started())

@@ -6,8 +6,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api.http.app import build
-from api.http.lease import Control
-from api.http.problems import Refused
+from api.http.lease import LeaseRegistry
+from api.http.problems import RequestRefused
 from api.http.service import Service
 from mock_devices.testing.clock import Clock
 from rig.config.products.bota_sensone import BotaWiring
@@ -33,7 +33,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Service, 
 @pytest.fixture
 def client(served: tuple[Service, TestClient], clock: Clock) -> TestClient:
     service, client = served
-    service.control = Control(clock.seconds)
+    service.control = LeaseRegistry(clock.seconds)
     return client
 
 
@@ -89,7 +89,7 @@ def test_a_lease_lasts_half_a_second_to_half_a_minute(client: TestClient, ttl_s:
 
 
 def test_a_lease_known_by_name_only_is_worth_nothing() -> None:
-    control = Control()
+    control = LeaseRegistry()
     control.take("Ann", 5.0)
-    with pytest.raises(Refused, match="that lease is not in force; Ann is in control"):
+    with pytest.raises(RequestRefused, match="that lease is not in force; Ann is in control"):
         control.check("Ann")

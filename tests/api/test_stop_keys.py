@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from api.cli.keys import StopKeys
-from controller.stop.word import Kind
+from controller.stop.word import StopReason
 
 
 @pytest.fixture
@@ -29,23 +29,23 @@ def until(condition: Callable[[], bool]) -> None:
 
 def test_keys_are_taken_in_order_and_others_do_nothing(terminal: tuple[int, int]) -> None:
     keyboard, program = terminal
-    pressed: list[Kind] = []
+    pressed: list[StopReason] = []
     with StopKeys(program) as keys:
         keys.attach(pressed.append)
         os.write(keyboard, b"xP sq\xff\n")
         until(lambda: len(pressed) == 3)
-    assert pressed == [Kind.PAIN, Kind.EMERGENCY, Kind.STOP]
+    assert pressed == [StopReason.PAIN, StopReason.EMERGENCY, StopReason.STOP]
 
 
 def test_keys_from_before_the_bench_are_handed_over_once_it_is_there(terminal: tuple[int, int]) -> None:
     keyboard, program = terminal
     os.write(keyboard, b"p")
-    pressed: list[Kind] = []
+    pressed: list[StopReason] = []
     with StopKeys(program) as keys:
         os.write(keyboard, b" ")
-        until(lambda: keys._early == [Kind.PAIN, Kind.EMERGENCY])
+        until(lambda: keys._early == [StopReason.PAIN, StopReason.EMERGENCY])
         keys.attach(pressed.append)
-        assert pressed == [Kind.PAIN, Kind.EMERGENCY]
+        assert pressed == [StopReason.PAIN, StopReason.EMERGENCY]
         os.write(keyboard, b"s")
         until(lambda: len(pressed) == 3)
         assert keys._early == []

@@ -21,7 +21,7 @@ from controller.loop.commands import Inbox
 from controller.loop.executive import Cycle
 from controller.loop.messages import (
     Finished,
-    Lease,
+    Heartbeat,
     Note,
     Recover,
     Reset,
@@ -36,8 +36,8 @@ from controller.loop.messages import (
 from controller.loop.modes import Mode
 from controller.loop.steps import Approach, Compress, Hold, Program, Retract, Step, Zero
 from controller.safety.table import TABLE, Check
-from controller.stop.word import PAGE, Kind, Lane, Request, Requester, Responder, StopWord
-from controller.stop.word import Answer as StopAnswer
+from controller.stop.word import PAGE, Lane, Requester, Responder, StopReason, StopRequest, StopWord
+from controller.stop.word import StopOutcome as StopAnswer
 from drivers.roles import Device
 from mock_devices.testing.clock import Clock
 from rig.channel import Answer, Channel, Message, Received
@@ -123,15 +123,20 @@ class FakeRing:
 
 SAID: dict[str, Callable[..., Message]] = {
     "program": Run,
-    "lease": lambda: Lease(attending=True),
-    "unattended": lambda: Lease(attending=False),
+    "lease": lambda: Heartbeat(attending=True),
+    "unattended": lambda: Heartbeat(attending=False),
     "reset": Reset,
     "note": Note,
     "shutdown": Shutdown,
     "survey": Survey,
     "recover": Recover,
 }
-KINDS = {"stop": Kind.STOP, "pain": Kind.PAIN, "estop": Kind.EMERGENCY, "keypad": Kind.KEYPAD_LOST}
+KINDS = {
+    "stop": StopReason.STOP,
+    "pain": StopReason.PAIN,
+    "estop": StopReason.EMERGENCY,
+    "keypad": StopReason.KEYPAD_LOST,
+}
 HEARD: dict[str, type[Message]] = {"finished": Finished, "incident": Stopped, "answer": Answer, "surveyed": Surveyed}
 
 
@@ -210,7 +215,7 @@ class FakeBench:
         self.devices = Devices(self.force, self.axis, self.tracker if self.wiring.tracker else None)
         link = cast(Channel, self.link)
         self.page = page = cast(StopWord, FakePage())
-        self.stops, self.asked = Requester(page, Lane.STOP_PROCESS), list[Request]()
+        self.stops, self.asked = Requester(page, Lane.STOP_PROCESS), list[StopRequest]()
         # A bench is copied whole by some tests, and a lock cannot be.
         self.stops._lock = cast(threading.Lock, contextlib.nullcontext())
         self.responder = Responder(page)

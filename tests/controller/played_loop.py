@@ -23,7 +23,7 @@ from controller.loop.messages import (
     StatusSaid,
 )
 from controller.loop.steps import Program, Zero
-from controller.stop.word import Kind
+from controller.stop.word import StopReason
 from rig.channel import Answer, Channel, Message, Received
 from rig.config.wiring import Wiring
 
@@ -95,14 +95,14 @@ class FakeStops:
     wiring: Wiring
     path: Path
     port: int = 5151
-    asked: list[Kind] = field(default_factory=list)
+    asked: list[StopReason] = field(default_factory=list)
     closed: int = 0
 
     @property
     def requester(self) -> "FakeStops":
         return self
 
-    def request(self, kind: Kind) -> None:
+    def request(self, kind: StopReason) -> None:
         self.asked.append(kind)
 
     def close(self) -> None:

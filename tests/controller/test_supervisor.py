@@ -12,8 +12,8 @@ import pytest
 from controller import claims
 from controller import supervisor as module
 from controller.loop.messages import (
-    Failed,
-    Lease,
+    Heartbeat,
+    LoopFailed,
     Note,
     Outcome,
     Ready,
@@ -23,7 +23,7 @@ from controller.loop.messages import (
     StatusSaid,
 )
 from controller.loop.messages import Stopped as StoppedSaid
-from controller.stop.word import Kind
+from controller.stop.word import StopReason
 from controller.supervisor import Supervisor, process_environment, stopped
 from rig.channel import Answer, Received
 from rig.config.wiring import Wiring
@@ -131,7 +131,7 @@ def test_a_program_that_does_not_end_in_its_time_is_stopped(around: Surroundings
     with Supervisor(Wiring()) as bench:
         with pytest.raises(DeviceError, match=r"did not end its program within 0\.1 s"):
             bench.run(PROGRAM, 0.1)
-        assert around.stops[0].asked == [Kind.STOP]
+        assert around.stops[0].asked == [StopReason.STOP]
 
 
 def test_a_program_waits_until_the_devices_are_ok(around: Surroundings) -> None:
@@ -154,8 +154,10 @@ def test_devices_that_do_not_become_ok_are_waited_for_three_seconds() -> None:
     assert module.READY_TIMEOUT_S == 3.0
 
 
-@pytest.mark.parametrize(("press", "kind"), [("stop", Kind.STOP), ("pain", Kind.PAIN), ("estop", Kind.EMERGENCY)])
-def test_a_stop_goes_through_the_stop_word(around: Surroundings, press: str, kind: Kind) -> None:
+@pytest.mark.parametrize(
+    ("press", "kind"), [("stop", StopReason.STOP), ("pain", StopReason.PAIN), ("estop", StopReason.EMERGENCY)]
+)
+def test_a_stop_goes_through_the_stop_word(around: Surroundings, press: str, kind: StopReason) -> None:
     with Supervisor(Wiring()) as bench:
         getattr(bench, press)()
         assert around.stops[0].asked == [kind]
@@ -223,11 +225,11 @@ def test_the_lease_is_renewed_four_times_in_it_and_says_whether_somebody_attends
     bench = Supervisor(Wiring.model_validate({"loop": {"lease_s": lease_s}}))
     bench._closing = Closing()
     with bench:
-        until(lambda: len(around.loop.of(Lease)) > 2)
+        until(lambda: len(around.loop.of(Heartbeat)) > 2)
         assert set(waited) == {period_s}
-        assert around.loop.of(Lease)[0].attending is True
+        assert around.loop.of(Heartbeat)[0].attending is True
         bench.attended = lambda: False
-        until(lambda: not around.loop.of(Lease)[-1].attending)
+        until(lambda: not around.loop.of(Heartbeat)[-1].attending)
         # The thread ends by itself once the loop is gone.
         around.loop.ended.set()
         until(lambda: not any(thread.name == "lease" for thread in threading.enumerate()))
@@ -239,7 +241,7 @@ def test_the_end_stops_motion_asks_the_loop_to_leave_and_ends_all_processes(arou
     recorder, ring = cast(FakeRecorder, bench.recorder), bench._ring_path
     ring.write_bytes(b"left behind")
     bench.close()
-    assert around.stops[0].asked == [Kind.STOP]
+    assert around.stops[0].asked == [StopReason.STOP]
     assert around.loop.of(Shutdown) == [Shutdown()]
     assert around.process.waits == [15.0]
     assert recorder.quits == 1
@@ -269,7 +271,7 @@ def test_an_end_after_the_loop_has_gone_asks_nothing_of_it(around: Surroundings)
 
 
 def test_a_bench_whose_loop_fails_is_ended_with_its_sentence(around: Surroundings) -> None:
-    around.first = Failed(text="force sensor: no answer")
+    around.first = LoopFailed(text="force sensor: no answer")
     bench = Supervisor(Wiring())
     ends_soon(around)
     with pytest.raises(DeviceError, match="force sensor: no answer"):
@@ -291,7 +293,7 @@ def test_a_start_that_came_to_no_loop_leaves_nothing_to_recover_from(monkeypatch
 
 
 def test_a_start_that_was_stopped_is_a_safety_stop(around: Surroundings) -> None:
-    around.first = Failed(text="stopped by a person", stopped=True)
+    around.first = LoopFailed(text="stopped by a person", stopped=True)
     bench = Supervisor(Wiring())
     ends_soon(around)
     with pytest.raises(SafetyStop, match="stopped by a person"):

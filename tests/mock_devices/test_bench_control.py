@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import mock_devices
-from mock_devices.control import Asked, BenchControl, ControlPort, Desk
+from mock_devices.control import BenchControl, ControlPort, ControlRequest, RequestHandler
 from mock_devices.faults.wires import WIRE_FAULTS, FaultyWire, faults_of
 from mock_devices.parameters import Parameters, load_parameters
 from mock_devices.wire import PtyWire
@@ -30,78 +30,78 @@ def wire() -> Iterator[FaultyWire]:
 
 
 @pytest.fixture
-def desk(wire: FaultyWire) -> Desk:
-    return Desk(quiet_bench(), {"force": [faults_of(wire, WIRE_FAULTS)]})
+def handler(wire: FaultyWire) -> RequestHandler:
+    return RequestHandler(quiet_bench(), {"force": [faults_of(wire, WIRE_FAULTS)]})
 
 
-def ask(desk: Desk, request: dict[str, Any]) -> dict[str, Any]:
+def ask(handler: RequestHandler, request: dict[str, Any]) -> dict[str, Any]:
     ((verb, argument),) = request.items()
     try:
-        return dict(json.loads(json.dumps({verb: desk.answer(verb, argument)})))
+        return dict(json.loads(json.dumps({verb: handler.answer(verb, argument)})))
     except RigError as error:
         return {"error": str(error)}
 
 
-def test_figures_are_read_by_name(desk: Desk) -> None:
-    assert ask(desk, {"get": ["tip.force_N", "axis.position_mm", "time_s", "tissue.present"]}) == {
+def test_figures_are_read_by_name(handler: RequestHandler) -> None:
+    assert ask(handler, {"get": ["tip.force_N", "axis.position_mm", "time_s", "tissue.present"]}) == {
         "get": {"tip.force_N": 0.0, "axis.position_mm": 5.0, "time_s": 0.0, "tissue.present": True}
     }
 
 
 def test_times_at_which_the_drive_was_synced_are_told_once() -> None:
-    desk = Desk(quiet_bench(), {}, deque(range(1200)))
-    assert ask(desk, {"synced_ns": True})["synced_ns"] == list(range(1000))
-    assert ask(desk, {"synced_ns": True})["synced_ns"] == list(range(1000, 1200))
-    assert ask(desk, {"synced_ns": True})["synced_ns"] == []
+    handler = RequestHandler(quiet_bench(), {}, deque(range(1200)))
+    assert ask(handler, {"synced_ns": True})["synced_ns"] == list(range(1000))
+    assert ask(handler, {"synced_ns": True})["synced_ns"] == list(range(1000, 1200))
+    assert ask(handler, {"synced_ns": True})["synced_ns"] == []
 
 
 def test_times_at_which_a_sensor_took_its_samples_are_told_once() -> None:
-    desk = Desk(quiet_bench(), {}, sampled={"force": deque([(7, 10**12), (8, 10**12 + 1)])})
-    assert ask(desk, {"sampled": "force"})["sampled"] == [[7, 10**12], [8, 10**12 + 1]]
-    assert ask(desk, {"sampled": "force"})["sampled"] == []
-    assert "force" in ask(desk, {"sampled": "forse"})["error"]
+    handler = RequestHandler(quiet_bench(), {}, sampled={"force": deque([(7, 10**12), (8, 10**12 + 1)])})
+    assert ask(handler, {"sampled": "force"})["sampled"] == [[7, 10**12], [8, 10**12 + 1]]
+    assert ask(handler, {"sampled": "force"})["sampled"] == []
+    assert "force" in ask(handler, {"sampled": "forse"})["error"]
 
 
 def test_the_limb_is_moved_stiffened_and_removed_while_running() -> None:
     bench = quiet_bench()
-    desk = Desk(bench, {})
+    handler = RequestHandler(bench, {})
     settle(bench, 25.0)
     rest_N = bench.contact_N
-    ask(desk, {"set": {"tissue.stiffness_scale": 2.0}})
+    ask(handler, {"set": {"tissue.stiffness_scale": 2.0}})
     bench.advance(bench.now_ns + 1000 * MS_NS)
     assert bench.contact_N == pytest.approx(2 * rest_N, rel=1e-3)
-    ask(desk, {"set": {"surface.position_mm": 23.0}})
+    ask(handler, {"set": {"surface.position_mm": 23.0}})
     bench.advance(bench.now_ns + 1000 * MS_NS)
-    assert ask(desk, {"get": ["surface.position_mm"]})["get"] == {"surface.position_mm": 23.0}
+    assert ask(handler, {"get": ["surface.position_mm"]})["get"] == {"surface.position_mm": 23.0}
     assert 0 < bench.contact_N < rest_N
-    assert ask(desk, {"set": {"tissue.present": False}}) == {"set": {"tissue.present": False}}
+    assert ask(handler, {"set": {"tissue.present": False}}) == {"set": {"tissue.present": False}}
     bench.advance(bench.now_ns + 10 * MS_NS)
-    assert ask(desk, {"get": ["tip.force_N"]})["get"] == {"tip.force_N": 0.0}
+    assert ask(handler, {"get": ["tip.force_N"]})["get"] == {"tip.force_N": 0.0}
 
 
-def test_every_dial_can_be_read_and_says_what_it_is(desk: Desk) -> None:
-    meanings = ask(desk, {"dials": True})["dials"]
-    assert set(ask(desk, {"get": list(meanings)})["get"]) == set(meanings)
+def test_every_dial_can_be_read_and_says_what_it_is(handler: RequestHandler) -> None:
+    meanings = ask(handler, {"dials": True})["dials"]
+    assert set(ask(handler, {"get": list(meanings)})["get"]) == set(meanings)
     assert all(meanings.values())
 
 
-def test_truth_is_told_when_asked_and_effects_are_switched(desk: Desk) -> None:
-    assert ask(desk, {"truth": True}) == {"truth": {}}
-    assert ask(desk, {"hide": {"friction.level_N": 0.2, "backlash": None}}) == {"hide": ["backlash", "friction"]}
-    assert ask(desk, {"truth": True}) == {
+def test_truth_is_told_when_asked_and_effects_are_switched(handler: RequestHandler) -> None:
+    assert ask(handler, {"truth": True}) == {"truth": {}}
+    assert ask(handler, {"hide": {"friction.level_N": 0.2, "backlash": None}}) == {"hide": ["backlash", "friction"]}
+    assert ask(handler, {"truth": True}) == {
         "truth": {"backlash": {"gap_mm": 0.3}, "friction": {"level_N": 0.2, "slip_length_mm": 0.05}}
     }
-    assert ask(desk, {"hide": {}}) == {"hide": []}
+    assert ask(handler, {"hide": {}}) == {"hide": []}
 
 
-def test_a_fault_takes_its_default_or_a_value(desk: Desk, wire: FaultyWire) -> None:
-    assert ask(desk, {"fault": {"device": "force", "kind": "drop"}}) == {
+def test_a_fault_takes_its_default_or_a_value(handler: RequestHandler, wire: FaultyWire) -> None:
+    assert ask(handler, {"fault": {"device": "force", "kind": "drop"}}) == {
         "fault": {"device": "force", "kind": "drop", "value": 0.1}
     }
     assert wire.drop_share == 0.1
-    ask(desk, {"fault": {"device": "force", "kind": "delay", "value": 0.5}})
+    ask(handler, {"fault": {"device": "force", "kind": "delay", "value": 0.5}})
     assert wire.delay_s == 0.5
-    assert set(ask(desk, {"faults": True})["faults"]["force"]) == set(WIRE_FAULTS)
+    assert set(ask(handler, {"faults": True})["faults"]["force"]) == set(WIRE_FAULTS)
 
 
 @pytest.mark.parametrize(
@@ -122,14 +122,16 @@ def test_a_fault_takes_its_default_or_a_value(desk: Desk, wire: FaultyWire) -> N
         ({"gett": []}, "unknown request 'gett'; nearest valid request: get"),
     ],
 )
-def test_a_wrong_request_is_answered_by_one_sentence(desk: Desk, request_: dict[str, Any], sentence: str) -> None:
-    assert sentence in ask(desk, request_)["error"]
+def test_a_wrong_request_is_answered_by_one_sentence(
+    handler: RequestHandler, request_: dict[str, Any], sentence: str
+) -> None:
+    assert sentence in ask(handler, request_)["error"]
 
 
 @contextmanager
-def answered(desk: Desk) -> Iterator[str]:
-    """The control port of ``desk``, waited on by another thread."""
-    port, ended = ControlPort(desk.answer), threading.Event()
+def answered(handler: RequestHandler) -> Iterator[str]:
+    """The control port of ``handler``, waited on by another thread."""
+    port, ended = ControlPort(handler.answer), threading.Event()
 
     def wait() -> None:
         while not ended.is_set():
@@ -146,8 +148,8 @@ def answered(desk: Desk) -> Iterator[str]:
         port.close()
 
 
-def test_the_client_sets_gets_and_raises_what_the_bench_says(desk: Desk, wire: FaultyWire) -> None:
-    with answered(desk) as address, BenchControl(address) as control, BenchControl(address) as other:
+def test_the_client_sets_gets_and_raises_what_the_bench_says(handler: RequestHandler, wire: FaultyWire) -> None:
+    with answered(handler) as address, BenchControl(address) as control, BenchControl(address) as other:
         assert control.set({"tissue.stiffness_scale": 3.0}) == {"tissue.stiffness_scale": 3.0}
         assert other.number("tissue.stiffness_scale") == 3.0
         assert control.hide({"friction": None}) == ["friction"]
@@ -160,14 +162,14 @@ def test_the_client_sets_gets_and_raises_what_the_bench_says(desk: Desk, wire: F
             control.get("time")
 
 
-def test_a_request_may_come_in_pieces_and_what_is_none_is_refused(desk: Desk) -> None:
-    with answered(desk) as address:
+def test_a_request_may_come_in_pieces_and_what_is_none_is_refused(handler: RequestHandler) -> None:
+    with answered(handler) as address:
         host, _, number = address.partition(":")
         with socket.create_connection((host, int(number)), 5) as client:
-            frame = encode(7, Asked.TYPE, b'{"verb": "get", "argument": ["time_s"]}')
+            frame = encode(7, ControlRequest.TYPE, b'{"verb": "get", "argument": ["time_s"]}')
             client.sendall(b"no frame at all, and longer than the head of one")
             client.sendall(frame[:9])
-            client.sendall(frame[9:] + encode(8, Asked.TYPE, b"no JSON") + encode(9, 77, b"{}"))
+            client.sendall(frame[9:] + encode(8, ControlRequest.TYPE, b"no JSON") + encode(9, 77, b"{}"))
             parser, frames = Parser(), list[Frame]()
             while len(frames) < 3:
                 frames += parser.feed(client.recv(1000))
@@ -176,8 +178,8 @@ def test_a_request_may_come_in_pieces_and_what_is_none_is_refused(desk: Desk) ->
     assert all(said[number]["refused"] for number in (8, 9))
 
 
-def test_a_bench_that_ends_is_said(desk: Desk) -> None:
-    with answered(desk) as address:
+def test_a_bench_that_ends_is_said(handler: RequestHandler) -> None:
+    with answered(handler) as address:
         control = BenchControl(address)
         control.get("time_s")
     with pytest.raises(DeviceError, match="the bench hung up"):

@@ -20,9 +20,9 @@ from drivers.epos4.device import Epos4Axis
 from drivers.ports import Port, PortClosed, open_port, read_until
 from mock_devices.bench import Bench
 from mock_devices.control import BenchControl
-from mock_devices.devices import Workshop
+from mock_devices.devices import DeviceFactory
 from mock_devices.parameters import Parameters
-from mock_devices.serve import Server, effects_table
+from mock_devices.serve import MockServer, effects_table
 from mock_devices.testing.clock import Clock
 from mock_devices.testing.force import collect
 from rig.config.products.bota_sensone import BotaWiring
@@ -210,9 +210,9 @@ class ServerBench:
     def __init__(self) -> None:
         self.clock = Clock(0)
         self.bench = Bench(Parameters.model_validate({"tracker": {"tcp_port": 0}, "force": {"counter_drift_ppm": 0.0}}))
-        devices = Workshop(self.bench, 0, self.clock, seed=0).devices((BotaWiring,))
+        devices = DeviceFactory(self.bench, 0, self.clock, seed=0).devices((BotaWiring,))
         self.line, self.axis = devices[0].wire, devices[1]
-        self.server = Server(self.bench, devices, self.clock)
+        self.server = MockServer(self.bench, devices, self.clock)
         self.port = open_port(self.line.endpoint, 460_800)
 
     def pass_ms(self, milliseconds: int) -> None:

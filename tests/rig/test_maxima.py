@@ -8,7 +8,7 @@ from api.cli.stage import patient
 from rig.config.maxima import MAXIMA, Maximum
 from rig.config.products import maxon_epos4
 from rig.config.products.registry import FORCE_SENSORS
-from rig.config.products.roles import Force
+from rig.config.products.roles import ForceProduct
 from rig.config.table import merged, parse
 from rig.config.wiring import Limits, Wiring
 from rig.errors import UsageError
@@ -58,7 +58,9 @@ def test_the_force_ceiling_is_the_pressure_that_a_tip_of_6_mm_may_put_on_a_forea
 
 
 @pytest.mark.parametrize("sensor", FORCE_SENSORS.values(), ids=FORCE_SENSORS)
-def test_a_limit_is_one_that_the_sensor_can_measure(sensor: type[Force], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_limit_is_one_that_the_sensor_can_measure(
+    sensor: type[ForceProduct], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(sensor, "range_N", 18.0)
     product = sensor().product
     with pytest.raises(UsageError, match=rf"limits.force_N 20 N .* 18 N: a {product} measures no more"):

@@ -4,7 +4,7 @@ from pkgutil import resolve_name
 
 import pytest
 
-from mock_devices.devices import FORCE_CHOICES, Workshop
+from mock_devices.devices import FORCE_CHOICES, DeviceFactory
 from rig.config.endpoints import Endpoints
 from rig.config.products.registry import AXES, FORCE_SENSORS, ROLES, TRACKERS, choice_of, name_of, read
 from rig.config.products.robotiq_ft300 import Ft300Wiring
@@ -35,7 +35,7 @@ def test_each_has_a_driver_and_says_where_to_look(role: str, product: type[Produ
 
 @each_product
 def test_each_mock_is_made_by_the_workshop(role: str, product: type[Product]) -> None:
-    assert product.mock and resolve_name(product.mock.maker).__qualname__.startswith(Workshop.__name__)
+    assert product.mock and resolve_name(product.mock.maker).__qualname__.startswith(DeviceFactory.__name__)
     printed = {
         "control": "",
         "pid": 1,

@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 from api.cli.options import built_in
 from api.cli.stage import plugged
 from api.http.app import build
-from api.http.lease import Control
+from api.http.lease import LeaseRegistry
 from api.http.service import Service
 from mock_devices.testing.clock import Clock
 from mock_devices.testing.commands import (
@@ -46,7 +46,7 @@ def served(clock: Clock, tmp_path_factory: pytest.TempPathFactory) -> Iterator[t
         service = Service(
             plugged(built_in(["loop.lease_s=1", *PATIENT]), bench.endpoints), folder / "sessions", folder / "protocols"
         )
-        service.control = Control(clock.seconds)
+        service.control = LeaseRegistry(clock.seconds)
         with TestClient(build(service), base_url="http://127.0.0.1:8000") as client:
             yield bench, client, folder
 

@@ -16,7 +16,7 @@ import pytest
 from api.cli.options import built_in
 from api.cli.stage import plugged
 from controller.stop.start import SENTENCE
-from controller.stop.word import NOT_CONFIRMED, Deed, Kind
+from controller.stop.word import NOT_CONFIRMED, Deed, StopReason
 from controller.supervisor import Supervisor
 from mock_devices.testing.commands import (
     PATIENCE_S,
@@ -145,7 +145,7 @@ def test_a_foot_switch_retracts_and_the_supervisors_own_lane_answers_too(bench: 
         latched = rig.status["latched"]
         assert latched and latched["code"] == "pain_stop"
         rig.reset()
-        answer = rig.stops.confirmed(rig.stops.request(Kind.EMERGENCY), PATIENCE_S)
+        answer = rig.stops.confirmed(rig.stops.request(StopReason.EMERGENCY), PATIENCE_S)
         assert answer is not None
         assert answer.deed is Deed.BRAKED
     os.close(writer)

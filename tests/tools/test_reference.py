@@ -13,7 +13,7 @@ from rig.config.protocol import Indentation
 from rig.config.quality import Bounds, QualityLimits
 from rig.config.stop import Stop
 from rig.config.table import Table
-from rig.config.wiring import Limits, Loop, Mock, Subject, Wiring
+from rig.config.wiring import Limits, Loop, MockBenchSettings, Subject, Wiring
 from rig.diagnosis.effects.registry import CAUSES
 from rig.tissue.registry import LAWS
 from tools.keys import tables
@@ -100,7 +100,8 @@ def test_every_key_of_the_models_stands_in_the_reference(mark: str, model: type[
 
 
 @pytest.mark.parametrize(
-    "model", [*PRODUCTS, Indentation, QualityLimits, Bounds, Loop, Limits, Subject, Mock, Stop, Calibration]
+    "model",
+    [*PRODUCTS, Indentation, QualityLimits, Bounds, Loop, Limits, Subject, MockBenchSettings, Stop, Calibration],
 )
 def test_every_key_that_a_person_writes_has_a_meaning(model: type[BaseModel]) -> None:
     silent = [name for name, field in model.model_fields.items() if not field.description and name != "quality"]

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from rig.config.maxima import Maximum
-from rig.config.products.roles import Axis, MockPort, Positive
+from rig.config.products.roles import AxisProduct, MockPort, Positive
 
 # Methods of CiA 402-2 (6098) that search for a switch or stop, by the direction in which they begin. Those that take
 # the next index or the present position (33, 34, 37) would make any place the home, also one in the tissue.
@@ -18,14 +18,14 @@ MAXIMA = (
 )
 
 
-class Epos4Wiring(Axis):
+class Epos4Wiring(AxisProduct):
     """A maxon EPOS4 behind a CAN adapter."""
 
     driver: ClassVar[str] = "drivers.epos4.device:Epos4Axis"
-    mock: ClassVar[MockPort | None] = MockPort("mock_devices.devices:Workshop.epos4", "axis", "slcan")
+    mock: ClassVar[MockPort | None] = MockPort("mock_devices.devices:DeviceFactory.epos4", "axis", "slcan")
     advice: ClassVar[str] = "its power, the CAN cable and its terminators, axis.port, axis.node and axis.bitrate"
     patience: ClassVar[Mapping[str, Mapping[str, float]]] = {
-        **Axis.patience, "axis": {**Axis.patience["axis"], "heartbeat_ms": 200},
+        **AxisProduct.patience, "axis": {**AxisProduct.patience["axis"], "heartbeat_ms": 200},
     }  # fmt: skip
 
     product: Literal["maxon-epos4"] = Field(default="maxon-epos4", description="what stands on the bench")

@@ -5,14 +5,14 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from rig.config.products.roles import MockPort, Tracker
+from rig.config.products.roles import MockPort, TrackerProduct
 
 
-class PolarisWiring(Tracker):
+class PolarisWiring(TrackerProduct):
     """An NDI Polaris on a serial line or, as `tcp://host:8765`, a Vega on the network."""
 
     driver: ClassVar[str] = "drivers.ndi.device:open_tracker"
-    mock: ClassVar[MockPort | None] = MockPort("mock_devices.devices:Workshop.ndi", "tracker", "tcp", "tcp://")
+    mock: ClassVar[MockPort | None] = MockPort("mock_devices.devices:DeviceFactory.ndi", "tracker", "tcp", "tcp://")
     advice: ClassVar[str] = "its power and warm-up, the cable or network address, tracker.port, and tracker.roms"
 
     product: Literal["ndi-polaris"] = Field(default="ndi-polaris", description="what stands on the bench")

@@ -14,7 +14,7 @@ from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
 from rig.config.products.robotiq_ft300 import Ft300Wiring
-from rig.config.products.roles import Axis, Force, Product, Tracker
+from rig.config.products.roles import AxisProduct, ForceProduct, Product, TrackerProduct
 from rig.registry import Registry
 
 AnyProduct = TypeVar("AnyProduct", bound=Product)
@@ -25,9 +25,9 @@ def name_of(product: type[Product]) -> str:
     return str(product.model_fields["product"].default)
 
 
-FORCE_SENSORS = Registry[type[Force]]("force sensor", name_of, (BotaWiring, Ft300Wiring))
-AXES = Registry[type[Axis]]("servo axis", name_of, (Epos4Wiring,))
-TRACKERS = Registry[type[Tracker]]("marker tracker", name_of, (PolarisWiring,))
+FORCE_SENSORS = Registry[type[ForceProduct]]("force sensor", name_of, (BotaWiring, Ft300Wiring))
+AXES = Registry[type[AxisProduct]]("servo axis", name_of, (Epos4Wiring,))
+TRACKERS = Registry[type[TrackerProduct]]("marker tracker", name_of, (PolarisWiring,))
 ROLES: Mapping[str, Registry[Any]] = {"force": FORCE_SENSORS, "axis": AXES, "tracker": TRACKERS}
 
 

@@ -4,16 +4,16 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from rig.config.products.roles import Force, MockPort
+from rig.config.products.roles import ForceProduct, MockPort
 
 STREAM_HZ = 100.0
 
 
-class Ft300Wiring(Force):
+class Ft300Wiring(ForceProduct):
     """A Robotiq FT 300 on a serial line; its rate is fixed."""
 
     driver: ClassVar[str] = "drivers.robotiq.device:open_sensor"
-    mock: ClassVar[MockPort | None] = MockPort("mock_devices.devices:Workshop.robotiq", "force_modbus")
+    mock: ClassVar[MockPort | None] = MockPort("mock_devices.devices:DeviceFactory.robotiq", "force_modbus")
     advice: ClassVar[str] = "its 24 V, the RS-485 adapter, force.port, and that no other program talks Modbus to it"
     # The maker's manual of the FT 300.
     range_N: ClassVar[float] = 300.0

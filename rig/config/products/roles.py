@@ -20,7 +20,7 @@ MOCK_PORT = "mock"
 class MockPort(NamedTuple):
     """Where the simulated bench serves a product: by ``role`` and ``kind`` among its endpoints, behind ``scheme``.
 
-    ``maker`` builds it: a function of `mock_devices.devices.Workshop` that returns the devices.
+    ``maker`` builds it: a function of `mock_devices.devices.DeviceFactory` that returns the devices.
     """
 
     maker: str
@@ -55,7 +55,7 @@ class Product(Table):
         return ()
 
 
-class Force(Product):
+class ForceProduct(Product):
     """A force sensor. Beyond ``range_N`` and ``range_N_m`` a channel measures nothing."""
 
     range_N: ClassVar[float]
@@ -89,7 +89,7 @@ class Force(Product):
         )
 
 
-class Axis(Product):
+class AxisProduct(Product):
     """A servo axis."""
 
     patience: ClassVar[Mapping[str, Mapping[str, float]]] = {
@@ -117,7 +117,7 @@ class Axis(Product):
         return False
 
 
-class Tracker(Product):
+class TrackerProduct(Product):
     """A marker tracker; leave the table out where there is none."""
 
     patience: ClassVar[Mapping[str, Mapping[str, float]]] = {"loop": {"stale_marker_ms": 500.0}}

@@ -6,7 +6,7 @@ from typing import cast
 import pytest
 
 from api.operations import motion
-from api.operations.motion import TrackRequest
+from api.operations.motion import TrackPlan
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.loop.messages import Outcome
@@ -89,9 +89,9 @@ def followed(rms_error_N: float) -> TrackResult:
     )  # fmt: skip
 
 
-def requests() -> tuple[TrackRequest, TrackRequest]:
+def requests() -> tuple[TrackPlan, TrackPlan]:
     program = Program(name="step", steps=(Retract(clearance_mm=1.0, speed_mm_s=1.0),))
-    return TrackRequest(program, "new.json"), TrackRequest(program, "old.json")
+    return TrackPlan(program, "new.json"), TrackPlan(program, "old.json")
 
 
 def test_what_a_model_gains_over_another_is_part_of_the_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from controller.devices import takeover
-from controller.devices.states import DeviceStatus, State
+from controller.devices.states import DeviceState, DeviceStatus
 from controller.loop.modes import Mode
 from controller.safety.table import Action, Incident
 from tests.controller.fake_bench import APPROACH, HOLD, LEAVE, ZERO, FakeBench, wired
@@ -240,10 +240,10 @@ def test_a_frozen_sensor_is_told_after_as_many_samples_as_may_be_missed(missed_p
 
 @pytest.mark.parametrize(
     ("state", "level"),
-    [(State.OK, 10), (State.CONNECTING, 10), (State.DEGRADED, 20), (State.LOST, 20), (State.RECONNECTING, 20),
-     (State.FAULT, 20)],
+    [(DeviceState.OK, 10), (DeviceState.CONNECTING, 10), (DeviceState.DEGRADED, 20), (DeviceState.LOST, 20),
+     (DeviceState.RECONNECTING, 20), (DeviceState.FAULT, 20)],
 )  # fmt: skip
-def test_a_state_that_needs_somebody_is_a_warning_and_any_other_a_note(state: State, level: int) -> None:
+def test_a_state_that_needs_somebody_is_a_warning_and_any_other_a_note(state: DeviceState, level: int) -> None:
     bench = FakeBench(settled=0)
     for detail in ("NO POWER: X", ""):
         takeover.said(bench.loop, "force", DeviceStatus(state, detail, 0))
@@ -252,7 +252,7 @@ def test_a_state_that_needs_somebody_is_a_warning_and_any_other_a_note(state: St
 
 
 def test_a_status_shows_state_detail_and_since_when_by_role() -> None:
-    assert takeover.as_status([("axis", DeviceStatus(State.LOST, "cable", 7))]) == {
+    assert takeover.as_status([("axis", DeviceStatus(DeviceState.LOST, "cable", 7))]) == {
         "axis": {"state": "lost", "detail": "cable", "since_ns": 7}
     }
 

@@ -12,9 +12,9 @@ from controller.loop import client as loop_client
 from controller.loop.client import LoopClient
 from controller.loop.messages import (
     TO_LOOP,
-    Failed,
     Finished,
-    Lease,
+    Heartbeat,
+    LoopFailed,
     Note,
     Outcome,
     Ready,
@@ -121,7 +121,7 @@ def test_a_loop_that_does_not_answer_is_said(loop: PlayedLoop, monkeypatch: pyte
 def test_the_loops_own_sentence_is_the_error_and_a_stop_is_a_stop() -> None:
     for stopped, kind in ((False, DeviceError), (True, SafetyStop)):
         played = PlayedLoop()
-        played.say(Failed(text="why", stopped=stopped))
+        played.say(LoopFailed(text="why", stopped=stopped))
         played.channel.close()
         with pytest.raises(kind, match=r"^why$"):
             played.client.ready(PATIENCE_S)
@@ -136,7 +136,7 @@ def test_a_loop_that_is_gone_is_said_with_how_it_went(loop: PlayedLoop) -> None:
         with pytest.raises(DeviceError, match=r"the loop's process ended unasked \(killed by signal 9\)"):
             running.result()
     with pytest.raises(DeviceError, match="the bench is not running"):
-        loop.client.tell(Lease(attending=True))
+        loop.client.tell(Heartbeat(attending=True))
 
 
 def test_status_incidents_and_what_was_found_are_kept(loop: PlayedLoop) -> None:

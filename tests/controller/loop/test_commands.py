@@ -9,11 +9,21 @@ import pytest
 
 from controller.loop.bench_loop import BenchLoop
 from controller.loop.commands import Inbox, _deed
-from controller.loop.messages import FROM_LOOP, TO_LOOP, Finished, Lease, Note, Reset, Run, Shutdown, StatusSaid
+from controller.loop.messages import (
+    FROM_LOOP,
+    TO_LOOP,
+    Finished,
+    Heartbeat,
+    Note,
+    Reset,
+    Run,
+    Shutdown,
+    StatusSaid,
+)
 from controller.loop.modes import Mode
 from controller.loop.steps import MoveTo, Program
 from controller.safety.table import Action, Incident
-from controller.stop.word import Deed, Kind, Request
+from controller.stop.word import Deed, StopReason, StopRequest
 from rig.channel import Answer, Channel, Message, encode, pair
 from tests.calibrations import axis_calibration
 from tests.controller.fake_bench import APPROACH, HOLD, LEAVE, ZERO, FakeBench
@@ -83,7 +93,7 @@ def test_a_loop_told_to_end_retracts_before_it_leaves(bench: Linked) -> None:
 
 def test_notes_resets_and_leave_are_answered_and_a_lease_is_not(bench: Linked) -> None:
     numbers = [bench.mine.send(message) for message in (Note(code="a", text="b"), Reset())]
-    bench.mine.send(Lease(attending=True))
+    bench.mine.send(Heartbeat(attending=True))
     bench.cycles(5)
     assert bench.replies() == [Answer(to=number) for number in numbers]
     assert bench.going
@@ -125,7 +135,7 @@ def test_a_message_that_is_none_is_refused_counted_and_noted_and_the_loop_cycles
 
 
 def test_noise_on_the_channel_does_not_renew_the_lease(bench: Linked) -> None:
-    bench.mine.send(Lease(attending=True))
+    bench.mine.send(Heartbeat(attending=True))
     bench.cycles(2)
     heard_ns = cast(Inbox, bench.loop._commands).heard_ns
     bench.raw.send(b"noise" * 50)
@@ -224,7 +234,7 @@ def loop_as(**values: Any) -> BenchLoop:
 
 
 STOPPED = Incident(Action.SOFT, "operator_stop", "stopped")
-SOFT, HARD = Request(1, Kind.STOP), Request(2, Kind.EMERGENCY)
+SOFT, HARD = StopRequest(1, StopReason.STOP), StopRequest(2, StopReason.EMERGENCY)
 
 
 @pytest.mark.parametrize(
@@ -243,7 +253,7 @@ SOFT, HARD = Request(1, Kind.STOP), Request(2, Kind.EMERGENCY)
     ],
 )
 def test_what_is_answered_is_what_is_done(
-    values: dict[str, Any], asked: tuple[Request, ...], deed: Deed | None
+    values: dict[str, Any], asked: tuple[StopRequest, ...], deed: Deed | None
 ) -> None:
     assert _deed(loop_as(**values), asked) is deed
 

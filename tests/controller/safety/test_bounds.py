@@ -12,7 +12,7 @@ from controller.loop.registration import Interval
 from controller.loop.state import LoopState
 from controller.safety import checks as safety_checks
 from controller.safety.inputs import SafetyInputs
-from controller.safety.load import UNKNOWN, Load
+from controller.safety.load import UNKNOWN, TipLoad
 from controller.safety.table import TABLE, Action, Check, Incident, evaluate
 from rig.config.wiring import Wiring
 
@@ -45,7 +45,7 @@ LINES = [
     ("supervisor_lost", SOFT, 0.1, False),
     ("operator_silent", SOFT, 3.1, False),
 ]
-QUIET = Load(force_N=0.0, torque_N_m=0.0, rate_N_s=0.0, stiffness_N_mm=0.0, predicted_N=0.0)
+QUIET = TipLoad(force_N=0.0, torque_N_m=0.0, rate_N_s=0.0, stiffness_N_mm=0.0, predicted_N=0.0)
 WRENCH = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from controller.loop.setpoint import Setpoint
 from controller.safety import load as load_monitor
-from controller.safety.load import NO_WRENCH, UNKNOWN, Load, LoadMonitor, Wrench, calibrated_zero
+from controller.safety.load import NO_WRENCH, UNKNOWN, LoadMonitor, TipLoad, Wrench, calibrated_zero
 from rig.config.wiring import Wiring
 from tests.calibrations import ZERO_N, with_calibration
 
@@ -34,7 +34,7 @@ def moving(
 
 def asked(
     monitor: LoadMonitor, now_ms: float, setpoint: Setpoint = STILL, zero: Wrench = NO_WRENCH, noise_N: float = 0.0
-) -> Load:
+) -> TipLoad:
     return monitor.load(round(now_ms * MS), zero, noise_N, setpoint, 2000.0)
 
 

@@ -13,7 +13,7 @@ import pytest
 
 from controller.stop import client as module
 from controller.stop.client import StopProcess
-from controller.stop.word import Kind, Lane, Requester, Responder, StopWord
+from controller.stop.word import Lane, Requester, Responder, StopReason, StopWord
 from rig.config.stop import Stop
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError
@@ -92,10 +92,10 @@ def test_the_process_gets_its_page_its_port_and_its_settings(processes: Processe
     }  # fmt: skip
     assert processes.listened == ("127.0.0.1", process.port)
     assert (process.path, process.pid, process.alive) == (path, 99, True)
-    request = process.requester.request(Kind.PAIN)
+    request = process.requester.request(StopReason.PAIN)
     page = StopWord.open(path)
     assert Responder(page).take(1) == (request,)
-    assert Requester(page, Lane.SUPERVISOR).request(Kind.PAIN).id == request.id + 1, "the supervisor's own lane"
+    assert Requester(page, Lane.SUPERVISOR).request(StopReason.PAIN).id == request.id + 1, "the supervisor's own lane"
     page.close()
     process.close()
     assert processes.calls == ["terminate", 2.0]

@@ -7,20 +7,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.stop.http import HEADER_BYTES, Refusal, Request, RequestParser, foreign, response
+from controller.stop.http import HEADER_BYTES, HttpRequest, Refusal, RequestParser, foreign, response
 
 ESTOP = b"POST /estop HTTP/1.1\r\nHost: 127.0.0.1:8001\r\nOrigin: http://127.0.0.1:8000\r\n\r\n"
 
 
-def fed(data: bytes, parser: RequestParser | None = None) -> Request | Refusal | None:
+def fed(data: bytes, parser: RequestParser | None = None) -> HttpRequest | Refusal | None:
     parser = parser or RequestParser()
     parser.put(data)
     return parser.following()
 
 
-def parsed(data: bytes) -> Request:
+def parsed(data: bytes) -> HttpRequest:
     found = fed(data)
-    assert isinstance(found, Request), found
+    assert isinstance(found, HttpRequest), found
     return found
 
 
@@ -138,7 +138,7 @@ def test_a_head_may_have_as_many_bytes_as_are_said_and_no_more() -> None:
     parser = RequestParser()
     parser.put(fitting)
     assert not parser.whole
-    assert isinstance(fed(b"\r\n\r\n", parser), Request)
+    assert isinstance(fed(b"\r\n\r\n", parser), HttpRequest)
     assert isinstance(fed(fitting + b"x\r\n\r\n"), Refusal)
     assert len(parser._buffer) == 0
     parser.put(b"x" * 5 * HEADER_BYTES)
@@ -147,17 +147,17 @@ def test_a_head_may_have_as_many_bytes_as_are_said_and_no_more() -> None:
 
 @pytest.mark.parametrize("headers", [{}, {"host": "localhost"}, {"host": "127.0.0.1:8001"}, {"host": "LOCALHOST:80"}])
 def test_who_names_no_host_or_this_computer_is_local(headers: dict[str, str]) -> None:
-    assert foreign(Request("POST", "/stop", headers, True)) is None
+    assert foreign(HttpRequest("POST", "/stop", headers, True)) is None
 
 
 @pytest.mark.parametrize("host", ["[", "", "XXXX"])
 def test_a_host_that_is_none_is_foreign_and_named_in_at_most_80_letters(host: str) -> None:
-    refusal = foreign(Request("POST", "/stop", {"host": host}, True))
+    refusal = foreign(HttpRequest("POST", "/stop", {"host": host}, True))
     name = host.lower() if host == "XXXX" else ""
     assert refusal == Refusal(HTTPStatus.FORBIDDEN, f"the host name {name} is not this computer's")
-    long = foreign(Request("POST", "/stop", {"host": "h" * 81, "origin": ""}, True))
+    long = foreign(HttpRequest("POST", "/stop", {"host": "h" * 81, "origin": ""}, True))
     assert long and long.text == f"the host name {'h' * 80} is not this computer's"
-    page = foreign(Request("POST", "/stop", {"origin": "p" * 81}, True))
+    page = foreign(HttpRequest("POST", "/stop", {"origin": "p" * 81}, True))
     assert page and page.text == f"a page of {'p' * 80} may not stop this bench"
 
 

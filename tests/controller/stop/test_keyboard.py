@@ -10,17 +10,17 @@ import pytest
 
 from controller.stop.keyboard import RETRY_S, Keyboard
 from controller.stop.keypad import Keys, open_device
-from controller.stop.word import Deed, Keypad, Kind, Lane, Requester, Responder, StopWord
+from controller.stop.word import Deed, Keypad, Lane, Requester, Responder, StopReason, StopWord
 from tests.controller.descriptors import open_files
 
-KEYS = Keys({48: Kind.PAIN}, Kind.EMERGENCY)
+KEYS = Keys({48: StopReason.PAIN}, StopReason.EMERGENCY)
 
 
 def press(code: int) -> bytes:
     return struct.pack("<qqHHi", 0, 0, 1, code, 1)
 
 
-class Desk:
+class KeypadServed:
     """A keypad that is a FIFO, and the stop process' way of asking it."""
 
     def __init__(self, folder: Path, required: bool = False) -> None:
@@ -49,7 +49,7 @@ class Desk:
         """What people see of the keypad."""
         return self.page.keypad.name
 
-    def taken(self) -> list[Kind]:
+    def taken(self) -> list[StopReason]:
         """Stops asked for since the last time."""
         kinds = [request.kind for request in self.loop.take(1)]
         self.loop.answer(Deed.HELD, 1)
@@ -63,42 +63,42 @@ def folder(tmp_path: Path) -> Iterator[Path]:
 
 
 def test_presses_are_counted_and_asked_for_in_the_stop_process_own_lane(folder: Path) -> None:
-    desk = Desk(folder)
-    assert desk.page.keypad is Keypad.OK
-    desk.turn(0.0)
-    os.write(desk.writer, press(48) + press(30) + press(48))
-    desk.turn(0.1)
-    assert desk.keyboard.presses == 3
-    assert sorted(desk.taken()) == sorted([Kind.PAIN, Kind.EMERGENCY])
-    assert Requester(desk.page, Lane.STOP_PROCESS).request(Kind.STOP).id == 4
+    served = KeypadServed(folder)
+    assert served.page.keypad is Keypad.OK
+    served.turn(0.0)
+    os.write(served.writer, press(48) + press(30) + press(48))
+    served.turn(0.1)
+    assert served.keyboard.presses == 3
+    assert sorted(served.taken()) == sorted([StopReason.PAIN, StopReason.EMERGENCY])
+    assert Requester(served.page, Lane.STOP_PROCESS).request(StopReason.STOP).id == 4
 
 
-@pytest.mark.parametrize(("required", "stops"), [(True, [Kind.KEYPAD_LOST]), (False, [])])
+@pytest.mark.parametrize(("required", "stops"), [(True, [StopReason.KEYPAD_LOST]), (False, [])])
 def test_a_keypad_that_goes_is_told_let_go_and_looked_for_every_second(
-    folder: Path, capsys: pytest.CaptureFixture[str], required: bool, stops: list[Kind]
+    folder: Path, capsys: pytest.CaptureFixture[str], required: bool, stops: list[StopReason]
 ) -> None:
-    desk, before = Desk(folder, required), open_files()
-    desk.turn(0.0)
-    desk.pull_out()
-    desk.turn(0.1)
-    assert desk.shown == "LOST"
-    assert desk.taken() == stops
-    assert capsys.readouterr().err == f"{desk.path}: the keypad is gone; plug it in again\n"
+    served, before = KeypadServed(folder, required), open_files()
+    served.turn(0.0)
+    served.pull_out()
+    served.turn(0.1)
+    assert served.shown == "LOST"
+    assert served.taken() == stops
+    assert capsys.readouterr().err == f"{served.path}: the keypad is gone; plug it in again\n"
     # The keypad's own descriptor and the writer's are closed.
     assert open_files() == before - 2
-    desk.turn(5.0)
-    assert desk.taken() == stops, "again and again: it cannot be acknowledged away"
-    desk.plug_in()
-    desk.turn(5.0 + RETRY_S - 0.01)
-    assert (desk.shown, desk.taken()) == ("LOST", [])
-    desk.turn(5.0 + RETRY_S)
-    assert desk.shown == "OK"
-    os.write(desk.writer, press(48))
-    desk.turn(6.1)
-    assert desk.taken() == [Kind.PAIN]
-    desk.pull_out()
-    desk.turn(6.2)
-    assert capsys.readouterr().err.startswith(f"{desk.path}: the keypad is gone")
+    served.turn(5.0)
+    assert served.taken() == stops, "again and again: it cannot be acknowledged away"
+    served.plug_in()
+    served.turn(5.0 + RETRY_S - 0.01)
+    assert (served.shown, served.taken()) == ("LOST", [])
+    served.turn(5.0 + RETRY_S)
+    assert served.shown == "OK"
+    os.write(served.writer, press(48))
+    served.turn(6.1)
+    assert served.taken() == [StopReason.PAIN]
+    served.pull_out()
+    served.turn(6.2)
+    assert capsys.readouterr().err.startswith(f"{served.path}: the keypad is gone")
 
 
 def test_without_a_keypad_nothing_is_looked_for(folder: Path) -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from controller.stop.keypad import EventParser, Keys, Pad, open_device
-from controller.stop.word import Kind
+from controller.stop.word import StopReason
 from rig.config.stop import Stop
 from rig.errors import DeviceError
 from tests.controller.descriptors import open_files
@@ -54,8 +54,8 @@ def test_no_bytes_raise(pieces: list[bytes]) -> None:
 def test_a_key_does_what_it_is_configured_for_and_any_other_key_brakes() -> None:
     codes = Stop().key_codes
     assert codes == {25: "pain", 48: "pain", 31: "stop", 57: "emergency"}
-    keys = Keys({48: Kind.PAIN}, Kind.EMERGENCY)
-    assert (keys.kind(48), keys.kind(99)) == (Kind.PAIN, Kind.EMERGENCY)
+    keys = Keys({48: StopReason.PAIN}, StopReason.EMERGENCY)
+    assert (keys.kind(48), keys.kind(99)) == (StopReason.PAIN, StopReason.EMERGENCY)
     assert Stop(keys={"183": "pain", "keypad_enter": "stop"}).key_codes == {183: "pain", 96: "stop"}
 
 

@@ -20,10 +20,10 @@ from controller.stop import keyboard
 from controller.stop import server as module
 from controller.stop.keyboard import Keyboard
 from controller.stop.keypad import Keys, open_device
-from controller.stop.server import CONFIRM_S, CONNECTIONS, Server
-from controller.stop.word import NOT_CONFIRMED, Deed, Keypad, Kind, Request, Responder, StopWord
+from controller.stop.server import CONFIRM_S, CONNECTIONS, StopServer
+from controller.stop.word import NOT_CONFIRMED, Deed, Keypad, Responder, StopReason, StopRequest, StopWord
 
-KEYS = Keys({48: Kind.PAIN}, Kind.EMERGENCY)
+KEYS = Keys({48: StopReason.PAIN}, StopReason.EMERGENCY)
 PRESS_B = struct.pack("<qqHHi", 0, 0, 1, 48, 1)
 
 
@@ -33,12 +33,12 @@ class Stopped:
     def __init__(self, folder: Path, keypad: str = "", required: bool = False) -> None:
         self.page = StopWord.create(folder / "a.stop")
         self.deed: Deed | None = Deed.RETRACTING
-        self.taken: list[Request] = []
+        self.taken: list[StopRequest] = []
         self._responder = Responder(self.page)
         listener = socket.create_server(("127.0.0.1", 0))
         self.port: int = listener.getsockname()[1]
         keys = Keyboard(self.page, keypad, open_device(keypad) if keypad else -1, KEYS, required)
-        self.server = Server(self.page, listener, keys)
+        self.server = StopServer(self.page, listener, keys)
         self._over = threading.Event()
         self._threads = [threading.Thread(target=self._serve), threading.Thread(target=self._cycle)]
         for thread in self._threads:
@@ -58,7 +58,7 @@ class Stopped:
 
     def lost(self) -> int:
         """Stops for want of the keypad."""
-        return len([request for request in self.taken if request.kind is Kind.KEYPAD_LOST])
+        return len([request for request in self.taken if request.kind is StopReason.KEYPAD_LOST])
 
     def post(self, path: str, **headers: str) -> tuple[int, dict[str, Any]]:
         """A request on a connection of its own."""
@@ -108,14 +108,20 @@ def stopped(tmp_path: Path) -> Iterator[Stopped]:
 
 
 @pytest.mark.parametrize(
-    ("path", "kind"), [("/estop", Kind.EMERGENCY), ("/pain", Kind.PAIN), ("/stop", Kind.STOP), ("/pain?x=1", Kind.PAIN)]
+    ("path", "kind"),
+    [
+        ("/estop", StopReason.EMERGENCY),
+        ("/pain", StopReason.PAIN),
+        ("/stop", StopReason.STOP),
+        ("/pain?x=1", StopReason.PAIN),
+    ],
 )
-def test_a_stop_is_answered_with_its_id_and_what_the_loop_did(stopped: Stopped, path: str, kind: Kind) -> None:
+def test_a_stop_is_answered_with_its_id_and_what_the_loop_did(stopped: Stopped, path: str, kind: StopReason) -> None:
     status, said = stopped.post(path)
     assert status == 200
     assert (said["id"], said["kind"], said["confirmed"], said["done"]) == (1, kind.name.lower(), True, "retracting")
     assert said["after_ms"] < 1e3 * CONFIRM_S
-    assert stopped.taken == [Request(1, kind)]
+    assert stopped.taken == [StopRequest(1, kind)]
 
 
 def test_a_second_press_has_an_id_of_its_own_and_is_confirmed_too(stopped: Stopped) -> None:
@@ -252,7 +258,7 @@ def test_a_foot_switch_is_a_stop(tmp_path: Path) -> None:
         assert stopped.taken == []
         os.write(writer, PRESS_B[11:] + struct.pack("<qqHHi", 0, 0, 1, 30, 1))
         until(lambda: len(stopped.taken) == 2, "both keys")
-        assert {request.kind for request in stopped.taken} == {Kind.PAIN, Kind.EMERGENCY}
+        assert {request.kind for request in stopped.taken} == {StopReason.PAIN, StopReason.EMERGENCY}
     finally:
         os.close(writer)
         stopped.close()
@@ -280,7 +286,7 @@ def test_a_keypad_that_is_pulled_out_is_shown_and_stops_where_it_is_required(
         writer = os.open(path, os.O_RDWR)
         until(lambda: stopped.page.keypad is Keypad.OK, "its return")
         os.write(writer, PRESS_B)
-        until(lambda: stopped.taken and stopped.taken[-1].kind is Kind.PAIN, "a press after its return")
+        until(lambda: stopped.taken and stopped.taken[-1].kind is StopReason.PAIN, "a press after its return")
         os.close(writer)
     finally:
         stopped.close()

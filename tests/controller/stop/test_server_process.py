@@ -16,8 +16,8 @@ import pytest
 from controller.loop import realtime
 from controller.stop import server as module
 from controller.stop.keypad import Keys, open_device
-from controller.stop.server import Server
-from controller.stop.word import Keypad, Kind, StopWord
+from controller.stop.server import StopServer
+from controller.stop.word import Keypad, StopReason, StopWord
 
 
 class Turns:
@@ -60,7 +60,7 @@ def test_it_serves_until_supervisor_and_loop_have_gone(tmp_path: Path, monkeypat
 
     # The loop lives for two more looks after the supervisor has gone.
     server = Turns(reading, [False, False, True], on)
-    module.serve(cast(Server, server), reading, page)
+    module.serve(cast(StopServer, server), reading, page)
     assert server.turns == 6
     assert server.unwatched == [reading]
     assert page.server_pid == os.getpid()
@@ -81,7 +81,7 @@ def test_the_process_reads_its_settings_and_gives_everything_back(
     monkeypatch.setattr(realtime, "raise_priority", done.append)
     monkeypatch.setattr(sys, "stdin", SimpleNamespace(fileno=lambda: 77))
 
-    def serve(server: Server, parent: int, page: StopWord) -> None:
+    def serve(server: StopServer, parent: int, page: StopWord) -> None:
         keyboard = server._keyboard
         assert keyboard._pad
         handed = (keyboard._path, keyboard._pad.fd)
@@ -98,7 +98,7 @@ def test_the_process_reads_its_settings_and_gives_everything_back(
     arguments = [str(path), str(listener.detach()), str(keypad), json.dumps(settings)]
     assert module.main(arguments) == 0
     fd = int(arguments[1])
-    assert done == [39, 77, path, fd, (str(pad), keypad), Keys({48: Kind.PAIN}, Kind.STOP), True, Keypad.OK]
+    assert done == [39, 77, path, fd, (str(pad), keypad), Keys({48: StopReason.PAIN}, StopReason.STOP), True, Keypad.OK]
     os.close(writer)
     os.close(keypad)
     assert {number: signals[number] for number in (signal.SIGINT, signal.SIGHUP)} == {

@@ -15,11 +15,11 @@ from controller.stop import http
 from controller.stop import server as module
 from controller.stop.keyboard import Keyboard
 from controller.stop.keypad import Keys
-from controller.stop.server import Connection, Server
-from controller.stop.word import Deed, Kind, Request, Responder, StopWord
+from controller.stop.server import Connection, StopServer
+from controller.stop.word import Deed, Responder, StopReason, StopRequest, StopWord
 from tests.controller.descriptors import open_files
 
-KEYS = Keys({}, Kind.EMERGENCY)
+KEYS = Keys({}, StopReason.EMERGENCY)
 PAIN = b"POST /pain HTTP/1.1\r\n\r\n"
 
 
@@ -31,7 +31,7 @@ class Served:
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.now = 100.0
         keyboard = Keyboard(self.page, "", -1, KEYS, required=False)
-        self.server = Server(self.page, self.listener, keyboard, lambda: self.now)
+        self.server = StopServer(self.page, self.listener, keyboard, lambda: self.now)
         self.address = self.listener.getsockname()
         self.loop = Responder(self.page)
         self.clients: list[socket.socket] = []
@@ -85,7 +85,7 @@ def begun(data: bytes, **values: Any) -> Connection:
     return made
 
 
-STOP = Request(1, Kind.STOP)
+STOP = StopRequest(1, StopReason.STOP)
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def test_a_turn_waits_as_long_as_nobody_is_kept_waiting(
 def test_a_request_that_came_with_its_connection_is_taken_in_the_same_turn(served: Served) -> None:
     client = served.client(PAIN)
     (request,) = served.loop.take(1)
-    assert request.kind is Kind.PAIN
+    assert request.kind is StopReason.PAIN
     served.loop.answer(Deed.RETRACTING, 2)
     served.now += 0.012346
     served.server.turn()

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from controller.stop.start import SENTENCE, StartGuard
-from controller.stop.word import Deed, Kind, Lane, Requester, Responder, StopWord
+from controller.stop.word import Deed, Lane, Requester, Responder, StopReason, StopWord
 from rig.errors import DeviceError, SafetyStop
 
 PATIENCE_S = 10.0
@@ -33,7 +33,7 @@ def test_a_stop_before_anything_moves_is_answered_and_nothing_moves(page: StopWo
     asking = Requester(page, Lane.STOP_PROCESS)
     moved = []
     with StartGuard(Responder(page)) as guard:
-        answer = asking.confirmed(asking.request(Kind.PAIN), PATIENCE_S)
+        answer = asking.confirmed(asking.request(StopReason.PAIN), PATIENCE_S)
         with pytest.raises(SafetyStop, match=SENTENCE), guard.moving():
             moved.append(True)
     assert answer is not None
@@ -42,7 +42,7 @@ def test_a_stop_before_anything_moves_is_answered_and_nothing_moves(page: StopWo
 
 def test_a_stop_from_before_the_start_counts(page: StopWord) -> None:
     asking = Requester(page, Lane.SUPERVISOR)
-    request = asking.request(Kind.EMERGENCY)
+    request = asking.request(StopReason.EMERGENCY)
     with StartGuard(Responder(page)) as guard, pytest.raises(SafetyStop), guard.moving():
         raise AssertionError("it moved")
     answer = asking.answer(request)
@@ -54,7 +54,7 @@ def test_a_stop_while_the_axis_homes_is_answered_once_it_is_braked(page: StopWor
     asking = Requester(page, Lane.SUPERVISOR)
     with StartGuard(Responder(page)) as guard:
         with pytest.raises(SafetyStop, match="braked"), guard.moving():
-            request = asking.request(Kind.STOP)
+            request = asking.request(StopReason.STOP)
             assert asking.confirmed(request, 0.05) is None
             homing(guard)
         answer = asking.answer(request)
@@ -66,7 +66,7 @@ def test_a_stop_that_a_lost_axis_cannot_follow_is_not_confirmed(page: StopWord) 
     asking = Requester(page, Lane.SUPERVISOR)
     with StartGuard(Responder(page)) as guard:
         with pytest.raises(DeviceError), guard.moving():
-            request = asking.request(Kind.STOP)
+            request = asking.request(StopReason.STOP)
             until_seen(guard)
             raise DeviceError("the drive does not answer")
         answer = asking.answer(request)
@@ -83,7 +83,7 @@ def test_a_stop_as_homing_ends_ends_the_start(page: StopWord) -> None:
     asking = Requester(page, Lane.SUPERVISOR)
     with StartGuard(Responder(page)) as guard:
         with pytest.raises(SafetyStop, match=SENTENCE), guard.moving():
-            request = asking.request(Kind.STOP)
+            request = asking.request(StopReason.STOP)
             until_seen(guard)
         answer = asking.answer(request)
     assert answer is not None
@@ -94,7 +94,7 @@ def test_without_a_stop_it_starts_and_what_comes_later_is_left_to_the_loop(page:
     asking, responder = Requester(page, Lane.SUPERVISOR), Responder(page)
     with StartGuard(responder) as guard, guard.moving():
         assert not guard.interrupted()
-    request = asking.request(Kind.STOP)
+    request = asking.request(StopReason.STOP)
     assert asking.confirmed(request, 0.05) is None
     assert responder.take(1) == (request,)
 
@@ -111,7 +111,7 @@ def test_a_stop_after_the_axis_has_homed_is_answered_while_the_bench_still_start
     with StartGuard(Responder(page)) as guard:
         with guard.moving():
             pass
-        request = asking.request(Kind.PAIN)
+        request = asking.request(StopReason.PAIN)
         guard.look()
         answer = asking.answer(request)
     assert answer and answer.deed is Deed.START_ENDED

@@ -12,7 +12,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.stop.word import DEEDS, Answer, Deed, Keypad, Kind, Lane, Request, Requester, Responder, StopWord
+from controller.stop.word import (
+    DEEDS,
+    Deed,
+    Keypad,
+    Lane,
+    Requester,
+    Responder,
+    StopOutcome,
+    StopReason,
+    StopRequest,
+    StopWord,
+)
 from rig.errors import DeviceError
 from tests.controller.descriptors import open_files
 
@@ -27,70 +38,70 @@ def page(tmp_path: Path) -> Iterator[StopWord]:
 def test_a_request_is_taken_until_it_is_answered_and_the_answer_has_its_id_and_time(page: StopWord) -> None:
     asking, loop = Requester(page, Lane.SUPERVISOR), Responder(page)
     assert loop.take(1) == ()
-    request = asking.request(Kind.PAIN)
+    request = asking.request(StopReason.PAIN)
     assert asking.answer(request) is None
     assert loop.take(2) == loop.take(3) == (request,)
     loop.answer(Deed.RETRACTING, 4)
-    assert asking.answer(request) == Answer(request.id, Deed.RETRACTING, 4)
+    assert asking.answer(request) == StopOutcome(request.id, Deed.RETRACTING, 4)
     assert loop.take(5) == ()
 
 
 def test_a_second_press_is_a_request_of_its_own(page: StopWord) -> None:
     asking, loop = Requester(page, Lane.STOP_PROCESS), Responder(page)
-    first = asking.request(Kind.PAIN)
+    first = asking.request(StopReason.PAIN)
     loop.take(1)
     loop.answer(Deed.RETRACTING, 1)
-    second = asking.request(Kind.PAIN)
+    second = asking.request(StopReason.PAIN)
     assert second.id > first.id
     assert asking.answer(second) is None
     assert loop.take(2) == (second,)
     loop.answer(Deed.HELD, 2)
-    assert asking.answer(second) == Answer(second.id, Deed.HELD, 2)
+    assert asking.answer(second) == StopOutcome(second.id, Deed.HELD, 2)
 
 
 def test_a_pain_stop_in_the_same_cycle_does_not_cover_an_emergency_stop(page: StopWord) -> None:
     asking, loop = Requester(page, Lane.STOP_PROCESS), Responder(page)
-    emergency, pain = asking.request(Kind.EMERGENCY), asking.request(Kind.PAIN)
+    emergency, pain = asking.request(StopReason.EMERGENCY), asking.request(StopReason.PAIN)
     assert set(loop.take(1)) == {emergency, pain}
 
 
 def test_the_lanes_do_not_disturb_each_other(page: StopWord) -> None:
     one, two, loop = Requester(page, Lane.STOP_PROCESS), Requester(page, Lane.SUPERVISOR), Responder(page)
-    stop, pain = one.request(Kind.STOP), two.request(Kind.PAIN)
+    stop, pain = one.request(StopReason.STOP), two.request(StopReason.PAIN)
     assert set(loop.take(1)) == {stop, pain}
-    assert two.answer(Request(1, Kind.STOP)) is None
+    assert two.answer(StopRequest(1, StopReason.STOP)) is None
     loop.answer(Deed.HELD, 1)
     assert one.answer(stop)
     assert two.answer(pain)
-    assert one.answer(Request(1, Kind.PAIN)) is None
+    assert one.answer(StopRequest(1, StopReason.PAIN)) is None
 
 
 def test_what_was_asked_before_the_loop_came_counts(page: StopWord) -> None:
-    request = Requester(page, Lane.SUPERVISOR).request(Kind.EMERGENCY)
+    request = Requester(page, Lane.SUPERVISOR).request(StopReason.EMERGENCY)
     assert Responder(page).take(1) == (request,)
 
 
 def test_a_loop_that_takes_over_does_not_repeat_what_was_answered(page: StopWord) -> None:
     asking, loop = Requester(page, Lane.SUPERVISOR), Responder(page)
-    asking.request(Kind.STOP)
+    asking.request(StopReason.STOP)
     loop.take(1)
     loop.answer(Deed.HELD, 1)
     assert Responder(page).take(2) == ()
 
 
 def test_a_stop_process_that_takes_over_goes_on_counting(page: StopWord) -> None:
-    first = Requester(page, Lane.STOP_PROCESS).request(Kind.STOP)
-    assert Requester(page, Lane.STOP_PROCESS).request(Kind.STOP).id == first.id + 1
+    first = Requester(page, Lane.STOP_PROCESS).request(StopReason.STOP)
+    assert Requester(page, Lane.STOP_PROCESS).request(StopReason.STOP).id == first.id + 1
 
 
-@given(st.lists(st.tuples(st.sampled_from(Lane), st.sampled_from(Kind), st.booleans()), max_size=40))
+@given(st.lists(st.tuples(st.sampled_from(Lane), st.sampled_from(StopReason), st.booleans()), max_size=40))
 def test_whenever_the_loop_looks_every_kind_asked_is_taken_and_answered(
-    steps: list[tuple[Lane, Kind, bool]],
+    steps: list[tuple[Lane, StopReason, bool]],
 ) -> None:
     path = Path(f"/dev/shm/test-{time.monotonic_ns()}.stop")
     page = StopWord.create(path)
     asking, loop = {lane: Requester(page, lane) for lane in Lane}, Responder(page)
-    asked: list[tuple[Lane, Request]] = []
+    asked: list[tuple[Lane, StopRequest]] = []
     for now, (lane, kind, look) in enumerate(steps):
         asked.append((lane, asking[lane].request(kind)))
         if look:
@@ -105,7 +116,7 @@ def test_it_reaches_another_mapping_of_the_file_and_only_a_page_of_ours_is_opene
     page: StopWord, tmp_path: Path
 ) -> None:
     other = StopWord.open(page.path)
-    request = Requester(page, Lane.SUPERVISOR).request(Kind.STOP)
+    request = Requester(page, Lane.SUPERVISOR).request(StopReason.STOP)
     assert Responder(other).take(7) == (request,)
     assert page.loop_beat_ns == 7
     other.serve(12)
@@ -133,7 +144,7 @@ def test_a_page_keeps_no_descriptor_and_is_given_back_once(tmp_path: Path) -> No
         assert not path.exists()
     assert open_files() == before
     with pytest.raises(DeviceError, match="the bench is not running"):
-        Requester(page, Lane.SUPERVISOR).request(Kind.STOP)
+        Requester(page, Lane.SUPERVISOR).request(StopReason.STOP)
 
 
 def test_where_there_is_no_memory_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -155,7 +166,7 @@ def test_the_loop_knows_when_the_stop_process_looked_last(page: StopWord) -> Non
 
 def test_a_thread_waits_for_its_answer_and_no_longer_than_it_said(page: StopWord) -> None:
     asking, loop = Requester(page, Lane.SUPERVISOR), Responder(page)
-    request = asking.request(Kind.PAIN)
+    request = asking.request(StopReason.PAIN)
     began = time.monotonic()
     assert asking.confirmed(request, 0.05) is None
     assert time.monotonic() - began >= 0.05
@@ -168,13 +179,13 @@ def test_a_thread_waits_for_its_answer_and_no_longer_than_it_said(page: StopWord
     answering.start()
     answer = asking.confirmed(request, 10.0)
     answering.join()
-    assert answer == Answer(request.id, Deed.BRAKED, 1)
+    assert answer == StopOutcome(request.id, Deed.BRAKED, 1)
 
 
 def test_every_deed_has_words_and_only_an_axis_that_does_not_answer_is_unconfirmed() -> None:
     assert set(DEEDS) == set(Deed)
-    assert [deed for deed in Deed if not Answer(1, deed, 1).confirmed] == [Deed.AXIS_LOST]
-    assert Answer(1, Deed.BRAKED, 1).text == "braked"
+    assert [deed for deed in Deed if not StopOutcome(1, deed, 1).confirmed] == [Deed.AXIS_LOST]
+    assert StopOutcome(1, Deed.BRAKED, 1).text == "braked"
 
 
 def test_a_look_without_a_request_costs_the_loop_less_than_two_microseconds(page: StopWord) -> None:

@@ -13,17 +13,18 @@ from drivers.bota.codec import (
     SOFT_RESET,
     Ack,
     BootText,
-    Decoder,
-    Frame,
+    ForceFrame,
     encode_communication,
     encode_filter,
     encode_frame,
     find_ack,
     find_boot_text,
     line_rate_Hz,
+    make_decoder,
     rate_Hz,
     sinc_for,
 )
+from drivers.framing import FrameDecoder
 from drivers.roles import LinkCounters
 from rig.errors import UsageError
 from tests.drivers.test_crc import makers_x25
@@ -37,18 +38,18 @@ RAW = bytes.fromhex(
     "0000C841"  # 25.0 degC
     "187B"  # CRC-16/X-25 of the 34 bytes behind the header
 )
-FRAME = Frame(2, 1.5, -2.25, -3.0, 0.125, -0.25, 0.5, 123456, 25.0)
-OTHER = Frame(0, 0.5, 0.25, -8.0, 0.0, 0.0, 1.0, 124452, 25.0)
+FRAME = ForceFrame(2, 1.5, -2.25, -3.0, 0.125, -0.25, 0.5, 123456, 25.0)
+OTHER = ForceFrame(0, 0.5, 0.25, -8.0, 0.0, 0.0, 1.0, 124452, 25.0)
 
 floats = st.floats(width=32, allow_nan=False)
 frames = st.builds(
-    Frame, st.integers(0, 0xFFFF), *[floats] * 6, st.integers(0, 0xFFFF_FFFF), floats
+    ForceFrame, st.integers(0, 0xFFFF), *[floats] * 6, st.integers(0, 0xFFFF_FFFF), floats
 )  # fmt: skip
 
 
-def decoder() -> tuple[Decoder, LinkCounters]:
+def decoder() -> tuple[FrameDecoder[ForceFrame], LinkCounters]:
     counters = LinkCounters()
-    return Decoder(counters), counters
+    return make_decoder(counters), counters
 
 
 def test_commands_are_bare_ascii_without_a_terminator() -> None:
@@ -102,7 +103,7 @@ def test_a_frame_cut_short_costs_that_frame_only() -> None:
 
 def test_header_bytes_inside_the_data_do_not_mislead() -> None:
     (aa,) = struct.unpack("<f", b"\xaa" * 4)
-    frame = Frame(0xAAAA, aa, aa, aa, aa, aa, aa, 0xAAAA_AAAA, aa)
+    frame = ForceFrame(0xAAAA, aa, aa, aa, aa, aa, aa, 0xAAAA_AAAA, aa)
     raw = encode_frame(frame)
     assert raw.count(b"\xaa") >= 35
     reader, counters = decoder()
@@ -126,7 +127,7 @@ def test_overlong_input_leaves_less_than_a_frame_behind(junk: bytes) -> None:
 
 
 @given(frames)
-def test_every_frame_survives_the_wire(frame: Frame) -> None:
+def test_every_frame_survives_the_wire(frame: ForceFrame) -> None:
     reader, _ = decoder()
     assert reader.feed(encode_frame(frame)) == [frame]
 
@@ -141,9 +142,9 @@ def test_no_input_raises_or_is_held_or_goes_uncounted(chunks: list[bytes]) -> No
 
 
 @given(st.lists(st.one_of(frames, st.binary(max_size=60)), max_size=12), st.integers(1, 80))
-def test_frames_between_any_garbage_are_all_recovered(parts: list[Frame | bytes], chunk: int) -> None:
-    stream = b"".join(encode_frame(part) if isinstance(part, Frame) else part for part in parts)
-    expected = [part for part in parts if isinstance(part, Frame)]
+def test_frames_between_any_garbage_are_all_recovered(parts: list[ForceFrame | bytes], chunk: int) -> None:
+    stream = b"".join(encode_frame(part) if isinstance(part, ForceFrame) else part for part in parts)
+    expected = [part for part in parts if isinstance(part, ForceFrame)]
     assume(sum(_looks_like_a_frame(stream, at) for at in range(len(stream))) == len(expected))
     reader, counters = decoder()
     found = [frame for at in range(0, len(stream), chunk) for frame in reader.feed(stream[at : at + chunk])]

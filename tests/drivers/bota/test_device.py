@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from drivers.bota import device
-from drivers.bota.codec import Frame, encode_frame
+from drivers.bota.codec import ForceFrame, encode_frame
 from drivers.bota.device import BotaSensOne
 from drivers.ports import PortClosed, open_port
 from drivers.roles import Identity
@@ -25,7 +25,7 @@ MS = 1_000_000
 
 
 def frame(time_us: int, status: int = 0, fz_N: float = -3.0) -> bytes:
-    return encode_frame(Frame(status, 1.5, -2.25, fz_N, 0.125, -0.25, 0.5, time_us, 25.0))
+    return encode_frame(ForceFrame(status, 1.5, -2.25, fz_N, 0.125, -0.25, 0.5, time_us, 25.0))
 
 
 def sensor_like(command: bytes) -> bytes:
@@ -161,7 +161,7 @@ def test_a_sensor_that_runs_without_frames_is_one_sentence() -> None:
 
 
 def test_a_sensor_that_never_vouches_for_a_reading_is_one_sentence() -> None:
-    with pytest.raises(DeviceError, match=r"no valid reading within .* status <Status.INVALID: 4>"):
+    with pytest.raises(DeviceError, match=r"no valid reading within .* status <StatusBits.INVALID: 4>"):
         started(lambda command: b"r,0,R,0\r\n" + frame(1000, status=4) if command == b"R" else sensor_like(command))
 
 

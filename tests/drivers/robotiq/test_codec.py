@@ -2,13 +2,13 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from drivers.framing import FrameDecoder
 from drivers.robotiq.codec import (
     FRAME_BYTES,
     FRAME_NS,
     START_STREAM,
     STOP_BURST,
     STREAM_STARTED,
-    Decoder,
     Wrench,
     decode_firmware,
     decode_forces,
@@ -17,6 +17,7 @@ from drivers.robotiq.codec import (
     encode_read,
     encode_write,
     is_intact,
+    make_decoder,
     refusal,
     to_counts,
     with_crc,
@@ -36,9 +37,9 @@ OTHER = Wrench(0.0, 0.01, 300.0, -30.0, 0.001, 0.0)
 counts = st.lists(st.integers(-0x8000, 0x7FFF), min_size=6, max_size=6)
 
 
-def decoder() -> tuple[Decoder, LinkCounters]:
+def decoder() -> tuple[FrameDecoder[Wrench], LinkCounters]:
     counters = LinkCounters()
-    return Decoder(counters), counters
+    return make_decoder(counters), counters
 
 
 def raw(wrench: Wrench) -> bytes:

@@ -5,10 +5,10 @@ import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.bota.codec import Decoder, Frame
+from drivers.bota.codec import ForceFrame, make_decoder
 from drivers.roles import LinkCounters
 from mock_devices.bota.mock import BOOT_NS, BotaMock, Command, CommandParser
-from mock_devices.interfaces import NEVER_NS, Mock
+from mock_devices.interfaces import NEVER_NS, ProtocolMock
 from mock_devices.testing.force import WRENCH, SensorBench, ServedMock, StillPlant
 from mock_devices.testing.wire import MemoryWire
 
@@ -29,12 +29,12 @@ class BotaBench(SensorBench[BotaMock]):
     def run(self) -> None:
         assert self.say(b"CR") == b"r,0,C,0\r\nr,0,R,0\r\n"
 
-    def frames(self, duration_ns: int) -> list[Frame]:
-        return Decoder(LinkCounters()).feed(self.wait(duration_ns))
+    def frames(self, duration_ns: int) -> list[ForceFrame]:
+        return make_decoder(LinkCounters()).feed(self.wait(duration_ns))
 
 
 def test_it_is_a_mock_of_the_stage() -> None:
-    mock: Mock = BotaBench().mock
+    mock: ProtocolMock = BotaBench().mock
     assert (mock.name, mock.endpoints(), mock.filenos(), mock.due_ns) == ("force", {"serial": "/memory"}, [], NEVER_NS)
 
 
@@ -113,8 +113,8 @@ def test_frames_carry_the_plants_load_and_the_sensors_own_time() -> None:
     stage.run()
     first, second = stage.frames(20_000_000)
     booted_us = BOOT_NS // 1000
-    assert first == Frame(0, *WRENCH, booted_us + 10_000, 24.5)
-    assert second == Frame(0, *WRENCH, booted_us + 20_000, 24.5)
+    assert first == ForceFrame(0, *WRENCH, booted_us + 10_000, 24.5)
+    assert second == ForceFrame(0, *WRENCH, booted_us + 20_000, 24.5)
 
 
 def test_when_samples_were_taken_is_kept_on_the_benchs_clock() -> None:
@@ -182,7 +182,7 @@ def test_every_nth_checksum_can_be_spoilt() -> None:
     stage.mock.corrupt_every = 3
     stage.run()
     counters = LinkCounters()
-    Decoder(counters).feed(stage.wait(90_000_000))
+    make_decoder(counters).feed(stage.wait(90_000_000))
     assert (counters.frames, counters.checksum_errors) == (6, 3)
 
 
@@ -201,7 +201,7 @@ def test_a_late_tick_sends_every_frame_that_was_due() -> None:
     late_ns = stage.now_ns + 35_000_000
     while stage.mock.due_ns <= late_ns:
         stage.mock.tick(late_ns)
-    assert [frame.time_us for frame in Decoder(LinkCounters()).feed(stage.wire.take())] == [
+    assert [frame.time_us for frame in make_decoder(LinkCounters()).feed(stage.wire.take())] == [
         BOOT_NS // 1000 + step for step in (10_000, 20_000, 30_000)
     ]
 
@@ -226,4 +226,4 @@ def test_a_client_that_follows_the_makers_example_gets_frames(bota: ServedMock) 
             assert line.read_until(answer).endswith(answer)
         assert line.read_until(b"\xaa").endswith(b"\xaa")
         payload = line.read(36)
-    assert Decoder(LinkCounters()).feed(b"\xaa" + payload)[0][1:7] == WRENCH
+    assert make_decoder(LinkCounters()).feed(b"\xaa" + payload)[0][1:7] == WRENCH

@@ -16,14 +16,14 @@ from drivers.robotiq.codec import (
     START_STREAM,
     STOP_BURST,
     STREAM_STARTED,
-    Decoder,
     Wrench,
     encode_read,
     encode_write,
+    make_decoder,
     with_crc,
 )
 from drivers.roles import LinkCounters
-from mock_devices.interfaces import NEVER_NS, Mock
+from mock_devices.interfaces import NEVER_NS, ProtocolMock
 from mock_devices.robotiq.mock import REQUEST_BYTES_MAX, RequestFinder, RobotiqMock
 from mock_devices.testing.force import WRENCH, SensorBench, ServedMock, StillPlant
 from mock_devices.testing.wire import MemoryWire
@@ -42,7 +42,7 @@ class RobotiqBench(SensorBench[RobotiqMock]):
         super().__init__(RobotiqMock(wire, self.plant, START_NS, drift_ppm, serial_number), wire, START_NS)
 
     def frames(self, duration_ns: int) -> list[Wrench]:
-        return Decoder(LinkCounters()).feed(self.wait(duration_ns))
+        return make_decoder(LinkCounters()).feed(self.wait(duration_ns))
 
     def stream(self) -> None:
         assert self.say(START_STREAM) == STREAM_STARTED
@@ -53,7 +53,7 @@ def exception(function: int, code: int) -> bytes:
 
 
 def test_it_is_a_mock_of_the_stage() -> None:
-    mock: Mock = RobotiqBench().mock
+    mock: ProtocolMock = RobotiqBench().mock
     assert (mock.name, mock.endpoints(), mock.filenos(), mock.due_ns) == ("force", {"serial": "/memory"}, [], NEVER_NS)
 
 
@@ -215,7 +215,7 @@ def test_every_nth_checksum_can_be_spoilt() -> None:
     stage.mock.corrupt_every = 3
     stage.stream()
     counters = LinkCounters()
-    Decoder(counters).feed(stage.wait(90_000_000 + FRAME_NS))
+    make_decoder(counters).feed(stage.wait(90_000_000 + FRAME_NS))
     assert (counters.frames, counters.checksum_errors) == (6, 3)
 
 
@@ -271,7 +271,7 @@ class TestThirdPartyClients:
         instrument.write_registers(410, [0x0200])
         frame = line.read(16)
         line.close()
-        assert Decoder(LinkCounters()).feed(frame) == [Wrench(*WRENCH)]
+        assert make_decoder(LinkCounters()).feed(frame) == [Wrench(*WRENCH)]
 
     def test_minimalmodbus_hears_nothing_from_another_slave(self, robotiq: ServedMock) -> None:
         instrument = minimalmodbus.Instrument(robotiq.endpoint, 8)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.bota.codec import Frame, encode_frame
+from drivers.bota.codec import ForceFrame, encode_frame
 from drivers.bota.device import BotaSensOne
 from mock_devices.testing.clock import long_ago
 from rig.channels import FORCE
@@ -28,7 +28,7 @@ def test_a_stalling_host_records_capture_times_that_all_differ_and_go_upwards(tm
     for read_ms, frames in READS:
         for _ in range(frames):
             sent += 1
-            port.push(encode_frame(Frame(0, 0, 0, sent, 0, 0, 0, sent * 996, 25.0)))
+            port.push(encode_frame(ForceFrame(0, 0, 0, sent, 0, 0, 0, sent * 996, 25.0)))
         for sample in sensor.poll(round(read_ms * MS)):
             writer.add(FORCE.id, FORCE.pack(sample))
     writer.finish({"outcome": "done"})
