@@ -14,8 +14,8 @@ from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
 from rig.trials.contact import LIMB_SHAPE, Contact, ContactSearch, Loading
 
-LEAST_ROWS = 8
-AIR_MM = 0.3
+LEAST_ROWS = 8  # the estimator fits seven numbers: one row is left to tell the noise by
+AIR_MM = 0.3  # of 0.5 mm between SLIP_MM and the surface, which is known to 0.2 mm
 ROUNDS = 3
 # Two portions are 0.2 ms of a cycle of 1 ms; a slower loop does as many more.
 PORTIONS_A_MS = 2

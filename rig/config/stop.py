@@ -26,7 +26,7 @@ KEY_CODES = {
     "mouse_left": 0x110,
     "mouse_right": 0x111,
 }
-KEY_CODE_MAX = 0x2FF
+KEY_CODE_MAX = 0x2FF  # KEY_MAX of Linux' input-event-codes.h
 
 
 class Stop(Table):

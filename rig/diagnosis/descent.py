@@ -9,9 +9,9 @@ from rig.diagnosis.noise import Array
 from rig.diagnosis.problem import Par, Values
 from rig.diagnosis.whitening import NUDGE, Whitener
 
-CONVERGED_NATS = 0.03
+CONVERGED_NATS = 0.03  # a hundredth of the 3 nats that keep a cause
 PRIOR_SCALES = 1e3
-TRUSTED_SHARE = 0.3
+TRUSTED_SHARE = 0.3  # near the quarter below which trust-region methods doubt their model (Nocedal and Wright 2006)
 
 
 def prior_precision(free: Sequence[Par]) -> Array:

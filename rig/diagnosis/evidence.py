@@ -15,10 +15,10 @@ from rig.diagnosis.noise import Array
 from rig.diagnosis.problem import Effect, Values
 from rig.diagnosis.whitening import NUDGE
 
-DRAWS = 400
-FEWEST_TO_FLIP = 6
-MOST_BITS = 40
-ALIAS_SHARE = 1e-6
+DRAWS = 400  # 1/401 is a third of the least chance that a step of the search asks for, 0.03/4
+FEWEST_TO_FLIP = 6  # in 31 ways: 1 in 32 is near the 3 % of the search; with five nothing would be rarer than 1 in 16
+MOST_BITS = 40  # so many ways that 400 draws never meet, in a code of 64 bits
+ALIAS_SHARE = 1e-6  # a complete imitation leaves 1e-11 by rounding, the next best cause 1e-2
 PROBE = 0.1
 
 

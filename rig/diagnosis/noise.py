@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-LARGEST_ORDER = 6
+LARGEST_ORDER = 6  # 24 ms at 250 Hz: longer than derivatives (16 ms) and the filters of force sensors
 EM_STEPS = 25
-SMALLEST_SD = 1e-12
+SMALLEST_SD = 1e-12  # no sensor resolves it in N, mm or m; exact data keep a logarithm
 
 
 @dataclass(frozen=True)

@@ -19,12 +19,14 @@ from rig.trials.findings import Finding, at_the_end_of_range, merged
 from rig.trials.trial import FEWEST_SAMPLES, Trial, TrialSet, cleaned, inspect, ordered
 
 WORKING_RATE_HZ = 250.0
-LOWEST_RATE_HZ = 100.0
-MOST_SAMPLES = 60_000
+LOWEST_RATE_HZ = 100.0  # below it no cause that acts fast can be tested
+MOST_SAMPLES = 60_000  # four minutes at 250 Hz, the length of `examples/diagnosis.toml`
 DERIVATIVE_SPANS_S = (0.008, 0.016)
-JITTER_MM = 0.0004
+JITTER_MM = 0.0004  # rounding to the encoder's 0.5 um makes 0.14 um: three times that comes from time stamps
 JITTERY = 125.0, (0.024, 0.024)
+# A device of 100 Hz that lost one sample has two periods; a gap within the derivatives' spans is bridged by them.
 GAP_PERIODS, GAP_S = 3.0, 0.01
+# Over 24 ms a dither of 0.25 mm at 6 Hz turns by 8.5 mm/s, which is to be seen, a corner of 2000 mm/s2 by 30.
 MOST_TURN_MM_S = 12.0
 OMITTED = "recording left out: "
 

@@ -18,6 +18,7 @@ from rig.diagnosis.noise import Array, starts_of
 from rig.diagnosis.problem import Effect, InverseProblem
 
 BUMPS = 6
+# The fewest draws that reach the level (1/201); with `search.ALPHA` it stays below the 5 % of false alarms allowed.
 DRAWS = 200
 LEVEL = 0.005
 # Ten recordings have so few orders that no pattern, however clear, is rarer than about 0.01: orders are only the check.

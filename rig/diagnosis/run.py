@@ -20,7 +20,7 @@ from rig.progress import Progress, silent
 from rig.trials.findings import Finding
 from rig.trials.trial import TrialSet
 
-FEWEST_RECORDINGS = 4
+FEWEST_RECORDINGS = 4  # three without the one left out: the fewest whose scatter about a mean is more than one number
 
 
 def diagnose(
@@ -85,6 +85,7 @@ class Flaw(NamedTuple):
 RECORD = "record at least 6 cycles at three or more speeds, for example with examples/diagnosis.toml"
 
 
+# Milliseconds taken for seconds make 1 Hz of 1 kHz; micrometres taken for millimetres make metres of any indentation.
 SLOWEST_HZ, LONGEST_MM = 2.0, 300.0
 # Of tissue and of anything soft in its place, over the whole travel.
 STIFFEST_N_MM, SOFTEST_N_MM = 100.0, 1e-4

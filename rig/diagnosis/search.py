@@ -24,13 +24,13 @@ from rig.diagnosis.omnibus import LEVEL, leftover
 from rig.diagnosis.problem import Effect, InverseProblem, Values
 from rig.progress import Progress
 
-ALPHA = 0.03
+ALPHA = 0.03  # of 5 % of false alarms allowed; the rest is for what is left over (`omnibus`) and for the noise's fit
 SHORT_LIST = 5
 MOST_EFFECTS = 3
-RIVAL_SE = 2.0
-KEEP_NATS = 3.0
-AMPLE_NATS = 20.0
-WORSE = 1.01
+RIVAL_SE = 2.0  # 95 % of a normal: a rival within it predicts as well
+KEEP_NATS = 3.0  # odds of 20 to 1 (e^3)
+AMPLE_NATS = 20.0  # more than chance reaches in sessions without a cause (95 %: 4 to 13)
+WORSE = 1.01  # an error of 15,000 rows is known to 0.6 % at best
 # What takes nothing off the error needs more evidence than this, or a tracker to have been seen by.
 PLENTY_NATS = 50.0
 BETTER = 0.998
@@ -189,7 +189,7 @@ def alive(effect: Effect, values: Values) -> bool:
 
 
 def search(problem: InverseProblem, before: Fit, rng: np.random.Generator, progress: Progress) -> Search:
-    """Forward steps while the best gain beats chance at 0.05 / 2^k, then drop and swap, then rivals."""
+    """Forward steps while the best gain beats chance at ALPHA / 2^k, then drop and swap, then rivals."""
     current, bars, p_values, alone = before, dict[str, float](), dict[str, float](), True
     library = testable(problem)
     for step in range(MOST_EFFECTS + 1):

@@ -33,7 +33,7 @@ from rig.version import SOFTWARE
 
 STREAMS = {"force": FORCE, "axis": AXIS, "marker": MARKER}
 ROWS_PER_CHUNK = 1000
-PARALLEL_ROWS = 1_000_000
+PARALLEL_ROWS = 1_000_000  # 4 s of writing; a process that helps takes one or two to begin
 
 
 @dataclass(frozen=True)

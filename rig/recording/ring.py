@@ -24,7 +24,7 @@ SLOT = 256
 TRAILER = struct.Struct("<QHH")
 BODY_LIMIT = SLOT - TRAILER.size
 SLOTS = 1 << 17
-MAX_STREAMS = 64
+MAX_STREAMS = 64  # of which there are five; their counters stand in the header's page
 PAGE = 4096
 MAGIC = int.from_bytes(b"tissring", "little")
 

@@ -31,8 +31,8 @@ Look = tuple[str, Dashes]
 LOOKS: dict[str, Look] = {"index": (MODEL, "-"), "constant": (RIVAL, (0, (5, 2)))}
 OTHER_COLORS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 OTHER_STYLES: tuple[Dashes, ...] = ((0, (1, 1.5)), (0, (6, 2, 1, 2)))
-PANELS_A_ROW = 3
-MOST_LABELS = 4
+PANELS_A_ROW = 3  # 3.7 of 11 inches each: square at the height of 3.6
+MOST_LABELS = 4  # laws that follow the data end side by side: more than four names there overlap
 
 
 def look(name: str, study: Study) -> Look:

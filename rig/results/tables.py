@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from rig.results.fit import DisplacementErrors, FitResult, LatticeModel, LatticeResult, LawResult, RateResult
 from rig.results.tracking import ComparedRun, Followed, LoopMargins, Plateau, SimulateResult, TrackResult
+from rig.tissue.rates import STUDY_B_N_S_MM
 from rig.tissue.summary import ControlRow, SpeedSummary
 
 UNKNOWN = "–"
-STUDY_B_N_S_MM = 1.3
 
 
 @dataclass(frozen=True)

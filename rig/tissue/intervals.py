@@ -2,7 +2,7 @@
 
 from scipy.special import stdtrit
 
-LEVEL = 0.95
+LEVEL = 0.95  # the convention, so that intervals compare with published ones
 
 
 def student_reach(freedom: int) -> float:

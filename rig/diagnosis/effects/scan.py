@@ -4,7 +4,7 @@ import numpy as np
 
 from rig.diagnosis.problem import Array
 
-PEAKS = 4
+PEAKS = 4  # breathing, pulse and a harmonic of each; each one more is a further way for chance to fit
 
 
 def peaks(coordinate: Array, match: Array, energy: float, grid: Array) -> list[float]:

@@ -12,7 +12,7 @@ from typing import TypeVar, TypeVarTuple
 
 Result = TypeVar("Result")
 Arguments = TypeVarTuple("Arguments")
-MOST_THREADS = 16
+MOST_THREADS = 16  # a force of the study's block is then 0.2 ms each; handing out 16 parts takes 0.3 ms
 
 
 def threads() -> int:
