@@ -8,16 +8,16 @@ from pathlib import Path
 
 from controller.operation import Operation
 from rig.errors import DataError
-from rig.recording import verify as verification
 from rig.recording.export import Format, export
 from rig.recording.files import make_folder
 from rig.recording.import_format import FIELDS
 from rig.recording.importing import import_session
-from rig.recording.reader import read_recording
+from rig.recording.reader import Recording, read_recording
 from rig.recording.sessions import TrialInfo, open_session
-from rig.recording.verify import Verdict
+from rig.recording.verify import repair as repaired
+from rig.recording.verify import verdict_of
 from rig.results.recorded import ExportResult, ImportResult, RepairResult, VerifiedTrial, VerifyResult
-from rig.trials.quality import TrialQuality, quality_of
+from rig.trials.quality import quality_of
 
 SUFFIXES: Mapping[Format, str] = {"csv": "csv", "parquet": "parquet", "hdf5": "session.h5", "mat": "session.mat"}
 
@@ -26,13 +26,13 @@ def verify(operation: Operation, path: Path) -> VerifyResult:
     """Reads every byte of a session or of one recording; what is no recording at all is damaged, and hides no other."""
     if path.is_file():
         trial = TrialInfo(path.stem, path.name, math.nan, math.nan, "")
-        return _result((), {path.stem: _verified(verification.verify(path), trial)})
+        return _result((), {path.stem: _verified(read_recording(path), trial)})
     session = open_session(path)
     found: dict[str, VerifiedTrial] = {}
     for number, trial in enumerate(session.trials):
         file = session.path(trial.name)
         operation.step(file.name, number / len(session.trials))
-        found[file.stem] = _verified(_verdict(file), trial)
+        found[file.stem] = _read(file, trial)
     operation.step("the session's list of hashes", 1.0)
     return _result((*session.remarks, *session.mismatches), found)
 
@@ -42,15 +42,19 @@ def _result(remarks: tuple[str, ...], found: Mapping[str, VerifiedTrial]) -> Ver
     return VerifyResult(ok=whole, remarks=remarks, recordings=found)
 
 
-def _verdict(path: Path) -> Verdict:
+def _read(file: Path, trial: TrialInfo) -> VerifiedTrial:
     try:
-        return verification.verify(path)
+        return _verified(read_recording(file), trial)
     except DataError as error:
-        return Verdict(path, "damaged", str(error), damage=(str(error),))
+        why = str(error)
+        return VerifiedTrial(state="damaged", ok=False, sentence=why, damage=(why,), streams={})
 
 
-def _verified(verdict: Verdict, trial: TrialInfo) -> VerifiedTrial:
-    found, quality = VerifiedTrial.model_validate(verdict), _quality(verdict.path, trial)
+def _verified(recording: Recording, trial: TrialInfo) -> VerifiedTrial:
+    """With the quality of a trial that was made with bounds and can be judged."""
+    found, quality = VerifiedTrial.model_validate(verdict_of(recording)), None
+    with contextlib.suppress(DataError):
+        quality = quality_of(recording, trial)
     if quality is None:
         return found
     return found.model_copy(
@@ -58,23 +62,14 @@ def _verified(verdict: Verdict, trial: TrialInfo) -> VerifiedTrial:
     )
 
 
-def _quality(path: Path, trial: TrialInfo) -> TrialQuality | None:
-    """Of a trial that was made with bounds and can be read."""
-    with contextlib.suppress(DataError):
-        return quality_of(read_recording(path), trial)
-    return None
-
-
 def repair(operation: Operation, recording: Path, out: Path) -> RepairResult:
     """Saves every good sample of ``recording`` as the new recording ``out``."""
-    operation.step(recording.name, 0.0)
-    return RepairResult.model_validate(verification.repair(recording, out))
+    return RepairResult.model_validate(repaired(recording, out, operation.step))
 
 
 def import_folder(operation: Operation, folder: Path, out: Path, columns: Sequence[str], now: datetime) -> ImportResult:
     """Makes the session ``out`` of measured CSV files; writes nothing if anything in them is wrong."""
-    operation.step(folder.name, 0.0)
-    session = import_session(folder, out, list(columns), now)
+    session = import_session(folder, out, list(columns), now, operation.step)
     return ImportResult(
         session=str(out),
         recordings=len(session.trials),

@@ -10,7 +10,6 @@ from rig.results.recorded import ReportResult
 def report(operation: Operation, session: Path, out: Path | None = None) -> ReportResult:
     """Writes one self-contained page about ``session`` to ``out``, else into the session; returns where that is."""
     target = out or session / "report.html"
-    operation.step("reading, fitting, drawing", 0.0)
-    write_report(session, target)
+    write_report(session, target, operation.step)
     operation.say(f"{target} is written")
     return ReportResult(session=str(session), file=str(target))

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from rig.channels import AXIS, FORCE, MARKER, Stream
 from rig.config.table import load
 from rig.errors import DataError
+from rig.progress import Progress, silent
 from rig.recording.csv_columns import TIME, TOOL, read_columns
 from rig.recording.files import whole_folder
 from rig.recording.import_format import EXPORTED, FIELDS, OPTIONAL, SessionTable, TrialTable, column_names
@@ -45,7 +46,7 @@ class TrialFiles:
     streams: dict[str, dict[str, NDArray[np.float64]]]
 
 
-def import_session(folder: Path, out: Path, columns: Iterable[str], now: datetime) -> Session:
+def import_session(folder: Path, out: Path, columns: Iterable[str], now: datetime, tell: Progress = silent) -> Session:
     """Makes the session ``out`` from the CSV files in ``folder``.
 
     ``columns`` are ``[STREAM.]FIELD=HEADER`` for files with other column names; ``now`` is noted as time of import.
@@ -57,21 +58,24 @@ def import_session(folder: Path, out: Path, columns: Iterable[str], now: datetim
     if not (folder / "session.toml").exists():
         raise DataError(f"{folder}: no session.toml in it; examples/measured shows what an import folder holds")
     session = load(SessionTable, folder / "session.toml")
-    trials = read_files(folder, names)
+    trials = read_files(folder, names, tell)
     info = _info(folder, session, trials, now)
     with whole_folder(out) as scratch:
-        _write_all(scratch, trials, session, info)
+        _write_all(scratch, trials, session, info, tell)
         write_session(scratch, replace(info, trials=tuple(trial.sealed(scratch) for trial in info.trials)))
     written = open_session(out)
     return replace(written, remarks=(*written.remarks, *_overlaps(trials)))
 
 
-def read_files(folder: Path, names: Mapping[str, Mapping[str, str]]) -> list[TrialFiles]:
+def read_files(folder: Path, names: Mapping[str, Mapping[str, str]], tell: Progress = silent) -> list[TrialFiles]:
     """All trials, in order of time; raises DataError for the first thing wrong in any of them."""
     found = sorted(path for path in folder.glob("trial_*") if path.is_dir())
     if not found:
         raise DataError(f"{folder}: no trial in it; each trial is a folder trial_NAME with force.csv and axis.csv")
-    trials = [_read_files(path, names) for path in found]
+    trials = []
+    for number, path in enumerate(found):
+        tell(f"reading {path.name}", number / len(found) / 2)
+        trials.append(_read_files(path, names))
     _check_distinct(folder, trials)
     return sorted(trials, key=lambda trial: float(trial.streams["force"][TIME][0]))
 
@@ -137,10 +141,13 @@ def _trial_info(trial: TrialFiles, force_sense: int) -> TrialInfo:
     )
 
 
-def _write_all(folder: Path, trials: Sequence[TrialFiles], session: SessionTable, info: SessionInfo) -> None:
+def _write_all(
+    folder: Path, trials: Sequence[TrialFiles], session: SessionTable, info: SessionInfo, tell: Progress
+) -> None:
     jobs = [(folder / f"{trial.name}.mcap", index, trial, session, info) for index, trial in enumerate(trials)]
     if sum(sum(item.samples.values()) for item in info.trials) < PARALLEL_ROWS:
-        for job in jobs:
+        for number, job in enumerate(jobs):
+            tell(f"writing {job[0].name}", (1 + number / len(jobs)) / 2)
             _write(*job)
         return
     # The stock writer takes some 4 us a row; the trials of a long session are written side by side.
@@ -148,7 +155,8 @@ def _write_all(folder: Path, trials: Sequence[TrialFiles], session: SessionTable
     ignoring = (signal.SIGINT, signal.SIG_IGN)
     with ProcessPoolExecutor(mp_context=get_context("spawn"), initializer=signal.signal, initargs=ignoring) as pool:
         try:
-            for done in [pool.submit(_write, *job) for job in jobs]:
+            for number, done in enumerate([pool.submit(_write, *job) for job in jobs]):
+                tell(f"writing {jobs[number][0].name}", (1 + number / len(jobs)) / 2)
                 done.result()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.channels import EVENT
+from rig.progress import Progress, silent
 from rig.recording.files import whole_file
 from rig.recording.mcap_file import SUMMARY, RecordingWriter
 from rig.recording.reader import Recording, read_bytes, read_recording, samples
@@ -69,13 +71,17 @@ class Verdict:
 
 def verify(path: Path) -> Verdict:
     """Reads the whole file and judges it; raises DataError where it is no recording at all."""
-    recording = read_recording(path)
+    return verdict_of(read_recording(path))
+
+
+def verdict_of(recording: Recording) -> Verdict:
+    """What a recording that was read proves about itself."""
     streams = {
         name: _judge(table["seq"], table["capture_ns"], table["arrival_ns"], _told(recording, name))
         for name, table in {**recording.tables, EVENT.name: _event_table(recording)}.items()
     }
     state: State = "damaged" if recording.damage else "complete" if recording.complete else "incomplete"
-    return Verdict(path, state, _sentence(recording, state, streams), streams, recording.damage)
+    return Verdict(recording.path, state, _sentence(recording, state, streams), streams, recording.damage)
 
 
 def _event_table(recording: Recording) -> NDArray[np.void]:
@@ -137,20 +143,22 @@ def _sentence(recording: Recording, state: State, streams: Mapping[str, StreamVe
     return f"{recording.path.name}: " + "; ".join([whole, *faults]) + advice
 
 
-def repair(path: Path, out: Path) -> Verdict:
+def repair(path: Path, out: Path, tell: Progress = silent) -> Verdict:
     """Saves every good sample of ``path``, in order, as the new valid recording ``out``, and judges that.
 
     The metadata are kept; the summary gains ``repaired_from`` and ``damage``. ``out`` appears whole or not at all.
     """
+    tell(f"reading {path.name}", 0.0)
     found = scan(read_bytes(path))
     metadata = {name: values for name, values in found.metadata.items() if name != SUMMARY}
     damage = [*found.damage, *([found.cut] if found.cut else [])]
     summary = {"outcome": "recording cut"} | found.metadata.get(SUMMARY, {})
-    with whole_file(out) as scratch:
-        writer = RecordingWriter(scratch, metadata)
+    count = sum(len(chunk.messages) for chunk in found.chunks)
+    with whole_file(out) as scratch, closing(RecordingWriter(scratch, metadata)) as writer:
         for number, (stream, body) in enumerate(samples(path, found)):
             writer.add(stream.id, body)
             if number % ROWS_PER_CHUNK == ROWS_PER_CHUNK - 1:
                 writer.flush()
+                tell("saving good samples", number / count)
         writer.finish({**summary, "repaired_from": path.name, "damage": json.dumps(damage)})
     return verify(out)

@@ -7,10 +7,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from rig.errors import DataError, RigError, UsageError
+from rig.errors import DataError, UsageError
+from rig.progress import Progress, silent
 from rig.recording.reader import Recording
 from rig.recording.sessions import Session, TrialInfo, open_session
-from rig.recording.verify import Verdict, verify
+from rig.recording.verify import Verdict, verdict_of
 from rig.report.diagnosed import Diagnosed, read_diagnosis
 from rig.report.figures import Tracked
 from rig.report.fitted import Fitted, read_fit
@@ -31,8 +32,20 @@ class TrialFacts:
 
     info: TrialInfo
     verdict: Verdict | str
-    samples: int
-    dropped: int
+
+    @property
+    def samples(self) -> int:
+        """Of all streams; as the session lists them where the recording cannot be read."""
+        if isinstance(self.verdict, str):
+            return sum(self.info.samples.values())
+        return sum(stream.samples for stream in self.verdict.streams.values())
+
+    @property
+    def dropped(self) -> int:
+        """As above."""
+        if isinstance(self.verdict, str):
+            return sum(self.info.dropped.values())
+        return sum(stream.dropped for stream in self.verdict.streams.values())
 
 
 @dataclass(frozen=True)
@@ -70,14 +83,14 @@ class Facts:
     diagnosis: Diagnosed | str
 
 
-def gather(folder: Path) -> Facts:
+def gather(folder: Path, tell: Progress = silent) -> Facts:
     """Reads the session in ``folder``; raises DataError only where there is none."""
     session = open_session(folder)
-    recordings = _recordings(session)
+    recordings, trials = _read(session, tell)
     metadata = next((recording.metadata for recording in recordings.values() if recording.metadata), {})
     return Facts(
         session=session,
-        trials=tuple(_trial(session, info) for info in session.trials),
+        trials=trials,
         fit=read_fit(session),
         tracking=_tracking(session, recordings),
         loop=_loop(list(recordings.values())),
@@ -88,23 +101,19 @@ def gather(folder: Path) -> Facts:
     )
 
 
-def _recordings(session: Session) -> dict[str, Recording]:
-    found = {}
-    for trial in session.trials:
+def _read(session: Session, tell: Progress) -> tuple[dict[str, Recording], tuple[TrialFacts, ...]]:
+    """The recordings that open, and what is known of each trial."""
+    found: dict[str, Recording] = {}
+    trials: list[TrialFacts] = []
+    for number, info in enumerate(session.trials):
+        tell(f"reading {info.file}", 0.9 * number / len(session.trials))
         try:
-            found[trial.name] = session.recording(trial.name)
-        except DataError:
-            continue
-    return found
-
-
-def _trial(session: Session, info: TrialInfo) -> TrialFacts:
-    try:
-        verdict = verify(session.path(info.name))
-    except RigError as error:
-        return TrialFacts(info, str(error), sum(info.samples.values()), sum(info.dropped.values()))
-    samples = sum(stream.samples for stream in verdict.streams.values())
-    return TrialFacts(info, verdict, samples, sum(stream.dropped for stream in verdict.streams.values()))
+            found[info.name] = session.recording(info.name)
+        except DataError as error:
+            trials.append(TrialFacts(info, str(error)))
+        else:
+            trials.append(TrialFacts(info, verdict_of(found[info.name])))
+    return found, tuple(trials)
 
 
 def _tracking(session: Session, recordings: Mapping[str, Recording]) -> TrackingFacts | str:

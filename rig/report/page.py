@@ -4,6 +4,7 @@ from pathlib import Path
 from string import Template
 
 from rig.errors import UsageError
+from rig.progress import Progress, silent
 from rig.recording.files import write_text
 from rig.report.facts import Facts, gather
 from rig.report.markup import paragraph, text
@@ -13,14 +14,18 @@ from rig.version import SOFTWARE
 TEMPLATE = Path(__file__).with_name("page.html")
 
 
-def write_report(session: Path, out: Path) -> None:
+def write_report(session: Path, out: Path, tell: Progress = silent) -> None:
     """Writes the report on the session in folder ``session`` to ``out``, whole or not at all.
 
     Raises DataError where there is no session, UsageError where ``out`` lies in no folder.
     """
     if not out.parent.is_dir():
         raise UsageError(f"{out}: its folder does not exist; make it, or give another --out")
-    write_text(out, page(gather(session)))
+    facts = gather(session, tell)
+    tell("drawing", 0.9)
+    found = page(facts)
+    tell(f"writing {out.name}", 1.0)
+    write_text(out, found)
 
 
 def page(facts: Facts) -> str:

@@ -7,6 +7,7 @@ import pytest
 from api.operations import records
 from controller.operation import Cancelled, Operation, Progress
 from rig.results.recorded import VerifyResult
+from tests.rig.recording.measured import NOW, measured
 from tests.rig.tissue.synthetic import Bench, write_made_session
 
 
@@ -42,14 +43,40 @@ def test_what_is_no_recording_is_damaged_and_hides_no_other(session: Path, tmp_p
     assert [one.state for one in found.recordings.values()] == ["damaged", alone.recordings["trial_500"].state]
 
 
-def test_an_export_that_is_cancelled_makes_no_further_format(session: Path, tmp_path: Path) -> None:
-    operation = Operation("export")
+def cancelled_once(message: str, name: str) -> Operation:
+    """An operation that is cancelled as soon as it says ``message``."""
+    operation = Operation(name)
 
     def watch(now: Progress) -> None:
-        if now.message == "csv":
+        if now.message == message:
             operation.cancel()
 
     operation.watch = watch
+    return operation
+
+
+def test_a_repair_that_is_cancelled_among_the_samples_leaves_nothing(session: Path, tmp_path: Path) -> None:
+    operation, out = cancelled_once("saving good samples", "repair"), tmp_path / "good.mcap"
+    with pytest.raises(Cancelled, match="repair was cancelled before: saving good samples"):
+        operation.run(lambda: records.repair(operation, session / "trial_500.mcap", out))
+    assert 0 < operation.progress.done < 1
+    assert not list(tmp_path.iterdir())
+    whole = records.repair(Operation("repair"), session / "trial_500.mcap", out)
+    assert whole.streams.keys() and out.exists()
+
+
+@pytest.mark.parametrize(
+    ("said", "next_"), [("reading trial_01", "reading trial_02"), ("writing trial_01.mcap", "writing trial_02.mcap")]
+)
+def test_an_import_that_is_cancelled_between_two_trials_leaves_nothing(tmp_path: Path, said: str, next_: str) -> None:
+    source, operation = measured(tmp_path / "measured"), cancelled_once(said, "import")
+    with pytest.raises(Cancelled, match=f"import was cancelled before: {next_}"):
+        operation.run(lambda: records.import_folder(operation, source, tmp_path / "out", (), NOW))
+    assert [path.name for path in tmp_path.iterdir()] == ["measured"]
+
+
+def test_an_export_that_is_cancelled_makes_no_further_format(session: Path, tmp_path: Path) -> None:
+    operation = cancelled_once("csv", "export")
     with pytest.raises(Cancelled, match="export was cancelled before: mat"):
         operation.run(lambda: records.export_session(operation, session, tmp_path / "out", ["csv", "mat"]))
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["csv"]

@@ -85,6 +85,20 @@ def test_a_report_and_a_check_that_are_cancelled_write_nothing(session: Path, tm
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("said", "next_"),
+    [("reading trial_500.mcap", "reading trial_501.mcap"), ("drawing", "writing report.html")],
+)
+def test_a_report_that_is_cancelled_between_two_steps_writes_nothing(
+    session: Path, tmp_path: Path, said: str, next_: str
+) -> None:
+    operation = Operation("report")
+    cancelled_at(operation, said)
+    with pytest.raises(Cancelled, match=f"report was cancelled before: {next_}"):
+        operation.run(lambda: report(operation, session, tmp_path / "report.html"))
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_simulation_that_is_cancelled_draws_nothing(tmp_path: Path) -> None:
     operation = Operation("simulate")
     cancelled_at(operation, "playing, 1 of 3")
