@@ -1,8 +1,13 @@
-"""Declarations by name: products, laws, causes. Each is registered once; a wrong name is answered with the nearest."""
+"""Declarations by name: products, laws, causes. Each is registered once; a wrong name is answered with the nearest.
+
+A distribution adds its own by entry points: `cubic = "acme.cubic:Cubic"` in group `tissue_rig.laws`, for example.
+"""
 
 import difflib
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Generic, TypeVar
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Generic, TypeVar
 
 from rig.errors import UsageError
 
@@ -26,13 +31,30 @@ def known(name: str, names: Iterable[str], what: str) -> str:
     )
 
 
-class Registry(Mapping[str, Item], Generic[Item]):
-    """Declarations in the order in which they were registered; ``what`` is what one of them is called in messages."""
+# Looking through all distributions takes 10 ms.
+_advertised = cache(entry_points)
 
-    def __init__(self, what: str, name_of: Callable[[Item], str], items: Iterable[Item] = ()) -> None:
+
+def _loaded(point: EntryPoint) -> Any:
+    try:
+        return point.load()
+    except Exception as error:
+        whose = point.dist.name if point.dist else "a distribution"
+        raise UsageError(
+            f"{point.group} {point.name!r} of {whose} cannot be loaded: {error!r}; mend or uninstall it"
+        ) from error
+
+
+class Registry(Mapping[str, Item], Generic[Item]):
+    """Declarations in the order in which they were registered; ``what`` is what one of them is called in messages.
+
+    After ``items`` come the entry points of ``group``; raises UsageError where one cannot be loaded.
+    """
+
+    def __init__(self, what: str, name_of: Callable[[Item], str], items: Iterable[Item], group: str = "") -> None:
         self._what, self._name_of = what, name_of
         self._items: dict[str, Item] = {}
-        for item in items:
+        for item in (*items, *map(_loaded, _advertised().select(group=group))):
             self.register(item)
 
     def register(self, item: Item) -> Item:

@@ -32,7 +32,7 @@ def draw_secret(rng: np.random.Generator, name: str) -> Secret:
         "rate_law": ({"exponent": u(0.4, 0.75)}, {"rate_exponent": "exponent"}),
         "frame_compliance": ({"mm_per_n": u(0.015, 0.06)}, {"frame_compliance_mm_N": "mm_per_n"}),
         "contact_offset": ({"mm": u(0.15, 0.8)}, {"contact_offset_mm": "mm"}),
-        "substrate": ({"share_at_6mm": u(0.1, 0.5)}, {}),
+        "substrate": ({"per_mm3": u(0.1, 0.5) / 6.0**3}, {"substrate_per_mm3": "per_mm3"}),
         "zero_drift": ({"n_per_h": u(2.5, 12)}, {"zero_drift_N_h": "n_per_h"}),
         "time_offset": ({"s": u(0.002, 0.012)}, {"time_offset_s": "s"}),
         "tracker_latency": ({"s": u(0.008, 0.05)}, {"tracker_latency_s": "s"}),

@@ -106,7 +106,7 @@ def elastic(bench: Bench, hidden: Hidden, depth: Array) -> Array:
         force = bench.a * x ** law["power"]
     else:
         force = bench.a * x * np.exp(bench.b * x)
-    force = force * (1 + hidden.get("substrate", "share_at_6mm") * (x / 6.0) ** 3)
+    force = force * (1 + hidden.get("substrate", "per_mm3") * x**3)
     bump = hidden.causes.get("unknown_depth_bump", {})
     if bump:
         force = force + bump["newton"] * np.exp(-0.5 * ((depth - bump["at_mm"]) / 0.5) ** 2) * (depth > 0)

@@ -12,7 +12,7 @@ from rig.tissue.laws_viscous import HuntCrossley, Prony, QuasiLinear, StandardLi
 COMPARED: tuple[type[Law], ...] = (Constant, Index)
 RIVALS: tuple[type[Law], ...] = (Quadratic, Power, Fung)
 OTHERS: tuple[type[Law], ...] = (Layer, HuntCrossley, StandardLinear, Prony, QuasiLinear, Extended)
-LAWS = Registry[type[Law]]("tissue law", lambda law: law.name, (*COMPARED, *RIVALS, *OTHERS))
+LAWS = Registry[type[Law]]("tissue law", lambda law: law.name, (*COMPARED, *RIVALS, *OTHERS), "tissue_rig.laws")
 ALSO = {"kelvin_voigt": Constant.name}
 
 

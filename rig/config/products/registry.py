@@ -25,9 +25,9 @@ def name_of(product: type[Product]) -> str:
     return str(product.model_fields["product"].default)
 
 
-FORCE_SENSORS = Registry[type[ForceProduct]]("force sensor", name_of, (BotaWiring, Ft300Wiring))
-AXES = Registry[type[AxisProduct]]("servo axis", name_of, (Epos4Wiring,))
-TRACKERS = Registry[type[TrackerProduct]]("marker tracker", name_of, (PolarisWiring,))
+FORCE_SENSORS = Registry[type[ForceProduct]]("force sensor", name_of, (BotaWiring, Ft300Wiring), "tissue_rig.force")
+AXES = Registry[type[AxisProduct]]("servo axis", name_of, (Epos4Wiring,), "tissue_rig.axis")
+TRACKERS = Registry[type[TrackerProduct]]("marker tracker", name_of, (PolarisWiring,), "tissue_rig.tracker")
 ROLES: Mapping[str, Registry[Any]] = {"force": FORCE_SENSORS, "axis": AXES, "tracker": TRACKERS}
 
 

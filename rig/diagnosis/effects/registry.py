@@ -5,4 +5,4 @@ from rig.diagnosis.effects.tissue import TISSUE_EFFECTS
 from rig.diagnosis.problem import Effect
 from rig.registry import Registry
 
-CAUSES = Registry[Effect]("cause", lambda cause: cause.key, (*TISSUE_EFFECTS, *BENCH_EFFECTS))
+CAUSES = Registry[Effect]("cause", lambda cause: cause.key, (*TISSUE_EFFECTS, *BENCH_EFFECTS), "tissue_rig.causes")
