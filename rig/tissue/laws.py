@@ -7,7 +7,8 @@ outside the tissue (depth below zero) force and stiffness are zero. `registry` f
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import ClassVar, NamedTuple, Self
+from inspect import get_annotations
+from typing import Annotated, ClassVar, NamedTuple, Self, TypeAlias, get_type_hints
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +31,9 @@ class ParameterBounds(NamedTuple):
     meaning: str
 
 
+SecantAtContact: TypeAlias = Annotated[float, ParameterBounds("N/mm", 1e-6, 1e4, "secant stiffness at contact")]
+
+
 class Parameter(NamedTuple):
     """One parameter of a law with its value."""
 
@@ -40,23 +44,28 @@ class Parameter(NamedTuple):
     upper: float
 
 
-DAMPING = ParameterBounds("N s/mm", 0.0, 10.0, "damping: force per speed of the tip")
-
-
 @dataclass(frozen=True, kw_only=True)
 class Law(ABC):
     """Force at depth x and speed v: F = int (1 + sum r_i exp(-(t-s)/tau_i)) de(x(s)) + damping(x) v; 0 for x < 0.
 
-    Subclasses are frozen dataclasses whose fields are the parameters; they give the elastic part e (what is left when
-    the tip rests) for x >= 0, its derivative and its inverse, and damping or the ``terms`` of relaxation if there are
-    any. A parameter outside its bounds raises UsageError. ``known`` are parameters that a fit takes as given, with the
-    value it takes unless told another.
+    Subclasses are frozen dataclasses whose fields are the parameters, each annotated with its ``ParameterBounds``; they
+    give the elastic part e (what is left when the tip rests) for x >= 0, its derivative and its inverse, and damping or
+    the ``terms`` of relaxation if there are any. A parameter outside its bounds raises UsageError. ``known`` are
+    parameters that a fit takes as given, with the value it takes unless told another.
     """
 
     name: ClassVar[str]
     formula: ClassVar[str]
     bounds: ClassVar[Mapping[str, ParameterBounds]]
     known: ClassVar[Mapping[str, float]] = {}
+
+    def __init_subclass__(cls) -> None:
+        if get_annotations(cls):
+            hints = get_type_hints(cls, include_extras=True).items()
+            declared = {name: hint.__metadata__[0] for name, hint in hints if hasattr(hint, "__metadata__")}
+            # The order of a model's covariance: damping last, but before what has a null and is off unless named.
+            order = sorted(declared, key=lambda name: (hasattr(cls, name), name == "damping_N_s_mm"))
+            cls.bounds = {name: declared[name] for name in order}
 
     def __post_init__(self) -> None:
         for parameter in self.parameters:
@@ -93,9 +102,14 @@ class Law(ABC):
         return type(type(self).__name__, (type(self),), {"known": known})
 
     @classmethod
-    @abstractmethod
     def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
         """A law near the data, shape (n,), to start a fit from; depths and forces are above zero."""
+        return cls.clipped(**(dict.fromkeys(cls.bounds, 0.0) | cls.near(depth_mm, force_N)))
+
+    @classmethod
+    @abstractmethod
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
+        """Parameters near the data, shape (n,), those left out being zero; depths and forces are above zero."""
 
     @abstractmethod
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
@@ -179,7 +193,7 @@ class Law(ABC):
 class Damped(Law):
     """An elastic law and one damping for all depths: F = elastic(x) + B v."""
 
-    damping_N_s_mm: float
+    damping_N_s_mm: Annotated[float, ParameterBounds("N s/mm", 0.0, 10.0, "damping: force per speed of the tip")]
 
     def damping(self, depth_mm: FloatArray) -> FloatArray:
         """B."""
@@ -237,12 +251,8 @@ class Constant(Linear, Damped):
 
     name: ClassVar[str] = "constant"
     formula: ClassVar[str] = "F = k x + B v"
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
-        "k_N_mm": ParameterBounds("N/mm", 1e-6, 1e4, "stiffness"),
-        "damping_N_s_mm": DAMPING,
-    }
 
-    k_N_mm: float
+    k_N_mm: Annotated[float, ParameterBounds("N/mm", 1e-6, 1e4, "stiffness")]
 
     @property
     def stiffness_N_mm(self) -> float:
@@ -250,9 +260,9 @@ class Constant(Linear, Damped):
         return self.k_N_mm
 
     @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
-        """The line through contact and the data's centre of least squares, without damping."""
-        return cls.clipped(k_N_mm=straight(depth_mm, force_N), damping_N_s_mm=0.0)
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
+        """The line through contact and the data's centre of least squares."""
+        return {"k_N_mm": straight(depth_mm, force_N)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -265,20 +275,15 @@ class Index(Damped):
 
     name: ClassVar[str] = "index"
     formula: ClassVar[str] = "F = a x exp(b x) + B v"
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
-        "a_N_mm": ParameterBounds("N/mm", 1e-6, 1e4, "secant stiffness at contact"),
-        "b_per_mm": ParameterBounds("1/mm", 0.0, 5.0, "stiffening per depth"),
-        "damping_N_s_mm": DAMPING,
-    }
 
-    a_N_mm: float
-    b_per_mm: float
+    a_N_mm: SecantAtContact
+    b_per_mm: Annotated[float, ParameterBounds("1/mm", 0.0, 5.0, "stiffening per depth")]
 
     @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
-        """The straight line ln(F/x) = ln a + b x, weighted with force, without damping."""
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
+        """The straight line ln(F/x) = ln a + b x, weighted with force."""
         slope, level = np.polyfit(depth_mm, np.log(force_N / depth_mm), 1, w=force_N)
-        return cls.clipped(a_N_mm=float(np.exp(level)), b_per_mm=slope, damping_N_s_mm=0.0)
+        return {"a_N_mm": float(np.exp(level)), "b_per_mm": float(slope)}
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """a x exp(b x)."""

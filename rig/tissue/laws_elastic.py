@@ -2,17 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from rig.tissue.hayes import punch_stiffness_N_mm
-from rig.tissue.laws import DAMPING, Damped, FloatArray, Law, Linear, ParameterBounds, straight
-
-FORCE_SCALE = ParameterBounds("N", 1e-6, 1e5, "force scale")
-STIFFENING = ParameterBounds("1/mm", 1e-4, 5.0, "stiffening per depth")
-FORCE_AT_1_MM = ParameterBounds("N/mm^n", 1e-6, 1e4, "force at 1 mm")
-EXPONENT = ParameterBounds("1", 1.0, 6.0, "exponent")
+from rig.tissue.laws import Damped, FloatArray, Law, Linear, ParameterBounds, straight
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,20 +18,15 @@ class Quadratic(Damped):
 
     name: ClassVar[str] = "quadratic"
     formula: ClassVar[str] = "F = a x + c x^2 + B v"
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
-        "a_N_mm": ParameterBounds("N/mm", 1e-6, 1e4, "stiffness at contact"),
-        "c_N_mm2": ParameterBounds("N/mm^2", 0.0, 1e3, "stiffening per depth"),
-        "damping_N_s_mm": DAMPING,
-    }
 
-    a_N_mm: float
-    c_N_mm2: float
+    a_N_mm: Annotated[float, ParameterBounds("N/mm", 1e-6, 1e4, "stiffness at contact")]
+    c_N_mm2: Annotated[float, ParameterBounds("N/mm^2", 0.0, 1e3, "stiffening per depth")]
 
     @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
         """Linear least squares."""
         (a, c), *_ = np.linalg.lstsq(np.column_stack([depth_mm, depth_mm**2]), force_N, rcond=None)
-        return cls.clipped(a_N_mm=a, c_N_mm2=c, damping_N_s_mm=0.0)
+        return {"a_N_mm": float(a), "c_N_mm2": float(c)}
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """a x + c x^2."""
@@ -55,8 +45,14 @@ class Quadratic(Damped):
 class PowerShape(Law):
     """Force at rest a x^n; n = 1.5 is Hertz's sphere, n = 2 the cone and any tip pushed in deep."""
 
-    a_N_mmn: float
-    exponent: float
+    a_N_mmn: Annotated[float, ParameterBounds("N/mm^n", 1e-6, 1e4, "force at 1 mm")]
+    exponent: Annotated[float, ParameterBounds("1", 1.0, 6.0, "exponent")]
+
+    @classmethod
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
+        """a and n of the straight line ln F = ln a + n ln x, weighted with force."""
+        n, level = np.polyfit(np.log(depth_mm), np.log(force_N), 1, w=force_N)
+        return {"a_N_mmn": float(np.exp(level)), "exponent": float(n)}
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """a x^n."""
@@ -71,37 +67,29 @@ class PowerShape(Law):
         return np.asarray((force_N / self.a_N_mmn) ** (1.0 / self.exponent))
 
 
-def power_near(depth_mm: FloatArray, force_N: FloatArray) -> tuple[float, float]:
-    """a and n of the straight line ln F = ln a + n ln x, weighted with force."""
-    n, level = np.polyfit(np.log(depth_mm), np.log(force_N), 1, w=force_N)
-    return float(np.exp(level)), float(n)
-
-
 @dataclass(frozen=True, kw_only=True)
 class Power(PowerShape, Damped):
     """F = a x^n + B v."""
 
     name: ClassVar[str] = "power"
     formula: ClassVar[str] = "F = a x^n + B v"
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
-        "a_N_mmn": FORCE_AT_1_MM,
-        "exponent": EXPONENT,
-        "damping_N_s_mm": DAMPING,
-    }
-
-    @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
-        """The straight line through logarithms, without damping."""
-        a, n = power_near(depth_mm, force_N)
-        return cls.clipped(a_N_mmn=a, exponent=n, damping_N_s_mm=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class FungShape(Law):
     """Force at rest A (exp(b x) - 1), the elastic part of Fung's quasi-linear viscoelasticity (Fung 1993, ch. 7)."""
 
-    A_N: float
-    b_per_mm: float
+    A_N: Annotated[float, ParameterBounds("N", 1e-6, 1e5, "force scale")]
+    b_per_mm: Annotated[float, ParameterBounds("1/mm", 1e-4, 5.0, "stiffening per depth")]
+
+    @classmethod
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
+        """A and b from the forces at the largest depth and at half of it: F(2x)/F(x) = exp(b x) + 1."""
+        order = np.argsort(depth_mm)
+        deep, top = float(depth_mm[order[-1]]), float(force_N[order[-1]])
+        half = float(np.interp(0.5 * deep, depth_mm[order], force_N[order]))
+        b = float(np.clip(np.log(max(top / max(half, 1e-9) - 1.0, 1.01)) / (0.5 * deep), 1e-3, 3.0))
+        return {"A_N": top / float(np.expm1(b * deep)), "b_per_mm": b}
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """A (exp(b x) - 1)."""
@@ -116,32 +104,12 @@ class FungShape(Law):
         return np.log1p(force_N / self.A_N) / self.b_per_mm
 
 
-def fung_near(depth_mm: FloatArray, force_N: FloatArray) -> tuple[float, float]:
-    """A and b from the forces at the largest depth and at half of it: F(2x)/F(x) = exp(b x) + 1."""
-    order = np.argsort(depth_mm)
-    deep, top = float(depth_mm[order[-1]]), float(force_N[order[-1]])
-    half = float(np.interp(0.5 * deep, depth_mm[order], force_N[order]))
-    b = float(np.clip(np.log(max(top / max(half, 1e-9) - 1.0, 1.01)) / (0.5 * deep), 1e-3, 3.0))
-    return top / float(np.expm1(b * deep)), b
-
-
 @dataclass(frozen=True, kw_only=True)
 class Fung(FungShape, Damped):
     """F = A (exp(b x) - 1) + B v."""
 
     name: ClassVar[str] = "fung"
     formula: ClassVar[str] = "F = A (exp(b x) - 1) + B v"
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
-        "A_N": FORCE_SCALE,
-        "b_per_mm": STIFFENING,
-        "damping_N_s_mm": DAMPING,
-    }
-
-    @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
-        """From two depths, without damping."""
-        scale_N, b_per_mm = fung_near(depth_mm, force_N)
-        return cls.clipped(A_N=scale_N, b_per_mm=b_per_mm, damping_N_s_mm=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,19 +122,12 @@ class Layer(Linear, Damped):
 
     name: ClassVar[str] = "layer"
     formula: ClassVar[str] = "F = 2 r E kappa(r/h, nu) x / (1 - nu^2) + B v"
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
-        "E_MPa": ParameterBounds("MPa", 1e-6, 1e4, "Young's modulus"),
-        "radius_mm": ParameterBounds("mm", 0.1, 100.0, "radius of the tip"),
-        "thickness_mm": ParameterBounds("mm", 0.1, 1e4, "tissue above the bone"),
-        "poisson_ratio": ParameterBounds("1", 0.0, 0.5, "Poisson's ratio"),
-        "damping_N_s_mm": DAMPING,
-    }
     known: ClassVar[Mapping[str, float]] = {"radius_mm": 3.0, "thickness_mm": 39.0, "poisson_ratio": 0.45}
 
-    E_MPa: float
-    radius_mm: float
-    thickness_mm: float
-    poisson_ratio: float
+    E_MPa: Annotated[float, ParameterBounds("MPa", 1e-6, 1e4, "Young's modulus")]
+    radius_mm: Annotated[float, ParameterBounds("mm", 0.1, 100.0, "radius of the tip")]
+    thickness_mm: Annotated[float, ParameterBounds("mm", 0.1, 1e4, "tissue above the bone")]
+    poisson_ratio: Annotated[float, ParameterBounds("1", 0.0, 0.5, "Poisson's ratio")]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -178,7 +139,7 @@ class Layer(Linear, Damped):
         return punch_stiffness_N_mm(self.E_MPa, self.poisson_ratio, self.radius_mm, self.thickness_mm)
 
     @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
         """E from the line through contact, for the tip and layer known."""
         soft = cls(E_MPa=1.0, damping_N_s_mm=0.0, **cls.known)
-        return cls.clipped(E_MPa=straight(depth_mm, force_N) / soft.stiffness_N_mm, damping_N_s_mm=0.0, **cls.known)
+        return {"E_MPa": straight(depth_mm, force_N) / soft.stiffness_N_mm, **cls.known}

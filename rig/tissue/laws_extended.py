@@ -1,15 +1,16 @@
 """The index law with what a diagnosis found missing in it; each part is off at its null."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar, Self
+from dataclasses import asdict, dataclass
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.tissue.history import Term
 from rig.tissue.index_law import extended_force
-from rig.tissue.laws import DAMPING, Damped, FloatArray, Index, ParameterBounds, bisect
+from rig.tissue.laws import Damped, FloatArray, Index, ParameterBounds, SecantAtContact, bisect
+from rig.tissue.laws_viscous import Tau
 
 DEEPEST_MM = 200.0  # no limb is thicker
 STEP_MM = 1e-5  # near the cube root of double precision, where a central difference errs least
@@ -27,40 +28,28 @@ class Extended(Damped):
     formula: ClassVar[str] = (
         "F = int (1 + r exp(-(t-s)/tau)) d[a x exp(b x) (x / 5 mm)^(n-1) (1 + q x) (1 + s x^3)] + B v, x = depth - c F"
     )
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
-        "a_N_mm": ParameterBounds("N/mm", 1e-6, 1e4, "secant stiffness at contact"),
-        "b_per_mm": ParameterBounds("1/mm", -0.5, 5.0, "stiffening per depth"),
-        "damping_N_s_mm": DAMPING,
-        "exponent": ParameterBounds("1", 0.2, 4.0, "exponent"),
-        "quadratic_per_mm": ParameterBounds("1/mm", -0.15, 50.0, "polynomial stiffening"),
-        "substrate_per_mm3": ParameterBounds("1/mm^3", 0.0, 0.05, "stiffening by what lies below"),
-        "relaxation_ratio": ParameterBounds("1", 0.0, 30.0, "force that relaxes over force at rest"),
-        "tau_s": ParameterBounds("s", 1e-3, 1e3, "time of relaxation"),
-        "frame_compliance_mm_N": ParameterBounds("mm/N", 0.0, 0.8, "compliance of the frame"),
-        "friction_N": ParameterBounds("N", 0.0, 20.0, "friction of the guide in front of the sensor"),
-        "friction_length_mm": ParameterBounds("mm", 1e-3, 10.0, "travel over which friction builds up"),
-    }
     known: ClassVar[Mapping[str, float]] = {
         "exponent": 1.0, "quadratic_per_mm": 0.0, "substrate_per_mm3": 0.0, "relaxation_ratio": 0.0, "tau_s": 1.0,
         "frame_compliance_mm_N": 0.0, "friction_N": 0.0, "friction_length_mm": 0.1,
     }  # fmt: skip
 
-    a_N_mm: float
-    b_per_mm: float
-    exponent: float = 1.0
-    quadratic_per_mm: float = 0.0
-    substrate_per_mm3: float = 0.0
-    relaxation_ratio: float = 0.0
-    tau_s: float = 1.0
-    frame_compliance_mm_N: float = 0.0
-    friction_N: float = 0.0
-    friction_length_mm: float = 0.1
+    a_N_mm: SecantAtContact
+    b_per_mm: Annotated[float, ParameterBounds("1/mm", -0.5, 5.0, "stiffening per depth")]
+    exponent: Annotated[float, ParameterBounds("1", 0.2, 4.0, "exponent")] = 1.0
+    quadratic_per_mm: Annotated[float, ParameterBounds("1/mm", -0.15, 50.0, "polynomial stiffening")] = 0.0
+    substrate_per_mm3: Annotated[float, ParameterBounds("1/mm^3", 0.0, 0.05, "stiffening by what lies below")] = 0.0
+    relaxation_ratio: Annotated[float, ParameterBounds("1", 0.0, 30.0, "force that relaxes over force at rest")] = 0.0
+    tau_s: Tau = 1.0
+    frame_compliance_mm_N: Annotated[float, ParameterBounds("mm/N", 0.0, 0.8, "compliance of the frame")] = 0.0
+    friction_N: Annotated[float, ParameterBounds("N", 0.0, 20.0, "friction of the guide in front of the sensor")] = 0.0
+    friction_length_mm: Annotated[float, ParameterBounds("mm", 1e-3, 10.0, "travel over which friction builds up")] = (
+        0.1
+    )
 
     @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
         """The index law's guess, nothing extended."""
-        index = Index.guess(depth_mm, force_N)
-        return cls(a_N_mm=index.a_N_mm, b_per_mm=index.b_per_mm, damping_N_s_mm=index.damping_N_s_mm)
+        return {**cls.known, **asdict(Index.guess(depth_mm, force_N))}
 
     @property
     def terms(self) -> tuple[Term, ...]:

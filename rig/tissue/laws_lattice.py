@@ -1,9 +1,8 @@
 """The lattice as laws to fit and judge like any other: with one stiffness, and with the study's global k(x)."""
 
 from abc import abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, TypeAlias
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -11,10 +10,10 @@ from scipy.interpolate import PchipInterpolator
 from rig.errors import UsageError
 from rig.tissue.index_law import index_stiffness
 from rig.tissue.lattice.sweep import Sweep
-from rig.tissue.laws import DAMPING, Damped, FloatArray, Law, ParameterBounds, bisect
+from rig.tissue.laws import Damped, FloatArray, Law, ParameterBounds, bisect, straight
 
 LEAST_DEPTHS = 4  # as many as a and b with an interval take
-STIFFNESS = ParameterBounds("N/mm", 1e-8, 1e3, "spring stiffness at contact")
+SpringStiffness: TypeAlias = Annotated[float, ParameterBounds("N/mm", 1e-8, 1e3, "spring stiffness at contact")]
 FURTHER = 1.5
 
 
@@ -69,15 +68,13 @@ class LatticeConstant(LatticeLaw):
 
     name: ClassVar[str] = "lattice constant"
     formula: ClassVar[str] = "F = k phi(x) + B v"
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {"k_N_mm": STIFFNESS, "damping_N_s_mm": DAMPING}
 
-    k_N_mm: float
+    k_N_mm: SpringStiffness
 
     @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
         """Linear least squares."""
-        carried_mm = cls.phi(depth_mm)
-        return cls.clipped(k_N_mm=float(carried_mm @ force_N / (carried_mm @ carried_mm)), damping_N_s_mm=0.0)
+        return {"k_N_mm": straight(cls.phi(depth_mm), force_N)}
 
     def spring_N_mm(self, depth_mm: FloatArray) -> FloatArray:
         """k."""
@@ -94,20 +91,15 @@ class LatticeIndex(LatticeLaw):
 
     name: ClassVar[str] = "lattice index"
     formula: ClassVar[str] = "F = a exp(b x) phi(x) + B v"
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
-        "a_N_mm": STIFFNESS,
-        "b_per_mm": ParameterBounds("1/mm", -2.0, 5.0, "stiffening per depth"),
-        "damping_N_s_mm": DAMPING,
-    }
 
-    a_N_mm: float
-    b_per_mm: float
+    a_N_mm: SpringStiffness
+    b_per_mm: Annotated[float, ParameterBounds("1/mm", -2.0, 5.0, "stiffening per depth")]
 
     @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
         """The straight line ln(F/phi) = ln a + b x, weighted with force."""
         b, level = np.polyfit(depth_mm, np.log(force_N / cls.phi(depth_mm)), 1, w=force_N)
-        return cls.clipped(a_N_mm=float(np.exp(level)), b_per_mm=b, damping_N_s_mm=0.0)
+        return {"a_N_mm": float(np.exp(level)), "b_per_mm": float(b)}
 
     def spring_N_mm(self, depth_mm: FloatArray) -> FloatArray:
         """a exp(b x)."""

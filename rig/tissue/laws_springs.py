@@ -1,8 +1,7 @@
 """The lattice whose springs stiffen each by itself, as a law to fit and judge like any other."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
@@ -10,8 +9,8 @@ from scipy.interpolate import RectBivariateSpline
 from rig.tissue.lattice.newton import tangent_stiffness_N_mm
 from rig.tissue.lattice.ramp import DepthRamp, project
 from rig.tissue.lattice.state import Loaded
-from rig.tissue.laws import DAMPING, Damped, FloatArray, Law, ParameterBounds, bisect
-from rig.tissue.laws_lattice import FURTHER, STIFFNESS
+from rig.tissue.laws import Damped, FloatArray, Law, ParameterBounds, bisect
+from rig.tissue.laws_lattice import FURTHER, SpringStiffness
 
 GUESSES = 100
 
@@ -50,23 +49,18 @@ class LatticeSprings(Damped):
 
     name: ClassVar[str] = "lattice springs"
     formula: ClassVar[str] = "F = a phi(x; b) + B v, spring by spring a exp(b |strain|)"
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
-        "a_N_mm": STIFFNESS,
-        "b": ParameterBounds("1", 0.0, 40.0, "stiffening per strain of a spring"),
-        "damping_N_s_mm": DAMPING,
-    }
     surface: ClassVar[PhiSurface]
 
-    a_N_mm: float
-    b: float
+    a_N_mm: SpringStiffness
+    b: Annotated[float, ParameterBounds("1", 0.0, 40.0, "stiffening per strain of a spring")]
 
     @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
         """Variable projection on a grid of b."""
         grid = np.linspace(0.0, cls.surface.largest_b, GUESSES)
         tried = [project(force_N, cls.surface(depth_mm, b)) for b in grid]
         best = int(np.argmin([misfit for _, misfit in tried]))
-        return cls.clipped(a_N_mm=tried[best][0], b=float(grid[best]), damping_N_s_mm=0.0)
+        return {"a_N_mm": tried[best][0], "b": float(grid[best])}
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """a phi(x; b)."""

@@ -1,29 +1,18 @@
 """Laws whose force depends on how the tip came to its depth: damping that grows with depth, and relaxation."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.tissue.history import Term
 from rig.tissue.laws import FloatArray, Law, Linear, ParameterBounds, bisect, straight
-from rig.tissue.laws_elastic import (
-    EXPONENT,
-    FORCE_AT_1_MM,
-    FORCE_SCALE,
-    STIFFENING,
-    FungShape,
-    PowerShape,
-    fung_near,
-    power_near,
-)
+from rig.tissue.laws_elastic import FungShape, PowerShape
 
-STIFFNESS = ParameterBounds("N/mm", 1e-6, 1e4, "stiffness at rest")
-BRANCH = ParameterBounds("N/mm", 0.0, 1e4, "stiffness that relaxes")
-RATIO = ParameterBounds("1", 0.0, 100.0, "force that relaxes over force at rest")
-TAU = ParameterBounds("s", 1e-3, 1e3, "time of relaxation")
+AtRest: TypeAlias = Annotated[float, ParameterBounds("N/mm", 1e-6, 1e4, "stiffness at rest")]
+Branch: TypeAlias = Annotated[float, ParameterBounds("N/mm", 0.0, 1e4, "stiffness that relaxes")]
+Tau: TypeAlias = Annotated[float, ParameterBounds("s", 1e-3, 1e3, "time of relaxation")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,19 +24,8 @@ class HuntCrossley(PowerShape):
 
     name: ClassVar[str] = "hunt_crossley"
     formula: ClassVar[str] = "F = a x^n + lambda x^n v"
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
-        "a_N_mmn": FORCE_AT_1_MM,
-        "exponent": EXPONENT,
-        "lambda_N_s_mmn1": ParameterBounds("N s/mm^(n+1)", 0.0, 1e3, "damping at 1 mm"),
-    }
 
-    lambda_N_s_mmn1: float
-
-    @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
-        """The power law without damping."""
-        a, n = power_near(depth_mm, force_N)
-        return cls.clipped(a_N_mmn=a, exponent=n, lambda_N_s_mmn1=0.0)
+    lambda_N_s_mmn1: Annotated[float, ParameterBounds("N s/mm^(n+1)", 0.0, 1e3, "damping at 1 mm")]
 
     def damping(self, depth_mm: FloatArray) -> FloatArray:
         """lambda x^n."""
@@ -93,17 +71,16 @@ class StandardLinear(Linear, Relaxing):
 
     name: ClassVar[str] = "sls"
     formula: ClassVar[str] = "F = k x + int k1 exp(-(t-s)/tau) dx(s)"
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {"k_N_mm": STIFFNESS, "k1_N_mm": BRANCH, "tau_s": TAU}
 
-    k_N_mm: float
-    k1_N_mm: float
-    tau_s: float
+    k_N_mm: AtRest
+    k1_N_mm: Branch
+    tau_s: Tau
 
     @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
         """The line through contact, a third of it relaxing."""
         k = straight(depth_mm, force_N)
-        return cls.clipped(k_N_mm=0.75 * k, k1_N_mm=0.25 * k, tau_s=0.3)
+        return {"k_N_mm": 0.75 * k, "k1_N_mm": 0.25 * k, "tau_s": 0.3}
 
     @property
     def stiffness_N_mm(self) -> float:
@@ -125,21 +102,18 @@ class Prony(Linear, Relaxing):
 
     name: ClassVar[str] = "prony"
     formula: ClassVar[str] = "F = k x + int (k1 exp(-(t-s)/tau1) + k2 exp(-(t-s)/tau2)) dx(s)"
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
-        "k_N_mm": STIFFNESS, "k1_N_mm": BRANCH, "tau1_s": TAU, "k2_N_mm": BRANCH, "tau2_s": TAU
-    }  # fmt: skip
 
-    k_N_mm: float
-    k1_N_mm: float
-    tau1_s: float
-    k2_N_mm: float
-    tau2_s: float
+    k_N_mm: AtRest
+    k1_N_mm: Branch
+    tau1_s: Tau
+    k2_N_mm: Branch
+    tau2_s: Tau
 
     @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
         """The line through contact, a third of it relaxing, half soon and half late."""
         k = straight(depth_mm, force_N)
-        return cls.clipped(k_N_mm=0.75 * k, k1_N_mm=0.125 * k, tau1_s=0.1, k2_N_mm=0.125 * k, tau2_s=1.0)
+        return {"k_N_mm": 0.75 * k, "k1_N_mm": 0.125 * k, "tau1_s": 0.1, "k2_N_mm": 0.125 * k, "tau2_s": 1.0}
 
     @property
     def stiffness_N_mm(self) -> float:
@@ -161,21 +135,15 @@ class QuasiLinear(FungShape, Relaxing):
 
     name: ClassVar[str] = "qlv"
     formula: ClassVar[str] = "F = int (1 + r exp(-(t-s)/tau)) d[A (exp(b x(s)) - 1)]"
-    bounds: ClassVar[Mapping[str, ParameterBounds]] = {
-        "A_N": FORCE_SCALE,
-        "b_per_mm": STIFFENING,
-        "relaxation_ratio": RATIO,
-        "tau_s": TAU,
-    }
 
-    relaxation_ratio: float
-    tau_s: float
+    relaxation_ratio: Annotated[float, ParameterBounds("1", 0.0, 100.0, "force that relaxes over force at rest")]
+    tau_s: Tau
 
     @classmethod
-    def guess(cls, depth_mm: FloatArray, force_N: FloatArray) -> Self:
+    def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
         """The elastic law near the data, a fifth of its force relaxing."""
-        scale_N, b_per_mm = fung_near(depth_mm, force_N)
-        return cls.clipped(A_N=scale_N / 1.25, b_per_mm=b_per_mm, relaxation_ratio=0.25, tau_s=0.3)
+        elastic = super().near(depth_mm, force_N)
+        return {**elastic, "A_N": elastic["A_N"] / 1.25, "relaxation_ratio": 0.25, "tau_s": 0.3}
 
     @property
     def terms(self) -> tuple[Term, ...]:
