@@ -155,17 +155,13 @@ def study_loop(points: list[KPoint], sweep: Sweep, progress: Callable[[int], Non
 def fit_index(points: list[KPoint]) -> IndexFit:
     """a and b by least squares on ln k against depth."""
     x, y = np.array([p.depth_mm for p in points]), np.log([p.k_exact_N_mm for p in points])
-    design = np.column_stack([np.ones_like(x), x])
-    (level, b), *_ = np.linalg.lstsq(design, y, rcond=None)
-    residual = y - design @ np.array([level, b])
-    freedom = max(len(x) - 2, 1)
-    covariance = np.linalg.inv(design.T @ design) * float(residual @ residual) / freedom
-    reach = student_reach(freedom) * np.sqrt(np.diag(covariance))
-    spread = float(np.sum((y - y.mean()) ** 2))
+    (b, level), covariance = np.polyfit(x, y, 1, cov=True)
+    b_reach, level_reach = student_reach(len(x) - 2) * np.sqrt(np.diag(covariance))
+    spread = float(np.var(y))
     return IndexFit(
         float(np.exp(level)),
         float(b),
-        (float(np.exp(level - reach[0])), float(np.exp(level + reach[0]))),
-        (float(b - reach[1]), float(b + reach[1])),
-        1.0 - float(residual @ residual) / spread if spread > 0.0 else 1.0,
+        (float(np.exp(level - level_reach)), float(np.exp(level + level_reach))),
+        (float(b - b_reach), float(b + b_reach)),
+        1.0 - float(np.mean((y - level - b * x) ** 2)) / spread if spread > 0.0 else 1.0,
     )

@@ -29,6 +29,10 @@ RENAMED = {
     "temperature_1_K": "temperature_per_K", "friction_start_1": "friction_start", "gain_error_1": "gain_error",
 }  # fmt: skip
 
+BY_PARAMETER = "parameters", "standard_errors", "intervals", "units"
+# What a file holds as the model does.
+AS_SAVED = "intervals", "interval_level", "interval_method", "valid", "data", "quality", "control", "effects"
+
 T = TypeVar("T")
 
 
@@ -164,15 +168,8 @@ class Model:
             parameters={p.name: p.value for p in self.law.parameters},
             units={p.name: p.unit for p in self.law.parameters},
             standard_errors=self.standard_errors,
-            intervals=dict(self.intervals),
-            interval_level=self.interval_level,
-            interval_method=self.interval_method,
             covariance=tuple(tuple(map(float, row)) for row in self.covariance),
-            valid=self.valid,
-            data=self.data,
-            quality=self.quality,
-            control=self.control,
-            effects=self.effects,
+            **{name: getattr(self, name) for name in AS_SAVED},
         )
 
 
@@ -200,7 +197,7 @@ def _renamed(file: _File) -> _File:
     """The file as version 2 has it."""
     if file.version == VERSION:
         return file
-    tables = {name: _today(getattr(file, name)) for name in ("parameters", "units", "standard_errors", "intervals")}
+    tables = {name: _today(getattr(file, name)) for name in BY_PARAMETER}
     effects = tuple(effect.model_copy(update={"parameters": _today(effect.parameters)}) for effect in file.effects)
     return file.model_copy(update={**tables, "effects": effects, "version": VERSION})
 
@@ -211,12 +208,8 @@ def _today(table: Mapping[str, T]) -> dict[str, T]:
 
 def _model(file: _File) -> Model:
     kind = law_named(file.law)
-    for table, given in (
-        ("parameters", file.parameters),
-        ("standard_errors", file.standard_errors),
-        ("intervals", file.intervals),
-        ("units", file.units),
-    ):
+    for table in BY_PARAMETER:
+        given = getattr(file, table)
         if set(given) != set(kind.bounds):
             raise UsageError(
                 f"{table} of the {file.law} law are {', '.join(kind.bounds)}; the file has {', '.join(given) or 'none'}"
@@ -227,14 +220,7 @@ def _model(file: _File) -> Model:
     return Model(
         law=kind(**file.parameters),
         covariance=_covariance(file, len(kind.bounds)),
-        intervals=file.intervals,
-        interval_level=file.interval_level,
-        interval_method=file.interval_method,
-        valid=file.valid,
-        data=file.data,
-        quality=file.quality,
-        control=file.control,
-        effects=file.effects,
+        **{name: getattr(file, name) for name in AS_SAVED},
     )
 
 
