@@ -46,7 +46,7 @@ def following_error(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> s
     return f"the axis lags its set-point by {abs(state.following_mm):.2f} mm (limit {limit_mm:g} mm): is it blocked?"
 
 
-def standstill(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
+def axis_frozen(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
     """The axis reports one place while its set-point goes on."""
     limit_mm = wiring.axis.standstill_mm
     if state.standstill_mm <= limit_mm:
@@ -66,7 +66,7 @@ def workspace(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
     return f"position {state.position_mm:.2f} mm is outside {low_mm:g} to {high_mm:g} mm"
 
 
-def speed(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
+def overspeed(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
     """The axis is faster than it may be."""
     limit_mm_s = SPEED_MARGIN * wiring.limits.speed_mm_s
     if abs(state.velocity_mm_s) <= limit_mm_s:
@@ -155,7 +155,7 @@ def axis_scale(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
     )
 
 
-def depth(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
+def depth_limit(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
     """The tip is deeper than it may be."""
     limit_mm = wiring.limits.depth_mm
     return f"depth {state.depth_mm:.2f} mm is above {limit_mm:g} mm" if state.depth_mm > limit_mm else ""

@@ -177,6 +177,7 @@ def test_the_table_puts_every_immediate_cause_before_every_soft_one() -> None:
 
 
 def test_a_code_stands_once_in_the_table_and_fits_into_a_row_of_the_event_stream() -> None:
+    assert all(line.evaluate.__name__ == line.code for line in TABLE), "a check has one name"
     codes = [line.code for line in TABLE]
     assert len(set(codes)) == len(codes)
     assert max(map(len, codes)) <= 20
