@@ -116,7 +116,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--root", type=Path, default=ROOT, help="of the project, for other files and tests than ours")
     parser.add_argument("--tests", type=shlex.split, default=(), metavar="ARGUMENTS", help="pytest's arguments")
     parser.add_argument("--survivors", type=Path, default=SURVIVORS, metavar="FILE", help="the list to agree with")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="mutants tried at a time")
+    # One more than cores: a trial waits for sockets and processes, and one that hangs for its whole time.
+    parser.add_argument("--jobs", type=int, default=(os.cpu_count() or 1) + 1, help="mutants tried at a time")
     parser.add_argument("--again", type=Path, default=None, metavar="FILE", help="only what survived in that --json")
     parser.add_argument("--json", type=Path, default=None, metavar="FILE", help="write every verdict there")
     return parser.parse_args()
