@@ -33,8 +33,8 @@ from rig.errors import RigError
 # stall of this process would look like a lost heartbeat. What the axis was told is heard line by line over the stall:
 # else the carriage would stand still, then jump, and force-displacement curves would show how busy the computer was.
 LATE_NS = 5_000_000
-GIVE_UP_NS = 1_000_000_000
-NAP_S = 0.1
+GIVE_UP_NS = 1_000_000_000  # a busy computer stalls for tenths of a second: this process was stopped
+NAP_S = 0.1  # of physics are 1.2 ms of work, which is in time (LATE_NS)
 # Physics of many milliseconds take a few tenths of one, by which a sample would come late: they are made up for before.
 LEAD_S = 0.001
 # All devices have booted when the endpoints are printed.

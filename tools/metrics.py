@@ -3,7 +3,7 @@
 Source are the five packages, tests are `tests` and what they are made with (`mock_devices.testing`). An untyped
 dictionary is a ``dict`` or ``Mapping`` to Any or object in a public signature or field that another package imports. A
 threshold is a number with a name at the head of a module that something is compared with or bounded by; its reason is a
-comment on its line or above its group, or a text below it.
+comment on its line, above it or above a pair of which it is the second, or a text below it.
 """
 
 import ast
@@ -40,6 +40,7 @@ GOALS = {
 }
 _UNTYPED = re.compile(r"\b(dict|Mapping|MutableMapping)\[str, (typing\.)?(Any|object)\]")
 _BOUNDING = {"min", "max", "clip", "minimum", "maximum"}
+_CONSTANT = re.compile(r"_?[A-Z][A-Z0-9]*(_\w+)*")  # a unit after the name may have small letters
 Functions = ast.FunctionDef | ast.AsyncFunctionDef
 
 
@@ -217,7 +218,8 @@ def _constants(node: ast.stmt) -> list[str]:
         return []
     several = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
     names, numbers = (target.elts, value.elts) if several else ([target], [value])  # type: ignore[attr-defined]
-    return [one.id for one in names if isinstance(one, ast.Name) and one.id.isupper() and all(map(_is_number, numbers))]
+    found = [one.id for one in names if isinstance(one, ast.Name) and _CONSTANT.fullmatch(one.id)]
+    return found if all(map(_is_number, numbers)) else []
 
 
 def _is_number(value: ast.expr) -> bool:
@@ -244,22 +246,22 @@ def _called(node: ast.Call) -> str:
 def _upper_names(node: ast.AST) -> Iterator[str]:
     for one in ast.walk(node):
         name = one.id if isinstance(one, ast.Name) else one.attr if isinstance(one, ast.Attribute) else ""
-        if name.isupper():
+        if _CONSTANT.fullmatch(name):
             yield name
 
 
 def _has_reason(source: Source, node: ast.stmt) -> bool:
-    """A comment on its lines, above the unbroken group of lines it stands in, or a text right below."""
+    """A comment on its lines, right above it, above the one line before it, or a text right below.
+
+    Of a longer group nobody can tell which member a comment above speaks of.
+    """
     own = source.lines[node.lineno - 1 : node.end_lineno]
     below = source.lines[node.end_lineno : (node.end_lineno or 0) + 1]
     if any("  # " in line for line in own) or any(line.startswith('"""') for line in below):
         return True
-    for line in reversed(source.lines[: node.lineno - 1]):
-        if line.startswith("#"):
-            return True
-        if not re.match(r"_?[A-Z]|[ )]", line):
-            return False
-    return False
+    above, before, *_ = [*reversed(source.lines[: node.lineno - 1]), "", ""]
+    paired = re.match(r"_?[A-Z]", above) and "  # " not in above
+    return above.startswith("#") or bool(paired and before.startswith("#"))
 
 
 def measured(root: Path) -> tuple[dict[str, float], dict[str, list[str]]]:

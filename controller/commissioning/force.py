@@ -29,10 +29,11 @@ LARGEST_GAIN_ERROR = 0.02
 # A tip 1.7 degrees out of the sensor's axis shows 3 % of its load across; beyond, load and channel do not belong
 # together.
 LARGEST_CROSSTALK = 0.03
-# Half of the gain's bound, so that a bend never hides in a gain that passes; of the largest load.
+# Half of the gain's bound, so that neither a bend nor a zero that moves hides in a gain that passes (of the largest
+# load).
 LARGEST_RESIDUAL = 0.01
 LARGEST_DRIFT = 0.01
-LEAST_CHANGE = 0.01
+LEAST_CHANGE = 0.01  # a third of the crosstalk allowed: not even a channel beside the load answers
 # Of the largest load: a mean over a second of such a swing at 1 Hz and more is still within a third of a per cent.
 LARGEST_SWING = 0.02
 # Of a mean: what lies within is not told from noise (1 in 15,000 for a normal distribution).

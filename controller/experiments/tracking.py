@@ -27,12 +27,13 @@ FORGETTING = 0.998
 LINE_PARTS = 8
 # Samples in one turn of the crossover: with fewer the loop plays back more of the sensor's noise than it takes away.
 SAMPLES_A_TURN = 50.0
+# Slower is a drift that needs no loop; below ten times the sensor's noise of 0.005 N its phase says little.
 LEAST_HZ, LEAST_AMPLITUDE_N = 0.2, 0.05
-SETTLE_S = 1.0
-SMOOTH_S = 0.05
+SETTLE_S = 1.0  # eighteen turns of a crossover of 18 Hz, two of the 2 Hz that a sensor of 100 Hz allows
+SMOOTH_S = 0.05  # a turn of the fastest loop; fifty samples have a seventh of one's noise
 GAIN_ROWS = 40
-APPROACH_MM_S = 5.0
-CONTACT_N = 0.05
+APPROACH_MM_S = 5.0  # at which even a stop on 50 N/mm stays below 16.5 N (limit 15 N)
+CONTACT_N = 0.05  # ten times the sensor's noise
 
 Column = NDArray[np.float64]
 

@@ -36,8 +36,9 @@ Values: TypeAlias = Sequence[float] | NDArray[np.float64]
 # Force must have moved this far from its slow mean before it says anything of stiffness; sensor noise is 0.005 N.
 EXCITATION_N = 0.05
 SLOW_S = 0.3
+# Beyond it is another limb: depths of five subjects at 10 N differ by 2.6 in all (5 to 13 mm).
 SCALE_LOW, SCALE_HIGH = 0.5, 2.0
-SPREAD = 1.0
+SPREAD = 1.0  # variance of a scale nothing is known of; forgetting must not raise it further while nothing moves
 
 
 class GainRow(Table):

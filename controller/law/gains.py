@@ -24,7 +24,7 @@ Choice = Literal["tangent", "secant", "constant", "admittance"]
 
 # Stiffness may be this much higher than the model says, and the loop must still be this far from instability.
 STIFFNESS_ERROR = 0.5
-LEAST_MARGIN_DEG = 30.0
+LEAST_MARGIN_DEG = 30.0  # the lower end of what textbooks ask for (30 to 60 deg)
 HIGHEST_HZ = 500.0
 GRID = 200
 

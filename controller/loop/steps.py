@@ -26,8 +26,8 @@ Positive = Annotated[float, Field(gt=0)]
 # row once in 10^13. More than 1 N is not pressed for that: the lowest pain thresholds of limbs are near 5 N.
 CONTACT_SAMPLES = 3
 TELLING_NOISE, CONTACT_NOISE, LARGEST_DETECTION_N = 10.0, 4.0, 1.0
-RUN_IN_MM = 0.5
-LARGEST_RUBBING_N = 0.5
+RUN_IN_MM = 0.5  # the guide's slip ends within it
+LARGEST_RUBBING_N = 0.5  # 0.2 N was met; what rubs more could as well be a limb
 # Ten standard deviations of one sample of the noisier product; a hundred times those of a zero's mean.
 LARGEST_ZERO_SHIFT_N = 0.5
 # A tenth of limits.torque_N_m, and 25 standard deviations of one sample of the noisier product.

@@ -13,8 +13,8 @@ from rig.config.wiring import Wiring
 
 # 0.4 mm of 8 mm of depth; over 8 mm a tracker's own scale is off by 0.02 at most (0.12 mm rms over its volume).
 SCALE_TOLERANCE = 0.05
-RECORDER_FILL = 0.5
-RECORDER_SILENT_S = 3.0
+RECORDER_FILL = 0.5  # 20 s of a loop of 1 kHz are left to retract in before rows are lost
+RECORDER_SILENT_S = 3.0  # twenty times the longest sync of a disk that was seen (0.13 s)
 # Five of the stop process's longest waits; it has real-time priority where the loop has.
 STOP_SILENT_S = 1.0
 RETRACTING_MARGIN_MM = 1.0

@@ -40,8 +40,8 @@ CONFIRM_S = 0.5
 HEAD_S = 2.0
 IDLE_S = 60.0
 LINGER_S = 0.5
-LINGER_BYTES = 65_536
-CONNECTIONS = 64
+LINGER_BYTES = 65_536  # about a socket's buffer: what the other end may have sent before it reads the refusal
+CONNECTIONS = 64  # many times the pages and keypads of a bench, and far below the 1024 descriptors of a process
 LONGEST_WAIT_S = 0.2
 
 

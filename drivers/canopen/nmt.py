@@ -13,7 +13,7 @@ TPDO_IDS = (0x180, 0x280, 0x380, 0x480)
 RPDO_IDS = (0x200, 0x300, 0x400, 0x500)
 SDO_RESPONSE_ID = 0x580
 SDO_REQUEST_ID = 0x600
-HEARTBEAT_ID = 0x700
+HEARTBEAT_ID = 0x700  # above it no identifier of the set but heartbeats
 
 
 class NmtCommand(IntEnum):

@@ -33,12 +33,12 @@ FRAME_BYTES = 16
 FRAME_NS = FRAME_BYTES * BITS_PER_BYTE * 1_000_000_000 // DEFAULT_BAUD
 STOP_BURST = b"\xff" * 50
 
-# Ranges as the maker states them; a count has a signed 16-bit register.
+# Ranges as the maker states them.
 FORCE_RANGE_N = 300.0
 MOMENT_RANGE_N_m = 30.0
 COUNTS_PER_N = 100
 COUNTS_PER_N_m = 1000
-COUNT_MAX = 0x7FFF
+COUNT_MAX = 0x7FFF  # a count has a signed 16-bit register
 
 READ, WRITE = 3, 16
 EXCEPTION = 0x80

@@ -30,9 +30,9 @@ LEAVING_OUT_NATS = 1.0
 OPERATOR_SHARE = 0.015
 # On development seeds none of the names beside an unexplained leftover was right; some will be.
 PROVISIONAL_SHARE = 0.2
-DRAWS = 1000
-NEAR_BOUND = 0.99
-LARGEST_LOG = 20.0
+DRAWS = 1000  # 25 beyond each end of a 95 % interval
+NEAR_BOUND = 0.99  # sizes are no surer than 1.5 % (OPERATOR_SHARE)
+LARGEST_LOG = 20.0  # a factor of e^20 is beyond the bounds of every parameter, and is still a number
 # A model whose noise and scatter are this large against the signal explains nothing, however white its residual.
 MOST_CHANCE = 0.25
 # White: a leftover of 0.7 mN in the dither of a quiet bench comes to less, and nobody would act on it.

@@ -24,15 +24,15 @@ LEVEL = 0.005
 # Ten recordings have so few orders that no pattern, however clear, is rarer than about 0.01: orders are only the check.
 BETWEEN_LEVEL = 0.003
 ORDER_LEVEL = 0.05
-WORTH_SHARE = 0.004
-MOST_UNNAMED = 0.1
-AMPLE_SHARE = 0.15
+WORTH_SHARE = 0.004  # of the noise power: an error of 6 % of the noise's rms
+MOST_UNNAMED = 0.1  # of what was named: the cause is known, if not its last detail
+AMPLE_SHARE = 0.15  # of the noise power: an error of 0.4 of the noise's rms is no detail
 RIDGE = 0.05
 BETWEEN = ("session time", "cycle number", "speed", "temperature")
-FEWEST_BETWEEN = 8
+FEWEST_BETWEEN = 8  # below it Student's t of a trend would have to pass 5 at BETWEEN_LEVEL
 BETWEEN_DRAWS = 999
-BEATEN_NATS = 3.0
-EVEN_SHARE = 0.05
+BEATEN_NATS = 3.0  # odds of 20 to 1 (e^3)
+EVEN_SHARE = 0.05  # of its mean: what varies less between recordings tells no trend from a level
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ FAR = 30.0
 # starts without slope a further e^4 against: soft tissue under a tip a few millimetres wide does not.
 JUMP_PENALTY = 4.0
 POWERS_PENALTY = 8.0
-LEAST_SEARCH_MM = 0.1
+LEAST_SEARCH_MM = 0.1  # half of what contact is known to in a good trial
 # Finer than any converter's step, and above zero: an exact curve has no noise of its own.
 LEAST_NOISE_N = 1e-5
 PROBABLE = 0.025, 0.975

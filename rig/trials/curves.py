@@ -27,23 +27,23 @@ LEAST_TRAVEL_MM = 0.1
 OUTLIER_SPREADS = 6
 # The clearance of a protocol (4 to 5 mm) is a quarter of its travel or more, so the highest tenth is air.
 HIGHEST_SHARE = 0.1
-ONSET_SHARE = 0.01
-SHALLOW_SHARE = 0.15
-SEARCH_SHARE = 1.0
+ONSET_SHARE = 0.01  # of 5 N and more: LEAST_FORCE_N, where the data have no noise
+SHALLOW_SHARE = 0.15  # deeper force says more of the tissue than of its surface
+SEARCH_SHARE = 1.0  # a soft onset may stay below the noise for as long a way as the rest takes
 # Five times what contact is known to in a good trial.
 LEAST_SEARCH_MM = 1.0
 # What contact is known to in a good trial: a smaller way back is no turn, but dither and noise of the axis.
 TURN_MM = 0.2
-STEADY_SHARE = 0.3
+STEADY_SHARE = 0.3  # the nearest of the study's speeds, 15 and 20 mm/s, lie a third apart
 # Half of the way that the wanted speed makes: nearer to going on than to standing.
 ON_SHARE = 0.5
-TOP_SHARE = 0.005
-SPEED_BASE_MM = 0.5
+TOP_SHARE = 0.005  # half of ONSET_SHARE: where the data have no noise, what is so near to the top is the top
+SPEED_BASE_MM = 0.5  # places written in hundredths of a millimetre give a speed within 3 %
 # A median over twenty samples is known to three tenths of their standard deviation.
 RUBBING_SAMPLES = 20
 # A step of two standard deviations of single samples is five of the difference of two medians over twenty.
 RUBBING_SPREADS = 2.0
-RUBBING_FLAT = 0.25
+RUBBING_FLAT = 0.25  # two medians over ten differ by chance by as much of such a step
 
 
 @dataclass(frozen=True)

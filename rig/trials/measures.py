@@ -16,14 +16,13 @@ from rig.recording.slope import TIP_TOOL, Slope
 from rig.recording.tables import compression_N, force_map
 from rig.trials.contact import FloatArray
 from rig.trials.curves import Curve
+from rig.trials.findings import FLAT_TOP_SAMPLES
 
 CHANNELS = ("fx_N", "fy_N", "fz_N", "mx_N_m", "my_N_m", "mz_N_m")
 # A sample later than one and a half periods has a lost one before it.
 LATE_PERIODS = 1.5
-# A converter that is full repeats its last value; eight in a row are no noise.
-FULL_SAMPLES = 8
 COMPRESS, RETRACT = 3, 5
-LEAST_AIR = 10
+LEAST_AIR = 10  # a median of ten is known to 0.4 of a sample's deviation
 # Samples further apart than a twentieth of the depth, and twice as far as usual, have a hole between them.
 HOLE_SHARE = 0.05
 
@@ -110,7 +109,7 @@ def _full(values: FloatArray) -> NDArray[np.bool_]:
     ends = (values == values.max()) | (values == values.min())
     length = _run_lengths(ends)
     held = _run_lengths(np.concatenate([[False], np.diff(values) == 0]) & ~ends).max(initial=0)
-    return np.asarray(ends & (length >= FULL_SAMPLES) & (length > 4 * held) & (np.ptp(values) > 0))
+    return np.asarray(ends & (length >= FLAT_TOP_SAMPLES) & (length > 4 * held) & (np.ptp(values) > 0))
 
 
 def frozen_samples(recording: Recording) -> float:

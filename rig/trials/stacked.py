@@ -14,7 +14,7 @@ NAME = "recording"
 # Headers a column may stand under, the project's own first.
 HEADERS = {"time_s": ("time_s", "t_s"), "force_N": ("force_N",), "position_mm": ("position_mm", "extension_mm")}
 SERIES = "|"
-GAP_S = 1.0
+GAP_S = 1.0  # the file has no time between them: a hundred times what is a gap within one
 
 
 def stacked_file(folder: Path) -> Path | None:
