@@ -11,7 +11,7 @@ from api.cli.asking import Person
 from api.cli.calibrate_axis import AxisAsked, calibrate_axis
 from api.cli.calibrate_force import ForceAsked, Load, calibrate_force
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_file, wiring_from
-from api.cli.output import console, write_json
+from api.cli.output import show, write_json
 from api.operations.calibrations import What, keep, refuse_out, refuse_unfit
 from rig.config.calibration import AxisCalibration, ForceCalibration
 from rig.errors import UsageError
@@ -80,8 +80,7 @@ def calibrate(
 def say_use(what: What, path: Path, wiring_folder: Path) -> None:
     """Where it is, and the lines of the wiring file that name it."""
     named = os.path.relpath(path, wiring_folder)
-    for line in (f"written: {path}; the lines of rig.toml that use it:", f'[calibration]\n{what} = "{named}"'):
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    show(f"written: {path}; the lines of rig.toml that use it:", f'[calibration]\n{what} = "{named}"')
 
 
 def _refuse_options(context: typer.Context, others: tuple[str, ...], what: str) -> None:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from api.cli.asking import Person
 from api.cli.live import here
-from api.cli.output import console, table
+from api.cli.output import show
 from api.cli.stage import bench_for
 from api.operations.calibrate import (
     AxisTravel,
@@ -24,6 +24,7 @@ from rig.config.endpoints import Endpoints
 from rig.config.products.roles import MOCK_PORT
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
+from rig.results.tables import TextTable
 
 # Half a millimetre in front of what is touched.
 NEAR_MM = 0.5
@@ -46,7 +47,7 @@ def calibrate_axis(wiring: Wiring, asked: AxisAsked, person: Person) -> AxisCali
     mock = wiring.axis.port == MOCK_PORT
     if not mock:
         asked = _confirmed(asked, person)
-        console.print("the axis homes and moves now", highlight=False)
+        show("the axis homes and moves now")
     operation = Operation("calibrate axis")
     with bench_for(wiring, approaches=False) as (live, endpoints):
         if asked.gauge_block_mm:
@@ -119,9 +120,8 @@ def _block(
 
 def _say(found: AxisCalibration) -> None:
     rows = [(f"{step.axis_mm:.3f}", f"{step.reference_mm:.3f}") for step in found.steps]
-    console.print(table(("axis mm", f"{found.reference} mm"), rows, "Axis and reference"))
-    console.print(
+    show(
+        TextTable("Axis and reference", ("axis (mm)", f"{found.reference} (mm)"), rows, words=0),
         f"{found.product} {found.serial}: 1 mm of the axis is {found.scale:.4f} +- {found.uncertainty:.4f} mm of the"
         f" {found.reference}; that it leads to the limb is known by the {found.direction_known_by}",
-        highlight=False, markup=False, soft_wrap=True,
-    )  # fmt: skip
+    )

@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple
 from api.cli.asking import Person
 from api.cli.live import here
 from api.cli.mock_calibration import BY_ITSELF, mock_weights, weights_on
-from api.cli.output import console, table
+from api.cli.output import show
 from api.cli.stage import bench_for
 from api.operations.calibrate import calibrate_force as measure
 from api.operations.calibrate import of_force
@@ -16,6 +16,7 @@ from rig.config.force_map import CHANNELS
 from rig.config.products.roles import MOCK_PORT
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
+from rig.results.tables import TextTable
 
 Load = Literal["pressed", "hung"]
 
@@ -66,15 +67,13 @@ def _request(load_N: float) -> str:
 
 def _say(found: ForceCalibration) -> None:
     rows = [(f"{load.load_N:.3f}", *(f"{value:.3f}" for value in load.force_N)) for load in found.loads]
-    console.print(table(("load N", *(f"{name} N" for name in CHANNELS)), rows, "Known loads and readings"))
     sure, largest_N = found.uncertainty, max(abs(load.load_N) for load in found.loads)
     at = CHANNELS.index(found.channel)
-    sentences = [
+    show(
+        TextTable("Known loads and readings", ("load (N)", *(f"{name} (N)" for name in CHANNELS)), rows, words=0),
         f"{found.product} {found.serial}: compression is {found.compression} on {found.channel},"
         f" corrected by {found.matrix[at][at]:.4f}",
         f"noise {found.noise_N[at]:.4f} N rms; standard uncertainty {100 * sure.combined:.2g} % at {largest_N:.4g} N"
         f" (repeatability {100 * sure.repeatability:.2g}, weights {100 * sure.weights:.2g},"
         f" linearity {100 * sure.linearity:.2g})",
-    ]
-    for sentence in sentences:
-        console.print(sentence, highlight=False, markup=False, soft_wrap=True)
+    )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import mock_devices
 from api.cli import live
-from api.cli.output import say, show
+from api.cli.output import show
 from api.cli.stage import bench_for
 from api.operations.compare import Comparison, of_comparison
 from api.operations.compare import compare as work
@@ -35,8 +35,7 @@ def compare(
     wanted = Comparison(wiring, out, whose, choices, reference, lambda subject: _bench(wiring, subject))
     operation = of_comparison(wanted)
     result = live.here(operation, lambda: work(operation, wanted))
-    show(run_table(result.runs, reference.name))
-    say([f"comparison.svg is in {out}"])
+    show(run_table(result.runs, reference.name), f"comparison.svg is in {out}")
     return result
 
 

@@ -15,9 +15,9 @@ from api.cli import live
 from api.cli.diagnose import diagnosed
 from api.cli.fitting import fitted as fit_session
 from api.cli.hidden_effect import HiddenCause, draw
-from api.cli.motion import captured, followed, say_levels
+from api.cli.motion import captured, followed
 from api.cli.options import built_in
-from api.cli.output import console
+from api.cli.output import console, show
 from api.cli.stage import bench_for
 from api.operations.motion import TrackPlan
 from controller.experiments import capture as experiment
@@ -33,6 +33,7 @@ from rig.report.page import write_report
 from rig.results.demo import DemoDiagnosis, DemoSummary, DemoTracking, HiddenTruth, RecordingCounts
 from rig.results.diagnosis import FOLDER, TRUTH, DiagnosisResult
 from rig.results.fit import FitResult
+from rig.results.tables import track_parts
 from rig.results.tracking import LoopCount, TrackResult
 from rig.tissue.model import load_model
 
@@ -79,7 +80,7 @@ def demo(
     _clear(out)
     seed = secrets.randbelow(LARGEST_SEED) if seed is None else seed
     secret = draw(np.random.default_rng(seed), plan)
-    console.print(f"a cause is hidden in the bench; --seed {seed} hides the same again", highlight=False)
+    show(f"a cause is hidden in the bench; --seed {seed} hides the same again")
     with bench_for(wiring, secret.hide) as (live_wiring, _), live.connected(live_wiring) as bench:
         console.rule(f"capture: {len(plan.speeds_mm_s)} speeds, {plan.trials} trials each")
         captured(bench, plan, session)
@@ -87,7 +88,7 @@ def demo(
         fitted = fit_session([session])
         console.rule("track: gains from the tangent stiffness of the model")
         result = _track(bench, session)
-    say_levels(result)
+    show(*track_parts(result))
     console.rule("diagnose: what the simulation gets wrong")
     diagnosis = diagnosed(session, out=session / FOLDER)
     console.rule("verify and report")
@@ -96,12 +97,10 @@ def demo(
     write_text(session / FOLDER / TRUTH, secret.sentence(diagnosis) + "\n")
     write_report(session, out / REPORT)
     _summary(counts, fitted, result, _diagnosis(diagnosis, secret, seed)).write(out / SUMMARY)
-    console.print(
-        f"{counts.recordings} recordings, {counts.samples} samples, {counts.dropped} dropped", highlight=False
-    )
-    console.print(f"{out / REPORT} shows it; {out / SUMMARY} has the figures", highlight=False)
+    show(f"{counts.recordings} recordings, {counts.samples} samples, {counts.dropped} dropped")
+    show(f"{out / REPORT} shows it; {out / SUMMARY} has the figures")
     console.rule("the truth")
-    console.print(secret.sentence(diagnosis), highlight=False, markup=False)
+    show(secret.sentence(diagnosis))
 
 
 def _clear(out: Path) -> None:

@@ -7,7 +7,7 @@ import typer
 
 from api.cli.live import compute
 from api.cli.options import JsonOption
-from api.cli.output import console, say, show, write_json
+from api.cli.output import show, write_json
 from api.operations import diagnose as work
 from api.operations.diagnose import Simulation
 from controller.operation import Operation
@@ -15,14 +15,7 @@ from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.recording.sessions import SESSION_FILE
 from rig.results.diagnosis import FOLDER, DiagnosisResult
-from rig.results.diagnosis_tables import (
-    check_tables,
-    further_sentences,
-    gain_sentence,
-    named_table,
-    not_found_table,
-    untestable_sentences,
-)
+from rig.results.diagnosis_tables import check_parts, diagnosis_parts
 
 
 def diagnose(
@@ -61,10 +54,7 @@ def protocol(
     """
     operation, plan = Operation("protocol check"), load(Indentation, file)
     result = compute(operation, lambda: work.check_protocol(operation, plan, tracker, rate_hz, out))
-    console.print(f"{result.cycles} cycles in {result.duration_s:.0f} s", highlight=False)
-    for shown in check_tables(result):
-        show(shown)
-    say(untestable_sentences(result.not_testable))
+    show(*check_parts(result))
     write_json(json_file, result)
 
 
@@ -79,18 +69,7 @@ def diagnosed(
     """The diagnosis, with progress on a terminal, shown; then what was written of it."""
     operation = Operation("diagnose")
     result = compute(operation, lambda: work.diagnose(operation, folder, simulation, columns, only, out), prints=False)
-    show_diagnosis(result)
+    show(*diagnosis_parts(result))
     write_json(json_file, result)
-    say(operation.progress.log)
+    show(*operation.progress.log)
     return result
-
-
-def show_diagnosis(result: DiagnosisResult) -> None:
-    """The diagnosis for a person."""
-    say([f"{result.verdict}: {result.statement}"])
-    if result.findings:
-        show(named_table(result))
-        say(map(gain_sentence, result.findings))
-    if result.detectable:
-        show(not_found_table(result))
-    say(further_sentences(result))

@@ -8,22 +8,12 @@ import typer
 
 from api.cli.live import compute
 from api.cli.options import JsonOption
-from api.cli.output import say, show, write_json
+from api.cli.output import show, write_json
 from api.operations import fit as work
 from api.operations.fit import DEFAULT_LAWS, Lattice, Laws
 from rig.errors import UsageError
-from rig.results.fit import FILE, FitResult, LatticeResult
-from rig.results.tables import (
-    control_table,
-    displacement_table,
-    lattice_errors_table,
-    lattice_sentences,
-    law_errors_table,
-    parameter_table,
-    rate_sentence,
-    speed_table,
-    spring_table,
-)
+from rig.results.fit import FILE, FitResult
+from rig.results.tables import fit_parts
 from rig.tissue.laws import Law
 from rig.tissue.model import load_model
 from rig.tissue.registry import COMPARED, LAWS, check_known, law_named
@@ -79,11 +69,10 @@ def fitted(
     """Fits and writes, with progress on a terminal, and shows what was found."""
     operation, target = work.of_fit(lattice), work.target_of(folders, out)
     result = compute(operation, lambda: work.fit(operation, folders, out, laws, lattice))
-    show_fit(result)
-    if result.lattice:
-        show_lattice(result.lattice)
-        say([f"lattice.png and lattice.svg are in {target}"])
-    say([f"{FILE}, fit.png, fit.svg, residuals.png, table.csv and model.json are in {target}"])
+    drawn = "lattice.png, lattice.svg, " if lattice else ""
+    show(
+        *fit_parts(result), f"{FILE}, fit.png, fit.svg, residuals.png, {drawn}table.csv and model.json are in {target}"
+    )
     return result
 
 
@@ -118,31 +107,3 @@ def _lattice(block: str, springs: str, stiffen: bool) -> Lattice:
     from api.cli.lattice import lattice_from  # noqa: PLC0415 - compiled kernels take seconds to load
 
     return lattice_from(block, springs, stiffen)
-
-
-def show_fit(result: FitResult) -> None:
-    """The fit for a person."""
-    show(speed_table(result.speeds))
-    say(f"skipped {one.trial}: {one.reason}" for one in result.skipped)
-    say(finding.sentence for finding in result.data_quality)
-    for names in _pairs(list(result.laws)):
-        show(displacement_table(result, names))
-    show(law_errors_table(result.laws))
-    show(parameter_table(result.laws))
-    show(control_table(result.laws[result.model_law].control, result.model_law))
-    if result.rate:
-        say([rate_sentence(result.rate)])
-    say(result.remarks)
-
-
-def _pairs(names: Sequence[str]) -> list[Sequence[str]]:
-    """Laws side by side, as many as 80 columns take."""
-    return [names[at : at + 2] for at in range(0, len(names), 2)]
-
-
-def show_lattice(found: LatticeResult) -> None:
-    """The lattice for a person."""
-    show(spring_table(found))
-    say(lattice_sentences(found))
-    show(lattice_errors_table(found.models))
-    show(control_table(found.control, "lattice index"))

@@ -8,7 +8,7 @@ import typer
 
 from api.cli.live import compute, here
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
-from api.cli.output import console, table, write_json
+from api.cli.output import show, write_json
 from api.cli.stage import bench_for, bench_process
 from api.operations import doctor as work
 from controller.claims import holder
@@ -17,6 +17,7 @@ from rig.config.endpoints import Endpoints
 from rig.config.products.registry import ROLES
 from rig.errors import CheckFailed
 from rig.results.bench import DeviceReport
+from rig.results.tables import TextTable
 
 
 def mock(
@@ -77,8 +78,8 @@ def doctor(config: ConfigOption = None, overrides: SetOption = None, json_file: 
     else:
         with bench_for(wiring, approaches=False) as (live_wiring, _):
             result = compute(operation, lambda: work.doctor(operation, live_wiring))
-    header = ("role", "device", "rate Hz", "noise", "latency ms", "range seen")
-    console.print(table(header, map(_row, result.devices), title="Devices"))
+    header = ("role", "device", "rate (Hz)", "noise", "latency (ms)", "range seen")
+    show(TextTable("Devices", header, [_row(found) for found in result.devices], words=2))
     write_json(json_file, result)
     broken = [f"{found.role}: {found.problem}" for found in result.devices if found.problem]
     if broken:

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from api.cli.keys import stop_keys
-from api.cli.output import console
+from api.cli.output import show
 from controller.operation import Operation
 from controller.operation import Progress as Snapshot
 from controller.stop.word import NOT_CONFIRMED, StopReason
@@ -108,8 +108,7 @@ def printed(operation: Operation) -> Callable[[Snapshot], None]:
 
     def watch(now: Snapshot) -> None:
         nonlocal told
-        for sentence in now.log[told:]:
-            console.print(sentence, highlight=False, markup=False, soft_wrap=True)
+        show(*now.log[told:])
         told = len(now.log)
 
     return watch

@@ -8,7 +8,7 @@ import typer
 
 from api.cli import live
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
-from api.cli.output import console, say, show, write_json
+from api.cli.output import show, write_json
 from api.cli.stage import bench_for
 from api.operations import motion
 from api.operations.motion import Captured, TrackPlan
@@ -24,7 +24,7 @@ from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
-from rig.results.tables import followed_sentence, gain_sentence, level_table
+from rig.results.tables import track_parts
 from rig.results.tracking import CompareResult, TrackResult
 from rig.tissue.model import load_model
 
@@ -109,11 +109,8 @@ def _tracked(wiring: Wiring, folder: Path, asked: "TrackOptions", against: Path 
     tracked.refuse_foreign(folder)
     with bench_for(wiring) as (live_wiring, _), live.connected(live_wiring) as bench:
         found = followed(bench, wanted, folder, other)
-    say_levels(found)
-    say(["quality: " + "; ".join([found.quality, *found.reasons])])
-    console.print(f"recorded in {folder}", highlight=False)
-    if found.gain:
-        say([gain_sentence(found)])
+    quality = "quality: " + "; ".join([found.quality, *found.reasons])
+    show(*track_parts(found), quality, f"recorded in {folder}")
     write_json(json_file, found)
     for run in (found.against, found):
         if run is not None:
@@ -162,10 +159,3 @@ def _compared(wiring: Wiring, folder: Path, asked: TrackOptions) -> CompareResul
     choices = choices_from(asked.gains) if asked.gains else CHOICES
     jumps = comparison.stairs(asked.force or "1,10", 1.5 if asked.seconds is None else asked.seconds)
     return comparison.compare(wiring, folder, subjects, choices, jumps)
-
-
-def say_levels(result: TrackResult) -> None:
-    """The table of given and actual force."""
-    if result.levels:
-        show(level_table(result.levels))
-    say([followed_sentence(result.followed)])

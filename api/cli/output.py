@@ -1,36 +1,32 @@
-"""What commands print and write: one console, one kind of table, JSON whole or not at all."""
+"""What commands print and write: one console, one kind of table and sentence, JSON."""
 
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
 from rig.results.base import SavedResult
-from rig.results.tables import TextTable
+from rig.results.tables import Part, TextTable
 
-console = Console()
+console = Console(markup=False, highlight=False)
 
 
-def table(header: Sequence[str], rows: Iterable[Sequence[str]], title: str = "") -> Table:
-    """A table for people; where the terminal is narrow, cells go on in the next line instead of being cut."""
-    found = Table(title=title, title_justify="left", show_edge=False)
-    for name in header:
+def show(*parts: Part) -> None:
+    """Prints tables and sentences. On a narrow terminal both go on in the next line; a pipe gets sentences whole."""
+    for part in parts:
+        if isinstance(part, TextTable):
+            console.print(_table(part))
+        else:
+            console.print(part, soft_wrap=not console.is_terminal)
+
+
+def _table(part: TextTable) -> Table:
+    found = Table(title=part.title, title_justify="left", show_edge=False)
+    for name in part.header:
         found.add_column(name, overflow="fold")
-    for row in rows:
+    for row in part.rows:
         found.add_row(*row)
     return found
-
-
-def show(found: TextTable) -> None:
-    """Prints a result's table."""
-    console.print(table(found.header, found.rows, found.title))
-
-
-def say(sentences: Iterable[str]) -> None:
-    """One line each."""
-    for sentence in sentences:
-        console.print(sentence, highlight=False, markup=False)
 
 
 def write_json(path: Path | None, value: SavedResult) -> None:

@@ -10,7 +10,7 @@ import typer
 
 from api.cli.live import compute
 from api.cli.options import JsonOption
-from api.cli.output import console, show, table, write_json
+from api.cli.output import show, write_json
 from api.operations import records
 from controller.operation import Operation
 from rig.errors import CheckFailed, UsageError
@@ -35,12 +35,13 @@ def verify(
     """
     operation = Operation("verify")
     result = compute(operation, lambda: records.verify(operation, path))
-    show(recording_table(result.recordings))
-    for name, found in result.recordings.items():
-        if found.quality:
-            _print("; ".join([f"{name}: quality {found.quality}", *found.reasons]))
-    for sentence in [*result.remarks, *(found.sentence for found in result.recordings.values() if not found.ok)]:
-        _print(sentence)
+    judged = ((name, found) for name, found in result.recordings.items() if found.quality)
+    show(
+        recording_table(result.recordings),
+        *("; ".join([f"{name}: quality {found.quality}", *found.reasons]) for name, found in judged),
+        *result.remarks,
+        *(found.sentence for found in result.recordings.values() if not found.ok),
+    )
     write_json(json_file, result)
     if not result.ok:
         bad = [name for name, found in result.recordings.items() if not found.ok]
@@ -50,10 +51,6 @@ def verify(
             + (f"; {result.remarks[0]}" if result.remarks else "")
             + "; what is listed above is known, everything else is good"
         )
-
-
-def _print(sentence: str) -> None:
-    console.print(sentence, markup=False, highlight=False, soft_wrap=True)
 
 
 def recording_table(recordings: Mapping[str, RecordingResult]) -> TextTable:
@@ -71,7 +68,7 @@ def recording_table(recordings: Mapping[str, RecordingResult]) -> TextTable:
         for stream, found in recording.streams.items()
         if found.samples or found.faults
     ]
-    return TextTable("", ["recording", "state", "stream", "samples", "rate Hz", "faults"], rows)
+    return TextTable("", ["recording", "state", "stream", "samples", "rate (Hz)", "faults"], rows)
 
 
 def repair(
@@ -85,8 +82,7 @@ def repair(
     """
     operation = Operation("repair")
     result = compute(operation, lambda: records.repair(operation, recording, out))
-    show(recording_table({out.stem: result}))
-    _print(result.sentence)
+    show(recording_table({out.stem: result}), result.sentence)
     write_json(json_file, result)
 
 
@@ -111,19 +107,17 @@ def import_(
     chosen = [column for item in columns or [] for column in re.split(r",(?=[\w.]+=)", item)]
     operation, now = Operation("import"), datetime.now().astimezone()
     result = compute(operation, lambda: records.import_folder(operation, folder, out, chosen, now))
-    console.print(_trial_table(result.trials))
-    for remark in result.remarks:
-        _print(remark)
+    show(_trial_table(result.trials), *result.remarks)
     write_json(json_file, result)
 
 
-def _trial_table(trials: Iterable[TrialInfo]) -> object:
+def _trial_table(trials: Iterable[TrialInfo]) -> TextTable:
     rows = [
         [trial.name, *(f"{value:g}" for value in (trial.speed_mm_s, trial.depth_mm)), f"{trial.peak_force_N:.2f}"]
         + [str(trial.samples.get(name, 0)) for name in FIELDS]
         for trial in trials
     ]
-    return table(["trial", "mm/s", "depth mm", "peak N", *FIELDS], rows)
+    return TextTable("", ["trial", "speed (mm/s)", "depth (mm)", "peak (N)", *FIELDS], rows)
 
 
 def export_(

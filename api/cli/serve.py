@@ -12,7 +12,7 @@ import typer
 import uvicorn
 
 from api.cli.options import ConfigOption, SetOption, wiring_from
-from api.cli.output import console
+from api.cli.output import show
 from api.cli.stage import bench_for
 from api.http.app import build
 from api.http.connection import server_settings
@@ -33,7 +33,7 @@ class Announced(uvicorn.Server):
         await super().startup(sockets)
         await asyncio.to_thread(self._settled.wait)
         if self.started:
-            console.print(f"http://{self.config.host}:{self.config.port}/", highlight=False)
+            show(f"http://{self.config.host}:{self.config.port}/")
 
 
 def serve(

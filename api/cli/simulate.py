@@ -7,13 +7,13 @@ import typer
 
 from api.cli.live import compute
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
-from api.cli.output import say, show, write_json
+from api.cli.output import show, write_json
 from api.operations import simulate as work
 from api.operations.simulate import SimulatedRun
 from controller.experiments import comparison
 from controller.experiments.references import named
 from controller.operation import Operation
-from rig.results.tables import margin_table, simulation_sentence
+from rig.results.tables import simulation_parts
 from rig.tissue.model import load_model
 
 
@@ -44,6 +44,5 @@ def simulate(
     choice = comparison.choice_from(gains) if gains else wiring.loop.gains
     wanted, operation = SimulatedRun(asked, fitted, choice, stiffness, breathing), Operation("simulate")
     result = compute(operation, lambda: work.simulate(operation, wiring, wanted, out))
-    show(margin_table(result.margins))
-    say([simulation_sentence(result), f"simulation.svg, simulation.png and bode.svg are in {out}"])
+    show(*simulation_parts(result), f"simulation.svg, simulation.png and bode.svg are in {out}")
     write_json(json_file, result)

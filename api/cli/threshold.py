@@ -7,7 +7,7 @@ import typer
 
 from api.cli import live
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
-from api.cli.output import console, write_json
+from api.cli.output import show, write_json
 from api.cli.stage import bench_for
 from api.operations import motion
 from api.operations.motion import TrackPlan
@@ -39,7 +39,7 @@ def threshold(
         operation = Operation("threshold", total=1, unit="ramps")
         found = live.run(bench, operation, lambda: motion.threshold(operation, bench, ramp, up_to, out))
     if found.force_N is None:
-        console.print(f"no pain stop up to {up_to:g} N: the threshold lies above", highlight=False)
+        show(f"no pain stop up to {up_to:g} N: the threshold lies above")
     else:
-        console.print(f"[subject]\npain_threshold_N = {found.force_N:.1f}", highlight=False, markup=False)
+        show(f"[subject]\npain_threshold_N = {found.force_N:.1f}")
     write_json(json_file, found)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from rig.errors import UsageError
 from rig.report.drawing import inlined
-from rig.report.markup import figure, paragraph, section, table
+from rig.report.markup import figure, paragraph, parts, section
 from rig.results.diagnosis import FILE, FOLDER, PICTURES, TRUTH, DiagnosisResult
-from rig.results.diagnosis_tables import further_sentences, gain_sentence, named_table, not_found_table
+from rig.results.diagnosis_tables import further_parts, named_parts
 
 TITLE = "What the simulation gets wrong"
 CAPTIONS = {
@@ -51,16 +51,10 @@ def diagnosis_section(found: Diagnosed | str) -> str:
     if isinstance(found, str):
         return section(TITLE, paragraph(found, "missing"))
     result = found.result
-    pieces = [paragraph(result.statement)]
-    if result.findings:
-        pieces += [table(named_table(result)), *map(paragraph, map(gain_sentence, result.findings))]
-    pieces += [
+    pictures = [
         figure(inlined(text, f"diagnosis-{name}", CAPTIONS[name]), CAPTIONS[name])
         for name, text in found.pictures.items()
     ]
-    if result.detectable:
-        pieces.append(table(not_found_table(result)))
-    pieces += map(paragraph, further_sentences(result))
-    if found.truth:
-        pieces.append(paragraph(f"The truth, which the analysis was not told. {found.truth}", "note"))
-    return section(TITLE, *pieces)
+    truth = paragraph(f"The truth, which the analysis was not told. {found.truth}", "note") if found.truth else ""
+    said = paragraph(result.statement), parts(named_parts(result)), *pictures, parts(further_parts(result))
+    return section(TITLE, *said, truth)

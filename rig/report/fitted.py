@@ -6,19 +6,9 @@ from dataclasses import dataclass
 from rig.errors import UsageError
 from rig.recording.sessions import Session
 from rig.report.drawing import inlined
-from rig.report.markup import figure, paragraph, section, table
-from rig.results.fit import FILE, FOLDER, PICTURES, FitResult, LatticeResult
-from rig.results.tables import (
-    control_table,
-    displacement_table,
-    lattice_errors_table,
-    lattice_sentences,
-    law_errors_table,
-    parameter_table,
-    rate_sentence,
-    speed_table,
-    spring_table,
-)
+from rig.report.markup import figure, paragraph, parts, section
+from rig.results.fit import FILE, FOLDER, PICTURES, FitResult
+from rig.results.tables import curve_parts, lattice_parts, law_parts
 
 CURVES, LAWS, LATTICE = "Force and displacement", "Tissue laws compared", "Mass-spring lattice"
 CAPTIONS = {
@@ -73,7 +63,7 @@ def fit_sections(found: Fitted | str) -> Iterator[str]:
     yield _curves(found)
     yield _laws(found.result)
     if found.result.lattice:
-        yield _lattice(found.result.lattice, found.pictures)
+        yield section(LATTICE, *_pictures(found.pictures, "lattice"), parts(lattice_parts(found.result.lattice)))
 
 
 def _pictures(pictures: Mapping[str, str], *names: str) -> list[str]:
@@ -86,10 +76,7 @@ def _curves(found: Fitted) -> str:
         CURVES,
         *[paragraph(change + again, "warning") for change in found.changes],
         *_pictures(found.pictures, "fit", "residuals"),
-        table(speed_table(found.result.speeds)),
-        *[paragraph(rate_sentence(rate)) for rate in (found.result.rate,) if rate],
-        *[paragraph(f"Not used: {one.trial}: {one.reason}", "warning") for one in found.result.skipped],
-        *[paragraph(finding.sentence, "warning") for finding in found.result.data_quality],
+        parts(curve_parts(found.result)),
     )
 
 
@@ -105,19 +92,5 @@ def _laws(result: FitResult) -> str:
             "constant stiffness and 4.6 % for the index law, both on the curve they were fitted to."
         ),
         paragraph(f"{formulas}.{f' Given, not fitted: {given}.' if given else ''}"),
-        table(law_errors_table(result.laws)),
-        table(displacement_table(result, list(result.laws))),
-        table(parameter_table(result.laws)),
-        table(control_table(result.laws[result.model_law].control, result.model_law)),
-    )
-
-
-def _lattice(found: LatticeResult, pictures: Mapping[str, str]) -> str:
-    return section(
-        LATTICE,
-        *_pictures(pictures, "lattice"),
-        table(spring_table(found)),
-        *map(paragraph, lattice_sentences(found)),
-        table(lattice_errors_table(found.models)),
-        table(control_table(found.control, "lattice index")),
+        parts(law_parts(result, beside=len(result.laws))),
     )

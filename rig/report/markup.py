@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
-from rig.results.tables import TextTable
+from rig.results.tables import Caution, Part, TextTable
 
 
 def text(value: object) -> str:
@@ -41,6 +41,14 @@ def table(shown: TextTable) -> str:
 
 def _cells(tag: str, cells: Sequence[str], kinds: Sequence[str]) -> str:
     return "".join(f"<{tag}{_class(kind)}>{text(cell)}</{tag}>" for cell, kind in zip(cells, kinds, strict=True))
+
+
+def parts(found: Iterable[Part]) -> str:
+    """Tables and sentences of a result, as they come."""
+    return "".join(
+        table(part) if isinstance(part, TextTable) else paragraph(part, "warning" * isinstance(part, Caution))
+        for part in found
+    )
 
 
 def pairs(values: Mapping[str, object]) -> str:

@@ -12,11 +12,11 @@ from rig.report.drawing import inline_svg
 from rig.report.facts import Facts, LoopFacts, TrackingFacts, TrialFacts
 from rig.report.figures import loop_figure, quantiles, tracking_figure
 from rig.report.fitted import Fitted, fit_sections
-from rig.report.markup import cards, details, figure, pairs, paragraph, section, table
+from rig.report.markup import cards, details, figure, pairs, paragraph, parts, section, table
 from rig.report.values import json_table, of_many
 from rig.results.base import known
 from rig.results.fit import LawResult
-from rig.results.tables import TextTable, followed_sentence, gain_sentence, level_table, shown
+from rig.results.tables import TextTable, shown, track_parts
 from rig.results.tracking import TrackResult
 
 STREAM_FAULTS = ("missing", "dropped", "lost", "duplicate", "out of order")
@@ -107,15 +107,7 @@ def _tracking(tracking: TrackingFacts | str) -> str:
     pieces = [figure(picture, "Reference and actual force as the loop saw them, unfiltered, and their difference.")]
     if isinstance(tracking.result, str):
         return section(title, *pieces, paragraph(tracking.result, "missing"))
-    return section(title, *pieces, *_runs(tracking.result))
-
-
-def _runs(result: TrackResult) -> Iterator[str]:
-    if result.levels:
-        yield table(level_table(result.levels))
-    yield paragraph(followed_sentence(result.followed))
-    if result.gain:
-        yield paragraph(gain_sentence(result))
+    return section(title, *pieces, parts(track_parts(tracking.result)))
 
 
 def _loop(facts: Facts) -> str:

@@ -5,10 +5,24 @@ from itertools import chain, repeat
 
 from rig.diagnosis.estimates import NamedCause, NextExperiment, SimulationError, SmallestSize
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
-from rig.results.tables import TextTable
+from rig.results.tables import Part, TextTable
 
 # Janot, Gautier, Brunot, "Data Set and Reference Models of EMPS", 2019: symmetric model, closed-loop simulation.
 PUBLISHED = {"DATA_EMPS": "; published 5.85 %", "DATA_EMPS_PULSES": "; published 8.94 %"}
+
+
+def diagnosis_parts(result: DiagnosisResult) -> Iterator[Part]:
+    """All of a diagnosis."""
+    yield f"{result.verdict}: {result.statement}"
+    yield from named_parts(result)
+    yield from further_parts(result)
+
+
+def named_parts(result: DiagnosisResult) -> Iterator[Part]:
+    """The causes named, and what each takes off the error."""
+    if result.findings:
+        yield named_table(result)
+        yield from map(gain_sentence, result.findings)
 
 
 def named_table(result: DiagnosisResult) -> TextTable:
@@ -43,19 +57,18 @@ def detectable_table(found: Mapping[str, SmallestSize], title: str, header: str)
     return TextTable(title, ("cause", header), rows, words=2)
 
 
-def not_found_table(result: DiagnosisResult) -> TextTable:
-    """The causes that were looked for and not found."""
-    return detectable_table(result.detectable, "Not found", "would have been named from")
-
-
-def further_sentences(result: DiagnosisResult) -> list[str]:
-    """What could not be tested, what the data show of themselves, and what to do next."""
-    said = untestable_sentences(result.not_testable)
-    if not result.parameters:
-        said = [f"cannot be tested: any of the {len(result.not_testable)} causes, for this reason"]
-    said += [_in_closed_loop(item) for item in result.simulation_error]
-    said += [finding.sentence for finding in result.data_quality]
-    return said + ([next_sentence(result.next_experiment)] if result.next_experiment else [])
+def further_parts(result: DiagnosisResult) -> Iterator[Part]:
+    """What was not found, what could not be tested, what the data show of themselves, and what to do next."""
+    if result.detectable:
+        yield detectable_table(result.detectable, "Not found", "would have been named from")
+    if result.parameters:
+        yield from untestable_sentences(result.not_testable)
+    else:
+        yield f"cannot be tested: any of the {len(result.not_testable)} causes, for this reason"
+    yield from map(_in_closed_loop, result.simulation_error)
+    yield from (finding.sentence for finding in result.data_quality)
+    if result.next_experiment:
+        yield next_sentence(result.next_experiment)
 
 
 def untestable_sentences(reasons: Mapping[str, str]) -> list[str]:
@@ -83,10 +96,12 @@ def next_sentence(experiment: NextExperiment) -> str:
     return f"{said}, which separates {causes} at {experiment.nats_per_minute:.1f} nats a minute"
 
 
-def check_tables(result: ProtocolCheckResult) -> list[TextTable]:
+def check_parts(result: ProtocolCheckResult) -> Iterator[Part]:
     """What the protocol can show, and the pairs it cannot separate safely."""
-    title = "On a limb and noise as the mock bench has them"
-    tables = [detectable_table(result.detectable, title, "visible from")]
+    yield f"{result.cycles} cycles in {result.duration_s:.0f} s"
+    yield detectable_table(result.detectable, "On a limb and noise as the mock bench has them", "visible from")
     pairs = [(*one.pair, f"{one.nats:.1f}") for one in (*result.not_separable, *result.ambiguous)]
-    header = ("cause", "imitated by", f"nats left of {result.confusion_nats.of:g}")
-    return tables + ([TextTable("Hard to separate (safe from 20)", header, pairs, words=2)] if pairs else [])
+    if pairs:
+        header = ("cause", "imitated by", f"nats left of {result.confusion_nats.of:g}")
+        yield TextTable("Hard to separate (safe from 20)", header, pairs, words=2)
+    yield from untestable_sentences(result.not_testable)

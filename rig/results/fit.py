@@ -75,19 +75,6 @@ class LatticeSweep(Result):
     intact: tuple[bool, ...]
 
 
-class LatticeModel(Result):
-    """A law compared with the lattice, on the same curves."""
-
-    formula: str
-    parameters: Mapping[str, float]
-    units: Mapping[str, str]
-    intervals: Mapping[str, tuple[float, float]]
-    fitted: DisplacementErrors
-    trials_left_out: DisplacementErrors | None
-    speeds_left_out: DisplacementErrors | None
-    subjects_left_out: DisplacementErrors | None
-
-
 class PerSpringResult(Result):
     """The fit with stiffness a exp(b |strain|) in each spring, checked with the whole block."""
 
@@ -112,8 +99,7 @@ class LatticeResult(Result):
     phi: LatticeSweep
     points: tuple[KPoint, ...]
     index: IndexFit
-    models: Mapping[str, LatticeModel]
-    control: tuple[ControlRow, ...]
+    models: Mapping[str, LawResult] = Field(description="laws on the lattice and others, on the same curves")
     per_spring: PerSpringResult | None
 
 

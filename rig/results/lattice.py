@@ -1,8 +1,7 @@
 """From a lattice study to its result."""
 
-from rig.results.fit import LatticeModel, LatticeResult, LatticeSweep, PerSpringResult
-from rig.results.study import errors_result
-from rig.tissue.judging import Judged
+from rig.results.fit import LatticeResult, LatticeSweep, PerSpringResult
+from rig.results.study import law_result
 from rig.tissue.lattice.sweep import Sweep
 from rig.tissue.lattice_study import LatticeStudy
 from rig.tissue.per_spring import PerSpring
@@ -22,8 +21,7 @@ def lattice_result(found: LatticeStudy) -> LatticeResult:
         phi=_sweep(found.sweep),
         points=found.points,
         index=found.index,
-        models={name: _model(judged) for name, judged in found.judged.items()},
-        control=found.control,
+        models={name: law_result(judged, found.force_N) for name, judged in found.judged.items()},
         per_spring=_per_spring(found.per_spring) if found.per_spring else None,
     )
 
@@ -41,19 +39,4 @@ def _per_spring(found: PerSpring) -> PerSpringResult:
         whole_force_over_k_mm=found.whole_mm.tolist(),
         agrees_to_mm=found.agrees_to_mm,
         doubt=found.doubt(),
-    )
-
-
-def _model(judged: Judged) -> LatticeModel:
-    fitted = errors_result(judged.fitted)
-    assert fitted is not None
-    return LatticeModel(
-        formula=judged.law.formula,
-        parameters={p.name: p.value for p in judged.law.parameters},
-        units={p.name: p.unit for p in judged.law.parameters},
-        intervals=judged.intervals,
-        fitted=fitted,
-        trials_left_out=errors_result(judged.trials_left_out),
-        speeds_left_out=errors_result(judged.speeds_left_out),
-        subjects_left_out=errors_result(judged.subjects_left_out),
     )

@@ -1,12 +1,12 @@
-"""Tables of results: built once, with one header, for terminal and HTML alike."""
+"""Results in tables and sentences: built once, with one header, for terminal and HTML alike."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from rig.results.fit import DisplacementErrors, FitResult, LatticeModel, LatticeResult, LawResult, RateResult
-from rig.results.tracking import ComparedRun, Followed, LoopMargins, Plateau, SimulateResult, TrackResult
+from rig.results.fit import DisplacementErrors, FitResult, LatticeResult, LawResult, RateResult
+from rig.results.tracking import ComparedRun, Followed, SimulateResult, TrackingGain, TrackResult
 from rig.tissue.rates import STUDY_B_N_S_MM
-from rig.tissue.summary import ControlRow, SpeedSummary
+from rig.tissue.summary import ControlRow
 
 UNKNOWN = "–"
 
@@ -21,16 +21,99 @@ class TextTable:
     words: int = 1
 
 
+class Caution(str):
+    """A sentence about what is not as it should be."""
+
+    __slots__ = ()
+
+
+Part = TextTable | str
+"""What a person is shown of a result; sentences are plain text."""
+
+Columns = Mapping[str, str]
+"""A column each: its header, and the attribute of a row with its format, as in ``force_N:.2f``."""
+
+SPEEDS = {
+    "speed (mm/s)": "speed_mm_s:g", "trials": "trials:d", "largest depth (mm)": "max_depth_mm:.2f",
+    "largest force (N)": "max_force_N:.2f",
+}  # fmt: skip
+SPRINGS = {
+    "force (N)": "force_N:.2f", "depth (mm)": "depth_mm:.2f", "k exact (N/mm)": "k_exact_N_mm:.5f",
+    "k by search (N/mm)": "k_loop_N_mm:.5f", "simulations": "simulations:d",
+}  # fmt: skip
+LEVELS = {
+    "reference (N)": "given_N:.2f", "actual (N)": "actual_N:.3f", "error (N)": "error_N:+.3f",
+    "error (%)": "error_percent:+.2f", "largest error (N)": "max_error_N:.3f", "rms error (N)": "rms_error_N:.4f",
+    "overshoot (%)": "overshoot_percent:.1f", "settling (s)": "settling_s:.2f",
+}  # fmt: skip
+WORST = {
+    "error (N)": "error_N:.4f", "error (%)": "error_percent:.2f", "largest (N)": "largest_error_N:.3f",
+    "overshoot (%)": "overshoot_percent:.1f", "settling (s)": "settling_s:.2f",
+}  # fmt: skip
+MARGINS = {
+    "force (N)": "force_N:.2f", "tangent (N/mm)": "tangent_N_mm:.2f", "crossover (Hz)": "crossover_Hz:.1f",
+    "phase margin (deg)": "phase_deg:.0f", "gain margin": "gain:.1f",
+}  # fmt: skip
+
+
 def shown(value: float | None, form: str) -> str:
     """The number in that format; a dash where it is unknown."""
     return UNKNOWN if value is None else format(value, form)
 
 
-def speed_table(speeds: Sequence[SpeedSummary]) -> TextTable:
-    """What was measured at each speed."""
-    header = ("speed (mm/s)", "trials", "largest depth (mm)", "largest force (N)")
-    rows = [(f"{s.speed_mm_s:g}", f"{s.trials}", f"{s.max_depth_mm:.2f}", f"{s.max_force_N:.2f}") for s in speeds]
-    return TextTable("Loading curves", header, rows, words=0)
+def cells(row: object, columns: Columns) -> list[str]:
+    """The row's text in each column."""
+    return [shown(getattr(row, name), form) for name, _, form in (text.partition(":") for text in columns.values())]
+
+
+def numbers(title: str, columns: Columns, rows: Iterable[object]) -> TextTable:
+    """A table of numbers alone."""
+    return TextTable(title, list(columns), [cells(row, columns) for row in rows], words=0)
+
+
+def fit_parts(result: FitResult) -> Iterator[Part]:
+    """All of a fit, two laws side by side: what 80 columns take."""
+    yield from curve_parts(result)
+    yield from law_parts(result, 2)
+    if result.lattice:
+        yield from lattice_parts(result.lattice)
+
+
+def curve_parts(result: FitResult) -> Iterator[Part]:
+    """What was measured, and what of it could not be used."""
+    yield numbers("Loading curves", SPEEDS, result.speeds)
+    if result.rate:
+        yield rate_sentence(result.rate)
+    yield from (Caution(f"not used: {one.trial}: {one.reason}") for one in result.skipped)
+    yield from (Caution(finding.sentence) for finding in result.data_quality)
+    yield from result.remarks
+
+
+def law_parts(result: FitResult, beside: int) -> Iterator[Part]:
+    """How wrong each law is, ``beside`` of them side by side, its parameters, and what it means to a force loop."""
+    names = list(result.laws)
+    yield errors_table(result.laws)
+    for at in range(0, len(names), beside):
+        yield displacement_table(result, names[at : at + beside])
+    yield parameter_table(result.laws)
+    yield control_table(result.laws[result.model_law].control, result.model_law)
+
+
+def lattice_parts(found: LatticeResult) -> Iterator[Part]:
+    """The lattice: spring by spring, and as a law among others."""
+    yield numbers(f"Spring stiffness per force, {' x '.join(map(str, found.vertices))} vertices", SPRINGS, found.points)
+    yield from lattice_sentences(found)
+    yield errors_table(found.models)
+    yield control_table(found.models["lattice index"].control, "lattice index")
+
+
+def track_parts(result: TrackResult) -> Iterator[Part]:
+    """A tracking run, level by level and as a whole."""
+    if result.levels:
+        yield numbers("Reference and actual force on each level", LEVELS, result.levels)
+    yield followed_sentence(result.followed)
+    if result.gain and result.against:
+        yield gain_sentence(result.gain, result.against.model, result.model)
 
 
 def displacement_table(fit: FitResult, names: Sequence[str]) -> TextTable:
@@ -40,40 +123,24 @@ def displacement_table(fit: FitResult, names: Sequence[str]) -> TextTable:
         header += [name, "error (mm)", "error (%)"]
     rows = []
     for at, first in enumerate(fit.laws[names[0]].rows):
-        cells = [f"{first.force_N:.2f}", f"{first.measured_mm:.2f}"]
-        for row in (fit.laws[name].rows[at] for name in names):
-            cells += [f"{row.predicted_mm:.2f}", f"{row.error_mm:.3f}", shown(row.error_percent, ".1f")]
-        rows.append(cells)
+        row = [f"{first.force_N:.2f}", f"{first.measured_mm:.2f}"]
+        for found in (fit.laws[name].rows[at] for name in names):
+            row += [f"{found.predicted_mm:.2f}", f"{found.error_mm:.3f}", shown(found.error_percent, ".1f")]
+        rows.append(row)
     return TextTable("Displacement in mm at given forces, and the worst trial's error", header, rows, words=0)
 
 
-def law_errors_table(laws: Mapping[str, LawResult]) -> TextTable:
+def errors_table(laws: Mapping[str, LawResult]) -> TextTable:
     """Worst errors of each law compared."""
-    return _errors_table(
-        {name: (law, law.held_out.trials, law.held_out.speeds, law.held_out.subjects) for name, law in laws.items()}
-    )
-
-
-def lattice_errors_table(models: Mapping[str, LatticeModel]) -> TextTable:
-    """Worst errors of the lattice's laws and of the laws compared with them."""
-    return _errors_table(
-        {
-            name: (model.fitted, model.trials_left_out, model.speeds_left_out, model.subjects_left_out)
-            for name, model in models.items()
-        }
-    )
-
-
-def _errors_table(found: Mapping[str, tuple[DisplacementErrors | None, ...]]) -> TextTable:
-    header = ["law", "fitted", "left-out trials", "left-out speeds", "left-out subjects", "residual (N rms)"]
-    several = any(errors[3] for errors in found.values())
-    kept = [0, 1, 2, 3] if several else [0, 1, 2]
+    kinds = {"trials": "left-out trials", "speeds": "left-out speeds"}
+    if any(law.held_out.subjects for law in laws.values()):
+        kinds["subjects"] = "left-out subjects"
     rows = [
-        [name, *(_worst(errors[at]) for at in kept), f"{errors[0].rmse_N:.3f}" if errors[0] else UNKNOWN]
-        for name, errors in found.items()
+        [name, _worst(law), *(_worst(getattr(law.held_out, kind)) for kind in kinds), f"{law.rmse_N:.3f}"]
+        for name, law in laws.items()
     ]
     title = "Worst errors of displacement in mm (%), on what was fitted and on what was left out"
-    return TextTable(title, header if several else header[:4] + header[5:], rows)
+    return TextTable(title, ["law", "fitted", *kinds.values(), "residual (N rms)"], rows)
 
 
 def _worst(errors: DisplacementErrors | None) -> str:
@@ -117,56 +184,24 @@ def rate_sentence(rate: RateResult) -> str:
     )
 
 
-def spring_table(found: LatticeResult) -> TextTable:
-    """Spring stiffness at each given force, exact and by the study's search."""
-    header = ("force (N)", "depth (mm)", "k exact (N/mm)", "k by search (N/mm)", "simulations")
-    rows = [
-        (
-            f"{p.force_N:.2f}", f"{p.depth_mm:.2f}", f"{p.k_exact_N_mm:.5f}",
-            shown(p.k_loop_N_mm, ".5f"), f"{p.simulations}",
-        )
-        for p in found.points
-    ]  # fmt: skip
-    return TextTable(f"Spring stiffness per force, {' x '.join(map(str, found.vertices))} vertices", header, rows, 0)
-
-
-def lattice_sentences(found: LatticeResult) -> list[str]:
+def lattice_sentences(found: LatticeResult) -> Iterator[str]:
     """The index law through the springs, where the block collapses, and the fit spring by spring."""
     fit = found.index
     (a_low, a_high), (b_low, b_high) = fit.a_interval, fit.b_interval
-    said = [
+    yield (
         f"k(x) = {fit.a_N_mm:.4g} exp({fit.b_per_mm:.4g} x) N/mm; 95 %: a {a_low:.4g} to {a_high:.4g}, "
         f"b {b_low:.4g} to {b_high:.4g}; R2 {fit.r_squared:.4f}"
-    ]
+    )
     if found.collapse:
-        said.append(f"the lattice collapses: {found.collapse}")
+        yield f"the lattice collapses: {found.collapse}"
     own = found.per_spring
     if own is not None:
-        model = found.models[own.law]
         values = [
-            f"{name} = {value:.4g} {model.units[name]} ({low:.4g} to {high:.4g})"
-            for (name, value), (low, high) in zip(model.parameters.items(), model.intervals.values(), strict=True)
+            f"{name} = {p.value:.4g} {p.unit} ({p.interval[0]:.4g} to {p.interval[1]:.4g})"
+            for name, p in found.models[own.law].parameters.items()
         ]
         check = own.doubt or f"the whole block agrees with its quarter to {own.agrees_to_mm:.3g} mm"
-        said.append(f"spring by spring: {', '.join(values)}; {check}")
-    return said
-
-
-def level_table(levels: Sequence[Plateau]) -> TextTable:
-    """Reference and actual force on each level of a tracking run."""
-    header = (
-        "reference (N)", "actual (N)", "error (N)", "error (%)", "largest error (N)", "rms error (N)",
-        "overshoot (%)", "settling (s)",
-    )  # fmt: skip
-    rows = [
-        (
-            f"{level.given_N:.2f}", f"{level.actual_N:.3f}", f"{level.error_N:+.3f}", f"{level.error_percent:+.2f}",
-            f"{level.max_error_N:.3f}", f"{level.rms_error_N:.4f}", f"{level.overshoot_percent:.1f}",
-            shown(level.settling_s, ".2f"),
-        )
-        for level in levels
-    ]  # fmt: skip
-    return TextTable("Reference and actual force on each level", header, rows, words=0)
+        yield f"spring by spring: {', '.join(values)}; {check}"
 
 
 def followed_sentence(whole: Followed) -> str:
@@ -179,44 +214,24 @@ def followed_sentence(whole: Followed) -> str:
     return f"error of the whole run: rms {whole.rms_error_N:.3f} N, largest {whole.largest_error_N:.3f} N{moving}"
 
 
-def gain_sentence(result: TrackResult) -> str:
-    """What the model tracked with gains over the one tracked with before; empty where there was one run only."""
-    if result.against is None or result.gain is None:
-        return ""
-    gain = result.gain
+def gain_sentence(gain: TrackingGain, before: str, after: str) -> str:
+    """What tracking with the model ``after`` gains over tracking with ``before``."""
     return (
-        f"rms error over the whole run: {gain.rms_error_before_N:.4f} N with {result.against.model}, "
-        f"{gain.rms_error_after_N:.4f} N with {result.model} ({100 * gain.reduction:+.0f} % less)"
+        f"rms error over the whole run: {gain.rms_error_before_N:.4f} N with {before}, "
+        f"{gain.rms_error_after_N:.4f} N with {after} ({100 * gain.reduction:+.0f} % less)"
     )
 
 
 def run_table(runs: Sequence[ComparedRun], reference: str = "") -> TextTable:
     """The worst jump of each choice of gains on each subject."""
-    header = ("subject", "gains", "error (N)", "error (%)", "largest (N)", "overshoot (%)", "settling (s)")
-    rows = [
-        (
-            run.subject, run.gains, shown(run.worst.error_N, ".4f"), shown(run.worst.error_percent, ".2f"),
-            shown(run.worst.largest_error_N, ".3f"), shown(run.worst.overshoot_percent, ".1f"),
-            shown(run.worst.settling_s, ".2f"),
-        )
-        for run in runs
-    ]  # fmt: skip
-    return TextTable(f"Worst of {reference}; overshoot of the jump", header, rows, words=2)
+    rows = [[run.subject, run.gains, *cells(run.worst, WORST)] for run in runs]
+    return TextTable(f"Worst of {reference}; overshoot of the jump", ["subject", "gains", *WORST], rows, words=2)
 
 
-def margin_table(margins: Sequence[LoopMargins]) -> TextTable:
-    """Stability margins at each force."""
-    header = ("force (N)", "tangent (N/mm)", "crossover (Hz)", "phase margin (deg)", "gain margin")
-    rows = [
-        (f"{m.force_N:.2f}", f"{m.tangent_N_mm:.2f}", f"{m.crossover_Hz:.1f}", f"{m.phase_deg:.0f}", f"{m.gain:.1f}")
-        for m in margins
-    ]
-    return TextTable("Stability margins of the force loop", header, rows, words=0)
-
-
-def simulation_sentence(found: SimulateResult) -> str:
-    """The simulation in one line."""
-    return (
+def simulation_parts(found: SimulateResult) -> Iterator[Part]:
+    """The simulation: how stable, how well, how fast."""
+    yield numbers("Stability margins of the force loop", MARGINS, found.margins)
+    yield (
         f"{found.reference}: rms error {found.rms_error_N:.3f} N, peak {found.peak_force_N:.2f} N,"
         f" {found.times_real_time:.0f} times real time"
     )

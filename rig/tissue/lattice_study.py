@@ -9,18 +9,18 @@ import numpy as np
 
 from rig.errors import DataError
 from rig.progress import Progress, silent
-from rig.tissue.control_table import control_rows
 from rig.tissue.fitting import fit_law
 from rig.tissue.judging import Judged, judge
 from rig.tissue.k_calculation import exact_k, fit_index, study_loop
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.springs import Mode, Springs
 from rig.tissue.lattice.sweep import DEFAULT_STEP_MM, Sweep, sweep
+from rig.tissue.laws import FloatArray
 from rig.tissue.laws_lattice import lattice_laws
 from rig.tissue.per_spring import PerSpring, per_spring
 from rig.tissue.registry import RIVALS
 from rig.tissue.study import Study, rows
-from rig.tissue.summary import ControlRow, IndexFit, KPoint
+from rig.tissue.summary import IndexFit, KPoint
 
 _DEPTH_MARGIN = 1.02
 _DEEPEST_SHARE = 0.85
@@ -28,13 +28,13 @@ _DEEPEST_SHARE = 0.85
 
 @dataclass(frozen=True)
 class LatticeStudy:
-    """Results; ``judged`` holds lattice laws and lumped rivals by name, on the same curves, rows and origins."""
+    """Results; ``judged`` holds lattice laws and lumped rivals by name, on the same curves, forces [N] and origins."""
 
     sweep: Sweep
     points: tuple[KPoint, ...]
     index: IndexFit
     judged: Mapping[str, Judged]
-    control: tuple[ControlRow, ...]
+    force_N: FloatArray
     per_spring: PerSpring | None = None
 
 
@@ -65,8 +65,7 @@ def lattice_study(
     own = per_spring(study, block, mode, deepest_mm, tell) if stiffen else None
     if own is not None:
         judged[own.judged.law.name] = own.judged
-    control = control_rows(judged["lattice index"], study.force_N)
-    return LatticeStudy(curve, tuple(points), fit_index(points), judged, control, own)
+    return LatticeStudy(curve, tuple(points), fit_index(points), judged, study.force_N, own)
 
 
 def _deepest(study: Study, block: Block) -> float:

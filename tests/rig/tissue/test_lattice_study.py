@@ -6,6 +6,7 @@ import pytest
 
 from api.operations.lattice import LatticeFit
 from rig.errors import DataError
+from rig.tissue.control_table import control_rows
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice_study import LatticeStudy, lattice_study
 from rig.tissue.study import Study, study_curves
@@ -39,7 +40,7 @@ def test_rivals_are_judged_on_the_same_curves(found: LatticeStudy) -> None:
 
 
 def test_the_control_table_gives_tangent_above_secant_and_the_damping_that_was_put_in(found: LatticeStudy) -> None:
-    for row in found.control:
+    for row in control_rows(found.judged["lattice index"], found.force_N):
         assert row.tangent_N_mm > row.secant_N_mm
         assert row.damping_N_s_mm == pytest.approx(0.01, abs=0.003)
 
@@ -65,6 +66,6 @@ def test_the_command_writes_picture_and_numbers(study: Study, tmp_path: Path) ->
     written = result.model_dump(mode="json")
     for point in written["points"]:
         assert point["k_loop_N_mm"] == pytest.approx(point["k_exact_N_mm"], rel=0.01)
-    assert written["models"]["lattice springs"]["parameters"]["b"] > 0.0
+    assert written["models"]["lattice springs"]["parameters"]["b"]["value"] > 0.0
     assert written["per_spring"]["agrees_to_mm"] > 6.0
     assert written["per_spring"]["doubt"] is None
