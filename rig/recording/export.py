@@ -18,7 +18,7 @@ from rig.channels import FORCE, STREAMS
 from rig.errors import UsageError
 from rig.recording.files import whole_file, whole_folder, write_text
 from rig.recording.sessions import Session, TrialInfo, plain
-from rig.recording.tables import Column, arrow_table, compression_N, filled, write_parquet
+from rig.recording.tables import arrow_table, compression_N, filled, write_parquet
 
 Format = Literal["csv", "parquet", "hdf5", "mat"]
 MatValue = NDArray[np.generic] | str | float | Mapping[str, "MatValue"]
@@ -27,6 +27,7 @@ COLUMNS_FILE = "columns.csv"
 # MATLAB's own limits: names of at most 63 characters, files of version 5 below 2 GiB a variable.
 MAT_NAME = 63
 MAT_LIMIT = 1 << 31
+COMPRESSED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 
 
 def export(session: Session, format: Format, out: Path) -> Path:
@@ -137,16 +138,10 @@ def _group(group: "h5py.Group", session: Session, trial: TrialInfo) -> None:
     group.attrs["metadata"] = json.dumps(recording.metadata)
     group.attrs["speed_mm_s"], group.attrs["depth_mm"] = trial.speed_mm_s, trial.depth_mm
     for stream, table in filled(recording):
-        for name, column in table.items():
-            _dataset(group, f"{stream.name}/{name}", column, stream.units[name])
-
-
-def _dataset(group: "h5py.Group", name: str, column: Column, unit: tuple[str, str]) -> None:
-    if isinstance(column, list):
-        data = group.create_dataset(name, data=column, dtype=h5py.string_dtype())
-    else:
-        data = group.create_dataset(name, data=column, compression="gzip", compression_opts=4, shuffle=True)
-    data.attrs["unit"], data.attrs["meaning"] = unit
+        for name, kind in stream.kinds.items():
+            stored = {"dtype": h5py.string_dtype()} if kind is str else COMPRESSED
+            data = group.create_dataset(f"{stream.name}/{name}", data=table[name].to_numpy(), **stored)
+            data.attrs["unit"], data.attrs["meaning"] = stream.units[name]
 
 
 def _mat(session: Session, out: Path) -> None:
@@ -168,17 +163,11 @@ def _mat(session: Session, out: Path) -> None:
 def _struct(session: Session, trial: TrialInfo) -> dict[str, MatValue]:
     recording = session.recording(trial.name)
     streams: dict[str, MatValue] = {
-        stream.name: {name: _mat_column(column) for name, column in table.items()}
+        stream.name: {name: table[name].to_numpy().reshape(-1, 1) for name in stream.kinds}
         for stream, table in filled(recording)
     }
     facts: dict[str, MatValue] = {"speed_mm_s": trial.speed_mm_s, "depth_mm": trial.depth_mm, "outcome": trial.outcome}
     return {**streams, **facts, "metadata": json.dumps(recording.metadata)}
-
-
-def _mat_column(column: Column) -> NDArray[np.generic]:
-    """The column as MATLAB has it: n x 1, texts as a cell array."""
-    values: NDArray[np.generic] = np.array(column, dtype=object) if isinstance(column, list) else column
-    return values.reshape(-1, 1)
 
 
 def _units() -> dict[str, dict[str, str]]:

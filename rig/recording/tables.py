@@ -17,39 +17,29 @@ from rig.recording.files import whole_file
 from rig.recording.reader import Recording
 
 FORCE_FIELDS = ("fx_N", "fy_N", "fz_N")
-Column = NDArray[np.int64] | NDArray[np.float64] | list[str]
 
 
-def columns(recording: Recording, stream: Stream) -> dict[str, Column]:
-    """Fields of the stream by name, in wire order; texts as lists."""
-    if not stream.has_text:
-        table = recording.tables[stream.name]
-        return {name: np.ascontiguousarray(table[name]) for name in stream.kinds}
-    found: dict[str, Column] = {}
-    for index, (name, kind) in enumerate(EVENT.kinds.items()):
-        values = [event[index] for event in recording.events]
-        found[name] = [str(value) for value in values] if kind is str else np.array(values, dtype=np.int64)
-    return found
-
-
-def filled(recording: Recording) -> Iterator[tuple[Stream, dict[str, Column]]]:
-    """Every stream that has rows."""
+def filled(recording: Recording) -> Iterator[tuple[Stream, pa.Table]]:
+    """Every stream that has rows, as ``arrow_table`` gives it."""
     for stream in STREAMS:
-        table = columns(recording, stream)
-        if len(next(iter(table.values()))):
-            yield stream, table
+        if len(recording.events if stream is EVENT else recording.tables[stream.name]):
+            yield stream, arrow_table(recording, stream)
 
 
 def arrow_table(recording: Recording, stream: Stream) -> pa.Table:
     """The stream with ``unit`` and ``meaning`` on each field and the recording's metadata, as JSON, on the whole."""
-    table = columns(recording, stream)
     kinds = {int: pa.int64(), float: pa.float64(), str: pa.string()}
     fields = [
         pa.field(name, kinds[kind], metadata=dict(zip(("unit", "meaning"), stream.units[name], strict=True)))
         for name, kind in stream.kinds.items()
     ]
+    columns = (
+        [[event[index] for event in recording.events] for index in range(len(fields))]
+        if stream is EVENT
+        else [np.ascontiguousarray(recording.tables[stream.name][field.name]) for field in fields]
+    )
     schema = pa.schema(fields, {name: json.dumps(values) for name, values in recording.metadata.items()})
-    return pa.table([pa.array(table[field.name], field.type) for field in fields], schema=schema)
+    return pa.table(columns, schema=schema)
 
 
 def compression_N(recording: Recording) -> NDArray[np.float64]:
@@ -85,9 +75,9 @@ def _matrix(name: str, text: str) -> Matrix:
 def write_parquet(recording: Recording, folder: Path, name: str) -> list[Path]:
     """``NAME.STREAM.parquet`` in ``folder`` for every stream with rows, each replaced in one step; their paths."""
     paths = []
-    for stream, _ in filled(recording):
+    for stream, table in filled(recording):
         path = folder / f"{name}.{stream.name}.parquet"
         with whole_file(path, overwrite=True) as scratch:
-            pq.write_table(arrow_table(recording, stream), scratch, compression="zstd")
+            pq.write_table(table, scratch, compression="zstd")
         paths.append(path)
     return paths
