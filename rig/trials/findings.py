@@ -131,6 +131,13 @@ def _quantum(value: Array) -> float:
     return float(np.min(steps[steps > 0])) if np.any(steps > 0) else float(np.ptp(value))
 
 
+def run_lengths(mark: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """For each element the length of the run of marks it lies in, 0 where it is not marked; shape (n,)."""
+    edges = np.flatnonzero(np.diff(mark.astype(np.int8), prepend=0, append=0))
+    lengths = np.zeros(len(mark), np.int64)
+    lengths[mark] = np.repeat(edges[1::2] - edges[::2], edges[1::2] - edges[::2])
+    return lengths
+
+
 def _longest_run(mark: NDArray[np.bool_]) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mark, [False]]).astype(np.int8)))
-    return int((edges[1::2] - edges[::2]).max()) if edges.size else 0
+    return int(run_lengths(mark).max(initial=0))

@@ -16,7 +16,7 @@ from rig.recording.slope import TIP_TOOL, Slope
 from rig.recording.tables import compression_N, force_map
 from rig.trials.contact import FloatArray
 from rig.trials.curves import Curve
-from rig.trials.findings import FLAT_TOP_SAMPLES
+from rig.trials.findings import FLAT_TOP_SAMPLES, run_lengths
 
 CHANNELS = ("fx_N", "fy_N", "fz_N", "mx_N_m", "my_N_m", "mz_N_m")
 # A sample later than one and a half periods has a lost one before it.
@@ -107,8 +107,8 @@ def saturated(recording: Recording) -> float:
 def _full(values: FloatArray) -> NDArray[np.bool_]:
     """Which values are a largest or smallest one that lasts, where others do not."""
     ends = (values == values.max()) | (values == values.min())
-    length = _run_lengths(ends)
-    held = _run_lengths(np.concatenate([[False], np.diff(values) == 0]) & ~ends).max(initial=0)
+    length = run_lengths(ends)
+    held = run_lengths(np.concatenate([[False], np.diff(values) == 0]) & ~ends).max(initial=0)
     return np.asarray(ends & (length >= FLAT_TOP_SAMPLES) & (length > 4 * held) & (np.ptp(values) > 0))
 
 
@@ -118,16 +118,7 @@ def frozen_samples(recording: Recording) -> float:
     if len(rows) < 2:
         return math.nan
     same = np.all(rows[1:] == rows[:-1], axis=1)
-    return float(_run_lengths(same).max(initial=0))
-
-
-def _run_lengths(mark: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """For each element the length of the run of marks it lies in, 0 where it is not marked."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mark, [False]]).astype(np.int8)))
-    lengths = np.zeros(len(mark), np.int64)
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        lengths[start:stop] = stop - start
-    return lengths
+    return float(run_lengths(same).max(initial=0))
 
 
 def dead_channels(recording: Recording) -> tuple[str, ...]:

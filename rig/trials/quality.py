@@ -17,7 +17,6 @@ from rig.recording.reader import Recording
 from rig.recording.sessions import TrialInfo
 from rig.recording.slope import tracker_slope
 from rig.trials import measures
-from rig.trials.contact import Contact
 from rig.trials.curves import Curve, loading_curve
 from rig.trials.cycles import cycle_of
 from rig.trials.recorded import trial_of
@@ -44,14 +43,23 @@ class TrialQuality:
 
 
 class Measure(NamedTuple):
-    """One thing measured: ``value`` against ``bounds``, both shown ``scale`` times with ``unit``; NaN: not shown."""
+    """One thing measured, under the name of its bound; shown ``scale`` times with ``unit``, not shown where NaN."""
 
     name: str
     value: float
-    bounds: Bounds
     text: str
     unit: str = ""
     scale: float = 1.0
+
+    def bounds(self, limits: QualityLimits) -> Bounds:
+        """What a protocol allows of it."""
+        found: Bounds = getattr(limits, self.name.rpartition(".")[2])
+        return found
+
+    def sentence(self, limits: QualityLimits) -> str:
+        """The value beside what is good."""
+        value, good = self.value * self.scale, self.bounds(limits).good * self.scale
+        return f"{self.text} {value:.3g}{self.unit} (good up to {good:.3g}{self.unit})"
 
 
 def evaluate_trial(recording: Recording, limits: QualityLimits, peaks_before_N: Sequence[float] = ()) -> TrialQuality:
@@ -59,19 +67,18 @@ def evaluate_trial(recording: Recording, limits: QualityLimits, peaks_before_N: 
 
     ``peaks_before_N``: what trials to the same depth on the same site reached before.
     """
-    measured = (*_measures(recording, limits), *_against_before(recording, limits, peaks_before_N))
-    found = [measure for measure in measured if not math.isnan(measure.value)]
-    unusable = list(_unusable(recording))
-    beyond = [measure for measure in found if measure.value > measure.bounds.good]
-    bad = unusable or any(m.bounds.bad is not None and m.value > m.bounds.bad for m in beyond)
+    curve = None if recording.tracks_force else _curve(recording)
+    measured = (*_of_streams(recording), *_of_force(recording), *_of_tracker(recording), *_of_loading(recording, curve))
+    found = [one for one in (*measured, *_against_before(recording, peaks_before_N)) if not math.isnan(one.value)]
+    unusable = [
+        *_unusable(recording),
+        *([f"no loading can be read from it: {curve}"] if isinstance(curve, str) else []),
+    ]
+    beyond = [(measure, measure.bounds(limits)) for measure in found if measure.value > measure.bounds(limits).good]
+    bad = unusable or any(bounds.bad is not None and measure.value > bounds.bad for measure, bounds in beyond)
     verdict: Verdict = "bad" if bad else "usable" if beyond else "good"
-    reasons = (*unusable, *map(_sentence, beyond))
+    reasons = (*unusable, *(measure.sentence(limits) for measure, _ in beyond))
     return TrialQuality(verdict, reasons, {measure.name: measure.value for measure in found})
-
-
-def _sentence(measure: Measure) -> str:
-    value, good = measure.value * measure.scale, measure.bounds.good * measure.scale
-    return f"{measure.text} {value:.3g}{measure.unit} (good up to {good:.3g}{measure.unit})"
 
 
 def _unusable(recording: Recording) -> Iterator[str]:
@@ -83,8 +90,6 @@ def _unusable(recording: Recording) -> Iterator[str]:
         yield f"it was stopped: {summary['cause']}"
     if recording.damage:
         yield f"the recording is damaged: {recording.damage[0]}"
-    if not recording.tracks_force and isinstance(curve := _curve(recording), str):
-        yield f"no loading can be read from it: {curve}"
 
 
 def _answered(recording: Recording) -> bool:
@@ -99,96 +104,70 @@ def _curve(recording: Recording) -> Curve | str:
         return str(error)
 
 
-def _measures(recording: Recording, limits: QualityLimits) -> Iterator[Measure]:
-    yield from _of_streams(recording, limits)
-    yield from _of_force(recording, limits)
-    yield from _of_tracker(recording, limits)
-    if not recording.tracks_force:
-        yield from _of_loading(recording, limits)
-
-
-def _of_streams(recording: Recording, limits: QualityLimits) -> Iterator[Measure]:
+def _of_streams(recording: Recording) -> Iterator[Measure]:
     rates = measures.nominal_Hz(recording)
-    yield Measure(
-        "cycles_missed", measures.cycles_missed(recording), limits.cycles_missed,
-        "the loop missed of its cycles", " %", 100,
-    )  # fmt: skip
+    yield Measure("cycles_missed", measures.cycles_missed(recording), "the loop missed of its cycles", " %", 100)
     for role, share in measures.wire_damage(recording).items():
-        text = f"{role}: damaged or foreign on its wire, bytes a message:"
-        yield Measure(f"{role}.wire_damage", share, limits.wire_damage, text)
+        yield Measure(f"{role}.wire_damage", share, f"{role}: damaged or foreign on its wire, bytes a message:")
     for stream in ("force", "axis"):
         lost = measures.rate_lost(recording, stream, rates[stream]) if stream in rates else math.nan
-        yield Measure(f"{stream}.rate_lost", lost, limits.rate_lost, f"{stream}: below its nominal rate by", " %", 100)
-        gap_ms = measures.gap_ms(recording, stream)
-        yield Measure(f"{stream}.gap_ms", gap_ms, limits.gap_ms, f"{stream}: a gap of", " ms")
+        yield Measure(f"{stream}.rate_lost", lost, f"{stream}: below its nominal rate by", " %", 100)
+        yield Measure(f"{stream}.gap_ms", measures.gap_ms(recording, stream), f"{stream}: a gap of", " ms")
 
 
-def _of_force(recording: Recording, limits: QualityLimits) -> Iterator[Measure]:
+def _of_force(recording: Recording) -> Iterator[Measure]:
     lost, full = measures.samples_lost(recording), measures.saturated(recording)
-    yield Measure("force.samples_lost", lost, limits.samples_lost, "force: samples lost or invalid", " %", 100)
-    yield Measure("saturated", full, limits.saturated, "force: samples at the end of the range", " %", 100)
-    yield Measure(
-        "frozen_samples", measures.frozen_samples(recording), limits.frozen_samples,
-        "force: equal readings in a row, as of a frozen sensor:",
-    )  # fmt: skip
+    yield Measure("force.samples_lost", lost, "force: samples lost or invalid", " %", 100)
+    yield Measure("saturated", full, "force: samples at the end of the range", " %", 100)
+    frozen = measures.frozen_samples(recording)
+    yield Measure("frozen_samples", frozen, "force: equal readings in a row, as of a frozen sensor:")
     dead = measures.dead_channels(recording)
-    yield Measure(
-        "dead_channels",
-        float(len(dead)),
-        limits.dead_channels,
-        f"force: channels that never change ({', '.join(dead)}):",
-    )
+    yield Measure("dead_channels", float(len(dead)), f"force: channels that never change ({', '.join(dead)}):")
     drift_N = abs(measures.zero_drift_N(recording))
-    yield Measure("zero_drift_N", drift_N, limits.zero_drift_N, "force in the air went off during the trial by", " N")
+    yield Measure("zero_drift_N", drift_N, "force in the air went off during the trial by", " N")
 
 
-def _of_tracker(recording: Recording, limits: QualityLimits) -> Iterator[Measure]:
+def _of_tracker(recording: Recording) -> Iterator[Measure]:
     nominal_Hz = measures.nominal_Hz(recording).get("marker")
     if nominal_Hz is None:
         return
     lost = measures.tracker_lost(recording, nominal_Hz)
-    yield Measure("tracker_lost", lost, limits.tracker_lost, "tracker: frames of the tip lost", " %", 100)
+    yield Measure("tracker_lost", lost, "tracker: frames of the tip lost", " %", 100)
     slope = tracker_slope(recording)
     if slope is not None:
         off = max(abs(slope.slope - 1.0) - 2 * slope.deviation, 0.0)
         text = f"tracker: travels {slope.slope:.4f} mm while the axis says 1 mm, off by"
-        yield Measure("tracker_slope_off", off, limits.tracker_slope_off, text, " %", 100)
+        yield Measure("tracker_slope_off", off, text, " %", 100)
         jump_mm = measures.tracker_jump_mm(recording, slope)
-        yield Measure("tracker_jump_mm", jump_mm, limits.tracker_jump_mm, "tracker: the tip's marker jumps by", " mm")
+        yield Measure("tracker_jump_mm", jump_mm, "tracker: the tip's marker jumps by", " mm")
 
 
-def _of_loading(recording: Recording, limits: QualityLimits) -> Iterator[Measure]:
-    yield Measure(
-        "contact_within_mm", _contact_within_mm(recording), limits.contact_within_mm,
-        "the surface is known no better than +-", " mm",
-    )  # fmt: skip
-    curve, asked_mm = _curve(recording), measures.asked_mm(recording)
+def _of_loading(recording: Recording, curve: Curve | str | None) -> Iterator[Measure]:
+    """Of a recording with a cycle; ``curve`` is its loading, None of one without."""
+    if curve is None:
+        return
+    within_mm = _contact_within_mm(recording)
+    yield Measure("contact_within_mm", within_mm, "the surface is known no better than +-", " mm")
     if isinstance(curve, str):
         return
-    reached_mm = measures.depth_mm(recording, curve.contact.position_mm)
+    reached_mm, asked_mm = measures.depth_mm(recording, curve.contact.position_mm), measures.asked_mm(recording)
     # A loading that the protocol's own limit of force ended is as deep as it should be, unless it is deeper.
     ended_early = recording.metadata.get(SUMMARY, {}).get("outcome") == FORCE_LIMIT
     missed_mm = reached_mm - asked_mm if ended_early else abs(reached_mm - asked_mm)
-    off_mm = max(missed_mm - _uncertain_mm(curve.contact), 0.0)
-    text = f"depth reached {reached_mm:.2f} of {asked_mm:g} mm: off by"
-    yield Measure("depth_off_mm", off_mm, limits.depth_off_mm, text, " mm")
-    lost = measures.loading_lost(curve, reached_mm)
-    yield Measure("loading_lost", lost, limits.loading_lost, "loading no fit can use:", " %", 100)
+    # The whole loading leaves two deviations of contact open.
+    off_mm = max(missed_mm - 2 * curve.contact.likely_mm, 0.0)
+    yield Measure("depth_off_mm", off_mm, f"depth reached {reached_mm:.2f} of {asked_mm:g} mm: off by", " mm")
+    yield Measure("loading_lost", measures.loading_lost(curve, reached_mm), "loading no fit can use:", " %", 100)
 
 
-def _against_before(recording: Recording, limits: QualityLimits, peaks_before_N: Sequence[float]) -> Iterator[Measure]:
+def _against_before(recording: Recording, peaks_before_N: Sequence[float]) -> Iterator[Measure]:
     """The force of a trial that reached its depth against the median of those that did before it."""
     summary = recording.metadata.get(SUMMARY, {})
     if recording.tracks_force or not peaks_before_N or summary.get("outcome") != "complete":
         return
     peak_N, usual_N = float(summary.get("peak_force_N", "nan")), median(peaks_before_N)
     text = f"peak force {peak_N:.2f} N, {usual_N:.2f} N in the trials before (another gain, or another site?): off by"
-    yield Measure("peak_off", abs(peak_N / usual_N - 1.0), limits.peak_off, text, " %", 100)
-
-
-def _uncertain_mm(contact: Contact) -> float:
-    """What the whole loading leaves open of contact: two deviations, within the interval it must lie in."""
-    return 2 * contact.likely_mm
+    yield Measure("peak_off", abs(peak_N / usual_N - 1.0), text, " %", 100)
 
 
 def _contact_within_mm(recording: Recording) -> float:
