@@ -70,7 +70,7 @@ class Coverage:
         found = self._affordable(list(dict.fromkeys([*near, *same])) or self._quickest(self.lines))
         files = {test.partition("::")[0] for test in found}
         beside = (test for test in self.lines if test.partition("::")[0] in files and self.seconds[test] < QUICK_S)
-        return list(dict.fromkeys([*found, *self._quickest(beside)]))
+        return self._quickest({*found, *beside})
 
     def _affordable(self, tests: list[str]) -> list[str]:
         until = accumulate((self.seconds[test] for test in tests), initial=0.0)

@@ -326,7 +326,7 @@ def test_limits_of_waiting_and_leases() -> None:
 def test_a_stopped_program_is_an_error_with_its_cause() -> None:
     error = stopped(Outcome("pain_stop", "the subject's pain stop at 3.00 N", 3.0, None, None))
     assert isinstance(error, SafetyStop)
-    assert str(error) == "stopped: the subject's pain stop at 3.00 N"
+    assert (str(error), error.code) == ("stopped: the subject's pain stop at 3.00 N", "pain_stop")
 
 
 def test_children_get_one_thread_a_numerics_library_and_all_else_of_the_environment(

@@ -61,5 +61,5 @@ def test_a_declaration_is_also_for_quick_tests_beside_those_that_run_its_file() 
         lines={"f.py::runs": {("a.py", 1)}, "f.py::declares": set(), "f.py::slow": set(), "g.py::other": set()},
         seconds={"f.py::runs": 0.5, "f.py::declares": 0.01, "f.py::slow": 0.3, "g.py::other": 0.01},
     )
-    assert tests.noticing("a.py", 7, at_import=True) == ["f.py::runs", "f.py::declares"]
+    assert tests.noticing("a.py", 7, at_import=True) == ["f.py::declares", "f.py::runs"]
     assert tests.noticing("a.py", 1, at_import=False) == ["f.py::runs"]

@@ -31,7 +31,7 @@ from rig.channel import Answer, Channel, Message, Received, pair
 from rig.errors import DeviceError, SafetyStop, UsageError
 
 HOLD = Run(program=Program(name="hold", steps=(Hold(duration_s=1.0),)))
-PATIENCE_S = 20.0
+PATIENCE_S = 5.0
 
 
 class PlayedLoop:

@@ -86,7 +86,7 @@ def test_the_process_reads_its_settings_and_gives_everything_back(
         assert keyboard._pad
         handed = (keyboard._path, keyboard._pad.fd)
         done.extend([parent, page.path, server._listener.fileno(), handed, keyboard._keys, keyboard._required])
-        done.append(page.keypad)
+        done.extend([page.keypad, server.state()["keypad"]])
 
     monkeypatch.setattr(module, "serve", serve)
     pad = tmp_path / "pad"
@@ -98,7 +98,8 @@ def test_the_process_reads_its_settings_and_gives_everything_back(
     arguments = [str(path), str(listener.detach()), str(keypad), json.dumps(settings)]
     assert module.main(arguments) == 0
     fd = int(arguments[1])
-    assert done == [39, 77, path, fd, (str(pad), keypad), Keys({48: StopReason.PAIN}, StopReason.STOP), True, Keypad.OK]
+    keys = Keys({48: StopReason.PAIN}, StopReason.STOP)
+    assert done == [39, 77, path, fd, (str(pad), keypad), keys, True, Keypad.OK, "ok"]
     os.close(writer)
     os.close(keypad)
     assert {number: signals[number] for number in (signal.SIGINT, signal.SIGHUP)} == {

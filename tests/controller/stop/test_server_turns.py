@@ -189,13 +189,15 @@ def test_what_there_is_not_is_answered_with_what_there_is(
     assert served.loop.take(1) == ()
 
 
-def test_who_leaves_no_room_for_an_answer_is_dropped(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_leaves_no_room_for_an_answer_is_dropped_without_a_word(
+    served: Served, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     client = served.client()
     (waiting,) = served.connections
     monkeypatch.setattr(http, "response", lambda *_: b"x" * 50_000_000)
     client.sendall(b"GET /state HTTP/1.1\r\n\r\n")
     served.server.turn()
-    assert (served.connections, waiting.socket.fileno()) == ([], -1)
+    assert (served.connections, waiting.socket.fileno(), capsys.readouterr().err) == ([], -1, "")
 
 
 def test_more_bytes_of_a_head_give_it_no_more_time(served: Served) -> None:
