@@ -6,7 +6,7 @@ All work on sums of products (the Gram matrix) of the simulation's own columns a
 import numpy as np
 
 from rig.diagnosis.evidence import Tangents, amplitudes_of, information, tangents
-from rig.diagnosis.fit import bold_view
+from rig.diagnosis.fit import low_noise_view
 from rig.diagnosis.noise import Array
 from rig.diagnosis.search import Search, testable
 
@@ -85,7 +85,7 @@ def naive(search: Search | None) -> dict[str, list[str]]:
     if search is None:
         return {}
     problem = search.before.problem
-    t, samples = tangents(bold_view(search.before), testable(problem)), len(problem.channels[0].observed)
+    t, samples = tangents(low_noise_view(search.before), testable(problem)), len(problem.channels[0].observed)
     found = {
         "residual look-up": look_up(t), "in-sample BIC": in_sample_bic(t, samples), "STLSQ": stlsq(t),
         "FROLS": frols(t, samples),

@@ -1,6 +1,6 @@
 """Speed of the lattice, as ratios within one run: ``python -m benchmarks.lattice [--figure FILE] [--part NAME]``.
 
-Rivals taichi and warp-lang are timed if they are installed (``uv pip install taichi warp-lang``); numpy always is.
+The alternatives taichi and warp-lang are timed if installed (``uv pip install taichi warp-lang``); numpy always is.
 Every ratio states what it compares; what is extrapolated says so.
 """
 
@@ -19,7 +19,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from benchmarks import lattice_euler
-from benchmarks.lattice_rivals import NumpySlices, taichi_force, warp_force
+from benchmarks.lattice_alternatives import NumpySlices, taichi_force, warp_force
 from rig.tissue.lattice import fire
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.kernels import STEPS
@@ -33,7 +33,7 @@ DEPTH_MM = 2.0
 TOLERANCE_N = RELATIVE_TOLERANCE * 0.1
 GUESSES_PER_FORCE, FORCES = 4, 10
 STATE_ARRAYS = 7  # positions, rest, force, free, and the solver's velocity, inverse mass and diagonal
-RIVALS: Mapping[str, Callable[[Matrix, float, float], Callable[[], Matrix] | None]] = {
+ALTERNATIVES: Mapping[str, Callable[[Matrix, float, float], Callable[[], Matrix] | None]] = {
     "numpy slices": NumpySlices,
     "taichi": taichi_force,
     "warp": warp_force,
@@ -81,8 +81,8 @@ def springs_of(block: Block) -> int:
 
 
 def force_table(rounds: int) -> tuple[dict[str, dict[str, float]], float]:
-    """ms per force evaluation of the study's full block, both laws, rivals where installed; and Gflop/s of a matrix
-    product."""
+    """ms per force evaluation of the study's full block, both laws, alternatives where installed; and Gflop/s of a
+    matrix product."""
     a = np.random.default_rng(0).normal(size=(1000, 1000))
     found: dict[str, dict[str, float]] = {}
     roof = 0.0
@@ -93,11 +93,11 @@ def force_table(rounds: int) -> tuple[dict[str, dict[str, float]], float]:
         inner = np.ascontiguousarray(lattice.block.inner(lattice.x))
         ours = lattice.block.inner(lattice.force()).copy()
         calls: dict[str, Callable[[], object]] = {"ours": lattice.force}
-        for name, make in RIVALS.items():
-            rival = make(inner, 0.1, b)
-            if rival is not None:
-                np.testing.assert_allclose(rival(), ours, atol=1e-9)
-                calls[name] = rival
+        for name, make in ALTERNATIVES.items():
+            alternative = make(inner, 0.1, b)
+            if alternative is not None:
+                np.testing.assert_allclose(alternative(), ours, atol=1e-9)
+                calls[name] = alternative
         calls |= {"ours, 1 thread": alone.force, "ours, with cell volumes": with_cells.force, "product": lambda: a @ a}
         times = best_of_rounds(calls, rounds)
         roof = max(roof, 2e-9 * 1000**3 / times.pop("product"))

@@ -43,5 +43,5 @@ def _said(statement: str) -> str:
 
 
 def _row(par: Par) -> str:
-    unit, worth = "" if par.unit == "1" else par.unit, f"{par.worth:g}" if par.worth else ""
-    return f"| `{par.name}` | {unit} | {par.null:g} | {par.low:g} | {par.high:g} | {worth} | {par.meaning} |"
+    unit, least = "" if par.unit == "1" else par.unit, f"{par.least:g}" if par.least else ""
+    return f"| `{par.name}` | {unit} | {par.null:g} | {par.low:g} | {par.high:g} | {least} | {par.meaning} |"

@@ -57,7 +57,7 @@ class HiddenCause:
         finding = next((found for found in result.findings if self.effect in found.effects), None)
         if finding is None:
             return f"{hidden}: the diagnosis missed it."
-        how = "named it" if finding.effects[0] == self.effect else "has it among its rivals"
+        how = "named it" if finding.effects[0] == self.effect else "has it among its alternatives"
         if self.parameter not in finding.parameters:
             return f"{hidden}: the diagnosis {how}."
         found = finding.parameters[self.parameter]

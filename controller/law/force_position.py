@@ -164,10 +164,10 @@ def foresee(
     dying_too_N = math.exp(-dt_s / settings.relaxing_too_s) * ahead.dying_too_N
     lacking_N = reference_N - rest_N - dying_N - dying_too_N - settings.friction_N * ahead.bristle
     side = 1.0 if lacking_N > 0 else -1.0
-    rubbing = settings.friction_N * (1.0 - side * ahead.bristle) / settings.friction_mm
+    friction = settings.friction_N * (1.0 - side * ahead.bristle) / settings.friction_mm
     tangent = scale * interpolate(table.depth_mm, table.tangent_N_mm, ahead.depth_mm)
     largest_mm = settings.ahead_mm_s * dt_s
-    step_mm = min(max(lacking_N / (tangent + resistance + rubbing), -largest_mm), largest_mm)
+    step_mm = min(max(lacking_N / (tangent + resistance + friction), -largest_mm), largest_mm)
     after_mm = ahead.depth_mm + step_mm
     after_N = scale * interpolate(table.depth_mm, table.force_N, after_mm)
     dying_N += settings.relaxing_1 * (after_N - rest_N)

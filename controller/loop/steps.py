@@ -27,7 +27,7 @@ Positive = Annotated[float, Field(gt=0)]
 CONTACT_SAMPLES = 3
 TELLING_NOISE, CONTACT_NOISE, LARGEST_DETECTION_N = 10.0, 4.0, 1.0
 RUN_IN_MM = 0.5  # the guide's slip ends within it
-LARGEST_RUBBING_N = 0.5  # 0.2 N was met; what rubs more could as well be a limb
+LARGEST_FRICTION_N = 0.5  # 0.2 N was met; what is more could as well be a limb
 # Ten standard deviations of one sample of the noisier product; a hundred times those of a zero's mean.
 LARGEST_ZERO_SHIFT_N = 0.5
 # A tenth of limits.torque_N_m, and 25 standard deviations of one sample of the noisier product.
@@ -129,13 +129,13 @@ class Approach(Table):
 class ApproachRun:
     """Counts consecutive samples above the threshold: one spike is not contact, and neither is the sensor's noise.
 
-    Nor is it contact that the guide rubs once the tip moves: force counts from what it is after the first 0.5 mm, where
-    that is up to 0.5 N above the zero.
+    Nor is the friction of the linear guide, once the tip moves: force counts from what it is after the first 0.5 mm,
+    where that is up to 0.5 N above the zero.
     """
 
     def __init__(self, step: Approach) -> None:
         self._step, self._above, self._seen = step, 0, -1
-        self._from_mm, self._rubbing_N = math.nan, LARGEST_RUBBING_N
+        self._from_mm, self._friction_N = math.nan, LARGEST_FRICTION_N
         self._running_in_N: list[float] = []
         self._touch: TouchRun | None = None
         self.has_run_in = False
@@ -143,7 +143,7 @@ class ApproachRun:
     def threshold_N(self, state: LoopState) -> float:
         """Force that may be contact."""
         telling_N = min(TELLING_NOISE * state.noise_N, LARGEST_DETECTION_N)
-        return max(self._step.contact_force_N, telling_N, CONTACT_NOISE * state.noise_N) + self._rubbing_N
+        return max(self._step.contact_force_N, telling_N, CONTACT_NOISE * state.noise_N) + self._friction_N
 
     @property
     def searches(self) -> bool:
@@ -172,7 +172,7 @@ class ApproachRun:
         return False
 
     def _run_in(self, state: LoopState) -> None:
-        """Force after the slip of the guide and before 0.5 mm; until then anything up to the largest may be rubbing."""
+        """Force after the slip of the guide and before 0.5 mm; before, anything up to the largest may be friction."""
         if math.isnan(self._from_mm):
             self._from_mm = state.position_mm
             state.paired.clear()
@@ -181,7 +181,7 @@ class ApproachRun:
         if moved_mm >= RUN_IN_MM:
             self.has_run_in = True
             state.paired.clear()
-            self._rubbing_N = min(max(fmean(self._running_in_N or [0.0]), 0.0), LARGEST_RUBBING_N)
+            self._friction_N = min(max(fmean(self._running_in_N or [0.0]), 0.0), LARGEST_FRICTION_N)
         elif moved_mm >= 0.5 * RUN_IN_MM:
             self._running_in_N.append(state.force_N)
 

@@ -11,7 +11,7 @@ from controller.loop.state import LoopState
 from controller.safety.load import Wrench
 from rig.config.wiring import Wiring
 
-# Twice the rubbing of the guide that an approach accepts as none, and ten times the noisier sensor's noise of a norm.
+# Twice the friction of the guide that an approach accepts as none, and ten times the noisier sensor's noise of a norm.
 TOUCH_N = 1.0
 # Cosine of 45 degrees: friction of 0.5 on a tip that slides leaves 0.9 along the axis.
 SHARE_ALONG = 0.7

@@ -40,7 +40,7 @@ class SpringBench:
     positions_mm: list[float] = field(default_factory=list)
     every: int = 1
     noise_N: float = 0.0
-    rubbing_N: float = 0.0
+    friction_N: float = 0.0
     noise: random.Random = field(default_factory=lambda: random.Random(1))
     count: int = -1
 
@@ -64,7 +64,7 @@ class SpringBench:
         """What the bench shows of where the axis stands now."""
         force_N = self.tissue_N(self.position_mm - self.state.position_mm)
         if self.position_mm > self.state.position_mm:
-            force_N += self.rubbing_N
+            force_N += self.friction_N
         self.state.position_mm = self.position_mm
         self.load_monitor.axis(self.state.now_ns, self.position_mm)
         self.count += 1

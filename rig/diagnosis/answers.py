@@ -17,10 +17,10 @@ from rig.diagnosis.estimates import (
 )
 from rig.diagnosis.evidence import Tangents, held_out_square_error, information, is_alias, jackknife
 from rig.diagnosis.fit import Fit, least_squares
+from rig.diagnosis.lack_of_fit import LackOfFit, find_better_trends, unexplained_variables
 from rig.diagnosis.noise import Array
-from rig.diagnosis.omnibus import Leftover, beaten, judged_leftover
 from rig.diagnosis.problem import Effect, InverseProblem, Par
-from rig.diagnosis.search import Named, Search, imitated, testable
+from rig.diagnosis.search import Named, Search, shared_variables, testable
 from rig.tissue.intervals import student_reach
 from rig.trials.findings import Finding
 
@@ -28,14 +28,14 @@ POWER_SD = 0.84  # 80 % power
 LEAVING_OUT_NATS = 1.0
 # Operators on a grid of 4 ms are not exact: development seeds gave sizes up to 1 % off within far tighter intervals.
 OPERATOR_SHARE = 0.015
-# On development seeds none of the names beside an unexplained leftover was right; some will be.
+# On development seeds none of the names beside an unexplained residual was right; some will be.
 PROVISIONAL_SHARE = 0.2
 DRAWS = 1000  # 25 beyond each end of a 95 % interval
 NEAR_BOUND = 0.99  # sizes are no surer than 1.5 % (OPERATOR_SHARE)
 LARGEST_LOG = 20.0  # a factor of e^20 is beyond the bounds of every parameter, and is still a number
 # A model whose noise and scatter are this large against the signal explains nothing, however white its residual.
 MOST_CHANCE = 0.25
-# White: a leftover of 0.7 mN in the dither of a quiet bench comes to less, and nobody would act on it.
+# White: a residual of 0.7 mN in the dither of a quiet bench comes to less, and nobody would act on it.
 LEAST_LEFT_N = 0.0003
 
 
@@ -50,21 +50,21 @@ class Diagnosis:
     statement: str
     findings: tuple[NamedCause, ...]
     depends_on: tuple[str, ...]
-    leftover_p: float | None
+    lack_of_fit_p: float | None
     detectable: Mapping[str, SmallestSize]
     not_testable: Mapping[str, str]
     next_experiment: NextExperiment | None
     quality: tuple[Finding, ...]
     base: Mapping[str, Estimate] = field(default_factory=dict)
     search: Search | None = None
-    before: Leftover | None = None
-    after: Leftover | None = None
+    before: LackOfFit | None = None
+    after: LackOfFit | None = None
     simulated: tuple[SimulationError, ...] = ()
 
     @property
     def unexplained(self) -> Unexplained | None:
         """What is left, where no known cause explains it."""
-        return Unexplained(self.depends_on, self.leftover_p) if self.verdict == "unexplained" else None
+        return Unexplained(self.depends_on, self.lack_of_fit_p) if self.verdict == "unexplained" else None
 
     def with_simulated(self, simulated: tuple[SimulationError, ...]) -> "Diagnosis":
         """The same with errors of whole simulations."""
@@ -90,7 +90,7 @@ def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Estimate]:
             k = place[par.name]
             half = wide * max(float(np.sqrt(c[k, k])) for c in covariances)
             half = min(half, LARGEST_LOG) if par.log else half
-            half = float(np.hypot(half, OPERATOR_SHARE * abs(value - par.null))) if par.worth else half
+            half = float(np.hypot(half, OPERATOR_SHARE * abs(value - par.null))) if par.least else half
             low, high = (value / np.exp(half), value * np.exp(half)) if par.log else (value - half, value + half)
             found[par.name] = Estimate(value, max(low, par.low), min(high, par.high), stopped(par, value))
     return found
@@ -99,7 +99,7 @@ def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Estimate]:
 def stopped(par: Par, value: float) -> bool:
     """Whether a size has gone all the way from its null to a bound."""
     bound = par.high if value > par.null else par.low
-    return bool(par.worth and abs(value - par.null) >= NEAR_BOUND * abs(bound - par.null))
+    return bool(par.least and abs(value - par.null) >= NEAR_BOUND * abs(bound - par.null))
 
 
 def _amplitude(fit: Fit, sine: str, place: Mapping[str, int], wide: float, covariances: Sequence[Array]) -> Estimate:
@@ -131,7 +131,7 @@ def answer(named: Named, after: Fit, provisional: bool) -> NamedCause:
     """One finding of the final model."""
     effect = named.effect
     return NamedCause(
-        (effect.name, *named.rivals),
+        (effect.name, *named.alternatives),
         sentence(effect, after.values),
         named.share * (PROVISIONAL_SHARE if provisional else 1.0),
         intervals(after, effect.pars),
@@ -157,7 +157,7 @@ def smallest_visible(t: Tangents, threshold: float) -> dict[str, SmallestSize]:
     result = {}
     for name, found in sizes.items():
         par = effects[name].amplitudes[0]
-        result[name] = SmallestSize(max(float(np.median(found)), par.worth), par.unit)
+        result[name] = SmallestSize(max(float(np.median(found)), par.least), par.unit)
     return result
 
 
@@ -183,17 +183,17 @@ def limits(problem: InverseProblem, search: Search) -> tuple[dict[str, SmallestS
     return visible, reasons
 
 
-def verdict_of(search: Search, after: Leftover) -> tuple[Verdict, tuple[str, ...]]:
-    """Adequate, explained or unexplained, and what a leftover depends on."""
+def verdict_of(search: Search, after: LackOfFit) -> tuple[Verdict, tuple[str, ...]]:
+    """Adequate, explained or unexplained, and what a residual depends on."""
     named = sum(found.nats for found in search.named)
-    depends = judged_leftover(after, named)
+    depends = unexplained_variables(after, named)
     if depends != after.between and left_N(search.after, after) < LEAST_LEFT_N:
         depends = ()
     if not depends:
-        plainer = [beaten(found.effect, search.after, found.without) for found in search.named]
+        plainer = [find_better_trends(found.effect, search.after, found.without) for found in search.named]
         depends = tuple(dict.fromkeys(name for names in plainer for name in names))
     if not depends:
-        depends = imitated([found.effect for found in search.named])
+        depends = shared_variables([found.effect for found in search.named])
     if not depends and left_to_chance(search.after) > MOST_CHANCE:
         depends = ("recording",)
     if depends:
@@ -201,8 +201,8 @@ def verdict_of(search: Search, after: Leftover) -> tuple[Verdict, tuple[str, ...
     return ("explained" if search.named else "adequate"), ()
 
 
-def left_N(fit: Fit, found: Leftover) -> float:
-    """The most telling leftover as a white force [N]; infinite for what is no force."""
+def left_N(fit: Fit, found: LackOfFit) -> float:
+    """The residual along its most telling variable as a white force [N]; infinite for what is no force."""
     share = max(found.shares[found.ranked[0]], 0.0)
     return float(np.sqrt(share)) * fit.whitener.noise.colours[0].sd if fit.problem.channels[0].unit == "N" else np.inf
 
@@ -224,4 +224,4 @@ def summary(verdict: Verdict, findings: Sequence[NamedCause], depends_on: Sequen
     if verdict == "explained":
         return f"The {simulation} simulation is wrong because {causes}."
     hint = f" Provisionally: {causes}." if causes else ""
-    return f"Something is left that no known cause explains; it depends on {', '.join(depends_on)}.{hint}"
+    return f"A residual is left that no known cause explains; it depends on {', '.join(depends_on)}.{hint}"

@@ -26,30 +26,30 @@ EDGE_S = 0.25
 MEMORY_S = 0.05
 
 MASS = Par("mass_kg", "kg", 50.0, 1e-3, 1e5, 1.0, log=True, meaning="moved mass")
-VISCOUS = Par("viscous_N_s_m", "N s/m", 0.0, -1e4, 1e5, 5.0, worth=1.0, meaning="viscous friction")
+VISCOUS = Par("viscous_N_s_m", "N s/m", 0.0, -1e4, 1e5, 5.0, least=1.0, meaning="viscous friction")
 OFFSET = Par("offset_N", "N", 0.0, -1e4, 1e4, 0.5, meaning="constant force (amplifier offset, weight)")
 AXIS_EFFECTS = (
     Effect(
-        "coulomb_friction", "the axis rubs with {coulomb_N:.3g} N whatever its speed",
-        (Par("coulomb_N", "N", 0.0, 0.0, 1e4, 1.0, worth=0.2, meaning="Coulomb friction"),),
+        "coulomb_friction", "the axis has Coulomb friction of {coulomb_N:.3g} N whatever its speed",
+        (Par("coulomb_N", "N", 0.0, 0.0, 1e4, 1.0, least=0.2, meaning="Coulomb friction"),),
         one_sided=True, repair="add Coulomb friction to the feed-forward",
     ),
     Effect(
         "asymmetric_friction",
         "friction grows with speed by {asymmetry_N_s_m:+.3g} N s/m forward and as much the other way backward",
-        (Par("asymmetry_N_s_m", "N s/m", 0.0, -1e4, 1e4, 2.0, worth=1.0, meaning="half the difference of directions"),),
+        (Par("asymmetry_N_s_m", "N s/m", 0.0, -1e4, 1e4, 2.0, least=1.0, meaning="half the difference of directions"),),
         repair="use friction parameters of their own for each direction",
     ),
     Effect(
         "dead_time", "the force acts {dead_time_s:.3g} s after its command",
-        (Par("dead_time_s", "s", 0.0, -0.05, 0.05, 5e-4, worth=5e-4, meaning="delay of the force"),),
+        (Par("dead_time_s", "s", 0.0, -0.05, 0.05, 5e-4, least=5e-4, meaning="delay of the force"),),
         needs=frozenset({"fast"}), repair="add the delay to the controller's design",
     ),
     Effect(
         "position_ripple", "the force ripples by {amplitude:.3g} N every {ripple_pitch_m:.3g} m",
         (
-            Par("ripple_sin_N", "N", 0.0, -1e3, 1e3, 0.5, worth=0.2, meaning="ripple along the screw"),
-            Par("ripple_cos_N", "N", 0.0, -1e3, 1e3, 0.5, worth=0.2, meaning="ripple along the screw"),
+            Par("ripple_sin_N", "N", 0.0, -1e3, 1e3, 0.5, least=0.2, meaning="ripple along the screw"),
+            Par("ripple_cos_N", "N", 0.0, -1e3, 1e3, 0.5, least=0.2, meaning="ripple along the screw"),
         ),
         (Par("ripple_pitch_m", "m", 0.005, 5e-4, 0.1, 1e-5, meaning="period along the axis"),),
         lambda *_: [{"ripple_pitch_m": pitch} for pitch in (0.0025, 0.004, 0.005, 0.01, 0.02)],
@@ -57,7 +57,7 @@ AXIS_EFFECTS = (
     ),
     Effect(
         "flexible_mode", "a flexible mode adds {flexible_kg_s2:.3g} kg s^2 times the fourth derivative of position",
-        (Par("flexible_kg_s2", "kg s^2", 0.0, 0.0, 10.0, 1e-3, worth=1e-4, meaning="mass over squared resonance"),),
+        (Par("flexible_kg_s2", "kg s^2", 0.0, 0.0, 10.0, 1e-3, least=1e-4, meaning="mass over squared resonance"),),
         one_sided=True, needs=frozenset({"fast"}), repair="filter the command at the resonance",
     ),
 )  # fmt: skip
@@ -193,7 +193,7 @@ class AxisProblem:
         return {"depth": "m", "velocity": "m/s", "acceleration": "m/s2", "session time": "s", "force": "N"}
 
     def variables(self) -> Mapping[str, Array]:
-        """What a leftover may depend on."""
+        """What a residual may depend on."""
         m = self.motion
         return {"depth": m.position, "velocity": m.velocity, "acceleration": m.acceleration, "session time": m.time_s}
 

@@ -12,7 +12,7 @@ from rig.trials.trial import Trial, TrialSet, ordered
 # at half depth, at 0.69, is none; what is within 0.26 mm of the highest place is the rest there.
 UP, DEEP = 0.25, 0.6
 AT_REST = 0.02
-AIR_SHARE = 0.05  # of the force's range: a guide that rubs by 0.2 N, in a trial of 4 N
+AIR_SHARE = 0.05  # of the force's range: guide friction of 0.2 N, in a trial of 4 N
 
 
 def in_cycles(session: TrialSet) -> TrialSet:

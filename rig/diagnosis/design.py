@@ -184,8 +184,8 @@ def _rate(protocol: Protocol, found: Fit, pair: Sequence[str]) -> float:
         return 0.0
     effect = by_name[pair[0]]
     size = sum((found.values[par.name] - par.null) ** 2 for par in effect.amplitudes) / len(effect.amplitudes)
-    rivals = groups.get(pair[1], [])
-    left = min((_trace(t, groups[pair[0]][0], rival.columns) for rival in rivals), default=0.0)
+    alternatives = groups.get(pair[1], [])
+    left = min((_trace(t, groups[pair[0]][0], alternative.columns) for alternative in alternatives), default=0.0)
     minutes = float(cycles[-1].force_s[-1]) / 60
     return 0.5 * size * left / minutes
 
@@ -199,7 +199,7 @@ def confusability(t: Tangents) -> tuple[tuple[str, ...], Array]:
         own = _trace(t, chosen[one][0], ())
         for j, other in enumerate(names):
             if i != j:
-                best = min(_trace(t, chosen[one][0], rival.columns) for rival in chosen[other])
+                best = min(_trace(t, chosen[one][0], alternative.columns) for alternative in chosen[other])
                 left[i, j] = ASSUMED_NATS * best / max(own, 1e-300)
     return names, left
 
@@ -213,12 +213,12 @@ def middle_shapes(t: Tangents) -> dict[str, list[Direction]]:
     return {name: [group[len(group) // 2], *group] for name, group in groups.items()}
 
 
-def _trace(t: Tangents, direction: Direction, rivals: Sequence[int]) -> float:
-    """Information on a direction's amplitudes after the model and the rival's columns are refitted."""
-    if not rivals:
+def _trace(t: Tangents, direction: Direction, alternatives: Sequence[int]) -> float:
+    """Information on a direction's amplitudes after the model and the alternative's columns are refitted."""
+    if not alternatives:
         return float(np.trace(information(t, direction)[1]))
     total = t.hessian.sum(axis=0)
-    index = [*range(t.base), *rivals]
+    index = [*range(t.base), *alternatives]
     own = total[np.ix_(direction.columns, direction.columns)]
     across = total[np.ix_(index, direction.columns)]
     model = total[np.ix_(index, index)] + np.diag(t.ridge[index])

@@ -126,8 +126,8 @@ def first_fit(problem: InverseProblem) -> Fit:
     """The simulation as it is, from its first guess."""
     rough = fit(problem, (), problem.start())
     wider = [optimistic(problem, rough.values, rough.whitener, wide) for wide in (1.0, 10.0)]
-    bold = [attempt(problem, (), rough.values, whitener) for whitener in wider]
-    best = max((rough, *(found for found in bold if found is not None)), key=level_of)
+    quiet = [attempt(problem, (), rough.values, whitener) for whitener in wider]
+    best = max((rough, *(found for found in quiet if found is not None)), key=level_of)
     return fit(problem, (), best.values, best.whitener)
 
 
@@ -144,7 +144,7 @@ def attempt(
     return found if np.isfinite(level_of(found)) and np.isfinite(found.hessian).all() else None
 
 
-def glance(
+def trial_fit(
     problem: InverseProblem, effects: Sequence[Effect], start: Values, whitener: Whitener
 ) -> tuple[Values, float] | None:
     """Where a fit under this very noise ends, and how well it explains the readings there; None as for ``attempt``."""
@@ -178,7 +178,7 @@ def low_noise_refit(
     return attempt(problem, effects, start, optimistic(problem, start, whitener), floor)
 
 
-def bold_view(model: Fit) -> Fit:
+def low_noise_view(model: Fit) -> Fit:
     """The model refitted and judged as if all of its misfit called for an explanation: for looking, not for judging."""
     problem = model.problem
     whitener = optimistic(problem, model.values, model.whitener)

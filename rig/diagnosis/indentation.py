@@ -131,7 +131,7 @@ class IndentationProblem:
         return UNITS
 
     def variables(self) -> Mapping[str, Array]:
-        """What a leftover may depend on; ``depth`` counts from an arbitrary zero."""
+        """What a residual may depend on; ``depth`` counts from an arbitrary zero."""
         drive = self.data.drive
         given = {
             "depth": drive.position_mm,

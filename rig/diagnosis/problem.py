@@ -19,7 +19,7 @@ Values = Mapping[str, float]
 class Par:
     """A parameter: null value (where its effect vanishes), bounds, and the step that is small but visible.
 
-    ``worth`` is the smallest distance from null anyone would act on: less is never named, however significant.
+    ``least`` is the smallest effect of interest, a distance from null: less is never named, however significant.
     ``may_end`` allows a shape to stand on its bound, where that is a limiting case and no failure.
     """
 
@@ -30,7 +30,7 @@ class Par:
     high: float
     scale: float
     log: bool = False
-    worth: float = 0.0
+    least: float = 0.0
     may_end: bool = False
     meaning: str = ""
 
@@ -154,4 +154,4 @@ class InverseProblem(Protocol):
         """Unit of each variable."""
 
     def variables(self) -> Mapping[str, Array]:
-        """What a leftover may depend on, each on the first channel, shape (n,)."""
+        """What a residual may depend on, each on the first channel, shape (n,)."""

@@ -11,8 +11,8 @@ from rig.diagnosis.design import next_experiment
 from rig.diagnosis.estimates import NextExperiment
 from rig.diagnosis.fit import first_fit, refreshed
 from rig.diagnosis.indentation import IndentationProblem, Simulation, library
+from rig.diagnosis.lack_of_fit import assess_lack_of_fit
 from rig.diagnosis.observations import Observations, observe, rise_N
-from rig.diagnosis.omnibus import leftover
 from rig.diagnosis.problem import InverseProblem
 from rig.diagnosis.search import search
 from rig.errors import DataError
@@ -42,10 +42,10 @@ def judge(
     rng = np.random.default_rng(seed)
     progress("fit of the simulation as it is", 0.02)
     before = refreshed(first_fit(problem))
-    found_before = leftover(before, rng)
+    found_before = assess_lack_of_fit(before, rng)
     search_result = search(problem, before, rng, progress)
     progress("what is left", 0.95)
-    found_after = leftover(search_result.after, rng) if search_result.named else found_before
+    found_after = assess_lack_of_fit(search_result.after, rng) if search_result.named else found_before
     verdict, depends = verdict_of(search_result, found_after)
     findings = tuple(
         sorted(
@@ -63,7 +63,7 @@ def judge(
         statement=summary(verdict, findings, depends, problem.title),
         findings=findings,
         depends_on=depends,
-        leftover_p=min(found_after.p_value, found_after.between_p),
+        lack_of_fit_p=min(found_after.p_value, found_after.between_p),
         detectable=visible,
         not_testable=reasons,
         next_experiment=None,
@@ -145,7 +145,7 @@ def cannot(simulation: Simulation, name: str, recordings: int, fault: Flaw, qual
     return Diagnosis(
         session=name, simulation=simulation, recordings=recordings, verdict="unexplained",
         statement=f"Nothing could be judged: {fault.reason}. This says neither that the simulation is right nor wrong.",
-        findings=(), depends_on=(), leftover_p=None, detectable={},
+        findings=(), depends_on=(), lack_of_fit_p=None, detectable={},
         not_testable={effect.name: fault.reason for effect in library(simulation)},
         next_experiment=NextExperiment(fault.remedy), quality=quality,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""From nothing to a set of named causes: forward steps, backward drop, swap pass, rivals of the final model."""
+"""From nothing to a set of named causes: forward steps, backward drop, swap pass, alternatives of the final model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,16 +18,26 @@ from rig.diagnosis.evidence import (
     linear_gains,
     tangents,
 )
-from rig.diagnosis.fit import Fit, attempt, best_fit, bold_view, fit, glance, least_squares, low_noise_refit, refreshed
+from rig.diagnosis.fit import (
+    Fit,
+    attempt,
+    best_fit,
+    fit,
+    least_squares,
+    low_noise_refit,
+    low_noise_view,
+    refreshed,
+    trial_fit,
+)
+from rig.diagnosis.lack_of_fit import LEVEL, assess_lack_of_fit
 from rig.diagnosis.noise import Array
-from rig.diagnosis.omnibus import LEVEL, leftover
 from rig.diagnosis.problem import Effect, InverseProblem, Values
 from rig.progress import Progress
 
-ALPHA = 0.03  # of 5 % of false alarms allowed; the rest is for what is left over (`omnibus`) and for the noise's fit
+ALPHA = 0.03  # of 5 % of false alarms allowed; the rest is for the test of lack of fit and for the noise's fit
 SHORT_LIST = 5
 MOST_EFFECTS = 3
-RIVAL_SE = 2.0  # 95 % of a normal: a rival within it predicts as well
+ALTERNATIVE_SE = 2.0  # 95 % of a normal: a alternative within it predicts as well
 KEEP_NATS = 3.0  # odds of 20 to 1 (e^3)
 AMPLE_NATS = 20.0  # more than chance reaches in sessions without a cause (95 %: 4 to 13)
 WORSE = 1.01  # an error of 15,000 rows is known to 0.6 % at best
@@ -45,10 +55,10 @@ REACH_SHARE = 0.5
 
 @dataclass(frozen=True)
 class Named:
-    """One effect of the final model: its rivals, held-out gain by recording over the best model without it."""
+    """One effect of the final model: its alternatives, held-out gain by recording over the best model without it."""
 
     effect: Effect
-    rivals: tuple[str, ...]
+    alternatives: tuple[str, ...]
     gains: Array
     p_value: float
     without: Fit
@@ -82,7 +92,7 @@ def penalty(effect: Effect, problem: InverseProblem) -> float:
     return float(np.log(effect.tries(problem)))
 
 
-def screened(t: Tangents, problem: InverseProblem) -> list[tuple[float, Direction]]:
+def screen(t: Tangents, problem: InverseProblem) -> list[tuple[float, Direction]]:
     """Best direction of each effect by linear held-out gain, best effect first; structural aliases left out."""
     gains = linear_gains(t, t.gradient[None])[0]
     best: dict[str, tuple[float, Direction]] = {}
@@ -94,7 +104,7 @@ def screened(t: Tangents, problem: InverseProblem) -> list[tuple[float, Directio
     return sorted(ranked, key=lambda item: -item[0])
 
 
-def started(current: Fit, direction: Direction, t: Tangents) -> dict[str, float]:
+def starting_values(current: Fit, direction: Direction, t: Tangents) -> dict[str, float]:
     """Values with one more effect just off its null, to the side the data ask for.
 
     A start at the linear estimate with all else unmoved would be a worse model than the current one, and noise
@@ -115,7 +125,7 @@ def score(model: Fit) -> Array:
     return held_out_log_density(model) - cost / model.problem.recordings
 
 
-def ahead(model: Fit, other: Fit) -> float:
+def gain_over(model: Fit, other: Fit) -> float:
     """By how many nats a model predicts recordings left out better than another."""
     return float((score(model) - score(other)).sum())
 
@@ -124,27 +134,27 @@ def candidates(current: Fit, t: Tangents) -> list[Fit]:
     """Effects that may be next, jointly refitted, best first.
 
     Tried are those within reach of the best by the linear gain, whatever may pass for scatter, and, where anything
-    stands out, the best of a second look under noise too small to have swallowed them.
+    stands out, the best of a rescreening under noise too small to have swallowed them.
     """
-    problem, ranked = current.problem, screened(t, current.problem)
+    problem, ranked = current.problem, screen(t, current.problem)
     top = ranked[0][0] if ranked else 0.0
     reach = max(within_reach(top), 0.0)
     near = [d for gain, d in ranked[:SHORT_LIST] if gain > reach]
     near += [d for _, d in ranked if d.effect.between and d not in near]
-    starts = [((*current.effects, d.effect), started(current, d, t)) for d in near]
+    starts = [((*current.effects, d.effect), starting_values(current, d, t)) for d in near]
     fits = [attempt(problem, effects, start, current.whitener) for effects, start in starts]
-    loud = top > STANDS_OUT_NATS or leftover(current, np.random.default_rng(0)).p_value <= LEVEL
+    loud = top > STANDS_OUT_NATS or assess_lack_of_fit(current, np.random.default_rng(0)).p_value <= LEVEL
     hidden = [(effects, start) for effects, start in starts if not loud or effects[-1].mean_of]
     fits += [low_noise_refit(problem, effects, start, current.whitener) for effects, start in hidden]
     fits += rescreen(current, t, ranked) if loud else []
-    living = [c for c in fits if c is not None and alive(c.effects[-1], c.values)]
-    gains = [ahead(c, current) for c in living]
+    living = [c for c in fits if c is not None and is_sizeable(c.effects[-1], c.values)]
+    gains = [gain_over(c, current) for c in living]
     best = max(gains, default=0.0)
     polished = [
         fit(c.problem, c.effects, c.values, c.whitener) if gain > within_reach(best) else c
         for c, gain in zip(living, gains, strict=True)
     ]
-    polished = [c for c in polished if alive(c.effects[-1], c.values)]
+    polished = [c for c in polished if is_sizeable(c.effects[-1], c.values)]
     return sorted(polished, key=lambda candidate: -float(score(candidate).sum()))
 
 
@@ -153,18 +163,18 @@ def rescreen(current: Fit, t: Tangents, ranked: Sequence[tuple[float, Direction]
 
     All are brought to their best under the same noise first; those that explain most there are fitted to the end.
     """
-    problem, bold = current.problem, bold_view(current)
-    bold_t = tangents(bold, [d.effect for _, d in ranked] + aliased(t, ranked))
-    best = [d for gain, d in screened(bold_t, problem)[:SHORT_LIST] if gain > 0]
-    # Strokes that repeat alias one frequency into another: every peak is followed to its end.
-    best += [d for d in bold_t.directions if d.effect.tries(problem) > 1 and d not in best]
-    starts = [(d.effect, started(bold, d, bold_t)) for d in best]
+    problem, quiet = current.problem, low_noise_view(current)
+    quiet_t = tangents(quiet, [d.effect for _, d in ranked] + aliases(t, ranked))
+    best = [d for gain, d in screen(quiet_t, problem)[:SHORT_LIST] if gain > 0]
+    # Cycles that repeat alias one frequency into another: every peak is followed to its end.
+    best += [d for d in quiet_t.directions if d.effect.tries(problem) > 1 and d not in best]
+    starts = [(d.effect, starting_values(quiet, d, quiet_t)) for d in best]
     free = {par.name for par in problem.base}
     for effect in {d.effect.key: d.effect for d in t.directions if d.effect.begin}.values():
         own = free | {par.name for par in effect.pars}
         begin = {name: value for name, value in effect.begin.items() if name in own}
         starts.append((effect, {**current.values, **begin}))
-    ends = [(effect, glance(problem, (*current.effects, effect), start, bold.whitener)) for effect, start in starts]
+    ends = [(effect, trial_fit(problem, (*current.effects, effect), start, quiet.whitener)) for effect, start in starts]
     furthest = sorted(((effect, *end) for effect, end in ends if end is not None), key=lambda end: -end[2])
     return [
         low_noise_refit(problem, (*current.effects, effect), values, current.whitener)
@@ -177,21 +187,21 @@ def within_reach(best: float) -> float:
     return best - max(REACH_NATS, REACH_SHARE * best)
 
 
-def aliased(t: Tangents, ranked: Sequence[tuple[float, Direction]]) -> list[Effect]:
-    """Effects that have a direction but no rank: wrong sign or imitated, under the present noise."""
+def aliases(t: Tangents, ranked: Sequence[tuple[float, Direction]]) -> list[Effect]:
+    """Effects that have a direction but no rank: wrong sign or confounded, under the present noise."""
     keys = {direction.effect.key for _, direction in ranked}
     return list({d.effect.key: d.effect for d in t.directions if d.effect.key not in keys}.values())
 
 
-def alive(effect: Effect, values: Values) -> bool:
-    """Whether the effect is worth naming and inside its bounds."""
+def is_sizeable(effect: Effect, values: Values) -> bool:
+    """Whether the effect is of the smallest size of interest or more, and inside its bounds."""
     size = float(np.hypot.reduce([values[p.name] - p.null for p in effect.amplitudes]))
     ended = any(on_bound(p, values[p.name]) and not p.may_end for p in effect.pars)
-    return size >= effect.amplitudes[0].worth and not ended
+    return size >= effect.amplitudes[0].least and not ended
 
 
 def search(problem: InverseProblem, before: Fit, rng: np.random.Generator, progress: Progress) -> Search:
-    """Forward steps while the best gain beats chance at ALPHA / 2^k, then drop and swap, then rivals."""
+    """Forward steps while the best gain beats chance at ALPHA / 2^k, then drop and swap, then alternatives."""
     current, bars, p_values, alone = before, dict[str, float](), dict[str, float](), True
     library = testable(problem)
     for step in range(MOST_EFFECTS + 1):
@@ -199,9 +209,9 @@ def search(problem: InverseProblem, before: Fit, rng: np.random.Generator, progr
         t = tangents(current, [effect for effect in library if effect.name not in current.names])
         maxima = chance_maxima(t, rng)
         # What two causes through one variable leave, a third cannot name.
-        found = [] if imitated(current.effects) else candidates(current, t)
+        found = [] if shared_variables(current.effects) else candidates(current, t)
         # Best first, so that of several beginnings of one cause the best stands in the table.
-        gains = {c.names[-1]: ahead(c, current) for c in reversed(found)}
+        gains = {c.names[-1]: gain_over(c, current) for c in reversed(found)}
         bars = bars or gains
         if not found or step == MOST_EFFECTS:
             break
@@ -213,19 +223,19 @@ def search(problem: InverseProblem, before: Fit, rng: np.random.Generator, progr
         alone = alone and sum(gain > within_reach(best) for gain in gains.values()) == 1
         current = refreshed(found[0])
     progress("drop and swap", 0.8)
-    current = dropped(current)
-    if not current.effects and ahead(current, before) > KEEP_NATS:
+    current = drop_unsupported(current)
+    if not current.effects and gain_over(current, before) > KEEP_NATS:
         # Taking the cause away led the simulation to a better fit than it had begun with: begin there.
         return search(problem, current, rng, progress)
-    # A single cause that left all others far behind has no rivals; with more than one the order of naming may mislead.
-    named, current = settled(current, library if len(current.effects) > 1 or not alone else (), p_values)
+    # A single cause far beyond all others has no alternatives; with more than one the order of naming may mislead.
+    named, current = settle(current, library if len(current.effects) > 1 or not alone else (), p_values)
     if current.names != tuple(p_values):
         t = tangents(current, [effect for effect in library if effect.name not in current.names])
         maxima = chance_maxima(t, rng)
     return Search(before, current, named, t, maxima, bars)
 
 
-def imitated(effects: Sequence[Effect]) -> tuple[str, ...]:
+def shared_variables(effects: Sequence[Effect]) -> tuple[str, ...]:
     """Variables two or more of the effects act through alone: together they fit any curve, so they name nothing."""
     variables = [effect.through for effect in effects if effect.through]
     return tuple(dict.fromkeys(name for name in variables if variables.count(name) > 1))
@@ -239,22 +249,22 @@ def without(model: Fit, name: str) -> Fit:
     return best_fit(model.problem, kept, start, model.whitener) or fit(model.problem, kept, start, model.whitener)
 
 
-def dropped(model: Fit) -> Fit:
+def drop_unsupported(model: Fit) -> Fit:
     """Without the effects that stopped earning their place, or shrank below it, once others had joined."""
     for effect in model.effects:
         smaller = without(model, effect.name)
-        if not alive(effect, model.values) or ahead(model, smaller) < KEEP_NATS:
-            return dropped(smaller)
+        if not is_sizeable(effect, model.values) or gain_over(model, smaller) < KEEP_NATS:
+            return drop_unsupported(smaller)
     return model
 
 
-def settled(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:
+def settle(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:
     """After the swaps, without what earns nothing, or little while it predicts unseen recordings worse in newtons."""
-    named, model = swapped(model, library, p_values)
+    named, model = swap(model, library, p_values)
     weak = [one for one in named if is_weak(model, one)]
     if not weak:
         return named, model
-    return settled(min(weak, key=lambda one: one.nats).without, (), p_values)
+    return settle(min(weak, key=lambda one: one.nats).without, (), p_values)
 
 
 def is_weak(model: Fit, one: Named) -> bool:
@@ -267,8 +277,8 @@ def is_weak(model: Fit, one: Named) -> bool:
     return bool((ratio > WORSE and one.nats < AMPLE_NATS) or (ratio > BETTER and not seen_by_tracker))
 
 
-def swapped(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:
-    """Every effect against all others in its place; a better one takes it, an equal one is a rival."""
+def swap(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:
+    """Every effect against all others in its place; a better one takes it, an equal one is a alternative."""
     for swaps_left in (2, 1, 0):
         named, better = [], None
         for effect in model.effects:
@@ -277,7 +287,7 @@ def swapped(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -
             others = [c for c in candidates(smaller, t) if c.effects[-1].key != effect.key]
             p = p_values.get(effect.name, 1 / 401)
             named.append(_named(model, effect, smaller, others, p))
-            if others and ahead(others[0], model) > KEEP_NATS:
+            if others and gain_over(others[0], model) > KEEP_NATS:
                 better = others[0]
         if better is None or not swaps_left:
             break
@@ -287,17 +297,17 @@ def swapped(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -
 
 def _named(model: Fit, effect: Effect, smaller: Fit, others: Sequence[Fit], p_value: float) -> Named:
     mine = score(model)
-    rivals = [c for c in others if _equal(mine - score(c)) and ahead(c, smaller) > 0]
-    table = np.stack([mine, *[score(c) for c in rivals]])
-    names = dict.fromkeys(c.names[-1] for c in rivals if c.names[-1] != effect.name)
+    alternatives = [c for c in others if _equal(mine - score(c)) and gain_over(c, smaller) > 0]
+    table = np.stack([mine, *[score(c) for c in alternatives]])
+    names = dict.fromkeys(c.names[-1] for c in alternatives if c.names[-1] != effect.name)
     named = Named(effect, tuple(names), mine - score(smaller), p_value, smaller, 1.0)
     return replace(named, share=wins(table) * (1 - p_value))
 
 
 def _equal(loss: Array) -> bool:
-    """Whether the paired loss of a rival is within two standard errors of nothing."""
+    """Whether the paired loss of a alternative is within two standard errors of nothing."""
     spread = float(np.std(loss, ddof=1)) * np.sqrt(len(loss))
-    return bool(loss.sum() < max(RIVAL_SE * spread, 1.0) and loss.sum() < 0.5 * np.inf)
+    return bool(loss.sum() < max(ALTERNATIVE_SE * spread, 1.0) and loss.sum() < 0.5 * np.inf)
 
 
 def wins(table: Array, draws: int = 400) -> float:

@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rig.report.drawing import ACTUAL, INK, MODEL, QUIET, RIVAL, SMALL_PT, dress, new_figure, speed_colors, thinned
+from rig.report.drawing import ACTUAL, INK, MODEL, OTHER, QUIET, SMALL_PT, dress, new_figure, speed_colors, thinned
 from rig.tissue.laws import FloatArray
 
 POINTS = 1200
-CHOICE_COLORS = {"tangent": ACTUAL, "secant": "#56b4e9", "constant": RIVAL, "admittance": MODEL}
+CHOICE_COLORS = {"tangent": ACTUAL, "secant": "#56b4e9", "constant": OTHER, "admittance": MODEL}
 
 
 class Signals(NamedTuple):
@@ -30,7 +30,7 @@ def run_figure(signals: Signals, title: str) -> Figure:
     figure = new_figure(8.0, 6.4)
     force, depth, effort = figure.subplots(3, 1, sharex=True, height_ratios=(1.6, 1, 1))
     dress(force, title, "", "force, N")
-    force.plot(*thinned(signals.time_s, signals.reference_N, POINTS), color=RIVAL, linewidth=1.6, label="reference")
+    force.plot(*thinned(signals.time_s, signals.reference_N, POINTS), color=OTHER, linewidth=1.6, label="reference")
     force.plot(*thinned(signals.time_s, signals.force_N, POINTS), color=ACTUAL, linewidth=1.1, label="force")
     _key(force)
     dress(depth, "Displacement", "", "depth, mm")

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.design import ASSUMED_NATS, SAFE_NATS, confusability
 from rig.diagnosis.fit import Fit, least_squares
-from rig.diagnosis.omnibus import variables
+from rig.diagnosis.lack_of_fit import variables
 from rig.diagnosis.search import Search
-from rig.report.drawing import ACTUAL, INK, MODEL, QUIET, RIVAL, SIZE_PT, SMALL_PT, dress, new_figure, thinned
+from rig.report.drawing import ACTUAL, INK, MODEL, OTHER, QUIET, SIZE_PT, SMALL_PT, dress, new_figure, thinned
 from rig.simulation.drive import Array
 
 BINS = 40  # with 375 of a session's 15,000 rows in each, a mean has a twentieth of a row's noise
@@ -42,13 +42,13 @@ def simulation_figure(before: Fit, after: Fit) -> Figure:
     time = known.get("time in recording", known["session time"])[rows]
     measured = channel.observed[rows]
     above.plot(*thinned(time, measured, 600), color=ACTUAL, linewidth=2.2, label="measured")
-    for fit, color, name in ((before, RIVAL, "simulated before"), (after, MODEL, "extended")):
+    for fit, color, name in ((before, OTHER, "simulated before"), (after, MODEL, "extended")):
         simulated = measured - fit.residual[rows]
         above.plot(*thinned(time, simulated, 600), color=color, linewidth=1.1, label=name)
         below.plot(*thinned(time, fit.residual[rows], 600), color=color, linewidth=1.0)
     above.legend(frameon=False, fontsize=SMALL_PT, labelcolor=INK)
     dress(above, "The recording the simulation gets most wrong", "", f"{channel.name} [{channel.unit}]")
-    dress(below, "What is left: grey before, orange after", "time [s]", f"measured - simulated [{channel.unit}]")
+    dress(below, "Residual: grey before, orange after", "time [s]", f"measured - simulated [{channel.unit}]")
     return figure
 
 
@@ -63,7 +63,7 @@ def residual_figure(old: Fit, new: Fit, result: Diagnosis) -> Figure:
     known, channel = variables(old), old.problem.channels[0]
     for axes, name in zip(panels, names, strict=False):
         values = known[name] - (new.values.get("surface_mm", 0.0) if name == "depth" else 0.0)
-        for fit, color in ((old, RIVAL), (new, MODEL)):
+        for fit, color in ((old, OTHER), (new, MODEL)):
             axes.plot(*binned(values, fit.residual), color=color, linewidth=1.5)
         gains = f"{max(result.before.gains[name], 0):.0f} -> {max(result.after.gains[name], 0):.0f} nats"
         unit = old.problem.units.get(name, channel.unit)
@@ -101,7 +101,7 @@ def evidence_figure(search: Search) -> Figure:
     axes = figure.subplots()
     bars = sorted(search.bars.items(), key=lambda item: item[1])
     names = [name for name, _ in bars]
-    colors = [MODEL if name in search.after.names else RIVAL for name in names]
+    colors = [MODEL if name in search.after.names else OTHER for name in names]
     axes.barh(names, [max(gain, 0.0) for _, gain in bars], color=colors)
     if not bars:
         axes.text(0.5, 0.5, "no cause gained more than chance does", ha="center", transform=axes.transAxes, color=QUIET)

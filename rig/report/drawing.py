@@ -18,10 +18,10 @@ from rig.tissue.laws import FloatArray
 
 INK, QUIET, GRID, PAPER = "#1d2430", "#5f6b7a", "#d9dee5", "#ffffff"
 # Vermilion and blue of Okabe and Ito, "Color Universal Design"; speeds go from light to dark.
-MODEL, RIVAL, ACTUAL = "#d55e00", "#767f8b", "#0072b2"
+MODEL, OTHER, ACTUAL = "#d55e00", "#767f8b", "#0072b2"
 SPEEDS = ("#7cc4ea", "#4da6dc", "#2f86c6", "#2767a8", "#203f7d")
 # Names of the page's own colours, which differ between light and dark.
-THEME = {INK: "--ink", QUIET: "--quiet", GRID: "--grid", PAPER: "--paper", RIVAL: "--rival", ACTUAL: "--actual"} | {
+THEME = {INK: "--ink", QUIET: "--quiet", GRID: "--grid", PAPER: "--paper", OTHER: "--other", ACTUAL: "--actual"} | {
     color: f"--speed-{number}" for number, color in enumerate(SPEEDS, 1)
 }
 SIZE_PT, SMALL_PT = 10, 8.5

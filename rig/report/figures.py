@@ -11,8 +11,8 @@ from rig.report.drawing import (
     ACTUAL,
     INK,
     MODEL,
+    OTHER,
     QUIET,
-    RIVAL,
     SMALL_PT,
     dress,
     label,
@@ -28,7 +28,7 @@ from rig.tissue.study import Study, rows
 Dashes = str | tuple[float, tuple[float, ...]]
 Look = tuple[str, Dashes]
 
-LOOKS: dict[str, Look] = {"index": (MODEL, "-"), "constant": (RIVAL, (0, (5, 2)))}
+LOOKS: dict[str, Look] = {"index": (MODEL, "-"), "constant": (OTHER, (0, (5, 2)))}
 OTHER_COLORS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 OTHER_STYLES: tuple[Dashes, ...] = ((0, (1, 1.5)), (0, (6, 2, 1, 2)))
 PANELS_A_ROW = 3  # 3.7 of 11 inches each: square at the height of 3.6

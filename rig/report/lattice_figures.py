@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rig.report.drawing import ACTUAL, MODEL, QUIET, RIVAL, dress, label, new_figure
+from rig.report.drawing import ACTUAL, MODEL, OTHER, QUIET, dress, label, new_figure
 from rig.tissue.lattice.sweep import Sweep
 from rig.tissue.lattice_study import LatticeStudy
 from rig.tissue.study import Study, rows
@@ -36,7 +36,7 @@ def _displacement(axes: Axes, study: Study, found: LatticeStudy) -> None:
     speed = float(np.median([curve.speed_mm_s for curve in study.curves]))
     places: tuple[tuple[str, str, int, Side], ...] = (
         ("lattice index", MODEL, 80, "below right"),
-        ("lattice constant", RIVAL, 45, "above"),
+        ("lattice constant", OTHER, 45, "above"),
     )
     for name, color, at, beside in places:
         judged = found.judged[name]
@@ -67,7 +67,7 @@ def collapse_figure(sweeps: Sequence[tuple[str, Sweep]]) -> Figure:
     figure = new_figure(7.5, 4.7)
     axes = figure.subplots()
     dress(axes, "Reaction over spring stiffness", "depth of the tip, mm", "R/k, mm")
-    for (name, sweep), color in zip(sweeps, (MODEL, ACTUAL, RIVAL, QUIET), strict=False):
+    for (name, sweep), color in zip(sweeps, (MODEL, ACTUAL, OTHER, QUIET), strict=False):
         depth, phi = sweep.depth_mm, sweep.force_over_k_mm
         good = np.array(sweep.intact)
         axes.plot(depth, phi, color=color, linewidth=1.0)

@@ -1,5 +1,5 @@
 """The study's whole argument on a session's curves, with the lattice: k per force, constant against index model,
-rivals, K and B for control.
+alternatives, K and B for control.
 """
 
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from rig.tissue.lattice.sweep import DEFAULT_STEP_MM, Sweep, sweep
 from rig.tissue.laws import FloatArray
 from rig.tissue.laws_lattice import lattice_laws
 from rig.tissue.per_spring import PerSpring, per_spring
-from rig.tissue.registry import RIVALS
+from rig.tissue.registry import THREE_PARAMETER
 from rig.tissue.study import Study, rows
 from rig.tissue.summary import IndexFit, KPoint
 
@@ -28,7 +28,7 @@ _DEEPEST_SHARE = 0.85
 
 @dataclass(frozen=True)
 class LatticeStudy:
-    """Results; ``judged`` holds lattice laws and lumped rivals by name, on the same curves, forces [N] and origins."""
+    """Results; ``judged`` holds lattice and lumped laws by name, on the same curves, forces [N] and origins."""
 
     sweep: Sweep
     points: tuple[KPoint, ...]
@@ -59,7 +59,7 @@ def lattice_study(
     if search:
         points = study_loop(points, curve, lambda done: tell("search for k per force", done / len(table)))
     judged = dict(study.judged)
-    for kind in (*lattice_laws(curve), *RIVALS):
+    for kind in (*lattice_laws(curve), *THREE_PARAMETER):
         if kind.name not in judged:
             judged[kind.name] = judge(fit_law(kind, study.curves), study.curves, study.force_N, study.origins_mm)
     own = per_spring(study, block, mode, deepest_mm, tell) if stiffen else None

@@ -10,9 +10,11 @@ from rig.tissue.laws_extended import Extended
 from rig.tissue.laws_viscous import HuntCrossley, Prony, QuasiLinear, StandardLinear
 
 COMPARED: tuple[type[Law], ...] = (Constant, Index)
-RIVALS: tuple[type[Law], ...] = (Quadratic, Power, Fung)
+THREE_PARAMETER: tuple[type[Law], ...] = (Quadratic, Power, Fung)
 OTHERS: tuple[type[Law], ...] = (Layer, HuntCrossley, StandardLinear, Prony, QuasiLinear, Extended)
-LAWS = Registry[type[Law]]("tissue law", lambda law: law.name, (*COMPARED, *RIVALS, *OTHERS), "tissue_rig.laws")
+LAWS = Registry[type[Law]](
+    "tissue law", lambda law: law.name, (*COMPARED, *THREE_PARAMETER, *OTHERS), "tissue_rig.laws"
+)
 ALSO = {"kelvin_voigt": Constant.name}
 
 

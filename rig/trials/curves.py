@@ -40,10 +40,10 @@ ON_SHARE = 0.5
 TOP_SHARE = 0.005  # half of ONSET_SHARE: where the data have no noise, what is so near to the top is the top
 SPEED_BASE_MM = 0.5  # places written in hundredths of a millimetre give a speed within 3 %
 # A median over twenty samples is known to three tenths of their standard deviation.
-RUBBING_SAMPLES = 20
+FRICTION_SAMPLES = 20
 # A step of two standard deviations of single samples is five of the difference of two medians over twenty.
-RUBBING_SPREADS = 2.0
-RUBBING_FLAT = 0.25  # two medians over ten differ by chance by as much of such a step
+FRICTION_SPREADS = 2.0
+FRICTION_FLAT = 0.25  # two medians over ten differ by chance by as much of such a step
 
 
 @dataclass(frozen=True)
@@ -139,20 +139,20 @@ def _rise(cycle: IndentationCycle) -> _Rise:
 
 
 def _run_in(cycle: IndentationCycle, rise: _Rise) -> tuple[IndentationCycle, _Rise]:
-    """The cycle from where the tip runs in, if the guide rubs: force in the air then steps with motion, and stays.
+    """The cycle from where the tip runs in, if the guide has friction: force in the air then steps with motion.
 
-    At rest or on the way up the guide rubs otherwise than on the way down, so the zero of loading is the run-in's own.
+    At rest or on the way up friction is another than on the way down, so the zero of loading is the run-in's own.
     """
     turn = _descent(cycle, rise.touch, -np.inf)
     way_mm = cycle.position_mm[turn : rise.peak + 1] - cycle.position_mm[turn]
     start, stop = np.searchsorted(np.maximum.accumulate(way_mm), (AIR_MARGIN_MM, HIGHEST_SHARE * way_mm[-1]))
     moving_N = cycle.force_N[turn + start : turn + stop]
-    if min(len(moving_N), turn) < RUBBING_SAMPLES:
+    if min(len(moving_N), turn) < FRICTION_SAMPLES:
         return cycle, rise
     level_N, spread_N = _middle(moving_N)
-    step_N = level_N - _middle(cycle.force_N[turn - RUBBING_SAMPLES : turn])[0]
+    step_N = level_N - _middle(cycle.force_N[turn - FRICTION_SAMPLES : turn])[0]
     early_N, late_N = (float(np.median(half)) for half in np.array_split(moving_N, 2))
-    if abs(step_N) < RUBBING_SPREADS * spread_N or abs(late_N - early_N) > RUBBING_FLAT * abs(step_N):
+    if abs(step_N) < FRICTION_SPREADS * spread_N or abs(late_N - early_N) > FRICTION_FLAT * abs(step_N):
         return cycle, rise
     first = turn + int(start)
     arrays = {name: getattr(cycle, name)[first:] for name in ("time_s", "force_N", "position_mm")}

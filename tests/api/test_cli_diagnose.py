@@ -57,7 +57,7 @@ def test_the_report_gives_the_statement_the_pictures_and_what_could_not_be_teste
     found = read_diagnosis(folder)
     assert isinstance(found, Diagnosed)
     html = diagnosis_section(found)
-    assert found.result.statement in html and "rubs" in found.result.statement
+    assert found.result.statement in html and "friction of" in found.result.statement
     assert html.count("<svg") == 4
     assert "hang a known weight" in html
 

@@ -37,9 +37,9 @@ def unplanted(causes: Collection[Effect]) -> list[str]:
             planted = [expected[name] for expected in drawn if name in expected]
             if not planted:
                 found += [] if name in NOT_SIZED else [f"{cause.name} is hidden without {name} [{par.unit}]"]
-            elif not all(par.low < size < par.high and abs(size - par.null) >= par.worth for size in planted):
+            elif not all(par.low < size < par.high and abs(size - par.null) >= par.least for size in planted):
                 told = f"{min(planted):g} to {max(planted):g} of {par.low:g} to {par.high:g} {par.unit}"
-                found.append(f"{cause.name} is hidden with {name} {told}, smallest named {par.worth:g}")
+                found.append(f"{cause.name} is hidden with {name} {told}, smallest named {par.least:g}")
     return found
 
 
@@ -49,10 +49,10 @@ def test_every_cause_is_planted_with_a_size_that_its_declaration_allows() -> Non
 
 
 def test_a_cause_without_a_plant_is_reported_by_what_it_lacks() -> None:
-    size = Par("curvature_per_N", "1/N", 0.0, -0.05, 0.05, 0.002, worth=0.001)
+    size = Par("curvature_per_N", "1/N", 0.0, -0.05, 0.05, 0.002, least=0.001)
     bent = Effect("sensor_curvature", "", (size,))
     assert unplanted([bent]) == ["sensor_curvature is no effect of the mock bench", "sensor_curvature is never hidden"]
     assert unplanted([Effect("friction", "", (size,))]) == ["friction is hidden without curvature_per_N [1/N]"]
-    narrow = Par("friction_N", "N", 0.0, 0.0, 0.2, 0.02, worth=0.1)
+    narrow = Par("friction_N", "N", 0.0, 0.0, 0.2, 0.02, least=0.1)
     (told,) = unplanted([Effect("friction", "", (narrow,))])
     assert told.startswith("friction is hidden with friction_N 0.03") and told.endswith("smallest named 0.1")

@@ -34,8 +34,8 @@ from tests.rig.tissue.synthetic import (
     Bench,
     index_force,
     metadata,
-    rubbing,
     tables,
+    with_friction,
     write_made_session,
     write_recording,
 )
@@ -49,8 +49,8 @@ def write_captured(folder: Path) -> Path:
     """Five trials on tissue, one through a guide with friction, one in the air, one with invalid samples, one run."""
     air = Bench(force=index_force(a_N_mm=1e-6, damping_N_s_mm=0.0)).cycle(10.0, 999)
     cycles = Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0, 10.0, 15.0, 30.0))
-    rubbed = Bench(force=rubbing(0.2), rate_Hz=500.0).cycle(10.0, 77)
-    write_made_session(folder, [*cycles, rubbed, air], subject={"id": "7", "site": "forearm"})
+    with_guide = Bench(force=with_friction(0.2), rate_Hz=500.0).cycle(10.0, 77)
+    write_made_session(folder, [*cycles, with_guide, air], subject={"id": "7", "site": "forearm"})
     spoilt = Bench(rate_Hz=500.0).cycle(20.0, 78)
     streams = tables(spoilt)
     streams["force"]["fz_N"][100:120], streams["force"]["valid"][100:120] = 99.0, 0

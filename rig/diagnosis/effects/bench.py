@@ -54,10 +54,10 @@ def _ripple_tries(_: InverseProblem) -> float:
     return max(1.0, len(PITCHES_PER_MM) / 3 / PEAKS)
 
 
-def _pair(stem: str, meaning: str, worth_mm: float) -> tuple[Par, Par]:
+def _pair(stem: str, meaning: str, least_mm: float) -> tuple[Par, Par]:
     return (
-        Par(f"{stem}_sin_mm", "mm", 0.0, -10.0, 10.0, 0.02, worth=worth_mm, meaning=meaning),
-        Par(f"{stem}_cos_mm", "mm", 0.0, -10.0, 10.0, 0.02, worth=worth_mm, meaning=meaning),
+        Par(f"{stem}_sin_mm", "mm", 0.0, -10.0, 10.0, 0.02, least=least_mm, meaning=meaning),
+        Par(f"{stem}_cos_mm", "mm", 0.0, -10.0, 10.0, 0.02, least=least_mm, meaning=meaning),
     )
 
 
@@ -105,7 +105,7 @@ ELASTIC = "in the force-depth curve: gains and inverse model"
 BACKLASH = Effect(
     "backlash",
     "the tip follows the encoder with a dead band of {backlash_mm:.3g} mm",
-    (Par("backlash_mm", "mm", 0.0, 0.0, 3.0, 0.03, worth=0.005, meaning="dead band"),),
+    (Par("backlash_mm", "mm", 0.0, 0.0, 3.0, 0.03, least=0.005, meaning="dead band"),),
     # The first micrometres of a dead band are no measure of it: at null the data may ask for less than none.
     begin={"backlash_mm": 0.15},
     one_sided=True,
@@ -116,7 +116,7 @@ BACKLASH = Effect(
 FRAME_COMPLIANCE = Effect(
     "frame_compliance",
     "the frame gives way by {frame_compliance_mm_N:.3g} mm per newton between encoder and tip",
-    (Par("frame_compliance_mm_N", "mm/N", 0.0, 0.0, 0.8, 0.005, worth=0.002, meaning="tip behind encoder per force"),),
+    (Par("frame_compliance_mm_N", "mm/N", 0.0, 0.0, 0.8, 0.005, least=0.002, meaning="tip behind encoder per force"),),
     one_sided=True,
     operator=Operator("frame", lambda _, compliance_mm_N, v: compliance_mm_N + one(v, "frame_compliance_mm_N")),
     needs=frozenset({"tracker", "depth"}),
@@ -139,7 +139,7 @@ POSITION_RIPPLE = Effect(
 CONTACT_OFFSET = Effect(
     "contact_offset",
     "the surface lies {contact_offset_mm:+.3g} mm from where it was stated",
-    (Par("contact_offset_mm", "mm", 0.0, -8.0, 8.0, 0.05, worth=0.02, meaning="true surface minus stated surface"),),
+    (Par("contact_offset_mm", "mm", 0.0, -8.0, 8.0, 0.05, least=0.02, meaning="true surface minus stated surface"),),
     between=True,
     mean_of="touch",
     operator=Operator("surface", lambda _, away_mm, v: away_mm + one(v, "contact_offset_mm")),
@@ -159,8 +159,8 @@ SURFACE_MOTION = Effect(
 )
 FRICTION = Effect(
     "friction",
-    "the guide in front of the sensor rubs with {friction_N:.3g} N",
-    (Par("friction_N", "N", 0.0, 0.0, 20.0, 0.02, worth=0.005, meaning="Coulomb level"),),
+    "the linear guide in front of the sensor has a friction of {friction_N:.3g} N",
+    (Par("friction_N", "N", 0.0, 0.0, 20.0, 0.02, least=0.005, meaning="Coulomb level"),),
     (
         Par("friction_length_mm", "mm", 0.1, 2e-3, 5.0, 1.0, log=True, may_end=True, meaning="travel to build it up"),
         # A recording begins where the way out of the one before has left the guide.
@@ -176,7 +176,7 @@ FRICTION = Effect(
 TIP_INERTIA = Effect(
     "tip_inertia",
     "a mass of {tip_inertia_kg:.3g} kg moves in front of the sensor",
-    (Par("tip_inertia_kg", "kg", 0.0, 0.0, 5.0, 0.02, worth=0.005, meaning="mass in front of the sensor"),),
+    (Par("tip_inertia_kg", "kg", 0.0, 0.0, 5.0, 0.02, least=0.005, meaning="mass in front of the sensor"),),
     one_sided=True,
     operator=Operator("sensing", _inertia),
     needs=frozenset({"fast"}),
@@ -185,7 +185,7 @@ TIP_INERTIA = Effect(
 FILTER_LAG = Effect(
     "filter_lag",
     "the force is low-passed with a time constant of {filter_lag_s:.3g} s",
-    (Par("filter_lag_s", "s", 0.0, 0.0, 0.5, 0.002, worth=0.0007, meaning="time constant of a first-order filter"),),
+    (Par("filter_lag_s", "s", 0.0, 0.0, 0.5, 0.002, least=0.0007, meaning="time constant of a first-order filter"),),
     one_sided=True,
     operator=Operator("sensing", _filtered),
     needs=frozenset({"fast"}),
@@ -194,7 +194,7 @@ FILTER_LAG = Effect(
 TIME_OFFSET = Effect(
     "time_offset",
     "the force's time stamps are off by {time_offset_s:+.3g} s against the position's (plus: late)",
-    (Par("time_offset_s", "s", 0.0, -0.3, 0.3, 0.002, worth=0.0007, meaning="force stamps late"),),
+    (Par("time_offset_s", "s", 0.0, -0.3, 0.3, 0.002, least=0.0007, meaning="force stamps late"),),
     operator=Operator("stamping", _late),
     needs=frozenset({"fast"}),
     repair="correct the sensor's latency in rig.toml, or stamp both in hardware",
@@ -202,7 +202,7 @@ TIME_OFFSET = Effect(
 TRACKER_LATENCY = Effect(
     "tracker_latency",
     "the tracker shows the tip {tracker_latency_s:.3g} s late",
-    (Par("tracker_latency_s", "s", 0.0, -0.3, 0.5, 0.005, worth=0.001, meaning="tracker stamps late"),),
+    (Par("tracker_latency_s", "s", 0.0, -0.3, 0.5, 0.005, least=0.001, meaning="tracker stamps late"),),
     operator=Operator("tracking", lambda _, late_s, v: late_s + one(v, "tracker_latency_s")),
     needs=frozenset({"tracker"}),
     repair="set the tracker's latency_ms in rig.toml",
@@ -210,7 +210,7 @@ TRACKER_LATENCY = Effect(
 ZERO_DRIFT = Effect(
     "zero_drift",
     "the force zero drifts by {zero_drift_N_h:.3g} N per hour",
-    (Par("zero_drift_N_h", "N/h", 0.0, -500.0, 500.0, 0.3, worth=0.1, meaning="drift of the zero"),),
+    (Par("zero_drift_N_h", "N/h", 0.0, -500.0, 500.0, 0.3, least=0.1, meaning="drift of the zero"),),
     between=True,
     needs=frozenset({"strokes"}),
     operator=Operator("reading", _drifted),
@@ -219,7 +219,7 @@ ZERO_DRIFT = Effect(
 GAIN_ERROR = Effect(
     "gain_error",
     "the force reads {gain_error:.2%} too high",
-    (Par("gain_error", "1", 0.0, -0.5, 0.5, 0.01, worth=0.005, meaning="relative error of the force gain"),),
+    (Par("gain_error", "1", 0.0, -0.5, 0.5, 0.01, least=0.005, meaning="relative error of the force gain"),),
     needs=frozenset({"weight"}),
     aliases=("a_N_mm", "damping_N_s_mm"),
     operator=Operator("sensing", lambda _, force_N, v: force_N * (1 + one(v, "gain_error"))),

@@ -40,10 +40,10 @@ def _adhering(tip: Tip, force_N: Series, v: Fields) -> Series:
     return np.asarray(force_N + pull_N * (touched & (tip.velocity_mm_s < 0)))
 
 
-EXPONENT = Par("exponent", "1", 1.0, 0.2, 4.0, 0.05, worth=0.03, meaning="exponent n of (x / 5 mm)^(n-1)")
-STIFFENING = Par("b_per_mm", "1/mm", 0.0, -0.5, 3.0, 0.02, worth=0.005, meaning="growth of stiffness with depth")
+EXPONENT = Par("exponent", "1", 1.0, 0.2, 4.0, 0.05, least=0.03, meaning="exponent n of (x / 5 mm)^(n-1)")
+STIFFENING = Par("b_per_mm", "1/mm", 0.0, -0.5, 3.0, 0.02, least=0.005, meaning="growth of stiffness with depth")
 RELAXATION_RATIO = Par(
-    "relaxation_ratio", "1", 0.0, 0.0, 30.0, 0.02, worth=0.005, may_end=True, meaning="transient over lasting force"
+    "relaxation_ratio", "1", 0.0, 0.0, 30.0, 0.02, least=0.005, may_end=True, meaning="transient over lasting force"
 )
 STIFFENING_EFFECT = Effect(
     "stiffening",
@@ -64,7 +64,7 @@ ELASTIC_LAW = Effect(
 QUADRATIC_LAW = Effect(
     "elastic_law",
     "another elastic law fits better: a polynomial, with an extra factor 1 + {quadratic_per_mm:.3g} x",
-    (Par("quadratic_per_mm", "1/mm", 0.0, -0.15, 50.0, 0.02, worth=0.01, meaning="q of the factor 1 + q x"),),
+    (Par("quadratic_per_mm", "1/mm", 0.0, -0.15, 50.0, 0.02, least=0.01, meaning="q of the factor 1 + q x"),),
     begin={"quadratic_per_mm": 0.4, "b_per_mm": 0.05},
     through="depth",
     control=ELASTIC,
@@ -73,7 +73,7 @@ QUADRATIC_LAW = Effect(
 SUBSTRATE = Effect(
     "substrate",
     "something stiff lies below: the force grows by 1 + {substrate_per_mm3:.3g} x^3",
-    (Par("substrate_per_mm3", "1/mm^3", 0.0, 0.0, 0.05, 2e-4, worth=2e-5, meaning="growth of force by depth cubed"),),
+    (Par("substrate_per_mm3", "1/mm^3", 0.0, 0.0, 0.05, 2e-4, least=2e-5, meaning="growth of force by depth cubed"),),
     one_sided=True,
     needs=frozenset({"depth"}),
     through="depth",
@@ -97,7 +97,7 @@ RELAXATION = Effect(
 RATE_LAW = Effect(
     "rate_law",
     "the viscous force does not grow in proportion to speed but as speed^{rate_exponent:.3g}",
-    (Par("rate_exponent", "1", 1.0, 0.05, 2.5, 0.1, worth=0.04, meaning="exponent of speed"),),
+    (Par("rate_exponent", "1", 1.0, 0.05, 2.5, 0.1, least=0.04, meaning="exponent of speed"),),
     operator=Operator("viscous", _rate_law),
     needs=frozenset({"speeds"}),
     control="its damping at 10 mm/s is in the gains and the inverse model",
@@ -106,7 +106,7 @@ RATE_LAW = Effect(
 PRECONDITIONING = Effect(
     "preconditioning",
     "the first cycles differ by {preconditioning_gain:.1%}, fading over {preconditioning_cycles:.2g} cycles",
-    (Par("preconditioning_gain", "1", 0.0, -0.9, 3.0, 0.02, worth=0.005, meaning="first cycle's gain over the last"),),
+    (Par("preconditioning_gain", "1", 0.0, -0.9, 3.0, 0.02, least=0.005, meaning="first cycle's gain over the last"),),
     (Par("preconditioning_cycles", "1", 3.0, 0.3, 30.0, 1.0, log=True, meaning="cycles to fade by 1/e"),),
     lambda *_: [{"preconditioning_cycles": n} for n in (1.0, 3.0, 8.0)],
     between=True,
@@ -117,7 +117,7 @@ PRECONDITIONING = Effect(
 ADHESION = Effect(
     "adhesion",
     "the tip sticks on the way out with up to {adhesion_N:.3g} N over {adhesion_length_mm:.2g} mm",
-    (Par("adhesion_N", "N", 0.0, 0.0, 10.0, 0.02, worth=0.005, meaning="largest pull"),),
+    (Par("adhesion_N", "N", 0.0, 0.0, 10.0, 0.02, least=0.005, meaning="largest pull"),),
     (Par("adhesion_length_mm", "mm", 1.0, 0.05, 8.0, 1.0, log=True, meaning="reach of the pull"),),
     lambda *_: [{"adhesion_length_mm": length} for length in (0.2, 0.6, 2.0)],
     one_sided=True,
@@ -128,7 +128,7 @@ ADHESION = Effect(
 TEMPERATURE = Effect(
     "temperature",
     "the force changes by {temperature_per_K:.2%} per kelvin of the sensor's temperature",
-    (Par("temperature_per_K", "1/K", 0.0, -0.3, 0.3, 0.005, worth=0.001, meaning="relative change of force"),),
+    (Par("temperature_per_K", "1/K", 0.0, -0.3, 0.3, 0.005, least=0.001, meaning="relative change of force"),),
     between=True,
     operator=Operator("elastic", _warmed),
     needs=frozenset({"temperature"}),

@@ -29,7 +29,7 @@ def wanted_N(cycle: int) -> float:
 
 
 def rms_error_N(model: Model, in_time: bool = True) -> float:
-    """On a bench whose guide rubs, after the first second; ``in_time``: asked for as early as the axis needs it."""
+    """On a bench with guide friction, after the first second; ``in_time``: asked for as early as the axis needs it."""
     bench = Bench(Parameters.model_validate({"hide": {"friction": FRICTION}}))
     settle(bench, 19.5, 1.0)
     zero_N, place_mm = bench.force.wrench()[2], 19.5

@@ -103,7 +103,7 @@ def test_while_the_force_is_late_the_tip_stands_still() -> None:
 
 
 def test_a_guide_that_rubs_is_no_contact_and_the_surface_is_found_below_it() -> None:
-    bench = SpringBench(rubbing_N=0.3)
+    bench = SpringBench(friction_N=0.3)
     bench.run(ZERO, APPROACH)
     assert bench.ended == [("complete", None)]
     assert bench.state.surface_mm == pytest.approx(SURFACE_MM, abs=0.1)

@@ -181,7 +181,7 @@ APPROACH = Approach(speed_mm_s=10.0, contact_force_N=0.1, search_to_mm=40.0, tou
 
 @pytest.mark.parametrize(
     ("contact_N", "noise_N", "threshold_N"),
-    # contact force, ten times the noise but not above 1 N for that, four times the noise; rubbing of 0.5 N beside it
+    # contact force, ten times the noise but not above 1 N for that, four times the noise; friction of 0.5 N beside it
     [(0.1, 0.0, 0.6), (0.1, 0.05, 1.0), (0.1, 0.2, 1.5), (0.1, 0.3, 1.7), (3.0, 0.3, 3.5)],
 )
 def test_what_may_be_contact_is_above_noise_rubbing_and_what_was_asked_for(
@@ -192,7 +192,7 @@ def test_what_may_be_contact_is_above_noise_rubbing_and_what_was_asked_for(
 
 
 def approached(forces_N: list[float], step: Approach = APPROACH) -> tuple[ApproachRun, LoopState, list[bool]]:
-    """A sample each cycle, standing in the air: nothing has rubbed yet, so 0.6 N may be contact."""
+    """A sample each cycle, standing in the air: nothing has moved yet, so 0.6 N may be contact."""
     here, run = state(), step.begin()
     searching = []
     for force_N in forces_N:
@@ -222,7 +222,7 @@ def test_the_touch_is_made_as_the_step_asks_and_the_axis_rests_for_it() -> None:
     assert here.setpoint.velocity_mm_s == 0.0
 
 
-def test_rubbing_is_the_mean_force_between_a_quarter_and_half_a_millimetre() -> None:
+def test_friction_is_the_mean_force_between_a_quarter_and_half_a_millimetre() -> None:
     here, run = state(10.0), APPROACH.begin()
     thresholds = []
     for position_mm, force_N in ((10.0, 9.9), (10.24, 9.9), (10.25, 0.1), (10.49, 0.3), (10.5, 9.9), (10.7, 9.9)):
@@ -235,14 +235,14 @@ def test_rubbing_is_the_mean_force_between_a_quarter_and_half_a_millimetre() -> 
     assert run.has_run_in
 
 
-@pytest.mark.parametrize(("force_N", "rubbing_N"), [(-3.0, 0.0), (0.2, 0.2), (3.0, 0.5)])
-def test_rubbing_is_never_negative_and_never_above_half_a_newton(force_N: float, rubbing_N: float) -> None:
+@pytest.mark.parametrize(("force_N", "friction_N"), [(-3.0, 0.0), (0.2, 0.2), (3.0, 0.5)])
+def test_friction_is_never_negative_and_never_above_half_a_newton(force_N: float, friction_N: float) -> None:
     here, run = state(10.0), APPROACH.begin()
     for position_mm in (10.0, 10.3, 10.6):
         here.position_mm = position_mm
         run._above = -100
         run.advance(sampled(here, force_N), 0.0)
-    assert run.threshold_N(here) == pytest.approx(0.1 + rubbing_N)
+    assert run.threshold_N(here) == pytest.approx(0.1 + friction_N)
 
 
 def test_loading_is_collected_from_the_start_and_again_from_where_the_guide_has_slipped() -> None:

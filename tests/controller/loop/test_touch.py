@@ -50,7 +50,7 @@ def test_touches_end_where_they_are_used_up_and_the_interval_says_how_well_it_is
 
 
 def test_a_guide_that_rubs_moves_neither_surface_nor_interval() -> None:
-    touch = approached(FIRM, BOTA, 3, rubbing_N=0.3).state.touch
+    touch = approached(FIRM, BOTA, 3, friction_N=0.3).state.touch
     assert touch and touch.surface_mm == pytest.approx(SURFACE_MM, abs=0.05)
 
 

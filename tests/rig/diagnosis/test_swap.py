@@ -5,7 +5,7 @@ from rig.diagnosis.effects.bench import FRICTION, TIME_OFFSET, TIP_INERTIA, ZERO
 from rig.diagnosis.fit import first_fit, fit, refreshed
 from rig.diagnosis.indentation import IndentationProblem
 from rig.diagnosis.observations import observe
-from rig.diagnosis.search import swapped
+from rig.diagnosis.search import swap
 
 
 def test_every_cause_named_after_two_swaps_is_in_the_model() -> None:
@@ -15,5 +15,5 @@ def test_every_cause_named_after_two_swaps_is_in_the_model() -> None:
     wrong = (ZERO_DRIFT, TIP_INERTIA)
     start = {par.name: par.null + par.scale for effect in wrong for par in effect.pars}
     model = refreshed(fit(problem, wrong, {**first_fit(problem).values, **start}))
-    named, final = swapped(model, [FRICTION, TIME_OFFSET], {})
+    named, final = swap(model, [FRICTION, TIME_OFFSET], {})
     assert {one.effect.name for one in named} == set(final.names) == {"friction", "time_offset"}

@@ -4,17 +4,17 @@ from dataclasses import replace
 
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.estimates import ErrorGain, NamedCause
-from rig.diagnosis.omnibus import Leftover
+from rig.diagnosis.lack_of_fit import LackOfFit
 from rig.report.diagnosis_figures import offending
 
-BEFORE = Leftover({"velocity": 300.0, "depth": 80.0}, {}, 0.002)
-AFTER = Leftover({"velocity": 1.0, "depth": 75.0}, {}, 0.4)
-RUBS = NamedCause(
-    ("friction",), "the guide rubs", 0.99, {}, ErrorGain(0.07, 0.01, 0.85, 0.8, 0.9), 900.0, 0.002, "", False
+BEFORE = LackOfFit({"velocity": 300.0, "depth": 80.0}, {}, 0.002)
+AFTER = LackOfFit({"velocity": 1.0, "depth": 75.0}, {}, 0.4)
+NAMED = NamedCause(
+    ("friction",), "the guide has friction", 0.99, {}, ErrorGain(0.07, 0.01, 0.85, 0.8, 0.9), 900.0, 0.002, "", False
 )
 FOUND = Diagnosis(
-    session="s", simulation="index", recordings=10, verdict="explained", statement="", findings=(RUBS,), depends_on=(),
-    leftover_p=0.4, detectable={}, not_testable={}, next_experiment=None, quality=(), before=BEFORE, after=AFTER,
+    session="s", simulation="index", recordings=10, verdict="explained", statement="", findings=(NAMED,), depends_on=(),
+    lack_of_fit_p=0.4, detectable={}, not_testable={}, next_experiment=None, quality=(), before=BEFORE, after=AFTER,
 )  # fmt: skip
 
 

@@ -17,10 +17,10 @@ from rig.trials.curves import loading_curve
 from tests.rig.tissue.synthetic import Bench
 
 OLD_DIAGNOSIS = {
-    "verdict": "unexplained", "statement": "Something is left.", "simulation": "index", "session": "first",
+    "verdict": "unexplained", "statement": "A residual is left.", "simulation": "index", "session": "first",
     "recordings": 6, "unexplained": {"depends_on": ["velocity"], "p_value": None}, "not_testable": {},
     "findings": [{
-        "effects": ["friction"], "statement": "it rubs", "confidence": 0.2, "provisional": True, "repair": "clean it",
+        "effects": ["friction"], "statement": "it sticks", "confidence": 0.2, "provisional": True, "repair": "clean it",
         "parameters": {"friction_N": {"value": 0.1, "low": 0.09, "high": 0.11}}, "evidence_nats": 12.0, "p_value": 0.01,
         "gain": {"rmse_before_N": 0.04, "rmse_after_N": 0.02, "reduction": 0.5, "low": 0.4, "high": 0.6},
     }],

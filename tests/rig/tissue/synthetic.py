@@ -50,7 +50,7 @@ def along(law: Law) -> Force:
     return force
 
 
-def rubbing(level_N: float, force: Force = FOREARM) -> Force:
+def with_friction(level_N: float, force: Force = FOREARM) -> Force:
     """Tissue behind a guide with Coulomb friction: against the motion, and at rest as the last motion left it."""
 
     def total(depth_mm: Column, rate_mm_s: Column) -> Column:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rig.errors import UsageError
 from rig.tissue.history import History
 from rig.tissue.laws import Law
-from rig.tissue.registry import LAWS, RIVALS, law_named
+from rig.tissue.registry import LAWS, THREE_PARAMETER, law_named
 from tests.rig.tissue.examples import EXAMPLES
 
 every_law = pytest.mark.parametrize("law", EXAMPLES, ids=[law.name for law in EXAMPLES])
@@ -109,5 +109,5 @@ def test_a_parameter_no_tissue_has_is_refused_with_its_bounds(law: Law, value: f
             dataclasses.replace(law, **{name: value})
 
 
-def test_rivals_have_as_many_parameters_as_the_index_model() -> None:
-    assert {len(kind.bounds) for kind in RIVALS} == {3}
+def test_alternatives_have_as_many_parameters_as_the_index_model() -> None:
+    assert {len(kind.bounds) for kind in THREE_PARAMETER} == {3}

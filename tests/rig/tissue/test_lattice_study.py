@@ -35,7 +35,7 @@ def test_the_index_lattice_beats_the_constant_one_on_fitted_and_left_out_trials(
     assert index.trials_left_out.max_error_percent < 0.5 * constant.trials_left_out.max_error_percent
 
 
-def test_rivals_are_judged_on_the_same_curves(found: LatticeStudy) -> None:
+def test_alternatives_are_judged_on_the_same_curves(found: LatticeStudy) -> None:
     assert {"constant", "index", "quadratic", "power", "fung", "lattice constant", "lattice index"} <= set(found.judged)
 
 

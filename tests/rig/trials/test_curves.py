@@ -14,7 +14,7 @@ from rig.trials.curves import loading_curve
 from rig.trials.cycles import IndentationCycle, cycle_of
 from rig.trials.recorded import trial_of
 from tests import data
-from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, index_force, recording, rubbing, tables
+from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, index_force, recording, tables, with_friction
 
 
 @pytest.mark.parametrize("speed_mm_s", SPEEDS_MM_S)
@@ -43,11 +43,11 @@ def test_speed_is_found_where_nobody_said_it() -> None:
 @pytest.mark.parametrize("level_N", [0.05, 0.1, 0.3])
 def test_a_guide_that_rubs_moves_the_zero_and_neither_contact_nor_curve(speed_mm_s: float, level_N: float) -> None:
     smooth = loading_curve(Bench().cycle(speed_mm_s))
-    rubbed = loading_curve(Bench(force=rubbing(level_N)).cycle(speed_mm_s))
-    assert rubbed.zero_N == pytest.approx(0.7 + level_N, abs=0.004)
-    assert rubbed.contact.lower_mm <= Bench().surface_mm <= rubbed.contact.upper_mm
+    with_guide = loading_curve(Bench(force=with_friction(level_N)).cycle(speed_mm_s))
+    assert with_guide.zero_N == pytest.approx(0.7 + level_N, abs=0.004)
+    assert with_guide.contact.lower_mm <= Bench().surface_mm <= with_guide.contact.upper_mm
     at_mm = np.linspace(19.8, 27.5, 100)
-    forces = [np.interp(at_mm, c.depth_mm + c.contact.position_mm, c.force_N) for c in (smooth, rubbed)]
+    forces = [np.interp(at_mm, c.depth_mm + c.contact.position_mm, c.force_N) for c in (smooth, with_guide)]
     assert np.abs(forces[0] - forces[1]).max() < 0.015
 
 

@@ -1,11 +1,11 @@
-"""What is left is judged by what recordings share: no sample outweighs them, no turning counts what was seen twice."""
+"""The residual is judged by what recordings share: no sample outweighs them, no turning counts what was seen twice."""
 
 import numpy as np
 import pytest
 
 from rig.diagnosis.evidence import _signs, chance
 from rig.diagnosis.fit import MOST_OF_ONE_ROW, bounded
-from rig.diagnosis.omnibus import _left_out, bumps
+from rig.diagnosis.lack_of_fit import _press_log_density, bumps
 
 
 @pytest.mark.parametrize("recordings", [6, 7, 12, 60])
@@ -47,5 +47,5 @@ def test_a_step_in_mid_session_is_predicted_better_by_a_step_than_by_a_trend() -
     level, step = np.ones(12), np.where(cycle >= 6, 1.0, 0.0)
     stepped, drifted = 0.08 * step + 0.01 * rng.standard_normal(12), 0.01 * cycle + 0.01 * rng.standard_normal(12)
     by_trend, by_step = np.column_stack([level, cycle]), np.column_stack([level, step])
-    assert _left_out(by_step, stepped) > _left_out(by_trend, stepped) + 3
-    assert _left_out(by_trend, drifted) > _left_out(by_step, drifted) + 3
+    assert _press_log_density(by_step, stepped) > _press_log_density(by_trend, stepped) + 3
+    assert _press_log_density(by_trend, drifted) > _press_log_density(by_step, drifted) + 3

@@ -1,4 +1,4 @@
-"""Is anything left, and what does it depend on? Asked before any cause is named and after.
+"""Test of lack of fit: does the residual depend on anything? Before any cause is named, and after.
 
 Six bumps along each variable, added and times the simulated force, must predict recordings they have not seen, beyond
 what the model's own parameters can imitate. The level is set by turning whole recordings round at random, with the
@@ -24,19 +24,19 @@ LEVEL = 0.005
 # Ten recordings have so few orders that no pattern, however clear, is rarer than about 0.01: orders are only the check.
 BETWEEN_LEVEL = 0.003
 ORDER_LEVEL = 0.05
-WORTH_SHARE = 0.004  # of the noise power: an error of 6 % of the noise's rms
+SMALLEST_SHARE = 0.004  # of the noise power: an error of 6 % of the noise's rms
 MOST_UNNAMED = 0.1  # of what was named: the cause is known, if not its last detail
 AMPLE_SHARE = 0.15  # of the noise power: an error of 0.4 of the noise's rms is no detail
 RIDGE = 0.05
 BETWEEN = ("session time", "cycle number", "speed", "temperature")
 FEWEST_BETWEEN = 8  # below it Student's t of a trend would have to pass 5 at BETWEEN_LEVEL
 BETWEEN_DRAWS = 999
-BEATEN_NATS = 3.0  # odds of 20 to 1 (e^3)
+TREND_NATS = 3.0  # odds of 20 to 1 (e^3)
 EVEN_SHARE = 0.05  # of its mean: what varies less between recordings tells no trend from a level
 
 
 @dataclass(frozen=True)
-class Leftover:
+class LackOfFit:
     """Held-out gain [nats] and share of the judged noise power by variable, and the chance of the largest gain."""
 
     gains: Mapping[str, float]
@@ -69,7 +69,7 @@ def variables(fit: Fit) -> dict[str, Array]:
     return {**fit.problem.variables(), "force": fit.prediction[0] - fit.values.get("zero_N", 0.0)}
 
 
-def leftover(fit: Fit, rng: np.random.Generator) -> Leftover:
+def assess_lack_of_fit(fit: Fit, rng: np.random.Generator) -> LackOfFit:
     """Test of the residual of ``fit`` against every variable."""
     problem, force = fit.problem, fit.prediction[0] - fit.values.get("zero_N", 0.0)
     scale = max(float(np.sqrt(np.mean(force**2))), 1e-12)
@@ -94,20 +94,20 @@ def leftover(fit: Fit, rng: np.random.Generator) -> Leftover:
     rows = float(sum(np.count_nonzero(keep) for keep in fit.whitener.judged[:1]))
     named = dict(zip(groups, map(float, gains), strict=True))
     shares = {name: 2 * gain / rows for name, gain in named.items()}
-    return Leftover(named, shares, p_value, *between_recordings(fit, rng))
+    return LackOfFit(named, shares, p_value, *between_recordings(fit, rng))
 
 
-def judged_leftover(found: Leftover, named_nats: float) -> tuple[str, ...]:
-    """Variables an unexplained leftover depends on; none where it is chance, too small to matter, or mostly named.
+def unexplained_variables(found: LackOfFit, named_nats: float) -> tuple[str, ...]:
+    """Variables an unexplained residual depends on; none where it is chance, too small to matter, or mostly named.
 
-    A leftover is too small below 0.4 % of the noise power, or below a tenth of what the named causes explain: the
+    A residual is too small below 0.4 % of the noise power, or below a tenth of what the named causes explain: the
     library has then got the cause, if not its last detail. 15 % of the noise power always matters.
     """
     if found.between_p <= BETWEEN_LEVEL:
         return found.between
     best = found.ranked[0]
     named_it = found.gains[best] < MOST_UNNAMED * named_nats and found.shares[best] < AMPLE_SHARE
-    matters = found.shares[best] >= WORTH_SHARE and not named_it
+    matters = found.shares[best] >= SMALLEST_SHARE and not named_it
     if found.p_value > LEVEL or not matters:
         return ()
     return tuple(name for name in found.ranked if found.gains[name] >= 0.5 * found.gains[best])
@@ -152,12 +152,12 @@ def beside_named(fit: Fit) -> Array:
     A step that a named trend has half explained is a step again beside it.
     """
     level = np.ones((len(fit.problem.scatter), fit.problem.recordings, 1))
-    taken = [level, *(carried(fit, effect) for effect in fit.effects if effect.between)]
+    taken = [level, *(express_as_shifts(fit, effect) for effect in fit.effects if effect.between)]
     columns = np.concatenate(taken, axis=2)
     return np.eye(fit.problem.recordings) - columns @ np.linalg.pinv(columns, rcond=1e-6)
 
 
-def carried(fit: Fit, effect: Effect) -> Array:
+def express_as_shifts(fit: Fit, effect: Effect) -> Array:
     """What a named effect does to the recordings as if it were shifts, (quantities, recordings, parameters)."""
     names = {par.name for par in effect.pars}
     columns = [k for k, par in enumerate(fit.free) if par.name in names]
@@ -167,7 +167,7 @@ def carried(fit: Fit, effect: Effect) -> Array:
     return np.stack([np.linalg.lstsq(secants[i:j], moves[i:j], rcond=None)[0] for i, j in pairwise(starts)], axis=1)
 
 
-def beaten(effect: Effect, after: Fit, without: Fit) -> tuple[str, ...]:
+def find_better_trends(effect: Effect, after: Fit, without: Fit) -> tuple[str, ...]:
     """Variables a plain step or trend over which predicts the recordings' shifts better than a named effect does.
 
     Judged on the model without the effect, each recording left out; what was tried is taken off the evidence.
@@ -175,7 +175,7 @@ def beaten(effect: Effect, after: Fit, without: Fit) -> tuple[str, ...]:
     if not effect.between or after.problem.recordings < FEWEST_BETWEEN:
         return ()
     patterns, owners = _trends_and_steps(after.problem)
-    own, shifts = carried(after, effect), without.whitener.noise.shifts.T
+    own, shifts = express_as_shifts(after, effect), without.whitener.noise.shifts.T
     size = np.abs(own[:, :, 0]).max(axis=1) / np.maximum(without.whitener.noise.scatter_sd, 1e-12)
     quantity = int(size.argmax())
     if np.ptp(own[quantity, :, 0]) < EVEN_SHARE * np.abs(own[quantity, :, 0]).max():
@@ -183,15 +183,15 @@ def beaten(effect: Effect, after: Fit, without: Fit) -> tuple[str, ...]:
     if not owners:
         return ()
     level = np.ones((after.problem.recordings, 1))
-    mine = _left_out(np.concatenate([level, own[quantity]], axis=1), shifts[quantity])
-    plain = np.array([_left_out(np.column_stack([level, pattern]), shifts[quantity]) for pattern in patterns])
+    mine = _press_log_density(np.concatenate([level, own[quantity]], axis=1), shifts[quantity])
+    plain = np.array([_press_log_density(np.column_stack([level, pattern]), shifts[quantity]) for pattern in patterns])
     cost = np.log(len(np.unique(patterns.round(9), axis=0)))
-    if plain.max() - mine - cost < BEATEN_NATS:
+    if plain.max() - mine - cost < TREND_NATS:
         return ()
     return tuple(dict.fromkeys(owner for owner, nats in zip(owners, plain, strict=True) if nats > plain.max() - 0.5))
 
 
-def _left_out(columns: Array, shifts: Array) -> float:
+def _press_log_density(columns: Array, shifts: Array) -> float:
     """Log density of shifts (recordings,) each left out of a least-squares fit, up to a constant (Allen's PRESS)."""
     hat = columns @ np.linalg.pinv(columns)
     errors = (shifts - hat @ shifts) / np.maximum(1 - np.diag(hat), 1e-9)
