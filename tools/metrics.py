@@ -1,9 +1,12 @@
 """``python -m tools.metrics``: how the source is built, each number beside its goal; the last line is one JSON object.
 
-Source are the five packages, tests are `tests` and what they are made with (`mock_devices.testing`). An untyped
-dictionary is a ``dict`` or ``Mapping`` to Any or object in a public signature or field that another package imports. A
-threshold is a number with a name at the head of a module that something is compared with or bounded by; its reason is a
-comment on its line, above it or above a pair of which it is the second, or a text below it.
+It ends with 1 where a number that had reached its goal has left it, or `source_lines` passes ``MOST_LINES``.
+
+Source are the five packages; their lines are counted without what is there for safety alone (``SAFETY``). Tests are
+`tests` and what they are made with (`mock_devices.testing`). An untyped dictionary is a ``dict`` or ``Mapping`` to Any
+or object in a public signature or field that another package imports. A threshold is a number with a name at the head
+of a module that something is compared with or bounded by; its reason is a comment on its line, above it or above a pair
+of which it is the second, or a text below it.
 """
 
 import ast
@@ -13,7 +16,7 @@ import statistics
 import sys
 import tomllib
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -26,12 +29,59 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("rig", "drivers", "controller", "api", "mock_devices")
 HARNESS = "mock_devices/testing/"
 LINES_BEFORE = 30_632  # of the five packages at commit 2887b84
+MOST_LINES = 36_000  # what there were when this was written: more must first be saved elsewhere
+# What came for a bench that cannot hurt (between commits 2887b84 and 06c6055, 8,126 lines), as far as it has folders
+# and files of its own; what grew inside others counts with them.
+SAFETY = {
+    "controller/stop/": "a stop of its own: word, process, keypad",
+    "controller/commissioning/": "no approach before force and axis are calibrated",
+    "controller/recovery/": "the tip comes out after a stop, a fault or a crash",
+    "controller/safety/first_touch.py": "force must rise as the calibration says",
+    "controller/safety/giving_way.py": "a limb that pushes is given way to",
+    "controller/safety/load.py": "the force limit holds for what is still to come",
+    "controller/devices/absent.py": "recovery begins where a sensor is absent",
+    "controller/devices/connections.py": "whether each device may be relied on",
+    "controller/devices/reopening.py": "lost devices come back by themselves",
+    "controller/devices/states.py": "connecting, ok, degraded, lost, reconnecting, fault",
+    "controller/devices/takeover.py": "lost devices that came back are taken over",
+    "controller/claims.py": "one process has the bench",
+    "controller/loop/touch.py": "the same depth with every sensor",
+    "controller/loop/paired_samples.py": "the same depth with every sensor",
+    "controller/experiments/verdicts.py": "a bad trial is repeated, not used",
+    "api/cli/asking.py": "a person confirms each step of a calibration",
+    "api/cli/calibrate.py": "commissioning",
+    "api/cli/calibrate_axis.py": "commissioning",
+    "api/cli/calibrate_force.py": "commissioning",
+    "api/cli/mock_calibration.py": "commissioning of the mock bench",
+    "api/cli/keys.py": "the keys that stop",
+    "api/cli/recovery.py": "recovery",
+    "api/operations/calibrate.py": "commissioning",
+    "api/operations/calibrations.py": "commissioning",
+    "api/operations/claimed.py": "one process has the bench",
+    "api/operations/reset.py": "recovery",
+    "api/http/guard.py": "neither a large body nor a slow client keeps a stop waiting",
+    "drivers/robotiq/frame_clock.py": "capture times that the checks can rely on",
+    "mock_devices/faults/sensing.py": "faults for the campaign",
+    "mock_devices/physics/channels.py": "faults for the campaign",
+    "rig/config/calibration.py": "commissioning",
+    "rig/config/calibration_files.py": "commissioning",
+    "rig/config/force_map.py": "compression by the calibrated matrix, in one place",
+    "rig/config/maxima.py": "what configuration cannot exceed",
+    "rig/config/quality.py": "the verdict on each trial",
+    "rig/config/stop.py": "a stop of its own",
+    "rig/recording/manifest.py": "swapped, copied and edited files are found",
+    "rig/recording/slope.py": "the axis' scale is checked against the tracker",
+    "rig/trials/contact.py": "the same depth with every sensor",
+    "rig/trials/measures.py": "the verdict on each trial",
+    "rig/trials/quality.py": "the verdict on each trial",
+}
 GOALS = {
     "class_names_twice": ("at most", 0),
     "untyped_dicts": ("at most", 9),
     "upward_imports": ("at most", 0),
     "cycles": ("at most", 0),
     "source_lines": ("at most", 0.9 * LINES_BEFORE),
+    "source_lines_safety": ("at most", 8126),
     "function_median": ("at most", 6),
     "function_p90": ("at most", 20),
     "file_max": ("at most", 400),
@@ -85,6 +135,11 @@ def read(root: Path, folders: Iterable[str]) -> list[Source]:
 def lines_of(sources: Iterable[Source]) -> int:
     """Physical lines."""
     return sum(len(source.lines) for source in sources)
+
+
+def for_safety(path: str) -> bool:
+    """Whether a file is there for safety alone."""
+    return path.startswith(tuple(SAFETY))
 
 
 def class_names_twice(sources: Iterable[Source], glossary: str = "") -> list[str]:
@@ -281,7 +336,8 @@ def measured(root: Path) -> tuple[dict[str, float], dict[str, list[str]]]:
     }
     numbers = {
         **{name: len(lists[name]) for name in ("class_names_twice", "untyped_dicts", "upward_imports", "cycles")},
-        "source_lines": lines_of(sources),
+        "source_lines": lines_of(source for source in sources if not for_safety(source.path)),
+        "source_lines_safety": lines_of(source for source in sources if for_safety(source.path)),
         "function_median": statistics.median(lengths),
         "function_p90": lengths[round(0.9 * (len(lengths) - 1))],
         "file_max": max(len(source.lines) for source in everything),
@@ -297,8 +353,17 @@ def reached(name: str, value: float) -> bool:
     return value <= goal if side == "at most" else value >= goal
 
 
+def fallen(numbers: Mapping[str, float]) -> list[str]:
+    """Names of the numbers beyond their goal; `source_lines`, which is not there yet, beyond ``MOST_LINES``."""
+    return [
+        name
+        for name, value in numbers.items()
+        if not (value <= MOST_LINES if name == "source_lines" else reached(name, value))
+    ]
+
+
 def main() -> None:
-    """Prints table, lists where asked by ``--list``, and one line of JSON."""
+    """Prints table, lists where asked by ``--list``, and one line of JSON; ends with 1 where a number fell back."""
     numbers, lists = measured(ROOT)
     console = Console(soft_wrap=True)
     table = Table("what", "value", "goal", "reached")
@@ -310,6 +375,7 @@ def main() -> None:
         for name, found in lists.items():
             console.print(f"{name}:", *found, sep="\n  ")
     sys.stdout.write(json.dumps(numbers) + "\n")
+    sys.exit(1 if fallen(numbers) else 0)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Each number of `make metrics` on sources in which what it counts was planted."""
 
+import json
 import sys
 from pathlib import Path
 
@@ -106,9 +107,50 @@ def test_an_upward_import_and_a_cycle_are_named(tmp_path: Path, monkeypatch: pyt
     sys.modules.pop("planted", None)
 
 
-def test_each_number_is_printed_beside_its_goal_and_last_as_json() -> None:
-    numbers, _ = metrics.measured(metrics.ROOT)
+def test_no_number_falls_back() -> None:
+    numbers, lists = metrics.measured(metrics.ROOT)
     assert numbers.keys() == metrics.GOALS.keys()
+    fallen = metrics.fallen(numbers)
+    assert not fallen, [(name, numbers[name], lists.get(name)) for name in fallen]
+
+
+BETTER = {
+    "class_names_twice": 0, "untyped_dicts": 9, "upward_imports": 0, "cycles": 0, "source_lines": metrics.MOST_LINES,
+    "source_lines_safety": 8126, "function_median": 6, "function_p90": 20, "file_max": 400, "test_to_source": 0.8,
+    "thresholds_with_reason": 0.9,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", metrics.GOALS)
+def test_a_number_that_falls_back_is_named(name: str) -> None:
+    assert metrics.fallen(BETTER) == []
+    worse = -0.01 if name in ("test_to_source", "thresholds_with_reason") else 1
+    assert metrics.fallen(BETTER | {name: BETTER[name] + worse}) == [name]
+
+
+def test_whoever_runs_it_sees_each_number_beside_its_goal_and_how_it_ended(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["metrics", "--list"])
+    for numbers, code in ((BETTER, 0), (BETTER | {"cycles": 2}, 1)):
+        monkeypatch.setattr(metrics, "measured", lambda _, numbers=numbers: (numbers, {"cycles": ["a <-> b"]}))
+        with pytest.raises(SystemExit) as ended:
+            metrics.main()
+        assert ended.value.code == code
+        told = capsys.readouterr().out
+        assert json.loads(told.splitlines()[-1]) == numbers
+        assert "at least 0.8" in told
+        assert "a <-> b" in told
+
+
+def test_safety_is_counted_apart_by_folders_and_files_that_exist() -> None:
+    assert metrics.for_safety("controller/stop/word.py")
+    assert metrics.for_safety("rig/trials/quality.py")
+    assert not metrics.for_safety("rig/trials/curves.py")
+    assert [path for path in metrics.SAFETY if not (metrics.ROOT / path).exists()] == []
+
+
+def test_a_goal_is_reached_from_the_side_it_names() -> None:
     assert metrics.reached("file_max", 400)
     assert not metrics.reached("file_max", 401)
     assert not metrics.reached("test_to_source", 0.79)
