@@ -20,7 +20,7 @@ def whole_file(path: Path, overwrite: bool = False) -> Iterator[Path]:
     scratch = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         yield scratch
-        _sync(scratch)
+        wait_for_disk(scratch)
         scratch.replace(path)
     except OSError as error:
         raise WriteFailed(f"{path}: cannot be written: {error.strerror or error}; nothing was left behind") from error
@@ -76,7 +76,8 @@ def _check(path: Path, overwrite: bool) -> None:
         raise UsageError(f"{path}: is a folder; give the name of a file")
 
 
-def _sync(path: Path) -> None:
+def wait_for_disk(path: Path) -> None:
+    """Waits until the disk has the file or folder."""
     fd = os.open(path, os.O_RDONLY)
     try:
         os.fsync(fd)

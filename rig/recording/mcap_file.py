@@ -18,6 +18,7 @@ from mcap.writer import CompressionType, Writer
 
 from rig.channels import CDR_HEADER, STREAMS, Stream
 from rig.errors import RigError, UsageError
+from rig.recording.files import wait_for_disk
 
 SUMMARY = "summary"
 CHECKSUM = "crc32"
@@ -60,7 +61,7 @@ class RecordingWriter:
             self._add_metadata(name, values)
         self._write_batch()
         self._sync()
-        _sync_folder(path.parent)
+        wait_for_disk(path.parent)
 
     def _create(self) -> int:
         try:
@@ -162,11 +163,3 @@ class _Batch(io.BytesIO):
         self.truncate(0)
         self._start += len(data)
         return start, data
-
-
-def _sync_folder(folder: Path) -> None:
-    fd = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(fd)
-    finally:
-        os.close(fd)

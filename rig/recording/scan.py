@@ -5,14 +5,18 @@ record whose checksum is right, says where bytes could not be used, and finds it
 whole or not at all, so no row is ever a wrong row. Record layouts: MCAP specification, "Records".
 """
 
+import io
 import re
 import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import zstandard
+from mcap import records
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
 
 from rig.recording.mcap_file import CHECKSUM, checksum
 
@@ -22,12 +26,14 @@ METADATA, DATA_END = 0x0C, 0x0F
 # No chunk of ours is larger; a damaged size must not be able to ask for all memory.
 LARGEST_CHUNK = 1 << 26
 _RECORD = struct.Struct("<BQ")
-_CHUNK = struct.Struct("<QQQI")
 _MESSAGE = struct.Struct("<BQHIQQ")
 _CDR = 4
 _FOOTER_SIZE = 9 + 20 + len(MAGIC)
 # Where a chunk (zstd) or a metadata record may begin.
 _BEGIN = re.compile(rb"\x06.{3}[\0-\x0f]\0{4}.{28}\x04\0\0\0zstd|\x0c.{4}\0{4}[\x01-\x40]\0\0\0", re.DOTALL)
+
+
+Record = TypeVar("Record", records.Chunk, records.Schema, records.Channel, records.Metadata)
 
 
 class Definition(NamedTuple):
@@ -166,19 +172,26 @@ def _take(record: _Record, found: Scan) -> None:
         found.metadata[name] = values
 
 
+def _unpack(kind: type[Record], content: bytes) -> Record:
+    """The record as the stock reader takes it apart."""
+    try:
+        unpacked: Record = kind.read(ReadDataStream(io.BytesIO(content)))
+    except (struct.error, UnicodeDecodeError, EndOfFile) as error:
+        raise _Bad(f"{kind.__name__.lower()} that cannot be read") from error
+    return unpacked
+
+
 def _unpack_chunk(content: bytes) -> bytes:
-    _, _, size, expected = _CHUNK.unpack_from(content)
-    (name,) = struct.unpack_from("<I", content, _CHUNK.size)
-    packed = content[40 + name :]
-    if content[32 : 32 + name] != b"zstd":
+    packed = _unpack(records.Chunk, content)
+    if packed.compression != "zstd":
         raise _Bad("chunk of an unknown compression")
     try:
-        if not zstandard.frame_content_size(packed) == size <= LARGEST_CHUNK:
+        if not zstandard.frame_content_size(packed.data) == packed.uncompressed_size <= LARGEST_CHUNK:
             raise _Bad("chunk with a wrong size")
-        data = zstandard.decompress(packed, size)
+        data = zstandard.decompress(packed.data, packed.uncompressed_size)
     except zstandard.ZstdError as error:
         raise _Bad("chunk that cannot be unpacked") from error
-    if zlib.crc32(data) != expected:
+    if zlib.crc32(data) != packed.uncompressed_crc:
         raise _Bad("chunk with a wrong checksum")
     return data
 
@@ -195,48 +208,22 @@ def _messages(data: bytes) -> Chunk:
             if opcode == MESSAGE:
                 append((unpack(data, at)[2], data[at + _MESSAGE.size + _CDR : end]))
             elif opcode == SCHEMA:
-                number, text = _unpack_schema(data[at + 9 : end])
-                schemas[number] = text
+                schema = _unpack(records.Schema, data[at + 9 : end])
+                schemas[schema.id] = schema.data.decode()
             elif opcode == CHANNEL:
-                number, schema, topic = _unpack_channel(data[at + 9 : end])
-                chunk.definitions[number] = Definition(topic, schemas.get(schema, ""))
+                channel = _unpack(records.Channel, data[at + 9 : end])
+                chunk.definitions[channel.id] = Definition(channel.topic, schemas.get(channel.schema_id, ""))
             at = end
     except (struct.error, UnicodeDecodeError) as error:
         raise _Bad("chunk with content this program does not know") from error
     return chunk
 
 
-def _unpack_schema(content: bytes) -> tuple[int, str]:
-    (number,) = struct.unpack_from("<H", content)
-    at = 2
-    for _ in ("name", "encoding"):
-        at += 4 + struct.unpack_from("<I", content, at)[0]
-    return number, content[at + 4 :].decode()
-
-
-def _unpack_channel(content: bytes) -> tuple[int, int, str]:
-    number, schema, size = struct.unpack_from("<HHI", content)
-    return number, schema, content[8 : 8 + size].decode()
-
-
 def _unpack_metadata(content: bytes) -> tuple[str, dict[str, str]]:
-    try:
-        (size,) = struct.unpack_from("<I", content)
-        name, texts = content[4 : 4 + size].decode(), list(_texts(content[8 + size :]))
-    except (struct.error, UnicodeDecodeError) as error:
-        raise _Bad("metadata that cannot be read") from error
-    values = dict(zip(texts[::2], texts[1::2], strict=False))
-    if values.pop(CHECKSUM, "") != checksum(values.items()):
-        raise _Bad(f"metadata {name!r} with a wrong checksum")
-    return name, values
-
-
-def _texts(content: bytes) -> Iterator[str]:
-    at = 0
-    while at < len(content):
-        (size,) = struct.unpack_from("<I", content, at)
-        yield content[at + 4 : at + 4 + size].decode()
-        at += 4 + size
+    found = _unpack(records.Metadata, content)
+    if found.metadata.pop(CHECKSUM, "") != checksum(found.metadata.items()):
+        raise _Bad(f"metadata {found.name!r} with a wrong checksum")
+    return found.name, found.metadata
 
 
 def _has_footer(data: bytes) -> bool:

@@ -123,13 +123,24 @@ class Law(ABC):
     def elastic_inverse(self, force_N: FloatArray) -> FloatArray:
         """Depth [mm] at which ``elastic`` is the force, for forces >= 0, same shape."""
 
-    @abstractmethod
     def damping(self, depth_mm: FloatArray) -> FloatArray:
-        """dF/dv [N s/mm] for depths >= 0, same shape; what relaxation gives is not counted."""
+        """dF/dv [N s/mm] for depths >= 0, same shape; what relaxation gives is not counted. Most have none."""
+        return np.zeros_like(depth_mm)
 
-    @abstractmethod
     def depth(self, force_N: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
-        """Depth [mm] at which the force is reached at that speed, broadcast; 0 where contact alone gives more."""
+        """Depth [mm] at which the force is reached at that speed, broadcast; 0 where contact alone gives more.
+
+        The damping is the same at all depths, but of laws that say otherwise. With relaxation by bisection between the
+        depths at which the force is reached suddenly and at rest.
+        """
+        force, rate = np.broadcast_arrays(np.asarray(force_N, float), np.asarray(rate_mm_s, float))
+        held_N = np.maximum(force - self.damping(np.zeros_like(force)) * rate, 0.0)
+        at_rest_mm = self.elastic_inverse(held_N)
+        if not self.terms:
+            return at_rest_mm
+        return bisect(
+            lambda depth_mm: self.force(depth_mm, rate), force, self.elastic_inverse(held_N / self.sudden), at_rest_mm
+        )
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -198,11 +209,6 @@ class Damped(Law):
     def damping(self, depth_mm: FloatArray) -> FloatArray:
         """B."""
         return np.full_like(depth_mm, self.damping_N_s_mm)
-
-    def depth(self, force_N: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
-        """The elastic inverse of F - B v."""
-        force, rate = np.broadcast_arrays(np.asarray(force_N, float), np.asarray(rate_mm_s, float))
-        return self.elastic_inverse(np.maximum(force - self.damping_N_s_mm * rate, 0.0))
 
 
 class Linear(Law):

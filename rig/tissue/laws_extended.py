@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rig.tissue.history import Term
 from rig.tissue.index_law import extended_force
@@ -60,13 +59,6 @@ class Extended(Damped):
     def friction(self) -> tuple[float, float]:
         """Level [N] and length [mm]."""
         return self.friction_N, self.friction_length_mm
-
-    def depth(self, force_N: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
-        """By bisection between the depths at which the force is reached suddenly and at rest."""
-        force, rate = np.broadcast_arrays(np.asarray(force_N, float), np.asarray(rate_mm_s, float))
-        held = np.maximum(force - self.damping_N_s_mm * rate, 0.0)
-        low_mm, high_mm = self.elastic_inverse(held / self.sudden), self.elastic_inverse(held)
-        return bisect(lambda depth_mm: self.force(depth_mm, rate), force, low_mm, high_mm) if self.terms else high_mm
 
     def elastic(self, depth_mm: FloatArray) -> FloatArray:
         """The tissue's force; with a compliant frame where tissue and frame carry the same."""

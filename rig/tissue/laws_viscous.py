@@ -1,4 +1,8 @@
-"""Laws whose force depends on how the tip came to its depth: damping that grows with depth, and relaxation."""
+"""Laws whose force depends on how the tip came to its depth: damping that grows with depth, and relaxation.
+
+Laws with ``terms`` are quasi-linear (Fung 1993, ch. 7): elastic force times a relaxation 1 + sum r_i exp(-t/tau_i).
+Where a quick way back leaves the surface behind, their force comes out negative: contact is lost there.
+"""
 
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, TypeAlias
@@ -7,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.tissue.history import Term
-from rig.tissue.laws import FloatArray, Law, Linear, ParameterBounds, bisect, straight
+from rig.tissue.laws import FloatArray, Linear, ParameterBounds, straight
 from rig.tissue.laws_elastic import FungShape, PowerShape
 
 AtRest: TypeAlias = Annotated[float, ParameterBounds("N/mm", 1e-6, 1e4, "stiffness at rest")]
@@ -44,26 +48,7 @@ class HuntCrossley(PowerShape):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Relaxing(Law):
-    """Quasi-linear viscoelasticity (Fung 1993, ch. 7): elastic force times a relaxation 1 + sum r_i exp(-t/tau_i).
-
-    Where a quick way back leaves the surface behind, force comes out negative: contact is lost there.
-    """
-
-    def damping(self, depth_mm: FloatArray) -> FloatArray:
-        """None besides relaxation."""
-        return np.zeros_like(depth_mm)
-
-    def depth(self, force_N: ArrayLike, rate_mm_s: ArrayLike = 0.0) -> FloatArray:
-        """By bisection between the depths at which the force is reached suddenly and at rest."""
-        force, rate = np.broadcast_arrays(np.asarray(force_N, float), np.asarray(rate_mm_s, float))
-        force = np.maximum(force, 0.0)
-        low_mm, high_mm = self.elastic_inverse(force / self.sudden), self.elastic_inverse(force)
-        return bisect(lambda depth_mm: self.force(depth_mm, rate), force, low_mm, high_mm)
-
-
-@dataclass(frozen=True, kw_only=True)
-class StandardLinear(Linear, Relaxing):
+class StandardLinear(Linear):
     """Standard linear solid: a spring k beside a spring k1 in series with a damper k1 tau (Zener 1948).
 
     After a sudden depth x: F = (k + k1 exp(-t/tau)) x. At speed v: F = k x + k1 v tau (1 - exp(-x/(v tau))).
@@ -94,7 +79,7 @@ class StandardLinear(Linear, Relaxing):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Prony(Linear, Relaxing):
+class Prony(Linear):
     """A Prony series of two terms, the generalised Maxwell solid: F(t) = int [k + sum k_i exp(-(t-s)/tau_i)] dx(s).
 
     Residual limbs: Tonuk and Silver-Thorn fitted two terms, and found that they do not carry over between sites.
@@ -127,7 +112,7 @@ class Prony(Linear, Relaxing):
 
 
 @dataclass(frozen=True, kw_only=True)
-class QuasiLinear(FungShape, Relaxing):
+class QuasiLinear(FungShape):
     """Fung's quasi-linear law with one term: elastic force A (exp(b x) - 1), relaxation 1 + r exp(-t/tau).
 
     Zheng and Mak (1999, J. Biomech. Eng. 121, 330) use one term for limbs; their alpha is r/(1 + r): 0.03 to 0.28.
