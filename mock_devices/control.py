@@ -4,7 +4,7 @@ A request is a verb and its argument, and is answered with a value, or with a se
 
     set       {"surface.position_mm": 22.0, "tissue.present": false}    {...as they are now}
     get       ["tip.force_N", "time_s"]                                 {"tip.force_N": 1.2, "time_s": 8.0}
-    dials     true                                                      {name: meaning}
+    quantities true                                                     {name: meaning}
     fault     {"device": "force", "kind": "drop", "value": 0.2}         {...}; value may be left out
     faults    true                                                      {device: {kind: meaning}}
     hide      {"friction.level_N": 0.2}                                 [names]; {} none, null defaults
@@ -25,7 +25,7 @@ from typing import Any, ClassVar, Self, TypeVar
 from pydantic import JsonValue
 from pydantic_core import to_jsonable_python
 
-from mock_devices import dials
+from mock_devices import quantities
 from mock_devices.bench import Bench
 from mock_devices.faults.wires import Fault, Value
 from mock_devices.physics.effects import parse_hidden
@@ -69,7 +69,7 @@ class RequestHandler:
         self._verbs: dict[str, Callable[[Any], Any]] = {
             "set": self._set,
             "get": self._get,
-            "dials": lambda _: {name: dial.meaning for name, dial in dials.DIALS.items()},
+            "quantities": lambda _: {name: one.meaning for name, one in quantities.QUANTITIES.items()},
             "fault": self._fault,
             "faults": lambda _: self._list_faults(),
             "hide": self._hide,
@@ -85,13 +85,13 @@ class RequestHandler:
     def _set(self, values: object) -> dict[str, Value]:
         wanted = _table(values, "set")
         for name, value in wanted.items():
-            dials.turn(self._bench, name, value)
+            quantities.write(self._bench, name, value)
         return self._get(list(wanted))
 
     def _get(self, names: object) -> dict[str, Value]:
         if not isinstance(names, list):
             raise UsageError('get takes a list of names, for example {"get": ["tip.force_N"]}')
-        return {str(name): dials.get(self._bench, str(name)) for name in names}
+        return {str(name): quantities.read(self._bench, str(name)) for name in names}
 
     def _hide(self, values: object) -> list[str]:
         wanted = _table(values, "hide").items()
@@ -191,15 +191,15 @@ class BenchControl:
         self._channel.close()
 
     def set(self, values: Mapping[str, Value]) -> dict[str, Value]:
-        """Turns dials; returns them as they are now."""
+        """Sets quantities; returns them as they are now."""
         return dict(self._ask("set", dict(values)))
 
     def get(self, *names: str) -> dict[str, Value]:
-        """Figures of the bench by name."""
+        """Quantities of the bench by name."""
         return dict(self._ask("get", list(names)))
 
     def number(self, name: str) -> float:
-        """One figure of the bench."""
+        """One quantity of the bench."""
         return float(self.get(name)[name])
 
     def fault(self, device: str, kind: str, value: Value | None = None) -> None:

@@ -25,7 +25,7 @@ class CauseRange:
 CAUSES = {
     "friction": CauseRange("level_N", "friction_N", 0.05, 0.15, {"slip_length_mm": (0.03, 0.1)}),
     "backlash": CauseRange("gap_mm", "backlash_mm", 0.06, 0.12, {}),
-    "relaxation": CauseRange("strength_1", "relaxation_ratio", 0.05, 0.1, {"time_constant_s": (0.2, 0.8)}),
+    "relaxation": CauseRange("ratio", "relaxation_ratio", 0.05, 0.1, {"time_constant_s": (0.2, 0.8)}),
     "frame_compliance": CauseRange("compliance_mm_N", "frame_compliance_mm_N", 0.02, 0.05, {}),
     "tracker_latency": CauseRange("delay_s", "tracker_latency_s", 0.015, 0.04, {}),
 }

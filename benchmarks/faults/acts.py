@@ -44,8 +44,8 @@ def several(*acts: Act) -> Act:
     return act
 
 
-def dials(**values: Value) -> Act:
-    """Turns figures of the bench; ``tissue__present`` stands for ``tissue.present``."""
+def set_quantities(**values: Value) -> Act:
+    """Sets quantities of the bench; ``tissue__present`` stands for ``tissue.present``."""
     wanted = {name.replace("__", "."): value for name, value in values.items()}
 
     def act(live: Live) -> None:

@@ -3,7 +3,7 @@
 import math
 
 from benchmarks.faults import acts
-from benchmarks.faults.acts import device, dials, several
+from benchmarks.faults.acts import device, set_quantities, several
 from benchmarks.faults.fault import DRIVE, NOBODY, PROTOCOL, QUALITY, REFUSED, Fault
 from benchmarks.faults.scenarios import REST_N, SEARCH_TO_MM, SURFACE_MM, Truth
 from controller.safety.table import TABLE, Check
@@ -12,7 +12,7 @@ from rig.config.wiring import Limits
 DEPTH_LIMIT_MM = 10.0
 WORKSPACE_MM = 28.5
 PATIENT_MM = 10.0
-PUSH = dials(surface__speed_mm_s=20.0, surface__position_mm=SURFACE_MM - 9.0)
+PUSH = set_quantities(surface__speed_mm_s=20.0, surface__position_mm=SURFACE_MM - 9.0)
 """The limb comes 9 mm towards the tip."""
 RUNNING = device("axis", "unguarded")
 """Without it the drive's own watches stop what the loop is to notice here."""
@@ -112,7 +112,7 @@ TRACKER = (
     Fault("tracker.delay", "press", ("tracker_lost",), device("tracker", "delay", 0.5)),
     Fault("tracker.unplugged", "press", ("tracker_lost",), device("tracker", "unplugged", 1)),
     Fault("tracker.error_reply", "press", ("tracker_lost",), device("tracker", "error_reply")),
-    Fault("tracker.arm_hidden", "press", ("tracker_lost",), dials(tracker__arm_in_view=False)),
+    Fault("tracker.arm_hidden", "press", ("tracker_lost",), set_quantities(tracker__arm_in_view=False)),
     Fault("tracker.jumps", "press", ("patient_moved",), device("tracker", "arm_slips", 15.0)),
 )
 
@@ -121,15 +121,16 @@ LIMB = (
         "limb.pushes", "hold", ("force_limit",), PUSH, _too_strong
     ),
     Fault(
-        "limb.inclusion", "loading", ("force_limit",), dials(tissue__inclusion_mm=4.0, tissue__inclusion_N_mm=20.0),
-        _too_strong, latest_s=0.0, why="20 N/mm from 4 mm on, met at 10 mm/s",
+        "limb.inclusion", "loading", ("force_limit",),
+        set_quantities(tissue__inclusion_mm=4.0, tissue__inclusion_N_mm=20.0), _too_strong,
+        latest_s=0.0, why="20 N/mm from 4 mm on, met at 10 mm/s",
     ),
-    Fault("limb.leaves", "press", ("depth_limit",), dials(tissue__present=False), _too_deep,
+    Fault("limb.leaves", "press", ("depth_limit",), set_quantities(tissue__present=False), _too_deep,
           settings=(f"limits.depth_mm={DEPTH_LIMIT_MM}",), why="the tip searches for it, down to the depth limit"),
-    Fault("limb.absent", "hold", (PROTOCOL,), dials(tissue__present=False), _searched, before=True),
+    Fault("limb.absent", "hold", (PROTOCOL,), set_quantities(tissue__present=False), _searched, before=True),
     Fault("limb.pushes_idle", "idle", ("pushed",), PUSH, _pushed),
     Fault("limb.pushes_safe", "safe", ("pushed",), PUSH, _pushed, why="after an emergency stop in contact"),
-    Fault("limb.moves", "press", ("patient_moved",), dials(surface__position_mm=35.0), _limb_moved),
+    Fault("limb.moves", "press", ("patient_moved",), set_quantities(surface__position_mm=35.0), _limb_moved),
 )  # fmt: skip
 
 OPERATOR = (

@@ -137,18 +137,18 @@ class Press(Table):
 
 
 class Knead(Table):
-    """Massage: presses that stay for the share ``dwell_1`` of each period, and as long below."""
+    """Massage: presses that stay for the share ``dwell`` of each period, and as long below."""
 
     kind: ClassVar[str] = "knead"
     amplitude_N: Positive
     base_N: Positive = 0.5
     frequency_Hz: Positive = 0.7
-    dwell_1: float = Field(default=0.3, gt=0, lt=0.5)
+    dwell: float = Field(default=0.3, gt=0, lt=0.5)
     duration_s: Positive = 10.0
 
     def reference(self) -> Reference:
         """One period of it and their number."""
-        shape = [_dwelling(i / POINTS_A_PERIOD, self.dwell_1) for i in range(POINTS_A_PERIOD + 1)]
+        shape = [_dwelling(i / POINTS_A_PERIOD, self.dwell) for i in range(POINTS_A_PERIOD + 1)]
         name = f"knead {self.base_N:g} to {self.base_N + self.amplitude_N:g} N at {self.frequency_Hz:g} Hz"
         return _periodic(name, self.base_N, self.amplitude_N, shape, self.frequency_Hz, self.duration_s)
 

@@ -123,7 +123,7 @@ def force_law(model: Model, wiring: Wiring, choice: Choice, adapt: bool) -> Trac
         ahead_mm_s=AHEAD_SHARE * speed_mm_s if ahead else 0.0,
         forgetting=FORGETTING if adapt else 0.0,
         drift_Hz=design.drift_Hz,
-        memory=tuple((term.ratio, term.tau_s) for term in model.law.terms[:2]),
+        relaxation=tuple((term.ratio, term.tau_s) for term in model.law.terms[:2]),
         friction_N=friction_N,
         friction_mm=friction_mm,
         speed_limit_mm_s=speed_mm_s,

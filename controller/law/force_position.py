@@ -70,10 +70,10 @@ class Settings(NamedTuple):
     forgetting: float
     drift_per_s: float
     drift_limit_mm_s: float
-    relaxing_1: float = 0.0
-    relaxing_s: float = 1.0
-    relaxing_too_1: float = 0.0
-    relaxing_too_s: float = 1.0
+    ratio1: float = 0.0
+    tau1_s: float = 1.0
+    ratio2: float = 0.0
+    tau2_s: float = 1.0
     friction_N: float = 0.0
     friction_mm: float = 1.0
 
@@ -82,8 +82,8 @@ class Foreseen(NamedTuple):
     """What the inverse model remembers: its place, what of the tissue's force will die out, the guide's bristles."""
 
     depth_mm: float
-    dying_N: float
-    dying_too_N: float
+    transient1_N: float
+    transient2_N: float
     bristle: float
 
 
@@ -160,9 +160,9 @@ def foresee(
     """
     resistance = settings.damping_N_s_mm / dt_s
     rest_N = scale * interpolate(table.depth_mm, table.force_N, ahead.depth_mm)
-    dying_N = math.exp(-dt_s / settings.relaxing_s) * ahead.dying_N
-    dying_too_N = math.exp(-dt_s / settings.relaxing_too_s) * ahead.dying_too_N
-    lacking_N = reference_N - rest_N - dying_N - dying_too_N - settings.friction_N * ahead.bristle
+    transient1_N = math.exp(-dt_s / settings.tau1_s) * ahead.transient1_N
+    transient2_N = math.exp(-dt_s / settings.tau2_s) * ahead.transient2_N
+    lacking_N = reference_N - rest_N - transient1_N - transient2_N - settings.friction_N * ahead.bristle
     side = 1.0 if lacking_N > 0 else -1.0
     friction = settings.friction_N * (1.0 - side * ahead.bristle) / settings.friction_mm
     tangent = scale * interpolate(table.depth_mm, table.tangent_N_mm, ahead.depth_mm)
@@ -170,11 +170,11 @@ def foresee(
     step_mm = min(max(lacking_N / (tangent + resistance + friction), -largest_mm), largest_mm)
     after_mm = ahead.depth_mm + step_mm
     after_N = scale * interpolate(table.depth_mm, table.force_N, after_mm)
-    dying_N += settings.relaxing_1 * (after_N - rest_N)
-    dying_too_N += settings.relaxing_too_1 * (after_N - rest_N)
+    transient1_N += settings.ratio1 * (after_N - rest_N)
+    transient2_N += settings.ratio2 * (after_N - rest_N)
     bristle = side - (side - ahead.bristle) * math.exp(-abs(step_mm) / settings.friction_mm)
-    foreseen_N = after_N + dying_N + dying_too_N + settings.friction_N * bristle + resistance * step_mm
-    return Foreseen(after_mm, dying_N, dying_too_N, bristle), foreseen_N
+    foreseen_N = after_N + transient1_N + transient2_N + settings.friction_N * bristle + resistance * step_mm
+    return Foreseen(after_mm, transient1_N, transient2_N, bristle), foreseen_N
 
 
 def adapt(

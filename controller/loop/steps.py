@@ -277,7 +277,7 @@ class TrackForce(Table):
     ahead_mm_s: float = Field(default=24.0, ge=0, description="speed of the inverse model; 0: it is not used")
     forgetting: float = Field(default=0.0, ge=0, lt=1, description="0: stiffness is not adapted")
     drift_Hz: float = Field(default=0.0, ge=0, description="corner of the second integral; 0: none")
-    memory: tuple[tuple[float, Positive], ...] = Field(
+    relaxation: tuple[tuple[float, Positive], ...] = Field(
         default=(), max_length=2, description="the tissue's: force that dies out over force at rest, and its time in s"
     )
     friction_N: Annotated[float, Field(ge=0)] = 0.0
@@ -295,7 +295,7 @@ class TrackForce(Table):
     def settings(self) -> Settings:
         """What of this step the law wants to know; the surface is believed to move no faster than the search."""
         drift_per_s = 2 * math.pi * self.drift_Hz
-        first, second = (*self.memory, (0.0, 1.0), (0.0, 1.0))[:2]
+        first, second = (*self.relaxation, (0.0, 1.0), (0.0, 1.0))[:2]
         return Settings(
             self.damping_N_s_mm, self.lag_s, self.ahead_mm_s, self.forgetting, drift_per_s, self.search_speed_mm_s,
             *first, *second, self.friction_N, self.friction_mm,

@@ -14,11 +14,11 @@ LEVER_LARGEST_MM = 1000.0
 
 
 def _polarity(plant: ForcePlant, value: Value) -> None:
-    plant.channels.gain_1 = -1.0 if as_switch(value) else 1.0
+    plant.channels.gain = -1.0 if as_switch(value) else 1.0
 
 
 def _gain(plant: ForcePlant, value: Value) -> None:
-    plant.channels.gain_1 = as_number(value, 0, GAIN_LARGEST)
+    plant.channels.gain = as_number(value, 0, GAIN_LARGEST)
 
 
 def _dead(plant: ForcePlant, value: Value) -> None:

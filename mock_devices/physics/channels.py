@@ -15,7 +15,7 @@ CHANNELS = 6
 class Channels:
     """The way from six loads to six converted values; the sensor's zero is added before the converter's end."""
 
-    gain_1: float = 1.0
+    gain: float = 1.0
     dead: int | None = None
     crossed: bool = False
     drift_N_s: float = 0.0
@@ -24,7 +24,7 @@ class Channels:
 
     def converted(self, loads: list[float]) -> list[float]:
         """Fx Fy Fz [N] and Mx My Mz [N m] behind gain, plug and amplifier."""
-        values = [self.gain_1 * load for load in loads]
+        values = [self.gain * load for load in loads]
         if self.crossed:
             values[:3] = [values[2], values[0], values[1]]
         if self.dead is not None:

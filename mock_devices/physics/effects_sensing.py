@@ -71,11 +71,11 @@ class TimeOffset(Sensing):
 class GainError(Conversion):
     """A wrong calibration: force x (1 + e)."""
 
-    gain_1: float = knob(0.05, -0.5, 0.5, "e")
+    gain: float = knob(0.05, -0.5, 0.5, "e")
 
     def __call__(self, force_N: float, _time_s: float, _temperature_C: float) -> float:
         """The force as converted."""
-        return force_N * (1 + self.gain_1)
+        return force_N * (1 + self.gain)
 
 
 @dataclass

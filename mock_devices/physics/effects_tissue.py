@@ -18,85 +18,85 @@ LETS_GO_LENGTHS = 3.0  # exp(-9) of the pull is left, a ten-thousandth
 class ElasticLaw(Elastic):
     """Another elastic law, as strong as the index law at one depth: a power law, Fung's exponential, or a mixture."""
 
-    weight_1: float = knob(1.0, 0, 1, "0: index law, 1: wholly the other law")
-    exponent_1: float = knob(2.0, 0.5, 5, "n of the power law x^n")
-    fung_share_1: float = knob(0.0, 0, 1, "0: power law, 1: Fung's exp(b x) - 1")
+    weight: float = knob(1.0, 0, 1, "0: index law, 1: wholly the other law")
+    exponent: float = knob(2.0, 0.5, 5, "n of the power law x^n")
+    fung_share: float = knob(0.0, 0, 1, "0: power law, 1: Fung's exp(b x) - 1")
     fung_per_mm: float = knob(0.3, 0.01, 2, "b of Fung's law")
     match_depth_mm: float = knob(8.0, 0.5, 20, "where both laws give the same force")
 
     def __call__(self, law: Callable[[float], float], depth_mm: float) -> float:
         """Newtons at ``depth_mm``."""
-        power = math.pow(depth_mm / self.match_depth_mm, self.exponent_1)
+        power = math.pow(depth_mm / self.match_depth_mm, self.exponent)
         fung = math.expm1(self.fung_per_mm * depth_mm) / math.expm1(self.fung_per_mm * self.match_depth_mm)
-        other = law(self.match_depth_mm) * ((1 - self.fung_share_1) * power + self.fung_share_1 * fung)
-        return (1 - self.weight_1) * law(depth_mm) + self.weight_1 * other
+        other = law(self.match_depth_mm) * ((1 - self.fung_share) * power + self.fung_share * fung)
+        return (1 - self.weight) * law(depth_mm) + self.weight * other
 
 
 @dataclass
 class Substrate(Factor):
     """Something stiff beneath: elastic force x (1 + s (depth / h)^3)."""
 
-    strength_1: float = knob(0.5, 0, 20, "s")
+    strength: float = knob(0.5, 0, 20, "s")
     thickness_mm: float = knob(10.0, 1, 60, "h")
 
     def __call__(self, depth_mm: float, _time_s: float) -> float:
         """The factor at this depth."""
-        return 1.0 + self.strength_1 * (depth_mm / self.thickness_mm) ** 3
+        return 1.0 + self.strength * (depth_mm / self.thickness_mm) ** 3
 
 
 @dataclass
 class Preconditioning(Factor):
-    """Softening by use: factor 1 + m (exp(-n / n0) - 1) after n strokes, which rest makes forgotten.
+    """Softening by use: factor 1 + m (exp(-n / n0) - 1) after n cycles, which rest makes forgotten.
 
-    A stroke counts once it went deeper than ``COUNTS_MM``.
+    A cycle counts once it went deeper than ``COUNTS_MM``.
     """
 
-    softening_1: float = knob(0.2, 0, 0.9, "m, the share of stiffness lost in the end")
-    strokes_1: float = knob(4.0, 0.3, 100, "n0, strokes after which 63 % of it is lost")
-    recovery_s: float = knob(600.0, 1, 1e6, "rest after which 37 % of the strokes still count")
-    _strokes: float = field(default=0.0, init=False)
+    softening: float = knob(0.2, 0, 0.9, "m, the share of stiffness lost in the end")
+    cycles: float = knob(4.0, 0.3, 100, "n0, cycles after which 63 % of it is lost")
+    recovery_s: float = knob(600.0, 1, 1e6, "rest after which 37 % of the cycles still count")
+    _cycles: float = field(default=0.0, init=False)
     _deepest_mm: float = field(default=0.0, init=False)
     _last_s: float = field(default=0.0, init=False)
 
     COUNTS_MM = 1.0
 
     def __call__(self, depth_mm: float, time_s: float) -> float:
-        """The factor in this stroke."""
+        """The factor in this cycle."""
         gap_s = time_s - self._last_s
         self._last_s = time_s
         if gap_s > 2 * STEP_S:
-            self._strokes += self._deepest_mm > self.COUNTS_MM
-            self._strokes *= math.exp(-gap_s / self.recovery_s)
+            self._cycles += self._deepest_mm > self.COUNTS_MM
+            self._cycles *= math.exp(-gap_s / self.recovery_s)
             self._deepest_mm = 0.0
         self._deepest_mm = max(self._deepest_mm, depth_mm)
-        return 1.0 + self.softening_1 * math.expm1(-self._strokes / self.strokes_1)
+        return 1.0 + self.softening * math.expm1(-self._cycles / self.cycles)
 
 
 @dataclass
 class RateLaw(Viscous):
     """Viscous force level (|v| / 10 mm/s)^n sign(v) instead of B v; straight below 0.5 mm/s."""
 
-    exponent_1: float = knob(0.4, 0.2, 1.5, "n")
+    exponent: float = knob(0.4, 0.2, 1.5, "n")
     level_N: float = knob(0.4, 0, 2, "force at 10 mm/s")
 
     def __call__(self, speed_mm_s: float) -> float:
         """Newtons at this speed."""
         speed = max(abs(speed_mm_s), LINEAR_BELOW_MM_S)
-        return self.level_N * math.pow(speed / REFERENCE_MM_S, self.exponent_1) * speed_mm_s / speed
+        return self.level_N * math.pow(speed / REFERENCE_MM_S, self.exponent) * speed_mm_s / speed
 
 
 @dataclass
 class Relaxation(Hereditary):
     """A Prony term: q' = -q / tau + g dF/dt of the elastic force; q is added to it."""
 
-    strength_1: float = knob(0.3, 0, 1.5, "g")
+    ratio: float = knob(0.3, 0, 1.5, "g")
     time_constant_s: float = knob(0.8, 0.02, 100, "tau")
     _q_N: float = field(default=0.0, init=False)
     _elastic_N: float = field(default=0.0, init=False)
 
     def __post_init__(self) -> None:
         self._keep = math.exp(-STEP_S / self.time_constant_s)
-        self._gain = self.strength_1 * math.exp(-STEP_S / 2 / self.time_constant_s)
+        self._gain = self.ratio * math.exp(-STEP_S / 2 / self.time_constant_s)
 
     def __call__(self, elastic_N: float) -> float:
         """Newtons that relax."""

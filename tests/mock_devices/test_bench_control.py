@@ -80,7 +80,7 @@ def test_the_limb_is_moved_stiffened_and_removed_while_running() -> None:
 
 
 def test_every_dial_can_be_read_and_says_what_it_is(handler: RequestHandler) -> None:
-    meanings = ask(handler, {"dials": True})["dials"]
+    meanings = ask(handler, {"quantities": True})["quantities"]
     assert set(ask(handler, {"get": list(meanings)})["get"]) == set(meanings)
     assert all(meanings.values())
 
@@ -107,9 +107,9 @@ def test_a_fault_takes_its_default_or_a_value(handler: RequestHandler, wire: Fau
 @pytest.mark.parametrize(
     ("request_", "sentence"),
     [
-        ({"get": ["tip.force"]}, "unknown figure 'tip.force'; nearest valid figure: tip.force_N"),
+        ({"get": ["tip.force"]}, "unknown quantity 'tip.force'; nearest valid quantity: tip.force_N"),
         ({"get": "time_s"}, "get takes a list of names"),
-        ({"set": {"tip.force_N": 1}}, "unknown settable figure 'tip.force_N'"),
+        ({"set": {"tip.force_N": 1}}, "unknown settable quantity 'tip.force_N'"),
         ({"set": {"surface.position_mm": 900}}, "surface.position_mm = 900 is outside -50 to 150"),
         ({"set": {"surface.position_mm": "up"}}, "takes a number, not 'up'"),
         ({"set": {"surface.position_mm": float("nan")}}, "takes a number, not nan"),
@@ -158,7 +158,7 @@ def test_the_client_sets_gets_and_raises_what_the_bench_says(handler: RequestHan
         assert wire.drop_share == 0.5
         assert "cut" in control.faults()["force"]
         assert control.synced_ns() == []
-        with pytest.raises(UsageError, match="nearest valid figure: time_s"):
+        with pytest.raises(UsageError, match="nearest valid quantity: time_s"):
             control.get("time")
 
 

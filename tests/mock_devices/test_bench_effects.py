@@ -14,6 +14,7 @@ NAMES = [
     *("zero_drift", "gain_error", "time_offset", "tracker_latency", "filter_lag", "surface_motion", "preconditioning"),
     *("adhesion", "tip_inertia", "position_ripple", "temperature", "elastic_law"),
 ]
+DIMENSIONLESS = {"ratio", "exponent", "strength", "gain", "softening", "cycles", "weight", "fung_share"}
 
 
 def test_the_library_has_exactly_the_agreed_names() -> None:
@@ -22,10 +23,10 @@ def test_the_library_has_exactly_the_agreed_names() -> None:
 
 @pytest.mark.parametrize("effect", NAMES)
 def test_every_parameter_carries_its_unit_and_its_default_lies_within_its_bounds(effect: str) -> None:
-    units = ("_N", "_mm", "_s", "_Hz", "_rad", "_kg", "_C", "_1", "_mm_N", "_N_h", "_per_K", "_per_mm")
+    units = ("_N", "_mm", "_s", "_Hz", "_rad", "_kg", "_C", "_mm_N", "_N_h", "_per_K", "_per_mm")
     assert statement(effect)
     for name, knob in knobs(effect).items():
-        assert name.endswith(units)
+        assert name.endswith(units) or name in DIMENSIONLESS
         assert knob.low <= knob.default <= knob.high
         assert knob.meaning
 
@@ -45,7 +46,7 @@ def test_an_effect_at_its_defaults_changes_what_is_seen_and_switched_off_it_leav
 
 
 def test_relaxation_lets_the_force_decay_in_a_hold_with_its_time_constant() -> None:
-    bench = quiet_bench({"relaxation": {"strength_1": 0.3, "time_constant_s": 0.4}})
+    bench = quiet_bench({"relaxation": {"ratio": 0.3, "time_constant_s": 0.4}})
     trace = play(bench, stroke(30.0, 8.0, hold_s=5.0), 3.5)
     extra_N = trace.force_N - trace.force_N[-1]
     assert extra_N[trace.at(0.9)] > 0.4
@@ -54,7 +55,7 @@ def test_relaxation_lets_the_force_decay_in_a_hold_with_its_time_constant() -> N
 
 def test_rate_law_makes_the_force_grow_with_a_power_of_the_speed() -> None:
     def viscous_N(speed_mm_s: float) -> float:
-        bench = quiet_bench({"rate_law": {"exponent_1": 0.5, "level_N": 0.4}})
+        bench = quiet_bench({"rate_law": {"exponent": 0.5, "level_N": 0.4}})
         trace = play(bench, stroke(speed_mm_s, 8.0), 9.0 / speed_mm_s)
         return float(trace.force_N[-1]) - bench.tissue.elastic_N(float(trace.tip_mm[-1]) - SURFACE_MM)
 
@@ -118,7 +119,7 @@ def test_contact_offset_can_scatter_from_contact_to_contact() -> None:
 
 
 def test_substrate_stiffens_with_the_cube_of_the_depth() -> None:
-    bench = quiet_bench({"substrate": {"strength_1": 1.0, "thickness_mm": 16.0}})
+    bench = quiet_bench({"substrate": {"strength": 1.0, "thickness_mm": 16.0}})
     settle(bench, SURFACE_MM + 8, 3.0)
     assert bench.contact_N == pytest.approx(bench.tissue.elastic_N(8.0) * 1.125, abs=2e-3)
 
@@ -130,7 +131,7 @@ def test_zero_drift_shows_in_the_air_with_the_time_of_the_session() -> None:
 
 
 def test_gain_error_scales_the_force_read_and_not_the_force_there_is() -> None:
-    bench = quiet_bench({"gain_error": {"gain_1": 0.1}})
+    bench = quiet_bench({"gain_error": {"gain": 0.1}})
     trace = settle(bench, SURFACE_MM + 8, 3.0)
     assert trace.force_N[-1] == pytest.approx(1.1 * bench.tissue.elastic_N(8.0), abs=2e-3)
     assert trace.contact_N[-1] == pytest.approx(bench.tissue.elastic_N(8.0), abs=2e-3)
@@ -175,7 +176,7 @@ def test_surface_motion_breathes_under_a_tip_at_rest() -> None:
 
 
 def test_preconditioning_softens_from_stroke_to_stroke_and_rest_brings_stiffness_back() -> None:
-    bench = quiet_bench({"preconditioning": {"softening_1": 0.3, "strokes_1": 1.0, "recovery_s": 20.0}})
+    bench = quiet_bench({"preconditioning": {"softening": 0.3, "cycles": 1.0, "recovery_s": 20.0}})
 
     def peak_N() -> float:
         return float(play(bench, stroke(30.0, 8.0), 1.5).force_N.max())
@@ -224,9 +225,9 @@ def test_temperature_changes_the_gain_as_the_sensor_warms_up() -> None:
 @pytest.mark.parametrize(
     ("parameters", "half_over_full"),
     [
-        ({"exponent_1": 2.0}, 0.25),
-        ({"exponent_1": 1.0}, 0.5),
-        ({"fung_share_1": 1.0, "fung_per_mm": 0.3}, math.expm1(1.2) / math.expm1(2.4)),
+        ({"exponent": 2.0}, 0.25),
+        ({"exponent": 1.0}, 0.5),
+        ({"fung_share": 1.0, "fung_per_mm": 0.3}, math.expm1(1.2) / math.expm1(2.4)),
     ],
 )
 def test_elastic_law_has_another_shape_but_the_same_force_where_it_is_matched(
@@ -241,7 +242,7 @@ def test_elastic_law_has_another_shape_but_the_same_force_where_it_is_matched(
 
 
 def test_several_effects_act_together() -> None:
-    bench = quiet_bench({"gain_error": {"gain_1": 0.1}, "zero_drift": {"rate_N_h": 36.0}})
+    bench = quiet_bench({"gain_error": {"gain": 0.1}, "zero_drift": {"rate_N_h": 36.0}})
     trace = play(bench, lambda _: 5.0, 1.0)
     assert trace.force_N[-1] == pytest.approx(0.01, abs=1e-6)
     assert list(bench.hidden) == ["gain_error", "zero_drift"]
@@ -250,7 +251,7 @@ def test_several_effects_act_together() -> None:
 def test_an_effect_that_stays_on_keeps_its_state_when_another_is_switched() -> None:
     bench = quiet_bench({"friction": {"level_N": 0.2}})
     play(bench, lambda t: 5 + 10 * t, 0.5)
-    bench.hide({"friction": {"level_N": 0.2}, "gain_error": {"gain_1": 0.5}})
+    bench.hide({"friction": {"level_N": 0.2}, "gain_error": {"gain": 0.5}})
     bench.advance(bench.now_ns + MS_NS)
     assert bench.force.zero[2] - bench.force.wrench()[2] == pytest.approx(0.3, abs=1e-3)
 

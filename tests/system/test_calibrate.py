@@ -76,13 +76,13 @@ def test_a_mock_bench_is_calibrated_once_without_what_is_hidden_in_it(
     bench: ServedBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    bench.control.hide({"gain_error.gain_1": 0.2})
+    bench.control.hide({"gain_error.gain": 0.2})
     found = plugged(built_in(), bench.endpoints).calibration
     assert found.of_force is not None
     assert found.of_axis is not None
     assert found.of_force.matrix[2][2] == pytest.approx(1.0, abs=0.002)
     assert found.of_axis.scale == pytest.approx(1.0, abs=0.005)
-    assert bench.control.truth() == {"gain_error": {"gain_1": 0.2}}
+    assert bench.control.truth() == {"gain_error": {"gain": 0.2}}
     assert bench.control.get("load.axial_N", "tissue.present") == {"load.axial_N": 0.0, "tissue.present": True}
     assert plugged(built_in(), bench.endpoints).calibration == found
     said = capsys.readouterr().err

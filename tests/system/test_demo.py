@@ -59,7 +59,7 @@ def test_what_was_hidden_is_named_with_its_size_and_a_gain(made: Path) -> None:
     assert said["truth"]["effect"] == "relaxation"
     assert said["named"], said["statement"]
     finding = next(found for found in said["findings"] if "relaxation" in found["effects"])
-    for truth, name in (("strength_1", "relaxation_ratio"), ("time_constant_s", "tau_s")):
+    for truth, name in (("ratio", "relaxation_ratio"), ("time_constant_s", "tau_s")):
         interval = finding["parameters"][name]
         # Time stamps that jitter on a busy computer are no part of the interval.
         slack = 0.05 * said["truth"]["parameters"][truth]

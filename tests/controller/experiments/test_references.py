@@ -36,7 +36,7 @@ def test_a_ramp_has_the_rate_asked_for() -> None:
         ("sine:0.5,mean_N=2,frequency_Hz=5,duration_s=3", 1.5, 2.5, 3.0),
         ("vibrate:0.4,mean_N=3,frequency_Hz=8,duration_s=2", 2.6, 3.4, 2.0),
         ("press:3,base_N=0.5,frequency_Hz=0.5,duration_s=4", 0.5, 3.5, 4.0),
-        ("knead:2,base_N=1,frequency_Hz=0.5,dwell_1=0.3,duration_s=4", 1.0, 3.0, 4.0),
+        ("knead:2,base_N=1,frequency_Hz=0.5,dwell=0.3,duration_s=4", 1.0, 3.0, 4.0),
     ],
 )
 def test_a_periodic_reference_has_amplitude_frequency_and_duration(
@@ -49,7 +49,7 @@ def test_a_periodic_reference_has_amplitude_frequency_and_duration(
 
 
 def test_kneading_dwells_above_for_its_share_of_the_period() -> None:
-    knead = named("knead:2,base_N=1,frequency_Hz=1,dwell_1=0.3")
+    knead = named("knead:2,base_N=1,frequency_Hz=1,dwell=0.3")
     held = [t for t, force in zip(knead.times_s, knead.forces_N, strict=True) if force == 3.0]
     assert max(held) - min(held) == pytest.approx(0.3, abs=0.02)
 
@@ -90,7 +90,7 @@ def test_a_csv_file_that_cannot_be_followed_is_refused_with_its_line(tmp_path: P
         ("step:5,forse_N=2", "unknown key forse_N; nearest valid key: force_N"),
         ("step:-1", "force_N: Input should be greater than 0"),
         ("sine:2,mean_N=1", "amplitude_N 2 must stay below mean_N 1"),
-        ("knead:2,dwell_1=0.6", "dwell_1: Input should be less than 0.5"),
+        ("knead:2,dwell=0.6", "dwell: Input should be less than 0.5"),
         ("step:nan", "force_N: Input should be a finite number"),
     ],
 )

@@ -172,14 +172,14 @@ def test_a_margin_that_the_delay_forbids_is_refused() -> None:
 
 def test_the_inverse_of_a_model_with_memory_asks_for_the_force_that_the_tissue_with_memory_gives() -> None:
     """The tissue is stepped by its own exact recursion; only the discretisation of one cycle is left."""
-    settings = AHEAD._replace(ahead_mm_s=1e3, relaxing_1=0.5, relaxing_s=0.2)
-    ahead, rest_N, dying_N = begin(linear(), 1.0, 1.0).ahead, 1.0, 0.0
+    settings = AHEAD._replace(ahead_mm_s=1e3, ratio1=0.5, tau1_s=0.2)
+    ahead, rest_N, transient_N = begin(linear(), 1.0, 1.0).ahead, 1.0, 0.0
     for _ in range(400):
         before_mm = ahead.depth_mm
         ahead, _ = foresee(linear(), settings, ahead, 1.0, 3.0, 0.001)
-        dying_N = dying_N * math.exp(-0.001 / 0.2) + 0.5 * (ahead.depth_mm - before_mm)
+        transient_N = transient_N * math.exp(-0.001 / 0.2) + 0.5 * (ahead.depth_mm - before_mm)
         rest_N += ahead.depth_mm - before_mm
-    assert rest_N + dying_N == pytest.approx(3.0, abs=0.01)
+    assert rest_N + transient_N == pytest.approx(3.0, abs=0.01)
     assert rest_N == pytest.approx(3.0, abs=0.3), "it creeps on to where the lasting force is the reference"
 
 

@@ -84,7 +84,7 @@ def test_what_a_step_does_not_say_is_this() -> None:
     track = TrackForce(times_s=(0.0, 1.0), forces_N=(0.0, 0.0), gains=ROWS)
     assert track.model_dump(exclude={"times_s", "forces_N", "gains", "step"}) == {
         "repeats": 1, "damping_N_s_mm": 0.0, "lag_s": 0.0, "preview_s": 0.0, "ahead_mm_s": 24.0, "forgetting": 0.0,
-        "drift_Hz": 0.0, "memory": (), "friction_N": 0.0, "friction_mm": 1.0, "speed_limit_mm_s": 30.0,
+        "drift_Hz": 0.0, "relaxation": (), "friction_N": 0.0, "friction_mm": 1.0, "speed_limit_mm_s": 30.0,
         "search_speed_mm_s": 5.0, "contact_force_N": 0.1,
     }  # fmt: skip
 
@@ -107,7 +107,7 @@ GOOD_TRACK: dict[str, Any] = {"times_s": (0.0, 1.0), "forces_N": (0.0, 0.0), "ga
             ("damping_N_s_mm", 0.0, -0.1), ("damping_N_s_mm", 0.5, -0.1), ("lag_s", 0.0, -0.1),
             ("preview_s", 0.0, -0.1), ("ahead_mm_s", 0.0, -0.1), ("forgetting", 0.0, -0.1), ("forgetting", 0.999, 1.0),
             ("drift_Hz", 0.0, -0.1),
-            ("memory", ((0.5, 0.5), (0.5, 0.5)), ((0.5, 0.5),) * 3), ("memory", ((0.5, 0.1),), ((0.5, 0.0),)),
+            ("relaxation", ((0.5, 0.5), (0.5, 0.5)), ((0.5, 0.5),) * 3), ("relaxation", ((0.5, 0.1),), ((0.5, 0.0),)),
             ("friction_N", 0.0, -0.1), ("friction_mm", 0.5, 0.0),
         ]],
     ],
@@ -418,13 +418,13 @@ def test_a_search_has_its_own_speed() -> None:
 def test_the_law_is_told_what_the_step_says_of_tissue_and_axis() -> None:
     step = tracking(
         damping_N_s_mm=0.1, lag_s=0.2, ahead_mm_s=3.0, forgetting=0.4, drift_Hz=5.0, search_speed_mm_s=6.0,
-        memory=((0.7, 0.8), (0.9, 1.0)), friction_N=1.1, friction_mm=1.2,
+        relaxation=((0.7, 0.8), (0.9, 1.0)), friction_N=1.1, friction_mm=1.2,
     )  # fmt: skip
     assert tuple(step.settings) == pytest.approx(
         (0.1, 0.2, 3.0, 0.4, 2 * math.pi * 5.0, 6.0, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)
     )
     assert tuple(tracking().settings)[6:10] == (0.0, 1.0, 0.0, 1.0)
-    assert tuple(tracking(memory=((0.7, 0.8),)).settings)[6:10] == (0.7, 0.8, 0.0, 1.0)
+    assert tuple(tracking(relaxation=((0.7, 0.8),)).settings)[6:10] == (0.7, 0.8, 0.0, 1.0)
     assert tuple(step.given) == ((0.0, 2.0), (1.0, 3.0), 1)
 
 

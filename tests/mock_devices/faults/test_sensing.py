@@ -47,11 +47,11 @@ def test_a_turned_polarity_turns_every_channel_but_not_the_zero(pressed: Bench) 
     assert loads(pressed) == pytest.approx(before)
 
 
-@pytest.mark.parametrize("gain_1", [0.5, 2.0])
-def test_a_wrong_gain_scales_every_channel(pressed: Bench, gain_1: float) -> None:
+@pytest.mark.parametrize("gain", [0.5, 2.0])
+def test_a_wrong_gain_scales_every_channel(pressed: Bench, gain: float) -> None:
     before = loads(pressed)
-    inject(pressed, "gain", gain_1)
-    assert loads(pressed) == pytest.approx(gain_1 * before)
+    inject(pressed, "gain", gain)
+    assert loads(pressed) == pytest.approx(gain * before)
 
 
 def test_a_dead_channel_answers_no_load_and_keeps_its_zero_and_noise() -> None:
