@@ -173,12 +173,12 @@ class StopServer:
         if found is None:
             return
         connection.since = self._now()
-        connection.asked = found if isinstance(found, http.HttpRequest) else None
-        refusal = http.foreign(found) if isinstance(found, http.HttpRequest) else found
-        if refusal:
-            connection.asked = None
-            self._reply(connection, refusal.status, {"error": refusal.text})
-        elif isinstance(found, http.HttpRequest):
+        if isinstance(found, http.HttpRequest):
+            found = http.foreign(found) or found
+        if isinstance(found, http.Refusal):
+            self._reply(connection, found.status, {"error": found.text})
+        else:
+            connection.asked = found
             self._do(connection, found)
 
     def _do(self, connection: Connection, request: http.HttpRequest) -> None:
