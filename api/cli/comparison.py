@@ -1,13 +1,12 @@
 """`rig track --table`: every choice of gains on the simulated subjects."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import mock_devices
 from api.cli import live
 from api.cli.output import show
-from api.cli.stage import bench_for
 from api.operations.compare import Comparison, of_comparison
 from api.operations.compare import compare as work
 from controller.experiments import comparison, tracked
@@ -52,13 +51,11 @@ def _who(subject: str) -> str:
     return "average" if subject == BREATHING else subject
 
 
-@contextmanager
-def _bench(wiring: Wiring, subject: str) -> Iterator[Supervisor]:
+def _bench(wiring: Wiring, subject: str) -> AbstractContextManager[Supervisor]:
     """The mock bench with this subject on it; the breathing one is the average subject, whose surface moves."""
     hidden = BREATHES if subject == BREATHING else ()
     mock = wiring.mock.model_copy(update={"parameters": SUBJECTS / f"{_who(subject)}.toml", "hide": hidden})
-    with bench_for(wiring.model_copy(update={"mock": mock})) as (plugged, _), live.connected(plugged) as bench:
-        yield bench
+    return live.running(wiring.model_copy(update={"mock": mock}))
 
 
 def stairs(forces: str, each_s: float) -> Reference:

@@ -14,27 +14,26 @@ import typer
 from api.cli import live
 from api.cli.diagnose import diagnosed
 from api.cli.fitting import fitted as fit_session
-from api.cli.hidden_effect import HiddenCause, draw
+from api.cli.hidden_effect import draw
 from api.cli.motion import captured, followed
 from api.cli.options import built_in
 from api.cli.output import console, show
-from api.cli.stage import bench_for
 from api.operations.motion import TrackPlan
+from api.operations.records import refuse_incomplete, verify
+from api.operations.report import report
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
+from controller.operation import Operation
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
-from rig.errors import CheckFailed, UsageError
+from rig.errors import UsageError
 from rig.recording.files import write_text
-from rig.recording.sessions import derive, open_session
-from rig.recording.verify import verify
-from rig.report.page import write_report
-from rig.results.demo import DemoDiagnosis, DemoSummary, DemoTracking, HiddenTruth, RecordingCounts
-from rig.results.diagnosis import FOLDER, TRUTH, DiagnosisResult
-from rig.results.fit import FitResult
+from rig.recording.sessions import derive
+from rig.results.demo import DemoSummary, HiddenTruth
+from rig.results.diagnosis import FOLDER, TRUTH
 from rig.results.tables import track_parts
-from rig.results.tracking import LoopCount, TrackResult
+from rig.results.tracking import TrackResult
 from rig.tissue.model import load_model
 
 PLAN = Indentation(
@@ -81,7 +80,7 @@ def demo(
     seed = secrets.randbelow(LARGEST_SEED) if seed is None else seed
     secret = draw(np.random.default_rng(seed), plan)
     show(f"a cause is hidden in the bench; --seed {seed} hides the same again")
-    with bench_for(wiring, secret.hide) as (live_wiring, _), live.connected(live_wiring) as bench:
+    with live.running(wiring, secret.hide) as bench:
         console.rule(f"capture: {len(plan.speeds_mm_s)} speeds, {plan.trials} trials each")
         captured(bench, plan, session)
         console.rule("fit: constant stiffness against the index law")
@@ -92,13 +91,15 @@ def demo(
     console.rule("diagnose: what the simulation gets wrong")
     diagnosis = diagnosed(session, out=session / FOLDER)
     console.rule("verify and report")
-    counts = _verified(session)
+    refuse_incomplete(verify(Operation("verify"), session), session)
     derive(session)
     write_text(session / FOLDER / TRUTH, secret.sentence(diagnosis) + "\n")
-    write_report(session, out / REPORT)
-    _summary(counts, fitted, result, _diagnosis(diagnosis, secret, seed)).write(out / SUMMARY)
-    show(f"{counts.recordings} recordings, {counts.samples} samples, {counts.dropped} dropped")
-    show(f"{out / REPORT} shows it; {out / SUMMARY} has the figures")
+    page = report(Operation("report"), session, out / REPORT)
+    hidden = HiddenTruth(effect=secret.effect, parameters=secret.knobs, seed=seed, named=secret.is_in(diagnosis))
+    found = DemoSummary(**dict(page), fit=fitted, tracking=result, diagnosis=diagnosis, hidden=hidden)
+    found.write(out / SUMMARY)
+    show(f"{page.recordings} recordings, {page.samples} samples, {page.dropped} dropped")
+    show(f"{page.file} shows it; {out / SUMMARY} has the figures")
     console.rule("the truth")
     show(secret.sentence(diagnosis))
 
@@ -127,40 +128,3 @@ def forces_within(largest_N: float) -> tuple[float, ...]:
     if largest_N >= FORCES_N[-1]:
         return FORCES_N
     return tuple(round(force_N / FORCES_N[-1] * 0.85 * largest_N, 2) for force_N in FORCES_N)
-
-
-def _diagnosis(result: DiagnosisResult, secret: HiddenCause, seed: int) -> DemoDiagnosis:
-    """What was said, and last what is true."""
-    return DemoDiagnosis(
-        verdict=result.verdict,
-        statement=result.statement,
-        findings=result.findings,
-        named=any(secret.effect in finding.effects for finding in result.findings),
-        seed=seed,
-        truth=HiddenTruth(effect=secret.effect, parameters=secret.knobs),
-    )
-
-
-def _verified(session: Path) -> RecordingCounts:
-    """Raises CheckFailed where a recording is not complete."""
-    opened = open_session(session)
-    verdicts = [verify(opened.path(trial.name)) for trial in opened.trials]
-    bad = [verdict.sentence for verdict in verdicts if not verdict.ok]
-    if bad:
-        raise CheckFailed("; ".join(bad))
-    loops = [opened.recording(trial.name).tables["loop"] for trial in opened.trials]
-    return RecordingCounts(
-        recordings=len(verdicts),
-        samples=sum(stream.samples for verdict in verdicts for stream in verdict.streams.values()),
-        dropped=sum(stream.dropped for verdict in verdicts for stream in verdict.streams.values()),
-        loop=LoopCount(
-            ticks=sum(len(rows) for rows in loops),
-            missed=sum(int(rows["missed"][-1] - rows["missed"][0]) for rows in loops),
-        ),
-    )
-
-
-def _summary(
-    counts: RecordingCounts, fitted: FitResult, tracking: TrackResult, diagnosis: DemoDiagnosis
-) -> DemoSummary:
-    return DemoSummary(**dict(counts), fit=fitted, tracking=DemoTracking.model_validate(tracking), diagnosis=diagnosis)

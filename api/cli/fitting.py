@@ -18,12 +18,9 @@ from rig.tissue.laws import Law
 from rig.tissue.model import load_model
 from rig.tissue.registry import COMPARED, LAWS, check_known, law_named
 
-FOLDER_HELP = "Session folder, as `rig capture` or `rig import` makes it."
-SessionsArgument = Annotated[list[Path], typer.Argument(help=f"{FOLDER_HELP} Several: subjects compared.")]
-
 
 def fit(
-    session: SessionsArgument,
+    session: Annotated[list[Path], typer.Argument(help="Session folder. Several: subjects compared.")],
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the results; else SESSION/fit.")] = None,
     laws: Annotated[
         str, typer.Option("--laws", help="Further laws to compare, with commas; `all` for every one there is.")

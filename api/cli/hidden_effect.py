@@ -51,6 +51,10 @@ class HiddenCause:
         """The amplitude."""
         return next(iter(self.knobs.values()))
 
+    def is_in(self, result: DiagnosisResult) -> bool:
+        """Whether the diagnosis named it, or has it among the alternatives."""
+        return any(self.effect in finding.effects for finding in result.findings)
+
     def sentence(self, result: DiagnosisResult) -> str:
         """The truth, and how the diagnosis did."""
         hidden = f"Hidden was {self.effect} ({', '.join(f'{k} = {v:.4g}' for k, v in self.knobs.items())})"

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from api.cli.keys import stop_keys
 from api.cli.output import show
+from api.cli.stage import bench_for
 from controller.operation import Operation
 from controller.operation import Progress as Snapshot
 from controller.stop.word import NOT_CONFIRMED, StopReason
@@ -43,6 +44,13 @@ def connected(wiring: Wiring) -> Iterator[Supervisor]:
             yield bench
         finally:
             bench.close()
+
+
+@contextlib.contextmanager
+def running(wiring: Wiring, hide: tuple[str, ...] = ()) -> Iterator[Supervisor]:
+    """The same, on the mock bench where ports say `mock`, with ``hide`` hidden in it."""
+    with bench_for(wiring, hide) as (live_wiring, _), connected(live_wiring) as bench:
+        yield bench
 
 
 def _press(bench: Supervisor, kind: StopReason) -> None:

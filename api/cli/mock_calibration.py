@@ -9,6 +9,7 @@ import contextlib
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TypeVar
 
 import typer
 
@@ -19,7 +20,7 @@ from controller.commissioning.axis_moves import Pace, RestingAxis, travelled
 from controller.commissioning.weights import Weights
 from controller.devices.drivers import start_devices
 from mock_devices.control import BenchControl
-from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
+from rig.config.calibration import AxisCalibration, ForceCalibration
 from rig.config.calibration_files import read_axis, read_force, text_of
 from rig.config.endpoints import Endpoints
 from rig.config.products.roles import Product
@@ -34,6 +35,7 @@ BY_ITSELF = ReadingTime(settle_s=0.05, read_s=0.12)
 # The simulated camera is 15 ms late; 18 frames at each place know the slope to 0.2 %.
 PACE = Pace(speed_mm_s=20.0, settle_s=0.15, read_s=0.3)
 AXIS_STEPS_MM = (2.0, 14.0, 2.0)
+Made = TypeVar("Made", ForceCalibration, AxisCalibration)
 
 
 def force_file(wiring: Wiring, endpoints: Endpoints) -> Path:
@@ -52,11 +54,9 @@ def mock_force_calibration(wiring: Wiring, endpoints: Endpoints) -> ForceCalibra
     file = force_file(wiring, endpoints)
     with contextlib.suppress(UsageError):
         known = read_force(file)
-        if _fit(Calibration(of_force=known), wiring):
+        if not wiring.calibration.alone(known).unfit(datetime.now(UTC)):
             return known
-    made = _measured_force(wiring, endpoints)
-    _say(f"the mock force sensor {made.product} {made.serial} was calibrated by itself{_kept(made, file)}")
-    return made
+    return _kept("the mock force sensor", _measured_force(wiring, endpoints), file)
 
 
 def mock_axis_calibration(wiring: Wiring, endpoints: Endpoints) -> AxisCalibration | None:
@@ -68,21 +68,14 @@ def mock_axis_calibration(wiring: Wiring, endpoints: Endpoints) -> AxisCalibrati
     file = _file(wiring.axis, endpoints)
     with contextlib.suppress(UsageError):
         known = read_axis(file)
-        if _fit(Calibration(of_axis=known), wiring):
+        if not wiring.calibration.alone(known).unfit(datetime.now(UTC)):
             return known
     try:
         made = _measured_axis(wiring, endpoints)
     except DeviceError as error:
         _say(f"the mock axis was not calibrated, next time again: {error}")
         return None
-    if made:
-        _say(f"the mock axis {made.product} {made.serial} was calibrated by itself{_kept(made, file)}")
-    return made
-
-
-def _fit(known: Calibration, wiring: Wiring) -> bool:
-    stated = wiring.calibration.model_copy(update={"of_force": known.of_force, "of_axis": known.of_axis})
-    return not stated.unfit(datetime.now(UTC))
+    return made and _kept("the mock axis", made, file)
 
 
 def mock_weights(wiring: Wiring, hung: bool = False) -> Weights:
@@ -165,11 +158,13 @@ def _say(sentence: str) -> None:
     typer.echo(sentence, err=True)
 
 
-def _kept(made: ForceCalibration | AxisCalibration, file: Path) -> str:
-    """Where it is kept; a folder that cannot be written costs a calibration each time, and is said."""
+def _kept(whose: str, made: Made, file: Path) -> Made:
+    """``made``, said and kept in ``file``; a folder that cannot be written costs a calibration each time."""
     try:
         make_folder(file.parent)
         write_text(file, text_of(made))
+        where = f"; kept in {file}"
     except RigError as error:
-        return f", and again next time: {error}"
-    return f"; kept in {file}"
+        where = f", and again next time: {error}"
+    _say(f"{whose} {made.product} {made.serial} was calibrated by itself{where}")
+    return made

@@ -7,9 +7,8 @@ from typing import Annotated, NamedTuple
 import typer
 
 from api.cli import live
-from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
+from api.cli.options import ConfigOption, GainsOption, JsonOption, SetOption, wiring_from
 from api.cli.output import show, write_json
-from api.cli.stage import bench_for
 from api.operations import motion
 from api.operations.motion import Captured, TrackPlan
 from controller.experiments import capture as experiment
@@ -28,12 +27,10 @@ from rig.results.tables import track_parts
 from rig.results.tracking import CompareResult, TrackResult
 from rig.tissue.model import load_model
 
-Out = Annotated[Path, typer.Option("--out", help="New folder for the session.")]
-
 
 def capture(
     protocol: Annotated[Path, typer.Argument(help="Protocol file, for example examples/indentation.toml.")],
-    out: Out,
+    out: Annotated[Path, typer.Option("--out", help="New folder for the session.")],
     config: ConfigOption = None,
     overrides: SetOption = None,
     json_file: JsonOption = None,
@@ -49,7 +46,7 @@ def capture(
     plan = load(Indentation, protocol)
     experiment.check(plan, wiring)
     experiment.refuse_used(out)
-    with bench_for(wiring) as (live_wiring, _), live.connected(live_wiring) as bench:
+    with live.running(wiring) as bench:
         found = captured(bench, plan, out)
     write_json(json_file, found)
     refuse_bad(found.info)
@@ -71,9 +68,7 @@ def track(
         str, typer.Option("--reference", help="Instead of --force: step:5, sine:0.5,mean_N=2, press:3, csv:FILE, ...")
     ] = "",
     seconds: Annotated[float | None, typer.Option("--seconds", help="Time on each force; else 10.")] = None,
-    gains: Annotated[
-        str, typer.Option("--gains", help="tangent, secant, constant or admittance; else loop.gains.")
-    ] = "",
+    gains: GainsOption = "",
     compare: Annotated[
         bool, typer.Option("--table", help="All gains on simulated subjects, 1 to 10 N; needs no model.")
     ] = False,
@@ -107,7 +102,7 @@ def _tracked(wiring: Wiring, folder: Path, asked: "TrackOptions", against: Path 
     wanted = TrackPlan(_planned(wiring, asked), str(asked.model))
     other = TrackPlan(_planned(wiring, asked._replace(model=against)), str(against)) if against else None
     tracked.refuse_foreign(folder)
-    with bench_for(wiring) as (live_wiring, _), live.connected(live_wiring) as bench:
+    with live.running(wiring) as bench:
         found = followed(bench, wanted, folder, other)
     quality = "quality: " + "; ".join([found.quality, *found.reasons])
     show(*track_parts(found), quality, f"recorded in {folder}")

@@ -23,6 +23,13 @@ SetOption = Annotated[
 ]
 
 
+ModelOption = Annotated[Path, typer.Option("--model", help="model.json as `rig fit` writes it.")]
+GainsOption = Annotated[str, typer.Option("--gains", help="tangent, secant, constant or admittance; else loop.gains.")]
+SessionArgument = Annotated[
+    Path, typer.Argument(help="Session folder, as `rig capture`, `rig track` or `rig import` makes it.")
+]
+
+
 def _checked_json(path: Path | None) -> Path | None:
     """A result that cannot be written is told before the work, not after it."""
     if path is not None:

@@ -9,18 +9,16 @@ from typing import Annotated
 import typer
 
 from api.cli.live import compute
-from api.cli.options import JsonOption
+from api.cli.options import JsonOption, SessionArgument
 from api.cli.output import show, write_json
 from api.operations import records
 from controller.operation import Operation
-from rig.errors import CheckFailed, UsageError
+from rig.errors import UsageError
 from rig.recording.export import FORMATS, Format
 from rig.recording.import_format import FIELDS
 from rig.recording.sessions import TrialInfo
 from rig.results.recorded import RecordingResult
 from rig.results.tables import TextTable
-
-SessionArgument = Annotated[Path, typer.Argument(help="Session folder.")]
 
 
 def verify(
@@ -43,14 +41,7 @@ def verify(
         *(found.sentence for found in result.recordings.values() if not found.ok),
     )
     write_json(json_file, result)
-    if not result.ok:
-        bad = [name for name, found in result.recordings.items() if not found.ok]
-        raise CheckFailed(
-            f"{path}: {len(bad)} of {len(result.recordings)} recordings are not complete"
-            + (f" ({', '.join(bad)})" if bad else "")
-            + (f"; {result.remarks[0]}" if result.remarks else "")
-            + "; what is listed above is known, everything else is good"
-        )
+    records.refuse_incomplete(result, path)
 
 
 def recording_table(recordings: Mapping[str, RecordingResult]) -> TextTable:

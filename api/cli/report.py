@@ -6,14 +6,14 @@ from typing import Annotated
 import typer
 
 from api.cli.live import compute
-from api.cli.options import JsonOption
+from api.cli.options import JsonOption, SessionArgument
 from api.cli.output import write_json
 from api.operations import report as work
 from controller.operation import Operation
 
 
 def report(
-    session: Annotated[Path, typer.Argument(help="Session folder, as `rig capture` or `rig import` makes it.")],
+    session: SessionArgument,
     out: Annotated[Path | None, typer.Option("--out", help="File to write; else SESSION/report.html.")] = None,
     json_file: JsonOption = None,
 ) -> None:

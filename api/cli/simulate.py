@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from api.cli.live import compute
-from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
+from api.cli.options import ConfigOption, GainsOption, JsonOption, ModelOption, SetOption, wiring_from
 from api.cli.output import show, write_json
 from api.operations import simulate as work
 from api.operations.simulate import SimulatedRun
@@ -18,13 +18,11 @@ from rig.tissue.model import load_model
 
 
 def simulate(
-    model: Annotated[Path, typer.Option("--model", help="model.json as `rig fit` writes it.")],
+    model: ModelOption,
     reference: Annotated[
         str, typer.Option("--reference", help="step:5, ramp:5, stairs:10, sine:0.5, press:3, knead:3, csv:FILE, ...")
     ],
-    gains: Annotated[
-        str, typer.Option("--gains", help="tangent, secant, constant or admittance; else loop.gains.")
-    ] = "",
+    gains: GainsOption = "",
     stiffness: Annotated[
         float, typer.Option("--stiffness", min=0.1, max=10.0, help="How much stiffer the tissue is than the model.")
     ] = 1.0,

@@ -6,9 +6,8 @@ from typing import Annotated
 import typer
 
 from api.cli import live
-from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
+from api.cli.options import ConfigOption, JsonOption, ModelOption, SetOption, wiring_from
 from api.cli.output import show, write_json
-from api.cli.stage import bench_for
 from api.operations import motion
 from api.operations.motion import TrackPlan
 from controller.experiments import threshold as experiment
@@ -18,7 +17,7 @@ from rig.tissue.model import load_model
 
 
 def threshold(
-    model: Annotated[Path, typer.Option("--model", help="model.json as `rig fit` writes it.")],
+    model: ModelOption,
     up_to: Annotated[float, typer.Option("--up-to", help="Force in N at which the ramp ends.")],
     rate: Annotated[float, typer.Option("--rate", help="How fast force rises, N/s.")] = 0.5,
     out: Annotated[Path, typer.Option("--out", help="Session folder of the recording; new or existing.")] = Path(
@@ -35,7 +34,7 @@ def threshold(
     wiring, fitted = wiring_from(config, overrides), load_model(model)
     ramp = TrackPlan(experiment.plan(up_to, rate, fitted, wiring), str(model))
     tracked.refuse_foreign(out)
-    with bench_for(wiring) as (live_wiring, _), live.connected(live_wiring) as bench:
+    with live.running(wiring) as bench:
         operation = Operation("threshold", total=1, unit="ramps")
         found = live.run(bench, operation, lambda: motion.threshold(operation, bench, ramp, up_to, out))
     if found.force_N is None:

@@ -105,18 +105,18 @@ class RigView(BaseModel):
 
     state: Literal["disconnected", "not ready", "idle", "running", "stopped"]
     reason: str = Field(description="why it is disconnected, not ready or stopped; empty otherwise")
-    ready: bool = Field(description="every device is ok; without that nothing starts")
-    mode: str
-    time_ns: int
-    force_N: float | None
-    reference_N: float | None
-    position_mm: float | None
-    depth_mm: float | None
-    missed: int
-    ticks: int
-    rates_Hz: dict[str, float]
+    ready: bool = Field(default=False, description="every device is ok; without that nothing starts")
+    mode: str = ""
+    time_ns: int = 0
+    force_N: float | None = None
+    reference_N: float | None = None
+    position_mm: float | None = None
+    depth_mm: float | None = None
+    missed: int = 0
+    ticks: int = 0
+    rates_Hz: dict[str, float] = {}
     health: dict[str, dict[str, bool]] = Field(description="per stream: alive, valid, on_rate")
-    lost: dict[str, str]
+    lost: dict[str, str] = {}
     devices: dict[str, DeviceView] = Field(
         description="per role: product, serial, firmware, settings; state (connecting, ok, degraded, lost,"
         " reconnecting, fault), detail, since_ns"

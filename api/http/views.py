@@ -35,19 +35,8 @@ SHOWN = (".mcap", ".json", ".html")
 def job(job: Job) -> JobView:
     """One job."""
     now = job.progress
-    return JobView(
-        id=job.id,
-        kind=job.kind,
-        name=now.name,
-        state=now.state,
-        done=now.done,
-        total=now.total,
-        unit=now.unit,
-        message=now.message,
-        time_left_s=now.time_left_s,
-        log=list(now.log),
-        result=now.result if isinstance(now.result, CaptureResult | TrackResult | RetractResult) else None,
-    )
+    result = now.result if isinstance(now.result, CaptureResult | TrackResult | RetractResult) else None
+    return JobView.model_validate({**vars(now), "id": job.id, "kind": job.kind, "result": result})
 
 
 def rig(service: Service) -> RigView:
@@ -58,30 +47,18 @@ def rig(service: Service) -> RigView:
     running = service.running
     limits = service.wiring.limits
     state, reason = _state(service, status, alive)
-    return RigView(
-        state=state,
-        reason=reason,
-        mode=str(status.get("mode", "")),
-        time_ns=int(status.get("time_ns", 0)),
-        force_N=status.get("force_N"),
-        reference_N=status.get("reference_N"),
-        position_mm=status.get("position_mm"),
-        depth_mm=status.get("depth_mm"),
-        missed=int(status.get("missed", 0)),
-        ticks=int(status.get("ticks", 0)),
-        rates_Hz=status.get("rates_Hz", {}),
-        health=_health(int(status.get("health", 0))),
-        lost=status.get("lost", {}),
-        ready=bool(status.get("ready")),
-        devices=_devices(bench, status) if bench else {},
-        limits={
-            "force_N": service.wiring.force_limit_N,
-            "depth_mm": limits.depth_mm,
-            "speed_mm_s": limits.speed_mm_s,
+    return RigView.model_validate({
+        **status,
+        "state": state,
+        "reason": reason,
+        "health": _health(status.get("health", 0)),
+        "devices": _devices(bench, status) if bench else {},
+        "limits": {
+            "force_N": service.wiring.force_limit_N, "depth_mm": limits.depth_mm, "speed_mm_s": limits.speed_mm_s
         },
-        control=control(service),
-        job=job(running).model_copy(update={"log": []}) if running else None,
-    )
+        "control": control(service),
+        "job": job(running).model_copy(update={"log": []}) if running else None,
+    })  # fmt: skip
 
 
 def control(service: Service) -> ControlView:

@@ -22,9 +22,7 @@ def refuse_out(out: Path | None) -> None:
 
 def refuse_unfit(stated: Calibration, found: ForceCalibration | AxisCalibration, now: datetime) -> None:
     """Raises CheckFailed where the new calibration is not as good as the wiring states: it would be refused at use."""
-    role = "of_force" if isinstance(found, ForceCalibration) else "of_axis"
-    reasons = stated.model_copy(update={"of_force": None, "of_axis": None, role: found}).unfit(now)
-    if reasons:
+    if reasons := stated.alone(found).unfit(now):
         raise CheckFailed("; ".join(reasons))
 
 

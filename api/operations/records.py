@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from controller.operation import Operation
-from rig.errors import DataError
+from rig.errors import CheckFailed, DataError
 from rig.recording.export import Format, export
 from rig.recording.files import make_folder
 from rig.recording.import_format import FIELDS
@@ -40,6 +40,19 @@ def verify(operation: Operation, path: Path) -> VerifyResult:
 def _result(remarks: tuple[str, ...], found: Mapping[str, VerifiedTrial]) -> VerifyResult:
     whole = not remarks and all(recording.ok for recording in found.values())
     return VerifyResult(ok=whole, remarks=remarks, recordings=found)
+
+
+def refuse_incomplete(found: VerifyResult, path: Path) -> None:
+    """Raises CheckFailed where anything is not whole."""
+    if found.ok:
+        return
+    bad = [name for name, recording in found.recordings.items() if not recording.ok]
+    raise CheckFailed(
+        f"{path}: {len(bad)} of {len(found.recordings)} recordings are not complete"
+        + (f" ({', '.join(bad)})" if bad else "")
+        + (f"; {found.remarks[0]}" if found.remarks else "")
+        + "; what is listed above is known, everything else is good"
+    )
 
 
 def _read(file: Path, trial: TrialInfo) -> VerifiedTrial:

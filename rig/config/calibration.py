@@ -142,6 +142,11 @@ class Calibration(Table):
     of_force: ForceCalibration | None = Field(default=None, description="read from the file that force names")
     of_axis: AxisCalibration | None = Field(default=None, description="read from the file that axis names")
 
+    def alone(self, one: ForceCalibration | AxisCalibration) -> Self:
+        """What is asked of calibrations, and ``one`` in the place of all there are."""
+        role = "of_force" if isinstance(one, ForceCalibration) else "of_axis"
+        return self.model_copy(update={"of_force": None, "of_axis": None, role: one})
+
     def unfit(self, now: datetime) -> list[str]:
         """Why a calibration may not be used at ``now``, one sentence each; empty if both may, or there is none."""
         found: list[ForceCalibration | AxisCalibration] = [one for one in (self.of_force, self.of_axis) if one]

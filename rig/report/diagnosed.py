@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.errors import UsageError
-from rig.report.drawing import inlined
+from rig.report.drawing import inlined, saved_figures
 from rig.report.markup import figure, paragraph, parts, section
 from rig.results.diagnosis import FILE, FOLDER, PICTURES, TRUTH, DiagnosisResult
 from rig.results.diagnosis_tables import further_parts, named_parts
@@ -34,16 +33,11 @@ class Diagnosed:
 def read_diagnosis(session: Path) -> Diagnosed | str:
     """The diagnosis in the session's folder, or the sentence that says why there is none."""
     folder = session / FOLDER
-    try:
-        result = DiagnosisResult.read(folder / FILE)
-    except OSError:
-        return f"This session was not diagnosed; `rig diagnose {session}` does it."
-    except UsageError as error:
-        return f"{error}; run `rig diagnose {session}` again."
-    drawn = {name: folder / f"{name}.svg" for name in PICTURES}
+    result = DiagnosisResult.read_or_why(folder / FILE, "This session was not diagnosed", f"rig diagnose {session}")
+    if isinstance(result, str):
+        return result
     truth = folder / TRUTH
-    pictures = {name: path.read_text() for name, path in drawn.items() if path.exists()}
-    return Diagnosed(result, pictures, truth.read_text().strip() if truth.exists() else "")
+    return Diagnosed(result, saved_figures(folder, PICTURES), truth.read_text().strip() if truth.exists() else "")
 
 
 def diagnosis_section(found: Diagnosed | str) -> str:

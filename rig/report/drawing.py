@@ -2,6 +2,7 @@
 
 import io
 import re
+from collections.abc import Iterable
 from html import escape
 from itertools import pairwise
 from pathlib import Path
@@ -111,6 +112,12 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
     with whole_file(folder / f"{name}.png", overwrite=True) as scratch:
         scratch.write_bytes(png(figure))
     write_text(folder / f"{name}.svg", svg(figure))
+
+
+def saved_figures(folder: Path, names: Iterable[str]) -> dict[str, str]:
+    """Those that ``save_figure`` left in ``folder``, as SVG by name."""
+    drawn = {name: folder / f"{name}.svg" for name in names}
+    return {name: path.read_text() for name, path in drawn.items() if path.exists()}
 
 
 def inline_svg(figure: Figure, name: str, alt: str) -> str:

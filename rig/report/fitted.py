@@ -3,9 +3,8 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from rig.errors import UsageError
 from rig.recording.sessions import Session
-from rig.report.drawing import inlined
+from rig.report.drawing import inlined, saved_figures
 from rig.report.markup import figure, paragraph, parts, section
 from rig.results.fit import FILE, FOLDER, PICTURES, FitResult
 from rig.results.tables import curve_parts, lattice_parts, law_parts
@@ -32,15 +31,10 @@ class Fitted:
 def read_fit(session: Session) -> Fitted | str:
     """The fit in the session's folder, or the sentence that says why there is none."""
     folder = session.folder / FOLDER
-    try:
-        result = FitResult.read(folder / FILE)
-    except OSError:
-        return f"This session was not fitted; `rig fit {session.folder}` does it."
-    except UsageError as error:
-        return f"{error}; run `rig fit {session.folder}` again."
-    drawn = {name: folder / f"{name}.svg" for name in PICTURES}
-    pictures = {name: path.read_text() for name, path in drawn.items() if path.exists()}
-    return Fitted(result, pictures, tuple(_changes(session, result)))
+    result = FitResult.read_or_why(folder / FILE, "This session was not fitted", f"rig fit {session.folder}")
+    if isinstance(result, str):
+        return result
+    return Fitted(result, saved_figures(folder, PICTURES), tuple(_changes(session, result)))
 
 
 def _changes(session: Session, result: FitResult) -> Iterator[str]:

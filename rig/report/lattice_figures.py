@@ -1,6 +1,5 @@
-"""Pictures of the lattice: k per force with the index curve, force against displacement, where the block collapses."""
+"""Pictures of the lattice: k per force with the index curve, and force against displacement."""
 
-from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -8,7 +7,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rig.report.drawing import ACTUAL, MODEL, OTHER, QUIET, dress, label, new_figure
-from rig.tissue.lattice.sweep import Sweep
 from rig.tissue.lattice_study import LatticeStudy
 from rig.tissue.study import Study, rows
 
@@ -60,19 +58,3 @@ def _stiffness(axes: Axes, found: LatticeStudy) -> None:
     text = formula + "\no  F/φ(d)    x  simulate, compare, adjust"
     axes.annotate(text, (0.03, 0.95), xycoords="axes fraction", va="top", fontsize=9, color=QUIET)
     axes.set_ylim(bottom=0.0)
-
-
-def collapse_figure(sweeps: Sequence[tuple[str, Sweep]]) -> Figure:
-    """phi(d) = R/k of several lattices; points past collapse are hollow."""
-    figure = new_figure(7.5, 4.7)
-    axes = figure.subplots()
-    dress(axes, "Reaction over spring stiffness", "depth of the tip, mm", "R/k, mm")
-    for (name, sweep), color in zip(sweeps, (MODEL, ACTUAL, OTHER, QUIET), strict=False):
-        depth, phi = sweep.depth_mm, sweep.force_over_k_mm
-        good = np.array(sweep.intact)
-        axes.plot(depth, phi, color=color, linewidth=1.0)
-        axes.plot(depth[good], phi[good], "o", color=color, markersize=4)
-        axes.plot(depth[~good], phi[~good], "o", color=color, markersize=4, fillstyle="none")
-        label(axes, (float(depth[-1]), float(phi[-1])), name, color, beside="above" if good.all() else "below")
-    axes.margins(x=0.18)
-    return figure

@@ -14,8 +14,8 @@ from rig.version import SOFTWARE
 TEMPLATE = Path(__file__).with_name("page.html")
 
 
-def write_report(session: Path, out: Path, tell: Progress = silent) -> None:
-    """Writes the report on the session in folder ``session`` to ``out``, whole or not at all.
+def write_report(session: Path, out: Path, tell: Progress = silent) -> Facts:
+    """Writes the report on the session in folder ``session`` to ``out``, whole or not at all; what it shows.
 
     Raises DataError where there is no session, UsageError where ``out`` lies in no folder.
     """
@@ -26,6 +26,7 @@ def write_report(session: Path, out: Path, tell: Progress = silent) -> None:
     found = page(facts)
     tell(f"writing {out.name}", 1.0)
     write_text(out, found)
+    return facts
 
 
 def page(facts: Facts) -> str:

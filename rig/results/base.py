@@ -41,6 +41,16 @@ class SavedResult(Result):
         write_text(path, self.model_dump_json(indent=2) + "\n")
 
     @classmethod
+    def read_or_why(cls, path: Path, never: str, command: str) -> Self | str:
+        """What ``read`` reads, or a sentence for a report: ``never``, or what is wrong; and what ``command`` does."""
+        try:
+            return cls.read(path)
+        except OSError:
+            return f"{never}; `{command}` does it."
+        except UsageError as error:
+            return f"{error}; run `{command}` again."
+
+    @classmethod
     def read(cls, path: Path) -> Self:
         """What ``write`` wrote; raises OSError where there is no such file, UsageError where it is another or newer."""
         text = path.read_bytes()

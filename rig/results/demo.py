@@ -2,50 +2,26 @@
 
 from collections.abc import Mapping
 
-from rig.diagnosis.estimates import NamedCause, Verdict
-from rig.results.base import Result, SavedResult
+from rig.results.base import Result
+from rig.results.diagnosis import DiagnosisResult
 from rig.results.fit import FitResult
-from rig.results.tracking import LoopCount, Plateau
-
-
-class RecordingCounts(Result):
-    """What all recordings of the session hold and lost."""
-
-    recordings: int
-    samples: int
-    dropped: int
-    loop: LoopCount
-
-
-class DemoTracking(Result):
-    """The tracking run in short."""
-
-    max_error_percent: float | None
-    rms_error_N: float | None
-    levels: tuple[Plateau, ...]
+from rig.results.recorded import ReportResult
+from rig.results.tracking import TrackResult
 
 
 class HiddenTruth(Result):
-    """What was hidden in the bench."""
+    """What was hidden in the bench; ``named``: the diagnosis found it."""
 
     effect: str
     parameters: Mapping[str, float]
-
-
-class DemoDiagnosis(Result):
-    """What the diagnosis said, and last what is true; ``named``: it found the cause that was hidden."""
-
-    verdict: Verdict
-    statement: str
-    findings: tuple[NamedCause, ...]
-    named: bool
     seed: int
-    truth: HiddenTruth
+    named: bool
 
 
-class DemoSummary(SavedResult, RecordingCounts):
-    """The whole demonstration."""
+class DemoSummary(ReportResult):
+    """The whole demonstration, and what its report counts."""
 
     fit: FitResult
-    tracking: DemoTracking
-    diagnosis: DemoDiagnosis
+    tracking: TrackResult
+    diagnosis: DiagnosisResult
+    hidden: HiddenTruth

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from rig.recording.sessions import TrialInfo
 from rig.results.base import Number, Result, SavedResult
+from rig.results.tracking import LoopCount
 
 Quality = Literal["", "good", "usable", "bad"]
 
@@ -105,7 +106,11 @@ class ExportResult(SavedResult):
 
 
 class ReportResult(SavedResult):
-    """The page that was written about a session."""
+    """The page that was written about a session, and what its recordings hold and lost."""
 
     session: str
     file: str
+    recordings: int
+    samples: int
+    dropped: int
+    loop: LoopCount | None = Field(description="null where no loop ran")

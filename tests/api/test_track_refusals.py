@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from api.cli import motion
 from api.cli.app import build
 from api.cli.demo import forces_within
 from mock_devices.testing.models import index_model
@@ -19,9 +18,7 @@ def nothing_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def opened(*_: object) -> None:
         raise AssertionError("a bench was started")
 
-    monkeypatch.setattr(motion, "bench_for", opened)
-    monkeypatch.setattr("api.cli.comparison.bench_for", opened)
-    monkeypatch.setattr("api.cli.threshold.bench_for", opened)
+    monkeypatch.setattr("api.cli.live.bench_for", opened)
     monkeypatch.chdir(tmp_path)
     index_model(0.12, 0.22, 0.01, force_N=11.0).save(tmp_path / "model.json")
 
@@ -108,7 +105,7 @@ def test_a_capture_into_a_used_folder_is_refused_before_any_device_is_opened(tmp
 def test_a_demonstration_of_a_wrong_protocol_is_refused_and_removes_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: str, sentence: str
 ) -> None:
-    monkeypatch.setattr("api.cli.demo.bench_for", lambda *_: pytest.fail("a bench was started"))
+    monkeypatch.setattr("api.cli.live.bench_for", lambda *_: pytest.fail("a bench was started"))
     (tmp_path / "demo").mkdir()
     (tmp_path / "demo" / "report.html").touch()
     if written:
