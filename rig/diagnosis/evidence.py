@@ -154,12 +154,19 @@ def is_alias(t: Tangents, direction: Direction) -> bool:
 
 def chance_draws(t: Tangents, rng: np.random.Generator, draws: int = DRAWS) -> Array:
     """Gradients under the present model: Gaussian with covariance H_i, shape (draws, recordings, P)."""
-    roots = []
-    for block in t.hessian:
-        weights, vectors = np.linalg.eigh(block)
-        roots.append(vectors * np.sqrt(np.maximum(weights, 0.0)))
-    normal = rng.standard_normal((draws, len(t.hessian), t.hessian.shape[1]))
-    return np.asarray(np.einsum("rij,brj->bri", np.stack(roots), normal))
+    normal = rng.standard_normal((draws, *t.hessian.shape[:2]))
+    return np.asarray(np.einsum("rij,brj->bri", covariance_root(t.hessian), normal))
+
+
+def covariance_root(covariance: Array) -> Array:
+    """Roots R of covariances (n, p, p) with R R' = covariance: unit by unit the symmetric root of the correlation.
+
+    That one is unique and continuous; eigenvectors have signs, and turn round with the last digits.
+    """
+    size = np.sqrt(np.maximum(np.einsum("rii->ri", covariance), 1e-300))
+    weights, vectors = np.linalg.eigh(covariance / (size[:, :, None] * size[:, None, :]))
+    symmetric = np.einsum("rik,rk,rjk->rij", vectors, np.sqrt(np.maximum(weights, 0.0)), vectors)
+    return np.asarray(size[:, :, None] * symmetric)
 
 
 def flipped_draws(t: Tangents, rng: np.random.Generator, draws: int = DRAWS) -> Array:
