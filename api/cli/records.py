@@ -1,6 +1,5 @@
 """Commands about what was recorded: verify, repair, import, export."""
 
-import re
 from collections.abc import Iterable, Mapping
 from datetime import datetime
 from pathlib import Path
@@ -14,8 +13,8 @@ from api.cli.output import show, write_json
 from api.operations import records
 from controller.operation import Operation
 from rig.errors import UsageError
+from rig.intake.rows import FIELDS
 from rig.recording.export import FORMATS, Format
-from rig.recording.import_format import FIELDS
 from rig.recording.sessions import TrialInfo
 from rig.results.recorded import RecordingResult
 from rig.results.tables import TextTable
@@ -78,26 +77,22 @@ def repair(
 
 
 def import_(
-    folder: Annotated[Path, typer.Argument(help="Folder with session.toml and trial_*/.")],
+    folder: Annotated[Path, typer.Argument(help="Folder or file with the data, as they are.")],
     out: Annotated[Path, typer.Option("--out", help="New folder for the session.")],
-    columns: Annotated[
-        list[str] | None,
-        typer.Option("--columns", help="Other column name: [STREAM.]FIELD=HEADER; may be repeated or comma-separated."),
+    mapping: Annotated[
+        Path | None, typer.Option("--mapping", help="TOML file: what the files hold; else FOLDER/mapping.toml.")
     ] = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Makes a session from measured CSV files; writes nothing if anything in them is wrong.
+    """Makes a session from measured files of any laboratory; writes nothing if anything in them is wrong.
 
-    FOLDER holds session.toml (may be empty; keys force_positive "compression" or "tension", position_positive "into"
-    or "out", surface_mm, and anything under [subject] and [notes]) and folders trial_NAME with trial.toml (speed_mm_s,
-    depth_mm), force.csv (time_s,force_N), axis.csv (time_s,position_mm) and, where there is one, marker.csv
-    (time_s,x_mm,y_mm,z_mm). time_s runs through the whole session; each stream keeps its own rate and clock.
+    CSV and other text, xls, xlsx, MAT, HDF5, Parquet and MCAP. A mapping names files, header and unit rows, columns
+    with their units and signs, and what a recording is; examples/mappings holds one for each of nine sources.
 
-    Example: rig import measured/ --out sessions/measured --columns force.force_N=Fz
+    Example: rig import measured/ --mapping examples/mappings/asmi.toml --out sessions/measured
     """
-    chosen = [column for item in columns or [] for column in re.split(r",(?=[\w.]+=)", item)]
     operation, now = Operation("import"), datetime.now().astimezone()
-    result = compute(operation, lambda: records.import_folder(operation, folder, out, chosen, now))
+    result = compute(operation, lambda: records.import_data(operation, folder, mapping, out, now))
     show(_trial_table(result.trials), *result.remarks)
     write_json(json_file, result)
 

@@ -7,11 +7,13 @@ from datetime import datetime
 from pathlib import Path
 
 from controller.operation import Operation
+from rig.config.table import load
 from rig.errors import CheckFailed, DataError
+from rig.intake.mapping import MAPPING_FILE, DataMapping
+from rig.intake.rows import FIELDS
+from rig.intake.session import import_folder
 from rig.recording.export import Format, export
 from rig.recording.files import make_folder
-from rig.recording.import_format import FIELDS
-from rig.recording.importing import import_session
 from rig.recording.reader import Recording, read_recording
 from rig.recording.sessions import TrialInfo, open_session
 from rig.recording.verify import repair as repaired
@@ -80,9 +82,9 @@ def repair(operation: Operation, recording: Path, out: Path) -> RepairResult:
     return RepairResult.model_validate(repaired(recording, out, operation.step))
 
 
-def import_folder(operation: Operation, folder: Path, out: Path, columns: Sequence[str], now: datetime) -> ImportResult:
-    """Makes the session ``out`` of measured CSV files; writes nothing if anything in them is wrong."""
-    session = import_session(folder, out, list(columns), now, operation.step)
+def import_data(operation: Operation, folder: Path, mapping: Path | None, out: Path, now: datetime) -> ImportResult:
+    """Makes the session ``out`` of what ``mapping`` names in ``folder``; writes nothing if anything in it is wrong."""
+    session = import_folder(folder, load(DataMapping, mapping or folder / MAPPING_FILE), out, now, operation.step)
     return ImportResult(
         session=str(out),
         recordings=len(session.trials),

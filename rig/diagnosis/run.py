@@ -125,7 +125,7 @@ def unusable(data: Observations) -> Flaw | None:
     if rise < 0 and -rise > 5 * noise:
         return Flaw(
             "force falls as the tip goes in, so force or position has the wrong sign",
-            "correct force_positive or position_positive in session.toml (force.compression in rig.toml for a capture) "
+            "correct `positive` of force or position in the mapping (force.compression in rig.toml for a capture) "
             "and diagnose again",
         )
     if rise < 5 * noise:

@@ -1,4 +1,4 @@
-"""Columns of a CSV file nobody here wrote: all of it good, or one sentence on what is not, or what can be used of it.
+"""Columns of a CSV file nobody here wrote: what can be used of it, and a remark on what cannot.
 
 Arrow reads the file in one go; only where something is wrong is it read again, cell by cell, to say what and where.
 """
@@ -19,12 +19,9 @@ from numpy.typing import NDArray
 from rig.errors import DataError
 
 TIME, TOOL = "time_s", "tool"
-# Beyond this, nanoseconds do not fit 64 bits: the column is not in seconds.
-TIME_LIMIT_S = 9e9
 # Units people write behind a name; used only to tell a wrong unit from a wrong name.
 UNITS = frozenset("s ms us ns min N kN mN cN kg g lb lbf kgf V mV mm m cm um nm in inch mil".split())  # noqa: SIM905
 _MISSING = ("", "nan", "NaN", "NAN", "MISSING")
-Columns = dict[str, NDArray[np.float64]]
 
 
 class Usable(NamedTuple):
@@ -34,32 +31,15 @@ class Usable(NamedTuple):
     is the column of texts, where one was asked for.
     """
 
-    columns: Columns
+    columns: dict[str, NDArray[np.float64]]
     remark: str
     labels: tuple[str, ...] = ()
 
 
-def read_columns(path: Path, names: Mapping[str, str], gaps: bool = False, more: Sequence[str] = ()) -> Columns:
-    """Columns of ``path`` by field; ``names`` says which header each field (``time_s`` first) stands under.
-
-    Times are finite and strictly increasing, all values finite, rows at least two. With ``gaps`` a row may lack all its
-    values (empty or NaN), but not its time. ``more`` are columns to be read where they are there, all of them or none;
-    rows of different ``tool`` may be of one time. Raises DataError with file, line, column and what was found there.
-    """
-    header = read_header(path)
-    names = _checked(path, header, names, more)
-    try:
-        table = _read(path, header, names).columns
-    except pa.ArrowInvalid as error:
-        _explain(path, header, names, gaps)
-        raise DataError(f"{path}: not readable as CSV: {error}") from error
-    if not _is_good(table, gaps):
-        _explain(path, header, names, gaps)
-    return table
-
-
 def read_usable(path: Path, names: Mapping[str, str], more: Sequence[str] = (), label: str = "") -> Usable:
-    """As ``read_columns``, whatever the cells hold; ``label`` names a column of texts.
+    """Columns of ``path`` by field; ``names`` says which header each field stands under, ``label`` a column of texts.
+
+    ``more`` are columns to be read where they are there, all of them or none.
 
     Raises DataError where there is no such file, no such column or no row, or where it is no text.
     """
@@ -161,28 +141,6 @@ def _number_or_nan(text: str) -> float:
         return math.nan
 
 
-def _is_good(table: Mapping[str, NDArray[np.float64]], gaps: bool) -> bool:
-    time_s, *values = (column for field, column in table.items() if field != TOOL)
-    tool = table.get(TOOL, np.zeros_like(time_s))
-    finite = np.array([np.isfinite(value) for value in values])
-    whole = finite.all(axis=0) | (np.isnan(np.array(values)).all(axis=0) & gaps)
-    rising = all((np.diff(time_s[tool == one]) > 0).all() for one in np.unique(tool))
-    usable = whole.all() and np.isfinite(tool).all()
-    return bool(time_s.size >= 2 and (np.abs(time_s) < TIME_LIMIT_S).all() and rising and usable)
-
-
-def _explain(path: Path, header: list[str], names: Mapping[str, str], gaps: bool) -> None:
-    """Raises the sentence for the first thing wrong in the file, line by line."""
-    before: dict[str, float] = {}
-    rows = 0
-    for line, cells in _rows(path):
-        _check_row(f"{path} line {line}", cells, header, names, before, gaps)
-        rows += 1
-    if rows < 2:
-        found = "no row" if rows == 0 else "only one row"
-        raise DataError(f"{path}: {found} under the header; a stream needs at least 2")
-
-
 def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Number of the line and cells of each row under the header."""
     reader = csv.reader(io.StringIO(_text(path), newline=""))
@@ -200,40 +158,3 @@ def _text(path: Path) -> str:
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise DataError(f"{path} line {line}: not UTF-8 text; save the file as UTF-8") from error
-
-
-def _check_row(
-    place: str, cells: list[str], header: list[str], names: Mapping[str, str], before: dict[str, float], gaps: bool
-) -> None:
-    """Checks one row, and notes its time in ``before``, by tool."""
-    if len(cells) != len(header):
-        raise DataError(f"{place}: {len(cells)} cells where the header has {len(header)}")
-    named = {field: (name, cells[header.index(name)].strip()) for field, name in names.items()}
-    numbers = {field: _number(place, name, text) for field, (name, text) in named.items()}
-    values = [value for field, value in numbers.items() if field not in (TIME, TOOL)]
-    hidden = gaps and all(math.isnan(value) for value in values)
-    for field, value in numbers.items():
-        if not math.isfinite(value) and not (hidden and field not in (TIME, TOOL)):
-            name, text = named[field]
-            raise DataError(f"{place}, column {name}: {text or 'nothing'} where a number is needed")
-    tool = str(numbers.get(TOOL, ""))
-    _check_time(f"{place}, column {named[TIME][0]}", numbers[TIME], before.get(tool))
-    before[tool] = numbers[TIME]
-
-
-def _check_time(place: str, time_s: float, before: float | None) -> None:
-    if abs(time_s) >= TIME_LIMIT_S:
-        raise DataError(f"{place}: {time_s:g} s is beyond {TIME_LIMIT_S:g} s; is it in s?")
-    if before is not None and time_s <= before:
-        raise DataError(f"{place}: {time_s!r} s follows {before!r} s; time must increase from row to row")
-
-
-def _number(place: str, name: str, text: str) -> float:
-    if text in _MISSING:
-        return math.nan
-    try:
-        if "_" in text:
-            raise ValueError
-        return float(text)
-    except ValueError as error:
-        raise DataError(f"{place}, column {name}: {text!r} is not a number") from error

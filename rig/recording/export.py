@@ -52,7 +52,7 @@ def _information(session: Session) -> str:
 
 
 def _csv(session: Session, out: Path) -> None:
-    """The layout `rig import` reads: ``session.toml``, ``trial_NAME/trial.toml`` and ``trial_NAME/STREAM.csv``.
+    """``trial_NAME/STREAM.csv`` and the ``mapping.toml`` by which `rig import` reads them.
 
     Runs of force tracking stand in folders of their own names, which the import leaves alone: they press to no depth.
 
@@ -60,35 +60,62 @@ def _csv(session: Session, out: Path) -> None:
     Units and meanings stand in ``columns.csv``, the session's facts in ``session.json``.
     """
     with whole_folder(out) as folder:
-        for trial in session.trials:
-            _csv_trial(folder, session, trial)
-        write_text(folder / "session.toml", _toml({"id": session.info.id, "subject": session.info.subject}))
+        facts = dict(filter(None, (_csv_trial(folder, session, trial) for trial in session.trials)))
+        write_text(folder / "mapping.toml", _mapping(session, facts, folder))
         write_text(folder / COLUMNS_FILE, _legend())
         write_text(folder / "session.json", _information(session))
 
 
-def _csv_trial(out: Path, session: Session, trial: TrialInfo) -> None:
+def _csv_trial(out: Path, session: Session, trial: TrialInfo) -> tuple[str, dict[str, object]] | None:
+    """Writes the streams; the folder's name and the facts of what an import takes for a trial."""
     recording = session.recording(trial.name)
-    tracked = recording.tracks_force
-    folder = out / (trial.name if tracked else f"trial_{trial.name.removeprefix('trial_')}")
-    folder.mkdir()
+    name = trial.name if recording.tracks_force else f"trial_{trial.name.removeprefix('trial_')}"
+    (out / name).mkdir()
     for stream, columns in filled(recording):
         table = arrow_table(recording, stream)
         if stream is FORCE:
             table = table.add_column(0, "force_N", pa.array(compression_N(recording)))
         table = table.add_column(0, "time_s", pa.array(np.asarray(columns["capture_ns"]) / 1e9))
-        arrow_csv.write_csv(table, folder / f"{stream.name}.csv")
-    facts = {"name": trial.name, "speed_mm_s": trial.speed_mm_s, "depth_mm": trial.depth_mm, "outcome": trial.outcome}
+        arrow_csv.write_csv(table, out / name / f"{stream.name}.csv")
     surface = recording.metadata.get("calibration", {}).get("surface_mm")
-    write_text(folder / "trial.toml", _toml(facts | ({"surface_mm": float(surface)} if surface else {})))
+    facts = {"speed_mm_s": trial.speed_mm_s, "depth_mm": trial.depth_mm, "outcome": trial.outcome}
+    return None if recording.tracks_force else (name, facts | ({"surface_mm": float(surface)} if surface else {}))
 
 
-def _toml(values: Mapping[str, object]) -> str:
+def _mapping(session: Session, facts: Mapping[str, Mapping[str, object]], folder: Path) -> str:
+    """How `rig import` reads the streams it knows, and the facts of session and trials."""
+    tables = [text for stream, text in _TABLES.items() if any(folder.glob(f"trial_*/{stream}.csv"))]
+    stated = {"session": {"id": session.info.id, "subject": session.info.subject}, "recordings": facts}
+    return "\n".join(['recording = "{recording}"', _toml(stated), *tables])
+
+
+_TABLES = {
+    stream: f"""[[tables]]
+files = "{{recording:trial_*}}/{stream}.csv"
+time = {{ column = "capture_ns", unit = "ns" }}
+columns = {{ {", ".join(columns)} }}
+"""
+    for stream, columns in {
+        "force": ['force = { column = "force_N", unit = "N" }', 'arrival = { column = "arrival_ns", unit = "ns" }'],
+        "axis": [
+            'position = { column = "position_mm", unit = "mm" }',
+            'arrival = { column = "arrival_ns", unit = "ns" }',
+        ],
+        "marker": [
+            *(f'{axis} = {{ column = "{axis}_mm", unit = "mm" }}' for axis in "xyz"),
+            'tool = { column = "tool" }',
+        ],
+    }.items()
+}
+
+
+def _toml(values: Mapping[str, object], above: str = "") -> str:
     """A TOML table of texts and numbers; lists become texts in JSON, unknown numbers are left out."""
     lines, tables = [], []
     for key, value in values.items():
         if isinstance(value, Mapping):
-            tables.append(f"\n[{json.dumps(key)}]\n{_toml(value)}")
+            place = f"{above}{json.dumps(key)}"
+            tables.append(f"\n[{place}]\n{_toml(value, f'{place}.')}")
         elif plain(value) is not None:
             simple = isinstance(value, str | int | float)
             lines.append(

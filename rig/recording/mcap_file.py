@@ -14,7 +14,9 @@ import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+import numpy as np
 from mcap.writer import CompressionType, Writer
+from numpy.typing import NDArray
 
 from rig.channels import CDR_HEADER, STREAMS, Stream
 from rig.errors import RigError, UsageError
@@ -25,6 +27,7 @@ CHECKSUM = "crc32"
 # Small pieces: on some kernels one large write stalls even processes of real-time priority.
 PIECE = 65_536
 CHUNK_SIZE = 1 << 20
+ROWS_PER_CHUNK = 1000
 _STAMP = struct.Struct("<qqq")
 
 
@@ -89,6 +92,13 @@ class RecordingWriter:
             publish_time=max(capture_ns, 0),
             sequence=seq & 0xFFFFFFFF,
         )
+
+    def add_rows(self, stream: Stream, rows: NDArray[np.void]) -> None:
+        """Appends ``rows`` of ``stream`` and hands them to the system."""
+        for at in range(0, rows.size, ROWS_PER_CHUNK):
+            for row in rows[at : at + ROWS_PER_CHUNK]:
+                self.add(stream.id, row.tobytes())
+            self.flush()
 
     def flush(self, sync: bool = False) -> None:
         """Closes the chunk in progress and hands it to the system; with ``sync`` waits until the disk has it."""

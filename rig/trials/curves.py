@@ -170,7 +170,7 @@ def _no_contact(cycle: IndentationCycle, height_N: float, spread_N: float, fall_
     if fall_N > max(10 * spread_N, LEAST_FORCE_N, height_N):
         return (
             f"{cycle.name}: force falls by {fall_N:.2g} N where the tip goes in: the sign of compression is wrong; "
-            "correct force.compression in rig.toml, or force_positive in session.toml"
+            "correct force.compression in rig.toml, or `positive` of the force in the mapping"
         )
     return (
         f"{cycle.name}: no contact: force rises by {max(height_N, 0):.2g} N at most "

@@ -12,8 +12,9 @@ import numpy as np
 
 from rig.config.table import load
 from rig.errors import DataError, RigError
+from rig.intake.mapping import MAPPING_FILE, DataMapping, RecordingFacts
 from rig.recording.csv_columns import TOOL, read_usable
-from rig.recording.import_format import EXPORTED, FIELDS, OPTIONAL, SessionTable, TrialTable, column_names
+from rig.recording.import_format import EXPORTED, FIELDS, OPTIONAL, column_names
 from rig.recording.sessions import Session, open_session
 from rig.recording.slope import TIP_TOOL
 from rig.trials.findings import UNREADABLE, Array, Finding
@@ -26,7 +27,7 @@ from rig.trials.trial import Trial, TrialSet
 def read_trials(folder: Path, columns: tuple[str, ...] = (), only: str = "") -> TrialSet:
     """The trials in ``folder``, of which stacked recordings may be chosen by a pattern; raises DataError."""
     if not folder.is_dir():
-        raise DataError(f"{folder}: no such folder; give a session, or a folder with session.toml and trial_*/")
+        raise DataError(f"{folder}: no such folder; give a session, or a folder with trial_*/")
     if any(folder.glob("*.mcap")):
         return trials_of(open_session(folder))
     if any(folder.glob("trial_*")):
@@ -66,17 +67,17 @@ def trials_of(session: Session) -> TrialSet:
 
 
 def trials_in_csv(folder: Path, columns: tuple[str, ...] = ()) -> TrialSet:
-    """Trials of a CSV folder in the senses of its ``session.toml``; what cannot be read is left out and said."""
+    """Trials of a CSV folder in the senses of its ``mapping.toml``; what cannot be read is left out and said."""
     names = column_names(columns)
-    table = load(SessionTable, folder / "session.toml") if (folder / "session.toml").exists() else SessionTable()
+    mapping = load(DataMapping, folder / MAPPING_FILE) if (folder / MAPPING_FILE).exists() else None
     trials, findings = [], []
     for path in sorted(path for path in folder.glob("trial_*") if path.is_dir()):
         read, said = _read_trial(path, names)
         findings += said
         if "force" in read and "axis" in read:
             findings += late(path.name, read["axis"]) if "arrival_ns" in read["axis"] else []
-            trials.append(_csv_trial(path, read, table))
-    surface = None if table.surface_mm is None else table.position_positive * table.surface_mm
+            trials.append(_csv_trial(path, read, mapping))
+    surface = None if mapping is None or mapping.stated.surface_mm is None else mapping.surface_of(mapping.stated)
     return TrialSet(folder.name, tuple(trials), surface, tuple(findings))
 
 
@@ -99,20 +100,21 @@ def _read_trial(
     return read, findings
 
 
-def _csv_trial(path: Path, read: dict[str, dict[str, Array]], table: SessionTable) -> Trial:
+def _csv_trial(path: Path, read: dict[str, dict[str, Array]], mapping: DataMapping | None) -> Trial:
     force, axis, marker = read["force"], _in_time_rows(read["axis"]), _tip_rows(read.get("marker"))
-    trial = load(TrialTable, path / "trial.toml") if (path / "trial.toml").exists() else None
-    kelvin = None if trial is None else trial.temperature_C
+    facts = RecordingFacts() if mapping is None else mapping.facts_of(path.name)
+    force_sense, position_sense = (1, 1) if mapping is None else (mapping.sense("force"), mapping.sense("position"))
+    temperature_C = facts.temperature_C
     return Trial(
         path.name,
         force["time_s"],
-        table.force_positive * force["force_N"],
+        force_sense * force["force_N"],
         axis["time_s"],
-        table.position_positive * axis["position_mm"],
+        position_sense * axis["position_mm"],
         None if marker is None else marker["time_s"],
         None if marker is None else np.stack([marker[field] for field in ("x_mm", "y_mm", "z_mm")], axis=1),
-        None if kelvin is None else np.full(force["time_s"].shape, kelvin),
-        math.nan if trial is None else trial.speed_mm_s,
+        None if temperature_C is None else np.full(force["time_s"].shape, temperature_C),
+        facts.speed_mm_s or math.nan,
     )
 
 

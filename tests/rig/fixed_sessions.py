@@ -19,17 +19,20 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.hidden.draw import draw_secret, recorded
+from rig.config.table import load
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.estimates import Estimate
 from rig.diagnosis.observations import observe
 from rig.diagnosis.run import diagnose_session
-from rig.recording.importing import import_session
+from rig.intake.mapping import MAPPING_FILE, DataMapping
+from rig.intake.session import import_folder
 from rig.recording.sessions import open_session
 from rig.tissue.judging import Errors, Judged
 from rig.tissue.study import Study, study_session
 from rig.trials.curves import Curve
 from rig.trials.reading import read_trials
 from tests import data
+from tests.rig.recording.measured import MARKER_TABLE, turned_tables
 from tests.rig.tissue.synthetic import (
     Bench,
     index_force,
@@ -65,17 +68,16 @@ def write_tables(folder: Path) -> Path:
     """Six cycles on a guide with friction as CSV, force counted in tension and position out of the tissue."""
     bench, cycles = recorded(4, draw_secret(np.random.default_rng(11), "friction"), 6)
     folder.mkdir()
-    words = 'id = "tables"\nforce_positive = "tension"\nposition_positive = "out"\n'
-    (folder / "session.toml").write_text(words)
+    facts = ['recording = "{recording}"\n[session]\nid = "tables"\n']
     for number, (cycle, speed) in enumerate(zip(cycles, bench.speeds, strict=True)):
         trial = folder / f"trial_{number:02d}"
         trial.mkdir()
-        (trial / "trial.toml").write_text(
-            f"speed_mm_s = {speed:.9g}\ndepth_mm = 8.0\ntemperature_C = {25 + number}.0\n"
-        )
+        stated = f"speed_mm_s = {speed:.9g}\ndepth_mm = 8.0\ntemperature_C = {25 + number}.0\n"
+        facts.append(f"[recordings.{trial.name}]\n{stated}")
         _write_csv(trial / "force.csv", ("time_s", "force_N"), (cycle.time_s, -cycle.force_n))
         _write_csv(trial / "axis.csv", ("time_s", "position_mm"), (cycle.axis_time_s, -cycle.axis_mm))
         _write_csv(trial / "marker.csv", ("time_s", "x_mm", "y_mm", "z_mm"), (cycle.frame_time_s, *cycle.marker_mm.T))
+    (folder / MAPPING_FILE).write_text("".join(facts) + turned_tables(turned=True) + MARKER_TABLE)
     return folder
 
 
@@ -93,7 +95,7 @@ def captured(folder: Path) -> Figures:
 def imported(folder: Path) -> Figures:
     """A folder of tables diagnosed as it is, and the session imported from it, fitted and as a diagnosis sees it."""
     source, out = write_tables(folder / "tables"), folder / "imported"
-    import_session(source, out, (), NOW)
+    import_folder(source, load(DataMapping, source / MAPPING_FILE), out, NOW)
     fit = of_study(study_session(open_session(out)))
     return {"tables": diagnosed(source), "fit": fit, "observed": observed(out)}
 

@@ -14,14 +14,20 @@ import pytest
 import scipy.io
 
 from rig.channels import FORCE, STREAMS
+from rig.config.table import load
 from rig.errors import DataError, UsageError
+from rig.intake.mapping import MAPPING_FILE, DataMapping
+from rig.intake.session import import_folder
 from rig.recording.export import FORMATS, Format, export
 from rig.recording.files import WriteFailed
-from rig.recording.importing import import_session
 from rig.recording.sessions import JsonTable, Session, SessionInfo, TrialInfo, open_session, write_session
 from tests.rig.recording.conftest import WriteRecording, axis, event, force
 from tests.rig.recording.measured import NOW, run
 from tests.rig.recording.test_mcap_file import disk_of
+
+
+def imported(folder: Path, out: Path) -> Session:
+    return import_folder(folder, load(DataMapping, folder / MAPPING_FILE), out, NOW)
 
 
 @pytest.fixture
@@ -41,12 +47,12 @@ def test_csv_has_a_folder_a_trial_as_import_reads_it(session: Session, tmp_path:
     out = export(session, "csv", tmp_path / "out")
     assert sorted(str(path.relative_to(out)) for path in out.rglob("*.*")) == [
         "columns.csv",
+        "mapping.toml",
         "session.json",
-        "session.toml",
         *(
             f"trial_{trial}/{file}"
             for trial in ("2 deep", "indent-1")
-            for file in ("axis.csv", "event.csv", "force.csv", "trial.toml")
+            for file in ("axis.csv", "event.csv", "force.csv")
         ),
     ]
     with (out / "trial_indent-1" / "force.csv").open(newline="") as file:
@@ -69,7 +75,9 @@ def test_csv_looks_like_this(session: Session, tmp_path: Path) -> None:
         '1,0,1000000000,1000000000,10,"note","Berührung 0"',
         '1.1,1,1100000000,1100000000,10,"note","Berührung 1"',
     ]
-    assert (out / "session.toml").read_text() == '"id" = "s1"\n\n["subject"]\n"id" = "7"\n"age" = 31\n'
+    mapping = load(DataMapping, out / MAPPING_FILE)
+    assert (mapping.session.id, mapping.session.subject) == ("s1", {"id": "7", "age": 31})
+    assert [form.files for form in mapping.tables] == [f"{{recording:trial_*}}/{s}.csv" for s in ("force", "axis")]
     legend = (out / "columns.csv").read_text().splitlines()
     assert legend[0] == "stream,column,unit,meaning"
     assert 'force,fz_N,N,"force along the sensor\'s z"' in legend
@@ -80,8 +88,8 @@ def test_csv_looks_like_this(session: Session, tmp_path: Path) -> None:
 def test_an_unknown_speed_is_left_out_of_the_csv_export(session: Session, tmp_path: Path) -> None:
     trial = replace(session.trials[0], speed_mm_s=math.nan)
     out = export(replace(session, info=replace(session.info, trials=(trial,))), "csv", tmp_path / "out")
-    text = (out / "trial_indent-1" / "trial.toml").read_text()
-    assert tomllib.loads(text) == {"name": "indent-1", "depth_mm": 8.0, "outcome": "done"}
+    stated = tomllib.loads((out / MAPPING_FILE).read_text())["recordings"]
+    assert stated == {"trial_indent-1": {"depth_mm": 8.0, "outcome": "done"}}
 
 
 def test_parquet_has_units(session: Session, tmp_path: Path) -> None:
@@ -157,7 +165,7 @@ def test_an_empty_session_is_refused(session: Session, tmp_path: Path) -> None:
 
 def test_exported_csv_can_be_imported_again(source: Path, tmp_path: Path) -> None:
     first = run(source)
-    again = import_session(export(first, "csv", tmp_path / "csv"), tmp_path / "again", [], NOW)
+    again = imported(export(first, "csv", tmp_path / "csv"), tmp_path / "again")
     assert again.info.id == first.info.id
     assert again.info.subject == first.info.subject
     for before, after in zip(first.trials, again.trials, strict=True):
@@ -171,15 +179,15 @@ def test_exported_csv_can_be_imported_again(source: Path, tmp_path: Path) -> Non
 def test_two_tools_seen_at_one_time_come_back_as_two(source: Path, tmp_path: Path) -> None:
     folder = export(run(source), "csv", tmp_path / "csv")
     (trial, *_) = sorted(folder.glob("trial_*"))
-    rows = [f"{0.1 * frame:.1f},{frame},0,0,{tool}" for frame in range(5) for tool in (0, 1)]
-    (trial / "marker.csv").write_text("\n".join(["time_s,x_mm,y_mm,z_mm,tool", *rows]) + "\n")
-    again = import_session(folder, tmp_path / "again", [], NOW)
+    rows = [f"{100_000_000 * frame},{frame},0,0,{tool}" for frame in range(5) for tool in (0, 1)]
+    (trial / "marker.csv").write_text("\n".join(["capture_ns,x_mm,y_mm,z_mm,tool", *rows]) + "\n")
+    again = imported(folder, tmp_path / "again")
     marker = again.recording(trial.name).tables["marker"]
     assert marker["tool"].tolist() == [0, 1] * 5
     assert marker["x_mm"].tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
-    (trial / "marker.csv").write_text("\n".join(["time_s,x_mm,y_mm,z_mm,tool", *rows[::-1]]) + "\n")
-    with pytest.raises(DataError, match=r"marker.csv line 4, column time_s: 0.3 s follows 0.4 s; time must increase"):
-        import_session(folder, tmp_path / "turned", [], NOW)
+    (trial / "marker.csv").write_text("\n".join(["capture_ns,x_mm,y_mm,z_mm,tool", *rows[::-1]]) + "\n")
+    with pytest.raises(DataError, match=r"marker.csv line 4: time 0.3 s follows 0.4 s; time must increase"):
+        imported(folder, tmp_path / "turned")
 
 
 def test_how_late_each_sample_came_is_kept(source: Path, tmp_path: Path) -> None:
@@ -191,7 +199,7 @@ def test_how_late_each_sample_came_is_kept(source: Path, tmp_path: Path) -> None
     cells = [row.split(",") for row in rows]
     later = [[*row[:at], str(int(row[at]) + 700), *row[at + 1 :]] for row in cells]
     (trial / "axis.csv").write_text("\n".join([header, *(",".join(row) for row in later)]) + "\n")
-    axis_rows = import_session(folder, tmp_path / "again", [], NOW).recording(trial.name).tables["axis"]
+    axis_rows = imported(folder, tmp_path / "again").recording(trial.name).tables["axis"]
     assert set((axis_rows["arrival_ns"] - axis_rows["capture_ns"]).tolist()) == {700}
 
 

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rig.config.table import load
 from rig.errors import DataError, UsageError
-from rig.recording.importing import import_session
+from rig.intake.mapping import MAPPING_FILE, DataMapping
+from rig.intake.session import import_folder
 from rig.recording.sessions import Session, open_session, write_session
 from rig.results.csv import as_csv
 from rig.results.fit import FitResult
@@ -21,6 +23,7 @@ from rig.tissue.model import load_model
 from rig.tissue.registry import COMPARED
 from rig.tissue.study import Study, fingerprint, model_of, rows, study_curves, study_session, study_sessions
 from rig.tissue.summary import Skipped
+from tests.rig.recording.measured import turned_tables
 from tests.rig.tissue.synthetic import Bench, index_force, metadata, tables, write_made_session, write_recording
 
 
@@ -235,13 +238,13 @@ def write_csv(path: Path, header: str, columns: list[np.ndarray[tuple[int], np.d
 def test_an_imported_session_of_streams_with_own_rates_and_clocks_is_fitted(tmp_path: Path, turned: bool) -> None:
     source, sign = tmp_path / "measured", -1.0 if turned else 1.0
     source.mkdir()
-    (source / "session.toml").write_text('force_positive = "tension"\nposition_positive = "out"\n' if turned else "")
+    stated: list[str] = []
     bench, start_s = Bench(noise_N=0.02, quantum_N=0.0), 0.0
     for number, speed_mm_s in enumerate((5.0, 10.0, 20.0) * 2):
         cycle = bench.cycle(speed_mm_s, number)
         trial = source / f"trial_{number:02d}"
         trial.mkdir()
-        (trial / "trial.toml").write_text(f"speed_mm_s = {speed_mm_s}\ndepth_mm = 8.0\n")
+        stated.append(f"[recordings.{trial.name}]\nspeed_mm_s = {speed_mm_s}\ndepth_mm = 8.0\n")
         force, axis = slice(None, None, 5), slice(3, None, 10)
         write_csv(
             trial / "force.csv",
@@ -252,7 +255,9 @@ def test_an_imported_session_of_streams_with_own_rates_and_clocks_is_fitted(tmp_
             trial / "axis.csv", "time_s,position_mm", [start_s + cycle.time_s[axis], sign * cycle.position_mm[axis]]
         )
         start_s += cycle.time_s[-1] + 5.0
-    session = import_session(source, tmp_path / "session", (), datetime(2026, 1, 2, tzinfo=UTC))
+    (source / MAPPING_FILE).write_text('recording = "{recording}"\n' + "".join(stated) + turned_tables(turned))
+    mapping, now = load(DataMapping, source / MAPPING_FILE), datetime(2026, 1, 2, tzinfo=UTC)
+    session = import_folder(source, mapping, tmp_path / "session", now)
     study = study_session(session)
     assert len(study.curves) == 6
     assert study.judged["index"].law.values == pytest.approx([0.12, 0.22, 0.01], rel=0.06)

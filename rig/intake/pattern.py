@@ -1,0 +1,48 @@
+"""Patterns with named places, ``{run}/well_{site:[A-H]?}_*.csv``: which files and sheets they name, and what with."""
+
+import re
+import string
+from collections.abc import Mapping
+
+from rig.errors import UsageError
+
+_PLACE = re.compile(
+    r"\{(?P<name>\w+)(?::(?P<shell>[^{}]*))?\}|(?P<folders>\*\*/)|(?P<many>\*)|(?P<one>\?)|\[(?P<of>[^\]/]+)\]"
+)
+
+
+def matched(pattern: str, text: str) -> dict[str, str] | None:
+    """What stands in each named place, None where ``text`` is not of the pattern.
+
+    ``*``, ``?``, ``[A-Z]`` and ``**/`` are as in a shell; a place takes anything in one folder, or what the shell
+    pattern behind its colon takes. A name that stands twice stands for the same.
+    """
+    found = re.fullmatch(_expression(pattern, set()), text)
+    return found.groupdict() if found else None
+
+
+def _expression(pattern: str, seen: set[str]) -> str:
+    parts, end = [], 0
+    for place in _PLACE.finditer(pattern):
+        parts += [re.escape(pattern[end : place.start()]), _place(place, seen)]
+        end = place.end()
+    return "".join([*parts, re.escape(pattern[end:])])
+
+
+def _place(place: re.Match[str], seen: set[str]) -> str:
+    if place["of"]:
+        return f"[{place['of'].replace('!', '^', 1) if place['of'].startswith('!') else place['of']}]"
+    if not place["name"]:
+        return "(?:.*/)?" if place["folders"] else "[^/]*" if place["many"] else "[^/]"
+    if place["name"] in seen:
+        return f"(?P={place['name']})"
+    seen.add(place["name"])
+    return f"(?P<{place['name']}>{_expression(place['shell'], seen) if place['shell'] else '[^/]+?'})"
+
+
+def filled(template: str, labels: Mapping[str, str], where: str) -> str:
+    """``template`` with each ``{name}`` replaced; raises UsageError naming those there are."""
+    try:
+        return string.Formatter().vformat(template, (), labels)
+    except (KeyError, IndexError, ValueError) as error:
+        raise UsageError(f"{where}: {template!r} asks for {error}; there are {', '.join(sorted(labels))}") from error

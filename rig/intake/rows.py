@@ -1,0 +1,204 @@
+"""From columns as they stand in a file to rows of the project's streams."""
+
+import math
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.channels import AXIS, BY_NAME, MARKER, Stream
+from rig.errors import DataError
+from rig.intake.mapping import FileForm, ValueColumn
+from rig.intake.sheet import Column, Sheet
+from rig.intake.times import Times, agreed_unit, is_text, times_ns
+from rig.intake.units import factor_of
+
+Numbers = NDArray[np.float64]
+# Which field of which stream a quantity of the mapping fills; a stream is there where its first quantity is.
+FIELDS = {
+    "force": {"force": "fz_N", "temperature": "temperature_C"},
+    "axis": {"position": "position_mm", "velocity": "velocity_mm_s", "current": "current_A"},
+    "marker": {"x": "x_mm", "y": "y_mm", "z": "z_mm", "tool": "tool"},
+}
+EXAMPLES = {"force": "N", "velocity": "mm/s", "current": "A", "temperature": "C", "arrival": "ns"}
+
+
+class Piece(NamedTuple):
+    """Rows of one recording: their times, and the numbers of each quantity in the project's units."""
+
+    label: str
+    at_ns: Times
+    values: dict[str, Numbers]
+    saturated: int
+    dropped: int
+
+
+def pieces(sheet: Sheet, form: FileForm) -> Iterator[Piece]:
+    """The rows of a sheet, piece by piece, one label each; raises DataError with the place of what is wrong."""
+    wanted = _wanted(sheet, form)
+    first, clocks = 0, dict[tuple[str, float], int]()
+    for batch in sheet.read(dict(wanted.values())):
+        found = dict(zip(wanted, batch, strict=True))
+        count = len(batch[0])
+        at_ns = times_ns(found.get("time"), first, count, form.time, sheet)
+        values, saturated = _values(found, sheet, form)
+        for label, rows in _runs(found.get("label"), count):
+            part = {name: column[rows] for name, column in values.items()}
+            keep = _in_order(at_ns[rows], part.get("tool"), clocks, label, form, sheet, first + rows.start)
+            kept = {name: column[keep] for name, column in part.items()}
+            yield Piece(label, at_ns[rows][keep], kept, int(saturated[rows].sum()), int((~keep).sum()))
+        first += count
+
+
+def _wanted(sheet: Sheet, form: FileForm) -> dict[str, tuple[int, bool]]:
+    """Number of each column that is read, and whether it is text."""
+    wanted: dict[str, tuple[int, bool]] = {}
+    if form.time.column is not None:
+        wanted["time"] = (sheet.number(form.time.column), is_text(form.time))
+    if form.label is not None:
+        wanted["label"] = (sheet.number(form.label), True)
+    taken = {number for number, _ in wanted.values()}
+    for quantity, column in form.columns.items():
+        number = sheet.number(column.column)
+        if number in taken:
+            raise DataError(
+                f"{sheet.where}: column {column.column!r} is named twice in the mapping; one of them is wrong"
+            )
+        taken.add(number)
+        wanted[quantity] = (number, False)
+    return wanted
+
+
+def _runs(labels: Column | None, count: int) -> Iterator[tuple[str, slice]]:
+    """Rows that follow each other under one label."""
+    if labels is None:
+        yield "", slice(0, count)
+        return
+    names = np.asarray(labels)
+    starts = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1).tolist(), count]
+    yield from ((str(names[start]), slice(start, end)) for start, end in pairwise(starts))
+
+
+def _in_order(
+    at_ns: Times,
+    tool: Numbers | None,
+    clocks: dict[tuple[str, float], int],
+    label: str,
+    form: FileForm,
+    sheet: Sheet,
+    first: int,
+) -> NDArray[np.bool_]:
+    """Rows whose time is after that of all before them, of one tool; ``clocks`` keeps the latest of each piece."""
+    latest = np.empty_like(at_ns)
+    for one in np.unique(tool) if tool is not None else [0.0]:
+        rows = np.flatnonzero(tool == one) if tool is not None else np.arange(at_ns.size)
+        before = [clocks.get((label, one), at_ns[rows[0]] - 1)] if rows.size else []
+        reached = np.maximum.accumulate(np.concatenate([np.array(before, np.int64), at_ns[rows]]))
+        latest[rows] = reached[:-1]
+        clocks.update({(label, one): int(reached[-1])} if rows.size else {})
+    late = np.flatnonzero(at_ns <= latest)
+    if late.size and form.disorder == "refuse":
+        _refuse_order(at_ns, latest, int(late[0]), sheet.place(first + int(late[0])))
+    return at_ns > latest
+
+
+def _refuse_order(at_ns: Times, latest: Times, row: int, place: str) -> None:
+    raise DataError(
+        f"{place}: time {at_ns[row] * 1e-9:.9g} s follows {latest[row] * 1e-9:.9g} s; time must increase from row to "
+        "row. Mend the file, or leave such rows out: disorder = 'drop'"
+    )
+
+
+def _values(found: Mapping[str, Column], sheet: Sheet, form: FileForm) -> tuple[dict[str, Numbers], NDArray[np.bool_]]:
+    """Every quantity in the project's unit; a number at the end of its range is NaN, and counted."""
+    values, saturated = dict[str, Numbers](), np.zeros(len(next(iter(found.values()))), bool)
+    for quantity, column in form.columns.items():
+        raw = np.asarray(found[quantity], np.float64)
+        full = _saturated(raw, column)
+        values[quantity] = np.where(full, math.nan, _converted(raw, quantity, column, sheet, form.lever_mm))
+        saturated |= full
+    return values, saturated
+
+
+def _saturated(raw: Numbers, column: ValueColumn) -> NDArray[np.bool_]:
+    low, high = column.saturates or (-math.inf, math.inf)
+    return (raw <= low) | (raw >= high) if column.saturates else np.zeros(raw.size, bool)
+
+
+def _converted(raw: Numbers, quantity: str, column: ValueColumn, sheet: Sheet, lever_mm: float | None) -> Numbers:
+    if column.sign_bit is not None:
+        raw = _signed(raw, column.sign_bit)
+    if quantity == "tool":
+        return raw
+    scale = _scale(quantity, column, sheet, lever_mm) if column.scale is None else column.scale
+    if scale == 1.0 and column.offset == 0.0:
+        return raw * column.positive
+    return column.positive * (scale * raw + column.offset)
+
+
+def _scale(quantity: str, column: ValueColumn, sheet: Sheet, lever_mm: float | None) -> float:
+    number = sheet.number(column.column)
+    unit = agreed_unit(column.unit, sheet, number, quantity, EXAMPLES.get(quantity, "mm"))
+    try:
+        return factor_of(quantity, unit, lever_mm)
+    except DataError as error:
+        raise DataError(f"{sheet.where}: column {sheet.header[number]!r}: {error}; or state a scale") from error
+
+
+def _signed(raw: Numbers, bit: int) -> Numbers:
+    """Numbers whose sign stands in ``bit``; what is missing stays so."""
+    weight = float(1 << bit)
+    return np.where(raw >= weight, weight - raw, raw)
+
+
+def stream_rows(piece: Piece, before: Mapping[str, NDArray[np.void]]) -> dict[str, NDArray[np.void]]:
+    """Rows of every stream the piece holds, their numbers going on from the last rows ``before``.
+
+    What was not measured is NaN, or 0 where the field is an integer; velocity is the slope of the position where no
+    column has it, and position the integral of the velocity.
+    """
+    values, at_s = dict(piece.values), piece.at_ns.astype(np.float64) * 1e-9
+    if "position" not in values and "velocity" in values:
+        values["position"] = _integral(at_s, values["velocity"], before.get(AXIS.name))
+    if "position" in values and "velocity" not in values:
+        values["velocity"] = np.gradient(values["position"], at_s) if at_s.size > 1 else np.full(at_s.shape, math.nan)
+    return {
+        stream: _filled(BY_NAME[stream], piece.at_ns, values, fields, before.get(stream))
+        for stream, fields in FIELDS.items()
+        if next(iter(fields)) in values
+    }
+
+
+def _integral(at_s: Numbers, velocity: Numbers, before: NDArray[np.void] | None) -> Numbers:
+    """The way gone at the ``velocity`` from where the axis was ``before``, 0 at the first row, by trapezia."""
+    start = before[-1] if before is not None else None
+    at_s = np.concatenate([[at_s[0] if start is None else start["capture_ns"] * 1e-9], at_s])
+    velocity = np.concatenate([[velocity[0] if start is None else start["velocity_mm_s"]], velocity])
+    gone = np.cumsum(np.diff(at_s) * (velocity[1:] + velocity[:-1]) / 2)
+    return np.asarray(gone + (0.0 if start is None else start["position_mm"]))
+
+
+def _filled(
+    stream: Stream,
+    at_ns: Times,
+    values: Mapping[str, Numbers],
+    fields: Mapping[str, str],
+    before: NDArray[np.void] | None,
+) -> NDArray[np.void]:
+    rows = np.zeros(at_ns.size, stream.dtype)
+    for name, kind in stream.kinds.items():
+        if kind is float:
+            rows[name] = math.nan
+    rows["seq"] = np.arange(at_ns.size) + (0 if before is None else before[-1]["seq"] + 1)
+    rows["capture_ns"] = rows["arrival_ns"] = at_ns
+    if "arrival" in values:
+        rows["arrival_ns"] = np.round(values["arrival"]).astype(np.int64)
+    for quantity in fields.keys() & values.keys():
+        rows[fields[quantity]] = values[quantity]
+    if stream is MARKER:
+        rows["frame"] = rows["seq"]
+    needed = ("x", "y", "z") if stream is MARKER else (next(iter(fields)),)
+    rows["valid"] = np.all([np.isfinite(values[quantity]) for quantity in needed], axis=0)
+    return rows

@@ -1,0 +1,67 @@
+"""The one raw form of every kind of file: named columns of numbers or texts, read a piece at a time."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import DataError
+from rig.intake.mapping import Place
+
+Column = NDArray[np.generic] | list[str]
+Batch = Sequence[Column]
+MISSING = "not there"
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A CSV file, a sheet of a workbook, the vectors of a struct, a group or a topic.
+
+    ``read`` takes the numbers (from 0) of columns, whether each is text, and gives them piece by piece, in the order
+    asked for, alike in length. ``first_row`` is where the first of them stands in the file, counted from 1 in
+    ``counted``s. ``facts`` are what stands above the table; ``unread`` says what in the file was not understood.
+    """
+
+    path: Path
+    name: str
+    header: tuple[str, ...]
+    units: tuple[str, ...]
+    read: Callable[[Mapping[int, bool]], Iterator[Batch]]
+    facts: Mapping[str, str] = field(default_factory=dict)
+    first_row: int = 1
+    counted: str = "row"
+    unread: str = ""
+
+    @property
+    def where(self) -> str:
+        """The file, and the sheet where it has several."""
+        return f"{self.path}, {self.name}" if self.name else str(self.path)
+
+    def place(self, row: int) -> str:
+        """Where row ``row`` (from 0) of the data stands."""
+        return f"{self.where} {self.counted} {self.first_row + row}"
+
+    def number(self, place: Place) -> int:
+        """The number of a column from 0; raises DataError where it is not there, or there twice."""
+        if isinstance(place, int):
+            if place > len(self.header):
+                raise DataError(f"{self.where}: no column {place}; there are {len(self.header)}")
+            return place - 1
+        if self.header.count(place) > 1:
+            raise DataError(
+                f"{self.where}: column {place!r} stands there {self.header.count(place)} times; name it by number"
+            )
+        if place not in self.header:
+            raise DataError(f"{self.where}: no column {place!r}; there are {self._shown()}{self.unread}")
+        return self.header.index(place)
+
+    def _shown(self) -> str:
+        return ", ".join(map(repr, self.header[:20])) + (" ..." if len(self.header) > 20 else "")
+
+
+def facts_in(rows: Sequence[Sequence[str]]) -> dict[str, str]:
+    """Of the rows above a table those that are a name and a value."""
+    found = ([cell for cell in map(str.strip, row) if cell] for row in rows)
+    return {row[0].rstrip(":"): " ".join(row[1:]) for row in found if len(row) > 1}

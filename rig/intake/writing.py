@@ -1,0 +1,94 @@
+"""A recording while it is written piece by piece, and what the session lists of it."""
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.channels import AXIS, BY_NAME, FORCE
+from rig.errors import DataError
+from rig.intake.folder import Table
+from rig.intake.rows import Piece, stream_rows
+from rig.recording.mcap_file import RecordingWriter
+from rig.recording.sessions import TrialInfo
+
+# Fewer rows tell no rate.
+FEWEST_ROWS = 2
+
+
+@dataclass(frozen=True)
+class Written:
+    """A recording that is finished: what is listed of it, when it began and ended, a hash of its rows, remarks."""
+
+    info: TrialInfo
+    span_ns: tuple[int, int]
+    digest: bytes
+    remarks: tuple[str, ...]
+
+
+class OpenRecording:
+    """A recording being written; ``info`` is what is known of it so far."""
+
+    def __init__(self, folder: Path, info: TrialInfo, metadata: Mapping[str, Mapping[str, str]]) -> None:
+        """Creates its file in ``folder``."""
+        self.info = info
+        self._writer = RecordingWriter(folder / info.file, metadata)
+        self._last: dict[str, NDArray[np.void]] = {}
+        self._sources: dict[str, str] = {}
+        self._seen = hashlib.sha256()
+        self._span_ns: list[int] = []
+        self._saturated = self._dropped = 0
+
+    def add(self, piece: Piece, table: Table) -> None:
+        """Appends a piece; raises DataError where a stream was there before."""
+        self._saturated += piece.saturated
+        self._dropped += piece.dropped
+        if not piece.at_ns.size:
+            return
+        for stream, rows in stream_rows(piece, self._last).items():
+            if self._sources.setdefault(stream, table.sheet.where) != table.sheet.where:
+                raise DataError(
+                    f"{table.sheet.where}: {stream} of recording {self.info.name} was there before; name what "
+                    "tells the two apart in `recording`"
+                )
+            self._write(stream, rows)
+
+    def _write(self, stream: str, rows: NDArray[np.void]) -> None:
+        self._writer.add_rows(BY_NAME[stream], rows)
+        self._seen.update(rows.tobytes())
+        self._last[stream] = rows[-1:]
+        span_ns = [*self._span_ns, int(rows[0]["capture_ns"]), int(rows[-1]["capture_ns"])]
+        self._span_ns = [min(span_ns), max(span_ns)]
+        samples = {**self.info.samples, stream: self.info.samples.get(stream, 0) + rows.size}
+        peak_N = (
+            float(np.fmax.reduce(rows["fz_N"], initial=self.info.peak_force_N)) if stream == FORCE.name else math.nan
+        )
+        self.info = replace(self.info, samples=samples, peak_force_N=np.fmax(peak_N, self.info.peak_force_N).item())
+
+    def finish(self) -> Written:
+        """Closes the file; raises DataError where it holds too little."""
+        samples, name = self.info.samples, self.info.name
+        if min(samples.values(), default=0) < FEWEST_ROWS:
+            found = "only one row" if samples else "no row"
+            raise DataError(f"recording {name}: {found} under the header; a stream needs at least {FEWEST_ROWS}")
+        self._writer.finish({"outcome": self.info.outcome, "samples": json.dumps(samples)})
+        first, last = self._span_ns
+        return Written(self.info, (first, last), self._seen.digest(), tuple(self._remarks()))
+
+    def _remarks(self) -> list[str]:
+        counts = {
+            "at the end of the range, marked not valid": self._saturated,
+            "out of order in time, left out": self._dropped,
+        }
+        said = [f"{self.info.name}: {count} samples {what}" for what, count in counts.items() if count]
+        absent = [stream.name for stream in (FORCE, AXIS) if stream.name not in self.info.samples]
+        return said + [f"{self.info.name}: holds no {stream}" for stream in absent]
+
+    def close(self) -> None:
+        """Lets go of the file as it is."""
+        self._writer.close()
