@@ -6,7 +6,7 @@ from typing import Literal
 from pydantic import ConfigDict, Field
 
 from rig.results.base import Number, Result, SavedResult
-from rig.tissue.summary import ControlRow, IndexFit, KPoint, Row, Skipped, SpeedSummary
+from rig.tissue.summary import ControlRow, IndexFit, KPoint, RateTest, Row, Skipped, SpeedSummary
 from rig.trials.findings import Finding
 
 FOLDER, FILE, MODEL = "fit", "fit.json", "model.json"
@@ -50,21 +50,6 @@ class LawResult(DisplacementErrors):
     interval_method: str
     held_out: HeldOut
     control: tuple[ControlRow, ...] = Field(description="what the law means to a force loop, at each given force")
-
-
-class RateResult(Result):
-    """Whether speeds differ: damping B with its interval over trials, against the study's 1.3 N s/mm."""
-
-    damping_N_s_mm: float
-    interval: tuple[float, float]
-    p_value: float
-    trials: int
-    speeds_mm_s: tuple[float, ...]
-    effect_N: float = Field(description="force that B makes between slowest and fastest speed")
-    effect_interval_N: tuple[float, float]
-    spread_N: float = Field(description="scatter of trials")
-    study_effect_N: float
-    excludes_study: bool
 
 
 class LatticeSweep(Result):
@@ -115,7 +100,7 @@ class FitResult(SavedResult):
     speeds: tuple[SpeedSummary, ...]
     force_N: tuple[float, ...] = Field(description="the given forces, at which errors are taken")
     closest: str = Field(description="the law with the smallest residual, whose contact all displacements count from")
-    rate: RateResult | None
+    rate: RateTest | None
     model: str = Field(description="the model file that was written")
     model_law: str = Field(description="the law that file holds")
     known: Mapping[str, float] = Field(description="parameters that were given")

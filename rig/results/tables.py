@@ -3,10 +3,10 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from rig.results.fit import DisplacementErrors, FitResult, LatticeResult, LawResult, RateResult
+from rig.results.fit import DisplacementErrors, FitResult, LatticeResult, LawResult
 from rig.results.tracking import ComparedRun, Followed, SimulateResult, TrackingGain, TrackResult
 from rig.tissue.rates import STUDY_B_N_S_MM
-from rig.tissue.summary import ControlRow
+from rig.tissue.summary import ControlRow, RateTest
 
 UNKNOWN = "–"
 
@@ -173,7 +173,7 @@ def control_table(control: Sequence[ControlRow], law: str) -> TextTable:
     return TextTable(f"K and B for control ({law})", header, rows, words=0)
 
 
-def rate_sentence(rate: RateResult) -> str:
+def rate_sentence(rate: RateTest) -> str:
     """What the comparison of speeds found, and what it says of the study's B."""
     low, high = rate.effect_interval_N
     return (

@@ -5,7 +5,6 @@ speed. The slope is B.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from rig.errors import DataError
 from rig.tissue.intervals import student_reach
 from rig.tissue.laws import FloatArray
+from rig.tissue.summary import RateTest
 from rig.trials.curves import Curve
 
 STUDY_B_N_S_MM = 1.3  # the study's, against which the session's is put
@@ -20,38 +20,6 @@ _DEPTHS = 40
 _SHALLOWEST_MM = 0.2  # above it a curve's uncertain contact makes the force
 _DRAWS = 2000
 ROUNDING = 1e-9  # the same sum in another order is no larger slope
-
-
-@dataclass(frozen=True)
-class RateTest:
-    """B in N s/mm with its interval over trials, and the share of shuffled speed labels that give as large a slope.
-
-    ``effect_N`` is the force that B makes between slowest and fastest speed; ``spread_N`` the scatter of trials.
-    """
-
-    damping_N_s_mm: float
-    interval: tuple[float, float]
-    p_value: float
-    trials: int
-    speeds_mm_s: tuple[float, ...]
-    effect_N: float
-    spread_N: float
-
-    @property
-    def study_effect_N(self) -> float:
-        """Force between slowest and fastest speed if B were the study's 1.3 N s/mm."""
-        return STUDY_B_N_S_MM * (self.speeds_mm_s[-1] - self.speeds_mm_s[0])
-
-    @property
-    def effect_interval_N(self) -> tuple[float, float]:
-        """Interval of ``effect_N``."""
-        range_mm_s = self.speeds_mm_s[-1] - self.speeds_mm_s[0]
-        return self.interval[0] * range_mm_s, self.interval[1] * range_mm_s
-
-    @property
-    def excludes_study(self) -> bool:
-        """The study's B lies outside the interval."""
-        return not self.interval[0] <= STUDY_B_N_S_MM <= self.interval[1]
 
 
 def rate_of(curves: Sequence[Curve]) -> RateTest | None:
@@ -80,14 +48,18 @@ def rate_test(curves: Sequence[Curve], seed: int = 0) -> RateTest:
     slope, interval = _slope(inside, level, len(curves) - groups - 1)
     generator = np.random.default_rng(seed)
     shuffled = np.array([_shuffled(inside, subject, generator) @ level for _ in range(_DRAWS)]) / (inside @ inside)
+    range_mm_s = float(np.ptp(speeds))
     return RateTest(
-        slope,
-        interval,
-        float((np.count_nonzero(np.abs(shuffled) >= abs(slope) * (1 - ROUNDING)) + 1) / (_DRAWS + 1)),
-        len(curves),
-        tuple(float(speed) for speed in np.unique(speeds)),
-        slope * float(np.ptp(speeds)),
-        float(np.sqrt(level @ level / (len(curves) - groups))),
+        damping_N_s_mm=slope,
+        interval=interval,
+        p_value=float((np.count_nonzero(np.abs(shuffled) >= abs(slope) * (1 - ROUNDING)) + 1) / (_DRAWS + 1)),
+        trials=len(curves),
+        speeds_mm_s=tuple(float(speed) for speed in np.unique(speeds)),
+        effect_N=slope * range_mm_s,
+        effect_interval_N=(interval[0] * range_mm_s, interval[1] * range_mm_s),
+        spread_N=float(np.sqrt(level @ level / (len(curves) - groups))),
+        study_effect_N=STUDY_B_N_S_MM * range_mm_s,
+        excludes_study=not interval[0] <= STUDY_B_N_S_MM <= interval[1],
     )
 
 

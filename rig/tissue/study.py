@@ -15,9 +15,9 @@ from rig.tissue.intervals import LEVEL
 from rig.tissue.judging import Errors, Judged, given_forces, judge
 from rig.tissue.laws import FloatArray, Law
 from rig.tissue.model import Model, Provenance, Quality, ValidRange
-from rig.tissue.rates import RateTest, rate_of
+from rig.tissue.rates import rate_of
 from rig.tissue.registry import COMPARED
-from rig.tissue.summary import Row, Skipped, SpeedSummary
+from rig.tissue.summary import RateTest, Row, Skipped, SpeedSummary
 from rig.trials.curves import Curve, loading_curve
 from rig.trials.cycles import cycle_of
 from rig.trials.findings import SAMPLES_LEFT_OUT, TRIAL_LEFT_OUT

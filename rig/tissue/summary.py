@@ -46,6 +46,26 @@ class Row:
     error_percent: float | None
 
 
+@dataclass(frozen=True)
+class RateTest:
+    """Whether speeds differ: damping B with its interval over trials, against the study's 1.3 N s/mm.
+
+    ``p_value`` is the share of shuffled speed labels that give as large a slope. ``effect_N`` is the force that B makes
+    between slowest and fastest speed, ``study_effect_N`` what the study's B would; ``spread_N`` the scatter of trials.
+    """
+
+    damping_N_s_mm: float
+    interval: tuple[float, float]
+    p_value: float
+    trials: int
+    speeds_mm_s: tuple[float, ...]
+    effect_N: float
+    effect_interval_N: tuple[float, float]
+    spread_N: float
+    study_effect_N: float
+    excludes_study: bool
+
+
 class ControlRow(Table):
     """One force: the depth at rest, stiffness from contact (secant) and for a small move (tangent), and damping.
 

@@ -46,15 +46,6 @@ class Springs:
         """Whether cells are kept from inverting."""
         return "stabilised" if self.cell_ratio > 0.0 else "study"
 
-    @property
-    def poisson_ratio(self) -> float:
-        """Small-strain Poisson ratio of the isotropic lattice."""
-        return (1.0 + self.cell_ratio) / (2.0 * (2.0 + self.cell_ratio))
-
-    def young_modulus_MPa(self, spacing_mm: float) -> float:
-        """Small-strain Young's modulus in N/mm^2: 2 G (1 + nu) with G = k/d; 2.5 k/d without the volume term."""
-        return 2.0 * self.k_N_mm / spacing_mm * (1.0 + self.poisson_ratio)
-
     def for_kernels(self, spacing_mm: float) -> Stiffness:
         """The numbers the compiled loops read."""
         return Stiffness(self.k_N_mm, self.b, self.cell_ratio * self.k_N_mm * spacing_mm**2, spacing_mm)

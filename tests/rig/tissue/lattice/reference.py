@@ -11,6 +11,13 @@ from rig.tissue.lattice.springs import Springs
 STEPS = [s for s in product((-1, 0, 1), repeat=3) if 0 < sum(map(abs, s)) < 3 and s > (0, 0, 0)]
 
 
+def moduli(springs: Springs) -> tuple[float, float]:
+    """Small-strain Young's modulus [MPa] at a spacing of 1 mm, and Poisson's ratio, of lambda = k + kv and G = k."""
+    lame_MPa, shear_MPa = springs.k_N_mm * (1.0 + springs.cell_ratio), springs.k_N_mm
+    nu = lame_MPa / (2.0 * (lame_MPa + shear_MPa))
+    return 2.0 * shear_MPa * (1.0 + nu), nu
+
+
 def energy(inner: Floats, springs: Springs, block: Block) -> float:
     """Energy of positions (3, nx, ny, nz) in N mm, by the formulas of the docstrings."""
     return _springs(inner, springs, block.spacing_mm) + _cells(inner, springs, block.spacing_mm)

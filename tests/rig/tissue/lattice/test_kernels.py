@@ -11,7 +11,7 @@ from rig.tissue.lattice.numba_types import Matrix
 from rig.tissue.lattice.rows import FRONT
 from rig.tissue.lattice.springs import Springs
 from rig.tissue.lattice.state import Loaded
-from tests.rig.tissue.lattice.reference import energy
+from tests.rig.tissue.lattice.reference import energy, moduli
 
 SIGNALLING_NAN = 0x7FF0000000000001
 LAWS = [Springs(0.1, 0.0, 0.0), Springs(0.1, 6.0, 0.0), Springs(0.1, 0.0, 1.0), Springs(0.3, 3.0, 2.0)]
@@ -120,8 +120,8 @@ def test_patch_a_uniform_strain_leaves_inner_nodes_at_rest_with_the_stress_of_th
     lattice.x[2] *= 1.0 + strain
     force = block.inner(lattice.force())
     assert np.abs(force[:, 1:-1, 1:-1, 1:-1]).max() < 1e-15
-    nu = springs.poisson_ratio
-    uniaxial = springs.young_modulus_MPa(1.0) * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+    young_MPa, nu = moduli(springs)
+    uniaxial = young_MPa * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
     # Inner nodes of the top face carry the stress of one cell face each.
     assert -force[2, 3, 3, -1] == pytest.approx(uniaxial * strain, rel=1e-5)
 
