@@ -60,7 +60,7 @@ class Load:
     execution_us: list[float] = field(default_factory=list)
     to_drive_us: list[float] = field(default_factory=list)
     answered_us: list[float] = field(default_factory=list)
-    slots: int = 0
+    cycles: int = 0
     missed: int = 0
     reference_us: list[float] = field(default_factory=list)
     requests: int = 0
@@ -172,7 +172,7 @@ def take(load: Load, recording: Path, found_ns: list[int]) -> None:
     load.execution_us += (loop["execution_ns"] / 1000).tolist()
     load.answered_us += ((axis["arrival_ns"] - axis["capture_ns"]) / 1000).tolist()
     load.to_drive_us += delays_us(axis["capture_ns"], found_ns)
-    load.slots += int(loop["slot"][-1] - loop["slot"][0]) + 1
+    load.cycles += int(loop["cycle"][-1] - loop["cycle"][0]) + 1
     load.missed += int(loop["missed"][-1] - loop["missed"][0])
 
 
@@ -210,12 +210,12 @@ def summary(load: Load, period_us: float) -> Summary:
         "wake p99.9 / cyclictest": ratio(wake[99.9], reference[99.9]),
         "execution p50 us": at(load.execution_us, 50),
         "execution p99 us": execution,
-        "execution p99 / slot": ratio(execution, period_us),
+        "execution p99 / period": ratio(execution, period_us),
         "loop to drive p50 us": at(load.to_drive_us, 50),
         "loop to drive p99 us": at(load.to_drive_us, 99),
         "loop to drive's answer read p50 us": at(load.answered_us, 50),
         "loop to drive's answer read p99 us": at(load.answered_us, 99),
-        "missed slots %": round(100 * load.missed / load.slots, 3) if load.slots else None,
+        "missed cycles %": round(100 * load.missed / load.cycles, 3) if load.cycles else None,
         "cyclictest over a cycle %": round(100 * len(late) / len(load.reference_us), 3) if load.reference_us else None,
         "presses stopped by a stall": load.spoilt,
         "HTTP requests per s": round(load.requests / load.busy_s, 1) if load.busy_s else None,

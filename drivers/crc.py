@@ -24,7 +24,7 @@ def crc16_x25(data: bytes) -> int:
     """CRC-16/X-25: polynomial 0x1021 reflected, initial value and final exclusive-or 0xFFFF.
 
     The standard library has the unreflected form in C; it serves here on mirrored bytes, several times faster than a
-    loop over a table, because a force frame is decoded inside a 1 ms tick.
+    loop over a table, because a force frame is decoded inside a 1 ms cycle.
     """
     crc = binascii.crc_hqx(data.translate(_MIRROR), 0xFFFF)
     return (_MIRROR[crc & 0xFF] << 8 | _MIRROR[crc >> 8]) ^ 0xFFFF

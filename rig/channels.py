@@ -79,12 +79,12 @@ class MarkerSample(NamedTuple):
 
 
 class LoopSample(NamedTuple):
-    """One tick of the loop: when it ran, how old its inputs were, what it decided."""
+    """One cycle of the loop: when it ran, how old its inputs were, what it decided."""
 
     seq: int
     capture_ns: int
     arrival_ns: int
-    slot: int
+    cycle: int
     missed: int
     scheduled_ns: int
     wake_latency_ns: int
@@ -215,10 +215,10 @@ MARKER = Stream(3, "marker", MarkerSample, STAMP | {
     "valid": ("1", "0 if the tool was missing"),
 })  # fmt: skip
 LOOP = Stream(4, "loop", LoopSample, STAMP | {
-    "slot": ("1", "number of this slot on the absolute time grid; a jump is a missed slot"),
-    "missed": ("1", "slots missed since the loop started"),
-    "scheduled_ns": ("ns", "when the slot was due"),
-    "wake_latency_ns": ("ns", "wake-up after the slot was due"),
+    "cycle": ("1", "number of this cycle on the absolute time grid; a jump is a missed cycle"),
+    "missed": ("1", "cycles missed since the loop started"),
+    "scheduled_ns": ("ns", "when the cycle was due"),
+    "wake_latency_ns": ("ns", "wake-up after the cycle was due"),
     "execution_ns": ("ns", "from wake-up to this row"),
     "force_age_ns": ("ns", "age of the newest force sample when it was used"),
     "axis_age_ns": ("ns", "age of the newest axis sample when it was used"),

@@ -15,7 +15,7 @@ ADDRESS = "http://bench.invalid/"
 KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 IDLE = RigView(
     state="idle", reason="", ready=True, mode="idle", time_ns=0, force_N=None, reference_N=None, position_mm=None,
-    depth_mm=None, missed=0, ticks=0, rates_Hz={}, health={}, lost={}, devices={}, limits={}, job=None,
+    depth_mm=None, missed=0, cycles=0, rates_Hz={}, health={}, lost={}, devices={}, limits={}, job=None,
     control=ControlView(holder="", since="", left_s=0.0),
 )  # fmt: skip
 

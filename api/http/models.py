@@ -113,7 +113,7 @@ class RigView(BaseModel):
     position_mm: float | None = None
     depth_mm: float | None = None
     missed: int = 0
-    ticks: int = 0
+    cycles: int = 0
     rates_Hz: dict[str, float] = {}
     health: dict[str, dict[str, bool]] = Field(description="per stream: alive, valid, on_rate")
     lost: dict[str, str] = {}

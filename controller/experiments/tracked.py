@@ -138,7 +138,7 @@ def evaluate(done: Recorded, model: str) -> TrackResult:
         followed=tracking.followed(*columns),
         samples=sum(done.samples.values()),
         dropped=sum(done.dropped.values()),
-        loop=LoopCount(ticks=last.seq - first.seq + 1, missed=last.missed - first.missed),
+        loop=LoopCount(cycles=last.seq - first.seq + 1, missed=last.missed - first.missed),
     )
 
 

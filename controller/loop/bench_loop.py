@@ -359,7 +359,7 @@ class BenchLoop:
             "step": row.step,
             "health": row.health,
             "missed": row.missed,
-            "ticks": row.seq + 1,
+            "cycles": row.seq + 1,
             "force_N": _finite(row.force_N),
             "peak_force_N": _finite(self.state.peak_force_N),
             "reference_N": _finite(row.reference_N),

@@ -17,7 +17,7 @@ class Cycle(NamedTuple):
 class Grid:
     """Slots at ``start_ns + n * period_ns``.
 
-    ``following`` never hands out a cycle twice and never two slots for one time: a loop that comes late runs the cycle
+    ``following`` never hands out a cycle twice and never two cycles for one time: a loop that comes late runs the cycle
     it is in, and what lay between is missed, not caught up.
     """
 

@@ -52,7 +52,7 @@ class Status(TypedDict, total=False):
     step: int
     health: int
     missed: int
-    ticks: int
+    cycles: int
     force_N: float | None
     peak_force_N: float | None
     reference_N: float | None

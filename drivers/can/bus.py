@@ -1,6 +1,6 @@
-"""Opening a CAN adapter: python-can sets it up and closes it, the tick reads and writes its descriptor directly.
+"""Opening a CAN adapter: python-can sets it up and closes it, the loop reads and writes its descriptor directly.
 
-python-can reads the line byte by byte, which costs more than the rest of a tick, and never looks at refusals.
+python-can reads the line byte by byte, which costs more than the rest of a cycle, and never looks at refusals.
 """
 
 import array

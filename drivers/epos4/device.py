@@ -1,6 +1,6 @@
 """The servo axis on a maxon EPOS4: set-up, homing, profile moves, cyclic positions, stops and faults.
 
-Set-up and moves wait and use SDO; each wait has a deadline from distance and speed, or the SDO time-out. In the tick
+Set-up and moves wait and use SDO; each wait has a deadline from distance and speed, or the SDO time-out. In the cycle
 ``command`` is one write (RPDO1 and SYNC) and ``poll`` one read. The drive stops by itself when the host falls silent:
 its watch starts with the first ``poll`` or move after ``start``, and from then on ``poll`` must be called more often
 than `setup.host_heartbeat_limit_ms`.

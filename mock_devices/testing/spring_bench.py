@@ -103,4 +103,4 @@ class SpringBench:
             self.run_cycle()
             if until() if until else not self.machine.busy:
                 return
-        raise AssertionError(f"still {self.machine.mode.name} after {cycles} ticks")
+        raise AssertionError(f"still {self.machine.mode.name} after {cycles} cycles")

@@ -12,6 +12,8 @@ from rig.errors import DataError
 from rig.recording.mcap_file import SUMMARY
 from rig.recording.scan import MAGIC, Chunk, Definition, Scan, scan
 
+# Fields of recordings that were made before they had the name on the right.
+RENAMED = {"slot": "cycle"}
 # The kind of a trial that tracked a force; one that indents has none.
 TRACKING = "tracking"
 NUMERIC = tuple(stream for stream in STREAMS if not stream.has_text)
@@ -102,5 +104,6 @@ def _streams(path: Path, chunks: Iterable[Chunk]) -> Mapping[int, Stream]:
 
 
 def layout(schema: str) -> list[list[str]]:
-    """Types and names of a ``ros2msg`` text, without comments."""
-    return [line.split("#")[0].split() for line in schema.splitlines() if line.split("#")[0].strip()]
+    """Types and names, as they are now, of a ``ros2msg`` text without comments."""
+    lines = (line.split("#")[0].split() for line in schema.splitlines())
+    return [[RENAMED.get(word, word) for word in words] for words in lines if words]

@@ -50,13 +50,13 @@ class TrialFacts:
 
 @dataclass(frozen=True)
 class LoopFacts:
-    """The loop over all recordings: times in microseconds a tick, shape (n,); ages by input."""
+    """The loop over all recordings: times in microseconds a cycle, shape (n,); ages by input."""
 
     wake_us: FloatArray
     execution_us: FloatArray
     period_us: float
     ages_us: Mapping[str, FloatArray]
-    ticks: int
+    cycles: int
     missed: int
 
 
@@ -145,7 +145,7 @@ def _loop(recordings: Sequence[Recording]) -> LoopFacts | str:
         execution_us=rows["execution_ns"] * 1e-3,
         period_us=float(np.median(np.concatenate([np.diff(table["scheduled_ns"]) for table in tables]))) * 1e-3,
         ages_us={name: ages for name, field in AGES.items() if len(ages := _ages(rows[field]))},
-        ticks=len(rows),
+        cycles=len(rows),
         missed=sum(int(table["missed"][-1] - table["missed"][0]) for table in tables),
     )
 

@@ -168,16 +168,16 @@ def tracking_figure(run: Tracked) -> Figure:
 
 
 def loop_figure(wake_us: FloatArray, execution_us: FloatArray, period_us: float) -> Figure:
-    """How late the loop woke and how long it worked, over all ticks, against its period."""
+    """How late the loop woke and how long it worked, over all cycles, against its period."""
     figure = new_figure(11.0, 3.2)
     left, right = figure.subplots(1, 2, sharey=True)
-    _histogram(left, "Wake-up after the slot was due", wake_us, period_us)
-    _histogram(right, "Work in a tick", execution_us, period_us)
+    _histogram(left, "Wake-up after the cycle was due", wake_us, period_us)
+    _histogram(right, "Work in a cycle", execution_us, period_us)
     return figure
 
 
 def _histogram(axes: Axes, title: str, values_us: FloatArray, period_us: float) -> None:
-    dress(axes, title, "µs", "share of ticks, %")
+    dress(axes, title, "µs", "share of cycles, %")
     values = np.maximum(values_us, 1.0)
     edges = np.geomspace(1.0, max(float(values.max()), period_us) * 1.3, 70).tolist()
     axes.hist(values, edges, weights=np.full(len(values), 100 / len(values)), color=ACTUAL, alpha=0.85)

@@ -65,8 +65,8 @@ def key_figures(facts: Facts) -> str:
         note = f"{shown(tracking.rms_error_N, '.2g')} N rms"
         found.append((f"{tracking.max_error_percent:.3g} %", "worst force-tracking error", note))
     if isinstance(facts.loop, LoopFacts):
-        share = 100 * facts.loop.missed / max(facts.loop.ticks + facts.loop.missed, 1)
-        found.append((f"{facts.loop.missed:,}", "missed loop slots", f"{share:.2g} % of {facts.loop.ticks:,}"))
+        share = 100 * facts.loop.missed / max(facts.loop.cycles + facts.loop.missed, 1)
+        found.append((f"{facts.loop.missed:,}", "missed loop cycles", f"{share:.2g} % of {facts.loop.cycles:,}"))
     return cards(found)
 
 
@@ -120,7 +120,7 @@ def _loop(facts: Facts) -> str:
         "loop",
         "How late the loop woke and how long it worked",
     )
-    timing = {"wake-up after due": loop.wake_us, "work in a tick": loop.execution_us} | {
+    timing = {"wake-up after due": loop.wake_us, "work in a cycle": loop.execution_us} | {
         f"age of {name} when used": ages for name, ages in loop.ages_us.items()
     }
     found = [(name, *(f"{value:,.0f}" for value in quantiles(values).values())) for name, values in timing.items()]
@@ -129,9 +129,9 @@ def _loop(facts: Facts) -> str:
     rate_Hz = 1e6 / loop.period_us
     return section(
         title,
-        figure(picture, f"All {loop.ticks:,} ticks of all recordings at {rate_Hz:,.0f} Hz; all axes are logarithmic."),
+        figure(picture, f"All {loop.cycles:,} cycles of the recordings at {rate_Hz:,.0f} Hz; axes are logarithmic."),
         table(TextTable("", ("time (µs)", "median", "99 %", "largest"), found)),
-        paragraph(f"{loop.missed:,} slots were missed while recording; a missed slot is skipped and counted."),
+        paragraph(f"{loop.missed:,} cycles were missed while recording; a missed cycle is skipped and counted."),
         pairs({f"real time: {name.replace('_', ' ')}": value for name, value in granted.items()}) if granted
         else paragraph("Which real-time privileges were granted is not in the recordings.", "missing"),
     )  # fmt: skip

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from pydantic import Field
+from pydantic import AliasChoices, Field
 
 from rig.results.base import Result, SavedResult
 
@@ -38,7 +38,7 @@ class Followed(Result):
 class LoopCount(Result):
     """Cycles of the loop during the run, and those it missed."""
 
-    ticks: int
+    cycles: int = Field(validation_alias=AliasChoices("cycles", "ticks"))
     missed: int
 
 

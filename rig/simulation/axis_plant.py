@@ -61,7 +61,7 @@ class ModelledLimb(NamedTuple):
 
 
 class ForceSensing(NamedTuple):
-    """The force channel: its filter, whole ticks between capture and use, and ticks for which a sample stands."""
+    """The force channel: its filter, whole cycles between capture and use, and cycles for which a sample stands."""
 
     filter_s: float = 0.0005
     noise_N: float = 0.005
@@ -185,7 +185,7 @@ def hold(
     target_mm: float,
     steps: int,
 ) -> AxisState:
-    """The axis ``steps`` steps later: the set-point is held, as between two ticks of the loop."""
+    """The axis ``steps`` steps later: the set-point is held, as between two cycles of the loop."""
     for _ in range(steps):
         state = step(state, motor, loop, limb, sensing, target_mm)
     return state

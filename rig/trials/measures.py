@@ -89,10 +89,10 @@ def wire_damage(recording: Recording) -> dict[str, float]:
 
 def cycles_missed(recording: Recording) -> float:
     """Share of the loop's cycles that were not run."""
-    slots = recording.tables["loop"]["slot"]
-    if len(slots) < 2:
+    numbers = recording.tables["loop"]["cycle"]
+    if len(numbers) < 2:
         return math.nan
-    return 1.0 - (len(slots) - 1) / max(int(slots[-1] - slots[0]), 1)
+    return 1.0 - (len(numbers) - 1) / max(int(numbers[-1] - numbers[0]), 1)
 
 
 def saturated(recording: Recording) -> float:

@@ -104,7 +104,7 @@ class FakeService(BaseHTTPRequestHandler):
             },
             "/api/v1/rig": {
                 "state": "not ready", "reason": "", "ready": False, "mode": "safe", "time_ns": 1, "force_N": None,
-                "reference_N": None, "position_mm": None, "depth_mm": None, "missed": 0, "ticks": 1, "health": {},
+                "reference_N": None, "position_mm": None, "depth_mm": None, "missed": 0, "cycles": 1, "health": {},
                 "lost": {}, "limits": {}, "control": {"holder": "", "since": "", "left_s": 0.0}, "job": None,
                 "rates_Hz": {"force": 1000.0, "axis": 999.0, "marker": 60.0},
                 "devices": {

@@ -47,7 +47,7 @@ def test_the_summary_holds_what_was_recorded_fitted_and_tracked(made: Path) -> N
     assert summary["recordings"] == len(trials)
     assert summary["samples"] > 50_000
     assert summary["dropped"] == 0
-    assert summary["loop"]["ticks"] > 10_000
+    assert summary["loop"]["cycles"] > 10_000
     assert summary["loop"]["missed"] >= 0
     assert summary["fit"]["index"]["max_error_percent"] < 10 < summary["fit"]["constant"]["max_error_percent"]
     assert summary["tracking"]["max_error_percent"] < LARGEST_STEADY_ERROR_PERCENT

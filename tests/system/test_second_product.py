@@ -21,8 +21,8 @@ def test_one_line_exchanges_the_force_sensor(bench: ServedBench, tmp_path: Path)
     recording = read_recording(tmp_path / "session" / "trial_001.mcap")
     assert "FT" in recording.metadata["devices"]["force"]
     force, loop = recording.tables["force"], recording.tables["loop"]
-    slots = int(loop["slot"][-1] - loop["slot"][0])
-    assert slots / len(force) == pytest.approx(10.0, rel=0.1)
+    cycles = int(loop["cycle"][-1] - loop["cycle"][0])
+    assert cycles / len(force) == pytest.approx(10.0, rel=0.1)
     assert loop["surface_mm"][-1] == pytest.approx(SURFACE_MM, abs=0.25)
     assert float(recording.metadata["summary"]["peak_force_N"]) > 3.0
 

@@ -81,7 +81,7 @@ def reset(client: TestClient) -> None:
 
 def test_the_bench_is_shown_with_its_devices_and_their_health(served: tuple[ServedBench, TestClient, Path]) -> None:
     _, client, _ = served
-    until(lambda: client.get("/api/v1/rig").json()["ticks"] > 300, PATIENCE_S, "a running loop")
+    until(lambda: client.get("/api/v1/rig").json()["cycles"] > 300, PATIENCE_S, "a running loop")
     rig = client.get("/api/v1/rig").json()
     assert rig["state"] == "idle"
     assert set(rig["devices"]) == {"force", "axis", "tracker"}

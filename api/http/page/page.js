@@ -67,7 +67,7 @@ function show(rig) {
   at("retract").disabled = rig.state !== "idle";
   at("connect").hidden = rig.state !== "disconnected";
   at("recover").hidden = rig.state === "idle" || rig.state === "running";
-  at("loop").textContent = `loop: ${rig.ticks} turns, ${rig.missed} slots missed`;
+  at("loop").textContent = `loop: ${rig.cycles} cycles, ${rig.missed} missed`;
   const mine = lease ? " (this page)" : "";
   at("control").textContent = rig.control.holder ? `in control: ${rig.control.holder}${mine}` : "nobody is in control";
   at("release").hidden = !lease || rig.state === "running";

@@ -85,7 +85,7 @@ def followed(rms_error_N: float) -> TrackResult:
     return TrackResult(
         recording="track_001.mcap", model="model.json", max_error_percent=None, rms_error_N=None, levels=(),
         followed=Followed(rms_error_N=rms_error_N, largest_error_N=1.0, amplitude_ratio=None, lag_s=None),
-        samples=1, dropped=0, loop=LoopCount(ticks=1, missed=0),
+        samples=1, dropped=0, loop=LoopCount(cycles=1, missed=0),
     )  # fmt: skip
 
 

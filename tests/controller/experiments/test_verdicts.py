@@ -127,7 +127,7 @@ def test_a_run_of_force_of_bad_quality_ends_with_the_same_code() -> None:
     followed = Followed(rms_error_N=0.1, largest_error_N=0.2, amplitude_ratio=None, lag_s=None)
     run = TrackResult(
         recording="track_001.mcap", model="model.json", max_error_percent=None, rms_error_N=None, levels=(),
-        followed=followed, samples=1, dropped=0, loop=LoopCount(ticks=1, missed=0), quality="usable",
+        followed=followed, samples=1, dropped=0, loop=LoopCount(cycles=1, missed=0), quality="usable",
         reasons=("axis: a gap of 58 ms",),
     )  # fmt: skip
     tracked.refuse_bad(run)

@@ -85,8 +85,8 @@ def test_the_first_cycle_has_number_0_and_a_status_and_then_each_has_the_next() 
     bench = FakeBench(settled=0)
     bench.cycles(51)
     rows = bench.ring.loop
-    assert [row.seq for row in rows] == [row.slot for row in rows] == list(range(51))
-    assert [status["ticks"] for status in bench.link.statuses] == [1, 51]
+    assert [row.seq for row in rows] == [row.cycle for row in rows] == list(range(51))
+    assert [status["cycles"] for status in bench.link.statuses] == [1, 51]
 
 
 def test_a_row_says_how_late_the_cycle_began_and_the_checks_hear_it_in_milliseconds() -> None:

@@ -27,7 +27,7 @@ def test_every_cycle_has_one_row_with_what_it_saw_and_decided() -> None:
     bench.cycle(late_ns=20_000)
     rows = bench.ring.loop[-3:]
     assert [row.seq for row in bench.ring.loop] == list(range(rows[-1].seq - 21, rows[-1].seq + 1))
-    assert [row.slot for row in rows] == [bench.cycle_number - 6, bench.cycle_number - 5, bench.cycle_number - 1]
+    assert [row.cycle for row in rows] == [bench.cycle_number - 6, bench.cycle_number - 5, bench.cycle_number - 1]
     assert [row.missed for row in rows] == [0, 0, 3]
     assert [row.wake_latency_ns for row in rows] == [0, 3_400_000, 20_000]
     state, last = bench.loop.state, rows[-1]
@@ -36,7 +36,7 @@ def test_every_cycle_has_one_row_with_what_it_saw_and_decided() -> None:
     assert last.position_mm == pytest.approx(bench.axis.position_mm, abs=1e-3)
     assert last._replace(reference_N=0.0, tangent_N_mm=0.0) == LoopSample(
         seq=last.seq, capture_ns=last.scheduled_ns + 20_000, arrival_ns=last.scheduled_ns + 20_000,
-        slot=bench.cycle_number - 1, missed=3, scheduled_ns=bench.start_ns + (bench.cycle_number - 1) * MS,
+        cycle=bench.cycle_number - 1, missed=3, scheduled_ns=bench.start_ns + (bench.cycle_number - 1) * MS,
         wake_latency_ns=20_000, execution_ns=0,
         force_age_ns=last.capture_ns - bench.force.samples[-1].capture_ns,
         axis_age_ns=last.capture_ns - bench.ring.axis[-1].capture_ns,
@@ -127,7 +127,7 @@ def test_status_comes_twenty_times_a_second_and_says_what_people_see() -> None:
         "mode": "compress", "busy": True, "step": 3, "health": ALL_WELL, "missed": 0, "latched": None, "lost": {},
         "ready": True,
     }  # fmt: skip
-    assert last["ticks"] == row.seq + 1
+    assert last["cycles"] == row.seq + 1
     assert (last["force_N"], last["position_mm"]) == (round(row.force_N, 4), round(row.position_mm, 4))
     assert (last["reference_N"], last["depth_mm"]) == (None, round(row.position_mm - state.surface_mm, 4))
     assert last["rates_Hz"] == {"force": 1000.0, "axis": 1000.0, "marker": 60.0}
@@ -135,7 +135,7 @@ def test_status_comes_twenty_times_a_second_and_says_what_people_see() -> None:
         "force": ("ok", ""), "axis": ("ok", ""), "tracker": ("ok", "")
     }  # fmt: skip
     assert set(last) == {
-        "time_ns", "mode", "busy", "step", "health", "missed", "ticks", "force_N", "reference_N", "position_mm",
+        "time_ns", "mode", "busy", "step", "health", "missed", "cycles", "force_N", "reference_N", "position_mm",
         "depth_mm", "rates_Hz", "lost", "devices", "ready", "latched", "peak_force_N",
     }  # fmt: skip
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import Writer
 
-from rig.channels import BY_ID, EVENT, STREAMS, EventSample
+from rig.channels import BY_ID, EVENT, LOOP, STREAMS, EventSample, LoopSample
 from rig.errors import DataError
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.reader import Recording, read_recording
@@ -189,13 +189,13 @@ def test_a_folder_in_place_of_a_file_is_one_sentence(tmp_path: Path) -> None:
         read_recording(tmp_path)
 
 
-def foreign(path: Path, topic: str, schema: str) -> Path:
+def foreign(path: Path, topic: str, schema: str, body: bytes = b"\0\1\0\0" + bytes(8)) -> Path:
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start()
         number = writer.register_schema("a/msg/A", "ros2msg", schema.encode())
         channel = writer.register_channel(topic, "cdr", number)
-        writer.add_message(channel, 0, b"\0\1\0\0" + bytes(8), 0)
+        writer.add_message(channel, 0, body, 0)
         writer.finish()
     return path
 
@@ -203,6 +203,13 @@ def foreign(path: Path, topic: str, schema: str) -> Path:
 def test_a_recording_with_other_fields_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="stream force has other fields"):
         read_recording(foreign(tmp_path / "a.mcap", "force", "int64 seq\n"))
+
+
+def test_a_recording_whose_loop_called_a_cycle_a_slot_is_read(tmp_path: Path) -> None:
+    old = LOOP.schema().replace("int64 cycle", "int64 slot")
+    body = b"\0\1\0\0" + LOOP.pack(LoopSample(1, 2, 3, 7, *(0 for _ in LoopSample._fields[4:])))
+    recording = read_recording(foreign(tmp_path / "a.mcap", "loop", old, body))
+    assert recording.tables["loop"]["cycle"].tolist() == [7]
 
 
 def test_an_mcap_file_of_someone_else_is_refused(tmp_path: Path) -> None:

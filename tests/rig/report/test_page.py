@@ -156,9 +156,9 @@ def test_tracking_is_a_table_of_reference_and_actual_force(html: str) -> None:
     assert "0.5 % worst force-tracking error 0.004 N rms" in words
 
 
-def test_missed_slots_are_counted_within_recordings(html: str) -> None:
-    assert "3 missed loop slots" in Page(html).words
-    assert "3 slots were missed while recording" in Page(html).words
+def test_missed_cycles_are_counted_within_recordings(html: str) -> None:
+    assert "3 missed loop cycles" in Page(html).words
+    assert "3 cycles were missed while recording" in Page(html).words
 
 
 def test_an_input_that_never_came_has_no_age(html: str) -> None:

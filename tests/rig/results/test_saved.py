@@ -90,7 +90,7 @@ def run_with(model: str, rms_error_N: float) -> TrackResult:
     followed = Followed(rms_error_N=rms_error_N, largest_error_N=1.0, amplitude_ratio=None, lag_s=None)
     return TrackResult(
         recording="track_001.mcap", model=model, max_error_percent=None, rms_error_N=None, levels=(),
-        followed=followed, samples=1, dropped=0, loop=LoopCount(ticks=1, missed=0),
+        followed=followed, samples=1, dropped=0, loop=LoopCount(cycles=1, missed=0),
     )  # fmt: skip
 
 
@@ -99,3 +99,7 @@ def test_a_tracked_comparison_keeps_both_runs_and_the_gain(tmp_path: Path) -> No
     read = TrackResult.read(tmp_path / "track.json")
     assert read.against is not None and (read.model, read.against.model) == ("new.json", "old.json")
     assert read.gain is not None and read.gain.reduction == pytest.approx(0.75)
+
+
+def test_a_run_saved_when_cycles_were_called_ticks_is_read() -> None:
+    assert LoopCount.model_validate({"ticks": 5, "missed": 1}) == LoopCount(cycles=5, missed=1)
