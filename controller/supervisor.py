@@ -27,10 +27,10 @@ from rig.recording.ring import new_path, remove_abandoned
 from rig.results.bench import Act, ResetResult
 
 LOOP_MODULE = "controller.loop.process"
+# Homing is the longest part of a start and of an act: 3 s over 60 mm at 20 mm/s, and much more on a slower axis.
 START_TIMEOUT_S = 60.0
-LEAVE_TIMEOUT_S = 15.0
-# Homing over 60 mm at the 20 mm/s of the default, and twice that for a slower axis.
 ACT_TIMEOUT_S = 60.0
+LEAVE_TIMEOUT_S = 15.0  # to retract over 60 mm at 20 mm/s (3 s) and to close devices (4 s), twice
 WAITING = "the bench was started for recovery"
 # In order, or with a failure it reported; a loop that was killed left the axis where it was.
 ENDED_BY_ITSELF = (0, 1)

@@ -18,7 +18,7 @@ import serial
 
 from rig.errors import DeviceError
 
-CONNECT_TIMEOUT_S = 2.0
+CONNECT_TIMEOUT_S = 2.0  # a first packet that was lost is sent again after 1 s (RFC 6298)
 CHUNK = 65536
 
 

@@ -33,7 +33,7 @@ from rig.channel import Answer, Channel, Message, Received, Reply
 from rig.errors import DeviceError, RigError, UsageError
 from rig.registry import known
 
-CLIENT_TIMEOUT_S = 10.0
+CLIENT_TIMEOUT_S = 10.0  # ten times what a bench may be late by before it gives up (`serve.GIVE_UP_NS`)
 TIMES_AT_ONCE = 1000  # a second of 1 kHz: some 30 kB of JSON, a tenth of the largest message
 Time = TypeVar("Time")
 

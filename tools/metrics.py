@@ -5,8 +5,8 @@ It ends with 1 where a number that had reached its goal has left it, or `source_
 Source are the five packages; their lines are counted without what is there for safety alone (``SAFETY``). Tests are
 `tests` and what they are made with (`mock_devices.testing`). An untyped dictionary is a ``dict`` or ``Mapping`` to Any
 or object in a public signature or field that another package imports. A threshold is a number with a name at the head
-of a module that something is compared with or bounded by; its reason is a comment on its line, above it or above a pair
-of which it is the second, or a text below it.
+of a module that something is compared with or bounded by, or whose name says that it bounds (`LARGEST`, `TIMEOUT`); its
+reason is a comment on its line, above it or above a pair of which it is the second, or a text below it.
 """
 
 import ast
@@ -90,6 +90,8 @@ GOALS = {
 }
 _UNTYPED = re.compile(r"\b(dict|Mapping|MutableMapping)\[str, (typing\.)?(Any|object)\]")
 _BOUNDING = {"min", "max", "clip", "minimum", "maximum"}
+_EXTREMES = "LEAST|MOST|LARGEST|SMALLEST|LONGEST|SHORTEST|FEWEST|HIGHEST|LOWEST|DEEPEST|MAX|MIN"
+_BOUND = re.compile(rf"(^|_)({_EXTREMES}|LIMIT|MARGIN|TIMEOUT)(_|$)")
 _CONSTANT = re.compile(r"_?[A-Z][A-Z0-9]*(_\w+)*")  # a unit after the name may have small letters
 Functions = ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -259,7 +261,7 @@ def thresholds(sources: list[Source]) -> dict[str, bool]:
         for source in sources
         for node in source.tree.body
         for name in _constants(node)
-        if name in bounding
+        if name in bounding or _BOUND.search(name)
     }
 
 

@@ -48,7 +48,7 @@ PLAN = Indentation(
     clearance_mm=4.0,
     rest_s=0.1,
 )
-LARGEST_SEED = 100_000
+LARGEST_SEED = 100_000  # five digits: soon typed again, and seldom drawn twice
 FORCES_N = (1.0, 2.0, 3.0, 4.0, 5.0)
 SECONDS = 3.0
 MODEL = Path("fit") / "model.json"

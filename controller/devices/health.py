@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 NEVER_NS = 1 << 62  # 146 years: older than any sample, and ages from it still have 64 bits
 ALIVE, VALID, ON_RATE = 1, 2, 4
-IDENTICAL_LIMIT = 100
+IDENTICAL_LIMIT = 100  # with noise of half a step every other sample is alike, but never a hundred in a row
 # 10 ms at 1 kHz, in which a trial of 30 mm/s goes the 0.3 mm of `axis.standstill_mm`: neither waits for the other.
 STANDING_REPORTS = 10
 # Neighbouring rates of a sensor lie 20 % apart; jitter of 40 % of a period moves a mean of fifty by 4 %.

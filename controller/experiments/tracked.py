@@ -24,7 +24,7 @@ from rig.recording.sessions import SESSION_FILE, TrialInfo, open_session, write_
 from rig.results.tracking import FILE, LoopCount, TrackResult
 from rig.tissue.model import Model
 
-MARGIN_S = 60.0
+MARGIN_S = 60.0  # three times what approach, touches and retraction over 40 mm take
 
 
 def forces(text: str) -> tuple[float, ...]:

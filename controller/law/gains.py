@@ -25,7 +25,7 @@ Choice = Literal["tangent", "secant", "constant", "admittance"]
 # Stiffness may be this much higher than the model says, and the loop must still be this far from instability.
 STIFFNESS_ERROR = 0.5
 LEAST_MARGIN_DEG = 30.0  # the lower end of what textbooks ask for (30 to 60 deg)
-HIGHEST_HZ = 500.0
+HIGHEST_HZ = 500.0  # half of the rate of a loop of 1 kHz
 GRID = 200
 
 

@@ -11,7 +11,7 @@ from controller.law.gains import Design
 
 Column = NDArray[np.float64]
 PADE_ORDER = 2
-LOWEST_HZ, HIGHEST_HZ = 0.1, 100.0
+LOWEST_HZ, HIGHEST_HZ = 0.1, 100.0  # a twentieth of the lowest crossover (2 Hz), five times the highest (18 Hz)
 
 
 class Bode(NamedTuple):

@@ -24,7 +24,7 @@ from controller.recovery.situation import Situation
 from rig.channel import Answer, Channel, Message, Received, refuse_oversized
 from rig.errors import DeviceError, SafetyStop, UsageError
 
-ANSWER_TIMEOUT_S = 5.0
+ANSWER_TIMEOUT_S = 5.0  # five times the longest pause that a loop may be configured to survive (`loop.overrun_ms`)
 LISTEN_S = 0.5  # messages wake the listener at once; only hanging up waits for this
 # Answers are looked for at once by whoever asked; what nobody came for makes room.
 KEPT = 64

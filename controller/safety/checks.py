@@ -17,8 +17,8 @@ RECORDER_FILL = 0.5  # 20 s of a loop of 1 kHz are left to retract in before row
 RECORDER_SILENT_S = 3.0  # twenty times the longest sync of a disk that was seen (0.13 s)
 # Five of the stop process's longest waits; it has real-time priority where the loop has.
 STOP_SILENT_S = 1.0
-RETRACTING_MARGIN_MM = 1.0
-SPEED_MARGIN = 1.2
+RETRACTING_MARGIN_MM = 1.0  # twice what the drive's own limits stand outside: these hold first
+SPEED_MARGIN = 1.2  # the overshoot of a servo with a damping of 0.46; one tuned well has 0.2 %
 
 
 def emergency_stop(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:

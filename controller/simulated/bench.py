@@ -44,7 +44,7 @@ Column = NDArray[np.float64]
 CURVE_POINTS = 400
 BEYOND = 2.0
 LONGEST_S = 600.0  # ten forces of 1.5 s each take 15 s: a program that takes forty times as long has no end
-LONGEST_STRETCH = 10_000
+LONGEST_STRETCH = 10_000  # most steps end within 10 s of 1 kHz, and noise is drawn for a whole stretch
 DRAWN = 20_000  # two stretches at a time: every append copies all that was drawn before
 MOTOR, POSITION_LOOP, SENSING = Motor(), PositionLoop(), ForceSensing()
 

@@ -42,7 +42,7 @@ IDLE_S = 60.0
 LINGER_S = 0.5
 LINGER_BYTES = 65_536  # about a socket's buffer: what the other end may have sent before it reads the refusal
 CONNECTIONS = 64  # many times the pages and keypads of a bench, and far below the 1024 descriptors of a process
-LONGEST_WAIT_S = 0.2
+LONGEST_WAIT_S = 0.2  # the loop takes five of them for silence
 
 
 class StopSaid(TypedDict):

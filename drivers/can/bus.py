@@ -20,7 +20,7 @@ from drivers.can.slcan import BITRATE_COMMANDS, CanFrame, SlcanDecoder, encode_f
 from drivers.ports import PortClosed, read_waiting
 from rig.errors import DeviceError, UsageError
 
-ADAPTER_TIMEOUT_S = 0.5
+ADAPTER_TIMEOUT_S = 0.5  # thirty deliveries of a USB adapter (16 ms)
 TEXT = frozenset(b"\a\r\n" + bytes(range(0x20, 0x7F)))
 
 

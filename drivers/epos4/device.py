@@ -29,7 +29,7 @@ from rig.errors import DeviceError, RigError, SafetyStop
 
 HOMING_START_S = 0.05
 """Within this a drive takes back an older "homing attained"; one that has homed already shows it again."""
-CLOSING_TIMEOUT_S = 0.3
+CLOSING_TIMEOUT_S = 0.3  # a drive that is gone costs it several times over, and a person waits
 SLACK_MM = 0.05
 """How far beyond a limit a position is still rounding and ripple, and is taken as the limit itself."""
 

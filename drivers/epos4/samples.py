@@ -14,7 +14,8 @@ from rig.channels import AxisSample
 # sooner (`loop.stale_axis_ms`), so that only the count of losses waits for it.
 TIMEOUT_NS = 250_000_000
 SUSPICIONS = 50
-"""Answers in a row that would fit the next SYNC as well before one is given up as lost."""
+"""Answers in a row that would fit the next SYNC as well before one is given up as lost: 50 ms at 1 kHz, longer than an
+adapter or a busy computer delays them all alike."""
 
 
 class SyncMatcher:

@@ -21,7 +21,7 @@ from rig.errors import DeviceError
 REPLY_TIMEOUT_NS = 200_000_000
 """After this a question is asked again; the longest BX reply takes 90 ms at 115200 baud."""
 LOST_AFTER_NS = 1_000_000_000
-"""After this without any good reply the tracker is given up."""
+"""After this without any good reply the tracker is given up: five questions."""
 _CLOSE_S = 0.5
 
 

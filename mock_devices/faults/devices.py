@@ -9,7 +9,7 @@ from mock_devices.ndi.mock import NdiMock
 from mock_devices.robotiq.mock import RobotiqMock
 from rig.errors import UsageError
 
-ASTRAY_LARGEST_MM_S = 500.0
+ASTRAY_LARGEST_MM_S = 500.0  # eight times the fastest axis: more is a slip of the unit
 AnySensor = BotaMock | RobotiqMock
 
 

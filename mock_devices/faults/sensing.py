@@ -7,10 +7,9 @@ from mock_devices.physics.camera import CameraPlant
 from mock_devices.physics.channels import CHANNELS, Slips
 from mock_devices.physics.sensor import ForcePlant
 
-GAIN_LARGEST = 10.0
-DRIFT_LARGEST_N_S = 100.0
-SLIP_LARGEST_MM = 200.0
-LEVER_LARGEST_MM = 1000.0
+# Beyond any fault of a bench, more than ten times the default of each: a larger number is a slip of the unit.
+GAIN_LARGEST, DRIFT_LARGEST_N_S = 10.0, 100.0
+SLIP_LARGEST_MM, LEVER_LARGEST_MM = 200.0, 1000.0
 
 
 def _polarity(plant: ForcePlant, value: Value) -> None:

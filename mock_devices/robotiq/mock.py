@@ -35,7 +35,7 @@ from mock_devices.wire import OnWire, Wire
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
 READ_COUNT_MAX = 125  # registers in one answer (Modbus application protocol 1.1b3, 6.3)
-REQUEST_BYTES_MAX = 256
+REQUEST_BYTES_MAX = 256  # a frame on a serial line (Modbus over serial line 1.02, 2.3)
 FIXED_SIZE_FUNCTIONS = range(1, 7)
 COUNTED_FUNCTIONS = (15, 16)
 

@@ -36,8 +36,8 @@ from rig.progress import Progress
 
 ALPHA = 0.03  # of 5 % of false alarms allowed; the rest is for the test of lack of fit and for the noise's fit
 SHORT_LIST = 5
-MOST_EFFECTS = 3
-ALTERNATIVE_SE = 2.0  # 95 % of a normal: a alternative within it predicts as well
+MOST_EFFECTS = 3  # one more than the benchmark hides together
+ALTERNATIVE_SE = 2.0  # 95 % of a normal: an alternative within it predicts as well
 KEEP_NATS = 3.0  # odds of 20 to 1 (e^3)
 AMPLE_NATS = 20.0  # more than chance reaches in sessions without a cause (95 %: 4 to 13)
 WORSE = 1.01  # an error of 15,000 rows is known to 0.6 % at best

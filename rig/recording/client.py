@@ -15,6 +15,7 @@ from rig.channel import Answer, Channel, Message, Received, Reply, pair
 from rig.recording.mcap_file import RecordingFailed
 from rig.recording.messages import FROM_RECORDER, Close, Closed, Open, Quit, RecorderFailed, Started
 
+# A recorder imports for one or two seconds; a busy computer takes ten times that, and so may a disk that wakes.
 START_TIMEOUT_S = 20.0
 OPEN_TIMEOUT_S = 20.0
 # A close drains up to a whole ring and waits for the disk.

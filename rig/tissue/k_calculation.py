@@ -19,7 +19,7 @@ from rig.tissue.laws import FloatArray
 from rig.tissue.summary import IndexFit, KPoint
 
 _LEAST_POINTS = 4  # two for a and b, two for an interval
-_MOST_SIMULATIONS = 30
+_MOST_SIMULATIONS = 30  # twice the halvings that _FORCE_TOLERANCE takes
 _FORCE_TOLERANCE = 1e-4  # of the force: one step of a sensor that resolves 1 mN, at 10 N
 
 

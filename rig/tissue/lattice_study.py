@@ -22,8 +22,8 @@ from rig.tissue.registry import THREE_PARAMETER
 from rig.tissue.study import Study, rows
 from rig.tissue.summary import IndexFit, KPoint
 
-_DEPTH_MARGIN = 1.02
-_DEEPEST_SHARE = 0.85
+_DEPTH_MARGIN = 1.02  # so that the deepest force has a depth on either side of it
+_DEEPEST_SHARE = 0.85  # a sweep may reach 0.9
 
 
 @dataclass(frozen=True)

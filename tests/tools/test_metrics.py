@@ -74,6 +74,7 @@ def test_functions_are_measured_from_def_to_end() -> None:
         ("# A nail.\nNAIL_N = 4\nLIMIT_N = 3\ndef f(x): return x > LIMIT_N", {"LIMIT_N": True}),
         ("# A nail.\nNAIL_N = 4\nSHOE_N = 4\nLIMIT_N = 3\ndef f(x): return x > LIMIT_N", {"LIMIT_N": False}),
         ("# A nail.\nNAIL_N = 4  # bends\nLIMIT_N = 3\ndef f(x): return x > LIMIT_N", {"LIMIT_N": False}),
+        ("ANSWER_TIMEOUT_S = 3\nANSWER_S = 3\nMINUTES = 3", {"ANSWER_TIMEOUT_S": False}),
         ("LIMIT_N_m = 3\ndef f(x): return x > LIMIT_N_m", {"LIMIT_N_m": False}),
         ("Limit = 3\nlimit = 4\ndef f(x): return limit > x > Limit", {}),
         ("# Far away.\nNAME = 'a'\n\nLIMIT = 3\ndef f(x): return x > LIMIT", {"LIMIT": False}),

@@ -10,10 +10,10 @@ from rig.simulation.chain import Operator, Series, Tip, one
 from rig.simulation.scans import dahl, play
 from rig.tissue.index_law import Fields
 
-LOWEST_HZ, HIGHEST_HZ = 0.08, 3.0
+LOWEST_HZ, HIGHEST_HZ = 0.08, 3.0  # five breaths a minute, a pulse of 180
 PITCHES_PER_MM = np.linspace(1 / 10, 1 / 0.5, 60)
 NUDGE_MM = 0.02
-FEWEST_PERIODS = 2.5
+FEWEST_PERIODS = 2.5  # in the tissue: of fewer, stiffness takes the place
 
 
 def _match(problem: InverseProblem, values: Values, residual: Array) -> tuple[Array, float]:

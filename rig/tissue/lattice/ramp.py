@@ -18,7 +18,7 @@ from rig.tissue.lattice.state import Loaded
 from rig.tissue.lattice.sweep import Equilibrium, push, settle
 
 STEP = 2.0  # of b; a cubic of ln phi between is good to 1e-3
-_PAST_BEST = 2  # levels of b that must fit worse than the best before the ramp ends
+_PAST_BEST = 2  # levels of b that must fit worse than the best before the ramp ends: one may by chance
 _LEAST_LEVELS = 4  # for the cubic
 
 
