@@ -12,7 +12,7 @@ from rig.intake.readers import kind_of, open_sheets
 from rig.intake.sheet import Sheet
 
 
-class Table(NamedTuple):
+class FoundTable(NamedTuple):
     """One table of the folder: its sheet, how it is read, and what tells it apart."""
 
     sheet: Sheet
@@ -35,7 +35,7 @@ def natural(text: str) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", text)]
 
 
-def tables_in(folder: Path, mapping: DataMapping) -> Iterator[Table]:
+def tables_in(folder: Path, mapping: DataMapping) -> Iterator[FoundTable]:
     """Every table the mapping names; raises DataError where one of its patterns names no file."""
     files = files_in(folder)
     for form in mapping.tables:
@@ -46,7 +46,7 @@ def tables_in(folder: Path, mapping: DataMapping) -> Iterator[Table]:
         for path, labels in named:
             own = {"file": path.name.removesuffix(".gz").rpartition(".")[0], "folder": path.parent.name}
             for more, sheet in open_sheets(path, form):
-                yield Table(sheet, form, {**own, "sheet": sheet.name, **form.labels, **labels, **more})
+                yield FoundTable(sheet, form, {**own, "sheet": sheet.name, **form.labels, **labels, **more})
 
 
 def unnamed_in(folder: Path, mapping: DataMapping) -> list[str]:
@@ -64,7 +64,7 @@ def _shown(folder: Path, files: list[Path]) -> str:
     return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "") or "none at all"
 
 
-def labels_of(table: Table, label: str, mapping: DataMapping) -> dict[str, str]:
+def labels_of(table: FoundTable, label: str, mapping: DataMapping) -> dict[str, str]:
     """What the recording of these rows is called, and its specimen, site and cycle where the mapping says them."""
     known, where = {**table.labels, "label": label}, table.sheet.where
     sheets = "-{sheet}" if table.sheet.name else ""

@@ -13,7 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from rig.errors import DataError
-from rig.intake.folder import Table, file_name, labels_of, natural, tables_in, unnamed_in
+from rig.intake.folder import FoundTable, file_name, labels_of, natural, tables_in, unnamed_in
 from rig.intake.mapping import DataMapping, RecordingFacts
 from rig.intake.rows import pieces
 from rig.intake.writing import OpenRecording, Written
@@ -68,16 +68,16 @@ def _recordings(
                 now.close()
 
 
-def _grouped(folder: Path, mapping: DataMapping) -> list[list[Table]]:
+def _grouped(folder: Path, mapping: DataMapping) -> list[list[FoundTable]]:
     """Tables that are one recording, together; a table with a column of labels is one by itself."""
-    groups: dict[object, list[Table]] = {}
+    groups: dict[object, list[FoundTable]] = {}
     for number, table in enumerate(tables_in(folder, mapping)):
         key = number if table.form.label is not None else file_name(labels_of(table, "", mapping)["recording"])
         groups.setdefault(key, []).append(table)
     return list(groups.values())
 
 
-def _check_new(name: str, names: set[str], table: Table) -> None:
+def _check_new(name: str, names: set[str], table: FoundTable) -> None:
     if name in names:
         raise DataError(
             f"{table.sheet.where}: recording {name} was there before; name what tells the two apart in `recording`, "
@@ -90,7 +90,7 @@ def _opened(
     scratch: Path,
     name: str,
     index: int,
-    table: Table,
+    table: FoundTable,
     about: Mapping[str, str],
     mapping: DataMapping,
     listed: SessionInfo,
@@ -158,8 +158,8 @@ def _info(folder: Path, mapping: DataMapping, now: datetime) -> SessionInfo:
 
 
 def _metadata(
-    info: TrialInfo, index: int, table: Table, about: Mapping[str, str], facts: RecordingFacts, mapping: DataMapping,
-    listed: SessionInfo,
+    info: TrialInfo, index: int, table: FoundTable, about: Mapping[str, str], facts: RecordingFacts,
+    mapping: DataMapping, listed: SessionInfo,
 ) -> dict[str, dict[str, str]]:  # fmt: skip
     calibration = {"force_axis": "fz", "compression": "positive"}
     surface_mm = mapping.surface_of(facts)

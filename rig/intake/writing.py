@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rig.channels import AXIS, BY_NAME, FORCE
 from rig.errors import DataError
-from rig.intake.folder import Table
+from rig.intake.folder import FoundTable
 from rig.intake.rows import Piece, stream_rows
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.sessions import TrialInfo
@@ -44,7 +44,7 @@ class OpenRecording:
         self._span_ns: list[int] = []
         self._saturated = self._dropped = 0
 
-    def add(self, piece: Piece, table: Table) -> None:
+    def add(self, piece: Piece, table: FoundTable) -> None:
         """Appends a piece; raises DataError where a stream was there before."""
         self._saturated += piece.saturated
         self._dropped += piece.dropped
