@@ -118,7 +118,8 @@ def curves_of(session: Session) -> tuple[list[Curve], list[Skipped]]:
         else:
             said = (*found.findings, *inspect(trial))
             kept = tuple(f for f in said if f.recording == trial.name and f.kind in SAMPLES_LEFT_OUT)
-            curves.append(replace(curve, subject=str(session.info.subject.get("id", "")), findings=kept))
+            subject = str(session.info.subject.get("id", ""))
+            curves.append(replace(curve, subject=subject, findings=(*curve.findings, *kept)))
     return curves, skipped
 
 

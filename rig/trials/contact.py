@@ -30,6 +30,15 @@ LEAST_SEARCH_MM = 0.1  # half of what contact is known to in a good trial
 # Finer than any converter's step, and above zero: an exact curve has no noise of its own.
 LEAST_NOISE_N = 1e-5
 PROBABLE = 0.025, 0.975
+# Force under a sphere grows as depth to the power 1.5, under a cone as its square; limbs stiffen no faster at first.
+STEEPEST_POWER = 2.0
+# Of the force at a preload that has been held: meat and elastomer keep half of it and more for minutes.
+LEAST_LEFT = 0.5
+# Nearer to the preload, transients of the start decide; further on, how the tissue stiffens does.
+FORCE_FOLD = 3.0
+# A drive has its speed within a hundredth of its way.
+MOVING_SHARE = 0.005
+CLEAR_SPREADS = 6.0  # of normal noise two samples in a thousand million lie further off
 
 
 class Contact(NamedTuple):
@@ -186,6 +195,34 @@ def find_contact(
     while not search.advance():
         pass
     return search.contact
+
+
+def contact_before(
+    position_mm: FloatArray, force_N: FloatArray, start: tuple[float, float], noise_N: float
+) -> Contact | None:
+    """The contact of a loading, arrays of shape (n,), that begins in contact or at the surface.
+
+    ``start`` is the force at rest before it, zero taken off, and its standard deviation. Force that grows no faster
+    than depth squared, from a preload that keeps half of its force, tells by the way it takes to grow by three times
+    that force, once the tip moves, how far before the start contact lies at most. None where it does not grow so far.
+    """
+    start_N, deviation_N = start
+    largest_N = max(start_N, 0.0) + 2 * deviation_N
+    way_mm = position_mm - position_mm[0]
+    # What friction and viscosity add as the tip sets off is not the tissue's elastic force.
+    moves = min(max(int(np.argmax(way_mm > MOVING_SHARE * way_mm.max())), 1), len(force_N) - 1)
+    growth_N = max(FORCE_FOLD * largest_N, CLEAR_SPREADS * noise_N)
+    reached = np.flatnonzero(force_N > max(force_N[moves], largest_N) + growth_N + CLEAR_SPREADS / 2 * noise_N)
+    if not len(reached):
+        return None
+    grown = (1 + LEAST_LEFT * growth_N / largest_N) ** (1 / STEEPEST_POWER)
+    clear = np.flatnonzero(force_N > start_N + CLEAR_SPREADS * noise_N)
+    # No contact is known better than the samples lie apart.
+    apart_mm = float(np.median(np.abs(np.diff(position_mm))))
+    lower_mm = float(position_mm[0] - way_mm[reached[0]] / (grown - 1)) - apart_mm
+    upper_mm = float(position_mm[0 if start_N > 2 * deviation_N else clear[0]]) + apart_mm
+    middle_mm, width_mm = (lower_mm + upper_mm) / 2, upper_mm - lower_mm
+    return Contact(middle_mm, lower_mm, upper_mm, width_mm / 4, lower_mm, upper_mm)
 
 
 def _inside(depth_mm: FloatArray, inside: NDArray[np.bool_], family: Family) -> FloatArray:

@@ -1,8 +1,5 @@
 """From raw samples to a loading curve: zero, contact, steady part; and every trial that has none."""
 
-import csv
-import gzip
-from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +10,6 @@ from rig.trials.contact import find_contact
 from rig.trials.curves import loading_curve
 from rig.trials.cycles import IndentationCycle, cycle_of
 from rig.trials.recorded import trial_of
-from tests import data
 from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, index_force, recording, tables, with_friction
 
 
@@ -114,15 +110,8 @@ def test_a_stroke_in_the_air_has_no_contact() -> None:
 
 def test_force_of_the_wrong_sign_names_the_settings_that_turn_it() -> None:
     cycle = Bench().cycle(10.0)
-    with pytest.raises(DataError, match=r"sign of compression is wrong; correct force.compression .* force_positive"):
+    with pytest.raises(DataError, match=r"sign of compression is wrong; correct force.compression .* in the mapping"):
         loading_curve(replace(cycle, force_N=-cycle.force_N))
-
-
-def test_a_stroke_that_begins_in_contact_has_no_air_part() -> None:
-    cycle = Bench().cycle(10.0)
-    pressed = int(np.argmax(cycle.position_mm > 21.0))
-    with pytest.raises(DataError, match=r"no air part: \d+ samples are clearly above the surface \(at least 3"):
-        loading_curve(moved(cycle, pressed))
 
 
 @pytest.mark.parametrize("noise_N", [0.005, 0.05])
@@ -250,27 +239,3 @@ def test_metadata_that_say_nothing_usable_are_refused(section: str, key: str, va
     made.metadata[section][key] = value
     with pytest.raises(DataError, match=says):
         cycle_of(trial_of("trial", made))
-
-
-def test_real_recordings_of_a_testing_machine_give_curves_where_they_begin_in_the_air() -> None:
-    curves, refused = [], []
-    for cycle in machine_strokes():
-        try:
-            curves.append(loading_curve(cycle))
-        except DataError as error:
-            refused.append(str(error))
-    assert len(curves) > 20
-    assert all("no air part" in reason for reason in refused)
-    assert all(curve.max_depth_mm > 1 and curve.max_force_N > 0.2 for curve in curves)
-
-
-def machine_strokes() -> list[IndentationCycle]:
-    """Ramps on meat and silicone at 10 Hz, with no speed said; most begin at the surface, some above it."""
-    rows: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
-    with gzip.open(data.recording("perineal_indentation/recordings.csv.gz"), "rt") as file:
-        for row in csv.DictReader(file):
-            rows[row["recording"]].append((float(row["t_s"]), float(row["force_N"]), float(row["extension_mm"])))
-    columns = {name: np.array(found).T for name, found in rows.items()}
-    return [
-        IndentationCycle(name, float("nan"), time_s, force, depth) for name, (time_s, force, depth) in columns.items()
-    ]
