@@ -53,17 +53,17 @@ def driver_tick() -> None:
 
 def mock_tick() -> None:
     """RPDO and SYNC in, two TPDOs and two acknowledgements out, without the pseudo-terminal."""
-    stage = DriveBench()
-    axis = Epos4Axis(Epos4Wiring(port="memory"), Limits(), stage.now, open_link=stage.open)
+    bench = DriveBench()
+    axis = Epos4Axis(Epos4Wiring(port="memory"), Limits(), bench.now, open_link=bench.open)
     axis.start()
     axis.home()
     axis.enable()
     times = []
     for cycle in range(TICKS):
-        stage.heard()
-        stage.wire.said = b"t20160F00%02X000000\rt0800\r" % (cycle % 200)
+        bench.heard()
+        bench.wire.said = b"t20160F00%02X000000\rt0800\r" % (cycle % 200)
         begun = time.perf_counter_ns()
-        stage.mock.receive(stage.now())
+        bench.mock.receive(bench.now())
         times.append(time.perf_counter_ns() - begun)
     print(f"mock, one SYNC:         {percentiles(times)}")
     axis.close()

@@ -23,7 +23,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from api.cli.stage import bench_process
+from api.cli.mock_bench import bench_process
 from controller.devices.drivers import open_force
 from controller.loop.realtime import acquire
 from drivers.robotiq.codec import FRAME_NS, to_counts

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from api.cli.asking import Person
 from api.cli.live import here
+from api.cli.mock_bench import bench_for
 from api.cli.output import show
-from api.cli.stage import bench_for
 from api.operations.calibrate import (
     AxisTravel,
     GaugeBlock,

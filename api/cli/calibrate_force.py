@@ -4,9 +4,9 @@ from typing import Literal, NamedTuple
 
 from api.cli.asking import Person
 from api.cli.live import here
+from api.cli.mock_bench import bench_for
 from api.cli.mock_calibration import BY_ITSELF, mock_weights, weights_on
 from api.cli.output import show
-from api.cli.stage import bench_for
 from api.operations.calibrate import calibrate_force as measure
 from api.operations.calibrate import of_force
 from controller.commissioning.weights import Weights, parse_weights

@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from api.cli.live import compute, here
+from api.cli.mock_bench import bench_for, bench_process
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import show, write_json
-from api.cli.stage import bench_for, bench_process
 from api.operations import doctor as work
 from controller.claims import holder
 from controller.operation import Operation

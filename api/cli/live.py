@@ -13,8 +13,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from api.cli.keys import stop_keys
+from api.cli.mock_bench import bench_for
 from api.cli.output import show
-from api.cli.stage import bench_for
 from controller.operation import Operation
 from controller.operation import Progress as Snapshot
 from controller.stop.word import NOT_CONFIRMED, StopReason

@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from api.cli.live import here
+from api.cli.mock_bench import bench_for
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import write_json
-from api.cli.stage import bench_for
 from api.operations.remote import RemoteBench
 from api.operations.reset import reset as recover
 from controller.claims import holder

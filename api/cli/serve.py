@@ -11,9 +11,9 @@ from typing import Annotated
 import typer
 import uvicorn
 
+from api.cli.mock_bench import bench_for
 from api.cli.options import ConfigOption, SetOption, wiring_from
 from api.cli.output import show
-from api.cli.stage import bench_for
 from api.http.app import build
 from api.http.connection import server_settings
 from api.http.guard import LOCAL

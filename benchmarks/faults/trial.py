@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from api.cli.stage import plugged
+from api.cli.mock_bench import plugged
 from benchmarks.faults.evaluation import Notice, Outcome, evaluate
 from benchmarks.faults.fault import DRIVE, Fault, at_once
 from benchmarks.faults.observer import Observer

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from api.cli.mock_bench import plugged
 from api.cli.mock_calibration import force_file
 from api.cli.options import built_in
-from api.cli.stage import plugged
 from mock_devices.control import BenchControl
 from rig.config.endpoints import Endpoints
 

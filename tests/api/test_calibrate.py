@@ -14,9 +14,9 @@ from api.cli.app import build
 from api.cli.asking import Person
 from api.cli.calibrate import say_use
 from api.cli.calibrate_axis import AxisAsked, calibrate_axis
+from api.cli.mock_bench import bench_for, plugged
 from api.cli.mock_calibration import force_file
 from api.cli.options import built_in, calibrated, wiring_from
-from api.cli.stage import bench_for, plugged
 from api.operations.calibrations import keep, refuse_out, refuse_unfit
 from rig.config.calibration import Calibration, Uncertainty
 from rig.config.calibration_files import read_force, text_of
@@ -77,7 +77,7 @@ def test_without_a_terminal_an_open_question_names_the_option(
 def test_what_cannot_be_calibrated_is_refused_before_anything_is_opened(
     arguments: list[str], sentence: str, monkeypatch: pytest.MonkeyPatch, own_state: Path
 ) -> None:
-    monkeypatch.setattr("api.cli.stage.bench_process", lambda *_: pytest.fail("a bench was started"))
+    monkeypatch.setattr("api.cli.mock_bench.bench_process", lambda *_: pytest.fail("a bench was started"))
     answer = runner.invoke(build("calibrate"), ["calibrate", *arguments])
     assert isinstance(answer.exception, UsageError)
     with pytest.raises(UsageError, match=sentence):
@@ -281,7 +281,7 @@ def test_where_it_cannot_be_kept_that_is_said(
 
 def test_a_wiring_that_contradicts_what_is_kept_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     stored()
-    monkeypatch.setattr("api.cli.stage.bench_process", lambda *_: contextlib.nullcontext((None, ENDPOINTS)))
+    monkeypatch.setattr("api.cli.mock_bench.bench_process", lambda *_: contextlib.nullcontext((None, ENDPOINTS)))
     wrong = built_in(["force.compression=positive"])
     with (
         pytest.raises(UsageError, match=r"force.compression positive: the calibration found compression negative"),
@@ -311,7 +311,7 @@ def test_a_real_sensor_beside_a_mock_axis_is_never_calibrated_by_itself(monkeypa
 
 
 def test_a_real_sensor_without_calibration_is_refused_before_a_bench_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("api.cli.stage.bench_process", lambda *_: pytest.fail("a bench was started"))
+    monkeypatch.setattr("api.cli.mock_bench.bench_process", lambda *_: pytest.fail("a bench was started"))
     with (
         pytest.raises(UsageError, match="no force calibration of the sensor at /dev/ttyUSB0"),
         bench_for(built_in(["force.port=/dev/ttyUSB0"])),

@@ -1,7 +1,7 @@
 """Limits of time: strict with real devices, patient with simulated ones, as the file says where it says anything."""
 
+from api.cli.mock_bench import patient
 from api.cli.options import built_in
-from api.cli.stage import patient
 from rig.config.products.maxon_epos4 import Epos4Wiring
 
 REAL = ["force.port=/dev/ttyUSB0", "axis.port=/dev/ttyACM0", "tracker.port=tcp://192.168.1.10:8765"]

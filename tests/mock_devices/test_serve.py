@@ -238,54 +238,54 @@ class ServerBench:
 
 
 @pytest.fixture
-def stage() -> Iterator[ServerBench]:
+def served() -> Iterator[ServerBench]:
     """Past its boot text, streaming at 100 Hz since 0.3 s."""
-    stage = ServerBench()
+    served = ServerBench()
     try:
-        stage.pass_ms(300)
-        stage.say(b"C")
-        stage.say(b"f,512,0,0,1")
-        assert stage.say(b"R") == b"r,0,R,0\r\n"
-        yield stage
+        served.pass_ms(300)
+        served.say(b"C")
+        served.say(b"f,512,0,0,1")
+        assert served.say(b"R") == b"r,0,R,0\r\n"
+        yield served
     finally:
-        stage.port.close()
-        stage.server.close()
+        served.port.close()
+        served.server.close()
 
 
-def test_each_mock_acts_at_its_own_time_after_physics_has_come_there(stage: ServerBench) -> None:
-    stage.pass_ms(105)
-    assert stage.frames(10) == 10
-    assert 0.400 <= stage.bench.time_s <= 0.405
+def test_each_mock_acts_at_its_own_time_after_physics_has_come_there(served: ServerBench) -> None:
+    served.pass_ms(105)
+    assert served.frames(10) == 10
+    assert 0.400 <= served.bench.time_s <= 0.405
 
 
-def test_a_short_stall_is_caught_up_sample_by_sample(stage: ServerBench) -> None:
-    stage.pass_ms(900)
-    assert stage.frames(90) == 90
-    assert stage.bench.time_s == pytest.approx(1.2, abs=0.01)
+def test_a_short_stall_is_caught_up_sample_by_sample(served: ServerBench) -> None:
+    served.pass_ms(900)
+    assert served.frames(90) == 90
+    assert served.bench.time_s == pytest.approx(1.2, abs=0.01)
 
 
 def test_after_a_long_stall_physics_goes_on_from_now_and_says_so(
-    stage: ServerBench, capsys: pytest.CaptureFixture[str]
+    served: ServerBench, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    stage.pass_ms(5000)
-    assert stage.bench.time_s == pytest.approx(0.3)
-    assert stage.bench.now_ns == pytest.approx(stage.clock.now_ns, abs=250_000)
+    served.pass_ms(5000)
+    assert served.bench.time_s == pytest.approx(0.3)
+    assert served.bench.now_ns == pytest.approx(served.clock.now_ns, abs=250_000)
     assert "stopped for 5.0 s" in capsys.readouterr().err
-    read_until(stage.port, lambda _: False, 0.2)
-    stage.pass_ms(100)
-    assert stage.frames(10) == 10
-    assert stage.bench.time_s == pytest.approx(0.4, abs=0.01)
+    read_until(served.port, lambda _: False, 0.2)
+    served.pass_ms(100)
+    assert served.frames(10) == 10
+    assert served.bench.time_s == pytest.approx(0.4, abs=0.01)
 
 
-def test_bytes_that_came_during_a_stall_are_heard_before_time_is_caught_up(stage: ServerBench) -> None:
-    stage.clock.now_ns += 500_000_000
-    assert stage.say(b"C") == b"r,0,C,0\r\n"
+def test_bytes_that_came_during_a_stall_are_heard_before_time_is_caught_up(served: ServerBench) -> None:
+    served.clock.now_ns += 500_000_000
+    assert served.say(b"C") == b"r,0,C,0\r\n"
 
 
 def test_what_the_axis_was_told_during_a_stall_is_heard_evenly_over_it(
-    stage: ServerBench, monkeypatch: pytest.MonkeyPatch
+    served: ServerBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mock, line, told_ns = stage.axis.mock, stage.axis.wire, list[int]()
+    mock, line, told_ns = served.axis.mock, served.axis.wire, list[int]()
     hear = mock.receive
 
     def heard(now_ns: int) -> None:
@@ -296,47 +296,47 @@ def test_what_the_axis_was_told_during_a_stall_is_heard_evenly_over_it(
     with opened(line.endpoint) as port:
         port.write(b"C\rS8\rO\rt00020101\r")
         assert select.select(line.filenos(), [], [], 5.0)[0]
-        stage.server.turn(line.filenos())
+        served.server.turn(line.filenos())
         told_ns.clear()
-        before_ns = stage.clock.now_ns
-        stage.clock.now_ns += 100_000_000
+        before_ns = served.clock.now_ns
+        served.clock.now_ns += 100_000_000
         port.write(b"t0800\r" * 50)
         await_bytes(line.filenos()[0], 300)
-        stage.server.turn(line.filenos())
+        served.server.turn(line.filenos())
     steps_ns = np.diff([before_ns, *told_ns])
     assert len(told_ns) == 50
     assert steps_ns == pytest.approx([0, *[2_000_000] * 49], abs=300_000)
-    assert stage.bench.now_ns == pytest.approx(stage.clock.now_ns, abs=5_000_000)
+    assert served.bench.now_ns == pytest.approx(served.clock.now_ns, abs=5_000_000)
 
 
 def test_what_the_axis_was_told_while_a_turn_was_held_up_is_not_heard_all_at_once(
-    stage: ServerBench, monkeypatch: pytest.MonkeyPatch
+    served: ServerBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The process loses its core just after it has looked at the clock, and fifty lines come before it goes on."""
-    line, told_ns = stage.axis.wire, list[int]()
+    line, told_ns = served.axis.wire, list[int]()
     with opened(line.endpoint) as port:
         port.write(b"C\rS8\rO\rt00020101\r")
         assert select.select(line.filenos(), [], [], 5.0)[0]
-        stage.server.turn(line.filenos())
-        hear = stage.axis.mock.receive
+        served.server.turn(line.filenos())
+        hear = served.axis.mock.receive
 
         def heard(now_ns: int) -> None:
             told_ns.append(now_ns)
             hear(now_ns)
 
         def held_up() -> int:
-            looked_ns = stage.clock.now_ns
+            looked_ns = served.clock.now_ns
             port.write(b"t0800\r" * 50)
             await_bytes(line.filenos()[0], 300)
-            stage.clock.now_ns += 100_000_000
-            monkeypatch.setattr(stage.server, "_clock_ns", stage.clock)
+            served.clock.now_ns += 100_000_000
+            monkeypatch.setattr(served.server, "_clock_ns", served.clock)
             return looked_ns
 
         port.write(b"t0800\r")
         assert select.select(line.filenos(), [], [], 5.0)[0]
-        monkeypatch.setattr(stage.axis.mock, "receive", heard)
-        monkeypatch.setattr(stage.server, "_clock_ns", held_up)
-        stage.server.turn(line.filenos())
-        stage.server.turn(line.filenos())
+        monkeypatch.setattr(served.axis.mock, "receive", heard)
+        monkeypatch.setattr(served.server, "_clock_ns", held_up)
+        served.server.turn(line.filenos())
+        served.server.turn(line.filenos())
     assert len(told_ns) == 51
     assert np.diff(told_ns[1:]) == pytest.approx(2_000_000, abs=300_000)

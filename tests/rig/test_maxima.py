@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from api.cli.stage import patient
+from api.cli.mock_bench import patient
 from rig.config.maxima import MAXIMA, Maximum
 from rig.config.products import maxon_epos4
 from rig.config.products.registry import FORCE_SENSORS

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from api.cli.mock_bench import plugged
 from api.cli.mock_calibration import force_file
 from api.cli.options import built_in
-from api.cli.stage import plugged
 from controller.commissioning.refusals import contradictions
 from mock_devices.testing.commands import EXAMPLES, PATIENCE_S, Running, Said, ServedBench, rig, until
 from rig.config.calibration_files import read_force, text_of

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from api.cli.stage import plugged
+from api.cli.mock_bench import plugged
 from controller.experiments import threshold
 from controller.supervisor import Supervisor
 from mock_devices.testing.commands import PATIENT, Running, ServedBench, children, freed, pressed

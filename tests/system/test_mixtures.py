@@ -7,7 +7,7 @@ from itertools import product
 
 import pytest
 
-from api.cli.stage import _arguments, bench_for, bench_process
+from api.cli.mock_bench import _arguments, bench_for, bench_process
 from controller.devices.drivers import Devices, start_devices
 from rig.config.endpoints import Endpoints
 from rig.config.products.bota_sensone import BotaWiring

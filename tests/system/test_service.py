@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
+from api.cli.mock_bench import plugged
 from api.cli.options import built_in
-from api.cli.stage import plugged
 from api.http.app import build
 from api.http.lease import LeaseRegistry
 from api.http.service import Service

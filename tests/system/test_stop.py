@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
+from api.cli.mock_bench import plugged
 from api.cli.options import built_in
-from api.cli.stage import plugged
 from controller.stop.start import SENTENCE
 from controller.stop.word import NOT_CONFIRMED, Deed, StopReason
 from controller.supervisor import Supervisor

@@ -10,13 +10,13 @@ from tests.drivers.epos4.sessions import axis_on
 
 
 @pytest.fixture
-def stage() -> DriveBench:
+def bench() -> DriveBench:
     return DriveBench()
 
 
 @pytest.fixture
-def axis(stage: DriveBench) -> Iterator[Epos4Axis]:
-    axis = axis_on(stage)
+def axis(bench: DriveBench) -> Iterator[Epos4Axis]:
+    axis = axis_on(bench)
     axis.start()
     yield axis
     axis.close()

@@ -1,4 +1,4 @@
-"""A servo axis on the stage, and one turn of a loop."""
+"""A servo axis on the bench, and one turn of a loop."""
 
 from typing import Any
 
@@ -9,13 +9,13 @@ from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.wiring import Limits
 
 
-def axis_on(stage: DriveBench, limits: Limits | None = None, **config: Any) -> Epos4Axis:
-    return Epos4Axis(Epos4Wiring(port="memory", **config), limits or Limits(), stage.now, open_link=stage.open)
+def axis_on(bench: DriveBench, limits: Limits | None = None, **config: Any) -> Epos4Axis:
+    return Epos4Axis(Epos4Wiring(port="memory", **config), limits or Limits(), bench.now, open_link=bench.open)
 
 
-def tick(stage: DriveBench, axis: Epos4Axis, position_mm: float) -> list[AxisSample]:
+def tick(bench: DriveBench, axis: Epos4Axis, position_mm: float) -> list[AxisSample]:
     """One turn of a loop at 1 kHz."""
-    stage.run(0.001)
-    samples = axis.poll(stage.now())
-    axis.command(position_mm, stage.now())
+    bench.run(0.001)
+    samples = axis.poll(bench.now())
+    axis.command(position_mm, bench.now())
     return list(samples)

@@ -11,17 +11,17 @@ from tests.drivers.epos4.sessions import axis_on
 COMMAND_DIGIT, INDEX_DIGIT, VALUE_DIGIT = 16, 12, 8
 
 
-def started(stage: DriveBench) -> Epos4Axis:
-    axis = axis_on(stage)
+def started(bench: DriveBench) -> Epos4Axis:
+    axis = axis_on(bench)
     axis.start()
     return axis
 
 
 @pytest.fixture(scope="module")
 def answers() -> int:
-    stage = DriveBench()
-    started(stage)
-    return stage.answers
+    bench = DriveBench()
+    started(bench)
+    return bench.answers
 
 
 @pytest.mark.parametrize(
@@ -31,29 +31,29 @@ def test_any_one_damaged_answer_is_asked_for_again(answers: int, digit: int, bec
     """A line that is none, an answer to nothing, another object's, and one that is right but for its value."""
     assert answers > 90
     for number in range(1, answers + 1):
-        stage = DriveBench()
-        stage.spoil, stage.digit, stage.becomes = {number}, digit, becomes
-        axis = started(stage)
+        bench = DriveBench()
+        bench.spoil, bench.digit, bench.becomes = {number}, digit, becomes
+        axis = started(bench)
         axis.home()
         assert not axis.fault
         axis.close()
 
 
 def test_an_answer_that_never_comes_right_is_told_after_three_tries(answers: int) -> None:
-    stage = DriveBench()
-    stage.spoil = set(range(answers // 2, answers // 2 + TRIES))
+    bench = DriveBench()
+    bench.spoil = set(range(answers // 2, answers // 2 + TRIES))
     with pytest.raises(DeviceError, match=r"does not answer: .* took longer than 1 s, tries: 3; check its power"):
-        started(stage)
+        started(bench)
 
 
 def test_a_drive_left_enabled_is_made_safe_although_an_answer_to_its_controlword_is_lost() -> None:
     """The order is not repeated: the state says what became of it."""
     for lost in range(1, 40):
-        stage = DriveBench()
-        first = started(stage)
+        bench = DriveBench()
+        first = started(bench)
         first.home()
         first.enable()
-        stage.spoil = {stage.answers + lost}
-        second = started(stage)
-        assert not stage.plant.powered
+        bench.spoil = {bench.answers + lost}
+        second = started(bench)
+        assert not bench.plant.powered
         second.close()

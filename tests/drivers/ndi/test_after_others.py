@@ -12,10 +12,10 @@ ROM = b"NDI\0".ljust(1024, b"\x07")
 
 
 @pytest.fixture
-def stage() -> Iterator[TrackerBench]:
-    stage = TrackerBench()
-    yield stage
-    stage.release()
+def bench() -> Iterator[TrackerBench]:
+    bench = TrackerBench()
+    yield bench
+    bench.release()
 
 
 @pytest.fixture
@@ -26,67 +26,67 @@ def roms(tmp_path: Path) -> tuple[Path, Path]:
     return paths
 
 
-def said(stage: TrackerBench, *commands: str) -> list[str]:
+def said(bench: TrackerBench, *commands: str) -> list[str]:
     """What the tracker answers to another client's commands."""
     answers = []
     for command in commands:
         name, _, params = command.partition(":")
-        stage.write(codec.encode_command(name, params))
-        (reply,) = codec.ReplyDecoder().feed(stage.read())
+        bench.write(codec.encode_command(name, params))
+        (reply,) = codec.ReplyDecoder().feed(bench.read())
         answers.append(reply.text if isinstance(reply, codec.TextReply) else "")
     return answers
 
 
-def handles(stage: TrackerBench) -> str:
-    return said(stage, "PHSR:00")[0][:2]
+def handles(bench: TrackerBench) -> str:
+    return said(bench, "PHSR:00")[0][:2]
 
 
-def other_client(stage: TrackerBench) -> None:
+def other_client(bench: TrackerBench) -> None:
     """As scikit-surgerynditracker does it: loads, enables, tracks, stops, and frees nothing."""
-    said(stage, "INIT:")
+    said(bench, "INIT:")
     for _ in range(2):
-        (handle,) = said(stage, "PHRQ:*********1****")
+        (handle,) = said(bench, "PHRQ:*********1****")
         for at in range(0, 1024, 64):
-            said(stage, f"PVWR:{handle}{at:04X}{ROM[at : at + 64].hex().upper()}")
-        assert said(stage, f"PINIT:{handle}", f"PENA:{handle}D") == ["OKAY", "OKAY"]
-    assert said(stage, "TSTART:80", "TSTOP:") == ["OKAY", "OKAY"]
+            said(bench, f"PVWR:{handle}{at:04X}{ROM[at : at + 64].hex().upper()}")
+        assert said(bench, f"PINIT:{handle}", f"PENA:{handle}D") == ["OKAY", "OKAY"]
+    assert said(bench, "TSTART:80", "TSTOP:") == ["OKAY", "OKAY"]
 
 
-def killed_while_loading(stage: TrackerBench) -> None:
-    said(stage, "INIT:", "PHRQ:*********1****", f"PVWR:030000{ROM[:64].hex().upper()}")
+def killed_while_loading(bench: TrackerBench) -> None:
+    said(bench, "INIT:", "PHRQ:*********1****", f"PVWR:030000{ROM[:64].hex().upper()}")
 
 
-def killed_while_tracking(stage: TrackerBench) -> None:
-    other_client(stage)
-    said(stage, "TSTART:")
+def killed_while_tracking(bench: TrackerBench) -> None:
+    other_client(bench)
+    said(bench, "TSTART:")
 
 
 BEFORE: tuple[Callable[[TrackerBench], None], ...] = (other_client, killed_while_loading, killed_while_tracking)
 
 
-@pytest.mark.parametrize("before", [*BEFORE, lambda stage: [session(stage) for session in BEFORE * 3]])
+@pytest.mark.parametrize("before", [*BEFORE, lambda bench: [session(bench) for session in BEFORE * 3]])
 @pytest.mark.parametrize("with_roms", [False, True])
 def test_it_starts_and_sees_both_tools(
-    stage: TrackerBench, roms: tuple[Path, Path], before: Callable[[TrackerBench], None], with_roms: bool
+    bench: TrackerBench, roms: tuple[Path, Path], before: Callable[[TrackerBench], None], with_roms: bool
 ) -> None:
-    before(stage)
-    device = started(stage, roms=roms if with_roms else ())
-    assert [(sample.tool, sample.valid) for sample in run(stage, device, 100, 130)[:2]] == [(0, 1), (1, 1)]
+    before(bench)
+    device = started(bench, roms=roms if with_roms else ())
+    assert [(sample.tool, sample.valid) for sample in run(bench, device, 100, 130)[:2]] == [(0, 1), (1, 1)]
     device.close()
 
 
 def test_closing_frees_what_was_loaded_and_leaves_the_ports_as_they_were(
-    stage: TrackerBench, roms: tuple[Path, Path]
+    bench: TrackerBench, roms: tuple[Path, Path]
 ) -> None:
-    said(stage, "INIT:")
-    assert handles(stage) == "02"
+    said(bench, "INIT:")
+    assert handles(bench) == "02"
     for _ in range(3):
-        device = started(stage, roms=roms)
-        run(stage, device, 100, 130)
+        device = started(bench, roms=roms)
+        run(bench, device, 100, 130)
         device.close()
-        assert stage.commands[-3:] == [codec.encode_command("TSTOP"), *freed(3, 4)]
-    said(stage, "INIT:")
-    assert handles(stage) == "02"
+        assert bench.commands[-3:] == [codec.encode_command("TSTOP"), *freed(3, 4)]
+    said(bench, "INIT:")
+    assert handles(bench) == "02"
 
 
 def freed(*numbers: int) -> list[bytes]:
@@ -94,21 +94,21 @@ def freed(*numbers: int) -> list[bytes]:
 
 
 def test_a_start_that_fails_while_loading_frees_what_it_had_loaded(
-    stage: TrackerBench, roms: tuple[Path, Path]
+    bench: TrackerBench, roms: tuple[Path, Path]
 ) -> None:
-    stage.canned = {"PENA": "ERROR0E"}
+    bench.canned = {"PENA": "ERROR0E"}
     with pytest.raises(Exception, match="refused PENA"):
-        started(stage, roms=roms)
-    assert stage.commands[-2:] == freed(3, 4)
+        started(bench, roms=roms)
+    assert bench.commands[-2:] == freed(3, 4)
 
 
-def test_after_our_sessions_another_client_finds_its_markers(stage: TrackerBench, roms: tuple[Path, Path]) -> None:
+def test_after_our_sessions_another_client_finds_its_markers(bench: TrackerBench, roms: tuple[Path, Path]) -> None:
     """And after its own: what an earlier session left does not keep the later one's tools from the camera."""
-    started(stage, roms=roms).close()
+    started(bench, roms=roms).close()
     for _ in range(3):
-        other_client(stage)
-        said(stage, "TSTART:")
-        stage.run_until(1_000_000_000)
-        tracked = said(stage, "TX:0001")[0]
+        other_client(bench)
+        said(bench, "TSTART:")
+        bench.run_until(1_000_000_000)
+        tracked = said(bench, "TX:0001")[0]
         assert "MISSING" not in tracked
-        said(stage, "TSTOP:")
+        said(bench, "TSTOP:")

@@ -51,41 +51,41 @@ def test_power_prints_who_it_is_after_booting_and_then_waits() -> None:
 
 @pytest.mark.parametrize(("reset", "answer"), [(b"#", b""), (b"I", b"r,0,I,0\r\n")])
 def test_both_resets_boot_again_and_lose_what_is_said_meanwhile(reset: bytes, answer: bytes) -> None:
-    stage = BotaBench()
-    stage.run()
-    assert stage.say(reset) == answer
-    assert stage.say(b"C") == b""
-    assert stage.wait(SECOND_NS) == BOOT
-    assert stage.say(b"C") == b"r,0,C,0\r\n"
+    bench = BotaBench()
+    bench.run()
+    assert bench.say(reset) == answer
+    assert bench.say(b"C") == b""
+    assert bench.wait(SECOND_NS) == BOOT
+    assert bench.say(b"C") == b"r,0,C,0\r\n"
 
 
 def test_settings_are_acknowledged_in_configuration_mode() -> None:
-    stage = BotaBench()
-    assert stage.say(b"Cc,0,1,0,4") == b"r,0,C,0\r\nr,0,c,0\r\n"
-    assert stage.say(b"f,51,0,0,1") == b"r,0,f,0\r\n"
-    assert stage.say(b"b, 0.000,-1.500, 0.000,12.345, 0.000, 0.000") == b"r,0,b,0\r\n"
-    assert stage.say(b"m5, 1.000000,-0.250000, 0.000000, 0.000000, 0.000000, 0.000000") == b"r,0,m,0\r\n"
-    assert stage.say(b"sl") == b"r,0,s,0\r\nr,0,l,0\r\n"
-    assert stage.say(b"w") == b"r,0,w,0\r\nc,0,1,0,4\r\nf,51,0,0,1\r\n"
+    bench = BotaBench()
+    assert bench.say(b"Cc,0,1,0,4") == b"r,0,C,0\r\nr,0,c,0\r\n"
+    assert bench.say(b"f,51,0,0,1") == b"r,0,f,0\r\n"
+    assert bench.say(b"b, 0.000,-1.500, 0.000,12.345, 0.000, 0.000") == b"r,0,b,0\r\n"
+    assert bench.say(b"m5, 1.000000,-0.250000, 0.000000, 0.000000, 0.000000, 0.000000") == b"r,0,m,0\r\n"
+    assert bench.say(b"sl") == b"r,0,s,0\r\nr,0,l,0\r\n"
+    assert bench.say(b"w") == b"r,0,w,0\r\nc,0,1,0,4\r\nf,51,0,0,1\r\n"
 
 
 def test_settings_are_refused_outside_configuration_mode() -> None:
-    stage = BotaBench()
-    assert stage.say(b"f,51,0,0,1") == b"r,0,f,1\r\n"
-    stage.run()
-    assert stage.say(b"c,0,1,0,4s") == b"r,0,c,1\r\nr,0,s,1\r\n"
+    bench = BotaBench()
+    assert bench.say(b"f,51,0,0,1") == b"r,0,f,1\r\n"
+    bench.run()
+    assert bench.say(b"c,0,1,0,4s") == b"r,0,c,1\r\nr,0,s,1\r\n"
 
 
 @pytest.mark.parametrize("wrong", [b"c,0,1,1,4", b"c,0,1,0,9", b"f,50,0,0,1", b"f,513,0,0,1", b"f,51R", b"c,,C", b"f;"])
 def test_settings_that_are_wrong_are_refused(wrong: bytes) -> None:
-    stage = BotaBench()
-    stage.say(b"C")
-    assert stage.say(wrong + b"R").startswith(f"r,0,{wrong[:1].decode()},1\r\n".encode())
+    bench = BotaBench()
+    bench.say(b"C")
+    assert bench.say(wrong + b"R").startswith(f"r,0,{wrong[:1].decode()},1\r\n".encode())
 
 
 def test_commands_are_understood_one_character_at_a_time() -> None:
-    stage = BotaBench()
-    answers = b"".join(stage.say(bytes([byte])) for byte in b"Cc,0,1,0,4f,512,0,0,1R")
+    bench = BotaBench()
+    answers = b"".join(bench.say(bytes([byte])) for byte in b"Cc,0,1,0,4f,512,0,0,1R")
     assert answers == b"r,0,C,0\r\nr,0,c,0\r\nr,0,f,0\r\nr,0,R,0\r\n"
 
 
@@ -103,113 +103,113 @@ def test_the_parser_holds_at_most_a_command_whatever_comes(noise: bytes) -> None
 
 @pytest.mark.parametrize(("sinc", "rate_Hz"), [(51, 1003), (64, 800), (128, 400), (205, 249), (256, 200), (512, 100)])
 def test_the_filter_sets_the_rate(sinc: int, rate_Hz: int) -> None:
-    stage = BotaBench()
-    stage.say(f"Cf,{sinc},0,0,1R".encode())
-    assert len(stage.frames(SECOND_NS)) == rate_Hz
+    bench = BotaBench()
+    bench.say(f"Cf,{sinc},0,0,1R".encode())
+    assert len(bench.frames(SECOND_NS)) == rate_Hz
 
 
 def test_frames_carry_the_plants_load_and_the_sensors_own_time() -> None:
-    stage = BotaBench()
-    stage.run()
-    first, second = stage.frames(20_000_000)
+    bench = BotaBench()
+    bench.run()
+    first, second = bench.frames(20_000_000)
     booted_us = BOOT_NS // 1000
     assert first == ForceFrame(0, *WRENCH, booted_us + 10_000, 24.5)
     assert second == ForceFrame(0, *WRENCH, booted_us + 20_000, 24.5)
 
 
 def test_when_samples_were_taken_is_kept_on_the_benchs_clock() -> None:
-    stage = BotaBench(drift_ppm=20_000)
-    begun_ns = stage.now_ns
-    stage.run()
-    frames = stage.frames(30_000_000)
+    bench = BotaBench(drift_ppm=20_000)
+    begun_ns = bench.now_ns
+    bench.run()
+    frames = bench.frames(30_000_000)
     times_ns = [begun_ns + round(number * 1e7 / 1.02) for number in (1, 2, 3)]
-    assert list(stage.mock.sampled) == [
+    assert list(bench.mock.sampled) == [
         (frame.time_us, time_ns) for frame, time_ns in zip(frames, times_ns, strict=True)
     ]
 
 
 def test_a_fast_clock_gives_more_frames_and_more_microseconds() -> None:
-    stage = BotaBench(drift_ppm=20_000)
-    stage.run()
-    frames = stage.frames(10 * SECOND_NS)
+    bench = BotaBench(drift_ppm=20_000)
+    bench.run()
+    frames = bench.frames(10 * SECOND_NS)
     assert len(frames) == 1020
     assert frames[-1].time_us - frames[0].time_us == pytest.approx(1019 * 10_000, abs=1)
 
 
 def test_the_sensors_clock_wraps_at_32_bits() -> None:
-    stage = BotaBench()
-    stage.now_ns = START_NS + (2**32 - 15_000) * 1000
-    stage.run()
-    assert [frame.time_us for frame in stage.frames(20_000_000)] == [2**32 - 5_000, 5_000]
+    bench = BotaBench()
+    bench.now_ns = START_NS + (2**32 - 15_000) * 1000
+    bench.run()
+    assert [frame.time_us for frame in bench.frames(20_000_000)] == [2**32 - 5_000, 5_000]
 
 
 def test_status_bits_tell_overrange_invalid_and_raw_readings() -> None:
-    stage = BotaBench()
-    stage.run()
-    stage.plant.over = True
-    assert [frame.status for frame in stage.frames(10_000_000)] == [2]
-    stage.mock.invalid = True
-    assert [frame.status for frame in stage.frames(10_000_000)] == [6]
-    stage.say(b"Cc,0,0,0,4R")
-    stage.plant.over = stage.mock.invalid = False
-    assert [frame.status for frame in stage.frames(10_000_000)] == [8]
+    bench = BotaBench()
+    bench.run()
+    bench.plant.over = True
+    assert [frame.status for frame in bench.frames(10_000_000)] == [2]
+    bench.mock.invalid = True
+    assert [frame.status for frame in bench.frames(10_000_000)] == [6]
+    bench.say(b"Cc,0,0,0,4R")
+    bench.plant.over = bench.mock.invalid = False
+    assert [frame.status for frame in bench.frames(10_000_000)] == [8]
 
 
 def test_a_frozen_sensor_repeats_its_forces_under_running_time() -> None:
-    stage = BotaBench()
-    stage.run()
-    stage.frames(10_000_000)
-    stage.mock.frozen = True
-    stage.plant.load = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    first, second = stage.frames(20_000_000)
+    bench = BotaBench()
+    bench.run()
+    bench.frames(10_000_000)
+    bench.mock.frozen = True
+    bench.plant.load = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    first, second = bench.frames(20_000_000)
     assert first[1:7] == second[1:7] == WRENCH
     assert second.time_us - first.time_us == 10_000
 
 
 def test_a_silent_sensor_neither_streams_nor_answers_but_goes_on_counting() -> None:
-    stage = BotaBench()
-    stage.run()
-    (before,) = stage.frames(10_000_000)
-    stage.mock.silent = True
-    assert stage.frames(50_000_000) == []
-    stage.mock.silent = False
-    (after,) = stage.frames(10_000_000)
+    bench = BotaBench()
+    bench.run()
+    (before,) = bench.frames(10_000_000)
+    bench.mock.silent = True
+    assert bench.frames(50_000_000) == []
+    bench.mock.silent = False
+    (after,) = bench.frames(10_000_000)
     assert after.time_us - before.time_us == 60_000
 
 
 def test_every_nth_checksum_can_be_spoilt() -> None:
-    stage = BotaBench()
-    stage.mock.corrupt_every = 3
-    stage.run()
+    bench = BotaBench()
+    bench.mock.corrupt_every = 3
+    bench.run()
     counters = LinkCounters()
-    make_decoder(counters).feed(stage.wait(90_000_000))
+    make_decoder(counters).feed(bench.wait(90_000_000))
     assert (counters.frames, counters.checksum_errors) == (6, 3)
 
 
 def test_a_wrong_identity_shows_after_a_reset_and_a_refusal_in_its_answer() -> None:
-    stage = BotaBench()
-    stage.mock.wrong_identity = True
-    stage.mock.refuse = "f"
-    stage.say(b"#")
-    assert b"name: KMS40\r\n" in stage.wait(SECOND_NS)
-    assert stage.say(b"Cf,51,0,0,1") == b"r,0,C,0\r\nr,0,f,1\r\n"
+    bench = BotaBench()
+    bench.mock.wrong_identity = True
+    bench.mock.refuse = "f"
+    bench.say(b"#")
+    assert b"name: KMS40\r\n" in bench.wait(SECOND_NS)
+    assert bench.say(b"Cf,51,0,0,1") == b"r,0,C,0\r\nr,0,f,1\r\n"
 
 
 def test_a_late_tick_sends_every_frame_that_was_due() -> None:
-    stage = BotaBench()
-    stage.run()
-    late_ns = stage.now_ns + 35_000_000
-    while stage.mock.due_ns <= late_ns:
-        stage.mock.tick(late_ns)
-    assert [frame.time_us for frame in make_decoder(LinkCounters()).feed(stage.wire.take())] == [
+    bench = BotaBench()
+    bench.run()
+    late_ns = bench.now_ns + 35_000_000
+    while bench.mock.due_ns <= late_ns:
+        bench.mock.tick(late_ns)
+    assert [frame.time_us for frame in make_decoder(LinkCounters()).feed(bench.wire.take())] == [
         BOOT_NS // 1000 + step for step in (10_000, 20_000, 30_000)
     ]
 
 
 def test_close_cuts_the_wire() -> None:
-    stage = BotaBench()
-    stage.mock.close()
-    assert stage.wire.closed
+    bench = BotaBench()
+    bench.mock.close()
+    assert bench.wire.closed
 
 
 @pytest.mark.bench

@@ -27,21 +27,21 @@ MODES = st.sampled_from([1, 3, 6, 8, 9]).map(lambda mode: (0x601, struct.pack("<
 
 @given(frames=st.lists(st.one_of(FRAMES, ORDERS, WRITES, WORDS, MODES), max_size=60))
 def test_no_frames_whatever_break_the_drive_and_a_reset_makes_it_as_new(frames: list[tuple[int, bytes]]) -> None:
-    stage = DriveBench()
+    bench = DriveBench()
     for can_id, data in frames:
-        stage.send(CanFrame(can_id, data))
-        stage.run(0.003)
-    stage.run(0.06)
-    stage.send(CanFrame(0x000, b"\x81\x01"))
-    stage.run(0.06)
-    assert status(stage) & 0x4F == 0x40
-    assert upload(stage, 0x6064) == 0
+        bench.send(CanFrame(can_id, data))
+        bench.run(0.003)
+    bench.run(0.06)
+    bench.send(CanFrame(0x000, b"\x81\x01"))
+    bench.run(0.06)
+    assert status(bench) & 0x4F == 0x40
+    assert upload(bench, 0x6064) == 0
 
 
 @given(chunks=st.lists(st.binary(max_size=60), max_size=20))
 def test_no_bytes_whatever_break_the_adapter(chunks: list[bytes]) -> None:
-    stage = DriveBench()
+    bench = DriveBench()
     for chunk in chunks:
-        stage.say(chunk)
-    stage.say(b"\rC\rS8\rO\r")
-    assert exchange(stage, b"\r") == b"\r"
+        bench.say(chunk)
+    bench.say(b"\rC\rS8\rO\r")
+    assert exchange(bench, b"\r") == b"\r"

@@ -22,7 +22,7 @@ PDO_MAPPING = [
 
 
 @pytest.fixture
-def stage() -> DriveBench:
+def bench() -> DriveBench:
     return DriveBench()
 
 
@@ -30,35 +30,35 @@ def stage() -> DriveBench:
 
 
 def test_the_adapter_answers_as_the_lawicel_manual_says() -> None:
-    stage = DriveBench()
-    assert exchange(stage, b"C\r") == b"\r"
-    assert exchange(stage, b"C\r") == b"\a"
-    assert exchange(stage, b"\r") == b"\r"
-    assert exchange(stage, b"V\rN\r") == b"V1013\rNA123\r"
-    assert exchange(stage, b"F\r") == b"\a"
-    assert exchange(stage, b"S9\rS8\r") == b"\a\r"
-    assert exchange(stage, b"t0800\r") == b"\a"
-    assert exchange(stage, b"O\r") == b"\r"
-    assert exchange(stage, b"O\rS6\rF\r") == b"\a\aF00\r"
-    assert exchange(stage, b"t0800\rT000000010\rr0800\rR000000010\r") == b"z\rZ\rz\rZ\r"
-    assert exchange(stage, b"t08\rhello\r") == b"\a\a"
+    bench = DriveBench()
+    assert exchange(bench, b"C\r") == b"\r"
+    assert exchange(bench, b"C\r") == b"\a"
+    assert exchange(bench, b"\r") == b"\r"
+    assert exchange(bench, b"V\rN\r") == b"V1013\rNA123\r"
+    assert exchange(bench, b"F\r") == b"\a"
+    assert exchange(bench, b"S9\rS8\r") == b"\a\r"
+    assert exchange(bench, b"t0800\r") == b"\a"
+    assert exchange(bench, b"O\r") == b"\r"
+    assert exchange(bench, b"O\rS6\rF\r") == b"\a\aF00\r"
+    assert exchange(bench, b"t0800\rT000000010\rr0800\rR000000010\r") == b"z\rZ\rz\rZ\r"
+    assert exchange(bench, b"t08\rhello\r") == b"\a\a"
 
 
-def test_a_line_feed_behind_a_command_is_no_command_of_its_own(stage: DriveBench) -> None:
-    assert exchange(stage, b"C\r\nS8\r\nO\r\nV\r\n") == b"\r\r\rV1013\r"
-    stage.mock.receive(stage.now())
-    assert exchange(stage, b"\n") == b""
+def test_a_line_feed_behind_a_command_is_no_command_of_its_own(bench: DriveBench) -> None:
+    assert exchange(bench, b"C\r\nS8\r\nO\r\nV\r\n") == b"\r\r\rV1013\r"
+    bench.mock.receive(bench.now())
+    assert exchange(bench, b"\n") == b""
 
 
-def test_time_stamps_are_sent_once_they_are_asked_for_and_our_decoder_passes_over_them(stage: DriveBench) -> None:
-    assert exchange(stage, b"Z1\rC\rZ2\rZ1\rO\r") == b"\a\r\a\r\r"
+def test_time_stamps_are_sent_once_they_are_asked_for_and_our_decoder_passes_over_them(bench: DriveBench) -> None:
+    assert exchange(bench, b"Z1\rC\rZ2\rZ1\rO\r") == b"\a\r\a\r\r"
     ask = b"t60184000100000000000\r"
-    now_ms = stage.now() // MS % 60_000
-    acknowledged, answer = exchange(stage, ask).split(b"\r")[:2]
+    now_ms = bench.now() // MS % 60_000
+    acknowledged, answer = exchange(bench, ask).split(b"\r")[:2]
     assert (acknowledged, len(answer), int(answer[-4:], 16)) == (b"z", 5 + 16 + 4, now_ms)
     assert decode_line(answer) == decode_line(answer[:-4])
-    assert exchange(stage, b"C\rZ0\rO\r") == b"\r\r\r"
-    assert len(exchange(stage, ask).split(b"\r")[1]) == 5 + 16
+    assert exchange(bench, b"C\rZ0\rO\r") == b"\r\r\r"
+    assert len(exchange(bench, ask).split(b"\r")[1]) == 5 + 16
 
 
 def test_an_adapter_without_a_bit_rate_does_not_open() -> None:
@@ -70,43 +70,43 @@ def test_an_adapter_without_a_bit_rate_does_not_open() -> None:
     assert wire.sent == [b"\a\r\r"]
 
 
-def test_a_channel_at_another_bit_rate_reaches_no_node(stage: DriveBench) -> None:
-    assert exchange(stage, b"C\rS6\rO\r") == b"\r\r\r"
-    assert exchange(stage, b"t60184041600000000000\r") == b"z\r"
+def test_a_channel_at_another_bit_rate_reaches_no_node(bench: DriveBench) -> None:
+    assert exchange(bench, b"C\rS6\rO\r") == b"\r\r\r"
+    assert exchange(bench, b"t60184041600000000000\r") == b"z\r"
 
 
-def test_a_listener_cannot_send(stage: DriveBench) -> None:
-    assert exchange(stage, b"C\rL\rt0800\r") == b"\r\r\a"
+def test_a_listener_cannot_send(bench: DriveBench) -> None:
+    assert exchange(bench, b"C\rL\rt0800\r") == b"\r\r\a"
 
 
-def test_lines_come_in_pieces_and_overlong_ones_are_refused(stage: DriveBench) -> None:
-    assert exchange(stage, b"t6018404160000") == b""
-    assert exchange(stage, b"0000000\r").startswith(b"z\rt58184B416000")
-    assert exchange(stage, b"t" * 500 + b"\r") == b"\a"
+def test_lines_come_in_pieces_and_overlong_ones_are_refused(bench: DriveBench) -> None:
+    assert exchange(bench, b"t6018404160000") == b""
+    assert exchange(bench, b"0000000\r").startswith(b"z\rt58184B416000")
+    assert exchange(bench, b"t" * 500 + b"\r") == b"\a"
 
 
 # Objects
 
 
-def test_identity_and_status_are_read_expedited(stage: DriveBench) -> None:
-    assert sdo(stage, "40 18 10 01 00 00 00 00") == "43181001FB000000"
-    assert sdo(stage, "40 18 10 02 00 00 00 00") == "4318100200005061"
-    assert sdo(stage, "40 41 60 00 00 00 00 00") == "4B41600050000000"
-    assert sdo(stage, "40 61 60 00 00 00 00 00") == "4F61600001000000"
+def test_identity_and_status_are_read_expedited(bench: DriveBench) -> None:
+    assert sdo(bench, "40 18 10 01 00 00 00 00") == "43181001FB000000"
+    assert sdo(bench, "40 18 10 02 00 00 00 00") == "4318100200005061"
+    assert sdo(bench, "40 41 60 00 00 00 00 00") == "4B41600050000000"
+    assert sdo(bench, "40 61 60 00 00 00 00 00") == "4F61600001000000"
 
 
-def test_a_text_is_read_in_segments(stage: DriveBench) -> None:
-    assert sdo(stage, "40 08 10 00 00 00 00 00") == "4108100005000000"
-    assert sdo(stage, "60 00 00 00 00 00 00 00") == "05" + b"EPOS4".hex().upper() + "0000"
+def test_a_text_is_read_in_segments(bench: DriveBench) -> None:
+    assert sdo(bench, "40 08 10 00 00 00 00 00") == "4108100005000000"
+    assert sdo(bench, "60 00 00 00 00 00 00 00") == "05" + b"EPOS4".hex().upper() + "0000"
 
 
-def test_a_value_is_written_in_segments_as_well(stage: DriveBench) -> None:
-    assert sdo(stage, "21 7A 60 00 04 00 00 00") == "607A600000000000"
-    assert sdo(stage, "07 39 30 00 00 00 00 00") == "2000000000000000"
-    assert upload(stage, 0x607A) == 12345
+def test_a_value_is_written_in_segments_as_well(bench: DriveBench) -> None:
+    assert sdo(bench, "21 7A 60 00 04 00 00 00") == "607A600000000000"
+    assert sdo(bench, "07 39 30 00 00 00 00 00") == "2000000000000000"
+    assert upload(bench, 0x607A) == 12345
 
 
-def test_the_makers_defaults(stage: DriveBench) -> None:
+def test_the_makers_defaults(bench: DriveBench) -> None:
     defaults = {
         (0x6065, 0): 2000,
         (0x6081, 0): 1000,
@@ -120,10 +120,10 @@ def test_the_makers_defaults(stage: DriveBench) -> None:
         (0x1A01, 1): 0x60410010,
         (0x607D, 2): (1 << 31) - 1,
     }
-    assert {key: upload(stage, *key) for key in defaults} == defaults
-    assert upload(stage, 0x6007, kind="h") == 3
-    assert upload(stage, 0x605A, kind="h") == 6
-    assert upload(stage, 0x60C2, 2, kind="b") == -3
+    assert {key: upload(bench, *key) for key in defaults} == defaults
+    assert upload(bench, 0x6007, kind="h") == 3
+    assert upload(bench, 0x605A, kind="h") == 6
+    assert upload(bench, 0x60C2, 2, kind="b") == -3
 
 
 @pytest.mark.parametrize(
@@ -146,141 +146,141 @@ def test_the_makers_defaults(stage: DriveBench) -> None:
         ("60 00 00 00 00 00 00 00", 0x05040001),
     ],
 )
-def test_what_is_not_allowed_is_aborted_with_the_right_code(stage: DriveBench, request_hex: str, abort: int) -> None:
-    answer = bytes.fromhex(sdo(stage, request_hex))
+def test_what_is_not_allowed_is_aborted_with_the_right_code(bench: DriveBench, request_hex: str, abort: int) -> None:
+    answer = bytes.fromhex(sdo(bench, request_hex))
     assert answer[0] == 0x80
     assert struct.unpack_from("<I", answer, 4)[0] == abort
 
 
-def test_a_toggle_bit_that_stands_still_is_aborted(stage: DriveBench) -> None:
-    sdo(stage, "40 08 10 00 00 00 00 00")
-    assert sdo(stage, "70 00 00 00 00 00 00 00") == "8008100000000305"
+def test_a_toggle_bit_that_stands_still_is_aborted(bench: DriveBench) -> None:
+    sdo(bench, "40 08 10 00 00 00 00 00")
+    assert sdo(bench, "70 00 00 00 00 00 00 00") == "8008100000000305"
 
 
-def test_the_current_limit_reaches_the_motor(stage: DriveBench) -> None:
-    assert download(stage, 0x3001, 2, 4, 2500) == 0
-    assert stage.plant.current_limit_A == 2.5
+def test_the_current_limit_reaches_the_motor(bench: DriveBench) -> None:
+    assert download(bench, 0x3001, 2, 4, 2500) == 0
+    assert bench.plant.current_limit_A == 2.5
 
 
 # Network management and heartbeats
 
 
 def test_a_node_says_that_it_booted_and_waits_in_pre_operational() -> None:
-    stage = DriveBench()
-    assert exchange(stage, b"t00028101\r") == b"z\r"
-    assert exchange(stage, b"t60184041600000000000\r") == b"z\r"
-    stage.run(0.06)
-    assert stage.heard() == b"t701100\r"
-    assert status(stage) & 0x200 == 0
+    bench = DriveBench()
+    assert exchange(bench, b"t00028101\r") == b"z\r"
+    assert exchange(bench, b"t60184041600000000000\r") == b"z\r"
+    bench.run(0.06)
+    assert bench.heard() == b"t701100\r"
+    assert status(bench) & 0x200 == 0
 
 
-def test_a_reset_brings_back_defaults_of_communication_or_of_everything(stage: DriveBench) -> None:
-    download(stage, 0x1017, 0, 2, 100)
-    download(stage, 0x6065, 0, 4, 5000)
-    exchange(stage, b"t00028201\r")
-    stage.run(0.06)
-    assert (upload(stage, 0x1017, kind="H"), upload(stage, 0x6065)) == (0, 5000)
-    exchange(stage, b"t00028100\r")
-    stage.run(0.06)
-    assert upload(stage, 0x6065) == 2000
+def test_a_reset_brings_back_defaults_of_communication_or_of_everything(bench: DriveBench) -> None:
+    download(bench, 0x1017, 0, 2, 100)
+    download(bench, 0x6065, 0, 4, 5000)
+    exchange(bench, b"t00028201\r")
+    bench.run(0.06)
+    assert (upload(bench, 0x1017, kind="H"), upload(bench, 0x6065)) == (0, 5000)
+    exchange(bench, b"t00028100\r")
+    bench.run(0.06)
+    assert upload(bench, 0x6065) == 2000
 
 
-def test_orders_to_another_node_are_not_obeyed(stage: DriveBench) -> None:
-    exchange(stage, b"t00020102\r")
-    assert status(stage) & 0x200 == 0
-    exchange(stage, b"t00020101\r")
-    assert status(stage) & 0x200
+def test_orders_to_another_node_are_not_obeyed(bench: DriveBench) -> None:
+    exchange(bench, b"t00020102\r")
+    assert status(bench) & 0x200 == 0
+    exchange(bench, b"t00020101\r")
+    assert status(bench) & 0x200
 
 
-def test_a_stopped_node_answers_no_sdo(stage: DriveBench) -> None:
-    exchange(stage, b"t00020201\r")
-    assert exchange(stage, b"t60184041600000000000\r") == b"z\r"
+def test_a_stopped_node_answers_no_sdo(bench: DriveBench) -> None:
+    exchange(bench, b"t00020201\r")
+    assert exchange(bench, b"t60184041600000000000\r") == b"z\r"
 
 
-def test_heartbeats_come_in_their_period_and_say_the_state(stage: DriveBench) -> None:
-    download(stage, 0x1017, 0, 2, 20)
-    stage.heard()
-    stage.run(0.1)
-    assert stage.heard() == b"t70117F\r" * 5
-    exchange(stage, b"t00020101\r")
-    stage.run(0.04)
-    assert stage.heard() == b"t701105\r" * 2
-    download(stage, 0x1017, 0, 2, 0)
-    stage.heard()
-    stage.run(0.1)
-    assert stage.heard() == b""
+def test_heartbeats_come_in_their_period_and_say_the_state(bench: DriveBench) -> None:
+    download(bench, 0x1017, 0, 2, 20)
+    bench.heard()
+    bench.run(0.1)
+    assert bench.heard() == b"t70117F\r" * 5
+    exchange(bench, b"t00020101\r")
+    bench.run(0.04)
+    assert bench.heard() == b"t701105\r" * 2
+    download(bench, 0x1017, 0, 2, 0)
+    bench.heard()
+    bench.run(0.1)
+    assert bench.heard() == b""
 
 
-def test_a_missing_host_is_an_error_that_leaves_operational(stage: DriveBench) -> None:
-    exchange(stage, b"t00020101\r")
-    download(stage, 0x1016, 1, 4, 127 << 16 | 40)
-    stage.run(1.0)
-    exchange(stage, b"t77F105\r")
-    stage.run(0.039)
-    assert stage.heard() == b""
-    stage.run(0.002)
-    assert stage.heard() == b"t08183081100000000000\r"
-    assert status(stage) & 0x24F == 0x08
-    assert upload(stage, 0x603F, kind="H") == 0x8130
-    assert upload(stage, 0x1001, kind="B") == 0x10
-    assert upload(stage, 0x1003, 1) == 0x8130
+def test_a_missing_host_is_an_error_that_leaves_operational(bench: DriveBench) -> None:
+    exchange(bench, b"t00020101\r")
+    download(bench, 0x1016, 1, 4, 127 << 16 | 40)
+    bench.run(1.0)
+    exchange(bench, b"t77F105\r")
+    bench.run(0.039)
+    assert bench.heard() == b""
+    bench.run(0.002)
+    assert bench.heard() == b"t08183081100000000000\r"
+    assert status(bench) & 0x24F == 0x08
+    assert upload(bench, 0x603F, kind="H") == 0x8130
+    assert upload(bench, 0x1001, kind="B") == 0x10
+    assert upload(bench, 0x1003, 1) == 0x8130
 
 
-def test_heartbeats_of_strangers_keep_nobody_alive(stage: DriveBench) -> None:
-    download(stage, 0x1016, 1, 4, 127 << 16 | 40)
-    exchange(stage, b"t77F105\r")
+def test_heartbeats_of_strangers_keep_nobody_alive(bench: DriveBench) -> None:
+    download(bench, 0x1016, 1, 4, 127 << 16 | 40)
+    exchange(bench, b"t77F105\r")
     for _ in range(5):
-        stage.run(0.01)
-        exchange(stage, b"t77E105\r")
-    assert upload(stage, 0x603F, kind="H") == 0x8130
+        bench.run(0.01)
+        exchange(bench, b"t77E105\r")
+    assert upload(bench, 0x603F, kind="H") == 0x8130
 
 
 @pytest.mark.parametrize(("behaviour", "state"), [(0, "7F"), (1, "05"), (2, "04")])
-def test_object_1029_says_where_a_communication_error_leads(stage: DriveBench, behaviour: int, state: str) -> None:
-    download(stage, 0x1029, 1, 1, behaviour)
-    download(stage, 0x1017, 0, 2, 10)
-    download(stage, 0x1016, 1, 4, 127 << 16 | 40)
-    exchange(stage, b"t00020101\r")
-    exchange(stage, b"t77F105\r")
-    stage.run(0.06)
-    assert stage.heard().endswith(f"t7011{state}\r".encode())
+def test_object_1029_says_where_a_communication_error_leads(bench: DriveBench, behaviour: int, state: str) -> None:
+    download(bench, 0x1029, 1, 1, behaviour)
+    download(bench, 0x1017, 0, 2, 10)
+    download(bench, 0x1016, 1, 4, 127 << 16 | 40)
+    exchange(bench, b"t00020101\r")
+    exchange(bench, b"t77F105\r")
+    bench.run(0.06)
+    assert bench.heard().endswith(f"t7011{state}\r".encode())
 
 
-def test_an_unguarded_node_misses_no_host(stage: DriveBench) -> None:
-    stage.mock.unguarded = True
-    download(stage, 0x1016, 1, 4, 127 << 16 | 40)
-    exchange(stage, b"t77F105\r")
-    stage.run(0.1)
-    assert upload(stage, 0x603F, kind="H") == 0
+def test_an_unguarded_node_misses_no_host(bench: DriveBench) -> None:
+    bench.mock.unguarded = True
+    download(bench, 0x1016, 1, 4, 127 << 16 | 40)
+    exchange(bench, b"t77F105\r")
+    bench.run(0.1)
+    assert upload(bench, 0x603F, kind="H") == 0
 
 
 # Process data
 
 
-def test_a_pdo_is_mapped_while_it_is_off_and_comes_with_each_sync(stage: DriveBench) -> None:
+def test_a_pdo_is_mapped_while_it_is_off_and_comes_with_each_sync(bench: DriveBench) -> None:
     for index, sub, size, value in PDO_MAPPING:
-        assert download(stage, index, sub, size, value) == 0
-    assert exchange(stage, b"t0800\r") == b"z\r"
-    exchange(stage, b"t00020101\r")
-    assert exchange(stage, b"t0800\r") == b"z\rt1816500200000000\r"
-    assert exchange(stage, b"t0800\rt0800\r") == b"z\rz\r" + b"t1816500200000000\r" * 2
+        assert download(bench, index, sub, size, value) == 0
+    assert exchange(bench, b"t0800\r") == b"z\r"
+    exchange(bench, b"t00020101\r")
+    assert exchange(bench, b"t0800\r") == b"z\rt1816500200000000\r"
+    assert exchange(bench, b"t0800\rt0800\r") == b"z\rz\r" + b"t1816500200000000\r" * 2
 
 
-def test_the_time_of_every_sync_that_is_obeyed_is_kept(stage: DriveBench) -> None:
-    exchange(stage, b"t0800\r")
-    assert list(stage.mock.synced_ns) == []
-    exchange(stage, b"t00020101\r")
-    exchange(stage, b"t0800\rt0800\r")
-    assert list(stage.mock.synced_ns) == [stage.now(), stage.now()]
+def test_the_time_of_every_sync_that_is_obeyed_is_kept(bench: DriveBench) -> None:
+    exchange(bench, b"t0800\r")
+    assert list(bench.mock.synced_ns) == []
+    exchange(bench, b"t00020101\r")
+    exchange(bench, b"t0800\rt0800\r")
+    assert list(bench.mock.synced_ns) == [bench.now(), bench.now()]
 
 
-def test_a_pdo_of_type_3_comes_with_every_third_sync(stage: DriveBench) -> None:
+def test_a_pdo_of_type_3_comes_with_every_third_sync(bench: DriveBench) -> None:
     for index, sub, size, value in PDO_MAPPING[:-1]:
-        download(stage, index, sub, size, value)
-    download(stage, 0x1800, 2, 1, 3)
-    download(stage, 0x1800, 1, 4, 0x40000181)
-    exchange(stage, b"t00020101\r")
-    assert exchange(stage, b"t0800\r" * 6).count(b"t1816") == 2
+        download(bench, index, sub, size, value)
+    download(bench, 0x1800, 2, 1, 3)
+    download(bench, 0x1800, 1, 4, 0x40000181)
+    exchange(bench, b"t00020101\r")
+    assert exchange(bench, b"t0800\r" * 6).count(b"t1816") == 2
 
 
 @pytest.mark.parametrize(
@@ -295,9 +295,9 @@ def test_a_pdo_of_type_3_comes_with_every_third_sync(stage: DriveBench) -> None:
     ],
 )
 def test_pdo_parameters_are_protected(
-    stage: DriveBench, index: int, sub: int, size: int, value: int, abort: int
+    bench: DriveBench, index: int, sub: int, size: int, value: int, abort: int
 ) -> None:
-    assert download(stage, index, sub, size, value) == abort
+    assert download(bench, index, sub, size, value) == abort
 
 
 @pytest.mark.parametrize(
@@ -310,84 +310,84 @@ def test_pdo_parameters_are_protected(
         (0x60640020, 0),
     ],
 )
-def test_only_what_may_be_sent_is_mapped_into_a_sent_pdo(stage: DriveBench, value: int, abort: int) -> None:
-    assert download(stage, 0x1A01, 0, 1, 0) == 0
-    assert download(stage, 0x1A01, 1, 4, value) == abort
+def test_only_what_may_be_sent_is_mapped_into_a_sent_pdo(bench: DriveBench, value: int, abort: int) -> None:
+    assert download(bench, 0x1A01, 0, 1, 0) == 0
+    assert download(bench, 0x1A01, 1, 4, value) == abort
 
 
-def test_a_pdo_holds_eight_bytes_and_no_gaps(stage: DriveBench) -> None:
-    download(stage, 0x1A01, 0, 1, 0)
+def test_a_pdo_holds_eight_bytes_and_no_gaps(bench: DriveBench) -> None:
+    download(bench, 0x1A01, 0, 1, 0)
     for sub, value in enumerate((0x60640020, 0x606C0020, 0x60410010), start=1):
-        assert download(stage, 0x1A01, sub, 4, value) == 0
-    assert download(stage, 0x1A01, 0, 1, 3) == 0x06040042
-    assert download(stage, 0x1A01, 0, 1, 2) == 0
-    download(stage, 0x1A02, 0, 1, 0)
-    assert download(stage, 0x1A02, 0, 1, 3) == 0x06040041
+        assert download(bench, 0x1A01, sub, 4, value) == 0
+    assert download(bench, 0x1A01, 0, 1, 3) == 0x06040042
+    assert download(bench, 0x1A01, 0, 1, 2) == 0
+    download(bench, 0x1A02, 0, 1, 0)
+    assert download(bench, 0x1A02, 0, 1, 3) == 0x06040041
 
 
-def test_by_default_the_statusword_is_sent_on_change_at_most_each_millisecond(stage: DriveBench) -> None:
-    assert b"t1812" in exchange(stage, b"t00020101\r")
-    assert exchange(stage, b"t60182B40600006000000\r").count(b"t1812") == 0
-    stage.run(0.002)
-    stage.say(b"\r")
-    assert b"t18123102" in stage.heard()
+def test_by_default_the_statusword_is_sent_on_change_at_most_each_millisecond(bench: DriveBench) -> None:
+    assert b"t1812" in exchange(bench, b"t00020101\r")
+    assert exchange(bench, b"t60182B40600006000000\r").count(b"t1812") == 0
+    bench.run(0.002)
+    bench.say(b"\r")
+    assert b"t18123102" in bench.heard()
 
 
-def test_a_controlword_by_pdo_is_obeyed_when_operational(stage: DriveBench) -> None:
-    exchange(stage, b"t20120600\r")
-    assert status(stage) & 0x6F == 0x40
-    exchange(stage, b"t00020101\rt20120600\rt20120700\r")
-    assert status(stage) & 0x6F == 0x23
+def test_a_controlword_by_pdo_is_obeyed_when_operational(bench: DriveBench) -> None:
+    exchange(bench, b"t20120600\r")
+    assert status(bench) & 0x6F == 0x40
+    exchange(bench, b"t00020101\rt20120600\rt20120700\r")
+    assert status(bench) & 0x6F == 0x23
 
 
-def test_a_synchronous_set_point_waits_for_the_sync(stage: DriveBench) -> None:
-    download(stage, 0x1400, 1, 4, 0x80000201)
-    download(stage, 0x1400, 2, 1, 1)
-    download(stage, 0x1400, 1, 4, 0x201)
-    exchange(stage, b"t00020101\rt20120600\r")
-    assert status(stage) & 0x6F == 0x40
-    exchange(stage, b"t0800\r")
-    assert status(stage) & 0x6F == 0x21
+def test_a_synchronous_set_point_waits_for_the_sync(bench: DriveBench) -> None:
+    download(bench, 0x1400, 1, 4, 0x80000201)
+    download(bench, 0x1400, 2, 1, 1)
+    download(bench, 0x1400, 1, 4, 0x201)
+    exchange(bench, b"t00020101\rt20120600\r")
+    assert status(bench) & 0x6F == 0x40
+    exchange(bench, b"t0800\r")
+    assert status(bench) & 0x6F == 0x21
 
 
-def test_a_pdo_too_short_is_an_error(stage: DriveBench) -> None:
-    exchange(stage, b"t00020101\r")
-    assert b"t08181082100000000000\r" in exchange(stage, b"t201106\r")
+def test_a_pdo_too_short_is_an_error(bench: DriveBench) -> None:
+    exchange(bench, b"t00020101\r")
+    assert b"t08181082100000000000\r" in exchange(bench, b"t201106\r")
 
 
 # Knobs
 
 
-def test_a_silent_drive_neither_hears_nor_speaks(stage: DriveBench) -> None:
-    download(stage, 0x1017, 0, 2, 10)
-    stage.mock.silent = True
-    assert exchange(stage, b"t60184041600000000000\r") == b"z\r"
-    stage.run(0.05)
-    assert stage.heard() == b""
-    stage.mock.silent = False
-    assert status(stage)
+def test_a_silent_drive_neither_hears_nor_speaks(bench: DriveBench) -> None:
+    download(bench, 0x1017, 0, 2, 10)
+    bench.mock.silent = True
+    assert exchange(bench, b"t60184041600000000000\r") == b"z\r"
+    bench.run(0.05)
+    assert bench.heard() == b""
+    bench.mock.silent = False
+    assert status(bench)
 
 
-def test_a_frozen_drive_repeats_its_position_while_it_moves(stage: DriveBench) -> None:
-    download(stage, 0x60FF, 0, 4, 120)
-    enabled(stage, 3)
-    stage.mock.frozen = True
-    before = upload(stage, 0x6064)
-    follow(stage, 0.3)
-    assert upload(stage, 0x6064) == before
-    assert stage.mock.frozen
-    stage.mock.frozen = False
-    assert upload(stage, 0x6064) > before + 1000
+def test_a_frozen_drive_repeats_its_position_while_it_moves(bench: DriveBench) -> None:
+    download(bench, 0x60FF, 0, 4, 120)
+    enabled(bench, 3)
+    bench.mock.frozen = True
+    before = upload(bench, 0x6064)
+    follow(bench, 0.3)
+    assert upload(bench, 0x6064) == before
+    assert bench.mock.frozen
+    bench.mock.frozen = False
+    assert upload(bench, 0x6064) > before + 1000
 
 
-def test_another_device_has_another_identity(stage: DriveBench) -> None:
-    stage.mock.wrong_identity = True
-    assert upload(stage, 0x1018, 1) == 0x24A
-    assert upload(stage, 0x1018, 2) == 0x10002
+def test_another_device_has_another_identity(bench: DriveBench) -> None:
+    bench.mock.wrong_identity = True
+    assert upload(bench, 0x1018, 1) == 0x24A
+    assert upload(bench, 0x1018, 2) == 0x10002
 
 
-def test_nothing_is_due_while_nothing_can_happen(stage: DriveBench) -> None:
-    assert stage.mock.due_ns - stage.now() > 1_000_000_000_000
-    assert stage.mock.endpoints() == {"slcan": "memory"}
-    enabled(stage, 1)
-    assert stage.mock.due_ns - stage.now() <= 1_000_000
+def test_nothing_is_due_while_nothing_can_happen(bench: DriveBench) -> None:
+    assert bench.mock.due_ns - bench.now() > 1_000_000_000_000
+    assert bench.mock.endpoints() == {"slcan": "memory"}
+    enabled(bench, 1)
+    assert bench.mock.due_ns - bench.now() <= 1_000_000

@@ -58,9 +58,9 @@ def test_it_is_a_mock_of_the_stage() -> None:
 
 
 def test_the_manuals_requests_are_answered() -> None:
-    stage = RobotiqBench()
-    assert stage.say(bytes.fromhex("09 03 00 B4 00 01 C5 64")) == with_crc(bytes.fromhex("09 03 02 00 7D"))
-    assert stage.say(READ_FORCES) == FORCES
+    bench = RobotiqBench()
+    assert bench.say(bytes.fromhex("09 03 00 B4 00 01 C5 64")) == with_crc(bytes.fromhex("09 03 02 00 7D"))
+    assert bench.say(READ_FORCES) == FORCES
 
 
 @pytest.mark.parametrize(
@@ -99,29 +99,29 @@ def test_a_large_serial_number_has_its_low_word_first() -> None:
     ],
 )
 def test_requests_that_cannot_be_served_get_an_exception(request_: bytes, function: int, code: int) -> None:
-    stage = RobotiqBench()
-    assert stage.say(request_) == exception(function, code)
-    assert not stage.mock.streaming
+    bench = RobotiqBench()
+    assert bench.say(request_) == exception(function, code)
+    assert not bench.mock.streaming
 
 
 @pytest.mark.parametrize("slave", [0, 1, 8, 10, 247])
 def test_requests_to_other_slaves_are_met_with_silence(slave: int) -> None:
-    stage = RobotiqBench()
+    bench = RobotiqBench()
     hidden = with_crc(bytes([slave, 16, 0, 0, 0, 4, 8]) + READ_FORCES)
-    assert stage.say(hidden) == b""
-    assert stage.say(READ_FORCES) == FORCES
+    assert bench.say(hidden) == b""
+    assert bench.say(READ_FORCES) == FORCES
 
 
 def test_a_wrong_checksum_is_met_with_silence() -> None:
-    stage = RobotiqBench()
-    assert stage.say(READ_FORCES[:-1] + b"\x00") == b""
-    assert stage.say(READ_FORCES) == FORCES
+    bench = RobotiqBench()
+    assert bench.say(READ_FORCES[:-1] + b"\x00") == b""
+    assert bench.say(READ_FORCES) == FORCES
 
 
 @pytest.mark.parametrize("cut", range(len(READ_FORCES) + 1))
 def test_a_request_may_be_split_at_every_byte(cut: int) -> None:
-    stage = RobotiqBench()
-    assert stage.say(READ_FORCES[:cut]) + stage.say(READ_FORCES[cut:]) == FORCES
+    bench = RobotiqBench()
+    assert bench.say(READ_FORCES[:cut]) + bench.say(READ_FORCES[cut:]) == FORCES
 
 
 def test_noise_before_a_request_is_passed_over() -> None:
@@ -138,119 +138,119 @@ def test_the_slave_holds_at_most_a_request_whatever_comes(chunks: list[bytes]) -
 
 
 def test_the_stream_starts_with_an_answer_and_runs_at_100_frames_a_second() -> None:
-    stage = RobotiqBench()
-    stage.stream()
-    assert stage.frames(1_000_000_000 + FRAME_NS) == [Wrench(*WRENCH)] * 100
+    bench = RobotiqBench()
+    bench.stream()
+    assert bench.frames(1_000_000_000 + FRAME_NS) == [Wrench(*WRENCH)] * 100
 
 
 def test_a_frame_arrives_when_it_has_passed_the_line() -> None:
-    stage = RobotiqBench()
-    stage.stream()
-    assert stage.wait(PERIOD_NS) == b""
-    stage.plant.load = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    assert stage.wait(FRAME_NS - 1) == b""
-    assert stage.frames(1) == [Wrench(*WRENCH)]
+    bench = RobotiqBench()
+    bench.stream()
+    assert bench.wait(PERIOD_NS) == b""
+    bench.plant.load = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert bench.wait(FRAME_NS - 1) == b""
+    assert bench.frames(1) == [Wrench(*WRENCH)]
 
 
 def test_when_samples_were_taken_is_kept_on_the_benchs_clock() -> None:
-    stage = RobotiqBench()
-    begun_ns = stage.now_ns
-    stage.stream()
-    stage.wait(2 * PERIOD_NS)
+    bench = RobotiqBench()
+    begun_ns = bench.now_ns
+    bench.stream()
+    bench.wait(2 * PERIOD_NS)
     mark = int.from_bytes(struct.pack("<6h", 125, -250, -775, 125, -250, 500), "little")
-    assert list(stage.mock.sampled) == [(mark, begun_ns + PERIOD_NS), (mark, begun_ns + 2 * PERIOD_NS)]
+    assert list(bench.mock.sampled) == [(mark, begun_ns + PERIOD_NS), (mark, begun_ns + 2 * PERIOD_NS)]
 
 
 def test_a_fast_clock_gives_more_frames() -> None:
-    stage = RobotiqBench(drift_ppm=20_000)
-    stage.stream()
-    assert len(stage.frames(10_000_000_000 + FRAME_NS)) == 1020
+    bench = RobotiqBench(drift_ppm=20_000)
+    bench.stream()
+    assert len(bench.frames(10_000_000_000 + FRAME_NS)) == 1020
 
 
 def test_a_streaming_sensor_is_deaf_to_modbus() -> None:
-    stage = RobotiqBench()
-    assert stage.say(START_STREAM + READ_FORCES) == STREAM_STARTED
-    assert stage.say(READ_FORCES) == b""
-    assert stage.mock.streaming
+    bench = RobotiqBench()
+    assert bench.say(START_STREAM + READ_FORCES) == STREAM_STARTED
+    assert bench.say(READ_FORCES) == b""
+    assert bench.mock.streaming
 
 
 @pytest.mark.parametrize("cut", [0, 1, 25, 49, 50])
 def test_a_burst_stops_the_stream_and_modbus_works_again(cut: int) -> None:
-    stage = RobotiqBench()
-    stage.stream()
-    stage.wait(PERIOD_NS)
-    assert stage.say(STOP_BURST[:cut]) + stage.say(STOP_BURST[cut:]) == b""
-    assert not stage.mock.streaming
-    assert stage.wait(10 * PERIOD_NS) == b""
-    assert stage.say(b"\xff\xff" + READ_FORCES) == FORCES
-    stage.stream()
+    bench = RobotiqBench()
+    bench.stream()
+    bench.wait(PERIOD_NS)
+    assert bench.say(STOP_BURST[:cut]) + bench.say(STOP_BURST[cut:]) == b""
+    assert not bench.mock.streaming
+    assert bench.wait(10 * PERIOD_NS) == b""
+    assert bench.say(b"\xff\xff" + READ_FORCES) == FORCES
+    bench.stream()
 
 
 def test_a_burst_that_is_too_short_or_interrupted_does_not_stop_the_stream() -> None:
-    stage = RobotiqBench()
-    stage.stream()
-    stage.say(STOP_BURST[:-1] + b"\x00" + STOP_BURST[:-1])
-    assert stage.mock.streaming
+    bench = RobotiqBench()
+    bench.stream()
+    bench.say(STOP_BURST[:-1] + b"\x00" + STOP_BURST[:-1])
+    assert bench.mock.streaming
 
 
 def test_a_frozen_sensor_repeats_its_forces() -> None:
-    stage = RobotiqBench()
-    assert stage.say(READ_FORCES) == FORCES
-    stage.mock.frozen = True
-    stage.plant.load = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    assert stage.say(READ_FORCES) == FORCES
-    stage.stream()
-    assert stage.frames(30_000_000) == [Wrench(*WRENCH)] * 2
+    bench = RobotiqBench()
+    assert bench.say(READ_FORCES) == FORCES
+    bench.mock.frozen = True
+    bench.plant.load = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert bench.say(READ_FORCES) == FORCES
+    bench.stream()
+    assert bench.frames(30_000_000) == [Wrench(*WRENCH)] * 2
 
 
 def test_an_invalid_sensor_gives_the_end_of_its_converter() -> None:
-    stage = RobotiqBench()
-    stage.mock.invalid = True
-    stage.stream()
-    assert stage.frames(20_000_000) == [Wrench(327.67, 327.67, 327.67, 32.767, 32.767, 32.767)]
+    bench = RobotiqBench()
+    bench.mock.invalid = True
+    bench.stream()
+    assert bench.frames(20_000_000) == [Wrench(327.67, 327.67, 327.67, 32.767, 32.767, 32.767)]
 
 
 def test_every_nth_checksum_can_be_spoilt() -> None:
-    stage = RobotiqBench()
-    stage.mock.corrupt_every = 3
-    stage.stream()
+    bench = RobotiqBench()
+    bench.mock.corrupt_every = 3
+    bench.stream()
     counters = LinkCounters()
-    make_decoder(counters).feed(stage.wait(90_000_000 + FRAME_NS))
+    make_decoder(counters).feed(bench.wait(90_000_000 + FRAME_NS))
     assert (counters.frames, counters.checksum_errors) == (6, 3)
 
 
 def test_a_silent_sensor_neither_answers_nor_streams() -> None:
-    stage = RobotiqBench()
-    stage.mock.silent = True
-    assert stage.say(READ_FORCES) == b""
-    assert stage.say(START_STREAM) == b""
-    assert stage.wait(50_000_000) == b""
-    stage.mock.silent = False
-    assert len(stage.frames(20_000_000)) == 2
+    bench = RobotiqBench()
+    bench.mock.silent = True
+    assert bench.say(READ_FORCES) == b""
+    assert bench.say(START_STREAM) == b""
+    assert bench.wait(50_000_000) == b""
+    bench.mock.silent = False
+    assert len(bench.frames(20_000_000)) == 2
 
 
 def test_start_can_go_unanswered_or_be_refused_and_a_deaf_sensor_streams_on() -> None:
-    stage = RobotiqBench()
-    stage.mock.refuse_stream = True
-    assert stage.say(START_STREAM) == exception(16, 3)
-    stage.mock.refuse_stream = False
-    stage.mock.mute_start = True
-    assert stage.say(START_STREAM) == b""
-    stage.mock.deaf = True
-    stage.say(STOP_BURST * 3)
-    assert stage.mock.streaming
+    bench = RobotiqBench()
+    bench.mock.refuse_stream = True
+    assert bench.say(START_STREAM) == exception(16, 3)
+    bench.mock.refuse_stream = False
+    bench.mock.mute_start = True
+    assert bench.say(START_STREAM) == b""
+    bench.mock.deaf = True
+    bench.say(STOP_BURST * 3)
+    assert bench.mock.streaming
 
 
 def test_a_wrong_identity_shows_in_the_firmware() -> None:
-    stage = RobotiqBench()
-    stage.mock.wrong_identity = True
-    assert stage.say(encode_read(500, 1)) == with_crc(b"\x09\x03\x02KM")
+    bench = RobotiqBench()
+    bench.mock.wrong_identity = True
+    assert bench.say(encode_read(500, 1)) == with_crc(b"\x09\x03\x02KM")
 
 
 def test_close_cuts_the_wire() -> None:
-    stage = RobotiqBench()
-    stage.mock.close()
-    assert stage.wire.closed
+    bench = RobotiqBench()
+    bench.mock.close()
+    assert bench.wire.closed
 
 
 @pytest.mark.bench
