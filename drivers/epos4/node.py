@@ -23,7 +23,7 @@ from drivers.epos4.objects import Entry
 from rig.errors import DeviceError
 
 SDO_TIMEOUT_S = 1.0  # a drive answers within milliseconds, a busy computer stalls for tenths of a second
-BOOT_TIMEOUT_S = 3.0  # three answers: a node that boots and one that is absent look the same until then
+BOOT_TIMEOUT_S = 3.0  # three times an answer: a node that boots and one that is absent look the same until then
 REPEAT_S = 0.2
 TRIES = 3
 Handler = Callable[[bytes, int], None]
