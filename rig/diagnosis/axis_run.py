@@ -10,8 +10,8 @@ from rig.diagnosis.axis import AxisProblem, AxisRecording, force_error_percent, 
 from rig.diagnosis.estimates import SimulationError
 from rig.diagnosis.run import judge
 from rig.errors import DataError
+from rig.intake.usable import read_header, read_usable
 from rig.progress import Progress, silent
-from rig.recording.csv_columns import read_header, read_usable
 from rig.trials.findings import inspect_stream
 
 NAMES = {

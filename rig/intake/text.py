@@ -134,7 +134,7 @@ def _column(found: pa.Array, text: bool, form: FileForm) -> Column:
 
 def _explain(path: Path, form: FileForm, start: int, names: tuple[str, ...], columns: Mapping[int, bool]) -> None:
     """Raises the sentence for the first line that is not of the form."""
-    for line, cells in _lines(path, form, start):
+    for line, cells in lines(path, form, start):
         place = f"{path} line {line}"
         if len(cells) != len(names):
             raise DataError(f"{place}: {len(cells)} cells where the header has {len(names)}")
@@ -142,7 +142,8 @@ def _explain(path: Path, form: FileForm, start: int, names: tuple[str, ...], col
             _check_number(f"{place}, column {names[number]}", cells[number].strip(), form)
 
 
-def _lines(path: Path, form: FileForm, start: int) -> Iterator[tuple[int, list[str]]]:
+def lines(path: Path, form: FileForm, start: int) -> Iterator[tuple[int, list[str]]]:
+    """Number and cells of each line below the first ``start``, empty ones left out; raises DataError."""
     with open_utf8(path, form.encoding) as file:
         _head(file, start)
         try:

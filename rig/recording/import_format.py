@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 
 from rig.errors import UsageError
-from rig.recording.csv_columns import TIME, TOOL
 
+TIME, TOOL = "time_s", "tool"
 FIELDS = {
     "force": (TIME, "force_N"),
     "axis": (TIME, "position_mm"),

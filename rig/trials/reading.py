@@ -13,8 +13,8 @@ import numpy as np
 from rig.config.table import load
 from rig.errors import DataError, RigError
 from rig.intake.mapping import MAPPING_FILE, DataMapping, RecordingFacts
-from rig.recording.csv_columns import TOOL, read_usable
-from rig.recording.import_format import EXPORTED, FIELDS, OPTIONAL, column_names
+from rig.intake.usable import read_usable
+from rig.recording.import_format import EXPORTED, FIELDS, OPTIONAL, TOOL, column_names
 from rig.recording.sessions import Session, open_session
 from rig.recording.slope import TIP_TOOL
 from rig.trials.findings import UNREADABLE, Array, Finding

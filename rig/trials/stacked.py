@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.errors import DataError
-from rig.recording.csv_columns import read_header, read_usable
+from rig.intake.usable import read_header, read_usable
 from rig.trials.findings import Finding
 from rig.trials.trial import Trial, TrialSet
 

@@ -15,7 +15,7 @@ from rig.diagnosis.indentation import library
 from rig.diagnosis.observations import beside_gaps
 from rig.diagnosis.run import diagnose_session
 from rig.errors import DataError
-from rig.recording.csv_columns import read_usable
+from rig.intake.usable import read_usable
 from rig.recording.sessions import open_session, write_session
 from rig.results.diagnosis import DiagnosisResult
 from rig.trials.reading import read_trials
