@@ -1,4 +1,4 @@
-"""One recording: one MCAP file (https://mcap.dev/spec), written by the stock writer so that any MCAP reader opens it.
+"""One recording: one MCAP file (https://mcap.dev/spec), in the standard layout that any MCAP reader opens.
 
 A channel a stream, message encoding ``cdr`` with the ``ros2msg`` schema of ``rig.channels``; log time is arrival,
 publish time is capture, the sequence is the low half of the sample's own number. Metadata stand at the start, so that
@@ -9,26 +9,23 @@ says that the recording was finished.
 import io
 import json
 import os
-import struct
 import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
-from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
 
-from rig.channels import CDR_HEADER, STREAMS, Stream
+from rig.channels import BY_ID, STREAMS, Stream
 from rig.errors import RigError, UsageError
 from rig.recording.files import wait_for_disk
+from rig.recording.mcap_layout import McapLayout
 
 SUMMARY = "summary"
 CHECKSUM = "crc32"
 # Small pieces: on some kernels one large write stalls even processes of real-time priority.
 PIECE = 65_536
 CHUNK_SIZE = 1 << 20
-ROWS_PER_CHUNK = 1000
-_STAMP = struct.Struct("<qqq")
 
 
 class RecordingFailed(RigError):
@@ -55,11 +52,10 @@ class RecordingWriter:
         self._failure = ""
         self._batch = _Batch()
         self._fd = self._create()
-        self._writer = Writer(
-            self._batch, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD, enable_data_crcs=True
-        )
-        self._writer.start(profile="ros2", library="tissue-rig")
+        self._layout = McapLayout(self._batch, "tissue-rig")
         self._channels = {stream.id: self._register(stream) for stream in STREAMS}
+        self._bodies: dict[int, list[bytes]] = {}
+        self._pending = 0
         for name, values in metadata.items():
             self._add_metadata(name, values)
         self._write_batch()
@@ -75,43 +71,51 @@ class RecordingWriter:
             raise RecordingFailed(f"{self.path}: cannot be created: {error.strerror}; check the folder") from error
 
     def _register(self, stream: Stream) -> int:
-        schema = self._writer.register_schema(schema_name(stream), "ros2msg", stream.schema().encode())
-        return self._writer.register_channel(stream.name, "cdr", schema)
+        return self._layout.register(stream.name, schema_name(stream), stream.schema().encode())
 
     def _add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        self._writer.add_metadata(name, {**values, CHECKSUM: checksum(values.items())})
+        self._layout.add_metadata(name, {**values, CHECKSUM: checksum(values.items())})
 
     def add(self, stream_id: int, body: bytes) -> None:
         """Appends one sample, ``body`` as packed by its stream; nothing reaches the disk before ``flush``."""
-        seq, capture_ns, arrival_ns = _STAMP.unpack_from(body)
-        # MCAP's own times are unsigned; the true ones are in the body.
-        self._writer.add_message(
-            self._channels[stream_id],
-            log_time=max(arrival_ns, 0),
-            data=CDR_HEADER + body,
-            publish_time=max(capture_ns, 0),
-            sequence=seq & 0xFFFFFFFF,
-        )
+        self._bodies.setdefault(stream_id, []).append(body)
+        self._pending += len(body)
+        if self._pending >= CHUNK_SIZE:
+            self._end_chunk()
+
+    def _end_chunk(self) -> None:
+        for stream_id, bodies in self._bodies.items():
+            self._lay_out(BY_ID[stream_id], bodies)
+        self._bodies, self._pending = {}, 0
+        self._layout.end_chunk()
+
+    def _lay_out(self, stream: Stream, bodies: list[bytes]) -> None:
+        channel = self._channels[stream.id]
+        if stream.has_text:
+            for body in bodies:
+                self._layout.add_body(channel, body)
+        else:
+            self._layout.add_rows(channel, np.frombuffer(b"".join(bodies), stream.dtype))
 
     def add_rows(self, stream: Stream, rows: NDArray[np.void]) -> None:
         """Appends ``rows`` of ``stream`` and hands them to the system."""
-        for at in range(0, rows.size, ROWS_PER_CHUNK):
-            for row in rows[at : at + ROWS_PER_CHUNK]:
-                self.add(stream.id, row.tobytes())
+        count = CHUNK_SIZE // stream.dtype.itemsize
+        for at in range(0, rows.size, count):
+            self._layout.add_rows(self._channels[stream.id], rows[at : at + count])
             self.flush()
 
     def flush(self, sync: bool = False) -> None:
         """Closes the chunk in progress and hands it to the system; with ``sync`` waits until the disk has it."""
-        self._writer.flush()
+        self._end_chunk()
         self._write_batch()
         if sync:
             self._sync()
 
     def finish(self, summary: Mapping[str, str]) -> None:
         """Writes ``summary``, index and footer and closes the file."""
-        self._writer.flush()
+        self._end_chunk()
         self._add_metadata(SUMMARY, summary)
-        self._writer.finish()
+        self._layout.finish()
         self._write_batch()
         self._sync()
         self.close()

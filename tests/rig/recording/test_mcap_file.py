@@ -1,5 +1,6 @@
 """A recording as others see it: the stock MCAP tools, a full disk, an existing file."""
 
+import io
 import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,11 +8,11 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
-from mcap.records import McapRecord, Message
+from mcap.records import Footer, McapRecord, Message, SummaryOffset
 from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 
-from rig.channels import FORCE, STREAMS
+from rig.channels import AXIS, EVENT, FORCE, STREAMS
 from rig.errors import UsageError
 from rig.recording.mcap_file import RecordingFailed, RecordingWriter
 from rig.recording.reader import read_recording
@@ -114,3 +115,33 @@ def test_after_a_full_disk_every_call_repeats_the_cause(tmp_path: Path) -> None:
     with pytest.raises(RecordingFailed, match="File too large"):
         writer.finish({})
     writer.close()
+
+
+def test_the_stock_reader_finds_every_row_by_the_index(write_recording: WriteRecording) -> None:
+    path = write_recording(rows=1000)
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        counts = summary.statistics.channel_message_counts
+        assert [counts[FORCE.id], counts[AXIS.id], counts[EVENT.id]] == [1000, 1000, 10]
+        assert summary.statistics.chunk_count == len(summary.chunk_indexes) == 10
+        later = [message for _, _, message in reader.iter_messages(["force"], starting_at=1_500_700_000)]
+    assert [message.sequence for message in later[:2]] == [500, 501]
+    assert len(later) == 500
+    assert [message.log_time for message in later] == sorted(message.log_time for message in later)
+
+
+def test_every_group_of_the_summary_is_where_its_offset_says(write_recording: WriteRecording) -> None:
+    data = write_recording(rows=200).read_bytes()
+    with io.BytesIO(data) as file:
+        records = [item for item in StreamReader(file).records if isinstance(item, SummaryOffset | Footer)]
+    *offsets, footer = records
+    assert isinstance(footer, Footer)
+    end = footer.summary_start
+    for offset in offsets:
+        assert isinstance(offset, SummaryOffset)
+        assert (data[offset.group_start], offset.group_start) == (offset.group_opcode, end)
+        end += offset.group_length
+    assert end == footer.summary_offset_start
