@@ -27,7 +27,7 @@ class StreamVerdict:
 
     ``missing`` samples have numbers between first and last but no row; ``dropped`` ones found the ring full;
     ``lost`` ones were written by the recorder but are not in the file any more. ``out_of_order`` counts steps back in
-    capture or arrival time. ``rate_Hz`` is measured over capture time, NaN below two samples.
+    capture or arrival time. ``rate_Hz`` is measured over capture time, None below two samples.
     """
 
     samples: int
@@ -38,7 +38,7 @@ class StreamVerdict:
     out_of_order: int = 0
     dropped: int = 0
     lost: int = 0
-    rate_Hz: float = float("nan")
+    rate_Hz: float | None = None
 
     @property
     def faults(self) -> dict[str, int]:
@@ -121,7 +121,7 @@ def _judge(
         out_of_order=int(((np.diff(capture_ns) < 0) | (np.diff(arrival_ns) < 0)).sum()),
         dropped=dropped,
         lost=lost,
-        rate_Hz=(np.unique(capture_ns).size - 1) / span_s if span_s > 0 else float("nan"),
+        rate_Hz=(np.unique(capture_ns).size - 1) / span_s if span_s > 0 else None,
     )
 
 

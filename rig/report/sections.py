@@ -168,7 +168,7 @@ def _stream_table(trials: Sequence[TrialFacts]) -> str:
         (
             name,
             f"{sum(one.samples for one in streams):,}",
-            shown(known(float(np.median([one.rate_Hz for one in streams]))), ".1f"),
+            shown(_median([one.rate_Hz for one in streams if one.rate_Hz is not None]), ".1f"),
             *(f"{sum(one.faults.get(fault, 0) for one in streams):,}" for fault in STREAM_FAULTS),
         )
         for name, streams in by_stream.items()
@@ -177,6 +177,10 @@ def _stream_table(trials: Sequence[TrialFacts]) -> str:
     header = ("stream", "samples", "rate (Hz)", *STREAM_FAULTS)
     title = "All recordings together; the rate is the median over recordings"
     return table(TextTable(title, header, found)) if found else ""
+
+
+def _median(values: Sequence[float]) -> float | None:
+    return float(np.median(values)) if values else None
 
 
 def _trial_row(trial: TrialFacts) -> Sequence[str]:

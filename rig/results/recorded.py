@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import Field
 
 from rig.recording.sessions import TrialInfo
+from rig.recording.verify import StreamVerdict
 from rig.results.base import Number, Result, SavedResult
 from rig.results.tracking import LoopCount
 
@@ -43,21 +44,6 @@ class CaptureResult(SavedResult):
     bad: tuple[str, ...] = Field(default=(), description="trials that stayed bad, however often they were made again")
 
 
-class StreamResult(Result):
-    """One stream of a recording: what is there, and what is known not to be; see `rig.recording.verify`."""
-
-    samples: int
-    first_seq: int
-    last_seq: int
-    missing: int
-    duplicates: int
-    out_of_order: int
-    dropped: int
-    lost: int
-    rate_Hz: Number
-    faults: Mapping[str, int] = Field(default={}, exclude=True, description="what is wrong, by name")
-
-
 class RecordingResult(Result):
     """What a recording proves about itself."""
 
@@ -65,7 +51,7 @@ class RecordingResult(Result):
     ok: bool
     sentence: str
     damage: tuple[str, ...]
-    streams: Mapping[str, StreamResult]
+    streams: Mapping[str, StreamVerdict]
 
 
 class RepairResult(SavedResult, RecordingResult):

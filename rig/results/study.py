@@ -37,13 +37,10 @@ def fit_result(study: Study, model: str, model_law: str, known: Known, recording
 
 def law_result(judged: Judged, force_N: FloatArray) -> LawResult:
     """A fitted law with its errors, and with what it means to a force loop at each force [N]."""
-    fitted, left_out = judged.fitted, (judged.trials_left_out, judged.speeds_left_out, judged.subjects_left_out)
-    trials, speeds, subjects = map(errors_result, left_out)
+    left_out = judged.trials_left_out, judged.speeds_left_out, judged.subjects_left_out
+    trials, speeds, subjects = (_errors(errors) if errors else None for errors in left_out)
     return LawResult(
-        max_error_mm=fitted.max_error_mm,
-        max_error_percent=fitted.max_error_percent,
-        rmse_N=fitted.rmse_N,
-        rows=tuple(rows(fitted)),
+        **dict(_errors(judged.fitted)),
         formula=judged.law.formula,
         parameters=_parameters(judged),
         interval_level=LEVEL,
@@ -53,10 +50,7 @@ def law_result(judged: Judged, force_N: FloatArray) -> LawResult:
     )
 
 
-def errors_result(errors: Errors | None) -> DisplacementErrors | None:
-    """The errors as a result holds them; None where nothing could be left out."""
-    if errors is None:
-        return None
+def _errors(errors: Errors) -> DisplacementErrors:
     return DisplacementErrors(
         max_error_mm=errors.max_error_mm,
         max_error_percent=errors.max_error_percent,

@@ -25,12 +25,7 @@ def test_a_session_is_verified_recording_by_recording(session: Path) -> None:
     assert [message for _, message in told] == [*names, "the session's list of hashes"]
     assert [done for done, _ in told] == [0.0, 0.5, 1.0]
     assert list(found.recordings) == [name.removesuffix(".mcap") for name in names]
-    assert VerifyResult.model_validate_json(found.model_dump_json()).recordings == {
-        name: one.model_copy(
-            update={"streams": {key: s.model_copy(update={"faults": {}}) for key, s in one.streams.items()}}
-        )
-        for name, one in found.recordings.items()
-    }
+    assert VerifyResult.model_validate_json(found.model_dump_json()) == found
 
 
 def test_what_is_no_recording_is_damaged_and_hides_no_other(session: Path, tmp_path: Path) -> None:
