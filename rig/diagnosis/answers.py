@@ -1,7 +1,7 @@
 """From evidence to words and numbers: verdict, findings with intervals and gains, what could have been seen."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -65,10 +65,6 @@ class Diagnosis:
     def unexplained(self) -> Unexplained | None:
         """What is left, where no known cause explains it."""
         return Unexplained(self.depends_on, self.lack_of_fit_p) if self.verdict == "unexplained" else None
-
-    def with_simulated(self, simulated: tuple[SimulationError, ...]) -> "Diagnosis":
-        """The same with errors of whole simulations."""
-        return replace(self, simulated=simulated)
 
 
 def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Estimate]:
@@ -163,24 +159,27 @@ def smallest_visible(t: Tangents, threshold: float) -> dict[str, SmallestSize]:
 
 def limits(problem: InverseProblem, search: Search) -> tuple[dict[str, SmallestSize], dict[str, str]]:
     """What could have been seen, and what not and why."""
-    reasons = {
+    level = max(float(np.quantile(maxima, 0.95)) for maxima in search.maxima if maxima.size)
+    visible = smallest_visible(search.tangents, max(level, 0.0))
+    reasons = invisible(problem, {*visible, *search.after.names})
+    for effect in testable(problem):
+        par = effect.amplitudes[0]
+        if effect.name in visible and visible[effect.name].minimum > par.high - par.null:
+            size = visible.pop(effect.name)
+            reasons[effect.name] = f"only {size.minimum:.2g} {size.unit} or more would have shown in this experiment"
+    return visible, reasons
+
+
+def invisible(problem: InverseProblem, seen: Collection[str]) -> dict[str, str]:
+    """Why the causes that are not among ``seen`` could not be: what the data lack, or the simulation imitates them."""
+    lacking = {
         effect.name: problem.offers[need]
         for effect in problem.effects
         for need in sorted(effect.needs)
         if need in problem.offers
     }
-    level = max(float(np.quantile(maxima, 0.95)) for maxima in search.maxima if maxima.size)
-    visible = smallest_visible(search.tangents, max(level, 0.0))
-    for effect in testable(problem):
-        par = effect.amplitudes[0]
-        if effect.name in search.after.names:
-            continue
-        if effect.name not in visible:
-            reasons[effect.name] = "the simulation's own parameters imitate it completely in this experiment"
-        elif visible[effect.name].minimum > par.high - par.null:
-            size = visible.pop(effect.name)
-            reasons[effect.name] = f"only {size.minimum:.2g} {size.unit} or more would have shown in this experiment"
-    return visible, reasons
+    imitated = "the simulation's own parameters imitate it completely in this experiment"
+    return lacking | {effect.name: imitated for effect in testable(problem) if effect.name not in seen}
 
 
 def verdict_of(search: Search, after: LackOfFit) -> tuple[Verdict, tuple[str, ...]]:

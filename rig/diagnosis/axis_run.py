@@ -1,5 +1,6 @@
 """From a folder of axis recordings to a diagnosis, and the simulation error on the recording left out."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,6 @@ NAMES = {
     "control_V": ("vir", "control_V"),
 }
 PULSES = ("pulses_N", "pulses_V")
-SATURATION_V = 9.99
 
 
 def diagnose_axis_folder(folder: Path, progress: Progress = silent) -> Diagnosis:
@@ -54,7 +54,7 @@ def diagnose_axis(recordings: list[AxisRecording], name: str, progress: Progress
         SimulationError(r.name, r is first, force_error_percent(r, before), force_error_percent(r, after))
         for r in recordings
     )
-    return result.with_simulated(simulated)
+    return replace(result, simulated=simulated)
 
 
 def read_axis(path: Path) -> AxisRecording:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.config.protocol import Indentation as Protocol
-from rig.diagnosis.answers import Diagnosis, smallest_visible
+from rig.diagnosis.answers import Diagnosis, invisible, smallest_visible
 from rig.diagnosis.estimates import NextExperiment, SmallestSize
 from rig.diagnosis.evidence import Direction, Tangents, information, is_alias, tangents
 from rig.diagnosis.fit import Fit, assemble
@@ -80,19 +80,10 @@ def check(protocol: Protocol, tracker: bool = True, force_rate_Hz: float = RATE_
     problem = IndentationProblem(data)
     fit = noiseless(problem)
     t = tangents(fit, testable(problem))
-    reasons = {
-        effect.name: problem.offers[need]
-        for effect in problem.effects
-        for need in sorted(effect.needs)
-        if need in problem.offers
-    }
     visible = smallest_visible(t, THRESHOLD_NATS)
-    for effect in testable(problem):
-        if effect.name not in visible:
-            reasons[effect.name] = "the simulation's own parameters imitate it completely in this experiment"
     names, confusion = confusability(t)
     duration = float(cycles[-1].force_s[-1])
-    return Detectability(duration, len(cycles), visible, reasons, names, confusion)
+    return Detectability(duration, len(cycles), visible, invisible(problem, visible), names, confusion)
 
 
 def planned(protocol: Protocol, tracker: bool, rate_Hz: float) -> list[Trial]:

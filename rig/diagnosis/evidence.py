@@ -4,7 +4,7 @@ Leaving recording i out moves the parameters by d_i = (H - H_i)^-1 (g - g_i), wi
 held-out log density is a few small matrices away from one joint fit. Exact for linear models.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -152,7 +152,7 @@ def is_alias(t: Tangents, direction: Direction) -> bool:
     return bool(np.trace(left) <= ALIAS_SHARE * np.trace(own))
 
 
-def chance_draws(t: Tangents, rng: np.random.Generator, draws: int = DRAWS) -> Array:
+def chance_draws(t: Tangents, rng: np.random.Generator, draws: int) -> Array:
     """Gradients under the present model: Gaussian with covariance H_i, shape (draws, recordings, P)."""
     normal = rng.standard_normal((draws, *t.hessian.shape[:2]))
     return np.asarray(np.einsum("rij,brj->bri", covariance_root(t.hessian), normal))
@@ -169,7 +169,7 @@ def covariance_root(covariance: Array) -> Array:
     return np.asarray(size[:, :, None] * symmetric)
 
 
-def flipped_draws(t: Tangents, rng: np.random.Generator, draws: int = DRAWS) -> Array:
+def flipped_draws(t: Tangents, rng: np.random.Generator, draws: int) -> Array:
     """The data's own gradients with whole recordings turned round, shape (draws, recordings, P).
 
     No draw turns all or none of them: that is what was observed, and is counted once already.
@@ -186,12 +186,17 @@ def _signs(recordings: int, rng: np.random.Generator, draws: int) -> Array:
     return np.concatenate([1.0 - 2.0 * turned, np.ones((len(codes), recordings - free))], axis=1)
 
 
-def chance_maxima(t: Tangents, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Largest gain over the library when nothing is hidden: parametric and sign-flip draws, each (draws,)."""
-    parametric = linear_gains(t, chance_draws(t, rng)).max(axis=1)
+def chance_maxima(
+    t: Tangents,
+    rng: np.random.Generator,
+    gains: Callable[[Tangents, Array], Array] = linear_gains,
+    draws: int = DRAWS,
+) -> tuple[Array, Array]:
+    """Largest of ``gains`` when nothing is hidden: parametric and sign-flip draws, each (draws,)."""
+    parametric = gains(t, chance_draws(t, rng, draws)).max(axis=1)
     if len(t.hessian) < FEWEST_TO_FLIP:
         return parametric, np.empty(0)
-    return parametric, linear_gains(t, flipped_draws(t, rng)).max(axis=1)
+    return parametric, gains(t, flipped_draws(t, rng, draws)).max(axis=1)
 
 
 def chance(maxima: tuple[Array, Array], gain: float) -> float:

@@ -1,6 +1,6 @@
 """Joint fit of a simulation and any set of effects, all parameters free, with noise of its own."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -68,33 +68,30 @@ def fit(
     start: Values,
     whitener: Whitener | None = None,
     rounds: int = NOISE_ROUNDS,
-    floor: float = -np.inf,
 ) -> Fit:
-    """Levenberg-Marquardt with noise and shifts re-estimated on the model's own residuals between rounds.
-
-    A model still below the log likelihood ``floor`` after two rounds is given up where it stands.
-    """
+    """Levenberg-Marquardt with noise and shifts re-estimated on the model's own residuals between rounds."""
     free = free_parameters(problem, effects)
     values: Values = {**start, **{par.name: float(np.clip(start[par.name], par.low, par.high)) for par in free}}
-    if whitener is None:
-        flat = [Colour(np.empty(0), max(float(np.std(c.observed)) * 0.02, 1e-9)) for c in problem.channels]
-        noise = Noise(tuple(flat), np.empty(0), np.empty((0, 0)))
-        blind = np.zeros(len(problem.channels[0].observed), bool)
-        whitener = Whitener(problem, noise, None, np.empty((0, 0)), blind)
+    whitener = whitener or flat_noise(problem, [0.02 * float(np.std(c.observed)) for c in problem.channels])
     values, slopes = descend(free, values, whitener, 2 * LM_STEPS, confirm=False)
     level, best = -np.inf, (log_level(whitener, values), values, whitener)
-    for done in range(rounds):
+    for _ in range(rounds):
         whitener = estimate(problem, values, whitener)
         values, slopes = descend(free, values, whitener, LM_STEPS, slopes, confirm=False)
         reached = log_level(whitener, values)
         # Contact is a kink: a round may lead away. The best point seen is the fit.
         best = max(best, (reached, values, whitener), key=lambda point: point[0])
-        if abs(reached - level) < SETTLED_NATS or (done >= 1 and best[0] < floor):
+        if abs(reached - level) < SETTLED_NATS:
             break
         level = reached
-    if best[0] >= floor:
-        best = (best[0], descend(free, best[1], best[2], LM_STEPS)[0], best[2])
-    return assemble(problem, effects, best[1], best[2])
+    _, values, whitener = best
+    return assemble(problem, effects, descend(free, values, whitener, LM_STEPS)[0], whitener)
+
+
+def flat_noise(problem: InverseProblem, spreads: Iterable[float]) -> Whitener:
+    """White noise of a standard deviation for each channel, no recording special, no row left out."""
+    noise = Noise(tuple(Colour(np.empty(0), max(sd, 1e-9)) for sd in spreads), np.empty(0), np.empty((0, 0)))
+    return Whitener(problem, noise, None, np.empty((0, 0)), np.zeros(len(problem.channels[0].observed), bool))
 
 
 def log_level(whitener: Whitener, values: Values) -> float:
@@ -110,12 +107,8 @@ def least_squares(model: Fit) -> Fit:
     What a person would call its best fit, and what its error in newtons is told by.
     """
     problem = model.problem
-    spreads = [
-        max(float(np.std(c.observed - p)), 1e-9) for c, p in zip(problem.channels, model.prediction, strict=True)
-    ]
-    noise = Noise(tuple(Colour(np.empty(0), spread) for spread in spreads), np.empty(0), np.empty((0, 0)))
-    blind = np.zeros(len(problem.channels[0].observed), bool)
-    whitener = Whitener(problem, noise, None, np.empty((0, 0)), blind)
+    errors = (c.observed - p for c, p in zip(problem.channels, model.prediction, strict=True))
+    whitener = flat_noise(problem, (float(np.std(error)) for error in errors))
     free = free_parameters(problem, model.effects)
     guess = {**problem.start(), **{par.name: model.values[par.name] for effect in model.effects for par in effect.pars}}
     ends = [descend(free, start, whitener, 3 * LM_STEPS)[0] for start in (model.values, guess)]
@@ -131,14 +124,12 @@ def first_fit(problem: InverseProblem) -> Fit:
     return fit(problem, (), best.values, best.whitener)
 
 
-def attempt(
-    problem: InverseProblem, effects: Sequence[Effect], start: Values, whitener: Whitener, floor: float = -np.inf
-) -> Fit | None:
+def attempt(problem: InverseProblem, effects: Sequence[Effect], start: Values, whitener: Whitener) -> Fit | None:
     """A fit, or None where its numbers ran away: a candidate that cannot be fitted is no candidate."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             start = _anchored(problem, effects, start, whitener)
-            found = fit(problem, effects, start, whitener, QUICK_ROUNDS, floor)
+            found = fit(problem, effects, start, whitener, QUICK_ROUNDS)
     except np.linalg.LinAlgError:
         return None
     return found if np.isfinite(level_of(found)) and np.isfinite(found.hessian).all() else None
@@ -171,11 +162,9 @@ def best_fit(problem: InverseProblem, effects: Sequence[Effect], start: Values, 
     return max((t for t in tried if t is not None), key=level_of, default=None)
 
 
-def low_noise_refit(
-    problem: InverseProblem, effects: Sequence[Effect], start: Values, whitener: Whitener, floor: float = -np.inf
-) -> Fit | None:
+def low_noise_refit(problem: InverseProblem, effects: Sequence[Effect], start: Values, before: Whitener) -> Fit | None:
     """A fit from noise too small to hide an effect in."""
-    return attempt(problem, effects, start, optimistic(problem, start, whitener), floor)
+    return attempt(problem, effects, start, optimistic(problem, start, before))
 
 
 def low_noise_view(model: Fit) -> Fit:

@@ -7,12 +7,13 @@ largest gain over all variables.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from rig.diagnosis.descent import prior_precision
-from rig.diagnosis.evidence import FEWEST_TO_FLIP, Tangents, chance, chance_draws, flipped_draws, held_out
+from rig.diagnosis.evidence import Tangents, chance, chance_maxima, held_out
 from rig.diagnosis.fit import Fit, by_recording
 from rig.diagnosis.noise import Array, starts_of
 from rig.diagnosis.problem import Effect, InverseProblem
@@ -71,10 +72,11 @@ def variables(fit: Fit) -> dict[str, Array]:
 
 def assess_lack_of_fit(fit: Fit, rng: np.random.Generator) -> LackOfFit:
     """Test of the residual of ``fit`` against every variable."""
-    problem, force = fit.problem, fit.prediction[0] - fit.values.get("zero_N", 0.0)
+    problem, along = fit.problem, variables(fit)
+    force = along["force"]
     scale = max(float(np.sqrt(np.mean(force**2))), 1e-12)
     blocks, groups, at = [fit.jacobian], dict[str, tuple[int, ...]](), fit.jacobian.shape[1]
-    for name, variable in variables(fit).items():
+    for name, variable in along.items():
         basis = bumps(variable)
         columns = np.concatenate([basis, basis * (force / scale)[:, None]], axis=1)
         others = [np.zeros((len(c.observed), columns.shape[1])) for c in problem.channels[1:]]
@@ -86,11 +88,8 @@ def assess_lack_of_fit(fit: Fit, rng: np.random.Generator) -> LackOfFit:
     hessian, gradient, _ = by_recording(problem, np.concatenate(blocks, axis=1), fit.white)
     ridge = np.concatenate([prior_precision(fit.free), np.full(at - len(fit.free), RIDGE)])
     t = Tangents(len(fit.free), ridge, hessian, gradient, ())
-    gains = _gains(t, groups, gradient[None])[0]
-    null = [_gains(t, groups, chance_draws(t, rng, DRAWS)).max(axis=1)]
-    if problem.recordings >= FEWEST_TO_FLIP:
-        null.append(_gains(t, groups, flipped_draws(t, rng, DRAWS)).max(axis=1))
-    p_value = chance((null[0], null[1] if len(null) > 1 else np.empty(0)), float(gains.max()))
+    gains = _gains(groups, t, gradient[None])[0]
+    p_value = chance(chance_maxima(t, rng, partial(_gains, groups), DRAWS), float(gains.max()))
     rows = float(sum(np.count_nonzero(keep) for keep in fit.whitener.judged[:1]))
     named = dict(zip(groups, map(float, gains), strict=True))
     shares = {name: 2 * gain / rows for name, gain in named.items()}
@@ -220,7 +219,7 @@ def _patterns(mean: Array) -> Array:
     return np.stack([mean - mean.mean(), *steps])
 
 
-def _gains(t: Tangents, groups: Mapping[str, tuple[int, ...]], gradients: Array) -> Array:
+def _gains(groups: Mapping[str, tuple[int, ...]], t: Tangents, gradients: Array) -> Array:
     own = tuple(range(t.base))
     base = held_out(t, own, gradients)[0]
     return np.stack([held_out(t, own + columns, gradients)[0] - base for columns in groups.values()], axis=1)

@@ -181,10 +181,8 @@ def beside_gaps(axis_s: Array, at_s: Array, margin_s: float) -> NDArray[np.bool_
     """Which times lie in a gap of the axis' clock, or so near to one that derivatives there reach across it."""
     step_s = np.diff(axis_s)
     gaps = np.flatnonzero(step_s > max(GAP_PERIODS * float(np.median(step_s)), GAP_S))
-    marks = np.zeros(len(at_s) + 1)
-    np.add.at(marks, np.searchsorted(at_s, axis_s[gaps] - margin_s), 1)
-    np.add.at(marks, np.searchsorted(at_s, axis_s[gaps + 1] + margin_s), -1)
-    return np.asarray(np.cumsum(marks)[:-1] > 0)
+    begun = np.searchsorted(axis_s[gaps] - margin_s, at_s, side="right")
+    return np.asarray(begun > np.searchsorted(axis_s[gaps + 1] + margin_s, at_s, side="right"))
 
 
 def _motion(trial: Trial, at_s: Array, spans_s: Sequence[float]) -> tuple[Array, Array, Array]:

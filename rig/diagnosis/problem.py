@@ -64,7 +64,6 @@ class Effect:
     operator: Operator | None = None
     control: str = "kept, and not used: it is no part of what the axis must do for a force"
     needs: frozenset[str] = frozenset()
-    aliases: tuple[str, ...] = ()
     repair: str = ""
 
     @property

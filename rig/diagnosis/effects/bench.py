@@ -120,7 +120,6 @@ FRAME_COMPLIANCE = Effect(
     one_sided=True,
     operator=Operator("frame", lambda _, compliance_mm_N, v: compliance_mm_N + one(v, "frame_compliance_mm_N")),
     needs=frozenset({"tracker", "depth"}),
-    aliases=("a_N_mm", "b_per_mm"),
     control=ELASTIC,
     repair="brace the frame, measure the tip itself, or keep the compliance in the model",
 )
@@ -221,7 +220,6 @@ GAIN_ERROR = Effect(
     "the force reads {gain_error:.2%} too high",
     (Par("gain_error", "1", 0.0, -0.5, 0.5, 0.01, least=0.005, meaning="relative error of the force gain"),),
     needs=frozenset({"weight"}),
-    aliases=("a_N_mm", "damping_N_s_mm"),
     operator=Operator("sensing", lambda _, force_N, v: force_N * (1 + one(v, "gain_error"))),
     repair="calibrate with a known weight",
 )

@@ -40,7 +40,6 @@ def _adhering(tip: Tip, force_N: Series, v: Fields) -> Series:
     return np.asarray(force_N + pull_N * (touched & (tip.velocity_mm_s < 0)))
 
 
-EXPONENT = Par("exponent", "1", 1.0, 0.2, 4.0, 0.05, least=0.03, meaning="exponent n of (x / 5 mm)^(n-1)")
 STIFFENING = Par("b_per_mm", "1/mm", 0.0, -0.5, 3.0, 0.02, least=0.005, meaning="growth of stiffness with depth")
 RELAXATION_RATIO = Par(
     "relaxation_ratio", "1", 0.0, 0.0, 30.0, 0.02, least=0.005, may_end=True, meaning="transient over lasting force"
@@ -56,7 +55,7 @@ STIFFENING_EFFECT = Effect(
 ELASTIC_LAW = Effect(
     "elastic_law",
     "another elastic law fits better: a power law, growing with depth as x^{exponent:.3g} times the rest",
-    (EXPONENT,),
+    (Par("exponent", "1", 1.0, 0.2, 4.0, 0.05, least=0.03, meaning="exponent n of (x / 5 mm)^(n-1)"),),
     through="depth",
     control=ELASTIC,
     repair="fit the law named here (`rig fit` offers it) and use it in place of the index law",
