@@ -26,6 +26,7 @@ def _cause(cause: Effect, variant: str) -> str:
             f"{_said(cause.statement)}.",
             "",
             *repair,
+            f"- acts: {f'at `{cause.operator.stage}`' if cause.operator else 'in the elastic law'}",
             f"- in control: {cause.control}",
             *needs,
             "",

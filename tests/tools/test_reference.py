@@ -150,6 +150,8 @@ def test_a_cause_stands_in_the_reference_with_its_smallest_size_and_what_to_do()
     substrate = text.partition("## `substrate`\n")[2].partition("\n## ")[0]
     assert "Something stiff lies below: the force grows by 1 + `substrate_per_mm3` x^3." in substrate
     assert "- what to do: measure over thicker tissue" in substrate
+    assert "- acts: in the elastic law\n" in substrate
+    assert "- acts: at `guide`\n" in text.partition("## `friction`\n")[2].partition("\n## ")[0]
     assert "| `substrate_per_mm3` | 1/mm^3 | 0 | 0 | 0.05 | 2e-05 | growth of force by depth cubed |" in substrate
     assert "## `elastic_law` (exponent)\n" in text
     assert "## `elastic_law` (quadratic_per_mm)\n" in text
