@@ -1,6 +1,6 @@
 """From a cycle to a loading curve: force zeroed in the air, depth from contact, only while the tip moves steadily."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ from rig.errors import DataError
 from rig.trials.contact import Contact, FloatArray
 from rig.trials.cycles import IndentationCycle
 from rig.trials.findings import Finding
-from rig.trials.surface import LEAST_SAMPLES, Rise, descent, despiked, find_surface
+from rig.trials.surface import LEAST_SAMPLES, WIDEST_SHARE, Rise, descent, despiked, find_surface
 
 # So that a fit may move contact by its interval and still see the air above it.
 AIR_KEPT_MM = 0.5
@@ -19,6 +19,10 @@ STEADY_SHARE = 0.3  # the nearest of the study's speeds, 15 and 20 mm/s, lie a t
 # Half of the way that the wanted speed makes: nearer to going on than to standing.
 ON_SHARE = 0.5
 TOP_SHARE = 0.005  # where the data have no noise, what is so near to the top is the top
+# Less than half of the way is no stroke with a run-in and a run-out, but a motion that steps or swings.
+STEADY_WAY = 0.5
+# A drive that misses its speed by so much is another's speed, or another unit.
+STATED_SHARE = 0.3
 SPEED_BASE_MM = 0.5  # places written in hundredths of a millimetre give a speed within 3 %
 
 
@@ -61,22 +65,24 @@ class Curve:
 
 
 def loading_curve(cycle: IndentationCycle) -> Curve:
-    """The loading curve of a cycle that begins in the air, touches, and goes deeper at steady speed.
+    """The loading curve of a cycle that touches, or begins in contact, and goes deeper, at steady speed where it can.
 
     The last rise of force from the air to its peak counts, so an earlier touch (the search for contact) does not.
-    Raises DataError where there is no contact, no air before it, or no steady loading after it.
+    Raises DataError where there is no contact, none that is known, or no loading after it.
     """
     if len(cycle.force_N) < LEAST_SAMPLES:
         raise DataError(f"{cycle.name}: {len(cycle.force_N)} samples; a curve needs at least {LEAST_SAMPLES}")
+    cycle, pulled = _pulled(cycle)
     zeroed, rise, contact, noise_N, findings = find_surface(cycle)
-    wanted_mm_s = _wanted_speed(zeroed, rise)
-    kept = _rising(zeroed, _steady(zeroed, rise, wanted_mm_s), noise_N)
+    wanted_mm_s, said = _wanted_speed(zeroed, rise)
+    kept, unsteady = _loading(zeroed, rise, wanted_mm_s, noise_N)
+    _refuse_unknown(cycle.name, contact, float(zeroed.position_mm[rise.peak]))
     if kept[0] == rise.touch:
         air = np.arange(descent(zeroed, rise.touch, contact.position_mm - AIR_KEPT_MM), rise.touch)
         kept = np.concatenate([air, kept])
     return Curve(
         name=cycle.name,
-        speed_mm_s=cycle.speed_mm_s if np.isfinite(cycle.speed_mm_s) else float(f"{wanted_mm_s:.2g}"),
+        speed_mm_s=wanted_mm_s if wanted_mm_s == cycle.speed_mm_s else float(f"{wanted_mm_s:.2g}"),
         depth_mm=zeroed.position_mm[kept] - contact.position_mm,
         force_N=zeroed.force_N[kept],
         rate_mm_s=_rate(zeroed.time_s[kept], zeroed.position_mm[kept], wanted_mm_s),
@@ -84,23 +90,47 @@ def loading_curve(cycle: IndentationCycle) -> Curve:
         zero_N=float(cycle.force_N[-1] - zeroed.force_N[-1]),
         noise_N=noise_N,
         time_s=zeroed.time_s[kept],
-        findings=findings,
+        findings=(*pulled, *findings, *said, *unsteady),
     )
 
 
-def _wanted_speed(cycle: IndentationCycle, rise: Rise) -> float:
-    """The speed asked for; where nobody said, the middle one by travel, so that holds do not count."""
+def _pulled(cycle: IndentationCycle) -> tuple[IndentationCycle, tuple[Finding, ...]]:
+    """The cycle with both signs turned, and that said, where the tip draws out and force grows in tension."""
+    force_N = despiked(cycle.force_N)
+    lowest = int(np.argmin(force_N))
+    way_mm = cycle.position_mm[: lowest + 1] - cycle.position_mm[0]
+    # A tip that leaves the tissue goes out as well, but its force ends at zero.
+    if -force_N[lowest] <= force_N.max() or -way_mm[-1] <= max(float(way_mm.max()), LEAST_TRAVEL_MM):
+        return cycle, ()
+    text = "force grows in tension as the tip goes out: depth and force count in that sense"
+    turned = replace(cycle, force_N=-cycle.force_N, position_mm=-cycle.position_mm)
+    return turned, (Finding(cycle.name, "force", "tension", text),)
+
+
+def _refuse_unknown(name: str, contact: Contact, peak_mm: float) -> None:
+    width_mm, stroke_mm = contact.high_mm - contact.low_mm, peak_mm - contact.low_mm
+    if width_mm > WIDEST_SHARE * stroke_mm:
+        raise DataError(
+            f"{name}: its surface lies between {contact.low_mm:.4g} and {contact.high_mm:.4g} mm, {width_mm:.2g} mm of "
+            f"a stroke of {stroke_mm:.3g} mm (at most a quarter is allowed); record faster, or go slower or deeper"
+        )
+
+
+def _wanted_speed(cycle: IndentationCycle, rise: Rise) -> tuple[float, tuple[Finding, ...]]:
+    """The speed asked for; where nobody said, or another, the middle one by travel, so that holds do not count."""
     loading = slice(rise.touch, rise.peak + 1)
     reached_mm = np.maximum.accumulate(cycle.position_mm[loading])
     if reached_mm[-1] - reached_mm[0] < LEAST_TRAVEL_MM:
         raise DataError(
             f"{cycle.name}: no loading: force rises while the tip does not go deeper; check axis and clocks"
         )
-    if np.isfinite(cycle.speed_mm_s):
-        return cycle.speed_mm_s
     marks_mm = np.linspace(reached_mm[0], reached_mm[-1], 41)
     times_s = np.interp(marks_mm, *_increasing(reached_mm, cycle.time_s[loading]))
-    return float(np.diff(marks_mm)[0] / np.median(np.diff(times_s)))
+    own_mm_s = float(np.diff(marks_mm)[0] / np.median(np.diff(times_s)))
+    if abs(cycle.speed_mm_s - own_mm_s) <= STATED_SHARE * own_mm_s:
+        return cycle.speed_mm_s, ()
+    text = f"stated speed {cycle.speed_mm_s:.3g} mm/s, but the tip loads at {own_mm_s:.2g} mm/s: the motion's is used"
+    return own_mm_s, (Finding(cycle.name, "axis", "speed", text),) if np.isfinite(cycle.speed_mm_s) else ()
 
 
 def _increasing(positions_mm: FloatArray, times_s: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -134,6 +164,26 @@ def _window_sums(values: FloatArray, first: NDArray[np.intp], last: NDArray[np.i
     return np.asarray(total[last] - total[first])
 
 
+def _loading(
+    cycle: IndentationCycle, rise: Rise, wanted_mm_s: float, noise_N: float
+) -> tuple[NDArray[np.intp], tuple[Finding, ...]]:
+    """Samples of steady loading; where those are little of the way, all at which the tip is deeper than before."""
+    position_mm = cycle.position_mm
+    steady = _steady(cycle, rise, wanted_mm_s)
+    way_mm = position_mm[rise.peak] - position_mm[rise.touch]
+    if len(steady) > LEAST_SAMPLES and position_mm[steady[-1]] - position_mm[rise.touch] >= STEADY_WAY * way_mm:
+        return _rising(cycle, steady, noise_N), ()
+    span = position_mm[rise.touch : rise.peak + 1]
+    deeper = np.concatenate([[True], span[1:] > np.maximum.accumulate(span)[:-1]])
+    rate_mm_s = np.diff(span[deeper]) / np.diff(cycle.time_s[rise.touch : rise.peak + 1][deeper])
+    text = (
+        f"the tip loads unsteadily, at {rate_mm_s.min():.2g} to {rate_mm_s.max():.2g} mm/s: all of its way in is used"
+    )
+    return _rising(cycle, rise.touch + np.flatnonzero(deeper), noise_N), (
+        Finding(cycle.name, "axis", "unsteady", text),
+    )
+
+
 def _steady(cycle: IndentationCycle, rise: Rise, wanted_mm_s: float) -> NDArray[np.intp]:
     """Samples between contact and peak that move at the wanted speed, up to where the tip stops.
 
@@ -144,11 +194,6 @@ def _steady(cycle: IndentationCycle, rise: Rise, wanted_mm_s: float) -> NDArray[
     time_s, position_mm = cycle.time_s[span], cycle.position_mm[span]
     rate_mm_s = _rate(cycle.time_s, cycle.position_mm, wanted_mm_s)[span]
     steady = np.flatnonzero(np.abs(rate_mm_s - wanted_mm_s) <= STEADY_SHARE * wanted_mm_s)
-    if not len(steady):
-        raise DataError(
-            f"{cycle.name}: no loading at {wanted_mm_s:.3g} mm/s: between contact and peak the tip moved at "
-            f"{rate_mm_s.min():.3g} to {rate_mm_s.max():.3g} mm/s; correct the trial's speed_mm_s"
-        )
     went_on = np.diff(position_mm[steady]) >= ON_SHARE * wanted_mm_s * np.diff(time_s[steady])
     stumbled = np.diff(steady) > 1
     stops = np.flatnonzero(stumbled & ~went_on)

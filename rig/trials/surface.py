@@ -223,6 +223,8 @@ def despiked(values: FloatArray) -> FloatArray:
 
 def _no_contact(cycle: IndentationCycle, height_N: float, spread_N: float, fall_N: float) -> str:
     if fall_N > max(10 * spread_N, LEAST_FORCE_N, height_N):
+        if cycle.position_mm[np.argmin(despiked(cycle.force_N))] < cycle.position_mm[0]:
+            return f"{cycle.name}: started in contact, and force only falls as the tip goes out; record the loading"
         return (
             f"{cycle.name}: force falls by {fall_N:.2g} N where the tip goes in: the sign of compression is wrong; "
             "correct force.compression in rig.toml, or `positive` of the force in the mapping"

@@ -11,6 +11,7 @@ from rig.trials.curves import loading_curve
 from rig.trials.cycles import IndentationCycle, cycle_of
 from rig.trials.recorded import trial_of
 from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, index_force, recording, tables, with_friction
+from tests.rig.trials.preloaded import SENSORS, preloaded
 
 
 @pytest.mark.parametrize("speed_mm_s", SPEEDS_MM_S)
@@ -125,17 +126,51 @@ def test_gentle_and_hard_tissue_and_a_noisy_sensor_have_an_air_part(
         assert contact.lower_mm - 0.1 <= 20.0 <= contact.upper_mm + 0.1
 
 
-def test_a_stroke_of_another_speed_than_said_names_both() -> None:
-    cycle = replace(Bench().cycle(5.0), speed_mm_s=30.0)
-    with pytest.raises(
-        DataError, match=r"no loading at 30 mm/s: .* the tip moved at .* to 5.* mm/s; correct the trial's"
-    ):
-        loading_curve(cycle)
+def test_a_stated_speed_that_is_not_the_motions_is_said_and_not_used() -> None:
+    cycle = Bench().cycle(5.0)
+    right, wrong = (loading_curve(replace(cycle, speed_mm_s=speed_mm_s)) for speed_mm_s in (5.0, 50.0))
+    assert not right.findings
+    assert wrong.findings[0].text == ("stated speed 50 mm/s, but the tip loads at 5 mm/s: the motion's is used")
+    assert wrong.speed_mm_s == 5.0
+    assert wrong.force_N == pytest.approx(right.force_N)
 
 
-def test_too_few_samples_in_the_rise_are_refused_with_their_number() -> None:
+def pulled_out(cycle: IndentationCycle) -> IndentationCycle:
+    """The cycle as a machine records it that counts tension and the way out as negative."""
+    return replace(cycle, force_N=-cycle.force_N, position_mm=-cycle.position_mm)
+
+
+def test_tension_is_loading_in_its_own_sense() -> None:
+    cycle = preloaded("linear", SENSORS["bota"], 0)
+    pushed, pulled = loading_curve(cycle), loading_curve(pulled_out(cycle))
+    assert pulled.findings[0].kind == "tension"
+    assert not [finding for finding in pushed.findings if finding.kind == "tension"]
+    assert pulled.depth_mm == pytest.approx(pushed.depth_mm)
+    assert pulled.force_N == pytest.approx(pushed.force_N)
+
+
+def test_a_tip_that_leaves_the_tissue_is_no_tension() -> None:
+    cycle = Bench(zero_N=0.0, noise_N=0.002).cycle(10.0)
+    with pytest.raises(DataError, match="started in contact"):
+        loading_curve(moved(cycle, int(np.flatnonzero(cycle.position_mm > 27.9)[-1])))
+
+
+def test_a_tip_that_steps_is_read_where_it_goes_on() -> None:
+    bench = Bench(noise_N=0.002)
+    cycle = bench.cycle(10.0)
+    inside = (cycle.position_mm > 18.5) & (np.arange(len(cycle.time_s)) <= int(np.argmax(cycle.position_mm)))
+    steps_mm = np.where(inside, np.floor(cycle.position_mm), cycle.position_mm)
+    forces = [bench.force(steps_mm - bench.surface_mm, np.zeros_like(steps_mm)), cycle.force_N * 0 + 0.7]
+    curve = loading_curve(replace(cycle, position_mm=steps_mm, force_N=np.sum(forces, axis=0), speed_mm_s=np.nan))
+    assert "unsteadily" in curve.findings[-1].text
+    expected_N = bench.force(curve.depth_mm + curve.contact.position_mm - 20.0, np.zeros_like(curve.depth_mm))
+    assert curve.force_N == pytest.approx(expected_N, abs=0.01)
+    assert curve.max_depth_mm > 7
+
+
+def test_few_samples_in_the_rise_leave_the_surface_open_and_are_refused() -> None:
     cycle = Bench(depth_mm=4.0, rate_Hz=15.0, axis_rate_Hz=100.0).cycle(30.0)
-    with pytest.raises(DataError, match=r"no loading: [12] samples .* \(at least 3 are needed\)"):
+    with pytest.raises(DataError, match=r"its surface lies between .* \(at most a quarter is allowed\); record faster"):
         loading_curve(cycle)
 
 
