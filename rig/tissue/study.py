@@ -70,8 +70,7 @@ def study_session(
 
     Raises DataError where no trial gives a curve.
     """
-    curves, skipped = _curves_or_refusal(session)
-    return study_curves(session.info.id, curves, skipped, laws, known, progress)
+    return study_sessions([session], laws, known, progress)
 
 
 def study_sessions(
@@ -79,10 +78,8 @@ def study_sessions(
 ) -> Study:
     """As ``study_session``, for sessions of several subjects at once: each subject is also left out in turn.
 
-    A trial is then called by its session's folder and its own name.
+    A trial of several sessions is called by its session's folder and its own name.
     """
-    if len(sessions) == 1:
-        return study_session(sessions[0], laws, known, progress)
     places = [session.folder.resolve() for session in sessions]
     twice = [place for place in places if places.count(place) > 1]
     if twice:
@@ -90,10 +87,10 @@ def study_sessions(
     curves: list[Curve] = []
     skipped: list[Skipped] = []
     for session in sessions:
-        place = str(session.folder)
+        place = f"{session.folder}/" if len(sessions) > 1 else ""
         found, missing = _curves_or_refusal(session)
-        curves += [replace(curve, name=f"{place}/{curve.name}") for curve in found]
-        skipped += [Skipped(f"{place}/{one.trial}", one.reason) for one in missing]
+        curves += [replace(curve, name=f"{place}{curve.name}") for curve in found]
+        skipped += [Skipped(f"{place}{one.trial}", one.reason) for one in missing]
     return study_curves(", ".join(session.info.id for session in sessions), curves, skipped, laws, known, progress)
 
 

@@ -94,6 +94,14 @@ def test_the_study_s_lattice_collapses_and_says_so_where_the_stabilised_one_does
         newton.tangent_stiffness_N_mm(at_limit(block))
 
 
+def test_cells_that_are_turned_count_as_often_as_the_whole_block_has_them(block: Block) -> None:
+    for stored, expected in ((block, 4), (block.as_quarter(), 16)):
+        lattice = Loaded(stored, Springs())
+        inner = stored.inner(lattice.x)
+        inner[2, 2, 2, -1] = inner[2, 2, 2, -2] - 0.1
+        assert inverted_cells(lattice) == expected, "a node of the top face is a corner of four cells"
+
+
 def pressed_far(block: Block, mode: Mode) -> Loaded:
     lattice = Loaded(block, Springs.for_mode(mode, 1.0))
     for depth in np.arange(0.5, 4.1, 0.5):
