@@ -52,8 +52,8 @@ def protocol(
 
     Example: rig protocol check examples/diagnosis.toml --json check.json
     """
-    operation, plan = Operation("protocol check"), load(Indentation, file)
-    result = compute(operation, lambda: work.check_protocol(operation, plan, tracker, rate_hz, out))
+    plan = load(Indentation, file)
+    result = compute("protocol check", lambda operation: work.check_protocol(operation, plan, tracker, rate_hz, out))
     show(*check_parts(result))
     write_json(json_file, result)
 
@@ -68,7 +68,7 @@ def diagnosed(
 ) -> DiagnosisResult:
     """The diagnosis, with progress on a terminal, shown; then what was written of it."""
     operation = Operation("diagnose")
-    result = compute(operation, lambda: work.diagnose(operation, folder, simulation, columns, only, out), prints=False)
+    result = compute(operation, lambda now: work.diagnose(now, folder, simulation, columns, only, out), prints=False)
     show(*diagnosis_parts(result))
     write_json(json_file, result)
     show(*operation.progress.log)

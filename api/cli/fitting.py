@@ -64,8 +64,8 @@ def fitted(
     folders: Sequence[Path], out: Path | None = None, laws: Laws = DEFAULT_LAWS, lattice: Lattice | None = None
 ) -> FitResult:
     """Fits and writes, with progress on a terminal, and shows what was found."""
-    operation, target = work.of_fit(lattice), work.target_of(folders, out)
-    result = compute(operation, lambda: work.fit(operation, folders, out, laws, lattice))
+    target = work.target_of(folders, out)
+    result = compute(work.of_fit(lattice), lambda operation: work.fit(operation, folders, out, laws, lattice))
     drawn = "lattice.png, lattice.svg, " if lattice else ""
     show(
         *fit_parts(result), f"{FILE}, fit.png, fit.svg, residuals.png, {drawn}table.csv and model.json are in {target}"

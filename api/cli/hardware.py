@@ -6,13 +6,12 @@ from typing import Annotated
 
 import typer
 
-from api.cli.live import compute, here
+from api.cli.live import compute
 from api.cli.mock_bench import bench_for, bench_process
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import show, write_json
 from api.operations import doctor as work
 from controller.claims import holder
-from controller.operation import Operation
 from rig.config.endpoints import Endpoints
 from rig.config.products.registry import ROLES
 from rig.errors import CheckFailed
@@ -72,12 +71,12 @@ def doctor(config: ConfigOption = None, overrides: SetOption = None, json_file: 
     Example: rig doctor --config rig.toml
     """
     wiring = wiring_from(config, overrides)
-    held, operation = holder(wiring), Operation("doctor")
+    held = holder(wiring)
     if held:
-        result = here(operation, lambda: work.doctor_served(operation, held))
+        result = compute("doctor", lambda operation: work.doctor_served(operation, held))
     else:
         with bench_for(wiring, approaches=False) as (live_wiring, _):
-            result = compute(operation, lambda: work.doctor(operation, live_wiring))
+            result = compute("doctor", lambda operation: work.doctor(operation, live_wiring))
     header = ("role", "device", "rate (Hz)", "noise", "latency (ms)", "range seen")
     show(TextTable("Devices", header, [_row(found) for found in result.devices], words=2))
     write_json(json_file, result)

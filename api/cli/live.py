@@ -88,8 +88,12 @@ def run(bench: Supervisor, operation: Operation, work: Callable[[], T]) -> T:
     return results[0]
 
 
-def compute(operation: Operation, work: Callable[[], T], prints: bool = True) -> T:
-    """``here``, with a bar that says how far it is; where this ``prints`` none, the log is the caller's."""
+def compute(asked: Operation | str, work: Callable[[Operation], T], prints: bool = True) -> T:
+    """``here``, with a bar that says how far it is; where this ``prints`` none, the log is the caller's.
+
+    ``asked``: the operation, or the name of one that has no parts to count.
+    """
+    operation = Operation(asked) if isinstance(asked, str) else asked
     screen = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=screen, disable=not screen.is_terminal, transient=True) as bar:
@@ -101,7 +105,7 @@ def compute(operation: Operation, work: Callable[[], T], prints: bool = True) ->
             bar.update(task, description=now.message, completed=now.done)
 
         operation.watch = watch
-        return operation.run(work)
+        return operation.run(lambda: work(operation))
 
 
 def here(operation: Operation, work: Callable[[], T]) -> T:

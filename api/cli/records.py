@@ -11,7 +11,6 @@ from api.cli.live import compute
 from api.cli.options import JsonOption, SessionArgument
 from api.cli.output import show, write_json
 from api.operations import records
-from controller.operation import Operation
 from rig.errors import UsageError
 from rig.intake.rows import FIELDS
 from rig.recording.export import FORMATS, Format
@@ -30,8 +29,7 @@ def verify(
 
     Example: rig verify sessions/first
     """
-    operation = Operation("verify")
-    result = compute(operation, lambda: records.verify(operation, path))
+    result = compute("verify", lambda operation: records.verify(operation, path))
     judged = ((name, found) for name, found in result.recordings.items() if found.quality)
     show(
         recording_table(result.recordings),
@@ -70,8 +68,7 @@ def repair(
 
     Example: rig repair sessions/first/trial-03.mcap --out trial-03-good.mcap
     """
-    operation = Operation("repair")
-    result = compute(operation, lambda: records.repair(operation, recording, out))
+    result = compute("repair", lambda operation: records.repair(operation, recording, out))
     show(recording_table({out.stem: result}), result.sentence)
     write_json(json_file, result)
 
@@ -91,8 +88,8 @@ def import_(
 
     Example: rig import measured/ --mapping examples/mappings/asmi.toml --out sessions/measured
     """
-    operation, now = Operation("import"), datetime.now().astimezone()
-    result = compute(operation, lambda: records.import_data(operation, folder, mapping, out, now))
+    now = datetime.now().astimezone()
+    result = compute("import", lambda operation: records.import_data(operation, folder, mapping, out, now))
     show(_trial_table(result.trials), *result.remarks)
     write_json(json_file, result)
 
@@ -121,8 +118,7 @@ def export_(
     Example: rig export sessions/first --out exported --format hdf5
     """
     chosen = _formats(formats or list(FORMATS))
-    operation = Operation("export")
-    write_json(json_file, compute(operation, lambda: records.export_session(operation, session, out, chosen)))
+    write_json(json_file, compute("export", lambda operation: records.export_session(operation, session, out, chosen)))
 
 
 def _formats(asked: list[str]) -> list[Format]:

@@ -9,7 +9,6 @@ from api.cli.live import compute
 from api.cli.options import JsonOption, SessionArgument
 from api.cli.output import write_json
 from api.operations import report as work
-from controller.operation import Operation
 
 
 def report(
@@ -21,5 +20,4 @@ def report(
 
     Example: rig report sessions/first --out first.html
     """
-    operation = Operation("report")
-    write_json(json_file, compute(operation, lambda: work.report(operation, session, out)))
+    write_json(json_file, compute("report", lambda operation: work.report(operation, session, out)))

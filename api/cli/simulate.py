@@ -12,7 +12,6 @@ from api.operations import simulate as work
 from api.operations.simulate import SimulatedRun
 from controller.experiments import comparison
 from controller.experiments.references import named
-from controller.operation import Operation
 from rig.results.tables import simulation_parts
 from rig.tissue.model import load_model
 
@@ -40,7 +39,7 @@ def simulate(
     """
     wiring, fitted, asked = wiring_from(config, overrides), load_model(model), named(reference)
     choice = comparison.choice_from(gains) if gains else wiring.loop.gains
-    wanted, operation = SimulatedRun(asked, fitted, choice, stiffness, breathing), Operation("simulate")
-    result = compute(operation, lambda: work.simulate(operation, wiring, wanted, out))
+    wanted = SimulatedRun(asked, fitted, choice, stiffness, breathing)
+    result = compute("simulate", lambda operation: work.simulate(operation, wiring, wanted, out))
     show(*simulation_parts(result), f"simulation.svg, simulation.png and bode.svg are in {out}")
     write_json(json_file, result)

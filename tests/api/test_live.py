@@ -54,7 +54,7 @@ def test_what_an_operation_says_is_printed_as_it_stands(capsys: pytest.CaptureFi
 def test_ctrl_c_ends_a_computation_at_once() -> None:
     operation, after = Operation("fit"), list[str]()
 
-    def work() -> None:
+    def work(_: Operation) -> None:
         os.kill(os.getpid(), signal.SIGINT)
         threading.Event().wait(10.0)
         after.append("went on")
