@@ -33,7 +33,8 @@ def test_a_stop_before_anything_moves_is_answered_and_nothing_moves(page: StopWo
     asking = Requester(page, Lane.STOP_PROCESS)
     moved = []
     with StartGuard(Responder(page)) as guard:
-        answer = asking.confirmed(asking.request(StopReason.PAIN), PATIENCE_S)
+        # Who presses at the stop process is told after half a second that nothing is confirmed.
+        answer = asking.confirmed(asking.request(StopReason.PAIN), 0.5)
         with pytest.raises(SafetyStop, match=SENTENCE), guard.moving():
             moved.append(True)
     assert answer is not None
