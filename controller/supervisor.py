@@ -311,7 +311,7 @@ class Supervisor:
         return self._process.poll() not in ENDED_BY_ITSELF
 
 
-def stopped(outcome: Outcome) -> SafetyStop:
+def stop_error(outcome: Outcome) -> SafetyStop:
     """The error that ends a command whose program was stopped."""
     return SafetyStop(f"stopped: {outcome.cause}", outcome.outcome)
 

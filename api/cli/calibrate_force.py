@@ -8,7 +8,7 @@ from api.cli.mock_bench import bench_for
 from api.cli.mock_calibration import BY_ITSELF, mock_weights, weights_on
 from api.cli.output import show
 from api.operations.calibrate import calibrate_force as measure
-from api.operations.calibrate import of_force
+from api.operations.calibrate import force_calibration_operation
 from controller.commissioning.weights import Weights, parse_weights
 from mock_devices.control import BenchControl
 from rig.config.calibration import ForceCalibration
@@ -34,14 +34,14 @@ def calibrate_force(wiring: Wiring, asked: ForceAsked, person: Person) -> ForceC
     """The calibration, and what it says on the terminal; raises CheckFailed with what is wrong."""
     if wiring.force.port == MOCK_PORT:
         weights = _weights(wiring, asked, person) if asked.weights else mock_weights(wiring, asked.load == "hung")
-        operation = of_force(weights)
+        operation = force_calibration_operation(weights)
         with bench_for(wiring, approaches=False) as (live, endpoints):
             assert endpoints
             with BenchControl(endpoints.control) as control, weights_on(control) as put_on:
                 found = here(operation, lambda: measure(operation, live, weights, put_on, BY_ITSELF))
     else:
         weights = _weights(wiring, asked, person)
-        operation = of_force(weights)
+        operation = force_calibration_operation(weights)
         found = here(operation, lambda: measure(operation, wiring, weights, lambda N: person.do(_request(N))))
     _say(found)
     return found

@@ -7,7 +7,7 @@ from pathlib import Path
 import mock_devices
 from api.cli import live
 from api.cli.output import show
-from api.operations.compare import Comparison, of_comparison
+from api.operations.compare import Comparison, comparison_operation
 from api.operations.compare import compare as work
 from controller.experiments import comparison, tracked
 from controller.experiments.references import Reference, Stairs
@@ -32,7 +32,7 @@ def compare(
     _refuse_subjects(wiring, subjects)
     whose = {subject: _who(subject) for subject in subjects}
     wanted = Comparison(wiring, out, whose, choices, reference, lambda subject: _bench(wiring, subject))
-    operation = of_comparison(wanted)
+    operation = comparison_operation(wanted)
     result = live.here(operation, lambda: work(operation, wanted))
     show(run_table(result.runs, reference.name), f"comparison.svg is in {out}")
     return result

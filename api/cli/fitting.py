@@ -65,7 +65,7 @@ def fitted(
 ) -> FitResult:
     """Fits and writes, with progress on a terminal, and shows what was found."""
     target = work.target_of(folders, out)
-    result = compute(work.of_fit(lattice), lambda operation: work.fit(operation, folders, out, laws, lattice))
+    result = compute(work.fit_operation(lattice), lambda operation: work.fit(operation, folders, out, laws, lattice))
     drawn = "lattice.png, lattice.svg, " if lattice else ""
     show(
         *fit_parts(result), f"{FILE}, fit.png, fit.svg, residuals.png, {drawn}table.csv and model.json are in {target}"

@@ -73,7 +73,7 @@ def doctor(config: ConfigOption = None, overrides: SetOption = None, json_file: 
     wiring = wiring_from(config, overrides)
     held = holder(wiring)
     if held:
-        result = compute("doctor", lambda operation: work.doctor_served(operation, held))
+        result = compute("doctor", lambda operation: work.ask_service(operation, held))
     else:
         with bench_for(wiring, approaches=False) as (live_wiring, _):
             result = compute("doctor", lambda operation: work.doctor(operation, live_wiring))

@@ -72,13 +72,13 @@ def bench_for(
         yield wiring, None
         return
     with bench_process(wiring, hide) as (_, endpoints):
-        live = plugged(wiring, endpoints) if approaches else at_endpoints(wiring, endpoints)
+        live = plug_into(wiring, endpoints) if approaches else at_endpoints(wiring, endpoints)
         if approaches and refuses:
             refuse_uncalibrated(live, datetime.now(UTC))
         yield live, endpoints
 
 
-def plugged(wiring: Wiring, endpoints: Endpoints) -> Wiring:
+def plug_into(wiring: Wiring, endpoints: Endpoints) -> Wiring:
     """``wiring`` on the mock bench's endpoints, with calibrations of what is a mock: its force sensor, and its axis.
 
     A calibration that the wiring brings along is kept, whosever it is. A mock axis is seen by the mock tracker alone.

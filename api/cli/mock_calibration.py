@@ -13,10 +13,10 @@ from typing import TypeVar
 
 import typer
 
-from api.operations.calibrate import ReadingTime, measured_force, of_force
+from api.operations.calibrate import ReadingTime, force_calibration_operation, measured_force
 from controller.claims import state_folder
 from controller.commissioning.axis import against_tracker, ahead_mm, known_direction
-from controller.commissioning.axis_moves import Pace, RestingAxis, travelled
+from controller.commissioning.axis_moves import Pace, RestingAxis, drive_to_positions
 from controller.commissioning.weights import Weights
 from controller.devices.drivers import start_devices
 from mock_devices.control import BenchControl
@@ -91,7 +91,7 @@ def _measured_force(wiring: Wiring, endpoints: Endpoints) -> ForceCalibration:
         _nothing_hidden(control),
         weights_on(control) as put_on,
     ):
-        return measured_force(of_force(weights), wiring.force, weights, put_on, BY_ITSELF)
+        return measured_force(force_calibration_operation(weights), wiring.force, weights, put_on, BY_ITSELF)
 
 
 def _measured_axis(wiring: Wiring, endpoints: Endpoints) -> AxisCalibration | None:
@@ -104,7 +104,7 @@ def _measured_axis(wiring: Wiring, endpoints: Endpoints) -> AxisCalibration | No
         devices = start_devices(wiring)
         try:
             devices.axis.home()
-            places = travelled(RestingAxis(devices, pace=PACE), places_mm)
+            places = drive_to_positions(RestingAxis(devices, pace=PACE), places_mm)
         except DeviceError:
             # What the computer was too late for must not be found in fault by what comes next.
             with contextlib.suppress(RigError):

@@ -14,7 +14,7 @@ from api.operations.motion import Captured, TrackPlan
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.experiments.comparison import CHOICES, choice_from, choices_from
-from controller.experiments.references import named
+from controller.experiments.references import parse_reference
 from controller.experiments.verdicts import refuse_bad
 from controller.loop.steps import Program
 from controller.operation import Operation
@@ -54,7 +54,7 @@ def capture(
 
 def captured(bench: Supervisor, plan: Indentation, out: Path) -> Captured:
     """The session, with progress on the terminal and a summary line a trial."""
-    operation = motion.of_capture(plan)
+    operation = motion.capture_operation(plan)
     return live.run(bench, operation, lambda: motion.capture(operation, bench, plan, out))
 
 
@@ -140,7 +140,7 @@ def _planned(wiring: Wiring, asked: TrackOptions) -> Program:
             raise UsageError(
                 "--seconds goes with --force; a --reference has its own duration, as in step:5,duration_s=4"
             )
-        return tracked.plan_reference(named(asked.reference), fitted, wiring, choice)
+        return tracked.plan_reference(parse_reference(asked.reference), fitted, wiring, choice)
     seconds = 10.0 if asked.seconds is None else asked.seconds
     return tracked.plan(tracked.forces(asked.force), seconds, fitted, wiring, choice)
 

@@ -11,7 +11,7 @@ from api.cli.output import show, write_json
 from api.operations import simulate as work
 from api.operations.simulate import SimulatedRun
 from controller.experiments import comparison
-from controller.experiments.references import named
+from controller.experiments.references import parse_reference
 from rig.results.tables import simulation_parts
 from rig.tissue.model import load_model
 
@@ -37,7 +37,7 @@ def simulate(
 
     Example: rig simulate --model sessions/first/fit/model.json --reference step:5 --json simulation.json
     """
-    wiring, fitted, asked = wiring_from(config, overrides), load_model(model), named(reference)
+    wiring, fitted, asked = wiring_from(config, overrides), load_model(model), parse_reference(reference)
     choice = comparison.choice_from(gains) if gains else wiring.loop.gains
     wanted = SimulatedRun(asked, fitted, choice, stiffness, breathing)
     result = compute("simulate", lambda operation: work.simulate(operation, wiring, wanted, out))

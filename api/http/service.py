@@ -145,7 +145,7 @@ class Service:
         experiment.check(plan, self.wiring)
         if folder.exists():
             raise RequestRefused(409, "session-exists", f"session {session} exists; recordings are never overwritten")
-        operation = motion.of_capture(plan)
+        operation = motion.capture_operation(plan)
         return self._start("capture", lease, operation, lambda: motion.capture(operation, bench, plan, folder))
 
     def track(self, lease: str, session: str, forces_N: list[float], seconds: float) -> Job:

@@ -8,7 +8,14 @@ from typing import NamedTuple
 
 from api.operations.claimed import claimed
 from controller.commissioning.axis import KnownBy, against_block, against_tracker, ahead_mm, known_direction
-from controller.commissioning.axis_moves import BACK_MM, SEARCH_MM, RestingAxis, steps_mm, touches_mm, travelled
+from controller.commissioning.axis_moves import (
+    BACK_MM,
+    SEARCH_MM,
+    RestingAxis,
+    drive_to_positions,
+    steps_mm,
+    touches_mm,
+)
 from controller.commissioning.force import calibrate
 from controller.commissioning.readings import read
 from controller.commissioning.stoppable import stoppable
@@ -53,7 +60,7 @@ class GaugeBlock(NamedTuple):
     near_mm: float
 
 
-def of_force(weights: Weights) -> Operation:
+def force_calibration_operation(weights: Weights) -> Operation:
     """The operation that ``calibrate_force`` is to report to."""
     return Operation("calibrate force", total=len(weights.sequence_N), unit="loads")
 
@@ -144,7 +151,7 @@ def axis_by_tracker(
     """The axis against the tracker; where no marker on the limb tells it, ``toward_limb`` says where the tip went."""
     refuse_travel(travel, wiring)
     with _resting(operation, wiring) as (axis, drive):
-        places = travelled(axis, _told(operation, steps_mm(travel.from_mm, travel.to_mm, STEPS)))
+        places = drive_to_positions(axis, _told(operation, steps_mm(travel.from_mm, travel.to_mm, STEPS)))
     known_by = known_direction(ahead_mm(places)) or _said(toward_limb)
     return against_tracker(drive, wiring.axis, places, known_by, datetime.now(UTC))
 

@@ -14,7 +14,7 @@ from controller.law.gains import Choice, pi_gains
 from controller.loop.steps import Program
 from controller.operation import Operation
 from controller.safety.table import BY_PERSON
-from controller.supervisor import Supervisor, stopped
+from controller.supervisor import Supervisor, stop_error
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring
 from rig.errors import DataError, DeviceError, SafetyStop, UsageError
@@ -79,7 +79,7 @@ def _refuse_strong(force_N: float, wiring: Wiring) -> None:
             raise UsageError(f"--force: {force_N:g} N is above {whose}, {limit_N:g} N")
 
 
-def of_comparison(wanted: Comparison) -> Operation:
+def comparison_operation(wanted: Comparison) -> Operation:
     """The operation that ``compare`` is to report to."""
     return Operation("compare", total=len(wanted.subjects) * len(wanted.choices), unit="runs")
 
@@ -154,7 +154,7 @@ def _tracked(
         found, stalled = compared_run(subject, choice, (), str(cause)), True
     else:
         if done.outcome.outcome in BY_PERSON:
-            raise stopped(done.outcome)
+            raise stop_error(done.outcome)
         found = compared_run(subject, choice, _jumps(done), done.outcome.cause)
         stalled = done.outcome.outcome in STALLED
     if not stalled or attempt == ATTEMPTS:

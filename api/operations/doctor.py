@@ -18,7 +18,7 @@ def doctor(operation: Operation, wiring: Wiring) -> DoctorResult:
     return DoctorResult(devices=examination.examine(wiring, tell=operation.step))
 
 
-def doctor_served(operation: Operation, held: Holder) -> DoctorResult:
+def ask_service(operation: Operation, held: Holder) -> DoctorResult:
     """What the service that uses the bench says of each device; raises DeviceError where it is no service."""
     if not held.address:
         raise DeviceError(held.sentence)

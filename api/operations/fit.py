@@ -43,7 +43,7 @@ class Laws:
 DEFAULT_LAWS = Laws()
 
 
-def of_fit(lattice: Lattice | None = None) -> Operation:
+def fit_operation(lattice: Lattice | None = None) -> Operation:
     """The operation that ``fit`` is to report to."""
     return Operation("fit", total=1 + (lattice.stages if lattice else 0))
 

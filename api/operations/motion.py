@@ -11,13 +11,13 @@ from controller.experiments import tracked
 from controller.experiments.verdicts import remaining_bad
 from controller.loop.steps import Program, Retract
 from controller.operation import Operation
-from controller.supervisor import Supervisor, stopped
+from controller.supervisor import Supervisor, stop_error
 from rig.config.protocol import Indentation
 from rig.errors import SafetyStop
 from rig.recording.sessions import SessionInfo
 from rig.results.bench import RetractResult
 from rig.results.recorded import CaptureResult, captured_trial
-from rig.results.tracking import Threshold, TrackResult, compared
+from rig.results.tracking import Threshold, TrackResult, compare_runs
 
 # Out of any depth that a protocol may reach, and slow enough to see it coming.
 RETRACT_MM = 20.0
@@ -40,7 +40,7 @@ class TrackPlan:
     model: str
 
 
-def of_capture(protocol: Indentation) -> Operation:
+def capture_operation(protocol: Indentation) -> Operation:
     """The operation that ``capture`` is to report to."""
     return Operation(f"capture {protocol.name}", total=len(protocol.speeds_mm_s) * protocol.trials, unit="trials")
 
@@ -67,7 +67,7 @@ def track(
     if operation.cancelled:
         raise SafetyStop("stopped by the operator before the second run")
     found = _track(operation, bench, wanted, folder)
-    return compared(before, found) if before else found
+    return compare_runs(before, found) if before else found
 
 
 def _track(operation: Operation, bench: Supervisor, wanted: TrackPlan, folder: Path) -> TrackResult:
@@ -92,5 +92,5 @@ def retract(operation: Operation, bench: Supervisor) -> RetractResult:
     operation.advance(0, "retract")
     outcome = bench.run(Program(name="retract", steps=(leave,)), RETRACT_TIMEOUT_S)
     if outcome.stopped:
-        raise stopped(outcome)
+        raise stop_error(outcome)
     return RetractResult(outcome=outcome.outcome)

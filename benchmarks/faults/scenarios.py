@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from controller.experiments import capture, tracked
-from controller.experiments.references import named
+from controller.experiments.references import parse_reference
 from controller.loop.steps import Approach, Compress, MoveTo, Program, Retract, TrackForce, Zero
 from controller.operation import Operation
 from controller.supervisor import Supervisor
@@ -21,7 +21,7 @@ Truth = dict[str, float]
 
 MODEL = index_model(0.12, 0.22, 0.01, force_N=11.0)
 """The mock bench's own forearm."""
-PRESSES = named("press:2,base_N=1,frequency_Hz=1,duration_s=5")
+PRESSES = parse_reference("press:2,base_N=1,frequency_Hz=1,duration_s=5")
 SURFACE_MM = 20.0
 NEAR_MM = 15.0
 """Short of the surface; far enough from 0 for the tracker to be registered to the axis."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from api.cli.mock_bench import plugged
+from api.cli.mock_bench import plug_into
 from benchmarks.faults.evaluation import Notice, Outcome, evaluate
 from benchmarks.faults.fault import DRIVE, Fault, at_once
 from benchmarks.faults.observer import Observer
@@ -108,7 +108,7 @@ def _outcome(
 ) -> Outcome:
     happened_ns, refusal, unpowered_ns, notices = time.monotonic_ns(), "", None, list[Notice]()
     try:
-        wiring = plugged(_with_keypad(wiring_for(fault), fault, folder), bench.endpoints)
+        wiring = plug_into(_with_keypad(wiring_for(fault), fault, folder), bench.endpoints)
         with program(bench, wiring, fault, folder, planted) as running:
             observer.listen(running.live.rig)
             if DRIVE in planted.split(","):

@@ -134,7 +134,7 @@ def steps_mm(from_mm: float, to_mm: float, count: int) -> list[float]:
     return [*up, *up[-2::-1]]
 
 
-def travelled(axis: RestingAxis, positions_mm: Iterable[float]) -> list[Place]:
+def drive_to_positions(axis: RestingAxis, positions_mm: Iterable[float]) -> list[Place]:
     """Where it stands, then ``positions_mm``; CheckFailed with the first step where scale or sense is wrong."""
     places = [_seen(axis.place())]
     checked = False

@@ -84,7 +84,7 @@ def refusal(loop: "BenchLoop", program: Program, now_ns: int) -> str:
     return loop.connections.refusal(["axis"] if leaves else None)
 
 
-def said(loop: "BenchLoop", role: str, status: DeviceStatus) -> None:
+def record_state_change(loop: "BenchLoop", role: str, status: DeviceStatus) -> None:
     """Writes a change of state into the event stream."""
     level = Action.NOTE if status.state in (DeviceState.OK, DeviceState.CONNECTING) else Action.WARNING
     loop.event(level, "device_state", f"{role} {status.state}: {status.detail}".rstrip(": "), loop.state.now_ns)

@@ -14,7 +14,7 @@ from controller.experiments.recorded import metadata, record, refuse_bench
 from controller.experiments.verdicts import sentences, with_quality, with_surface
 from controller.operation import Operation
 from controller.safety.program_limits import refuse_beyond_limits
-from controller.supervisor import Supervisor, stopped
+from controller.supervisor import Supervisor, stop_error
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring
 from rig.errors import RigError, SafetyStop, UsageError
@@ -119,4 +119,4 @@ def _run(
         dropped=done.dropped,
     ).sealed(folder)
     result = with_quality(result, folder, protocol.quality, info.trials)
-    return result, stopped(outcome) if outcome.stopped else None
+    return result, stop_error(outcome) if outcome.stopped else None

@@ -178,7 +178,7 @@ def _periodic(
     return Reference(name, times, forces, max(1, math.ceil(duration_s * frequency_Hz - 1e-9)), frequency_Hz)
 
 
-def named(text: str) -> Reference:
+def parse_reference(text: str) -> Reference:
     """The reference written ``kind:key=value,...`` or ``csv:FILE``; raises UsageError naming key and bound."""
     kind, _, rest = text.partition(":")
     if kind == "csv":

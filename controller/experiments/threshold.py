@@ -8,7 +8,7 @@ from controller.experiments import tracked
 from controller.experiments.recorded import Recorded
 from controller.experiments.references import Ramp
 from controller.loop.steps import Program
-from controller.supervisor import Supervisor, stopped
+from controller.supervisor import Supervisor, stop_error
 from rig.config.table import parse
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
@@ -33,7 +33,7 @@ def run(bench: Supervisor, program: Program, up_to_N: float, folder: Path, model
     """Plays the ramp into a recording; any stop but the subject's own raises SafetyStop."""
     done = tracked.recorded_run(bench, program, folder, model)
     if done.outcome.stopped and done.outcome.outcome != PAIN:
-        raise stopped(done.outcome)
+        raise stop_error(done.outcome)
     return Threshold(force_N=force_at_stop(done), up_to_N=up_to_N, recording=done.file.name)
 
 

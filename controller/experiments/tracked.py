@@ -14,7 +14,7 @@ from controller.experiments.verdicts import with_quality, with_surface
 from controller.law.gains import Choice
 from controller.loop.steps import Program, TrackForce
 from controller.safety.program_limits import refuse_beyond_limits
-from controller.supervisor import Supervisor, stopped
+from controller.supervisor import Supervisor, stop_error
 from rig.channels import LoopSample
 from rig.config.quality import QualityLimits
 from rig.config.wiring import Wiring
@@ -70,7 +70,7 @@ def run(bench: Supervisor, program: Program, folder: Path, model: str) -> TrackR
     """
     done = recorded_run(bench, program, folder, model)
     if done.outcome.stopped:
-        raise stopped(done.outcome)
+        raise stop_error(done.outcome)
     entry = open_session(folder).trial(done.file.stem)
     result = evaluate(done, model).model_copy(update={"quality": entry.quality, "reasons": entry.reasons})
     result.write(folder / FILE)

@@ -50,7 +50,7 @@ def along(line: Line, elapsed_s: Column) -> Column:
     return np.asarray(forces[k] + share * (forces[k + 1] - forces[k]))
 
 
-def previewed(line: Line, preview_s: float) -> Line:
+def preview(line: Line, preview_s: float) -> Line:
     """The line ``preview_s`` early between jumps; where one repeat joins the next without a jump, across the joint."""
     if preview_s <= 0:
         return line

@@ -95,7 +95,7 @@ class BenchLoop:
             stream: takeover.unheard(self.wiring, self.devices, stream) for stream in ("force", "axis", "marker")
         }
         self.published = {"force": -1, "axis": -1, "tracker": -1}
-        said = partial(takeover.said, self)
+        said = partial(takeover.record_state_change, self)
         self.connections = Connections(devices.by_role(), opens or openers(wiring), said, now())
         self._status_every = round(STATUS_EVERY_S / period_s)
         self._cycles = self._events = self._program = 0

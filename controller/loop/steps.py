@@ -311,7 +311,7 @@ class TrackForceRun:
 
     def __init__(self, step: TrackForce) -> None:
         self._step, self._given = step, step.given
-        self._asked = force_profile.previewed(step.given, step.preview_s)
+        self._asked = force_profile.preview(step.given, step.preview_s)
         self._table = force_position.columns(step.gains)
         self._settings = step.settings
 

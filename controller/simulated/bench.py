@@ -175,7 +175,7 @@ class _Playback:
         state = self._state
         assert state.memory
         if self._law is None or self._law[0] is not step:
-            self._law = step, _columns(step), force_profile.previewed(step.given, step.preview_s)
+            self._law = step, _columns(step), force_profile.preview(step.given, step.preview_s)
         elapsed_s = self._times_ns(LONGEST_STRETCH, self._machine.step_start_ns) * 1e-9
         elapsed_s = elapsed_s[elapsed_s < step.given.duration_s]
         reference_N = force_profile.along(step.given, elapsed_s)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from api.cli.mock_bench import plugged
+from api.cli.mock_bench import plug_into
 from api.cli.mock_calibration import force_file
 from api.cli.options import built_in
 from mock_devices.control import BenchControl
@@ -55,7 +55,7 @@ class ServedBench:
         """File of the calibration of this bench's force sensor, of the product that ``more`` names."""
         products = [setting for setting in more if setting.startswith("force.product=")]
         wiring = built_in(products)
-        plugged(wiring, self.endpoints)
+        plug_into(wiring, self.endpoints)
         return force_file(wiring, self.endpoints)
 
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from rig.trials.findings import Array, Finding
-from rig.trials.trial import Trial, TrialSet, ordered
+from rig.trials.trial import Trial, TrialSet, drop_disordered
 
 # Shares of a travel, of 5 mm of air and 8 mm of depth for example: a lift leaves the surface, which is at 0.38; a stop
 # at half depth, at 0.69, is none; what is within 0.26 mm of the highest place is the rest there.
@@ -27,7 +27,7 @@ def in_cycles(session: TrialSet) -> TrialSet:
 
 def cut(trial: Trial) -> list[Trial]:
     """The cycles of a recording, each from the middle of the rest before it to that after it."""
-    time_s, place_mm = ordered(trial.axis_s, trial.axis_mm)
+    time_s, place_mm = drop_disordered(trial.axis_s, trial.axis_mm)
     if not len(time_s):
         return [trial]
     cuts = [at for at in lifts(time_s, place_mm) if in_the_air(trial, at)]

@@ -15,8 +15,8 @@ from scipy.signal import savgol_filter
 
 from rig.errors import DataError
 from rig.simulation.drive import Array, MeasuredMotion
-from rig.trials.findings import Finding, at_the_end_of_range, merged
-from rig.trials.trial import FEWEST_SAMPLES, Trial, TrialSet, cleaned, inspect, ordered
+from rig.trials.findings import Finding, at_the_end_of_range, merge
+from rig.trials.trial import FEWEST_SAMPLES, Trial, TrialSet, drop_disordered, drop_unusable, inspect
 
 WORKING_RATE_HZ = 250.0
 LOWEST_RATE_HZ = 100.0  # below it no cause that acts fast can be tested
@@ -89,7 +89,7 @@ def observe(session: TrialSet) -> Observations:
     parts.sort(key=lambda part: float(part.time_s[0]))
     drive, force, tip = _joined(parts)
     return Observations(
-        session.name, tuple(part.name for part in parts), drive, force, tip, session.surface_mm, merged(findings),
+        session.name, tuple(part.name for part in parts), drive, force, tip, session.surface_mm, merge(findings),
         rough_mm, np.concatenate([part.unseen for part in parts]),
     )  # fmt: skip
 
@@ -114,7 +114,7 @@ def _cleaned(session: TrialSet) -> tuple[list[Trial], list[Finding]]:
     usable, lost = [], []
     for trial in session.trials:
         try:
-            usable.append(cleaned(trial))
+            usable.append(drop_unusable(trial))
         except DataError as error:
             lost.append(Finding(trial.name, "recording", "unusable", f"{OMITTED}{error}"))
     return usable, lost
@@ -165,7 +165,7 @@ def _on_grid(trial: Trial, period_s: float, spans_s: Sequence[float]) -> _Gridde
     time_s, temperature = means[0], means[5] if len(means) > 5 else None
     marker_s, marker_mm = np.empty(0), np.empty((0, 3))
     if trial.marker_s is not None and trial.marker_mm is not None:
-        marker_s, *xyz = ordered(trial.marker_s, *trial.marker_mm.T)
+        marker_s, *xyz = drop_disordered(trial.marker_s, *trial.marker_mm.T)
         inside = (marker_s >= time_s[0]) & (marker_s <= time_s[-1])
         marker_s, marker_mm = marker_s[inside], np.array(xyz).T[inside]
     unseen = beside_gaps(trial.axis_s, time_s, 0.5 * max(spans_s))

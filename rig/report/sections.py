@@ -16,7 +16,7 @@ from rig.report.markup import cards, details, figure, pairs, paragraph, parts, s
 from rig.report.values import json_table, of_many
 from rig.results.base import known
 from rig.results.fit import LawResult
-from rig.results.tables import TextTable, shown, track_parts
+from rig.results.tables import TextTable, render, track_parts
 from rig.results.tracking import TrackResult
 
 STREAM_FAULTS = ("missing", "dropped", "lost", "duplicate", "out of order")
@@ -39,7 +39,7 @@ def headline(facts: Facts) -> str:
 
 def _within(law: LawResult) -> str:
     errors = law.held_out.trials or law
-    return f"{shown(errors.max_error_mm, '.2g')}\u00a0mm ({shown(errors.max_error_percent, '.2g')}\u00a0%)"
+    return f"{render(errors.max_error_mm, '.2g')}\u00a0mm ({render(errors.max_error_percent, '.2g')}\u00a0%)"
 
 
 def _tracked(facts: Facts) -> TrackResult | None:
@@ -58,11 +58,11 @@ def key_figures(facts: Facts) -> str:
     if isinstance(facts.fit, Fitted):
         for name, law in facts.fit.result.laws.items():
             out = law.held_out.trials
-            note = f"{shown(out.max_error_percent, '.3g')} % on left-out trials" if out else "no trial was left out"
-            found.append((f"{shown(law.max_error_percent, '.3g')} %", f"worst error, {name} law", note))
+            note = f"{render(out.max_error_percent, '.3g')} % on left-out trials" if out else "no trial was left out"
+            found.append((f"{render(law.max_error_percent, '.3g')} %", f"worst error, {name} law", note))
     tracking = _tracked(facts)
     if tracking and tracking.max_error_percent is not None:
-        note = f"{shown(tracking.rms_error_N, '.2g')} N rms"
+        note = f"{render(tracking.rms_error_N, '.2g')} N rms"
         found.append((f"{tracking.max_error_percent:.3g} %", "worst force-tracking error", note))
     if isinstance(facts.loop, LoopFacts):
         share = 100 * facts.loop.missed / max(facts.loop.cycles + facts.loop.missed, 1)
@@ -168,7 +168,7 @@ def _stream_table(trials: Sequence[TrialFacts]) -> str:
         (
             name,
             f"{sum(one.samples for one in streams):,}",
-            shown(_median([one.rate_Hz for one in streams if one.rate_Hz is not None]), ".1f"),
+            render(_median([one.rate_Hz for one in streams if one.rate_Hz is not None]), ".1f"),
             *(f"{sum(one.faults.get(fault, 0) for one in streams):,}" for fault in STREAM_FAULTS),
         )
         for name, streams in by_stream.items()
@@ -185,7 +185,7 @@ def _median(values: Sequence[float]) -> float | None:
 
 def _trial_row(trial: TrialFacts) -> Sequence[str]:
     info = trial.info
-    speed, peak = shown(known(info.speed_mm_s), "g"), shown(known(info.peak_force_N), ".2f")
+    speed, peak = render(known(info.speed_mm_s), "g"), render(known(info.peak_force_N), ".2f")
     counts = f"{trial.samples:,}", f"{trial.dropped:,}"
     return info.name, info.outcome, _state(trial.verdict), info.quality or "not judged", speed, peak, *counts
 

@@ -9,7 +9,7 @@ from rig.tissue.intervals import LEVEL
 from rig.tissue.judging import Errors, Judged
 from rig.tissue.laws import FloatArray
 from rig.tissue.study import Known, Study, rows
-from rig.trials.findings import merged
+from rig.trials.findings import merge
 
 FRICTION = "friction shows at reversals: curves of loading say nothing for or against it"
 
@@ -31,7 +31,7 @@ def fit_result(study: Study, model: str, model_law: str, known: Known, recording
         "known": known,
         "recordings": recordings,
         "remarks": [FRICTION] if any(judged.law.friction[0] for judged in study.judged.values()) else [],
-        "data_quality": merged([finding for curve in study.curves for finding in curve.findings]),
+        "data_quality": merge([finding for curve in study.curves for finding in curve.findings]),
     })  # fmt: skip
 
 

@@ -56,14 +56,14 @@ MARGINS = {
 }  # fmt: skip
 
 
-def shown(value: float | None, form: str) -> str:
+def render(value: float | None, form: str) -> str:
     """The number in that format; a dash where it is unknown."""
     return UNKNOWN if value is None else format(value, form)
 
 
 def cells(row: object, columns: Columns) -> list[str]:
     """The row's text in each column."""
-    return [shown(getattr(row, name), form) for name, _, form in (text.partition(":") for text in columns.values())]
+    return [render(getattr(row, name), form) for name, _, form in (text.partition(":") for text in columns.values())]
 
 
 def numbers(title: str, columns: Columns, rows: Iterable[object]) -> TextTable:
@@ -125,7 +125,7 @@ def displacement_table(fit: FitResult, names: Sequence[str]) -> TextTable:
     for at, first in enumerate(fit.laws[names[0]].rows):
         row = [f"{first.force_N:.2f}", f"{first.measured_mm:.2f}"]
         for found in (fit.laws[name].rows[at] for name in names):
-            row += [f"{found.predicted_mm:.2f}", f"{found.error_mm:.3f}", shown(found.error_percent, ".1f")]
+            row += [f"{found.predicted_mm:.2f}", f"{found.error_mm:.3f}", render(found.error_percent, ".1f")]
         rows.append(row)
     return TextTable("Displacement in mm at given forces, and the worst trial's error", header, rows, words=0)
 
@@ -144,7 +144,7 @@ def errors_table(laws: Mapping[str, LawResult]) -> TextTable:
 
 
 def _worst(errors: DisplacementErrors | None) -> str:
-    return f"{shown(errors.max_error_mm, '.3f')} ({shown(errors.max_error_percent, '.1f')})" if errors else UNKNOWN
+    return f"{render(errors.max_error_mm, '.3f')} ({render(errors.max_error_percent, '.1f')})" if errors else UNKNOWN
 
 
 def parameter_table(laws: Mapping[str, LawResult]) -> TextTable:

@@ -68,7 +68,7 @@ class TrackResult(SavedResult):
     gain: TrackingGain | None = None
 
 
-def compared(before: TrackResult, after: TrackResult) -> TrackResult:
+def compare_runs(before: TrackResult, after: TrackResult) -> TrackResult:
     """``after`` with the run ``before`` it, of another model, and what it gains over that."""
     old_N, new_N = before.followed.rms_error_N, after.followed.rms_error_N
     gain = TrackingGain(rms_error_before_N=old_N, rms_error_after_N=new_N, reduction=1 - new_N / old_N)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.trials.findings import Array
-from rig.trials.trial import Trial, cleaned
+from rig.trials.trial import Trial, drop_unusable
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class IndentationCycle:
 
 def cycle_of(trial: Trial) -> IndentationCycle:
     """The trial, cleaned, with position at the times of force; raises DataError where too little is left."""
-    sound = cleaned(trial)
+    sound = drop_unusable(trial)
     force_s, axis_s = (_from(sound.force_s[0], at_s) for at_s in (sound.force_s, sound.axis_s))
     position_mm = np.interp(force_s, axis_s, sound.axis_mm)
     return IndentationCycle(trial.name, trial.speed_mm_s, force_s, sound.force_N, position_mm)

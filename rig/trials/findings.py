@@ -35,7 +35,7 @@ class Finding:
         return f"data: {f'{self.recording} ' if self.recording else ''}{self.text}{others}"
 
 
-def merged(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+def merge(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     """One finding a stream and kind: the first, with the number of recordings it was seen in."""
     groups: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:

@@ -49,7 +49,7 @@ def inspect(trial: Trial) -> list[Finding]:
     return found
 
 
-def ordered(time_s: Array, *columns: Array) -> tuple[Array, ...]:
+def drop_disordered(time_s: Array, *columns: Array) -> tuple[Array, ...]:
     """Rows with finite values whose time lies after every earlier one: a clock that steps back loses those rows."""
     finite = np.isfinite(time_s) & np.all([np.isfinite(c) for c in columns], axis=0)
     time_s, columns = time_s[finite], tuple(c[finite] for c in columns)
@@ -59,15 +59,15 @@ def ordered(time_s: Array, *columns: Array) -> tuple[Array, ...]:
     return (time_s[keep], *(c[keep] for c in columns))
 
 
-def cleaned(trial: Trial) -> Trial:
+def drop_unusable(trial: Trial) -> Trial:
     """The trial without what holds no number or comes out of order, cut to the time both force and axis cover.
 
     The marker is left as it is. Raises DataError where too little is left.
     """
     temperature = trial.temperature_C
     extra = () if temperature is None or not np.isfinite(temperature).all() else (temperature,)
-    force = ordered(trial.force_s, trial.force_N, *extra)
-    axis = ordered(trial.axis_s, trial.axis_mm)
+    force = drop_disordered(trial.force_s, trial.force_N, *extra)
+    axis = drop_disordered(trial.axis_s, trial.axis_mm)
     for name, raw, kept in (("force", trial.force_s, force[0]), ("axis", trial.axis_s, axis[0])):
         if not raw.size:
             raise DataError(f"{trial.name}: no valid {name} samples; a trial needs force and axis")

@@ -14,7 +14,7 @@ from api.cli.app import build
 from api.cli.asking import Person
 from api.cli.calibrate import say_use
 from api.cli.calibrate_axis import AxisAsked, calibrate_axis
-from api.cli.mock_bench import bench_for, plugged
+from api.cli.mock_bench import bench_for, plug_into
 from api.cli.mock_calibration import force_file
 from api.cli.options import built_in, calibrated, wiring_from
 from api.operations.calibrations import keep, refuse_out, refuse_unfit
@@ -207,7 +207,7 @@ def test_a_mock_sensor_uses_the_calibration_that_is_kept_for_its_serial_number(
     monkeypatch.setattr(mock_calibration, "_measured_force", lambda *_: pytest.fail("calibrated again"))
     stored()
     assert force_file(built_in(), ENDPOINTS).parent == own_state / "state" / "tissue-rig"
-    found = plugged(built_in(), ENDPOINTS).calibration.of_force
+    found = plug_into(built_in(), ENDPOINTS).calibration.of_force
     assert found is not None
     assert found.serial == "000271"
 
@@ -235,7 +235,7 @@ def test_it_is_made_once_where_none_may_be_used_and_said(
 
     monkeypatch.setattr(mock_calibration, "_measured_force", make)
     for _ in range(2):
-        assert plugged(built_in(), endpoints).calibration.of_force is not None
+        assert plug_into(built_in(), endpoints).calibration.of_force is not None
     assert made == ["made"]
     assert capsys.readouterr().err.count("was calibrated by itself") == 1
 
@@ -252,10 +252,10 @@ def test_a_mock_axis_is_calibrated_once_too(
 
     monkeypatch.setattr(mock_calibration, "_measured_axis", make)
     for _ in range(2):
-        assert plugged(built_in(), ENDPOINTS).calibration.of_axis is not None
+        assert plug_into(built_in(), ENDPOINTS).calibration.of_axis is not None
     assert made == ["made"]
     assert capsys.readouterr().err.count("the mock axis EPOS4 A1 was calibrated by itself; kept in") == 1
-    assert plugged(built_in(["tracker.port=tcp://10.0.0.1:8765"]), ENDPOINTS).calibration.of_axis is None
+    assert plug_into(built_in(["tracker.port=tcp://10.0.0.1:8765"]), ENDPOINTS).calibration.of_axis is None
 
 
 def test_a_computer_too_busy_to_calibrate_the_mock_axis_is_told_and_goes_on(
@@ -266,7 +266,7 @@ def test_a_computer_too_busy_to_calibrate_the_mock_axis_is_told_and_goes_on(
 
     stored()
     monkeypatch.setattr(mock_calibration, "_measured_axis", late)
-    assert plugged(built_in(), ENDPOINTS).calibration.of_axis is None
+    assert plug_into(built_in(), ENDPOINTS).calibration.of_axis is None
     assert "the mock axis was not calibrated, next time again: its heartbeat is missing" in capsys.readouterr().err
 
 
@@ -275,7 +275,7 @@ def test_where_it_cannot_be_kept_that_is_said(
 ) -> None:
     force_file(built_in(), ENDPOINTS).mkdir(parents=True)
     monkeypatch.setattr(mock_calibration, "_measured_force", lambda *_: force_calibration())
-    assert plugged(built_in(), ENDPOINTS).calibration.of_force is not None
+    assert plug_into(built_in(), ENDPOINTS).calibration.of_force is not None
     assert "and again next time: " in capsys.readouterr().err
 
 
@@ -306,7 +306,7 @@ def test_a_real_sensor_beside_a_mock_axis_is_never_calibrated_by_itself(monkeypa
     known = force_calibration(serial="real")
     wiring = built_in(["force.port=/dev/ttyUSB0"])
     wiring = wiring.model_copy(update={"calibration": wiring.calibration.model_copy(update={"of_force": known})})
-    live = plugged(wiring, ENDPOINTS)
+    live = plug_into(wiring, ENDPOINTS)
     assert (live.force.port, live.axis.port, live.calibration.of_force) == ("/dev/ttyUSB0", "/dev/pts/92", known)
 
 

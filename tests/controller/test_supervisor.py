@@ -24,7 +24,7 @@ from controller.loop.messages import (
 )
 from controller.loop.messages import Stopped as StoppedSaid
 from controller.stop.word import StopReason
-from controller.supervisor import Supervisor, process_environment, stopped
+from controller.supervisor import Supervisor, process_environment, stop_error
 from rig.channel import Answer, Received
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, SafetyStop, UsageError
@@ -324,7 +324,7 @@ def test_limits_of_waiting_and_leases() -> None:
 
 
 def test_a_stopped_program_is_an_error_with_its_cause() -> None:
-    error = stopped(Outcome("pain_stop", "the subject's pain stop at 3.00 N", 3.0, None, None))
+    error = stop_error(Outcome("pain_stop", "the subject's pain stop at 3.00 N", 3.0, None, None))
     assert isinstance(error, SafetyStop)
     assert (str(error), error.code) == ("stopped: the subject's pain stop at 3.00 N", "pain_stop")
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from api.cli.mock_bench import plugged
+from api.cli.mock_bench import plug_into
 from api.cli.mock_calibration import force_file
 from api.cli.options import built_in
 from controller.commissioning.refusals import contradictions
@@ -77,14 +77,14 @@ def test_a_mock_bench_is_calibrated_once_without_what_is_hidden_in_it(
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     bench.control.hide({"gain_error.gain": 0.2})
-    found = plugged(built_in(), bench.endpoints).calibration
+    found = plug_into(built_in(), bench.endpoints).calibration
     assert found.of_force is not None
     assert found.of_axis is not None
     assert found.of_force.matrix[2][2] == pytest.approx(1.0, abs=0.002)
     assert found.of_axis.scale == pytest.approx(1.0, abs=0.005)
     assert bench.control.truth() == {"gain_error": {"gain": 0.2}}
     assert bench.control.get("load.axial_N", "tissue.present") == {"load.axial_N": 0.0, "tissue.present": True}
-    assert plugged(built_in(), bench.endpoints).calibration == found
+    assert plug_into(built_in(), bench.endpoints).calibration == found
     said = capsys.readouterr().err
     assert said.count("000271 was calibrated by itself; kept in") == 1
     assert said.count("62014711 was calibrated by itself; kept in") == 1
@@ -97,9 +97,9 @@ def test_a_wiring_with_a_wrong_scale_is_refused_by_the_first_run_and_by_later_on
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     wrong = built_in(["axis.increments_per_mm=4000"])
     with pytest.raises(CheckFailed, match="the axis says it went 2 mm and the tracker saw"):
-        plugged(wrong, bench.endpoints)
-    assert plugged(built_in(), bench.endpoints).calibration.of_axis is not None
-    assert contradictions(plugged(wrong, bench.endpoints)) == [
+        plug_into(wrong, bench.endpoints)
+    assert plug_into(built_in(), bench.endpoints).calibration.of_axis is not None
+    assert contradictions(plug_into(wrong, bench.endpoints)) == [
         "axis.increments_per_mm 4000, axis.direction 1: the axis was calibrated with 2000 and 1; correct the wiring, or"
         " calibrate again"
     ]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from api.cli.mock_bench import plugged
+from api.cli.mock_bench import plug_into
 from controller.experiments import threshold
 from controller.supervisor import Supervisor
 from mock_devices.testing.commands import PATIENT, Running, ServedBench, children, freed, pressed
@@ -82,7 +82,7 @@ def test_a_command_that_is_suspended_loses_its_lease_and_the_tip_retracts(
 
 def test_a_threshold_session_ends_where_the_subject_stops_it(bench: ServedBench, tmp_path: Path) -> None:
     model = index_model(0.12, 0.22, 0.01, force_N=11.0)
-    wiring = plugged(parse(Wiring, merged({}, PATIENT), "PATIENT"), bench.endpoints)
+    wiring = plug_into(parse(Wiring, merged({}, PATIENT), "PATIENT"), bench.endpoints)
     program = threshold.plan(8.0, 1.0, model, wiring)
     pressed_N: list[float] = []
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from api.cli.mock_bench import plugged
+from api.cli.mock_bench import plug_into
 from api.cli.options import built_in
 from api.http.app import build
 from api.http.lease import LeaseRegistry
@@ -44,7 +44,9 @@ def served(clock: Clock, tmp_path_factory: pytest.TempPathFactory) -> Iterator[t
     (folder / "protocols" / "short.toml").write_text(SHORT)
     with served_bench("--seed", "2") as bench:
         service = Service(
-            plugged(built_in(["loop.lease_s=1", *PATIENT]), bench.endpoints), folder / "sessions", folder / "protocols"
+            plug_into(built_in(["loop.lease_s=1", *PATIENT]), bench.endpoints),
+            folder / "sessions",
+            folder / "protocols",
         )
         service.control = LeaseRegistry(clock.seconds)
         with TestClient(build(service), base_url="http://127.0.0.1:8000") as client:

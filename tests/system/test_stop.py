@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from api.cli.mock_bench import plugged
+from api.cli.mock_bench import plug_into
 from api.cli.options import built_in
 from controller.stop.start import SENTENCE
 from controller.stop.word import NOT_CONFIRMED, Deed, StopReason
@@ -111,7 +111,7 @@ def test_with_the_loop_killed_or_frozen_nothing_is_confirmed(served: ServedRig, 
 def test_a_stop_while_the_axis_homes_brakes_it_and_ends_the_start(bench: ServedBench) -> None:
     bench.control.set({"surface.position_mm": 60.0})
     settings = [*PATIENT, "stop.port=0", "axis.homing_speed_mm_s=2"]
-    supervisor = Supervisor(plugged(built_in(settings), bench.endpoints))
+    supervisor = Supervisor(plug_into(built_in(settings), bench.endpoints))
     supervisor.prepare()
     errors: list[BaseException] = []
 
@@ -138,7 +138,7 @@ def test_a_foot_switch_retracts_and_the_supervisors_own_lane_answers_too(bench: 
     pad = tmp_path / "pad"
     os.mkfifo(pad)
     writer = os.open(pad, os.O_RDWR)
-    wiring = plugged(built_in([*PATIENT, "stop.port=0", f"stop.keypad={pad}"]), bench.endpoints)
+    wiring = plug_into(built_in([*PATIENT, "stop.port=0", f"stop.keypad={pad}"]), bench.endpoints)
     with Supervisor(wiring) as rig:
         os.write(writer, struct.pack("<qqHHi", 0, 0, 1, 48, 1))
         until(lambda: rig.status.get("latched"), PATIENCE_S, "the stop")

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from api.operations import calibrate
-from api.operations.calibrate import AxisTravel, GaugeBlock, of_force
+from api.operations.calibrate import AxisTravel, GaugeBlock, force_calibration_operation
 from controller.commissioning.axis_moves import RestingAxis
 from controller.commissioning.readings import Reading
 from controller.commissioning.weights import Weights
@@ -49,7 +49,7 @@ def sensor(monkeypatch: pytest.MonkeyPatch) -> FakeSensor:
 
 
 def test_a_force_calibration_tells_each_load(sensor: FakeSensor) -> None:
-    operation, told = of_force(WEIGHTS), list[tuple[float, str]]()
+    operation, told = force_calibration_operation(WEIGHTS), list[tuple[float, str]]()
     operation.watch = lambda now: told.append((now.done, now.message))
     found = calibrate.calibrate_force(operation, Wiring(), WEIGHTS, sensor.put)
     assert found.serial == "000271" and found.compression == "negative"
@@ -58,7 +58,7 @@ def test_a_force_calibration_tells_each_load(sensor: FakeSensor) -> None:
 
 
 def test_one_that_is_cancelled_asks_for_no_further_load(sensor: FakeSensor) -> None:
-    operation, loads = of_force(WEIGHTS), list[float]()
+    operation, loads = force_calibration_operation(WEIGHTS), list[float]()
 
     def put_on(load_N: float) -> None:
         loads.append(load_N)
@@ -109,7 +109,7 @@ def test_an_axis_calibration_that_is_cancelled_moves_no_further(
         operation.cancel()
         resting.go(6.0)
 
-    monkeypatch.setattr(calibrate, "travelled", lambda resting, _: place(resting))
+    monkeypatch.setattr(calibrate, "drive_to_positions", lambda resting, _: place(resting))
     with pytest.raises(Cancelled, match="cancelled before: the next move"):
         calibrate.axis_by_tracker(operation, Wiring(), AxisTravel(2.0, 14.0), lambda: True)
     assert axis.moves == ["home", 5.0, "closed"]

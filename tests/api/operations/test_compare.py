@@ -8,10 +8,10 @@ from typing import cast
 import pytest
 
 from api.operations import compare as comparing
-from api.operations.compare import Comparison, compare, of_comparison
+from api.operations.compare import Comparison, compare, comparison_operation
 from controller.experiments import capture, tracked
 from controller.experiments.recorded import Recorded
-from controller.experiments.references import named
+from controller.experiments.references import parse_reference
 from controller.law.gains import Choice
 from controller.loop.messages import Outcome
 from controller.operation import Cancelled
@@ -47,7 +47,7 @@ def comparison(out: Path, *choices: Choice) -> Comparison:
         yield cast(Supervisor, None)
 
     subjects = {"average": "average", "breathing": "average"}
-    return Comparison(Wiring(), out, subjects, choices, named("stairs:5"), bench)
+    return Comparison(Wiring(), out, subjects, choices, parse_reference("stairs:5"), bench)
 
 
 @pytest.fixture(autouse=True)
@@ -61,7 +61,7 @@ def test_what_a_stall_of_the_computer_stopped_is_said_and_done_again(
     runs = PlayedRuns(LATE, DeviceError("the force sensor is silent"))
     monkeypatch.setattr(tracked, "recorded_run", runs)
     wanted = comparison(tmp_path, "tangent")
-    operation = of_comparison(wanted)
+    operation = comparison_operation(wanted)
     found = compare(operation, wanted)
     assert runs.made == ["average", "average", "average", "breathing"]
     assert [(run.subject, run.gains, run.stopped) for run in found.runs] == [
@@ -79,7 +79,7 @@ def test_one_that_stalls_each_time_is_given_up_with_its_reason(tmp_path: Path, m
     runs = PlayedRuns(LATE, LATE, LATE)
     monkeypatch.setattr(tracked, "recorded_run", runs)
     wanted = comparison(tmp_path, "tangent")
-    found = compare(of_comparison(wanted), wanted)
+    found = compare(comparison_operation(wanted), wanted)
     assert [run.stopped for run in found.runs] == ["the loop was late", ""]
     assert runs.made == ["average"] * 3 + ["breathing"]
 
@@ -90,7 +90,7 @@ def test_a_persons_stop_ends_the_comparison(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(tracked, "recorded_run", runs)
     wanted = comparison(tmp_path, "tangent", "constant")
     with pytest.raises(SafetyStop, match="stopped: stopped by the operator"):
-        compare(of_comparison(wanted), wanted)
+        compare(comparison_operation(wanted), wanted)
     assert runs.made == ["average"]
 
 
@@ -107,13 +107,13 @@ def test_learning_is_done_again_only_where_the_computer_was_late(
 
     monkeypatch.setattr(capture, "capture", stopped_capture)
     with pytest.raises(SafetyStop, match="stopped"):
-        compare(of_comparison(wanted), wanted)
+        compare(comparison_operation(wanted), wanted)
     assert len(folders) == len(set(folders)) == attempts
 
 
 def test_one_that_is_cancelled_starts_no_further_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     wanted = comparison(tmp_path, "tangent", "constant")
-    operation, runs = of_comparison(wanted), PlayedRuns()
+    operation, runs = comparison_operation(wanted), PlayedRuns()
 
     def run(*arguments: object) -> Recorded:
         operation.cancel()

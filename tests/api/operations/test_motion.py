@@ -50,7 +50,7 @@ def test_a_capture_returns_what_was_recorded_and_says_a_line_a_trial(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(experiment, "record", FakeRecorder(GOOD, BAD, BAD))
-    operation = motion.of_capture(PLAN)
+    operation = motion.capture_operation(PLAN)
     assert (operation.progress.total, operation.progress.unit) == (2, "trials")
     found = motion.capture(operation, bench(), PLAN, folder)
     assert (found.session, found.recordings, found.samples, found.dropped) == (str(folder), 3, 3, 0)
@@ -68,7 +68,7 @@ def test_a_capture_returns_what_was_recorded_and_says_a_line_a_trial(
 
 
 def test_a_capture_that_is_cancelled_keeps_the_trials_so_far(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    operation, recorder = motion.of_capture(PLAN), FakeRecorder()
+    operation, recorder = motion.capture_operation(PLAN), FakeRecorder()
 
     def first_only(*arguments: object) -> object:
         operation.cancel()

@@ -6,10 +6,10 @@ import pytest
 
 from api.operations import diagnose as diagnosing
 from api.operations.diagnose import check_protocol, diagnose
-from api.operations.fit import Laws, fit, of_fit
+from api.operations.fit import Laws, fit, fit_operation
 from api.operations.report import report
 from api.operations.simulate import SimulatedRun, simulate
-from controller.experiments.references import named
+from controller.experiments.references import parse_reference
 from controller.operation import Cancelled, Operation, Progress
 from mock_devices.testing.models import index_model
 from rig.config.protocol import Indentation
@@ -39,7 +39,7 @@ def cancelled_at(operation: Operation, message: str) -> None:
 
 
 def test_a_fit_tells_each_law_and_returns_what_it_saved(session: Path, tmp_path: Path) -> None:
-    operation, told = of_fit(), list[tuple[float, str]]()
+    operation, told = fit_operation(), list[tuple[float, str]]()
     operation.watch = lambda now: told.append((round(now.done, 3), now.message))
     found = operation.run(lambda: fit(operation, [session], tmp_path, LAWS))
     assert told == [
@@ -51,7 +51,7 @@ def test_a_fit_tells_each_law_and_returns_what_it_saved(session: Path, tmp_path:
 
 
 def test_a_fit_that_is_cancelled_writes_nothing(session: Path, tmp_path: Path) -> None:
-    operation = of_fit()
+    operation = fit_operation()
     cancelled_at(operation, "evaluating constant")
     with pytest.raises(Cancelled, match="fit was cancelled before: evaluating index"):
         operation.run(lambda: fit(operation, [session], tmp_path / "out", LAWS))
@@ -102,7 +102,7 @@ def test_a_report_that_is_cancelled_between_two_steps_writes_nothing(
 def test_a_simulation_that_is_cancelled_draws_nothing(tmp_path: Path) -> None:
     operation = Operation("simulate")
     cancelled_at(operation, "playing, 1 of 3")
-    wanted = SimulatedRun(named("step:2"), index_model(0.12, 0.22, 0.01, force_N=11.0), "tangent")
+    wanted = SimulatedRun(parse_reference("step:2"), index_model(0.12, 0.22, 0.01, force_N=11.0), "tangent")
     with pytest.raises(Cancelled, match="simulate was cancelled before: playing, 2 of 3"):
         operation.run(lambda: simulate(operation, Wiring(), wanted, tmp_path / "out"))
     assert not (tmp_path / "out").exists()

@@ -14,7 +14,7 @@ from controller.commissioning.axis import (
     known_direction,
     refuse_first_step,
 )
-from controller.commissioning.axis_moves import RestingAxis, steps_mm, touches_mm, travelled
+from controller.commissioning.axis_moves import RestingAxis, drive_to_positions, steps_mm, touches_mm
 from controller.devices.drivers import Devices
 from drivers.roles import Identity
 from rig.channels import AxisSample, ForceSample, MarkerSample
@@ -171,7 +171,7 @@ def resting(bench: AxisOf) -> RestingAxis:
 
 
 def test_the_axis_is_read_at_each_place() -> None:
-    found = travelled(resting(AxisOf()), steps_mm(2.0, 14.0, 4))
+    found = drive_to_positions(resting(AxisOf()), steps_mm(2.0, 14.0, 4))
     assert [one.axis_mm for one in found] == pytest.approx([0.0, *steps_mm(2.0, 14.0, 4)])
     assert against_tracker(DRIVE, Epos4Wiring(), found, "limb marker", NOW).scale == pytest.approx(1.0)
 
@@ -179,27 +179,27 @@ def test_the_axis_is_read_at_each_place() -> None:
 def test_a_wrong_scale_goes_no_farther_than_the_first_step() -> None:
     bench = AxisOf(scale=2.0)
     with pytest.raises(CheckFailed, match="the tracker saw 4 mm"):
-        travelled(resting(bench), steps_mm(2.0, 14.0, 4))
+        drive_to_positions(resting(bench), steps_mm(2.0, 14.0, 4))
     assert max(bench.visited) == 2.0
 
 
 def test_the_wrong_way_goes_no_farther_than_the_first_step() -> None:
     bench = AxisOf(scale=-1.0)
     with pytest.raises(CheckFailed, match=r"goes away from the limb's marker, .* axis.direction is wrong"):
-        travelled(resting(bench), steps_mm(2.0, 14.0, 4))
+        drive_to_positions(resting(bench), steps_mm(2.0, 14.0, 4))
     assert max(bench.visited) == 2.0
 
 
 def test_a_first_step_too_short_to_tell_is_not_judged() -> None:
     bench = AxisOf(scale=2.0)
     with pytest.raises(CheckFailed, match=r"the axis says it went 3.5 mm and the tracker saw 7 mm"):
-        travelled(resting(bench), steps_mm(0.5, 12.5, 4))
+        drive_to_positions(resting(bench), steps_mm(0.5, 12.5, 4))
 
 
 def test_something_in_the_way_ends_it() -> None:
     bench = AxisOf(wall_mm=7.9)
     with pytest.raises(SafetyStop, match=r"10 N on the tip at 8.00 mm \(limit 0.5 N\): something is in its way"):
-        travelled(resting(bench), steps_mm(2.0, 14.0, 4))
+        drive_to_positions(resting(bench), steps_mm(2.0, 14.0, 4))
     assert max(bench.visited) == 8.0
 
 
@@ -207,7 +207,7 @@ def test_a_tip_that_is_not_seen_ends_it() -> None:
     bench = AxisOf()
     bench.tip_seen = False
     with pytest.raises(CheckFailed, match=r"the tip's marker is not seen at 0.00 mm"):
-        travelled(resting(bench), steps_mm(2.0, 14.0, 4))
+        drive_to_positions(resting(bench), steps_mm(2.0, 14.0, 4))
 
 
 def test_a_touch_is_where_the_load_passes_its_threshold_and_presses_no_farther_than_a_step() -> None:

@@ -246,7 +246,7 @@ def test_a_frozen_sensor_is_told_after_as_many_samples_as_may_be_missed(missed_p
 def test_a_state_that_needs_somebody_is_a_warning_and_any_other_a_note(state: DeviceState, level: int) -> None:
     bench = FakeBench(settled=0)
     for detail in ("NO POWER: X", ""):
-        takeover.said(bench.loop, "force", DeviceStatus(state, detail, 0))
+        takeover.record_state_change(bench.loop, "force", DeviceStatus(state, detail, 0))
     told = [(event.code, event.level, event.text) for event in bench.ring.events]
     assert told == [("device_state", level, f"force {state}: NO POWER: X"), ("device_state", level, f"force {state}")]
 

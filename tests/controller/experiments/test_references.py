@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from controller.experiments import tracking
-from controller.experiments.references import named
+from controller.experiments.references import parse_reference
 from controller.loop.steps import TrackForce
 from controller.safety.program_limits import refuse_beyond_limits
 from mock_devices.testing.models import index_model
@@ -17,17 +17,17 @@ MODEL = index_model(0.12, 0.22, 0.01, force_N=11.0)
 
 
 def test_a_step_rests_at_its_base_and_jumps() -> None:
-    step = named("step:5,base_N=1,duration_s=2")
+    step = parse_reference("step:5,base_N=1,duration_s=2")
     assert (step.times_s, step.forces_N) == ((0.0, 1.0, 1.0, 3.0), (1.0, 1.0, 5.0, 5.0))
 
 
 def test_stairs_jump_up_or_down() -> None:
-    assert named("stairs:3,each_s=1").forces_N == (1.0, 1.0, 2.0, 2.0, 3.0, 3.0)
-    assert named("stairs:1,from_N=2,each_s=1").forces_N == (2.0, 2.0, 1.0, 1.0)
+    assert parse_reference("stairs:3,each_s=1").forces_N == (1.0, 1.0, 2.0, 2.0, 3.0, 3.0)
+    assert parse_reference("stairs:1,from_N=2,each_s=1").forces_N == (2.0, 2.0, 1.0, 1.0)
 
 
 def test_a_ramp_has_the_rate_asked_for() -> None:
-    assert named("ramp:4,base_N=1,rate_N_s=2,hold_s=1").times_s == (0.0, 1.5, 2.5)
+    assert parse_reference("ramp:4,base_N=1,rate_N_s=2,hold_s=1").times_s == (0.0, 1.5, 2.5)
 
 
 @pytest.mark.parametrize(
@@ -42,14 +42,14 @@ def test_a_ramp_has_the_rate_asked_for() -> None:
 def test_a_periodic_reference_has_amplitude_frequency_and_duration(
     text: str, low_N: float, high_N: float, duration_s: float
 ) -> None:
-    reference = named(text)
+    reference = parse_reference(text)
     assert min(reference.forces_N) == pytest.approx(low_N, abs=1e-3)
     assert max(reference.forces_N) == pytest.approx(high_N, abs=1e-3)
     assert reference.duration_s == pytest.approx(duration_s)
 
 
 def test_kneading_dwells_above_for_its_share_of_the_period() -> None:
-    knead = named("knead:2,base_N=1,frequency_Hz=1,dwell=0.3")
+    knead = parse_reference("knead:2,base_N=1,frequency_Hz=1,dwell=0.3")
     held = [t for t, force in zip(knead.times_s, knead.forces_N, strict=True) if force == 3.0]
     assert max(held) - min(held) == pytest.approx(0.3, abs=0.02)
 
@@ -61,7 +61,7 @@ def write(tmp_path: Path, text: str) -> str:
 
 
 def test_a_csv_file_is_followed_from_its_first_time_on(tmp_path: Path) -> None:
-    reference = named(write(tmp_path, "time_s,force_N\n2.0,1.0\n3.0,2.5\n"))
+    reference = parse_reference(write(tmp_path, "time_s,force_N\n2.0,1.0\n3.0,2.5\n"))
     assert (reference.times_s, reference.forces_N) == ((0.0, 1.0), (1.0, 2.5))
 
 
@@ -79,7 +79,7 @@ def test_a_csv_file_is_followed_from_its_first_time_on(tmp_path: Path) -> None:
 )
 def test_a_csv_file_that_cannot_be_followed_is_refused_with_its_line(tmp_path: Path, text: str, sentence: str) -> None:
     with pytest.raises(UsageError, match=sentence):
-        named(write(tmp_path, text))
+        parse_reference(write(tmp_path, text))
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_a_csv_file_that_cannot_be_followed_is_refused_with_its_line(tmp_path: P
 )
 def test_a_reference_that_means_nothing_is_refused(text: str, sentence: str) -> None:
     with pytest.raises(UsageError, match=sentence):
-        named(text)
+        parse_reference(text)
 
 
 @pytest.mark.parametrize(
@@ -111,31 +111,31 @@ def test_a_reference_that_means_nothing_is_refused(text: str, sentence: str) -> 
 )
 def test_a_reference_beyond_model_or_axis_is_refused_with_number_and_bound(text: str, sentence: str) -> None:
     with pytest.raises(UsageError, match=sentence):
-        tracking.following(named(text), MODEL, Wiring())
+        tracking.following(parse_reference(text), MODEL, Wiring())
 
 
 def test_a_reference_beyond_the_pain_threshold_is_refused() -> None:
     wiring = Wiring.model_validate({"subject": {"pain_threshold_N": 4.0}})
     with pytest.raises(UsageError, match="reference force 5 N is above the force limit, 4 N"):
-        refuse_beyond_limits(tracking.following(named("step:5"), MODEL, wiring), wiring)
+        refuse_beyond_limits(tracking.following(parse_reference("step:5"), MODEL, wiring), wiring)
 
 
 def test_a_force_deeper_than_the_limit_is_refused_before_it_is_tried() -> None:
     wiring = Wiring.model_validate({"limits": {"depth_mm": 3.0}})
     with pytest.raises(UsageError, match=r"depth of it by the model \d\.\d+ mm is above limits.depth_mm, 3 mm"):
-        refuse_beyond_limits(tracking.following(named("step:5"), MODEL, wiring), wiring)
+        refuse_beyond_limits(tracking.following(parse_reference("step:5"), MODEL, wiring), wiring)
 
 
 def test_a_reference_without_end_is_refused() -> None:
     with pytest.raises(UsageError, match=r"duration of the reference 1e\+09 s is above an hour, 3600 s"):
-        refuse_beyond_limits(tracking.following(named("step:5,duration_s=1e9"), MODEL, Wiring()), Wiring())
+        refuse_beyond_limits(tracking.following(parse_reference("step:5,duration_s=1e9"), MODEL, Wiring()), Wiring())
 
 
 def test_a_design_that_cannot_be_reached_is_refused() -> None:
     wiring = Wiring(loop=Loop(crossover_Hz=20.0, phase_margin_deg=89.0), axis=Epos4Wiring(delay_ms=20.0))
     stiff = index_model(2.0, 0.0, 0.0, force_N=11.0)
     with pytest.raises(UsageError, match=r"no PI law reaches 20 Hz with 89 deg at 2 N/mm: lower loop\.crossover_Hz"):
-        tracking.following(named("step:5"), stiff, wiring)
+        tracking.following(parse_reference("step:5"), stiff, wiring)
 
 
 def test_a_slower_sensor_is_designed_for_with_its_delay() -> None:
@@ -160,7 +160,7 @@ def test_a_loop_faster_than_its_axis_is_refused() -> None:
 
 
 def test_a_periodic_reference_goes_on_where_the_lead_in_ended_and_repeats() -> None:
-    program = tracking.following(named("press:3,duration_s=4"), MODEL, Wiring())
+    program = tracking.following(parse_reference("press:3,duration_s=4"), MODEL, Wiring())
     tracks = [step for step in program.steps if isinstance(step, TrackForce)]
     assert [track.repeats for track in tracks] == [1, 2]
     assert tracks[0].forces_N[-1] == tracks[1].forces_N[0]

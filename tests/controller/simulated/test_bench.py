@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from controller.experiments import comparison, tracking
-from controller.experiments.references import named
+from controller.experiments.references import parse_reference
 from controller.law import transfer_functions
 from controller.law.gains import Choice, Design, margins, schedule
 from controller.loop.modes import Mode
@@ -106,7 +106,7 @@ def test_the_second_integral_divides_what_breathing_leaves_of_error() -> None:
 
 
 def test_a_sine_of_5_Hz_is_followed_in_amplitude() -> None:
-    sine = named("sine:0.5,mean_N=2,frequency_Hz=5,duration_s=4")
+    sine = parse_reference("sine:0.5,mean_N=2,frequency_Hz=5,duration_s=4")
     reference_N = np.interp(np.arange(4000) * 1e-3 % sine.times_s[-1], sine.times_s, sine.forces_N)
     for name in SUBJECT_NAMES:
         trace = follow(law(name), reference_N, SimulatedBench(limb_of(subject(name))))
@@ -210,7 +210,7 @@ def test_the_motor_at_constant_voltage_runs_at_the_speed_its_back_emf_allows() -
 
 def test_a_whole_program_runs_through_the_machine_and_tracks_as_the_law_alone_does() -> None:
     model = subject("average")
-    program = tracking.following(named("stairs:3,each_s=1.5"), model, WIRING)
+    program = tracking.following(parse_reference("stairs:3,each_s=1.5"), model, WIRING)
     trace = simulated.run(program, WIRING, SimulatedBench(limb_of(model)))
     assert list(dict.fromkeys(trace.mode.tolist())) == [
         Mode.FREE, Mode.APPROACH, Mode.CONTACT, Mode.RETRACT, Mode.COMPRESS, Mode.IDLE
@@ -231,7 +231,7 @@ def test_stretches_in_machine_code_change_nothing_of_a_run(
     reference: str, breathing_mm: float, every_cycles: int
 ) -> None:
     model = subject("average")
-    program = tracking.following(named(reference), model, WIRING)
+    program = tracking.following(parse_reference(reference), model, WIRING)
     bench = SimulatedBench(limb_of(model, 1.3, breathing_mm), sensing=SENSING._replace(every_cycles=every_cycles))
     stretched, ticked = (simulated.run(program, WIRING, bench, way) for way in (True, False))
     for ours, theirs in zip(stretched, ticked, strict=True):
@@ -240,6 +240,6 @@ def test_stretches_in_machine_code_change_nothing_of_a_run(
 
 def test_a_limit_ends_the_simulation_with_its_sentence() -> None:
     model = subject("average")
-    program = tracking.following(named("step:5"), model, WIRING)
+    program = tracking.following(parse_reference("step:5"), model, WIRING)
     with pytest.raises(CheckFailed, match=r"the simulated run was stopped: depth .* mm is above 15 mm"):
         simulated.run(program, WIRING, SimulatedBench(limb_of(model, stiffness=0.1)))

@@ -11,7 +11,7 @@ from rig.results.base import Number, Result
 from rig.results.diagnosis import DiagnosisResult
 from rig.results.fit import FitResult
 from rig.results.study import fit_result
-from rig.results.tracking import Followed, LoopCount, TrackResult, compared
+from rig.results.tracking import Followed, LoopCount, TrackResult, compare_runs
 from rig.tissue.study import study_curves
 from rig.trials.curves import loading_curve
 from tests.rig.tissue.synthetic import Bench
@@ -95,7 +95,7 @@ def run_with(model: str, rms_error_N: float) -> TrackResult:
 
 
 def test_a_tracked_comparison_keeps_both_runs_and_the_gain(tmp_path: Path) -> None:
-    compared(run_with("old.json", 0.4), run_with("new.json", 0.1)).write(tmp_path / "track.json")
+    compare_runs(run_with("old.json", 0.4), run_with("new.json", 0.1)).write(tmp_path / "track.json")
     read = TrackResult.read(tmp_path / "track.json")
     assert read.against is not None and (read.model, read.against.model) == ("new.json", "old.json")
     assert read.gain is not None and read.gain.reduction == pytest.approx(0.75)
