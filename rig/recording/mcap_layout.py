@@ -6,7 +6,7 @@ Records that come once a file or once a chunk are the stock library's own; its r
 import struct
 import zlib
 from collections.abc import Mapping
-from typing import IO, NamedTuple, Protocol
+from typing import IO, NamedTuple
 
 import numpy as np
 import zstandard
@@ -19,6 +19,7 @@ from mcap.records import (
     DataEnd,
     Footer,
     Header,
+    McapRecord,
     Metadata,
     MetadataIndex,
     Schema,
@@ -31,13 +32,9 @@ from rig.channels import CDR_HEADER
 
 MAGIC = b"\x89MCAP0\r\n"
 _STAMP = struct.Struct("<qqq")
-_MESSAGE = struct.Struct("<BQHIQQ")
 # Of a message record: opcode, length, channel, sequence, log time, publish time; the data come behind.
+MESSAGE_HEAD = struct.Struct("<BQHIQQ")
 _HEAD = [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("seq", "<u4"), ("log", "<u8"), ("publish", "<u8")]
-
-
-class _Record(Protocol):
-    def write(self, stream: RecordBuilder) -> None: ...
 
 
 class _Messages(NamedTuple):
@@ -63,7 +60,7 @@ def _of_rows(channel: int, rows: NDArray[np.void], offset: int) -> _Messages:
 def _of_body(channel: int, body: bytes, offset: int) -> _Messages:
     seq, capture_ns, arrival_ns = _STAMP.unpack_from(body)
     log, publish, size = max(arrival_ns, 0), max(capture_ns, 0), 22 + len(CDR_HEADER) + len(body)
-    head = _MESSAGE.pack(int(Opcode.MESSAGE), size, channel, seq & 0xFFFFFFFF, log, publish)
+    head = MESSAGE_HEAD.pack(int(Opcode.MESSAGE), size, channel, seq & 0xFFFFFFFF, log, publish)
     return _Messages(channel, head + CDR_HEADER + body, np.array([[log, offset]], np.uint64))
 
 
@@ -145,14 +142,14 @@ class McapLayout:
         self.end_chunk()
         self._output.write(_bytes([DataEnd(self._crc)]))
         start = self._output.tell()
-        groups: list[tuple[Opcode, list[_Record]]] = [
+        groups: list[tuple[Opcode, list[McapRecord]]] = [
             (Opcode.SCHEMA, [*self._schemas]),
             (Opcode.CHANNEL, [*self._channels]),
             (Opcode.STATISTICS, [self._statistics()]),
             (Opcode.CHUNK_INDEX, [*self._chunks]),
             (Opcode.METADATA_INDEX, [*self._metadata]),
         ]
-        summary, offsets = b"", list[_Record]()
+        summary, offsets = b"", list[McapRecord]()
         for opcode, records in groups:
             data = _bytes(records)
             offsets.append(SummaryOffset(group_opcode=opcode, group_start=start + len(summary), group_length=len(data)))
@@ -178,7 +175,7 @@ class McapLayout:
         )
 
 
-def _bytes(records: list[_Record]) -> bytes:
+def _bytes(records: list[McapRecord]) -> bytes:
     builder = RecordBuilder()
     for record in records:
         record.write(builder)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from rig.channels import BY_ID, BY_NAME, EVENT, STREAMS, EventSample, Stream
 from rig.errors import DataError
 from rig.recording.mcap_file import SUMMARY
-from rig.recording.scan import MAGIC, Chunk, Definition, Scan, scan
+from rig.recording.mcap_layout import MAGIC
+from rig.recording.scan import Chunk, Definition, Scan, scan
 
 # Fields of recordings that were made before they had the name on the right.
 RENAMED = {"slot": "cycle"}

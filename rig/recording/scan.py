@@ -17,21 +17,18 @@ import zstandard
 from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
 
 from rig.recording.mcap_file import CHECKSUM, checksum
+from rig.recording.mcap_layout import MAGIC, MESSAGE_HEAD
 
-MAGIC = b"\x89MCAP0\r\n"
-HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX = 1, 2, 3, 4, 5, 6, 7
-METADATA, DATA_END = 0x0C, 0x0F
 # No chunk of ours is larger; a damaged size must not be able to ask for all memory.
 LARGEST_CHUNK = 1 << 26
 _RECORD = struct.Struct("<BQ")
-_MESSAGE = struct.Struct("<BQHIQQ")
 _CDR = 4
 _FOOTER_SIZE = 9 + 20 + len(MAGIC)
 # Where a chunk (zstd) or a metadata record may begin.
 _BEGIN = re.compile(rb"\x06.{3}[\0-\x0f]\0{4}.{28}\x04\0\0\0zstd|\x0c.{4}\0{4}[\x01-\x40]\0\0\0", re.DOTALL)
-
 
 Record = TypeVar("Record", records.Chunk, records.Schema, records.Channel, records.Metadata)
 
@@ -95,7 +92,7 @@ def _walk(data: bytes, found: Scan) -> Iterator[_Record]:
             at = following
             continue
         yield record
-        if record.opcode == DATA_END:
+        if record.opcode == Opcode.DATA_END:
             found.footer = _has_footer(data)
             return
         at = record.end
@@ -115,19 +112,19 @@ def _record(data: bytes, at: int) -> _Record | None:
 def _fits(opcode: int, data: bytes, start: int, size: int) -> bool:
     # A length that lies would make the walk skip good chunks; so each kind is checked against its own inner lengths.
     try:
-        if opcode == CHUNK:
+        if opcode == Opcode.CHUNK:
             (name,) = struct.unpack_from("<I", data, start + 28)
             (inner,) = struct.unpack_from("<Q", data, start + 32 + name)
             return bool(size == 40 + name + inner)
-        if opcode == MESSAGE_INDEX:
+        if opcode == Opcode.MESSAGE_INDEX:
             return bool(size == 6 + struct.unpack_from("<I", data, start + 2)[0])
-        if opcode == METADATA:
+        if opcode == Opcode.METADATA:
             (name,) = struct.unpack_from("<I", data, start)
             return bool(size == 8 + name + struct.unpack_from("<I", data, start + 4 + name)[0])
-        if opcode == HEADER:
+        if opcode == Opcode.HEADER:
             (profile,) = struct.unpack_from("<I", data, start)
             return bool(size == 8 + profile + struct.unpack_from("<I", data, start + 4 + profile)[0])
-        return opcode == DATA_END and size == 4
+        return opcode == Opcode.DATA_END and size == 4
     except struct.error:
         return False
 
@@ -160,14 +157,14 @@ def _is_cut(data: bytes, at: int) -> bool:
     """Whether what stands at ``at`` is the beginning of a record (or of the magic) that the file ends within."""
     if at == 0:
         return MAGIC.startswith(data)
-    known = data[at] in (HEADER, CHUNK, MESSAGE_INDEX, METADATA, DATA_END)
+    known = data[at] in (Opcode.HEADER, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.METADATA, Opcode.DATA_END)
     return known and (at + 9 > len(data) or at + 9 + _RECORD.unpack_from(data, at)[1] > len(data))
 
 
 def _take(record: _Record, found: Scan) -> None:
-    if record.opcode == CHUNK:
+    if record.opcode == Opcode.CHUNK:
         found.chunks.append(_messages(_unpack_chunk(record.content)))
-    elif record.opcode == METADATA:
+    elif record.opcode == Opcode.METADATA:
         name, values = _unpack_metadata(record.content)
         found.metadata[name] = values
 
@@ -200,17 +197,17 @@ def _messages(data: bytes) -> Chunk:
     """Takes a chunk's content apart; its checksum was right, so only a foreign writer can make this fail."""
     schemas: dict[int, str] = {}
     chunk = Chunk({}, [])
-    append, unpack, at = chunk.messages.append, _MESSAGE.unpack_from, 0
+    append, unpack, message, at = chunk.messages.append, MESSAGE_HEAD.unpack_from, int(Opcode.MESSAGE), 0
     try:
         while at < len(data):
             opcode, size = _RECORD.unpack_from(data, at)
             end = at + 9 + size
-            if opcode == MESSAGE:
-                append((unpack(data, at)[2], data[at + _MESSAGE.size + _CDR : end]))
-            elif opcode == SCHEMA:
+            if opcode == message:
+                append((unpack(data, at)[2], data[at + MESSAGE_HEAD.size + _CDR : end]))
+            elif opcode == Opcode.SCHEMA:
                 schema = _unpack(records.Schema, data[at + 9 : end])
                 schemas[schema.id] = schema.data.decode()
-            elif opcode == CHANNEL:
+            elif opcode == Opcode.CHANNEL:
                 channel = _unpack(records.Channel, data[at + 9 : end])
                 chunk.definitions[channel.id] = Definition(channel.topic, schemas.get(channel.schema_id, ""))
             at = end
@@ -227,7 +224,7 @@ def _unpack_metadata(content: bytes) -> tuple[str, dict[str, str]]:
 
 
 def _has_footer(data: bytes) -> bool:
-    return data.endswith(MAGIC) and data[-_FOOTER_SIZE:].startswith(_RECORD.pack(FOOTER, 20))
+    return data.endswith(MAGIC) and data[-_FOOTER_SIZE:].startswith(_RECORD.pack(Opcode.FOOTER, 20))
 
 
 def _check_end(data: bytes, found: Scan) -> None:
@@ -246,4 +243,4 @@ def _check_end(data: bytes, found: Scan) -> None:
 
 def _data_crc(data: bytes, summary_start: int) -> int:
     opcode, _, value = struct.unpack_from("<BQI", data, summary_start - 13)
-    return int(value) if opcode == DATA_END else -1
+    return int(value) if opcode == Opcode.DATA_END else -1
