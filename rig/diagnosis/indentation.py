@@ -98,17 +98,14 @@ class IndentationProblem:
     def start(self) -> Values:
         """Best of a coarse grid of surface and stiffening, the rest by linear least squares."""
         values = coarse_start(self.data, stiffening=self.simulation == "index")
-        if self.data.has_tracker:
-            return {**values, "tip_zero_mm": float(np.median(self.data.tip_mm - self._encoder))}
-        return values
+        if not self.data.has_tracker:
+            return values
+        encoder_mm = self.data.drive.at_tracker(self.data.drive.position_mm)
+        return {**values, "tip_zero_mm": float(np.median(self.data.tip_mm - encoder_mm))}
 
     @cached_property
     def _nulls(self) -> Values:
         return nulls()
-
-    @property
-    def _encoder(self) -> Array:
-        return self.data.drive.at_tracker(self.data.drive.position_mm)
 
     def predict(self, values: Fields) -> tuple[Array, ...]:
         """Force, and tip where it was measured."""

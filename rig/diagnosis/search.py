@@ -146,7 +146,7 @@ def candidates(current: Fit, t: Tangents) -> list[Fit]:
     loud = top > STANDS_OUT_NATS or assess_lack_of_fit(current, np.random.default_rng(0)).p_value <= LEVEL
     hidden = [(effects, start) for effects, start in starts if not loud or effects[-1].mean_of]
     fits += [low_noise_refit(problem, effects, start, current.whitener) for effects, start in hidden]
-    fits += rescreen(current, t, ranked) if loud else []
+    fits += rescreen(current, t) if loud else []
     living = [c for c in fits if c is not None and is_sizeable(c.effects[-1], c.values)]
     gains = [gain_over(c, current) for c in living]
     best = max(gains, default=0.0)
@@ -158,19 +158,20 @@ def candidates(current: Fit, t: Tangents) -> list[Fit]:
     return sorted(polished, key=lambda candidate: -float(score(candidate).sum()))
 
 
-def rescreen(current: Fit, t: Tangents, ranked: Sequence[tuple[float, Direction]]) -> list[Fit | None]:
+def rescreen(current: Fit, t: Tangents) -> list[Fit | None]:
     """Fits from noise too small to have swallowed an effect: of the best, every peak of a scan, second beginnings.
 
     All are brought to their best under the same noise first; those that explain most there are fitted to the end.
     """
     problem, quiet = current.problem, low_noise_view(current)
-    quiet_t = tangents(quiet, [d.effect for _, d in ranked] + aliases(t, ranked))
+    effects = list({d.effect.key: d.effect for d in t.directions}.values())
+    quiet_t = tangents(quiet, effects)
     best = [d for gain, d in screen(quiet_t, problem)[:SHORT_LIST] if gain > 0]
     # Cycles that repeat alias one frequency into another: every peak is followed to its end.
     best += [d for d in quiet_t.directions if d.effect.tries(problem) > 1 and d not in best]
     starts = [(d.effect, starting_values(quiet, d, quiet_t)) for d in best]
     free = {par.name for par in problem.base}
-    for effect in {d.effect.key: d.effect for d in t.directions if d.effect.begin}.values():
+    for effect in (effect for effect in effects if effect.begin):
         own = free | {par.name for par in effect.pars}
         begin = {name: value for name, value in effect.begin.items() if name in own}
         starts.append((effect, {**current.values, **begin}))
@@ -185,12 +186,6 @@ def rescreen(current: Fit, t: Tangents, ranked: Sequence[tuple[float, Direction]
 def within_reach(best: float) -> float:
     """Gain above which a candidate might still be as good as the best."""
     return best - max(REACH_NATS, REACH_SHARE * best)
-
-
-def aliases(t: Tangents, ranked: Sequence[tuple[float, Direction]]) -> list[Effect]:
-    """Effects that have a direction but no rank: wrong sign or confounded, under the present noise."""
-    keys = {direction.effect.key for _, direction in ranked}
-    return list({d.effect.key: d.effect for d in t.directions if d.effect.key not in keys}.values())
 
 
 def is_sizeable(effect: Effect, values: Values) -> bool:
