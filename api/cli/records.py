@@ -1,19 +1,23 @@
 """Commands about what was recorded: verify, repair, import, export."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from api.cli.asking import Person
 from api.cli.live import compute
 from api.cli.options import JsonOption, SessionArgument
 from api.cli.output import show, write_json
 from api.operations import records
 from rig.errors import UsageError
+from rig.intake.proposal import Proposal, propose
 from rig.intake.rows import FIELDS
 from rig.recording.export import FORMATS, Format
+from rig.recording.files import write_text
 from rig.recording.sessions import TrialInfo
 from rig.results.recorded import RecordingResult
 from rig.results.tables import TextTable
@@ -79,19 +83,46 @@ def import_(
     mapping: Annotated[
         Path | None, typer.Option("--mapping", help="TOML file: what the files hold; else FOLDER/mapping.toml.")
     ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Takes the usual answer to every question.")] = False,
     json_file: JsonOption = None,
 ) -> None:
     """Makes a session from measured files of any laboratory; writes nothing if anything in them is wrong.
 
-    CSV and other text, xls, xlsx, MAT, HDF5, Parquet and MCAP. A mapping names files, header and unit rows, columns
-    with their units and signs, and what a recording is; examples/mappings holds one for each of nine sources.
+    Without a mapping one is proposed, saved as OUT.toml and used; what it doubts is said, and only what the data cannot
+    say is asked. CSV and other text, xls, xlsx, MAT, HDF5, Parquet and MCAP. A mapping names files, header and unit
+    rows, columns with units and signs, and what a recording is; examples/mappings holds one for each of nine sources.
 
     Example: rig import measured/ --mapping examples/mappings/asmi.toml --out sessions/measured
     """
     now = datetime.now().astimezone()
-    result = compute("import", lambda operation: records.import_data(operation, folder, mapping, out, now))
+    chosen = mapping or records.mapping_in(folder) or _proposed(folder, out.with_name(f"{out.name}.toml"), yes)
+    result = compute("import", lambda operation: records.import_data(operation, folder, chosen, out, now))
     show(_trial_table(result.trials), *result.remarks)
     write_json(json_file, result)
+
+
+def _proposed(folder: Path, file: Path, yes: bool) -> Path:
+    """The mapping proposed for ``folder``, its questions answered, saved as ``file``; what it doubts is said."""
+    if file.exists():
+        raise UsageError(f"{file}: was proposed before; use it by --mapping {file}, or remove it")
+    found = propose(folder)
+    write_text(file, found.text)
+    show(_mapping_table(found), *found.doubts)
+    for question in found.questions:
+        usual = str(question.usual) if yes and question.usual else ""
+        question.answer(found.tree, usual or Person().answer(question.text, f"the line {question.line} in {file}"))
+    write_text(file, replace(found, questions=()).text)
+    return file
+
+
+def _mapping_table(found: Proposal) -> TextTable:
+    """What every kind of file was understood to hold."""
+    rows = [
+        [str(table["files"]), quantity, *(str(column.get(key, "?")) for key in ("column", "unit", "positive"))]
+        for table in found.tree["tables"]
+        for quantity, column in {"time": table["time"], **table["columns"]}.items()
+    ]
+    return TextTable("", ["files", "quantity", "column", "unit", "positive"], rows)
 
 
 def _trial_table(trials: Iterable[TrialInfo]) -> TextTable:

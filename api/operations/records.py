@@ -82,9 +82,15 @@ def repair(operation: Operation, recording: Path, out: Path) -> RepairResult:
     return RepairResult.model_validate(repaired(recording, out, operation.step))
 
 
-def import_data(operation: Operation, folder: Path, mapping: Path | None, out: Path, now: datetime) -> ImportResult:
+def mapping_in(folder: Path) -> Path | None:
+    """The mapping that lies with the data, if any."""
+    found = folder / MAPPING_FILE
+    return found if found.is_file() else None
+
+
+def import_data(operation: Operation, folder: Path, mapping: Path, out: Path, now: datetime) -> ImportResult:
     """Makes the session ``out`` of what ``mapping`` names in ``folder``; writes nothing if anything in it is wrong."""
-    session = import_folder(folder, load(DataMapping, mapping or folder / MAPPING_FILE), out, now, operation.step)
+    session = import_folder(folder, load(DataMapping, mapping), out, now, operation.step)
     return ImportResult(
         session=str(out),
         recordings=len(session.trials),

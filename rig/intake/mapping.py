@@ -75,15 +75,15 @@ class ValueColumn(Table):
 class FileForm(Table):
     """Files of one kind: which, and how their rows are written.
 
-    ``files`` is a pattern below the folder in which ``{name}`` names what tells them apart, ``sheets`` one of the
-    sheets of a workbook, the groups of an HDF5 file, the structs of a MAT file or the topics of an MCAP file.
+    ``files`` is a pattern, or several, below the folder; ``{name}`` in it names what tells them apart. ``sheets`` is
+    one of the sheets of a workbook, the groups of an HDF5 file, the structs of a MAT file, the topics of an MCAP file.
     ``header_row`` and ``unit_row`` count from 1; 0 where there is none. ``label`` is a column whose text tells
     recordings apart, ``labels`` adds names to those of the patterns.
     ``disorder = "drop"`` leaves out rows whose time is not after all before it.
     """
 
-    files: str
-    sheets: str = "*"
+    files: str | tuple[str, ...]
+    sheets: str | tuple[str, ...] = "*"
     encoding: str = "utf-8"
     delimiter: str = Field(default=",", min_length=1, max_length=1)
     decimal: Literal[".", ","] = "."

@@ -11,13 +11,14 @@ _PLACE = re.compile(
 )
 
 
-def matched(pattern: str, text: str) -> dict[str, str] | None:
-    """What stands in each named place, None where ``text`` is not of the pattern.
+def matched(pattern: str | tuple[str, ...], text: str) -> dict[str, str] | None:
+    """What stands in each named place, None where ``text`` is of none of the patterns.
 
     ``*``, ``?``, ``[A-Z]`` and ``**/`` are as in a shell; a place takes anything in one folder, or what the shell
     pattern behind its colon takes. A name that stands twice stands for the same.
     """
-    found = re.fullmatch(_expression(pattern, set()), text)
+    patterns = (pattern,) if isinstance(pattern, str) else pattern
+    found = next(filter(None, (re.fullmatch(_expression(item, set()), text) for item in patterns)), None)
     return found.groupdict() if found else None
 
 

@@ -43,6 +43,12 @@ def open_sheet(path: Path, name: str, form: FileForm) -> Sheet:
     return Sheet(path, name, names, units, read, facts_in(above[: max(form.header_row - 1, 0)]), start + 1)
 
 
+def shown_rows(path: Path, name: str, count: int) -> list[list[str]]:
+    """The first ``count`` rows of a sheet, as text."""
+    rows = _opened(path).get_sheet_by_name(name).to_python(skip_empty_area=False, nrows=count)
+    return [[shown(cell).strip() for cell in row] for row in rows]
+
+
 def shown(cell: object) -> str:
     """A cell as text: dates as ISO, whole numbers without a point."""
     if isinstance(cell, datetime.date | datetime.time):

@@ -12,7 +12,7 @@ from api.cli import records
 from rig.errors import CheckFailed, DataError, UsageError
 from rig.recording.files import WriteFailed
 from rig.recording.sessions import open_session, write_session
-from tests.rig.recording.measured import measured
+from tests.rig.recording.measured import measured, write
 
 app = typer.Typer(rich_markup_mode=None)
 for name, command in (
@@ -64,6 +64,23 @@ def test_a_mapping_may_stand_anywhere(source: Path, tmp_path: Path) -> None:
     mapping = (source / "mapping.toml").rename(tmp_path / "mine.toml")
     assert rig("import", source, "--out", tmp_path / "out", "--mapping", mapping).exit_code == 0
     assert open_session(tmp_path / "out").trials[0].peak_force_N == 1.5
+
+
+def test_without_a_mapping_one_is_proposed_saved_and_used(tmp_path: Path) -> None:
+    rows = "".join(f"0.{k},{k},{2 * k}\n" for k in range(8))
+    source = write(tmp_path / "in", {"a.csv": "time_s,Force,x_mm\n" + rows})
+    refused = rig("import", source, "--out", tmp_path / "out").exception
+    assert isinstance(refused, UsageError)
+    assert 'give the line tables.columns.force.unit = "N" in' in str(refused)
+    assert "# open: nothing says the unit of force" in (tmp_path / "out.toml").read_text()
+    assert "was proposed before" in str(rig("import", source, "--out", tmp_path / "out").exception)
+    (tmp_path / "out.toml").unlink()
+    taken = rig("import", source, "--out", tmp_path / "out", "--yes")
+    assert taken.exit_code == 0, taken.exception
+    assert "as if pressed" in taken.output
+    assert open_session(tmp_path / "out").trials[0].peak_force_N == 7.0
+    again = rig("import", source, "--out", tmp_path / "again", "--mapping", tmp_path / "out.toml")
+    assert again.exit_code == 0
 
 
 def test_bad_files_are_wrong_use(source: Path, tmp_path: Path) -> None:

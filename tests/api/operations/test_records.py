@@ -67,7 +67,7 @@ def test_a_repair_that_is_cancelled_among_the_samples_leaves_nothing(session: Pa
 def test_an_import_that_is_cancelled_between_two_pieces_leaves_nothing(tmp_path: Path, said: str, next_: str) -> None:
     source, operation = measured(tmp_path / "measured"), cancelled_once(said, "import")
     with pytest.raises(Cancelled, match=f"import was cancelled before: {next_}"):
-        operation.run(lambda: records.import_data(operation, source, None, tmp_path / "out", NOW))
+        operation.run(lambda: records.import_data(operation, source, source / "mapping.toml", tmp_path / "out", NOW))
     assert [path.name for path in tmp_path.iterdir()] == ["measured"]
 
 

@@ -44,7 +44,7 @@ def test_wells_of_hydrogel(tmp_path: Path) -> None:
     path = next((recording("asmi") / "run_002").glob("well_B6_*.csv"))
     frame = pd.read_csv(path, skiprows=10)
     values = [frame[name].to_numpy() for name in ("Timestamp(s)", "Force(N)", "Z_Position(mm)")]
-    check(session, "run_002_B6", values[0], values[1], -values[2])
+    check(session, "run_002_B6", values[0], -values[1], -values[2])
     metadata = session.recording("run_002_B6").metadata
     assert metadata["source"]["Force_Limit(N)"] == "45.0"
     assert (metadata["labels"]["specimen"], metadata["labels"]["site"]) == ("run_002", "B6")
