@@ -55,7 +55,7 @@ class Rise(NamedTuple):
     peak: int
 
 
-class Surface(NamedTuple):
+class FoundSurface(NamedTuple):
     """The cycle less its zero, the rise in it, contact, the noise of a sample, and what is to be said of them."""
 
     cycle: IndentationCycle
@@ -69,7 +69,7 @@ class _NoAirError(DataError):
     """Nothing of the recording before its rise is air."""
 
 
-def find_surface(cycle: IndentationCycle) -> Surface:
+def find_surface(cycle: IndentationCycle) -> FoundSurface:
     """Zero and contact of a cycle; raises DataError where there is no contact, or none that can be told."""
     try:
         run_in, rise = _run_in(cycle, _rise(cycle))
@@ -121,7 +121,7 @@ def _left_mm(position_mm: FloatArray) -> float:
     return max(OUTLIER_SPREADS * sample_noise(position_mm), LEFT_SHARE * float(np.ptp(position_mm)))
 
 
-def _from_contact(cycle: IndentationCycle) -> Surface:
+def _from_contact(cycle: IndentationCycle) -> FoundSurface:
     """Surface of a cycle without air before its loading; zero is the air's after it, else the recording's own."""
     rise = _rise_from_contact(cycle)
     start_N, deviation_N, noise_N = _at_start(cycle, rise)
@@ -145,7 +145,7 @@ def _from_contact(cycle: IndentationCycle) -> Surface:
             f"N: its surface may lie up to {position_mm[0] - contact.lower_mm:.2g} mm above its start (at most a "
             f"quarter of its stroke of {stroke_mm:.3g} mm is allowed); start higher"
         )
-    return Surface(zeroed, rise, contact, noise_N, (_said(cycle.name, position_mm[0], contact, lifted is None),))
+    return FoundSurface(zeroed, rise, contact, noise_N, (_said(cycle.name, position_mm[0], contact, lifted is None),))
 
 
 def _rise_from_contact(cycle: IndentationCycle) -> Rise:
@@ -235,13 +235,13 @@ def _no_contact(cycle: IndentationCycle, height_N: float, spread_N: float, fall_
     )
 
 
-def _zeroed(cycle: IndentationCycle, rise: Rise) -> Surface:
+def _zeroed(cycle: IndentationCycle, rise: Rise) -> FoundSurface:
     """The cycle less its zero, its contact, and the noise in the air; twice, since what is air depends on contact."""
     first = _zeroed_above(cycle, rise, float(cycle.position_mm[rise.touch]))
     return _zeroed_above(cycle, rise, first.contact.lower_mm)
 
 
-def _zeroed_above(cycle: IndentationCycle, rise: Rise, surface_mm: float) -> Surface:
+def _zeroed_above(cycle: IndentationCycle, rise: Rise, surface_mm: float) -> FoundSurface:
     """As ``_zeroed``: zero is the mean of what comes before the rise, clear of the surface, without wrong samples."""
     air_N = cycle.force_N[: rise.touch][cycle.position_mm[: rise.touch] < surface_mm - AIR_MARGIN_MM]
     if len(air_N) < LEAST_AIR_SAMPLES:
@@ -249,7 +249,7 @@ def _zeroed_above(cycle: IndentationCycle, rise: Rise, surface_mm: float) -> Sur
     middle_N, spread_N = _middle(air_N)
     usual_N = air_N[np.abs(air_N - middle_N) <= OUTLIER_SPREADS * spread_N] if spread_N else air_N
     zeroed, noise_N = replace(cycle, force_N=cycle.force_N - float(np.mean(usual_N))), float(np.std(usual_N))
-    return Surface(zeroed, rise, _contact(zeroed, rise, noise_N), noise_N)
+    return FoundSurface(zeroed, rise, _contact(zeroed, rise, noise_N), noise_N)
 
 
 def _middle(values: FloatArray) -> tuple[float, float]:

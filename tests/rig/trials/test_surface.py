@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rig.errors import DataError
-from rig.trials.surface import Surface, find_surface
+from rig.trials.surface import FoundSurface, find_surface
 from tests.rig.tissue.synthetic import Bench
 from tests.rig.trials.preloaded import LAWS, SENSORS, SURFACE_MM, preloaded
 
@@ -20,7 +20,7 @@ def test_the_interval_holds_the_surface_whatever_law_the_tissue_obeys(sensor: st
     assert held.count(False) <= 0.05 * len(held)
 
 
-def _found(law: str, sensor: str, seed: int) -> Surface | None:
+def _found(law: str, sensor: str, seed: int) -> FoundSurface | None:
     try:
         return find_surface(preloaded(law, SENSORS[sensor], seed))
     except DataError as refusal:
