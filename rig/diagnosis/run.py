@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.diagnosis.answers import Diagnosis, answer, intervals, limits, summary, verdict_of
-from rig.diagnosis.cycles import in_cycles
 from rig.diagnosis.design import next_experiment
 from rig.diagnosis.estimates import NextExperiment
 from rig.diagnosis.fit import first_fit, refreshed
@@ -17,6 +16,7 @@ from rig.diagnosis.problem import InverseProblem
 from rig.diagnosis.search import search
 from rig.errors import DataError
 from rig.progress import Progress, silent
+from rig.trials.cycles import in_cycles
 from rig.trials.findings import Finding
 from rig.trials.trial import TrialSet
 

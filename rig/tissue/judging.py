@@ -158,12 +158,15 @@ def judge(fit: LawFit, curves: Sequence[Curve], force_N: FloatArray, origins_mm:
         Prediction(curve, fit.law, float(offset), origin[curve.name])
         for curve, offset in zip(curves, fit.offsets_mm, strict=True)
     ]
-    trials = _without_each(curves, fit, lambda curve: curve.name)
+    # Cycles of one recording share its day, site and rest: they leave together, unless there is no other.
+    recordings = {curve.trial for curve in curves}
+    trials = _without_each(curves, fit, lambda curve: curve.trial if len(recordings) > 1 else curve.name)
     speeds = _without_each(curves, fit, lambda curve: curve.speed_mm_s)
     subjects = _without_each(curves, fit, lambda curve: curve.subject)
     by_subject = list({id(law): law for _, law in subjects}.values())
-    covariance, method = _covariance(fit, [law for _, law in trials], by_subject)
-    groups = len(by_subject) if method == OVER_SUBJECTS else len(curves)
+    by_trial = list({id(law): law for _, law in trials}.values())
+    covariance, method = _covariance(fit, by_trial, by_subject)
+    groups = len(by_subject) if method == OVER_SUBJECTS else max(len(by_trial), 1)
     return Judged(
         fit=fit,
         covariance=covariance,

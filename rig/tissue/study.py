@@ -19,8 +19,8 @@ from rig.tissue.rates import rate_of
 from rig.tissue.registry import COMPARED
 from rig.tissue.summary import RateTest, Row, Skipped, SpeedSummary
 from rig.trials.curves import Curve, loading_curve
-from rig.trials.cycles import cycle_of
-from rig.trials.findings import SAMPLES_LEFT_OUT, TRIAL_LEFT_OUT
+from rig.trials.cycles import cut, cycle_of
+from rig.trials.findings import SAMPLES_LEFT_OUT, TRIAL_LEFT_OUT, Finding
 from rig.trials.reading import trials_of
 from rig.trials.trial import inspect
 from rig.version import SOFTWARE
@@ -89,7 +89,10 @@ def study_sessions(
     for session in sessions:
         place = f"{session.folder}/" if len(sessions) > 1 else ""
         found, missing = _curves_or_refusal(session)
-        curves += [replace(curve, name=f"{place}{curve.name}") for curve in found]
+        curves += [
+            replace(curve, name=f"{place}{curve.name}", recording=curve.recording and f"{place}{curve.recording}")
+            for curve in found
+        ]
         skipped += [Skipped(f"{place}{one.trial}", one.reason) for one in missing]
     return study_curves(", ".join(session.info.id for session in sessions), curves, skipped, laws, known, progress)
 
@@ -107,16 +110,22 @@ def curves_of(session: Session) -> tuple[list[Curve], list[Skipped]]:
     found = trials_of(session)
     skipped = [Skipped(said.recording, said.text) for said in found.findings if said.kind in TRIAL_LEFT_OUT]
     curves: list[Curve] = []
+    subject = str(session.info.subject.get("id", ""))
     for trial in found.trials:
-        try:
-            curve = loading_curve(cycle_of(trial))
-        except DataError as error:
-            skipped.append(Skipped(trial.name, str(error).removeprefix(f"{trial.name}: ")))
-        else:
-            said = (*found.findings, *inspect(trial))
-            kept = tuple(f for f in said if f.recording == trial.name and f.kind in SAMPLES_LEFT_OUT)
-            subject = str(session.info.subject.get("id", ""))
-            curves.append(replace(curve, subject=subject, findings=(*curve.findings, *kept)))
+        said = (*found.findings, *inspect(trial))
+        kept = tuple(f for f in said if f.recording == trial.name and f.kind in SAMPLES_LEFT_OUT)
+        cycles = cut(trial)
+        recording = trial.name if len(cycles) > 1 else ""
+        if recording:
+            text = f"cut into its {len(cycles)} cycles where force is lowest between them"
+            kept = (*kept, Finding(trial.name, "recording", "cut", text))
+        for part in cycles:
+            try:
+                curve = loading_curve(cycle_of(part))
+            except DataError as error:
+                skipped.append(Skipped(part.name, str(error).removeprefix(f"{part.name}: ")))
+            else:
+                curves.append(replace(curve, subject=subject, recording=recording, findings=(*curve.findings, *kept)))
     return curves, skipped
 
 

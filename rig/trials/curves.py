@@ -31,8 +31,8 @@ class Curve:
     """Loading at steady speed, from just before contact to the deepest point; arrays have shape (n,).
 
     ``depth_mm`` counts from ``contact.position_mm``; ``zero_N`` was taken off; ``noise_N`` is the standard deviation
-    in the air. ``speed_mm_s`` is the speed asked for, or the speed found where nobody said. ``findings`` say which
-    samples of the trial were left out.
+    in the air. ``speed_mm_s`` is the speed asked for, or the speed found where nobody said. ``recording`` is that
+    of which the curve is one cycle of several. ``findings`` say what was left out, and what contact rests on.
     """
 
     name: str
@@ -45,7 +45,13 @@ class Curve:
     noise_N: float
     time_s: FloatArray
     subject: str = ""
+    recording: str = ""
     findings: tuple[Finding, ...] = ()
+
+    @property
+    def trial(self) -> str:
+        """What repeats: the cycles of a recording are one."""
+        return self.recording or self.name
 
     @property
     def max_force_N(self) -> float:

@@ -1,11 +1,18 @@
-"""One trial as three aligned arrays, on the force sensor's own time base."""
+"""The cycles of a recording, and one of them as three aligned arrays, on the force sensor's own time base."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from rig.trials.findings import Array
-from rig.trials.trial import Trial, drop_unusable
+from rig.trials.findings import Array, Finding
+from rig.trials.trial import Trial, TrialSet, drop_disordered, drop_unusable
+
+# Shares of a travel, of 5 mm of air and 8 mm of depth for example: a lift leaves the surface, which is at 0.38; a stop
+# at half depth, at 0.69, is none; what is within 0.26 mm of the highest place is the rest there.
+UP, DEEP = 0.25, 0.6
+AT_REST = 0.02
+AIR_SHARE = 0.05  # of the force's range: guide friction of 0.2 N, in a trial of 4 N
 
 
 @dataclass(frozen=True)
@@ -33,3 +40,63 @@ def cycle_of(trial: Trial) -> IndentationCycle:
 def _from(start_s: float, at_s: Array) -> Array:
     """Times from the start, in whole nanoseconds: how far into a session the trial was made leaves no digit in them."""
     return np.asarray(np.rint((at_s - start_s) * 1e9) * 1e-9)
+
+
+def in_cycles(session: TrialSet) -> TrialSet:
+    """The session with every recording cut in the air between its cycles; as it was where none has two."""
+    parts = [part for trial in session.trials for part in cut(trial)]
+    if len(parts) == len(session.trials):
+        return session
+    text = f"{len(session.trials)} recordings were cut into {len(parts)} cycles, in the air between them"
+    finding = Finding(session.trials[0].name, "session", "cut", text)
+    return replace(session, trials=tuple(parts), findings=(*session.findings, finding))
+
+
+def cut(trial: Trial) -> list[Trial]:
+    """The cycles of a recording, each from the middle of the rest before it to that after it."""
+    time_s, place_mm = drop_disordered(trial.axis_s, trial.axis_mm)
+    if not len(time_s):
+        return [trial]
+    cuts = [at for at in lifts(time_s, place_mm) if in_the_air(trial, at)]
+    edges = [-np.inf, *cuts, np.inf]
+    return [between(trial, number, start, stop) for number, (start, stop) in enumerate(pairwise(edges), start=1)]
+
+
+def lifts(time_s: Array, place_mm: Array) -> list[float]:
+    """When the tip rests highest between two cycles [s]; a cycle goes below 60 % of the travel, a lift above 25 %."""
+    travel = (place_mm - place_mm.min()) / max(float(np.ptp(place_mm)), 1e-12)
+    marks = np.flatnonzero((travel > DEEP) | (travel < UP))
+    leaves = np.flatnonzero(np.diff((travel[marks] > DEEP).astype(int)))
+    found = []
+    for out, back in pairwise(leaves):
+        if travel[marks[out]] > DEEP:
+            up = np.arange(marks[out] + 1, marks[back] + 1)
+            rest = up[travel[up] < travel[up].min() + AT_REST]
+            found.append(float(time_s[rest[len(rest) // 2]]))
+    return found
+
+
+def in_the_air(trial: Trial, at_s: float) -> bool:
+    """Whether force is at its lowest at a time: a tissue still pressed remembers the cycle before."""
+    low_N, high_N = np.nanquantile(trial.force_N, [0.01, 0.99])
+    near = int(np.argmin(np.abs(trial.force_s - at_s)))
+    around_N = float(np.nanmedian(trial.force_N[max(near - 5, 0) : near + 6]))
+    return bool(around_N < low_N + AIR_SHARE * (high_N - low_N) + 1e-12)
+
+
+def between(trial: Trial, number: int, start_s: float, stop_s: float) -> Trial:
+    """The part of a recording between two times."""
+    force, axis = ((t >= start_s) & (t < stop_s) for t in (trial.force_s, trial.axis_s))
+    part = replace(
+        trial,
+        name=trial.name if (start_s, stop_s) == (-np.inf, np.inf) else f"{trial.name}, cycle {number}",
+        force_s=trial.force_s[force],
+        force_N=trial.force_N[force],
+        axis_s=trial.axis_s[axis],
+        axis_mm=trial.axis_mm[axis],
+        temperature_C=None if trial.temperature_C is None else trial.temperature_C[force],
+    )
+    if trial.marker_s is None or trial.marker_mm is None:
+        return part
+    seen = (trial.marker_s >= start_s) & (trial.marker_s < stop_s)
+    return replace(part, marker_s=trial.marker_s[seen], marker_mm=trial.marker_mm[seen])

@@ -89,8 +89,10 @@ def _rise(cycle: IndentationCycle) -> Rise:
     height_N = float(force_N[peak]) - zero_N
     if _loaded(before_mm, before_N):
         raise _NoAirError(f"{cycle.name}: no air part: force rises from where the tip starts")
-    if height_N < max(10 * spread_N, LEAST_FORCE_N):
-        raise DataError(_no_contact(cycle, height_N, spread_N, zero_N - float(force_N.min())))
+    fall_N = zero_N - float(force_N.min())
+    # Adhesion pulls less than what pressed the tip in: force that falls further than it rises has the wrong sign.
+    if height_N < max(10 * spread_N, LEAST_FORCE_N, fall_N / 2):
+        raise DataError(_no_contact(cycle, height_N, spread_N, fall_N))
     air = np.flatnonzero(before_N < zero_N + max(6 * spread_N, ONSET_SHARE * height_N))
     if not len(air) or air[-1] + 1 < LEAST_AIR_SAMPLES:
         raise _NoAirError(f"{cycle.name}: no air part: force rises from the first sample")

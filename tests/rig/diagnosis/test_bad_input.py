@@ -9,7 +9,6 @@ import pytest
 
 from benchmarks.hidden.draw import draw_secret, recorded, session_of
 from rig.diagnosis.answers import Diagnosis
-from rig.diagnosis.cycles import cut
 from rig.diagnosis.estimates import Unexplained
 from rig.diagnosis.indentation import library
 from rig.diagnosis.observations import beside_gaps
@@ -18,6 +17,7 @@ from rig.errors import DataError
 from rig.intake.usable import read_usable
 from rig.recording.sessions import open_session, write_session
 from rig.results.diagnosis import DiagnosisResult
+from rig.trials.cycles import cut
 from rig.trials.reading import read_trials
 from rig.trials.recorded import in_time
 from rig.trials.trial import Trial, TrialSet

@@ -23,6 +23,7 @@ from rig.tissue.model import load_model
 from rig.tissue.registry import COMPARED
 from rig.tissue.study import Study, fingerprint, model_of, rows, study_curves, study_session, study_sessions
 from rig.tissue.summary import Skipped
+from rig.trials.cycles import IndentationCycle
 from tests.rig.recording.measured import turned_tables
 from tests.rig.tissue.synthetic import Bench, index_force, metadata, tables, write_made_session, write_recording
 
@@ -264,3 +265,31 @@ def test_an_imported_session_of_streams_with_own_rates_and_clocks_is_fitted(tmp_
     for errors in (study.judged["index"].fitted, study.judged["index"].trials_left_out):
         assert errors is not None
         assert errors.max_error_mm < 0.25
+
+
+def repeated(bench: Bench, seed: int, cycles: int) -> IndentationCycle:
+    """One recording of several cycles, each lifting into the air."""
+    parts = [bench.cycle(10.0, seed + number) for number in range(cycles)]
+    starts_s = np.cumsum([0.0, *(part.time_s[-1] + 0.01 for part in parts[:-1])])
+    return IndentationCycle(
+        parts[0].name,
+        10.0,
+        np.concatenate([part.time_s + start_s for part, start_s in zip(parts, starts_s, strict=True)]),
+        np.concatenate([part.force_N for part in parts]),
+        np.concatenate([part.position_mm for part in parts]),
+    )
+
+
+def test_cycles_of_a_recording_are_curves_that_are_left_out_together(tmp_path: Path) -> None:
+    soft, stiff = (Bench(force=index_force(a_N_mm, 0.22), rate_Hz=200.0) for a_N_mm in (0.12, 0.16))
+    made = [repeated(soft, 0, 3), repeated(stiff, 10, 3)]
+    study = study_session(open_session(write_made_session(tmp_path / "cycles", made)), COMPARED[:2])
+    assert [curve.name for curve in study.curves] == [
+        f"trial_{seed:03d}, cycle {number}" for seed in (0, 10) for number in (1, 2, 3)
+    ]
+    assert study.curves[0].findings[-1].text == "cut into its 3 cycles where force is lowest between them"
+    left_out = study.judged["index"].trials_left_out
+    # From the other recording alone: a third too stiff. From its own other cycles too it would be half of that.
+    assert left_out is not None
+    forces_off = study.judged["index"].fitted.rmse_N
+    assert left_out.rmse_N > 1.7 * forces_off
