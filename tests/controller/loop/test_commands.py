@@ -215,6 +215,17 @@ def test_stops_that_come_together_are_all_heard() -> None:
     assert inbox.collect(bench.loop) == {"unattended", "stop", "pain", "keypad"}
 
 
+@pytest.mark.parametrize(
+    ("said", "code"),
+    [("stop", "operator_stop"), ("pain", "pain_stop"), ("estop", "emergency_stop"), ("keypad", "operator_stop")],
+)
+def test_each_stop_by_itself_latches_its_line_of_the_safety_table(said: str, code: str) -> None:
+    bench = FakeBench()
+    bench.say(said)
+    bench.cycle()
+    assert bench.latched == code
+
+
 def test_a_stop_is_answered_in_its_cycle_as_an_event_too_and_none_where_none_was_asked() -> None:
     bench = FakeBench()
     bench.say("stop")
