@@ -37,8 +37,8 @@ SENSORS = {
 }
 
 
-def preloaded(law: str, sensor: Sensor, seed: int) -> IndentationCycle:
-    """A stroke of 6 mm from a preload held until it has relaxed; every other lifts out at the end."""
+def preloaded(law: str, sensor: Sensor, seed: int, air_mm: float = 0.0) -> IndentationCycle:
+    """A stroke of 6 mm from a preload held until it has relaxed, or from the air; every other lifts out at the end."""
     random = np.random.default_rng(seed)
     lost, tau_s = random.uniform(0, 0.5), 10 ** random.uniform(-0.7, 1)
     damping_N_s_mm, speed_mm_s = random.uniform(0, 0.004) * sensor.stiffer, random.choice(sensor.speeds_mm_s)
@@ -46,7 +46,8 @@ def preloaded(law: str, sensor: Sensor, seed: int) -> IndentationCycle:
     depths_mm = np.linspace(0, 12, 4000)
     preload_N = random.choice([0.0, 1.0]) * 10 ** random.uniform(-3, -1.3) * float(stiffness(depths_mm)[2000])
     start_mm = float(np.interp(preload_N / (1 - lost), stiffness(depths_mm), depths_mm))
-    way_mm = np.arange(0, STROKE_MM, speed_mm_s * STEP_S)
+    start_mm = -air_mm if air_mm else start_mm
+    way_mm = np.arange(0, STROKE_MM + air_mm, speed_mm_s * STEP_S)
     parts = [np.full(600, 0.0), way_mm, np.full(500, way_mm[-1])]
     if seed % 2:
         parts += [np.arange(way_mm[-1], -start_mm - 1.5, -speed_mm_s * STEP_S), np.full(300, -start_mm - 1.5)]
