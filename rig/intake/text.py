@@ -18,8 +18,8 @@ from rig.intake.mapping import FileForm
 from rig.intake.sheet import Batch, Column, Sheet, facts_in
 from rig.intake.units import unit_in, unit_of
 
-# Read at a time: large beside a row, small beside memory.
-BLOCK_BYTES = 1 << 24
+# Read at a time; Arrow reads some 32 of these ahead, so 16 MiB would be half a gigabyte of memory.
+BLOCK_BYTES = 1 << 22
 _UTF8 = ("utf-8", "utf8", "utf-8-sig", "ascii")
 
 
