@@ -29,7 +29,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("rig", "drivers", "controller", "api", "mock_devices")
 HARNESS = "mock_devices/testing/"
 LINES_BEFORE = 30_632  # of the five packages at commit 2887b84
-MOST_LINES = 36_000  # what there were on 22 November 2026, rounded up: more must first be saved elsewhere
+MOST_LINES = 36_300  # what there were on 22 November 2026, rounded up: more must first be saved elsewhere
 # What came for a bench that cannot hurt (between commits 2887b84 and 06c6055, 8,126 lines), as far as it has folders
 # and files of its own; what grew inside others counts with them.
 SAFETY = {

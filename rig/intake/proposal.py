@@ -23,7 +23,7 @@ Group = list[tuple[Path, Layout]]
 
 
 @dataclass(frozen=True)
-class Question:
+class OpenQuestion:
     """What the data cannot say. ``key`` is where the answer stands in the mapping, ``usual`` the likeliest answer."""
 
     text: str
@@ -53,7 +53,7 @@ class Proposal:
 
     tree: TomlTable
     doubts: tuple[str, ...]
-    questions: tuple[Question, ...]
+    questions: tuple[OpenQuestion, ...]
 
     @property
     def text(self) -> str:
@@ -70,7 +70,7 @@ def propose(folder: Path) -> Proposal:
     groups, doubts = _groups(folder)
     if not groups:
         raise DataError(f"{folder}: no table with force and position was found in it; write a mapping by hand")
-    tables, questions = list[TomlTable](), list[Question]()
+    tables, questions = list[TomlTable](), list[OpenQuestion]()
     for number, group in enumerate(groups):
         table, said, asked = _proposed(folder, group, number)
         tables.append(table)
@@ -111,7 +111,7 @@ def _columns(layout: Layout) -> dict[str, int]:
     return {quantity: items[0].column for quantity, items in found.items() if items}
 
 
-def _proposed(folder: Path, group: Group, number: int) -> tuple[TomlTable, list[str], list[Question]]:
+def _proposed(folder: Path, group: Group, number: int) -> tuple[TomlTable, list[str], list[OpenQuestion]]:
     layout = group[0][1]
     columns = _columns(layout)
     table: TomlTable = {"files": _files(folder, group), **_sheets(group), **layout.form}
@@ -188,9 +188,9 @@ def _senses(path: Path, table: TomlTable) -> dict[str, str]:
     }
 
 
-def _questions(layout: Layout, columns: Mapping[str, int], table: TomlTable, number: int) -> Iterator[Question]:
+def _questions(layout: Layout, columns: Mapping[str, int], table: TomlTable, number: int) -> Iterator[OpenQuestion]:
     if "time" not in columns:
-        yield Question(
+        yield OpenQuestion(
             "no column of time; at what rate are the rows, in Hz?", ("tables", number, "time", "rate_Hz"), 0.0
         )
     for quantity in ("time", "force", "position"):
@@ -199,7 +199,7 @@ def _questions(layout: Layout, columns: Mapping[str, int], table: TomlTable, num
             place: tuple[str | int, ...] = ("time",) if quantity == "time" else ("columns", quantity)
             units = ", ".join(LINEAR[quantity])
             text = f"nothing says the unit of {quantity} ({layout.header[columns[quantity]]!r}); one of {units}"
-            yield Question(text, ("tables", number, *place, "unit"), USUAL[quantity])
+            yield OpenQuestion(text, ("tables", number, *place, "unit"), USUAL[quantity])
 
 
 def _table(table: TomlTable) -> str:
