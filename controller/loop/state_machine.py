@@ -19,7 +19,6 @@ from rig.errors import SafetyStop
 SAFE_CLEARANCE_MM = 10.0  # as far as a limb may move before it stops a program (`limits.patient_mm`)
 # Less way than this is none: the end of the workspace is where a retreat ends.
 LEAST_WAY_MM = 0.5
-MOVING = (Mode.FREE, Mode.APPROACH, Mode.COMPRESS, Mode.CONTACT, Mode.RETRACT)
 
 # Stops that a person asks for: at rest they forbid what comes next, and move the tip only out of contact.
 ASKED = ("pain_stop", "operator_stop")
@@ -48,7 +47,7 @@ class MotionStateMachine:
     @property
     def busy(self) -> bool:
         """Whether a program or a retraction is under way."""
-        return self._program is not None or self.mode in MOVING
+        return self._program is not None or self.mode is Mode.RETRACT
 
     @property
     def run(self) -> Run | None:

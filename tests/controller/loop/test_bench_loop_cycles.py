@@ -18,7 +18,7 @@ from controller.safety.load import UNKNOWN, LoadMonitor
 from controller.safety.table import Action, Incident
 from rig.channels import AxisSample, ForceSample
 from rig.errors import DeviceError
-from tests.controller.fake_bench import FakeBench, wired
+from tests.controller.fake_bench import ZERO, FakeBench, wired
 from tests.controller.fake_devices import ARM
 
 MS = 1_000_000
@@ -180,6 +180,16 @@ def test_the_markers_health_is_the_tips(hidden: int, vouched_for: bool) -> None:
     bench.tracker.hidden = frozenset({hidden})
     bench.cycles(40)
     assert bool(bench.ring.loop[-1].health & 0b010_000_000) is vouched_for
+
+
+@pytest.mark.parametrize("mode", [Mode.APPROACH, Mode.COMPRESS, Mode.CONTACT])
+def test_a_first_touch_on_another_channel_is_found_in_whatever_mode_it_comes(mode: Mode) -> None:
+    bench = FakeBench()
+    bench.run(ZERO)
+    bench.loop.machine.mode = mode
+    bench.force.sideways_N = (3.0, 0.0, 0.0)
+    bench.cycles(3)
+    assert bench.latched == "first_touch"
 
 
 def test_only_a_person_who_was_heard_can_have_fallen_silent() -> None:
