@@ -25,6 +25,10 @@ def after(*seen: tuple[float, Observation], before: DeviceStatus | None = None) 
     return status
 
 
+def test_a_device_is_told_by_the_words_that_status_and_page_show() -> None:
+    assert [str(state) for state in DeviceState] == ["connecting", "ok", "degraded", "lost", "reconnecting", "fault"]
+
+
 def test_the_first_sample_makes_a_device_ok() -> None:
     assert after((0.1, Observation(None))).state is DeviceState.CONNECTING
     assert after((0.1, Observation(None)), (0.2, WELL)) == DeviceStatus(DeviceState.OK, "", round(0.2 * S))

@@ -13,7 +13,7 @@ from controller.loop.state import LoopState
 from controller.safety import checks as safety_checks
 from controller.safety.inputs import SafetyInputs
 from controller.safety.load import UNKNOWN, TipLoad
-from controller.safety.table import TABLE, Action, Check, Incident, evaluate
+from controller.safety.table import BY_PERSON, TABLE, Action, Check, Incident, evaluate
 from rig.config.wiring import Wiring
 
 SOFT, IMMEDIATE = Action.SOFT, Action.IMMEDIATE
@@ -178,6 +178,10 @@ def line_of(code: str) -> Check:
 
 def test_the_table_is_the_one_written_down_here() -> None:
     assert [(line.code, line.action, line.bound_s, line.at_rest) for line in TABLE] == LINES
+
+
+def test_a_person_stops_by_three_lines_and_no_other() -> None:
+    assert {code for code, *_ in LINES if code in BY_PERSON} == {"emergency_stop", "pain_stop", "operator_stop"}
 
 
 def test_actions_stand_in_the_event_stream_by_these_levels() -> None:
