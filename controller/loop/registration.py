@@ -20,6 +20,9 @@ SMOOTH_FRAMES = 6  # 0.1 s at 60 Hz, in which noise of 0.06 mm falls to 0.025
 # From one frame of 60 Hz to the next at 0.5 mm/s.
 LEAST_STEP_MM = 0.008
 HISTORY = 1000  # a second at 1 kHz: a frame that counts is 0.2 s old at most (`loop.stale_marker_ms`)
+# How much later than stated a frame may have been taken, and how much earlier: trackers are late by one to four frames
+# of 60 Hz. A step of 10 ms leaves 0.15 mm where an axis of 30 mm/s turns: over 4 mm of way less than tolerated.
+LAGS_NS = tuple(range(-20_000_000, 70_000_000, 10_000_000))
 
 
 class Point(NamedTuple):
@@ -37,6 +40,38 @@ class Interval(NamedTuple):
     high: float
 
 
+class MarkerLine:
+    """Running least squares of the tip's marker on the axis' position."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.spread = self._scatter = self._mean_mm = 0.0
+        self._means, self._with = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+
+    def add(self, position_mm: float, at: Point) -> None:
+        """One frame."""
+        self.count += 1
+        change_mm = position_mm - self._mean_mm
+        self._mean_mm += change_mm / self.count
+        rest_mm = position_mm - self._mean_mm
+        self.spread += change_mm * rest_mm
+        for axis, value in enumerate(at):
+            change = value - self._means[axis]
+            self._means[axis] += change / self.count
+            self._with[axis] += change_mm * (value - self._means[axis])
+            self._scatter += change * (value - self._means[axis])
+
+    @property
+    def slopes(self) -> tuple[float, ...]:
+        """Millimetres of the marker, along each coordinate, for each of the axis."""
+        return tuple(value / self.spread for value in self._with)
+
+    @property
+    def left(self) -> float:
+        """Variance about the line [mm2], of each of three coordinates."""
+        return max(self._scatter - math.hypot(*self.slopes) ** 2 * self.spread, 0.0) / (3 * self.count - 6)
+
+
 class Registration:
     """Fed with axis samples and tracker frames; ``moved_mm`` is NaN until the axis has travelled far enough."""
 
@@ -47,11 +82,7 @@ class Registration:
     def begin(self) -> None:
         """A new program: where the limb is from now on is where it should be."""
         self.moved_mm = math.nan
-        self._count = 0
-        self._mean_mm = 0.0
-        self._means = [0.0, 0.0, 0.0]
-        self._spread = self._scatter = 0.0
-        self._with = [0.0, 0.0, 0.0]
+        self._lines = {lag_ns: MarkerLine() for lag_ns in LAGS_NS}
         self._low_mm, self._high_mm = math.inf, -math.inf
         self._tip: tuple[int, Point, float] | None = None
         self._home: Point | None = None
@@ -72,16 +103,9 @@ class Registration:
         # At rest a frame that is dated wrongly shows no lag and in motion it does: together they would bend the line.
         if before is None or abs(position_mm - before[2]) < LEAST_STEP_MM:
             return
-        self._count += 1
-        change_mm = position_mm - self._mean_mm
-        self._mean_mm += change_mm / self._count
-        rest_mm = position_mm - self._mean_mm
-        self._spread += change_mm * rest_mm
-        for axis, value in enumerate(at):
-            change = value - self._means[axis]
-            self._means[axis] += change / self._count
-            self._with[axis] += change_mm * (value - self._means[axis])
-            self._scatter += change * (value - self._means[axis])
+        for lag_ns, line in self._lines.items():
+            lagged_mm = self._position(capture_ns - lag_ns)
+            line.add(self._axis[0][1] if lagged_mm is None else lagged_mm, at)
         self._low_mm, self._high_mm = min(self._low_mm, position_mm), max(self._high_mm, position_mm)
 
     def arm(self, frame: int, at: Point) -> None:
@@ -89,7 +113,8 @@ class Registration:
         if self._tip is None or self._tip[0] != frame or not self.registered:
             return
         _, tip, position_mm = self._tip
-        relative = (a - t + w / self._spread * position_mm for a, t, w in zip(at, tip, self._with, strict=True))
+        slopes = self._lines[0].slopes
+        relative = (a - t + slope * position_mm for a, t, slope in zip(at, tip, slopes, strict=True))
         self._recent.append(Point(*relative))
         if len(self._recent) < SMOOTH_FRAMES:
             return
@@ -102,19 +127,19 @@ class Registration:
         """Millimetres of the tracker for each of the axis; None until 2 mm of way.
 
         Least squares of the marker on the axis: |w| / S, of which noise of variance s2 (from what the line leaves of
-        three coordinates) makes s2 / S along the line; across it, noise adds to |w| no more than its own square.
+        three coordinates) makes s2 / S along the line; across it, noise adds to |w| no more than its own square. A
+        frame dated wrongly bends the line where the axis turns: that lag counts which leaves least.
         """
-        if self._count < LEAST_FRAMES or self._high_mm - self._low_mm < SCALE_TRAVEL_MM:
+        if self._lines[0].count < LEAST_FRAMES or self._high_mm - self._low_mm < SCALE_TRAVEL_MM:
             return None
-        slope = math.hypot(*self._with) / self._spread
-        left = max(self._scatter - slope**2 * self._spread, 0.0) / (3 * self._count - 6)
-        within = CONFIDENCE * math.sqrt(left / self._spread)
+        line = min(self._lines.values(), key=lambda each: each.left)
+        slope, within = math.hypot(*line.slopes), CONFIDENCE * math.sqrt(line.left / line.spread)
         return Interval(slope - within, slope + within)
 
     @property
     def registered(self) -> bool:
         """Whether the axis' direction is known."""
-        return self._count >= LEAST_FRAMES and self._high_mm - self._low_mm >= LEAST_TRAVEL_MM
+        return self._lines[0].count >= LEAST_FRAMES and self._high_mm - self._low_mm >= LEAST_TRAVEL_MM
 
     def _position(self, capture_ns: int) -> float | None:
         """The axis when the frame was taken, between the samples around it; the newest where none came after it yet."""

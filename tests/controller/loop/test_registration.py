@@ -114,6 +114,24 @@ def test_frames_that_are_dated_wrongly_bend_no_scale_where_the_axis_had_rested_b
     assert known is not None and 0.5 * (known.low + known.high) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.parametrize("latency_s", [0.0, 0.015, 0.034, 0.04])
+@pytest.mark.parametrize("scale", [0.88, 1.0, 1.12])
+def test_a_tracker_that_is_late_bends_no_scale_where_the_axis_turns(scale: float, latency_s: float) -> None:
+    """A slow touch, 2 mm back, then a fast press: at one lag all frames lie on one line, whose slope is the scale."""
+    speeds_mm_s = [0.0] * 300 + [6.0] * 700 + [0.0] * 150 + [-20.0] * 100 + [30.0] * 250
+    at_mm = np.cumsum(np.array(speeds_mm_s) * 1e-3)
+    registration, noise = Registration(), np.random.default_rng(47)
+    for milli, position_mm in enumerate(at_mm):
+        registration.axis(milli * 1_000_000, position_mm)
+        if milli % 16 == 0:
+            seen_mm = scale * np.interp(milli * 1e-3 - latency_s, np.arange(at_mm.size) * 1e-3, at_mm)
+            place = TIP + DIRECTION * seen_mm + noise.normal(0.0, 0.06, 3)
+            registration.tip(milli // 16, milli * 1_000_000, Point(*place))
+    known = registration.scale
+    assert known is not None and known.low - 0.02 < scale < known.high + 0.02
+    assert known.high - known.low < 0.05
+
+
 def moved_mm(time_s: float) -> float:
     """Half a second of rest, then 20 mm/s."""
     return 20.0 * max(time_s - 0.5, 0.0)
