@@ -20,11 +20,12 @@ test: $(READY) browser
 
 # Tests that start processes wait most of their time; the others compute meanwhile, and give way where both want a core:
 # they may take more than twice as long as alone.
+GIVING_WAY := $(shell command -v chrt >/dev/null && echo chrt --idle 0 || echo nice -n 19)
 test-processes: $(READY)
 	$(BIN)/pytest -n 2 --dist loadgroup -m bench --durations 15
 
 test-computing: $(READY)
-	nice -n 19 $(BIN)/pytest -n 2 -m "not bench" --timeout 300 --durations 10 >$(VENV)/computing.log 2>&1; code=$$?; \
+	$(GIVING_WAY) $(BIN)/pytest -n 2 -m "not bench" --timeout 300 --durations 10 >$(VENV)/computing.log 2>&1; code=$$?; \
 	  cat $(VENV)/computing.log; exit $$code
 
 # What to run before each commit, in less than half a minute: all checks, and the tests of what changed.

@@ -8,6 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from controller.devices.drivers import open_axis, open_force, open_tracker
+from controller.loop.realtime import promptly
 from drivers.roles import Device, ForceSensor, Identity, MarkerTracker, ServoAxis
 from rig.channels import AxisSample, ForceSample, MarkerSample
 from rig.config.force_map import CHANNELS
@@ -28,7 +29,15 @@ Listen = Callable[[AnyDevice], Samples]
 
 
 def examine(wiring: Wiring, seconds: float = LISTEN_S, tell: Progress = silent) -> tuple[DeviceReport, ...]:
-    """One finding a configured device; a device that fails is a finding with a problem, not an error."""
+    """One finding a configured device; a device that fails is a finding with a problem, not an error.
+
+    They are listened to at the loop's priority: what a busy computer keeps from a desktop program, the loop would get.
+    """
+    with promptly(wiring.loop.priority):
+        return _examined(wiring, seconds, tell)
+
+
+def _examined(wiring: Wiring, seconds: float, tell: Progress) -> tuple[DeviceReport, ...]:
     force, axis, tracker = wiring.force, wiring.axis, wiring.tracker
     channel = CHANNELS.index(force.axis)
     tell("force", 0.0)

@@ -5,6 +5,7 @@ import ctypes
 import fcntl
 import gc
 import os
+from collections.abc import Iterator
 
 from controller.claims import state_folder
 
@@ -26,6 +27,20 @@ def acquire(priority: int) -> dict[str, str]:
     gc.freeze()
     gc.disable()
     return granted | {"garbage_collector": "frozen"}
+
+
+@contextlib.contextmanager
+def promptly(priority: int) -> Iterator[None]:
+    """FIFO scheduling of this thread at ``priority`` (0: no), where granted, until the block ends."""
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    if priority:
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, *before)
 
 
 def raise_priority(priority: int) -> None:

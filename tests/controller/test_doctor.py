@@ -1,5 +1,8 @@
 """What the doctor says of a device: noise of the channel that is used, and where to look at one that is not heard."""
 
+import contextlib
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
@@ -8,7 +11,7 @@ from drivers.roles import Identity
 from rig.channels import ForceSample
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
-from rig.config.wiring import Wiring
+from rig.config.wiring import Loop, Wiring
 
 WHO = Identity("bota-sensone", "000271", "1.0.6")
 
@@ -35,3 +38,18 @@ def test_a_device_that_is_not_there_comes_with_where_to_look() -> None:
     force, axis = doctor.examine(wiring, 0.0)
     assert "/dev/no-sensor" in force.problem and force.advice == BotaWiring.advice
     assert "/dev/no-adapter" in axis.problem and axis.advice == Epos4Wiring.advice
+
+
+def test_devices_are_listened_to_at_the_loops_priority(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, looked_at = list[int](), list[int]()
+
+    @contextlib.contextmanager
+    def promptly(priority: int) -> Iterator[None]:
+        asked.append(priority)
+        yield
+        asked.clear()
+
+    monkeypatch.setattr(doctor, "promptly", promptly)
+    monkeypatch.setattr(doctor, "_examined", lambda *_: looked_at.extend(asked))
+    doctor.examine(Wiring(loop=Loop(priority=37)), 0.0)
+    assert looked_at == [37]

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from controller.loop import realtime
+
 PIN = "from controller.loop import realtime; print(realtime._pin(), flush=True); input()"
 
 
@@ -34,3 +36,15 @@ def test_each_loop_takes_the_last_core_that_no_other_has(tmp_path: Path) -> None
             assert one_too_many == f"pinned to {cores[0]}"
     with pinned_loop(tmp_path) as after:
         assert after == f"pinned to {cores[0]}"
+
+
+def test_a_thread_is_prompt_until_the_block_ends() -> None:
+    before = os.sched_getscheduler(0)
+    with realtime.promptly(1):
+        granted = os.sched_getscheduler(0)
+    assert os.sched_getscheduler(0) == before
+    if granted == before:
+        pytest.skip("real-time priority is not granted here")
+    assert granted == os.SCHED_FIFO
+    with realtime.promptly(0):
+        assert os.sched_getscheduler(0) == before
