@@ -1,6 +1,8 @@
 import array
 import fcntl
 import json
+import os
+import resource
 import select
 import signal
 import socket
@@ -10,6 +12,7 @@ import termios
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +27,7 @@ from mock_devices.devices import DeviceFactory
 from mock_devices.parameters import Parameters
 from mock_devices.serve import MockServer, effects_table
 from mock_devices.testing.clock import Clock
+from mock_devices.testing.commands import served_bench
 from mock_devices.testing.force import collect
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
@@ -181,6 +185,18 @@ def test_one_force_product_alone_and_a_taken_tracker_port_are_both_said_in_the_l
             assert "force" not in endpoints
             assert endpoints["force_modbus"]["serial"].startswith("/dev/")
             assert endpoints["tracker"]["tcp"] != f"127.0.0.1:{number}"
+
+
+@pytest.mark.bench
+@pytest.mark.xdist_group("wire")
+def test_a_bench_of_real_time_priority_keeps_its_memory() -> None:
+    may_lock_bytes = resource.getrlimit(resource.RLIMIT_MEMLOCK)[1]
+    if os.geteuid() != 0 and may_lock_bytes != resource.RLIM_INFINITY:
+        pytest.skip("locked memory is not granted here")
+    with served_bench() as bench:
+        status = Path(f"/proc/{bench.endpoints.pid}/status").read_text()
+    locked_kB = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmLck:"))
+    assert locked_kB > 10_000
 
 
 @pytest.mark.bench
