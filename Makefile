@@ -6,27 +6,19 @@ READY := $(VENV)/ready
 # Modules are compiled once, not by each of the processes that a bench is made of.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test test-processes test-computing check metrics docs package wheels mutants mutants-sample lock clean
+.PHONY: demo test check metrics docs package wheels mutants mutants-sample lock clean
 
 demo: $(READY)
 	$(BIN)/rig demo --out demo
 
+# Tests that start processes first and by themselves: beside others that compute, a simulated device came too late.
 test: $(READY) browser
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(MAKE) --jobs 2 --keep-going test-processes test-computing
-
-# Tests that start processes wait most of their time; the others compute meanwhile, and give way where both want a core:
-# they may take more than twice as long as alone.
-GIVING_WAY := $(shell command -v chrt >/dev/null && echo chrt --idle 0 || echo nice -n 19)
-test-processes: $(READY)
 	$(BIN)/pytest -n 2 --dist loadgroup -m bench --durations 15
-
-test-computing: $(READY)
-	$(GIVING_WAY) $(BIN)/pytest -n 2 -m "not bench" --timeout 300 --durations 10 >$(VENV)/computing.log 2>&1; code=$$?; \
-	  cat $(VENV)/computing.log; exit $$code
+	$(BIN)/pytest -n 2 -m "not bench" --durations 10
 
 # What to run before each commit, in less than half a minute: all checks, and the tests of what changed.
 check: $(READY)
