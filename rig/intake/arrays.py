@@ -1,69 +1,122 @@
-"""MAT, HDF5, Parquet and MCAP files: columns that carry their own names."""
+"""MAT, HDF5, Parquet, MCAP and lines of JSON: columns that carry their own names."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+import re
+import struct
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import scipy.io
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 from numpy.typing import NDArray
-from scipy.io.matlab import MatlabFunction, MatlabOpaque, MatReadError, mat_struct
+from scipy.io.matlab import MatlabFunction, MatlabOpaque, MatReadError, MatReadWarning, mat_struct
+from zstandard import ZstdError
 
 from rig.errors import DataError
-from rig.intake.sheet import Batch, Column, Sheet
-from rig.intake.units import unit_in, unit_of
+from rig.intake.sheet import DAMAGE, Batch, Column, Sheet, unreadable
+from rig.intake.stored import StoredVector, fields_of, lines_of
+from rig.intake.text import bytes_of
+from rig.intake.units import ros_unit, unit_in, unit_of
 
-Vectors = dict[str, NDArray[np.generic]]
+Vectors = dict[str, NDArray[np.generic] | StoredVector]
+BATCH_ROWS = 1 << 18  # two megabytes a column
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
-# ROS 2 types of eight bytes and less that stand one after another in a message, by their name in a ros2msg schema.
-ROS_TYPES = {"int64": "<i8", "float64": "<f8", "uint64": "<u8", "int32": "<i4", "float32": "<f4", "uint32": "<u4"}
+# Longer lists in a message are images and clouds of points.
+LONGEST_LIST = 64
 OBJECT_ADVICE = "; save objects of MATLAB as plain vectors, a table by table2struct(T, 'ToScalar', true)"
+# What attributes are called in which HDF5 writers put the unit and the names of columns.
+UNIT_NAMES = ("unit", "units", "engineeringunit", "unit_string", "engineering_units")
+COLUMN_NAMES = ("columns", "column_names", "channels", "channel_names", "names", "fields", "labels")
 
 
 def open_mat(path: Path) -> list[Sheet]:
     """A sheet of the vectors of the file, and one of each struct; versions 5 to 7.3."""
-    with path.open("rb") as file:
-        head = file.read(520)
-    if HDF5_MAGIC in head:
-        return open_hdf5(path)
     try:
-        found = scipy.io.loadmat(str(path), squeeze_me=True, struct_as_record=False, appendmat=False)
-    except (MatReadError, ValueError, OSError, TypeError, NotImplementedError) as error:
-        raise DataError(f"{path}: not readable as a MAT file ({error}); copy it again, or save it with -v7") from error
+        with path.open("rb") as file:
+            head = file.read(520)
+        if HDF5_MAGIC in head:
+            return open_hdf5(path)
+        with warnings.catch_warnings():  # of two objects in one file, which are named when they are asked for
+            warnings.simplefilter("ignore", MatReadWarning)
+            found = scipy.io.loadmat(str(path), squeeze_me=True, struct_as_record=False, appendmat=False)
+    except (*DAMAGE, MatReadError) as error:
+        raise unreadable(path, "a MAT file", error, "copy it again, or save it with -v7") from error
     groups: dict[str, dict[str, object]] = {}
     _sort("", {name: value for name, value in found.items() if not name.startswith("__")}, groups)
-    return [_of_values(path, name, values) for name, values in groups.items()]
+    _join(groups)
+    titles = list(_titles(groups))
+    return [_of_values(path, name, values, titles) for name, values in groups.items()]
+
+
+def _titles(groups: Mapping[str, Mapping[str, object]]) -> Iterator[list[str]]:
+    """The lists of texts in the file, which may be the names of a matrix's columns."""
+    for value in (value for values in groups.values() for value in values.values()):
+        if isinstance(value, np.ndarray) and value.ndim == 1 and all(isinstance(item, str) for item in value):
+            yield [str(item).strip() for item in value]
 
 
 def _sort(name: str, values: Mapping[str, object], groups: dict[str, dict[str, object]]) -> None:
-    """Structs into groups of their own, by the way to them."""
+    """Structs, and the members of arrays of structs and of cells, into groups of their own, by the way to them."""
     flat = {}
     for key, value in values.items():
         if key == "_fieldnames":
             continue
+        inner = f"{name}.{key}".lstrip(".")
         if isinstance(value, mat_struct):
-            _sort(f"{name}.{key}".lstrip("."), vars(value), groups)
+            _sort(inner, vars(value), groups)
+        elif isinstance(value, np.ndarray) and value.size and isinstance(value.flat[0], mat_struct | np.ndarray):
+            for number, item in enumerate(value.flat, 1):
+                _sort(f"{inner}({number})", vars(item) if isinstance(item, mat_struct) else {key: item}, groups)
         else:
             flat[key] = value
     groups[name] = flat
 
 
-def _of_values(path: Path, name: str, values: Mapping[str, object]) -> Sheet:
+def _join(groups: dict[str, dict[str, object]]) -> None:
+    """Structs of one vector, as Simulink nests signals, into the struct above them that has others of its length."""
+    for name in sorted(groups, key=len, reverse=True):
+        own = {key: value for key, value in groups[name].items() if _sized(value) > 1}
+        above = [name[: match.start()] for match in re.finditer(r"[.]", name)][::-1]
+        sizes = {_sized(value) for value in own.values()}
+        home = next((up for up in above if any(_sized(value) in sizes for value in groups.get(up, {}).values())), None)
+        if len(own) == 1 and home is not None:
+            groups[home] |= {f"{name[len(home) + 1 :]}.{key}": value for key, value in own.items()}
+            del groups[name]
+
+
+def _sized(value: object) -> int:
+    return value.size if isinstance(value, np.ndarray) else 1
+
+
+def _of_values(path: Path, name: str, values: Mapping[str, object], titles: Sequence[Sequence[str]]) -> Sheet:
     vectors, facts, objects = Vectors(), dict[str, str](), list[str]()
     for key, value in values.items():
         if isinstance(value, MatlabOpaque | MatlabFunction):
-            objects.append(key)
+            objects.append(_object_name(key, value))
         elif isinstance(value, np.ndarray) and value.ndim in (1, 2) and value.size > 1 and value.dtype.kind in "biufO":
-            vectors |= _split(key, value)
+            split = _split(key, value)
+            names = next((own for own in titles if len(own) == len(split) > 1 and vectors.keys().isdisjoint(own)), ())
+            vectors |= _named(split, names)
         else:
             facts[key] = str(value)
     unread = f"; {', '.join(objects)} cannot be read{OBJECT_ADVICE}" if objects else ""
     return _of_vectors(path, name, vectors, {}, facts, unread)
+
+
+def _object_name(name: str, value: Any) -> str:
+    """What the object is called and its class; the name of one stands in itself, and scipy gives it as None."""
+    if not isinstance(value, MatlabOpaque) or not value.size:
+        return name
+    inner = np.ravel(value)[0]
+    return f"{inner['s0'].decode()} (a {inner['s2'].decode()})"
 
 
 def _split(name: str, value: NDArray[np.generic]) -> Vectors:
@@ -86,11 +139,14 @@ def _of_vectors(
         if len(set(lengths.values())) > 1:
             said = ", ".join(f"{key} has {length}" for key, length in lengths.items())
             raise DataError(f"{path}{name and f', {name}'}: columns of one table differ in length: {said} values")
-        yield [_values(f"{path}, {names[number]}", vectors[names[number]], text) for number, text in columns.items()]
+        for start in range(0, max(*lengths.values(), 1), BATCH_ROWS):
+            rows = slice(start, start + BATCH_ROWS)
+            yield [_values(f"{path}, {names[at]}", vectors[names[at]][rows], text) for at, text in columns.items()]
 
     return Sheet(
-        path, name, names, tuple(units.get(key, "") or unit_of(key) for key in names), read, facts, unread=unread
-    )
+        path, name, names, tuple(unit_in(units.get(key, "")) or unit_of(key) for key in names), read, facts,
+        unread=unread, rows=max(map(len, vectors.values()), default=0),
+    )  # fmt: skip
 
 
 def _values(where: str, vector: NDArray[np.generic], text: bool) -> Column:
@@ -107,31 +163,81 @@ def open_hdf5(path: Path) -> list[Sheet]:
         with h5py.File(path) as file:
             groups: dict[str, Any] = {}
             file.visititems(groups.__setitem__)
-            return [
-                _of_group(path, name, group)
+            found = [
+                (name, group)
                 for name, group in {"": file, **groups}.items()
                 if isinstance(group, h5py.Group) and not name.startswith("#")
             ]
-    except OSError as error:
-        raise DataError(f"{path}: not readable as HDF5 ({error}); copy it again") from error
+            return [
+                sheet for name, group in found for sheet in (_of_group(path, name, group), *_members(path, name, group))
+            ]
+    except DAMAGE as error:
+        raise unreadable(path, "HDF5", error) from error
+
+
+def _members(path: Path, name: str, group: Any) -> Iterator[Sheet]:
+    """A sheet of each struct in an array of them, whose fields MATLAB stores as references to their values."""
+    fields = {key: item for key, item in group.items() if _refers(item)}
+    for number in range(min((item.size for item in fields.values()), default=0)):
+        items = {key: group.file[np.ravel(item[()])[number]] for key, item in fields.items()}
+        vectors = {
+            key: column
+            for key, item in items.items()
+            if isinstance(item, h5py.Dataset) and item.size > 1 and item.dtype.kind in "biuf" and _is_numeric(item)
+            for key, column in _split(key, item[()]).items()
+        }
+        yield _of_vectors(path, f"{name}({number + 1})", vectors, {}, {})
+
+
+def _refers(item: Any) -> bool:
+    return (
+        isinstance(item, h5py.Dataset)
+        and bool(h5py.check_ref_dtype(item.dtype))
+        and not item.attrs.get("MATLAB_object_decode")
+    )
 
 
 def _of_group(path: Path, name: str, group: Any) -> Sheet:
-    vectors, units, facts, objects = Vectors(), dict[str, str](), dict[str, str](), list[str]()
+    vectors, units, objects = Vectors(), dict[str, str](), list[str]()
+    facts = {name: " ".join(map(_text, np.ravel(value))) for name, value in group.attrs.items()}
     for key, item in group.items():
         if not isinstance(item, h5py.Dataset):
             continue
-        if "MATLAB_object_decode" in item.attrs:
+        if "MATLAB_object_decode" in item.attrs or h5py.check_ref_dtype(item.dtype):
             objects.append(key)
         elif item.dtype.names:
-            vectors |= {field: item[field] for field in item.dtype.names}
+            vectors |= fields_of(path, item)
+            units |= zip(item.dtype.names, _attribute(item, UNIT_NAMES), strict=False)
         elif item.ndim in (1, 2) and item.size > 1 and item.dtype.kind in "biuf" and _is_numeric(item):
-            vectors |= _split(key, item[()])
-            units[key] = unit_in(_text(item.attrs.get("unit", item.attrs.get("units", ""))))
+            split = _named(lines_of(path, key, item), _attribute(item, COLUMN_NAMES))
+            vectors |= split
+            units |= zip(split, _spread(_attribute(item, UNIT_NAMES), len(split)), strict=False)
         elif item.size == 1:
-            facts[key] = str(np.ravel(item[()])[0])
+            facts[key] = _text(np.ravel(item[()])[0])
+        facts |= {name: " ".join(map(_text, np.ravel(value))) for name, value in item.attrs.items()}
     unread = f"; {', '.join(objects)} cannot be read{OBJECT_ADVICE}" if objects else ""
     return _of_vectors(path, name, vectors, units, facts, unread)
+
+
+def _attribute(item: Any, names: Sequence[str]) -> list[str]:
+    """The texts of the first attribute with one of these names, whatever its case; none without it."""
+    found = {name.lower(): value for name, value in item.attrs.items()}
+    value = next((found[name] for name in names if name in found), None)
+    return [] if value is None else [_text(one) for one in np.ravel(np.asarray(value, object))]
+
+
+def _spread(units: Sequence[str], count: int) -> list[str]:
+    """The unit of each column, one for all where there is one."""
+    return list(units) * count if len(units) == 1 else list(units)
+
+
+def _named(vectors: Mapping[str, NDArray[np.generic] | StoredVector], names: Sequence[str]) -> Vectors:
+    """With other names, where there is one for each and none twice."""
+    return (
+        dict(zip(names, vectors.values(), strict=True))
+        if len(set(names)) == len(names) == len(vectors)
+        else dict(vectors)
+    )
 
 
 def _is_numeric(item: Any) -> bool:
@@ -145,26 +251,35 @@ def _text(value: object) -> str:
 def open_parquet(path: Path) -> list[Sheet]:
     """The one table of a Parquet file, a row group at a time."""
     try:
-        schema = pq.ParquetFile(path).schema_arrow
-    except (OSError, ValueError) as error:
-        raise DataError(f"{path}: not readable as Parquet ({error}); copy it again") from error
-    stated = [(field.metadata or {}).get(b"unit", b"").decode() for field in schema]
+        with pq.ParquetFile(path) as file:
+            schema, rows = file.schema_arrow, file.metadata.num_rows
+    except DAMAGE as error:
+        raise unreadable(path, "Parquet", error) from error
+    stated = ["ns" if pa.types.is_temporal(field.type) else _unit_field(field.metadata or {}) for field in schema]
     units = tuple(unit_in(unit) or unit_of(name) for unit, name in zip(stated, schema.names, strict=True))
 
     def read(columns: Mapping[int, bool]) -> Iterator[Batch]:
-        with pq.ParquetFile(path) as file:
-            for batch in file.iter_batches(columns=[schema.names[number] for number in columns]):
-                yield [
-                    _values(f"{path}, {schema.names[number]}", _array(batch[schema.names[number]]), text)
-                    for number, text in columns.items()
-                ]
+        names = [schema.names[number] for number in columns]
+        try:
+            with pq.ParquetFile(path, page_checksum_verification=True) as file:
+                for batch in file.iter_batches(columns=names):
+                    yield [
+                        _values(f"{path}, {name}", _array(batch[name]), text)
+                        for name, text in zip(names, columns.values(), strict=True)
+                    ]
+        except DAMAGE as error:
+            raise unreadable(path, "Parquet", error) from error
 
-    return [Sheet(path, "", tuple(schema.names), units, read)]
+    return [Sheet(path, "", tuple(schema.names), units, read, rows=rows)]
+
+
+def _unit_field(metadata: Mapping[bytes, bytes]) -> str:
+    return next((metadata[name.encode()].decode() for name in UNIT_NAMES if name.encode() in metadata), "")
 
 
 def _array(column: Any) -> NDArray[np.generic]:
     found = column.to_numpy(zero_copy_only=False)
-    return np.asarray(found.astype("datetime64[ns]").astype(np.int64) if found.dtype.kind == "M" else found)
+    return np.asarray(found.astype(f"{found.dtype.kind}8[ns]").astype(np.int64) if found.dtype.kind in "Mm" else found)
 
 
 def open_mcap(path: Path) -> list[Sheet]:
@@ -172,15 +287,13 @@ def open_mcap(path: Path) -> list[Sheet]:
     bodies: dict[str, tuple[Any, Any, list[bytes], list[tuple[int, int]]]] = {}
     try:
         with path.open("rb") as file:
-            for schema, channel, message in make_reader(file).iter_messages(log_time_order=False):
+            for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages(log_time_order=False):
                 kept = bodies.setdefault(channel.topic, (schema, channel, [], []))
                 kept[2].append(message.data)
                 kept[3].append((message.log_time, message.publish_time))
-    except (McapError, OSError, ValueError) as error:
-        raise DataError(
-            f"{path}: not readable as MCAP ({error}); `rig repair` saves what is good in a recording"
-        ) from error
-    return [_of_topic(path, topic, *found) for topic, found in bodies.items()]
+        return [_of_topic(path, topic, *found) for topic, found in bodies.items()]
+    except (*DAMAGE, McapError, ZstdError) as error:
+        raise unreadable(path, "MCAP", error, "`rig repair` saves what is good in a recording") from error
 
 
 def _of_topic(
@@ -194,27 +307,61 @@ def _of_topic(
         else f"; its messages are {channel.message_encoding}, of which only JSON and plain numbers are read"
     )
     log_ns, publish_ns = np.array(times, np.int64).T
-    units = {"log_time": "ns", "publish_time": "ns"}
+    units = {"log_time": "ns", "publish_time": "ns", **{name: ros_unit(name) for name in vectors if decode is _of_cdr}}
     return _of_vectors(path, topic, {"log_time": log_ns, "publish_time": publish_ns, **vectors}, units, {}, unread)
 
 
+def open_json_lines(path: Path) -> list[Sheet]:
+    """The one table of a file with a JSON object a line."""
+    rows = list[dict[str, object]]()
+    try:
+        with bytes_of(path) as file:
+            for number, line in enumerate(file, 1):
+                place = f"{path} line {number}"
+                rows += [dict(_flat("", json.loads(line)))] if line.strip() else []
+    except json.JSONDecodeError as error:
+        raise DataError(f"{place}: no JSON object ({error.msg} in column {error.colno}); mend the line") from error
+    except DAMAGE as error:
+        raise unreadable(path, "lines of JSON", error) from error
+    return [_of_vectors(path, "", _of_rows(rows), {}, {})] if rows else []
+
+
 def _of_json(_: Any, bodies: list[bytes]) -> Vectors:
-    rows = [json.loads(body) for body in bodies]
-    names = [name for name, value in rows[0].items() if isinstance(value, int | float | str)]
-    return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+    return _of_rows([dict(_flat("", json.loads(body))) for body in bodies])
+
+
+def _of_rows(rows: Sequence[Mapping[str, object]]) -> Vectors:
+    """The numbers and texts that any of the rows has; nothing where one has none."""
+    names = dict.fromkeys(name for row in rows for name, value in row.items() if isinstance(value, int | float | str))
+    found = {name: [row.get(name) for row in rows] for name in names}
+    return {name: np.array([np.nan if value is None else value for value in values]) for name, values in found.items()}
+
+
+def _flat(name: str, value: object) -> Iterator[tuple[str, object]]:
+    """The plain values in nested tables, messages and short lists, by the way to them."""
+    items = _items(value)
+    if items is None:
+        yield name, value
+    for key, item in items or ():
+        yield from _flat(f"{name}.{key}".lstrip("."), item)
+
+
+def _items(value: object) -> Iterable[tuple[object, object]] | None:
+    if isinstance(value, dict):
+        return value.items()
+    if isinstance(value, list | tuple):
+        return enumerate(value) if len(value) <= LONGEST_LIST else ()
+    names = getattr(value, "__slots__", None)
+    return None if names is None else [(name, getattr(value, name)) for name in names]
 
 
 def _of_cdr(schema: Any, bodies: list[bytes]) -> Vectors:
-    """Messages of numbers alone, little-endian, all of one size; none where there is anything else in them."""
-    lines = (line.split("#")[0].split() for line in schema.data.decode().splitlines())
-    fields = [(name, ROS_TYPES.get(kind, "")) for kind, name in (line for line in lines if len(line) == 2)]
-    if not all(kind for _, kind in fields):
+    """Messages of ROS 2; none where the schema or the bytes are not as ROS has them."""
+    try:
+        decode = DecoderFactory().decoder_for("cdr", schema)
+        return _of_rows([dict(_flat("", decode(body))) for body in bodies]) if decode else {}
+    except (McapError, ValueError, IndexError, struct.error):
         return {}
-    layout = np.dtype([(name, kind) for name, kind in fields], align=True)
-    if any(len(body) < 4 + layout.itemsize for body in bodies):
-        return {}
-    rows = np.frombuffer(b"".join(body[4 : 4 + layout.itemsize] for body in bodies), layout)
-    return {name: rows[name] for name, _ in fields}
 
 
 _DECODERS: dict[str, Callable[[Any, list[bytes]], Vectors]] = {"json": _of_json, "cdr": _of_cdr}

@@ -1,7 +1,8 @@
 """Which tables of which files in a folder are of which recording."""
 
+import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,7 +10,7 @@ from rig.errors import DataError
 from rig.intake.mapping import DataMapping, FileForm
 from rig.intake.pattern import filled, matched
 from rig.intake.readers import kind_of, open_sheets
-from rig.intake.sheet import Sheet
+from rig.intake.sheet import Sheet, unreadable
 
 
 class FoundTable(NamedTuple):
@@ -22,12 +23,24 @@ class FoundTable(NamedTuple):
 
 def files_in(folder: Path) -> list[Path]:
     """Every file below ``folder``, or the one file it is, in natural order, but hidden ones; raises DataError."""
-    if folder.is_file():
-        return [folder]
-    if not folder.is_dir():
-        raise DataError(f"{folder}: no such folder; give the folder, or the file, that holds the data")
-    found = (path for path in folder.rglob("*") if path.is_file() and not path.name.startswith("."))
+    try:
+        if folder.is_file():
+            return [folder]
+        if not folder.is_dir():
+            raise DataError(f"{folder}: no such file or folder; give the one that holds the data")
+        found = [path for path in _below_all(folder) if path.is_file() and not path.name.startswith(".")]
+    except PermissionError as error:
+        raise unreadable(Path(error.filename), "a folder", error) from error
     return sorted(found, key=lambda path: natural(path.relative_to(folder).as_posix()))
+
+
+def _below_all(folder: Path) -> Iterator[Path]:
+    """Everything below the folder; raises PermissionError where `Path.rglob` would leave out a folder silently."""
+
+    def refuse(error: OSError) -> None:
+        raise error
+
+    return (Path(place, name) for place, _, names in os.walk(folder, onerror=refuse) for name in names)
 
 
 def natural(text: str) -> list[tuple[int, str]]:
@@ -39,10 +52,11 @@ def tables_in(folder: Path, mapping: DataMapping) -> Iterator[FoundTable]:
     """Every table the mapping names; raises DataError where one of its patterns names no file."""
     files = files_in(folder)
     for form in mapping.tables:
-        chosen = [(path, matched(form.files, _below(folder, path))) for path in files]
+        chosen = [(path, matched(form.files, below(folder, path))) for path in files]
         named = [(path, labels) for path, labels in chosen if labels is not None]
         if not named:
-            raise DataError(f"{folder}: no file is of the pattern {form.files!r}; there are {_shown(folder, files)}")
+            there = listed([below(folder, path) for path in files]) or "none at all"
+            raise DataError(f"{folder}: no file is of the pattern {form.files!r}; there are {there}")
         for path, labels in named:
             own = {"file": path.name.removesuffix(".gz").rpartition(".")[0], "folder": path.parent.name}
             for more, sheet in open_sheets(path, form):
@@ -51,25 +65,26 @@ def tables_in(folder: Path, mapping: DataMapping) -> Iterator[FoundTable]:
 
 def unnamed_in(folder: Path, mapping: DataMapping) -> list[str]:
     """Data files that no pattern of the mapping names."""
-    names = [_below(folder, path) for path in files_in(folder) if kind_of(path)]
+    names = [below(folder, path) for path in files_in(folder) if kind_of(path)]
     return [name for name in names if all(matched(form.files, name) is None for form in mapping.tables)]
 
 
-def _below(folder: Path, path: Path) -> str:
+def below(folder: Path, path: Path) -> str:
+    """The file as patterns name it: its path below the folder."""
     return path.name if path == folder else path.relative_to(folder).as_posix()
 
 
-def _shown(folder: Path, files: list[Path]) -> str:
-    names = [_below(folder, path) for path in files]
-    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "") or "none at all"
+def listed(names: Sequence[str]) -> str:
+    """The first five, and how many more there are."""
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
 
 
-def labels_of(table: FoundTable, label: str, mapping: DataMapping) -> dict[str, str]:
-    """What the recording of these rows is called, and its specimen, site and cycle where the mapping says them."""
-    known, where = {**table.labels, "label": label}, table.sheet.where
+def labels_of(table: FoundTable, labels: Mapping[str, str], mapping: DataMapping) -> dict[str, str]:
+    """The labels of rows that have these, what their recording is called, and its specimen, site and cycle."""
+    known, where = {**table.labels, **labels}, table.sheet.where
     sheets = "-{sheet}" if table.sheet.name else ""
-    name = mapping.recording or ("{label}" if table.form.label is not None else "{file}" + sheets)
-    found = {"recording": filled(name, known, where)}
+    name = mapping.recording or ("{label}" if "label" in labels else "{file}" + sheets)
+    found = {**known, "recording": filled(name, known, where)}
     for key in ("specimen", "site", "cycle"):
         template = getattr(mapping, key)
         if template:
@@ -79,4 +94,4 @@ def labels_of(table: FoundTable, label: str, mapping: DataMapping) -> dict[str, 
 
 def file_name(recording: str) -> str:
     """The recording's name as that of a file, on any system."""
-    return re.sub(r"[^\w.+-]+", "_", recording).strip("._") or "recording"
+    return re.sub(r"[^\w.+-]+", "_", recording).strip("._-") or "recording"

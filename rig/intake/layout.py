@@ -1,91 +1,256 @@
 """How the rows of a file nobody described are written: encoding, delimiter, decimal sign, header and unit rows."""
 
-import gzip
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import islice, zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
 from rig.config.table import TomlTable
 from rig.errors import DataError
-from rig.intake.mapping import FileForm
+from rig.intake.cells import NO_VALUE, Affixed, above_columns, affixed, cells_of, is_value
+from rig.intake.edited import joined, loosened
+from rig.intake.headings import Headings, headings_of
+from rig.intake.interruptions import MOST_LINES, interruptions_of
+from rig.intake.long import by_channel
+from rig.intake.mapping import FileForm, LongForm
+from rig.intake.notation import Notation, notation_of
 from rig.intake.readers import ARRAYS, kind_of, open_sheets
-from rig.intake.roles import WORDS, candidates, knows
+from rig.intake.roles import WORDS, candidates, knows, words_of
+from rig.intake.sheet import DAMAGE, Sheet, Source, unreadable
+from rig.intake.survey import texts_of
+from rig.intake.text import BLANK_CELLS, bytes_of, lines_in, open_texts, open_utf8, section_in, section_name
 from rig.intake.units import unit_in, unit_of
-from rig.intake.workbook import sheet_names, shown_rows
+from rig.intake.workbook import hidden_sheets, sheet_names
 
 # Read of a text to see how it is written: preambles are shorter, and a table shows itself in a few rows.
 HEAD_BYTES = 65_536
-HEAD_ROWS = 200
+HEAD_ROWS = 400
 # Of the encodings that laboratories' machines write; one that is no Unicode is told by the words of the header only.
 ENCODINGS = ("gb18030", "cp949", "shift_jis", "big5", "cp1252", "cp1251")
-DELIMITERS = ("\t", ";", ",", "|")
-_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
-_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+DELIMITERS = ("\t", ";", ",", "|", " ")
+
+# A table of so few rows may lie across; a quantity each is fewer.
+ACROSS_ROWS = 100
+# Force and a way at least: words for fewer may be there by chance.
+QUANTITIES = 2
+# Parted by the wrong sign, half of the cells are numbers by chance; by the right one all but texts and labels are.
+SURE_SHARE = 0.75
+# A row for each value has its time, channel, value and unit, and what the whole is called.
+WIDEST_LONG = 12
+VALUES = frozenset(("value", "wert", "reading", "messwert", "data", "val", "valeur"))
+UNITS = frozenset(("unit", "units", "einheit", "unité"))
+# Where more of the lines are none of the table, it is another table than was thought.
+OTHER_SHARE = 0.1
 
 
 class Layout(NamedTuple):
-    """What was understood of one sheet: keys of its form, its columns, the first row of data, and what is doubtful."""
+    """Of one sheet the keys of its form, all words above each column, doubts, and which lines are no rows."""
 
-    sheet: str
+    sheet: Sheet
+    source: Source
     form: TomlTable
-    header: tuple[str, ...]
-    units: tuple[str, ...]
-    first: tuple[str, ...]
+    heads: tuple[str, ...]
     doubts: tuple[str, ...] = ()
+    broken: str = ""
+
+
+class Found(NamedTuple):
+    """The rows of data in a piece of text or a sheet, what stands above them, and the share of numbers."""
+
+    form: TomlTable
+    headings: Headings
+    notation: Notation
+    share: float
 
 
 def layouts_of(path: Path) -> list[Layout]:
     """Every sheet of the file that holds a table; raises DataError where the file cannot be read."""
+    return [long for layout in _layouts(path) for long in _by_channel(layout)]
+
+
+def _by_channel(layout: Layout) -> list[Layout]:
+    """The table as it is, or those of its channels, where it has a row for each value."""
+    if candidates("force", layout.heads, layout.sheet.units) or len(layout.heads) > WIDEST_LONG:
+        return [layout]
+    form = _long_form(layout.sheet)
+    if form is None:
+        return [layout]
+    key = {"long": form.model_dump(exclude_none=True)}
+    sheets = by_channel(layout.sheet, form)
+    return [layout._replace(sheet=sheet, form=layout.form | key, heads=sheet.header) for sheet in sheets]
+
+
+def _long_form(sheet: Sheet) -> LongForm | None:
+    """The form of a sheet in which one column says of what a row is, a force or a way among others."""
+    texts = {number: list(dict.fromkeys(own)) for number, own in texts_of(sheet, range(len(sheet.header))).items()}
+    units = _called(sheet, UNITS)
+    told = [number for number, names in texts.items() if number not in units and _are_channels(names)]
+    values = [number for number in _called(sheet, VALUES) if number not in told]
+    units = [number for number in units if all(map(unit_in, texts[number]))]
+    if len(told) != 1 or len(values) != 1:
+        return None
+    return LongForm(channel=told[0] + 1, value=values[0] + 1, unit=units[0] + 1 if units else None)
+
+
+def _called(sheet: Sheet, words: frozenset[str]) -> list[int]:
+    return [number for number, name in enumerate(sheet.header) if words & set(words_of(name))]
+
+
+def _are_channels(names: Sequence[str]) -> bool:
+    units = list(map(unit_of, names))
+    found = [{item.column for item in candidates(quantity, names, units)} for quantity in ("force", "position")]
+    return all(found) and len(found[0] | found[1]) > 1
+
+
+def _layouts(path: Path) -> list[Layout]:
     kind = kind_of(path)
     if kind == "text":
-        return _of_text(path)
+        sections = _sections(path)
+        found = {name: _of_text(Source(path), name) for name in sections if len(sections) > 1}
+        return [layout for layouts in found.values() for layout in layouts] or _of_text(Source(path))
     if kind == "workbook":
-        found = (_of_rows(name, shown_rows(path, name, HEAD_ROWS), {}, "") for name in sheet_names(path))
-        return [layout for layout in found if layout is not None]
+        hidden = hidden_sheets(path)
+        found = {name: _of_text(Source(path, name)) for name in sheet_names(path)}
+        seen = [layout for name, layouts in found.items() if name not in hidden for layout in layouts]
+        return seen or [layout for layouts in found.values() for layout in layouts]
     if kind != "arrays" or path.suffix.lower() not in ARRAYS:
         return []
-    form = FileForm.model_construct(sheets="**/*")
-    sheets = [sheet for _, sheet in open_sheets(path, form) if sheet.header]
-    return [Layout(sheet.name, {}, sheet.header, sheet.units, ()) for sheet in sheets]
+    sheets = [sheet for _, sheet in open_sheets(path, FileForm.model_construct(sheets="**/*")) if sheet.header]
+    return [Layout(sheet, Source(path, sheet.name), {}, sheet.header) for sheet in sheets]
 
 
-def _of_text(path: Path) -> list[Layout]:
+def _sections(path: Path) -> list[str]:
+    """The names of tables below each other, of a text that begins with one: lines of one cell behind empty ones."""
+    found, empty = list[str](), True
+    with open_utf8(path, "utf-8") as file:
+        for line in islice(file, MOST_LINES):
+            blank = not line.strip(BLANK_CELLS)
+            name = section_name(line.decode(errors="replace")) if empty and not blank else ""
+            if not (found or blank or name):
+                return []
+            found += [name] if name else []
+            empty = blank
+    return found if len(set(found)) == len(found) else []
+
+
+def _of_text(source: Source, section: str = "") -> list[Layout]:
+    lines, encoding, doubts = _beginning(source, section)
+    signs = ("",) if source.sheet else DELIMITERS
+    best = _best([found for sign in signs for found in _parted(lines, sign)])
+    if best is None or _understood(best)[0] < QUANTITIES:
+        best = next(_lying_across(source, encoding, signs), best)
+    if best is None:
+        return []
+    form: TomlTable = ({"encoding": encoding} if encoding != "utf-8" else {}) | best.form
+    form |= {"section": section} if section else {}
+    more, said = ({}, "") if section else _between(source, form)
+    sheets = open_texts(source, FileForm.model_construct(**form, **more))
+    if best.notation.unsure:
+        shown = f"{source.path.name}: {best.notation.unsure!r}"
+        doubts = (*doubts, f"{shown} is read with a decimal comma; it may part thousands")
+    heads = best.headings.heads
+    padded = [tuple([*heads, *sheet.header[len(heads) :]][: len(sheet.header)]) for sheet in sheets]
+    return [Layout(sheet, source, form | more, own, doubts, said) for sheet, own in zip(sheets, padded, strict=True)]
+
+
+def _beginning(source: Source, section: str = "") -> tuple[list[str], str, tuple[str, ...]]:
+    """The first lines, without one that is cut, their encoding, and what is doubtful in it."""
+    if section:
+        part = section_in(source, FileForm.model_construct(section=section, header_row=0))
+        return joined(_decoded(source, "utf-8", part.start, part.end)[:HEAD_ROWS]), "utf-8", ()
+    if source.sheet:
+        return _decoded(source, "utf-8", 0, HEAD_ROWS), "utf-8", ()
     try:
-        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+        with bytes_of(source.path) as file:
             head = file.read(HEAD_BYTES)
-    except (OSError, EOFError) as error:
-        raise DataError(f"{path}: cannot be read: {error}; copy it again from where it was recorded") from error
+    except DAMAGE as error:
+        raise unreadable(source.path, "text", error) from error
+    if b"\r" in head and b"\n" not in head:
+        raise DataError(f"{source}: its lines end as old Macs wrote them; save it with the line ends of today")
     encoding, doubts = encoding_of(head)
     lines = head.decode(encoding, errors="replace").removeprefix("\ufeff").splitlines()[:HEAD_ROWS]
-    whole = lines[:-1] if len(head) == HEAD_BYTES else lines
-    found = [_of_rows("", [_cells(line, sign) for line in whole], {"delimiter": sign}, sign) for sign in DELIMITERS]
-    best = max((item for item in found if item is not None), key=_named, default=None)
-    said = {"encoding": encoding} if encoding != "utf-8" else {}
-    return [] if best is None else [best._replace(form=said | best.form, doubts=(*doubts, *best.doubts))]
+    whole = lines[:-1] if len(head) == HEAD_BYTES and len(lines) < HEAD_ROWS else lines
+    return joined(whole), encoding, doubts
 
 
-def _named(layout: Layout) -> tuple[int, int]:
+def _decoded(source: Source, encoding: str, start: int, end: int | None) -> list[str]:
+    with lines_in(source, FileForm.model_construct(encoding=encoding)) as file:
+        return [line.decode(errors="replace").rstrip("\r\n") for line in islice(file, start, end)]
+
+
+def _lying_across(source: Source, encoding: str, signs: Sequence[str]) -> Iterator[Found]:
+    """The table in the columns of a text of few lines, each of them a quantity."""
+    lines = _decoded(source, encoding, 0, ACROSS_ROWS + 1)
+    for sign in signs if len(lines) <= ACROSS_ROWS else ():
+        turned = zip_longest(*(cells_of(line, sign) for line in lines), fillvalue="")
+        found = _of_rows(list(islice(turned, HEAD_ROWS)), sign)
+        if found is not None and _understood(found)[0] >= QUANTITIES:
+            yield found._replace(form={**found.form, "across": True})
+
+
+def _parted(lines: Sequence[str], sign: str) -> list[Found]:
+    """The table that the lines hold where ``sign`` parts their cells, as they stand and freed of names and units."""
+    plain = [cells_of(line, sign) for line in lines]
+    found = _of_rows(plain, sign, lines)
+    if found is not None and found.share == 1.0:
+        return [found]
+    loose = [loosened(line, sign) for line in lines]
+    parted = [cells_of(line, sign) for line in loose]
+    freed = _of_rows([[affixed(cell).number for cell in row] for row in parted], sign, loose, parted)
+    return [item for item in (found, freed) if item is not None]
+
+
+def _best(found: Sequence[Found]) -> Found | None:
+    """The one in which most quantities are found, of those with the most numbers; blanks only where no sign does."""
+    share = max((item.share for item in found), default=0.0)
+    sure = [item for item in found if item.share >= SURE_SHARE * share]
+    signs = [item for item in sure if item.form.get("delimiter") != " " and len(item.headings.heads) > 1]
+    widest = max((len(item.headings.heads) for item in signs), default=0)
+    kept = [item for item in sure if item in signs or len(item.headings.heads) > widest]
+    return max(kept or sure, key=_understood, default=None)
+
+
+def _between(source: Source, form: TomlTable) -> tuple[TomlTable, str]:
+    """The keys for lines that are no rows of the table, unless they are many, and the doubt that says so."""
+    found = interruptions_of(source, FileForm.model_construct(**form))
+    if found.headers:
+        said = f"its row of names comes {found.headers + 1} times; what stands below each is a recording of its own"
+        said = f"{source.path.name}: {said}; if they are one, take repeats out"
+        return {"repeats": True, "other_lines": "drop"}, said
+    said = f"{found.text[:40]!r} is no row of the table, as {found.others} in all; they are left out"
+    if found.gap and not (found.another or found.others):
+        said = f"{source._replace(path=Path(source.path.name)).line(found.gap)}: rows go on below an empty line"
+        return {}, f"{said}; if they are another table, save it as a file of its own"
+    if found.another:
+        said = f"{found.text[:40]!r} begins another table, which is not read; save it as a file of its own"
+    elif not 0 < found.others <= OTHER_SHARE * found.lines:
+        return {}, ""
+    return {"other_lines": "drop"}, f"{source._replace(path=Path(source.path.name)).line(found.line)}: {said}"
+
+
+def _understood(found: Found) -> tuple[int, int]:
     """How many quantities are found in it, and how many columns."""
-    found = (candidates(quantity, layout.header, layout.units) for quantity in WORDS)
-    return sum(bool(items) for items in found), len(layout.header)
+    heads, units = found.headings.heads, found.headings.units
+    return sum(bool(candidates(quantity, heads, units)) for quantity in WORDS), len(heads)
 
 
 def encoding_of(head: bytes) -> tuple[str, tuple[str, ...]]:
     """The encoding whose header has the most words that are known, and a doubt where others have as many."""
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16", ()
+    zeros = [head[start:HEAD_ROWS:2].count(0) for start in (0, 1)]
+    if max(zeros) > len(head[:HEAD_ROWS]) // 4:  # of two bytes of a digit one is none
+        return ("utf-16-be" if zeros[0] > zeros[1] else "utf-16-le"), ()
     if _decodes(head, "utf-8"):
         return "utf-8", ()
     header = b"\n".join(head.splitlines()[:HEAD_ROWS])
     known = {name: _words(header, name) for name in ENCODINGS if _decodes(head, name)}
     best = max(known, key=lambda name: known[name], default="cp1252")
-    rivals = [name for name in known if known[name] == known[best] and name != best]
-    shown = {
-        name: next((line for line in header.decode(name).splitlines() if not line.isascii()), "") for name in known
-    }
-    texts = "; ".join(f"{name}: {shown[name]!r}" for name in (best, *rivals))
-    return best, (f"the encoding may be {texts}",) if rivals else ()
+    others = [name for name in known if known[name] == known[best] and name != best]
+    said = {name: next((line for line in header.decode(name).splitlines() if not line.isascii()), "") for name in known}
+    texts = "; ".join(f"{name}: {said[name]!r}" for name in (best, *others))
+    return best, (f"the encoding may be {texts}",) if others else ()
 
 
 def _decodes(head: bytes, name: str) -> bool:
@@ -98,37 +263,78 @@ def _decodes(head: bytes, name: str) -> bool:
 
 def _words(header: bytes, name: str) -> int:
     words = re.split(r"[\s,;|\"()\[\]]+", header.decode(name))
-    return sum(knows(word) for word in words if not word.isascii())
+    return sum(knows(word) or bool(unit_in(word)) for word in words if not word.isascii())
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
-    return [cell.strip().strip('"').strip() for cell in line.split(delimiter)]
+def _of_rows(
+    rows: Sequence[Sequence[str]], delimiter: str, lines: Sequence[str] = (), affixed_rows: Sequence[Sequence[str]] = ()
+) -> Found | None:
+    """The longest run of rows with numbers and equally many cells, and what stands above it; None without one.
 
-
-def _of_rows(sheet: str, rows: Sequence[Sequence[str]], form: TomlTable, delimiter: str) -> Layout | None:
-    """The longest run of rows with numbers and equally many cells, and what stands above it; None without one."""
-    start, end = _longest([_kind(row, delimiter) for row in rows])
-    if end - start < 2:  # two rows are the least that has a rate
+    ``lines`` are the rows of a text as they stand, ``affixed_rows`` their cells with names and units.
+    """
+    kinds = [_kind(row, delimiter) for row in rows]
+    longest, end = _longest(kinds)
+    if end - longest < 2:  # two rows are the least that has a rate
         return None
-    data = rows[start:end]
-    unit_row = start if start and _are_units(rows[start - 1]) else 0
-    above = start - 1 - bool(unit_row)
-    header_row = above + 1 if above >= 0 and _names(rows[above]) else 0
-    width = len(data[0])
-    header = [*(rows[header_row - 1] if header_row else []), *[""] * width][:width]
-    units = [*(rows[unit_row - 1] if unit_row else []), *[""] * width][:width]
-    names = tuple(name or str(number + 1) for number, name in enumerate(header))
-    comma = delimiter not in ("", ",") and any(_COMMA.fullmatch(cell) for row in data for cell in row)
-    said = {**form, **({"decimal": ","} if comma else {}), "header_row": header_row, "unit_row": unit_row}
-    found = tuple(unit_in(unit) or unit_of(name) for unit, name in zip(units, names, strict=True))
-    return Layout(sheet, said, names, found, tuple(data[0]))
+    start = _begins(rows, kinds, longest)
+    data = [row for row, kind in zip(rows[start:end], kinds[start:end], strict=True) if kind == kinds[longest]]
+    used = sorted(sum(map(bool, row)) for row in data)[len(data) // 2]
+    above = [above_columns(line, delimiter, lines[start]) for line in lines[:start]] if lines else rows[:start]
+    headings = headings_of(above, len(data[0]), used)
+    sooner = _sooner(rows, headings.header_row) if lines else 0
+    headings = headings.moved(-sooner)
+    if affixed_rows:
+        headings = _from_cells(headings, [affixed(cell) for cell in affixed_rows[start]])
+    notation = notation_of(cell for row in data for cell in row)
+    form: TomlTable = {"delimiter": delimiter} if delimiter else {}
+    form |= {"affixes": True} if affixed_rows else {}
+    form |= {"decimal": ","} if notation.decimal == "," else {}
+    form |= {"thousands": notation.thousands} if notation.thousands else {}
+    form |= {"exponent": "D"} if notation.exponent == "D" else {}
+    place = {"header_row": headings.header_row, "unit_row": headings.unit_row, **_first(headings, start - sooner)}
+    return Found({**form, **place}, headings, notation, _share(data))
+
+
+def _begins(rows: Sequence[Sequence[str]], kinds: Sequence[int], longest: int) -> int:
+    """Where the table begins whose longest run of rows is known: above lines between its rows that are no names."""
+    start = longest
+    for at in range(longest - 1, -1, -1):
+        if kinds[at] == kinds[longest]:
+            start = at
+        elif sum(map(bool, rows[at])) > 1 and any(map(knows, rows[at])):
+            break
+    return start
+
+
+def _sooner(rows: Sequence[Sequence[str]], header_row: int) -> int:
+    """How many rows above the row of names, counted from 1, it stands for the first time."""
+    return header_row - 1 - list(rows).index(rows[header_row - 1]) if header_row else 0
+
+
+def _from_cells(headings: Headings, cells: Sequence[Affixed]) -> Headings:
+    """With the names and units in the cells where none stand above them."""
+    heads = [cell.name or head for cell, head in zip(cells, headings.heads, strict=True)]
+    units = [unit or unit_in(cell.unit) for cell, unit in zip(cells, headings.units, strict=True)]
+    return headings._replace(heads=headings.heads if headings.header_row else tuple(heads), units=tuple(units))
+
+
+def _share(rows: Sequence[Sequence[str]]) -> float:
+    """How many of the cells that say something are numbers or times."""
+    filled = [cell for row in rows for cell in row if cell and cell.lower() not in NO_VALUE]
+    return sum(map(is_value, filled)) / max(1, len(filled))
+
+
+def _first(headings: Headings, start: int) -> TomlTable:
+    """The first row of data, where it is not the one below names and units."""
+    return {"first_row": start + 1} if start != max(headings.header_row, headings.unit_row) else {}
 
 
 def _kind(row: Sequence[str], delimiter: str) -> int:
     """How many cells a row of data has; 0 for a row of anything else."""
-    filled = [cell for cell in row if cell]
-    least = 1 if delimiter == "" else 2
-    numbers = sum(bool(_NUMBER.fullmatch(cell)) for cell in filled)
+    filled = [cell for cell in row if cell and cell.lower() not in NO_VALUE]
+    least = 1 if delimiter == "" else min(2, len(row))
+    numbers = sum(map(is_value, filled))
     return len(row) if numbers >= least and 2 * numbers >= len(filled) else 0
 
 
@@ -139,12 +345,3 @@ def _longest(kinds: Sequence[int]) -> tuple[int, int]:
             best = max(best, (start, at), key=lambda span: span[1] - span[0] if kinds and kinds[span[0]] else 0)
             start = at
     return best if kinds and kinds[best[0]] else (0, 0)
-
-
-def _are_units(row: Sequence[str]) -> bool:
-    filled = [cell for cell in row if cell]
-    return bool(filled) and 2 * sum(bool(unit_in(cell)) for cell in filled) >= len(filled)
-
-
-def _names(row: Sequence[str]) -> bool:
-    return any(cell and not _NUMBER.fullmatch(cell) for cell in row)

@@ -1,50 +1,38 @@
 """A mapping proposed for a folder nobody described, with what is doubtful in it and what cannot be known."""
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from rig.config.table import TomlTable, parse
-from rig.errors import DataError, UsageError
-from rig.intake.folder import files_in
-from rig.intake.layout import Layout, layouts_of
+from rig.config.table import TomlTable
+from rig.intake.aside import WAYS, Group, left_aside, nothing_found, untimed
+from rig.intake.families import INTERRUPTED, ColumnGroup, all_tables, groups_of
+from rig.intake.folder import below, files_in
+from rig.intake.labelling import Labels, labels_in
 from rig.intake.mapping import FileForm
-from rig.intake.readers import kind_of, open_sheets
-from rig.intake.roles import candidates
-from rig.intake.rows import pieces
-from rig.intake.units import LINEAR
+from rig.intake.measured import chosen, measured_in, ranks_of, spoilt
+from rig.intake.naming import channels_of, names_of
+from rig.intake.questions import JointQuestion, OpenQuestion, Question, inline
+from rig.intake.readers import kind_of
+from rig.intake.survey import texts_of
+from rig.intake.timebase import clock_of, span_s
+from rig.intake.units import ROTARY
 
-USUAL = {"time": "s", "force": "N", "position": "mm"}
-Group = list[tuple[Path, Layout]]
-
-
-@dataclass(frozen=True)
-class OpenQuestion:
-    """What the data cannot say. ``key`` is where the answer stands in the mapping, ``usual`` the likeliest answer."""
-
-    text: str
-    key: tuple[str | int, ...]
-    usual: str | float
-
-    @property
-    def line(self) -> str:
-        """The line of the mapping that answers it."""
-        place = ".".join(str(part) for part in self.key if not isinstance(part, int))
-        return f"{place} = {json.dumps(self.usual)}"
-
-    def answer(self, tree: TomlTable, said: str) -> None:
-        """Puts the answer into the mapping; raises UsageError where a number is needed and none was said."""
-        table: Any = tree
-        for part in self.key[:-1]:
-            table = table[part]
-        try:
-            table[self.key[-1]] = type(self.usual)(said)
-        except ValueError as error:
-            raise UsageError(f"{said!r} is no number; {self.text}") from error
+Picked = list[tuple[TomlTable, Group, tuple[str, ...]]]
+# A way and a force of a rotary axis whose lever nobody states: at this one a radian is a metre and a N m a N.
+LEVER_MM = 1000.0
+# Two loggers that are started by hand begin and end apart by more than this share of what they recorded.
+CLOCKS_APART = 0.02
+# A table of fewer rows in which no word is known is a list of settings or results.
+FEWEST_ROWS = 10
+# Where more of the rows would be left out, time starts anew for another recording, or the column is no time.
+LATE_SHARE = 0.1
+# Of three questions people give up; what can be asked as one is.
+MOST_QUESTIONS = 2
+OPEN = "# open: "
 
 
 @dataclass(frozen=True)
@@ -53,162 +41,284 @@ class Proposal:
 
     tree: TomlTable
     doubts: tuple[str, ...]
-    questions: tuple[OpenQuestion, ...]
+    questions: tuple[Question, ...]
 
     @property
     def text(self) -> str:
         """The mapping as a file."""
         head = [f"# doubtful: {doubt}" for doubt in self.doubts]
-        head += [f"# open: {question.text}; {question.line}" for question in self.questions]
-        session = "\n".join(f"{key} = {_inline(value)}" for key, value in self.tree.items() if key != "tables")
-        tables = [_table(table) for table in self.tree["tables"]]
-        return "\n".join([*head, session, *tables])
+        head += [f"{OPEN}{question.text}; {question.line}" for question in self.questions]
+        session = "\n".join(f"{key} = {inline(value)}" for key, value in self.tree.items() if key != "tables")
+        return "\n".join([*head, session, *map(_lines, self.tree["tables"])])
+
+    def answered(self, answers: Sequence[str]) -> "Proposal":
+        """The same with an answer to each question; raises UsageError where one is none."""
+        for question, said in zip(self.questions, answers, strict=True):
+            question.answer(self.tree, said)
+        turning = [table for table in self.tree["tables"] if _turns(table)]
+        for table in turning:
+            table["lever_mm"] = LEVER_MM
+        said = f"a torque and an angle are taken at a lever of {LEVER_MM:g} mm; state lever_mm where it is another"
+        return replace(self, questions=(), doubts=(*self.doubts, *([said] if turning else [])))
+
+
+def _turns(table: TomlTable) -> bool:
+    units = {quantity: column.get("unit", "") for quantity, column in table["columns"].items()}
+    return any(unit in ROTARY.get(quantity, {}) for quantity, unit in units.items())
 
 
 def propose(folder: Path) -> Proposal:
-    """What the folder seems to hold; raises DataError where nothing in it has a force and a position in one table."""
-    groups, doubts = _groups(folder)
-    if not groups:
-        raise DataError(f"{folder}: no table with force and position was found in it; write a mapping by hand")
-    tables, questions = list[TomlTable](), list[OpenQuestion]()
-    for number, group in enumerate(groups):
-        table, said, asked = _proposed(folder, group, number)
+    """What the folder seems to hold; raises DataError where nothing in it may be a force and a position."""
+    doubts, files = list[str](), files_in(folder)
+    groups = groups_of(list(all_tables(files, doubts)))
+    picked, recording = _picked(folder, groups)
+    if not picked:
+        raise nothing_found(folder, files, groups, doubts)
+    tables, questions, names = list[TomlTable](), list[OpenQuestion](), dict[str, str]()
+    for pattern, tables_alike, quantities in picked:
+        group, empty = _with_numbers(tables_alike)
+        doubts += [f"left aside, no numbers in its columns: {table.layout.sheet.where}" for table in empty]
+        table, templates, said, asked = _proposed(folder, group, quantities, pattern)
         tables.append(table)
+        names |= templates
         doubts += said
-        questions += asked
-    stems = [path.name for group in groups for path in {path for path, _ in group}]
-    tree: TomlTable = {} if len(stems) == len(set(stems)) else {"recording": "{folder}-{file}"}
-    return Proposal({**tree, "tables": tables}, tuple(doubts), tuple(questions))
+        questions += [replace(question, tables=(len(tables) - 1,)) for question in asked]
+    if recording:
+        doubts += _two_clocks([group[0] for _, group, _ in picked], tables)
+    doubts += untimed(groups, [table for _, group, _ in picked for table in group])
+    doubts += left_aside(folder, files, [table for _, group, _ in picked for table in group])
+    tree = {**_recording(picked), **names, **recording, "tables": tables}
+    proposal = Proposal(tree, tuple(dict.fromkeys(doubts)), tuple(_few(list(_together(questions)))))
+    return proposal if questions else proposal.answered([])
 
 
-def _groups(folder: Path) -> tuple[list[Group], list[str]]:
-    """Sheets that are written alike, together; those without force and position are left out and said."""
-    groups: dict[str, Group] = {}
-    doubts = list[str]()
-    for path in files_in(folder):
-        layouts = _layouts(path, doubts) if kind_of(path) else []
-        for layout in layouts:
-            if _columns(layout).keys() >= {"force", "position"}:
-                key = json.dumps([kind_of(path), layout.form, layout.header, layout.units])
-                groups.setdefault(key, []).append((path, layout))
-    timed = [group for group in groups.values() if "time" in _columns(group[0][1])]
-    return timed or list(groups.values()), doubts
+def _with_numbers(group: Group) -> tuple[Group, Group]:
+    """The tables whose columns hold numbers as the others' do, and those where one is empty."""
+    found = [len(chosen(table)) for table in group]
+    whole = [table for table, count in zip(group, found, strict=True) if count == max(found)]
+    return whole, [table for table, count in zip(group, found, strict=True) if count < max(found)]
 
 
-def _layouts(path: Path, doubts: list[str]) -> list[Layout]:
-    try:
-        return layouts_of(path)
-    except DataError as error:
-        doubts.append(str(error))
+def _picked(folder: Path, groups: Sequence[Group]) -> tuple[Picked, TomlTable]:
+    """The groups that are taken, each with its own keys and quantities; what recordings of several files are called."""
+    known = [(group, chosen(group[0])) for group in groups]
+    both = [(group, found) for group, found in known if "force" in found and not found.keys().isdisjoint(WAYS)]
+    best = min((ranks_of(group[0], "force")[found["force"]] for group, found in both), default=None)
+    pair = _pair(folder, known, best)
+    if pair:
+        return pair
+    if both:
+        timed = [item for item in both if _is_timed(item[0][0])] or both
+        return [({}, group, _quantities(found)) for group, found in timed], {}
+    most = max((len(found) for _, found in known), default=0)
+    asked = [(group, found) for group, found in known if len(found) == most and _may_be(group[0], found)]
+    return [({}, group, _quantities(found)) for group, found in asked], {}
+
+
+def _pair(
+    folder: Path, known: Sequence[tuple[Group, Mapping[str, int]]], best: tuple[bool, int, int] | None
+) -> tuple[Picked, TomlTable] | None:
+    """Tables with force and with a way that go together by their names, if that force is surer than ``best``."""
+    forces = [(group, found) for group, found in known if "force" in found and found.keys().isdisjoint(WAYS)]
+    ways = [(group, found) for group, found in known if not found.keys().isdisjoint(WAYS)]
+    for (force, found), (way, moved) in product(forces, ways):
+        keys = _joined(folder, force, way)
+        if keys and (best is None or ranks_of(force[0], "force")[found["force"]] < best):
+            ours, theirs, recording = keys
+            own = next(name for name in WAYS if name in moved)
+            return [(ours, force, ("force",)), (theirs, way, (own,))], {"recording": recording}
+    return None
+
+
+def _joined(folder: Path, force: Group, way: Group) -> tuple[TomlTable, TomlTable, str] | None:
+    """The keys of both that say which of them go together, sheets of a file or files, and the name of a recording."""
+    if {table.layout.sheet.where for table in force} == {table.layout.sheet.where for table in way}:
+        return {}, {}, "{file}-{sheet}" if force[0].layout.sheet.name else "{file}"
+    if {table.path for table in force} == {table.path for table in way}:
+        found = channels_of(*([table.layout.sheet.name for table in group] for group in (force, way)))
+        name = found and found[2].replace("{folder}", "")
+        return found and ({"sheets": found[0]}, {"sheets": found[1]}, "{file}" + (f"-{name}" if name else ""))
+    found = channels_of(_stems(folder, force), _stems(folder, way))
+    return found and ({"files": found[0] + _ending(force)}, {"files": found[1] + _ending(way)}, found[2])
+
+
+def _two_clocks(both: Sequence[ColumnGroup], tables: Sequence[TomlTable]) -> Iterator[str]:
+    """Marks the second of two tables as on a clock of its own where their times do not begin and end together."""
+    spans = [span_s(table, made["time"]) for table, made in zip(both, tables, strict=True)]
+    one = len({table.layout.sheet.where for table in both}) == 1 or all("section" in made for made in tables)
+    if one or any(span is None for span in spans):
+        return
+    (start, end), (other_start, other_end) = (span for span in spans if span is not None)
+    apart_s = abs((end - start) - (other_end - other_start)) + abs(start - other_start) * (start != 0 != other_start)
+    if apart_s > CLOCKS_APART * (end - start):
+        tables[1]["clock"] = "own"
+        names = " and ".join(table.path.name for table in both)
+        yield f"{names}: their times do not begin and end together; each is taken as a clock of its own"
+
+
+def _quantities(found: Mapping[str, int]) -> tuple[str, ...]:
+    return ("force", "velocity" if "velocity" in found else "position")
+
+
+def _is_timed(table: ColumnGroup) -> bool:
+    time, _, asked = clock_of(table)
+    return bool(time) and not asked
+
+
+def _may_be(table: ColumnGroup, found: Mapping[str, int]) -> bool:
+    """Whether numbers move in enough columns besides time to be force and position, in rows enough to see it."""
+    time = _number(table, clock_of(table)[0])
+    moving = [number for number, looks in table.looks.items() if looks.moves and number != time]
+    rows = max((looks.values.size for looks in table.looks.values()), default=0)
+    return (len(moving) >= 2 and rows >= FEWEST_ROWS) or (len(moving) >= 1 and bool(found))
+
+
+def _proposed(
+    folder: Path, group: Group, quantities: Sequence[str], pattern: TomlTable
+) -> tuple[TomlTable, TomlTable, list[str], list[OpenQuestion]]:
+    """A table of the mapping with the ``pattern`` of its files or sheets, templates of names, doubts and questions."""
+    first = group[0]
+    time, doubts, asked = clock_of(first)
+    at = None if {"wraps_at", "finer"} & time.keys() else _number(first, time)
+    measured = measured_in(first, _number(first, time), quantities)
+    files, templates = (pattern["files"], {}) if "files" in pattern else _files(folder, group)
+    table: TomlTable = {
+        "files": files, **_sheets(group), **pattern, **first.layout.form, **_interrupted(group), **_missing(group),
+    }  # fmt: skip
+    taken = [number for number in (_number(first, time), *chosen(first).values()) if number is not None]
+    labels = labels_in(first, taken, at)
+    table |= {"label": labels.label} if labels.label is not None else {}
+    table |= {"labels": {"part": first.index}} if first.index else {}
+    late = _late(first, at, labels.label)
+    table |= {"disorder": "drop"} if late else {}
+    table |= {"time": time, "columns": measured.columns}
+    spoils = [said for table in group for item in chosen(table).items() for said in spoilt(table, *item)]
+    said = [
+        *first.layout.doubts, *_broken(group), *doubts, *spoils, *measured.doubts, *labels.doubts, *late,
+        *_senses(first, measured.columns),
+    ]  # fmt: skip
+    return table, {**templates, **labels.templates, **_apart(group, labels)}, said, [*asked, *measured.questions]
+
+
+def _apart(group: Group, labels: Labels) -> TomlTable:
+    """What recordings are called where labels come again in another file or sheet: by both."""
+    named = labels.templates.get("recording", "{label}")
+    places = labels.label if isinstance(labels.label, dict) else {"label": labels.label}
+    telling = [place for name, place in places.items() if place is not None and f"{{{name}}}" in named]
+    if not telling:
+        return {}
+    sheets = [table.layout.sheet for table in group]
+    found = [texts_of(sheet, [sheet.number(place) for place in telling]).values() for sheet in sheets]
+    names = [set(zip(*columns, strict=True)) for columns in found]
+    alone = not _recording([({}, group, ())]) and sum(map(len, names)) == len(set().union(*names))
+    return {} if alone else {"recording": f"{_place(group)}-{named}"}
+
+
+def _number(table: ColumnGroup, time: TomlTable) -> int | None:
+    return table.layout.sheet.number(time["column"]) if "column" in time else None
+
+
+def _interrupted(group: Group) -> TomlTable:
+    """The keys for lines that are no rows, where any of the tables has them."""
+    return {key: form[key] for form in (table.layout.form for table in group) for key in INTERRUPTED if key in form}
+
+
+def _broken(group: Group) -> Iterator[str]:
+    """What is said of lines that are no rows in the first file that has them, and in how many more there are some."""
+    found = {table.path: table.layout.broken for table in group if table.layout.broken}
+    more = f" (and so in {len(found) - 1} more files)" if len(found) > 1 else ""
+    yield from (said + more for said in list(found.values())[:1])
+
+
+def _missing(group: Group) -> TomlTable:
+    """The words and numbers that stand for none in any of the tables, with those that always do."""
+    found = dict.fromkeys(word for table in group for looks in table.looks.values() for word in looks.missing)
+    usual = FileForm.model_fields["missing"].default
+    return {"missing": [*usual, *(word for word in found if word not in usual)]} if set(found) - set(usual) else {}
+
+
+def _late(table: ColumnGroup, at: int | None, label: object) -> list[str]:
+    """That rows are left out whose time does not grow, where there are some and no label starts it anew."""
+    if at is None or at not in table.looks or label is not None:
         return []
+    values = table.looks[at].values
+    late = np.flatnonzero(values[1:] <= np.maximum.accumulate(values)[:-1])
+    if not 0 < late.size <= LATE_SHARE * values.size:
+        return []
+    place = table.layout.sheet.place(int(late[0]) + 1)
+    return [f"{place}: time does not grow, as in {late.size} rows in all; they are left out"]
 
 
-def _columns(layout: Layout) -> dict[str, int]:
-    found = {
-        quantity: candidates(quantity, layout.header, layout.units)
-        for quantity in ("time", "force", "position", "label")
-    }
-    return {quantity: items[0].column for quantity, items in found.items() if items}
+def _senses(table: ColumnGroup, columns: TomlTable) -> Iterator[str]:
+    said = ", ".join(f"positive {quantity} as {column['positive']}" for quantity, column in columns.items())
+    if said:
+        other = "as if pressed; pulled, write the other of compression and tension, into and out"
+        yield f"{table.path.name}: {said}, {other}"
 
 
-def _proposed(folder: Path, group: Group, number: int) -> tuple[TomlTable, list[str], list[OpenQuestion]]:
-    layout = group[0][1]
-    columns = _columns(layout)
-    table: TomlTable = {"files": _files(folder, group), **_sheets(group), **layout.form}
-    table["time"] = _time(layout, columns)
-    if "label" in columns:
-        table["label"] = _named(layout, columns["label"])
-    table["columns"] = {key: _value(layout, columns[key]) for key in ("force", "position")}
-    path = group[0][0]
-    senses = _senses(path, table)
-    for key, sense in senses.items():
-        table["columns"][key]["positive"] = sense
-    return table, [*layout.doubts, *_doubts(layout, path, senses)], list(_questions(layout, columns, table, number))
+def _files(folder: Path, group: Group) -> tuple[str | list[str], TomlTable]:
+    """A pattern that names these files and no others of the folder, with what varies in their names; or their list."""
+    chosen_files = list(dict.fromkeys(table.path for table in group))
+    ending = _ending(group)
+    if folder.is_dir() and ending is not None:
+        beside = [path for path in files_in(folder) if path.name.endswith(ending) and path not in chosen_files]
+        names = names_of(_stems(folder, group), [below(folder, path).removesuffix(ending) for path in beside])
+        if names or not beside:
+            return (names.files + ending, names.templates) if names else (f"**/*{ending}", {})
+    return sorted(below(folder, path) for path in chosen_files), {}
 
 
-def _files(folder: Path, group: Group) -> str | list[str]:
-    """A pattern that names these files and no others of the folder, or their list."""
-    chosen = {path for path, _ in group}
-    suffixes = {"".join(path.suffixes[-2:]) if path.suffix == ".gz" else path.suffix for path in chosen}
-    if folder.is_dir() and len(suffixes) == 1:
-        (suffix,) = suffixes
-        if {path for path in files_in(folder) if path.name.endswith(suffix)} == chosen:
-            return f"**/*{suffix}"
-    return sorted(path.name if folder.is_file() else path.relative_to(folder).as_posix() for path in chosen)
+def _ending(group: Group) -> str:
+    path = group[0].path
+    return "".join(path.suffixes[-2:]) if path.suffix == ".gz" else path.suffix
+
+
+def _stems(folder: Path, group: Group) -> list[str]:
+    names = dict.fromkeys(below(folder, table.path) for table in group)
+    return [name.removesuffix(_ending(group)) for name in names]
 
 
 def _sheets(group: Group) -> TomlTable:
-    names = list(dict.fromkeys(layout.sheet for _, layout in group if layout.sheet))
+    if kind_of(group[0].path) == "text":  # whose tables are counted, in each file others
+        return {}
+    names = list(dict.fromkeys(table.layout.source.sheet for table in group if table.layout.source.sheet))
     return {"sheets": names} if names else {}
 
 
-def _named(layout: Layout, column: int) -> str | int:
-    name = layout.header[column]
-    return name if layout.header.count(name) == 1 and name != str(column + 1) else column + 1
+def _recording(picked: Picked) -> TomlTable:
+    """What tells recordings apart where the names of files do not."""
+    template = _place([table for _, group, _ in picked for table in group])
+    return {"recording": template} if template.startswith("{folder}") or template.endswith("{part}") else {}
 
 
-def _value(layout: Layout, column: int) -> TomlTable:
-    unit = layout.units[column]
-    return {"column": _named(layout, column), **({"unit": unit} if unit else {})}
+def _place(tables: Group) -> str:
+    """A template of the file, with what else tells the tables apart."""
+    paths = list(dict.fromkeys(table.path for table in tables))
+    folders = "{folder}-" if len({path.name for path in paths}) < len(paths) else ""
+    sheets = "-{sheet}" if any(table.layout.sheet.name for table in tables) else ""
+    parts = "-{part}" if any(table.index for table in tables) else ""
+    return f"{folders}{{file}}{sheets}{parts}"
 
 
-def _time(layout: Layout, columns: Mapping[str, int]) -> TomlTable:
-    if "time" not in columns:
-        return {}
-    first = layout.first[columns["time"]] if layout.first else ""
-    iso = len(first) > 10 and first[:4].isdigit() and first[4] == "-"
-    found = _value(layout, columns["time"])
-    return {"column": found["column"], "form": "iso"} if iso else found
+def _together(questions: Sequence[OpenQuestion]) -> Iterator[OpenQuestion]:
+    """One question for all tables that ask the same of their columns."""
+    kept: dict[object, OpenQuestion] = {}
+    for question in questions:
+        key = (question.quantity, len(question.choices) == 1, question.choices[1:] and question.choices)
+        first = kept.setdefault(repr(key), question)
+        kept[repr(key)] = replace(first, tables=tuple(dict.fromkeys((*first.tables, *question.tables))))
+    yield from kept.values()
 
 
-def _doubts(layout: Layout, path: Path, senses: Mapping[str, str]) -> Iterator[str]:
-    for quantity in ("time", "force", "position"):
-        found = candidates(quantity, layout.header, layout.units)
-        rivals = [layout.header[item.column] for item in found[1:] if item.rank[0] == found[0].rank[0]]
-        if rivals:
-            taken = layout.header[found[0].column]
-            yield f"{path.name}: {quantity} is taken to be {taken!r}; it may be {', '.join(map(repr, rivals))}"
-    said = ", ".join(f"positive {quantity} as {sense}" for quantity, sense in senses.items())
-    yield f"{path.name}: {said}, as if pressed; pulled, write the other of compression and tension, into and out"
+def _few(questions: Sequence[OpenQuestion]) -> Sequence[Question]:
+    """At most as many as people answer, where questions of columns of the same tables can be asked as one."""
+    columns = [question for question in questions if question.quantity != "time"]
+    if len(questions) <= MOST_QUESTIONS or len({question.tables for question in columns}) > 1:
+        return questions
+    return [*(question for question in questions if question.quantity == "time"), JointQuestion(tuple(columns))]
 
 
-def _senses(path: Path, table: TomlTable) -> dict[str, str]:
-    """The senses in which the largest force is compression and lies deeper than the start; ours where none is seen."""
-    try:
-        _, sheet = next(iter(open_sheets(path, parse(FileForm, table, path.name))))
-        values = next(pieces(sheet, parse(FileForm, table, path.name))).values
-    except UsageError:
-        return {"force": "compression", "position": "into"}
-    force, position = (np.nan_to_num(values[quantity]) for quantity in ("force", "position"))
-    risen = force - np.median(force[: max(1, force.size // 10)])
-    most = int(np.argmax(np.abs(risen)))
-    return {
-        "force": "tension" if risen[most] < 0 else "compression",
-        "position": "out" if position[most] < position[0] else "into",
-    }
-
-
-def _questions(layout: Layout, columns: Mapping[str, int], table: TomlTable, number: int) -> Iterator[OpenQuestion]:
-    if "time" not in columns:
-        yield OpenQuestion(
-            "no column of time; at what rate are the rows, in Hz?", ("tables", number, "time", "rate_Hz"), 0.0
-        )
-    for quantity in ("time", "force", "position"):
-        iso = quantity == "time" and table["time"].get("form") == "iso"
-        if quantity in columns and not layout.units[columns[quantity]] and not iso:
-            place: tuple[str | int, ...] = ("time",) if quantity == "time" else ("columns", quantity)
-            units = ", ".join(LINEAR[quantity])
-            text = f"nothing says the unit of {quantity} ({layout.header[columns[quantity]]!r}); one of {units}"
-            yield OpenQuestion(text, ("tables", number, *place, "unit"), USUAL[quantity])
-
-
-def _table(table: TomlTable) -> str:
-    return "\n".join(["\n[[tables]]", *(f"{key} = {_inline(value)}" for key, value in table.items())]) + "\n"
-
-
-def _inline(value: object) -> str:
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_inline(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return "[" + ", ".join(map(_inline, value)) + "]"
-    return json.dumps(value, ensure_ascii=False)
+def _lines(table: TomlTable) -> str:
+    plain = [f"{key} = {inline(value)}" for key, value in table.items() if key != "columns"]
+    columns = [f"columns.{quantity} = {inline(value)}" for quantity, value in table["columns"].items()]
+    return "\n".join(["\n[[tables]]", *plain, *columns]) + "\n"

@@ -1,42 +1,63 @@
 """Which reader a file has."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from importlib import import_module
 from pathlib import Path
 
 from rig.errors import DataError
-from rig.intake.arrays import open_hdf5, open_mat, open_mcap, open_parquet
+from rig.intake.long import by_channel
 from rig.intake.mapping import FileForm
 from rig.intake.pattern import matched
-from rig.intake.sheet import Sheet
-from rig.intake.text import open_text
-from rig.intake.workbook import open_sheet, sheet_names
+from rig.intake.sheet import Sheet, Source
+from rig.intake.text import open_texts
+from rig.intake.workbook import sheet_names
 
 WORKBOOKS = (".xls", ".xlsx", ".xlsm", ".xlsb", ".ods")
-TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".tab", ".log")
+# Besides plain ones: LabVIEW (lvm), Zwick (tra), MTS and Instron (raw), Windows printing to a file (prn).
+TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".tab", ".log", ".lvm", ".tra", ".raw", ".prn", ".ascii", ".out")
+# By the name of their function in `rig.intake.arrays`, whose libraries take as long to load as a small text to import.
 ARRAYS = {
-    ".mat": open_mat, ".h5": open_hdf5, ".hdf5": open_hdf5, ".hdf": open_hdf5, ".parquet": open_parquet,
-    ".mcap": open_mcap,
+    ".mat": "open_mat", ".h5": "open_hdf5", ".hdf5": "open_hdf5", ".hdf": "open_hdf5", ".parquet": "open_parquet",
+    ".mcap": "open_mcap", ".jsonl": "open_json_lines", ".ndjson": "open_json_lines",
 }  # fmt: skip
 
 
 def kind_of(path: Path) -> str:
     """``text``, ``workbook``, ``arrays``, or empty where no reader takes the file."""
     suffix = (path.with_suffix("") if path.suffix == ".gz" else path).suffix.lower()
-    return "text" if suffix in TEXTS else "workbook" if suffix in WORKBOOKS else "arrays" if suffix in ARRAYS else ""
+    if suffix in WORKBOOKS:
+        return "text" if _is_text(path) else "workbook"
+    return "text" if suffix in TEXTS else "arrays" if suffix in ARRAYS else ""
+
+
+def _is_text(path: Path) -> bool:
+    """Whether a workbook by its name is a text with tabs, as many programs write for spreadsheets to open."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(4096)
+    except OSError:
+        return False
+    return head.startswith((b"\xff\xfe", b"\xfe\xff")) or (b"\n" in head and b"\0" not in head and head[:1] != b"<")
 
 
 def open_sheets(path: Path, form: FileForm) -> Iterable[tuple[dict[str, str], Sheet]]:
     """The sheets that ``form`` names, with what stands in the places of its pattern; raises DataError."""
     kind = kind_of(path)
-    if kind == "text":
-        yield {}, open_text(path, form)
-        return
-    if kind == "workbook":
+    if form.long is not None:
+        whole = open_sheets(path, form.model_copy(update={"long": None, "sheets": "**/*"}))
+        sheets = [long for _, sheet in whole for long in by_channel(sheet, form.long)]
+        chosen = [(matched(form.sheets, sheet.name) or {}, sheet) for sheet in sheets if _is_named(form, sheet)]
+    elif kind == "text":
+        tables = [
+            (matched(form.sheets, sheet.name) if sheet.name else {}, sheet) for sheet in open_texts(Source(path), form)
+        ]
+        chosen = [(labels, sheet) for labels, sheet in tables if labels is not None]
+    elif kind == "workbook":
         names = [(name, matched(form.sheets, name)) for name in sheet_names(path)]
-        chosen = [(labels, open_sheet(path, name, form)) for name, labels in names if labels is not None]
+        books = [(Source(path, name), labels) for name, labels in names if labels is not None]
+        chosen = [(labels, sheet) for source, labels in books for sheet in open_texts(source, form)]
     elif kind == "arrays":
-        sheets = ARRAYS[path.suffix.lower()](path)
-        found = [(matched(form.sheets, sheet.name), sheet) for sheet in sheets]
+        found = [(matched(form.sheets, sheet.name), sheet) for sheet in _array_sheets(path)]
         chosen = [(labels, sheet) for labels, sheet in found if labels is not None]
     else:
         raise DataError(
@@ -45,3 +66,12 @@ def open_sheets(path: Path, form: FileForm) -> Iterable[tuple[dict[str, str], Sh
     if not chosen:
         raise DataError(f"{path}: none of its sheets is of the pattern {form.sheets!r}")
     yield from chosen
+
+
+def _is_named(form: FileForm, sheet: Sheet) -> bool:
+    return not sheet.name or matched(form.sheets, sheet.name) is not None
+
+
+def _array_sheets(path: Path) -> list[Sheet]:
+    read: Callable[[Path], list[Sheet]] = vars(import_module("rig.intake.arrays"))[ARRAYS[path.suffix.lower()]]
+    return read(path)

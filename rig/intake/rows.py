@@ -1,7 +1,7 @@
 """From columns as they stand in a file to rows of the project's streams."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from rig.channels import AXIS, BY_NAME, MARKER, Stream
 from rig.errors import DataError
 from rig.intake.mapping import FileForm, ValueColumn
-from rig.intake.sheet import Column, Sheet
-from rig.intake.times import Times, agreed_unit, is_text, times_ns
+from rig.intake.sheet import Batch, Column, Sheet
+from rig.intake.times import Times, agreed_unit, is_text, period_ns, times_ns, unwrapped
 from rig.intake.units import factor_of
 
 Numbers = NDArray[np.float64]
@@ -22,13 +22,17 @@ FIELDS = {
     "axis": {"position": "position_mm", "velocity": "velocity_mm_s", "current": "current_A"},
     "marker": {"x": "x_mm", "y": "y_mm", "z": "z_mm", "tool": "tool"},
 }
+# A number of a tool, and a signal that only tells how two clocks lie.
+UNITLESS = ("tool", "sync")
 EXAMPLES = {"force": "N", "velocity": "mm/s", "current": "A", "temperature": "C", "arrival": "ns"}
+# Before the name of a label, among the columns that are read.
+LABEL = "label "
 
 
 class Piece(NamedTuple):
-    """Rows of one recording: their times, and the numbers of each quantity in the project's units."""
+    """Rows of one recording: its labels, their times, and the numbers of each quantity in the project's units."""
 
-    label: str
+    labels: Mapping[str, str]
     at_ns: Times
     values: dict[str, Numbers]
     saturated: int
@@ -36,20 +40,37 @@ class Piece(NamedTuple):
 
 
 def pieces(sheet: Sheet, form: FileForm) -> Iterator[Piece]:
-    """The rows of a sheet, piece by piece, one label each; raises DataError with the place of what is wrong."""
+    """The rows of a sheet in pieces of the same labels; raises DataError with the place of what is wrong."""
     wanted = _wanted(sheet, form)
-    first, clocks = 0, dict[tuple[str, float], int]()
+    first, clocks = 0, dict[tuple[tuple[str, ...], float], int]()
+    last_ns: int | None = None
     for batch in sheet.read(dict(wanted.values())):
-        found = dict(zip(wanted, batch, strict=True))
-        count = len(batch[0])
-        at_ns = times_ns(found.get("time"), first, count, form.time, sheet)
+        length, count = len(batch[0]), _filled_rows(batch)
+        found = {name: column[:count] for name, column in zip(wanted, batch, strict=True)}
+        at_ns = times_ns([found.get(name) for name in ("time", "finer")], first, count, form.time, sheet)
+        at_ns = unwrapped(at_ns, last_ns, period_ns(form.time, sheet))
+        last_ns = int(at_ns[-1]) if at_ns.size else last_ns
         values, saturated = _values(found, sheet, form)
-        for label, rows in _runs(found.get("label"), count):
+        for labels, rows in _runs([found[LABEL + name] for name in form.label_columns], count):
             part = {name: column[rows] for name, column in values.items()}
-            keep = _in_order(at_ns[rows], part.get("tool"), clocks, label, form, sheet, first + rows.start)
+            keep = _in_order(at_ns[rows], part.get("tool"), clocks, labels, form, sheet, first + rows.start)
             kept = {name: column[keep] for name, column in part.items()}
-            yield Piece(label, at_ns[rows][keep], kept, int(saturated[rows].sum()), int((~keep).sum()))
-        first += count
+            named = dict(zip(form.label_columns, labels, strict=True))
+            yield Piece(named, at_ns[rows][keep], kept, int(saturated[rows].sum()), int((~keep).sum()))
+        first += length
+
+
+def _filled_rows(batch: Batch) -> int:
+    """How many rows there are up to the last that says anything: a shorter table beside a longer one ends above."""
+    said = [_says(column) for column in batch]
+    rows = np.flatnonzero(np.any(said, axis=0))
+    return int(rows[-1]) + 1 if rows.size else 0
+
+
+def _says(column: Column) -> NDArray[np.bool_]:
+    if isinstance(column, list):
+        return np.array([bool(text) for text in column])
+    return ~np.isnan(column) if column.dtype.kind == "f" else np.ones(column.size, bool)
 
 
 def _wanted(sheet: Sheet, form: FileForm) -> dict[str, tuple[int, bool]]:
@@ -57,47 +78,41 @@ def _wanted(sheet: Sheet, form: FileForm) -> dict[str, tuple[int, bool]]:
     wanted: dict[str, tuple[int, bool]] = {}
     if form.time.column is not None:
         wanted["time"] = (sheet.number(form.time.column), is_text(form.time))
-    if form.label is not None:
-        wanted["label"] = (sheet.number(form.label), True)
+    if form.time.finer is not None:
+        wanted["finer"] = (sheet.number(form.time.finer), False)
+    wanted |= {LABEL + name: (sheet.number(place), True) for name, place in form.label_columns.items()}
     taken = {number for number, _ in wanted.values()}
     for quantity, column in form.columns.items():
         number = sheet.number(column.column)
         if number in taken:
-            raise DataError(
-                f"{sheet.where}: column {column.column!r} is named twice in the mapping; one of them is wrong"
-            )
+            raise DataError(f"{sheet.where}: column {column.column!r} is named twice in the mapping; one is wrong")
         taken.add(number)
         wanted[quantity] = (number, False)
     return wanted
 
 
-def _runs(labels: Column | None, count: int) -> Iterator[tuple[str, slice]]:
-    """Rows that follow each other under one label."""
-    if labels is None:
-        yield "", slice(0, count)
-        return
-    names = np.asarray(labels)
-    starts = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1).tolist(), count]
-    yield from ((str(names[start]), slice(start, end)) for start, end in pairwise(starts))
+def _runs(labels: Sequence[Column], count: int) -> Iterator[tuple[tuple[str, ...], slice]]:
+    """Rows that follow each other under the same labels."""
+    names = [np.asarray(column) for column in labels]
+    changes = np.zeros(max(count - 1, 0), bool)
+    for column in names:
+        changes |= column[1:] != column[:-1]
+    starts = [0, *(np.flatnonzero(changes) + 1).tolist(), count] if count else []
+    yield from ((tuple(str(column[start]) for column in names), slice(start, end)) for start, end in pairwise(starts))
 
 
 def _in_order(
-    at_ns: Times,
-    tool: Numbers | None,
-    clocks: dict[tuple[str, float], int],
-    label: str,
-    form: FileForm,
-    sheet: Sheet,
-    first: int,
-) -> NDArray[np.bool_]:
+    at_ns: Times, tool: Numbers | None, clocks: dict[tuple[tuple[str, ...], float], int], labels: tuple[str, ...],
+    form: FileForm, sheet: Sheet, first: int,
+) -> NDArray[np.bool_]:  # fmt: skip
     """Rows whose time is after that of all before them, of one tool; ``clocks`` keeps the latest of each piece."""
     latest = np.empty_like(at_ns)
     for one in np.unique(tool) if tool is not None else [0.0]:
         rows = np.flatnonzero(tool == one) if tool is not None else np.arange(at_ns.size)
-        before = [clocks.get((label, one), at_ns[rows[0]] - 1)] if rows.size else []
+        before = [clocks.get((labels, one), at_ns[rows[0]] - 1)] if rows.size else []
         reached = np.maximum.accumulate(np.concatenate([np.array(before, np.int64), at_ns[rows]]))
         latest[rows] = reached[:-1]
-        clocks.update({(label, one): int(reached[-1])} if rows.size else {})
+        clocks.update({(labels, one): int(reached[-1])} if rows.size else {})
     late = np.flatnonzero(at_ns <= latest)
     if late.size and form.disorder == "refuse":
         _refuse_order(at_ns, latest, int(late[0]), sheet.place(first + int(late[0])))
@@ -115,11 +130,16 @@ def _values(found: Mapping[str, Column], sheet: Sheet, form: FileForm) -> tuple[
     """Every quantity in the project's unit; a number at the end of its range is NaN, and counted."""
     values, saturated = dict[str, Numbers](), np.zeros(len(next(iter(found.values()))), bool)
     for quantity, column in form.columns.items():
-        raw = np.asarray(found[quantity], np.float64)
+        raw = _present(np.asarray(found[quantity], np.float64), form)
         full = _saturated(raw, column)
         values[quantity] = np.where(full, math.nan, _converted(raw, quantity, column, sheet, form.lever_mm))
         saturated |= full
     return values, saturated
+
+
+def _present(raw: Numbers, form: FileForm) -> Numbers:
+    """NaN where a number stands for none."""
+    return np.where(np.isin(raw, form.missing_numbers), math.nan, raw) if form.missing_numbers else raw
 
 
 def _saturated(raw: Numbers, column: ValueColumn) -> NDArray[np.bool_]:
@@ -130,7 +150,9 @@ def _saturated(raw: Numbers, column: ValueColumn) -> NDArray[np.bool_]:
 def _converted(raw: Numbers, quantity: str, column: ValueColumn, sheet: Sheet, lever_mm: float | None) -> Numbers:
     if column.sign_bit is not None:
         raw = _signed(raw, column.sign_bit)
-    if quantity == "tool":
+    if column.bits is not None:
+        raw = np.where(raw >= 2.0 ** (column.bits - 1), raw - 2.0**column.bits, raw)
+    if quantity in UNITLESS:
         return raw
     scale = _scale(quantity, column, sheet, lever_mm) if column.scale is None else column.scale
     if scale == 1.0 and column.offset == 0.0:
@@ -172,25 +194,28 @@ def stream_rows(piece: Piece, before: Mapping[str, NDArray[np.void]]) -> dict[st
 
 
 def _integral(at_s: Numbers, velocity: Numbers, before: NDArray[np.void] | None) -> Numbers:
-    """The way gone at the ``velocity`` from where the axis was ``before``, 0 at the first row, by trapezia."""
+    """The way gone at the ``velocity`` from where the axis was ``before``, 0 at the first row."""
     start = before[-1] if before is not None else None
     at_s = np.concatenate([[at_s[0] if start is None else start["capture_ns"] * 1e-9], at_s])
     velocity = np.concatenate([[velocity[0] if start is None else start["velocity_mm_s"]], velocity])
-    gone = np.cumsum(np.diff(at_s) * (velocity[1:] + velocity[:-1]) / 2)
-    return np.asarray(gone + (0.0 if start is None else start["position_mm"]))
+    return way_of(at_s, velocity)[1:] + (0.0 if start is None else start["position_mm"])
+
+
+def way_of(at_s: Numbers, velocity: Numbers) -> Numbers:
+    """What a speed adds up to from the first of its times on, by trapezia."""
+    return np.concatenate([[0.0], np.cumsum(np.diff(at_s) * (velocity[1:] + velocity[:-1]) / 2)])
 
 
 def _filled(
-    stream: Stream,
-    at_ns: Times,
-    values: Mapping[str, Numbers],
-    fields: Mapping[str, str],
+    stream: Stream, at_ns: Times, values: Mapping[str, Numbers], fields: Mapping[str, str],
     before: NDArray[np.void] | None,
-) -> NDArray[np.void]:
-    rows = np.zeros(at_ns.size, stream.dtype)
+) -> NDArray[np.void]:  # fmt: skip
+    unmeasured = np.zeros((), stream.dtype)
     for name, kind in stream.kinds.items():
         if kind is float:
-            rows[name] = math.nan
+            unmeasured[name] = math.nan
+    # Record by record: `np.full` goes field by field, which takes six times as long.
+    rows = np.repeat(unmeasured, at_ns.size)
     rows["seq"] = np.arange(at_ns.size) + (0 if before is None else before[-1]["seq"] + 1)
     rows["capture_ns"] = rows["arrival_ns"] = at_ns
     if "arrival" in values:

@@ -6,31 +6,38 @@ the tissue, as the mapping says the files have them.
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
 
 from rig.errors import DataError
-from rig.intake.folder import FoundTable, file_name, labels_of, natural, tables_in, unnamed_in
-from rig.intake.mapping import DataMapping, RecordingFacts
-from rig.intake.rows import pieces
+from rig.intake.clocks import Part, on_one_clock
+from rig.intake.folder import FoundTable, file_name, labels_of, listed, natural, tables_in, unnamed_in
+from rig.intake.mapping import DataMapping
+from rig.intake.stating import StatedFacts, stated_of
 from rig.intake.writing import OpenRecording, Written
 from rig.progress import Progress, silent
 from rig.recording.files import whole_folder
+from rig.recording.reader import Recording
 from rig.recording.sessions import Session, SessionInfo, TrialInfo, open_session, plain, write_session
 from rig.version import SOFTWARE
 
+Seeing = Callable[[TrialInfo, Recording], None]
 
-def import_folder(folder: Path, mapping: DataMapping, out: Path, now: datetime, tell: Progress = silent) -> Session:
+
+def import_folder(
+    folder: Path, mapping: DataMapping, out: Path, now: datetime, tell: Progress = silent, see: Seeing | None = None
+) -> Session:
     """Makes the session ``out`` of what ``mapping`` names in ``folder``; ``now`` is noted as time of import.
 
+    ``see`` is shown each recording as its file holds it, while it is in memory, but those too long to be.
     Raises DataError or UsageError, naming file and place, and then has written nothing.
     """
     listed = _info(folder, mapping, now)
     with whole_folder(out) as scratch:
-        found = list(_recordings(folder, mapping, scratch, listed, tell))
+        found = [_shown(item, see) for item in _recordings(folder, mapping, scratch, listed, tell)]
         _check_stated(folder, mapping, found)
         written = _in_order_of_time(_distinct(found))
         for copy in {item.info.file for item in found} - {item.info.file for item in written}:
@@ -38,7 +45,14 @@ def import_folder(folder: Path, mapping: DataMapping, out: Path, now: datetime, 
         trials = tuple(item.info.sealed(scratch) for item in written)
         write_session(scratch, replace(listed, trials=trials))
     session = open_session(out)
-    return replace(session, remarks=(*session.remarks, *_remarks(folder, mapping, written)))
+    return replace(session, remarks=(*session.remarks, *_remarks(folder, mapping, written), *_copies(found)))
+
+
+def _shown(item: Written, see: Seeing | None) -> Written:
+    """Without its rows, which ``see`` has seen."""
+    if see is not None and item.recording is not None:
+        see(item.info, item.recording)
+    return replace(item, recording=None)
 
 
 def _recordings(
@@ -46,21 +60,25 @@ def _recordings(
 ) -> Iterator[Written]:
     """Each recording, written as soon as the last table that holds it is read."""
     names = set[str]()
-    groups = _grouped(folder, mapping)
-    for number, tables in enumerate(groups):
+    groups = grouped(folder, mapping)
+    parts = ((number, part) for number, tables in enumerate(groups) for part in on_one_clock(tables))
+    for number, part in parts:
         now: OpenRecording | None = None
+        rows, expected = 0, max(1, sum(table.sheet.rows for table in part.tables))
         try:
-            for table, piece in ((each, piece) for each in tables for piece in pieces(each.sheet, each.form)):
-                about = labels_of(table, piece.label, mapping)
-                name = file_name(about["recording"])
+            for table, piece in part.pieces():
+                about = labels_of(table, piece.labels, mapping)
+                name = file_name(about["recording"] + part.suffix)
                 if now is not None and now.info.name != name:
                     yield now.finish()
                     now = None
                 if now is None:
                     _check_new(name, names, table)
-                    now = _opened(scratch, name, len(names) - 1, table, about, mapping, listed)
+                    now = _opened(scratch, name, len(names) - 1, table, about, mapping, listed, part)
                 now.add(piece, table)
-                tell(f"{name}: {sum(now.info.samples.values())} samples", number / len(groups))
+                rows += piece.at_ns.size + piece.dropped
+                share = min(1.0, rows / expected)
+                tell(f"{name}: {sum(now.info.samples.values())} samples", (number + share) / len(groups))
             if now is not None:
                 yield now.finish()
         finally:
@@ -68,13 +86,20 @@ def _recordings(
                 now.close()
 
 
-def _grouped(folder: Path, mapping: DataMapping) -> list[list[FoundTable]]:
-    """Tables that are one recording, together; a table with a column of labels is one by itself."""
+def grouped(folder: Path, mapping: DataMapping) -> list[list[FoundTable]]:
+    """Tables that are one recording, together; a table whose labels name recordings is one by itself."""
     groups: dict[object, list[FoundTable]] = {}
     for number, table in enumerate(tables_in(folder, mapping)):
-        key = number if table.form.label is not None else file_name(labels_of(table, "", mapping)["recording"])
-        groups.setdefault(key, []).append(table)
+        labels = dict.fromkeys(table.form.label_columns, "")
+        name = file_name(labels_of(table, labels, mapping)["recording"])
+        groups.setdefault(number if _parted(table, mapping) else name, []).append(table)
     return list(groups.values())
+
+
+def _parted(table: FoundTable, mapping: DataMapping) -> bool:
+    """Whether rows of the table are of several recordings, by its labels."""
+    named = mapping.recording or "{label}"
+    return any(f"{{{label}}}" in named for label in table.form.label_columns)
 
 
 def _check_new(name: str, names: set[str], table: FoundTable) -> None:
@@ -87,29 +112,30 @@ def _check_new(name: str, names: set[str], table: FoundTable) -> None:
 
 
 def _opened(
-    scratch: Path,
-    name: str,
-    index: int,
-    table: FoundTable,
-    about: Mapping[str, str],
-    mapping: DataMapping,
-    listed: SessionInfo,
-) -> OpenRecording:
-    facts = mapping.facts_of(name) if name in mapping.recordings else mapping.facts_of(about["recording"])
-    info = TrialInfo(name, f"{name}.mcap", facts.speed_mm_s or math.nan, facts.depth_mm or math.nan, facts.outcome)
+    scratch: Path, name: str, index: int, table: FoundTable, about: Mapping[str, str], mapping: DataMapping,
+    listed: SessionInfo, part: Part,
+) -> OpenRecording:  # fmt: skip
+    stated = mapping.facts_of(name if name in mapping.recordings else about["recording"])
+    facts = stated_of(stated, about, table.sheet.where)
+    info = TrialInfo(name, f"{name}.mcap", facts.speed_mm_s, facts.depth_mm, facts.outcome)
     metadata = _metadata(info, index, table, about, facts, mapping, listed)
-    return OpenRecording(scratch, info, metadata)
+    return OpenRecording(scratch, info, metadata | part.metadata, part.remarks(name))
 
 
 def _distinct(written: Sequence[Written]) -> list[Written]:
-    """Without copies of a recording under another name, which would count twice in every fit; said where it stays."""
-    kept: dict[bytes, Written] = {}
-    for item in written:
-        first = kept.setdefault(item.digest, item)
-        if first is not item:
-            said = f"{item.info.name} holds the same data as {first.info.name} and was left out"
-            kept[item.digest] = replace(first, remarks=(*first.remarks, said))
-    return list(kept.values())
+    """Without copies of a recording under another name, which would count twice in every fit."""
+    return list({item.digest: item for item in written[::-1]}.values())[::-1]
+
+
+def _copies(written: Sequence[Written]) -> Iterator[str]:
+    """Which recordings are copies of which, in one sentence."""
+    first = {item.digest: item.info.name for item in written[::-1]}
+    pairs = [(item.info.name, first[item.digest]) for item in written if item.info.name != first[item.digest]]
+    if len(pairs) == 1:
+        yield f"{pairs[0][0]} holds the same data as {pairs[0][1]} and was left out"
+    elif pairs:
+        shown = listed([f"{copy} as {original}" for copy, original in pairs])
+        yield f"{len(pairs)} recordings hold the same data as others and were left out: {shown}"
 
 
 def _check_stated(folder: Path, mapping: DataMapping, written: Sequence[Written]) -> None:
@@ -138,7 +164,7 @@ def _remarks(folder: Path, mapping: DataMapping, written: Sequence[Written]) -> 
         )
     left = unnamed_in(folder, mapping)
     if left:
-        yield f"{len(left)} files are of no pattern and were left out: {', '.join(left[:5])}{' ...' * (len(left) > 5)}"
+        yield f"{len(left)} files are of no pattern and were left out: {listed(left)}"
 
 
 def _info(folder: Path, mapping: DataMapping, now: datetime) -> SessionInfo:
@@ -148,40 +174,32 @@ def _info(folder: Path, mapping: DataMapping, now: datetime) -> SessionInfo:
     subject = facts.subject if isinstance(facts.subject, dict) else {"id": facts.subject}
     stated = {name: value for name, value in given.items() if value not in ("", None)}
     return SessionInfo(
-        id=facts.id or facts.name or folder.resolve().name,
-        kind="import",
-        created=now.isoformat(),
-        software=SOFTWARE,
+        id=facts.id or facts.name or folder.resolve().name, kind="import", created=now.isoformat(), software=SOFTWARE,
         subject={str(key): plain(value) for key, value in subject.items()},
         notes={str(key): plain(value) for key, value in (stated | notes).items()},
-    )
+    )  # fmt: skip
 
 
 def _metadata(
-    info: TrialInfo, index: int, table: FoundTable, about: Mapping[str, str], facts: RecordingFacts,
+    info: TrialInfo, index: int, table: FoundTable, about: Mapping[str, str], facts: StatedFacts,
     mapping: DataMapping, listed: SessionInfo,
 ) -> dict[str, dict[str, str]]:  # fmt: skip
     calibration = {"force_axis": "fz", "compression": "positive"}
-    surface_mm = mapping.surface_of(facts)
-    if surface_mm is not None:
-        calibration["surface_mm"] = repr(surface_mm)
-    extra = facts.model_dump(exclude={"speed_mm_s", "depth_mm", "surface_mm"}, exclude_defaults=True)
+    if not math.isnan(facts.surface_mm):
+        calibration["surface_mm"] = repr(mapping.sense("position") * facts.surface_mm)
     return {
         "recording": {
-            "id": f"{listed.id}/{info.name}",
-            "session": listed.id,
-            "trial": info.name,
-            "software": listed.software,
-            "kind": "import",
-            "wall_start_iso": listed.created,
+            "id": f"{listed.id}/{info.name}", "session": listed.id, "trial": info.name,
+            "software": listed.software, "kind": "import", "wall_start_iso": listed.created,
         },
         "trial": {
-            "index": str(index), "speed_mm_s": repr(info.speed_mm_s), "depth_mm": repr(info.depth_mm), **_texts(extra)
+            "index": str(index), "speed_mm_s": repr(info.speed_mm_s), "depth_mm": repr(info.depth_mm),
+            **_texts(facts.more),
         },
         "calibration": calibration,
         "subject": _texts(listed.subject),
         "notes": _texts(listed.notes),
-        "labels": {**table.labels, **about},
+        "labels": {**about, **({"operator": facts.operator} if facts.operator else {})},
         "source": {**table.sheet.facts, "file": table.sheet.path.name},
     }  # fmt: skip
 

@@ -1,8 +1,11 @@
 """The one raw form of every kind of file: named columns of numbers or texts, read a piece at a time."""
 
+import re
+import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +16,22 @@ from rig.intake.mapping import Place
 Column = NDArray[np.generic] | list[str]
 Batch = Sequence[Column]
 MISSING = "not there"
+# What readers of files raise on bytes that were cut or changed.
+DAMAGE = (OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, MemoryError, OverflowError, zlib.error)
+
+
+class Source(NamedTuple):
+    """A text, or a sheet of a workbook, which is read as one."""
+
+    path: Path
+    sheet: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.path}, {self.sheet}" if self.sheet else str(self.path)
+
+    def line(self, number: int) -> str:
+        """Where line ``number`` stands."""
+        return f"{self} {'row' if self.sheet else 'line'} {number}"
 
 
 @dataclass(frozen=True)
@@ -21,7 +40,8 @@ class Sheet:
 
     ``read`` takes the numbers (from 0) of columns, whether each is text, and gives them piece by piece, in the order
     asked for, alike in length. ``first_row`` is where the first of them stands in the file, counted from 1 in
-    ``counted``s. ``facts`` are what stands above the table; ``unread`` says what in the file was not understood.
+    ``counted``s. ``facts`` are what stands above the table; ``unread`` says what in the file was not understood,
+    ``rows`` about how many rows there are, 0 where nobody knows.
     """
 
     path: Path
@@ -33,6 +53,7 @@ class Sheet:
     first_row: int = 1
     counted: str = "row"
     unread: str = ""
+    rows: int = 0
 
     @property
     def where(self) -> str:
@@ -61,7 +82,16 @@ class Sheet:
         return ", ".join(map(repr, self.header[:20])) + (" ..." if len(self.header) > 20 else "")
 
 
+def unreadable(path: Path, kind: str, error: Exception, advice: str = "copy it again") -> DataError:
+    """The sentence for a file that its reader does not take as ``kind``."""
+    if isinstance(error, PermissionError):
+        return DataError(f"{path}: you may not read it; ask its owner, or copy it to where you may")
+    said = " ".join(str(error).split()) or type(error).__name__
+    return DataError(f"{path}: not readable as {kind} ({said}); {advice}")
+
+
 def facts_in(rows: Sequence[Sequence[str]]) -> dict[str, str]:
-    """Of the rows above a table those that are a name and a value."""
-    found = ([cell for cell in map(str.strip, row) if cell] for row in rows)
-    return {row[0].rstrip(":"): " ".join(row[1:]) for row in found if len(row) > 1}
+    """Of the rows above a table those that are a name and a value, in two cells or one with a colon or = in it."""
+    found = [[cell for cell in map(str.strip, row) if cell] for row in rows]
+    parted = [re.split(r"\s*[:=]\s*", row[0], maxsplit=1) if len(row) == 1 else row for row in found]
+    return {row[0].rstrip(":= "): " ".join(row[1:]) for row in parted if len(row) > 1}

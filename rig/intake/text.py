@@ -4,112 +4,266 @@ import codecs
 import csv
 import gzip
 import io
-from collections.abc import Iterator, Mapping
+import re
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
+from itertools import islice, pairwise, takewhile, zip_longest
 from pathlib import Path
-from typing import IO, cast
+from typing import IO, NamedTuple, cast
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv as arrow_csv
+from numpy.typing import NDArray
 
 from rig.errors import DataError
+from rig.intake.cells import COMMENT, Affixed, above_columns, affixed, bare, begins_another, cells_of, is_other
+from rig.intake.edited import EditedLines, joined, loosened, single_blanks, with_exponents
+from rig.intake.headings import stated_unit
 from rig.intake.mapping import FileForm
-from rig.intake.sheet import Batch, Column, Sheet, facts_in
-from rig.intake.units import unit_in, unit_of
+from rig.intake.notation import GROUPS, is_number, is_stamp
+from rig.intake.sheet import DAMAGE, Batch, Column, Sheet, Source, facts_in, unreadable
+from rig.intake.units import unit_in
+from rig.intake.workbook import sheet_text
 
 # Read at a time; Arrow reads some 32 of these ahead, so 16 MiB would be half a gigabyte of memory.
 BLOCK_BYTES = 1 << 22
+Kinds = Mapping[int, bool]  # of the columns that are read, whether they are text
+BLANK_CELLS = b" \t\r\n,;"
+_SECTION = re.compile(r'"?\[?([^\W\d_][\w .-]*)\]?"?[\s,;]*')
 _UTF8 = ("utf-8", "utf8", "utf-8-sig", "ascii")
 
 
-def open_text(path: Path, form: FileForm) -> Sheet:
-    """The table in ``path``; raises DataError naming file and line where the form is not the file's."""
-    start = max(form.header_row, form.unit_row)
-    with open_utf8(path, form.encoding) as file:
-        above = [_cells(_decoded(path, number + 1, line), form) for number, line in enumerate(_head(file, start + 1))]
-    if len(above) <= start:
-        raise DataError(f"{path}: ends above line {start + 1}, where its table should begin; correct header_row")
-    width = _width(above, form)
-    header = _row(above, form.header_row, width)
-    names = tuple(name.strip() or str(number + 1) for number, name in enumerate(header))
-    stated = _row(above, form.unit_row, width) if form.unit_row else [""] * width
-    units = tuple(unit_in(unit) or unit_of(name) for unit, name in zip(stated, names, strict=True))
+class FilePart(NamedTuple):
+    """One of the tables of a file, by its number: the lines from ``start`` (0 the first) on, up to ``end``."""
+
+    name: str = ""
+    start: int = 0
+    end: int | None = None
+
+
+class Head(NamedTuple):
+    """What stands above a table, its first row with marks, its line from 0, names of columns, about how many rows."""
+
+    above: list[list[str]]
+    first: list[str]
+    marks: list[Affixed]
+    start: int
+    names: tuple[str, ...]
+    rows: int
+
+
+def open_texts(source: Source, form: FileForm) -> list[Sheet]:
+    """The tables in ``source``, one but where its names come again; raises DataError where it is not of the form."""
+    if form.section:
+        return [_open(source, form, section_in(source, form))]
+    return [_open(source, form, part) for part in (_parts(source, form) if form.repeats else [FilePart()])]
+
+
+def _parts(source: Source, form: FileForm) -> list[FilePart]:
+    """Each table with as many lines above its row of names as the first has, without those that have no row."""
+    header, at, number = b"", list[int](), 0
+    with lines_in(source, form) as file:
+        for number, line in enumerate(file):
+            header = line.strip() if number == form.header_row - 1 else header
+            at += [number] if header and line.strip() == header else []
+    below = form.rows_above - form.header_row + 1
+    spans = [(here - form.header_row + 1, after) for here, after in pairwise([*at, number + 1]) if after - here > below]
+    return [FilePart(str(index), *span) for index, span in enumerate(spans, 1)] if len(spans) > 1 else [FilePart()]
+
+
+def section_in(source: Source, form: FileForm) -> FilePart:
+    """The lines below the one that is the section's name, up to an empty one below the row of names."""
+    start, end = 0, None
+    with lines_in(source, form) as file:
+        for number, line in enumerate(file, 1):
+            if not start and section_name(line.decode(errors="replace")) == form.section:
+                start = number
+            elif start and number > start + form.rows_above and not line.strip(BLANK_CELLS):
+                end = number - 1
+                break
+    if start:
+        return FilePart(form.section, start, end)
+    raise DataError(f"{source}: no line is {form.section!r}; correct `section`")
+
+
+def section_name(line: str) -> str:
+    """The only cell of a line, where it is words; else empty."""
+    found = _SECTION.fullmatch(line.strip())
+    return found[1] if found else ""
+
+
+def _open(source: Source, form: FileForm, part: FilePart) -> Sheet:
+    head = head_of(source, form, part)
+    below = _row(head.above, form.unit_row, len(head.names)) if form.unit_row else [""] * len(head.names)
+    behind = [*(mark.unit for mark in head.marks), *[""] * len(head.names)]
+    units = tuple(
+        stated_unit(name, unit_in(unit) or unit_in(own)) or ""
+        for unit, own, name in zip(below, behind, head.names, strict=False)
+    )
 
     def read(columns: Mapping[int, bool]) -> Iterator[Batch]:
-        return _batches(path, form, start, names, columns)
+        return _batches(source, form, part, head, columns)
 
-    last = (form.header_row or start + 1) - 1
-    return Sheet(path, "", names, units, read, facts_in(above[:last]), start + 1, "line")
+    last, kind = (form.header_row or form.rows_above + 1) - 1, "row" if source.sheet else "line"
+    facts = [row for row in head.above[:last] if not part.start or is_other(row, head.first)]
+    name = "-".join(filter(None, (source.sheet, part.name)))
+    stated = facts_in(facts)
+    if form.section and is_number("".join(head.above[0])):  # as Vicon has it
+        stated |= {"sampling rate (Hz)": "".join(head.above[0])}
+    return Sheet(
+        source.path, name, head.names, units, read, stated, head.start + 1,
+        "column" if form.across else kind, rows=head.rows,
+    )  # fmt: skip
+
+
+def head_of(source: Source, form: FileForm, part: FilePart) -> Head:
+    """What stands above the table in ``part``, and its first row; raises DataError where it ends above it."""
+    start = form.rows_above
+    with lines_in(source, form) as file:
+        raw = list(islice(file, part.start, part.start + start + 1))
+    lines = joined([_decoded(source, part.start + number, line) for number, line in enumerate(raw, 1)])
+    lines = [loosened(line, form.delimiter) for line in lines] if form.affixes else lines
+    if len(lines) <= start:
+        place = source.line(start + 1).removeprefix(f"{source} ")
+        raise DataError(f"{source}: ends above {place}, where its table should begin; correct header_row")
+    above = [cells_of(line, form.delimiter) for line in lines[:start]]
+    for row in filter(None, {form.header_row, form.unit_row}):
+        above[row - 1] = above_columns(lines[row - 1], form.delimiter, lines[start])
+    first = cells_of(lines[start], form.delimiter)
+    header = _row(above, form.header_row, _width(above, first, form))
+    marks = list(map(affixed, first)) if form.affixes else []
+    given = [*(mark.name for mark in marks), *[""] * (len(header) - len(marks))]
+    names = tuple(
+        ("" if is_stamp(name) else name.strip()) or own or str(number)
+        for number, (name, own) in enumerate(zip(header, given, strict=False), 1)
+    )
+    rows = 0 if source.sheet else _size(source.path) // len(raw[-1])
+    return Head(above, bare(first, marks) if marks else first, marks, part.start + start, names, rows)
 
 
 def open_utf8(path: Path, encoding: str) -> IO[bytes]:
     """The bytes of the file as UTF-8 without a mark; raises DataError where it cannot be opened."""
     try:
-        raw = _bytes_of(path)
+        raw = bytes_of(path)
         if encoding.lower() not in _UTF8:
             return codecs.EncodedFile(raw, "utf-8", encoding)
         if raw.read(3) != codecs.BOM_UTF8:
             raw.seek(0)
     except FileNotFoundError as error:
         raise DataError(f"{path}: no such file") from error
-    except (OSError, EOFError) as error:
-        raise DataError(f"{path}: cannot be read: {error}; copy it again from where it was recorded") from error
+    except (OSError, EOFError, zlib.error) as error:
+        raise unreadable(path, "text", error) from error
     except LookupError as error:
         raw.close()
         raise DataError(f"{path}: {encoding!r} is no encoding; utf-8, latin-1, utf-16 and gb18030 are") from error
     return raw
 
 
-def _bytes_of(path: Path) -> IO[bytes]:
+def lines_in(source: Source, form: FileForm) -> IO[bytes]:
+    """The lines of the file in UTF-8, or those that its columns make where the table lies across."""
+    path, sheet = source
+    file = io.BytesIO(sheet_text(path, sheet, form.decimal)) if sheet else open_utf8(path, form.encoding)
+    if not form.across:
+        return file
+    with file:
+        rows = [cells_of(line.decode(), form.delimiter) for line in file]
+    turned = io.StringIO()
+    csv.writer(turned, delimiter=form.delimiter).writerows(zip_longest(*rows, fillvalue=""))
+    return io.BytesIO(turned.getvalue().encode())
+
+
+def _size(path: Path) -> int:
+    """Bytes of the text; of a compressed one as its end says."""
+    if path.suffix != ".gz":
+        return path.stat().st_size
+    with path.open("rb") as file:
+        file.seek(-4, io.SEEK_END)
+        return int.from_bytes(file.read(4), "little")
+
+
+def bytes_of(path: Path) -> IO[bytes]:
+    """The bytes of the file, or of what it holds compressed."""
     return cast("IO[bytes]", gzip.open(path)) if path.suffix == ".gz" else path.open("rb")
 
 
-def _head(file: IO[bytes], count: int) -> list[bytes]:
-    lines = (file.readline() for _ in range(count))
-    return [line for line in lines if line]
-
-
-def _decoded(path: Path, number: int, line: bytes) -> str:
+def _decoded(source: Source, number: int, line: bytes) -> str:
     try:
         return line.decode()
     except UnicodeDecodeError as error:
         raise DataError(
-            f"{path} line {number}: not UTF-8; state its encoding, for example encoding = 'latin-1'"
+            f"{source.line(number)}: not UTF-8; state its encoding, for example encoding = 'latin-1'"
         ) from error
 
 
-def _cells(line: str, form: FileForm) -> list[str]:
-    return next(csv.reader([line], delimiter=form.delimiter, skipinitialspace=True), [])
-
-
-def _width(above: list[list[str]], form: FileForm) -> int:
-    """Cells of a row: as many as the header has, and empty ones that a comma at the end of each line makes."""
-    named, first = above[form.header_row - 1] if form.header_row else [], above[-1]
-    return len(named) if any(first[len(named) :]) and named else max(len(named), len(first))
+def _width(above: list[list[str]], first: list[str], form: FileForm) -> int:
+    """Cells of the first row of data, but not those behind the header that hold something."""
+    named = above[form.header_row - 1] if form.header_row else []
+    return len(named) if named and any(first[len(named) :]) else len(first) or len(named)
 
 
 def _row(above: list[list[str]], row: int, width: int) -> list[str]:
     found = above[row - 1] if row else []
-    return [*found, *[""] * (width - len(found))]
+    return [*found, *[""] * (width - len(found))][:width]
 
 
-def _batches(
-    path: Path, form: FileForm, start: int, names: tuple[str, ...], columns: Mapping[int, bool]
-) -> Iterator[Batch]:
+def _batches(source: Source, form: FileForm, part: FilePart, head: Head, columns: Kinds) -> Iterator[Batch]:
     texts = {number: text or bool(form.thousands) for number, text in columns.items()}
-    with open_utf8(path, form.encoding) as file:
-        _head(file, start)
+    with lines_in(source, form) as file:
         try:
-            for batch in _arrow(file, form, names, texts):
+            for batch in _arrow(_rows(file, form, part, head), form, head.names, texts):
                 yield [_column(batch.column(at), columns[number], form) for at, number in enumerate(columns)]
-        except (pa.ArrowInvalid, ValueError, OSError, EOFError) as error:
-            _explain(path, form, start, names, columns)
-            raise DataError(f"{path}: not readable as text in columns: {error}") from error
+        except (pa.ArrowInvalid, *DAMAGE) as error:
+            _explain(source, form, part, head, columns)
+            raise unreadable(source.path, "text in columns", error) from error
+
+
+def _rows(file: IO[bytes], form: FileForm, part: FilePart, head: Head) -> IO[bytes] | EditedLines:
+    """The lines of the table, as Arrow and csv read them; nothing is put between where they stand so in the file."""
+    for _ in islice(file, head.start):
+        pass
+    edit = _edit(form, head)
+    if edit is None and part.end is None:
+        return file
+    return EditedLines(_until(file, part, head, form), edit or bytes)
+
+
+def _until(file: Iterable[bytes], part: FilePart, head: Head, form: FileForm) -> Iterator[bytes]:
+    """The lines of the part; where others are left out, those above one that begins another table."""
+    lines = islice(file, None if part.end is None else part.end - head.start)
+    if form.other_lines == "refuse" or form.affixes:
+        return lines
+    ends = partial(begins_another, delimiter=form.delimiter, names=head.names)
+    return takewhile(lambda line: not ends(line.decode(errors="replace")), lines)
+
+
+def _edit(form: FileForm, head: Head) -> Callable[[bytes], bytes] | None:
+    edit = single_blanks if form.delimiter == " " else None
+    if form.affixes or form.other_lines == "drop":
+        edit = partial(_edited, form=form, head=head)
+    return partial(with_exponents, edit=edit) if form.exponent == "D" else edit
+
+
+def _edited(line: bytes, form: FileForm, head: Head) -> bytes:
+    """Empty where a line is none of the table and such are left out, so that the others keep their numbers."""
+    text = line.decode(errors="replace")
+    cells = cells_of(text, form.delimiter)
+    if form.affixes:
+        cells = bare(cells_of(loosened(text, form.delimiter), form.delimiter), head.marks)
+    if form.other_lines == "drop" and (line.startswith(_COMMENT) or is_other(cells, head.first)):
+        return b"\n"
+    if form.affixes:
+        return form.delimiter.join(f'"{cell}"' for cell in cells).encode() + b"\n"
+    return single_blanks(line) if form.delimiter == " " else line
+
+
+_COMMENT = tuple(mark.encode() for mark in COMMENT)
 
 
 def _arrow(
-    file: IO[bytes], form: FileForm, names: tuple[str, ...], texts: Mapping[int, bool]
+    file: IO[bytes] | EditedLines, form: FileForm, names: tuple[str, ...], texts: Mapping[int, bool]
 ) -> arrow_csv.CSVStreamingReader:
     kinds = {str(number): pa.string() if text else pa.float64() for number, text in texts.items()}
     return arrow_csv.open_csv(
@@ -126,37 +280,63 @@ def _column(found: pa.Array, text: bool, form: FileForm) -> Column:
     if text:
         return ["" if item is None else item.strip() for item in found.to_pylist()]
     if form.thousands:
+        grouped = pc.match_substring_regex(found, rf"^\s*(?:{GROUPS.format(re.escape(form.thousands))})\s*$")
+        if pc.any(pc.and_not(pc.match_substring(found, form.thousands), grouped)).as_py():
+            raise pa.ArrowInvalid("digits are not parted in thousands")
         plain = pc.replace_substring(pc.replace_substring(found, form.thousands, ""), form.decimal, ".")
         gone = pc.is_in(found, pa.array(form.missing))
         found = pc.cast(pc.if_else(gone, None, pc.utf8_trim_whitespace(plain)), pa.float64())
-    return np.asarray(found.to_numpy(zero_copy_only=False), np.float64)
+    return _numbers(found)
 
 
-def _explain(path: Path, form: FileForm, start: int, names: tuple[str, ...], columns: Mapping[int, bool]) -> None:
+def _numbers(found: pa.Array) -> NDArray[np.float64]:
+    """NaN where nothing is. From the buffers: `to_numpy` loads pandas where that is installed, for half a second."""
+    rows = slice(found.offset, found.offset + len(found))
+    there, data = found.buffers()
+    values = np.frombuffer(data, np.float64)[rows]
+    if not found.null_count:
+        return values
+    known = np.unpackbits(np.frombuffer(there, np.uint8), bitorder="little")[rows]
+    return np.where(known, values, np.nan)
+
+
+def _explain(source: Source, form: FileForm, part: FilePart, head: Head, columns: Mapping[int, bool]) -> None:
     """Raises the sentence for the first line that is not of the form."""
-    for line, cells in lines(path, form, start):
-        place = f"{path} line {line}"
-        if len(cells) != len(names):
-            raise DataError(f"{place}: {len(cells)} cells where the header has {len(names)}")
+    for line, cells in _lines(source, form, part, head):
+        place = source.line(line)
+        if len(cells) != len(head.names) and is_other([cell.strip() for cell in cells], head.first):
+            said = " ".join(filter(None, cells))[:40]
+            raise DataError(f"{place}: {said!r} is no row of the table; to leave such lines out, say {_LEFT_OUT}")
+        if len(cells) != len(head.names):
+            why = _TWICE if len(cells) == 2 * len(head.names) and form.delimiter == "," else "mend it or take it out"
+            raise DataError(f"{place}: {len(cells)} cells where the header has {len(head.names)}; {why}")
         for number in (number for number, text in columns.items() if not text):
-            _check_number(f"{place}, column {names[number]}", cells[number].strip(), form)
+            _check_number(f"{place}, column {head.names[number]}", cells[number].strip(), form)
 
 
-def lines(path: Path, form: FileForm, start: int) -> Iterator[tuple[int, list[str]]]:
-    """Number and cells of each line below the first ``start``, empty ones left out; raises DataError."""
-    with open_utf8(path, form.encoding) as file:
-        _head(file, start)
+_TWICE = "the comma parts cells and decimals: save it with semicolons"
+_LEFT_OUT = "other_lines = 'drop', and repeats = true where its row of names comes again"
+
+
+def _lines(source: Source, form: FileForm, part: FilePart, head: Head) -> Iterator[tuple[int, list[str]]]:
+    """Number and cells of each line of the table, empty ones left out; raises DataError."""
+    with lines_in(source, form) as file:
+        for _ in islice(file, head.start):
+            pass
+        edit = _edit(form, head) or bytes
         try:
-            with io.TextIOWrapper(io.BytesIO(file.read()), "utf-8", newline="") as text:
-                reader = csv.reader(text, delimiter=form.delimiter)
-                yield from ((start + reader.line_num, cells) for cells in reader if cells)
-        except (UnicodeDecodeError, csv.Error, OSError, EOFError) as error:
-            raise DataError(f"{path}: {error}; state its encoding, or copy the file again") from error
+            rows = (edit(line).decode() for line in _until(file, part, head, form))
+            reader = csv.reader(rows, delimiter=form.delimiter)
+            yield from ((head.start + reader.line_num, cells) for cells in reader if cells)
+        except (UnicodeDecodeError, csv.Error, *DAMAGE) as error:
+            raise unreadable(source.path, "text", error, "state its encoding, or copy the file again") from error
 
 
 def _check_number(place: str, text: str, form: FileForm) -> None:
     if text in form.missing:
         return
+    if form.thousands and form.thousands in text and not re.fullmatch(GROUPS.format(re.escape(form.thousands)), text):
+        raise DataError(f"{place}: {text!r} is no number whose thousands {form.thousands!r} parts; correct the mapping")
     try:
         float(text.replace(form.thousands, "").replace(form.decimal, ".") if form.thousands else _pointed(text, form))
     except ValueError as error:
@@ -170,9 +350,15 @@ def _pointed(text: str, form: FileForm) -> str:
 
 
 def _hint(text: str, form: FileForm) -> str:
-    bare = text.lstrip("+-")
-    if bare.replace(",", "").replace(".", "").isdigit() and bare.count(",") + bare.count(".") > 1:
+    digits = text.lstrip("+-")
+    if digits.replace(",", "").replace(".", "").isdigit() and digits.count(",") + digits.count(".") > 1:
         return "; if digits are parted in thousands, state it: thousands = ',' (or '.', with decimal = ',')"
-    if form.decimal == "." and bare.replace(",", "", 1).isdigit():
+    if form.decimal == "." and digits.replace(",", "", 1).isdigit():
         return "; if this is a decimal comma, state it: decimal = ','"
+    if form.decimal == "," and digits.replace(".", "", 1).isdigit():
+        return ", for others of this table have a decimal comma; write one of the two in all of them"
+    if affixed(text).number != text and form.affixes:
+        return " with the name and unit of the first row's; one column has one unit: mend it, or take the row out"
+    if affixed(text).number != text:
+        return "; if every cell of the column has this name or unit beside its number, state it: affixes = true"
     return f"; if it says that there is no value, add it: missing = ['', {text!r}]"

@@ -1,14 +1,18 @@
 """Units as people write them behind a name or under it, and what they are in the project's own."""
 
 import re
+import unicodedata
 
 from rig.errors import DataError
 
 # Factor to the project's unit of each quantity: SI prefixes, NIST SP 811 B.8 (pound-force, inch, kilogram-force).
-TIME_NS = {"ns": 1.0, "us": 1e3, "ms": 1e6, "s": 1e9, "sec": 1e9, "seconds": 1e9, "min": 60e9, "h": 3600e9}
+TIME_NS = {"ns": 1.0, "us": 1e3, "ms": 1e6, "s": 1e9, "min": 60e9, "h": 3600e9}
 FORCE_N = {
-    "N": 1.0, "kN": 1e3, "mN": 1e-3, "uN": 1e-6, "MN": 1e6, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605,
+    "N": 1.0, "kN": 1e3, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "pN": 1e-12, "cN": 1e-2, "daN": 10.0, "MN": 1e6,
+    "dyn": 1e-5, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605,
 }  # fmt: skip
+# Of a force, a mass is the weight of it: so texture analysers and balances write.
+FORCE_N |= {"g": FORCE_N["gf"], "kg": FORCE_N["kgf"], "lb": FORCE_N["lbf"]}
 LENGTH_MM = {"mm": 1.0, "m": 1e3, "cm": 10.0, "um": 1e-3, "nm": 1e-6, "inch": 25.4, "in": 25.4, "mil": 0.0254}
 SPEED_MM_S = {
     "mm/s": 1.0, "m/s": 1e3, "um/s": 1e-3, "cm/s": 10.0, "mm/min": 1 / 60, "in/s": 25.4, "in/min": 25.4 / 60,
@@ -19,34 +23,79 @@ ANGLE_RAD = {"rad": 1.0, "deg": 0.017453292519943295, "°": 0.017453292519943295
 RATE_RAD_S = {"rad/s": 1.0, "deg/s": 0.017453292519943295, "r/min": 0.10471975511965977, "rpm": 0.10471975511965977}
 CURRENT_A = {"A": 1.0, "mA": 1e-3}
 TEMPERATURE_C = {"C": 1.0, "°C": 1.0, "degC": 1.0}
-# Known, but no measure of a quantity of ours: a column in one of them needs its scale.
-RAW = ("V", "mV", "uV", "count", "counts", "%", "Pa", "kPa", "MPa", "1", "g", "kg", "lb")
+# What a sensor gives before it is calibrated: a column in one of them needs its scale.
+SIGNALS = ("V", "mV", "uV", "count", "counts")
+# Known, but no measure of a quantity of ours.
+RAW = (*SIGNALS, "%", "Pa", "kPa", "MPa", "1")
+# Other spellings, in small letters: plurals, whole words, other scripts, and units that mean nothing else in capitals.
+SPELLINGS = {
+    **dict.fromkeys(("sec", "secs", "second", "seconds", "sekunden", "秒", "초"), "s"),
+    **dict.fromkeys(("msec", "millisecond", "milliseconds", "毫秒", "ミリ秒"), "ms"),
+    **dict.fromkeys(("usec", "usecs", "microsec", "microsecond", "microseconds", "微秒"), "us"),
+    **dict.fromkeys(("nsec", "nsecs", "nanosec", "nanosecs", "nanosecond", "nanoseconds", "纳秒"), "ns"),
+    **dict.fromkeys(("minute", "minutes", "分"), "min"),
+    **dict.fromkeys(("newton", "newtons", "牛", "牛顿", "ニュートン"), "N"),
+    **dict.fromkeys(("kilonewton", "kilonewtons", "千牛"), "kN"),
+    **dict.fromkeys(("gram", "grams", "克"), "g"),
+    **dict.fromkeys(("millimeter", "millimeters", "millimetre", "millimetres", "毫米", "ミリ"), "mm"),
+    **dict.fromkeys(("meter", "meters", "metre", "metres", "米"), "m"),
+    **dict.fromkeys(("micrometer", "micrometers", "micron", "microns", "微米"), "um"),
+    **{unit.lower(): unit for unit in ("s", "ms", "min", "kN", "gf", "kgf", "lbf", "kg", "lb")},
+    **{unit: unit for unit in ("mm", "cm", "um", "in", "inch")},
+    **dict.fromkeys(("inches", '"'), "inch"), "kgs": "kg", "lbs": "lb", "volt": "V", "volts": "V",
+    **dict.fromkeys(("degree", "degrees"), "deg"), **dict.fromkeys(("radian", "radians"), "rad"),
+}  # fmt: skip
 
 LINEAR = {
     "time": TIME_NS, "arrival": TIME_NS, "force": FORCE_N, "position": LENGTH_MM, "velocity": SPEED_MM_S,
     "current": CURRENT_A, "temperature": TEMPERATURE_C, "x": LENGTH_MM, "y": LENGTH_MM, "z": LENGTH_MM,
+    "setpoint": LENGTH_MM, "load_position": LENGTH_MM, "excitation": {},
 }  # fmt: skip
-ROTARY = {"force": TORQUE_N_MM, "position": ANGLE_RAD, "velocity": RATE_RAD_S}
+ROTARY = {
+    "force": TORQUE_N_MM, "position": ANGLE_RAD, "velocity": RATE_RAD_S, "setpoint": ANGLE_RAD,
+    "load_position": ANGLE_RAD,
+}  # fmt: skip
 UNITS = frozenset(RAW).union(*LINEAR.values(), *ROTARY.values())
+
+# Of ROS messages the vectors with units (REP 103: standard units and coordinate conventions).
+ROS_UNITS = {"force": "N", "torque": "N m", "position": "m", "translation": "m"}
 
 
 def unit_in(text: str) -> str:
-    """``text`` as a unit (``(mm)``, ``[N]``, ``µm``), empty where it is none that is known."""
-    bare = text.strip().strip("()[]{}<>").strip().replace("µ", "u").replace("μ", "u").replace("·", " ")
-    return bare if bare in UNITS else ""
+    """``text`` as a unit (``(mm)``, ``[N]``, ``µm``, ``sec``, ``（秒）``), empty where it is none that is known."""
+    bare = _plain(text).strip().strip("()[]{}<>").strip()
+    bare = bare[:-1] if bare[:-1].isalpha() and bare.endswith(".") else bare  # in. and sec.
+    return bare if bare in UNITS else SPELLINGS.get(bare.lower(), "")
+
+
+def _plain(text: str) -> str:
+    """Wide letters and brackets as narrow ones, a micro sign as u, a middle dot as a blank."""
+    return unicodedata.normalize("NFKC", text).replace("μ", "u").replace("·", " ")
+
+
+def unknown_unit(name: str) -> str:
+    """What stands in brackets behind a name like a unit and is none that is known, empty without one."""
+    found = re.findall(r"[(\[{]\s*([^\W\d_]{2,4})\s*[)\]}]", _plain(name))
+    return next((text for text in found if not unit_in(text)), "")
 
 
 def unit_of(name: str) -> str:
-    """The unit a column's name ends in (``force_kN``, ``Force [kN]``, ``x (mm)``); empty if it names none."""
-    found = re.search(r"^.*?[\s_]*(?:[(\[{]([^)\]}]*)[)\]}]|(?<=[\s_/,])([^\s_,()\[\]]+))\s*$", name.strip())
-    return unit_in(found[1] or found[2] or "") if found else ""
+    """The unit a column's name ends in, or has in brackets (``force_kN``, ``Force [kN]``, ``x (mm) left``), or is.
+
+    Empty if it names none. One letter alone is a name and no unit, and a 1 in brackets counts columns.
+    """
+    plain = _plain(name).strip()
+    ending = re.search(r"(?<=[\s_/,])([^\s_,()\[\]{}]+)$", plain)
+    found = [
+        *re.findall(r"[(\[{]([^)\]}]*)[)\]}]", plain)[::-1],
+        ending[1] if ending else "",
+        plain if plain[1:] else "",
+    ]
+    return next((unit for unit in map(unit_in, found) if unit not in ("", "1")), "")
 
 
 def factor_of(quantity: str, unit: str, lever_mm: float | None = None) -> float:
-    """What a number in ``unit`` is multiplied by to be in the project's unit; raises DataError naming those known.
-
-    A torque over the lever is a force, and an angle times it a way.
-    """
+    """What a number in ``unit`` is multiplied by, at the lever if it turns; raises DataError naming those known."""
     if unit in LINEAR[quantity]:
         return LINEAR[quantity][unit]
     rotary = ROTARY.get(quantity, {})
@@ -55,3 +104,9 @@ def factor_of(quantity: str, unit: str, lever_mm: float | None = None) -> float:
     if lever_mm is None:
         raise DataError(f"{unit!r} turns; state the lever at which it is a {quantity}, for example lever_mm = 1000.0")
     return rotary[unit] / lever_mm if quantity == "force" else rotary[unit] * lever_mm
+
+
+def ros_unit(name: str) -> str:
+    """The unit that ROS lays down for the parts of a message (REP 103), empty for others."""
+    parts = name.split(".")
+    return ROS_UNITS.get(parts[-2], "") if len(parts) > 1 and parts[-1] in ("x", "y", "z") else ""

@@ -1,18 +1,17 @@
-"""Workbooks (xls, xlsx, xlsb, ods): every sheet a table with rows above it."""
+"""Workbooks (xls, xlsx, xlsb, ods): every sheet as the text it would be saved as, with all digits."""
 
+import csv
 import datetime
-import math
-from collections.abc import Callable, Iterator, Mapping
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import python_calamine as calamine
 
 from rig.errors import DataError
-from rig.intake.mapping import FileForm
-from rig.intake.sheet import Batch, Column, Sheet, facts_in
-from rig.intake.units import unit_in, unit_of
+from rig.intake.sheet import DAMAGE, unreadable
 
 # Day 0 of spreadsheets, in the calendar of 1900 with its leap day that never was (ECMA-376 part 1, 18.17.4.1).
 EPOCH = datetime.datetime(1899, 12, 30)
@@ -21,89 +20,50 @@ DAY_S = 86_400.0
 
 def sheet_names(path: Path) -> list[str]:
     """The sheets of the workbook; raises DataError where it is damaged or encrypted."""
-    return list(_opened(path).sheet_names)
+    with _readable(path):
+        return list(calamine.CalamineWorkbook.from_path(str(path)).sheet_names)
 
 
-def open_sheet(path: Path, name: str, form: FileForm) -> Sheet:
-    """The table in sheet ``name``; raises DataError where it ends above its table."""
-    cells = _opened(path).get_sheet_by_name(name).to_python(skip_empty_area=False)
-    start = max(form.header_row, form.unit_row)
-    if len(cells) <= start:
-        raise DataError(f"{path}, {name}: ends above row {start + 1}, where its table should begin; correct header_row")
-    above = [[shown(cell) for cell in row] for row in cells[:start]]
-    header = above[form.header_row - 1] if form.header_row else [""] * len(cells[start])
-    names = tuple(name.strip() or str(number + 1) for number, name in enumerate(header))
-    stated = above[form.unit_row - 1] if form.unit_row else [""] * len(names)
-    units = tuple(unit_in(unit) or unit_of(item) for unit, item in zip(stated, names, strict=True))
-    rows = _filled(cells[start:])
-
-    def read(columns: Mapping[int, bool]) -> Iterator[Batch]:
-        yield [_column(f"{path}, {name}", rows, number, text, start, form) for number, text in columns.items()]
-
-    return Sheet(path, name, names, units, read, facts_in(above[: max(form.header_row - 1, 0)]), start + 1)
+def hidden_sheets(path: Path) -> set[str]:
+    """The sheets that the workbook's maker does not show; raises DataError where it cannot be read."""
+    with _readable(path):
+        found = calamine.CalamineWorkbook.from_path(str(path)).sheets_metadata
+    return {sheet.name for sheet in found if sheet.visible != calamine.SheetVisibleEnum.Visible}
 
 
-def shown_rows(path: Path, name: str, count: int) -> list[list[str]]:
-    """The first ``count`` rows of a sheet, as text."""
-    rows = _opened(path).get_sheet_by_name(name).to_python(skip_empty_area=False, nrows=count)
-    return [[shown(cell).strip() for cell in row] for row in rows]
+def sheet_text(path: Path, name: str, decimal: str) -> bytes:
+    """The rows of sheet ``name`` as lines with commas between their cells; raises DataError as above."""
+    with _readable(path):
+        return _text(path, name, decimal, path.stat().st_mtime_ns)
 
 
-def shown(cell: object) -> str:
-    """A cell as text: dates as ISO, whole numbers without a point."""
-    if isinstance(cell, datetime.date | datetime.time):
-        return cell.isoformat()
-    return f"{cell:.15g}" if isinstance(cell, float) else str(cell)
+@lru_cache(maxsize=64)  # a sheet is read once for its head and once for its rows, those of all files after one another
+def _text(path: Path, name: str, decimal: str, _changed_ns: int) -> bytes:
+    sheet, text = calamine.CalamineWorkbook.from_path(str(path)).get_sheet_by_name(name), io.StringIO()
+    rows = sheet.to_python(skip_empty_area=False)
+    csv.writer(text, lineterminator="\n").writerows([[_written(cell, decimal) for cell in row] for row in rows])
+    return text.getvalue().encode()
 
 
-def _opened(path: Path) -> calamine.CalamineWorkbook:
+def _written(cell: object, decimal: str) -> str:
+    """A cell as text in one line: dates and times as ISO, a number with all its digits, a whole one without a point."""
+    if isinstance(cell, float):
+        return repr(cell).removesuffix(".0").replace(".", decimal)
+    if isinstance(cell, datetime.timedelta):
+        cell = (
+            (datetime.datetime.min + cell).time() if cell < datetime.timedelta(days=1) else cell.total_seconds() / DAY_S
+        )
+    return cell.isoformat() if isinstance(cell, datetime.date | datetime.time) else " ".join(str(cell).split())
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
     try:
-        return calamine.CalamineWorkbook.from_path(str(path))
+        with path.open("rb"):  # says why it cannot, which the library does not
+            yield
     except FileNotFoundError as error:
         raise DataError(f"{path}: no such file") from error
     except calamine.PasswordError as error:
         raise DataError(f"{path}: encrypted; save it without a password") from error
-    except (calamine.CalamineError, OSError, ValueError) as error:
-        raise DataError(
-            f"{path}: not readable as a workbook ({error}); open it and save it as xlsx, or copy it again"
-        ) from error
-
-
-def _filled(rows: list[list[Any]]) -> list[list[Any]]:
-    """Without the empty rows at the end."""
-    last = max((number for number, row in enumerate(rows) if any(cell != "" for cell in row)), default=-1)
-    return rows[: last + 1]
-
-
-def _column(where: str, rows: list[list[Any]], number: int, text: bool, start: int, form: FileForm) -> Column:
-    if text:
-        return [shown(row[number]).strip() for row in rows]
-    values = np.empty(len(rows))
-    for at, row in enumerate(rows):
-        try:
-            values[at] = _number(row[number], form)
-        except ValueError as error:
-            raise DataError(
-                f"{where} row {start + 1 + at}, column {number + 1}: {row[number]!r} is not a number"
-            ) from error
-    return values
-
-
-def _number(cell: object, form: FileForm) -> float:
-    for kind, convert in _NUMBERS.items():
-        if isinstance(cell, kind):
-            return convert(cell)
-    text = str(cell).strip()
-    return (
-        math.nan if text in form.missing else float(text.replace(form.thousands or "\0", "").replace(form.decimal, "."))
-    )
-
-
-_NUMBERS: dict[type, Callable[[Any], float]] = {
-    float: float,
-    int: float,
-    datetime.datetime: lambda cell: (cell - EPOCH).total_seconds() / DAY_S,
-    datetime.date: lambda cell: float((cell - EPOCH.date()).days),
-    datetime.time: lambda cell: (cell.hour * 3600 + cell.minute * 60 + cell.second + cell.microsecond * 1e-6) / DAY_S,
-    datetime.timedelta: lambda cell: cell.total_seconds() / DAY_S,
-}
+    except (calamine.CalamineError, *DAMAGE) as error:
+        raise unreadable(path, "a workbook", error, "open it and save it as xlsx, or copy it again") from error

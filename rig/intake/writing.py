@@ -3,18 +3,19 @@
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.channels import AXIS, BY_NAME, FORCE
+from rig.channels import AXIS, BY_NAME, FORCE, Stream
 from rig.errors import DataError
 from rig.intake.folder import FoundTable
-from rig.intake.rows import Piece, stream_rows
-from rig.recording.mcap_file import RecordingWriter
+from rig.intake.rows import FIELDS, Piece, stream_rows
+from rig.recording.mcap_file import SUMMARY, RecordingWriter
+from rig.recording.reader import LONGEST_ROWS, NUMERIC, Recording
 from rig.recording.sessions import TrialInfo
 
 # Fewer rows tell no rate.
@@ -23,26 +24,33 @@ FEWEST_ROWS = 2
 
 @dataclass(frozen=True)
 class Written:
-    """A recording that is finished: what is listed of it, when it began and ended, a hash of its rows, remarks."""
+    """A finished recording: what is listed of it, span, hash of its rows, remarks, and itself if not too long."""
 
     info: TrialInfo
     span_ns: tuple[int, int]
     digest: bytes
     remarks: tuple[str, ...]
+    recording: Recording | None = None
 
 
 class OpenRecording:
     """A recording being written; ``info`` is what is known of it so far."""
 
-    def __init__(self, folder: Path, info: TrialInfo, metadata: Mapping[str, Mapping[str, str]]) -> None:
-        """Creates its file in ``folder``."""
+    def __init__(
+        self, folder: Path, info: TrialInfo, metadata: Mapping[str, Mapping[str, str]], known: Sequence[str] = ()
+    ) -> None:
+        """Creates its file in ``folder``; ``known`` are remarks from before it is written."""
         self.info = info
+        self._known = known
+        self._metadata = metadata
         self._writer = RecordingWriter(folder / info.file, metadata)
+        self._rows: dict[str, list[NDArray[np.void]]] = {}
         self._last: dict[str, NDArray[np.void]] = {}
         self._sources: dict[str, str] = {}
         self._seen = hashlib.sha256()
         self._span_ns: list[int] = []
         self._saturated = self._dropped = 0
+        self._left_out: dict[str, int] = {}
 
     def add(self, piece: Piece, table: FoundTable) -> None:
         """Appends a piece; raises DataError where a stream was there before."""
@@ -56,15 +64,20 @@ class OpenRecording:
                     f"{table.sheet.where}: {stream} of recording {self.info.name} was there before; name what "
                     "tells the two apart in `recording`"
                 )
+            self._left_out[stream] = self._left_out.get(stream, 0) + piece.dropped
             self._write(stream, rows)
 
     def _write(self, stream: str, rows: NDArray[np.void]) -> None:
         self._writer.add_rows(BY_NAME[stream], rows)
-        self._seen.update(rows.tobytes())
-        self._last[stream] = rows[-1:]
+        for field in ("capture_ns", *FIELDS[stream].values()):
+            self._seen.update(np.ascontiguousarray(rows[field]).data)
+        self._last[stream] = rows[-1:].copy()
+        self._rows.setdefault(stream, []).append(rows)
         span_ns = [*self._span_ns, int(rows[0]["capture_ns"]), int(rows[-1]["capture_ns"])]
         self._span_ns = [min(span_ns), max(span_ns)]
         samples = {**self.info.samples, stream: self.info.samples.get(stream, 0) + rows.size}
+        if sum(samples.values()) > LONGEST_ROWS:
+            self._rows = {}
         peak_N = (
             float(np.fmax.reduce(rows["fz_N"], initial=self.info.peak_force_N)) if stream == FORCE.name else math.nan
         )
@@ -76,9 +89,22 @@ class OpenRecording:
         if min(samples.values(), default=0) < FEWEST_ROWS:
             found = "only one row" if samples else "no row"
             raise DataError(f"recording {name}: {found} under the header; a stream needs at least {FEWEST_ROWS}")
-        self._writer.finish({"outcome": self.info.outcome, "samples": json.dumps(samples)})
+        counts = {"samples": json.dumps(samples), "left_out": json.dumps(self._left_out)}
+        summary = {"outcome": self.info.outcome, **counts}
+        self._writer.finish(summary)
         first, last = self._span_ns
-        return Written(self.info, (first, last), self._seen.digest(), tuple(self._remarks()))
+        return Written(self.info, (first, last), self._seen.digest(), tuple(self._remarks()), self._recording(summary))
+
+    def _recording(self, summary: Mapping[str, str]) -> Recording | None:
+        if sum(self.info.samples.values()) > LONGEST_ROWS:
+            return None
+        metadata = {name: dict(values) for name, values in {**self._metadata, SUMMARY: summary}.items()}
+        tables = {stream.name: self._table(stream) for stream in NUMERIC}
+        return Recording(self._writer.path, metadata, tables, (), complete=True, damage=())
+
+    def _table(self, stream: Stream) -> NDArray[np.void]:
+        parts = self._rows.get(stream.name, [np.zeros(0, stream.dtype)])
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def _remarks(self) -> list[str]:
         counts = {
@@ -87,7 +113,7 @@ class OpenRecording:
         }
         said = [f"{self.info.name}: {count} samples {what}" for what, count in counts.items() if count]
         absent = [stream.name for stream in (FORCE, AXIS) if stream.name not in self.info.samples]
-        return said + [f"{self.info.name}: holds no {stream}" for stream in absent]
+        return [*self._known, *said, *(f"{self.info.name}: holds no {stream}" for stream in absent)]
 
     def close(self) -> None:
         """Lets go of the file as it is."""

@@ -5,13 +5,11 @@ import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
-import h5py
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as arrow_csv
-import scipy.io
 from numpy.typing import NDArray
 
 from rig.channels import FORCE, STREAMS
@@ -20,6 +18,9 @@ from rig.recording.files import whole_file, whole_folder, write_text
 from rig.recording.sessions import Session, TrialInfo, plain
 from rig.recording.tables import arrow_table, compression_N, filled, write_parquet
 
+if TYPE_CHECKING:
+    import h5py
+
 Format = Literal["csv", "parquet", "hdf5", "mat"]
 MatValue = NDArray[np.generic] | str | float | Mapping[str, "MatValue"]
 FORMATS: tuple[Format, ...] = get_args(Format)
@@ -27,6 +28,8 @@ COLUMNS_FILE = "columns.csv"
 # MATLAB's own limits: names of at most 63 characters, files of version 5 below 2 GiB a variable.
 MAT_NAME = 63
 MAT_LIMIT = 1 << 31
+# Of any length, in UTF-8, as `h5py.string_dtype` describes it.
+TEXT = np.dtype("O", metadata={"vlen": str})
 COMPRESSED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 
 
@@ -36,7 +39,7 @@ def export(session: Session, format: Format, out: Path) -> Path:
     Raises UsageError where ``out`` exists or the format cannot hold the session, WriteFailed where the disk is full.
     """
     if not session.trials:
-        raise UsageError(f"{session.folder}: no recording to export")
+        raise UsageError(f"{session.place}: no recording to export")
     writers: dict[Format, Callable[[Session, Path], None]] = {
         "csv": _csv,
         "parquet": _parquet,
@@ -147,6 +150,8 @@ def _parquet(session: Session, out: Path) -> None:
 
 def _hdf5(session: Session, out: Path) -> None:
     """``/TRIAL/STREAM/FIELD`` with attributes ``unit`` and ``meaning``; facts as JSON in attributes of the groups."""
+    import h5py  # noqa: PLC0415 - it takes as long to load as a small text to import, which needs none of it
+
     # In memory first: the HDF5 library crashes the process when the disk is full on close.
     # libver: what is newer cannot be opened by the HDF5 of current Debian, R and Octave.
     with (
@@ -166,13 +171,15 @@ def _group(group: "h5py.Group", session: Session, trial: TrialInfo) -> None:
     group.attrs["speed_mm_s"], group.attrs["depth_mm"] = trial.speed_mm_s, trial.depth_mm
     for stream, table in filled(recording):
         for name, kind in stream.kinds.items():
-            stored = {"dtype": h5py.string_dtype()} if kind is str else COMPRESSED
+            stored = {"dtype": TEXT} if kind is str else COMPRESSED
             data = group.create_dataset(f"{stream.name}/{name}", data=table[name].to_numpy(), **stored)
             data.attrs["unit"], data.attrs["meaning"] = stream.units[name]
 
 
 def _mat(session: Session, out: Path) -> None:
     """One struct a trial (``trial_01.force.fz_N``), ``units.force.fz_N``, and ``session`` as JSON text."""
+    import scipy.io  # noqa: PLC0415 - as above
+
     size = sum(
         stream.dtype.itemsize * trial.samples.get(stream.name, 0) for trial in session.trials for stream in STREAMS
     )

@@ -30,6 +30,7 @@ MAGIC = int.from_bytes(b"tissring", "little")
 
 # Words of the header; head and tail stand on cache lines of their own.
 _MAGIC, _SLOTS, _HEAD, _TAIL, _HEARTBEAT, _DROPPED = 0, 1, 8, 16, 24, 32
+HEAD_BYTE = 8 * _HEAD
 
 
 def new_path() -> Path:
@@ -166,7 +167,7 @@ class RingReader:
             raise UsageError(f"{path}: no ring: {error.strerror}; start the loop first") from error
         try:
             fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            slots = _slots(fd)
+            slots = slots_of(fd)
             if not slots:
                 raise UsageError(f"{path}: not a ring of this program")
             return cls(path, fd, _Mapping(fd, PAGE + slots * SLOT), slots)
@@ -232,7 +233,7 @@ class RingReader:
         self._fd = -1
 
 
-def _slots(fd: int) -> int:
+def slots_of(fd: int) -> int:
     """Slots of the ring in the file, 0 if it is none."""
     with contextlib.suppress(OSError, struct.error):
         magic, slots = struct.unpack("<qq", os.pread(fd, 16, 0))

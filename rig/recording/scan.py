@@ -13,19 +13,23 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeVar
 
+import numpy as np
 import zstandard
 from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
+from numpy.typing import NDArray
 
+from rig.channels import CDR_HEADER
 from rig.recording.mcap_file import CHECKSUM, checksum
 from rig.recording.mcap_layout import MAGIC, MESSAGE_HEAD
 
 # No chunk of ours is larger; a damaged size must not be able to ask for all memory.
 LARGEST_CHUNK = 1 << 26
 _RECORD = struct.Struct("<BQ")
-_CDR = 4
+_CDR = len(CDR_HEADER)
+_AT_ONCE = 1024  # compared in 20 us: what mixes streams waits no longer for each message
 _FOOTER_SIZE = 9 + 20 + len(MAGIC)
 # Where a chunk (zstd) or a metadata record may begin.
 _BEGIN = re.compile(rb"\x06.{3}[\0-\x0f]\0{4}.{28}\x04\0\0\0zstd|\x0c.{4}\0{4}[\x01-\x40]\0\0\0", re.DOTALL)
@@ -40,11 +44,18 @@ class Definition(NamedTuple):
     schema: str
 
 
+class Messages(NamedTuple):
+    """Messages of one channel, alike in length, that follow each other: bodies without CDR header, shape (n, bytes)."""
+
+    channel: int
+    bodies: NDArray[np.uint8]
+
+
 class Chunk(NamedTuple):
-    """Messages of one good chunk as (channel, body without CDR header), in the order they were written."""
+    """Messages of one good chunk, in the order they were written."""
 
     definitions: dict[int, Definition]
-    messages: list[tuple[int, bytes]]
+    messages: list[Messages]
 
 
 @dataclass
@@ -197,13 +208,14 @@ def _messages(data: bytes) -> Chunk:
     """Takes a chunk's content apart; its checksum was right, so only a foreign writer can make this fail."""
     schemas: dict[int, str] = {}
     chunk = Chunk({}, [])
-    append, unpack, message, at = chunk.messages.append, MESSAGE_HEAD.unpack_from, int(Opcode.MESSAGE), 0
+    at = 0
     try:
         while at < len(data):
             opcode, size = _RECORD.unpack_from(data, at)
             end = at + 9 + size
-            if opcode == message:
-                append((unpack(data, at)[2], data[at + MESSAGE_HEAD.size + _CDR : end]))
+            if opcode == Opcode.MESSAGE:
+                end = _end_of_alike(data, at, end)
+                chunk.messages.append(_unpack_messages(data, at, end, 9 + size))
             elif opcode == Opcode.SCHEMA:
                 schema = _unpack(records.Schema, data[at + 9 : end])
                 schemas[schema.id] = schema.data.decode()
@@ -211,9 +223,30 @@ def _messages(data: bytes) -> Chunk:
                 channel = _unpack(records.Channel, data[at + 9 : end])
                 chunk.definitions[channel.id] = Definition(channel.topic, schemas.get(channel.schema_id, ""))
             at = end
-    except (struct.error, UnicodeDecodeError) as error:
+    except (struct.error, ValueError) as error:
         raise _Bad("chunk with content this program does not know") from error
     return chunk
+
+
+def _end_of_alike(data: bytes, at: int, end: int) -> int:
+    """Where the last of the messages ends that begin as the one from ``at`` to ``end`` does and follow it."""
+    size = end - at
+    # Eleven bytes, opcode to channel, as two numbers that overlap: byte by byte takes five times as long.
+    beginning = np.dtype({"names": ["first", "last"], "formats": ["<u8", "<u4"], "offsets": [0, 7], "itemsize": size})
+    (own,) = np.frombuffer(data, beginning, 1, at)
+    while end + size <= len(data):
+        count = min((len(data) - end) // size, _AT_ONCE)
+        rows = np.frombuffer(data, beginning, count, end)
+        others = np.flatnonzero((rows["first"] != own["first"]) | (rows["last"] != own["last"]))
+        end += size * (int(others[0]) if others.size else count)
+        if others.size:
+            break
+    return end
+
+
+def _unpack_messages(data: bytes, at: int, end: int, size: int) -> Messages:
+    bodies = np.frombuffer(data, np.uint8, end - at, at).reshape(-1, size)[:, MESSAGE_HEAD.size + _CDR :]
+    return Messages(MESSAGE_HEAD.unpack_from(data, at)[2], bodies)
 
 
 def _unpack_metadata(content: bytes) -> tuple[str, dict[str, str]]:
@@ -233,11 +266,11 @@ def _check_end(data: bytes, found: Scan) -> None:
         if not found.cut and not found.damage:
             found.cut = f"the file ends at byte {len(data)} without its footer"
         return
-    found.footer = True
+    found.footer, whole = True, memoryview(data)
     start, _, expected = struct.unpack_from("<QQI", data, len(data) - _FOOTER_SIZE + 9)
-    if not _FOOTER_SIZE + 13 <= start <= len(data) - _FOOTER_SIZE or zlib.crc32(data[start:-12]) != expected:
+    if not _FOOTER_SIZE + 13 <= start <= len(data) - _FOOTER_SIZE or zlib.crc32(whole[start:-12]) != expected:
         found.damage.append("the index at the end has a wrong checksum; a reader that trusts it may fail")
-    elif not found.damage and _data_crc(data, start) != zlib.crc32(data[: start - 13]):
+    elif not found.damage and _data_crc(data, start) != zlib.crc32(whole[: start - 13]):
         found.damage.append("the data section has a wrong checksum outside chunks and metadata; no sample is touched")
 
 

@@ -73,11 +73,20 @@ class SessionInfo:
 
 @dataclass(frozen=True)
 class Session:
-    """An opened session. ``remarks`` are sentences on what was not as it should be, empty if all was."""
+    """An opened session. ``remarks`` are sentences on what was not as it should be, empty if all was.
+
+    ``origin`` is the place somebody named where that is not its own ``folder``.
+    """
 
     folder: Path
     info: SessionInfo
     remarks: tuple[str, ...] = ()
+    origin: Path | None = None
+
+    @property
+    def place(self) -> Path:
+        """What to call it by: the place it was opened from."""
+        return self.origin or self.folder
 
     @property
     def trials(self) -> tuple[TrialInfo, ...]:
@@ -89,7 +98,7 @@ class Session:
         for trial in self.trials:
             if trial.name == name:
                 return trial
-        raise UsageError(f"{self.folder}: no trial {name}; there are {', '.join(item.name for item in self.trials)}")
+        raise UsageError(f"{self.place}: no trial {name}; there are {', '.join(item.name for item in self.trials)}")
 
     @property
     def mismatches(self) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from rig.channels import EVENT
 from rig.progress import Progress, silent
 from rig.recording.files import whole_file
 from rig.recording.mcap_file import SUMMARY, RecordingWriter
-from rig.recording.reader import Recording, read_bytes, read_recording, samples
+from rig.recording.reader import Recording, messages, read_bytes, read_recording
 from rig.recording.scan import scan
 
 State = Literal["complete", "incomplete", "damaged"]
@@ -153,10 +153,11 @@ def repair(path: Path, out: Path, tell: Progress = silent) -> Verdict:
     metadata = {name: values for name, values in found.metadata.items() if name != SUMMARY}
     damage = [*found.damage, *([found.cut] if found.cut else [])]
     summary = {"outcome": "recording cut"} | found.metadata.get(SUMMARY, {})
-    count = sum(len(chunk.messages) for chunk in found.chunks)
+    count = sum(len(alike.bodies) for chunk in found.chunks for alike in chunk.messages)
+    samples = ((stream, body) for stream, bodies in messages(path, found) for body in bodies)
     with whole_file(out) as scratch, closing(RecordingWriter(scratch, metadata)) as writer:
-        for number, (stream, body) in enumerate(samples(path, found)):
-            writer.add(stream.id, body)
+        for number, (stream, body) in enumerate(samples):
+            writer.add(stream.id, body.tobytes())
             if number % ROWS_PER_CHUNK == ROWS_PER_CHUNK - 1:
                 writer.flush()
                 tell("saving good samples", number / count)

@@ -62,3 +62,11 @@ class SavedResult(Result):
             first = error.errors()[0]
             place = ".".join(map(str, first["loc"])) or "the file"
             raise UsageError(f"{path}: holds no {cls.__name__}: {place}: {first['msg']}") from error
+
+
+class Failure(SavedResult):
+    """Why a command that has no result ended: ``error`` is the kind, ``reason`` the sentence it said."""
+
+    error: str = Field(description="class of the error, such as DataError, DeviceError, CheckFailed or SafetyStop")
+    exit_code: int
+    reason: str

@@ -10,12 +10,13 @@ from rig.results.tracking import TrackResult
 
 
 class HiddenTruth(Result):
-    """What was hidden in the bench; ``named``: the diagnosis found it."""
+    """What was hidden in the bench; ``named``: the diagnosis found it; ``inside``: whether intervals hold it."""
 
     effect: str
     parameters: Mapping[str, float]
     seed: int
     named: bool
+    inside: Mapping[str, bool] = {}
 
 
 class DemoSummary(ReportResult):

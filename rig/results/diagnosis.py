@@ -2,22 +2,30 @@
 
 from collections.abc import Mapping
 
-from pydantic import AliasChoices, Field
+from pydantic import AliasChoices, AliasPath, Field
 
 from rig.diagnosis.estimates import (
+    AxisPrediction,
     Estimate,
     NamedCause,
     NextExperiment,
+    OwnSpread,
     SimulationError,
     SmallestSize,
     Unexplained,
     Verdict,
 )
-from rig.results.base import Result, SavedResult
+from rig.results.base import Number, Result, SavedResult
 from rig.trials.findings import Finding
 
 FOLDER, FILE, MODEL, TRUTH = "diagnosis", "diagnosis.json", "model.json", "truth.txt"
-PICTURES = ("simulation", "residuals", "evidence", "confusability")
+MOCK_LIMB = "a limb like the mock bench's"
+PICTURES = ("share", "simulation", "residuals", "evidence", "confusability")
+
+
+def _of_budget(name: str) -> AliasChoices:
+    """The key, or where a diagnosis keeps it."""
+    return AliasChoices(name, AliasPath("budget", name))
 
 
 class DiagnosisResult(SavedResult):
@@ -40,6 +48,49 @@ class DiagnosisResult(SavedResult):
     simulation_error: tuple[SimulationError, ...] = Field(
         validation_alias=AliasChoices("simulation_error", "simulated")
     )
+    explained_share: Estimate | None = Field(
+        default=None,
+        validation_alias=AliasChoices(
+            "explained_share", AliasPath("budget", "explained_share"), AliasPath("axis", "explained_share")
+        ),
+        description="of the power of the error that could be taken off, what the causes named take off",
+    )
+    base_N: Number = Field(
+        default=None,
+        validation_alias=_of_budget("base_N"),
+        description="error on recordings left out, each with its own contact, zero and stiffness; so are those below",
+    )
+    extended_N: Number = Field(
+        default=None, validation_alias=_of_budget("extended_N"), description="with the causes named"
+    )
+    flexible_N: Number = Field(
+        default=None, validation_alias=_of_budget("flexible_N"), description="of a tissue of any form and memory"
+    )
+    floor_N: Number = Field(
+        default=None, validation_alias=_of_budget("floor_N"), description="the smallest that any of them reached"
+    )
+    noise_N: Number = Field(default=None, validation_alias=_of_budget("noise_N"), description="of force in the air")
+    repeatability_N: Number = Field(
+        default=None,
+        validation_alias=_of_budget("repeatability_N"),
+        description="by how much repeats of one motion differ",
+    )
+    shared_by_repeats: Estimate | None = Field(
+        default=None,
+        validation_alias=_of_budget("shared_by_repeats"),
+        description="power that the errors of repeats have in common, over what they differ by",
+    )
+    scatter: Mapping[str, OwnSpread] = Field(
+        default={},
+        validation_alias=_of_budget("scatter"),
+        description="how recordings differ in contact, zero and stiffness",
+    )
+    stiffness_N_mm: Number = Field(
+        default=None,
+        validation_alias=_of_budget("stiffness_N_mm"),
+        description="of the tissue where the tip presses: it turns an error of force into one of depth",
+    )
+    axis: AxisPrediction | None = Field(default=None, description="of a drive axis; its effort has a unit of its own")
 
 
 class AmbiguousPair(Result):
@@ -60,6 +111,7 @@ class Confusion(Result):
 class ProtocolCheckResult(SavedResult):
     """What a protocol can show before anything is recorded."""
 
+    tissue: str = Field(default=MOCK_LIMB, description="what the protocol was laid out on; its noise is assumed")
     duration_s: float
     cycles: int
     detectable: Mapping[str, SmallestSize]

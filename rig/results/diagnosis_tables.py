@@ -1,19 +1,19 @@
-"""A diagnosis, and a protocol check, in tables and sentences: once, for terminal and HTML alike."""
+"""A diagnosis, and a protocol check, in lines, tables and sentences: once, for terminal and HTML alike."""
 
 from collections.abc import Iterator, Mapping
 from itertools import chain, repeat
 
-from rig.diagnosis.estimates import NamedCause, NextExperiment, SimulationError, SmallestSize
+from rig.diagnosis.estimates import Estimate, NamedCause, SimulationError, SmallestSize
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
+from rig.results.diagnosis_lines import five_lines, unit_after
 from rig.results.tables import Part, TextTable
-
-# Janot, Gautier, Brunot, "Data Set and Reference Models of EMPS", 2019: symmetric model, closed-loop simulation.
-PUBLISHED = {"DATA_EMPS": "; published 5.85 %", "DATA_EMPS_PULSES": "; published 8.94 %"}
 
 
 def diagnosis_parts(result: DiagnosisResult) -> Iterator[Part]:
-    """All of a diagnosis."""
-    yield f"{result.verdict}: {result.statement}"
+    """All of a diagnosis: five lines, the verdict in a sentence, then tables."""
+    yield from five_lines(result)
+    if result.verdict != "not judged":  # the lines say why
+        yield f"{result.verdict}: {result.statement}"
     yield from named_parts(result)
     yield from further_parts(result)
 
@@ -28,12 +28,17 @@ def named_parts(result: DiagnosisResult) -> Iterator[Part]:
 def named_table(result: DiagnosisResult) -> TextTable:
     """The causes named, with their sizes."""
     rows = [
-        (cause, name, f"{found.value:.4g}", f"{found.low:.4g} to {found.high:.4g}{', at its bound' * found.at_bound}")
+        (cause, name, *_cells(found))
         for finding in result.findings
         for cause, (name, found) in zip(_once(" or ".join(finding.effects)), finding.parameters.items(), strict=False)
     ]
-    title = "Named" if result.verdict == "explained" else "Named provisionally"
+    title = "Named provisionally" if any(finding.provisional for finding in result.findings) else "Named"
     return TextTable(title, ("cause", "parameter", "value", "95 % interval"), rows, words=2)
+
+
+def _cells(found: Estimate) -> tuple[str, str]:
+    bound = ", at its bound" * found.at_bound
+    return f"{found.value:.4g}{unit_after(found)}", f"{found.low:.4g} to {found.high:.4g}{bound}"
 
 
 def _once(text: str) -> Iterator[str]:
@@ -42,23 +47,31 @@ def _once(text: str) -> Iterator[str]:
 
 
 def gain_sentence(finding: NamedCause) -> str:
-    """What a named cause takes off the error, and what repairs it."""
-    gain = finding.gain
+    """What a named cause takes off the error, how surely, and what repairs it."""
+    gain, error = finding.gain, finding.evidence_se_nats
+    before, after = gain.errors
+    surely = f", evidence of {finding.evidence_nats / error:.2g} standard errors" if error else ""
     return (
-        f"{finding.effects[0]}: error on recordings left out {gain.rmse_before_N:.4f} -> {gain.rmse_after_N:.4f} N "
-        f"({100 * gain.reduction:.0f} % less, {100 * gain.low:.0f} to {100 * gain.high:.0f}), "
-        f"{finding.evidence_nats:.0f} nats; {finding.repair}"
+        f"{finding.effects[0]}: error on recordings left out {before:.4f} -> {after:.4f} {gain.unit} "
+        f"({100 * gain.reduction:.0f} % less, {100 * gain.low:.0f} to {100 * gain.high:.0f}){surely}; {finding.repair}"
     )
 
 
 def detectable_table(found: Mapping[str, SmallestSize], title: str, header: str) -> TextTable:
-    """From what size each cause would be named."""
-    rows = [(name, f"{size.minimum:.3g} {size.unit}".removesuffix(" 1")) for name, size in sorted(found.items())]
-    return TextTable(title, ("cause", header), rows, words=2)
+    """From what size each cause would be named, and how often it was where it was tried."""
+    rows = [
+        (name, f"{size.minimum:.3g} {size.unit}".removesuffix(" 1"), _tried(size))
+        for name, size in sorted(found.items())
+    ]
+    return TextTable(title, ("cause", header, "planted, and found"), rows, words=3)
+
+
+def _tried(size: SmallestSize) -> str:
+    return f"{size.found} of {size.trials}" if size.trials else "an estimate"
 
 
 def further_parts(result: DiagnosisResult) -> Iterator[Part]:
-    """What was not found, what could not be tested, what the data show of themselves, and what to do next."""
+    """What was not found, what could not be tested, and what the data show of themselves."""
     if result.detectable:
         yield detectable_table(result.detectable, "Not found", "would have been named from")
     if result.parameters:
@@ -67,8 +80,6 @@ def further_parts(result: DiagnosisResult) -> Iterator[Part]:
         yield f"cannot be tested: any of the {len(result.not_testable)} causes, for this reason"
     yield from map(_in_closed_loop, result.simulation_error)
     yield from (finding.sentence for finding in result.data_quality)
-    if result.next_experiment:
-        yield next_sentence(result.next_experiment)
 
 
 def untestable_sentences(reasons: Mapping[str, str]) -> list[str]:
@@ -81,25 +92,17 @@ def untestable_sentences(reasons: Mapping[str, str]) -> list[str]:
 
 def _in_closed_loop(item: SimulationError) -> str:
     which = "fitted" if item.fitted else "left out"
+    others = "".join(f"; {name} {percent:.2f} %" for name, percent in item.reference_percent.items())
     return (
-        f"closed-loop force error, {item.recording} ({which}): "
-        f"{item.before_percent:.2f} % -> {item.after_percent:.2f} %{PUBLISHED.get(item.recording, '')}"
+        f"closed-loop effort error, {item.recording} ({which}): "
+        f"{item.before_percent:.2f} % -> {item.after_percent:.2f} %{others}"
     )
-
-
-def next_sentence(experiment: NextExperiment) -> str:
-    """The next experiment as a sentence."""
-    said = f"next experiment: {experiment.do}"
-    if experiment.nats_per_minute is None:
-        return said
-    causes = " from ".join(experiment.separates)
-    return f"{said}, which separates {causes} at {experiment.nats_per_minute:.1f} nats a minute"
 
 
 def check_parts(result: ProtocolCheckResult) -> Iterator[Part]:
     """What the protocol can show, and the pairs it cannot separate safely."""
     yield f"{result.cycles} cycles in {result.duration_s:.0f} s"
-    yield detectable_table(result.detectable, "On a limb and noise as the mock bench has them", "visible from")
+    yield detectable_table(result.detectable, f"On {result.tissue}, with noise as of the mock bench", "visible from")
     pairs = [(*one.pair, f"{one.nats:.1f}") for one in (*result.not_separable, *result.ambiguous)]
     if pairs:
         header = ("cause", "imitated by", f"nats left of {result.confusion_nats.of:g}")

@@ -8,6 +8,7 @@ from pydantic import Field
 from rig.recording.sessions import TrialInfo
 from rig.recording.verify import StreamVerdict
 from rig.results.base import Number, Result, SavedResult
+from rig.results.came_in import CameInResult
 from rig.results.tracking import LoopCount
 
 Quality = Literal["", "good", "usable", "bad"]
@@ -82,6 +83,7 @@ class ImportResult(SavedResult):
     samples: Mapping[str, int]
     remarks: tuple[str, ...]
     trials: tuple[TrialInfo, ...] = Field(default=(), exclude=True)
+    came_in: CameInResult | None = Field(default=None, description="null in files of earlier versions")
 
 
 class ExportResult(SavedResult):

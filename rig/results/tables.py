@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from rig.results.base import known
 from rig.results.fit import DisplacementErrors, FitResult, LatticeResult, LawResult
 from rig.results.tracking import ComparedRun, Followed, SimulateResult, TrackingGain, TrackResult
 from rig.tissue.rates import STUDY_B_N_S_MM
@@ -58,7 +59,7 @@ MARGINS = {
 
 def render(value: float | None, form: str) -> str:
     """The number in that format; a dash where it is unknown."""
-    return UNKNOWN if value is None else format(value, form)
+    return UNKNOWN if known(value) is None else format(value, form)
 
 
 def cells(row: object, columns: Columns) -> list[str]:

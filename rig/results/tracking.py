@@ -7,6 +7,8 @@ from pydantic import AliasChoices, Field
 from rig.results.base import Result, SavedResult
 
 FILE = "track.json"
+# Of each recording of a ramp, since one session may have several.
+THRESHOLD = "threshold.json"
 
 
 class Plateau(Result):

@@ -22,6 +22,8 @@ LARGEST_TURN = 0.75  # Transtrum and Sethna (2012): beyond it the turn is no sma
 PROBE = 0.1  # of the step, likewise theirs
 FIRST_DAMPING = 1e-3  # Marquardt's
 LARGEST_DAMPING = 1e10  # shortens a step until nothing in double precision moves
+EDGE_DAMPING = 1e3  # at a smooth minimum far longer steps than these no longer go up
+BESIDE = 0.05  # of the range of an own parameter: past the edge, and near enough to find its valley again
 
 
 class Values(NamedTuple):
@@ -68,7 +70,20 @@ def minimise(problem: LeastSquares, start: Values, evaluations: int) -> Values |
     """The values of least squares near ``start``; None where they are not reached in so many evaluations.
 
     In a valley, where the data cannot tell parameters apart, the sum hardly falls in the end: that is reached too.
+    Where damping lets the force of a moving tip jump at contact, a search can end at the edge of the jump, on which an
+    own parameter puts a sample: it begins once more on either side, and the lowest end counts.
     """
+    found, at_edge = _descend(problem, start, evaluations)
+    if found is None or not at_edge:
+        return found
+    shift = BESIDE * (problem.upper.own - problem.lower.own)
+    both = (_descend(problem, found._replace(own=found.own + way * shift), evaluations)[0] for way in (-1, 1))
+    ends = [found, *(end for end in both if end is not None)]
+    return min(ends, key=lambda end: _cost(problem, end, problem.residuals(end)))
+
+
+def _descend(problem: LeastSquares, start: Values, evaluations: int) -> tuple[Values | None, bool]:
+    """Where the search ends, and whether at an edge: only the shortest of steps did not go up."""
     values = _clipped(problem, start)
     residuals, damping = problem.residuals(values), FIRST_DAMPING
     cost = _cost(problem, values, residuals)
@@ -84,13 +99,12 @@ def minimise(problem: LeastSquares, start: Values, evaluations: int) -> Values |
             values, residuals, slopes = trial, trial_residuals, problem.slopes(trial)
             damping = max(damping / 10, TOLERANCE)
             if gained <= TOLERANCE * cost:
-                return values
+                return values, damping > EDGE_DAMPING
         else:
             damping *= 4
-            # No step however short goes down any more: a minimum, smooth or at a kink.
             if damping > LARGEST_DAMPING or trial_cost <= cost * (1 + TOLERANCE):
-                return values
-    return values if evaluations >= LONG_SEARCH and halfway - cost <= VALLEY * cost else None
+                return values, damping > EDGE_DAMPING
+    return (values if evaluations >= LONG_SEARCH and halfway - cost <= VALLEY * cost else None), False
 
 
 def normal_equations(problem: LeastSquares, slopes: Slopes) -> Arrow:

@@ -2,8 +2,7 @@
 
 With elastic force e(t) and relaxation 1 + sum r_i exp(-t/tau_i), force is F = e + sum r_i q_i with q_i the integral of
 exp(-(t-s)/tau_i) de(s). Where e goes straight from sample to sample that is exact in steps: q <- exp(-h/tau) q +
-(tau/h)(1 - exp(-h/tau)) (e_new - e_old), unconditionally stable (Taylor, Pister, Goudreau 1970; Simo, Hughes 1998, ch.
-10.3). Steps are chained by doubling (Hillis, Steele 1986), which numpy does in whole arrays.
+(tau/h)(1 - exp(-h/tau)) (e_new - e_old), unconditionally stable (Taylor, Pister, Goudreau 1970; Simo, Hughes 1998).
 """
 
 from collections.abc import Callable, Sequence
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rig.errors import UsageError
+from rig.remembered import exp, remembered
 
 FloatArray = NDArray[np.float64]
 SMALLEST = np.finfo(float).tiny
@@ -61,21 +61,22 @@ class History:
         left_N = (ratio * self.transient(elastic_N, tau_s) for ratio, tau_s in terms)
         return elastic_N + sum(left_N, np.zeros_like(elastic_N))
 
+    @remembered
     def transient(self, signal: FloatArray, tau_s: float) -> FloatArray:
-        """What is left of a signal's changes, which die out with ``tau_s``: q above, shape (n,); signal - q lags it."""
-        decay = np.exp(-self.step_s / tau_s)
-        lost = np.where(self.step_s < SUDDEN * tau_s, -np.expm1(-self.step_s / tau_s), 1 - decay)
-        return recurrence(decay, lost * tau_s / self.step_s * np.diff(signal, prepend=signal[:1]))
+        """What is left of signals' changes, which die out with ``tau_s``: q above, same shape; signal - q lags it."""
+        decay, sudden = exp(-self.step_s / tau_s), self.step_s < SUDDEN * tau_s
+        lost = 1 - decay
+        lost[sudden] = -np.expm1(-self.step_s[sudden] / tau_s)
+        return recurrence(decay, (lost * tau_s / self.step_s * np.diff(signal, axis=0, prepend=signal[:1]).T).T)
 
 
 def recurrence(decay: FloatArray, source: FloatArray) -> FloatArray:
-    """y[n] = decay[n] y[n-1] + source[n], from y = 0; a decay of 0 begins anew."""
-    decay, total, reach = decay.copy(), source.copy(), 1
-    while reach < len(total) and np.any(decay > SMALLEST):
-        total[reach:] += decay[reach:] * total[:-reach]
-        decay[reach:] *= decay[:-reach]
-        reach *= 2
-    return total
+    """y[n] = decay[n] y[n-1] + source[n], from y = 0; a decay of 0 begins anew. Of a source (n,) or several (n, k)."""
+    from scipy.linalg.lapack import dtbtrs  # noqa: PLC0415 - a law without memory does not wait for it
+
+    # The sources are a triangular matrix of two diagonals times what is wanted.
+    band = np.stack([np.ones_like(decay), np.append(-decay[1:], 0.0)])
+    return np.asarray(dtbtrs(band, source, uplo="L", diag="U")[0], float)
 
 
 def ramped(

@@ -12,6 +12,7 @@ from rig.tissue.fitting import LawFit, early_offset, fit_law, residual_force
 from rig.tissue.intervals import student_reach
 from rig.tissue.laws import FloatArray, Law
 from rig.trials.curves import Curve
+from rig.trials.streams import in_order
 
 ROWS = 10
 JACKKNIFE_GROUPS = 5  # with fewer, Student's t reaches so far that an interval says nothing
@@ -106,7 +107,7 @@ def displacement_at(curve: Curve, force_N: FloatArray) -> FloatArray:
     """
     inside = curve.depth_mm > 0
     depth, force = curve.depth_mm[inside], curve.force_N[inside]
-    higher = np.concatenate([[True], force[1:] > np.maximum.accumulate(force)[:-1]])
+    higher = in_order(force)
     if np.count_nonzero(higher) < 2:
         return np.full_like(force_N, np.nan)
     nodes_N, nodes_mm = force[higher], depth[higher]

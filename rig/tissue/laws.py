@@ -51,13 +51,15 @@ class Law(ABC):
     Subclasses are frozen dataclasses whose fields are the parameters, each annotated with its ``ParameterBounds``; they
     give the elastic part e (what is left when the tip rests) for x >= 0, its derivative and its inverse, and damping or
     the ``terms`` of relaxation if there are any. A parameter outside its bounds raises UsageError. ``known`` are
-    parameters that a fit takes as given, with the value it takes unless told another.
+    parameters that a fit takes as given, with the value it takes unless told another; ``later`` those that files of a
+    model may lack, as the law has them for a shorter time, and which are off then.
     """
 
     name: ClassVar[str]
     formula: ClassVar[str]
     bounds: ClassVar[Mapping[str, ParameterBounds]]
     known: ClassVar[Mapping[str, float]] = {}
+    later: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         if get_annotations(cls):

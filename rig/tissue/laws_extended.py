@@ -17,7 +17,7 @@ STEP_MM = 1e-5  # near the cube root of double precision, where a central differ
 
 @dataclass(frozen=True, kw_only=True)
 class Extended(Damped):
-    """The index law with extra factors and relaxation, behind a compliant frame and linear-guide friction.
+    """The index law, or another form in its place, with relaxation, behind a compliant frame and linear-guide friction.
 
     Depth is what the encoder shows: the tip is behind it by compliance times force. Friction (Dahl's, with its level
     and the travel over which it builds up) is a matter of direction and no part of the force at rest.
@@ -25,12 +25,15 @@ class Extended(Damped):
 
     name: ClassVar[str] = "extended"
     formula: ClassVar[str] = (
-        "F = int (1 + r exp(-(t-s)/tau)) d[a x exp(b x) (x / 5 mm)^(n-1) (1 + q x) (1 + s x^3)] + B v, x = depth - c F"
+        "F = int (1 + r exp(-(t-s)/tau)) d[a x exp(b x) (x / 5 mm)^(n-1) (1 + q x) (1 + s x^3) f(x)] + B v, "
+        "x = depth - c F, f: (exp(k x) - 1)/(k x) of Fung, that of Ogden's block, or of a sphere on a layer"
     )
     known: ClassVar[Mapping[str, float]] = {
         "exponent": 1.0, "quadratic_per_mm": 0.0, "substrate_per_mm3": 0.0, "relaxation_ratio": 0.0, "tau_s": 1.0,
-        "frame_compliance_mm_N": 0.0, "friction_N": 0.0, "friction_length_mm": 0.1,
+        "frame_compliance_mm_N": 0.0, "friction_N": 0.0, "friction_length_mm": 0.1, "fung_per_mm": 0.0,
+        "ogden_per_mm": 0.0, "ogden_exponent": 4.0, "layer_ratio": 0.0,
     }  # fmt: skip
+    later: ClassVar[tuple[str, ...]] = ("fung_per_mm", "ogden_per_mm", "ogden_exponent", "layer_ratio")
 
     a_N_mm: SecantAtContact
     b_per_mm: Annotated[float, ParameterBounds("1/mm", -0.5, 5.0, "stiffening per depth")]
@@ -43,6 +46,12 @@ class Extended(Damped):
     friction_N: Annotated[float, ParameterBounds("N", 0.0, 20.0, "friction of the guide in front of the sensor")] = 0.0
     friction_length_mm: Annotated[float, ParameterBounds("mm", 1e-3, 10.0, "travel over which friction builds up")] = (
         0.1
+    )
+    fung_per_mm: Annotated[float, ParameterBounds("1/mm", 0.0, 5.0, "rate of Fung's exponential")] = 0.0
+    ogden_per_mm: Annotated[float, ParameterBounds("1/mm", 0.0, 0.5, "one over the thickness of Ogden's block")] = 0.0
+    ogden_exponent: Annotated[float, ParameterBounds("1", 1.05, 40.0, "exponent of the stretch")] = 4.0
+    layer_ratio: Annotated[float, ParameterBounds("1", 0.0, 8.0, "contact radius over a layer's thickness at 5 mm")] = (
+        0.0
     )
 
     @classmethod

@@ -179,7 +179,7 @@ def load_model(path: Path) -> Model:
         values = json.loads(path.read_text())
     except FileNotFoundError as error:
         raise UsageError(f"{path}: no such file; `rig fit SESSION` writes a model.json") from error
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise UsageError(f"{path}: cannot be read as JSON: {error}; fit the session again") from error
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise UsageError(f"{path}: is not a tissue model (no format {FORMAT!r}); `rig fit SESSION` writes one")
@@ -208,6 +208,7 @@ def _today(table: Mapping[str, T]) -> dict[str, T]:
 
 def _model(file: _File) -> Model:
     kind = law_named(file.law)
+    file = _completed(file, kind)
     for table in BY_PARAMETER:
         given = getattr(file, table)
         if set(given) != set(kind.bounds):
@@ -222,6 +223,21 @@ def _model(file: _File) -> Model:
         covariance=_covariance(file, len(kind.bounds)),
         **{name: getattr(file, name) for name in AS_SAVED},
     )
+
+
+def _completed(file: _File, kind: type[Law]) -> _File:
+    """The file with what its law has learnt since it was written, off."""
+    off = {name: float(getattr(kind, name)) for name in kind.later if name not in file.parameters}
+    size = len(file.covariance) + len(off)
+    rows = [(*row, *(0.0 for _ in off)) for row in file.covariance]
+    added: dict[str, object] = {
+        "parameters": file.parameters | off,
+        "units": file.units | {name: kind.bounds[name].unit for name in off},
+        "standard_errors": file.standard_errors | dict.fromkeys(off, 0.0),
+        "intervals": file.intervals | {name: (value, value) for name, value in off.items()},
+        "covariance": (*rows, *((0.0,) * size for _ in off)),
+    }
+    return file.model_copy(update=added)
 
 
 def _covariance(file: _File, size: int) -> FloatArray:

@@ -20,9 +20,9 @@ from rig.tissue.registry import COMPARED
 from rig.tissue.summary import RateTest, Row, Skipped, SpeedSummary
 from rig.trials.curves import Curve, loading_curve
 from rig.trials.cycles import cut, cycle_of
-from rig.trials.findings import SAMPLES_LEFT_OUT, TRIAL_LEFT_OUT, Finding
+from rig.trials.findings import SAMPLES_LEFT_OUT, STATED, TRIAL_LEFT_OUT, Finding
 from rig.trials.reading import trials_of
-from rig.trials.trial import inspect
+from rig.trials.trial import TrialSet, inspected
 from rig.version import SOFTWARE
 
 Laws = Sequence[type[Law]]
@@ -80,14 +80,14 @@ def study_sessions(
 
     A trial of several sessions is called by its session's folder and its own name.
     """
-    places = [session.folder.resolve() for session in sessions]
+    places = [session.place.resolve() for session in sessions]
     twice = [place for place in places if places.count(place) > 1]
     if twice:
         raise UsageError(f"{twice[0]} is given twice; give each session once")
     curves: list[Curve] = []
     skipped: list[Skipped] = []
     for session in sessions:
-        place = f"{session.folder}/" if len(sessions) > 1 else ""
+        place = f"{session.place}/" if len(sessions) > 1 else ""
         found, missing = _curves_or_refusal(session)
         curves += [
             replace(curve, name=f"{place}{curve.name}", recording=curve.recording and f"{place}{curve.recording}")
@@ -101,19 +101,21 @@ def _curves_or_refusal(session: Session) -> tuple[list[Curve], list[Skipped]]:
     curves, skipped = curves_of(session)
     if not curves:
         reasons = f"{skipped[0].trial}: {skipped[0].reason}" if skipped else "there is no trial"
-        raise DataError(f"{session.folder}: no trial gives a curve ({len(skipped)} skipped); first: {reasons}")
+        raise DataError(f"{session.place}: no trial gives a curve ({len(skipped)} skipped); first: {reasons}")
     return curves, skipped
 
 
 def curves_of(session: Session) -> tuple[list[Curve], list[Skipped]]:
     """The loading curves of a session's trials, and those that have none or are bad; runs of force are neither."""
-    found = trials_of(session)
+    return curves_in(inspected(trials_of(session)), str(session.info.subject.get("id", "")))
+
+
+def curves_in(found: TrialSet, subject: str = "") -> tuple[list[Curve], list[Skipped]]:
+    """The same of trials that were inspected."""
     skipped = [Skipped(said.recording, said.text) for said in found.findings if said.kind in TRIAL_LEFT_OUT]
     curves: list[Curve] = []
-    subject = str(session.info.subject.get("id", ""))
     for trial in found.trials:
-        said = (*found.findings, *inspect(trial))
-        kept = tuple(f for f in said if f.recording == trial.name and f.kind in SAMPLES_LEFT_OUT)
+        kept = tuple(f for f in found.findings if f.recording == trial.name and f.kind in SAMPLES_LEFT_OUT | STATED)
         cycles = cut(trial)
         recording = trial.name if len(cycles) > 1 else ""
         if recording:

@@ -1,6 +1,6 @@
 """From a cycle to a loading curve: force zeroed in the air, depth from contact, only while the tip moves steadily."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,20 +9,27 @@ from rig.errors import DataError
 from rig.trials.contact import Contact, FloatArray
 from rig.trials.cycles import IndentationCycle
 from rig.trials.findings import Finding
-from rig.trials.surface import LEAST_SAMPLES, WIDEST_SHARE, Rise, descent, despiked, find_surface
+from rig.trials.stated import SPEED_SHARE, middle_speed
+from rig.trials.streams import in_order
+from rig.trials.surface import (
+    LEAST_SAMPLES,
+    LEAST_TRAVEL_MM,
+    WIDEST_SHARE,
+    Rise,
+    descent,
+    despiked,
+    find_surface,
+    pushed,
+)
 
 # So that a fit may move contact by its interval and still see the air above it.
 AIR_KEPT_MM = 0.5
-# Half of what contact is known to in a good trial: a shorter way has no depth that can be told.
-LEAST_TRAVEL_MM = 0.1
 STEADY_SHARE = 0.3  # the nearest of the study's speeds, 15 and 20 mm/s, lie a third apart
 # Half of the way that the wanted speed makes: nearer to going on than to standing.
 ON_SHARE = 0.5
 TOP_SHARE = 0.005  # where the data have no noise, what is so near to the top is the top
 # Less than half of the way is no stroke with a run-in and a run-out, but a motion that steps or swings.
 STEADY_WAY = 0.5
-# A drive that misses its speed by so much is another's speed, or another unit.
-STATED_SHARE = 0.3
 SPEED_BASE_MM = 0.5  # places written in hundredths of a millimetre give a speed within 3 %
 
 
@@ -78,9 +85,9 @@ def loading_curve(cycle: IndentationCycle) -> Curve:
     """
     if len(cycle.force_N) < LEAST_SAMPLES:
         raise DataError(f"{cycle.name}: {len(cycle.force_N)} samples; a curve needs at least {LEAST_SAMPLES}")
-    cycle, pulled = _pulled(cycle)
+    cycle, pulled = pushed(cycle)
     zeroed, rise, contact, noise_N, findings = find_surface(cycle)
-    wanted_mm_s, said = _wanted_speed(zeroed, rise)
+    wanted_mm_s = _wanted_speed(zeroed, rise)
     kept, unsteady = _loading(zeroed, rise, wanted_mm_s, noise_N)
     _refuse_unknown(cycle.name, contact, float(zeroed.position_mm[rise.peak]))
     if kept[0] == rise.touch:
@@ -96,21 +103,8 @@ def loading_curve(cycle: IndentationCycle) -> Curve:
         zero_N=float(cycle.force_N[-1] - zeroed.force_N[-1]),
         noise_N=noise_N,
         time_s=zeroed.time_s[kept],
-        findings=(*pulled, *findings, *said, *unsteady),
+        findings=(*pulled, *findings, *unsteady),
     )
-
-
-def _pulled(cycle: IndentationCycle) -> tuple[IndentationCycle, tuple[Finding, ...]]:
-    """The cycle with both signs turned, and that said, where the tip draws out and force grows in tension."""
-    force_N = despiked(cycle.force_N)
-    lowest = int(np.argmin(force_N))
-    way_mm = cycle.position_mm[: lowest + 1] - cycle.position_mm[0]
-    # A tip that leaves the tissue goes out as well, but its force ends at zero.
-    if -force_N[lowest] <= force_N.max() or -way_mm[-1] <= max(float(way_mm.max()), LEAST_TRAVEL_MM):
-        return cycle, ()
-    text = "force grows in tension as the tip goes out: depth and force count in that sense"
-    turned = replace(cycle, force_N=-cycle.force_N, position_mm=-cycle.position_mm)
-    return turned, (Finding(cycle.name, "force", "tension", text),)
 
 
 def _refuse_unknown(name: str, contact: Contact, peak_mm: float) -> None:
@@ -122,7 +116,7 @@ def _refuse_unknown(name: str, contact: Contact, peak_mm: float) -> None:
         )
 
 
-def _wanted_speed(cycle: IndentationCycle, rise: Rise) -> tuple[float, tuple[Finding, ...]]:
+def _wanted_speed(cycle: IndentationCycle, rise: Rise) -> float:
     """The speed asked for; where nobody said, or another, the middle one by travel, so that holds do not count."""
     loading = slice(rise.touch, rise.peak + 1)
     reached_mm = np.maximum.accumulate(cycle.position_mm[loading])
@@ -130,18 +124,8 @@ def _wanted_speed(cycle: IndentationCycle, rise: Rise) -> tuple[float, tuple[Fin
         raise DataError(
             f"{cycle.name}: no loading: force rises while the tip does not go deeper; check axis and clocks"
         )
-    marks_mm = np.linspace(reached_mm[0], reached_mm[-1], 41)
-    times_s = np.interp(marks_mm, *_increasing(reached_mm, cycle.time_s[loading]))
-    own_mm_s = float(np.diff(marks_mm)[0] / np.median(np.diff(times_s)))
-    if abs(cycle.speed_mm_s - own_mm_s) <= STATED_SHARE * own_mm_s:
-        return cycle.speed_mm_s, ()
-    text = f"stated speed {cycle.speed_mm_s:.3g} mm/s, but the tip loads at {own_mm_s:.2g} mm/s: the motion's is used"
-    return own_mm_s, (Finding(cycle.name, "axis", "speed", text),) if np.isfinite(cycle.speed_mm_s) else ()
-
-
-def _increasing(positions_mm: FloatArray, times_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    first = np.concatenate([[True], np.diff(positions_mm) > 0])
-    return positions_mm[first], times_s[first]
+    own_mm_s = middle_speed(cycle.time_s[loading], cycle.position_mm[loading])
+    return cycle.speed_mm_s if abs(cycle.speed_mm_s - own_mm_s) <= SPEED_SHARE * own_mm_s else own_mm_s
 
 
 def _rate(time_s: FloatArray, position_mm: FloatArray, speed_mm_s: float) -> FloatArray:
@@ -180,7 +164,7 @@ def _loading(
     if len(steady) > LEAST_SAMPLES and position_mm[steady[-1]] - position_mm[rise.touch] >= STEADY_WAY * way_mm:
         return _rising(cycle, steady, noise_N), ()
     span = position_mm[rise.touch : rise.peak + 1]
-    deeper = np.concatenate([[True], span[1:] > np.maximum.accumulate(span)[:-1]])
+    deeper = in_order(span)
     rate_mm_s = np.diff(span[deeper]) / np.diff(cycle.time_s[rise.touch : rise.peak + 1][deeper])
     text = (
         f"the tip loads unsteadily, at {rate_mm_s.min():.2g} to {rate_mm_s.max():.2g} mm/s: all of its way in is used"

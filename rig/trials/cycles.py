@@ -5,7 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.trials.findings import Array, Finding
+from rig.recording.converter import Array
+from rig.trials.findings import Finding
 from rig.trials.trial import Trial, TrialSet, drop_disordered, drop_unusable
 
 # Shares of a travel, of 5 mm of air and 8 mm of depth for example: a lift leaves the surface, which is at 0.38; a stop
@@ -37,6 +38,13 @@ def cycle_of(trial: Trial) -> IndentationCycle:
     return IndentationCycle(trial.name, trial.speed_mm_s, force_s, sound.force_N, position_mm)
 
 
+def way_back(position_mm: Array, turn_mm: float) -> Array:
+    """Places from the last one backwards, to where the tip turned by more than ``turn_mm`` on its way in."""
+    back_mm = position_mm[::-1]
+    turned = np.flatnonzero(back_mm > np.minimum.accumulate(back_mm) + turn_mm)
+    return back_mm[: turned[0]] if len(turned) else back_mm
+
+
 def _from(start_s: float, at_s: Array) -> Array:
     """Times from the start, in whole nanoseconds: how far into a session the trial was made leaves no digit in them."""
     return np.asarray(np.rint((at_s - start_s) * 1e9) * 1e-9)
@@ -55,7 +63,7 @@ def in_cycles(session: TrialSet) -> TrialSet:
 def cut(trial: Trial) -> list[Trial]:
     """The cycles of a recording, each from the middle of the rest before it to that after it."""
     time_s, place_mm = drop_disordered(trial.axis_s, trial.axis_mm)
-    if not len(time_s):
+    if not len(time_s) or not np.isfinite(trial.force_N).any():
         return [trial]
     cuts = [at for at in lifts(time_s, place_mm) if in_the_air(trial, at)]
     edges = [-np.inf, *cuts, np.inf]

@@ -4,19 +4,17 @@ import json
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from rig.config.products.registry import FORCE_SENSORS, TRACKERS, read
 from rig.config.wiring import Loop
 from rig.errors import DataError
+from rig.recording.converter import at_the_end_of_range, run_lengths
 from rig.recording.mcap_file import SUMMARY
 from rig.recording.reader import Recording
 from rig.recording.slope import TIP_TOOL, Slope
 from rig.recording.tables import compression_N, force_map
-from rig.trials.contact import FloatArray
 from rig.trials.curves import Curve
-from rig.trials.findings import FLAT_TOP_SAMPLES, run_lengths
 
 CHANNELS = ("fx_N", "fy_N", "fz_N", "mx_N_m", "my_N_m", "mz_N_m")
 # A sample later than one and a half periods has a lost one before it.
@@ -96,20 +94,19 @@ def cycles_missed(recording: Recording) -> float:
 
 
 def saturated(recording: Recording) -> float:
-    """Share of force samples at the end of a range: where a full converter repeats its largest or smallest value.
+    """Share of force samples at the end of a range, where a full sensor stands at its largest or smallest value.
 
     Beyond the range that its maker states a sensor marks its samples as invalid; those count as lost.
     """
-    read_N = recording.tables["force"][f"{force_map(recording).channel}_N"]
-    return float(np.mean(_full(read_N))) if len(read_N) > 1 else math.nan
-
-
-def _full(values: FloatArray) -> NDArray[np.bool_]:
-    """Which values are a largest or smallest one that lasts, where others do not."""
-    ends = (values == values.max()) | (values == values.min())
-    length = run_lengths(ends)
-    held = run_lengths(np.concatenate([[False], np.diff(values) == 0]) & ~ends).max(initial=0)
-    return np.asarray(ends & (length >= FLAT_TOP_SAMPLES) & (length > 4 * held) & (np.ptp(values) > 0))
+    force, axis = recording.tables["force"], recording.tables["axis"]
+    read_N, axis = force[f"{force_map(recording).channel}_N"], axis[axis["valid"] != 0]
+    if len(read_N) < 2:
+        return math.nan
+    sound = np.isfinite(read_N)
+    start_ns = force["capture_ns"][0]
+    at_ns, seen_ns = force["capture_ns"][sound] - start_ns, axis["capture_ns"] - start_ns
+    place_mm = np.interp(at_ns, seen_ns, axis["position_mm"]) if len(axis) else None
+    return float(np.mean(at_the_end_of_range(read_N[sound], place_mm)))
 
 
 def frozen_samples(recording: Recording) -> float:

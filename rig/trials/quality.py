@@ -19,7 +19,10 @@ from rig.recording.slope import tracker_slope
 from rig.trials import measures
 from rig.trials.curves import Curve, loading_curve
 from rig.trials.cycles import cycle_of
+from rig.trials.findings import BAD
 from rig.trials.recorded import trial_of
+from rig.trials.stated import stated_findings
+from rig.trials.trial import Trial
 
 Verdict = Literal["good", "usable", "bad"]
 
@@ -188,9 +191,19 @@ def limits_of(recording: Recording) -> QualityLimits | None:
         return None
 
 
-def quality_of(recording: Recording, trial: TrialInfo) -> TrialQuality | None:
-    """What the session says of ``trial``; else what its recording gives; None where it was made without bounds."""
+def quality_of(recording: Recording, trial: TrialInfo, read: Trial | None = None) -> TrialQuality | None:
+    """What the session says of ``trial``, else what its recording gives by its bounds, or by what is stated of it.
+
+    ``read`` is the trial in the recording, where the caller has it.
+    """
     if trial.quality:
         return TrialQuality(trial.quality, trial.reasons, trial.measured)
     limits = limits_of(recording)
-    return evaluate_trial(recording, limits) if limits else None
+    return evaluate_trial(recording, limits) if limits else _of_statements(trial.name, recording, read)
+
+
+def _of_statements(name: str, recording: Recording, read: Trial | None) -> TrialQuality | None:
+    """The verdict on a recording of others, where what they state of it is not its motion's; None where it is."""
+    found = () if recording.tracks_force else stated_findings(read or trial_of(name, recording))
+    bad = any(finding.kind == BAD for finding in found)
+    return TrialQuality("bad" if bad else "usable", tuple(finding.text for finding in found)) if found else None

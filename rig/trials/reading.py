@@ -1,133 +1,152 @@
-"""Trials from where they are kept: a session folder, or a folder of CSV files as `rig import` reads it.
-
-Unlike the import, which refuses a folder with anything wrong in it, this takes what can be used and says what was left
-out: data that are wrong in part are the very data somebody wants to understand.
-"""
+"""The trials of a session, as fit, diagnosis and whoever else read them."""
 
 import math
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
 
-import numpy as np
-
-from rig.config.table import load
-from rig.errors import DataError, RigError
-from rig.intake.mapping import MAPPING_FILE, DataMapping, RecordingFacts
-from rig.intake.usable import read_usable
-from rig.recording.import_format import EXPORTED, FIELDS, OPTIONAL, TOOL, column_names
-from rig.recording.sessions import Session, open_session
-from rig.recording.slope import TIP_TOOL
-from rig.trials.findings import UNREADABLE, Array, Finding
-from rig.trials.quality import quality_of
-from rig.trials.recorded import in_time, late, shifted, start_ns, trial_of
-from rig.trials.stacked import read_stacked, stacked_file
+from rig.errors import RigError
+from rig.progress import Progress, silent
+from rig.recording.reader import Recording
+from rig.recording.sessions import Session, TrialInfo
+from rig.trials.findings import UNREADABLE, Finding
+from rig.trials.quality import TrialQuality, quality_of
+from rig.trials.recorded import NS, late, shifted, start_ns, trial_of
+from rig.trials.stated import stated_findings
 from rig.trials.trial import Trial, TrialSet
 
+GAP_NS = 1_000_000_000  # nobody states the time between them: a hundred times what is a gap within one
 
-def read_trials(folder: Path, columns: tuple[str, ...] = (), only: str = "") -> TrialSet:
-    """The trials in ``folder``, of which stacked recordings may be chosen by a pattern; raises DataError."""
-    if not folder.is_dir():
-        raise DataError(f"{folder}: no such folder; give a session, or a folder with trial_*/")
-    if any(folder.glob("*.mcap")):
-        return trials_of(open_session(folder))
-    if any(folder.glob("trial_*")):
-        return trials_in_csv(folder, columns)
-    stacked = stacked_file(folder)
-    if stacked is not None:
-        return read_stacked(stacked, columns, only)
-    raise DataError(f"{folder}: neither recordings (*.mcap) nor trial folders (trial_*) are in it")
+
+class TrialReading(NamedTuple):
+    """What one recording gave: its trial, None where it has none that is used, when it began, what is said of it."""
+
+    trial: Trial | None = None
+    start_ns: int = 0
+    findings: tuple[Finding, ...] = ()
+
+
+class Readings:
+    """Recordings as they come by, in memory or from their files, of each of which its trial alone is kept."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, TrialReading] = {}
+
+    def add(self, info: TrialInfo, recording: Recording) -> None:
+        """Reads a recording that is at hand."""
+        try:
+            self._found[info.name] = _read(info, recording, trial_of(info.name, recording))
+        except RigError as error:
+            self._found[info.name] = _unreadable(info.name, error)
+
+    def of(self, session: Session, tell: Progress = silent) -> TrialSet:
+        """The trials of a session, those recordings read from their files that did not come by."""
+        for number, info in enumerate(session.trials):
+            if info.name not in self._found:
+                tell(f"looking at {info.name}", number / len(session.trials))
+                try:
+                    self.add(info, session.recording(info.name))
+                except RigError as error:
+                    self._found[info.name] = _unreadable(info.name, error)
+        return _together(session, self._found)
 
 
 def trials_of(session: Session) -> TrialSet:
-    """Every trial of a session that opens and is not bad, on the clock of the first; no runs of force tracking."""
-    findings = [Finding("", "session", "incomplete", remark) for remark in session.remarks]
-    trials, starts_ns, stated = [], [], set()
-    for info in session.trials:
-        try:
-            recording = session.recording(info.name)
-            if recording.tracks_force:
-                continue
-            found = quality_of(recording, info)
-            trial = trial_of(info.name, recording)
-        except RigError as error:
-            findings.append(Finding(info.name, "recording", UNREADABLE, str(error)))
-            continue
-        if found and found.reasons:
-            findings.append(Finding(info.name, "recording", f"quality_{found.verdict}", found.sentence))
-        if found is None or found.verdict != "bad":
-            trials.append(trial)
-            starts_ns.append(start_ns(recording))
-            findings += late(info.name, recording.tables["axis"])
-            stated.add(recording.metadata.get("calibration", {}).get("surface_mm", ""))
-    pairs = list(zip(trials, starts_ns, strict=True))
-    first_ns = min((start for trial, start in pairs if trial.force_s.size), default=0)
-    on_one_clock = (shifted(trial, start - first_ns) for trial, start in pairs)
-    surface = float(stated.pop()) if len(stated) == 1 and "" not in stated else None
-    return TrialSet(session.folder.name, tuple(on_one_clock), surface, tuple(findings))
+    """Every trial of a session that opens and is not bad, on one clock from 0; no runs of force tracking."""
+    return Readings().of(session)
 
 
-def trials_in_csv(folder: Path, columns: tuple[str, ...] = ()) -> TrialSet:
-    """Trials of a CSV folder in the senses of its ``mapping.toml``; what cannot be read is left out and said."""
-    names = column_names(columns)
-    mapping = load(DataMapping, folder / MAPPING_FILE) if (folder / MAPPING_FILE).exists() else None
-    trials, findings = [], []
-    for path in sorted(path for path in folder.glob("trial_*") if path.is_dir()):
-        read, said = _read_trial(path, names)
-        findings += said
-        if "force" in read and "axis" in read:
-            findings += late(path.name, read["axis"]) if "arrival_ns" in read["axis"] else []
-            trials.append(_csv_trial(path, read, mapping))
-    surface = None if mapping is None or mapping.stated.surface_mm is None else mapping.surface_of(mapping.stated)
-    return TrialSet(folder.name, tuple(trials), surface, tuple(findings))
+def _unreadable(name: str, error: RigError) -> TrialReading:
+    return TrialReading(findings=(Finding(name, "recording", UNREADABLE, str(error)),))
 
 
-def _read_trial(
-    path: Path, names: Mapping[str, Mapping[str, str]]
-) -> tuple[dict[str, dict[str, Array]], list[Finding]]:
-    """The streams that can be read, and what is to be said of the others."""
-    read: dict[str, dict[str, Array]] = {}
-    findings = []
-    for stream in FIELDS:
-        file = path / f"{stream}.csv"
-        if stream in OPTIONAL and not file.exists():
-            continue
-        try:
-            found = read_usable(file, names[stream], EXPORTED[stream])
-            read[stream] = found.columns
-            findings += [Finding(path.name, stream, "text", found.remark)] if found.remark else []
-        except DataError as error:
-            findings.append(Finding(path.name, stream, UNREADABLE, str(error)))
-    return read, findings
+def _read(info: TrialInfo, recording: Recording, trial: Trial) -> TrialReading:
+    if recording.tracks_force:
+        return TrialReading()
+    found, stated = quality_of(recording, info, trial), stated_findings(trial)
+    said = tuple(_judged(info.name, found, stated))
+    if found is not None and found.verdict == "bad":
+        return TrialReading(findings=said)
+    came_late = late(info.name, recording.tables["axis"])
+    return TrialReading(_without_wrong_surface(trial, stated), start_ns(recording), (*said, *came_late))
 
 
-def _csv_trial(path: Path, read: dict[str, dict[str, Array]], mapping: DataMapping | None) -> Trial:
-    force, axis, marker = read["force"], _in_time_rows(read["axis"]), _tip_rows(read.get("marker"))
-    facts = RecordingFacts() if mapping is None else mapping.facts_of(path.name)
-    force_sense, position_sense = (1, 1) if mapping is None else (mapping.sense("force"), mapping.sense("position"))
-    temperature_C = facts.temperature_C
-    return Trial(
-        path.name,
-        force["time_s"],
-        force_sense * force["force_N"],
-        axis["time_s"],
-        position_sense * axis["position_mm"],
-        None if marker is None else marker["time_s"],
-        None if marker is None else np.stack([marker[field] for field in ("x_mm", "y_mm", "z_mm")], axis=1),
-        None if temperature_C is None else np.full(force["time_s"].shape, temperature_C),
-        facts.speed_mm_s or math.nan,
-    )
+def _together(session: Session, found: Mapping[str, TrialReading]) -> TrialSet:
+    readings = [found[info.name] for info in session.trials]
+    findings = [_remarked(session, remark) for remark in session.remarks]
+    findings += [finding for reading in readings for finding in reading.findings]
+    pairs = [(reading.trial, reading.start_ns) for reading in readings if reading.trial]
+    trials, starts_ns = [trial for trial, _ in pairs], [start for _, start in pairs]
+    one_clock = session.info.kind != "import" or _follow(trials, starts_ns)
+    surface_mm, unlike = _common_surface(trials)
+    findings += [*unlike, *_mixed(trials)]
+    laid_out = _laid_out(trials, starts_ns, one_clock)
+    return TrialSet(session.folder.name, tuple(laid_out), surface_mm, tuple(findings), one_clock)
 
 
-def _in_time_rows(axis: dict[str, Array]) -> dict[str, Array]:
-    """Without the rows that came late, where the file says when each came."""
-    if "arrival_ns" not in axis:
-        return axis
-    keep = in_time(axis["capture_ns"], axis["arrival_ns"])
-    return {field: column[keep] for field, column in axis.items()}
+def _remarked(session: Session, remark: str) -> Finding:
+    """A remark, as one on a recording where it begins with that one's name."""
+    name, _, text = remark.partition(": ")
+    own = any(trial.name == name for trial in session.trials)
+    return Finding(name, "session", "incomplete", text) if own else Finding("", "session", "incomplete", remark)
 
 
-def _tip_rows(marker: dict[str, Array] | None) -> dict[str, Array] | None:
-    """The tip's own rows, where the file holds several tools."""
-    if marker is None or TOOL not in marker:
-        return marker
-    return {field: column[marker[TOOL] == TIP_TOOL] for field, column in marker.items()}
+def _judged(name: str, found: TrialQuality | None, stated: Sequence[Finding]) -> Iterator[Finding]:
+    """What keeps a trial from being good; of one that is used, statements each as a finding of their own."""
+    bad = found is not None and found.verdict == "bad"
+    yield from () if bad else stated
+    said = set() if bad else {finding.text for finding in stated}
+    reasons = tuple(reason for reason in found.reasons if reason not in said) if found else ()
+    if found and reasons:
+        sentence = replace(found, reasons=reasons).sentence
+        yield Finding(name, "recording", f"quality_{found.verdict}", sentence)
+
+
+def _without_wrong_surface(trial: Trial, stated: Sequence[Finding]) -> Trial:
+    wrong = any(finding.kind == "surface" for finding in stated)
+    return replace(trial, surface_mm=math.nan) if wrong else trial
+
+
+def _common_surface(trials: Sequence[Trial]) -> tuple[float | None, list[Finding]]:
+    """The surface that is stated of all; None, with what is to be said of it, where there are several."""
+    stated = [trial.surface_mm for trial in trials if not math.isnan(trial.surface_mm)]
+    if not stated:
+        return None, []
+    if len(stated) == len(trials) and len(set(stated)) == 1:
+        return stated[0], []
+    text = "a surface is stated of some recordings only, or not alike: it is not used"
+    return None, [Finding("", "session", "surface", text)]
+
+
+def _mixed(trials: Sequence[Trial]) -> Iterator[Finding]:
+    """Labels of which there are several: a model of all is a model of none of them."""
+    for label in ("specimen", "site", "operator"):
+        names = list(dict.fromkeys(trial.labels.get(label, "") for trial in trials))
+        if len(names) > 1:
+            shown = ", ".join(name or "none" for name in names[:4]) + (", ..." if len(names) > 4 else "")
+            text = f"{len(names)} {label}s ({shown}) are taken as one tissue under one hand: choose one with --only"
+            yield Finding("", "session", label, text)
+
+
+def _follow(trials: Sequence[Trial], starts_ns: Sequence[int]) -> bool:
+    """Whether the recordings lie one after the other as they are: on a clock that runs through all of them."""
+    return all(before[1] <= after[0] for before, after in pairwise(_spans_ns(trials, starts_ns)))
+
+
+def _spans_ns(trials: Sequence[Trial], starts_ns: Sequence[int]) -> list[tuple[int, int]]:
+    pairs = zip(trials, starts_ns, strict=True)
+    return sorted((start, start + _length_ns(trial)) for trial, start in pairs if trial.force_s.size)
+
+
+def _laid_out(trials: Sequence[Trial], starts_ns: Sequence[int], one_clock: bool) -> Iterator[Trial]:
+    """Trials on the clock of the first; those that each count their own time one after the other."""
+    first_ns = next((start for start, _ in _spans_ns(trials, starts_ns)), None)
+    next_ns = 0
+    for trial, start in zip(trials, starts_ns, strict=True):
+        yield shifted(trial, start - first_ns if one_clock and first_ns is not None else next_ns)
+        next_ns += _length_ns(trial) + GAP_NS
+
+
+def _length_ns(trial: Trial) -> int:
+    return round(float(max(trial.force_s.max(initial=0.0), trial.axis_s.max(initial=0.0))) / NS)

@@ -7,15 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import DataError
+from rig.recording.converter import Array
 from rig.recording.reader import Recording
 from rig.recording.slope import TIP_TOOL
 from rig.recording.tables import compression_N
-from rig.trials.findings import Array, Finding
+from rig.trials.findings import Finding
 from rig.trials.trial import Trial
 
 NS = 1e-9
 # A drive that is asked half a millisecond late has gone 15 um at 30 mm/s, a tenth of what contact is known to.
 LATE_NS = 500_000
+LABELS = ("specimen", "site", "cycle", "operator")
 MOST_LATE = 0.01  # one left out in a hundred leaves a hole of one period, which interpolation bridges
 
 
@@ -27,8 +29,9 @@ def trial_of(name: str, recording: Recording) -> Trial:
     force, axis, marker = (recording.tables[stream] for stream in ("force", "axis", "marker"))
     sound, moving = force["valid"] != 0, (axis["valid"] != 0) & in_time(axis["capture_ns"], axis["arrival_ns"])
     seen = (marker["tool"] == TIP_TOOL) & (marker["valid"] != 0)
-    temperature = force["temperature_C"][sound]
-    start = start_ns(recording)
+    facts, labels = recording.metadata.get("trial", {}), recording.metadata.get("labels", {})
+    notes, start = recording.metadata.get("notes", {}), start_ns(recording)
+    stated_C = _number(name, "temperature_C", facts if "temperature_C" in facts else notes)
     return Trial(
         name,
         (force["capture_ns"][sound] - start) * NS,
@@ -37,9 +40,18 @@ def trial_of(name: str, recording: Recording) -> Trial:
         axis["position_mm"][moving],
         (marker["capture_ns"][seen] - start) * NS,
         np.stack([marker[field][seen] for field in ("x_mm", "y_mm", "z_mm")], axis=1),
-        temperature if temperature.size and np.isfinite(temperature).all() else None,
-        _nominal_speed(name, recording.metadata),
+        _temperature(force["temperature_C"][sound], stated_C),
+        _number(name, "speed_mm_s", facts),
+        _number(name, "depth_mm", facts),
+        _number(name, "surface_mm", recording.metadata.get("calibration", {})),
+        {key: text for key, text in {**notes, **labels}.items() if key in LABELS},
     )
+
+
+def _temperature(measured_C: Array, stated_C: float) -> Array | None:
+    """At each force sample: as measured, else as stated."""
+    found = measured_C if np.isfinite(measured_C).all() else np.full(measured_C.shape, stated_C)
+    return found if found.size and np.isfinite(found).all() else None
 
 
 def start_ns(recording: Recording) -> int:
@@ -59,12 +71,12 @@ def _later(at_s: Array, by_ns: int) -> Array:
     return np.asarray((np.rint(at_s / NS) + by_ns) * NS)
 
 
-def _nominal_speed(name: str, metadata: Mapping[str, Mapping[str, str]]) -> float:
-    text = metadata.get("trial", {}).get("speed_mm_s", "nan")
+def _number(name: str, key: str, facts: Mapping[str, str]) -> float:
+    text = facts.get(key, "")
     try:
-        return float(text)
+        return float(text or "nan")
     except ValueError as error:
-        raise DataError(f"{name}: trial speed_mm_s is {text!r}; it must be a number in mm/s") from error
+        raise DataError(f"{name}: {key} is {text!r}; it must be a number") from error
 
 
 def late(name: str, axis: Mapping[str, Array] | NDArray[np.void]) -> list[Finding]:

@@ -1,7 +1,7 @@
 """Where a recording's force is zero and where its tip touches: from the air before, the air after, or without any.
 
 A recording that begins in contact (at a preload, clamped, glued) has no onset of force. Its surface lies before its
-start, as far as the force on the tip at the start allows: ``contact_before``.
+start, as far as the force there and how it grows on allow: ``contact_before``.
 """
 
 from dataclasses import replace
@@ -10,9 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.errors import DataError
-from rig.trials.contact import Contact, FloatArray, contact_before, find_contact
-from rig.trials.cycles import IndentationCycle
+from rig.trials.contact import Contact, FloatArray, Misfits, find_contact
+from rig.trials.cycles import IndentationCycle, way_back
 from rig.trials.findings import Finding
+from rig.trials.preload import contact_before
+from rig.trials.streams import sample_noise
 
 # Two samples always lie on a line; the third can contradict it.
 LEAST_SAMPLES = 3
@@ -31,6 +33,8 @@ SHALLOW_SHARE = 0.15  # deeper force says more of the tissue than of its surface
 SEARCH_SHARE = 1.0  # a soft onset may stay below the noise for as long a way as the rest takes
 # Five times what contact is known to in a good trial.
 LEAST_SEARCH_MM = 1.0
+# Half of what contact is known to in a good trial: a shorter way has no depth that can be told.
+LEAST_TRAVEL_MM = 0.1
 # What contact is known to in a good trial: a smaller way back is no turn, but dither and noise of the axis.
 TURN_MM = 0.2
 # A median over twenty samples is known to three tenths of their standard deviation.
@@ -78,10 +82,22 @@ def find_surface(cycle: IndentationCycle) -> FoundSurface:
         return _from_contact(cycle)
 
 
+def pushed(cycle: IndentationCycle) -> tuple[IndentationCycle, tuple[Finding, ...]]:
+    """The cycle as compression: with both signs turned, and that said, where force grows in tension on the way out."""
+    force_N = despiked(cycle.force_N)
+    lowest = int(np.argmin(force_N))
+    way_mm = cycle.position_mm[: lowest + 1] - cycle.position_mm[0]
+    # A tip that leaves the tissue goes out as well, but its force ends at zero.
+    if -force_N[lowest] <= force_N.max() or -way_mm[-1] <= max(float(way_mm.max()), LEAST_TRAVEL_MM):
+        return cycle, ()
+    text = "force grows in tension as the tip goes out: depth and force count in that sense"
+    turned = replace(cycle, force_N=-cycle.force_N, position_mm=-cycle.position_mm)
+    return turned, (Finding(cycle.name, "force", "tension", text),)
+
+
 def _rise(cycle: IndentationCycle) -> Rise:
     """The last rise from the air to the peak of force; the air is where the tip was highest before the peak."""
-    force_N = despiked(cycle.force_N)
-    peak = int(np.argmax(force_N))
+    force_N, peak = despiked(cycle.force_N), _peak(cycle)
     before_mm, before_N = cycle.position_mm[: peak + 1], force_N[: peak + 1]
     travel_mm = float(np.ptp(before_mm))
     high_N = before_N[before_mm <= before_mm.min() + HIGHEST_SHARE * travel_mm]
@@ -99,6 +115,13 @@ def _rise(cycle: IndentationCycle) -> Rise:
     return Rise(int(air[-1]) + 1, peak)
 
 
+def _peak(cycle: IndentationCycle) -> int:
+    """The sample of the largest force; the deepest before it, where a full sensor has that on the way out."""
+    peak = int(np.argmax(despiked(cycle.force_N)))
+    deepest = int(np.argmax(cycle.position_mm[: peak + 1]))
+    return deepest if cycle.position_mm[deepest] - cycle.position_mm[peak] > TURN_MM else peak
+
+
 def _loaded(position_mm: FloatArray, force_N: FloatArray) -> bool:
     """Whether force grows all the way from where the tip is highest: no air, and no noise either."""
     gone_mm = position_mm - position_mm.min()
@@ -111,11 +134,6 @@ def _loaded(position_mm: FloatArray, force_N: FloatArray) -> bool:
     # From the middle of the first third to that of the last is two thirds of the way; a guide's friction levels off.
     grows = last_N - middle_N > 0.5 * (middle_N - first_N) > 0
     return bool(grows and 1.5 * (last_N - first_N) > least_N)
-
-
-def sample_noise(values: FloatArray) -> float:
-    """Standard deviation of one sample by third differences: at 10 Hz the first ones of a ramp are no noise."""
-    return float(np.median(np.abs(np.diff(values, 3)))) / (0.6745 * np.sqrt(20)) if len(values) > 3 else 0.0
 
 
 def _left_mm(position_mm: FloatArray) -> float:
@@ -135,24 +153,28 @@ def _from_contact(cycle: IndentationCycle) -> FoundSurface:
     span = slice(rise.touch - 1, rise.peak + 1)
     position_mm, force_N = zeroed.position_mm[span], despiked(zeroed.force_N[span])
     contact = contact_before(position_mm, force_N, (start_N - zero_N, deviation_N), noise_N)
-    if contact is None:
+    _refuse_wide(cycle.name, position_mm, contact, f"at {start_N:.2g} N where zero is {zero_N:.2g} N")
+    return FoundSurface(zeroed, rise, contact, noise_N, (_said(cycle.name, position_mm[0], contact, lifted is None),))
+
+
+def _refuse_wide(name: str, position_mm: FloatArray, contact: Contact, pressed: str) -> None:
+    stroke_mm, width_mm = float(np.ptp(position_mm)), contact.high_mm - contact.low_mm
+    if width_mm >= stroke_mm:
         raise DataError(
-            f"{cycle.name}: started in contact, at {start_N:.2g} N where zero is {zero_N:.2g} +- {2 * deviation_N:.1g} "
-            "N: force grows too little more to tell where its surface lies; start higher, or go deeper"
+            f"{name}: started in contact, {pressed}: force grows too little more to tell where its surface lies; "
+            "start higher, or go deeper"
         )
-    stroke_mm, width_mm = float(np.ptp(position_mm)), contact.upper_mm - contact.lower_mm
     if width_mm > WIDEST_SHARE * stroke_mm:
         raise DataError(
-            f"{cycle.name}: started in contact, at {start_N:.2g} N where zero is {zero_N:.2g} +- {2 * deviation_N:.1g} "
-            f"N: its surface may lie up to {position_mm[0] - contact.lower_mm:.2g} mm above its start (at most a "
-            f"quarter of its stroke of {stroke_mm:.3g} mm is allowed); start higher"
+            f"{name}: started in contact, {pressed}: its surface lies between {position_mm[0] - contact.low_mm:.2g} mm "
+            f"above its start and {contact.high_mm - position_mm[0]:.2g} mm below, {width_mm:.2g} mm of a stroke of "
+            f"{stroke_mm:.3g} mm (at most a quarter is allowed); start higher, or go deeper"
         )
-    return FoundSurface(zeroed, rise, contact, noise_N, (_said(cycle.name, position_mm[0], contact, lifted is None),))
 
 
 def _rise_from_contact(cycle: IndentationCycle) -> Rise:
     """From where the tip leaves its highest place to the peak of force."""
-    peak = int(np.argmax(despiked(cycle.force_N)))
+    peak = _peak(cycle)
     before_mm = cycle.position_mm[: peak + 1]
     touch = int(np.flatnonzero(before_mm - before_mm.min() <= _left_mm(before_mm))[-1]) + 1
     if peak - touch < LEAST_SAMPLES:
@@ -189,8 +211,8 @@ def _lifted_N(cycle: IndentationCycle, rise: Rise, noise_N: float) -> float | No
 def _said(name: str, start_mm: float, contact: Contact, own_zero: bool) -> Finding:
     zero = "the recording's own zero" if own_zero else "the air after the loading"
     text = (
-        f"started in contact: the surface lies between {start_mm - contact.lower_mm:.2g} mm above its start and "
-        f"{contact.upper_mm - start_mm:.2g} mm below; force counts from {zero}"
+        f"started in contact: the surface lies between {start_mm - contact.low_mm:.2g} mm above its start and "
+        f"{contact.high_mm - start_mm:.2g} mm below; force counts from {zero}"
     )
     return Finding(name, "force", "contact", text)
 
@@ -219,8 +241,11 @@ def _run_in(cycle: IndentationCycle, rise: Rise) -> tuple[IndentationCycle, Rise
 
 def despiked(values: FloatArray) -> FloatArray:
     """Median of three: one wrong sample is no contact and no peak."""
-    middle = np.median([values[:-2], values[1:-1], values[2:]], axis=0)
-    return np.concatenate([values[:1], middle, values[-1:]])
+    if len(values) < LEAST_SAMPLES:
+        return values
+    before, after = values[:-2], values[2:]
+    low, high = np.minimum(before, after), np.maximum(before, after)
+    return np.concatenate([values[:1], np.maximum(low, np.minimum(high, values[1:-1])), values[-1:]])
 
 
 def _no_contact(cycle: IndentationCycle, height_N: float, spread_N: float, fall_N: float) -> str:
@@ -238,12 +263,21 @@ def _no_contact(cycle: IndentationCycle, height_N: float, spread_N: float, fall_
 
 
 def _zeroed(cycle: IndentationCycle, rise: Rise) -> FoundSurface:
-    """The cycle less its zero, its contact, and the noise in the air; twice, since what is air depends on contact."""
-    first = _zeroed_above(cycle, rise, float(cycle.position_mm[rise.touch]))
-    return _zeroed_above(cycle, rise, first.contact.lower_mm)
+    """The cycle less its zero, its contact, and the noise in the air; twice, since what is air depends on contact.
+
+    Where contact may lie so high that too few samples are above it for certain, those above the likeliest count.
+    """
+    known: dict[tuple[int, int], Misfits] = {}
+    first = _zeroed_above(cycle, rise, float(cycle.position_mm[rise.touch]), known)
+    try:
+        return _zeroed_above(cycle, rise, first.contact.lower_mm, known)
+    except _NoAirError:
+        return first
 
 
-def _zeroed_above(cycle: IndentationCycle, rise: Rise, surface_mm: float) -> FoundSurface:
+def _zeroed_above(
+    cycle: IndentationCycle, rise: Rise, surface_mm: float, known: dict[tuple[int, int], Misfits]
+) -> FoundSurface:
     """As ``_zeroed``: zero is the mean of what comes before the rise, clear of the surface, without wrong samples."""
     air_N = cycle.force_N[: rise.touch][cycle.position_mm[: rise.touch] < surface_mm - AIR_MARGIN_MM]
     if len(air_N) < LEAST_AIR_SAMPLES:
@@ -251,7 +285,7 @@ def _zeroed_above(cycle: IndentationCycle, rise: Rise, surface_mm: float) -> Fou
     middle_N, spread_N = _middle(air_N)
     usual_N = air_N[np.abs(air_N - middle_N) <= OUTLIER_SPREADS * spread_N] if spread_N else air_N
     zeroed, noise_N = replace(cycle, force_N=cycle.force_N - float(np.mean(usual_N))), float(np.std(usual_N))
-    return FoundSurface(zeroed, rise, _contact(zeroed, rise, noise_N), noise_N)
+    return FoundSurface(zeroed, rise, _contact(zeroed, rise, noise_N, known), noise_N)
 
 
 def _middle(values: FloatArray) -> tuple[float, float]:
@@ -260,7 +294,7 @@ def _middle(values: FloatArray) -> tuple[float, float]:
     return middle, 1.4826 * float(np.median(np.abs(values - middle)))
 
 
-def _contact(cycle: IndentationCycle, rise: Rise, noise_N: float) -> Contact:
+def _contact(cycle: IndentationCycle, rise: Rise, noise_N: float, known: dict[tuple[int, int], Misfits]) -> Contact:
     """Contact searched from well above the first clear rise of force to the first sample in it."""
     position_mm, force_N = cycle.position_mm, cycle.force_N
     touch_mm, peak_mm = float(position_mm[rise.touch]), float(position_mm[rise.peak])
@@ -271,13 +305,11 @@ def _contact(cycle: IndentationCycle, rise: Rise, noise_N: float) -> Contact:
     stop = min(stop, rise.peak + 1)
     search_mm = (max(float(position_mm[start]), touch_mm - above_mm), touch_mm)
     least_N = max(noise_N, 1e-4 * float(force_N[rise.peak]))
-    return find_contact(position_mm[start:stop], force_N[start:stop], search_mm, least_N)
+    return find_contact(position_mm[start:stop], force_N[start:stop], search_mm, least_N, known)
 
 
 def descent(cycle: IndentationCycle, touch: int, from_mm: float) -> int:
     """Where the way down to ``touch`` passes ``from_mm``, or where it begins if that is deeper."""
-    back_mm = cycle.position_mm[touch::-1]
-    turned = np.flatnonzero(back_mm > np.minimum.accumulate(back_mm) + TURN_MM)
-    way_mm = back_mm[: turned[0]] if len(turned) else back_mm
+    way_mm = way_back(cycle.position_mm[: touch + 1], TURN_MM)
     passed = np.flatnonzero(way_mm <= from_mm)
     return touch - int(passed[0] if len(passed) else np.argmin(way_mm))

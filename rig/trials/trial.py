@@ -1,11 +1,14 @@
 """One trial as everything reads it: raw streams on one clock, compression positive, position into the tissue."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rig.errors import DataError
-from rig.trials.findings import Array, Finding, in_order, inspect_stream
+from rig.recording.converter import Array
+from rig.trials.findings import Finding, inspect_stream
+from rig.trials.streams import in_order
 
 # Of force and of axis: fewer are no cycle, at 10 Hz as little as two seconds.
 FEWEST_SAMPLES = 20
@@ -16,7 +19,8 @@ class Trial:
     """Raw streams of one recording on one clock [s]; force as sensed, no zero taken off.
 
     ``marker_mm`` has shape (frames, 3), NaN where the tool was hidden; ``temperature_C`` goes with ``force_s``;
-    ``speed_mm_s`` is the speed of loading that was asked for, NaN where nobody said.
+    ``speed_mm_s`` of loading, ``depth_mm`` from the surface and ``surface_mm`` on the axis are as somebody stated or
+    asked for them, NaN where nobody did; ``labels`` tell specimen, site, operator and the like.
     """
 
     name: str
@@ -28,25 +32,40 @@ class Trial:
     marker_mm: Array | None = None
     temperature_C: Array | None = None
     speed_mm_s: float = float("nan")
+    depth_mm: float = float("nan")
+    surface_mm: float = float("nan")
+    labels: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class TrialSet:
-    """Trials in the order they were made, the surface where somebody stated it, and what is to be said of the data."""
+    """Trials in the order they were made, the surface where somebody stated it, and what is to be said of the data.
+
+    ``one_clock`` is false where each recording counted its own time, so that nobody knows when it was made.
+    """
 
     name: str
     trials: tuple[Trial, ...]
     surface_mm: float | None = None
     findings: tuple[Finding, ...] = ()
+    one_clock: bool = True
 
 
 def inspect(trial: Trial) -> list[Finding]:
     """What is wrong with the numbers of a trial."""
-    found = inspect_stream(trial.name, "force", trial.force_s, trial.force_N)
+    axis_s, axis_mm = drop_disordered(trial.axis_s, trial.axis_mm)
+    place_mm = np.interp(trial.force_s, axis_s, axis_mm) if axis_s.size else None
+    found = inspect_stream(trial.name, "force", trial.force_s, trial.force_N, place_mm)
     found += inspect_stream(trial.name, "axis", trial.axis_s, trial.axis_mm)
-    if trial.marker_s is not None and trial.marker_mm is not None:
+    if trial.marker_s is not None and trial.marker_mm is not None and len(trial.marker_s):
         found += inspect_stream(trial.name, "marker", trial.marker_s, trial.marker_mm[:, 0])
     return found
+
+
+def inspected(trials: TrialSet) -> TrialSet:
+    """The trials with what is wrong with the numbers of each among their findings."""
+    found = (finding for trial in trials.trials for finding in inspect(trial))
+    return replace(trials, findings=(*trials.findings, *found))
 
 
 def drop_disordered(time_s: Array, *columns: Array) -> tuple[Array, ...]:

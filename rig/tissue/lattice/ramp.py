@@ -41,11 +41,7 @@ def project(force_N: Floats, phi_mm: Floats) -> tuple[float, float]:
 
 
 def ramp(
-    block: Block,
-    springs: Springs,
-    depth_mm: Floats,
-    force_N: Floats,
-    progress: Callable[[float], None] | None = None,
+    block: Block, springs: Springs, depth_mm: Floats, force_N: Floats, progress: Callable[[float], None] | None = None
 ) -> DepthRamp:
     """Raise b from 0 until the forces (m,) at the depths (m,) are fitted worse again; ``progress(b)`` after each level.
 

@@ -94,6 +94,16 @@ def test_a_group_of_hdf5_with_units_in_its_attributes(folder: Path) -> None:
     check(session, "a-runs_first")
 
 
+@pytest.mark.parametrize("across", [False, True])
+def test_a_long_dataset_is_read_piece_by_piece(folder: Path, across: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rig.intake.arrays.BATCH_ROWS", 3)
+    table = np.stack([TIME_S, FORCE_N, WAY_MM], axis=1)
+    with h5py.File(folder / "a.h5", "w") as file:
+        file["all"] = table.T if across else table
+    columns = {"force": {"column": "all:2", "unit": "N"}, "position": {"column": "all:3", "unit": "mm"}}
+    check(imported(folder, files="a.h5", time={"column": "all:1", "unit": "s"}, columns=columns), "a")
+
+
 def test_a_parquet_file_of_several_row_groups(folder: Path) -> None:
     pq.write_table(pa.table({"t": TIME_S, "F": FORCE_N, "x": WAY_MM}), folder / "a.parquet", row_group_size=2)
     check(imported(folder, files="a.parquet"), "a")

@@ -1,12 +1,16 @@
 """A folder of measured CSV files with its mapping, and the call that imports it."""
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+
+import numpy as np
 
 from rig.config.table import load
 from rig.intake.mapping import MAPPING_FILE, DataMapping
 from rig.intake.session import import_folder
 from rig.recording.sessions import Session
+from rig.trials.cycles import IndentationCycle
 
 NOW = datetime(2024, 5, 1, 10, 0, tzinfo=UTC)
 TABLES = """
@@ -59,6 +63,17 @@ def measured(folder: Path) -> Path:
         files[f"trial_{number}/axis.csv"] = AXIS.replace("\n0", f"\n{second}")
     files["trial_02/marker.csv"] = MARKER.replace("\n0", "\n9")
     return write(folder, files)
+
+
+def pressed(folder: Path, cycles: Sequence[IndentationCycle], stated: str = "") -> Path:
+    """A folder of trials that touch, each on a clock of its own; ``stated`` are further lines of its mapping."""
+    for number, cycle in enumerate(cycles):
+        trial = folder / f"trial_{number}"
+        trial.mkdir(parents=True)
+        for name, header, column in (("force", "force_N", cycle.force_N), ("axis", "position_mm", cycle.position_mm)):
+            rows = np.stack([cycle.time_s, column], axis=1)
+            np.savetxt(trial / f"{name}.csv", rows, delimiter=",", header=f"time_s,{header}", comments="", fmt="%.6f")
+    return write(folder, {MAPPING_FILE: f'recording = "{{recording}}"\n{stated}\n{TABLES}'})
 
 
 def run(source: Path, out: str = "out", mapping: str = MAPPING_FILE) -> Session:

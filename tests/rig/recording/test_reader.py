@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import Writer
 
-from rig.channels import BY_ID, EVENT, LOOP, STREAMS, EventSample, LoopSample
+from rig.channels import BY_ID, BY_NAME, EVENT, LOOP, STREAMS, EventSample, LoopSample
 from rig.errors import DataError
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.reader import Recording, read_recording
@@ -210,6 +210,24 @@ def test_a_recording_whose_loop_called_a_cycle_a_slot_is_read(tmp_path: Path) ->
     body = b"\0\1\0\0" + LOOP.pack(LoopSample(1, 2, 3, 7, *(0 for _ in LoopSample._fields[4:])))
     recording = read_recording(foreign(tmp_path / "a.mcap", "loop", old, body))
     assert recording.tables["loop"]["cycle"].tolist() == [7]
+
+
+def test_messages_that_the_stock_writer_mixed_come_back_in_their_order(tmp_path: Path) -> None:
+    random, made = np.random.default_rng(SEED), {"force": force, "axis": axis}
+    names = random.choice(list(made), 300).tolist()
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schemas = {name: writer.register_schema(name, "ros2msg", BY_NAME[name].schema().encode()) for name in made}
+        channels = {name: writer.register_channel(name, "cdr", number) for name, number in schemas.items()}
+        for number, name in enumerate(names):
+            body = b"\0\1\0\0" + BY_NAME[name].pack(made[name](number))
+            writer.add_message(channels[name], 0, body, 0)
+        writer.finish()
+    tables = read_recording(tmp_path / "a.mcap").tables
+    for name, make in made.items():
+        numbers = [number for number, of in enumerate(names) if of == name]
+        assert [row.item() for row in tables[name]] == [make(number) for number in numbers]
 
 
 def test_an_mcap_file_of_someone_else_is_refused(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from rig.diagnosis.estimates import SmallestSize
 from rig.errors import UsageError
 from rig.results.base import Number, Result
 from rig.results.diagnosis import DiagnosisResult
@@ -54,9 +55,11 @@ def test_a_diagnosis_of_an_earlier_version_is_still_read(tmp_path: Path) -> None
     (tmp_path / "diagnosis.json").write_text(json.dumps(OLD_DIAGNOSIS))
     read = DiagnosisResult.read(tmp_path / "diagnosis.json")
     assert read.findings[0].parameters["friction_N"].high == 0.11
+    assert read.detectable["backlash"] == SmallestSize(0.02, "mm", found=0, trials=0)
     written = json.loads(read.model_dump_json())
-    assert {key: written[key] for key in OLD_DIAGNOSIS if key not in ("findings", "next_experiment")} == {
-        key: value for key, value in OLD_DIAGNOSIS.items() if key not in ("findings", "next_experiment")
+    completed = ("findings", "next_experiment", "detectable")
+    assert {key: written[key] for key in OLD_DIAGNOSIS if key not in completed} == {
+        key: value for key, value in OLD_DIAGNOSIS.items() if key not in completed
     }
 
 

@@ -2,8 +2,21 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
-from rig.trials.contact import LIMB_SHAPE, Contact, ContactSearch, Loading, find_contact
+from rig.trials.contact import (
+    ANY_SHAPE,
+    CANDIDATES,
+    LIMB_SHAPE,
+    POWERS,
+    Contact,
+    ContactSearch,
+    Family,
+    Loading,
+    Misfits,
+    _onsets,
+    find_contact,
+)
 
 SURFACE_MM = 20.0
 BOTA, FT300_SLOW = (0.005, 0.005), (0.05, 0.005)
@@ -24,7 +37,7 @@ def loading(
 
 def found(of: Loading, noise_N: float) -> Contact:
     search_mm = (float(of.position_mm[0]) + 0.3, float(of.position_mm[-1]))
-    search = ContactSearch(of, search_mm, noise_N, LIMB_SHAPE, levelled=False, rounds=3)
+    search = ContactSearch(of, search_mm, noise_N, LIMB_SHAPE, rounds=3)
     while not search.advance():
         pass
     return search.contact
@@ -73,3 +86,37 @@ def test_a_stroke_that_was_levelled_is_searched_at_once() -> None:
     contact = find_contact(position, force, (8.5, 10.1), noise_N=1e-4)
     assert contact.position_mm == pytest.approx(10.0, abs=0.02)
     assert contact.low_mm < 10.0 < contact.high_mm
+
+
+def test_misfits_are_those_of_both_fits_by_themselves() -> None:
+    of = loading(0.12, 0.22, 0.05, 0.005, 0.005, 1.0, 4)
+    search = ContactSearch(of, (float(of.position_mm[0]) + 0.3, float(of.position_mm[-1])), 0.005)
+    jumps = set()
+    for candidate in range(CANDIDATES):
+        columns, force = search._centred(candidate, *ANY_SHAPE)
+        level, jumped = nnls(columns[:, :-1], force), nnls(columns, force)
+        jumps.add(bool(jumped[0][-1]))
+        assert search._misfit(candidate, *ANY_SHAPE) == pytest.approx((level[1] ** 2, jumped[1] ** 2), rel=1e-9)
+    assert jumps == {True, False}
+
+
+def test_the_shapes_of_an_onset_begin_with_the_powers_of_depth() -> None:
+    depth_mm = np.linspace(0.0, 3.0, 50)
+    assert _onsets(depth_mm)[:, : len(POWERS)] == pytest.approx((depth_mm / 3.0)[:, None] ** POWERS)
+
+
+def test_a_search_with_another_zero_finds_the_same_without_trying_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    of, tried = loading(0.12, 0.22, 0.05, 0.005, 0.005, 1.0, 4), list[int]()
+    search_mm, misfit = (float(of.position_mm[0]) + 0.3, SURFACE_MM + 0.3), ContactSearch._misfit
+
+    def counted(search: ContactSearch, candidate: int, family: Family) -> tuple[float, float]:
+        tried.append(candidate)
+        return misfit(search, candidate, family)
+
+    monkeypatch.setattr(ContactSearch, "_misfit", counted)
+    known: dict[tuple[int, int], Misfits] = {}
+    find_contact(of.position_mm, of.force_N - LEVEL_N - 0.001, search_mm, 0.0052, known)
+    first = len(tried)
+    again = find_contact(of.position_mm, of.force_N - LEVEL_N, search_mm, 0.005, known)
+    assert len(tried) - first < 0.1 * first
+    assert again == pytest.approx(find_contact(of.position_mm, of.force_N - LEVEL_N, search_mm, 0.005), rel=1e-9)

@@ -126,11 +126,9 @@ def test_gentle_and_hard_tissue_and_a_noisy_sensor_have_an_air_part(
         assert contact.lower_mm - 0.1 <= 20.0 <= contact.upper_mm + 0.1
 
 
-def test_a_stated_speed_that_is_not_the_motions_is_said_and_not_used() -> None:
+def test_a_stated_speed_that_is_not_the_motions_is_not_used() -> None:
     cycle = Bench().cycle(5.0)
     right, wrong = (loading_curve(replace(cycle, speed_mm_s=speed_mm_s)) for speed_mm_s in (5.0, 50.0))
-    assert not right.findings
-    assert wrong.findings[0].text == ("stated speed 50 mm/s, but the tip loads at 5 mm/s: the motion's is used")
     assert wrong.speed_mm_s == 5.0
     assert wrong.force_N == pytest.approx(right.force_N)
 

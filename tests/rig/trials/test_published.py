@@ -24,7 +24,7 @@ def answered(trials: Sequence[Trial]) -> tuple[list[Curve], list[str]]:
 
 def test_strokes_of_a_testing_machine_from_air_surface_and_preload() -> None:
     curves, refused = answered(machine_strokes())
-    assert len(curves) > 200
+    assert len(curves) > 240
     # One of these is the machine's stroke without a specimen.
     others = [reason for reason in refused if "started in contact" not in reason]
     assert all("its surface lies between" in reason for reason in others)
@@ -46,5 +46,5 @@ def test_clamped_strips_begin_unloaded_at_their_start() -> None:
 def test_wells_sampled_millimetres_apart_are_refused_for_that() -> None:
     curves, refused = answered(well_plate())
     assert len(curves) + len(refused) == 24
-    assert curves
+    assert len(curves) >= 15
     assert all("its surface lies between" in reason or "no contact" in reason for reason in refused)

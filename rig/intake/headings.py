@@ -1,0 +1,113 @@
+"""What stands above a table: the row of names, the row of units, and all the words above each column."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from rig.intake.notation import is_number, is_stamp
+from rig.intake.roles import knows, words_of
+from rig.intake.units import unit_in, unit_of
+
+# Filled rows above the data among which names and units are looked for: LabVIEW has six between units and names.
+ROWS = 12
+# Rows directly above the names whose words say more of a column, as a group's name over several columns does.
+MORE_ROWS = 2
+# Of letters: a longer word that is known among units makes names of them (`secs`, `nsecs`, `force`).
+LONGEST_UNIT = 4
+
+Row = Sequence[str]
+
+
+class Headings(NamedTuple):
+    """Rows are counted from 1, 0 where there is none; ``heads`` are all the words above each column."""
+
+    header_row: int
+    unit_row: int
+    heads: tuple[str, ...]
+    units: tuple[str, ...]
+
+    def moved(self, rows: int) -> "Headings":
+        """The same so many rows further down."""
+        header_row, unit_row = (row + rows if row else 0 for row in self[:2])
+        return self._replace(header_row=header_row, unit_row=unit_row)
+
+
+def headings_of(above: Sequence[Row], width: int, used: int) -> Headings:
+    """The names and units of ``width`` columns, of which ``used`` are filled, in the rows above them."""
+    filled = [number for number, row in enumerate(above) if any(row)][-ROWS:]
+    unit_at = next((number for number in filled[::-1] if _are_units(above[number], number == len(above) - 1)), None)
+    header_at = _names_at(above, [number for number in filled if number != unit_at], used)
+    names = above[header_at] if header_at is not None else []
+    between = unit_at is not None and unit_at == len(above) - 1 and header_at is not None and header_at < unit_at
+    stated = [] if unit_at is None or (not between and _contradict(names, above[unit_at])) else above[unit_at]
+    rows = [above[number] for number in _around(above, header_at, unit_at, used)]
+    heads = tuple(
+        " ".join(filter(None, (*(_cell(row, column) for row in rows), _unknown(_cell(stated, column)))))
+        for column in range(width)
+    )
+    units = tuple(stated_unit(_cell(names, column), unit_in(_cell(stated, column))) or "" for column in range(width))
+    return Headings(
+        0 if header_at is None else header_at + 1,
+        unit_at + 1 if unit_at is not None and stated else 0,
+        tuple(head or str(number + 1) for number, head in enumerate(heads)),
+        units,
+    )
+
+
+def _contradict(names: Row, units: Row) -> bool:
+    """Whether a name has another unit than the row of units, which is of other columns if it is not right below."""
+    return any(stated_unit(name, unit_in(unit)) is None for name, unit in zip(names, units, strict=False))
+
+
+def stated_unit(name: str, below: str) -> str | None:
+    """The unit in the row of units, else that in the name; None where a name's own in brackets is another."""
+    own = unit_of(name)
+    return None if own and below and own != below and {*name} & {*"(["} else below or own
+
+
+def _unknown(unit: str) -> str:
+    """What stands in the row of units and is none that is known, as it would behind a name; else empty."""
+    return f"({unit.strip('()[]{} ')})" if unit and not unit_in(unit) else ""
+
+
+def _cell(row: Row, column: int) -> str:
+    """What stands there, but a time: it is of the line, as a logger's before its names, and names nothing."""
+    return row[column] if column < len(row) and not is_stamp(row[column]) else ""
+
+
+def _are_units(row: Row, last: bool) -> bool:
+    """Whether half of the cells are units: one is enough directly above the data, elsewhere it may be a setting."""
+    filled = [cell for cell in row if cell]
+    others = [cell for cell in filled if not unit_in(cell)]
+    units = len(filled) - len(others)
+    named = any(len(word) > LONGEST_UNIT and knows(word) for cell in others for word in words_of(cell))
+    return not named and units >= (1 if last else 2) and 2 * units >= len(filled)
+
+
+def _names_at(above: Sequence[Row], rows: Sequence[int], width: int) -> int | None:
+    """The row with the most words that are known, the lowest of them; else the one directly above, if it is names."""
+    scores = {number: _score(above[number]) for number in rows if _are_names(above[number], width)}
+    best = max(scores, key=lambda number: (scores[number], number), default=None)
+    if best is not None and scores[best] <= 0:
+        return max(scores)
+    return best
+
+
+def _score(row: Row) -> int:
+    """Words that are known, without those of settings, which have a value beside them."""
+    return sum(knows(cell) for cell in row) - sum(is_number(cell) or is_stamp(cell) for cell in row)
+
+
+def _are_names(row: Row, width: int) -> bool:
+    """Whether it has words, and fills half of the columns."""
+    filled = [cell for cell in row if cell]
+    return 2 * len(filled) >= width and len(filled) <= 2 * width and any(not is_number(cell) for cell in filled)
+
+
+def _around(above: Sequence[Row], header_at: int | None, unit_at: int | None, width: int) -> list[int]:
+    """The row of names, and those beside it that say more of the columns."""
+    if header_at is None:
+        return []
+    before = range(max(0, header_at - MORE_ROWS), header_at)
+    after = range(header_at + 1, len(above))
+    more = [number for number in (*before, *after) if number != unit_at and _are_names(above[number], width)]
+    return [header_at, *(number for number in more if not any(map(is_number, above[number])))]

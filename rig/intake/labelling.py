@@ -1,0 +1,116 @@
+"""Columns of a table whose texts say which rows belong together: recordings below each other, who, what, how."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rig.config.table import TomlTable
+from rig.intake.families import ColumnGroup
+from rig.intake.naming import templates_of
+from rig.intake.notation import is_stamp
+from rig.intake.roles import WORDS, words_of
+
+# A label holds for many rows: one that changes more often is a state of the machine, or noise.
+FEWEST_ROWS = 5
+# Of the words for labels those that are a whole recording's; a cycle, an operator and a condition may change within.
+RECORDINGS = WORDS["label"][: WORDS["label"].index("cycle")]
+UNKNOWN = len(WORDS["label"])
+
+
+class Labels(NamedTuple):
+    """The `label` of a mapping, the templates over it, and what is doubtful."""
+
+    label: TomlTable | str | int | None
+    templates: TomlTable
+    doubts: list[str]
+
+
+def labels_in(table: ColumnGroup, taken: Sequence[int], time: int | None) -> Labels:
+    """The columns of labels of a table; those that tell recordings apart are named in the template of `recording`."""
+    texts = {number: texts for number, texts in _labelled(table, taken) if _holds(texts)}
+    anew = _anew(table, time)
+    telling = _telling(table, texts, anew)
+    kept = [number for number in texts if number in telling or _rank(table, number) < UNKNOWN]
+    if not kept:
+        return Labels(None, {}, [])
+    doubts = list(_doubts(table, texts, telling, anew)) if telling else []
+    if kept == telling and len(telling) == 1:
+        return Labels(table.place(telling[0]), {}, doubts)
+    called = {number: _called(table, number) for number in kept}
+    recording = "-".join(f"{{{called[number]}}}" for number in telling)
+    templates = {**({"recording": recording} if telling else {}), **templates_of(list(called.values()))}
+    return Labels({called[number]: table.place(number) for number in kept}, templates, doubts)
+
+
+def _labelled(table: ColumnGroup, taken: Sequence[int]) -> Iterator[tuple[int, list[str]]]:
+    """Columns called as labels are, or of texts that are no numbers, as texts."""
+    for number in table.columns:
+        words = words_of(table.layout.sheet.header[number])
+        named = any(word in WORDS["label"] for word in words)
+        if number in taken:
+            continue
+        if number in table.texts and any(map(is_stamp, table.texts[number][:1])):
+            continue
+        if number in table.texts and (named or len(set(table.texts[number])) > 1):
+            yield number, table.texts[number]
+        elif named and number in table.looks and not table.looks[number].counts:
+            yield number, [f"{value:g}" for value in table.looks[number].values]
+
+
+def _holds(texts: Sequence[str]) -> bool:
+    names = np.asarray(texts)
+    return bool(
+        names.size >= FEWEST_ROWS and (np.sum(names[1:] != names[:-1]) + 1) * FEWEST_ROWS <= names.size
+    ) and bool(all(texts))
+
+
+def _called(table: ColumnGroup, number: int) -> str:
+    """The column's name as one of a template."""
+    name = "_".join(words_of(table.layout.sheet.header[number]))
+    return name if name.isidentifier() else f"column_{number + 1}"
+
+
+def _anew(table: ColumnGroup, time: int | None) -> list[int]:
+    """Rows at which time starts anew."""
+    if time is None or time not in table.looks:
+        return []
+    return [int(row) + 1 for row in np.flatnonzero(np.diff(table.looks[time].values) < 0)]
+
+
+def _telling(table: ColumnGroup, texts: Mapping[int, Sequence[str]], anew: Sequence[int]) -> list[int]:
+    """The fewest columns, surest words first, that change wherever time starts anew; else one that is called so."""
+    ordered = sorted(texts, key=lambda number: _rank(table, number))
+    if not anew:
+        sure = [number for number in ordered if _rank(table, number) < len(RECORDINGS) and len(set(texts[number])) > 1]
+        return sure[:1]
+    needed = ordered
+    for number in ordered[::-1]:
+        fewer = [other for other in needed if other != number]
+        needed = fewer if fewer and _apart([texts[other] for other in fewer], anew) else needed
+    return needed
+
+
+def _rank(table: ColumnGroup, number: int) -> int:
+    words = words_of(table.layout.sheet.header[number])
+    return min((WORDS["label"].index(word) for word in words if word in WORDS["label"]), default=UNKNOWN)
+
+
+def _apart(columns: Sequence[Sequence[str]], anew: Sequence[int]) -> bool:
+    rows = list(zip(*columns, strict=True))
+    starts = [at for at in range(1, len(rows)) if rows[at] != rows[at - 1]]
+    runs = [rows[0], *(rows[at] for at in starts)]
+    return set(anew) <= set(starts) and len(runs) == len(set(runs))
+
+
+def _doubts(
+    table: ColumnGroup, texts: Mapping[int, Sequence[str]], telling: Sequence[int], anew: Sequence[int]
+) -> Iterator[str]:
+    """Where two recordings, or two specimens, have the same name: time starts anew, or the name comes again."""
+    rows = list(zip(*(texts[number] for number in telling), strict=True))
+    starts = [0, *(at for at in range(1, len(rows)) if rows[at] != rows[at - 1])]
+    first = {rows[at]: at for at in starts[::-1]}
+    again = [at for at in starts if first[rows[at]] != at]
+    for row in sorted({*(at for at in anew if at not in starts), *again})[:1]:
+        name = "-".join(rows[row])
+        yield f"{table.layout.sheet.place(row)}: {name} begins here again: two under one name; name what parts them"

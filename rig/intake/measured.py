@@ -1,0 +1,203 @@
+"""Which columns of a table that nobody described are its force and its position."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rig.config.table import TomlTable
+from rig.intake.families import ColumnGroup
+from rig.intake.questions import Choice, OpenQuestion
+from rig.intake.roles import candidates, words_of
+from rig.intake.survey import Looks, sign_of
+from rig.intake.units import LINEAR, ROTARY, SIGNALS, ros_unit, unit_in, unit_of, unknown_unit
+from rig.recording.converter import at_the_end_of_range, run_lengths
+
+# Whole numbers beyond this are a converter's counts: it has ten bits at least, and no one weighs and measures so.
+COUNTS = 1000
+# Words of an axis that turns; an angle of more than a turn is in degrees as a rule.
+ROTARY_WORDS = frozenset(("torque", "tau", "drehmoment", "moment", "q", "dq", "angle", "winkel"))
+TURN_RAD = 6.3
+# Robots count the place of their tool in metres, of which none reaches far.
+ROBOT_WORDS = frozenset(("tcp", "pose", "ee", "eef", "flange"))
+REACH_M = 3.0
+# A way this short in millimetres is pressed by nanoindenters, which write smaller units; robots write it in metres.
+LEAST_MM = 0.05
+# As OptiTrack's Motive states them above its columns.
+_LENGTHS = re.compile(r"length units?\W+(\w+)", re.IGNORECASE)
+USUAL = {"force": "N", "position": "mm", "velocity": "mm/s"}
+
+
+class MeasuredColumns(NamedTuple):
+    """The `columns` of a mapping, what is doubtful in them, and what has to be asked."""
+
+    columns: TomlTable
+    doubts: list[str]
+    questions: list[OpenQuestion]
+
+
+def chosen(table: ColumnGroup) -> dict[str, int]:
+    """The columns that words and units say are which quantity, of those called alike the one that moves most."""
+    found = dict[str, int]()
+    for quantity in ("force", "position", "velocity"):
+        if quantity == "velocity" and "position" in found:
+            break
+        columns = [number for number in table.fitting(quantity) if number not in found.values()]
+        moving = [number for number in columns if number in table.looks and table.looks[number].moves]
+        if moving:
+            ranks = ranks_of(table, quantity)
+            alike = [number for number in moving if ranks[number] == ranks[moving[0]]]
+            found[quantity] = max(alike, key=lambda number: float(np.ptp(table.looks[number].known)))
+    return found
+
+
+def ranks_of(table: ColumnGroup, quantity: str) -> dict[int, tuple[bool, int, int]]:
+    """How likely each column is the quantity by word and unit, the smaller the likelier."""
+    return {table.columns[item.column]: item.rank for item in candidates(quantity, table.names, table.units)}
+
+
+def measured_in(table: ColumnGroup, time: int | None, quantities: Sequence[str]) -> MeasuredColumns:
+    """What is known of each quantity; a question where nothing tells its column, or its unit."""
+    known = chosen(table)
+    left = [number for number, looks in table.looks.items() if looks.moves and number not in (time, *known.values())]
+    found = MeasuredColumns({}, [], [])
+    for quantity in quantities:
+        if quantity in known:
+            _take(found, table, quantity, known)
+        else:
+            found.questions.append(_question(table, quantity, left, known, len(found.questions)))
+    return found
+
+
+def _take(found: MeasuredColumns, table: ColumnGroup, quantity: str, known: Mapping[str, int]) -> None:
+    column = known[quantity]
+    value = value_of(table, quantity, column, known)
+    found.columns[quantity] = value
+    found.doubts.extend(_doubts(table, quantity, column))
+    if "unit" not in value:
+        units = ", ".join((*LINEAR[quantity], *ROTARY.get(quantity, {})))
+        said = table.layout.sheet.units[column]
+        other = unknown_unit(table.layout.heads[column])
+        own = unit_of(str(value["column"]))
+        twice = f"is in {own} by its name and in another by the row of units" if own and not said else "has no unit"
+        unsaid = f"is in {other}, which is none of" if other else f"{twice}; it is one of"
+        how = f"is in {said}, which needs a scale" if said else f"{unsaid} {units}, or needs a scale"
+        what = f"{table.path.name}: {quantity} ({value['column']!r}, {table.looks[column].span}) {how}"
+        text = f"{what} (how many {USUAL[quantity]} one of it is)"
+        choice = Choice(str(value["column"]), value)
+        found.questions.append(OpenQuestion(text, (), quantity, (choice,), _usual(table, quantity, column), "0.01"))
+
+
+def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
+    """The unit it has nearly always; none where a sensor's signal or a count needs a scale."""
+    known, words = table.looks[column].known, words_of(table.layout.sheet.header[column])
+    counts = bool((known % 1 == 0).all()) and float(np.abs(known).max()) >= COUNTS
+    header = table.layout.sheet.header[column]
+    if table.layout.sheet.units[column] or counts or unknown_unit(table.layout.heads[column]) or unit_of(header):
+        return ""
+    if unit := ros_unit(table.layout.sheet.header[column]):
+        return unit
+    if not ROTARY_WORDS.isdisjoint(words):
+        return {"force": "N m", "velocity": "rad/s"}.get(quantity, "rad" if np.abs(known).max() <= TURN_RAD else "deg")
+    if quantity == "position" and (
+        stated := _LENGTHS.search(" ".join(map(" ".join, table.layout.sheet.facts.items())))
+    ):
+        return unit_in(stated[1])
+    robot = not ROBOT_WORDS.isdisjoint(words) and np.abs(known).max() < REACH_M
+    return "m" if quantity == "position" and (robot or np.ptp(known) < LEAST_MM) else USUAL[quantity]
+
+
+def value_of(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, int]) -> TomlTable:
+    """What the mapping says of a column: its place, its unit, where its sign stands, and its sense."""
+    unit = table.layout.sheet.units[column]
+    fitting = unit in LINEAR[quantity] or unit in ROTARY.get(quantity, {})
+    value: TomlTable = {"column": table.place(column), **({"unit": unit} if fitting else {})}
+    return {**value, **sign_of(table.looks[column].values), "positive": _sense(table, quantity, column, known)}
+
+
+def _sense(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, int]) -> str:
+    """The sense in which the largest force is compression and lies deeper than the start; ours where none is seen."""
+    force = column if quantity == "force" else known.get("force")
+    risen = np.zeros(1) if force is None else _risen(table.looks[force])
+    most = int(np.argmax(np.abs(risen)))
+    if quantity == "force":
+        return "tension" if risen[most] < 0 else "compression"
+    way = np.nan_to_num(signed(table.looks[column]))
+    return "out" if way[min(most, way.size - 1)] < way[0] else "into"
+
+
+def _risen(looks: Looks) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Above its first tenth, where the machine stands in air or at its preload."""
+    force = np.nan_to_num(signed(looks))
+    return np.asarray(force - np.median(force[: max(1, force.size // 10)]))
+
+
+def signed(looks: Looks) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """The numbers with the sign where it stands in a bit."""
+    sign, values = sign_of(looks.values), looks.values
+    if "bits" in sign:
+        return np.where(values >= 2.0 ** (sign["bits"] - 1), values - 2.0 ** sign["bits"], values)
+    weight = 2.0 ** sign["sign_bit"] if sign else np.inf
+    return np.where(values >= weight, weight - values, values)
+
+
+def _doubts(table: ColumnGroup, quantity: str, column: int) -> Iterator[str]:
+    name, looks = table.path.name, table.looks[column]
+    header = table.layout.sheet.header
+    ranks = ranks_of(table, quantity)
+    others = [number for number, rank in ranks.items() if rank[:2] == ranks[column][:2] and number != column]
+    if others:
+        shown = ", ".join(repr(header[number]) for number in others)
+        yield f"{name}: {quantity} is taken to be {header[column]!r}; it may be {shown}"
+    for key, value in sign_of(looks.values).items():
+        yield f"{name}: {header[column]!r} has its sign in high numbers, read with {key} = {value}; if not, take it out"
+
+
+def spoilt(table: ColumnGroup, quantity: str, column: int) -> Iterator[str]:
+    """Cells of a column that are no numbers, and a force that stays at the end of its range, with their place."""
+    looks, sheet = table.looks[column], table.layout.sheet
+    if looks.odd:
+        row, text = looks.odd
+        yield f"{sheet.place(row)}, column {sheet.header[column]}: {text!r} is no number; mend it"
+    row, count = _full_rows(table, column) if quantity == "force" else (0, 0)
+    if count:
+        end = float(np.abs(looks.values[row : row + count]).min())
+        yield (
+            f"{sheet.place(row)}, column {sheet.header[column]}: {count} rows stay at {end:g}, its largest; if that is "
+            f"the end of its range, say saturates = [{-end:g}, {end:g}]"
+        )
+
+
+def _full_rows(table: ColumnGroup, column: int) -> tuple[int, int]:
+    """First row and length of the longest stretch of a force at an end of its range; 0, 0 without one."""
+    values, position = table.looks[column].values, chosen(table).get("position")
+    sound, full = np.isfinite(values), np.zeros(values.size, bool)
+    full[sound] = at_the_end_of_range(values[sound], None if position is None else table.looks[position].values[sound])
+    lengths = run_lengths(full)
+    row = int(np.argmax(lengths))
+    return row, int(lengths[row])
+
+
+def _question(
+    table: ColumnGroup, quantity: str, left: Sequence[int], known: Mapping[str, int], asked: int
+) -> OpenQuestion:
+    """Which column it is, of those that move and are nothing else; its example is none of those ``asked``."""
+    choices = tuple(
+        Choice(str(table.place(column)), value_of(table, quantity, column, known), _why(table, column))
+        for column in left
+    )
+    signals = [
+        choice for choice, column in zip(choices, left, strict=True) if table.layout.sheet.units[column] in SIGNALS
+    ]
+    clear = signals if len(signals) == 1 else choices if len(choices) == 1 else ()
+    usual = clear[0].name if len(clear) == 1 and clear[0].whole else ""
+    shown = "; ".join(f"{choice.name} ({choice.why})" for choice in choices) or "none whose cells are mostly numbers"
+    text = f"{table.path.name}: no name tells which column is the {quantity}; it may be {shown}; say it with its unit"
+    example = f"{choices[min(asked, len(choices) - 1)].name} {USUAL[quantity]}" if choices else ""
+    return OpenQuestion(text, (), quantity, choices, usual, example)
+
+
+def _why(table: ColumnGroup, column: int) -> str:
+    unit = table.layout.sheet.units[column]
+    return f"{unit or 'no unit'}, {table.looks[column].span}, moves"

@@ -1,0 +1,139 @@
+"""What the data cannot say: the question, its candidates, and the line of a mapping that answers it."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from rig.config.table import TomlTable
+from rig.errors import UsageError
+from rig.intake.units import LINEAR, ROTARY, unit_in
+
+
+class Choice(NamedTuple):
+    """A column that may be meant: what a person types, what the mapping then says of it, and why it is possible."""
+
+    name: str
+    known: TomlTable
+    why: str = ""
+
+    @property
+    def whole(self) -> bool:
+        """Whether a unit or a scale is known."""
+        return not {"unit", "scale", "form"}.isdisjoint(self.known)
+
+
+@dataclass(frozen=True)
+class OpenQuestion:
+    """What the data cannot say of a ``quantity`` in the tables of these numbers.
+
+    Without ``choices`` it is the rate of the rows [Hz]. ``usual`` is what `--yes` answers, empty where nothing is
+    clearly the best answer; ``example`` is one that is valid.
+    """
+
+    text: str
+    tables: tuple[int, ...]
+    quantity: str
+    choices: tuple[Choice, ...] = ()
+    usual: str = ""
+    example: str = ""
+
+    @property
+    def line(self) -> str:
+        """The line of the mapping that answers it."""
+        place = "time" if self.quantity == "time" else f"columns.{self.quantity}"
+        return f"{place} = {inline(self.value(self.usual or self.example))}"
+
+    def answer(self, tree: TomlTable, said: str) -> None:
+        """Puts the answer into every table where it is open; raises UsageError where it is none."""
+        value = self.value(said)
+        for number in self.tables:
+            table = tree["tables"][number]
+            columns = table if self.quantity == "time" else table["columns"]
+            columns[self.quantity] = {**value, **columns.get(self.quantity, {})}
+
+    def value(self, said: str) -> TomlTable:
+        """What the mapping says of the quantity after the answer; raises UsageError where it is none."""
+        if not self.choices:
+            return {"rate_Hz": self._number(said)}
+        named = [choice for choice in self.choices if f"{said} ".startswith(f"{choice.name} ")]
+        if not named and len(self.choices) > 1:
+            raise UsageError(f"{said!r} is none of the columns; {self.text}")
+        choice = max(named or self.choices, key=lambda item: len(item.name))
+        rest = said[len(choice.name) :].strip() if named else said.strip()
+        return dict(choice.known) if choice.whole and not rest else {**choice.known, **self._measured(rest)}
+
+    def _measured(self, said: str) -> TomlTable:
+        """A unit of the quantity, or how much of ours one of the file's is."""
+        unit = unit_in(said) or said
+        if unit in LINEAR[self.quantity] or unit in ROTARY.get(self.quantity, {}):
+            return {"unit": unit}
+        if self.quantity == "time":
+            raise UsageError(f"{said!r} is no unit of time; {self.text}")
+        return {"scale": self._number(said)}
+
+    def _number(self, said: str) -> float:
+        try:
+            return float(said)
+        except ValueError as error:
+            raise UsageError(f"{said!r} is no answer; {self.text}") from error
+
+
+@dataclass(frozen=True)
+class JointQuestion:
+    """Questions that are asked as one, answered in their order with a semicolon between."""
+
+    parts: tuple[OpenQuestion, ...]
+
+    @property
+    def text(self) -> str:
+        """All of them, and how they are answered."""
+        said = "; and ".join(part.text for part in self.parts)
+        return f"{said}; answer them together, with a semicolon between, as {self.example!r}"
+
+    @property
+    def usual(self) -> str:
+        """What `--yes` answers, empty where one of them has no clear answer."""
+        return "; ".join(part.usual for part in self.parts) if all(part.usual for part in self.parts) else ""
+
+    @property
+    def example(self) -> str:
+        """An answer that is valid."""
+        return "; ".join(part.usual or part.example for part in self.parts)
+
+    @property
+    def line(self) -> str:
+        """The lines of the mapping that answer it."""
+        return " and ".join(part.line for part in self.parts)
+
+    def answer(self, tree: TomlTable, said: str) -> None:
+        """Puts the answers into every table where they are open; raises UsageError where one is none."""
+        for part, own in zip(self.parts, self._parted(said), strict=True):
+            part.answer(tree, own)
+
+    def value(self, said: str) -> TomlTable:
+        """What the mapping says of each quantity after the answer; raises UsageError where one is none."""
+        return {part.quantity: part.value(own) for part, own in zip(self.parts, self._parted(said), strict=True)}
+
+    def _parted(self, said: str) -> list[str]:
+        found = [own.strip() for own in said.split(";")]
+        if len(found) != len(self.parts):
+            raise UsageError(f"{said!r} is not {len(self.parts)} answers with a semicolon between, as {self.example!r}")
+        return found
+
+
+Question = OpenQuestion | JointQuestion
+
+
+def inline(value: object) -> str:
+    """A value as TOML has it in one line."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(str(key))} = {inline(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return "[" + ", ".join(map(inline, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _key(name: str) -> str:
+    plain = name.isascii() and name.replace("_", "").replace("-", "").isalnum()
+    return name if plain else json.dumps(name, ensure_ascii=False)

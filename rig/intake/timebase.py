@@ -1,0 +1,202 @@
+"""How a table that nobody described says its time."""
+
+import re
+from collections.abc import Mapping, Sequence
+from itertools import groupby, pairwise, permutations
+
+import numpy as np
+
+from rig.config.table import TomlTable
+from rig.intake.families import ColumnGroup
+from rig.intake.notation import is_stamp, pattern_of
+from rig.intake.questions import Choice, OpenQuestion
+from rig.intake.readers import kind_of
+from rig.intake.roles import words_of
+from rig.intake.survey import Looks, wraps_at
+from rig.intake.times import is_iso
+from rig.intake.units import TIME_NS, unit_in, unit_of
+
+# Numbers so large are time since 1970 (2001 to 2286), whatever the column is called.
+EPOCH = {"s": (1e9, 1e10), "ms": (1e12, 1e13), "us": (1e15, 1e16), "ns": (1e18, 1e19)}
+# A day of a spreadsheet between 2000 and 2064, in its calendar of 1900.
+DAYS = (36_526.0, 60_000.0)
+# Of two units nobody states, one is impossible where the rows would come faster or slower than loggers for force and
+# motion are, or the whole recording were shorter than anybody records.
+RATES_HZ = (0.2, 20_000.0)
+SHORTEST_S = 0.2
+# Where more of the rows have the stamp of the row before, it is coarser than they are: whole seconds of many rows each.
+SAME_STAMPS = 0.1
+_RATE = re.compile(r"rate|freq|abtast|采样|サンプリング|\bfs\b", re.IGNORECASE)
+_SAMPLED = re.compile(
+    r"sampl|scan|acqui|frame|data|collect|log|abtast|采样|サンプリング|update|hz|\bfs\b", re.IGNORECASE
+)
+_STEP = re.compile(r"interval|period|delta_x|time step|sample time|\bdt\b|increment|schrittweite", re.IGNORECASE)
+_SECOND = re.compile(r":\d\d:\d\d$")
+_FIRST = re.compile(r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?")
+
+
+# The `time` of a mapping, what is doubtful in it, and what has to be asked.
+SaidTime = tuple[TomlTable, list[str], list[OpenQuestion]]
+
+
+def clock_of(table: ColumnGroup) -> SaidTime:
+    """The `time` of the mapping, what is doubtful in it, and what has to be asked."""
+    if parted := _in_two(table):
+        return parted, [], []
+    for column in _fitting(table):
+        found = _column(table, column)
+        if found is not None:
+            time, doubts, asked = found
+            return time, [*doubts, *_other_times(table, column)], asked
+    rate_Hz = _stated_rate_Hz(table.layout.sheet.facts)
+    # Tables of one file that are recorded at rates of their own count from its beginning, whatever the frame is called.
+    own = {} if "section" in table.layout.form else table.looks
+    counter = next((number for number, looks in own.items() if looks.counts), None)
+    if rate_Hz is None:
+        about = _rows_a_stamp(table)
+        coarse = f" finer than {about} rows with one stamp" if about else ""
+        named = [repr(table.place(number)) for number in table.fitting("time") if number in table.looks]
+        still = f" that grows from row to row ({named[0]} does not)" if named and not about else ""
+        text = f"{table.path.name}: no column of time{coarse or still}; at what rate are the rows, in Hz?"
+        return {}, [], [OpenQuestion(text, (), "time", example=str(about or 1000))]
+    said = [f"{table.path.name}: rows are counted at {rate_Hz:g} Hz, as stands above the table"]
+    if counter is None:
+        return {"rate_Hz": rate_Hz}, said, []
+    return {"column": table.place(counter), "form": "counter", "rate_Hz": rate_Hz}, said, []
+
+
+def _in_two(table: ColumnGroup) -> TomlTable:
+    """Whole seconds in one column and the rest of them in another, which are called alike; empty without them."""
+    said = {number: words_of(table.layout.sheet.header[number]) for number in table.columns if number in table.looks}
+    for (whole, words), (rest, others) in permutations(said.items(), 2):
+        unit = unit_in(others[-1]) if others else ""
+        alike = words[:-1] == others[:-1] and words and unit_in(words[-1]) == "s" and unit in ("ms", "us", "ns")
+        if alike and table.looks[rest].known.max() * TIME_NS[unit] < TIME_NS["s"]:
+            return {"column": table.place(whole), "unit": "s", "finer": table.place(rest), "finer_unit": unit}
+    return {}
+
+
+def _other_times(table: ColumnGroup, column: int) -> list[str]:
+    """That another column may be the time as well, where it runs otherwise."""
+    looks, unit = table.looks, table.layout.sheet.units[column]
+    alike = [number for number in table.fitting("time") if table.layout.sheet.units[number] == unit and number in looks]
+    others = [number for number in alike if looks[number].rises and column in looks]
+    own = looks[column].values if others else np.empty(0)
+    shown = [repr(table.place(at)) for at in others if not np.array_equal(looks[at].values, own, equal_nan=True)]
+    said = f"{table.path.name}: time is taken to be {table.place(column)!r}; it may be {', '.join(shown)}"
+    return [said] if shown else []
+
+
+def _rows_a_stamp(table: ColumnGroup) -> int:
+    """How many rows follow each other with the same whole second, 0 without a column of those."""
+    stamped = next((texts for texts in table.texts.values() if any(map(is_stamp, texts[:1]))), [])
+    runs = [len(list(run)) for _, run in groupby(stamped)]
+    return int(np.median(runs[1:-1])) if runs[2:] and _SECOND.search(stamped[0]) else 0
+
+
+def span_s(table: ColumnGroup, time: TomlTable) -> tuple[float, float] | None:
+    """First and last time of a table in s, None where they are texts or days, or their unit is open."""
+    rate_Hz, rows = time.get("rate_Hz"), max((looks.values.size for looks in table.looks.values()), default=0)
+    if rate_Hz and rows:
+        return 0.0, (rows - 1) / rate_Hz
+    if time.get("unit") not in TIME_NS:
+        return None
+    known = table.looks[table.layout.sheet.number(time["column"])].known * TIME_NS[time["unit"]] * 1e-9
+    return float(known[0]), float(known[-1])
+
+
+def _fitting(table: ColumnGroup) -> list[int]:
+    """Columns that may be time: by their words, then those of stamps, then the first if it runs like a clock."""
+    named = table.fitting("time")
+    first = [number for number in table.columns[:1] if number in table.looks]
+    clocks = [number for number in first if table.looks[number].even and not table.looks[number].counts]
+    stamps = [number for number in table.columns if any(map(is_stamp, table.texts.get(number, [])[:1]))]
+    return list(dict.fromkeys((*named, *stamps, *clocks)))
+
+
+def _column(table: ColumnGroup, column: int) -> SaidTime | None:
+    """The column as time, None where its cells are no times."""
+    place, unit = table.place(column), table.layout.sheet.units[column]
+    if column in table.texts:
+        return _of_texts(table, place, [text for text in table.texts[column] if text])
+    looks = table.looks.get(column)
+    if looks is None:
+        return None
+    anew = wraps_at(looks.values)
+    gone = np.cumsum(np.diff(looks.values, prepend=looks.values[:1]) < 0)
+    found = _of_numbers(table, place, unit, looks._replace(values=looks.values + anew * gone))
+    if found is None or not anew:
+        return found
+    said = f"{table.path.name}: time {place!r} goes on where it begins anew, at {anew:.15g}"
+    return {**found[0], "wraps_at": anew}, [*found[1], said], found[2]
+
+
+def _of_numbers(table: ColumnGroup, place: str | int, unit: str, looks: Looks) -> SaidTime | None:
+    """Times that are numbers."""
+    if not looks.rises or (_rows_a_stamp(table) and (np.diff(looks.known) < 0).any()):
+        return None
+    if kind_of(table.path) == "workbook" and _are_days(looks):
+        return {"column": place, "form": "spreadsheet"}, [], []
+    if unit in TIME_NS:
+        return {"column": place, "unit": unit}, [], []
+    if unit or (looks.counts and not unit_of(str(place)) and _stated_rate_Hz(table.layout.sheet.facts)):
+        return None
+    return _without_unit(table, place, looks)
+
+
+def _of_texts(table: ColumnGroup, place: str | int, texts: Sequence[str]) -> SaidTime | None:
+    """Times that are written as texts."""
+    same = sum(one == other for one, other in pairwise(texts))
+    if not texts or not is_stamp(texts[0]) or same > SAME_STAMPS * len(texts):
+        return None
+    if kind_of(table.path) == "workbook":
+        return {"column": place, "form": "spreadsheet"}, [], []
+    if is_iso(texts[0]):
+        return {"column": place, "form": "iso"}, [], []
+    patterns = pattern_of([texts[0], texts[len(texts) // 2], texts[-1]])
+    if not patterns:
+        return None
+    others = [pattern for pattern in patterns[1:] if "%d" in pattern]
+    said = f"{table.path.name}: {texts[0]!r} is read as {patterns[0]}; it may be {', '.join(others)}"
+    return {"column": place, "form": patterns[0]}, [said] if others else [], []
+
+
+def _are_days(looks: Looks) -> bool:
+    low, high = DAYS
+    return bool(low < looks.known.min() and looks.known.max() < high and looks.known.max() - looks.known.min() < 100)
+
+
+def _without_unit(table: ColumnGroup, place: str | int, looks: Looks) -> SaidTime:
+    """The only unit that is possible, with a doubt; else a question."""
+    units = possible_units(looks)
+    if len(units) == 1:
+        said = f"{table.path.name}: nothing says the unit of time ({place!r}); taken as {units[0]}, no other is likely"
+        return {"column": place, "unit": units[0]}, [said], []
+    text = f"nothing says the unit of time ({place!r}, {looks.span}); one of {', '.join(TIME_NS)}"
+    return {"column": place}, [], [OpenQuestion(text, (), "time", (Choice(str(place), {"column": place}),), "s", "s")]
+
+
+def possible_units(looks: Looks) -> list[str]:
+    """The units in which the column is time since 1970, or else in which rate and length are those of a recording."""
+    since = [unit for unit, (low, high) in EPOCH.items() if low <= looks.known.min() and looks.known.max() < high]
+    if since:
+        return since
+    step, length = float(np.median(np.diff(looks.known))), float(np.ptp(looks.known))
+    scales = {unit: TIME_NS[unit] * 1e-9 for unit in ("s", "ms", "us", "ns")}
+    low, high = RATES_HZ
+    return [unit for unit, size in scales.items() if low <= 1 / (step * size) <= high and length * size >= SHORTEST_S]
+
+
+def _stated_rate_Hz(facts: Mapping[str, str]) -> float | None:
+    """The rate of the rows where a line above the table states it, or the time between them."""
+    for name, value in facts.items():
+        number = _FIRST.search(value)
+        if not number or ":" in value:
+            continue
+        amount = float(number[0].replace(",", "."))
+        unit = unit_of(name) or unit_of(value)
+        if amount > 0 and _STEP.search(name):
+            return 1e9 / (amount * TIME_NS.get(unit, TIME_NS["s"]))
+        if amount > 0 and _RATE.search(name) and _SAMPLED.search(f"{name} {value}"):
+            return amount * (1e3 if "khz" in (name + value).lower() else 1.0)
+    return None

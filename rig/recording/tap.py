@@ -1,0 +1,108 @@
+"""A look into the ring beside its one reader: neither the producer nor the recorder notices it.
+
+The file is mapped for reading only, so nothing that happens here can hold up or harm the loop. What has been published
+stays in its slot until the producer comes round again; whoever looks too late has missed it, and is told how much.
+"""
+
+import contextlib
+import mmap
+import os
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.channels import Stream
+from rig.errors import UsageError
+from rig.recording.ring import BODY_LIMIT, HEAD_BYTE, PAGE, SLOT, slots_of
+
+SLOT_TYPE = np.dtype(
+    {
+        "names": ["body", "number", "stream", "size"],
+        "formats": [(np.uint8, BODY_LIMIT), "<u8", "<u2", "<u2"],
+        "offsets": [0, BODY_LIMIT, BODY_LIMIT + 8, BODY_LIMIT + 10],
+        "itemsize": SLOT,
+    }
+)
+Slots = NDArray[np.void]
+
+
+class RingTap:
+    """Follows a ring from the oldest sample that is still there; ``missed`` counts those it came too late for."""
+
+    def __init__(self, data: mmap.mmap, slots: int) -> None:
+        self._data = data
+        self._slots = np.frombuffer(data, SLOT_TYPE, slots, PAGE)
+        self._word = np.frombuffer(data, "<i8", 1, HEAD_BYTE)
+        self._mask = slots - 1
+        self.position = self._oldest(self.head)
+        self.missed = 0
+
+    @classmethod
+    def open(cls, path: Path) -> Self:
+        """Looks into the ring at ``path``; raises UsageError where it is none."""
+        try:
+            fd = os.open(path, os.O_RDONLY)
+        except OSError as error:
+            raise UsageError(f"{path}: no ring: {error.strerror}; start the loop first") from error
+        try:
+            slots = slots_of(fd)
+            if not slots:
+                raise UsageError(f"{path}: not a ring of this program")
+            flags = mmap.MAP_SHARED | getattr(mmap, "MAP_POPULATE", 0)
+            return cls(mmap.mmap(fd, PAGE + slots * SLOT, flags, mmap.PROT_READ), slots)
+        finally:
+            os.close(fd)
+
+    @property
+    def head(self) -> int:
+        """Samples published so far."""
+        return int(self._word[0])
+
+    def take(self, limit: int) -> Slots:
+        """Copies of up to ``limit`` slots not taken before, in the order they were published."""
+        head = self.head
+        first = max(self.position, self._oldest(head))
+        numbers = np.arange(first, min(head, first + limit))
+        found = self._slots[numbers & self._mask]
+        # What the producer has come round to meanwhile may be half overwritten.
+        whole = (found["number"] == numbers) & (numbers >= self._oldest(self.head))
+        self.missed += first - self.position + int(np.count_nonzero(~whole))
+        self.position = first + len(numbers)
+        kept: Slots = found[whole]
+        return kept
+
+    def put_back(self, count: int) -> None:
+        """The last ``count`` slots taken are taken again the next time."""
+        self.position -= count
+
+    def close(self) -> None:
+        """Lets go of the ring."""
+        del self._slots, self._word
+        self._data.close()
+
+    def _oldest(self, head: int) -> int:
+        # The slot behind the head is the one that the producer may be writing now.
+        return max(head - self._mask, 0)
+
+
+def holding(slots: Slots, stream: Stream) -> NDArray[np.bool_]:
+    """Which of ``slots`` hold a whole row of ``stream``."""
+    found: NDArray[np.bool_] = slots["stream"] == stream.id
+    return found if stream.has_text else found & (slots["size"] == stream.dtype.itemsize)
+
+
+def rows_of(slots: Slots, stream: Stream) -> NDArray[np.void]:
+    """The rows of ``stream`` among ``slots``, as its table; streams with text have none."""
+    bodies = slots["body"][holding(slots, stream), : stream.dtype.itemsize]
+    return np.ascontiguousarray(bodies).view(stream.dtype).reshape(-1)
+
+
+def texts_of(slots: Slots, stream: Stream) -> Iterator[tuple[Any, ...]]:
+    """The rows of a ``stream`` with text among ``slots``; those cut short are left out."""
+    for slot in slots[holding(slots, stream)]:
+        with contextlib.suppress(struct.error, IndexError):
+            yield stream.unpack(slot["body"][: slot["size"]].tobytes())
