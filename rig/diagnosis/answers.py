@@ -1,4 +1,4 @@
-"""From evidence to words and numbers: verdict, findings with intervals and gains, what could have been seen."""
+"""From evidence to words and numbers: findings with intervals and gains, what could have been seen."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rig.diagnosis.estimates import (
+    AxisPrediction,
+    ErrorBudget,
     ErrorGain,
     Estimate,
     NamedCause,
@@ -17,10 +19,11 @@ from rig.diagnosis.estimates import (
 )
 from rig.diagnosis.evidence import Tangents, held_out_square_error, information, is_alias, jackknife
 from rig.diagnosis.fit import Fit, least_squares
-from rig.diagnosis.lack_of_fit import LackOfFit, find_better_trends, unexplained_variables
+from rig.diagnosis.lack_of_fit import LackOfFit
 from rig.diagnosis.noise import Array
 from rig.diagnosis.problem import Effect, InverseProblem, Par
-from rig.diagnosis.search import Named, Search, shared_variables, testable
+from rig.diagnosis.search import Named, Search, chance_level, testable
+from rig.diagnosis.verdict import shortfalls
 from rig.tissue.intervals import student_reach
 from rig.trials.findings import Finding
 
@@ -33,10 +36,6 @@ PROVISIONAL_SHARE = 0.2
 DRAWS = 1000  # 25 beyond each end of a 95 % interval
 NEAR_BOUND = 0.99  # sizes are no surer than 1.5 % (OPERATOR_SHARE)
 LARGEST_LOG = 20.0  # a factor of e^20 is beyond the bounds of every parameter, and is still a number
-# A model whose noise and scatter are this large against the signal explains nothing, however white its residual.
-MOST_CHANCE = 0.25
-# White: a residual of 0.7 mN in the dither of a quiet bench comes to less, and nobody would act on it.
-LEAST_LEFT_N = 0.0003
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,9 @@ class Diagnosis:
     search: Search | None = None
     before: LackOfFit | None = None
     after: LackOfFit | None = None
+    budget: ErrorBudget | None = None
     simulated: tuple[SimulationError, ...] = ()
+    axis: AxisPrediction | None = None
 
     @property
     def unexplained(self) -> Unexplained | None:
@@ -79,16 +80,16 @@ def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Estimate]:
     for par in wanted:
         value = fit.values[par.name]
         if par.name not in place:
-            found[par.name] = Estimate(value, par.low, par.high)
-        elif par.name.endswith("_sin_mm"):
-            found[par.name.replace("_sin_mm", "_mm")] = _amplitude(fit, par.name, place, wide, covariances)
-        elif not par.name.endswith("_cos_mm"):
+            found[par.name] = Estimate(value, par.low, par.high, unit=par.unit)
+        elif "_sin" in par.name:
+            found[par.name.replace("_sin", "")] = _amplitude(fit, par.name, place, wide, covariances)
+        elif "_cos" not in par.name:
             k = place[par.name]
             half = wide * max(float(np.sqrt(c[k, k])) for c in covariances)
             half = min(half, LARGEST_LOG) if par.log else half
             half = float(np.hypot(half, OPERATOR_SHARE * abs(value - par.null))) if par.least else half
             low, high = (value / np.exp(half), value * np.exp(half)) if par.log else (value - half, value + half)
-            found[par.name] = Estimate(value, max(low, par.low), min(high, par.high), stopped(par, value))
+            found[par.name] = Estimate(value, max(low, par.low), min(high, par.high), stopped(par, value), par.unit)
     return found
 
 
@@ -99,12 +100,13 @@ def stopped(par: Par, value: float) -> bool:
 
 
 def _amplitude(fit: Fit, sine: str, place: Mapping[str, int], wide: float, covariances: Sequence[Array]) -> Estimate:
-    pair = np.array([fit.values[sine], fit.values[sine.replace("_sin_", "_cos_")]])
-    index = [place[sine], place[sine.replace("_sin_", "_cos_")]]
+    cosine = sine.replace("_sin", "_cos")
+    pair = np.array([fit.values[sine], fit.values[cosine]])
+    index = [place[sine], place[cosine]]
     size = float(np.hypot(*pair))
     variance = max(float(pair @ c[np.ix_(index, index)] @ pair) for c in covariances) / max(size**2, 1e-300)
     half = float(np.hypot(wide * np.sqrt(variance), OPERATOR_SHARE * size))
-    return Estimate(size, max(size - half, 0.0), size + half)
+    return Estimate(size, max(size - half, 0.0), size + half, unit=fit.free[index[0]].unit)
 
 
 def gain_of(before: Fit, after: Fit) -> ErrorGain:
@@ -127,39 +129,43 @@ def answer(named: Named, after: Fit, provisional: bool) -> NamedCause:
     """One finding of the final model."""
     effect = named.effect
     return NamedCause(
-        (effect.name, *named.alternatives),
+        tuple(dict.fromkeys((effect.name, *named.alternatives, *named.family))),
         sentence(effect, after.values),
         named.share * (PROVISIONAL_SHARE if provisional else 1.0),
         intervals(after, effect.pars),
         gain_of(named.without, after),
-        named.nats,
+        float(named.support.nats.sum()),
         named.p_value,
         effect.repair,
         provisional,
+        named.support.standard_error_nats,
+        "depth" if named.family else None,
     )
 
 
 def smallest_visible(t: Tangents, threshold: float) -> dict[str, SmallestSize]:
-    """Amplitude that would have been named with 80 % probability, by effect; the median over its shapes."""
+    """Amplitude that would have been named with 80 % probability, by name: of its first law, the median over shapes."""
     needed = np.sqrt(2 * (threshold + LEAVING_OUT_NATS)) + POWER_SD
-    sizes: dict[str, list[float]] = {}
+    first, sizes = dict[str, Effect](), dict[str, list[float]]()
     for direction in t.directions:
-        if is_alias(t, direction):
+        effect = first.setdefault(direction.effect.name, direction.effect)
+        if direction.effect is not effect or is_alias(t, direction):
             continue
         _, left = information(t, direction)
         weakest = float(np.linalg.eigvalsh(left).min())
-        sizes.setdefault(direction.effect.name, []).append(needed / np.sqrt(max(weakest, 1e-300)))
-    effects = {direction.effect.name: direction.effect for direction in t.directions}
+        sizes.setdefault(effect.name, []).append(needed / np.sqrt(max(weakest, 1e-300)))
     result = {}
     for name, found in sizes.items():
-        par = effects[name].amplitudes[0]
+        par = first[name].amplitudes[0]
         result[name] = SmallestSize(max(float(np.median(found)), par.least), par.unit)
     return result
 
 
-def limits(problem: InverseProblem, search: Search) -> tuple[dict[str, SmallestSize], dict[str, str]]:
-    """What could have been seen, and what not and why."""
-    level = max(float(np.quantile(maxima, 0.95)) for maxima in search.maxima if maxima.size)
+def limits(
+    problem: InverseProblem, search: Search, budget: ErrorBudget | None
+) -> tuple[dict[str, SmallestSize], dict[str, str]]:
+    """What could have been seen, and what not and why; no size where the model itself falls short of what is right."""
+    level = chance_level(search.maxima)
     visible = smallest_visible(search.tangents, max(level, 0.0))
     reasons = invisible(problem, {*visible, *search.after.names})
     for effect in testable(problem):
@@ -167,6 +173,9 @@ def limits(problem: InverseProblem, search: Search) -> tuple[dict[str, SmallestS
         if effect.name in visible and visible[effect.name].minimum > par.high - par.null:
             size = visible.pop(effect.name)
             reasons[effect.name] = f"only {size.minimum:.2g} {size.unit} or more would have shown in this experiment"
+    missed = shortfalls(budget) if budget else []
+    if missed:
+        return {}, dict.fromkeys(visible, f"not judged: what is left may hide it; {missed[0]}") | reasons
     return visible, reasons
 
 
@@ -179,48 +188,5 @@ def invisible(problem: InverseProblem, seen: Collection[str]) -> dict[str, str]:
         if need in problem.offers
     }
     imitated = "the simulation's own parameters imitate it completely in this experiment"
-    return lacking | {effect.name: imitated for effect in testable(problem) if effect.name not in seen}
-
-
-def verdict_of(search: Search, after: LackOfFit) -> tuple[Verdict, tuple[str, ...]]:
-    """Adequate, explained or unexplained, and what a residual depends on."""
-    named = sum(found.nats for found in search.named)
-    depends = unexplained_variables(after, named)
-    if depends != after.between and left_N(search.after, after) < LEAST_LEFT_N:
-        depends = ()
-    if not depends:
-        plainer = [find_better_trends(found.effect, search.after, found.without) for found in search.named]
-        depends = tuple(dict.fromkeys(name for names in plainer for name in names))
-    if not depends:
-        depends = shared_variables([found.effect for found in search.named])
-    if not depends and left_to_chance(search.after) > MOST_CHANCE:
-        depends = ("recording",)
-    if depends:
-        return "unexplained", depends
-    return ("explained" if search.named else "adequate"), ()
-
-
-def left_N(fit: Fit, found: LackOfFit) -> float:
-    """The residual along its most telling variable as a white force [N]; infinite for what is no force."""
-    share = max(found.shares[found.ranked[0]], 0.0)
-    return float(np.sqrt(share)) * fit.whitener.noise.colours[0].sd if fit.problem.channels[0].unit == "N" else np.inf
-
-
-def left_to_chance(fit: Fit) -> float:
-    """Error on recordings left out as a share of the signal's own spread."""
-    spread = float(np.std(fit.problem.channels[0].observed))
-    return float(np.sqrt(held_out_square_error(least_squares(fit)).mean())) / max(spread, 1e-300)
-
-
-def summary(verdict: Verdict, findings: Sequence[NamedCause], depends_on: Sequence[str], simulation: str) -> str:
-    """One sentence for a person."""
-    if verdict == "adequate":
-        return f"The {simulation} simulation explains these recordings to within their noise; nothing else is needed."
-    causes = "; ".join(
-        finding.statement + (f" (or {', '.join(finding.effects[1:])})" if finding.effects[1:] else "")
-        for finding in findings
-    )
-    if verdict == "explained":
-        return f"The {simulation} simulation is wrong because {causes}."
-    hint = f" Provisionally: {causes}." if causes else ""
-    return f"A residual is left that no known cause explains; it depends on {', '.join(depends_on)}.{hint}"
+    unseen = [effect for effect in testable(problem) if effect.name not in seen]
+    return lacking | {e.name: f"it is looked for beside {e.beside} only" if e.beside else imitated for e in unseen}

@@ -1,125 +1,37 @@
-"""The servo axis as a problem: motion in, drive force out, judged by the same engine as the tissue.
+"""A drive axis as a problem: motion in, effort out, judged by the same engine as the tissue.
 
-Inverse dynamic model F = M a + Fv v + offset, in SI units, and the causes an axis is known for. Motion and force pass
-the same zero-phase filter and are thinned together (parallel decimation; Gautier 1997).
+The simulation as it is: effort = inertia x acceleration + offset, and the causes it is said to know. All rows and
+parameters are without unit, so that the answer is the same in millimetres, metres, radians or counts.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.signal import butter, filtfilt
 
-from rig.diagnosis.problem import Array, Effect, Par, Scatter, Signal, Values
+from rig.diagnosis.axis_motion import Mask, Motion, Scales, noise_of
+from rig.diagnosis.effects.axis import AXIS_CAUSES, AxisEffect
+from rig.diagnosis.problem import Array, Par, Scatter, Signal, Values
 from rig.tissue.index_law import Fields
 
-# At 50 Hz, which is as fast as thinned rows tell, the filter lets 5 % pass; six lags of them, the largest order of the
-# noise, reach over MEMORY_S.
-CUT_HZ = 35.0
-THINNED_HZ = 100.0
-BLOCKS = 12
-SIGN_M_S = 5e-4
-BLIND_M_S = 3e-3  # six times SIGN_M_S: from here on friction has its full sign (tanh 6 = 1 - 1e-5)
-EDGE_S = 0.25
-MEMORY_S = 0.05
+MOST_NOISE = 0.2  # of what stands on one side of a regression, which then comes out 4 % too small
+MEMORY_ROWS = 5.0  # of the noise; what lasts longer is an error to be explained
 
-MASS = Par("mass_kg", "kg", 50.0, 1e-3, 1e5, 1.0, log=True, meaning="moved mass")
-VISCOUS = Par("viscous_N_s_m", "N s/m", 0.0, -1e4, 1e5, 5.0, least=1.0, meaning="viscous friction")
-OFFSET = Par("offset_N", "N", 0.0, -1e4, 1e4, 0.5, meaning="constant force (amplifier offset, weight)")
-AXIS_EFFECTS = (
-    Effect(
-        "coulomb_friction", "the axis has Coulomb friction of {coulomb_N:.3g} N whatever its speed",
-        (Par("coulomb_N", "N", 0.0, 0.0, 1e4, 1.0, least=0.2, meaning="Coulomb friction"),),
-        one_sided=True, repair="add Coulomb friction to the feed-forward",
-    ),
-    Effect(
-        "asymmetric_friction",
-        "friction grows with speed by {asymmetry_N_s_m:+.3g} N s/m forward and as much the other way backward",
-        (Par("asymmetry_N_s_m", "N s/m", 0.0, -1e4, 1e4, 2.0, least=1.0, meaning="half the difference of directions"),),
-        repair="use friction parameters of their own for each direction",
-    ),
-    Effect(
-        "dead_time", "the force acts {dead_time_s:.3g} s after its command",
-        (Par("dead_time_s", "s", 0.0, -0.05, 0.05, 5e-4, least=5e-4, meaning="delay of the force"),),
-        needs=frozenset({"fast"}), repair="add the delay to the controller's design",
-    ),
-    Effect(
-        "position_ripple", "the force ripples by {amplitude:.3g} N every {ripple_pitch_m:.3g} m",
-        (
-            Par("ripple_sin_N", "N", 0.0, -1e3, 1e3, 0.5, least=0.2, meaning="ripple along the screw"),
-            Par("ripple_cos_N", "N", 0.0, -1e3, 1e3, 0.5, least=0.2, meaning="ripple along the screw"),
-        ),
-        (Par("ripple_pitch_m", "m", 0.005, 5e-4, 0.1, 1e-5, meaning="period along the axis"),),
-        lambda *_: [{"ripple_pitch_m": pitch} for pitch in (0.0025, 0.004, 0.005, 0.01, 0.02)],
-        repair="compensate the ripple along the screw",
-    ),
-    Effect(
-        "flexible_mode", "a flexible mode adds {flexible_kg_s2:.3g} kg s^2 times the fourth derivative of position",
-        (Par("flexible_kg_s2", "kg s^2", 0.0, 0.0, 10.0, 1e-3, least=1e-4, meaning="mass over squared resonance"),),
-        one_sided=True, needs=frozenset({"fast"}), repair="filter the command at the resonance",
-    ),
-)  # fmt: skip
-VISCOUS_EFFECT = Effect(
-    "viscous_friction", "the axis is braked by {viscous_N_s_m:.3g} N per m/s", (VISCOUS,), one_sided=True,
-    repair="add viscous friction to the feed-forward",
-)  # fmt: skip
-
-
-@dataclass(frozen=True)
-class AxisRecording:
-    """One recording, SI units, shape (n,): position and reference [m], control signal [V], added pulses [V]."""
-
-    name: str
-    time_s: Array
-    position_m: Array
-    reference_m: Array
-    control_V: Array
-    pulses_V: Array
-    force_N_V: float
-    kp_1_s: float
-    kv_V_s_m: float
-
-    @property
-    def period_s(self) -> float:
-        """Sampling period."""
-        return float(np.median(np.diff(self.time_s)))
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Filtered and thinned signals, shape (m,)."""
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-    snap: Array
-    force: Array
-    time_s: Array
-
-
-def motion_of(recording: AxisRecording) -> Motion:
-    """Derivatives by central differences of the filtered position; force through the same filter."""
-    rate = 1 / recording.period_s
-    numerator, denominator = butter(4, min(CUT_HZ, 0.4 * rate) / (rate / 2))
-    position = filtfilt(numerator, denominator, recording.position_m)
-    derivatives = [position]
-    for _ in range(4):
-        derivatives.append(np.gradient(derivatives[-1], recording.period_s))
-    force = filtfilt(numerator, denominator, recording.force_N_V * recording.control_V)
-    edge, step = int(EDGE_S * rate), max(1, round(rate / THINNED_HZ))
-    take = slice(edge, len(position) - edge, step)
-    q, v, a, _, s = (np.ascontiguousarray(d[take]) for d in derivatives)
-    return Motion(q, v, a, s, force[take], recording.time_s[take])
+INERTIA = Par("inertia", "effort s2/position", 0.5, -10.0, 100.0, 0.02, meaning="moved mass or inertia")
+OFFSET = Par("offset", "effort", 0.0, -100.0, 100.0, 0.02, meaning="constant load, or zero of the effort")
+LOAD_ZERO = Par("load_zero", "position", 0.0, -1e9, 1e9, 2e-3, meaning="zero of the load's encoder")
+LOAD_RATIO = Par("load_ratio", "1", 0.0, -10.0, 10.0, 2e-3, meaning="load's way beyond the drive's, as a share of it")
 
 
 @dataclass(frozen=True)
 class AxisProblem:
-    """One recording of an axis, cut into blocks that are left out in turn."""
+    """Recordings of an axis in blocks that are left out in turn; ``lacks`` are needs that are not met, and why."""
 
     motion: Motion
-    frictionless: bool = False
+    scales: Scales
+    known: tuple[str, ...] = ()
+    lacks: Mapping[str, str] | None = None
 
     @property
     def title(self) -> str:
@@ -128,25 +40,33 @@ class AxisProblem:
 
     @cached_property
     def channels(self) -> tuple[Signal, ...]:
-        """Drive force [N]."""
-        count = len(self.motion.force)
-        memory = MEMORY_S / float(np.median(np.diff(self.motion.time_s)))
-        return (Signal("force", "N", self.motion.force, np.arange(count) * BLOCKS // count, memory),)
+        """Effort, and what the load is ahead of the drive where it has an encoder."""
+        m, s = self.motion, self.scales
+        effort = Signal("effort", f"{s.effort:.4g} {s.units.effort}", m.effort, m.block, MEMORY_ROWS)
+        if not self.has_load:
+            return (effort,)
+        return effort, Signal("slip", f"{s.position:.4g} {s.units.position}", m.slip, m.block, MEMORY_ROWS)
+
+    @property
+    def has_load(self) -> bool:
+        """Whether a second encoder sees the load in every recording."""
+        return bool(np.isfinite(self.motion.slip).all())
 
     @property
     def recordings(self) -> int:
         """Blocks."""
-        return BLOCKS
+        return int(self.motion.block[-1]) + 1
 
-    @property
+    @cached_property
     def base(self) -> tuple[Par, ...]:
-        """Mass, viscous friction where the axis is not taken as frictionless, offset."""
-        return (MASS, OFFSET) if self.frictionless else (MASS, VISCOUS, OFFSET)
+        """Inertia, offset, what is known, and the second encoder's zero and scale."""
+        known = [par for name in self.known for par in AXIS_CAUSES.named(name).pars]
+        return (INERTIA, OFFSET, *known, *((LOAD_ZERO, LOAD_RATIO) if self.has_load else ()))
 
-    @property
-    def effects(self) -> tuple[Effect, ...]:
-        """The axis' library."""
-        return (VISCOUS_EFFECT, *AXIS_EFFECTS) if self.frictionless else AXIS_EFFECTS
+    @cached_property
+    def effects(self) -> tuple[AxisEffect, ...]:
+        """The library without what is known."""
+        return tuple(cause for name, cause in AXIS_CAUSES.items() if name not in self.known)
 
     @property
     def scatter(self) -> tuple[Scatter, ...]:
@@ -155,95 +75,70 @@ class AxisProblem:
 
     @cached_property
     def offers(self) -> Mapping[str, str]:
-        """All needs are met at 100 Hz or more."""
-        rate = 1 / float(np.median(np.diff(self.motion.time_s)))
-        return {} if rate >= 99 else {"fast": f"{rate:.0f} Hz is too slow"}
+        """Why a need is not met, by need."""
+        found = dict(self.lacks or {})
+        if not self.has_load:
+            found["tracker"] = "no second encoder sees the load"
+        if not np.isfinite(self.motion.angle_rad).all():
+            found["angle"] = "the position is no angle"
+        if noise_of(self.motion.snap) > MOST_NOISE * float(np.std(self.motion.snap)):
+            found["smooth"] = "the fourth derivative of the position is lost in noise"
+        return found
+
+    @property
+    def labels(self) -> Mapping[str, Sequence[str]]:
+        """None: blocks of one axis."""
+        return {}
 
     def start(self) -> Values:
-        """Linear least squares."""
+        """Linear least squares of what the simulation knows."""
         m = self.motion
-        columns = np.stack([m.acceleration, m.velocity, np.ones_like(m.force)], axis=1)
-        mass, viscous, offset = np.linalg.lstsq(columns, m.force, rcond=None)[0]
-        values = {par.name: par.null for effect in self.effects for par in effect.pars}
-        viscous = 0.0 if self.frictionless else float(viscous)
-        return {**values, "mass_kg": max(float(mass), 0.01), "viscous_N_s_m": viscous, "offset_N": float(offset)}
+        moving = ~self.blind({})
+        rows = np.stack([m.acceleration, m.velocity, np.ones_like(m.effort)], axis=1)[moving]
+        inertia, viscous, offset = np.linalg.lstsq(rows, m.effort[moving], rcond=None)[0]
+        found = {"inertia": inertia, "offset": offset, "viscous": viscous if "viscous_friction" in self.known else 0.0}
+        if self.has_load:
+            found["load_zero"] = np.median(m.slip)
+        return {**self._nulls, **{name: float(value) for name, value in found.items()}}
 
-    def predict(self, fields: Fields) -> tuple[Array, ...]:
-        """Force the drive must give for this motion."""
-        values = {name: float(value) for name, value in fields.items()}
-        m, g = self.motion, values.get
-        direction = np.tanh(m.velocity / SIGN_M_S)
-        force = values["mass_kg"] * m.acceleration + values["offset_N"]
-        force = force + values["viscous_N_s_m"] * m.velocity + g("coulomb_N", 0.0) * direction
-        force = force + g("asymmetry_N_s_m", 0.0) * np.abs(m.velocity) + g("flexible_kg_s2", 0.0) * m.snap
-        if g("ripple_sin_N", 0.0) or g("ripple_cos_N", 0.0):
-            phase = 2 * np.pi * m.position / values["ripple_pitch_m"]
-            force = force + values["ripple_sin_N"] * np.sin(phase) + values["ripple_cos_N"] * np.cos(phase)
-        if g("dead_time_s", 0.0):
-            force = np.interp(m.time_s + values["dead_time_s"], m.time_s, force)
-        return (np.asarray(force),)
+    @cached_property
+    def _nulls(self) -> dict[str, float]:
+        pars = (*(par for cause in AXIS_CAUSES.values() for par in cause.pars), *self.base)
+        return {par.name: par.null for par in pars}
 
-    def blind(self, values: Fields) -> NDArray[np.bool_]:  # noqa: ARG002 - where it stands still is known beforehand
-        """Standstill, where friction is whatever holds the axis."""
-        return np.asarray(np.abs(self.motion.velocity) < BLIND_M_S)
+    def predict(self, values: Fields) -> tuple[Array, ...]:
+        """Effort the drive must give for this motion, and where the load then is."""
+        m, v = self.motion, {**self._nulls, **values}
+        effort = np.asarray(v["inertia"] * m.acceleration + v["offset"])
+        slip = np.asarray(v["load_zero"] + v["load_ratio"] * m.position) if self.has_load else m.slip
+        for cause in AXIS_CAUSES.values():
+            if all(v[par.name] == par.null for par in cause.amplitudes):
+                continue
+            if cause.on_load:
+                slip = cause.act(m, slip, v)
+            else:
+                effort = cause.act(m, effort, v)
+        return (effort, slip) if self.has_load else (effort,)
+
+    def blind(self, values: Fields) -> Mask:  # noqa: ARG002 - where it stands still is known beforehand
+        """Standstill, where dry friction is whatever holds the axis, and rows on missing samples."""
+        return self.motion.blind
 
     @property
     def units(self) -> Mapping[str, str]:
-        """Of the variables; the drive is asked for newtons."""
-        return {"depth": "m", "velocity": "m/s", "acceleration": "m/s2", "session time": "s", "force": "N"}
+        """Of the variables."""
+        s = self.scales
+        return {
+            "position": f"{s.position:.4g} {s.units.position}",
+            "velocity": f"{s.speed:.4g} {s.units.position}/s",
+            "acceleration": f"{s.acceleration:.4g} {s.units.position}/s2",
+            "session time": f"{s.time_s:.4g} s",
+            "force": f"{s.effort:.4g} {s.units.effort}",
+        }
 
     def variables(self) -> Mapping[str, Array]:
         """What a residual may depend on."""
         m = self.motion
-        return {"depth": m.position, "velocity": m.velocity, "acceleration": m.acceleration, "session time": m.time_s}
-
-
-SUBSTEPS = 4
-
-
-def simulate(recording: AxisRecording, values: Mapping[str, float], limit_V: float = 10.0) -> Array:
-    """Closed loop with the recorded reference: the control signal [V] the model would have asked for, shape (n,).
-
-    The loop is the recorded one: kv (kp (reference - position) - velocity), velocity the backward difference of the
-    two-sample mean, saturated, pulses added as they were.
-    """
-    period, g = recording.period_s, values.get
-    mass = values["mass_kg"]
-    viscous, coulomb = values["viscous_N_s_m"], g("coulomb_N", 0.0)
-    asymmetry, offset = g("asymmetry_N_s_m", 0.0), values["offset_N"]
-    added = recording.pulses_V * pulse_share(recording)
-    place, speed = float(recording.position_m[0]), 0.0
-    before = [place, place]
-    control = np.empty(len(recording.time_s))
-    step = period / SUBSTEPS
-    for k, reference in enumerate(recording.reference_m):
-        measured = (place - before[0]) / (2 * period)
-        before = [before[1], place]
-        wish = recording.kv_V_s_m * (recording.kp_1_s * (reference - place) - measured) + added[k]
-        volts = min(max(wish, -limit_V), limit_V)
-        control[k] = volts
-        for _ in range(SUBSTEPS):
-            push = recording.force_N_V * volts - offset - viscous * speed - asymmetry * abs(speed)
-            # Dry friction brings to rest within a step what it can hold, and opposes the motion otherwise.
-            free = speed + step * push / mass
-            brake = step * coulomb / mass
-            speed = free - brake if free > brake else free + brake if free < -brake else 0.0
-            place += step * speed
-    return control
-
-
-def pulse_share(recording: AxisRecording) -> float:
-    """How the pulses enter the control signal, by regression on what the loop alone would have asked for."""
-    if not np.any(recording.pulses_V):
-        return 0.0
-    position, period = recording.position_m, recording.period_s
-    velocity = np.concatenate([[0.0, 0.0], (position[2:] - position[:-2]) / (2 * period)])
-    own = recording.kv_V_s_m * (recording.kp_1_s * (recording.reference_m - position) - velocity)
-    pulses = recording.pulses_V - recording.pulses_V.mean()
-    return float(pulses @ (recording.control_V - own) / (pulses @ pulses))
-
-
-def force_error_percent(recording: AxisRecording, values: Mapping[str, float]) -> float:
-    """100 |F - F_simulated| / |F| of the closed loop."""
-    simulated = simulate(recording, values)
-    return 100 * float(np.linalg.norm(recording.control_V - simulated) / np.linalg.norm(recording.control_V))
+        return {
+            "position": m.position, "velocity": m.velocity, "acceleration": m.acceleration, "session time": m.time
+        }  # fmt: skip

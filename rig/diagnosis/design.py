@@ -5,31 +5,33 @@ else is refitted. No data are involved, so this is what the design itself allows
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from rig.config.protocol import Indentation as Protocol
 from rig.diagnosis.answers import Diagnosis, invisible, smallest_visible
-from rig.diagnosis.estimates import NextExperiment, SmallestSize
+from rig.diagnosis.estimates import SAFE_NATS, NextExperiment, SmallestSize
 from rig.diagnosis.evidence import Direction, Tangents, information, is_alias, tangents
 from rig.diagnosis.fit import Fit, assemble
 from rig.diagnosis.indentation import IndentationProblem, nulls
 from rig.diagnosis.noise import Array, Colour, Noise, ScatterWhitener, starts_of
 from rig.diagnosis.observations import Observations, observe
-from rig.diagnosis.search import testable
+from rig.diagnosis.search import proposed, testable
 from rig.diagnosis.whitening import Whitener, secants_of
-from rig.simulation.chain import respond
+from rig.tissue.laws_extended import Extended
+from rig.tissue.model import Model
 from rig.trials.trial import Trial, TrialSet
 
 RATE_HZ = 1000.0
 TRACKER_HZ = 60.0
-SURFACE_MM = 20.0
+SURFACE_MM = 20.0  # any place below the top of the way: all else counts from it
 FORCE_NOISE_N = 0.003  # at the working rate
 TRACKER_NOISE_MM = 0.06
 SCATTER = np.array([0.01, 0.02, 0.003])
 LIMB = {"a_N_mm": 0.12, "b_per_mm": 0.22, "damping_N_s_mm": 0.01, "surface_mm": SURFACE_MM}
 THRESHOLD_NATS = 5.0
+DEPTHS = 80  # 0.1 mm of an indentation of 8
 ASSUMED_NATS = 50.0
 BLOCKS = {
     "5 cycles at 4 to 30 mm/s": Protocol(speeds_mm_s=(4, 8, 12, 20, 30), trials=1, hold_s=0.2),
@@ -43,8 +45,7 @@ BLOCKS = {
     "5 cycles with a stop at half depth": Protocol(speeds_mm_s=(10,), trials=5, depth_mm=4, second_depth_mm=8),
     "5 cycles with a slow way out, 2 mm/s": Protocol(speeds_mm_s=(10,), trials=5, retract_speed_mm_s=2),
 }
-# Odds of 20 to 1 (e^3); more than chance reaches in sessions without a cause (95 %: 4 to 13 nats, `evidence.chance`).
-NOT_SEPARABLE_NATS, SAFE_NATS = 3.0, 20.0
+NOT_SEPARABLE_NATS = 3.0  # odds of 20 to 1 (e^3)
 
 
 @dataclass(frozen=True)
@@ -73,17 +74,35 @@ class Detectability:
         return sorted(found, key=lambda pair: pair[2])
 
 
-def check(protocol: Protocol, tracker: bool = True, force_rate_Hz: float = RATE_HZ) -> Detectability:
-    """What ``protocol`` can show with a force sensor at this rate, with or without a tracker on the tip."""
+def check(
+    protocol: Protocol, tracker: bool = True, force_rate_Hz: float = RATE_HZ, limb: Mapping[str, float] = LIMB
+) -> Detectability:
+    """What ``protocol`` can show on ``limb`` with a force sensor at this rate, with or without a tracker on the tip."""
     cycles = planned(protocol, tracker, force_rate_Hz)
     data = observe(TrialSet("planned", tuple(cycles)))
     problem = IndentationProblem(data)
-    fit = noiseless(problem)
-    t = tangents(fit, testable(problem))
+    fit = noiseless(problem, limb)
+    t = tangents(fit, proposed(testable(problem), fit.names))
     visible = smallest_visible(t, THRESHOLD_NATS)
     names, confusion = confusability(t)
     duration = float(cycles[-1].force_s[-1])
-    return Detectability(duration, len(cycles), visible, invisible(problem, visible), names, confusion)
+    reasons = invisible(problem, {*visible, *fit.names})
+    return Detectability(duration, len(cycles), visible, reasons, names, confusion)
+
+
+def limb_of(model: Model, depth_mm: float) -> dict[str, float]:
+    """A fitted tissue as the chain has it: an extended law as it is, of any other the index law nearest to it.
+
+    Of its relaxation the largest term is taken. Nearest is meant down to ``depth_mm``, or as far as was fitted.
+    """
+    law = model.law
+    if isinstance(law, Extended):
+        return {**asdict(law), "surface_mm": SURFACE_MM}
+    depths_mm = np.linspace(0, min(depth_mm, model.valid.depth_mm), DEPTHS + 1)[1:]
+    terms = sorted(law.terms)[-1:]
+    memory = {"relaxation_ratio": terms[0].ratio, "tau_s": terms[0].tau_s} if terms else {}
+    index = Extended.near(depths_mm, law.elastic(depths_mm))
+    return {**index, "damping_N_s_mm": model.damping_N_s_mm, **memory, "surface_mm": SURFACE_MM}
 
 
 def planned(protocol: Protocol, tracker: bool, rate_Hz: float) -> list[Trial]:
@@ -129,12 +148,11 @@ def cycle(protocol: Protocol, speed: float, rate_Hz: float) -> tuple[Array, Arra
 
 
 def noiseless(problem: IndentationProblem, limb: Mapping[str, float] = LIMB) -> Fit:
-    """The simulation at the given limb, judged with the assumed noise, as if it had been fitted."""
+    """The simulation of a limb, with what is off its null there, at the assumed noise, as if it had been fitted."""
     values = {**nulls(), **limb}
-    drive = problem.data.drive
-    data = Observations(
-        problem.data.name, problem.data.names, drive, respond(drive, values).force_N, problem.data.tip_mm, None
-    )
+    there = [effect for effect in problem.effects if any(values[par.name] != par.null for par in effect.amplitudes)]
+    seen, force_N = problem.data, problem.predict(values)[0]
+    data = Observations(seen.name, seen.names, seen.drive, force_N, seen.tip_mm, None)
     problem = IndentationProblem(data, problem.simulation)
     colours = [Colour(np.empty(0), FORCE_NOISE_N), Colour(np.empty(0), TRACKER_NOISE_MM)][: len(problem.channels)]
     noise = Noise(tuple(colours), SCATTER, np.zeros((problem.recordings, len(SCATTER))))
@@ -143,7 +161,7 @@ def noiseless(problem: IndentationProblem, limb: Mapping[str, float] = LIMB) -> 
     bare = Whitener(problem, noise, None, secants, blind)
     starts = starts_of(problem.channels[0].recording, problem.recordings)
     scatter = ScatterWhitener.of(colours[0].whiten(secants, bare.judged[0]), SCATTER, starts)
-    return assemble(problem, (), values, Whitener(problem, noise, scatter, secants, blind))
+    return assemble(problem, there, values, Whitener(problem, noise, scatter, secants, blind))
 
 
 def next_experiment(result: Diagnosis) -> NextExperiment | None:
@@ -151,7 +169,10 @@ def next_experiment(result: Diagnosis) -> NextExperiment | None:
 
     Each block is taken alone, on the limb as fitted, with the named effect at the size found.
     """
-    open_sets = [finding.effects for finding in result.findings if len(finding.effects) > 1]
+    sets = [finding for finding in result.findings if len(finding.effects) > 1]
+    open_sets = [finding.effects for finding in sets if finding.shared_variable is None]
+    if sets and not open_sets:
+        return NextExperiment("5 cycles with a tip of another radius, or where the tissue is thicker", sets[0].effects)
     if not open_sets or result.search is None:
         if "frame_compliance" in result.not_testable and "tracker" in result.not_testable["frame_compliance"]:
             return NextExperiment("record again with a tracker on the tip")

@@ -187,10 +187,7 @@ def _signs(recordings: int, rng: np.random.Generator, draws: int) -> Array:
 
 
 def chance_maxima(
-    t: Tangents,
-    rng: np.random.Generator,
-    gains: Callable[[Tangents, Array], Array] = linear_gains,
-    draws: int = DRAWS,
+    t: Tangents, rng: np.random.Generator, gains: Callable[[Tangents, Array], Array] = linear_gains, draws: int = DRAWS
 ) -> tuple[Array, Array]:
     """Largest of ``gains`` when nothing is hidden: parametric and sign-flip draws, each (draws,)."""
     parametric = gains(t, chance_draws(t, rng, draws)).max(axis=1)

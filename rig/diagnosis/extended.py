@@ -34,7 +34,7 @@ def extended_model(result: Diagnosis) -> Model:
 
 
 def covariance_of(fit: Fit) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Covariance of the law's parameters, shape (11, 11); 0 where one was not free. Logarithms are carried through."""
+    """Covariance of the law's parameters, shape (p, p); 0 where one was not free. Logarithms are carried through."""
     free = {par.name: k for k, par in enumerate(fit.free)}
     covariance = np.zeros((len(Extended.bounds), len(Extended.bounds)))
     there = [(k, free[name]) for k, name in enumerate(Extended.bounds) if name in free]

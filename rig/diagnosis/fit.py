@@ -10,6 +10,7 @@ from rig.diagnosis.descent import descend, jacobian, on_bound, prior_precision
 from rig.diagnosis.noise import Array, Colour, Noise, starts_of
 from rig.diagnosis.problem import Effect, InverseProblem, Par, Values
 from rig.diagnosis.whitening import Whitener, estimate, optimistic, shifted
+from rig.remembered import known_of
 
 LM_STEPS = 8
 NOISE_ROUNDS = 25
@@ -57,9 +58,16 @@ class Fit:
         return np.asarray(np.linalg.inv(self.hessian.sum(axis=0) + np.diag(prior_precision(self.free))))
 
 
+def held_values(problem: InverseProblem, effects: Sequence[Effect]) -> dict[str, float]:
+    """Base parameters that stay at their null beside these effects."""
+    return {par.name: par.null for par in problem.base if any(par.name in effect.holds for effect in effects)}
+
+
 def free_parameters(problem: InverseProblem, effects: Sequence[Effect]) -> tuple[Par, ...]:
-    """Base parameters and those of the effects."""
-    return problem.base + tuple(par for effect in effects for par in effect.pars)
+    """Base parameters, but those that an effect holds, and those of the effects."""
+    held = held_values(problem, effects)
+    base = tuple(par for par in problem.base if par.name not in held)
+    return base + tuple(par for effect in effects for par in effect.pars)
 
 
 def fit(
@@ -68,20 +76,24 @@ def fit(
     start: Values,
     whitener: Whitener | None = None,
     rounds: int = NOISE_ROUNDS,
+    enough: float = -np.inf,
 ) -> Fit:
-    """Levenberg-Marquardt with noise and shifts re-estimated on the model's own residuals between rounds."""
+    """Levenberg-Marquardt with noise and shifts re-estimated on the model's own residuals between rounds.
+
+    One whose log likelihood is below ``enough`` after the second round stays as it is then.
+    """
     free = free_parameters(problem, effects)
     values: Values = {**start, **{par.name: float(np.clip(start[par.name], par.low, par.high)) for par in free}}
     whitener = whitener or flat_noise(problem, [0.02 * float(np.std(c.observed)) for c in problem.channels])
     values, slopes = descend(free, values, whitener, 2 * LM_STEPS, confirm=False)
     level, best = -np.inf, (log_level(whitener, values), values, whitener)
-    for _ in range(rounds):
+    for number in range(rounds):
         whitener = estimate(problem, values, whitener)
         values, slopes = descend(free, values, whitener, LM_STEPS, slopes, confirm=False)
         reached = log_level(whitener, values)
         # Contact is a kink: a round may lead away. The best point seen is the fit.
         best = max(best, (reached, values, whitener), key=lambda point: point[0])
-        if abs(reached - level) < SETTLED_NATS:
+        if abs(reached - level) < SETTLED_NATS or (number > 0 and reached < enough):
             break
         level = reached
     _, values, whitener = best
@@ -101,6 +113,7 @@ def log_level(whitener: Whitener, values: Values) -> float:
     return reached if np.isfinite(reached) else -np.inf
 
 
+@known_of
 def least_squares(model: Fit) -> Fit:
     """The same model with the parameters that bring it closest to the readings, noise white, no recording special.
 
@@ -110,7 +123,8 @@ def least_squares(model: Fit) -> Fit:
     errors = (c.observed - p for c, p in zip(problem.channels, model.prediction, strict=True))
     whitener = flat_noise(problem, (float(np.std(error)) for error in errors))
     free = free_parameters(problem, model.effects)
-    guess = {**problem.start(), **{par.name: model.values[par.name] for effect in model.effects for par in effect.pars}}
+    own = {par.name: model.values[par.name] for effect in model.effects for par in effect.pars}
+    guess = {**problem.start(), **own, **held_values(problem, model.effects)}
     ends = [descend(free, start, whitener, 3 * LM_STEPS)[0] for start in (model.values, guess)]
     return assemble(problem, model.effects, max(ends, key=lambda end: log_level(whitener, end)), whitener)
 
@@ -124,12 +138,14 @@ def first_fit(problem: InverseProblem) -> Fit:
     return fit(problem, (), best.values, best.whitener)
 
 
-def attempt(problem: InverseProblem, effects: Sequence[Effect], start: Values, whitener: Whitener) -> Fit | None:
+def attempt(
+    problem: InverseProblem, effects: Sequence[Effect], start: Values, whitener: Whitener, enough: float = -np.inf
+) -> Fit | None:
     """A fit, or None where its numbers ran away: a candidate that cannot be fitted is no candidate."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             start = _anchored(problem, effects, start, whitener)
-            found = fit(problem, effects, start, whitener, QUICK_ROUNDS)
+            found = fit(problem, effects, start, whitener, QUICK_ROUNDS, enough)
     except np.linalg.LinAlgError:
         return None
     return found if np.isfinite(level_of(found)) and np.isfinite(found.hessian).all() else None
@@ -162,9 +178,11 @@ def best_fit(problem: InverseProblem, effects: Sequence[Effect], start: Values, 
     return max((t for t in tried if t is not None), key=level_of, default=None)
 
 
-def low_noise_refit(problem: InverseProblem, effects: Sequence[Effect], start: Values, before: Whitener) -> Fit | None:
+def low_noise_refit(
+    problem: InverseProblem, effects: Sequence[Effect], start: Values, before: Whitener, enough: float = -np.inf
+) -> Fit | None:
     """A fit from noise too small to hide an effect in."""
-    return attempt(problem, effects, start, optimistic(problem, start, before))
+    return attempt(problem, effects, start, optimistic(problem, start, before), enough)
 
 
 def low_noise_view(model: Fit) -> Fit:

@@ -1,7 +1,7 @@
 """The indentation rig as a problem: index or constant simulation, the bench's and the tissue's possible causes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Literal
@@ -13,7 +13,8 @@ from rig.diagnosis.effects.registry import CAUSES
 from rig.diagnosis.effects.tissue import STIFFENING, STIFFENING_EFFECT
 from rig.diagnosis.observations import Observations
 from rig.diagnosis.problem import Array, Effect, Par, Scatter, Signal, Values, operators
-from rig.simulation.chain import respond
+from rig.remembered import exp
+from rig.simulation.chain import Operator, respond
 from rig.simulation.drive import SETTLE_MM_S, MeasuredMotion
 from rig.tissue.index_law import Fields, index_force
 
@@ -23,6 +24,8 @@ SURFACE = Par("surface_mm", "mm", 0.0, -1e4, 1e4, 0.05, meaning="axis position o
 ZERO = Par("zero_N", "N", 0.0, -1e3, 1e3, 0.02, meaning="force zero")
 TIP_ZERO = Par("tip_zero_mm", "mm", 0.0, -1e4, 1e4, 0.05, meaning="tracker zero along the axis")
 START_SAMPLES = 4000  # 0.05 s; four times as many change the start by 2 um and 0.1 %
+# Of the travel, to either side of where contact was found: lags and lost motion move it by less.
+ROOM_SHARE = 0.25
 BLIND_MM = 0.12  # six deviations of the place of contact between recordings (0.02 mm)
 MEMORY_S = 1.0
 FEWEST_WAY_OUT = 0.2  # 2.6 of 13 mm: five times the way in which a guide's friction turns round
@@ -73,7 +76,7 @@ class IndentationProblem:
     def base(self) -> tuple[Par, ...]:
         """What the simulation itself has free; a stated surface is taken at its word."""
         pars = [STIFFNESS, *([STIFFENING] if self.simulation == "index" else []), DAMPING]
-        pars += [] if self.data.surface_mm is not None else [SURFACE]
+        pars += [] if self.data.surface_mm is not None else [surface(self.data)]
         return (*pars, ZERO, *([TIP_ZERO] if self.data.has_tracker else []))
 
     @cached_property
@@ -95,6 +98,11 @@ class IndentationProblem:
         """Why a need of an effect is not met, by need."""
         return missing(self.data)
 
+    @cached_property
+    def labels(self) -> Mapping[str, Sequence[str]]:
+        """As the session has them."""
+        return self.data.labels
+
     def start(self) -> Values:
         """Best of a coarse grid of surface and stiffening, the rest by linear least squares."""
         values = coarse_start(self.data, stiffening=self.simulation == "index")
@@ -107,10 +115,10 @@ class IndentationProblem:
     def _nulls(self) -> Values:
         return nulls()
 
-    def predict(self, values: Fields) -> tuple[Array, ...]:
-        """Force, and tip where it was measured."""
+    def predict(self, values: Fields, beside: Sequence[Operator] = ()) -> tuple[Array, ...]:
+        """Force, and tip where it was measured; ``beside`` acts after the causes."""
         values = {**self._nulls, **values}
-        response = respond(self.data.drive, values, operators(self.effects, values))
+        response = respond(self.data.drive, values, [*operators(self.effects, values), *beside])
         return response if self.data.has_tracker else (response.force_N,)
 
     def blind(self, values: Fields) -> NDArray[np.bool_]:
@@ -150,7 +158,7 @@ UNITS = {
 
 
 def _scaled(values: Fields, share: Array) -> Fields:
-    return {**values, "a_N_mm": values["a_N_mm"] * np.exp(np.clip(share, -2.0, 2.0))}
+    return {**values, "a_N_mm": values["a_N_mm"] * exp(np.clip(share, -2.0, 2.0))}
 
 
 def missing(data: Observations) -> dict[str, str]:
@@ -171,12 +179,24 @@ def missing(data: Observations) -> dict[str, str]:
         )
     if drive.recordings < 4:
         reasons["strokes"] = f"{drive.recordings} recordings are too few cycles; at least 4"
+    if not data.one_clock:
+        reasons["session time"] = "each recording counts its own time, so nobody knows how far apart they were made"
+    if data.contact_mm is not None and drive.position_mm.min() > data.contact_mm[1]:
+        reasons["air"] = "the tip never leaves the tissue; begin and end each cycle above the surface"
     if way_out(drive) < FEWEST_WAY_OUT:
         reasons["unloading"] = "the recordings do not show the way out; record the retraction too"
     loading = drive.speed_mm_s[drive.starts[:-1]]
     if loading.max() < 1.5 * max(float(loading.min()), 1e-9):
         reasons["speeds"] = "all cycles have about one speed; use at least three, from slow to fast"
     return reasons
+
+
+def surface(data: Observations) -> Par:
+    """The surface's parameter, near to where the estimator of contact found it."""
+    if data.contact_mm is None:
+        return SURFACE
+    room_mm = ROOM_SHARE * float(np.ptp(data.drive.position_mm))
+    return replace(SURFACE, low=data.contact_mm[0] - room_mm, high=data.contact_mm[1] + room_mm)
 
 
 def way_out(drive: MeasuredMotion) -> float:
@@ -194,17 +214,20 @@ def coarse_start(data: Observations, stiffening: bool) -> dict[str, float]:
     stride = max(1, data.drive.size // START_SAMPLES)
     x, v, force = (a[::stride] for a in (data.drive.position_mm, data.drive.velocity_mm_s, data.force_N))
     low, high = np.percentile(x, [0.5, 99.5])
-    surfaces = [data.surface_mm] if data.surface_mm is not None else np.linspace(low, high, 42)[:-3]
+    bounds = surface(data)
+    # Of a recording that begins in contact the surface lies above its start.
+    grid = np.linspace(min(low, data.contact_mm[0]) if data.contact_mm else low, high, 42)[:-3]
+    surfaces = [data.surface_mm] if data.surface_mm is not None else grid[(grid >= bounds.low) & (grid <= bounds.high)]
     best: tuple[float, dict[str, float]] = (np.inf, nulls())
-    for surface in surfaces:
-        depth = np.maximum(x - surface, 0.0)
+    for surface_mm in surfaces:
+        depth = np.maximum(x - surface_mm, 0.0)
         for growth in _growths(depth, stiffening):
             columns = np.stack([index_force(depth, 1.0, growth), v * (depth > 0), np.ones_like(x)], axis=1)
             solution, *_ = np.linalg.lstsq(columns, force, rcond=None)
             error = float(np.sum((force - columns @ solution) ** 2))
             if error < best[0] and solution[0] > 0:
                 found = dict(zip(("a_N_mm", "damping_N_s_mm", "zero_N"), map(float, solution), strict=True))
-                best = error, {**nulls(), **found, "b_per_mm": growth, "surface_mm": float(surface)}
+                best = error, {**nulls(), **found, "b_per_mm": growth, "surface_mm": float(surface_mm)}
     return best[1]
 
 

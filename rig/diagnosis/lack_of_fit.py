@@ -15,6 +15,7 @@ import numpy as np
 from rig.diagnosis.descent import prior_precision
 from rig.diagnosis.evidence import Tangents, chance, chance_maxima, held_out
 from rig.diagnosis.fit import Fit, by_recording
+from rig.diagnosis.levels import label_dependence
 from rig.diagnosis.noise import Array, starts_of
 from rig.diagnosis.problem import Effect, InverseProblem
 
@@ -93,7 +94,7 @@ def assess_lack_of_fit(fit: Fit, rng: np.random.Generator) -> LackOfFit:
     rows = float(sum(np.count_nonzero(keep) for keep in fit.whitener.judged[:1]))
     named = dict(zip(groups, map(float, gains), strict=True))
     shares = {name: 2 * gain / rows for name, gain in named.items()}
-    return LackOfFit(named, shares, p_value, *between_recordings(fit, rng))
+    return LackOfFit(named, shares, p_value, *with_labels(between_recordings(fit, rng), fit))
 
 
 def unexplained_variables(found: LackOfFit, named_nats: float) -> tuple[str, ...]:
@@ -109,7 +110,12 @@ def unexplained_variables(found: LackOfFit, named_nats: float) -> tuple[str, ...
     matters = found.shares[best] >= SMALLEST_SHARE and not named_it
     if found.p_value > LEVEL or not matters:
         return ()
-    return tuple(name for name in found.ranked if found.gains[name] >= 0.5 * found.gains[best])
+    return telling_variables(found)
+
+
+def telling_variables(found: LackOfFit) -> tuple[str, ...]:
+    """The variables that tell half as much as the best, or more."""
+    return tuple(name for name in found.ranked if found.gains[name] >= 0.5 * found.gains[found.ranked[0]])
 
 
 def between_recordings(fit: Fit, rng: np.random.Generator) -> tuple[tuple[str, ...], float]:
@@ -143,6 +149,15 @@ def between_recordings(fit: Fit, rng: np.random.Generator) -> tuple[tuple[str, .
     )
     found = dict.fromkeys(owners[k] for k in np.argsort(-observed) if observed[k] > 0.95 * best)
     return tuple(found), p_normal if p_order <= ORDER_LEVEL else 1.0
+
+
+def with_labels(found: tuple[tuple[str, ...], float], fit: Fit) -> tuple[tuple[str, ...], float]:
+    """What own shifts depend on and its chance, or the label that they go with, where that is rarer by chance."""
+    shifts = fit.whitener.noise.shifts
+    if len(shifts) < FEWEST_BETWEEN or not fit.problem.labels:
+        return found
+    label, p_value = label_dependence(shifts, beside_named(fit), fit.problem.labels)
+    return ((label,), p_value) if label is not None and p_value < found[1] else found
 
 
 def beside_named(fit: Fit) -> Array:

@@ -5,17 +5,22 @@ faster than the working rate, force and motion are averaged over the same sample
 both sides alike and cannot be mistaken for a lag of one of them.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+import math
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from itertools import repeat
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import savgol_filter
 
 from rig.errors import DataError
+from rig.recording.converter import at_the_end_of_range
 from rig.simulation.drive import Array, MeasuredMotion
-from rig.trials.findings import Finding, at_the_end_of_range, merge
+from rig.trials.cycles import cycle_of
+from rig.trials.findings import Finding, merge
+from rig.trials.surface import find_surface, pushed
 from rig.trials.trial import FEWEST_SAMPLES, Trial, TrialSet, drop_disordered, drop_unusable, inspect
 
 WORKING_RATE_HZ = 250.0
@@ -26,16 +31,22 @@ JITTER_MM = 0.0004  # rounding to the encoder's 0.5 um makes 0.14 um: three time
 JITTERY = 125.0, (0.024, 0.024)
 # A device of 100 Hz that lost one sample has two periods; a gap within the derivatives' spans is bridged by them.
 GAP_PERIODS, GAP_S = 3.0, 0.01
+MOST_FILLED_S = 5.0  # of lost force; a longer break would be filled for nothing but its two ends
 # Over 24 ms a dither of 0.25 mm at 6 Hz turns by 8.5 mm/s, which is to be seen, a corner of 2000 mm/s2 by 30.
 MOST_TURN_MM_S = 12.0
 OMITTED = "recording left out: "
+Span = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class Observations:
     """Drive and readings on the working grid: force shape (n,), tip at the tracker's frames shape (m,).
 
-    ``unseen``, shape (n,), marks what nobody knows: motion in gaps of the axis' clock, force beyond the sensor's range.
+    ``unseen``, shape (n,), marks what nobody knows: motion in gaps of the axis' clock, force lost or beyond the
+    sensor's range.
+    ``contact_mm`` is from where to where contact lies in some of the recordings, None where none of them tells. Times
+    between recordings mean something where they have ``one_clock``. ``labels`` are those that differ, each with what it
+    is for each recording, nothing where nobody said.
     """
 
     name: str
@@ -47,6 +58,9 @@ class Observations:
     findings: tuple[Finding, ...] = field(default=())
     jitter_mm: float = 0.0
     unseen: NDArray[np.bool_] | None = None
+    contact_mm: Span | None = None
+    one_clock: bool = True
+    labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def rate_Hz(self) -> float:
@@ -70,8 +84,24 @@ class _Gridded:
     unseen: NDArray[np.bool_]
 
 
-def observe(session: TrialSet) -> Observations:
-    """The session on its working grid; raises DataError where no recording can be used at all."""
+def contact_span(usable: Sequence[Trial]) -> Span | None:
+    """From the first to the last place [mm] at which contact may lie in a recording that tells it."""
+    found = []
+    for trial in usable:
+        with suppress(DataError):
+            found.append(find_surface(cycle_of(trial)).contact)
+    return (min(c.low_mm for c in found), max(c.high_mm for c in found)) if found else None
+
+
+def observe(
+    session: TrialSet,
+    contact_of: Callable[[Sequence[Trial]], Span | None] = contact_span,
+    fastest_Hz: float = WORKING_RATE_HZ,
+) -> Observations:
+    """The session on its working grid; raises DataError where no recording can be used at all.
+
+    ``contact_of`` says where contact lies in the recordings that are used; the grid has at most ``fastest_Hz``.
+    """
     findings = [*session.findings, *(finding for trial in session.trials for finding in inspect(trial))]
     usable, lost = _cleaned(session)
     if not usable:
@@ -80,18 +110,27 @@ def observe(session: TrialSet) -> Observations:
         raise DataError(f"{session.name}: no recording can be used ({why}); run `rig verify` on it")
     findings += lost
     usable, copies = _without_copies(usable)
+    usable, pulled = _pushed(usable)
     usable, turned = _turned(usable)
-    findings += [*copies, *turned]
+    findings += [*copies, *pulled, *turned]
     rough_mm = float(np.median([jitter_mm(trial) for trial in usable]))
     rate_Hz, spans_s = (WORKING_RATE_HZ, DERIVATIVE_SPANS_S) if rough_mm <= JITTER_MM else JITTERY
-    period_s = working_period(usable, rate_Hz)
+    period_s = working_period(usable, min(rate_Hz, fastest_Hz))
     parts = [_on_grid(trial, period_s, spans_s) for trial in usable]
     parts.sort(key=lambda part: float(part.time_s[0]))
     drive, force, tip = _joined(parts)
     return Observations(
         session.name, tuple(part.name for part in parts), drive, force, tip, session.surface_mm, merge(findings),
-        rough_mm, np.concatenate([part.unseen for part in parts]),
+        rough_mm, np.concatenate([part.unseen for part in parts]), contact_of(usable), session.one_clock,
+        _labels(usable, parts),
     )  # fmt: skip
+
+
+def _labels(usable: Sequence[Trial], parts: Sequence[_Gridded]) -> dict[str, tuple[str, ...]]:
+    of = {trial.name: trial.labels for trial in usable}
+    names = dict.fromkeys(name for trial in usable for name in trial.labels)
+    found = {name: tuple(of[part.name].get(name, "") for part in parts) for name in names}
+    return {name: told for name, told in found.items() if len(set(told)) > 1}
 
 
 def jitter_mm(trial: Trial) -> float:
@@ -133,6 +172,16 @@ def _without_copies(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]
     return [trial for trial in usable if trial.name not in gone], copies
 
 
+def _pushed(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:
+    """What was pulled as if it had been pushed, as for a fit."""
+    said = [pushed(cycle_of(trial))[1] for trial in usable]
+    trials = [
+        replace(trial, force_N=-trial.force_N, axis_mm=-trial.axis_mm) if found else trial
+        for trial, found in zip(usable, said, strict=True)
+    ]
+    return trials, [finding for found in said for finding in found]
+
+
 def _turned(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:
     """Without the few recordings in which force falls as the tip goes in while it rises in the others."""
     rises = np.array([rise_N(np.interp(s.force_s, s.axis_s, s.axis_mm), s.force_N) for s in usable])
@@ -162,19 +211,35 @@ def _on_grid(trial: Trial, period_s: float, spans_s: Sequence[float]) -> _Gridde
     count = np.bincount(window)
     full = count >= max(1, round(0.5 * period_s / native_s))
     means = [np.bincount(window, column)[full] / count[full] for column in columns]
-    time_s, temperature = means[0], means[5] if len(means) > 5 else None
+    time_s = means[0]
     marker_s, marker_mm = np.empty(0), np.empty((0, 3))
     if trial.marker_s is not None and trial.marker_mm is not None:
         marker_s, *xyz = drop_disordered(trial.marker_s, *trial.marker_mm.T)
         inside = (marker_s >= time_s[0]) & (marker_s <= time_s[-1])
         marker_s, marker_mm = marker_s[inside], np.array(xyz).T[inside]
     unseen = beside_gaps(trial.axis_s, time_s, 0.5 * max(spans_s))
-    unseen |= np.bincount(window, at_the_end_of_range(trial.force_N))[full] > 0
+    unseen |= np.bincount(window, at_the_end_of_range(trial.force_N, columns[2]))[full] > 0
     if spans_s[0] > DERIVATIVE_SPANS_S[0]:
         # Derivatives over long spans round off what turns within one.
         unseen |= np.abs(means[4]) * spans_s[0] > MOST_TURN_MM_S
-    motion = means[1], means[2], means[3], means[4]
-    return _Gridded(trial.name, time_s, motion, temperature, marker_s, marker_mm, unseen)
+    # A row at every time whose force was lost: a delay of so many rows is one of so much time then.
+    lost_s = lost_times(time_s, period_s)
+    at = np.searchsorted(time_s, lost_s)
+    lost = [lost_s, np.interp(lost_s, time_s, means[1]), *_motion(trial, lost_s, spans_s)]
+    lost += [np.interp(lost_s, time_s, kelvin) for kelvin in means[5:]]
+    time_s, force, position, velocity, acceleration, *kelvin = map(np.insert, means, repeat(at), lost)
+    motion = force, position, velocity, acceleration
+    unseen = np.insert(unseen, at, True)
+    return _Gridded(trial.name, time_s, motion, kelvin[0] if kelvin else None, marker_s, marker_mm, unseen)
+
+
+def lost_times(time_s: Array, period_s: float) -> Array:
+    """Evenly between the times of each break, those that an even grid has there, shape (lost,)."""
+    steps_s = np.diff(time_s)
+    counts = np.where(steps_s < MOST_FILLED_S, np.round(steps_s / period_s).astype(np.int64) - 1, 0)
+    breaks = np.flatnonzero(counts > 0)
+    inner = (np.linspace(time_s[k], time_s[k + 1], counts[k] + 2)[1:-1] for k in breaks)
+    return np.concatenate([np.empty(0), *inner])
 
 
 def beside_gaps(axis_s: Array, at_s: Array, margin_s: float) -> NDArray[np.bool_]:
@@ -188,7 +253,7 @@ def beside_gaps(axis_s: Array, at_s: Array, margin_s: float) -> NDArray[np.bool_
 def _motion(trial: Trial, at_s: Array, spans_s: Sequence[float]) -> tuple[Array, Array, Array]:
     """Position, velocity, acceleration at the given times.
 
-    Derivatives come from local quartics over ``spans_s`` (Savitzky and Golay 1964): differences of an encoder's steps
+    Derivatives come from local quartics over ``spans_s``: differences of an encoder's steps
     would put noise into the simulation that no noise model of the force accounts for.
     """
     motion = CubicSpline(trial.axis_s, trial.axis_mm)
@@ -198,9 +263,24 @@ def _motion(trial: Trial, at_s: Array, spans_s: Sequence[float]) -> tuple[Array,
     if len(even_s) <= max(lengths):
         return motion(at_s), motion(at_s, 1), motion(at_s, 2)
     even = motion(even_s)
-    slopes = (savgol_filter(even, n, 4, deriv=k, delta=period_s) for k, n in enumerate(lengths, start=1))
+    slopes = (derivative(even, n, k, period_s) for k, n in enumerate(lengths, start=1))
     velocity, acceleration = (np.asarray(CubicSpline(even_s, slope)(at_s)) for slope in slopes)
     return np.asarray(motion(at_s)), velocity, acceleration
+
+
+def derivative(values: Array, count: int, order: int, period_s: float) -> Array:
+    """Derivative of the quartics nearest to ``count`` values, an odd number, about each (Savitzky and Golay 1964).
+
+    Near either end that of the quartic of the first or the last ``count``. Not by scipy.signal, which takes half a
+    second to load.
+    """
+    half = count // 2
+    at = np.arange(-half, half + 1) / half
+    slopes = np.zeros((count, 5))
+    slopes[:, order:] = np.vander(at, 5 - order, increasing=True) * [math.perm(k, order) for k in range(order, 5)]
+    weights = slopes @ np.linalg.pinv(np.vander(at, 5, increasing=True)) / (half * period_s) ** order
+    first, last = weights[:half] @ values[:count], weights[-half:] @ values[-count:]
+    return np.concatenate([first, np.correlate(values, weights[half], "valid"), last])
 
 
 def _joined(parts: Sequence[_Gridded]) -> tuple[MeasuredMotion, Array, Array]:

@@ -13,6 +13,7 @@ from rig.tissue.index_law import Fields
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Values = Mapping[str, float]
+TISSUE_STAGES = frozenset({"elastic", "relaxing", "viscous"})
 
 
 @dataclass(frozen=True)
@@ -45,9 +46,12 @@ class Effect:
     ``begin`` is a second place to start from, far from null, where the way from null leads into a wrong valley.
     ``one_sided`` effects exist only above their null. ``between`` effects differ between recordings rather than inside
     them, so that without them they pass for scatter: they are always tried with a scatter of their own; ``mean_of`` is
-    the scatter whose mean an effect is. ``through`` names the one variable an effect acts through, if it is one: two
-    such together may imitate a third that is unknown. ``operator`` is what it does in the simulation, None where it is
-    a parameter of the elastic law. ``control`` says what it means for the control.
+    the scatter whose mean an effect is. ``beside`` names the cause without which it means nothing: it is looked for
+    once that is found. ``through`` names the one variable an effect acts through, if it is one: two such together may
+    imitate a third that is unknown. ``holds`` are parameters of the simulation that stay at their null beside it: it is
+    another law and no step away from this one, so it is fitted in place of what was named, and never sought.
+    ``operator`` is what it does in the simulation, None where it is a parameter of the elastic law. ``control`` says
+    what it means for the control.
     """
 
     name: str
@@ -60,7 +64,9 @@ class Effect:
     one_sided: bool = False
     between: bool = False
     mean_of: str = ""
+    beside: str = ""
     through: str = ""
+    holds: frozenset[str] = frozenset()
     operator: Operator | None = None
     control: str = "kept, and not used: it is no part of what the axis must do for a force"
     needs: frozenset[str] = frozenset()
@@ -76,14 +82,27 @@ class Effect:
         """Amplitudes, then shapes."""
         return self.amplitudes + self.shapes
 
+    @property
+    def is_elastic(self) -> bool:
+        """Whether it is another form of the tissue's law at rest."""
+        return self.operator is None
+
+    @property
+    def is_of_rate(self) -> bool:
+        """Whether it is what the tissue makes of time and speed."""
+        return self.operator is not None and self.operator.stage in {"relaxing", "viscous"}
+
+    @property
+    def is_of_bench(self) -> bool:
+        """Whether it acts inside a recording, on the force, and no tissue of any form or memory can do the same."""
+        lies_in_tissue = self.operator is None or self.operator.stage in TISSUE_STAGES
+        return not (lies_in_tissue or self.between or "tracker" in self.needs)
+
 
 def operators(causes: Iterable[Effect], values: Fields) -> list[Operator]:
-    """What the causes that are off their null do, in their order."""
-    return [
-        cause.operator
-        for cause in causes
-        if cause.operator and any(values[par.name] != par.null for par in cause.amplitudes)
-    ]
+    """What the causes that are off their null do, in their order; one that several share acts once."""
+    known = (cause.operator for cause in causes if any(values[par.name] != par.null for par in cause.amplitudes))
+    return list(dict.fromkeys(operator for operator in known if operator))
 
 
 class Signal(NamedTuple):
@@ -138,6 +157,10 @@ class InverseProblem(Protocol):
     @property
     def offers(self) -> Mapping[str, str]:
         """Needs of effects this data cannot meet, each with the reason."""
+
+    @property
+    def labels(self) -> Mapping[str, Sequence[str]]:
+        """By the name of each label of the recordings, what it is for each of them."""
 
     def start(self) -> Values:
         """First guess of the base parameters."""

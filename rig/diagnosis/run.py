@@ -5,19 +5,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.diagnosis.answers import Diagnosis, answer, intervals, limits, summary, verdict_of
+from rig.diagnosis.answers import Diagnosis, answer, intervals, limits
 from rig.diagnosis.design import next_experiment
 from rig.diagnosis.estimates import NextExperiment
-from rig.diagnosis.fit import first_fit, refreshed
+from rig.diagnosis.families import on_any_law, with_families
+from rig.diagnosis.fit import first_fit, held_values, refreshed
+from rig.diagnosis.floor import error_budget
 from rig.diagnosis.indentation import IndentationProblem, Simulation, library
 from rig.diagnosis.lack_of_fit import assess_lack_of_fit
 from rig.diagnosis.observations import Observations, observe, rise_N
+from rig.diagnosis.other_forms import with_best_form
 from rig.diagnosis.problem import InverseProblem
 from rig.diagnosis.search import search
+from rig.diagnosis.verdict import summary, verdict_of
 from rig.errors import DataError
 from rig.progress import Progress, silent
 from rig.trials.cycles import in_cycles
 from rig.trials.findings import Finding
+from rig.trials.streams import sample_noise
 from rig.trials.trial import TrialSet
 
 FEWEST_RECORDINGS = 4  # three without the one left out: the fewest whose scatter about a mean is more than one number
@@ -43,24 +48,23 @@ def judge(
     progress("fit of the simulation as it is", 0.02)
     before = refreshed(first_fit(problem))
     found_before = assess_lack_of_fit(before, rng)
-    search_result = search(problem, before, rng, progress)
+    search_result = with_families(with_best_form(search(problem, before, rng, progress)))
     progress("what is left", 0.95)
     found_after = assess_lack_of_fit(search_result.after, rng) if search_result.named else found_before
-    verdict, depends = verdict_of(search_result, found_after)
-    findings = tuple(
-        sorted(
-            (answer(named, search_result.after, verdict == "unexplained") for named in search_result.named),
-            key=lambda found: -found.evidence_nats,
-        )
-    )
-    visible, reasons = limits(problem, search_result)
+    budget = error_budget(before, search_result.after) if isinstance(problem, IndentationProblem) else None
+    verdict, depends = verdict_of(search_result, found_after, budget)
+    after, is_explained = search_result.after, verdict == "explained"
+    named = [on_any_law(one, after) if is_explained else one for one in search_result.named]
+    answers = [answer(one, after, not (is_explained and one.stands)) for one in named]
+    findings = tuple(sorted(answers, key=lambda found: -found.evidence_nats))
+    visible, reasons = limits(problem, search_result, budget)
     progress("done", 1.0)
     return Diagnosis(
         session=name,
         simulation=problem.title,
         recordings=problem.recordings,
         verdict=verdict,
-        statement=summary(verdict, findings, depends, problem.title),
+        statement=summary(verdict, findings, depends, problem.title, budget),
         findings=findings,
         depends_on=depends,
         lack_of_fit_p=min(found_after.p_value, found_after.between_p),
@@ -68,10 +72,11 @@ def judge(
         not_testable=reasons,
         next_experiment=None,
         quality=quality,
-        base=intervals(search_result.after, problem.base),
+        base=intervals(after, [par for par in problem.base if par.name not in held_values(problem, after.effects)]),
         search=search_result,
         before=found_before,
         after=found_after,
+        budget=budget,
     )
 
 
@@ -119,8 +124,7 @@ def unusable(data: Observations) -> Flaw | None:
     if np.ptp(force) == 0 or np.ptp(position) == 0:
         still = "force" if np.ptp(force) == 0 else "position"
         return Flaw(f"the {still} never changes, so the recordings carry no experiment", f"connect the {still} sensor")
-    # Third differences: at 10 Hz the first ones of a ramp are no noise.
-    noise = float(np.median(np.abs(np.diff(force, 3)))) / (0.6745 * np.sqrt(20))
+    noise = sample_noise(force)
     rise = rise_N(position, force)
     if rise < 0 and -rise > 5 * noise:
         return Flaw(
@@ -143,7 +147,7 @@ def unusable(data: Observations) -> Flaw | None:
 def cannot(simulation: Simulation, name: str, recordings: int, fault: Flaw, quality: tuple[Finding, ...]) -> Diagnosis:
     """The answer where nothing can be judged: nothing is explained, no cause named, and each listed with the reason."""
     return Diagnosis(
-        session=name, simulation=simulation, recordings=recordings, verdict="unexplained",
+        session=name, simulation=simulation, recordings=recordings, verdict="not judged",
         statement=f"Nothing could be judged: {fault.reason}. This says neither that the simulation is right nor wrong.",
         findings=(), depends_on=(), lack_of_fit_p=None, detectable={},
         not_testable={effect.name: fault.reason for effect in library(simulation)},
@@ -151,10 +155,15 @@ def cannot(simulation: Simulation, name: str, recordings: int, fault: Flaw, qual
     )  # fmt: skip
 
 
+def judged_trials(session: TrialSet) -> TrialSet:
+    """What of a session is judged: its recordings, or where they are few their cycles."""
+    return in_cycles(session) if len(session.trials) < FEWEST_RECORDINGS else session
+
+
 def diagnose_session(session: TrialSet, simulation: Simulation = "index", progress: Progress = silent) -> Diagnosis:
     """A session as it was read; one without a usable recording gets an answer too."""
     try:
-        data = observe(in_cycles(session) if len(session.trials) < FEWEST_RECORDINGS else session)
+        data = observe(judged_trials(session))
     except DataError as error:
         reason = str(error).removeprefix(f"{session.name}: ").removesuffix("; run `rig verify` on it")
         return cannot(simulation, session.name, 0, Flaw(reason, f"mend these files, or {RECORD}"), session.findings)

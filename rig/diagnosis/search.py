@@ -1,7 +1,7 @@
 """From nothing to a set of named causes: forward steps, backward drop, swap pass, alternatives of the final model."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from rig.diagnosis.evidence import (
     chance,
     chance_maxima,
     held_out_log_density,
-    held_out_square_error,
     is_alias,
     linear_gains,
     tangents,
@@ -23,7 +22,7 @@ from rig.diagnosis.fit import (
     attempt,
     best_fit,
     fit,
-    least_squares,
+    level_of,
     low_noise_refit,
     low_noise_view,
     refreshed,
@@ -32,6 +31,7 @@ from rig.diagnosis.fit import (
 from rig.diagnosis.lack_of_fit import LEVEL, assess_lack_of_fit
 from rig.diagnosis.noise import Array
 from rig.diagnosis.problem import Effect, InverseProblem, Values
+from rig.diagnosis.support import Support, support_of
 from rig.progress import Progress
 
 ALPHA = 0.03  # of 5 % of false alarms allowed; the rest is for the test of lack of fit and for the noise's fit
@@ -39,11 +39,6 @@ SHORT_LIST = 5
 MOST_EFFECTS = 3  # one more than the benchmark hides together
 ALTERNATIVE_SE = 2.0  # 95 % of a normal: an alternative within it predicts as well
 KEEP_NATS = 3.0  # odds of 20 to 1 (e^3)
-AMPLE_NATS = 20.0  # more than chance reaches in sessions without a cause (95 %: 4 to 13)
-WORSE = 1.01  # an error of 15,000 rows is known to 0.6 % at best
-# What takes nothing off the error needs more evidence than this, or a tracker to have been seen by.
-PLENTY_NATS = 50.0
-BETTER = 0.998
 START_SCALES = 0.05  # off the null by so little that the model is not worse for it, and its noise stays small
 STANDS_OUT_NATS = 3.0  # odds of 20 to 1 (e^3)
 FOLLOWED = 5
@@ -55,7 +50,11 @@ REACH_SHARE = 0.5
 
 @dataclass(frozen=True)
 class Named:
-    """One effect of the final model: its alternatives, held-out gain by recording over the best model without it."""
+    """One effect of the final model: its alternatives, held-out gain by recording over the best model without it.
+
+    ``support`` is what decides whether it is named. ``family`` are names that act through the same variable; it
+    ``stands`` where any other elastic law leaves it.
+    """
 
     effect: Effect
     alternatives: tuple[str, ...]
@@ -63,6 +62,9 @@ class Named:
     p_value: float
     without: Fit
     share: float
+    support: Support
+    family: tuple[str, ...] = ()
+    stands: bool = True
 
     @property
     def nats(self) -> float:
@@ -71,20 +73,34 @@ class Named:
 
 
 @dataclass(frozen=True)
+class SearchStep:
+    """Gain [nats] of each cause tried beside those before, what chance reaches once in twenty, and which was taken."""
+
+    gains: Mapping[str, float]
+    level: float
+    taken: str | None
+
+
+@dataclass(frozen=True)
 class Search:
-    """What was found: the simulation as it was, the final model, its effects, and the last step's view of the rest."""
+    """What was found: the models before and after, its effects, the last step's view of the rest, and every step."""
 
     before: Fit
     after: Fit
     named: tuple[Named, ...]
     tangents: Tangents
     maxima: tuple[Array, Array]
-    bars: dict[str, float]
+    steps: tuple[SearchStep, ...]
 
 
 def testable(problem: InverseProblem) -> list[Effect]:
-    """Effects whose needs the data meet."""
-    return [effect for effect in problem.effects if not effect.needs & problem.offers.keys()]
+    """Effects whose needs the data meet, that are steps away from the simulation."""
+    return [effect for effect in problem.effects if not (effect.holds or effect.needs & problem.offers.keys())]
+
+
+def proposed(library: Sequence[Effect], names: Collection[str]) -> list[Effect]:
+    """Effects that may be next beside those of these names."""
+    return [e for e in library if e.name not in names and (not e.beside or e.beside in names)]
 
 
 def penalty(effect: Effect, problem: InverseProblem) -> float:
@@ -130,41 +146,69 @@ def gain_over(model: Fit, other: Fit) -> float:
     return float((score(model) - score(other)).sum())
 
 
-def candidates(current: Fit, t: Tangents) -> list[Fit]:
-    """Effects that may be next, jointly refitted, best first.
+def candidates(current: Fit, t: Tangents, other: Fit | None = None) -> list[Fit]:
+    """Effects that may be next, jointly refitted, best first; beside ``other``, another model of as many, only others.
 
     Tried are those within reach of the best by the linear gain, whatever may pass for scatter, and, where anything
     stands out, the best of a rescreening under noise too small to have swallowed them.
     """
     problem, ranked = current.problem, screen(t, current.problem)
     top = ranked[0][0] if ranked else 0.0
-    reach = max(within_reach(top), 0.0)
-    near = [d for gain, d in ranked[:SHORT_LIST] if gain > reach]
-    near += [d for _, d in ranked if d.effect.between and d not in near]
+    reach, known = max(within_reach(top), 0.0), {effect.key for effect in other.effects} if other else set[str]()
+    if all(d.effect.key in known for d in t.directions):
+        return []
+    near = [d for gain, d in ranked[:SHORT_LIST] if gain > reach and d.effect.key not in known]
+    near += [d for _, d in ranked if d.effect.between and d not in near and d.effect.key not in known]
     starts = [((*current.effects, d.effect), starting_values(current, d, t)) for d in near]
-    fits = [attempt(problem, effects, start, current.whitener) for effects, start in starts]
+    race = Race(current, other)
+    for effects, start in starts:
+        race.enter(attempt(problem, effects, start, current.whitener, race.enough))
     loud = top > STANDS_OUT_NATS or assess_lack_of_fit(current, np.random.default_rng(0)).p_value <= LEVEL
-    hidden = [(effects, start) for effects, start in starts if not loud or effects[-1].mean_of]
-    fits += [low_noise_refit(problem, effects, start, current.whitener) for effects, start in hidden]
-    fits += rescreen(current, t) if loud else []
-    living = [c for c in fits if c is not None and is_sizeable(c.effects[-1], c.values)]
+    for effects, start in starts:
+        if not loud or effects[-1].mean_of:
+            race.enter(low_noise_refit(problem, effects, start, current.whitener, race.enough))
+    if loud:
+        rescreen(current, t, race, known)
+    living = [c for c in race.entered if is_sizeable(c.effects[-1], c.values)]
     gains = [gain_over(c, current) for c in living]
-    best = max(gains, default=0.0)
-    polished = [
-        fit(c.problem, c.effects, c.values, c.whitener) if gain > within_reach(best) else c
-        for c, gain in zip(living, gains, strict=True)
-    ]
+    best = max([*gains, gain_over(other, current) if other else 0.0])
+    polished = [finished(c) if gain > within_reach(best) else c for c, gain in zip(living, gains, strict=True)]
     polished = [c for c in polished if is_sizeable(c.effects[-1], c.values)]
     return sorted(polished, key=lambda candidate: -float(score(candidate).sum()))
 
 
-def rescreen(current: Fit, t: Tangents) -> list[Fit | None]:
+class Race:
+    """Candidates for the next effect as they come, and the log likelihood below which none is worth another round."""
+
+    def __init__(self, current: Fit, other: Fit | None) -> None:
+        self.level = level_of(current)
+        self.best = level_of(other) - self.level if other else -np.inf
+        self.entered: list[Fit] = []
+
+    @property
+    def enough(self) -> float:
+        """As far behind the best as what refitting may add."""
+        return self.level + within_reach(self.best) if np.isfinite(self.best) else -np.inf
+
+    def enter(self, candidate: Fit | None) -> None:
+        """One more, unless its numbers ran away."""
+        if candidate is not None:
+            self.entered.append(candidate)
+            self.best = max(self.best, level_of(candidate) - self.level)
+
+
+def finished(candidate: Fit) -> Fit:
+    """The candidate fitted to the end."""
+    return fit(candidate.problem, candidate.effects, candidate.values, candidate.whitener)
+
+
+def rescreen(current: Fit, t: Tangents, race: Race, known: Collection[str]) -> None:
     """Fits from noise too small to have swallowed an effect: of the best, every peak of a scan, second beginnings.
 
     All are brought to their best under the same noise first; those that explain most there are fitted to the end.
     """
     problem, quiet = current.problem, low_noise_view(current)
-    effects = list({d.effect.key: d.effect for d in t.directions}.values())
+    effects = [e for e in {d.effect.key: d.effect for d in t.directions}.values() if e.key not in known]
     quiet_t = tangents(quiet, effects)
     best = [d for gain, d in screen(quiet_t, problem)[:SHORT_LIST] if gain > 0]
     # Cycles that repeat alias one frequency into another: every peak is followed to its end.
@@ -177,10 +221,8 @@ def rescreen(current: Fit, t: Tangents) -> list[Fit | None]:
         starts.append((effect, {**current.values, **begin}))
     ends = [(effect, trial_fit(problem, (*current.effects, effect), start, quiet.whitener)) for effect, start in starts]
     furthest = sorted(((effect, *end) for effect, end in ends if end is not None), key=lambda end: -end[2])
-    return [
-        low_noise_refit(problem, (*current.effects, effect), values, current.whitener)
-        for effect, values, _ in furthest[:FOLLOWED]
-    ]
+    for effect, values, _ in furthest[:FOLLOWED]:
+        race.enter(low_noise_refit(problem, (*current.effects, effect), values, current.whitener, race.enough))
 
 
 def within_reach(best: float) -> float:
@@ -197,26 +239,24 @@ def is_sizeable(effect: Effect, values: Values) -> bool:
 
 def search(problem: InverseProblem, before: Fit, rng: np.random.Generator, progress: Progress) -> Search:
     """Forward steps while the best gain beats chance at ALPHA / 2^k, then drop and swap, then alternatives."""
-    current, bars, p_values, alone = before, dict[str, float](), dict[str, float](), True
+    current, steps, p_values, alone = before, list[SearchStep](), dict[str, float](), True
     library = testable(problem)
     for step in range(MOST_EFFECTS + 1):
         progress(f"step {step + 1}: {len(library) - len(current.effects)} causes", 0.15 + 0.15 * step)
-        t = tangents(current, [effect for effect in library if effect.name not in current.names])
+        t = tangents(current, proposed(library, current.names))
         maxima = chance_maxima(t, rng)
         # What two causes through one variable leave, a third cannot name.
         found = [] if shared_variables(current.effects) else candidates(current, t)
         # Best first, so that of several beginnings of one cause the best stands in the table.
         gains = {c.names[-1]: gain_over(c, current) for c in reversed(found)}
-        bars = bars or gains
-        if not found or step == MOST_EFFECTS:
+        chosen = next_cause(found, current, maxima) if step < MOST_EFFECTS else None
+        steps.append(SearchStep(gains, chance_level(maxima), chosen.names[-1] if chosen else None))
+        if chosen is None:
             break
-        p = chance(maxima, gains[found[0].names[-1]])
-        if p > ALPHA / 2**step:
-            break
-        p_values[found[0].names[-1]] = p
+        p_values[chosen.names[-1]] = chance(maxima, gains[chosen.names[-1]])
         best = max(gains.values())
         alone = alone and sum(gain > within_reach(best) for gain in gains.values()) == 1
-        current = refreshed(found[0])
+        current = refreshed(chosen)
     progress("drop and swap", 0.8)
     current = drop_unsupported(current)
     if not current.effects and gain_over(current, before) > KEEP_NATS:
@@ -225,9 +265,39 @@ def search(problem: InverseProblem, before: Fit, rng: np.random.Generator, progr
     # A single cause far beyond all others has no alternatives; with more than one the order of naming may mislead.
     named, current = settle(current, library if len(current.effects) > 1 or not alone else (), p_values)
     if current.names != tuple(p_values):
-        t = tangents(current, [effect for effect in library if effect.name not in current.names])
+        t = tangents(current, proposed(library, current.names))
         maxima = chance_maxima(t, rng)
-    return Search(before, current, named, t, maxima, bars)
+    return Search(before, current, named, t, maxima, tuple(steps))
+
+
+def chance_level(maxima: tuple[Array, Array]) -> float:
+    """The gain [nats] that chance reaches once in twenty."""
+    return max((float(np.quantile(drawn, 0.95)) for drawn in maxima if drawn.size), default=0.0)
+
+
+def next_cause(found: Sequence[Fit], current: Fit, maxima: tuple[Array, Array]) -> Fit | None:
+    """The best candidate that beats chance and whose name is supported, if any."""
+    level = ALPHA / 2 ** len(current.effects)
+    return first_supported([c for c in best_of_each(found) if chance(maxima, gain_over(c, current)) <= level], current)
+
+
+def best_of_each(found: Sequence[Fit]) -> list[Fit]:
+    """Of several beginnings of one cause the best, as they come."""
+    best = dict[str, Fit]()
+    for candidate in found:
+        best.setdefault(candidate.names[-1], candidate)
+    return list(best.values())
+
+
+def first_supported(found: Sequence[Fit], current: Fit) -> Fit | None:
+    """The best of the candidates whose name is supported: what only seemed to be the best stands in no other's way."""
+    best = gain_over(found[0], current) if found else 0.0
+    for candidate in found[:FOLLOWED]:
+        far = gain_over(candidate, current) <= within_reach(best)
+        whole = finished(candidate) if far else candidate
+        if is_sizeable(whole.effects[-1], whole.values) and support_of(whole, whole.effects[-1], current).holds:
+            return whole
+    return None
 
 
 def shared_variables(effects: Sequence[Effect]) -> tuple[str, ...]:
@@ -237,16 +307,23 @@ def shared_variables(effects: Sequence[Effect]) -> tuple[str, ...]:
 
 
 def without(model: Fit, name: str) -> Fit:
-    """The model refitted with one effect less."""
-    kept = tuple(effect for effect in model.effects if effect.name != name)
-    gone = next(effect for effect in model.effects if effect.name == name)
-    start = {**model.values, **{par.name: par.null for par in gone.pars}}
+    """The model refitted with one effect less, and without those that mean nothing without it."""
+    names = {name}
+    for effect in model.effects:
+        names |= {effect.name} if effect.beside in names else set()
+    kept = tuple(effect for effect in model.effects if effect.name not in names)
+    gone = [effect for effect in model.effects if effect.name in names]
+    start = {**model.values, **{par.name: par.null for effect in gone for par in effect.pars}}
+    held = frozenset[str]().union(*(effect.holds for effect in gone))
+    if held:
+        start |= {name: value for name, value in model.problem.start().items() if name in held}
     return best_fit(model.problem, kept, start, model.whitener) or fit(model.problem, kept, start, model.whitener)
 
 
 def drop_unsupported(model: Fit) -> Fit:
     """Without the effects that stopped earning their place, or shrank below it, once others had joined."""
-    for effect in model.effects:
+    # What means nothing without another goes before it.
+    for effect in sorted(model.effects, key=lambda effect: not effect.beside):
         smaller = without(model, effect.name)
         if not is_sizeable(effect, model.values) or gain_over(model, smaller) < KEEP_NATS:
             return drop_unsupported(smaller)
@@ -254,22 +331,12 @@ def drop_unsupported(model: Fit) -> Fit:
 
 
 def settle(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:
-    """After the swaps, without what earns nothing, or little while it predicts unseen recordings worse in newtons."""
+    """After the swaps, without what earns nothing, and what is not supported."""
     named, model = swap(model, library, p_values)
-    weak = [one for one in named if is_weak(model, one)]
+    weak = [one for one in named if one.nats < KEEP_NATS or not one.support.holds]
     if not weak:
         return named, model
     return settle(min(weak, key=lambda one: one.nats).without, (), p_values)
-
-
-def is_weak(model: Fit, one: Named) -> bool:
-    """Too little evidence for what the cause does to the error [N] on recordings left out."""
-    if one.nats < KEEP_NATS or one.nats >= PLENTY_NATS:
-        return one.nats < KEEP_NATS
-    errors = [float(held_out_square_error(least_squares(fit)).mean()) for fit in (model, one.without)]
-    ratio = np.sqrt(errors[0] / errors[1])
-    seen_by_tracker = "tracker" in one.effect.needs
-    return bool((ratio > WORSE and one.nats < AMPLE_NATS) or (ratio > BETTER and not seen_by_tracker))
 
 
 def swap(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> tuple[tuple[Named, ...], Fit]:
@@ -278,8 +345,8 @@ def swap(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> t
         named, better = [], None
         for effect in model.effects:
             smaller = without(model, effect.name)
-            t = tangents(smaller, [e for e in library if e.name not in smaller.names])
-            others = [c for c in candidates(smaller, t) if c.effects[-1].key != effect.key]
+            t = tangents(smaller, proposed(library, smaller.names))
+            others = candidates(smaller, t, model)
             p = p_values.get(effect.name, 1 / 401)
             named.append(_named(model, effect, smaller, others, p))
             if others and gain_over(others[0], model) > KEEP_NATS:
@@ -292,15 +359,15 @@ def swap(model: Fit, library: Sequence[Effect], p_values: dict[str, float]) -> t
 
 def _named(model: Fit, effect: Effect, smaller: Fit, others: Sequence[Fit], p_value: float) -> Named:
     mine = score(model)
-    alternatives = [c for c in others if _equal(mine - score(c)) and gain_over(c, smaller) > 0]
+    alternatives = [c for c in others if is_equal(mine - score(c)) and gain_over(c, smaller) > 0]
     table = np.stack([mine, *[score(c) for c in alternatives]])
     names = dict.fromkeys(c.names[-1] for c in alternatives if c.names[-1] != effect.name)
-    named = Named(effect, tuple(names), mine - score(smaller), p_value, smaller, 1.0)
-    return replace(named, share=wins(table) * (1 - p_value))
+    support = support_of(model, effect, smaller)
+    return Named(effect, tuple(names), mine - score(smaller), p_value, smaller, wins(table) * (1 - p_value), support)
 
 
-def _equal(loss: Array) -> bool:
-    """Whether the paired loss of a alternative is within two standard errors of nothing."""
+def is_equal(loss: Array) -> bool:
+    """Whether the paired loss of an alternative is within two standard errors of nothing."""
     spread = float(np.std(loss, ddof=1)) * np.sqrt(len(loss))
     return bool(loss.sum() < max(ALTERNATIVE_SE * spread, 1.0))
 

@@ -47,11 +47,16 @@ class Whitener:
         """Each quantity's shift at every sample of the first channel, shape (k, n)."""
         return np.ascontiguousarray(self.noise.shifts[self.problem.channels[0].recording].T)
 
+    @cached_property
+    def of_shifts(self) -> Array:
+        """What the shifts add to the first channel, linear about them, shape (n,)."""
+        return np.asarray(np.einsum("nk,kn->n", self.secants, self.own_shifts))
+
     def residual(self, prediction: Sequence[Array]) -> Array:
         """White rows of what is measured minus predicted, the shifts' own part given back to the scatter."""
         rows = [c.observed - p for c, p in zip(self.problem.channels, prediction, strict=True)]
         if self.noise.shifts.size:
-            rows[0] = rows[0] + np.einsum("nk,kn->n", self.secants, self.own_shifts)
+            rows[0] += self.of_shifts
         return self(rows)
 
     def __call__(self, parts: Sequence[Array]) -> Array:
@@ -66,7 +71,9 @@ class Whitener:
     @cached_property
     def judged(self) -> tuple[Mask, ...]:
         """Rows of each channel that count, by the longest memory, so that all models are scored on the same rows."""
-        return tuple(_judged(self.problem, k, LARGEST_ORDER, self.blind) for k in range(len(self.noise.colours)))
+        count = self.problem.recordings
+        parts = [(one.recording, None if k else self.blind) for k, one in enumerate(self.problem.channels)]
+        return tuple(judged(len(rows), starts_of(rows, count), LARGEST_ORDER, blind) for rows, blind in parts)
 
     @cached_property
     def log_det(self) -> Array:
@@ -76,12 +83,6 @@ class Whitener:
             rows = self.judged[k]
             total -= np.bincount(channel.recording[rows], minlength=len(total)) * np.log(colour.sd)
         return total + (self.scatter.log_det if self.scatter is not None else 0.0)
-
-
-def _judged(problem: InverseProblem, channel: int, order: int, blind: Mask) -> Mask:
-    recording = problem.channels[channel].recording
-    starts = starts_of(recording, problem.recordings)
-    return judged(len(recording), starts, order, blind if channel == 0 else None)
 
 
 def shifted(problem: InverseProblem, values: Fields, shifts: Array) -> Fields:

@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from rig.remembered import remembered
 from rig.simulation.drive import Array, MeasuredMotion
 from rig.tissue.index_law import Fields, extended_force
 
@@ -137,9 +138,13 @@ class _Chain(NamedTuple):
         return self.through("guide", tip, self.through("touch", tip, np.maximum(force, 0.0)))
 
 
+@remembered
 def contact(depth_mm: Array, travel_mm: Array) -> tuple[Array, Array]:
     """Mean depth inside and share of time in contact while the tip travels by ``travel_mm`` in one sample."""
     half = np.maximum(0.5 * np.abs(travel_mm), 1e-9)
-    share = np.minimum(np.maximum(0.5 + 0.5 * depth_mm / half, 0.0), 1.0)
-    crossing = (depth_mm > -half) & (depth_mm < half)
-    return np.where(crossing, (depth_mm + half) ** 2 / (4 * half), np.maximum(depth_mm, 0.0)), share
+    inside, share = np.maximum(depth_mm, 0.0), np.asarray(depth_mm > 0, float)
+    # Few samples cross the surface, and this is the simulation's innermost step.
+    rows = np.flatnonzero(np.abs(depth_mm) < half)
+    depth, reach = depth_mm[rows], half[rows]
+    inside[rows], share[rows] = (depth + reach) ** 2 / (4 * reach), 0.5 + 0.5 * depth / reach
+    return inside, share

@@ -103,6 +103,10 @@ class MeasuredMotion:
         late[ends] = self._gather(signal, np.asarray(ends - delay, float), self.recording[ends])
         return late
 
+    def delayed(self, signal: Array, delay_s: Array) -> Array:
+        """``signal`` at each sample's time minus its own delay, as ``shifted``, shape (n,)."""
+        return self._gather(signal, np.arange(self.size) - delay_s / self.period_s, self.recording)
+
     @cached_property
     def _from_start(self) -> Index:
         return np.arange(self.size) - self.starts[:-1][self.recording]

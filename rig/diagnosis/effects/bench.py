@@ -1,11 +1,13 @@
 """Causes that lie in the bench: kinematics, environment, guide, sensor, time stamps."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from rig.diagnosis.effects.scan import PEAKS, peaks
 from rig.diagnosis.problem import Array, Effect, InverseProblem, Par, Values
+from rig.remembered import cos, sin
 from rig.simulation.chain import Operator, Series, Tip, one
 from rig.simulation.scans import dahl, play
 from rig.tissue.index_law import Fields
@@ -50,15 +52,15 @@ def _surface_tries(problem: InverseProblem) -> float:
     return max(1.0, len(_frequencies(problem)) / 2 / PEAKS)
 
 
-def _ripple_tries(_: InverseProblem) -> float:
+def ripple_tries(_: InverseProblem) -> float:
+    """How many independent pitches are scanned for each that is followed."""
     return max(1.0, len(PITCHES_PER_MM) / 3 / PEAKS)
 
 
-def _pair(stem: str, meaning: str, least_mm: float) -> tuple[Par, Par]:
-    return (
-        Par(f"{stem}_sin_mm", "mm", 0.0, -10.0, 10.0, 0.02, least=least_mm, meaning=meaning),
-        Par(f"{stem}_cos_mm", "mm", 0.0, -10.0, 10.0, 0.02, least=least_mm, meaning=meaning),
-    )
+def pair(stem: str, unit: str, meaning: str, least: float) -> tuple[Par, Par]:
+    """Sine and cosine of a wave."""
+    sine = Par(f"{stem}_sin_{unit}", unit, 0.0, -10.0, 10.0, 0.02, least=least, meaning=meaning)
+    return sine, replace(sine, name=f"{stem}_cos_{unit}")
 
 
 def _backlash(encoder: Tip, offset: Series, v: Fields) -> Series:
@@ -68,7 +70,7 @@ def _backlash(encoder: Tip, offset: Series, v: Fields) -> Series:
 
 
 def _wave(stem: str, phase: Array, v: Fields) -> Array:
-    return np.asarray(v[f"{stem}_sin_mm"] * np.sin(phase) + v[f"{stem}_cos_mm"] * np.cos(phase))
+    return np.asarray(v[f"{stem}_sin_mm"] * sin(phase) + v[f"{stem}_cos_mm"] * cos(phase))
 
 
 def _ripple(encoder: Tip, offset: Series, v: Fields) -> Series:
@@ -79,13 +81,36 @@ def _surface_motion(encoder: Tip, away: Series, v: Fields) -> Series:
     return away + _wave("surface_motion", 2 * np.pi * v["surface_motion_Hz"] * encoder.drive.time_s, v)
 
 
+def _surface_harmonic(encoder: Tip, away: Series, v: Fields) -> Series:
+    return away + _wave("surface_harmonic", 4 * np.pi * v["surface_motion_Hz"] * encoder.drive.time_s, v)
+
+
 def _friction(tip: Tip, force_N: Series, v: Fields) -> Series:
     state = dahl(tip.position_mm, tip.drive.first, one(v, "friction_length_mm"), one(v, "friction_start"))
     return force_N + one(v, "friction_N") * state
 
 
+def _cross_talk(tip: Tip, force_N: Series, v: Fields) -> Series:
+    """A parabola over the axis' travel: a chord from one end to the other, and how far it hangs below in the middle."""
+    place_mm = tip.drive.position_mm
+    share = (place_mm - place_mm.min()) / max(float(np.ptp(place_mm)), 1e-9)
+    return np.asarray(force_N + v["cross_talk_N"] * share - v["cross_talk_sag_N"] * 4 * share * (1 - share))
+
+
 def _inertia(tip: Tip, force_N: Series, v: Fields) -> Series:
     return force_N + 1e-3 * one(v, "tip_inertia_kg") * tip.acceleration_mm_s2
+
+
+def _remembered(tip: Tip, force_N: Series, v: Fields) -> Series:
+    """A play on the force itself: nothing where it rises, all of it where it has fallen by the width."""
+    force_N, width_N = np.asarray(force_N, float), one(v, "hysteresis_width_N")
+    behind_N = play(force_N, tip.drive.first, width_N) - force_N
+    return force_N + one(v, "hysteresis_N") / width_N * behind_N
+
+
+def _hysteresis_starts(problem: InverseProblem, _: Values, __: Array) -> Sequence[Values]:
+    span_N = float(np.ptp(problem.channels[0].observed))
+    return [{"hysteresis_width_N": share * span_N} for share in (0.05, 0.2, 0.6)]
 
 
 def _filtered(tip: Tip, force_N: Series, v: Fields) -> Series:
@@ -101,6 +126,11 @@ def _late(tip: Tip, force_N: Series, v: Fields) -> Series:
     return tip.drive.shifted(np.asarray(force_N), one(v, "time_offset_s"))
 
 
+def _drifting_clock(tip: Tip, force_N: Series, v: Fields) -> Series:
+    time_s = tip.drive.time_s
+    return tip.drive.delayed(np.asarray(force_N), 1e-6 * one(v, "clock_drift_ppm") * (time_s - time_s[0]))
+
+
 ELASTIC = "in the force-depth curve: gains and inverse model"
 BACKLASH = Effect(
     "backlash",
@@ -110,6 +140,7 @@ BACKLASH = Effect(
     begin={"backlash_mm": 0.15},
     one_sided=True,
     operator=Operator("carriage", _backlash),
+    through="time since reversal",
     needs=frozenset({"unloading"}),
     repair="preload or replace the nut; or measure the tip itself",
 )
@@ -126,10 +157,10 @@ FRAME_COMPLIANCE = Effect(
 POSITION_RIPPLE = Effect(
     "position_ripple",
     "the screw has a periodic error of {amplitude:.3g} mm every {ripple_pitch_mm:.3g} mm",
-    _pair("ripple", "periodic error of the screw", 0.003),
+    pair("ripple", "mm", "periodic error of the screw", 0.003),
     (Par("ripple_pitch_mm", "mm", 2.0, 0.2, 20.0, 0.02, meaning="period along the axis"),),
     _ripple_starts,
-    _ripple_tries,
+    ripple_tries,
     operator=Operator("carriage", _ripple),
     needs=frozenset({"depth"}),
     through="depth",
@@ -148,13 +179,22 @@ CONTACT_OFFSET = Effect(
 SURFACE_MOTION = Effect(
     "surface_motion",
     "the surface moves by {amplitude:.3g} mm at {surface_motion_Hz:.3g} Hz (breathing or pulse)",
-    _pair("surface_motion", "motion of the surface", 0.01),
+    pair("surface_motion", "mm", "motion of the surface", 0.01),
     (Par("surface_motion_Hz", "Hz", 0.25, 0.05, 5.0, 0.002, meaning="frequency"),),
     _surface_starts,
     _surface_tries,
     operator=Operator("surface", _surface_motion),
     needs=frozenset({"depth"}),
     repair="ask for held breath, or measure the limb with a marker and subtract it",
+)
+SURFACE_HARMONIC = Effect(
+    "surface_motion_harmonic",
+    "the surface does not move as a sine does: {amplitude:.3g} mm at twice its frequency",
+    pair("surface_harmonic", "mm", "motion of the surface at twice its frequency", 0.01),
+    beside="surface_motion",
+    operator=Operator("surface", _surface_harmonic),
+    needs=frozenset({"depth"}),
+    repair="as for the motion of the surface; subtract what a marker on the limb shows, not a sine",
 )
 FRICTION = Effect(
     "friction",
@@ -168,9 +208,24 @@ FRICTION = Effect(
     lambda *_: [{"friction_length_mm": mm, "friction_start": -0.5} for mm in (0.005, 0.03, 0.15, 0.6)],
     one_sided=True,
     operator=Operator("guide", _friction),
+    through="time since reversal",
     needs=frozenset({"unloading"}),
     control="in the inverse model",
     repair="clean and align the guide, or put the sensor at the tip",
+)
+CROSS_TALK = Effect(
+    "cross_talk",
+    "the force follows the axis: {cross_talk_N:+.3g} N from one end of its travel to the other, in the air too",
+    (
+        Par(
+            "cross_talk_N", "N", 0.0, -20.0, 20.0, 0.02, least=0.005, meaning="from one end of the travel to the other"
+        ),
+        Par("cross_talk_sag_N", "N", 0.0, -20.0, 20.0, 0.02, least=0.005, meaning="below the chord in the middle"),
+    ),
+    operator=Operator("reading", _cross_talk),
+    # Without it an elastic law does the same.
+    needs=frozenset({"air"}),
+    repair="free the cables and balance the axis, or subtract the force measured along the axis in the air",
 )
 TIP_INERTIA = Effect(
     "tip_inertia",
@@ -180,6 +235,19 @@ TIP_INERTIA = Effect(
     operator=Operator("sensing", _inertia),
     needs=frozenset({"fast"}),
     repair="weigh what is mounted on the sensor and enter it in the calibration",
+)
+SENSOR_HYSTERESIS = Effect(
+    "sensor_hysteresis",
+    "the sensor reads {hysteresis_N:.3g} N more on the way down from a force, once it has fallen by "
+    "{hysteresis_width_N:.3g} N",
+    (Par("hysteresis_N", "N", 0.0, 0.0, 20.0, 0.02, least=0.005, meaning="reading falling over reading rising"),),
+    (Par("hysteresis_width_N", "N", 1.0, 0.005, 200.0, 1.0, log=True, meaning="fall of force that brings it out"),),
+    _hysteresis_starts,
+    one_sided=True,
+    operator=Operator("sensing", _remembered),
+    through="time since reversal",
+    needs=frozenset({"unloading"}),
+    repair="exercise the sensor over its range before use; replace one that has been overloaded",
 )
 FILTER_LAG = Effect(
     "filter_lag",
@@ -198,6 +266,15 @@ TIME_OFFSET = Effect(
     needs=frozenset({"fast"}),
     repair="correct the sensor's latency in rig.toml, or stamp both in hardware",
 )
+CLOCK_DRIFT = Effect(
+    "clock_drift",
+    "the force's clock gains {clock_drift_ppm:+.3g} ppm on the position's from the session's start on (plus: late)",
+    # Quartz clocks differ by up to 50 ppm each; 10 are 0.7 ms, the least time offset, after 70 s.
+    (Par("clock_drift_ppm", "ppm", 0.0, -5e3, 5e3, 10.0, least=10.0, meaning="force's clock fast against position's"),),
+    operator=Operator("stamping", _drifting_clock),
+    needs=frozenset({"fast", "strokes", "session time"}),
+    repair="stamp both in hardware from one clock, or record a common pulse at start and end",
+)
 TRACKER_LATENCY = Effect(
     "tracker_latency",
     "the tracker shows the tip {tracker_latency_s:.3g} s late",
@@ -211,7 +288,7 @@ ZERO_DRIFT = Effect(
     "the force zero drifts by {zero_drift_N_h:.3g} N per hour",
     (Par("zero_drift_N_h", "N/h", 0.0, -500.0, 500.0, 0.3, least=0.1, meaning="drift of the zero"),),
     between=True,
-    needs=frozenset({"strokes"}),
+    needs=frozenset({"strokes", "session time"}),
     operator=Operator("reading", _drifted),
     repair="let the sensor warm up and take the zero in the air before every cycle",
 )
@@ -224,6 +301,7 @@ GAIN_ERROR = Effect(
     repair="calibrate with a known weight",
 )
 BENCH_EFFECTS = (
-    BACKLASH, FRAME_COMPLIANCE, POSITION_RIPPLE, CONTACT_OFFSET, SURFACE_MOTION, FRICTION, TIP_INERTIA, FILTER_LAG,
-    TIME_OFFSET, TRACKER_LATENCY, ZERO_DRIFT, GAIN_ERROR,
+    BACKLASH, FRAME_COMPLIANCE, POSITION_RIPPLE, CONTACT_OFFSET, SURFACE_MOTION, SURFACE_HARMONIC, FRICTION,
+    CROSS_TALK, TIP_INERTIA, SENSOR_HYSTERESIS, FILTER_LAG, TIME_OFFSET, CLOCK_DRIFT, TRACKER_LATENCY, ZERO_DRIFT,
+    GAIN_ERROR,
 )  # fmt: skip

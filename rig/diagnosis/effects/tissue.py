@@ -1,26 +1,46 @@
-"""Causes that lie in the tissue: its elastic law, relaxation, rate dependence, its surface chemistry."""
+"""Causes that lie in the tissue: its elastic law, rate dependence, softening, its surface chemistry."""
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.special import erf
 
 from rig.diagnosis.effects.bench import ELASTIC
 from rig.diagnosis.problem import Effect, Par
-from rig.simulation.chain import Operator, Series, Tip, one
-from rig.tissue.history import Term
-from rig.tissue.index_law import Fields
+from rig.simulation.chain import TANGENT_MM, Operator, Series, Tip, one
+from rig.simulation.drive import SETTLE_MM_S
+from rig.tissue.index_law import Fields, extended_force
 
 REFERENCE_SPEED_MM_S = 10.0
-
-
-def _relaxing(tip: Tip, force_N: Series, v: Fields) -> Series:
-    term = Term(one(v, "relaxation_ratio"), one(v, "tau_s"))
-    return tip.drive.history.respond(np.asarray(force_N), [term])
+ENERGY_STEPS = 200  # of a strain energy over depth: 0.02 % of it by the trapezoid rule
 
 
 def _rate_law(tip: Tip, _: Series, v: Fields) -> Series:
-    """B v0 |v/v0|^n with v0 = 10 mm/s in place of B v."""
-    ratio = np.abs(tip.indenting_mm_s) / REFERENCE_SPEED_MM_S
-    law = np.sign(tip.indenting_mm_s) * np.maximum(ratio, 1e-9) ** v["rate_exponent"]
-    return np.asarray(v["damping_N_s_mm"] * REFERENCE_SPEED_MM_S * law)
+    """B v0 |v/v0|^n with v0 = 10 mm/s in place of B v; straight where the tip stands still.
+
+    A power below one would make a force of the encoder's noise there.
+    """
+    speed_mm_s = np.maximum(np.abs(tip.indenting_mm_s), SETTLE_MM_S)
+    law = (speed_mm_s / REFERENCE_SPEED_MM_S) ** (v["rate_exponent"] - 1)
+    return np.asarray(v["damping_N_s_mm"] * tip.indenting_mm_s * law)
+
+
+def _damped_by_depth(tip: Tip, force_N: Series, v: Fields) -> Series:
+    """lambda v times the force at rest, beside the viscous force (Hunt and Crossley 1975)."""
+    at_rest_N = extended_force(np.maximum(tip.depth_mm, 0.0), v)
+    return np.asarray(force_N + v["hunt_crossley_s_mm"] * tip.indenting_mm_s * at_rest_N)
+
+
+def _softened(tip: Tip, force_N: Series, v: Fields) -> Series:
+    """Less by share x erf((W_most - W) / m): W is the strain energy at rest (Ogden and Roxburgh 1999, eq. 34).
+
+    ``m`` is in shares of the session's largest energy; what was reached in one recording is remembered in all later.
+    """
+    depth_mm = np.maximum(tip.depth_mm, 0.0)
+    grid_mm = np.linspace(0.0, max(float(depth_mm.max()), TANGENT_MM), ENERGY_STEPS)
+    energy = cumulative_trapezoid(extended_force(grid_mm, {**v, "a_N_mm": 1.0}), grid_mm, initial=0)
+    reached = np.interp(depth_mm, grid_mm, energy / energy[-1])
+    below = np.maximum.accumulate(reached) - reached
+    return np.asarray(force_N * (1 - one(v, "mullins_share") * erf(below / one(v, "mullins_energy"))))
 
 
 def _preconditioned(tip: Tip, force_N: Series, v: Fields) -> Series:
@@ -41,9 +61,6 @@ def _adhering(tip: Tip, force_N: Series, v: Fields) -> Series:
 
 
 STIFFENING = Par("b_per_mm", "1/mm", 0.0, -0.5, 3.0, 0.02, least=0.005, meaning="growth of stiffness with depth")
-RELAXATION_RATIO = Par(
-    "relaxation_ratio", "1", 0.0, 0.0, 30.0, 0.02, least=0.005, may_end=True, meaning="transient over lasting force"
-)
 STIFFENING_EFFECT = Effect(
     "stiffening",
     "the tissue stiffens with depth: stiffness grows as exp(x {b_per_mm:.3g}/mm) instead of being constant",
@@ -79,20 +96,6 @@ SUBSTRATE = Effect(
     control=ELASTIC,
     repair="measure over thicker tissue, stay shallower, or keep the substrate term in the model",
 )
-RELAXATION = Effect(
-    "relaxation",
-    "the tissue relaxes: a transient of {relaxation_ratio:.3g} times the lasting elastic force "
-    "dies out in {tau_s:.3g} s",
-    (RELAXATION_RATIO,),
-    (Par("tau_s", "s", 1.0, 0.005, 100.0, 1.0, log=True, meaning="time constant"),),
-    lambda *_: [{"tau_s": tau} for tau in (0.02, 0.06, 0.2, 0.6, 2.0, 6.0, 20.0)],
-    begin={"relaxation_ratio": 1.0, "tau_s": 2.0, "b_per_mm": 0.05},
-    one_sided=True,
-    operator=Operator("relaxing", _relaxing),
-    needs=frozenset({"depth"}),
-    control="in the inverse model and, as sudden stiffness, in the gains",
-    repair="use the model with relaxation; wait out the time constant before reading a static force",
-)
 RATE_LAW = Effect(
     "rate_law",
     "the viscous force does not grow in proportion to speed but as speed^{rate_exponent:.3g}",
@@ -101,6 +104,27 @@ RATE_LAW = Effect(
     needs=frozenset({"speeds"}),
     control="its damping at 10 mm/s is in the gains and the inverse model",
     repair="use the power law of speed in the model",
+)
+HUNT_CROSSLEY = Effect(
+    "hunt_crossley",
+    "damping grows with depth: the elastic force is larger by {hunt_crossley_s_mm:.3g} of itself for each mm/s",
+    # 0.0005 are half a percent of the force at 10 mm/s.
+    (Par("hunt_crossley_s_mm", "s/mm", 0.0, 0.0, 1.0, 0.002, least=0.0005, meaning="damping over elastic force"),),
+    one_sided=True,
+    operator=Operator("viscous", _damped_by_depth),
+    needs=frozenset({"depth", "unloading"}),
+    repair="use a Hunt-Crossley law (`rig fit` offers it) in place of the constant damper",
+)
+MULLINS = Effect(
+    "mullins",
+    "the tissue softens by what it has borne: up to {mullins_share:.1%} less force below the deepest depth so far",
+    (Par("mullins_share", "1", 0.0, 0.0, 0.95, 0.02, least=0.01, meaning="largest loss of force, 1/r"),),
+    (Par("mullins_energy", "1", 0.3, 0.02, 5.0, 1.0, log=True, meaning="m over the session's largest strain energy"),),
+    lambda *_: [{"mullins_energy": energy} for energy in (0.08, 0.4, 1.5)],
+    one_sided=True,
+    operator=Operator("elastic", _softened),
+    needs=frozenset({"depth", "unloading"}),
+    repair="press once deeper than the protocol goes before recording, and never deeper afterwards",
 )
 PRECONDITIONING = Effect(
     "preconditioning",
@@ -133,4 +157,6 @@ TEMPERATURE = Effect(
     needs=frozenset({"temperature"}),
     repair="let the sensor warm up, or calibrate its temperature coefficient",
 )
-TISSUE_EFFECTS = (ELASTIC_LAW, QUADRATIC_LAW, SUBSTRATE, RELAXATION, RATE_LAW, PRECONDITIONING, ADHESION, TEMPERATURE)
+TISSUE_EFFECTS = (
+    ELASTIC_LAW, QUADRATIC_LAW, SUBSTRATE, RATE_LAW, HUNT_CROSSLEY, MULLINS, PRECONDITIONING, ADHESION, TEMPERATURE,
+)  # fmt: skip

@@ -8,20 +8,22 @@ import numpy as np
 import pytest
 
 from benchmarks.hidden.draw import draw_secret, recorded, session_of
+from rig.diagnosis import search
 from rig.diagnosis.answers import Diagnosis
-from rig.diagnosis.estimates import Unexplained
-from rig.diagnosis.indentation import library
-from rig.diagnosis.observations import beside_gaps
+from rig.diagnosis.indentation import IndentationProblem, library, missing
+from rig.diagnosis.observations import beside_gaps, observe
 from rig.diagnosis.run import diagnose_session
-from rig.errors import DataError
-from rig.intake.usable import read_usable
+from rig.errors import DataError, UsageError
+from rig.intake.mapping import MAPPING_FILE
 from rig.recording.sessions import open_session, write_session
 from rig.results.diagnosis import DiagnosisResult
 from rig.trials.cycles import cut
-from rig.trials.reading import read_trials
+from rig.trials.opening import Opening
 from rig.trials.recorded import in_time
 from rig.trials.trial import Trial, TrialSet
 from tests.data import recording
+from tests.rig.fixed_sessions import PERINEAL, read
+from tests.rig.recording.measured import TABLES, write
 from tests.rig.tissue.synthetic import Bench, write_made_session
 
 
@@ -37,8 +39,8 @@ def changed(session: TrialSet, **fields: object) -> TrialSet:
 
 def nothing_named(result: Diagnosis, because: str) -> None:
     assert result.findings == ()
-    assert result.verdict == "unexplained"
-    assert DiagnosisResult.model_validate(result).unexplained == Unexplained((), None)
+    assert result.verdict == "not judged"
+    assert DiagnosisResult.model_validate(result).floor_N is None
     assert set(result.not_testable) == {effect.name for effect in library("index")}
     assert result.statement.startswith("Nothing could be judged"), result.statement
     assert because in result.statement, result.statement
@@ -142,15 +144,6 @@ def test_samples_that_hold_no_number_are_counted(clean: TrialSet) -> None:
     assert said.text == f"force: 2 of {len(force_N)} samples hold no number, first sample 41; left out"
 
 
-def test_a_word_among_numbers_is_named_with_its_line(tmp_path: Path) -> None:
-    file = tmp_path / "force.csv"
-    file.write_text('"time_s","force_N"\n0,1\n0.1,OVERLOAD\n0.2\n0.3,inf\n')
-    columns, remark, _ = read_usable(file, {"time_s": "time_s", "force_N": "force_N"})
-    assert columns["time_s"].tolist() == [0, 0.1, 0.2, 0.3]
-    assert np.isnan(columns["force_N"]).tolist() == [False, True, True, False]
-    assert remark == "force.csv line 3, column force_N: 'OVERLOAD' is no number; left out"
-
-
 def test_constant_force_is_no_experiment(clean: TrialSet) -> None:
     flat = tuple(replace(trial, force_N=np.ones_like(trial.force_N)) for trial in clean.trials)
     nothing_named(diagnose_session(replace(clean, trials=flat)), "never changes")
@@ -172,6 +165,16 @@ def test_at_10_Hz_what_is_fast_is_not_testable(clean: TrialSet) -> None:
     result = diagnose_session(replace(clean, trials=slow))
     assert {"time_offset", "filter_lag", "tip_inertia"} <= result.not_testable.keys()
     assert result.findings == ()
+
+
+def test_recordings_that_each_count_their_own_time_say_nothing_of_drift(clean: TrialSet) -> None:
+    def tested(session: TrialSet) -> set[str]:
+        return {effect.name for effect in search.testable(IndentationProblem(observe(session)))}
+
+    assert "zero_drift" in tested(clean)
+    apart = replace(clean, one_clock=False)
+    assert tested(clean) - tested(apart) == {"zero_drift", "clock_drift"}
+    assert "counts its own time" in missing(observe(apart))["session time"]
 
 
 def test_without_the_way_out_what_needs_it_is_not_testable(clean: TrialSet) -> None:
@@ -208,17 +211,16 @@ def test_beside_a_gap_of_the_axis_the_motion_is_not_judged() -> None:
 def test_a_csv_folder_with_a_stream_missing_answers_with_the_rest(clean: TrialSet, tmp_path: Path) -> None:
     for k, trial in enumerate(clean.trials[:5]):
         write_csv(tmp_path / f"trial_{k}", trial)
+    write(tmp_path, {MAPPING_FILE: 'recording = "{recording}"' + TABLES})
     (tmp_path / "trial_2" / "axis.csv").unlink()
-    session = read_trials(tmp_path)
-    assert len(session.trials) == 4
-    result = diagnose_session(session)
-    assert any("axis.csv" in finding.text for finding in result.quality)
+    result = diagnose_session(read(tmp_path))
+    assert any(finding.sentence == "data: trial_2 holds no axis" for finding in result.quality)
     assert result.recordings == 4
 
 
 def test_a_folder_with_nothing_in_it_is_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="neither recordings"):
-        read_trials(tmp_path)
+    with pytest.raises(DataError, match="no table with force and position was found in it"):
+        read(tmp_path)
 
 
 def _slowed(trial: Trial, rate_Hz: float) -> Trial:
@@ -253,26 +255,23 @@ def test_recordings_stacked_in_one_file_are_told_apart_and_chosen_by_name(clean:
         place = np.interp(trial.force_s, trial.axis_s, trial.axis_mm)
         rows = zip(trial.force_s[::100], trial.force_N[::100], place[::100], strict=True)
         lines += [f"beef|{k},{t:.4f},{f:.4f},{x:.4f}" for t, f, x in rows]
-        lines += [f"silicone|{k},0,0,0"]
+        lines += [f"silicone|{k},0,0,0", f"silicone|{k},1,{k},0"]
     (tmp_path / "stacked.csv").write_text("\n".join(lines) + "\n")
-    assert [trial.name for trial in read_trials(tmp_path).trials] == ["beef|0", "beef|1"]
-    chosen = read_trials(tmp_path, only="*|1")
-    assert [trial.name for trial in chosen.trials] == ["beef|1", "silicone|1"]
-    assert "2 of 4 recordings" in chosen.findings[0].text
-    with pytest.raises(DataError, match="no recording matches"):
-        read_trials(tmp_path, only="pork*")
-    whole = read_trials(tmp_path).trials[1]
-    (tmp_path / "stacked.csv").write_text("\n".join([*lines, "beef|1,9,OVERLOAD,2", "beef|1"]) + "\n")
-    spoilt = read_trials(tmp_path)
-    assert [finding.text for finding in spoilt.findings if finding.kind == "text"] == [
-        f"stacked.csv line {len(lines) + 1}, column force_N: 'OVERLOAD' is no number; left out"
-    ]
-    np.testing.assert_array_equal(spoilt.trials[1].force_N, [*whole.force_N, np.nan, np.nan])
+    names = [f"{material}_{number}" for material in ("beef", "silicone") for number in (0, 1)]
+    assert [trial.name for trial in read(tmp_path).trials] == names
+    chosen = read(tmp_path, Opening(only="*_1"))
+    assert [trial.name for trial in chosen.trials] == ["beef_1", "silicone_1"]
+    assert any("2 of 4 recordings" in finding.text for finding in chosen.findings)
+    with pytest.raises(UsageError, match=r"no recording matches --only 'pork\*'; they are called like beef_0"):
+        read(tmp_path, Opening(only="pork*"))
+    (tmp_path / "stacked.csv").write_text("\n".join([*lines, "beef|1,9,OVERLOAD,2"]) + "\n")
+    with pytest.raises(DataError, match=rf"line {len(lines) + 1}, column force_N: 'OVERLOAD' is not a number"):
+        read(tmp_path)
 
 
 def test_what_the_index_law_gets_wrong_on_real_meat_is_relaxation() -> None:
     folder = recording("perineal_indentation")
-    result = diagnose_session(read_trials(folder, only="230411_C_Ind*_RDG*"))
+    result = diagnose_session(read(folder, Opening(PERINEAL, "230411_C_Ind*_RDG*")))
     assert "relaxation" in {effect for finding in result.findings for effect in finding.effects}, result.statement
     named = next(finding for finding in result.findings if finding.effects[0] == "relaxation")
     assert named.gain.reduction > 0.2
@@ -288,7 +287,7 @@ def test_a_trial_of_bad_quality_is_left_out_and_one_that_is_not_good_is_named(tm
         replace(good, quality="good"),
     )
     write_session(folder, replace(info, trials=marked))
-    session = read_trials(folder)
+    session = read(folder)
     assert [trial.name for trial in session.trials] == [usable.name, good.name]
     said = {finding.recording: finding.text for finding in session.findings}
     assert said[bad.name] == "quality bad, left out: force: a gap of 500 ms"

@@ -40,16 +40,26 @@ def force_with(**values: float) -> Array:
     return respond(stroke_drive(), {**BASE, **values}).force_N
 
 
+def beside(effect: Effect) -> dict[str, float]:
+    """One step of every cause without which this one means nothing."""
+    found = dict[str, float]()
+    while effect.beside:
+        effect = next(other for other in library("index") if other.name == effect.beside)
+        found |= {par.name: par.null + par.scale for par in effect.amplitudes}
+    return found
+
+
 @pytest.mark.parametrize("effect", library("index"), ids=lambda effect: effect.key)
 def test_every_effect_vanishes_at_its_null_and_shows_off_it(effect: Effect) -> None:
     drive = stroke_drive()
     own = {par.name: par.null for par in effect.pars}
     assert all(nulls()[name] == value or par_is_shape(effect, name) for name, value in own.items())
-    plain, off = respond(drive, BASE), respond(drive, {**BASE, **own})
+    known = BASE | beside(effect)
+    plain, off = respond(drive, known), respond(drive, {**known, **own})
     np.testing.assert_array_equal(plain.force_N, off.force_N)
     np.testing.assert_array_equal(plain.tip_mm, off.tip_mm)
     moved = respond(
-        drive, {**BASE, **own, effect.amplitudes[0].name: effect.amplitudes[0].null + effect.amplitudes[0].scale}
+        drive, {**known, **own, effect.amplitudes[0].name: effect.amplitudes[0].null + effect.amplitudes[0].scale}
     )
     change = np.abs(moved.force_N - plain.force_N).max() + np.abs(moved.tip_mm - plain.tip_mm).max()
     assert change > 1e-6

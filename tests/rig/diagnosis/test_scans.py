@@ -28,6 +28,14 @@ def test_a_recurrence_equals_its_loop(seed: int) -> None:
     np.testing.assert_allclose(recurrence(decay, source), looped, atol=1e-12)
 
 
+def test_of_several_signals_each_relaxes_as_by_itself() -> None:
+    time_s, rng = np.cumsum(np.random.default_rng(1).uniform(0.002, 0.006, 300)), np.random.default_rng(2)
+    history, signals = History.at(time_s, time_s), rng.normal(size=(600, 3))
+    together = history.transient(signals, 0.05)
+    for signal, found in zip(signals.T, together.T, strict=True):
+        np.testing.assert_allclose(found, history.transient(signal, 0.05), rtol=0, atol=1e-15)
+
+
 @given(st.integers(0, 10_000), st.floats(0.01, 5))
 def test_play_equals_its_loop_and_never_leaves_the_dead_band(seed: int, width: float) -> None:
     position, _, first = two_recordings(seed)

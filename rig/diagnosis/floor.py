@@ -1,0 +1,167 @@
+"""What could have been reached: errors on recordings left out, from the noise alone up to the simulation as it is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from rig.diagnosis.bootstrap import bootstrap
+from rig.diagnosis.estimates import ErrorBudget, Estimate, OwnSpread
+from rig.diagnosis.fit import Fit
+from rig.diagnosis.flexible import ROOM, Basis, Flexible
+from rig.diagnosis.indentation import IndentationProblem
+from rig.diagnosis.left_out import LeftOut, left_out, with_own_terms
+from rig.diagnosis.noise import Array, Mask
+from rig.diagnosis.problem import Effect
+from rig.diagnosis.repeats import compare_repeats
+from rig.remembered import known_of
+from rig.simulation.drive import MeasuredMotion
+from rig.trials.segments import Kind, rows_in, segments_of
+
+WINDOW_S = 1.0  # a window of noise: longer ones hold drift, which the zero of a recording does not take
+# About a line 12 readings give a deviation to a fifth (1 / sqrt(20)); of three windows one knock spoils no median.
+FEWEST_IN_WINDOW, FEWEST_WINDOWS = 12, 3
+CLEAR_SHARE = 0.05  # of the depth above contact, as much as contacts differ between recordings
+SETTLED_S = 0.5  # of a hold: relaxation is no noise
+# Below it there is nothing to explain: an error a tenth above what can be reached is not told from it.
+WORTH_EXPLAINING = 1.10
+
+
+@dataclass(frozen=True, kw_only=True)
+class JudgedErrors(ErrorBudget):
+    """The budget, and sample by sample the errors of the simulation as it is and with what was named."""
+
+    base: LeftOut
+    extended: LeftOut
+
+
+def error_budget(before: Fit, after: Fit) -> JudgedErrors:
+    """The errors of the simulation before and after what was named, and what a better one could have reached."""
+    problem, blind = after.problem, after.whitener.blind
+    assert isinstance(problem, IndentationProblem)
+    own = with_own_terms(after, blind)
+    own_before = closest_before(before, after) if after.effects else own
+    base, extended = left_out(own_before), left_out(own)
+    # Contact has local minima, and a model that misses much may stand in one.
+    flexible = _least([flexible_errors(start, (), True) for start in (own, *([own_before] if after.effects else []))])
+    bench = tuple(effect for effect in after.effects if effect.is_of_bench)
+    floor = _least([base, extended, flexible, *([flexible_errors(own, bench, True)] if bench else [])])
+    repeats = compare_repeats(extended, problem.data.drive, contacts_mm(own))
+    return JudgedErrors(
+        base=base,
+        extended=extended,
+        base_N=base.rms,
+        extended_N=extended.rms,
+        flexible_N=flexible.rms,
+        floor_N=floor.rms,
+        noise_N=noise_N(own),
+        repeatability_N=repeats.pure_error_N if repeats else None,
+        shared_by_repeats=repeats.shared if repeats else None,
+        explained_share=explained_share(base.square_errors, extended.square_errors, floor.square_errors),
+        scatter=own_spread(own),
+        stiffness_N_mm=stiffness_N_mm(own),
+    )
+
+
+def closest_before(before: Fit, after: Fit) -> Fit:
+    """The simulation as it was, with own terms, from the better of its own values and those of the final model."""
+    null = {par.name: par.null for effect in after.effects for par in effect.pars}
+    starts = before, replace(after, effects=(), values={**after.values, **null})
+    return min((with_own_terms(one, after.whitener.blind) for one in starts), key=lambda own: left_out(own).rms)
+
+
+def _least(found: Sequence[LeftOut]) -> LeftOut:
+    return min(found, key=lambda errors: errors.rms)
+
+
+def contacts_mm(own: Fit) -> Array:
+    """Place of contact of each recording, shape (recordings,)."""
+    return np.asarray(own.values["surface_mm"] + own.values["contact_offset_mm"] + own.whitener.noise.shifts[:, 1])
+
+
+def own_spread(own: Fit) -> dict[str, OwnSpread]:
+    """How recordings differ in what each has of its own."""
+    deviations = own.whitener.noise.shifts.std(axis=0, ddof=1)
+    return {s.name: OwnSpread(float(sd), s.unit) for s, sd in zip(own.problem.scatter, deviations, strict=True)}
+
+
+def stiffness_N_mm(own: Fit) -> float:
+    """How force rises with depth where the tip presses, rms over the rows that are judged [N/mm]."""
+    slope = own.whitener.secants[:, 1][own.whitener.judged[0]]
+    return float(np.sqrt(np.mean(slope[slope != 0] ** 2)))
+
+
+@known_of
+def flexible_errors(own: Fit, causes: tuple[Effect, ...], remembers: bool) -> LeftOut:
+    """Errors of the flexible tissue, with memory or without, and these causes beside it, each as the model has it."""
+    assert isinstance(own.problem, IndentationProblem)
+    drive = own.problem.data.drive
+    deepest_mm = float((drive.position_mm - contacts_mm(own)[drive.recording]).max())
+    columns = [cause_force(own, cause) for cause in causes]
+    stacked = np.stack(columns, axis=1) if columns else np.empty((drive.size, 0))
+    return Flexible(Basis(drive, ROOM * deepest_mm, remembers), own, stacked).left_out()
+
+
+def cause_force(own: Fit, cause: Effect) -> Array:
+    """What a cause adds to the force in a model, all else as it is there [N], shape (n,)."""
+    off = {**own.values, **{par.name: par.null for par in cause.amplitudes}}
+    return np.asarray(own.prediction[0] - own.whitener.predict(off)[0])
+
+
+def explained_share(base: Array, extended: Array, floor: Array) -> Estimate | None:
+    """(base - extended) / (base - floor) of mean square errors, each of shape (recordings,), bootstrapped over them.
+
+    None where little could be gained.
+    """
+    if base.mean() <= WORTH_EXPLAINING**2 * floor.mean():
+        return None
+    return bootstrap(np.stack([base, extended, floor], axis=1), _share)
+
+
+def _share(squares: Array) -> Array:
+    """Share explained of what could be, from mean squares of base, extended and floor along the first axis."""
+    base, extended, floor = squares
+    return np.asarray((base - extended) / np.maximum(base - floor, 1e-300))
+
+
+def noise_N(own: Fit) -> float | None:
+    """Noise of force in the air, less what named causes do there, else where the tip stands still in the tissue [N].
+
+    None where there is neither.
+    """
+    assert isinstance(own.problem, IndentationProblem)
+    data, drive = own.problem.data, own.problem.data.drive
+    contact_mm, seen = contacts_mm(own), np.ones(drive.size, bool) if data.unseen is None else ~data.unseen
+    clear_mm = CLEAR_SHARE * float((drive.position_mm - contact_mm[drive.recording]).max())
+    above = seen & _rows_in(drive, contact_mm - clear_mm, "air")
+    air = _window_variances(drive, data.force_N - own.prediction[0], above, 1)
+    if len(air) >= FEWEST_WINDOWS:
+        return float(np.sqrt(np.median(air)))
+    # In holds once most of the tissue's relaxation is over.
+    held = _window_variances(drive, data.force_N, seen & _rows_in(drive, contact_mm, "hold", SETTLED_S), 2)
+    return float(np.sqrt(np.median(held))) if len(held) >= FEWEST_WINDOWS else None
+
+
+def _rows_in(drive: MeasuredMotion, surfaces_mm: Array, kind: Kind, after_s: float = 0.0) -> Mask:
+    parts = (slice(begin, end) for begin, end in pairwise(drive.starts))
+    motions = ((drive.time_s[part], drive.position_mm[part]) for part in parts)
+    found = (
+        rows_in(segments_of(time_s, position_mm, surface_mm), kind, time_s, after_s)
+        for (time_s, position_mm), surface_mm in zip(motions, surfaces_mm, strict=True)
+    )
+    return np.concatenate(list(found))
+
+
+def _window_variances(drive: MeasuredMotion, force_N: Array, rows: Mask, degree: int) -> list[float]:
+    """Variance of force about a polynomial in each window of rows that follow one another."""
+    length = max(FEWEST_IN_WINDOW, round(WINDOW_S / drive.period_s))
+    edges = np.flatnonzero((np.diff(rows.astype(np.int8), prepend=0, append=0) != 0) | np.append(drive.first, True))
+    found = []
+    for begin, end in pairwise(edges):
+        for first in range(begin, end, length) if rows[begin] else ():
+            part = force_N[first : min(first + length, end)]
+            if len(part) >= FEWEST_IN_WINDOW:
+                left = part - np.polynomial.Polynomial.fit(np.arange(len(part)), part, degree)(np.arange(len(part)))
+                found.append(float(left @ left) / (len(part) - degree - 1))
+    return found

@@ -1,0 +1,49 @@
+"""The working grid: derivatives of a motion, with scipy's as judge, and what was lost of the force."""
+
+import numpy as np
+import pytest
+from scipy.signal import savgol_filter
+
+from rig.diagnosis.observations import derivative, lost_times, observe
+from rig.trials.trial import Trial, TrialSet
+
+
+@pytest.mark.parametrize(("count", "order"), [(5, 1), (9, 1), (17, 2), (161, 2)])
+def test_derivatives_are_those_of_savitzky_and_golay(count: int, order: int) -> None:
+    values = np.cumsum(np.random.default_rng(1).standard_normal(400))
+    expected = savgol_filter(values, count, 4, deriv=order, delta=1e-3)
+    assert derivative(values, count, order, 1e-3) == pytest.approx(expected, abs=1e-7 * float(np.abs(expected).max()))
+
+
+def slow_force_N(time_s: np.ndarray) -> np.ndarray:
+    return np.sin(2 * np.pi * 0.8 * time_s)
+
+
+def with_lost_force(lost: slice | list[int]) -> TrialSet:
+    """Ten seconds at 100 Hz; of force some samples are lost."""
+    time_s = np.arange(0, 10, 0.01)
+    kept = np.delete(time_s, lost)
+    trial = Trial("one", kept, slow_force_N(kept), time_s, 20 + 3 * np.sin(2 * np.pi * 0.8 * time_s))
+    return TrialSet("made", (trial,))
+
+
+@pytest.mark.parametrize("lost", [slice(0, 0), [57, 200, 201, 640], slice(300, 306)])
+def test_a_delay_is_one_of_time_where_samples_of_force_were_lost(lost: slice | list[int]) -> None:
+    """As rows of a grid with breaks, eight samples behind a break of six would be fourteen: off by 0.3 N."""
+    drive = observe(with_lost_force(lost)).drive
+    early = drive.shifted(slow_force_N(drive.time_s), 0.0812)
+    inner = slice(10, -10)
+    assert early[inner] == pytest.approx(slow_force_N(drive.time_s - 0.0812)[inner], abs=1e-4)
+
+
+def test_lost_samples_are_rows_that_are_not_judged_with_the_motion_that_was_measured() -> None:
+    seen = observe(with_lost_force([57, 200, 201, 640]))
+    assert seen.drive.time_s == pytest.approx(np.arange(0, 10, 0.01))
+    assert seen.unseen is not None
+    assert np.flatnonzero(seen.unseen).tolist() == [57, 200, 201, 640]
+    assert seen.drive.position_mm == pytest.approx(20 + 3 * np.sin(2 * np.pi * 0.8 * seen.drive.time_s), abs=1e-4)
+
+
+def test_breaks_are_filled_evenly_whatever_is_left_between_them_and_long_ones_are_breaks() -> None:
+    assert lost_times(np.array([0.0, 0.01, 0.0205, 0.05]), 0.01) == pytest.approx([0.0303333, 0.0401667], abs=1e-6)
+    assert not lost_times(np.array([0.0, 0.0149, 0.02, 6.0]), 0.01).size
