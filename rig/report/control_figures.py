@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rig.report.drawing import ACTUAL, INK, MODEL, OTHER, QUIET, SMALL_PT, dress, new_figure, speed_colors, thinned
+from rig.report.drawing import dress, new_figure, speed_colors, thinned
+from rig.report.ink import ACTUAL, INK, MODEL, OTHER, QUIET, SMALL_PT
 from rig.tissue.laws import FloatArray
 
 POINTS = 1200

@@ -1,10 +1,6 @@
-"""What all figures share: size, ink, colours that colour-blind people tell apart, and how a figure becomes bytes."""
+"""What figures of matplotlib share: frame, labels, and how a figure becomes bytes."""
 
 import io
-import re
-from collections.abc import Iterable
-from html import escape
-from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -15,22 +11,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rig.recording.files import whole_file, write_text
+from rig.report.ink import GRID, INK, PAPER, QUIET, SIZE_PT, SMALL_PT, SPEEDS, inlined
 from rig.tissue.laws import FloatArray
-
-INK, QUIET, GRID, PAPER = "#1d2430", "#5f6b7a", "#d9dee5", "#ffffff"
-# Vermilion and blue of Okabe and Ito, "Color Universal Design"; speeds go from light to dark.
-MODEL, OTHER, ACTUAL = "#d55e00", "#767f8b", "#0072b2"
-SPEEDS = ("#7cc4ea", "#4da6dc", "#2f86c6", "#2767a8", "#203f7d")
-# Names of the page's own colours, which differ between light and dark.
-THEME = {INK: "--ink", QUIET: "--quiet", GRID: "--grid", PAPER: "--paper", OTHER: "--other", ACTUAL: "--actual"} | {
-    color: f"--speed-{number}" for number, color in enumerate(SPEEDS, 1)
-}
-SIZE_PT, SMALL_PT = 10, 8.5
+from rig.trials.thinning import extremes
 
 
-def new_figure(width_in: float, height_in: float) -> Figure:
-    """An empty figure that arranges itself; no state is shared with other figures."""
-    figure = Figure(figsize=(width_in, height_in), layout="constrained", facecolor=PAPER)
+def new_figure(width_in: float, height_in: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
+    """An empty figure that arranges itself, unless ``layout`` is None; no state is shared with other figures."""
+    figure = Figure(figsize=(width_in, height_in), layout=layout, facecolor=PAPER)
     FigureCanvasAgg(figure)
     return figure
 
@@ -81,14 +69,8 @@ def speed_colors(count: int) -> list[str]:
 
 
 def thinned(x: FloatArray, y: FloatArray, points: int = 160) -> tuple[FloatArray, FloatArray]:
-    """At most ``points`` points that look the same: smallest and largest y of each run of samples, in order."""
-    if len(x) <= points:
-        return x, y
-    edges = np.linspace(0, len(x), points // 2 + 1).astype(int).tolist()
-    kept: list[int] = []
-    for start, stop in pairwise(edges):
-        part = y[start:stop]
-        kept += sorted({start + int(np.argmin(part)), start + int(np.argmax(part))})
+    """At most ``points`` points that look the same, in order."""
+    kept = extremes(y, points)
     return x[kept], y[kept]
 
 
@@ -114,24 +96,6 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
     write_text(folder / f"{name}.svg", svg(figure))
 
 
-def saved_figures(folder: Path, names: Iterable[str]) -> dict[str, str]:
-    """Those that ``save_figure`` left in ``folder``, as SVG by name."""
-    drawn = {name: folder / f"{name}.svg" for name in names}
-    return {name: path.read_text() for name, path in drawn.items() if path.exists()}
-
-
 def inline_svg(figure: Figure, name: str, alt: str) -> str:
     """The figure as an SVG element of a page: described by ``alt``, own ids, ink and paper of the page's theme."""
     return inlined(svg(figure), name, alt)
-
-
-def inlined(text: str, name: str, alt: str) -> str:
-    """The same of a figure that was saved by ``svg``."""
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    for found, prefixed in ((r'\bid="', f'id="{name}-'), (r'href="#', f'href="#{name}-'), (r"url\(#", f"url(#{name}-")):
-        text = re.sub(found, prefixed, text)
-    for color, variable in THEME.items():
-        text = text.replace(color, f"var({variable}, {color})")
-    text = re.sub(r'(<svg [^>]*?) (?:width|height)="[^"]*"', r"\1", text)
-    return text.replace("<svg ", f'<svg role="img" aria-label="{escape(alt)}" ', 1)

@@ -10,8 +10,9 @@ import numpy as np
 from rig.errors import DataError, UsageError
 from rig.progress import Progress, silent
 from rig.recording.reader import Recording
-from rig.recording.sessions import Session, TrialInfo, open_session
+from rig.recording.sessions import Session, TrialInfo
 from rig.recording.verify import Verdict, verdict_of
+from rig.report.came_in import CameIn, came_in_of
 from rig.report.diagnosed import Diagnosed, read_diagnosis
 from rig.report.figures import Tracked
 from rig.report.fitted import Fitted, read_fit
@@ -81,23 +82,24 @@ class Facts:
     realtime: Mapping[str, str]
     metadata: Mapping[str, Mapping[str, str]]
     diagnosis: Diagnosed | str
+    came_in: CameIn
 
 
-def gather(folder: Path, tell: Progress = silent) -> Facts:
-    """Reads the session in ``folder``; raises DataError only where there is none."""
-    session = open_session(folder)
+def gather(session: Session, results: Path, tell: Progress = silent) -> Facts:
+    """Reads the session, and what was found of it and is kept in the folder ``results``."""
     recordings, trials = _read(session, tell)
     metadata = next((recording.metadata for recording in recordings.values() if recording.metadata), {})
     return Facts(
         session=session,
         trials=trials,
-        fit=read_fit(session),
-        tracking=_tracking(session, recordings),
+        fit=read_fit(session, results),
+        tracking=_tracking(results, recordings),
         loop=_loop(list(recordings.values())),
         devices={role: json_table(text) for role, text in metadata.get("devices", {}).items() if role != "crc32"},
         realtime=metadata.get("realtime", {}),
         metadata=metadata,
-        diagnosis=read_diagnosis(folder),
+        diagnosis=read_diagnosis(results, session.place),
+        came_in=came_in_of(session),
     )
 
 
@@ -116,7 +118,7 @@ def _read(session: Session, tell: Progress) -> tuple[dict[str, Recording], tuple
     return found, tuple(trials)
 
 
-def _tracking(session: Session, recordings: Mapping[str, Recording]) -> TrackingFacts | str:
+def _tracking(results: Path, recordings: Mapping[str, Recording]) -> TrackingFacts | str:
     runs = [name for name, recording in recordings.items() if recording.tracks_force]
     if not runs:
         return "No force was tracked in this session; `rig track --model MODEL --force 5 --out SESSION` adds a run."
@@ -125,7 +127,7 @@ def _tracking(session: Session, recordings: Mapping[str, Recording]) -> Tracking
     if not len(loop):
         return f"The tracking run {runs[-1]} never came into contact."
     time_s = (loop["capture_ns"] - loop["capture_ns"][0]) * 1e-9
-    return TrackingFacts(Tracked(time_s, loop["reference_N"], loop["force_N"]), _result(session.folder / FILE))
+    return TrackingFacts(Tracked(time_s, loop["reference_N"], loop["force_N"]), _result(results / FILE))
 
 
 def _result(path: Path) -> TrackResult | str:

@@ -7,19 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from rig.report.drawing import (
-    ACTUAL,
-    INK,
-    MODEL,
-    OTHER,
-    QUIET,
-    SMALL_PT,
-    dress,
-    label,
-    new_figure,
-    speed_colors,
-    thinned,
-)
+from rig.report.drawing import dress, label, new_figure, speed_colors, thinned
+from rig.report.ink import ACTUAL, INK, MODEL, OTHER, QUIET, SMALL_PT
 from rig.tissue.fitting import residual_force
 from rig.tissue.judging import Errors, Judged
 from rig.tissue.laws import FloatArray

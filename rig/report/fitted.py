@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from rig.recording.sessions import Session
-from rig.report.drawing import inlined, saved_figures
+from rig.report.ink import inlined, saved_figures
 from rig.report.markup import figure, paragraph, parts, section
 from rig.results.fit import FILE, FOLDER, PICTURES, FitResult
 from rig.results.tables import curve_parts, lattice_parts, law_parts
@@ -28,10 +29,10 @@ class Fitted:
     changes: tuple[str, ...]
 
 
-def read_fit(session: Session) -> Fitted | str:
-    """The fit in the session's folder, or the sentence that says why there is none."""
-    folder = session.folder / FOLDER
-    result = FitResult.read_or_why(folder / FILE, "This session was not fitted", f"rig fit {session.folder}")
+def read_fit(session: Session, results: Path) -> Fitted | str:
+    """The fit of the session in the folder of its results, or the sentence that says why there is none."""
+    folder = results / FOLDER
+    result = FitResult.read_or_why(folder / FILE, "This session was not fitted", f"rig fit {session.place}")
     if isinstance(result, str):
         return result
     return Fitted(result, saved_figures(folder, PICTURES), tuple(_changes(session, result)))

@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rig.report.drawing import ACTUAL, MODEL, OTHER, QUIET, dress, label, new_figure
+from rig.report.drawing import dress, label, new_figure
+from rig.report.ink import ACTUAL, MODEL, OTHER, QUIET
 from rig.tissue.lattice_study import LatticeStudy
 from rig.tissue.study import Study, rows
 

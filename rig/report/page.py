@@ -6,6 +6,7 @@ from string import Template
 from rig.errors import UsageError
 from rig.progress import Progress, silent
 from rig.recording.files import write_text
+from rig.recording.sessions import Session
 from rig.report.facts import Facts, gather
 from rig.report.markup import paragraph, text
 from rig.report.sections import diagnosed, headline, key_figures, sections, simulated
@@ -14,14 +15,15 @@ from rig.version import SOFTWARE
 TEMPLATE = Path(__file__).with_name("page.html")
 
 
-def write_report(session: Path, out: Path, tell: Progress = silent) -> Facts:
-    """Writes the report on the session in folder ``session`` to ``out``, whole or not at all; what it shows.
+def write_report(session: Session, out: Path, tell: Progress = silent, results: Path | None = None) -> Facts:
+    """Writes the report on ``session`` to ``out``, whole or not at all; what it shows.
 
-    Raises DataError where there is no session, UsageError where ``out`` lies in no folder.
+    ``results`` is the folder that fit, diagnosis and tracking were left in, else the session's own. Raises UsageError
+    where ``out`` lies in no folder.
     """
     if not out.parent.is_dir():
         raise UsageError(f"{out}: its folder does not exist; make it, or give another --out")
-    facts = gather(session, tell)
+    facts = gather(session, results or session.folder, tell)
     tell("drawing", 0.9)
     found = page(facts)
     tell(f"writing {out.name}", 1.0)

@@ -7,6 +7,7 @@ import numpy as np
 
 from rig.channels import EVENT
 from rig.recording.verify import StreamVerdict, Verdict
+from rig.report.came_in import came_in_section
 from rig.report.diagnosed import Diagnosed, diagnosis_section
 from rig.report.drawing import inline_svg
 from rig.report.facts import Facts, LoopFacts, TrackingFacts, TrialFacts
@@ -15,6 +16,7 @@ from rig.report.fitted import Fitted, fit_sections
 from rig.report.markup import cards, details, figure, pairs, paragraph, parts, section, table
 from rig.report.values import json_table, of_many
 from rig.results.base import known
+from rig.results.diagnosis_lines import five_lines
 from rig.results.fit import LawResult
 from rig.results.tables import TextTable, render, track_parts
 from rig.results.tracking import TrackResult
@@ -83,8 +85,11 @@ def simulated(facts: Facts) -> str:
 
 
 def diagnosed(facts: Facts) -> str:
-    """The diagnosis in one sentence; nothing where there is none."""
-    return paragraph(facts.diagnosis.result.statement, "lead") if isinstance(facts.diagnosis, Diagnosed) else ""
+    """What is explained, by which cause; nothing where there is no diagnosis."""
+    if not isinstance(facts.diagnosis, Diagnosed):
+        return ""
+    _, explained, cause, *_ = five_lines(facts.diagnosis.result)
+    return paragraph(explained, "lead") + paragraph(cause, "lead")
 
 
 def sections(facts: Facts) -> Iterator[str]:
@@ -92,6 +97,7 @@ def sections(facts: Facts) -> Iterator[str]:
     yield from fit_sections(facts.fit)
     yield _tracking(facts.tracking)
     yield diagnosis_section(facts.diagnosis)
+    yield came_in_section(facts.came_in)
     yield _loop(facts)
     yield _recorded(facts)
     yield _setup(facts)
