@@ -21,14 +21,17 @@ if TYPE_CHECKING:
 __all__ = ["RigError", "SessionData", "TrialData", "__version__", "open", "to_pandas"]
 
 
-def open(folder: str | Path) -> "SessionData":
-    """The session in ``folder``, as `rig capture`, `rig track` or `rig import` wrote it.
+def open(place: str | Path, mapping: str | Path | None = None, only: str = "") -> "SessionData":
+    """The session in ``place``: its folder, one recording of it, or files of any laboratory.
 
-    Raises DataError where there is none.
+    What such files hold is said by the TOML file ``mapping``, else by ``mapping.toml`` beside them, else as far as it
+    can be told from them. Of the recordings those are taken whose names match the pattern ``only``. Raises DataError or
+    UsageError where there is none, or something in them is wrong.
     """
-    from rig.notebook import open_folder  # noqa: PLC0415 - numerics and Arrow take a second to load
+    from rig.notebook import open_data  # noqa: PLC0415 - numerics and Arrow take a second to load
+    from rig.trials.opening import Opening  # noqa: PLC0415
 
-    return open_folder(Path(folder))
+    return open_data(Path(place), Opening(Path(mapping) if mapping else None, only))
 
 
 def __getattr__(name: str) -> object:

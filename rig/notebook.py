@@ -4,10 +4,14 @@ Nothing here writes into the session's folder. Tables are Arrow tables; each fie
 as metadata. ``pandas`` is needed only where a table is asked for as a data frame.
 """
 
+import shutil
+import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from functools import cached_property
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Literal
 
 import pyarrow as pa
@@ -16,7 +20,7 @@ from rig.channels import STREAMS
 from rig.errors import UsageError
 from rig.progress import Progress, silent
 from rig.recording.reader import Recording
-from rig.recording.sessions import Session, TrialInfo, open_session
+from rig.recording.sessions import Session, TrialInfo
 from rig.recording.tables import arrow_table, filled
 from rig.results.diagnosis import DiagnosisResult
 from rig.results.fit import FitResult
@@ -26,19 +30,27 @@ from rig.tissue.registry import COMPARED, check_known, law_named
 from rig.tissue.study import Study, model_of, study_session
 from rig.trials.curves import loading_curve
 from rig.trials.cycles import cycle_of
-from rig.trials.reading import read_trials
+from rig.trials.opening import Opening, open_place
+from rig.trials.reading import trials_of
 from rig.trials.recorded import trial_of
+from rig.trials.segments import segments_of
+from rig.trials.surface import find_surface, pushed
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-Simulation = Literal["index", "constant", "axis"]
+Simulation = Literal["index", "constant"]
 _CURVE_UNITS = {
     "time_s": ("s", "since the first force sample of the trial"),
     "depth_mm": ("mm", "from contact, positive into the tissue"),
     "force_N": ("N", "positive in compression, from the zero in the air"),
     "rate_mm_s": ("mm/s", "speed into the tissue"),
+}
+_SEGMENT_UNITS = {
+    "kind": ("", "air, loading, hold or unloading"),
+    "start_s": ("s", "its first sample, since the first force sample of the trial"),
+    "end_s": ("s", "its last sample"),
 }
 _TRIAL_UNITS = {
     "name": ("", "name of the trial"),
@@ -51,9 +63,16 @@ _TRIAL_UNITS = {
 }
 
 
-def open_folder(folder: Path) -> "SessionData":
-    """The session in ``folder``; raises DataError where there is none."""
-    return SessionData(open_session(folder))
+def open_data(place: Path, opening: Opening) -> "SessionData":
+    """What ``place`` holds; what is made of foreign files is kept as long as the answer is in use."""
+    scratch = Path(mkdtemp(prefix="rig-"))
+    try:
+        session = open_place(place, opening, scratch, datetime.now().astimezone())
+    except BaseException:
+        shutil.rmtree(scratch)
+        raise
+    weakref.finalize(session, shutil.rmtree, scratch)
+    return SessionData(session)
 
 
 def to_pandas(table: pa.Table) -> "pd.DataFrame":
@@ -133,6 +152,21 @@ class TrialData:
         facts = {"trial": self.name, "zero_N": repr(curve.zero_N), "contact_mm": repr(curve.contact.position_mm)}
         return _table({name: getattr(curve, name) for name in _CURVE_UNITS}, _CURVE_UNITS, **facts)
 
+    def segments(self) -> pa.Table:
+        """Air, loading, holds and unloading of the trial, one row each, in order: what the tip did.
+
+        Raises DataError where nothing tells the surface, above which is air.
+        """
+        cycle = pushed(cycle_of(trial_of(self.name, self.recording)))[0]
+        surface_mm = find_surface(cycle).contact.position_mm
+        found = segments_of(cycle.time_s, cycle.position_mm, surface_mm)
+        columns = {
+            "kind": [one.kind for one in found],
+            "start_s": [float(cycle.time_s[one.rows.start]) for one in found],
+            "end_s": [float(cycle.time_s[one.rows.stop - 1]) for one in found],
+        }
+        return _table(columns, _SEGMENT_UNITS)
+
 
 class SessionData:
     """An opened session: its trials, and what fit and diagnosis say of it."""
@@ -155,7 +189,7 @@ class SessionData:
     @property
     def folder(self) -> Path:
         """Where it lies."""
-        return self._session.folder
+        return self._session.place
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -212,12 +246,9 @@ class SessionData:
 
         ``progress`` is called with what is being done and the share that is done. Takes seconds to minutes.
         """
-        from rig.diagnosis.axis_run import diagnose_axis_folder  # noqa: PLC0415 - loads an optimiser
-        from rig.diagnosis.run import diagnose_session  # noqa: PLC0415
+        from rig.diagnosis.run import diagnose_session  # noqa: PLC0415 - loads an optimiser
 
-        if simulation == "axis":
-            return DiagnosisResult.model_validate(diagnose_axis_folder(self.folder, progress))
-        return DiagnosisResult.model_validate(diagnose_session(read_trials(self.folder), simulation, progress))
+        return DiagnosisResult.model_validate(diagnose_session(trials_of(self._session), simulation, progress))
 
     def _study(self, laws: tuple[str, ...], known: Mapping[str, float]) -> Study:
         """Laws compared, and those asked for; kept, because pictures and results are asked for one after another."""

@@ -8,3 +8,8 @@ Progress = Callable[[str, float], None]
 
 def silent(_message: str, _share: float) -> None:
     """Progress nobody watches."""
+
+
+def portion(tell: Progress, first: float, last: float) -> Progress:
+    """Progress of a step that takes a computation from the share ``first`` of it to the share ``last``."""
+    return lambda message, share: tell(message, first + share * (last - first))

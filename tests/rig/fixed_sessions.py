@@ -12,7 +12,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -30,7 +29,9 @@ from rig.recording.sessions import open_session
 from rig.tissue.judging import Errors, Judged
 from rig.tissue.study import Study, study_session
 from rig.trials.curves import Curve
-from rig.trials.reading import read_trials
+from rig.trials.opening import AS_IT_IS, Opening, open_place
+from rig.trials.reading import trials_of
+from rig.trials.trial import TrialSet
 from tests import data
 from tests.rig.recording.measured import MARKER_TABLE, turned_tables
 from tests.rig.tissue.synthetic import (
@@ -44,6 +45,7 @@ from tests.rig.tissue.synthetic import (
 )
 
 FILE = Path(__file__).with_suffix(".json")
+PERINEAL = data.ROOT / "examples" / "mappings" / "perineal_indentation.toml"
 NOW = datetime(2026, 1, 2, 10, 0, tzinfo=UTC)
 Figures = Mapping[str, object]
 
@@ -102,17 +104,23 @@ def imported(folder: Path) -> Figures:
 
 def measured(_: Path) -> Figures:
     """What the diagnosis sees of real meat, four recordings of a testing machine."""
-    return observed(data.recording("perineal_indentation"), only="230411_C_Ind*_RDG1[A-D]")
+    return observed(data.recording("perineal_indentation"), Opening(PERINEAL, "230411_C_Ind*_RDG1[A-D]"))
 
 
 def diagnosed(folder: Path) -> Figures:
     """What is observed in a folder, and the diagnosis of it."""
-    return {**observed(folder), **of_diagnosis(diagnose_session(read_trials(folder)))}
+    return {**observed(folder), **of_diagnosis(diagnose_session(read(folder)))}
 
 
-def observed(folder: Path, only: str = "") -> Figures:
+def read(place: Path, opening: Opening = AS_IT_IS) -> TrialSet:
+    """The trials of whatever lies there."""
+    with tempfile.TemporaryDirectory() as scratch:
+        return trials_of(open_place(place, opening, Path(scratch), NOW))
+
+
+def observed(folder: Path, opening: Opening = AS_IT_IS) -> Figures:
     """Sums over the working grid, and what was said of the data."""
-    seen = observe(read_trials(folder, only=only))
+    seen = observe(read(folder, opening))
     drive = seen.drive
     arrays = (drive.time_s, drive.position_mm, drive.velocity_mm_s, seen.force_N, seen.tip_mm, drive.temperature_C)
     return {
@@ -135,7 +143,7 @@ def of_diagnosis(result: Diagnosis) -> Figures:
                 "causes": list(found.effects),
                 "evidence": [found.evidence_nats, found.p_value, found.confidence],
                 "parameters": [_interval(size) for size in found.parameters.values()],
-                "gain": list(astuple(found.gain)),
+                "gain": [*found.gain.errors, found.gain.reduction, found.gain.low, found.gain.high],
             }
             for found in result.findings
         ],

@@ -1,5 +1,6 @@
 """`import rig` as a notebook uses it: light to import, tables with units, and the answers that the commands give."""
 
+import gc
 import inspect
 import json
 import math
@@ -15,9 +16,11 @@ from typer.testing import CliRunner
 import rig
 from api.cli.app import build
 from rig.errors import DataError, UsageError
+from rig.intake.mapping import MAPPING_FILE
 from rig.notebook import SessionData
 from rig.recording.reader import read_recording
 from rig.tissue.model import load_model
+from tests.rig.recording.measured import pressed
 from tests.rig.tissue.synthetic import FOREARM, Bench, write_made_session
 
 
@@ -60,6 +63,21 @@ def test_a_folder_without_a_session_is_said(tmp_path: Path) -> None:
         rig.open(tmp_path)
 
 
+def test_files_of_others_are_opened_by_a_mapping_and_last_as_long_as_they_are_used(tmp_path: Path) -> None:
+    cycles = Bench(rate_Hz=100.0).cycles(trials=1, speeds_mm_s=(5.0, 20.0))
+    source = pressed(tmp_path / "in", cycles)
+    mapping = (source / MAPPING_FILE).rename(tmp_path / "mine.toml")
+    opened = rig.open(source, mapping, only="*_1")
+    assert opened.folder == source and [trial.name for trial in opened] == ["trial_1"]
+    trial, made = opened.trials[0], opened._session.folder
+    del opened
+    gc.collect()
+    assert trial.arrow().num_rows == len(cycles[1].force_N)
+    del trial
+    gc.collect()
+    assert not made.exists() and not list(source.rglob("*.mcap"))
+
+
 def test_trials_are_one_row_each_with_units(session: SessionData) -> None:
     table = session.arrow()
     assert table.column("name").to_pylist() == [trial.name for trial in session]
@@ -91,6 +109,17 @@ def test_loading_counts_from_contact_and_zero(session: SessionData) -> None:
     assert table.schema.metadata[b"trial"].decode() == session.trials[0].name
     assert float(table.schema.metadata[b"contact_mm"]) > 0
     assert {field.metadata[b"unit"] for field in table.schema} == {b"s", b"mm", b"N", b"mm/s"}
+
+
+def test_segments_are_what_the_tip_did(session: SessionData) -> None:
+    table = session.trials[0].segments()
+    kinds, start_s, end_s = (table.column(name).to_pylist() for name in ("kind", "start_s", "end_s"))
+    # A touch, whose way into the tissue ends in a turn, then the stroke with a hold of 0.3 s.
+    assert kinds[-5:] == ["air", "loading", "hold", "unloading", "air"]
+    assert end_s[-3] - start_s[-3] == pytest.approx(0.3, abs=0.02)
+    assert start_s[-4] - end_s[-4] == pytest.approx(-8.0 / 5.0, abs=0.1), "8 mm at 5 mm/s"
+    assert all(earlier <= later for earlier, later in zip(end_s, start_s[1:], strict=False))
+    assert table.schema.field("start_s").metadata[b"unit"] == b"s"
 
 
 def test_data_frames_carry_units(session: SessionData) -> None:
@@ -146,5 +175,5 @@ def test_the_diagnosis_of_too_few_trials_says_so(tmp_path: Path) -> None:
     """A whole one is made by the notebook of the tutorial, which is run too."""
     cycles = Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0,))
     found = rig.open(write_made_session(tmp_path / "one", cycles)).diagnose()
-    assert (found.verdict, found.recordings) == ("unexplained", 1)
+    assert (found.verdict, found.recordings) == ("not judged", 1)
     assert found.statement.startswith("Nothing could be judged: 1 recording of one")

@@ -123,9 +123,7 @@ class TrackerProduct(Product):
     patience: ClassVar[Mapping[str, Mapping[str, float]]] = {"loop": {"stale_marker_ms": 500.0}}
 
     tools: tuple[str, ...] = Field(
-        default=("tip", "arm"),
-        min_length=1,
-        description="names of the markers, that on the tip first",
+        default=("tip", "arm"), min_length=1, description="names of the markers, that on the tip first"
     )
     rate_Hz: Positive = Field(default=60.0, description="frames a second")
     latency_ms: float = Field(default=0.0, ge=0, le=200, description="known smallest delay from capture to arrival")

@@ -11,6 +11,7 @@ from playwright.sync_api import Browser, sync_playwright
 
 from api.operations.fit import fit
 from controller.operation import Operation
+from rig.recording.sessions import open_session
 from rig.report.page import write_report
 from tests.rig.report.test_page import track_into
 from tests.rig.tissue.synthetic import Bench, write_made_session
@@ -36,7 +37,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_made_session(folder, Bench(rate_Hz=500.0).cycles(trials=1, speeds_mm_s=(5.0, 30.0)))
     track_into(folder)
     fit(Operation("fit"), [folder])
-    write_report(folder, folder / "report.html")
+    write_report(open_session(folder), folder / "report.html")
     return folder / "report.html"
 
 
@@ -51,7 +52,7 @@ def test_the_page_shows_its_pictures_offline(browser: Browser, report: Path, sch
         page.on("request", lambda request: requests.append(request.url))
         page.goto(report.as_uri())
         pictures = page.locator("figure svg")
-        assert pictures.count() == 4
+        assert pictures.count() == 5
         for index in range(pictures.count()):
             pixels = np.asarray(Image.open(io.BytesIO(pictures.nth(index).screenshot())).convert("L"), float)
             assert min(pixels.shape) > 200

@@ -100,7 +100,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def html(folder: Path) -> str:
     """Its report."""
-    write_report(folder, folder / "report.html")
+    write_report(open_session(folder), folder / "report.html")
     return (folder / "report.html").read_text(encoding="utf-8")
 
 
@@ -108,10 +108,10 @@ def test_the_page_is_well_formed_and_has_all_parts(html: str) -> None:
     page = Page(html)
     assert page.open == []
     assert page.headings[1:] == [
-        "Force and displacement", "Tissue laws compared", "Force tracking",
-        "What the simulation gets wrong", "The loop", "What was recorded", "Bench, subject and protocol",
+        "Force and displacement", "Tissue laws compared", "Force tracking", "What the simulation gets wrong",
+        "What came in", "The loop", "What was recorded", "Bench, subject and protocol",
     ]  # fmt: skip
-    assert page.tags.count("svg") == 4
+    assert page.tags.count("svg") == 5
 
 
 def test_the_headline_says_what_came_out(html: str) -> None:
@@ -177,7 +177,7 @@ def test_a_bench_on_pseudo_terminals_is_called_simulated(tmp_path: Path) -> None
     about = metadata(cycle) | {"wiring": {"force": '{"port": "/dev/pts/4"}'}}
     (folder / "trial_002.mcap").unlink()
     write_recording(folder / "trial_002.mcap", tables(cycle), about)
-    write_report(folder, tmp_path / "report.html")
+    write_report(open_session(folder), tmp_path / "report.html")
     assert "Simulated bench: the devices were served on pseudo-terminals" in (tmp_path / "report.html").read_text()
 
 
@@ -189,7 +189,7 @@ def test_a_session_without_curves_loop_tracking_or_devices_still_has_a_report(tm
     write_recording(folder / "trial_001.mcap", streams, {"recording": {"kind": "import"}})
     trial = TrialInfo("trial_001", "trial_001.mcap", 10.0, 8.0, "imported")
     write_session(folder, SessionInfo("bare", "import", "2026-01-02", "tissue-rig 0.1.0", trials=(trial,)))
-    write_report(folder, tmp_path / "report.html")
+    write_report(open_session(folder), tmp_path / "report.html")
     page = Page((tmp_path / "report.html").read_text())
     assert page.headings[0] == "1 recording, without a fit"
     for said in (
@@ -197,7 +197,7 @@ def test_a_session_without_curves_loop_tracking_or_devices_still_has_a_report(tm
         "The recordings name no device", "No protocol: imported data", "0 dropped samples",
     ):  # fmt: skip
         assert said in page.words
-    assert page.tags.count("svg") == 0
+    assert page.tags.count("svg") == 1, "what came in"
 
 
 def test_damage_and_cuts_are_said_on_the_page(tmp_path: Path) -> None:
@@ -205,7 +205,7 @@ def test_damage_and_cuts_are_said_on_the_page(tmp_path: Path) -> None:
     cut = folder / "trial_002.mcap"
     cut.write_bytes(cut.read_bytes()[:-3000])
     (folder / "session.json").write_text("{")
-    write_report(folder, tmp_path / "report.html")
+    write_report(open_session(folder), tmp_path / "report.html")
     words = Page((tmp_path / "report.html").read_text()).words
     assert "session.json cannot be read: the session is taken from its recordings" in words
     assert "trial_002.mcap: incomplete" in words
@@ -217,7 +217,7 @@ def test_an_unreadable_tracking_result_is_one_line(tmp_path: Path, content: str)
     folder = write_made_session(tmp_path / "session", [Bench().cycle(10.0, 1)])
     track_into(folder)
     (folder / "track.json").write_text(content)
-    write_report(folder, tmp_path / "report.html")
+    write_report(open_session(folder), tmp_path / "report.html")
     page = Page((tmp_path / "report.html").read_text())
     assert "No table of reference and actual force" in page.words
     assert "tracked within" not in page.headings[0]
@@ -227,21 +227,21 @@ def test_a_tracking_run_without_contact_is_one_line(tmp_path: Path) -> None:
     folder = write_made_session(tmp_path / "session", [Bench().cycle(10.0, 1)])
     run = Bench().cycle(10.0, 5)
     write_recording(folder / "track_001.mcap", tables(run), metadata(run) | {"trial": {"kind": "tracking"}})
-    write_report(folder, tmp_path / "report.html")
+    write_report(open_session(folder), tmp_path / "report.html")
     assert "The tracking run track_001 never came into contact." in (tmp_path / "report.html").read_text()
 
 
 def test_the_report_replaces_an_older_one_and_leaves_no_scraps(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     out.write_text("old")
-    write_report(folder, out)
+    write_report(open_session(folder), out)
     assert "old" not in out.read_text()[:20]
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
 
 
 def test_a_place_that_is_not_there_is_refused(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"its folder does not exist"):
-        write_report(folder, tmp_path / "missing" / "report.html")
+        write_report(open_session(folder), tmp_path / "missing" / "report.html")
 
 
 def test_the_quality_of_each_trial_is_shown_and_why_it_is_not_good(tmp_path: Path) -> None:
@@ -249,7 +249,7 @@ def test_the_quality_of_each_trial_is_shown_and_why_it_is_not_good(tmp_path: Pat
     info = open_session(folder).info
     spoilt = replace(info.trials[0], quality="usable", reasons=("axis: a gap of 58 ms (good up to 20 ms)",))
     write_session(folder, replace(info, trials=(spoilt, replace(info.trials[1], quality="good"))))
-    write_report(folder, folder / "report.html")
+    write_report(open_session(folder), folder / "report.html")
     words = Page((folder / "report.html").read_text(encoding="utf-8")).words
     assert f"{spoilt.name}: quality usable: axis: a gap of 58 ms (good up to 20 ms)" in words
     assert f"{info.trials[1].name}: quality" not in words
@@ -257,7 +257,7 @@ def test_the_quality_of_each_trial_is_shown_and_why_it_is_not_good(tmp_path: Pat
 
 def test_a_folder_without_a_session_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"no session here"):
-        write_report(tmp_path, tmp_path / "report.html")
+        write_report(open_session(tmp_path), tmp_path / "report.html")
 
 
 def test_the_fit_shown_is_the_one_that_was_asked_for(html: str) -> None:
@@ -273,7 +273,7 @@ def test_the_report_reads_the_saved_fit_and_computes_nothing_again(folder: Path,
     saved = json.loads((again / "fit" / "fit.json").read_text())
     saved["index"]["parameters"]["a_N_mm"]["value"] = 4321.0
     (again / "fit" / "fit.json").write_text(json.dumps(saved))
-    write_report(again, again / "report.html")
+    write_report(open_session(again), again / "report.html")
     assert "a_N_mm 4321" in Page((again / "report.html").read_text()).words
 
 
@@ -286,7 +286,7 @@ def test_a_fit_that_is_older_than_its_session_says_so(folder: Path, tmp_path: Pa
     changed, later = replace(second, sha256="0" * 64), replace(third, name="trial_later")
     write_session(again, replace(info, trials=(changed, later, *rest)))
     (again / first.file).unlink()
-    write_report(again, again / "report.html")
+    write_report(open_session(again), again / "report.html")
     words = Page((again / "report.html").read_text()).words
     assert f"{first.name}, which the fit was made from, is not in the session" in words
     assert f"{second.name} was changed after the fit" in words
