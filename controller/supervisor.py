@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from socket import socket
 
 from controller.claims import Claim, take
@@ -31,6 +32,7 @@ LOOP_MODULE = "controller.loop.process"
 START_TIMEOUT_S = 60.0
 ACT_TIMEOUT_S = 60.0
 LEAVE_TIMEOUT_S = 15.0  # to retract over 60 mm at 20 mm/s (3 s) and to close devices (4 s), twice
+NOT_IN_CONTROL = "whoever started this is not in control any more: nothing more of it moves"
 WAITING = "the bench was started for recovery"
 # In order, or with a failure it reported; a loop that was killed left the axis where it was.
 ENDED_BY_ITSELF = (0, 1)
@@ -81,7 +83,7 @@ class Supervisor:
     def prepare(self) -> None:
         """Starts the stop process alone, which ``start`` does by itself: from now on a stop counts."""
         if self._stop is None:
-            self._stop = StopProcess(self.wiring, self._ring_path.with_suffix(".stop"))
+            self._stop = StopProcess(self.wiring, self.stop_path)
 
     def start(self) -> None:
         """Starts the stop process, loop and recorder; raises with the loop's own sentence where a device is not right.
@@ -169,10 +171,14 @@ class Supervisor:
     def run(self, program: Program, timeout_s: float) -> Outcome:
         """Executes ``program`` to its end, however it ends; raises UsageError where the loop refuses it.
 
-        One that has not ended in time is stopped, and DeviceError raised; how it ended is then nobody's any more.
+        SafetyStop where whoever started it is not in control any more: under a lease that is over nothing begins, also
+        where the loop has not heard of it yet. One that has not ended in time is stopped, and DeviceError raised; how
+        it ended is then nobody's any more.
         """
         self.await_ready()
         self.refuse_held()
+        if not self.attended():
+            raise SafetyStop(NOT_IN_CONTROL, "operator_silent")
         try:
             return self._loop().run(Run(program=program), timeout_s)
         except DeviceError:
@@ -200,6 +206,16 @@ class Supervisor:
     def loop_is_to_come(self) -> bool:
         """Whether the stop process is there and the loop not yet: a stop now forbids its start."""
         return self._stop is not None and self._process is None
+
+    @property
+    def ring_path(self) -> Path:
+        """Where the loop publishes its samples, for whoever looks on beside the recorder."""
+        return self._ring_path
+
+    @property
+    def stop_path(self) -> Path:
+        """Where the stop word is."""
+        return self._ring_path.with_suffix(".stop")
 
     @property
     def stop_port(self) -> int:

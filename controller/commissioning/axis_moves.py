@@ -103,18 +103,23 @@ class RestingAxis:
             raise errors[0]
 
     def _read(self, seconds: float) -> tuple[float, list[MarkerSample], Array]:
-        """Mean position, frames and mean force of a while; the reading keeps the drive's heartbeat going."""
+        """Mean position, frames and mean force of a while; the reading keeps the drive's heartbeat going.
+
+        Of samples taken in it alone: a computer held up before it fetches what was measured under way, or unrested.
+        """
         positions: list[float] = []
         markers: list[MarkerSample] = []
         forces: list[tuple[float, ...]] = []
         axis, force, tracker = self._devices.axis, self._devices.force, self._devices.tracker
-        end_ns = self._now() + round(seconds * 1e9)
+        begin_ns = self._now()
+        end_ns = begin_ns + round(seconds * 1e9)
         last_ns = end_ns + round(SILENT_S * 1e9)
         while (at_ns := self._now()) < (end_ns if positions and forces else last_ns):
             axis.request(at_ns)
-            positions += [sample.position_mm for sample in axis.poll(at_ns)]
-            forces += [sample[4:7] for sample in force.poll(at_ns) if sample.valid]
-            markers += [sample for sample in tracker.poll(at_ns) if sample.valid] if tracker else []
+            positions += [sample.position_mm for sample in axis.poll(at_ns) if sample.capture_ns >= begin_ns]
+            forces += [sample[4:7] for sample in force.poll(at_ns) if sample.valid and sample.capture_ns >= begin_ns]
+            frames = tracker.poll(at_ns) if tracker else []
+            markers += [sample for sample in frames if sample.valid and sample.capture_ns >= begin_ns]
             self._sleep(PERIOD_S)
         if not positions or not forces:
             raise DeviceError(

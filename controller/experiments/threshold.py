@@ -13,7 +13,7 @@ from rig.config.table import parse
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
 from rig.recording.reader import read_recording
-from rig.results.tracking import Threshold
+from rig.results.tracking import THRESHOLD, Threshold
 from rig.tissue.model import Model
 
 PAIN = "pain_stop"
@@ -30,11 +30,13 @@ def plan(up_to_N: float, rate_N_s: float, model: Model, wiring: Wiring) -> Progr
 
 
 def run(bench: Supervisor, program: Program, up_to_N: float, folder: Path, model: str) -> Threshold:
-    """Plays the ramp into a recording; any stop but the subject's own raises SafetyStop."""
+    """Plays the ramp into a recording, the answer beside it; any stop but the subject's own raises SafetyStop."""
     done = tracked.recorded_run(bench, program, folder, model)
     if done.outcome.stopped and done.outcome.outcome != PAIN:
         raise stop_error(done.outcome)
-    return Threshold(force_N=force_at_stop(done), up_to_N=up_to_N, recording=done.file.name)
+    found = Threshold(force_N=force_at_stop(done), up_to_N=up_to_N, recording=done.file.name)
+    found.write(folder / f"{done.file.stem}.{THRESHOLD}")
+    return found
 
 
 def force_at_stop(done: Recorded) -> float | None:

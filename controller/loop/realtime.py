@@ -1,27 +1,26 @@
 """Real-time privileges: each is tried, none is required, and what was granted is reported."""
 
 import contextlib
-import ctypes
 import fcntl
 import gc
 import os
 from collections.abc import Iterator
 
 from controller.claims import state_folder
+from rig.realtime import ask_fifo, keep_cores_awake, lock_memory, shorten_timer_slack
 
-MCL_CURRENT_AND_FUTURE = 3
-PR_SET_TIMERSLACK = 29
 # Longer than nearly all wake-ups take: with 120 us the slowest hundredth stayed as late. A quarter of a core at 1 kHz.
 SPIN_NS = 250_000
 
 
 def acquire(priority: int) -> dict[str, str]:
-    """Asks for FIFO scheduling at ``priority`` (0: no), locked memory, a core of its own and fine timers."""
+    """Asks for FIFO scheduling at ``priority`` (0: no), memory locked, cores awake, one its own, and fine timers."""
     granted = {
         "scheduler": _scheduler(priority),
-        "memory": _lock_memory(),
+        "memory": "locked" if lock_memory() else "not locked (not granted)",
         "core": _pin(),
-        "timer_slack": _timer_slack(),
+        "idle_cores": "awake" if priority and keep_cores_awake() else "sleep",
+        "timer_slack": "1 ns" if shorten_timer_slack() else "default",
     }
     gc.collect()
     gc.freeze()
@@ -34,8 +33,7 @@ def promptly(priority: int) -> Iterator[None]:
     """FIFO scheduling of this thread at ``priority`` (0: no), where granted, until the block ends."""
     before = os.sched_getscheduler(0), os.sched_getparam(0)
     if priority:
-        with contextlib.suppress(OSError):
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+        ask_fifo(priority)
     try:
         yield
     finally:
@@ -46,7 +44,7 @@ def promptly(priority: int) -> Iterator[None]:
 def raise_priority(priority: int) -> None:
     """FIFO scheduling at ``priority`` (0: no) and locked memory where granted, and nothing else."""
     _scheduler(priority)
-    _lock_memory()
+    lock_memory()
     gc.freeze()
 
 
@@ -58,18 +56,11 @@ def spin_ns(granted: dict[str, str]) -> int:
 def _scheduler(priority: int) -> str:
     if priority == 0:
         return "normal (not asked for)"
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except OSError:
-        with contextlib.suppress(OSError):
-            os.nice(-10)
-        return "normal (SCHED_FIFO not granted)"
-    return f"SCHED_FIFO {priority}"
-
-
-def _lock_memory() -> str:
-    libc = ctypes.CDLL(None, use_errno=True)
-    return "locked" if libc.mlockall(MCL_CURRENT_AND_FUTURE) == 0 else "not locked (not granted)"
+    if not ask_fifo(priority):
+        return f"SCHED_FIFO {priority}"
+    with contextlib.suppress(OSError):
+        os.nice(-10)
+    return "normal (SCHED_FIFO not granted)"
 
 
 def _pin() -> str:
@@ -93,8 +84,3 @@ def _take(core: int) -> bool:
         os.close(fd)
         return False
     return True
-
-
-def _timer_slack() -> str:
-    libc = ctypes.CDLL(None, use_errno=True)
-    return "1 ns" if libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0) == 0 else "default"

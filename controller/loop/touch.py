@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.loop.paired_samples import Touch
+from controller.loop.paired_samples import ROWS, Touch
 from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
 from rig.trials.contact import LIMB_SHAPE, Contact, ContactSearch, Loading
@@ -117,12 +117,18 @@ def _search(loading: Loading, noise_N: float) -> ContactSearch | None:
         return None
     first_mm, last_mm = float(loading.position_mm.min()), float(loading.position_mm.max())
     air_mm = min(AIR_MM, 0.2 * (last_mm - first_mm))
-    return ContactSearch(loading, (first_mm + air_mm, last_mm), noise_N, LIMB_SHAPE, levelled=False, rounds=ROUNDS)
+    # Force and axis are paired to a row: at its speed that is how far a force may lie from its place.
+    paired = loading._replace(apart_mm=float(np.median(np.abs(np.diff(loading.position_mm)))))
+    return ContactSearch(paired, (first_mm + air_mm, last_mm), noise_N, LIMB_SHAPE, ROUNDS)
 
 
 def warm_up() -> Contact:
-    """Estimates a surface at 0 mm before anything moves: what a first call loads and allocates takes milliseconds."""
-    depth_mm = np.linspace(-1.0, 1.0)
+    """Estimates a surface at 0 mm before anything moves: what a first call loads and allocates takes milliseconds.
+
+    As many rows as an approach may leave: linear algebra takes its 64 MB of working memory only for long ones, and
+    memory that is locked is filled at once, which takes 25 ms.
+    """
+    depth_mm = np.linspace(-1.0, 1.0, ROWS)
     search = _search(Loading(depth_mm, np.maximum(depth_mm, 0.0), np.ones_like(depth_mm)), 0.01)
     assert search
     while not search.advance():

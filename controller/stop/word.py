@@ -33,6 +33,7 @@ class Lane(IntEnum):
 
     STOP_PROCESS = 0
     SUPERVISOR = 1
+    AWAY = 2
 
 
 class StopReason(IntEnum):

@@ -106,6 +106,15 @@ def test_a_program_is_run_and_its_outcome_returned(around: Surroundings) -> None
         assert [run.program for run in around.loop.of(Run)] == [PROGRAM]
 
 
+def test_a_program_of_somebody_who_is_not_in_control_any_more_is_never_begun(around: Surroundings) -> None:
+    with Supervisor(Wiring()) as bench:
+        bench.attended = lambda: False
+        with pytest.raises(SafetyStop, match="not in control any more: nothing more of it moves") as refused:
+            bench.run(PROGRAM, 2.0)
+        assert refused.value.code == "operator_silent"
+        assert around.loop.of(Run) == []
+
+
 def test_a_program_that_is_refused_is_not_stopped(around: Surroundings) -> None:
     def refuse(loop: PlayedLoop, received: Received) -> None:
         if isinstance(received.message, Run):
@@ -373,10 +382,15 @@ def test_a_program_waits_until_every_device_is_ready(around: Surroundings) -> No
     with Supervisor(Wiring()) as bench:
         around.loop.say(StatusSaid(status={"ready": False, "busy": False, "latched": None}))
         until(lambda: not bench.status["ready"])
-        late = threading.Timer(0.2, lambda: around.loop.say(StatusSaid(status=around.status)))
-        late.start()
+        ready = threading.Event()
+
+        def become_ready() -> None:
+            ready.set()
+            around.loop.say(StatusSaid(status=around.status))
+
+        threading.Timer(0.2, become_ready).start()
         bench.run(PROGRAM, 5.0)
-        assert not late.is_alive()
+        assert ready.is_set()
 
 
 def test_waiting_for_devices_ends(around: Surroundings) -> None:

@@ -239,6 +239,44 @@ def test_a_computer_that_stalls_still_reads_and_a_sensor_that_is_silent_ends_it(
         resting(bench).place()
 
 
+class RingingTracker(TrackerOf):
+    """Its frames, one in 16 ms, wait to be fetched; for 0.2 s after a move the tip still swings by 1 mm."""
+
+    def __init__(self, bench: "HeldUp") -> None:
+        super().__init__(bench)
+        self.held_up, self._taken_ns = bench, bench.now_ns
+
+    def poll(self, now_ns: int) -> list[MarkerSample]:
+        taken = range(self._taken_ns, now_ns, 16_000_000)
+        self._taken_ns = taken[-1] + 16_000_000 if taken else self._taken_ns
+        swung_mm = {at_ns: float(at_ns - self.held_up.moved_ns < 200_000_000) for at_ns in taken}
+        return [_seen(at_ns, 0, TIP_MM + (self.held_up.position_mm + swung_mm[at_ns]) * WAY, True) for at_ns in taken]
+
+
+class HeldUp(AxisOf):
+    """A computer that sleeps through the rest after a move."""
+
+    moved_ns = 0
+
+    def move_to(self, position_mm: float, speed_mm_s: float) -> None:
+        super().move_to(position_mm, speed_mm_s)
+        self.moved_ns, self.stall_s = self.now_ns, 0.3
+
+    def sleep(self, seconds: float) -> None:
+        super().sleep(seconds)
+        self.stall_s = 0.0
+
+
+def test_a_computer_held_up_while_the_axis_rests_reads_nothing_of_before() -> None:
+    bench = HeldUp()
+    devices = Devices(ForceOf(bench), bench, RingingTracker(bench))  # type: ignore[arg-type]
+    axis = RestingAxis(devices, now=bench.clock, sleep=bench.sleep)
+    axis.go(5.0)
+    tip_mm = axis.place().tip_mm
+    assert len(tip_mm) > 20
+    assert tip_mm == pytest.approx(np.tile(TIP_MM + 5.0 * WAY, (len(tip_mm), 1)))
+
+
 def test_while_a_person_is_waited_for_the_axis_is_kept_alive() -> None:
     bench = AxisOf()
     axis, before = resting(bench), bench.polls

@@ -4,16 +4,23 @@ Expected values are the limb's own: it begins at ``SURFACE_MM``.
 """
 
 import math
+import os
+import subprocess
+import sys
 import time
 
+import numpy as np
 import pytest
 
+from controller.loop import touch
 from controller.loop.modes import Mode
 from controller.loop.paired_samples import ROWS, PairedSamples
 from controller.loop.steps import Zero
 from controller.loop.touch import warm_up
+from mock_devices.testing.commands import ROOT
 from mock_devices.testing.limb_bench import BOTA, FT300, Limb, Sensor, approached
 from mock_devices.testing.spring_bench import APPROACH, PRESS, SURFACE_MM, SpringBench
+from rig.trials.contact import Loading
 
 FIRM = Limb(0.5, 0.2, 0.0)
 SENSORS = pytest.mark.parametrize("sensor", [BOTA, FT300])
@@ -86,9 +93,67 @@ def test_the_tip_rests_while_the_surface_is_estimated() -> None:
 
 def test_what_warms_up_is_the_estimate_of_an_approach_and_it_is_right() -> None:
     contact = warm_up()
-    # Fifty places 0.04 mm apart on 1 N/mm from 0 mm; the search names a place to a fraction of that.
+    # Places 0.002 mm apart on 1 N/mm from 0 mm; the search names a place to a fraction of its steps of 0.02 mm.
     assert contact.position_mm == pytest.approx(0.0, abs=0.02)
     assert contact.low_mm < 0.0 < contact.high_mm
+    # From fifty rows it would be known to a tenth of a millimetre.
+    assert contact.within_mm < 0.03
+
+
+MEMORY_TAKEN_MB = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+from controller.loop import touch
+from controller.loop.paired_samples import ROWS
+from rig.trials.contact import Loading
+
+def taken_MB():
+    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() / 2**20
+
+touch.ROWS = int(sys.argv[1])
+touch.warm_up()
+before_MB = taken_MB()
+depth_mm = np.linspace(-1.0, 8.0, ROWS)
+search = touch._search(Loading(depth_mm, np.maximum(depth_mm, 0.0), np.ones(ROWS)), 0.01)
+while not search.advance():
+    pass
+print(taken_MB() - before_MB)
+"""
+
+
+@pytest.mark.parametrize(("rows", "least_MB", "most_MB"), [(ROWS, 0.0, 4.0), (50, 16.0, 128.0)])
+def test_the_first_contact_takes_no_memory_unless_too_little_was_warmed_up(
+    rows: int, least_MB: float, most_MB: float
+) -> None:
+    said = subprocess.run(
+        [sys.executable, "-c", MEMORY_TAKEN_MB, str(rows)], capture_output=True, text=True, check=True, cwd=ROOT,
+        env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+    )  # fmt: skip
+    assert least_MB <= float(said.stdout) <= most_MB
+
+
+def test_no_surface_is_known_better_than_the_way_between_two_rows() -> None:
+    depth_mm = np.linspace(-1.0, 1.0, 20)
+    search = touch._search(Loading(depth_mm, np.maximum(depth_mm, 0.0), np.ones_like(depth_mm)), noise_N=0.001)
+    assert search
+    while not search.advance():
+        pass
+    assert search.contact.within_mm >= 2 / 19
+
+
+@pytest.mark.parametrize("seed", [8, 59, 122])
+def test_a_surface_does_not_lie_at_the_edge_of_its_own_interval(seed: int) -> None:
+    """Of noise that looks like a jump further in, the penalty for jumps makes less than the interval did."""
+    depth_mm = np.linspace(-0.5, 2.3, 200)
+    elastic_N = 0.12 * depth_mm * np.exp(0.22 * depth_mm) + 0.01
+    force_N = np.where(depth_mm > 0, elastic_N, 0.0) + np.random.default_rng(seed).normal(0.0, 0.05, len(depth_mm))
+    search = touch._search(Loading(depth_mm, force_N, np.ones_like(depth_mm)), noise_N=0.05)
+    assert search
+    while not search.advance():
+        pass
+    found = search.contact
+    assert found.low_mm + 0.1 < found.position_mm < found.high_mm - 0.1
 
 
 def test_a_portion_of_the_estimate_leaves_the_loop_its_cycle() -> None:

@@ -69,15 +69,15 @@ def test_the_first_third_of_a_millimetre_or_fifth_of_the_way_is_taken_for_air(
 ) -> None:
     asked: list[tuple[Any, ...]] = []
 
-    def search(loading: Loading, search_mm: Any, noise_N: float, families: Any, levelled: bool, rounds: int) -> Any:
-        asked.append((search_mm, noise_N, families, levelled, rounds))
+    def search(loading: Loading, search_mm: Any, noise_N: float, families: Any, rounds: int) -> Any:
+        asked.append((search_mm, noise_N, families, rounds))
 
     monkeypatch.setattr(module, "ContactSearch", search)
     places_mm = np.linspace(10.0, 10.0 + length_mm, 20)
     module._search(Loading(places_mm, places_mm, np.ones(20)), 0.05)
     ((search_mm, *rest),) = asked
     assert search_mm == pytest.approx((10.0 + air_mm, 10.0 + length_mm))
-    assert rest == [0.05, LIMB_SHAPE, False, 3]
+    assert rest == [0.05, LIMB_SHAPE, 3]
 
 
 @pytest.mark.parametrize(("dt_s", "portions"), [(0.0001, 1), (0.0005, 1), (0.001, 2), (0.01, 20)])

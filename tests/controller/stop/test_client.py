@@ -101,7 +101,7 @@ def test_the_process_gets_its_page_its_port_and_its_settings(processes: Processe
     assert processes.calls == ["terminate", 2.0]
     assert processes.stdin.closed
     assert not path.exists()
-    assert open_files() == before
+    assert open_files() <= before
 
 
 def test_a_process_that_has_ended_is_not_alive_and_one_that_hangs_is_killed(
@@ -126,7 +126,7 @@ def test_a_keypad_is_opened_here_handed_over_and_closed_here(processes: Processe
         os.fstat(keypad)
     process.close()
     os.close(writer)
-    assert open_files() == before
+    assert open_files() <= before
 
 
 @pytest.mark.parametrize(("keypad", "passed"), [(-1, [7]), (0, [7, 0]), (5, [7, 5])])

@@ -105,4 +105,4 @@ def test_a_device_is_taken_for_this_process_alone_and_given_back(
     (tmp_path / "file").write_bytes(b"")
     with pytest.raises(DeviceError, match="is no input device"):
         open_device(str(tmp_path / "file"))
-    assert open_files() == before
+    assert open_files() <= before

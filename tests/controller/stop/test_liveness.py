@@ -87,12 +87,12 @@ def test_a_loop_that_ends_is_gone_for_good_and_leaves_no_descriptor(
     life = LoopLife(page, Now())
     Responder(page).attach(process.pid)
     assert not life.gone
-    assert open_files() == before + 1
+    assert len(open_files() - before) == 1
     process.kill()
     process.wait()
     for _ in range(2):
         assert (life.gone, life.over(), life.state()) == (True, True, "gone")
-    assert open_files() == before
+    assert open_files() <= before
 
 
 def test_a_process_that_is_not_there_is_gone(page: StopWord, process: "subprocess.Popen[bytes]") -> None:
@@ -111,7 +111,7 @@ def test_a_loop_that_takes_over_is_followed_in_place_of_the_other(
     assert not life.gone
     Responder(page).attach(process.pid)
     assert not life.gone
-    assert open_files() == before + 1
+    assert len(open_files() - before) == 1
     process.kill()
     process.wait()
     assert life.gone

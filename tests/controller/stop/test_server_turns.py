@@ -244,7 +244,7 @@ def test_a_client_that_is_reset_is_forgotten(served: Served) -> None:
     client.close()
     served.server.turn()
     assert served.connections == []
-    assert open_files() == before
+    assert open_files() <= before
 
 
 def test_a_client_that_was_told_to_go_may_send_so_much_and_wait_so_long(served: Served) -> None:
@@ -327,7 +327,7 @@ def test_the_end_hangs_up_on_everybody_and_gives_everything_back(tmp_path: Path)
     assert made.listener.fileno() == -1
     client.close()
     made.page.close(unlink=True)
-    assert open_files() == before
+    assert open_files() <= before
 
 
 def test_bounds_of_the_server() -> None:

@@ -76,6 +76,16 @@ def test_the_lanes_do_not_disturb_each_other(page: StopWord) -> None:
     assert one.answer(StopRequest(1, StopReason.PAIN)) is None
 
 
+def test_each_who_asks_counts_for_itself(page: StopWord) -> None:
+    asking = [Requester(page, lane) for lane in (Lane.STOP_PROCESS, Lane.SUPERVISOR, Lane.AWAY)]
+    asked = [one.request(StopReason.STOP) for one in asking]
+    assert [request.id for request in asked] == [1, 1, 1]
+    loop = Responder(page)
+    assert loop.take(1) == (*asked,)
+    loop.answer(Deed.HELD, 1)
+    assert all(one.answer(request) for one, request in zip(asking, asked, strict=True))
+
+
 def test_what_was_asked_before_the_loop_came_counts(page: StopWord) -> None:
     request = Requester(page, Lane.SUPERVISOR).request(StopReason.EMERGENCY)
     assert Responder(page).take(1) == (request,)
@@ -154,7 +164,7 @@ def test_a_page_keeps_no_descriptor_and_is_given_back_once(tmp_path: Path) -> No
     for _ in range(2):
         page.close(unlink=True)
         assert not path.exists()
-    assert open_files() == before
+    assert open_files() <= before
     with pytest.raises(DeviceError, match="the bench is not running"):
         Requester(page, Lane.SUPERVISOR).request(StopReason.STOP)
 
@@ -168,7 +178,7 @@ def test_where_there_is_no_memory_nothing_is_left_behind(tmp_path: Path, monkeyp
     with pytest.raises(DeviceError, match="no memory for the stop word: No space left on device; free some"):
         StopWord.create(tmp_path / "e.stop")
     assert list(tmp_path.iterdir()) == []
-    assert open_files() == before
+    assert open_files() <= before
 
 
 def test_the_loop_knows_when_the_stop_process_looked_last(page: StopWord) -> None:
