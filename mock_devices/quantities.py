@@ -16,34 +16,16 @@ class Quantity(NamedTuple):
 
     meaning: str
     read: Callable[[Bench], Value]
-    write: Callable[[Bench, float], None] | None = None
+    write: Callable[[Bench, Value], None] | None = None
     low: float = -math.inf
     high: float = math.inf
     switch: bool = False
 
 
-def _move_surface(bench: Bench, position_mm: float) -> None:
-    bench.limb.wanted_mm = position_mm
-
-
-def _stiffen(bench: Bench, scale: float) -> None:
-    bench.tissue.stiffness_scale = scale
-
-
-def _include(bench: Bench, stiffness_N_mm: float) -> None:
-    bench.tissue.inclusion_N_mm = stiffness_N_mm
-
-
-def _sink_inclusion(bench: Bench, depth_mm: float) -> None:
-    bench.tissue.inclusion_mm = depth_mm
-
-
-def _hurry(bench: Bench, speed_mm_s: float) -> None:
-    bench.limb.speed_limit_mm_s = speed_mm_s
-
-
-def _place_tissue(bench: Bench, present: float) -> None:
-    bench.tissue.present = bool(present)
+def _setting(path: str) -> Callable[[Bench, Value], None]:
+    """What sets the attribute at ``path`` below the bench."""
+    owner, _, attribute = path.partition(".")
+    return lambda bench, value: setattr(getattr(bench, owner), attribute, value)
 
 
 def _zero(bench: Bench, zero_N: float) -> None:
@@ -58,14 +40,6 @@ def _push_aside(bench: Bench, lateral_N: float) -> None:
     bench.force.lateral_N = bench.force_modbus.lateral_N = lateral_N
 
 
-def _show_tip(bench: Bench, seen: float) -> None:
-    bench.tracker.tip_in_view = bool(seen)
-
-
-def _show_arm(bench: Bench, seen: float) -> None:
-    bench.tracker.arm_in_view = bool(seen)
-
-
 QUANTITIES: dict[str, Quantity] = {
     "time_s": Quantity("time simulated since the bench started", lambda bench: bench.time_s),
     "axis.position_mm": Quantity("true position of the carriage", lambda bench: bench.axis.position_mm),
@@ -78,22 +52,42 @@ QUANTITIES: dict[str, Quantity] = {
     "tip.depth_mm": Quantity("tip below the surface", lambda bench: bench.tip_mm - bench.limb.position_mm),
     "tip.force_N": Quantity("true force of the tissue on the tip", lambda bench: bench.contact_N),
     "surface.position_mm": Quantity(
-        "where the limb's surface is; set: where it goes", lambda bench: bench.limb.position_mm, _move_surface, -50, 150
+        "where the limb's surface is; set: where it goes",
+        lambda bench: bench.limb.position_mm,
+        _setting("limb.wanted_mm"),
+        -50,
+        150,
     ),
     "surface.speed_mm_s": Quantity(
-        "how fast the limb goes to where it was told", lambda bench: bench.limb.speed_limit_mm_s, _hurry, 0.01, 1000
+        "how fast the limb goes to where it was told",
+        lambda bench: bench.limb.speed_limit_mm_s,
+        _setting("limb.speed_limit_mm_s"),
+        0.01,
+        1000,
     ),
     "tissue.inclusion_mm": Quantity(
-        "depth at which something stiff begins", lambda bench: bench.tissue.inclusion_mm, _sink_inclusion, 0, 100
+        "depth at which something stiff begins",
+        lambda bench: bench.tissue.inclusion_mm,
+        _setting("tissue.inclusion_mm"),
+        0,
+        100,
     ),
     "tissue.inclusion_N_mm": Quantity(
-        "what it adds per millimetre; 0: there is none", lambda bench: bench.tissue.inclusion_N_mm, _include, 0, 100
+        "what it adds per millimetre; 0: there is none",
+        lambda bench: bench.tissue.inclusion_N_mm,
+        _setting("tissue.inclusion_N_mm"),
+        0,
+        100,
     ),
     "tissue.stiffness_scale": Quantity(
-        "factor on the elastic force", lambda bench: bench.tissue.stiffness_scale, _stiffen, 0, 20
+        "factor on the elastic force",
+        lambda bench: bench.tissue.stiffness_scale,
+        _setting("tissue.stiffness_scale"),
+        0,
+        20,
     ),
     "tissue.present": Quantity(
-        "whether there is a limb at all", lambda bench: bench.tissue.present, _place_tissue, switch=True
+        "whether there is a limb at all", lambda bench: bench.tissue.present, _setting("tissue.present"), switch=True
     ),
     "load.axial_N": Quantity(
         "weight on the tip along the axis, below 0: hanging from it", lambda bench: bench.weight_N, _press, -200, 200
@@ -103,8 +97,12 @@ QUANTITIES: dict[str, Quantity] = {
     ),
     "force.zero_N": Quantity("zero of the axial channel", lambda bench: bench.force.zero[bench.force.axis], _zero),
     "force.temperature_C": Quantity("inside the sensor", lambda bench: bench.force.temperature_C),
-    "tracker.tip_in_view": Quantity("tool tip seen", lambda bench: bench.tracker.tip_in_view, _show_tip, switch=True),
-    "tracker.arm_in_view": Quantity("tool arm seen", lambda bench: bench.tracker.arm_in_view, _show_arm, switch=True),
+    "tracker.tip_in_view": Quantity(
+        "tool tip seen", lambda bench: bench.tracker.tip_in_view, _setting("tracker.tip_in_view"), switch=True
+    ),
+    "tracker.arm_in_view": Quantity(
+        "tool arm seen", lambda bench: bench.tracker.arm_in_view, _setting("tracker.arm_in_view"), switch=True
+    ),
 }
 
 
@@ -117,15 +115,15 @@ def write(bench: Bench, name: str, value: object) -> None:
     """Sets ``name`` to ``value``; raises UsageError."""
     settable = [key for key, quantity in QUANTITIES.items() if quantity.write]
     quantity = QUANTITIES[known(name, settable, "settable quantity")]
-    number = _checked(name, quantity, value)
+    checked = _checked(name, quantity, value)
     if quantity.write:
-        quantity.write(bench, number)
+        quantity.write(bench, checked)
 
 
-def _checked(name: str, quantity: Quantity, value: object) -> float:
+def _checked(name: str, quantity: Quantity, value: object) -> Value:
     if quantity.switch:
         if isinstance(value, bool):
-            return float(value)
+            return value
         raise UsageError(f"{name} takes true or false, not with {value!r}")
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise UsageError(f"{name} takes a number, not {value!r}")

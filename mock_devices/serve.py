@@ -6,7 +6,6 @@ until the next mock is due or bytes have come, integrates physics exactly to tha
 
 import argparse
 import contextlib
-import ctypes
 import gc
 import os
 import select
@@ -28,6 +27,7 @@ from mock_devices.physics.effects import EFFECTS, complete, knobs, parse_hidden,
 from mock_devices.robotiq.mock import RobotiqMock
 from rig.config.endpoints import Endpoints
 from rig.errors import RigError
+from rig.realtime import ask_fifo, lock_memory, shorten_timer_slack
 
 # A client's bytes that came during a stall were sent before its end: they are heard before time is caught up, or every
 # stall of this process would look like a lost heartbeat. What the axis was told is heard line by line over the stall:
@@ -39,8 +39,6 @@ NAP_S = 0.1  # of physics are 1.2 ms of work, which is in time (LATE_NS)
 LEAD_S = 0.001
 # All devices have booted when the endpoints are printed.
 POWERED_BEFORE_NS = 500_000_000
-PR_SET_TIMERSLACK = 29
-MCL_CURRENT_AND_FUTURE = 3
 
 
 class Timed(Protocol):
@@ -228,17 +226,13 @@ def _be_prompt(priority: int) -> None:
     """Asks for short timer slack and, where wanted, real-time priority; says so where it is not granted."""
     gc.collect()
     gc.freeze()
-    with contextlib.suppress(OSError, AttributeError):
-        ctypes.CDLL(None).prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    shorten_timer_slack()
     if not priority:
         return
     # What the computer puts aside of a bench that rested is read again from a disk others write to: 0.45 s were seen.
-    with contextlib.suppress(OSError, AttributeError):
-        ctypes.CDLL(None).mlockall(MCL_CURRENT_AND_FUTURE)
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except (OSError, AttributeError) as error:
-        sys.stderr.write(f"bench: runs without real-time priority {priority} ({error})\n")
+    lock_memory()
+    if refused := ask_fifo(priority):
+        sys.stderr.write(f"bench: runs without real-time priority {priority} ({refused})\n")
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -4,67 +4,26 @@ from collections.abc import Mapping
 
 from mock_devices.bota.mock import BotaMock
 from mock_devices.epos4.mock import Epos4Mock
-from mock_devices.faults.wires import FaultKind, Value, as_number, as_switch
+from mock_devices.faults.wires import FaultKind, Value, as_number, as_switch, switching
 from mock_devices.ndi.mock import NdiMock
 from mock_devices.robotiq.mock import RobotiqMock
 from rig.errors import UsageError
 
 ASTRAY_LARGEST_MM_S = 500.0  # eight times the fastest axis: more is a slip of the unit
-AnySensor = BotaMock | RobotiqMock
 
 
 def _whole(value: Value, high: int) -> int:
     return round(as_number(value, 0, high))
 
 
-def _sensor_silent(sensor: AnySensor, value: Value) -> None:
-    sensor.silent = as_switch(value)
-
-
-def _sensor_frozen(sensor: AnySensor, value: Value) -> None:
-    sensor.frozen = as_switch(value)
-
-
-def _sensor_invalid(sensor: AnySensor, value: Value) -> None:
-    sensor.invalid = as_switch(value)
-
-
-def _sensor_stranger(sensor: AnySensor, value: Value) -> None:
-    sensor.wrong_identity = as_switch(value)
-
-
-def _sensor_corrupt(sensor: AnySensor, value: Value) -> None:
-    sensor.corrupt_every = _whole(value, 1_000_000)
+def _corrupt(device: BotaMock | RobotiqMock | NdiMock, value: Value) -> None:
+    device.corrupt_every = _whole(value, 1_000_000)
 
 
 def _refuse(sensor: BotaMock, value: Value) -> None:
     if not isinstance(value, str):
         raise UsageError(f"this fault takes the letters of the commands to refuse, not {value!r}")
     sensor.refuse = value
-
-
-def _mute_start(sensor: RobotiqMock, value: Value) -> None:
-    sensor.mute_start = as_switch(value)
-
-
-def _deaf(sensor: RobotiqMock, value: Value) -> None:
-    sensor.deaf = as_switch(value)
-
-
-def _refuse_stream(sensor: RobotiqMock, value: Value) -> None:
-    sensor.refuse_stream = as_switch(value)
-
-
-def _tracker_silent(tracker: NdiMock, value: Value) -> None:
-    tracker.silent = as_switch(value)
-
-
-def _tracker_frozen(tracker: NdiMock, value: Value) -> None:
-    tracker.frozen = as_switch(value)
-
-
-def _tracker_corrupt(tracker: NdiMock, value: Value) -> None:
-    tracker.corrupt_every = _whole(value, 1_000_000)
 
 
 def _missing(tracker: NdiMock, value: Value) -> None:
@@ -82,22 +41,6 @@ def _tools(value: Value) -> set[int]:
 
 def _error_reply(tracker: NdiMock, value: Value) -> None:
     tracker.error_reply = None if value is False else _whole(value, 0xFF)
-
-
-def _axis_silent(axis: Epos4Mock, value: Value) -> None:
-    axis.silent = as_switch(value)
-
-
-def _axis_frozen(axis: Epos4Mock, value: Value) -> None:
-    axis.frozen = as_switch(value)
-
-
-def _axis_stranger(axis: Epos4Mock, value: Value) -> None:
-    axis.wrong_identity = as_switch(value)
-
-
-def _axis_unguarded(axis: Epos4Mock, value: Value) -> None:
-    axis.unguarded = as_switch(value)
 
 
 def _astray(axis: Epos4Mock, value: Value) -> None:
@@ -118,36 +61,36 @@ def _lasting_error(axis: Epos4Mock, value: Value) -> None:
 
 
 BOTA_FAULTS: Mapping[str, FaultKind[BotaMock]] = {
-    "silent": FaultKind("sends nothing", True, _sensor_silent),
-    "frozen": FaultKind("repeats the last forces under running time", True, _sensor_frozen),
-    "invalid": FaultKind("flags its measurements as invalid", True, _sensor_invalid),
-    "wrong_identity": FaultKind("prints another maker's name after a reset", True, _sensor_stranger),
-    "corrupt_every": FaultKind("spoils the checksum of every n-th frame; 0: none", 10, _sensor_corrupt),
+    "silent": FaultKind("sends nothing", True, switching("silent")),
+    "frozen": FaultKind("repeats the last forces under running time", True, switching("frozen")),
+    "invalid": FaultKind("flags its measurements as invalid", True, switching("invalid")),
+    "wrong_identity": FaultKind("prints another maker's name after a reset", True, switching("wrong_identity")),
+    "corrupt_every": FaultKind("spoils the checksum of every n-th frame; 0: none", 10, _corrupt),
     "refuse": FaultKind("answers these commands with code 1", "R", _refuse),
 }
 ROBOTIQ_FAULTS: Mapping[str, FaultKind[RobotiqMock]] = {
-    "silent": FaultKind("sends nothing", True, _sensor_silent),
-    "frozen": FaultKind("repeats the last forces", True, _sensor_frozen),
-    "invalid": FaultKind("gives the converter's end on all channels", True, _sensor_invalid),
-    "wrong_identity": FaultKind("has firmware letters that are no force sensor's", True, _sensor_stranger),
-    "corrupt_every": FaultKind("spoils the checksum of every n-th frame; 0: none", 10, _sensor_corrupt),
-    "mute_start": FaultKind("starts the stream without answering", True, _mute_start),
-    "deaf": FaultKind("streams on whatever comes", True, _deaf),
-    "refuse_stream": FaultKind("answers the start of the stream with exception 3", True, _refuse_stream),
+    "silent": FaultKind("sends nothing", True, switching("silent")),
+    "frozen": FaultKind("repeats the last forces", True, switching("frozen")),
+    "invalid": FaultKind("gives the converter's end on all channels", True, switching("invalid")),
+    "wrong_identity": FaultKind("has firmware letters that are no force sensor's", True, switching("wrong_identity")),
+    "corrupt_every": FaultKind("spoils the checksum of every n-th frame; 0: none", 10, _corrupt),
+    "mute_start": FaultKind("starts the stream without answering", True, switching("mute_start")),
+    "deaf": FaultKind("streams on whatever comes", True, switching("deaf")),
+    "refuse_stream": FaultKind("answers the start of the stream with exception 3", True, switching("refuse_stream")),
 }
 NDI_FAULTS: Mapping[str, FaultKind[NdiMock]] = {
-    "silent": FaultKind("answers nothing", True, _tracker_silent),
-    "frozen": FaultKind("answers, but the frame number stands still", True, _tracker_frozen),
-    "corrupt_every": FaultKind("one bit is wrong in every n-th reply; 0: none", 10, _tracker_corrupt),
+    "silent": FaultKind("answers nothing", True, switching("silent")),
+    "frozen": FaultKind("answers, but the frame number stands still", True, switching("frozen")),
+    "corrupt_every": FaultKind("one bit is wrong in every n-th reply; 0: none", 10, _corrupt),
     "missing": FaultKind("the tool of this index is MISSING; false: none", 0, _missing),
     "unplugged": FaultKind("the tool of this index is pulled out of its port; false: none", 0, _unplugged),
     "error_reply": FaultKind("answers TX and BX with this ERROR code; false: none", 0x0D, _error_reply),
 }
 EPOS4_FAULTS: Mapping[str, FaultKind[Epos4Mock]] = {
-    "silent": FaultKind("neither hears nor sends anything", True, _axis_silent),
-    "frozen": FaultKind("repeats the position it had", True, _axis_frozen),
-    "wrong_identity": FaultKind("has another maker and product", True, _axis_stranger),
-    "unguarded": FaultKind("watches neither heartbeats nor its own limits any more", True, _axis_unguarded),
+    "silent": FaultKind("neither hears nor sends anything", True, switching("silent")),
+    "frozen": FaultKind("repeats the position it had", True, switching("frozen")),
+    "wrong_identity": FaultKind("has another maker and product", True, switching("wrong_identity")),
+    "unguarded": FaultKind("watches neither heartbeats nor its own limits any more", True, switching("unguarded")),
     "astray": FaultKind(
         "its set-points run away from those that were sent at this speed, mm/s; 0: no more", 10.0, _astray
     ),

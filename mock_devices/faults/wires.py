@@ -140,6 +140,16 @@ def as_number(value: Value, low: float, high: float) -> float:
     return float(value)
 
 
+def switching(attribute: str) -> Callable[[object, Value], None]:
+    """What sets ``attribute`` of a wire or device to on or off."""
+    return lambda target, value: setattr(target, attribute, as_switch(value))
+
+
+def setting(attribute: str, high: float) -> Callable[[object, Value], None]:
+    """What sets ``attribute`` of a wire or device to a number from 0 to ``high``."""
+    return lambda target, value: setattr(target, attribute, as_number(value, 0, high))
+
+
 def _cut(wire: FaultyWire, value: Value) -> None:
     if as_switch(value):
         wire.close()
@@ -152,30 +162,6 @@ def _unplug(wire: FaultyWire, value: Value) -> None:
         wire.plug()
 
 
-def _freeze(wire: FaultyWire, value: Value) -> None:
-    wire.frozen = as_switch(value)
-
-
-def _drop(wire: FaultyWire, value: Value) -> None:
-    wire.drop_share = as_number(value, 0, 1)
-
-
-def _corrupt(wire: FaultyWire, value: Value) -> None:
-    wire.corrupt_share = as_number(value, 0, 1)
-
-
-def _truncate(wire: FaultyWire, value: Value) -> None:
-    wire.truncate_share = as_number(value, 0, 1)
-
-
-def _garbage(wire: FaultyWire, value: Value) -> None:
-    wire.garbage_share = as_number(value, 0, 1)
-
-
-def _delay(wire: FaultyWire, value: Value) -> None:
-    wire.delay_s = as_number(value, 0, 10)
-
-
 def _heal(wire: FaultyWire, value: Value) -> None:
     if as_switch(value):
         wire.heal()
@@ -184,11 +170,13 @@ def _heal(wire: FaultyWire, value: Value) -> None:
 WIRE_FAULTS: Mapping[str, FaultKind[FaultyWire]] = {
     "cut": FaultKind("the cable is pulled: the client sees a hang-up; for good", True, _cut),
     "unplug": FaultKind("the cable is pulled, and with false plugged in again under the same address", True, _unplug),
-    "freeze": FaultKind("nothing passes any more in either direction, though the line stays open", True, _freeze),
-    "drop": FaultKind("this share of messages is lost", 0.1, _drop),
-    "corrupt": FaultKind("one bit is flipped in this share of messages", 0.1, _corrupt),
-    "truncate": FaultKind("this share of messages ends too early", 0.1, _truncate),
-    "garbage": FaultKind("this share of messages has random bytes in front of it", 0.1, _garbage),
-    "delay": FaultKind("messages arrive this many seconds late", 0.05, _delay),
+    "freeze": FaultKind(
+        "nothing passes any more in either direction, though the line stays open", True, switching("frozen")
+    ),
+    "drop": FaultKind("this share of messages is lost", 0.1, setting("drop_share", 1)),
+    "corrupt": FaultKind("one bit is flipped in this share of messages", 0.1, setting("corrupt_share", 1)),
+    "truncate": FaultKind("this share of messages ends too early", 0.1, setting("truncate_share", 1)),
+    "garbage": FaultKind("this share of messages has random bytes in front of it", 0.1, setting("garbage_share", 1)),
+    "delay": FaultKind("messages arrive this many seconds late", 0.05, setting("delay_s", 10)),
     "heal": FaultKind("the wire is well again, unless it was cut", True, _heal),
 }

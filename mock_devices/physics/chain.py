@@ -65,8 +65,8 @@ class Viscous(HiddenEffect, ABC):
     """Replaces the viscous term."""
 
     @abstractmethod
-    def __call__(self, speed_mm_s: float) -> float:
-        """Newtons at ``speed_mm_s`` into the tissue."""
+    def __call__(self, speed_mm_s: float, elastic_N: float) -> float:
+        """Newtons at ``speed_mm_s`` into the tissue, given the elastic force now."""
 
 
 class Hereditary(HiddenEffect, ABC):

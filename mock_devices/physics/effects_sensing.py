@@ -39,6 +39,55 @@ class TipInertia(Guide):
 
 
 @dataclass
+class Cogging(Guide):
+    """Magnets of a linear motor pull by themselves: A (sin(2 pi x / p) + 0.3 sin(4 pi x / p + 1)), in air too."""
+
+    level_N: float = knob(0.1, 0, 5, "A")
+    period_mm: float = knob(2.0, 0.2, 50, "pitch of the magnets")
+    _way_mm: float = field(default=0.0, init=False)
+
+    def __call__(self, moved_mm: float, _acceleration_mm_s2: float) -> float:
+        """Newtons along the axis."""
+        self._way_mm += moved_mm
+        turn = math.tau * self._way_mm / self.period_mm
+        return self.level_N * (math.sin(turn) + 0.3 * math.sin(2 * turn + 1))
+
+
+@dataclass
+class CrossTalk(Guide):
+    """A cable is drawn out by the axis and pulls on the sensor, with the square of the way, in air too."""
+
+    level_N: float = knob(0.2, -5, 5, "after 10 mm")
+    _way_mm: float = field(default=0.0, init=False)
+
+    def __call__(self, moved_mm: float, _acceleration_mm_s2: float) -> float:
+        """Newtons of the cable."""
+        self._way_mm += moved_mm
+        return self.level_N * (self._way_mm / 10) ** 2
+
+
+@dataclass
+class SensorHysteresis(Sensing):
+    """A sensor's body remembers: falling forces read more, by plays of several widths (Kuhnen 2003)."""
+
+    level_N: float = knob(0.2, 0, 5, "reading on the way down over that on the way up")
+    width_N: float = knob(0.5, 0.005, 50, "mean fall of force that brings it out")
+
+    BRANCHES = (0.8, 0.9, 1.0, 1.1, 1.2)  # widths, in shares of their mean
+
+    def __post_init__(self) -> None:
+        self._followers = [0.0] * len(self.BRANCHES)
+
+    def __call__(self, force_N: float) -> float:
+        """The force with what is remembered."""
+        widths = (self.width_N * share for share in self.BRANCHES)
+        pairs = zip(self._followers, widths, strict=True)
+        self._followers = [min(max(place_N, force_N), force_N + width_N) for place_N, width_N in pairs]
+        ahead_N = sum(self._followers) / len(self._followers) - force_N
+        return force_N + self.level_N * ahead_N / self.width_N
+
+
+@dataclass
 class FilterLag(Sensing):
     """A first-order low-pass in the force channel."""
 
@@ -65,6 +114,28 @@ class TimeOffset(Sensing):
         """The force of ``delay_s`` ago."""
         self._line.append(force_N)
         return self._line.popleft()
+
+
+@dataclass
+class ClockDrift(Sensing):
+    """The force's clock runs fast: its stamps come later and later against the position's."""
+
+    gain_ppm: float = knob(500.0, 0, 5000, "seconds gained in a million")
+    _steps: int = field(default=0, init=False)
+
+    LONGEST_STEPS = round(0.2 / STEP_S)
+
+    def __post_init__(self) -> None:
+        self._past: deque[float] = deque([0.0, 0.0], maxlen=self.LONGEST_STEPS)
+
+    def __call__(self, force_N: float) -> float:
+        """The force of the time that the clock has come to be late by."""
+        self._past.append(force_N)
+        self._steps += 1
+        late = min(1e-6 * self.gain_ppm * self._steps, len(self._past) - 2.0)
+        whole = int(late)
+        newer, older = self._past[-1 - whole], self._past[-2 - whole]
+        return newer + (late - whole) * (older - newer)
 
 
 @dataclass

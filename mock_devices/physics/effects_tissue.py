@@ -79,10 +79,63 @@ class RateLaw(Viscous):
     exponent: float = knob(0.4, 0.2, 1.5, "n")
     level_N: float = knob(0.4, 0, 2, "force at 10 mm/s")
 
-    def __call__(self, speed_mm_s: float) -> float:
+    def __call__(self, speed_mm_s: float, _elastic_N: float) -> float:
         """Newtons at this speed."""
         speed = max(abs(speed_mm_s), LINEAR_BELOW_MM_S)
         return self.level_N * math.pow(speed / REFERENCE_MM_S, self.exponent) * speed_mm_s / speed
+
+
+@dataclass
+class HuntCrossleyDamping(Viscous):
+    """Viscous force lambda v times the elastic one instead of B v, so that none is there at contact."""
+
+    damping_s_mm: float = knob(0.01, 0, 0.2, "lambda")
+
+    def __call__(self, speed_mm_s: float, elastic_N: float) -> float:
+        """Newtons at this speed and load."""
+        return self.damping_s_mm * speed_mm_s * elastic_N
+
+
+@dataclass
+class Mullins(Factor):
+    """Softening by the largest load borne: factor 1 - m erf((X^2 - x^2) / r^2), X the deepest so far (Mullins 1969)."""
+
+    softening: float = knob(0.3, 0, 0.9, "m, the largest share lost")
+    reach_mm: float = knob(4.0, 0.2, 40, "r, in depth as a spring's energy has it")
+    _deepest_mm: float = field(default=0.0, init=False)
+
+    def __call__(self, depth_mm: float, _time_s: float) -> float:
+        """The factor at this depth."""
+        self._deepest_mm = max(self._deepest_mm, depth_mm)
+        return 1.0 - self.softening * math.erf((self._deepest_mm**2 - depth_mm**2) / self.reach_mm**2)
+
+
+@dataclass
+class PowerLawRelaxation(Hereditary):
+    """Fractional memory: what a rise of the elastic force leaves fades as g (1 + t / t0)^-n."""
+
+    ratio: float = knob(0.5, 0, 3, "g, at once")
+    begin_s: float = knob(0.02, 0.002, 10, "t0")
+    exponent: float = knob(0.3, 0.1, 2, "n")
+    _elastic_N: float = field(default=0.0, init=False)
+
+    WIDTH, SLOWEST, FASTEST = 0.5, -14.0, 2.5  # of ln s below; the fastest holds exp(-12) of the rest
+
+    def __post_init__(self) -> None:
+        # Gamma(n) (1 + t/t0)^-n is the integral of s^n exp(-s) exp(-s t/t0) over ln s; what is slower stands still.
+        places = [self.SLOWEST + self.WIDTH * k for k in range(round((self.FASTEST - self.SLOWEST) / self.WIDTH) + 1)]
+        shares = [self.WIDTH * math.exp(self.exponent * u - math.exp(u)) / math.gamma(self.exponent) for u in places]
+        shares[0] += 1.0 - math.fsum(shares)
+        keep = [math.exp(-STEP_S / self.begin_s * math.exp(u)) for u in places]
+        self._terms = [(kept, self.ratio * share * math.sqrt(kept)) for kept, share in zip(keep, shares, strict=True)]
+        self._left_N = [0.0] * len(places)
+
+    def __call__(self, elastic_N: float) -> float:
+        """Newtons that relax."""
+        rise_N, self._elastic_N = elastic_N - self._elastic_N, elastic_N
+        pairs = zip(self._terms, self._left_N, strict=True)
+        self._left_N = [kept * left_N + gain * rise_N for (kept, gain), left_N in pairs]
+        return math.fsum(self._left_N)
 
 
 @dataclass

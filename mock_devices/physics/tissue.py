@@ -59,7 +59,7 @@ class TissueLaw:
             for factor in chain.factors:
                 elastic_N *= factor(depth_mm, time_s)
             elastic_N += self.included_N(depth_mm)
-            viscous_N = self._viscosity * speed_mm_s if chain.viscous is None else chain.viscous(speed_mm_s)
+            viscous_N = self._viscosity * speed_mm_s if chain.viscous is None else chain.viscous(speed_mm_s, elastic_N)
         force_N = elastic_N + viscous_N
         for memory in chain.memories:
             force_N += memory(elastic_N)

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from urllib.request import Request, urlopen
+from uuid import uuid4
 
+from mock_devices.testing.access import bearer
 from mock_devices.testing.commands import PATIENCE_S, Running, ServedBench, children, free_port, until
 
 ANSWER_S = 30.0  # connecting a device is waited for, and a busy computer
@@ -32,7 +34,12 @@ class ServedRig:
     def ask(self, method: str, path: str, body: object = None, lease: str = "") -> Any:
         """One request; ``path`` is what follows /api/v1."""
         data = None if body is None else json.dumps(body).encode()
-        headers = {"Content-Type": "application/json", "X-Control-Lease": lease}
+        headers = {
+            "Content-Type": "application/json",
+            "X-Control-Lease": lease,
+            **bearer(),
+            "Idempotency-Key": uuid4().hex,
+        }
         request = Request(f"{self.address}/api/v1{path}", data, headers, method=method)
         with urlopen(request, timeout=ANSWER_S) as answer:
             return json.load(answer)

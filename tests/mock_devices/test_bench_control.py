@@ -16,6 +16,7 @@ import mock_devices
 from mock_devices.control import BenchControl, ControlPort, ControlRequest, RequestHandler
 from mock_devices.faults.wires import WIRE_FAULTS, FaultyWire, faults_of
 from mock_devices.parameters import Parameters, load_parameters
+from mock_devices.quantities import QUANTITIES, read, write
 from mock_devices.wire import PtyWire
 from rig.channel import Frame, Parser, encode
 from rig.errors import DeviceError, RigError, UsageError
@@ -46,6 +47,15 @@ def test_figures_are_read_by_name(handler: RequestHandler) -> None:
     assert ask(handler, {"get": ["tip.force_N", "axis.position_mm", "time_s", "tissue.present"]}) == {
         "get": {"tip.force_N": 0.0, "axis.position_mm": 5.0, "time_s": 0.0, "tissue.present": True}
     }
+
+
+def test_every_quantity_that_can_be_set_sets_an_attribute_that_there_is() -> None:
+    bench = quiet_bench()
+    parts = [bench, *(part for part in vars(bench).values() if hasattr(part, "__dict__"))]
+    attributes = [set(vars(part)) for part in parts]
+    for name in (name for name, quantity in QUANTITIES.items() if quantity.write):
+        write(bench, name, read(bench, name))
+    assert [set(vars(part)) for part in parts] == attributes
 
 
 def test_times_at_which_the_drive_was_synced_are_told_once() -> None:

@@ -13,6 +13,8 @@ NAMES = [
     *("relaxation", "rate_law", "friction", "backlash", "frame_compliance", "contact_offset", "substrate"),
     *("zero_drift", "gain_error", "time_offset", "tracker_latency", "filter_lag", "surface_motion", "preconditioning"),
     *("adhesion", "tip_inertia", "position_ripple", "temperature", "elastic_law"),
+    *("second_relaxation", "third_relaxation", "power_law_relaxation", "hunt_crossley", "mullins"),
+    *("sensor_hysteresis", "clock_drift", "surface_motion_harmonic", "cogging", "cross_talk"),
 ]
 DIMENSIONLESS = {"ratio", "exponent", "strength", "gain", "softening", "cycles", "weight", "fung_share"}
 
@@ -23,7 +25,7 @@ def test_the_library_has_exactly_the_agreed_names() -> None:
 
 @pytest.mark.parametrize("effect", NAMES)
 def test_every_parameter_carries_its_unit_and_its_default_lies_within_its_bounds(effect: str) -> None:
-    units = ("_N", "_mm", "_s", "_Hz", "_rad", "_kg", "_C", "_mm_N", "_N_h", "_per_K", "_per_mm")
+    units = ("_N", "_mm", "_s", "_Hz", "_rad", "_kg", "_C", "_mm_N", "_N_h", "_per_K", "_per_mm", "_s_mm", "_ppm")
     assert statement(effect)
     for name, knob in knobs(effect).items():
         assert name.endswith(units) or name in DIMENSIONLESS
@@ -207,6 +209,23 @@ def test_tip_inertia_is_felt_in_the_air_as_mass_times_acceleration() -> None:
     assert force_N / swing_mm == pytest.approx(-0.2e-3 * (math.tau * 5) ** 2, rel=0.03)
 
 
+def test_magnets_pull_in_the_air_and_again_after_their_pitch() -> None:
+    bench = quiet_bench({"cogging": {"level_N": 0.1, "period_mm": 4.0}})
+    trace = play(bench, lambda t: 5 + 8 * min(t, 1.0), 1.5)
+    from_start = trace.tip_mm - trace.tip_mm[0]
+    turn = math.tau * from_start / 4.0
+    expected_N = 0.1 * (np.sin(turn) + 0.3 * np.sin(2 * turn + 1))
+    assert trace.force_N[10:] - trace.force_N[10] == pytest.approx(expected_N[10:] - expected_N[10], abs=0.01)
+    assert np.ptp(trace.force_N) > 0.15
+
+
+def test_a_cable_pulls_with_the_square_of_the_way() -> None:
+    bench = quiet_bench({"cross_talk": {"level_N": 0.2}})
+    trace = play(bench, lambda t: 5 + 8 * min(t, 1.0), 1.5)
+    slope = np.polynomial.Polynomial.fit(trace.tip_mm[10:], trace.force_N[10:], 2).convert().coef
+    assert slope[2] == pytest.approx(0.2 / 100, rel=0.02)
+
+
 def test_position_ripple_repeats_with_the_lead_of_the_screw() -> None:
     bench = quiet_bench({"position_ripple": {"amplitude_mm": 0.05, "period_mm": 4.0, "phase_rad": 0.0}})
     for position_mm in (9.0, 13.0, 11.0):
@@ -239,6 +258,62 @@ def test_elastic_law_has_another_shape_but_the_same_force_where_it_is_matched(
     settle(bench, SURFACE_MM + 8, 3.0)
     assert bench.contact_N == pytest.approx(bench.tissue.elastic_N(8.0), abs=2e-3)
     assert half_N / bench.contact_N == pytest.approx(half_over_full, abs=1e-3)
+
+
+def test_power_law_relaxation_fades_as_a_power_of_time_in_a_hold() -> None:
+    hidden = {"ratio": 0.5, "begin_s": 0.05, "exponent": 0.4}
+    bench = quiet_bench({"power_law_relaxation": hidden})
+    trace = play(bench, stroke(30.0, 8.0, hold_s=5.0), 4.0)
+    rest_N = bench.tissue.elastic_N(float(trace.tip_mm[-1]) - SURFACE_MM)
+    # Long after a rise of 0.3 s each part of it fades alike, as if all of it had come near its end.
+    left = (trace.force_N[trace.at(3.8)] - rest_N) / (trace.force_N[trace.at(1.0)] - rest_N)
+    ended_s = 0.36
+    expected = [(1 + (at_s - ended_s) / 0.05) ** -0.4 for at_s in (3.8, 1.0)]
+    assert left == pytest.approx(expected[0] / expected[1], rel=0.05)
+
+
+def test_hunt_crossley_damping_is_nothing_at_contact_and_grows_with_the_load() -> None:
+    bench = quiet_bench({"hunt_crossley": {"damping_s_mm": 0.01}})
+    trace = play(bench, stroke(20.0, 8.0), 0.62)
+    depth_mm = trace.tip_mm - SURFACE_MM
+    for at_mm in (2.0, 6.0):
+        here = crossing(depth_mm, at_mm)
+        speed_mm_s = float(np.gradient(trace.tip_mm, trace.time_s)[here])
+        elastic_N = bench.tissue.elastic_N(float(depth_mm[here]))
+        assert trace.force_N[here] / elastic_N == pytest.approx(1 + 0.01 * speed_mm_s, rel=0.01)
+
+
+def test_mullins_softening_is_below_the_deepest_place_so_far_only() -> None:
+    bench = quiet_bench({"mullins": {"softening": 0.3, "reach_mm": 4.0}})
+
+    def share(depth_mm: float) -> float:
+        settle(bench, SURFACE_MM + depth_mm, 2.0)
+        return bench.contact_N / bench.tissue.elastic_N(depth_mm)
+
+    assert share(4.0) == pytest.approx(1.0, abs=1e-3)
+    assert share(6.0) == pytest.approx(1.0, abs=1e-3)
+    assert share(4.0) == pytest.approx(1 - 0.3 * math.erf((36 - 16) / 16), abs=1e-3)
+
+
+def test_sensor_hysteresis_reads_more_once_the_force_has_fallen() -> None:
+    bench = quiet_bench({"sensor_hysteresis": {"level_N": 0.2, "width_N": 0.3}})
+    up = settle(bench, SURFACE_MM + 6, 2.0)
+    # An axis that overshoots has come down a little.
+    assert up.force_N[-1] < up.contact_N[-1] + 0.1
+    settle(bench, SURFACE_MM + 8, 2.0)
+    down = settle(bench, SURFACE_MM + 6, 2.0)
+    assert 0.12 < down.force_N[-1] - down.contact_N[-1] < 0.2
+
+
+def test_clock_drift_makes_the_force_later_and_later() -> None:
+    bench = quiet_bench({"clock_drift": {"gain_ppm": 5000.0}})
+    settle(bench, SURFACE_MM - 1, 4.0)
+    trace = play(bench, stroke(20.0, 8.0), 0.5)
+    now = 400
+    late_s = 5e-3 * float(trace.time_s[now])
+    before = now - round(1000 * late_s)
+    assert trace.force_N[now] == pytest.approx(trace.contact_N[before], abs=0.02)
+    assert late_s > 0.02
 
 
 def test_several_effects_act_together() -> None:

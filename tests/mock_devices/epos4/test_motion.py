@@ -135,21 +135,22 @@ def test_a_set_point_beyond_the_software_limit_is_an_error(bench: DriveBench) ->
     assert upload(bench, 0x603F, kind="H") == 0x8A82
 
 
-def test_running_out_of_the_software_limit_is_an_error(bench: DriveBench) -> None:
+def run_past_software_limit(bench: DriveBench) -> None:
     download(bench, 0x607D, 2, 4, 4000)
     download(bench, 0x60FF, 0, 4, 240)
     enabled(bench, 3)
     follow(bench, 0.5)
+
+
+def test_running_out_of_the_software_limit_is_an_error(bench: DriveBench) -> None:
+    run_past_software_limit(bench)
     assert upload(bench, 0x603F, kind="H") == 0x8A82
     assert bench.plant.position_mm == pytest.approx(8 + 2.0, abs=0.6)
 
 
 def test_an_unguarded_drive_runs_out_of_its_software_limit(bench: DriveBench) -> None:
     bench.mock.unguarded = True
-    download(bench, 0x607D, 2, 4, 4000)
-    download(bench, 0x60FF, 0, 4, 240)
-    enabled(bench, 3)
-    follow(bench, 0.5)
+    run_past_software_limit(bench)
     assert upload(bench, 0x603F, kind="H") == 0
 
 

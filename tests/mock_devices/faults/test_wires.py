@@ -153,8 +153,10 @@ def test_every_device_has_every_wire_fault_and_its_own_and_takes_each_at_its_def
     ]
     for device in devices:
         assert set(WIRE_FAULTS) | {"silent", "frozen"} <= set(device.faults)
+        before = vars(device.mock).keys() | vars(device.wire).keys()
         for fault in device.faults.values():
             fault.apply(fault.default)
+        assert vars(device.mock).keys() | vars(device.wire).keys() == before  # a slip of a name would add an attribute
         assert device.wire.filenos() == []
 
 
