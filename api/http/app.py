@@ -3,38 +3,42 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from pathlib import Path
-from typing import Any
 
 from fastapi import FastAPI
-from fastapi.responses import FileResponse
+from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 
 import rig
-from api.http import problems, routes
+from api.http import description, problems, routes
+from api.http.access.rights import PUBLIC, READ, Right, RightsTable
 from api.http.guard import Guard
-from api.http.problems import Problem
 from api.http.service import Service
+from api.http.streams import routes as stream_routes
+from api.http.streams.feed import Feed
+from api.http.streams.session import Streams
+from api.page import BUILT, NOT_BUILT
 
-PAGE = Path(__file__).parent / "page"
-INVALID = 422
 
-
-def build(service: Service, meanwhile: bool = False) -> FastAPI:
+def build(service: Service, meanwhile: bool = False, names: tuple[str, ...] = ()) -> FastAPI:
     """The service's application; the bench is connected with it and disconnected with it.
 
     With ``meanwhile`` requests are answered while the bench still starts, which homes the axis: so that it can be seen,
-    and stopped.
+    and stopped. ``names`` are those that it is reached by from elsewhere.
     """
+
+    feed = Feed(service.wiring, lambda: service.bench, service.events, service.onlookers)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001 - the signature of a lifespan
+        following = asyncio.create_task(feed.follow())
         starting = asyncio.create_task(asyncio.to_thread(service.connect))
         if not meanwhile:
             await starting
         yield
         await starting
+        service.jobs.close()
         await asyncio.to_thread(service.disconnect)
+        following.cancel()
 
     app = FastAPI(
         title="tissue-rig",
@@ -44,20 +48,33 @@ def build(service: Service, meanwhile: bool = False) -> FastAPI:
         lifespan=lifespan,
         docs_url=None,
         redoc_url=None,
-        openapi_url="/api/v1/openapi.json",
+        openapi_url=None,
     )
     problems.install(app)
-    app.add_middleware(Guard, headers=_headers())
-    app.include_router(routes.build(service))
-    app.get("/", include_in_schema=False)(_page)
-    app.mount("/page", StaticFiles(directory=PAGE))
-    _describe_problems(app)
+    app.add_middleware(Guard, headers=_headers(service), access=service.access, rights=RightsTable(app), names=names)
+    # As routes of the application's own: those of an included router are looked through twice for each request.
+    for router in (routes.build(service), stream_routes.build(Streams(service.wiring, feed, service.id))):
+        app.router.routes.extend(router.routes)
+    app.get("/api/v1/openapi.json", include_in_schema=False, dependencies=[READ])(lambda: JSONResponse(app.openapi()))
+    app.get("/", include_in_schema=False, dependencies=[PUBLIC])(lambda: _page(service))
+    app.mount("/page", PageFiles(directory=BUILT, check_dir=False))
+    description.install(app)
     return app
 
 
-def _headers() -> dict[str, str]:
-    """The page may talk to this service and to the stop process on this computer, whatever port that has."""
+class PageFiles(StaticFiles):
+    """The page itself holds nothing of the bench, and has to be there to log in."""
+
+    right = Right(None)
+
+    async def check_config(self) -> None:
+        """A checkout that has not built the page has no such folder: then there is no such file, and no failure."""
+
+
+def _headers(service: Service) -> dict[str, str]:
+    """The page may talk to this service and to what takes stops beside it, by whatever name the page was opened."""
     stops = " ".join(f"http://{host}:*" for host in ("127.0.0.1", "localhost"))
+    stops += f" https://*:{service.away.port}" if service.away else ""
     return {
         "Content-Security-Policy": f"default-src 'self'; connect-src 'self' {stops}; frame-ancestors 'none'",
         "X-Content-Type-Options": "nosniff",
@@ -65,26 +82,8 @@ def _headers() -> dict[str, str]:
     }
 
 
-async def _page() -> FileResponse:
-    return FileResponse(PAGE / "index.html")
-
-
-def _describe_problems(app: FastAPI) -> None:
-    """Puts Problem among the schemas, and problem+json in place of the framework's own validation error."""
-    original = app.openapi
-
-    def described() -> dict[str, Any]:
-        schema = original()
-        schemas = schema["components"]["schemas"]
-        schemas["Problem"] = Problem.model_json_schema(ref_template="#/components/schemas/{model}")
-        for unused in ("HTTPValidationError", "ValidationError"):
-            schemas.pop(unused, None)
-        operations = [operation for path in schema["paths"].values() for operation in path.values()]
-        for operation in operations:
-            operation["responses"].update(
-                {key: ours[int(key)] for key in operation["responses"] if int(key) == INVALID}
-            )
-        return schema
-
-    ours = problems.responses(INVALID)
-    app.openapi = described  # type: ignore[method-assign]
+def _page(service: Service) -> Response:
+    """The page, or where a checkout has not built it what to do about that."""
+    if not (BUILT / "index.html").is_file():
+        return HTMLResponse(NOT_BUILT.format(stop_port=service.stop_port), status_code=503)
+    return FileResponse(BUILT / "index.html")

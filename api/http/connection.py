@@ -5,9 +5,14 @@ import socket
 import struct
 from typing import ClassVar, TypedDict
 
+import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.exceptions import InvalidState
 
 NO_LINGER = struct.pack("ii", 1, 0)
+# A second of all streams: what the system keeps for a client that reads slowly is old before it comes.
+SOCKET_BYTES = 65_536
 
 
 class ImpatientProtocol(H11Protocol):
@@ -48,6 +53,15 @@ class ImpatientProtocol(H11Protocol):
         self._cancel_reading()
         super().connection_lost(exc)
 
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        """From now on the deadlines of a WebSocket hold, see `server_settings`."""
+        if self._head:
+            self._head.cancel()
+        transport = self.transport
+        transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SOCKET_BYTES)
+        transport.set_write_buffer_limits(high=SOCKET_BYTES)
+        super().handle_websocket_upgrade(event)
+
     def _end_without_head(self) -> None:
         if not self._asked:
             self._drop()
@@ -63,15 +77,35 @@ class ImpatientProtocol(H11Protocol):
             self._reading = None
 
 
+class LeavingProtocol(WebSocketsSansIOProtocol):
+    """Uvicorn's own, whose end raises where the client is just leaving, and leaves the rest of the service running."""
+
+    def shutdown(self) -> None:
+        """The service ends."""
+        try:
+            super().shutdown()
+        except InvalidState:  # both have said good-bye
+            self.transport.close()
+
+
 class ServerSettings(TypedDict):
     """Keywords of `uvicorn.Config`."""
 
     http: type[ImpatientProtocol]
+    ws: type[LeavingProtocol]
     timeout_keep_alive: int
     backlog: int
     log_level: str
+    ws_max_size: int
+    ws_ping_timeout: float
+    ws_per_message_deflate: bool
 
 
 def server_settings() -> ServerSettings:
     """What `uvicorn.Config` needs so that no client can hold the service up."""
-    return {"http": ImpatientProtocol, "timeout_keep_alive": 5, "backlog": 128, "log_level": "warning"}
+    return {
+        "http": ImpatientProtocol, "timeout_keep_alive": 5, "backlog": 128, "log_level": "warning",
+        # A subscription to all streams has 2 kB; a client that reads nothing for a minute has been left; and numbers
+        # from a sensor do not get shorter by compression, which takes the time of 50 clients.
+        "ws": LeavingProtocol, "ws_max_size": 64_000, "ws_ping_timeout": 60.0, "ws_per_message_deflate": False,
+    }  # fmt: skip

@@ -4,10 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
+from api.http.jobs.states import JobState, Verb
 from controller.loop.messages import DeviceView
-from rig.results.bench import RetractResult
-from rig.results.recorded import CaptureResult
-from rig.results.tracking import TrackResult
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
 
@@ -16,29 +14,6 @@ class RequestBody(BaseModel):
     """Root of request bodies."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
-
-
-class CaptureRequest(RequestBody):
-    """Starts a protocol."""
-
-    kind: Literal["capture"]
-    protocol: Name = Field(description="name of a protocol as /protocols lists it")
-    session: Name = Field(description="name of the new session folder")
-
-
-class TrackRequest(RequestBody):
-    """Tracks forces with gains from the model of a session."""
-
-    kind: Literal["track"]
-    session: Name = Field(description="session whose fitted model gives the gains; the run is recorded there")
-    forces_N: list[Annotated[float, Field(gt=0)]] = Field(min_length=1, max_length=20)
-    seconds: Annotated[float, Field(gt=1, le=600)] = 10.0
-
-
-class RetractRequest(RequestBody):
-    """Moves out of the tissue, after a stop that was acknowledged."""
-
-    kind: Literal["retract"]
 
 
 class RecoverRequest(RequestBody):
@@ -52,8 +27,16 @@ class RecoverRequest(RequestBody):
 class LeaseRequest(RequestBody):
     """Takes control of the bench."""
 
+    purpose: Annotated[str, Field(max_length=200, description="what for, as others are told")] = ""
+
     holder: Annotated[str, Field(min_length=1, max_length=80, description="who this is, as others are told")]
     ttl_s: float = Field(default=5.0, ge=0.5, le=30.0, description="how long it lasts after each renewal")
+
+
+class TakeoverRequest(LeaseRequest):
+    """Takes control from whoever has it."""
+
+    reason: Annotated[str, Field(min_length=3, max_length=200, description="why, as whoever had control is told")]
 
 
 class LeaseView(BaseModel):
@@ -64,30 +47,47 @@ class LeaseView(BaseModel):
     since: str
     ttl_s: float
     left_s: float
+    epoch: int = Field(default=0, description="grows with every lease given")
+    purpose: str = ""
 
 
 class ControlView(BaseModel):
     """Who is in control, as everybody may see it; empty where nobody is."""
 
+    epoch: int = 0
+    purpose: str = ""
     holder: str
     since: str
     left_s: float
 
 
-class JobView(BaseModel):
-    """A piece of work."""
+class JobProblem(BaseModel):
+    """Why a job did not succeed."""
+
+    code: str = Field(description="a line of the safety table, or data, device, refused, crashed, cancelled, ...")
+    detail: str
+
+
+class JobSummary(BaseModel):
+    """A piece of work, as lists show it."""
 
     id: str
     kind: str
     name: str
-    state: Literal["running", "succeeded", "failed", "stopped"]
+    state: JobState
+    moves: bool = Field(description="it uses the bench")
+    by: str = Field(description="who started it")
+    session: str | None = Field(default=None, description="the session it works on or records")
+    created: str
+    started: str | None = None
+    ended: str | None = None
     done: float
     total: float
     unit: str
-    message: str
+    message: str = Field(description="what it does now; of a paused calibration what a person is to do")
     time_left_s: float | None = Field(description="at the pace so far; null before the first part is done")
-    log: list[str] = Field(description="what it said so far; empty where the bench is shown, see /jobs/{id}")
-    result: CaptureResult | TrackResult | RetractResult | None = Field(description="once it has succeeded")
+    can: list[Verb] = Field(description="what it may be asked for now")
+    problem: JobProblem | None = Field(default=None, description="why it did not succeed")
 
 
 class Info(BaseModel):
@@ -98,6 +98,7 @@ class Info(BaseModel):
     monotonic_ns: int = Field(description="the clock of all samples, now")
     sessions_folder: str
     stop_port: int = Field(description="of the stop process on 127.0.0.1, which takes POST /estop, /pain and /stop")
+    away_stops: str = Field(description="where a page of other computers finds the same beside the service; else empty")
 
 
 class RigView(BaseModel):
@@ -123,7 +124,7 @@ class RigView(BaseModel):
     )
     limits: dict[str, float]
     control: ControlView
-    job: JobView | None
+    job: JobSummary | None
 
 
 class ProtocolView(BaseModel):

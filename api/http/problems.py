@@ -1,5 +1,6 @@
 """Errors of the service as RFC 9457 problem details: what happened, where, and what to do next."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from fastapi import FastAPI, Request
@@ -8,6 +9,8 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
+from api.http.explained import EXPLAINED
+from api.http.jobs.places import PlaceRefused
 from rig.errors import DeviceError, RigError, SafetyStop, UsageError
 
 MEDIA_TYPE = "application/problem+json"
@@ -21,6 +24,12 @@ class Problem(BaseModel):
     status: int
     detail: str
     code: str = Field(description="short name for programs")
+    holder: str | None = Field(default=None, description="who is in control, where that is why")
+    purpose: str | None = Field(default=None, description="what the holder wants to do")
+    since: str | None = Field(default=None, description="since when the holder is in control")
+    state: str | None = Field(default=None, description="of the job that was asked for what it cannot do")
+    taken_by: str | None = Field(default=None, description="who took control over from whoever sent this")
+    reason: str | None = Field(default=None, description="why, as stated at the takeover")
 
 
 class RequestRefused(RigError):
@@ -29,6 +38,8 @@ class RequestRefused(RigError):
     def __init__(self, status: int, code: str, detail: str) -> None:
         super().__init__(detail)
         self.status, self.code = status, code
+        self.members: Mapping[str, str] = {}
+        self.headers: Mapping[str, str] = {}
 
 
 TITLES = {
@@ -39,29 +50,49 @@ TITLES = {
     405: "not with this method",
     408: "too slow",
     409: "not in the present state",
+    412: "changed meanwhile",
     413: "too large",
+    415: "not in this form",
     422: "the request is wrong",
+    423: "somebody else is in control, or nobody",
+    428: "say what is to be changed",
+    429: "too many requests",
     503: "the bench is not available",
     504: "no answer in time",
+    507: "no room on the disk",
 }
 
 
-def answer(status: int, code: str, detail: str) -> JSONResponse:
-    """One problem as a response."""
-    title = TITLES.get(status, "the request failed")
-    problem = Problem(type=f"/api/v1/problems/{code}", title=title, status=status, detail=detail, code=code)
-    return JSONResponse(problem.model_dump(), status, media_type=MEDIA_TYPE)
+def title(status: int) -> str:
+    """What all problems of ``status`` have in common."""
+    return TITLES.get(status, "the request failed")
 
 
-def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """The OpenAPI entry of the problems a route may answer with."""
-    return {
-        status: {
-            "description": TITLES[status],
-            "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
-        }
-        for status in statuses
-    }
+def problem(status: int, code: str, detail: str) -> Problem:
+    """One problem; ``code`` leads to its page."""
+    return Problem(type=f"/api/v1/problems/{code}", title=title(status), status=status, detail=detail, code=code)
+
+
+def answer(status: int, code: str, detail: str, members: Mapping[str, str] | None = None) -> JSONResponse:
+    """One problem as a response; ``members`` are more of its fields."""
+    shown = problem(status, code, detail).model_copy(update=dict(members or {}))
+    return JSONResponse(shown.model_dump(exclude_none=True), status, media_type=MEDIA_TYPE)
+
+
+def responses(*words: str) -> dict[int | str, dict[str, Any]]:
+    """The OpenAPI entries of the problems a route may answer with, each named by status and code: ``409 busy``."""
+    found: dict[int | str, dict[str, Any]] = {}
+    for word in words:
+        status, _, code = word.partition(" ")
+        content = {"schema": {"$ref": "#/components/schemas/Problem"}, "examples": {}}
+        entry = found.setdefault(int(status), {"description": title(int(status)), "content": {MEDIA_TYPE: content}})
+        entry["content"][MEDIA_TYPE]["examples"][code] = _example(int(status), code)
+    return found
+
+
+def _example(status: int, code: str) -> dict[str, Any]:
+    meaning, step = EXPLAINED[code]
+    return {"summary": meaning, "value": problem(status, code, f"{meaning} {step}").model_dump(exclude_none=True)}
 
 
 def install(app: FastAPI) -> None:
@@ -80,14 +111,32 @@ def install(app: FastAPI) -> None:
         assert isinstance(error, RigError)
         return _ours(error)
 
+    async def system(request: Request, error: Exception) -> JSONResponse:  # noqa: ARG001
+        assert isinstance(error, OSError)
+        if error.filename is None:
+            raise error
+        if isinstance(error, FileNotFoundError):
+            return answer(404, "gone", f"{error.filename} was removed meanwhile; look at the list again")
+        return answer(503, "storage", f"{error.filename}: {error.strerror}; see to that, then try again")
+
+    async def unforeseen(request: Request, error: Exception) -> JSONResponse:  # noqa: ARG001
+        text = f"the service met an error of its own ({type(error).__name__}); report it with what it has printed"
+        return answer(500, "error", text)
+
     app.add_exception_handler(RequestValidationError, validation)
     app.add_exception_handler(HTTPException, http)
     app.add_exception_handler(RigError, ours)
+    app.add_exception_handler(OSError, system)
+    app.add_exception_handler(Exception, unforeseen)
 
 
 def _ours(error: RigError) -> JSONResponse:
     match error:
         case RequestRefused():
+            response = answer(error.status, error.code, str(error), error.members)
+            response.headers.update(error.headers)
+            return response
+        case PlaceRefused():
             return answer(error.status, error.code, str(error))
         case SafetyStop():
             return answer(409, "safety-stop", str(error))

@@ -1,50 +1,35 @@
-"""What the routes call: one bench, at most one job, stops that never wait for either."""
+"""What the routes call: one bench, at most one job that uses it, stops that never wait for either."""
 
 import asyncio
-import contextlib
 import threading
 import time
 import uuid
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+from api.http.access.access import Access
+from api.http.jobs.board import JobBoard
+from api.http.jobs.job import Job
 from api.http.lease import LeaseRegistry
 from api.http.problems import RequestRefused
-from api.operations import motion
-from api.operations.motion import TrackPlan
-from controller.experiments import capture as experiment
-from controller.experiments import tracked
-from controller.operation import Operation, Progress
+from api.http.stops.process import AwayStops
+from api.http.streams.events import EventLog
+from api.operations.doctor import reports_of
+from controller.loop.messages import DeviceView
 from controller.recovery.situation import Consent
 from controller.stop.word import NOT_CONFIRMED, StopOutcome, StopReason
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
-from rig.config.wiring import Wiring
+from rig.config.wiring import Subject, Wiring
 from rig.errors import RigError, UsageError
-from rig.results.bench import ResetResult
-from rig.tissue.model import load_model
+from rig.recording.tap import Slots
+from rig.results.bench import DeviceReport, ResetResult
 
-MODEL = Path("fit") / "model.json"
 # As long as the stop process itself waits for the loop.
 CONFIRM_S = 0.5
 LOOK_S = 0.001
-
-
-@dataclass(frozen=True)
-class Job:
-    """A piece of work in a thread of its own; it runs on whether or not anyone looks."""
-
-    id: str
-    kind: str
-    lease: str
-    operation: Operation
-
-    @property
-    def progress(self) -> Progress:
-        """How it stands."""
-        return self.operation.progress
 
 
 class Service:
@@ -59,10 +44,21 @@ class Service:
         self.settled = threading.Event()
         """Set once the first attempt to connect has ended, well or not."""
         self.bench: Supervisor | None = None
-        self.control = LeaseRegistry()
-        self.jobs: dict[str, Job] = {}
+        self.events = EventLog()
+        self.control = LeaseRegistry(told=partial(self.events.publish, "control"))
+        self.access = Access()
+        self.jobs = JobBoard(sessions, protocols, self.events)
+        self.works: dict[str, str] = {}
+        """Functions that do a kind of job otherwise than usual: on a mock bench, which is nobody's here."""
+        self.hands = ""
+        """Where the mock bench takes orders, for what a person would do at it."""
+        self.onlookers: list[Callable[[Slots], None]] = []
+        """Called with all samples as they lie in the ring."""
+        self.away: AwayStops | None = None
+        """Takes stops from other computers, where any may use the service."""
         self._coming: Supervisor | None = None
-        self._starting = threading.Lock()
+        self.starting = threading.RLock()
+        """Held while the bench begins anything: a start, a recovery, a job."""
 
     @property
     def stop_port(self) -> int:
@@ -72,7 +68,7 @@ class Service:
 
     def connect(self) -> None:
         """Starts loop and recorder; what fails is kept as ``reason`` and shown, the service goes on."""
-        with self._starting:
+        with self.starting:
             if self.bench and self.bench.alive:
                 return
             self._start_bench(waiting=False)
@@ -84,6 +80,8 @@ class Service:
         bench.attended = self.attended
         try:
             bench.prepare()
+            if self.away:
+                self.away.follow(bench.stop_path)
             self.reason = "the bench is starting: devices are opened and the axis is homed"
             self._coming = bench
             bench.start()
@@ -97,7 +95,7 @@ class Service:
 
     def recover(self, consent: Consent) -> ResetResult:
         """The way back after a crash, a fault or a stop, as far as ``consent`` goes; a dead loop is replaced."""
-        with self._starting:
+        with self.starting:
             if self.running:
                 raise RequestRefused(409, "busy", "a job is under way; stop it, then recover")
             if not (self.bench and self.bench.alive):
@@ -116,8 +114,8 @@ class Service:
 
     @property
     def running(self) -> Job | None:
-        """The job under way."""
-        return next((job for job in self.jobs.values() if job.progress.state == "running"), None)
+        """The job that uses the bench."""
+        return self.jobs.moving
 
     def attended(self) -> bool:
         """Whether whoever started what is under way still is in control; the loop stops motion where this stays no."""
@@ -132,76 +130,59 @@ class Service:
             raise RequestRefused(503, "disconnected", "the loop's process is gone; connect again")
         return self.bench
 
+    def use_subject(self, subject: Subject) -> None:
+        """Whose recordings follow; the loop, which holds the force below the threshold, is started anew for another."""
+        with self.starting:
+            self.jobs.refuse_busy()
+            before, bench = self.wiring, self.bench
+            if bench and bench.alive:
+                self.refuse_stopped()
+            self.wiring = before.model_copy(update={"subject": subject})
+            if bench and bench.alive and subject.pain_threshold_N != before.subject.pain_threshold_N:
+                self._start_bench(waiting=False)
+            elif bench:
+                bench.wiring = self.wiring
+        self.events.publish("control", "subject-changed", f"subject {subject.id}, {subject.site}")
+
+    def refuse_stopped(self) -> None:
+        """Raises RequestRefused where a stop is in force: what was started then would leave an empty session."""
+        bench = self.the_bench()
+        latched = bench.status.get("latched")
+        if latched:
+            text = f"the bench is stopped: {latched['text']}; acknowledge that (POST /api/v1/estop/reset), then start"
+            raise RequestRefused(409, "stopped", text)
+
+    def seen_devices(self) -> tuple[DeviceReport, ...] | None:
+        """As the loop sees them; None where no loop runs, and they may be looked at."""
+        bench = self.bench
+        if bench is None or not bench.alive:
+            return None
+        return reports_of(self.devices(bench), bench.status.get("rates_Hz", {}))
+
+    def devices(self, bench: Supervisor) -> dict[str, DeviceView]:
+        """Who each device is, and how it is."""
+        states = bench.status.get("devices", {})
+        return {role: {**identity, **states.get(role, {})} for role, identity in bench.ready.devices.items()}
+
     def plan(self, name: str) -> Indentation:
         """The protocol called ``name``."""
-        path = self.protocols / f"{name}.toml"
-        if not path.is_file():
-            raise RequestRefused(404, "no-such-protocol", f"no protocol {name} in {self.protocols}")
-        return load(Indentation, path)
-
-    def capture(self, lease: str, protocol: str, session: str) -> Job:
-        """Starts a capture; checks protocol, limits and folder first."""
-        plan, bench, folder = self.plan(protocol), self.the_bench(), self.sessions / session
-        experiment.check(plan, self.wiring)
-        if folder.exists():
-            raise RequestRefused(409, "session-exists", f"session {session} exists; recordings are never overwritten")
-        operation = motion.capture_operation(plan)
-        return self._start("capture", lease, operation, lambda: motion.capture(operation, bench, plan, folder))
-
-    def track(self, lease: str, session: str, forces_N: list[float], seconds: float) -> Job:
-        """Starts force tracking with the model of ``session``."""
-        bench, folder = self.the_bench(), self.session(session)
-        file = folder / MODEL
-        if not file.is_file():
-            raise RequestRefused(
-                409, "no-model", f"session {session} has no fitted model; run `rig fit {folder}` first"
-            )
-        wanted = TrackPlan(tracked.plan(forces_N, seconds, load_model(file), self.wiring), str(MODEL))
-        operation = Operation("track", total=1, unit="runs")
-        return self._start("track", lease, operation, lambda: motion.track(operation, bench, wanted, folder))
-
-    def retract(self, lease: str) -> Job:
-        """Moves the tip out of wherever a stop left it."""
-        bench, operation = self.the_bench(), Operation("retract", total=1, unit="moves")
-        return self._start("retract", lease, operation, lambda: motion.retract(operation, bench))
-
-    def _start(self, kind: str, lease: str, operation: Operation, work: Callable[[], object]) -> Job:
-        with self._starting:
-            busy = self.running
-            if busy:
-                raise RequestRefused(409, "busy", f"{busy.progress.name} is under way (job {busy.id}); stop it or wait")
-            job = Job(uuid.uuid4().hex[:12], kind, lease, operation)
-            self.jobs[job.id] = job
-        threading.Thread(target=_work, args=(operation, work), name=f"job-{job.id}", daemon=True).start()
-        return job
-
-    def job(self, identifier: str) -> Job:
-        """The job called ``identifier``."""
-        if identifier not in self.jobs:
-            raise RequestRefused(404, "no-such-job", f"no job {identifier} since this service started")
-        return self.jobs[identifier]
+        return load(Indentation, self.jobs.places("").protocol(name))
 
     def session(self, name: str) -> Path:
         """The folder of session ``name``."""
-        folder = self.sessions / name
-        if not folder.is_dir() or folder.resolve().parent != self.sessions.resolve():
-            raise RequestRefused(404, "no-such-session", f"no session {name} in {self.sessions}")
-        return folder
+        return self.jobs.places("").folder(name)
 
-    def stop_job(self, identifier: str) -> Job:
-        """Soft stop of that job and no other; a job that has ended stays as it is."""
-        job = self.job(identifier)
-        if job.progress.state == "running":
-            job.operation.cancel()
-            self.the_bench().stop()
-        return job
+    def stop_softly(self) -> None:
+        """The operator's stop, which retracts."""
+        self.the_bench().stop()
 
     async def stop(self, kind: StopReason) -> StopOutcome:
         """Asks the loop itself to stop and returns what it did; raises 504 where it has not confirmed that in time."""
         bench = self.stoppable()
         request = bench.stops.request(kind)
-        for job in list(self.jobs.values()):
-            job.operation.cancel()
+        job = self.running
+        if job:
+            job.stopped()
         deadline = time.monotonic() + CONFIRM_S
         while (answer := bench.stops.answer(request)) is None and time.monotonic() < deadline:
             await asyncio.sleep(LOOK_S)
@@ -223,9 +204,3 @@ class Service:
             bench.reset()
         except UsageError as error:
             raise RequestRefused(409, "cause-not-cleared", str(error)) from error
-
-
-def _work(operation: Operation, work: Callable[[], object]) -> None:
-    """In a job's thread, which has nobody above it: how the work failed is shown as the job's."""
-    with contextlib.suppress(RigError):
-        operation.run(work)

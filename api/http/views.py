@@ -1,42 +1,29 @@
 """What the service knows, as what goes over the wire."""
 
+import contextlib
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
+from urllib.parse import quote
 
+from api.http.jobs.places import is_text
+from api.http.jobs.views import summary
 from api.http.lease import ControlLease
 from api.http.models import (
     ControlView,
-    JobView,
     LeaseView,
-    ProtocolView,
     RecordingView,
     RigView,
     SessionView,
 )
-from api.http.service import Job, Service
+from api.http.service import Service
 from controller.devices.health import ALIVE, ON_RATE, VALID
-from controller.experiments.capture import check
-from controller.loop.messages import DeviceView, Status
-from controller.supervisor import Supervisor
-from rig.config.protocol import Indentation
-from rig.config.table import load
-from rig.errors import RigError
+from controller.loop.messages import Status
 from rig.recording.sessions import TrialInfo, read_listing
-from rig.results.bench import RetractResult
-from rig.results.recorded import CaptureResult
-from rig.results.tracking import TrackResult
 
 State = Literal["disconnected", "not ready", "idle", "running", "stopped"]
 STREAMS = ("force", "axis", "marker")
 SHOWN = (".mcap", ".json", ".html")
-
-
-def job(job: Job) -> JobView:
-    """One job."""
-    now = job.progress
-    result = now.result if isinstance(now.result, CaptureResult | TrackResult | RetractResult) else None
-    return JobView.model_validate({**vars(now), "id": job.id, "kind": job.kind, "result": result})
 
 
 def rig(service: Service) -> RigView:
@@ -52,12 +39,12 @@ def rig(service: Service) -> RigView:
         "state": state,
         "reason": reason,
         "health": _health(status.get("health", 0)),
-        "devices": _devices(bench, status) if bench else {},
+        "devices": service.devices(bench) if bench else {},
         "limits": {
             "force_N": service.wiring.force_limit_N, "depth_mm": limits.depth_mm, "speed_mm_s": limits.speed_mm_s
         },
         "control": control(service),
-        "job": job(running).model_copy(update={"log": []}) if running else None,
+        "job": summary(running) if running else None,
     })  # fmt: skip
 
 
@@ -66,13 +53,19 @@ def control(service: Service) -> ControlView:
     held = service.control.lease
     if held is None:
         return ControlView(holder="", since="", left_s=0.0)
-    return ControlView(holder=held.holder, since=held.since, left_s=service.control.left_s(held))
+    left_s = service.control.left_s(held)
+    return ControlView(
+        holder=held.holder, since=held.since, left_s=left_s, epoch=held.epoch, purpose=held.purpose
+    )  # fmt: skip
 
 
 def lease(service: Service, held: ControlLease) -> LeaseView:
     """The lease for its holder."""
     left_s = service.control.left_s(held)
-    return LeaseView(lease_id=held.id, holder=held.holder, since=held.since, ttl_s=held.ttl_s, left_s=left_s)
+    return LeaseView(
+        lease_id=held.id, holder=held.holder, since=held.since, ttl_s=held.ttl_s, left_s=left_s, epoch=held.epoch,
+        purpose=held.purpose,
+    )  # fmt: skip
 
 
 def _state(service: Service, status: Status, alive: bool) -> tuple[State, str]:
@@ -96,12 +89,6 @@ def _missing(status: Status) -> str:
     )
 
 
-def _devices(bench: Supervisor, status: Status) -> dict[str, DeviceView]:
-    """Who each device is, and how it is."""
-    states = status.get("devices", {})
-    return {role: {**identity, **states.get(role, {})} for role, identity in bench.ready.devices.items()}
-
-
 def _health(bits: int) -> dict[str, dict[str, bool]]:
     return {
         name: {
@@ -113,33 +100,20 @@ def _health(bits: int) -> dict[str, dict[str, bool]]:
     }
 
 
-def protocols(service: Service) -> list[ProtocolView]:
-    """Every indentation protocol in the folder, also those this bench refuses."""
-    return [_protocol(service, path) for path in sorted(service.protocols.glob("*.toml")) if _is_protocol(path)]
-
-
-def _is_protocol(path: Path) -> bool:
-    return 'kind = "indentation"' in path.read_text(errors="replace")
-
-
-def _protocol(service: Service, path: Path) -> ProtocolView:
-    try:
-        plan = load(Indentation, path)
-        check(plan, service.wiring)
-    except RigError as error:
-        return ProtocolView(name=path.stem, file=path.name, settings={}, refusal=str(error))
-    return ProtocolView(name=path.stem, file=path.name, settings=plan.model_dump(mode="json"), refusal="")
-
-
 def sessions(service: Service) -> list[SessionView]:
     """Sessions with at least one recording, newest first."""
     if not service.sessions.is_dir():
         return []
-    folders = [path for path in service.sessions.iterdir() if any(path.glob("*.mcap"))]
-    return [_session(path) for path in sorted(folders, key=lambda path: path.stat().st_mtime, reverse=True)]
+    found: list[tuple[float, SessionView]] = []
+    for path in service.sessions.iterdir():
+        with contextlib.suppress(FileNotFoundError):  # removed meanwhile
+            if is_text(path.name) and any(path.glob("*.mcap")):
+                found.append((path.stat().st_mtime, session(path)))
+    return [view for _, view in sorted(found, key=lambda each: each[0], reverse=True)]
 
 
-def _session(folder: Path) -> SessionView:
+def session(folder: Path) -> SessionView:
+    """One of them."""
     info, remarks = read_listing(folder)
     trials = info.trials if info else ()
     created = info.created if info else ""
@@ -153,7 +127,9 @@ def _session(folder: Path) -> SessionView:
         dropped=sum(sum(trial.dropped.values()) for trial in trials),
         remarks=list(remarks),
         recordings=[
-            _file(folder.name, path, listed.get(path.name)) for path in sorted(folder.iterdir()) if path.suffix in SHOWN
+            _file(folder.name, path, listed.get(path.name))
+            for path in sorted(folder.iterdir())
+            if path.suffix in SHOWN and is_text(path.name)
         ],
     )
 
@@ -163,7 +139,7 @@ def _file(session: str, path: Path, trial: TrialInfo | None) -> RecordingView:
         session=session,
         file=path.name,
         bytes=path.lstat().st_size,
-        href=f"/api/v1/recordings/{session}/{path.name}",
+        href=f"/api/v1/recordings/{quote(session)}/{quote(path.name)}",
         quality=trial.quality if trial else "",
         reasons=list(trial.reasons) if trial else [],
     )

@@ -66,7 +66,7 @@ def test_a_port_that_is_taken_is_one_sentence_before_the_bench_starts(monkeypatc
         (["doctor", "--config", "no-such.toml"], "no-such.toml: no such file"),
         (["doctor", "--set", "force"], "write section.key=value"),
         (["track", "--model", "no-such.json", "--force", "5"], "no-such.json: no such file"),
-        (["serve", "--host", "0.0.0.0"], "listens on this computer only"),
+        (["serve", "--host", "0.0.0.0"], "others on the network would read tokens and passwords"),
     ],
 )
 def test_a_wrong_file_or_setting_is_one_sentence(

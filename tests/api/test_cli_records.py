@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import typer
@@ -51,7 +52,9 @@ def test_import_prints_a_table_and_writes_its_result(source: Path, tmp_path: Pat
     result = rig("import", source, "--out", tmp_path / "out", "--json", tmp_path / "result.json")
     assert result.exit_code == 0
     assert "trial_02" in result.output
-    assert json.loads((tmp_path / "result.json").read_text()) == {
+    written = json.loads((tmp_path / "result.json").read_text())
+    assert written.pop("came_in") == json.loads((tmp_path / "out" / "what-came-in.json").read_text())
+    assert written == {
         "version": 1,
         "session": str(tmp_path / "out"),
         "recordings": 2,
@@ -71,8 +74,10 @@ def test_without_a_mapping_one_is_proposed_saved_and_used(tmp_path: Path) -> Non
     source = write(tmp_path / "in", {"a.csv": "time_s,Force,x_mm\n" + rows})
     refused = rig("import", source, "--out", tmp_path / "out").exception
     assert isinstance(refused, UsageError)
-    assert 'give the line tables.columns.force.unit = "N" in' in str(refused)
-    assert "# open: nothing says the unit of force" in (tmp_path / "out.toml").read_text()
+    line = 'columns.force = { column = "Force", positive = "compression", unit = "N" }'
+    assert f"give the line {line} and the line columns.position = " not in str(refused)
+    assert f"give the line {line} in" in str(refused)
+    assert "# open: a.csv: force ('Force', 0 to 7) has no unit" in (tmp_path / "out.toml").read_text()
     assert "was proposed before" in str(rig("import", source, "--out", tmp_path / "out").exception)
     (tmp_path / "out.toml").unlink()
     taken = rig("import", source, "--out", tmp_path / "out", "--yes")
@@ -81,6 +86,51 @@ def test_without_a_mapping_one_is_proposed_saved_and_used(tmp_path: Path) -> Non
     assert open_session(tmp_path / "out").trials[0].peak_force_N == 7.0
     again = rig("import", source, "--out", tmp_path / "again", "--mapping", tmp_path / "out.toml")
     assert again.exit_code == 0
+
+
+def test_folders_of_one_name_have_proposals_of_their_own_and_each_is_used_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path, {"data.toml": "mine = 1\n"})
+    places = [tmp_path / name / "data" for name in ("first", "second")]
+    for place in places:
+        write(place, {"a.csv": "time_s,force_N,depth_mm\n" + "".join(f"0.{k},{k},{2 * k}\n" for k in range(8))})
+    used = [records.mapping_for(place, None, Path(place.stem), yes=True) for place in (*places, places[0])]
+    assert used == [Path("data-2.toml"), Path("data-3.toml"), Path("data-2.toml")]
+    assert (tmp_path / "data.toml").read_text() == "mine = 1\n"
+
+
+NAMELESS = "time_s,a,depth_mm,b\n" + "".join(f"0.{k},{k / 3},{2 * k},{-k / 7}\n" for k in range(10))
+
+
+def test_a_column_no_name_tells_is_asked_for_and_never_guessed(tmp_path: Path) -> None:
+    source = write(tmp_path / "in", {"a.csv": NAMELESS})
+    line = 'give the line columns.force = { column = "a", positive = "compression", unit = "N" } in'
+    for options, why in (
+        ([], "no terminal to answer at"),
+        (["--yes"], "no answer is clearly the best, so --yes takes"),
+    ):
+        refused = rig("import", source, "--out", tmp_path / "out", *options).exception
+        assert isinstance(refused, UsageError) and refused.exit_code == 2
+        assert "a.csv: no name tells which column is the force; it may be a (no unit, 0 to 3, moves); b" in str(refused)
+        assert why in str(refused) and line in str(refused)
+        assert not (tmp_path / "out").exists()
+        text = (tmp_path / "out.toml").read_text()
+        (tmp_path / "out.toml").unlink()
+    (tmp_path / "mine.toml").write_text(text + line.removeprefix("give the line ").removesuffix(" in"))
+    mended = rig("import", source, "--out", tmp_path / "out", "--mapping", tmp_path / "mine.toml")
+    assert mended.exit_code == 0, mended.exception
+    assert open_session(tmp_path / "out").trials[0].peak_force_N == pytest.approx(3.0)
+
+
+def test_on_a_terminal_it_is_asked_until_the_answer_is_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("api.cli.asking.sys", SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True)))
+    source = write(tmp_path / "in", {"a.csv": NAMELESS})
+    result = CliRunner().invoke(app, ["import", str(source), "--out", str(tmp_path / "out")], input="c N\nb mN\n")
+    assert result.exit_code == 0, result.exception
+    assert "'c N' is none of the columns" in result.output
+    assert open_session(tmp_path / "out").trials[0].peak_force_N == pytest.approx(9 / 7e3)
 
 
 def test_bad_files_are_wrong_use(source: Path, tmp_path: Path) -> None:

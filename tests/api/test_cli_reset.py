@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import pytest
 
 from api.cli import hardware
-from api.cli.live import here
+from api.cli.computing import here
 from api.cli.recovery import ask
 from api.operations.remote import RemoteBench
 from api.operations.reset import Ask, Recover, reset

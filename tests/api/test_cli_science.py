@@ -161,8 +161,18 @@ def test_fit_refuses_a_place_that_is_a_file(session: Path, tmp_path: Path) -> No
         run("fit", session, "--out", tmp_path / "taken")
 
 
+def test_fit_of_a_drive_axis_names_the_command_for_it(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "a.csv").write_text("t,F,x\n0,1,0\n1,2,1\n")
+    columns = 'columns = { force = { column = "F", unit = "N" }, position = { column = "x", unit = "mm" } }'
+    table = f'[[tables]]\nfiles = "*.csv"\ntime = {{ column = "t", unit = "s" }}\n{columns}\n[axis]\n'
+    (tmp_path / "in" / "mapping.toml").write_text(table)
+    with pytest.raises(UsageError, match=r"in: is a drive axis, as \[axis\] in its mapping says.*`rig diagnose`"):
+        run("fit", tmp_path / "in", "--out", tmp_path / "out")
+
+
 def test_fit_refuses_a_folder_that_is_no_session(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"no such session folder"):
+    with pytest.raises(DataError, match=r"no such file or folder; give the one that holds the data"):
         run("fit", tmp_path / "nowhere")
 
 

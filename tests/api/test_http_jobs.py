@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from api.http.app import build
 from api.http.service import Service
 from api.operations import motion
 from controller.operation import Operation
+from mock_devices.testing.access import client_of
 from rig.config.wiring import Wiring
-from rig.errors import SafetyStop
+from rig.errors import DeviceError, SafetyStop
 from rig.results.bench import RetractResult
 from tests.api.test_http_recover import ScriptedBench
 
@@ -30,7 +30,7 @@ def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Service:
 @pytest.fixture
 def client(service: Service) -> TestClient:
     """In control."""
-    found = TestClient(build(service), base_url="http://127.0.0.1:8000")
+    found = client_of(service)
     taken = found.post("/api/v1/control/lease", json={"holder": "test", "ttl_s": 30.0})
     found.headers["X-Control-Lease"] = taken.json()["lease_id"]
     return found
@@ -39,7 +39,7 @@ def client(service: Service) -> TestClient:
 def ended(client: TestClient, work: Work, monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
     """A retraction that does ``work`` instead, once its thread has ended."""
     monkeypatch.setattr(motion, "retract", work)
-    started = client.post("/api/v1/jobs", json={"kind": "retract"}).json()
+    started = client.post("/api/v1/jobs", json={"kind": "retract", "params": {}}).json()
     for thread in threading.enumerate():
         if thread.name == f"job-{started['id']}":
             thread.join(10.0)
@@ -57,6 +57,7 @@ def test_a_job_shows_the_log_and_the_result_of_its_operation(
     found = ended(client, work, monkeypatch)
     assert (found["state"], found["message"], found["time_left_s"]) == ("succeeded", "done", None)
     assert found["log"] == ["the tip leaves", "the tip is out"]
+    assert found["done"] == found["total"] == 1.0
     assert found["result"] == {"version": 1, "outcome": "complete"}
 
 
@@ -73,38 +74,44 @@ def test_while_it_runs_the_bench_shows_its_time_left_and_not_its_log(
 
     assert ended(client, work, monkeypatch)["log"] == ["a long log"]
     (now,) = shown
-    assert (now["state"], now["message"], now["log"]) == ("running", "half way", [])
+    assert (now["state"], now["message"], "log" in now) == ("running", "half way", False)
     assert isinstance(now["time_left_s"], float) and 0 <= now["time_left_s"] < 10
 
 
 @pytest.mark.parametrize(
-    ("error", "state", "message"),
+    ("error", "state", "code", "message"),
     [
-        (SafetyStop("stopped: pain stop"), "stopped", "stopped: pain stop"),
-        (ValueError("odd"), "failed", "the job met an error of its own: ValueError: odd"),
+        (SafetyStop("stopped: pain stop", "pain_stop"), "cancelled", "pain_stop", "stopped: pain stop"),
+        (SafetyStop("stopped: 13 N", "force_limit"), "failed", "force_limit", "stopped: 13 N"),
+        (DeviceError("silent"), "failed", "device", "silent"),
+        (ValueError("odd"), "failed", "error", "the job met an error of its own: ValueError('odd')"),
     ],
 )
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_a_job_that_does_not_succeed_says_why(
-    client: TestClient, monkeypatch: pytest.MonkeyPatch, error: Exception, state: str, message: str
+    client: TestClient, monkeypatch: pytest.MonkeyPatch, error: Exception, state: str, code: str, message: str
 ) -> None:
     def work(_operation: Operation, _bench: object) -> RetractResult:
         raise error
 
     found = ended(client, work, monkeypatch)
     assert (found["state"], found["message"], found["result"]) == (state, message, None)
+    assert found["problem"] == {"code": code, "detail": message}
 
 
-def test_a_job_that_is_stopped_is_cancelled_and_the_bench_stops(
+def test_a_job_that_is_cancelled_stops_the_bench(
     client: TestClient, service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stops: list[str] = []
     monkeypatch.setattr(ScriptedBench, "stop", lambda _: stops.append("stop"), raising=False)
 
     def work(operation: Operation, _bench: object) -> RetractResult:
-        (job,) = service.jobs
-        client.post(f"/api/v1/jobs/{job}/stop")
+        (job,) = service.jobs.active
+        assert client.post(f"/api/v1/jobs/{job.id}/cancel").json()["state"] == "cancelling"
+        assert client.post(f"/api/v1/jobs/{job.id}/cancel").json()["state"] == "cancelling"
         assert operation.cancelled
         raise SafetyStop("stopped by the operator")
 
-    assert ended(client, work, monkeypatch)["state"] == "stopped" and stops == ["stop"]
+    found = ended(client, work, monkeypatch)
+    assert (found["state"], found["can"], stops) == ("cancelled", [], ["stop"])
+    again = client.post(f"/api/v1/jobs/{found['id']}/cancel")
+    assert (again.status_code, again.json()["state"]) == (200, "cancelled")

@@ -1,20 +1,22 @@
 """The control lease: one holder at a time, until it runs out; what moves needs it, looking and stopping do not."""
 
+import re
+import time
 from collections.abc import Iterator
 
 import pytest
 from fastapi.testclient import TestClient
 
-from api.http.app import build
 from api.http.lease import LeaseRegistry
 from api.http.problems import RequestRefused
 from api.http.service import Service
+from mock_devices.testing.access import client_of
 from mock_devices.testing.clock import Clock
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.wiring import Wiring
 
 HEADER = "X-Control-Lease"
-CAPTURE = {"kind": "capture", "protocol": "indentation", "session": "a"}
+CAPTURE = {"kind": "capture", "params": {"protocol": "indentation", "session": "a"}}
 
 
 @pytest.fixture
@@ -26,7 +28,7 @@ def clock() -> Clock:
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Service, TestClient]]:
     folder = tmp_path_factory.mktemp("service")
     service = Service(Wiring(force=BotaWiring(port="/dev/no-such-sensor")), folder, folder)
-    with TestClient(build(service), base_url="http://127.0.0.1:8000") as client:
+    with client_of(service) as client:
         yield service, client
 
 
@@ -46,8 +48,9 @@ def taken(client: TestClient, holder: str = "Ann", ttl_s: float = 5.0) -> dict[s
 def test_a_second_user_is_refused_and_told_who_is_in_control(client: TestClient) -> None:
     taken(client, "Ann")
     second = client.post("/api/v1/control/lease", json={"holder": "Ben"})
-    assert (second.status_code, second.json()["code"]) == (409, "lease-held")
+    assert (second.status_code, second.json()["code"]) == (423, "lease-held")
     assert "Ann has been in control since" in second.json()["detail"]
+    assert second.json()["holder"] == "Ann"
     assert client.get("/api/v1/rig").json()["control"]["holder"] == "Ann"
     assert client.get("/api/v1/control/lease").json()["left_s"] == pytest.approx(5.0)
 
@@ -58,7 +61,7 @@ def test_a_lease_that_is_not_renewed_runs_out_and_the_next_user_may_have_it(clie
     assert client.put("/api/v1/control/lease", headers=first).json()["left_s"] == pytest.approx(5.0)
     clock.advance(5.0)
     late = client.put("/api/v1/control/lease", headers=first)
-    assert (late.status_code, late.json()["code"]) == (409, "no-lease")
+    assert (late.status_code, late.json()["code"]) == (423, "no-lease")
     assert "that lease is not in force; nobody is in control" in late.json()["detail"]
     taken(client, "Ben")
     assert "Ben is in control" in client.put("/api/v1/control/lease", headers=first).json()["detail"]
@@ -72,12 +75,12 @@ def test_a_lease_that_is_given_back_is_free_at_once(client: TestClient) -> None:
 @pytest.mark.parametrize(("path", "body"), [("/jobs", CAPTURE), ("/estop/reset", None), ("/rig/connect", None)])
 def test_what_moves_or_arms_needs_the_lease(client: TestClient, path: str, body: object) -> None:
     without = client.post(f"/api/v1{path}", json=body)
-    assert (without.status_code, without.json()["code"]) == (409, "no-lease")
+    assert (without.status_code, without.json()["code"]) == (423, "no-lease")
     assert "no X-Control-Lease header was sent" in without.json()["detail"]
     assert client.post(f"/api/v1{path}", json=body, headers=taken(client)).json().get("code") != "no-lease"
 
 
-@pytest.mark.parametrize("path", ["/estop", "/pain", "/jobs/none/stop"])
+@pytest.mark.parametrize("path", ["/estop", "/pain", "/jobs/none/cancel"])
 def test_a_stop_never_asks_who_is_in_control(client: TestClient, path: str) -> None:
     assert client.post(f"/api/v1{path}").json()["code"] in {"disconnected", "no-such-job"}
 
@@ -93,3 +96,50 @@ def test_a_lease_known_by_name_only_is_worth_nothing() -> None:
     control.take("Ann", 5.0)
     with pytest.raises(RequestRefused, match="that lease is not in force; Ann is in control"):
         control.check("Ann")
+
+
+def test_each_lease_has_a_greater_epoch_and_its_purpose_is_told(client: TestClient, clock: Clock) -> None:
+    body = {"holder": "Ann", "ttl_s": 5.0, "purpose": "calibrate"}
+    first = client.post("/api/v1/control/lease", json=body).json()
+    refused = client.post("/api/v1/control/lease", json={"holder": "Ben"}).json()
+    assert (refused["holder"], refused["purpose"], refused["since"]) == ("Ann", "calibrate", first["since"])
+    assert client.get("/api/v1/control/lease").json()["purpose"] == "calibrate"
+    clock.advance(6.0)
+    second = client.post("/api/v1/control/lease", json={"holder": "Ben"}).json()
+    assert second["epoch"] == first["epoch"] + 1
+
+
+def test_control_is_taken_over_with_a_reason_and_who_had_it_is_told(client: TestClient) -> None:
+    first = taken(client, "Ann")
+    body = {"holder": "Ben", "ttl_s": 5.0, "reason": "Ann has left"}
+    second = client.post("/api/v1/control/take", json=body)
+    assert second.status_code == 200
+    told = client.put("/api/v1/control/lease", headers=first)
+    assert (told.status_code, told.json()["holder"]) == (423, "Ben")
+    assert re.match(r"Ben took control over at \S+: Ann has left; Ben is in control", told.json()["detail"])
+    assert (told.json()["taken_by"], told.json()["reason"]) == ("Ben", "Ann has left")
+    assert client.put("/api/v1/control/lease", headers={HEADER: second.json()["lease_id"]}).status_code == 200
+    assert client.post("/api/v1/control/take", json={"holder": "Ben", "reason": ""}).status_code == 422
+
+
+@pytest.mark.parametrize(("moving", "may_stop", "given"), [(0, 0, 1), (0, 1, 1), (1, 0, 0), (1, 1, 1)])
+def test_while_something_moves_only_who_may_stop_others_takes_over(moving: bool, may_stop: bool, given: bool) -> None:
+    control = LeaseRegistry()
+    first = control.take("Ann", 5.0)
+    if given:
+        assert control.take_over("Ben", 5.0, "", "why", moving, may_stop).epoch > first.epoch
+    else:
+        with pytest.raises(RequestRefused, match="Ann moves the bench; wait for its end, or stop it"):
+            control.take_over("Ben", 5.0, "", "why", moving, may_stop)
+    assert control.holds(first.id) is not given
+
+
+def test_no_clock_that_somebody_sets_keeps_a_lease_alive(monkeypatch: pytest.MonkeyPatch) -> None:
+    control, real = LeaseRegistry(), time.clock_gettime
+    lease = control.take("Ann", 5.0)
+    for name, value in (("time", 0.0), ("time_ns", 0)):
+        monkeypatch.setattr(time, name, lambda value=value: value)  # set back to 1970
+    assert control.holds(lease.id)
+    # The computer sleeps for six seconds: only this clock goes on meanwhile.
+    monkeypatch.setattr(time, "clock_gettime", lambda clock: real(clock) + 6.0 * (clock == time.CLOCK_BOOTTIME))
+    assert not control.holds(lease.id)

@@ -6,11 +6,11 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from api.http.app import build
 from api.http.service import Service
 from controller.loop.messages import Status
 from controller.operation import Operation
 from controller.recovery.situation import Consent
+from mock_devices.testing.access import client_of
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError
 from rig.results.bench import Question, ResetResult
@@ -50,7 +50,7 @@ def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Service:
 @pytest.fixture
 def client(service: Service) -> TestClient:
     """In control."""
-    found = TestClient(build(service), base_url="http://127.0.0.1:8000")
+    found = client_of(service)
     taken = found.post("/api/v1/control/lease", json={"holder": "test", "ttl_s": 30.0})
     found.headers["X-Control-Lease"] = taken.json()["lease_id"]
     return found
@@ -75,7 +75,7 @@ def test_without_consent_the_answer_asks_and_with_it_says_what_was_done(client: 
 def test_recovery_takes_the_lease(client: TestClient, service: Service) -> None:
     client.headers["X-Control-Lease"] = "another"
     refused = client.post("/api/v1/recover", json={"clear": True})
-    assert refused.status_code == 409
+    assert refused.status_code == 423
     assert refused.json()["type"].endswith("no-lease")
     assert bench_of(service).consents == []
 

@@ -1,5 +1,6 @@
 """The service where no bench answers: state is data, requests are strict, other sites' pages are kept out."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -7,8 +8,10 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from api.http.app import build
+import hatch_build
+from api.http import app
 from api.http.service import Service
+from mock_devices.testing.access import client_of
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.wiring import Wiring
@@ -17,6 +20,7 @@ from tests.rig.tissue.synthetic import Bench, write_made_session
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PROBLEM = "application/problem+json"
+MODEL = {"model": {"session": "a"}}
 
 
 @pytest.fixture(scope="module")
@@ -24,9 +28,7 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     wiring = Wiring(
         force=BotaWiring(port="/dev/no-such-sensor"), axis=Epos4Wiring(port="/dev/no-such-adapter"), tracker=None
     )
-    with TestClient(
-        build(Service(wiring, tmp_path_factory.mktemp("sessions"), EXAMPLES)), base_url="http://127.0.0.1:8000"
-    ) as client:
+    with client_of(Service(wiring, tmp_path_factory.mktemp("sessions"), EXAMPLES)) as client:
         yield client
 
 
@@ -38,26 +40,50 @@ def test_a_bench_that_is_not_there_is_a_state_with_a_reason_not_an_error(client:
 
 
 def test_the_page_loads_nothing_from_outside(client: TestClient) -> None:
+    hatch_build.build()
     page = client.get("/")
-    assert page.headers["content-security-policy"].startswith("default-src 'self'")
-    for name in ("page.js", "plot.js", "style.css", "icon.svg"):
-        assert f"/page/{name}" in page.text or name == "icon.svg"
-        text = client.get(f"/page/{name}").text
-        assert "http://" not in text.replace("http://www.w3.org/2000/svg", "")
-        assert "https://" not in text
+    policy = page.headers["content-security-policy"]
+    assert policy.startswith("default-src 'self'")
+    assert "unsafe" not in policy
+    named = re.findall(r'(?:src|href)="([^"]+)"', page.text)
+    assert {Path(name).suffix for name in named} == {".js", ".css", ".svg"}
+    assert "<style" not in page.text
+    for name in named:
+        assert name.startswith("/page/")
+        answer = client.get(name)
+        assert answer.status_code == 200
+        # Names of formats, not addresses that anything is loaded from.
+        text = re.sub(r"http://www\.w3\.org/\S+?(?=[\"'`])", "", answer.text)
+        assert re.findall(r"https?://\w[\w.]*", text) == []
+
+
+def test_a_checkout_without_its_page_says_so_at_the_pages_address_and_serves_the_rest(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(app, "BUILT", tmp_path)
+    page = client.get("/")
+    assert page.status_code == 503
+    assert "not built" in page.text and "make page" in page.text
+    assert client.get("/api/v1/info").status_code == 200
 
 
 @pytest.mark.parametrize(
     ("body", "wrong"),
     [
-        ({"kind": "capture", "protocol": "indentation"}, "session"),
-        ({"kind": "capture", "protocol": "indentation", "session": "a", "speed": 3}, "speed"),
-        ({"kind": "capture", "protocol": "indentation", "session": "../../etc"}, "session"),
-        ({"kind": "capture", "protocol": 7, "session": "a"}, "protocol"),
-        ({"kind": "track", "session": "a", "forces_N": [False]}, "forces_N"),
-        ({"kind": "track", "session": "a", "forces_N": [-1.0]}, "forces_N"),
-        ({"kind": "track", "session": "a", "forces_N": []}, "forces_N"),
-        ({"kind": "track", "session": "a", "forces_N": [1.0], "seconds": "10"}, "seconds"),
+        ({"kind": "capture", "params": {"protocol": "indentation"}}, "capture.params.session"),
+        ({"kind": "capture", "params": {"protocol": "indentation", "session": "a", "speed": 3}}, "speed"),
+        ({"kind": "capture", "params": {"protocol": "indentation", "session": "../../etc"}}, "session"),
+        ({"kind": "capture", "params": {"protocol": 7, "session": "a"}}, "protocol"),
+        ({"kind": "track", "params": MODEL | {"forces_N": [False]}}, "forces_N"),
+        ({"kind": "track", "params": MODEL | {"forces_N": [-1.0]}}, "forces_N"),
+        ({"kind": "track", "params": MODEL | {"forces_N": []}}, "one of forces_N, reference and points"),
+        ({"kind": "track", "params": MODEL | {"forces_N": [1.0], "seconds": "10"}}, "seconds"),
+        ({"kind": "track", "params": MODEL | {"forces_N": [1.0], "reference": "step:5"}}, "one of forces_N"),
+        ({"kind": "capture", "session": "a"}, "capture.params"),
+        ({"kind": "fit", "params": {}}, "either sessions or upload"),
+        ({"kind": "export", "params": {"session": "a", "upload": "0a1b2c3d4e5f"}}, "either session or upload"),
+        ({"kind": "report", "params": {"session": "a", "mapping": "x = 1"}}, "a session says it itself"),
+        ({"kind": "calibrate", "params": {}}, "kind"),
         ({"kind": "dance"}, "kind"),
     ],
 )
@@ -71,7 +97,7 @@ def test_a_body_that_is_not_exactly_right_is_refused_naming_the_field(
 
 
 def test_what_needs_the_bench_says_that_it_is_not_connected(client: TestClient) -> None:
-    body = {"kind": "capture", "protocol": "indentation", "session": "a"}
+    body = {"kind": "capture", "params": {"protocol": "indentation", "session": "a"}}
     lease = client.post("/api/v1/control/lease", json={"holder": "test"}).json()["lease_id"]
     for path, sent in (("/jobs", body), ("/estop", None), ("/pain", None), ("/estop/reset", None)):
         answer = client.post(f"/api/v1{path}", json=sent, headers={"X-Control-Lease": lease})
@@ -102,7 +128,7 @@ def test_protocols_beyond_the_limits_are_listed_with_the_refusal(tmp_path: Path)
     (protocols / "typo.toml").write_text('kind = "indentation"\ndepth_nm = 5\n')
     (protocols / "fine.toml").write_text('kind = "indentation"\ndepth_mm = 5\n')
     wiring = Wiring(force=BotaWiring(port="/dev/no-such-sensor"))
-    with TestClient(build(Service(wiring, tmp_path, protocols)), base_url="http://127.0.0.1:8000") as client:
+    with client_of(Service(wiring, tmp_path, protocols)) as client:
         listed = {item["name"]: item["refusal"] for item in client.get("/api/v1/protocols").json()}
     assert listed["fine"] == ""
     assert "50 mm deep, above limits.depth_mm" in listed["deep"]
@@ -117,10 +143,7 @@ def test_one_bad_file_hides_no_other(tmp_path: Path) -> None:
     (protocols / "fine.toml").write_text('kind = "indentation"\n')
     (sessions / "garbage" / "a.mcap").write_bytes(b"no recording at all")
     (sessions / "secret" / "b.mcap").symlink_to("/etc/hostname")
-    with TestClient(
-        build(Service(Wiring(force=BotaWiring(port="/dev/no-such-sensor")), sessions, protocols)),
-        base_url="http://127.0.0.1:8000",
-    ) as client:
+    with client_of(Service(Wiring(force=BotaWiring(port="/dev/no-such-sensor")), sessions, protocols)) as client:
         listed = {item["name"]: item["refusal"] for item in client.get("/api/v1/protocols").json()}
         found = {item["name"]: item for item in client.get("/api/v1/recordings").json()}
         assert client.get("/api/v1/recordings/secret/b.mcap").status_code == 404
@@ -137,8 +160,8 @@ def test_the_quality_of_a_recording_stands_in_the_list(tmp_path: Path) -> None:
     info = open_session(folder).info
     reason = "force: a gap of 58 ms (good up to 20 ms)"
     write_session(folder, replace(info, trials=(replace(info.trials[0], quality="usable", reasons=(reason,)),)))
-    app = build(Service(Wiring(force=BotaWiring(port="/dev/no-such-sensor")), tmp_path / "sessions", EXAMPLES))
-    with TestClient(app, base_url="http://127.0.0.1:8000") as client:
+    service = Service(Wiring(force=BotaWiring(port="/dev/no-such-sensor")), tmp_path / "sessions", EXAMPLES)
+    with client_of(service) as client:
         (session,) = client.get("/api/v1/recordings").json()
     found = {entry["file"]: (entry["quality"], entry["reasons"]) for entry in session["recordings"]}
     assert found[info.trials[0].file] == ("usable", [reason])

@@ -1,5 +1,6 @@
 """An operation on the terminal: what it says is printed, Ctrl-C cancels it and stops the bench."""
 
+import functools
 import os
 import signal
 import threading
@@ -8,6 +9,7 @@ from typing import cast
 import pytest
 
 from api.cli import live
+from api.cli.computing import compute
 from controller.loop.messages import Status
 from controller.operation import Operation
 from controller.supervisor import Supervisor
@@ -51,7 +53,10 @@ def test_what_an_operation_says_is_printed_as_it_stands(capsys: pytest.CaptureFi
     assert capsys.readouterr().out == f"trial_001  [brackets]\n{long}\n"
 
 
-def test_ctrl_c_ends_a_computation_at_once() -> None:
+def test_ctrl_c_ends_a_computation_at_once(request: pytest.FixtureRequest) -> None:
+    # Whoever starts the tests behind a shell's back has them ignore it.
+    request.addfinalizer(functools.partial(signal.signal, signal.SIGINT, signal.getsignal(signal.SIGINT)))
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     operation, after = Operation("fit"), list[str]()
 
     def work(_: Operation) -> None:
@@ -60,5 +65,5 @@ def test_ctrl_c_ends_a_computation_at_once() -> None:
         after.append("went on")
 
     with pytest.raises(KeyboardInterrupt):
-        live.compute(operation, work)
+        compute(operation, work)
     assert operation.progress.state == "stopped" and not after

@@ -69,7 +69,7 @@ def test_a_diagnosis_that_is_cancelled_writes_nothing(session: Path, tmp_path: P
 def test_a_diagnosis_that_could_not_be_written_is_refused_before_the_work(
     session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(diagnosing, "read_trials", lambda *_: pytest.fail("the work began"))
+    monkeypatch.setattr(diagnosing, "trials_of", lambda *_: pytest.fail("the work began"))
     (tmp_path / "file").touch()
     with pytest.raises(UsageError, match="is a file, not a folder; give another place"):
         diagnose(Operation("diagnose"), session, out=tmp_path / "file" / "out")

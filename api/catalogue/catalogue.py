@@ -1,0 +1,272 @@
+"""The catalogue of one folder of sessions: every question brings the tables to what the folders hold first."""
+
+import contextlib
+import os
+import time
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+from sqlalchemy import Connection, func, select
+
+from api.catalogue import people
+from api.catalogue.database import CatalogueDamaged, Database, address
+from api.catalogue.erasing import finish
+from api.catalogue.folder import short, utc
+from api.catalogue.people import NamedPerson
+from api.catalogue.queries import EVERYTHING, FIRST, Asked, Page, every, listed, sites
+from api.catalogue.refresh import refill, refresh
+from api.catalogue.schema import TABLES
+from api.catalogue.stiffness import compared
+from rig.errors import UsageError
+from rig.results.catalogue import (
+    CatalogueResult,
+    CauseEntry,
+    CauseList,
+    DiagnosisEntry,
+    DiagnosisList,
+    ModelEntry,
+    ModelList,
+    NamesResult,
+    SessionEntry,
+    SessionList,
+    SiteList,
+    SubjectEntry,
+    SubjectHistory,
+    SubjectList,
+    ThresholdEntry,
+    TrialEntry,
+    TrialList,
+    WorkEntry,
+    WorkList,
+    storable,
+)
+
+ENVIRONMENT = "RIG_CATALOGUE"
+# Clocks that a person set differ by a minute; one that is further ahead was wrong.
+LARGEST_AHEAD_S = 60.0
+
+
+class NoSuchSubject(UsageError):
+    """Nothing is known of a code; the message says where the codes are."""
+
+
+def default_file(root: Path) -> Path:
+    """Beside the folder, not in it: whoever passes sessions on passes no names on."""
+    return root.absolute().with_name(f"{root.absolute().name}.catalogue.sqlite")
+
+
+class Catalogue:
+    """What the folder ``root`` of sessions holds. Safe from any thread and any number of processes.
+
+    ``given`` is a file or a URL of PostgreSQL; empty: RIG_CATALOGUE, else a file beside the folder. Every method raises
+    CatalogueUnavailable, CatalogueDamaged or UsageError with the next step.
+    """
+
+    def __init__(self, root: Path, given: str = "", now_s: Callable[[], float] = time.time) -> None:
+        self.root, self._now_s = root, now_s
+        given = given or os.environ.get(ENVIRONMENT, "")
+        self.database = Database(address(given, default_file(root)), root, moves=not given)
+        self._prepared = False
+
+    @contextlib.contextmanager
+    def _fresh(self) -> Iterator[tuple[Connection, tuple[str, ...]]]:
+        """One state of all tables, as the folders are now; and sentences on what is not listed."""
+        self._prepare()
+        remarks = refresh(self.database)
+        with self.database.reading() as connection:
+            yield connection, remarks
+
+    def _prepare(self) -> None:
+        file = self.database.file
+        if not self._prepared or (file is not None and not file.exists()):
+            self.database.prepare()
+            self._prepared = True
+
+    def sessions(self, asked: Asked = EVERYTHING, page: Page = FIRST) -> SessionList:
+        """Sessions by subject, site, kind, quality, dates and causes found."""
+        with self._fresh() as (connection, remarks):
+            items, following = listed(connection, SessionEntry, asked, page)
+        return SessionList(items=tuple(map(self._dated, items)), next=following, remarks=remarks)
+
+    def _dated(self, session: SessionEntry) -> SessionEntry:
+        """The entry, with a remark where its date has not come yet."""
+        if session.at <= utc(self._now_s() + LARGEST_AHEAD_S):
+            return session
+        ahead = f"its date, {session.at}, has not come yet: this computer's clock or the one that wrote it was wrong"
+        return session.model_copy(update={"remarks": (*session.remarks, ahead)})
+
+    def trials(self, asked: Asked = EVERYTHING, page: Page = FIRST) -> TrialList:
+        """Trials, also by quality."""
+        with self._fresh() as (connection, _):
+            items, following = listed(connection, TrialEntry, asked, page)
+        return TrialList(items=items, next=following)
+
+    def models(self, asked: Asked = EVERYTHING, page: Page = FIRST) -> ModelList:
+        """Models, also by law."""
+        with self._fresh() as (connection, _):
+            items, following = listed(connection, ModelEntry, asked, page)
+        return ModelList(items=items, next=following)
+
+    def diagnoses(self, asked: Asked = EVERYTHING, page: Page = FIRST) -> DiagnosisList:
+        """Diagnoses, also by verdict and by a cause they named."""
+        with self._fresh() as (connection, _):
+            items, following = listed(connection, DiagnosisEntry, asked, page)
+        return DiagnosisList(items=items, next=following)
+
+    def causes(self, asked: Asked = EVERYTHING, page: Page = FIRST) -> CauseList:
+        """Causes that were named, also by name."""
+        with self._fresh() as (connection, _):
+            items, following = listed(connection, CauseEntry, asked, page)
+        return CauseList(items=items, next=following)
+
+    def operations(self, asked: Asked = EVERYTHING, page: Page = FIRST) -> WorkList:
+        """Operations that left a result, by kind and session."""
+        with self._fresh() as (connection, _):
+            items, following = listed(connection, WorkEntry, asked, page)
+        return WorkList(items=items, next=following)
+
+    def subjects(self, site: str = "", named: bool = True) -> SubjectList:
+        """Subjects that have a session or a name, by code; without ``named`` no names."""
+        with self._fresh() as (connection, _):
+            found = _subjects(connection, people.names(connection) if named else {})
+        return SubjectList(items=tuple(each for each in found if not site or site in each.sites))
+
+    def sites(self, asked: Asked = EVERYTHING) -> SiteList:
+        """Sites by subject, each with its number of sessions."""
+        with self._fresh() as (connection, _):
+            return SiteList(items=sites(connection, asked))
+
+    def history(self, subject: str, named: bool = True) -> SubjectHistory:
+        """All that is known of one subject; raises UsageError where nothing is."""
+        with self._fresh() as (connection, _):
+            return self.history_in(connection, subject, named)
+
+    def history_in(self, connection: Connection, subject: str, named: bool) -> SubjectHistory:
+        """The same from tables as they are."""
+        asked = Asked(subject=code_of(subject))
+        found = [each for each in _subjects(connection, people.names(connection)) if each.subject == asked.subject]
+        if not found:
+            raise NoSuchSubject(
+                f"subject {subject!r}: has no session in {self.root} and no name; `rig subject list` says who has"
+            )
+        shown = found[0] if named else found[0].model_copy(update={"name": None})
+        sessions = tuple(map(self._dated, every(connection, SessionEntry, asked)))
+        models = every(connection, ModelEntry, asked)
+        return SubjectHistory(
+            subject=shown,
+            sessions=sessions,
+            thresholds=every(connection, ThresholdEntry, asked),
+            models=models,
+            diagnoses=every(connection, DiagnosisEntry, asked),
+            operations=every(connection, WorkEntry, asked),
+            stiffness=compared(sessions, models),
+        )
+
+    def refreshed(self) -> tuple[str, ...]:
+        """Brings the tables to what the folders hold now; sentences on what is not listed."""
+        with self._fresh() as (_, remarks):
+            return remarks
+
+    def unreadable(self) -> tuple[SessionEntry, ...]:
+        """Sessions of which nothing could be read, so that nobody knows whose they are."""
+        with self._fresh() as (connection, _):
+            return every(connection, SessionEntry, Asked(kind="unknown"))
+
+    def rename(self, subject: str, name: str) -> None:
+        """Keeps a person's name for a code; an empty one is forgotten. Raises UsageError for a code that is none."""
+        code = code_of(subject)
+        self._prepare()
+        with self.database.writing() as connection:
+            if name.strip():
+                people.keep(connection, [NamedPerson(subject=code, name=name.strip(), entered=people.now())])
+            elif not people.forget_name(connection, code):
+                raise NoSuchSubject(f"subject {subject!r}: no name is kept for it; `rig subject list` says for whom")
+
+    def rebuild(self) -> CatalogueResult:
+        """Makes all tables anew from the folders; names stay, as far as they can be read."""
+        saved, remarks = self._saved_names()
+        if self.database.file is not None and not self.database.file.exists():
+            self.database.prepare()
+        with self.database.writing() as connection:
+            self.database.refuse_other(connection)
+            finish(self.root)
+            remarks += refill(self.database, connection)
+            people.keep(connection, saved)
+            sessions = connection.scalar(select(func.count()).select_from(TABLES[SessionEntry]))
+            subjects, named = _subjects(connection, {}), people.names(connection)
+        self._prepared = True
+        return CatalogueResult(
+            catalogue=self.database.place,
+            sessions=sessions or 0,
+            subjects=len([each for each in subjects if each.sessions]),
+            names=len(named),
+            remarks=remarks,
+        )
+
+    def _saved_names(self) -> tuple[list[NamedPerson], tuple[str, ...]]:
+        """Where the file is damaged: it is put aside, with what it still says of names."""
+        try:
+            self.database.check()
+        except CatalogueDamaged as damage:
+            file = self.database.file
+            if file is None:
+                return [], ()
+            saved, why = people.salvage(file)
+            aside = file.with_name(f"{file.name}.damaged-{datetime.now(UTC):%Y%m%dT%H%M%SZ}")
+            file.replace(aside)
+            lost = f"after that: {why}; the others come back by `rig catalogue restore`" if why else "all there were"
+            return saved, (
+                str(damage).partition("; ")[0],
+                f"it was kept as {aside}",
+                f"{len(saved)} names saved, {lost}",
+            )
+        return [], ()
+
+    def backup(self, file: Path) -> NamesResult:
+        """Writes all names to a new file, which only its owner may read."""
+        self._prepare()
+        with self.database.reading() as connection:
+            found = tuple(people.names(connection).values())
+        people.write_backup(found, file)
+        return NamesResult(file=str(file), names=len(found))
+
+    def restore(self, file: Path) -> NamesResult:
+        """Brings names back; those entered here since the backup, or never in it, stay."""
+        saved = people.read_backup(file)
+        self._prepare()
+        with self.database.writing() as connection:
+            there = people.names(connection)
+            older = [each for each in saved if each.subject not in there or there[each.subject].entered < each.entered]
+            people.keep(connection, older)
+        return NamesResult(file=str(file), names=len(older))
+
+
+def code_of(subject: str) -> str:
+    """A subject's code as sessions are listed by; raises UsageError where it is empty."""
+    code = short(storable(subject).strip())
+    if not code:
+        raise UsageError("subject: its code is empty; give the code that its sessions carry")
+    return code
+
+
+def _subjects(connection: Connection, named: dict[str, NamedPerson]) -> list[SubjectEntry]:
+    """Everybody with a session or a name, by code."""
+    table = TABLES[SessionEntry]
+    columns = (table.c.subject, table.c.site, table.c.at)
+    found: dict[str, SubjectEntry] = {code: SubjectEntry(subject=code, name=each.name) for code, each in named.items()}
+    for row in connection.execute(select(*columns).where(table.c.subject != "").order_by(*columns)):
+        before = found.get(row.subject) or SubjectEntry(subject=row.subject)
+        found[row.subject] = _with_session(before, row.site, row.at)
+    return [found[code] for code in sorted(found)]
+
+
+def _with_session(subject: SubjectEntry, site: str, at: str) -> SubjectEntry:
+    return subject.model_copy(
+        update={
+            "sites": tuple(sorted({*subject.sites, site} - {""})),
+            "sessions": subject.sessions + 1,
+            "first": min(subject.first or at, at),
+            "last": max(subject.last, at),
+        }
+    )

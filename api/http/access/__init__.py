@@ -1,0 +1,1 @@
+"""Who may act: credentials, rights of routes, limits and the audit log."""

@@ -1,0 +1,113 @@
+"""Who did what, when, and how it ended: a file that is only ever added to, each line bound to the one before it.
+
+A line that was changed or removed shows: each carries the SHA-256 of the line before. Times of day are for people; the
+order is that of ``seq``, whatever the clock was set to.
+"""
+
+import fcntl
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from datetime import UTC, datetime
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict
+
+from api.http.access.scopes import Caller
+
+TAIL_BYTES = 65_536  # many times the longest line
+FIRST = "0" * 64
+
+
+class AuditLine(BaseModel):
+    """One thing that somebody did, or was kept from doing."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    seq: int
+    time: str
+    who: str
+    credential: str
+    what: str
+    outcome: str
+    before: str
+
+
+class AuditLog:
+    """The log at ``path``; services of one account may share it."""
+
+    def __init__(self, path: Path, now: Callable[[], datetime] = lambda: datetime.now(UTC)) -> None:
+        self.path, self._now = path, now
+        self._writer = ThreadPoolExecutor(1, "audit")
+
+    def add(self, caller: Caller | None, what: str, outcome: str) -> "Future[None]":
+        """Adds a line, in a thread: a disk that is slow must keep nobody from stopping; one that is full is told of."""
+        return self._writer.submit(self._add, caller, what, outcome)
+
+    def settle(self) -> None:
+        """Waits until all that was added is written."""
+        self._writer.submit(lambda: None).result()
+
+    def _add(self, caller: Caller | None, what: str, outcome: str) -> None:
+        try:
+            self._append(caller, what, outcome)
+        except OSError as error:
+            sys.stderr.write(f"{self.path}: not in the audit log: {what}: {error.strerror}\n")
+
+    def _append(self, caller: Caller | None, what: str, outcome: str) -> None:
+        self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        fd = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(fd, fcntl.LOCK_EX)
+            seq, before = _last(fd)
+            line = AuditLine(
+                seq=seq + 1, time=self._now().isoformat(timespec="milliseconds"), who=caller.name if caller else "",
+                credential=f"{caller.by} {caller.id}".strip() if caller else "", what=what[:300], outcome=outcome[:300],
+                before=before,
+            )  # fmt: skip
+            os.write(fd, line.model_dump_json().encode() + b"\n")
+        finally:
+            os.close(fd)
+
+    def lines(self) -> Iterable[bytes]:
+        """All lines, oldest first."""
+        return self.path.read_bytes().splitlines() if self.path.exists() else []
+
+    def newest(self, count: int) -> list[AuditLine]:
+        """The last ``count`` lines, newest first; what cannot be read is left out, and `broken` tells of it."""
+        found = []
+        for line in reversed(list(self.lines())[-count:]):
+            try:
+                found.append(AuditLine.model_validate_json(line))
+            except ValueError:
+                continue
+        return found
+
+    def broken(self) -> list[int]:
+        """Numbers of the lines, from 1, that do not follow the line before: something was changed there, or taken."""
+        found, seq, before = [], 0, FIRST
+        for number, line in enumerate(self.lines(), 1):
+            try:
+                known = AuditLine.model_validate_json(line)
+                follows = (known.seq, known.before) == (seq + 1, before)
+                seq = known.seq
+            except ValueError:
+                follows, seq = False, seq + 1
+            before = hashlib.sha256(line).hexdigest()
+            found += [] if follows else [number]
+        return found
+
+
+def _last(fd: int) -> tuple[int, str]:
+    """Number and SHA-256 of the last line."""
+    size = os.fstat(fd).st_size
+    lines = os.pread(fd, TAIL_BYTES, max(size - TAIL_BYTES, 0)).splitlines()
+    if not lines:
+        return 0, FIRST
+    try:
+        return int(json.loads(lines[-1])["seq"]), hashlib.sha256(lines[-1]).hexdigest()
+    except (ValueError, KeyError, TypeError):  # a line cut short by a power failure
+        return len(lines), hashlib.sha256(lines[-1]).hexdigest()

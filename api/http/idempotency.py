@@ -1,0 +1,172 @@
+"""The same request twice is one: an answer is kept for a day under the key that its sender gave it.
+
+A lost answer is asked for again without the thing being done again. What was refused did nothing, so it may be tried
+again under the same key. Kept on disk: a service that ended in the middle does not know whether it acted, and says so.
+"""
+
+import base64
+import hashlib
+import threading
+import time
+from collections.abc import Callable, Coroutine
+from pathlib import Path
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+from pydantic import BaseModel, ValidationError
+
+from api.http.access.rights import CALLER, STOP
+from api.http.problems import RequestRefused
+from rig.recording.files import make_folder, write_text
+
+KEPT_S = 24 * 3600.0
+# A busy day's jobs; the oldest go first.
+MOST_KEPT = 2000
+# As `KeyHeader` takes them; a longer one is refused by the route.
+LONGEST_KEY = 100
+REFUSED = 400
+SENT_AGAIN = ("location", "etag", "content-type")
+Handler = Callable[[Request], Coroutine[Any, Any, Response]]
+
+
+class KeptAnswer(BaseModel):
+    """What was answered; status 0 while nobody knows. ``body`` in base64."""
+
+    place: str
+    """Who asked, where, under which key."""
+    asked: str
+    """SHA-256 of the body."""
+    at_s: float
+    status: int = 0
+    headers: dict[str, str] = {}
+    body: str = ""
+
+    def response(self) -> Response:
+        """The same again, marked."""
+        headers = {**self.headers, "Idempotent-Replayed": "true"}
+        return Response(base64.b64decode(self.body), self.status, headers)
+
+
+class AnswerStore:
+    """Answers of a service, in ``file``. Safe from any thread; the event loop waits for one short line of it."""
+
+    def __init__(self, file: Path, now_s: Callable[[], float] = time.time) -> None:
+        self._file, self._now_s, self._lock = file, now_s, threading.Lock()
+        self._kept: dict[str, KeptAnswer] | None = None
+        self._under_way: set[str] = set()
+
+    def begin(self, place: str, body: bytes) -> KeptAnswer | None:
+        """The answer given before; None where this is the first time, which is noted. Raises RequestRefused."""
+        asked = hashlib.sha256(body).hexdigest()
+        with self._lock:
+            known = self._known().get(place)
+            if known is None:
+                self._under_way.add(place)
+                self._write(KeptAnswer(place=place, asked=asked, at_s=self._now_s()))
+                return None
+            if known.asked != asked:
+                text = "this Idempotency-Key was sent with another body; a new request takes a new key"
+                raise RequestRefused(422, "idempotency-key-reused", text)
+            if known.status:
+                return known
+            raise _undecided(place in self._under_way)
+
+    def end(self, place: str, response: Response | None) -> None:
+        """Keeps what was answered; a refusal, or None, is forgotten, so that it can be tried again."""
+        with self._lock:
+            self._under_way.discard(place)
+            begun = self._known().get(place)
+            if begun is None:
+                return
+            if response is None or response.status_code >= REFUSED:
+                self._write(begun.model_copy(update={"at_s": 0.0}))
+                return
+            headers = {name: response.headers[name] for name in SENT_AGAIN if name in response.headers}
+            body = base64.b64encode(bytes(response.body)).decode()
+            answer = {"status": response.status_code, "headers": headers, "body": body}
+            self._write(begun.model_copy(update=answer))
+
+    def _known(self) -> dict[str, KeptAnswer]:
+        oldest_s = self._now_s() - KEPT_S
+        if self._kept is None:
+            self._kept = _read(self._file)
+            self._shorten()
+        self._kept = {place: each for place, each in self._kept.items() if each.at_s > oldest_s}
+        return self._kept
+
+    def _shorten(self) -> None:
+        """Once a start: what is out of date leaves the file too."""
+        if self._file.is_file():
+            write_text(self._file, "".join(f"{each.model_dump_json()}\n" for each in (self._kept or {}).values()))
+
+    def _write(self, answer: KeptAnswer) -> None:
+        known = self._known()
+        known.pop(answer.place, None)
+        if answer.at_s:
+            known[answer.place] = answer
+        while len(known) > MOST_KEPT:
+            known.pop(next(iter(known)))
+        make_folder(self._file.parent)
+        with self._file.open("a", encoding="utf-8") as file:
+            file.write(answer.model_dump_json() + "\n")
+
+
+def _read(file: Path) -> dict[str, KeptAnswer]:
+    """The last line of each place counts; one that was not written whole is none."""
+    found: dict[str, KeptAnswer] = {}
+    lines = file.read_text(encoding="utf-8", errors="replace").splitlines() if file.is_file() else []
+    for line in lines:
+        try:
+            answer = KeptAnswer.model_validate_json(line)
+        except ValidationError:
+            continue
+        found[answer.place] = answer
+    return found
+
+
+def _undecided(under_way: bool) -> RequestRefused:
+    if under_way:
+        return RequestRefused(409, "in-progress", "the request with this Idempotency-Key is still being answered; wait")
+    text = "the service ended while it answered this request: look whether it took effect, and use a new key"
+    return RequestRefused(409, "outcome-unknown", text)
+
+
+def holds_secret(path: str) -> bool:
+    """Whether what is answered there is kept by nobody but who asked."""
+    return "/tokens" in path or "/auth/" in path
+
+
+def idempotent(store: AnswerStore) -> type[APIRoute]:
+    """Routes whose POST heeds an Idempotency-Key."""
+
+    class IdempotentRoute(APIRoute):
+        """A stop that is asked for twice stops twice; what answers with a secret keeps none."""
+
+        def get_route_handler(self) -> Handler:
+            handler = super().get_route_handler()
+            keeps = "POST" in (self.methods or ()) and not holds_secret(self.path) and STOP not in self.dependencies
+
+            async def answered(request: Request) -> Response:
+                key = request.headers.get("idempotency-key", "")
+                caller = request.scope.get(CALLER)
+                if not (keeps and key and caller) or len(key) > LONGEST_KEY:
+                    return await handler(request)
+                place = f"{caller.name} {request.url.path} {key}"
+                return await _once(store, place, request, handler)
+
+            return answered
+
+    return IdempotentRoute
+
+
+async def _once(store: AnswerStore, place: str, request: Request, handler: Handler) -> Response:
+    before = store.begin(place, await request.body())
+    if before:
+        return before.response()
+    response: Response | None = None
+    try:
+        response = await handler(request)
+    finally:
+        store.end(place, response)
+    return response

@@ -1,0 +1,202 @@
+"""Every kind of job: what it is asked for, what it gives, which command it is, and what does it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal, get_args, get_type_hints
+
+from pydantic import Field
+
+from api.http.jobs.params import (
+    CaptureParams,
+    DataPlace,
+    DiagnoseParams,
+    ExportParams,
+    FitParams,
+    ImportParams,
+    NothingAsked,
+    ProposeParams,
+    ProtocolCheckParams,
+    RepairParams,
+    SimulateParams,
+    ThresholdParams,
+    TrackParams,
+    VerifyParams,
+)
+from api.http.jobs.proposal import ProposalResult
+from api.http.models import RequestBody
+from rig.results.base import SavedResult
+from rig.results.bench import DoctorResult, RetractResult
+from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
+from rig.results.fit import FitResult
+from rig.results.recorded import CaptureResult, ExportResult, ImportResult, RepairResult, ReportResult, VerifyResult
+from rig.results.tracking import SimulateResult, Threshold, TrackResult
+
+AnyResult = (
+    CaptureResult | TrackResult | RetractResult | Threshold | DoctorResult | FitResult | DiagnosisResult
+    | ProtocolCheckResult | SimulateResult | ReportResult | ExportResult | VerifyResult | RepairResult
+    | ProposalResult | ImportResult
+)  # fmt: skip
+
+
+class JobBody(RequestBody):
+    """Root of what starts a job."""
+
+
+class CaptureJob(JobBody):
+    """Runs a protocol and records every trial."""
+
+    kind: Literal["capture"]
+    params: CaptureParams
+
+
+class TrackJob(JobBody):
+    """Tracks a force with gains from a model."""
+
+    kind: Literal["track"]
+    params: TrackParams
+
+
+class RetractJob(JobBody):
+    """Moves the tip out, after a stop that was acknowledged."""
+
+    kind: Literal["retract"]
+    params: NothingAsked = NothingAsked()
+
+
+class ThresholdJob(JobBody):
+    """Raises force slowly until the subject stops it."""
+
+    kind: Literal["threshold"]
+    params: ThresholdParams
+
+
+class DoctorJob(JobBody):
+    """Looks at each device without moving anything."""
+
+    kind: Literal["doctor"]
+    params: NothingAsked = NothingAsked()
+
+
+class FitJob(JobBody):
+    """Fits tissue laws, and the lattice where asked for."""
+
+    kind: Literal["fit"]
+    params: FitParams
+
+
+class DiagnoseJob(JobBody):
+    """Says what the simulation gets wrong, names the cause and extends the model."""
+
+    kind: Literal["diagnose"]
+    params: DiagnoseParams
+
+
+class ProtocolCheckJob(JobBody):
+    """Says before any recording which causes a protocol can show."""
+
+    kind: Literal["protocol-check"]
+    params: ProtocolCheckParams
+
+
+class SimulateJob(JobBody):
+    """Plays a reference on a model before anything real moves."""
+
+    kind: Literal["simulate"]
+    params: SimulateParams
+
+
+class ReportJob(JobBody):
+    """Writes one self-contained page."""
+
+    kind: Literal["report"]
+    params: DataPlace
+
+
+class ExportJob(JobBody):
+    """Writes recordings as CSV, Parquet, HDF5 and MAT."""
+
+    kind: Literal["export"]
+    params: ExportParams
+
+
+class VerifyJob(JobBody):
+    """Reads every byte and says what is complete, missing or damaged."""
+
+    kind: Literal["verify"]
+    params: VerifyParams
+
+
+class RepairJob(JobBody):
+    """Saves every good sample of a recording as a new one."""
+
+    kind: Literal["repair"]
+    params: RepairParams
+
+
+class ProposeJob(JobBody):
+    """Proposes a mapping for an upload, with what is doubtful and what to ask."""
+
+    kind: Literal["propose"]
+    params: ProposeParams
+
+
+class ImportJob(JobBody):
+    """Makes a session of an upload."""
+
+    kind: Literal["import"]
+    params: ImportParams
+
+
+AnyJob = Annotated[
+    CaptureJob | TrackJob | RetractJob | ThresholdJob | DoctorJob | FitJob | DiagnoseJob | ProtocolCheckJob
+    | SimulateJob | ReportJob | ExportJob | VerifyJob | RepairJob | ProposeJob | ImportJob,
+    Field(discriminator="kind"),
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Kind:
+    """``work`` names the function that a process of its own calls; without one it uses the bench of the service."""
+
+    body: type[JobBody]
+    result: type[SavedResult]
+    command: str
+    work: str = ""
+    moves: bool = False
+    pausable: bool = False
+    """Between two parts of it, with the tip out."""
+
+    @property
+    def name(self) -> str:
+        """As requests and views say it."""
+        (name,) = get_args(get_type_hints(self.body)["kind"])
+        return str(name)
+
+    @property
+    def params(self) -> type[RequestBody]:
+        """What it is asked for."""
+        found: type[RequestBody] = get_type_hints(self.body)["params"]
+        return found
+
+
+RECORDINGS, SCIENCE, BENCH = (f"api.http.jobs.work_{part}" for part in ("recordings", "science", "bench"))
+KINDS: Mapping[str, Kind] = {
+    kind.name: kind
+    for kind in (
+        Kind(CaptureJob, CaptureResult, "capture", moves=True, pausable=True),
+        Kind(TrackJob, TrackResult, "track", moves=True),
+        Kind(RetractJob, RetractResult, "reset", moves=True),
+        Kind(ThresholdJob, Threshold, "threshold", moves=True),
+        Kind(DoctorJob, DoctorResult, "doctor", f"{BENCH}:doctor"),
+        Kind(FitJob, FitResult, "fit", f"{SCIENCE}:fit"),
+        Kind(DiagnoseJob, DiagnosisResult, "diagnose", f"{SCIENCE}:diagnose"),
+        Kind(ProtocolCheckJob, ProtocolCheckResult, "protocol", f"{SCIENCE}:protocol_check"),
+        Kind(SimulateJob, SimulateResult, "simulate", f"{SCIENCE}:simulate"),
+        Kind(ReportJob, ReportResult, "report", f"{RECORDINGS}:report"),
+        Kind(ExportJob, ExportResult, "export", f"{RECORDINGS}:export"),
+        Kind(VerifyJob, VerifyResult, "verify", f"{RECORDINGS}:verify"),
+        Kind(RepairJob, RepairResult, "repair", f"{RECORDINGS}:repair"),
+        Kind(ProposeJob, ProposalResult, "import", f"{RECORDINGS}:propose_mapping"),
+        Kind(ImportJob, ImportResult, "import", f"{RECORDINGS}:import_upload"),
+    )
+}  # fmt: skip

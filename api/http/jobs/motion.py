@@ -1,0 +1,86 @@
+"""Jobs that use the bench of the service: what each is checked for, and what it then does in a thread of its own."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from api.http.jobs.kinds import AnyJob, CaptureJob, RetractJob, ThresholdJob, TrackJob
+from api.http.jobs.params import ModelRef, TrackParams
+from api.http.jobs.places import Places
+from api.http.jobs.references import reference_of
+from api.operations import motion
+from api.operations.motion import TrackPlan
+from controller.experiments import capture as experiment
+from controller.experiments import threshold as ramp
+from controller.experiments import tracked
+from controller.loop.steps import Program
+from controller.operation import Operation
+from controller.supervisor import Supervisor
+from rig.config.protocol import Indentation
+from rig.config.table import load
+from rig.results.base import SavedResult
+from rig.tissue.model import load_model
+
+
+class Planned(NamedTuple):
+    """A job that was checked: its operation, the session it records, and its work."""
+
+    operation: Operation
+    session: str | None
+    work: Callable[[], SavedResult]
+
+
+def planned(body: AnyJob, bench: Supervisor, places: Places) -> Planned:
+    """All checks of a job, before anything moves; raises UsageError with what is wrong."""
+    match body:
+        case CaptureJob():
+            return _capture(body, bench, places)
+        case TrackJob():
+            return _track(body.params, bench, places)
+        case ThresholdJob():
+            return _threshold(body, bench, places)
+        case RetractJob():
+            operation = Operation("retract", total=1, unit="moves")
+            return Planned(operation, None, lambda: motion.retract(operation, bench))
+    raise AssertionError(f"{body.kind} does not use the bench")
+
+
+def _capture(body: CaptureJob, bench: Supervisor, places: Places) -> Planned:
+    name = body.params.session
+    plan = load(Indentation, places.protocol(body.params.protocol))
+    experiment.check(plan, bench.wiring)
+    folder, operation = places.new_session(name), motion.capture_operation(plan)
+    return Planned(operation, name, lambda: motion.capture(operation, bench, plan, folder))
+
+
+def _track(asked: TrackParams, bench: Supervisor, places: Places) -> Planned:
+    wanted = _plan(asked, asked.model, bench, places)
+    against = _plan(asked, asked.against, bench, places) if asked.against else None
+    name = asked.session or asked.model.session
+    folder = places.recorded_into(name)
+    tracked.refuse_foreign(folder)
+    operation = Operation("track", total=2 if against else 1, unit="runs")
+    return Planned(operation, name, lambda: motion.track(operation, bench, wanted, folder, against))
+
+
+def _plan(asked: TrackParams, ref: ModelRef, bench: Supervisor, places: Places) -> TrackPlan:
+    file = places.model(ref)
+    return TrackPlan(_program(asked, file, bench), str(file.relative_to(places.sessions)))
+
+
+def _program(asked: TrackParams, file: Path, bench: Supervisor) -> Program:
+    model = load_model(file)
+    if asked.forces_N:
+        return tracked.plan(asked.forces_N, asked.seconds, model, bench.wiring, asked.gains)
+    return tracked.plan_reference(reference_of(asked), model, bench.wiring, asked.gains)
+
+
+def _threshold(body: ThresholdJob, bench: Supervisor, places: Places) -> Planned:
+    asked, file = body.params, places.model(body.params.model)
+    program = ramp.plan(asked.up_to_N, asked.rate_N_s, load_model(file), bench.wiring)
+    plan = TrackPlan(program, str(file.relative_to(places.sessions)))
+    name = asked.session or asked.model.session
+    folder = places.recorded_into(name)
+    tracked.refuse_foreign(folder)
+    operation = Operation("threshold", total=1, unit="ramps")
+    return Planned(operation, name, lambda: motion.threshold(operation, bench, plan, asked.up_to_N, folder))

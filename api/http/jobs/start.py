@@ -1,0 +1,77 @@
+"""From a request to a job: names are looked up and limits checked before anything begins."""
+
+from api.http.jobs.job import Job
+from api.http.jobs.kinds import KINDS, AnyJob, Kind
+from api.http.jobs.motion import planned
+from api.http.jobs.params import ImportParams, ModelRef, RepairParams, VerifyParams
+from api.http.jobs.places import Places
+from api.http.jobs.process import Computation
+from api.http.jobs.wire import Order
+from api.http.models import RequestBody
+from api.http.service import Service
+from controller.operation import Operation
+from rig.results.base import SavedResult
+from rig.results.bench import DoctorResult
+
+
+def start(service: Service, body: AnyJob, by: str, lease: str = "") -> Job:
+    """The job that ``body`` asks for; raises what it refuses, and then nothing has begun."""
+    kind = KINDS[body.kind]
+    return _moving(service, body, kind, by, lease) if kind.moves else _computing(service, body, kind, by)
+
+
+def _moving(service: Service, body: AnyJob, kind: Kind, by: str, lease: str) -> Job:
+    plan = planned(body, service.the_bench(), service.jobs.places(""))
+    job = service.jobs.new(kind, body.params, by, plan.session, plan.operation)
+    job.lease, job.interrupt = lease, service.stop_softly
+    with service.starting:
+        service.jobs.refuse_busy()
+        service.refuse_stopped()
+        return service.jobs.start_moving(job, plan.work)
+
+
+def _computing(service: Service, body: AnyJob, kind: Kind, by: str) -> Job:
+    _check(service.jobs.places(""), body.params)
+    operation = Operation(kind.name)
+    job = service.jobs.new(kind, body.params, by, _session(body.params), operation)
+    seen = service.seen_devices() if kind.name == "doctor" else None
+    if seen is not None:
+        return service.jobs.start_computing(job, lambda: DoctorResult(devices=seen))
+    order = Order(
+        kind=kind.name, work=service.works.get(kind.name, kind.work), params=job.asked.params,
+        wiring=service.wiring.model_dump_json(), hands=service.hands, **service.jobs.places(job.id)._asdict(),
+    )  # fmt: skip
+    computation = Computation(order, job.ask, lambda port: setattr(job, "stop_port", port))
+    job.interrupt, job.go_on = computation.cancel, computation.done
+    return service.jobs.start_computing(job, lambda: _result(kind, computation.run(operation)))
+
+
+def _result(kind: Kind, text: str) -> SavedResult:
+    return kind.result.model_validate_json(text)
+
+
+def _session(asked: RequestBody) -> str | None:
+    """The session it works on, where that is one."""
+    several: list[str] = getattr(asked, "sessions", [])
+    found: str | None = getattr(asked, "session", None)
+    return several[0] if len(several) == 1 else found
+
+
+def _check(places: Places, asked: RequestBody) -> None:
+    """Whatever is named has to be there, and what is made must not."""
+    for name, value in asked:
+        match name, value:
+            case "upload", str():
+                places.upload(value)
+            case "session", str():
+                look = places.new_session if isinstance(asked, ImportParams) else places.session
+                look(value)
+            case "sessions", list():
+                for session in value:
+                    places.session(session)
+            case "protocol", str():
+                places.protocol(value)
+            case _, ModelRef():
+                places.model(value)
+    if isinstance(asked, RepairParams | VerifyParams) and asked.recording:
+        places.recording(asked.session, asked.recording)

@@ -1,0 +1,116 @@
+"""Jobs on disk, beside the folder of sessions: what has ended outlasts the service, what had not is told so."""
+
+import contextlib
+import fcntl
+import json
+import os
+import shutil
+import time
+from pathlib import Path
+
+from api.http.jobs.job import stamp
+from api.http.jobs.views import FILES, JobView
+from api.http.models import JobProblem, JobSummary
+from rig.errors import RigError
+from rig.recording.files import make_folder, write_text
+
+RECORD, LOCK = "job.json", "lock"
+# A busy month of a lab; each has a record of some kilobytes.
+MOST_JOBS = 500
+# Files of jobs are exports and pictures, made again when they are wanted.
+FILES_KEPT_S = 7 * 24 * 3600.0
+INTERRUPTED = "the service ended while this was under way; look at what it left, and start it again if it is wanted"
+
+
+class JobStore:
+    """Folder ``root`` with one folder a job. Used under the board's lock."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self._locks: dict[str, int] = {}
+
+    def folder(self, identifier: str) -> Path:
+        """That of one job."""
+        return self.root / identifier
+
+    def files(self, identifier: str) -> Path:
+        """Its own files."""
+        return self.folder(identifier) / FILES
+
+    def hold(self, identifier: str) -> None:
+        """From now until ``keep_ended`` the job is this service's: the lock ends with the process at the latest."""
+        make_folder(self.folder(identifier))
+        fd = os.open(self.folder(identifier) / LOCK, os.O_RDWR | os.O_CREAT, 0o600)
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        self._locks[identifier] = fd
+
+    def keep(self, view: JobView) -> None:
+        """Writes it as it stands."""
+        make_folder(self.folder(view.id))
+        write_text(self.folder(view.id) / RECORD, view.model_dump_json())
+
+    def let_go(self, identifier: str) -> None:
+        """The job has ended."""
+        fd = self._locks.pop(identifier, None)
+        if fd is not None:
+            os.close(fd)
+            (self.folder(identifier) / LOCK).unlink(missing_ok=True)
+
+    def record(self, identifier: str) -> bytes | None:
+        """The view of a job as JSON; None where there is none."""
+        with contextlib.suppress(OSError):
+            return (self.folder(identifier) / RECORD).read_bytes()
+        return None
+
+    def load(self) -> dict[str, JobSummary]:
+        """All jobs that no other service has under way, by id."""
+        if not self.root.is_dir():
+            return {}
+        found = (self._loaded(folder) for folder in self.root.iterdir() if (folder / RECORD).is_file())
+        return {each.id: each for each in found if each is not None}
+
+    def _loaded(self, folder: Path) -> JobSummary | None:
+        lock = folder / LOCK
+        if lock.exists() and not _abandoned(lock):
+            return None
+        try:
+            facts = json.loads((folder / RECORD).read_bytes())
+            summary = JobSummary.model_validate(facts)
+            if summary.ended is None:
+                summary = _interrupted(summary)
+                write_text(folder / RECORD, json.dumps({**facts, **summary.model_dump(mode="json")}))
+            lock.unlink(missing_ok=True)
+        except (OSError, ValueError, RigError):  # a record that was not written by this program
+            return None
+        return summary
+
+    def prune(self, jobs: dict[str, JobSummary]) -> None:
+        """Forgets the oldest beyond what is kept, and their files sooner."""
+        newest = sorted(jobs.values(), key=lambda job: (job.created, job.id), reverse=True)
+        for job in newest[MOST_JOBS:]:
+            del jobs[job.id]
+            shutil.rmtree(self.folder(job.id), ignore_errors=True)
+        for job in newest[:MOST_JOBS]:
+            folder = self.files(job.id)
+            with contextlib.suppress(OSError):
+                if time.time() - folder.stat().st_mtime > FILES_KEPT_S:
+                    shutil.rmtree(folder, ignore_errors=True)
+
+
+def _abandoned(lock: Path) -> bool:
+    with contextlib.suppress(OSError), lock.open("rb") as file:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return True
+    return False
+
+
+def _interrupted(job: JobSummary) -> JobSummary:
+    problem = JobProblem(code="interrupted", detail=INTERRUPTED)
+    ended: dict[str, object] = {
+        "state": "interrupted",
+        "ended": stamp(),
+        "message": INTERRUPTED,
+        "can": [],
+        "time_left_s": None,
+    }
+    return job.model_copy(update={**ended, "problem": problem})

@@ -1,0 +1,130 @@
+"""`python -m api.http.jobs.worker`: the process that computes one job.
+
+Its order comes as the first line of standard input, what it finds goes out as lines; where the input ends the service
+is gone, and so is this. What libraries print goes to standard error.
+"""
+
+import os
+import queue
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from importlib import import_module
+from typing import NamedTuple, Protocol, TextIO
+
+from api.http.jobs.kinds import KINDS
+from api.http.jobs.places import Places
+from api.http.jobs.wire import Order, Told, Word
+from api.http.models import RequestBody
+from controller.operation import Cancelled, Operation, Progress
+from rig.config.wiring import Wiring
+from rig.errors import RigError, SafetyStop
+from rig.results.base import SavedResult
+
+# A third of a normal program's share of a busy computer: a fit may wait for a page, and never the other way.
+NICENESS = 5
+# A stop by the service's signal (as by systemd) is an end in order; of what was asked to end it is the last word.
+ENDED = 1
+
+
+class Tell(Protocol):
+    """Sends one message to the service."""
+
+    def __call__(self, message: Told) -> None:
+        """In one piece, from any thread."""
+
+
+class Desk(NamedTuple):
+    """What a function works with beside its parameters: where, on which bench, and who does what only a person can."""
+
+    places: Places
+    wiring: Wiring
+    ask: Callable[[str], None]
+    """Asks a person to do something, and returns when it is done; raises Cancelled where it was cancelled."""
+    tell: Tell
+    hands: str = ""
+
+
+class Pipes:
+    """The two pipes."""
+
+    def __init__(self, incoming: TextIO, outgoing: TextIO) -> None:
+        self._incoming, self._outgoing = incoming, outgoing
+        self._lock, self._done = threading.Lock(), queue.SimpleQueue[bool]()
+        self.operation: Operation | None = None
+
+    def tell(self, message: Told) -> None:
+        """In one piece."""
+        with self._lock:
+            self._outgoing.write(message.model_dump_json(exclude_defaults=True) + "\n")
+            self._outgoing.flush()
+
+    def listen(self) -> None:
+        """Until the service is gone, which ends this process."""
+        for line in self._incoming:
+            word = Word.model_validate_json(line)
+            if word.type == "cancel" and self.operation:
+                self.operation.cancel()
+            self._done.put(word.type == "done")
+        os._exit(ENDED)
+
+    def ask(self, request: str) -> None:
+        """A person is asked to do something; returns when it is done."""
+        self.tell(Told(type="ask", text=request))
+        if not self._done.get():
+            raise Cancelled(f"cancelled before: {request}")
+
+
+def compute(order: Order, pipes: Pipes) -> None:
+    """The work of ``order``, told from beginning to end."""
+    kind = KINDS[order.kind]
+    operation = pipes.operation = Operation(order.kind)
+    operation.watch = _watch(pipes.tell)
+    desk = Desk(order.places, Wiring.model_validate_json(order.wiring), pipes.ask, pipes.tell, order.hands)
+    try:
+        asked = kind.params.model_validate(order.params)
+        found = function_at(order.work)(operation, asked, desk)
+    except RigError as error:
+        code = error.code if isinstance(error, SafetyStop) else ""
+        pipes.tell(Told(type="error", name=type(error).__name__, text=str(error), code=code))
+    except OSError as error:  # most often a session that was removed meanwhile
+        pipes.tell(Told(type="error", name="DataError", text=f"{error.filename}: {error.strerror or error}"))
+    else:
+        pipes.tell(Told(type="result", text=found.model_dump_json()))
+
+
+def function_at(name: str) -> Callable[[Operation, RequestBody, Desk], SavedResult]:
+    """The function that ``module:name`` stands for; only the module of the job asked for is loaded."""
+    module, _, function = name.partition(":")
+    found: Callable[[Operation, RequestBody, Desk], SavedResult] = vars(import_module(module))[function]
+    return found
+
+
+def _watch(tell: Tell) -> Callable[[Progress], None]:
+    told = 0
+
+    def watch(now: Progress) -> None:
+        nonlocal told
+        for sentence in now.log[told:]:
+            tell(Told(type="say", text=sentence))
+        told = len(now.log)
+        tell(Told(type="step", text=now.message, done=now.done / now.total))
+
+    return watch
+
+
+def main() -> None:
+    """Reads the order, does it, ends."""
+    os.nice(NICENESS)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    outgoing = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    pipes = Pipes(sys.stdin, outgoing)
+    order = Order.model_validate_json(sys.stdin.readline())
+    threading.Thread(target=pipes.listen, name="service", daemon=True).start()
+    compute(order, pipes)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,60 @@
+"""Who this service is, and its bench as of now."""
+
+import time
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import StreamingResponse
+
+import rig
+from api.http import views
+from api.http.access.rights import OPERATE, PUBLIC, READ
+from api.http.live import Broadcast
+from api.http.models import Info, RigView
+from api.http.problems import RequestRefused, responses
+from api.http.routes.common import KeyHeader, LeaseHeader, refuse_without_key
+from api.http.service import Service
+
+
+def add(router: APIRouter, service: Service) -> None:
+    """Its routes."""
+    broadcast = Broadcast(lambda: views.rig(service).model_dump_json())
+
+    @router.get("/info", dependencies=[PUBLIC], summary="Who this service is")
+    async def info(request: Request) -> Info:
+        return Info(
+            software=f"tissue-rig {rig.__version__}",
+            service_id=service.id,
+            monotonic_ns=time.monotonic_ns(),
+            sessions_folder=str(service.sessions),
+            stop_port=service.stop_port,
+            away_stops=service.away.address(request.url.hostname or "") if service.away else "",
+        )
+
+    # Asked for most often: in the event loop, which it takes less of than a thread would, and written once.
+    @router.get("/rig", dependencies=[READ], response_model=RigView, summary="The bench as of now")
+    async def status() -> Response:
+        return Response(views.rig(service).model_dump_json(), media_type="application/json")
+
+    @router.post(
+        "/rig/connect",
+        dependencies=[OPERATE],
+        summary="Starts loop and devices where they are not running",
+        responses=responses("400 idempotency-key", "409 busy"),
+    )
+    def connect(lease: LeaseHeader = "", key: KeyHeader = "") -> RigView:
+        service.control.check(lease)
+        refuse_without_key(key)
+        if service.running:
+            raise RequestRefused(409, "busy", "a job is under way")
+        service.connect()
+        return views.rig(service)
+
+    @router.get(
+        "/live",
+        dependencies=[READ],
+        summary="The bench twenty times a second as server-sent events; a slow reader gets the newest",
+        response_class=StreamingResponse,
+        responses={200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
+    )
+    async def live() -> StreamingResponse:
+        return StreamingResponse(broadcast.stream(), media_type="text/event-stream")

@@ -1,0 +1,79 @@
+"""Calibrations: those that the bench uses, and those that lie beside them."""
+
+from collections.abc import Callable, Iterator, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Literal
+
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+
+from api.http.access.rights import READ
+from api.http.service import Service
+from api.operations.calibrations import FOLDER
+from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
+from rig.config.calibration_files import read_axis, read_force
+from rig.errors import RigError
+
+What = Literal["force", "axis"]
+Found = ForceCalibration | AxisCalibration
+READERS: Mapping[What, Callable[[Path], Found]] = {"force": read_force, "axis": read_axis}
+
+
+class CalibrationView(BaseModel):
+    """One calibration; of a file that cannot be read only its name and why."""
+
+    what: What
+    used: bool = Field(description="the bench measures with it now")
+    file: str = Field(description="empty: the simulated bench's own")
+    product: str = ""
+    serial: str = ""
+    date: str = ""
+    uncertainty_percent: float | None = Field(default=None, description="relative standard uncertainty")
+    refused: str = Field(description="why the bench would not use it; empty if it would")
+
+
+def add(router: APIRouter, service: Service) -> None:
+    """Its routes."""
+
+    @router.get(
+        "/calibrations", dependencies=[READ], summary="Calibrations in use, then those in their folder, newest first"
+    )
+    def calibrations() -> list[CalibrationView]:
+        stated, now = service.wiring.calibration, datetime.now(UTC)
+        used = list(_used(stated, now))
+        taken = {Path(one.file).resolve() for one in used if one.file}
+        lying = [one for one in _lying(stated, now) if Path(one.file).resolve() not in taken]
+        return [*used, *sorted(lying, key=lambda one: one.date, reverse=True)]
+
+
+def _used(stated: Calibration, now: datetime) -> Iterator[CalibrationView]:
+    if stated.of_force:
+        yield _view("force", stated.force, stated.of_force, stated, now, used=True)
+    if stated.of_axis:
+        yield _view("axis", stated.axis, stated.of_axis, stated, now, used=True)
+
+
+def _lying(stated: Calibration, now: datetime) -> Iterator[CalibrationView]:
+    for what, read in READERS.items():
+        for path in FOLDER.glob(f"{what}-*.json"):
+            try:
+                yield _view(what, path, read(path), stated, now)
+            except RigError as error:
+                yield CalibrationView(what=what, used=False, file=str(path), refused=str(error))
+
+
+def _view(
+    what: What, file: Path | None, found: Found, stated: Calibration, now: datetime, used: bool = False
+) -> CalibrationView:
+    share = found.uncertainty.combined if isinstance(found, ForceCalibration) else found.uncertainty / found.scale
+    return CalibrationView(
+        what=what,
+        used=used,
+        file=str(file or ""),
+        product=found.product,
+        serial=found.serial,
+        date=found.date.isoformat(),
+        uncertainty_percent=100 * share,
+        refused="; ".join(stated.alone(found).unfit(now)),
+    )

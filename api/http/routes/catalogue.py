@@ -1,0 +1,219 @@
+"""Subjects, models, diagnoses and what else the catalogue lists; a subject's data leave whole, or are erased."""
+
+import contextlib
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi.responses import FileResponse
+from pydantic import Field
+from starlette.background import BackgroundTask
+
+from api.catalogue.catalogue import Catalogue, NoSuchSubject
+from api.catalogue.database import CatalogueDamaged, CatalogueUnavailable
+from api.catalogue.queries import MOST, USUAL, Asked, Page
+from api.catalogue.subjects import erase_subject, export_subject
+from api.http.access.rights import ADMIN, CALLER, OPERATE, READ
+from api.http.access.scopes import Scope
+from api.http.models import RequestBody
+from api.http.problems import RequestRefused, responses
+from api.http.service import Service
+from rig.results.catalogue import (
+    CatalogueResult,
+    CauseList,
+    DiagnosisList,
+    ErasureResult,
+    ModelList,
+    SiteList,
+    SubjectHistory,
+    SubjectList,
+    TrialList,
+    WorkList,
+)
+
+# Codes and words that are asked for; PostgreSQL and SQLite are asked with no longer ones.
+LONGEST = 500
+Word = Annotated[str, Query(max_length=LONGEST)]
+
+
+class NameRequest(RequestBody):
+    """Who a code stands for."""
+
+    name: str = Field(max_length=200, description="empty: the name is forgotten")
+
+
+def asked_in(
+    subject: Word = "",
+    site: Word = "",
+    session: Word = "",
+    kind: Word = "",
+    quality: Word = "",
+    law: Word = "",
+    verdict: Word = "",
+    cause: Word = "",
+    since: Word = "",
+    until: Word = "",
+) -> Asked:
+    """What is asked for; a list takes no notice of what its lines do not have."""
+    return Asked(subject, site, session, kind, quality, law, verdict, cause, since=since, until=until)
+
+
+def page_in(
+    limit: Annotated[int, Query(ge=1, le=MOST)] = USUAL, cursor: Annotated[str, Query(max_length=4 * LONGEST)] = ""
+) -> Page:
+    """Which page: the ``next`` of the one before is its cursor."""
+    return Page(limit, cursor)
+
+
+AskedQuery = Annotated[Asked, Depends(asked_in)]
+PageQuery = Annotated[Page, Depends(page_in)]
+
+
+@contextlib.contextmanager
+def answering() -> Iterator[None]:
+    """What the catalogue refuses, as problems."""
+    try:
+        yield
+    except NoSuchSubject as error:
+        raise RequestRefused(404, "no-such-subject", str(error)) from error
+    except (CatalogueDamaged, CatalogueUnavailable) as error:
+        raise RequestRefused(503, "catalogue", str(error)) from error
+
+
+def add(router: APIRouter, service: Service) -> None:
+    """Its routes."""
+    lists = Catalogue(service.sessions)
+    _lists(router, lists)
+    _one_subject(router, lists)
+    _changes(router, service, lists)
+
+
+def _lists(router: APIRouter, lists: Catalogue) -> None:
+    told = responses("422 refused", "503 catalogue")
+
+    @router.get(
+        "/subjects", summary="Subjects by code; names only for whoever may operate", dependencies=[READ], responses=told
+    )
+    def subjects(request: Request, site: Word = "") -> SubjectList:
+        with answering():
+            return lists.subjects(site, sees_names(request))
+
+    @router.get("/sites", summary="Sites of subjects, with their sessions", dependencies=[READ], responses=told)
+    def sites(asked: AskedQuery) -> SiteList:
+        with answering():
+            return lists.sites(asked)
+
+    @router.get("/trials", summary="Trials with their quality, newest first", dependencies=[READ], responses=told)
+    def trials(asked: AskedQuery, page: PageQuery) -> TrialList:
+        with answering():
+            return lists.trials(asked, page)
+
+    @router.get("/models", summary="Fitted models, newest first", dependencies=[READ], responses=told)
+    def models(asked: AskedQuery, page: PageQuery) -> ModelList:
+        with answering():
+            return lists.models(asked, page)
+
+    @router.get("/diagnoses", summary="Diagnoses, newest first", dependencies=[READ], responses=told)
+    def diagnoses(asked: AskedQuery, page: PageQuery) -> DiagnosisList:
+        with answering():
+            return lists.diagnoses(asked, page)
+
+    @router.get("/causes", summary="Causes that diagnoses named, newest first", dependencies=[READ], responses=told)
+    def causes(asked: AskedQuery, page: PageQuery) -> CauseList:
+        with answering():
+            return lists.causes(asked, page)
+
+    @router.get(
+        "/operations",
+        summary="Operations that left a result in a session, newest first",
+        dependencies=[READ],
+        responses=told,
+    )
+    def operations(asked: AskedQuery, page: PageQuery) -> WorkList:
+        with answering():
+            return lists.operations(asked, page)
+
+
+def sees_names(request: Request) -> bool:
+    """Whether the caller may see names of people."""
+    caller = request.scope.get(CALLER)
+    return caller is not None and caller.may(Scope.OPERATE)
+
+
+def _one_subject(router: APIRouter, lists: Catalogue) -> None:
+    # A code may have any character; what follows it is looked for first.
+    @router.get(
+        "/subjects/{subject:path}/export",
+        dependencies=[OPERATE],
+        summary="Recordings, results and name of a subject in one zip",
+        response_class=FileResponse,
+        responses={
+            200: {"content": {"application/zip": {}}},
+            **responses("404 no-such-subject", "422 refused", "503 catalogue"),
+        },
+    )
+    def export(subject: str) -> FileResponse:
+        scratch = tempfile.TemporaryDirectory(prefix="rig-export-")
+        archive = Path(scratch.name) / "subject.zip"
+        try:
+            with answering():
+                export_subject(lists, subject, archive)
+        except BaseException:
+            scratch.cleanup()
+            raise
+        sent = BackgroundTask(scratch.cleanup)
+        return FileResponse(archive, media_type="application/zip", filename="subject.zip", background=sent)
+
+    @router.put(
+        "/subjects/{subject:path}/name",
+        dependencies=[OPERATE],
+        summary="Keeps a person's name for a code",
+        responses=responses("404 no-such-subject", "422 refused", "503 catalogue"),
+    )
+    def rename(subject: str, request: NameRequest) -> SubjectList:
+        with answering():
+            lists.rename(subject, request.name)
+            return lists.subjects()
+
+    @router.get(
+        "/subjects/{subject:path}",
+        dependencies=[READ],
+        summary="A subject's sessions, thresholds, models and diagnoses; the name only for whoever may operate",
+        responses=responses("404 no-such-subject", "422 refused", "503 catalogue"),
+    )
+    def history(subject: str, request: Request) -> SubjectHistory:
+        with answering():
+            return lists.history(subject, sees_names(request))
+
+
+def _changes(router: APIRouter, service: Service, lists: Catalogue) -> None:
+    @router.delete(
+        "/subjects/{subject:path}",
+        dependencies=[ADMIN],
+        summary="First says what would be erased, with 202; with what that says as `confirm` it is erased",
+        responses={
+            202: {"model": ErasureResult},
+            **responses("404 no-such-subject", "409 busy", "422 refused", "503 catalogue"),
+        },
+    )
+    def erase(subject: str, response: Response, confirm: Word = "") -> ErasureResult:
+        if service.running:
+            raise RequestRefused(
+                409, "busy", "a job is under way, which may write to a session; erase when it has ended"
+            )
+        with answering():
+            found = erase_subject(lists, subject, confirm)
+        response.status_code = 200 if found.done else 202
+        return found
+
+    @router.post(
+        "/catalogue/rebuild",
+        dependencies=[ADMIN],
+        summary="Makes the catalogue anew from the folders; names stay",
+        responses=responses("422 refused", "503 catalogue"),
+    )
+    def rebuild() -> CatalogueResult:
+        with answering():
+            return lists.rebuild()

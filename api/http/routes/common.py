@@ -1,0 +1,41 @@
+"""What several concerns' routes are made with."""
+
+from typing import Annotated
+
+from fastapi import Depends, Header
+from starlette.requests import HTTPConnection
+
+from api.http.access.rights import CALLER
+from api.http.access.scopes import Caller
+from api.http.problems import RequestRefused
+
+PREFIX = "/api/v1"
+
+LeaseHeader = Annotated[str, Header(alias="X-Control-Lease", description="lease_id of the lease in force")]
+
+KEY = r"^[!-~]{1,100}$"
+KeyHeader = Annotated[
+    str,
+    Header(
+        alias="Idempotency-Key",
+        pattern=f"^$|{KEY}",
+        description="asked for by what moves: the same key with the same body gets the first answer again, for a day",
+    ),
+]
+
+
+def refuse_without_key(key: str) -> None:
+    """Raises RequestRefused: what moves must not move twice because an answer was lost."""
+    if not key:
+        text = "this moves the bench: send a header Idempotency-Key, new for each thing that is to happen once"
+        raise RequestRefused(400, "idempotency-key", text)
+
+
+def _caller(connection: HTTPConnection) -> Caller:
+    caller = connection.scope[CALLER]
+    assert isinstance(caller, Caller)
+    return caller
+
+
+# For every route that asks for a right, so that it can say who did what.
+WhoAsks = Annotated[Caller, Depends(_caller)]

@@ -1,0 +1,134 @@
+"""Jobs: what takes longer than an answer, for everything that the command line can do."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Query, Response
+from fastapi.responses import FileResponse
+
+from api.http.access.rights import OPERATE, READ, STOP
+from api.http.downloads import FileAsOfNow
+from api.http.jobs.board import MOST_LISTED, Filter
+from api.http.jobs.examples import EXAMPLES
+from api.http.jobs.kinds import KINDS, AnyJob
+from api.http.jobs.places import regular_file
+from api.http.jobs.start import start
+from api.http.jobs.states import JobState
+from api.http.jobs.views import FILE_TYPES, JobList, JobView, media_type
+from api.http.problems import RequestRefused, responses
+from api.http.routes.common import PREFIX, KeyHeader, LeaseHeader, WhoAsks, refuse_without_key
+from api.http.service import Service
+
+Word = Annotated[str, Query(max_length=1000)]
+JSON = "application/json"
+REFUSED = responses(
+    "400 idempotency-key", "404 no-such-session", "404 no-such-model", "404 no-such-upload", "404 no-such-protocol",
+    "404 no-such-recording", "409 busy", "409 stopped", "409 session-exists", "409 link", "422 refused",
+    "429 queue-full", "503 disconnected",
+)  # fmt: skip
+
+
+def add(router: APIRouter, service: Service) -> None:
+    """Its routes."""
+    _lists(router, service)
+    _verbs(router, service)
+
+    @router.post(
+        "/jobs",
+        dependencies=[OPERATE],
+        status_code=202,
+        response_model=JobView,
+        summary="Starts a job; one that uses the bench asks for the lease and an Idempotency-Key",
+        responses=REFUSED,
+    )
+    def begin(
+        request: Annotated[AnyJob, Body(openapi_examples=EXAMPLES)],
+        caller: WhoAsks,
+        lease: LeaseHeader = "",
+        key: KeyHeader = "",
+    ) -> Response:
+        if KINDS[request.kind].moves:
+            service.control.check(lease)
+            refuse_without_key(key)
+        job = start(service, request, caller.name, lease)
+        return Response(service.jobs.shown(job.id), 202, {"Location": f"{PREFIX}/jobs/{job.id}"}, JSON)
+
+
+def _lists(router: APIRouter, service: Service) -> None:
+    @router.get("/jobs", dependencies=[READ], summary="Jobs, newest first", responses=responses("422 refused"))
+    def jobs(
+        kind: Word = "",
+        state: JobState | None = None,
+        session: Word = "",
+        moves: bool | None = None,
+        limit: Annotated[int, Query(ge=1, le=MOST_LISTED)] = 50,
+        cursor: Word = "",
+    ) -> JobList:
+        return service.jobs.listed(Filter(kind, state or "", session, moves), limit, cursor)
+
+    @router.get(
+        "/jobs/{identifier}",
+        dependencies=[READ],
+        response_model=JobView,
+        summary="One job",
+        responses=responses("404 no-such-job"),
+    )
+    def job(identifier: str) -> Response:
+        return Response(service.jobs.shown(identifier), media_type=JSON)
+
+    @router.get(
+        "/jobs/{identifier}/files/{path:path}",
+        dependencies=[READ],
+        summary="A file of a job's own; ranges are served",
+        response_class=FileResponse,
+        responses={
+            200: {"content": {kind: {} for kind in FILE_TYPES}},
+            **responses("404 no-such-job", "404 no-such-file"),
+        },
+    )
+    def download(identifier: str, path: str) -> FileAsOfNow:
+        found = regular_file(service.jobs.files(identifier), path)
+        if found is None:
+            raise RequestRefused(404, "no-such-file", f"job {identifier} has no file {path[:200]!r}")
+        return FileAsOfNow(found, media_type=media_type(found.name), filename=found.name)
+
+
+def _verbs(router: APIRouter, service: Service) -> None:
+    said = responses("404 no-such-job", "409 job-state", "503 disconnected", "503 device")
+
+    def shown(identifier: str) -> Response:
+        return Response(service.jobs.shown(identifier), media_type=JSON)
+
+    @router.post(
+        "/jobs/{identifier}/cancel",
+        dependencies=[STOP],
+        response_model=JobView,
+        summary="Ends this job and no other; what moves is stopped and retracts",
+        responses=said,
+    )
+    def cancel(identifier: str) -> Response:
+        service.jobs.cancel(identifier)
+        return shown(identifier)
+
+    @router.post(
+        "/jobs/{identifier}/pause",
+        dependencies=[OPERATE],
+        response_model=JobView,
+        summary="Lets a capture wait before its next trial, with the tip out",
+        responses=said,
+    )
+    def pause(identifier: str, lease: LeaseHeader = "") -> Response:
+        service.control.check(lease)
+        service.jobs.alive(identifier).pause()
+        return shown(identifier)
+
+    @router.post(
+        "/jobs/{identifier}/resume",
+        dependencies=[OPERATE],
+        response_model=JobView,
+        summary="Lets a paused job go on; in a calibration it says that what was asked for is done",
+        responses=said,
+    )
+    def resume(identifier: str, lease: LeaseHeader = "") -> Response:
+        service.control.check(lease)
+        service.jobs.alive(identifier).resume(lease)
+        return shown(identifier)

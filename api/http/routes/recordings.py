@@ -1,0 +1,45 @@
+"""The recordings of the sessions, to be looked through and downloaded."""
+
+from fastapi import APIRouter
+from fastapi.responses import FileResponse
+
+from api.http import views
+from api.http.access.rights import READ
+from api.http.downloads import FileAsOfNow
+from api.http.jobs.places import regular_file
+from api.http.jobs.views import FILE_TYPES, media_type
+from api.http.models import SessionView
+from api.http.problems import RequestRefused, responses
+from api.http.service import Service
+
+# A report is a page that carries its own style and pictures. Whatever else lies there as one, it runs no script, and is
+# of no origin: neither what the page keeps nor the interface is open to it.
+SANDBOX = "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
+
+
+def add(router: APIRouter, service: Service) -> None:
+    """Its routes."""
+
+    @router.get("/recordings", dependencies=[READ], summary="Sessions with their recordings, newest first")
+    def recordings() -> list[SessionView]:
+        return views.sessions(service)
+
+    @router.get(
+        "/recordings/{session}/{file:path}",
+        dependencies=[READ],
+        summary="One file of a session, also of its results; ranges are served, and a report is shown by a browser",
+        response_class=FileResponse,
+        responses={
+            200: {"content": {kind: {} for kind in FILE_TYPES}},
+            **responses("404 no-such-session", "404 no-such-recording"),
+        },
+    )
+    def download(session: str, file: str) -> FileAsOfNow:
+        found = regular_file(service.session(session), file)
+        if found is None:
+            raise RequestRefused(404, "no-such-recording", f"session {session} has no file {file[:200]}")
+        name, kind = f"{session}-{file.replace('/', '-')}", media_type(found.name)
+        if kind != "text/html":
+            return FileAsOfNow(found, media_type=kind, filename=name)
+        apart = {"Content-Security-Policy": SANDBOX}
+        return FileAsOfNow(found, headers=apart, media_type=kind, filename=name, content_disposition_type="inline")

@@ -1,0 +1,189 @@
+"""Sessions: listed by query, looked at, taken away in every format, and erased in two steps."""
+
+import asyncio
+import hashlib
+import shutil
+from collections.abc import Coroutine
+from pathlib import Path
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Response
+from fastapi.responses import FileResponse
+from pydantic import BaseModel, Field
+
+from api.catalogue.catalogue import Catalogue
+from api.catalogue.erasing import put_aside
+from api.http import views
+from api.http.access.rights import ADMIN, OPERATE, READ
+from api.http.downloads import FileAsOfNow
+from api.http.jobs.kinds import ExportJob
+from api.http.jobs.params import ExportParams
+from api.http.jobs.places import PlaceRefused
+from api.http.jobs.start import start
+from api.http.jobs.views import FILE_TYPES, FileView, listed_files, media_type
+from api.http.models import SessionView
+from api.http.problems import RequestRefused, responses
+from api.http.routes.catalogue import AskedQuery, PageQuery, answering
+from api.http.service import Service
+from rig.results.base import SavedResult
+from rig.results.catalogue import SessionList
+
+Format = Literal["csv", "parquet", "hdf5", "mat", "mcap"]
+Word = Annotated[str, Query(max_length=100)]
+NAMES = {"csv": "csv", "parquet": "parquet", "hdf5": "session.h5", "mat": "session.mat"}
+FOLDERS = ("csv", "parquet")
+LOOK_S = 0.1
+PATIENCE_S = 20.0  # programs and proxies give up after 30 s
+RETRY_S = 5
+
+
+class SessionFiles(SessionView):
+    """A session with everything in its folder, also what was found in it."""
+
+    files: list[FileView]
+
+
+class SessionErasure(SavedResult):
+    """What an erasure takes, or has taken once it is ``done``; ``confirm`` is what the second step asks for."""
+
+    session: str
+    done: bool
+    files: int
+    bytes: int
+    confirm: str = Field(default="", description="good as long as nothing in the session changes")
+
+
+class ExportUnderWay(BaseModel):
+    """The file is being made, or waits for other computations; the same request gets it later."""
+
+    session: str
+    form: Format
+    retry_after_s: int
+
+
+def add(router: APIRouter, service: Service) -> None:
+    """Its routes."""
+    lists = Catalogue(service.sessions)
+    _looks(router, service, lists)
+    _exports(router, service)
+    _erasure(router, service)
+
+
+def _looks(router: APIRouter, service: Service, lists: Catalogue) -> None:
+    @router.get(
+        "/sessions",
+        dependencies=[READ],
+        summary="Sessions by query, newest first",
+        responses=responses("422 refused", "503 catalogue"),
+    )
+    def sessions(asked: AskedQuery, page: PageQuery) -> SessionList:
+        with answering():
+            return lists.sessions(asked, page)
+
+    @router.get(
+        "/sessions/{session}",
+        dependencies=[READ],
+        summary="One session, with all its files",
+        responses=responses("404 no-such-session"),
+    )
+    def one(session: str) -> SessionFiles:
+        folder = service.session(session)
+        return SessionFiles(**vars(views.session(folder)), files=listed_files(folder, session))
+
+
+def _exports(router: APIRouter, service: Service) -> None:
+    under_way: dict[Path, asyncio.Task[None]] = {}
+
+    @router.get(
+        "/sessions/{session}/export/{form}",
+        dependencies=[OPERATE],
+        summary="A session in another format as one file, made when it is first asked for; ranges are served",
+        response_class=FileResponse,
+        responses={
+            200: {"content": {kind: {} for kind in FILE_TYPES}},
+            202: {"model": ExportUnderWay},
+            **responses("404 no-such-session", "409 link", "409 failed", "429 queue-full"),
+        },
+    )
+    async def export(session: str, form: Format) -> Response:
+        folder = service.session(session)
+        file = service.jobs.folder / "exports" / f"{_state(folder)}.{form}.zip"
+        if form not in FOLDERS and form != "mcap":
+            file = file.with_name(f"{_state(folder)}.{NAMES[form]}")
+        if not file.is_file():
+            making = _made(service, session, form, file)
+            if not await _awaited(under_way, file, making):
+                later = ExportUnderWay(session=session, form=form, retry_after_s=RETRY_S)
+                return Response(later.model_dump_json(), 202, {"Retry-After": str(RETRY_S)}, "application/json")
+        name = f"{session}-{form}{''.join(file.suffixes[-1:])}"
+        return FileAsOfNow(file, media_type=media_type(file.name), filename=name)
+
+
+async def _awaited(under_way: dict[Path, asyncio.Task[None]], file: Path, making: Coroutine[None, None, None]) -> bool:
+    """Whether it is there; it is made once, however many ask and however soon they go."""
+    if file in under_way:
+        making.close()
+    else:
+        under_way[file] = asyncio.create_task(making)
+        under_way[file].add_done_callback(lambda _: under_way.pop(file))
+    task = under_way[file]
+    done, _ = await asyncio.wait({task}, timeout=PATIENCE_S)
+    for ended in done:
+        ended.result()
+    return bool(done)
+
+
+async def _made(service: Service, session: str, form: Format, file: Path) -> None:
+    """By a job, as everything that takes long."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    if form == "mcap":
+        folder = await asyncio.to_thread(service.jobs.places("").session, session)
+        await asyncio.to_thread(_zipped, folder, file)
+        return
+    body = ExportJob(kind="export", params=ExportParams(session=session, formats=[form]))
+    job = await asyncio.to_thread(start, service, body, "export")
+    while not job.ended:
+        await asyncio.sleep(LOOK_S)
+    if job.wrong:
+        raise RequestRefused(409, job.wrong.code, job.wrong.detail)
+    made = service.jobs.files(job.id) / NAMES[form]
+    await asyncio.to_thread(_zipped if form in FOLDERS else shutil.copyfile, made, file)
+
+
+def _zipped(folder: Path, file: Path) -> None:
+    scratch = shutil.make_archive(str(file.with_name(f".{file.stem}")), "zip", folder)
+    Path(scratch).replace(file)
+
+
+def _state(folder: Path) -> str:
+    """Another content, another name."""
+    found = sorted(
+        (path.relative_to(folder).as_posix(), *(path.lstat()[at] for at in (6, 8)), path.lstat().st_mtime_ns)
+        for path in folder.rglob("*")
+    )
+    return hashlib.sha256(repr((str(folder), found)).encode()).hexdigest()[:24]
+
+
+def _erasure(router: APIRouter, service: Service) -> None:
+    @router.delete(
+        "/sessions/{session}",
+        dependencies=[ADMIN],
+        summary="First says what would be erased, with 202; with what that says as `confirm` it is erased",
+        responses={202: {"model": SessionErasure}, **responses("404 no-such-session", "409 busy", "409 stale")},
+    )
+    def erase(session: str, response: Response, confirm: Word = "") -> SessionErasure:
+        folder = service.session(session)
+        if any(job.asked.session == session for job in service.jobs.active):
+            raise RequestRefused(409, "busy", f"a job works on session {session}; cancel it or wait")
+        token, files = _state(folder), [path for path in folder.rglob("*") if path.is_file()]
+        size = sum(path.lstat().st_size for path in files)
+        found = SessionErasure(session=session, done=False, files=len(files), bytes=size, confirm=token)
+        if not confirm:
+            response.status_code = 202
+            return found
+        if confirm != token:
+            text = f"session {session} has changed since, or that is not what the first step said; ask again without it"
+            raise PlaceRefused(409, "stale", text)
+        with put_aside(service.sessions, [session]):
+            pass
+        return found.model_copy(update={"done": True, "confirm": ""})

@@ -1,0 +1,65 @@
+"""Who lies under the tip: kept with each recording, and the force that none may pass. Until the service ends."""
+
+import hashlib
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Response
+from pydantic import Field
+
+from api.http.access.rights import OPERATE, READ
+from api.http.models import RequestBody
+from api.http.problems import RequestRefused, responses
+from api.http.routes.common import LeaseHeader
+from api.http.service import Service
+from rig.config.wiring import Subject
+
+MatchHeader = Annotated[str, Header(alias="If-Match", max_length=80, description="the ETag of what is to be changed")]
+
+
+class SubjectSettings(RequestBody):
+    """Subject, site and the force that none may pass, beside limits.force_N."""
+
+    id: str = Field(min_length=1, max_length=80, description="a code, no person's name", examples=["S01"])
+    site: str = Field(min_length=1, max_length=80, examples=["left forearm"])
+    pain_threshold_N: float = Field(gt=0, le=1000, examples=[8.5])
+
+
+def add(router: APIRouter, service: Service) -> None:
+    """Its routes."""
+
+    def shown(response: Response) -> SubjectSettings:
+        found = SubjectSettings(**service.wiring.subject.model_dump())
+        response.headers["ETag"] = etag_of(found)
+        return found
+
+    @router.get("/subject", dependencies=[READ], summary="The subject on the bench; its ETag is asked for by a change")
+    async def subject(response: Response) -> SubjectSettings:
+        return shown(response)
+
+    @router.put(
+        "/subject",
+        dependencies=[OPERATE],
+        summary="Changes the subject; another threshold starts the loop anew, which homes the axis",
+        responses=responses("409 busy", "409 stopped", "412 stale", "428 if-match"),
+    )
+    def change(
+        wanted: SubjectSettings, response: Response, lease: LeaseHeader = "", match: MatchHeader = ""
+    ) -> SubjectSettings:
+        service.control.check(lease)
+        _refuse_stale(match, etag_of(shown(response)))
+        service.use_subject(Subject(**wanted.model_dump()))
+        return shown(response)
+
+
+def etag_of(settings: SubjectSettings) -> str:
+    """Another content, another tag."""
+    return f'"{hashlib.sha256(settings.model_dump_json().encode()).hexdigest()[:16]}"'
+
+
+def _refuse_stale(match: str, now: str) -> None:
+    if not match:
+        text = "send If-Match with the ETag of GET /api/v1/subject, so that no change of somebody else is lost"
+        raise RequestRefused(428, "if-match", text)
+    if match not in (now, "*"):
+        text = "the subject was changed meanwhile: look at it (GET /api/v1/subject), then change it"
+        raise RequestRefused(412, "stale", text)

@@ -1,0 +1,126 @@
+"""From the loop's ring to histories and events, twenty-five times a second, whether or not anybody looks."""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from api.http.streams.events import EventLog
+from api.http.streams.live_run import LiveRun
+from rig.channels import EVENT, LOOP
+from rig.config.wiring import Wiring
+from rig.errors import UsageError
+from rig.recording.tap import RingTap, Slots, texts_of
+
+PERIOD_S = 0.04
+# Two seconds of the bench, which take a few milliseconds.
+MOST_SLOTS = 8192
+# A loop that has published nothing for this many turns, 0.2 s, is not within a cycle: it has ended.
+PATIENT_TURNS = 5
+
+
+class RunningBench(Protocol):
+    """A running bench."""
+
+    @property
+    def ring_path(self) -> Path:
+        """Where its loop publishes."""
+
+
+class Feed:
+    """Follows whichever bench there is. All of it happens in the thread of the event loop."""
+
+    def __init__(
+        self,
+        wiring: Wiring,
+        bench: Callable[[], RunningBench | None],
+        events: EventLog,
+        onlookers: Sequence[Callable[[Slots], None]] = (),
+    ) -> None:
+        """``onlookers`` are called with all that was published, as it lies in the ring."""
+        self._wiring, self._bench, self.events, self._onlookers = wiring, bench, events, onlookers
+        self._followed: RunningBench | None = None
+        self._tap: RingTap | None = None
+        self._fruitless = 0
+        self._turn = asyncio.Event()
+        self.now_ns = time.monotonic_ns()
+        """When the newest turn began: all clients see the same moment."""
+        self.run = LiveRun(wiring)
+
+    async def follow(self) -> None:
+        """Goes on until it is cancelled."""
+        try:
+            while True:
+                self._try_step()
+                turn, self._turn = self._turn, asyncio.Event()
+                turn.set()
+                await asyncio.sleep(PERIOD_S)
+        finally:
+            self._let_go()
+
+    async def turn(self) -> None:
+        """Waits until there may be something new."""
+        await self._turn.wait()
+
+    @property
+    def missed(self) -> int:
+        """Samples of this run for which the service came too late."""
+        return self._tap.missed if self._tap else 0
+
+    def _try_step(self) -> None:
+        try:
+            self.step()
+        except Exception as error:  # nothing stands above this task: what goes wrong is told, and this run given up
+            self._tap, self.run.ended = None, True
+            text = f"live samples end: {type(error).__name__}: {error}; connect the bench again, and report this"
+            self.events.publish("service", "feed_failed", text, 20)
+
+    def step(self) -> None:
+        """Takes what has been published since the last time."""
+        self.now_ns = time.monotonic_ns()
+        bench = self._bench()
+        if bench is not self._followed:
+            self._let_go()
+            self._followed = bench
+            if bench is not None:
+                self._begin(bench.ring_path)
+        if self._tap:
+            self._take(self._tap)
+
+    def _begin(self, ring: Path) -> None:
+        with contextlib.suppress(UsageError):  # a loop that has ended already
+            self._tap = RingTap.open(ring)
+            self.run.ended, self.run = True, LiveRun(self._wiring)
+
+    def _let_go(self) -> None:
+        if self._tap:
+            self._fruitless = PATIENT_TURNS
+            while self._take(self._tap):
+                pass
+            self._tap.close()
+        self._tap = None
+        self.run.ended = True
+
+    def _take(self, tap: RingTap) -> int:
+        """How much there was; a cycle that is still being published is left for the next time."""
+        slots = tap.take(MOST_SLOTS)
+        cycles = np.flatnonzero(slots["stream"] == LOOP.id)
+        whole = int(cycles[-1]) + 1 if len(cycles) else 0
+        self._fruitless = 0 if whole else self._fruitless + 1
+        if self._fruitless <= PATIENT_TURNS:
+            tap.put_back(len(slots) - whole)
+            slots = slots[:whole]
+        if len(slots):
+            self._hand_on(slots)
+        return len(slots)
+
+    def _hand_on(self, slots: Slots) -> None:
+        self.run.add(slots)
+        for _, capture_ns, _, level, code, text in texts_of(slots, EVENT):
+            self.events.publish("bench", code, text, level, capture_ns)
+        for onlooker in self._onlookers:
+            onlooker(slots)

@@ -1,0 +1,51 @@
+"""Routes of live samples and events."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Query, WebSocket
+from fastapi.responses import StreamingResponse
+
+from api.http.access.rights import READ
+from api.http.routes.common import PREFIX
+from api.http.streams import sse
+from api.http.streams.messages import StreamView
+from api.http.streams.session import Streams
+from api.http.streams.socket import serve
+
+EventId = Annotated[
+    str,
+    Header(
+        alias="Last-Event-ID", pattern=r"^$|^[0-9a-f]{32}-[0-9]{1,15}$", description="id of the last event that came"
+    ),
+]
+Since = Annotated[int | None, Query(ge=0, le=2**53, description="number of the last event that came; 0: all there are")]
+
+
+def build(streams: Streams) -> APIRouter:
+    """`/stream`, `/streams` and `/events`."""
+    router = APIRouter(prefix=PREFIX)
+
+    @router.websocket("/stream", dependencies=[READ])
+    async def stream(socket: WebSocket) -> None:
+        await serve(socket, streams)
+
+    @router.get(
+        "/streams", dependencies=[READ], summary="Live streams that `WS /stream` (subprotocol rig.v1) can be asked for"
+    )
+    async def listed() -> list[StreamView]:
+        return streams.listed()
+
+    @router.get(
+        "/events",
+        dependencies=[READ],
+        summary="What happens, as server-sent events; with Last-Event-ID what was missed comes first",
+        response_class=StreamingResponse,
+        responses={200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
+    )
+    async def events(last_event_id: EventId = "", since: Since = None) -> StreamingResponse:
+        newest = streams.feed.events.last
+        last = sse.after(streams.session_id, last_event_id) if last_event_id else newest if since is None else since
+        told = sse.told(streams.feed, streams.session_id, min(last, newest))
+        return StreamingResponse(told, media_type="text/event-stream")
+
+    return router

@@ -1,0 +1,72 @@
+"""A WebSocket of `rig.v1`: one task sends what is due, one takes what the client asks."""
+
+import asyncio
+import contextlib
+from collections.abc import Awaitable, Callable
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from api.http import problems
+from api.http.streams.messages import PROTOCOL
+from api.http.streams.session import LiveClient, Spoken, Streams, TooSlow
+
+# The client is to come back and resume: of the codes that are an application's own.
+OVERFLOW = 4008
+
+
+async def serve(socket: WebSocket, streams: Streams) -> None:
+    """One connection, from its first to its last message."""
+    if PROTOCOL not in socket.scope["subprotocols"]:
+        text = f"this address speaks the WebSocket subprotocol {PROTOCOL}: ask for it when connecting"
+        await socket.send_denial_response(problems.answer(400, "subprotocol", text))
+        return
+    client = LiveClient(streams)
+    await socket.accept(subprotocol=PROTOCOL)
+    with contextlib.suppress(WebSocketDisconnect), contextlib.closing(client):
+        await _said(socket, client.hello())
+        await _first(_send(socket, client, turn := asyncio.Lock(), streams.feed.turn), _take(socket, client, turn))
+
+
+async def _first(*parts: Awaitable[None]) -> None:
+    """Until one of them ends; what it raised is raised here."""
+    tasks = [asyncio.ensure_future(part) for part in parts]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in tasks:
+            task.cancel()
+        results = await asyncio.gather(*tasks, return_exceptions=True)
+    for result in results:
+        if isinstance(result, Exception):
+            raise result
+
+
+async def _send(socket: WebSocket, client: LiveClient, turn: asyncio.Lock, news: Callable[[], Awaitable[None]]) -> None:
+    while True:
+        sent = False
+        async with turn:
+            try:
+                for said in client.due():
+                    await _said(socket, said)
+                    sent = True
+            except TooSlow as lost:
+                await socket.close(OVERFLOW, f"{lost}; come back with since_event")
+                return
+        if not (sent and client.catching_up):
+            await news()
+
+
+async def _take(socket: WebSocket, client: LiveClient, turn: asyncio.Lock) -> None:
+    while True:
+        message = await socket.receive()
+        if message["type"] == "websocket.disconnect":
+            return
+        async with turn:  # nothing comes on a channel before the client has been told what it is
+            await _said(socket, client.answer(message.get("text")))
+
+
+async def _said(socket: WebSocket, said: Spoken | bytes) -> None:
+    if isinstance(said, bytes):
+        await socket.send_bytes(said)
+    else:
+        await socket.send_text(said.model_dump_json(by_alias=True, exclude_none=said.type in ("ping", "pong")))

@@ -1,0 +1,46 @@
+"""Events as server-sent events, for scripts and curl: a reader that comes back says which was its last."""
+
+from collections.abc import AsyncIterator
+
+from api.http.streams.events import EventsLost
+from api.http.streams.feed import PERIOD_S, Feed
+from api.http.streams.messages import Gap
+
+# A comment after this much silence, so that proxies and readers know that the line is there.
+SILENCE_S = 5.0
+RETRY_MS = 1000
+
+
+def after(session_id: str, last_event_id: str) -> int:
+    """Number of the event that a reader had last; 0, so that it gets all there are, where another service gave it."""
+    session, _, number = last_event_id.rpartition("-")
+    return int(number) if session == session_id else 0
+
+
+async def told(feed: Feed, session_id: str, last: int) -> AsyncIterator[str]:
+    """Every event after number ``last``, for as long as the reader stays; one that falls too far behind is ended."""
+    yield f"retry: {RETRY_MS}\n\n"
+    try:
+        feed.events.after(last)
+    except EventsLost as lost:
+        yield _gap(last + 1, lost.oldest - 1)
+        last = lost.oldest - 1
+    silent_s = 0.0
+    while True:
+        try:
+            events = feed.events.after(last)
+        except EventsLost:
+            return
+        for event in events:
+            last = event.seq
+            yield f"id: {session_id}-{last}\nevent: {event.source}\ndata: {event.model_dump_json()}\n\n"
+        silent_s = 0.0 if events else silent_s + PERIOD_S
+        if silent_s >= SILENCE_S:
+            silent_s = 0.0
+            yield ": nothing new\n\n"
+        await feed.turn()
+
+
+def _gap(first: int, last: int) -> str:
+    gap = Gap(channel=0, stream="events", first=first, last=last, dropped=last - first + 1, cause="expired")
+    return f"event: gap\ndata: {gap.model_dump_json(by_alias=True)}\n\n"

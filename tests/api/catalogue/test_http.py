@@ -1,0 +1,175 @@
+"""The catalogue over HTTP: who may see what, pages, archives, erasure in two steps, and problems in words."""
+
+import io
+import shutil
+import zipfile
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.catalogue import subjects
+from api.catalogue.catalogue import Catalogue, default_file
+from api.http.access.scopes import Scope
+from api.http.service import Service
+from mock_devices.testing.access import bearer, client_of
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.wiring import Wiring
+from tests.api.catalogue.made import diagnosed, fitted, make_session, trial, with_threshold
+
+API = "/api/v1"
+NAME = "Ann Unmistakable-Example"
+
+
+@pytest.fixture
+def lab(root: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.delenv("RIG_CATALOGUE", raising=False)
+    with_threshold(diagnosed(fitted(make_session(root, "first")), "friction"), 7.25)
+    make_session(root, "second", {"id": "../S 02/ä", "site": "calf"}, trials=(trial(1, "bad"),))
+    Catalogue(root).rename("S01", NAME)
+    return root
+
+
+@pytest.fixture
+def client(lab: Path) -> TestClient:
+    """Of a service that is not started: no bench is looked for."""
+    wiring = Wiring(force=BotaWiring(port="/dev/no-sensor"), axis=Epos4Wiring(port="/dev/no-adapter"), tracker=None)
+    return client_of(Service(wiring, lab, lab))
+
+
+def as_(scope: Scope) -> dict[str, str]:
+    return bearer(scope)
+
+
+@pytest.mark.parametrize(
+    ("path", "found"),
+    [
+        ("/trials?quality=bad", ["second/trial_001"]),
+        ("/models?subject=S01&law=index", ["first/fit/model.json"]),
+        ("/models?law=fung", []),
+        ("/diagnoses?cause=friction&verdict=explained", ["first/diagnosis/diagnosis.json"]),
+        ("/causes?since=2026-11-01", ["first/cause 1 friction"]),
+        ("/operations?kind=threshold", ["first/threshold:track_001.threshold.json"]),
+    ],
+)
+def test_each_list_is_asked_by_query(client: TestClient, path: str, found: list[str]) -> None:
+    answer = client.get(f"{API}{path}")
+    assert answer.status_code == 200, answer.text
+    assert [each["key"] for each in answer.json()["items"]] == found
+
+
+def test_sites_and_history_are_those_of_the_command_line(client: TestClient, lab: Path) -> None:
+    assert client.get(f"{API}/sites").json() == Catalogue(lab).sites().model_dump(mode="json")
+    assert client.get(f"{API}/subjects/S01").json() == Catalogue(lab).history("S01").model_dump(mode="json")
+    odd = client.get(f"{API}/subjects/..%2FS%2002%2F%C3%A4")
+    assert odd.json()["subject"]["sessions"] == 1, odd.text
+
+
+def test_a_reader_sees_no_names_anywhere(client: TestClient) -> None:
+    for path in ("/subjects", "/subjects/S01", "/sites", "/operations", "/models"):
+        answer = client.get(f"{API}{path}", headers=as_(Scope.READ))
+        assert answer.status_code == 200 and NAME not in answer.text
+    for path in ("/subjects", "/subjects/S01"):
+        assert NAME in client.get(f"{API}{path}", headers=as_(Scope.OPERATE)).text
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "scope"),
+    [
+        ("GET", "/subjects/S01/export", Scope.READ),
+        ("PUT", "/subjects/S01/name", Scope.READ),
+        ("DELETE", "/subjects/S01", Scope.READ),
+        ("DELETE", "/subjects/S01", Scope.OPERATE),
+        ("POST", "/catalogue/rebuild", Scope.OPERATE),
+    ],
+)
+def test_a_smaller_right_is_refused_and_changes_nothing(
+    client: TestClient, lab: Path, method: str, path: str, scope: Scope
+) -> None:
+    answer = client.request(method, f"{API}{path}", json={"name": "x"}, headers=as_(scope))
+    assert answer.status_code == 403, answer.text
+    assert Catalogue(lab).history("S01").subject.name == NAME
+
+
+@pytest.mark.parametrize("path", ["/subjects", "/subjects/S01", "/models", "/subjects/S01/export"])
+def test_without_a_credential_nothing_is_said(client: TestClient, path: str) -> None:
+    answer = client.get(f"{API}{path}", headers={"Authorization": ""})
+    assert answer.status_code == 401 and NAME not in answer.text
+
+
+def test_a_name_is_kept_and_forgotten(client: TestClient, lab: Path) -> None:
+    assert client.put(f"{API}/subjects/S01/name", json={"name": "Bo"}).status_code == 200
+    assert Catalogue(lab).history("S01").subject.name == "Bo"
+    assert client.put(f"{API}/subjects/S01/name", json={"name": ""}).status_code == 200
+    again = client.put(f"{API}/subjects/S01/name", json={"name": ""})
+    assert (again.status_code, again.json()["code"]) == (404, "no-such-subject")
+
+
+def test_an_archive_is_sent_whole_and_leaves_no_file(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    before = set(tmp_path.iterdir())
+    answer = client.get(f"{API}/subjects/S01/export", headers=as_(Scope.OPERATE))
+    assert answer.headers["content-type"] == "application/zip"
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        assert archive.testzip() is None and "sessions/first/trial_001.mcap" in archive.namelist()
+    assert client.get(f"{API}/subjects/S99/export").status_code == 404
+    assert {path for path in tmp_path.iterdir() if path.name.startswith("rig-export")} <= before
+
+
+def test_a_subject_is_erased_in_two_steps(client: TestClient, lab: Path) -> None:
+    first = client.delete(f"{API}/subjects/S01")
+    assert first.status_code == 202 and (lab / "first").exists()
+    assert "nothing brings them back" in first.json()["statement"]
+    wrong = client.delete(f"{API}/subjects/S01", params={"confirm": "yes"})
+    assert wrong.status_code == 422 and (lab / "first").exists()
+    done = client.delete(f"{API}/subjects/S01", params={"confirm": first.json()["confirm"]})
+    assert (done.status_code, done.json()["done"]) == (200, True)
+    assert not (lab / "first").exists() and (lab / "second").exists()
+    assert client.get(f"{API}/subjects/S01").status_code == 404
+
+
+def test_an_erasure_in_one_step_would_be_seen(client: TestClient, lab: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The plant: whatever is planned counts as confirmed."""
+    real = subjects.erase_subject
+    monkeypatch.setattr(
+        "api.http.routes.catalogue.erase_subject",
+        lambda lists, subject, _: real(lists, subject, real(lists, subject).confirm),
+    )
+    with pytest.raises(AssertionError):
+        test_a_subject_is_erased_in_two_steps(client, lab)
+
+
+def test_sessions_removed_under_the_service_are_gone_from_every_list(client: TestClient, lab: Path) -> None:
+    assert client.get(f"{API}/models").json()["items"]
+    shutil.rmtree(lab / "first")
+    assert client.get(f"{API}/models").json()["items"] == []
+    shutil.rmtree(lab)
+    for path in ("/subjects", "/trials", "/sites", "/operations"):
+        assert client.get(f"{API}{path}").status_code == 200
+    assert client.get(f"{API}/subjects/S01").json()["subject"]["sessions"] == 0
+
+
+def test_a_damaged_catalogue_is_a_problem_with_its_next_step_and_is_rebuilt(client: TestClient, lab: Path) -> None:
+    default_file(lab).write_bytes(b"damaged" * 1000)
+    answer = client.get(f"{API}/models")
+    assert (answer.status_code, answer.json()["code"]) == (503, "catalogue")
+    assert "`rig catalogue rebuild`" in answer.json()["detail"]
+    assert client.post(f"{API}/catalogue/rebuild").json()["sessions"] == 2
+    assert client.get(f"{API}/models").status_code == 200
+
+
+@pytest.mark.parametrize(
+    "query", ["limit=0", "limit=501", "limit=x", "cursor=x", "since=soon", "until=1e9", "subject=" + "x" * 501]
+)
+def test_a_wrong_question_is_422(client: TestClient, query: str) -> None:
+    answer = client.get(f"{API}/trials?{query}")
+    assert answer.status_code == 422, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+
+
+@pytest.mark.parametrize("code", ["%00", "%FF", "..%2F..%2Fetc%2Fpasswd", "%20", "😀", "'%3B--", "x" * 3000])
+def test_a_code_that_nobody_has_is_not_found_or_refused(client: TestClient, code: str) -> None:
+    assert client.get(f"{API}/subjects/{code}").status_code in (404, 422)

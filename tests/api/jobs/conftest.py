@@ -1,0 +1,36 @@
+"""A service without a bench, and a session in its folder."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.http.service import Service
+from mock_devices.testing.access import client_of
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.wiring import Wiring
+from tests.rig.tissue.synthetic import Bench, write_made_session
+
+
+@pytest.fixture
+def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Service:
+    (tmp_path / "protocols").mkdir()
+    made = Service(Wiring(force=BotaWiring(port="/dev/no-such-sensor")), tmp_path / "sessions", tmp_path / "protocols")
+    monkeypatch.setattr(made, "connect", lambda: None)
+    return made
+
+
+@pytest.fixture
+def first(service: Service) -> Path:
+    """A session of one trial."""
+    return write_made_session(service.sessions / "first", Bench().cycles(trials=1, speeds_mm_s=(10.0,)))
+
+
+@pytest.fixture
+def client(service: Service) -> Iterator[TestClient]:
+    """In control."""
+    with client_of(service) as found:
+        taken = found.post("/api/v1/control/lease", json={"holder": "test", "ttl_s": 30.0})
+        found.headers["X-Control-Lease"] = taken.json()["lease_id"]
+        yield found

@@ -1,0 +1,72 @@
+"""Work that a process of its own is given in the place of a command's: it waits, dies, asks, or talks too much."""
+
+import os
+import shutil
+import signal
+import sys
+import time
+
+from api.http.jobs.params import VerifyParams
+from api.http.jobs.worker import Desk
+from controller.operation import Operation
+from rig.errors import DataError
+from rig.results.recorded import VerifyResult
+
+WHOLE = VerifyResult(ok=True, remarks=(), recordings={})
+
+
+def patient(operation: Operation, _asked: VerifyParams, _desk: Desk) -> VerifyResult:
+    """Looks ten times a second whether it is to end."""
+    for turn in range(600):
+        operation.step(f"turn {turn}", turn / 600)
+        time.sleep(0.1)
+    return WHOLE
+
+
+def deaf(operation: Operation, _asked: VerifyParams, _desk: Desk) -> VerifyResult:
+    """Never looks."""
+    operation.advance(0.1, "deaf")
+    time.sleep(60)
+    return WHOLE
+
+
+def dying(_operation: Operation, _asked: VerifyParams, _desk: Desk) -> VerifyResult:
+    """As where the system has no memory left."""
+    os.kill(os.getpid(), signal.SIGKILL)
+    return WHOLE
+
+
+def odd(_operation: Operation, _asked: VerifyParams, _desk: Desk) -> VerifyResult:
+    """A mistake of ours."""
+    raise ZeroDivisionError("the third spring has no length")
+
+
+def wrong(_operation: Operation, _asked: VerifyParams, _desk: Desk) -> VerifyResult:
+    """Something about the data."""
+    raise DataError("trial_001: line 3: force is no number")
+
+
+def removing(_operation: Operation, asked: VerifyParams, desk: Desk) -> VerifyResult:
+    """Somebody else takes the session away."""
+    folder = desk.places.session(asked.session)
+    shutil.rmtree(folder)
+    (folder / "session.json").read_bytes()
+    return WHOLE
+
+
+def talkative(operation: Operation, _asked: VerifyParams, _desk: Desk) -> VerifyResult:
+    """Prints where messages go, and says what belongs into the log."""
+    sys.stdout.write("a library says hello\n")
+    os.write(1, b"{}\n")
+    operation.say("one", "two")
+    operation.advance(0.5, "half way")
+    operation.say("three")
+    return WHOLE
+
+
+def asking(operation: Operation, _asked: VerifyParams, desk: Desk) -> VerifyResult:
+    """Needs a person twice."""
+    for load in ("1 N", "2 N"):
+        desk.ask(f"put {load} on the tip")
+        operation.say(f"{load} is on")
+    return WHOLE

@@ -1,0 +1,137 @@
+"""Jobs are listed page by page, outlast the service, and none is left as if it still ran."""
+
+import json
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.http.jobs import board, store
+from api.http.jobs.board import JobBoard
+from api.http.jobs.kinds import KINDS
+from api.http.jobs.params import VerifyParams
+from api.http.service import Service
+from api.http.streams.events import EventLog
+from controller.operation import Operation
+from mock_devices.testing.access import client_of
+from mock_devices.testing.commands import until
+from tests.api.jobs.asked import begun, ended
+
+
+def made(jobs: JobBoard, session: str = "first", wait: bool = False) -> str:
+    """A job of no work; one that is to ``wait`` is never begun."""
+    kind, operation = KINDS["verify"], Operation("verify")
+    job = jobs.new(kind, VerifyParams(session=session), "Ann", session, operation)
+    if wait:
+        jobs._enter(job)
+    else:
+        jobs.start_computing(job, lambda: None)
+        until(lambda: jobs.find(job.id) is None, 10.0, "the job's end")
+    return job.id
+
+
+@pytest.fixture
+def jobs(tmp_path: Path) -> JobBoard:
+    return JobBoard(tmp_path / "sessions", tmp_path, EventLog())
+
+
+def again(jobs: JobBoard) -> JobBoard:
+    """The board of the next service over the same folder."""
+    return JobBoard(jobs.folder.with_name("sessions"), jobs.folder.parent, EventLog())
+
+
+def test_pages_follow_each_other_without_a_gap_while_jobs_are_added(client: TestClient, service: Service) -> None:
+    names = [made(service.jobs) for _ in range(5)][::-1]
+    page = client.get("/api/v1/jobs?limit=2").json()
+    assert [job["id"] for job in page["items"]] == names[:2]
+    made(service.jobs)
+    found = [job["id"] for job in page["items"]]
+    while page["next"]:
+        page = client.get(f"/api/v1/jobs?limit=2&cursor={page['next']}").json()
+        found += [job["id"] for job in page["items"]]
+    assert found == names
+    refused = client.get("/api/v1/jobs?cursor=nonsense")
+    assert (refused.status_code, refused.json()["code"]) == (422, "refused")
+
+
+def test_jobs_are_found_by_kind_state_and_session(client: TestClient, service: Service) -> None:
+    made(service.jobs, "first")
+    second = made(service.jobs, "second")
+    for query in ("session=second", "session=second&kind=verify&state=succeeded", "session=second&moves=false"):
+        assert [job["id"] for job in client.get(f"/api/v1/jobs?{query}").json()["items"]] == [second]
+    for query in ("kind=fit", "state=failed", "moves=true"):
+        assert client.get(f"/api/v1/jobs?{query}").json()["items"] == []
+    assert client.get("/api/v1/jobs?state=dancing").status_code == 422
+
+
+def test_a_job_outlasts_the_service_with_its_result(service: Service, client: TestClient, first: Path) -> None:
+    job = begun(client, "verify", session=first.name)
+    before = ended(client, job)
+    other = Service(service.wiring, service.sessions, service.protocols)
+    assert client_of(other).get(f"/api/v1/jobs/{job}").json() == before
+
+
+def test_what_was_under_way_when_the_service_died_is_interrupted(jobs: JobBoard) -> None:
+    job = made(jobs, wait=True)
+    jobs._store.let_go(job)
+    found = json.loads(again(jobs).shown(job))
+    assert (found["state"], found["problem"]["code"], found["can"]) == ("interrupted", "interrupted", [])
+    assert found["ended"] and "start it again" in found["problem"]["detail"]
+
+
+def test_what_another_service_has_under_way_is_left_to_it(jobs: JobBoard) -> None:
+    job = made(jobs, wait=True)
+    assert again(jobs)._known() == {}
+    assert json.loads(jobs.shown(job))["state"] == "queued"
+
+
+def test_a_record_that_was_cut_hides_no_other(jobs: JobBoard) -> None:
+    good, cut = made(jobs), made(jobs)
+    file = jobs.folder / cut / "job.json"
+    file.write_text(file.read_text()[:100])
+    assert list(again(jobs)._known()) == [good]
+
+
+def test_the_oldest_are_forgotten_with_their_files(jobs: JobBoard, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "MOST_JOBS", 3)
+    names = [made(jobs) for _ in range(5)]
+    assert set(jobs._known()) == set(names[2:])
+    assert {path.name for path in jobs.folder.iterdir()} == set(names[2:])
+
+
+def test_files_go_before_their_job_does(jobs: JobBoard, monkeypatch: pytest.MonkeyPatch) -> None:
+    job = made(jobs)
+    jobs.files(job).mkdir()
+    made(jobs)
+    assert jobs.files(job).is_dir()
+    monkeypatch.setattr(store, "FILES_KEPT_S", -1.0)
+    made(jobs)
+    assert not jobs.files(job).exists() and jobs.shown(job)
+
+
+def test_a_queue_has_an_end(client: TestClient, service: Service, first: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(board, "MOST_WAITING", 0)
+    refused = client.post("/api/v1/jobs", json={"kind": "verify", "params": {"session": first.name}})
+    assert (refused.status_code, refused.json()["code"]) == (429, "queue-full")
+    assert client.get("/api/v1/jobs").json()["items"] == []
+
+
+def test_each_state_of_a_job_is_an_event(jobs: JobBoard) -> None:
+    job = made(jobs)
+    told = [(event.source, event.code, event.data["state"]) for event in jobs._events.after(0)]
+    assert told == [("job", f"job-{state}", state) for state in ("queued", "running", "succeeded")]
+    assert {event.data["id"] for event in jobs._events.after(0)} == {job}
+
+
+@pytest.mark.parametrize("name", ["none", "../first", "..%2f..%2fetc", "job.json"])
+def test_a_job_that_is_none_is_not_found(client: TestClient, name: str) -> None:
+    for path in (f"/api/v1/jobs/{name}", f"/api/v1/jobs/{name}/files/job.json"):
+        assert client.get(path).status_code == 404
+    assert client.post(f"/api/v1/jobs/{name}/cancel").status_code == 404
+
+
+@pytest.mark.parametrize("path", ["../job.json", "..%2Fjob.json", "/etc/passwd", "none"])
+def test_of_a_job_only_its_files_are_served(client: TestClient, service: Service, path: str) -> None:
+    job = made(service.jobs)
+    service.jobs.files(job).mkdir(exist_ok=True)
+    assert client.get(f"/api/v1/jobs/{job}/files/{path}").status_code == 404

@@ -1,0 +1,88 @@
+"""The description shows each request and answer by an example that is valid, and names every problem of a route."""
+
+import copy
+from typing import Any
+
+import pytest
+
+from api.http.explained import EXPLAINED
+from tests.api import described
+
+STOP = "/api/v1/estop"
+
+
+@pytest.fixture(scope="module")
+def schema() -> dict[str, Any]:
+    return described.description()
+
+
+def test_every_request_answer_and_address_has_an_example(schema: dict[str, Any]) -> None:
+    assert len(list(described.operations(schema))) > 60
+    assert described.without_example(schema) == []
+
+
+def test_every_example_is_valid(schema: dict[str, Any]) -> None:
+    assert described.wrong_examples(schema) == []
+
+
+def test_every_route_has_a_summary_and_names_each_problem_by_a_type_that_has_a_page(schema: dict[str, Any]) -> None:
+    for name, operation in described.operations(schema):
+        assert operation["summary"], name
+        told = described.problems(operation)
+        assert {word.partition(" ")[2] for word in told} <= EXPLAINED.keys(), name
+        assert {"401 no-credential", "403 scope", "429 too-many"} <= told, name
+        for status, response in operation["responses"].items():
+            if int(status) >= 400:
+                assert any(word.startswith(status) for word in told), (name, status)
+                assert response["content"].keys() == {described.PROBLEM}, (name, status)
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("POST /api/v1/jobs", "409 stopped"),
+        ("POST /api/v1/jobs", "422 idempotency-key-reused"),
+        ("PUT /api/v1/subject", "423 no-lease"),
+        ("PUT /api/v1/subject", "412 stale"),
+        ("POST /api/v1/control/lease", "423 lease-held"),
+        ("GET /api/v1/sessions/{session}", "404 no-such-session"),
+        ("POST /api/v1/estop", "504 not-confirmed"),
+    ],
+)
+def test_the_problems_of_a_route_are_among_them(schema: dict[str, Any], name: str, told: str) -> None:
+    assert told in described.problems(dict(described.operations(schema))[name])
+
+
+def test_a_stop_and_what_answers_with_a_secret_heed_no_key(schema: dict[str, Any]) -> None:
+    found = dict(described.operations(schema))
+    keyed = {name for name in found if "409 in-progress" in described.problems(found[name])}
+    assert {"POST /api/v1/jobs", "POST /api/v1/recover", "POST /api/v1/rig/connect"} <= keyed
+    assert not {f"POST {STOP}", "POST /api/v1/jobs/{identifier}/cancel", "POST /api/v1/tokens"} & keyed
+
+
+def test_an_example_that_lacks_or_is_wrong_is_found(schema: dict[str, Any]) -> None:
+    planted = copy.deepcopy(schema)
+    answer = planted["paths"][STOP]["post"]["responses"]["200"]["content"]["application/json"]
+    answer["example"]["done"] = "yes"
+    assert [wrong.partition(":")[0] for wrong in described.wrong_examples(planted)] == [
+        f"POST {STOP} 200 application/json"
+    ]
+    del answer["example"], planted["paths"]["/api/v1/tokens/{name}"]["delete"]["parameters"][0]["example"]
+    assert described.without_example(planted) == [
+        f"POST {STOP} 200 application/json", "DELETE /api/v1/tokens/{name} name"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "problem", "found"),
+    [
+        ("GET", "/api/v1/jobs/x", "404 no-such-job", False),
+        ("GET", "/api/v1/jobs/x", "404 no-such-session", True),
+        ("GET", "/api/v1/recordings/a/fit/model.json", "409 busy", True),
+        ("GET", "/api/v1/nothing", "404 no-such-route", False),
+    ],
+)
+def test_a_problem_that_its_route_does_not_tell_of_is_found(
+    schema: dict[str, Any], method: str, path: str, problem: str, found: bool
+) -> None:
+    assert described.undescribed(schema, method, path, problem) is found

@@ -1,0 +1,137 @@
+"""Sessions over HTTP: pages, every format with ranges, erasure in two steps."""
+
+import io
+import zipfile
+from pathlib import Path
+
+import h5py
+import pytest
+from fastapi.testclient import TestClient
+
+from api.http.access.scopes import Scope
+from api.http.routes import sessions
+from api.http.service import Service
+from mock_devices.testing.access import bearer
+from rig.recording.reader import read_recording
+from tests.api.catalogue.made import fitted, make_session
+from tests.api.jobs import conftest
+from tests.api.jobs.asked import PATIENCE_S
+
+service, first, client = conftest.service, conftest.first, conftest.client
+pytestmark = pytest.mark.timeout(600)
+API = "/api/v1/sessions"
+
+
+def test_sessions_are_listed_page_by_page_with_filters(client: TestClient, service: Service) -> None:
+    for number in range(3):
+        make_session(service.sessions, f"s{number}", {"id": f"S{number % 2}", "site": "calf"})
+    page = client.get(f"{API}?limit=2").json()
+    rest = client.get(f"{API}?limit=2&cursor={page['next']}").json()
+    names = [each["session"] for each in (*page["items"], *rest["items"])]
+    assert sorted(names) == ["s0", "s1", "s2"] and rest["next"] is None
+    assert [each["session"] for each in client.get(f"{API}?subject=S1").json()["items"]] == ["s1"]
+
+
+def test_a_session_is_shown_with_what_was_found_in_it(client: TestClient, service: Service) -> None:
+    fitted(make_session(service.sessions, "first"))
+    shown = client.get(f"{API}/first").json()
+    files = {file["name"]: file for file in shown["files"]}
+    assert "fit/model.json" in files and shown["name"] == "first"
+    answer = client.get(files["fit/model.json"]["href"])
+    assert answer.content == (service.sessions / "first" / "fit" / "model.json").read_bytes()
+    for wrong in ("none", "..", "%2e%2e", "..%2Ffirst"):
+        assert client.get(f"{API}/{wrong}").status_code == 404
+
+
+def test_a_page_in_a_session_is_shown_without_any_right_and_everything_else_is_only_saved(
+    client: TestClient, service: Service
+) -> None:
+    folder = make_session(service.sessions, "first")
+    for name in ("report.html", "what.svg", "notes.txt"):
+        (folder / name).write_text("<script>1</script>")
+        answer = client.get(f"/api/v1/recordings/first/{name}")
+        (policy,) = answer.headers.get_list("content-security-policy")
+        rules = [rule.split() for rule in policy.split(";")]
+        shown = name == "report.html"
+        assert (["sandbox"] in rules) == (["default-src", "'none'"] in rules) == shown
+        assert answer.headers["content-disposition"].startswith("inline" if shown else "attachment")
+        assert answer.headers["x-content-type-options"] == "nosniff"
+
+
+def test_who_asks_for_what_takes_long_is_told_to_come_back_and_it_is_made_once(
+    client: TestClient, service: Service, first: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sessions, "PATIENCE_S", 0.2)
+    for _ in range(2):
+        early = client.get(f"{API}/{first.name}/export/mat")
+        assert (early.status_code, early.json()["retry_after_s"], early.headers["retry-after"]) == (202, 5, "5")
+    monkeypatch.setattr(sessions, "PATIENCE_S", PATIENCE_S)
+    assert client.get(f"{API}/{first.name}/export/mat").content[:6] == b"MATLAB"
+    assert len(client.get("/api/v1/jobs?kind=export").json()["items"]) == 1
+
+
+def test_a_session_is_sent_in_each_format_and_made_once(
+    client: TestClient, service: Service, first: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sessions, "PATIENCE_S", PATIENCE_S)
+    whole = client.get(f"{API}/first/export/hdf5")
+    assert whole.status_code == 200, whole.text
+    with h5py.File(io.BytesIO(whole.content)) as file:
+        assert len(file) > 0
+    part = client.get(f"{API}/first/export/hdf5", headers={"Range": "bytes=0-7"})
+    assert (part.status_code, part.content) == (206, b"\x89HDF\r\n\x1a\n")
+    assert len(client.get("/api/v1/jobs?kind=export").json()["items"]) == 1
+    with zipfile.ZipFile(io.BytesIO(client.get(f"{API}/first/export/csv").content)) as archive:
+        assert any(name.endswith(".csv") for name in archive.namelist())
+    with zipfile.ZipFile(io.BytesIO(client.get(f"{API}/first/export/mcap").content)) as archive:
+        names = archive.namelist()
+        archive.extractall(service.sessions.with_name("taken"))
+    (trial,) = first.glob("*.mcap")
+    assert trial.name in names and read_recording(service.sessions.with_name("taken") / trial.name).complete
+    (first / "session.json").touch()
+    client.get(f"{API}/first/export/hdf5")
+    assert len(client.get("/api/v1/jobs?kind=export").json()["items"]) == 3
+    assert client.get(f"{API}/first/export/xls").status_code == 422
+
+
+def test_a_session_is_erased_in_two_steps_by_whoever_may(client: TestClient, first: Path) -> None:
+    asked = client.delete(f"{API}/first")
+    assert (asked.status_code, asked.json()["done"], asked.json()["files"]) == (202, False, len(list(first.iterdir())))
+    wrong = client.delete(f"{API}/first?confirm=nonsense")
+    assert (wrong.status_code, wrong.json()["code"]) == (409, "stale")
+    (first / "note.txt").write_text("something came meanwhile")
+    late = client.delete(f"{API}/first?confirm={asked.json()['confirm']}")
+    assert late.status_code == 409 and first.is_dir()
+    confirm = client.delete(f"{API}/first").json()["confirm"]
+    assert client.delete(f"{API}/first?confirm={confirm}", headers=bearer(Scope.OPERATE)).status_code == 403
+    done = client.delete(f"{API}/first?confirm={confirm}")
+    assert (done.status_code, done.json()["done"]) == (200, True)
+    assert not first.exists() and client.delete(f"{API}/first").status_code == 404
+
+
+def test_a_session_that_is_worked_on_is_not_erased(client: TestClient, service: Service, first: Path) -> None:
+    service.works["verify"] = "tests.api.jobs.planted:patient"
+    job = client.post("/api/v1/jobs", json={"kind": "verify", "params": {"session": "first"}}).json()["id"]
+    refused = client.delete(f"{API}/first")
+    assert (refused.status_code, refused.json()["code"]) == (409, "busy") and first.is_dir()
+    client.post(f"/api/v1/jobs/{job}/cancel")
+
+
+def test_one_protocol_that_cannot_be_read_is_listed_with_its_error_and_the_others_stay(
+    client: TestClient, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = service.protocols
+    (folder / "plain.toml").write_text("depth_mm = 5\n")
+    (folder / "wiring.toml").write_text('[force]\nproduct = "bota"\n')
+    (folder / "folder.toml").mkdir()
+    (folder / "gone.toml").symlink_to(folder / "nowhere")
+    listed = {each["name"]: each["refusal"] for each in client.get("/api/v1/protocols").json()}
+    assert listed.keys() == {"plain", "folder", "gone"} and listed["plain"] == ""
+    assert "Is a directory" in listed["folder"] and "No such file" in listed["gone"]
+    monkeypatch.setattr("api.http.protocols.load", lambda _kind, path: pytest.fail(f"{path} was read again"))
+    assert len(client.get("/api/v1/protocols").json()) == 3
+    monkeypatch.undo()
+    (folder / "plain.toml").write_text("depth_mm = 500\n")
+    assert "500 mm deep" in next(
+        each["refusal"] for each in client.get("/api/v1/protocols").json() if each["name"] == "plain"
+    )

@@ -1,0 +1,143 @@
+"""The same request twice is one; another one under the same key is refused; a stop stops each time."""
+
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+from api.http.idempotency import KEPT_S, AnswerStore
+from api.http.problems import RequestRefused
+from api.http.service import Service
+from mock_devices.testing.access import client_of
+from mock_devices.testing.clock import Clock
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.wiring import Wiring
+from tests.rig.tissue.synthetic import Bench, write_made_session
+
+BODY = {"kind": "verify", "params": {"session": "first"}}
+
+
+@pytest.fixture
+def service(tmp_path: Path) -> Service:
+    write_made_session(tmp_path / "sessions" / "first", Bench().cycles(trials=1, speeds_mm_s=(10.0,)))
+    return Service(Wiring(force=BotaWiring(port="/dev/no-such-sensor")), tmp_path / "sessions", tmp_path)
+
+
+def sent(client: TestClient, key: str, body: object = BODY) -> Any:
+    return client.post("/api/v1/jobs", json=body, headers={"Idempotency-Key": key})
+
+
+def started(client: TestClient) -> int:
+    return len(client.get("/api/v1/jobs").json()["items"])
+
+
+def test_a_request_that_is_repeated_gets_the_first_answer_and_does_nothing(service: Service) -> None:
+    client = client_of(service)
+    first, again, other = sent(client, "a"), sent(client, "a"), sent(client, "b")
+    assert (again.status_code, again.json()["id"]) == (202, first.json()["id"])
+    assert again.headers["location"] == first.headers["location"]
+    assert (again.headers["idempotent-replayed"], "idempotent-replayed" in first.headers) == ("true", False)
+    assert other.json()["id"] != first.json()["id"] and started(client) == 2
+
+
+def test_the_same_key_with_another_body_is_refused(service: Service) -> None:
+    client = client_of(service)
+    sent(client, "a")
+    refused = sent(client, "a", {"kind": "report", "params": {"session": "first"}})
+    assert (refused.status_code, refused.json()["code"]) == (422, "idempotency-key-reused")
+    assert started(client) == 1
+
+
+def test_a_key_is_its_senders_own(service: Service) -> None:
+    one, two = client_of(service), client_of(service)
+    token = two.post("/api/v1/tokens", json={"name": "other", "scope": "operate"}).json()["token"]
+    two.headers["Authorization"] = f"Bearer {token}"
+    assert sent(one, "a").json()["id"] != sent(two, "a").json()["id"]
+
+
+def test_what_was_refused_did_nothing_and_may_be_tried_again(service: Service) -> None:
+    client = client_of(service)
+    body = {"kind": "verify", "params": {"session": "second"}}
+    assert sent(client, "a", body).status_code == 404
+    (service.sessions / "first").rename(service.sessions / "second")
+    assert sent(client, "a", body).status_code == 202
+    assert sent(client, "", body).status_code == 202
+    assert sent(client, "x" * 101, body).status_code == 422
+
+
+def test_answers_outlast_the_service(service: Service) -> None:
+    first = sent(client_of(service), "a").json()["id"]
+    later = Service(service.wiring, service.sessions, service.protocols)
+    assert sent(client_of(later), "a").json()["id"] == first
+
+
+def test_a_stop_with_a_key_stops_each_time_and_a_secret_is_not_kept(service: Service) -> None:
+    client = client_of(service)
+    calls: list[str] = []
+
+    async def stop(kind: Any) -> Any:
+        calls.append(kind.name)
+        return type("Answer", (), {"text": "braked", "id": len(calls)})()
+
+    service.stop = stop  # type: ignore[method-assign]
+    for _ in range(2):
+        client.post("/api/v1/estop", headers={"Idempotency-Key": "a"})
+    assert len(calls) == 2
+    answer = client.post("/api/v1/tokens", json={"name": "n", "scope": "read"}, headers={"Idempotency-Key": "a"})
+    assert answer.status_code == 201
+    sent(client, "b")
+    assert answer.json()["token"] not in (service.jobs.folder / "answers.jsonl").read_text()
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> AnswerStore:
+    return AnswerStore(tmp_path / "answers.jsonl", Clock().seconds)
+
+
+def test_while_an_answer_is_made_the_second_request_waits_for_it(store: AnswerStore) -> None:
+    assert store.begin("p", b"x") is None
+    with pytest.raises(RequestRefused, match="still being answered") as refused:
+        store.begin("p", b"x")
+    assert refused.value.status == 409
+
+
+def test_a_service_that_died_in_the_middle_says_that_it_does_not_know(tmp_path: Path, store: AnswerStore) -> None:
+    store.begin("p", b"x")
+    with pytest.raises(RequestRefused, match="look whether it took effect") as refused:
+        AnswerStore(tmp_path / "answers.jsonl", Clock().seconds).begin("p", b"x")
+    assert refused.value.code == "outcome-unknown"
+
+
+def test_an_answer_is_kept_for_a_day(tmp_path: Path) -> None:
+    clock = Clock()
+    store = AnswerStore(tmp_path / "answers.jsonl", clock.seconds)
+    store.begin("p", b"x")
+    clock.advance(KEPT_S - 1)
+    with pytest.raises(RequestRefused):
+        store.begin("p", b"y")
+    clock.advance(2)
+    assert store.begin("p", b"y") is None
+
+
+def test_a_line_that_was_cut_is_no_answer(tmp_path: Path, store: AnswerStore) -> None:
+    store.begin("p", b"x")
+    file = tmp_path / "answers.jsonl"
+    file.write_text(file.read_text() + '{"place": "q", "asked"')
+    later = AnswerStore(file, Clock().seconds)
+    assert later.begin("q", b"x") is None
+    with pytest.raises(RequestRefused):
+        later.begin("p", b"x")
+
+
+def test_two_at_once_are_one(service: Service) -> None:
+    client = client_of(service)
+    answers: list[Any] = []
+    threads = [threading.Thread(target=lambda: answers.append(sent(client, "a"))) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(20.0)
+    assert {answer.status_code for answer in answers} <= {202, 409}
+    assert len({answer.json()["id"] for answer in answers if answer.status_code == 202}) == started(client) == 1
