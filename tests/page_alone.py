@@ -1,16 +1,18 @@
-"""The page in a browser without a service: its files as they are with what is added, on views of the bench."""
+"""The page in a browser without a service: its sources as they are with what is added, built, on views of the bench."""
 
 import json
-from collections.abc import Iterator, Mapping
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from playwright.sync_api import Page, Request, Route, sync_playwright
 
 from api.http.models import ControlView, RigView
+from hatch_build import LIMIT_S, SOURCES, build, fetch
 from tests.system.browser import find, launch
 
-FOLDER = Path(__file__).parents[1] / "api" / "http" / "page"
 ADDRESS = "http://bench.invalid/"
 KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 IDLE = RigView(
@@ -20,36 +22,65 @@ IDLE = RigView(
 )  # fmt: skip
 
 
+# A stream that is open and says only that it is.
+SPEAKING = """
+window.WebSocket = class {
+  constructor() { setInterval(() => this.onmessage?.({ data: '{"type": "ping"}' }), 100); }
+  send() {}
+};
+"""
+
+Changes = Mapping[str, Mapping[str, str]]
+
+
 @contextmanager
-def shown(view: RigView, added: Mapping[str, str]) -> Iterator[Page]:
-    """The page as it shows ``view``; ``added`` is put where its files say `<!-- add here -->` or at their end."""
-
-    def answer(route: Route, request: Request) -> None:
-        path = request.url.removeprefix(ADDRESS)
-        file = FOLDER / (path.removeprefix("page/") or "index.html")
-        if path == "api/v1/live":
-            route.fulfill(content_type="text/event-stream", body=f"data: {view.model_dump_json()}\n\n")
-        elif path.startswith("api/"):
-            route.fulfill(content_type="application/json", body=json.dumps([]))
-        else:
-            route.fulfill(content_type=KINDS[file.suffix], body=with_added(file, added))
-
-    with sync_playwright() as playwright:
+def shown(views: Sequence[RigView], added: Mapping[str, str], changed: Changes) -> Iterator[list[Page]]:
+    """A page for each of ``views``; ``added`` are files by their place in its sources, ``changed`` lines in others."""
+    with tempfile.TemporaryDirectory() as place, sync_playwright() as playwright:
+        built = built_with(added, changed, Path(place))
         browser = launch(playwright, find())
-        page = browser.new_page()
-        page.on("pageerror", lambda error: errors.append(str(error)))
         errors: list[str] = []
-        page.route("**/*", answer)
-        page.goto(ADDRESS)
-        page.wait_for_function("state => document.getElementById('state').textContent === state", arg=view.state)
-        yield page
+        yield [_opened(browser.new_page(), built, view, errors) for view in views]
         browser.close()
         assert not errors, errors
 
 
-def with_added(file: Path, added: Mapping[str, str]) -> str:
-    """The file's text with the block of its language."""
-    text, more = file.read_text(), added.get(file.suffix[1:], "")
-    if file.name == "index.html":
-        return text.replace("</main>", f"{more}</main>")
-    return f"{text}\n{more}" if file.name in ("page.js", "style.css") else text
+def built_with(added: Mapping[str, str], changed: Changes, folder: Path) -> Path:
+    """Where the page is, built from our sources with ``added`` and ``changed``."""
+    fetch(SOURCES, LIMIT_S)
+    sources = folder / "sources"
+    shutil.copytree(SOURCES, sources, ignore=shutil.ignore_patterns("node_modules"))
+    (sources / "node_modules").symlink_to(SOURCES / "node_modules")
+    for name, text in added.items():
+        (sources / name).write_text(text)
+    for name, lines in changed.items():
+        text = (sources / name).read_text()
+        for old, new in lines.items():
+            assert old in text, f"{name} has no {old!r}"
+            text = text.replace(old, new)
+        (sources / name).write_text(text)
+    build(sources)
+    return folder / "built"
+
+
+def _opened(page: Page, built: Path, view: RigView, errors: list[str]) -> Page:
+    """The page in ``built``, whose service says ``view`` and nothing else."""
+
+    def answer(route: Route, request: Request) -> None:
+        path = request.url.removeprefix(ADDRESS)
+        if path == "api/v1/rig":
+            route.fulfill(content_type="application/json", body=view.model_dump_json())
+        elif path == "api/v1/auth/me":
+            route.fulfill(content_type="application/json", body=json.dumps({"name": "", "scopes": ["read"]}))
+        elif path.startswith("api/"):
+            route.fulfill(content_type="application/json", body=json.dumps([]))
+        else:
+            file = built / (path.removeprefix("page/") or "index.html")
+            route.fulfill(content_type=KINDS[file.suffix], body=file.read_bytes())
+
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.add_init_script(SPEAKING)
+    page.route("**/*", answer)
+    page.goto(ADDRESS)
+    page.wait_for_function("() => document.getElementById('state')?.textContent === 'ready'")
+    return page

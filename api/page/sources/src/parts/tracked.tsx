@@ -1,0 +1,31 @@
+// How well force followed what was asked, level by level.
+import type { Schema } from "../api";
+import { t } from "../texts";
+import { Rows, shown, significant } from "./basics";
+
+export type Tracked = Schema["TrackResult"];
+
+export function TrackedResult({ found }: { found: Tracked }) {
+  return (
+    <div class="tracked">
+      <dl class="facts large">
+        <div><dt>{t.track.rms}</dt><dd><span id="rms">{shown(found.followed.rms_error_N, 3)}</span> <small>N</small></dd></div>
+        <div><dt>{t.track.largest}</dt><dd>{shown(found.followed.largest_error_N, 2)} <small>N</small></dd></div>
+        <div><dt>{t.track.missed}</dt><dd>{found.loop.missed} <small>{t.track.ofCycles(found.loop.cycles)}</small></dd></div>
+      </dl>
+      {found.levels.length > 0 && (
+        <Rows label={t.track.levels} heads={[t.track.given, t.track.actual, t.track.error, t.track.settling]}>
+          {found.levels.map((level, i) => (
+            <tr key={i}>
+              <th scope="row">{significant(level.given_N)} N</th>
+              <td>{shown(level.actual_N, 3)} N</td>
+              <td>{shown(level.error_percent, 1)} %</td>
+              <td>{level.settling_s === null ? t.track.notSettled : `${shown(level.settling_s)} s`}</td>
+            </tr>
+          ))}
+        </Rows>
+      )}
+      {found.reasons?.map((reason) => <p key={reason} class="notice warn">{reason}</p>)}
+    </div>
+  );
+}

@@ -1,0 +1,119 @@
+// `rig.v1`: samples in batches with their least and greatest, events, and what was missed after a break.
+export interface Batch {
+  stream: string;
+  columns: string[];
+  times_s: Float64Array;
+  values: Float32Array[];
+}
+
+export interface RigEvent {
+  seq: number;
+  time_ns: number;
+  source: string;
+  level: number;
+  code: string;
+  text: string;
+}
+
+interface Channel {
+  channel: number;
+  stream: string;
+  columns: string[];
+  step: number;
+}
+
+export interface Asked {
+  streams: string[];
+  max_rate_hz: number;
+  decimate: "minmax" | "last";
+}
+
+export interface Heard {
+  message: () => void;
+  open: () => void;
+  run: () => void;
+  batch: (batch: Batch) => void;
+  event: (event: RigEvent) => void;
+  gap: (stream: string, dropped: number) => void;
+}
+
+const HEADER_BYTES = 24;
+// A service that restarts is back within seconds; more tries than two a second help nobody.
+const AGAIN_MS = 500;
+
+export class Stream {
+  private socket: WebSocket | null = null;
+  private channels = new Map<number, Channel>();
+  private seq: Record<string, number> = {};
+  private run = "";
+  private session = "";
+  private event: number | null = null;
+
+  constructor(
+    private readonly asked: Asked[],
+    private readonly heard: Heard,
+  ) {}
+
+  open(): void {
+    const scheme = location.protocol === "https:" ? "wss" : "ws";
+    const socket = new WebSocket(`${scheme}://${location.host}/api/v1/stream`, "rig.v1");
+    socket.binaryType = "arraybuffer";
+    socket.onmessage = (message) => {
+      this.heard.message();
+      if (typeof message.data === "string") this.told(JSON.parse(message.data));
+      else this.sampled(message.data as ArrayBuffer);
+    };
+    socket.onclose = () => setTimeout(() => this.open(), AGAIN_MS);
+    this.socket = socket;
+  }
+
+  private told(said: Record<string, unknown>): void {
+    if (said.type === "hello") this.greet(said as never);
+    else if (said.type === "subscribed") for (const one of (said as unknown as { channels: Channel[] }).channels) this.channels.set(one.channel, one);
+    else if (said.type === "run") this.begin((said as unknown as { run: string }).run);
+    else if (said.type === "gap") this.heard.gap(said.stream as string, said.dropped as number);
+    else if (said.type === "event") {
+      this.event = said.seq as number;
+      this.heard.event(said as unknown as RigEvent);
+    }
+  }
+
+  private begin(run: string): void {
+    this.seq = {};
+    this.run = run;
+    this.heard.run();
+  }
+
+  private greet(hello: { session_id: string; run: string; event_seq: number; streams: { name: string }[] }): void {
+    if (hello.run !== this.run) this.begin(hello.run);
+    if (hello.session_id !== this.session) this.event = hello.event_seq;
+    this.session = hello.session_id;
+    this.channels.clear();
+    const known = new Set(hello.streams.map((one) => one.name));
+    for (const { streams, ...how } of this.asked) {
+      const wanted = streams.filter((name) => known.has(name));
+      const since_seq = Object.fromEntries(Object.entries(this.seq).filter(([name]) => wanted.includes(name)));
+      this.socket!.send(JSON.stringify({ type: "subscribe", streams: wanted, ...how, run: this.run, since_seq, session_id: this.session, since_event: this.event }));
+    }
+    this.heard.open();
+  }
+
+  /** Batches follow each other in one message. */
+  private sampled(data: ArrayBuffer): void {
+    const view = new DataView(data);
+    for (let at = 0; at + HEADER_BYTES <= data.byteLength; ) {
+      const [channel, columns] = [view.getUint16(at, true), view.getUint16(at + 2, true)];
+      const seq = view.getUint32(at + 4, true);
+      const t0_s = Number(view.getBigInt64(at + 8, true)) * 1e-9;
+      const [n, covered] = [view.getUint32(at + 16, true), view.getUint32(at + 20, true)];
+      const body = at + HEADER_BYTES;
+      const offsets = new Int32Array(data.slice(body, body + 4 * n));
+      const values = Array.from({ length: columns }, (_, i) => new Float32Array(data.slice(body + 4 * n * (i + 1), body + 4 * n * (i + 2))));
+      at = body + 4 * n * (columns + 1);
+      const of = this.channels.get(channel);
+      if (!of) continue;
+      this.seq[of.stream] = seq + (covered - 1) * of.step;
+      this.heard.batch({ stream: of.stream, columns: of.columns, times_s: Float64Array.from(offsets, (offset) => t0_s + offset * 1e-9), values });
+    }
+  }
+}

@@ -1,0 +1,25 @@
+// Who lies on the bench: read with the mark that a change has to name, so that two pages do not overwrite each other.
+import { ask, get, marked, requestKey } from "./api";
+import { held, inControl } from "./lease";
+import { useLoaded } from "./loaded";
+
+export interface Subject {
+  id: string;
+  site: string;
+  pain_threshold_N: number;
+}
+
+export interface OnBench {
+  value: Subject;
+  mark: string;
+}
+
+const PATH = "/api/v1/subject";
+
+export const useSubject = (on: unknown[] = []) => useLoaded(() => marked<Subject>(PATH), on);
+
+export const keepSubject = (before: OnBench, changed: Partial<Subject>) =>
+  inControl(() => ask("put", PATH, { body: { ...before.value, ...changed }, headers: { ...held(), ...requestKey(), "If-Match": before.mark } }));
+
+/** Codes and sites that were used before, to choose from. */
+export const useKnownSubjects = () => useLoaded(async () => (await get("/api/v1/subjects")).items);

@@ -1,0 +1,38 @@
+// From a subject to what came of a run, in four steps that can be read without knowing the bench.
+import { useState } from "preact/hooks";
+import { get } from "../api";
+import { rig } from "../live";
+import { useLoaded } from "../loaded";
+import { keyOf, ownModel, refOf, useModels } from "../parts/models";
+import { useSubject } from "../subject";
+import { t } from "../texts";
+import { GoStep } from "./run/go";
+import { ProtocolStep } from "./run/protocol";
+import { SubjectStep } from "./run/subject";
+import { ThresholdStep } from "./run/threshold";
+
+export function Run() {
+  const subject = useSubject();
+  const limit_N = rig.value?.limits.force_N;
+  const protocols = useLoaded(() => get("/api/v1/protocols"), [limit_N]);
+  const id = subject.value?.value.id ?? "";
+  const models = useModels(id).value ?? [];
+  const own = ownModel(models, id);
+  const [chosen, choose] = useState("");
+  const [model, chooseModel] = useState<string | null>(null);
+  const usable = (protocols.value ?? []).filter((one) => !one.refusal);
+  const protocol = chosen || (usable[0] ?? protocols.value?.[0])?.name || "";
+  const refusal = protocols.value?.find((one) => one.name === protocol)?.refusal ? t.run.refusedHere : "";
+  const taken = { protocol, choose, model: model ?? (own ? keyOf(refOf(own)) : ""), chooseModel };
+  return (
+    <>
+      <h1>{t.run.title}</h1>
+      <div class="steps">
+        <SubjectStep subject={subject} />
+        <ThresholdStep subject={subject} />
+        <ProtocolStep protocols={protocols} models={models} chosen={taken} on={limit_N} />
+        <GoStep protocol={protocol} refusal={refusal} />
+      </div>
+    </>
+  );
+}

@@ -1,0 +1,61 @@
+// Everything to take away: the report, the recordings as they are and in the formats of others, and whether they are whole.
+import type { Schema } from "../../api";
+import { attempt } from "../../attempt";
+import { ended, start, useWork } from "../../jobs";
+import { Card } from "../../parts/basics";
+import { JobState } from "../../parts/job";
+import { Start, whyNotWork } from "../../parts/may";
+import { t } from "../../texts";
+
+const FORMATS = ["csv", "parquet", "hdf5", "mat"] as const;
+type Session = Schema["SessionFiles"];
+
+function Report({ of, session, changed }: { of: string; session: Session; changed: () => void }) {
+  const [job, follow] = useWork("report", of);
+  const running = job && !ended(job);
+  const report = session.files.find((file) => file.name.endsWith(".html"));
+  const made = job?.files?.find((file) => file.name.endsWith(".html"))?.href ?? report?.href;
+  const begin = () => void attempt(async () => { follow((await start("report", { session: of })).id); changed(); });
+  return (
+    <>
+      <JobState job={job} />
+      <div class="row">
+        {made && <a id="report" class="button primary" href={made} target="_blank" rel="noopener">{t.session.reportOpen}</a>}
+        {made && <a id="report-save" class="button" href={made} download>{t.session.report}</a>}
+        {!running && <Start id="report-start" quiet={Boolean(made)} why={whyNotWork()} onClick={begin}>{made ? t.session.reportAgain : t.session.reportMake}</Start>}
+      </div>
+    </>
+  );
+}
+
+function Whole({ of }: { of: string }) {
+  const [job, follow] = useWork<Schema["VerifyResult"]>("verify", of);
+  const begin = () => void attempt(async () => follow((await start<Schema["VerifyResult"]>("verify", { session: of })).id));
+  const said = job?.result && (job.result.ok ? t.session.whole : t.session.damaged);
+  const wrong = Object.entries(job?.result?.recordings ?? {}).filter(([, one]) => !one.ok);
+  return (
+    <>
+      <JobState job={job} />
+      {said && <p id="whole" class={job.result!.ok ? "notice" : "notice bad"}>{said}</p>}
+      {wrong.map(([name, one]) => <p key={name} class="notice bad">{name}: {one.sentence}</p>)}
+      {(!job || ended(job)) && <Start id="verify-start" quiet why={whyNotWork()} onClick={begin}>{t.session.verify}</Start>}
+    </>
+  );
+}
+
+export function FilesCard({ of, session, changed }: { of: string; session: Session; changed: () => void }) {
+  const base = `/api/v1/sessions/${encodeURIComponent(of)}/export`;
+  return (
+    <Card id="files-card" title={t.session.files}>
+      <Report of={of} session={session} changed={changed} />
+      <h3>{t.session.exports}</h3>
+      <div class="row">{FORMATS.map((format) => <a key={format} id={`export-${format}`} class="button small" href={`${base}/${format}`} download>{t.session.format[format]}</a>)}</div>
+      <h3>{t.session.verifyTitle}</h3>
+      <Whole of={of} />
+      <details>
+        <summary>{t.sessions.filesOf(session.files.length)}</summary>
+        <ul id="files">{session.files.map((file) => <li key={file.name}><a href={file.href} download>{file.name}</a> <span class="quiet">{(file.bytes / 1e6).toFixed(2)} MB</span></li>)}</ul>
+      </details>
+    </Card>
+  );
+}

@@ -1,0 +1,171 @@
+"""What each view says in states of its own; the states that all share are in `test_every_view`."""
+
+import math
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from hatch_build import SOURCES, built_folder
+from tests.page import told
+from tests.page.looks import holds_up, violations
+from tests.page.pretend import IDLE, INFO, OPERATOR, STOPPED, Pretended, opened
+
+VIEWS = {"run": "run", "session": f"session/{told.NAME}", "track": "track", "bench": "bench"}
+TOO_MUCH = "40 N is more than the 6 N that bench, subject and model allow."
+
+
+@pytest.fixture
+def service() -> Pretended:
+    """At rest, with one session, for somebody who may operate."""
+    answers: dict[str, Any] = {"auth/me": OPERATOR, "rig": IDLE, "info": INFO, "POST estop": STOPPED}
+    return Pretended(built_folder(SOURCES), answers | told.everything())
+
+
+@pytest.fixture
+def errors() -> Iterator[list[str]]:
+    found: list[str] = []
+    yield found
+    assert found == []
+
+
+@pytest.fixture
+def show(browser: Browser, service: Pretended, errors: list[str]) -> Iterator[Any]:
+    pages: list[Page] = []
+
+    def at(view: str) -> Page:
+        pages.append(opened(browser, service, VIEWS[view], errors))
+        return pages[-1]
+
+    yield at
+    for page in pages:
+        page.context.close()
+
+
+def listed(job: dict[str, Any]) -> dict[str, Any]:
+    """A job as the newest of its kind, and by itself."""
+    return {f"jobs/{job['kind']}": {"items": [job], "next": None}, f"jobs/{job['id']}": job}
+
+
+def test_a_run_under_way_shows_how_far_it_is_and_its_card_what_came_of_it(show: Any, service: Pretended) -> None:
+    under_way = told.job("capture", "running", can=["cancel", "pause"])
+    service.answers |= listed(under_way)
+    page = show("run")
+    card = page.locator("#capture-under-way")
+    expect(card).to_contain_text("trial_002, 15 mm/s (1 of 3 trials)")
+    expect(card).to_contain_text("about 21 s left")
+    expect(page.locator("#capture-pause")).to_be_visible()
+    holds_up(page, "state-running-run", (390,))
+    service.answers["jobs/job-capture"] = told.job("capture", result=told.CAPTURED)
+    expect(page.locator("#result")).to_contain_text("usable")
+    expect(page.locator("#peak")).to_have_text("5.88")
+    expect(page.locator("#next")).to_contain_text("fit the tissue")
+    expect(page.locator("#open-session")).to_have_attribute("href", f"#/session/{told.NAME}")
+    holds_up(page, "state-result-run", (390,))
+
+
+def test_a_run_that_was_stopped_or_failed_says_why_and_what_is_kept(show: Any, service: Pretended) -> None:
+    problem = {"code": "force_limit", "detail": "force 12.3 N is above the limit of 12 N; the tip was retracted"}
+    failed = told.job("capture", "failed", problem=problem)
+    service.answers |= listed(failed)
+    page = show("run")
+    expect(page.locator("#capture-ended")).to_contain_text("it failed")
+    expect(page.locator("#capture-ended")).to_contain_text("force 12.3 N is above the limit of 12 N")
+    holds_up(page, "state-failed-run", (390,))
+
+
+def test_a_tracked_force_shows_its_levels_and_where_the_gains_come_from(show: Any, service: Pretended) -> None:
+    tracked = told.job("track", result=told.TRACKED.model_dump(mode="json"))
+    service.answers |= listed(tracked)
+    page = show("track")
+    expect(page.locator("#origin")).to_contain_text(f"index law, fitted to session {told.NAME}")
+    expect(page.locator("#rms")).to_have_text("0.014")
+    page.fill("#forces", "1, 40")
+    expect(page.locator("#track-start-why")).to_have_text(TOO_MUCH)
+    page.fill("#forces", "1; -2")
+    expect(page.locator("#track-start-why")).to_contain_text("Give one force or several")
+    page.fill("#forces", "1 2.5")
+    expect(page.locator("#track-start")).to_be_enabled()
+    holds_up(page, "state-result-track", (390,))
+
+
+def test_curves_span_what_was_recorded_though_depth_is_not_known_at_first_and_have_the_model_over_them(
+    show: Any,
+) -> None:
+    page = show("session")
+    curves = page.locator("#curves")
+    expect(curves.locator("canvas")).to_be_visible()
+    low, high = (float(curves.get_attribute(f"data-{end}") or "nan") for end in ("from", "to"))
+    assert -1.5 < low < -0.7 and 8.0 < high < 9.0
+    expect(page.locator("#curves-card .swatch.dashed")).to_be_visible()
+    page.click("#over-time")
+    expect(page.locator("#over-time")).to_have_attribute("aria-pressed", "true")
+    expect(page.locator("#curves")).to_have_attribute("aria-label", re.compile("against time"))
+
+
+def test_what_axe_is_for_is_found(show: Any) -> None:
+    page = show("track")
+    expect(page.locator("#track-form")).to_be_visible()
+    page.evaluate("() => document.getElementById('track-start').replaceChildren()")
+    assert any("button-name" in line for line in violations(page))
+
+
+def test_a_protocol_that_the_bench_refuses_can_be_read_but_not_started(show: Any, service: Pretended) -> None:
+    page = show("run")
+    page.select_option("#protocol", "deep")
+    expect(page.locator("#verdict")).to_contain_text("depth_mm 900 is above limits.depth_mm 25 mm")
+    expect(page.locator("#capture-start")).to_be_disabled()
+    holds_up(page, "state-refused-run", (390,))
+
+
+def test_without_a_model_of_the_subject_the_ramp_says_what_to_do_first_and_leads_to_the_session_to_fit(
+    show: Any, service: Pretended
+) -> None:
+    service.answers["models"] = told.nothing()["models"]
+    page = show("run")
+    page.click("#ramp summary")
+    first = page.locator("#ramp-first")
+    expect(first).to_contain_text(f"nothing is fitted to {told.SUBJECT} yet")
+    expect(first).to_contain_text("Run a short protocol with it: that is done.")
+    expect(page.locator("#ramp-fit")).to_have_attribute("href", f"#/session/{told.NAME}")
+    expect(page.locator("#ramp-start")).to_have_count(0)
+    holds_up(page, "state-no-model-run", (390,))
+
+
+def test_somebody_elses_tissue_controls_a_ramp_only_where_a_person_chose_it_and_is_warned(
+    show: Any, service: Pretended
+) -> None:
+    other = told.MODELS.items[0].model_copy(update={"subject": "S99"})
+    service.answers["models"] = told.MODELS.model_copy(update={"items": (other,)})
+    page = show("run")
+    page.click("#ramp summary")
+    expect(page.locator("#ramp-first")).to_be_visible()
+    expect(page.locator("#ramp-start-why")).to_have_text("Choose the tissue whose model controls it.")
+    page.select_option("#ramp-model", f"fit/{told.NAME}")
+    expect(page.locator("#origin")).to_contain_text(f"This tissue is that of S99, not of {told.SUBJECT}")
+    expect(page.locator("#ramp-start")).to_be_enabled()
+    track = show("track")
+    expect(track.locator("#origin")).to_contain_text(f"This tissue is that of S99, not of {told.SUBJECT}")
+
+
+def test_the_arrow_keys_read_values_of_one_time_and_a_pause_keeps_what_is_shown(show: Any) -> None:
+    page = show("bench")
+    page.click("#plot-pause")
+    expect(page.locator("#plot-pause")).to_have_text("Live")
+    plot, said = page.locator("#force-plot"), page.locator(".readout")
+    plot.focus()
+    read: set[str] = set()
+    for key, share in (("ArrowLeft", "99"), ("PageDown", "89"), ("PageDown", "79"), ("ArrowRight", "80")):
+        page.keyboard.press(key)
+        expect(plot).to_have_attribute("aria-valuenow", share)
+        expect(plot).to_have_attribute("aria-valuetext", re.compile(r"^force [\d.]+ N, set-point [\d.]+ N, error"))
+        text = said.text_content() or ""
+        depth_mm, setpoint_N = (float(re.findall(rf"{name} ([\d.]+)", text)[0]) for name in ("depth", "set-point"))
+        # As the pretended bench has it; a sample and a column of pixels lie between what the two are read at.
+        assert setpoint_N == pytest.approx(0.12 * depth_mm * math.exp(0.22 * depth_mm), rel=0.05, abs=0.02)
+        read.add(text)
+    assert len(read) == 4
+    page.click("#plot-pause")
+    expect(page.locator("#plot-pause")).to_have_text("Pause")
