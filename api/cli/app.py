@@ -31,7 +31,11 @@ COMMANDS = {
     "repair": "api.cli.records:repair",
     "import": "api.cli.records:import_",
     "export": "api.cli.records:export_",
+    "catalogue": "api.cli.catalogue:catalogue",
+    "subject": "api.cli.catalogue:subject",
     "serve": "api.cli.serve:serve",
+    "account": "api.cli.account:account",
+    "token": "api.cli.token:token",
     "mock": "api.cli.hardware:mock",
     "reset": "api.cli.recovery:reset",
     "doctor": "api.cli.hardware:doctor",
@@ -78,9 +82,11 @@ def _summary(target: str) -> str:
 
 
 def _load(target: str) -> Callable[..., None]:
+    from api.cli.output import with_reason  # noqa: PLC0415 - loads pydantic
+
     module, _, function = target.partition(":")
     command: Callable[..., None] = vars(import_module(module))[function]
-    return command
+    return with_reason(command)
 
 
 def main() -> None:

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from typing import NamedTuple
 
 from api.cli.asking import Person
-from api.cli.live import here
+from api.cli.computing import here
 from api.cli.mock_bench import bench_for
 from api.cli.output import show
 from api.operations.calibrate import (

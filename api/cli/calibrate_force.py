@@ -3,7 +3,7 @@
 from typing import Literal, NamedTuple
 
 from api.cli.asking import Person
-from api.cli.live import here
+from api.cli.computing import here
 from api.cli.mock_bench import bench_for
 from api.cli.mock_calibration import BY_ITSELF, mock_weights, weights_on
 from api.cli.output import show

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import mock_devices
 from api.cli import live
+from api.cli.computing import here
 from api.cli.output import show
 from api.operations.compare import Comparison, comparison_operation
 from api.operations.compare import compare as work
@@ -33,7 +34,7 @@ def compare(
     whose = {subject: _who(subject) for subject in subjects}
     wanted = Comparison(wiring, out, whose, choices, reference, lambda subject: _bench(wiring, subject))
     operation = comparison_operation(wanted)
-    result = live.here(operation, lambda: work(operation, wanted))
+    result = here(operation, lambda: work(operation, wanted))
     show(run_table(result.runs, reference.name), f"comparison.svg is in {out}")
     return result
 

@@ -27,8 +27,10 @@ from controller.operation import Operation
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
+from rig.diagnosis.design import check
 from rig.errors import UsageError
-from rig.recording.files import write_text
+from rig.intake.questions import inline
+from rig.recording.files import make_folder, write_text
 from rig.recording.sessions import derive
 from rig.results.demo import DemoSummary, HiddenTruth
 from rig.results.diagnosis import FOLDER, TRUTH
@@ -52,7 +54,7 @@ LARGEST_SEED = 100_000  # five digits: soon typed again, and seldom drawn twice
 FORCES_N = (1.0, 2.0, 3.0, 4.0, 5.0)
 SECONDS = 3.0
 MODEL = Path("fit") / "model.json"
-SUMMARY, REPORT, SESSION = "summary.json", "report.html", "session"
+SUMMARY, REPORT, SESSION, PROTOCOLS = "summary.json", "report.html", "session", "protocols"
 TrialsOption = Annotated[
     int | None, typer.Option(min=1, max=5, help="Trials at each speed; else 2, or the protocol's own.")
 ]
@@ -67,18 +69,26 @@ def demo(
     trials: TrialsOption = None,
     protocol: ProtocolOption = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Of what is hidden in the bench; else drawn.")] = None,
+    serve: Annotated[bool, typer.Option("--serve", help="Then serves the session, until Ctrl-C.")] = False,
+    port: Annotated[int, typer.Option(min=1, max=65535, help="With --serve: TCP port to listen on.")] = 8000,
 ) -> None:
     """Does the whole job on the mock bench: capture, fit, track, diagnose, verify, report, and the truth at the end.
 
+    With --serve it ends with an address that logs a browser in once, where all of it is shown and can be done again.
+
     Example: rig demo --out demo
     """
+    if serve:
+        from api.cli.serve import refuse_taken  # noqa: PLC0415 - loads the service
+
+        refuse_taken(port)
     session, wiring = out / SESSION, built_in()
     plan = PLAN if protocol is None else load(Indentation, protocol)
     plan = plan.model_copy(update={"trials": trials or plan.trials})
     experiment.check(plan, wiring)
     _clear(out)
     seed = secrets.randbelow(LARGEST_SEED) if seed is None else seed
-    secret = draw(np.random.default_rng(seed), plan)
+    secret = draw(np.random.default_rng(seed), check(plan).detectable)
     show(f"a cause is hidden in the bench; --seed {seed} hides the same again")
     with live.running(wiring, secret.hide) as bench:
         console.rule(f"capture: {len(plan.speeds_mm_s)} speeds, {plan.trials} trials each")
@@ -95,20 +105,43 @@ def demo(
     derive(session)
     write_text(session / FOLDER / TRUTH, secret.sentence(diagnosis) + "\n")
     page = report(Operation("report"), session, out / REPORT)
-    hidden = HiddenTruth(effect=secret.effect, parameters=secret.knobs, seed=seed, named=secret.is_in(diagnosis))
+    hidden = HiddenTruth(
+        effect=secret.effect,
+        parameters=secret.knobs,
+        seed=seed,
+        named=secret.found_in(diagnosis) is not None,
+        inside=secret.inside(diagnosis),
+    )
     found = DemoSummary(**dict(page), fit=fitted, tracking=result, diagnosis=diagnosis, hidden=hidden)
     found.write(out / SUMMARY)
     show(f"{page.recordings} recordings, {page.samples} samples, {page.dropped} dropped")
     show(f"{page.file} shows it; {out / SUMMARY} has the figures")
     console.rule("the truth")
     show(secret.sentence(diagnosis))
+    if serve:
+        console.rule("served until Ctrl-C")
+        served(out, plan, port)
+
+
+def served(out: Path, plan: Indentation, port: int) -> None:
+    """The session, on a bench with nothing hidden, and the protocol that it was recorded by."""
+    from api.cli.serve import serve_here  # noqa: PLC0415 - only a demonstration that is served needs it
+
+    make_folder(out / PROTOCOLS)
+    write_text(out / PROTOCOLS / f"{plan.name}.toml", as_toml(plan))
+    serve_here(built_in(), out, out / PROTOCOLS, port)
+
+
+def as_toml(plan: Indentation) -> str:
+    """What is not as usual, as a protocol's file."""
+    stated = {"kind": plan.kind, **plan.model_dump(mode="json", exclude_defaults=True)}
+    return "".join(f"{key} = {inline(value)}\n" for key, value in stated.items())
 
 
 def _clear(out: Path) -> None:
     """Removes an earlier demonstration, and nothing else."""
-    strangers = (
-        [path.name for path in out.iterdir() if path.name not in (SUMMARY, REPORT, SESSION)] if out.exists() else []
-    )
+    own = (SUMMARY, REPORT, SESSION, PROTOCOLS)
+    strangers = [path.name for path in out.iterdir() if path.name not in own] if out.exists() else []
     if strangers:
         raise UsageError(
             f"{out}: holds {', '.join(sorted(strangers))}, which no demonstration made; give another folder"
@@ -119,7 +152,9 @@ def _clear(out: Path) -> None:
 
 def _track(bench: Supervisor, session: Path) -> TrackResult:
     model = load_model(session / MODEL)
-    program = tracked.plan(forces_within(model.valid.force_N), SECONDS, model, bench.wiring)
+    # A limb that softens was pressed harder at first than its model reaches.
+    largest_N = min(model.valid.force_N, model.force_N(model.valid.depth_mm))
+    program = tracked.plan(forces_within(largest_N), SECONDS, model, bench.wiring)
     return followed(bench, TrackPlan(program, str(MODEL)), session)
 
 

@@ -1,26 +1,28 @@
 """`rig fit`: tissue laws and the lattice on sessions."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from api.cli.live import compute
-from api.cli.options import JsonOption
+from api.cli.computing import compute
+from api.cli.options import PLACE, JsonOption, MappingOption, OnlyOption, YesOption
 from api.cli.output import show, write_json
+from api.cli.records import mapping_for
 from api.operations import fit as work
 from api.operations.fit import DEFAULT_LAWS, Lattice, Laws
 from rig.errors import UsageError
 from rig.results.fit import FILE, FitResult
 from rig.results.tables import fit_parts
 from rig.tissue.laws import Law
-from rig.tissue.model import load_model
-from rig.tissue.registry import COMPARED, LAWS, check_known, law_named
+from rig.tissue.registry import check_known
+from rig.trials.opening import AS_IT_IS, Opening
 
 
 def fit(
-    session: Annotated[list[Path], typer.Argument(help="Session folder. Several: subjects compared.")],
+    places: Annotated[list[Path], typer.Argument(help=f"{PLACE} Several: subjects compared.")],
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the results; else SESSION/fit.")] = None,
     laws: Annotated[
         str, typer.Option("--laws", help="Further laws to compare, with commas; `all` for every one there is.")
@@ -44,6 +46,9 @@ def fit(
     per_spring: Annotated[
         bool, typer.Option("--per-spring", help="The lattice, and stiffness a exp(b |strain|) in each of its springs.")
     ] = False,
+    mapping: MappingOption = None,
+    only: OnlyOption = "",
+    yes: YesOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Fits constant stiffness, the index model and other tissue laws to sessions, and says how wrong each is.
@@ -57,15 +62,23 @@ def fit(
     """
     compared = laws_from(laws, known or [], model, extended)
     simulated = _lattice(block, springs, per_spring) if lattice or per_spring else None
-    write_json(json_file, fitted(session, out, compared, simulated))
+    target = work.target_of(places, out)
+    chosen = mapping_for(places[0], mapping, target, yes) if len(places) == 1 else mapping
+    write_json(json_file, fitted(places, out, compared, simulated, Opening(chosen, only)))
 
 
 def fitted(
-    folders: Sequence[Path], out: Path | None = None, laws: Laws = DEFAULT_LAWS, lattice: Lattice | None = None
+    places: Sequence[Path],
+    out: Path | None = None,
+    laws: Laws = DEFAULT_LAWS,
+    lattice: Lattice | None = None,
+    opening: Opening = AS_IT_IS,
 ) -> FitResult:
     """Fits and writes, with progress on a terminal, and shows what was found."""
-    target = work.target_of(folders, out)
-    result = compute(work.fit_operation(lattice), lambda operation: work.fit(operation, folders, out, laws, lattice))
+    target = work.target_of(places, out)
+    result = compute(
+        work.fit_operation(lattice), lambda operation: work.fit(operation, places, out, laws, lattice, opening)
+    )
     drawn = "lattice.png, lattice.svg, " if lattice else ""
     show(
         *fit_parts(result), f"{FILE}, fit.png, fit.svg, residuals.png, {drawn}table.csv and model.json are in {target}"
@@ -78,13 +91,9 @@ def laws_from(laws: str, known: Sequence[str], saved: str, model: Path | None = 
 
     The law of ``model`` is compared too, and what it takes as known it takes from there.
     """
-    names = list(LAWS) if laws == "all" else [name.strip() for name in laws.split(",") if name.strip()]
-    found = {law.name: law for law in (*COMPARED, *map(law_named, names), law_named(saved))}
-    if model:
-        law = load_model(model).law
-        found[law.name] = law.held()
-    chosen = list(found.values())
-    return Laws(chosen, dict(_known(text, chosen) for text in known), law_named(saved).name)
+    names = [name.strip() for name in laws.split(",") if name.strip()]
+    found = work.laws_of(names, saved, model)
+    return replace(found, known=dict(_known(text, found.compared) for text in known))
 
 
 def _known(text: str, laws: Sequence[type[Law]]) -> tuple[str, float]:
@@ -101,6 +110,6 @@ def _known(text: str, laws: Sequence[type[Law]]) -> tuple[str, float]:
 
 
 def _lattice(block: str, springs: str, stiffen: bool) -> Lattice:
-    from api.cli.lattice import lattice_from  # noqa: PLC0415 - compiled kernels take seconds to load
+    from api.operations.lattice import lattice_from  # noqa: PLC0415 - compiled kernels take seconds to load
 
     return lattice_from(block, springs, stiffen)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from api.cli.live import compute
+from api.cli.computing import compute
 from api.cli.mock_bench import bench_for, bench_process
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import show, write_json

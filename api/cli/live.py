@@ -12,9 +12,9 @@ from typing import TypeVar
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from api.cli.computing import printed
 from api.cli.keys import stop_keys
 from api.cli.mock_bench import bench_for
-from api.cli.output import show
 from controller.operation import Operation
 from controller.operation import Progress as Snapshot
 from controller.stop.word import NOT_CONFIRMED, StopReason
@@ -86,44 +86,6 @@ def run(bench: Supervisor, operation: Operation, work: Callable[[], T]) -> T:
     if errors:
         raise errors[0]
     return results[0]
-
-
-def compute(asked: Operation | str, work: Callable[[Operation], T], prints: bool = True) -> T:
-    """``here``, with a bar that says how far it is; where this ``prints`` none, the log is the caller's.
-
-    ``asked``: the operation, or the name of one that has no parts to count.
-    """
-    operation = Operation(asked) if isinstance(asked, str) else asked
-    screen = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=screen, disable=not screen.is_terminal, transient=True) as bar:
-        task, say = bar.add_task(operation.progress.name, total=operation.progress.total), printed(operation)
-
-        def watch(now: Snapshot) -> None:
-            if prints:
-                say(now)
-            bar.update(task, description=now.message, completed=now.done)
-
-        operation.watch = watch
-        return operation.run(lambda: work(operation))
-
-
-def here(operation: Operation, work: Callable[[], T]) -> T:
-    """Runs ``work`` in this thread, which Ctrl-C ends at once; what the operation says is printed."""
-    operation.watch = printed(operation)
-    return operation.run(work)
-
-
-def printed(operation: Operation) -> Callable[[Snapshot], None]:
-    """What ``operation`` says from now on, on the terminal, a line each."""
-    told = len(operation.progress.log)
-
-    def watch(now: Snapshot) -> None:
-        nonlocal told
-        show(*now.log[told:])
-        told = len(now.log)
-
-    return watch
 
 
 def _show(bench: Supervisor, operation: Operation, thread: threading.Thread) -> None:

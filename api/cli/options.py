@@ -25,9 +25,13 @@ SetOption = Annotated[
 
 ModelOption = Annotated[Path, typer.Option("--model", help="model.json as `rig fit` writes it.")]
 GainsOption = Annotated[str, typer.Option("--gains", help="tangent, secant, constant or admittance; else loop.gains.")]
-SessionArgument = Annotated[
-    Path, typer.Argument(help="Session folder, as `rig capture`, `rig track` or `rig import` makes it.")
+PLACE = "Session folder, one recording (.mcap), or files of any laboratory, with their mapping."
+PlaceArgument = Annotated[Path, typer.Argument(help=PLACE)]
+MappingOption = Annotated[
+    Path | None, typer.Option("--mapping", help="TOML file: what the files hold; else that beside them, or a proposal.")
 ]
+YesOption = Annotated[bool, typer.Option("--yes", help="Takes the usual answer to every question of a proposal.")]
+OnlyOption = Annotated[str, typer.Option("--only", help="Of the recordings those called so, for example 'pork*'.")]
 
 
 def _checked_json(path: Path | None) -> Path | None:

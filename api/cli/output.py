@@ -1,11 +1,14 @@
 """What commands print and write: one console, one kind of table and sentence, JSON."""
 
+import functools
+from collections.abc import Callable
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
-from rig.results.base import SavedResult
+from rig.errors import RigError
+from rig.results.base import Failure, SavedResult
 from rig.results.tables import Part, TextTable
 
 console = Console(markup=False, highlight=False)
@@ -33,3 +36,28 @@ def write_json(path: Path | None, value: SavedResult) -> None:
     """Writes ``value`` to ``path``, whole or not at all; without a path does nothing."""
     if path is not None:
         value.write(path)
+
+
+def with_reason(command: Callable[..., None]) -> Callable[..., None]:
+    """The command, which writes to its --json why it ended where it wrote no result there."""
+
+    @functools.wraps(command)
+    def run(**options: object) -> None:
+        file = options.get("json_file")
+        before = _version(file)
+        try:
+            command(**options)
+        except RigError as error:
+            if isinstance(file, Path) and _version(file) == before:
+                Failure(error=type(error).__name__, exit_code=error.exit_code, reason=str(error)).write(file)
+            raise
+
+    return run
+
+
+def _version(file: object) -> tuple[int, int] | None:
+    """What tells a file from one that took its place; None of none."""
+    if not isinstance(file, Path) or not file.exists():
+        return None
+    found = file.stat()
+    return found.st_ino, found.st_mtime_ns

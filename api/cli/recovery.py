@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from api.cli.live import here
+from api.cli.computing import here
 from api.cli.mock_bench import bench_for
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import write_json

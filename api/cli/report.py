@@ -5,19 +5,27 @@ from typing import Annotated
 
 import typer
 
-from api.cli.live import compute
-from api.cli.options import JsonOption, SessionArgument
+from api.cli.computing import compute
+from api.cli.options import JsonOption, MappingOption, OnlyOption, PlaceArgument, YesOption
 from api.cli.output import write_json
+from api.cli.records import mapping_for
 from api.operations import report as work
+from rig.trials.opening import Opening
 
 
 def report(
-    session: SessionArgument,
+    place: PlaceArgument,
     out: Annotated[Path | None, typer.Option("--out", help="File to write; else SESSION/report.html.")] = None,
+    mapping: MappingOption = None,
+    only: OnlyOption = "",
+    yes: YesOption = False,
     json_file: JsonOption = None,
 ) -> None:
     """Writes one self-contained HTML page about a session; it needs no network.
 
+    Of files of others it shows the results in fit/ and diagnosis/ beside the page.
+
     Example: rig report sessions/first --out first.html
     """
-    write_json(json_file, compute("report", lambda operation: work.report(operation, session, out)))
+    opening = Opening(mapping_for(place, mapping, out or Path(place.stem), yes), only)
+    write_json(json_file, compute("report", lambda operation: work.report(operation, place, out, opening)))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from api.cli.live import compute
+from api.cli.computing import compute
 from api.cli.options import ConfigOption, GainsOption, JsonOption, ModelOption, SetOption, wiring_from
 from api.cli.output import show, write_json
 from api.operations import simulate as work

@@ -21,6 +21,7 @@ from controller.commissioning.readings import read
 from controller.commissioning.stoppable import stoppable
 from controller.commissioning.weights import Weights
 from controller.devices.drivers import open_force, start_devices
+from controller.loop.realtime import promptly
 from controller.operation import Operation
 from drivers.roles import Identity
 from rig.config.calibration import AxisCalibration, ForceCalibration
@@ -129,8 +130,11 @@ def refuse_outside(ends_mm: tuple[float, float], wiring: Wiring) -> None:
 
 @contextmanager
 def _resting(operation: Operation, wiring: Wiring) -> Iterator[tuple[RestingAxis, Identity]]:
-    """Devices started and the axis homed; a stop brakes it, and whatever happens the devices are closed."""
-    with claimed(wiring, moves=True), stoppable(wiring) as (guard, port):
+    """Devices started and the axis homed; a stop brakes it, and whatever happens the devices are closed.
+
+    At the loop's priority, as the drive brakes where its heartbeat comes late.
+    """
+    with claimed(wiring, moves=True), stoppable(wiring) as (guard, port), promptly(wiring.loop.priority):
         operation.say(f"stop: Ctrl-C, the foot switch, or POST http://127.0.0.1:{port}/estop")
 
         @contextmanager

@@ -26,8 +26,12 @@ def ask_service(operation: Operation, held: Holder) -> DoctorResult:
     operation.say(f"as the service at {held.address} sees them")
     if not state.devices:
         raise CheckFailed(f"the service at {held.address} is {state.state}: {state.reason}")
-    seen = state.devices.items()
-    return DoctorResult(devices=tuple(_seen(role, device, state.rates_Hz) for role, device in seen))
+    return DoctorResult(devices=reports_of(state.devices, state.rates_Hz))
+
+
+def reports_of(devices: Mapping[str, DeviceView], rates_Hz: Mapping[str, float]) -> tuple[DeviceReport, ...]:
+    """Devices as the loop sees them, by role."""
+    return tuple(_seen(role, device, rates_Hz) for role, device in devices.items())
 
 
 def _seen(role: str, device: DeviceView, rates_Hz: Mapping[str, float]) -> DeviceReport:

@@ -1,23 +1,27 @@
 """Tissue laws fitted to sessions, and the mass-spring lattice where it is asked for."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+from api.operations.opening import opened, results_in
 from controller.operation import Operation
 from rig.errors import UsageError
 from rig.progress import Progress
 from rig.recording.files import make_folder, refuse_unwritable, write_text
-from rig.recording.sessions import Session, open_session
+from rig.recording.sessions import Session
 from rig.report.drawing import save_figure
 from rig.report.figures import fit_figure, residual_figure
 from rig.results.csv import as_csv
 from rig.results.fit import FILE, FOLDER, MODEL, FitResult, LatticeResult
 from rig.results.study import fit_result
 from rig.tissue.laws import Law
-from rig.tissue.registry import COMPARED
+from rig.tissue.model import load_model
+from rig.tissue.registry import COMPARED, LAWS, law_named
 from rig.tissue.study import Study, model_of, study_sessions
+from rig.trials.opening import AS_IT_IS, Opening, stated_mapping
 
 
 class Lattice(Protocol):
@@ -43,6 +47,19 @@ class Laws:
 DEFAULT_LAWS = Laws()
 
 
+def laws_of(names: Sequence[str], saved: str, model: Path | None = None) -> Laws:
+    """By name, `all` for every one there is; raises UsageError for laws and a file that are none.
+
+    The law of ``model`` is compared too, and what it takes as known it takes from there.
+    """
+    more = LAWS if "all" in names else names
+    found = {law.name: law for law in (*COMPARED, *map(law_named, more), law_named(saved))}
+    if model:
+        law = load_model(model).law
+        found[law.name] = law.held()
+    return Laws(list(found.values()), saved=law_named(saved).name)
+
+
 def fit_operation(lattice: Lattice | None = None) -> Operation:
     """The operation that ``fit`` is to report to."""
     return Operation("fit", total=1 + (lattice.stages if lattice else 0))
@@ -50,15 +67,35 @@ def fit_operation(lattice: Lattice | None = None) -> Operation:
 
 def fit(
     operation: Operation,
-    folders: Sequence[Path],
+    places: Sequence[Path],
     out: Path | None = None,
     laws: Laws = DEFAULT_LAWS,
     lattice: Lattice | None = None,
+    opening: Opening = AS_IT_IS,
 ) -> FitResult:
-    """Fits the sessions and writes everything to ``out``, else to the one session's fit/; ``lattice`` adds its own."""
-    target = target_of(folders, out)
+    """Fits what ``places`` hold and writes all to ``out``, else to the one session's fit/; ``lattice`` adds its own."""
+    target = target_of(places, out)
     refuse_unwritable(target / FILE)
-    sessions = [open_session(folder) for folder in folders]
+    _refuse_axis(places, opening)
+    with ExitStack() as stack:
+        sessions = [stack.enter_context(opened(place, operation.step, opening)) for place in places]
+        return _fitted(operation, sessions, target, laws, lattice)
+
+
+def _refuse_axis(places: Sequence[Path], opening: Opening) -> None:
+    """Raises UsageError where a mapping says that there is no tissue."""
+    for place in places:
+        mapping = stated_mapping(place, opening.mapping)
+        if mapping is not None and mapping.axis is not None:
+            raise UsageError(
+                f"{place}: is a drive axis, as [axis] in its mapping says, and has no tissue to fit; "
+                "`rig diagnose` with the same place and mapping fits its mass and friction"
+            )
+
+
+def _fitted(
+    operation: Operation, sessions: Sequence[Session], target: Path, laws: Laws, lattice: Lattice | None
+) -> FitResult:
     study = study_sessions(sessions, laws.compared, laws.known, operation.step)
     result = fit_result(study, str(target / MODEL), laws.saved, laws.known, _recordings(sessions))
     make_folder(target)
@@ -84,18 +121,18 @@ def _in_stages(operation: Operation) -> Progress:
     return tell
 
 
-def target_of(folders: Sequence[Path], out: Path | None) -> Path:
-    """Where results go; raises UsageError where several sessions leave that open."""
-    if out is None and len(folders) > 1:
-        raise UsageError(f"{len(folders)} sessions have no one place for results: give a folder with --out")
-    return out or folders[0] / FOLDER
+def target_of(places: Sequence[Path], out: Path | None) -> Path:
+    """Where results go; raises UsageError where several sessions, or files of others, leave that open."""
+    if out is None and len(places) > 1:
+        raise UsageError(f"{len(places)} sessions have no one place for results: give a folder with --out")
+    return results_in(places[0], FOLDER, out)
 
 
 def _recordings(sessions: Sequence[Session]) -> dict[str, str]:
     """The hash of each recording by its trial's name, as the study calls it."""
     alone = len(sessions) == 1
     return {
-        trial.name if alone else f"{session.folder}/{trial.name}": trial.sha256
+        trial.name if alone else f"{session.place}/{trial.name}": trial.sha256
         for session in sessions
         for trial in session.trials
     }

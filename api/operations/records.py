@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 
+from api.operations.opening import opened
 from controller.operation import Operation
-from rig.config.table import load
 from rig.errors import CheckFailed, DataError
-from rig.intake.mapping import MAPPING_FILE, DataMapping
 from rig.intake.rows import FIELDS
-from rig.intake.session import import_folder
+from rig.progress import portion
 from rig.recording.export import Format, export
 from rig.recording.files import make_folder
 from rig.recording.reader import Recording, read_recording
@@ -19,8 +18,11 @@ from rig.recording.sessions import TrialInfo, open_session
 from rig.recording.verify import repair as repaired
 from rig.recording.verify import verdict_of
 from rig.results.recorded import ExportResult, ImportResult, RepairResult, VerifiedTrial, VerifyResult
+from rig.trials.opening import AS_IT_IS, Opening, import_place
 from rig.trials.quality import quality_of
 
+# Of the time that an import takes, each recording being looked at while it is in memory; the rest is contact.
+IMPORTING = 0.8
 SUFFIXES: Mapping[Format, str] = {"csv": "csv", "parquet": "parquet", "hdf5": "session.h5", "mat": "session.mat"}
 
 
@@ -82,31 +84,39 @@ def repair(operation: Operation, recording: Path, out: Path) -> RepairResult:
     return RepairResult.model_validate(repaired(recording, out, operation.step))
 
 
-def mapping_in(folder: Path) -> Path | None:
-    """The mapping that lies with the data, if any."""
-    found = folder / MAPPING_FILE
-    return found if found.is_file() else None
+def import_data(operation: Operation, place: Path, mapping: Path | None, out: Path, now: datetime) -> ImportResult:
+    """Makes the session ``out`` of what ``place`` holds, by ``mapping``; writes nothing if anything in it is wrong.
 
+    What came in is looked at then, and kept in the session as table, JSON and picture.
+    """
+    from rig.report.came_in import look_at, save_came_in  # noqa: PLC0415 - only an import needs them
+    from rig.results.incoming import Looked  # noqa: PLC0415
 
-def import_data(operation: Operation, folder: Path, mapping: Path, out: Path, now: datetime) -> ImportResult:
-    """Makes the session ``out`` of what ``mapping`` names in ``folder``; writes nothing if anything in it is wrong."""
-    session = import_folder(folder, load(DataMapping, mapping), out, now, operation.step)
+    looked = Looked()
+    session = import_place(place, mapping, out, now, portion(operation.step, 0.0, IMPORTING), looked.add)
+    # Not cancelled any more: the session is there.
+    finishing = portion(lambda message, share: operation.advance(share, message), IMPORTING, 1.0)
+    found = look_at(session, finishing, looked)
+    save_came_in(session, found)
     return ImportResult(
         session=str(out),
         recordings=len(session.trials),
         samples={name: sum(trial.samples.get(name, 0) for trial in session.trials) for name in FIELDS},
         remarks=session.remarks,
         trials=session.trials,
+        came_in=found.result,
     )
 
 
-def export_session(operation: Operation, folder: Path, out: Path, formats: Sequence[Format]) -> ExportResult:
-    """Writes the session in ``folder`` to ``out`` in each format."""
-    session = open_session(folder)
-    make_folder(out)
-    written: dict[str, str] = {}
-    for number, name in enumerate(formats):
-        operation.step(name, number / len(formats))
-        written[name] = str(export(session, name, out / SUFFIXES[name]))
-        operation.say(f"{name:8s}{written[name]}")
-    return ExportResult(session=str(folder), written=written)
+def export_session(
+    operation: Operation, place: Path, out: Path, formats: Sequence[Format], opening: Opening = AS_IT_IS
+) -> ExportResult:
+    """Writes what ``place`` holds to ``out`` in each format."""
+    with opened(place, operation.step, opening) as session:
+        make_folder(out)
+        written: dict[str, str] = {}
+        for number, name in enumerate(formats):
+            operation.step(name, number / len(formats))
+            written[name] = str(export(session, name, out / SUFFIXES[name]))
+            operation.say(f"{name:8s}{written[name]}")
+    return ExportResult(session=str(place), written=written)
