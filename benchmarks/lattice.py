@@ -182,7 +182,8 @@ def scaling(repeats: int) -> list[Size]:
 
 def draw(points: Sequence[Size], file: Path) -> None:
     """Cost against vertex count, as a picture."""
-    from rig.report.drawing import ACTUAL, MODEL, QUIET, dress, label, new_figure, png  # noqa: PLC0415
+    from rig.report.drawing import dress, label, new_figure, png  # noqa: PLC0415
+    from rig.report.ink import ACTUAL, MODEL, QUIET  # noqa: PLC0415
 
     figure = new_figure(7.0, 4.4)
     axes = figure.subplots()

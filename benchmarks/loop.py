@@ -27,11 +27,13 @@ from dataclasses import dataclass, field
 from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mock_devices.control import BenchControl
+from mock_devices.testing.access import bearer
 from mock_devices.testing.commands import RIG, ROOT, ServedBench, served_bench
 from rig.channels import AXIS
 from rig.config.wiring import Loop
@@ -78,15 +80,20 @@ class Service:
                    str(folder / "protocols"), *bench.settings()]  # fmt: skip
         self._process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
         self.folder = folder
-        self._lease: dict[str, str] = {}
+        self._headers: dict[str, str] = bearer()
         assert self._process.stdout and self._process.stdout.readline()
-        self._lease = {"X-Control-Lease": self.ask("POST", "/control/lease", LEASE)["lease_id"]}
+        self._headers |= {"X-Control-Lease": self.ask("POST", "/control/lease", LEASE)["lease_id"]}
 
     def ask(self, method: str, path: str, body: object = None) -> Any:
         """One request; its JSON."""
         connection = HTTPConnection("127.0.0.1", PORT, timeout=60)
         text = None if body is None else json.dumps(body)
-        connection.request(method, "/api/v1" + path, text, {"Content-Type": "application/json", **self._lease})
+        connection.request(
+            method,
+            "/api/v1" + path,
+            text,
+            {"Content-Type": "application/json", "Idempotency-Key": uuid4().hex, **self._headers},
+        )
         reply = connection.getresponse()
         content = json.loads(reply.read())
         connection.close()
@@ -95,7 +102,7 @@ class Service:
 
     def press(self, name: str) -> Path | None:
         """Runs the protocol into session ``name`` to its end; the recording, or None where it was stopped."""
-        job = self.ask("POST", "/jobs", {"kind": "capture", "protocol": "hold", "session": name})["id"]
+        job = self.ask("POST", "/jobs", {"kind": "capture", "params": {"protocol": "hold", "session": name}})["id"]
         while self.ask("GET", f"/jobs/{job}")["state"] == "running":
             self.ask("PUT", "/control/lease")
             time.sleep(0.5)
@@ -116,7 +123,9 @@ class Service:
 def hammered(load: Load, seconds: float) -> Iterator[None]:
     """CLIENTS connections that ask for the bench's state without pause for ``seconds``; 0: none."""
     began = time.monotonic()
-    command = ["wrk", "-t1", f"-c{CLIENTS}", f"-d{math.ceil(seconds)}s", f"http://127.0.0.1:{PORT}/api/v1/rig"]
+    (credential,) = (f"{name}: {value}" for name, value in bearer().items())
+    command = ["wrk", "-t1", f"-c{CLIENTS}", f"-d{math.ceil(seconds)}s", "-H", credential,
+               f"http://127.0.0.1:{PORT}/api/v1/rig"]  # fmt: skip
     client = subprocess.Popen(command, stdout=subprocess.PIPE, text=True) if seconds else None
     try:
         yield

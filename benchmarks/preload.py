@@ -1,49 +1,84 @@
-"""Whether contact's interval holds the surface, with air before the loading or none: ``python -m benchmarks.preload``.
+"""Whether contact's interval holds the surface, from air or pressed, however sampled: ``python -m benchmarks.preload``.
 
-Tissue of seven laws, most of which the estimator does not know, and three sensors. A line a sensor, of answered
-loadings: the share held and its exact 95 % interval. Last line: one JSON object.
+Tissue of seven laws and of five others, most of which the estimator does not contain, and three sensors. A line a
+sensor and group of laws, of answered loadings: the share held, its exact 95 % interval (Clopper and Pearson 1934), the
+median width of contact's interval, and which laws were missed. Last line: one JSON object.
 """
 
 import argparse
 import json
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 from itertools import product
+from typing import NamedTuple
 
+import numpy as np
 from scipy.stats import binomtest
 
 from rig.errors import DataError
 from rig.trials.curves import loading_curve
-from tests.rig.trials.preloaded import LAWS, SENSORS, SURFACE_MM, preloaded
+from rig.trials.cycles import IndentationCycle
+from tests.rig.trials.preloaded import LAWS, OTHER_LAWS, SENSORS, SURFACE_MM, Sensor, preloaded, stepped, uneven
+
+TISSUES: Mapping[str, Collection[str]] = {"seven laws": LAWS, "five others": OTHER_LAWS}
+
+STROKES: Mapping[str, Callable[[str, Sensor, int], IndentationCycle]] = {
+    "no air": preloaded,
+    "3 mm of air": partial(preloaded, air_mm=3.0),
+    "3 mm of air, uneven": uneven,
+    "3 mm of air, in steps": stepped,
+}
+
+
+class Answer(NamedTuple):
+    """Of one loading: law, whether contact's interval held the surface (None: refused), and how wide it was [mm]."""
+
+    law: str
+    held: bool | None
+    width_mm: float = float("nan")
 
 
 def main() -> None:
-    """Prints a line a sensor, without air and with 3 mm of it."""
+    """Prints a line a kind of stroke, group of laws and sensor."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--loadings", type=int, default=60, help="of each sensor and law")
-    count = parser.parse_args().loadings
-    found = {
-        f"{sensor}, {air_mm:g} mm of air": _row(sensor, air_mm, count) for air_mm in (0.0, 3.0) for sensor in SENSORS
-    }
-    for name, (held, answered) in found.items():
-        low, high = binomtest(held, answered).proportion_ci(method="exact")
-        print(
-            f"{name:24s} answered {answered:4d} of {count * len(LAWS)}, held {held / answered:.3f} "
-            f"(95 %: {low:.3f} to {high:.3f})"
-        )
-    print(json.dumps({name: {"held": held, "answered": answered} for name, (held, answered) in found.items()}))
+    parser.add_argument("--seed", type=int, default=0, help="of the first one")
+    parser.add_argument("--strokes", nargs="+", choices=STROKES, default=list(STROKES))
+    asked, found = parser.parse_args(), {}
+    for stroke, tissue, sensor in product(asked.strokes, TISSUES, SENSORS):
+        seeds = range(asked.seed, asked.seed + asked.loadings)
+        answers = [_answer(law, sensor, seed, stroke) for law, seed in product(TISSUES[tissue], seeds)]
+        found[f"{sensor}, {tissue}, {stroke}"] = _row(answers)
+        print(f"{sensor:6s} {tissue:11s} {stroke:21s}: {_said(answers)}", flush=True)
+    print(json.dumps(found))
 
 
-def _row(sensor: str, air_mm: float, count: int) -> tuple[int, int]:
-    """How many loadings were answered with an interval that held the surface, and how many were answered."""
-    held = [_held(law, sensor, seed, air_mm) for law, seed in product(LAWS, range(count))]
-    return held.count(True), held.count(True) + held.count(False)
-
-
-def _held(law: str, sensor: str, seed: int, air_mm: float) -> bool | None:
+def _answer(law: str, sensor: str, seed: int, stroke: str) -> Answer:
     try:
-        contact = loading_curve(preloaded(law, SENSORS[sensor], seed, air_mm)).contact
+        contact = loading_curve(STROKES[stroke](law, SENSORS[sensor], seed)).contact
     except DataError:
-        return None
-    return contact.low_mm <= SURFACE_MM <= contact.high_mm
+        return Answer(law, None)
+    return Answer(law, contact.low_mm <= SURFACE_MM <= contact.high_mm, contact.high_mm - contact.low_mm)
+
+
+def _row(answers: Sequence[Answer]) -> dict[str, float | int]:
+    held = [answer.held for answer in answers if answer.held is not None]
+    low, high = binomtest(sum(held), len(held)).proportion_ci(method="exact")
+    width_mm = float(np.nanmedian([answer.width_mm for answer in answers]))
+    return {
+        "held": sum(held), "answered": len(held), "of": len(answers), "share": round(sum(held) / len(held), 4),
+        "low": round(low, 4), "high": round(high, 4), "median_width_mm": round(width_mm, 4),
+    }  # fmt: skip
+
+
+def _said(answers: Sequence[Answer]) -> str:
+    row = _row(answers)
+    missed = [answer.law for answer in answers if answer.held is False]
+    return (
+        f"answered {row['answered']:4d} of {row['of']}, held {row['share']:.3f} (95 %: {row['low']:.3f} to "
+        f"{row['high']:.3f}), median width {row['median_width_mm']:.3f} mm"
+        + "".join(f"; missed {missed.count(law)} of {law}" for law in dict.fromkeys(missed))
+    )
 
 
 if __name__ == "__main__":

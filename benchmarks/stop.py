@@ -25,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mock_devices.testing.access import bearer
 from mock_devices.testing.commands import RIG, ROOT, ServedBench, free_port, served_bench
 from rig.recording.files import write_text
 
@@ -78,16 +79,21 @@ def served(bench: ServedBench, folder: Path) -> Iterator[tuple[int, int, int]]:
 
 
 def _stop_port(port: int) -> int:
+    """The stop process' port, once the bench is ready: before that, a stop ends the start."""
     deadline = time.monotonic() + 60
     while time.monotonic() < deadline:
         with contextlib.suppress(OSError):
-            client = http.client.HTTPConnection("127.0.0.1", port, timeout=5)
-            client.request("GET", "/api/v1/info")
-            found = int(json.loads(client.getresponse().read())["stop_port"])
-            if found:
-                return found
+            if _asked(port, "/api/v1/rig")["ready"]:
+                return int(_asked(port, "/api/v1/info")["stop_port"])
         time.sleep(0.1)
-    raise SystemExit("the service did not come up within 60 s")
+    raise SystemExit("the bench was not ready within 60 s")
+
+
+def _asked(port: int, path: str) -> dict[str, int]:
+    client = http.client.HTTPConnection("127.0.0.1", port, timeout=5)
+    client.request("GET", path, headers=bearer())
+    found: dict[str, int] = json.loads(client.getresponse().read())
+    return found
 
 
 def measured(pid: int, port: int, stop_port: int, presses: int) -> dict[str, list[float]]:
@@ -158,8 +164,13 @@ def put_under_load(port: int) -> int:
     return 0
 
 
+def _head(line: str, port: int, more: str = "") -> bytes:
+    known = "".join(f"{name}: {value}\r\n" for name, value in bearer().items())
+    return f"{line} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n{known}{more}\r\n".encode()
+
+
 def _send_bodies(port: int) -> None:
-    head = f"POST /api/v1/jobs HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Length: {BODY_BYTES}\r\n\r\n".encode()
+    head = _head("POST /api/v1/jobs", port, f"Content-Length: {BODY_BYTES}\r\n")
     while True:
         with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), 5) as client:
             client.sendall(head)
@@ -176,7 +187,7 @@ def _ask(port: int, rate_Hz: float) -> None:
         path = "/api/v1/recordings" if number % LISTING_EVERY == 0 else "/api/v1/rig"
         with contextlib.suppress(OSError, http.client.HTTPException):
             client = http.client.HTTPConnection("127.0.0.1", port, timeout=5)
-            client.request("GET", path)
+            client.request("GET", path, headers=bearer())
             client.getresponse().read()
             client.close()
 
@@ -185,7 +196,7 @@ def _drain_streams(port: int) -> None:
     with selectors.DefaultSelector() as selector:
         for _ in range(STREAMS):
             client = socket.create_connection(("127.0.0.1", port), 10)
-            client.sendall(f"GET /api/v1/live HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+            client.sendall(_head("GET /api/v1/live", port))
             client.setblocking(False)
             selector.register(client, selectors.EVENT_READ)
         while True:

@@ -4,6 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Collection
 
+from rig.diagnosis.effects.axis import AxisEffect
 from rig.diagnosis.problem import Effect, Par
 
 HEADER = "| parameter | unit | absent at | from | to | smallest named | meaning |\n|---|---|---|---|---|---|---|"
@@ -26,7 +27,7 @@ def _cause(cause: Effect, variant: str) -> str:
             f"{_said(cause.statement)}.",
             "",
             *repair,
-            f"- acts: {f'at `{cause.operator.stage}`' if cause.operator else 'in the elastic law'}",
+            f"- acts: {_place(cause)}",
             f"- in control: {cause.control}",
             *needs,
             "",
@@ -35,6 +36,12 @@ def _cause(cause: Effect, variant: str) -> str:
             "",
         ]
     )
+
+
+def _place(cause: Effect) -> str:
+    if isinstance(cause, AxisEffect):
+        return "between drive and load" if cause.on_load else "on the effort"
+    return f"at `{cause.operator.stage}`" if cause.operator else "in the elastic law"
 
 
 def _said(statement: str) -> str:

@@ -20,6 +20,7 @@ from rig.config.maxima import MAXIMA
 from rig.config.products.registry import AXES
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring
+from rig.diagnosis.effects.axis import AXIS_CAUSES
 from rig.diagnosis.effects.registry import CAUSES
 from rig.tissue.registry import LAWS
 from tools.causes import causes as causes_of
@@ -27,13 +28,20 @@ from tools.http_routes import routes
 from tools.interface import interface
 from tools.keys import tables
 from tools.laws import laws as laws_of
+from tools.parity import parity
 from tools.schemas import WRITTEN
 
 MARK = re.compile(r"^<!-- generated: ([a-z-]+) -->$", re.MULTILINE)
 HELP_COLUMNS = 100
 COMMANDS_OF = {
+    "came-in": "import`, file `what-came-in.json",
     "compare": "track --table", "diagnosis": "diagnose", "protocol-check": "protocol check",
-    "retract": "serve`, job `retract",
+    "catalogue-names": "catalogue backup|restore",
+    **{f"catalogue-{what}": f"catalogue {what}" for what in (
+        "causes", "diagnoses", "models", "operations", "rebuild", "sessions", "sites", "trials",
+    )},
+    **{f"subject-{what}": f"subject {what}" for what in ("erase", "export", "list", "show")},
+    "retract": "serve`, job `retract", "failure": "COMMAND` without a result, exit code not `0",
 }  # fmt: skip
 
 
@@ -82,6 +90,11 @@ def causes() -> str:
     return causes_of(list(CAUSES.values()))
 
 
+def axis_causes() -> str:
+    """Every cause that a diagnosis of a drive axis can name."""
+    return causes_of(list(AXIS_CAUSES.values()))
+
+
 def python() -> str:
     """Everything that `import rig` offers."""
     return interface(rig)
@@ -90,9 +103,11 @@ def python() -> str:
 GENERATORS: dict[str, Callable[[], str]] = {
     "wiring": wiring, "protocol": protocol, "commands": commands, "schemas": schemas,
     "http": http,
+    "parity": parity,
     "laws": laws,
     "python": python,
     "causes": causes,
+    "axis causes": axis_causes,
 }  # fmt: skip
 
 

@@ -5,8 +5,24 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from rig.results.base import Result
+from rig.results.base import Failure, Result
 from rig.results.bench import CalibrateResult, DoctorResult, ResetResult, RetractResult
+from rig.results.came_in import CameInResult
+from rig.results.catalogue import (
+    CatalogueResult,
+    CauseList,
+    DiagnosisList,
+    ErasureResult,
+    ModelList,
+    NamesResult,
+    SessionList,
+    SiteList,
+    SubjectExport,
+    SubjectHistory,
+    SubjectList,
+    TrialList,
+    WorkList,
+)
 from rig.results.demo import DemoSummary
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
 from rig.results.fit import FitResult
@@ -17,11 +33,22 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 WRITTEN: Mapping[str, type[Result]] = {
     "capture": CaptureResult,
     "calibrate": CalibrateResult,
+    "catalogue-causes": CauseList,
+    "catalogue-diagnoses": DiagnosisList,
+    "catalogue-models": ModelList,
+    "catalogue-names": NamesResult,
+    "catalogue-operations": WorkList,
+    "catalogue-rebuild": CatalogueResult,
+    "catalogue-sessions": SessionList,
+    "catalogue-sites": SiteList,
+    "catalogue-trials": TrialList,
     "compare": CompareResult,
     "demo": DemoSummary,
     "diagnosis": DiagnosisResult,
     "doctor": DoctorResult,
+    "came-in": CameInResult,
     "export": ExportResult,
+    "failure": Failure,
     "fit": FitResult,
     "import": ImportResult,
     "protocol-check": ProtocolCheckResult,
@@ -30,6 +57,10 @@ WRITTEN: Mapping[str, type[Result]] = {
     "reset": ResetResult,
     "retract": RetractResult,
     "simulate": SimulateResult,
+    "subject-erase": ErasureResult,
+    "subject-export": SubjectExport,
+    "subject-list": SubjectList,
+    "subject-show": SubjectHistory,
     "threshold": Threshold,
     "track": TrackResult,
     "verify": VerifyResult,

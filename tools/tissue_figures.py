@@ -11,7 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rig.recording.sessions import open_session
-from rig.report.drawing import ACTUAL, MODEL, OTHER, QUIET, dress, label, new_figure, png
+from rig.report.drawing import dress, label, new_figure, png
+from rig.report.ink import ACTUAL, MODEL, OTHER, QUIET
 from rig.report.lattice_figures import lattice_figure
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.springs import Springs

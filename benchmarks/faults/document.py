@@ -1,4 +1,4 @@
-"""Writes `docs/reference/safety.md` from hazards, safety table and results: `python -m benchmarks.faults.document`.
+"""Writes `docs/safety.md` from hazards, safety table and results: `python -m benchmarks.faults.document`.
 
 The results are those of `python -m benchmarks.faults --trials 1 --json docs/validation/faults.json`.
 """
@@ -22,7 +22,7 @@ from rig.recording.files import write_text
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "docs" / "validation" / "faults.json"
-PAGE = ROOT / "docs" / "reference" / "safety.md"
+PAGE = ROOT / "docs" / "safety.md"
 REACTIONS = {
     Action.IMMEDIATE: "the drive stops by its own ramp, the tip stays",
     Action.SOFT: "the tip retracts, then stays",

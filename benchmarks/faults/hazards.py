@@ -51,7 +51,8 @@ HAZARDS = (
         "nobody at the keyboard, a hung page, a busy service, a lost connection, a lease that ran out",
         ("emergency_stop", "operator_stop", "pain_stop", "stop_lost", "operator_silent"),
         "All these ways end in software; for a second after the stop process froze a press is not heard (the page then"
-        " says NOT CONFIRMED). The hardware emergency stop does not depend on it.",
+        " says NOT CONFIRMED). From another computer the network and, where there is one, a reverse proxy come before"
+        " them. The hardware emergency stop does not depend on it.",
     ),
     Hazard(
         "The software itself stops, hangs or is late",

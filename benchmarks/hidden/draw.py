@@ -53,18 +53,45 @@ def draw_secret(rng: np.random.Generator, name: str) -> Secret:
         "unknown_depth_bump": ({"newton": u(0.1, 0.3), "at_mm": u(2.5, 4)}, {}),
         "unknown_speed_gain": ({"share": u(0.04, 0.1)}, {}),
         "unknown_session_step": ({"share": u(0.06, 0.15)}, {}),
+        "hunt_crossley": ({"s_per_mm": u(0.004, 0.015)}, {"hunt_crossley_s_mm": "s_per_mm"}),
+        "mullins": ({"share": u(0.15, 0.5), "energy": u(0.2, 0.8)}, {"mullins_share": "share"}),
+        "second_relaxation": (
+            {"share": u(0.1, 0.25), "tau_s": u(0.02, 0.06)}, {"second_ratio": "share", "second_tau_s": "tau_s"},
+        ),
+        "third_relaxation": (
+            {"share": u(0.1, 0.25), "tau_s": u(3.0, 10.0)}, {"third_ratio": "share", "third_tau_s": "tau_s"},
+        ),
+        "power_law_relaxation": (
+            {"spread": u(2.0, 4.0)}, {"relaxation_spread": "spread"},
+        ),
+        "sensor_hysteresis": ({"newton": u(0.05, 0.2), "width_n": u(0.2, 0.6)}, {"hysteresis_N": "newton"}),
+        "clock_drift": ({"ppm": u(100, 600)}, {"clock_drift_ppm": "ppm"}),
+        "surface_motion_harmonic": ({"mm": u(0.04, 0.15), "phase": u(0, 6)}, {"surface_harmonic_mm": "mm"}),
+        "cogging": (
+            {"newton": u(0.05, 0.15), "half": u(0.01, 0.04), "pitch_mm": u(1.0, 2.5), "phase": u(0, 6)},
+            {"cogging_N": "newton", "cogging_harmonic_N": "half", "cogging_pitch_mm": "pitch_mm"},
+        ),
+        "cross_talk": ({"newton": u(0.1, 0.4)}, {"cross_talk_N": "newton"}),
     }  # fmt: skip
     if name == "none":
         return Secret(name, {}, {})
     numbers, reported = drawn[name]
-    return Secret(name, {name: numbers}, {parameter: numbers[number] for parameter, number in reported.items()})
+    causes = {one: drawn[one][0] for one in (*BESIDE.get(name, ()), name)}
+    return Secret(name, causes, {parameter: numbers[number] for parameter, number in reported.items()})
 
 
 KNOWN = (
     "friction", "backlash", "relaxation", "rate_law", "frame_compliance", "contact_offset", "substrate", "zero_drift",
     "time_offset", "tracker_latency", "filter_lag", "surface_motion", "preconditioning", "adhesion", "tip_inertia",
-    "position_ripple", "temperature", "elastic_law",
+    "position_ripple", "temperature", "elastic_law", "hunt_crossley", "mullins", "second_relaxation",
+    "third_relaxation", "power_law_relaxation", "sensor_hysteresis", "clock_drift", "surface_motion_harmonic",
+    "cogging", "cross_talk",
 )  # fmt: skip
+# What is hidden with it: a second time means nothing without a first.
+BESIDE: Mapping[str, tuple[str, ...]] = {
+    "second_relaxation": ("relaxation",), "third_relaxation": ("relaxation", "second_relaxation"),
+    "power_law_relaxation": ("relaxation",), "surface_motion_harmonic": ("surface_motion",),
+}  # fmt: skip
 UNKNOWN: Mapping[str, tuple[str, ...]] = {
     "unknown_depth_bump": ("depth", "force"),
     "unknown_speed_gain": ("velocity", "speed", "force"),

@@ -5,14 +5,18 @@ forward), at 4 kHz, semi-implicit; effects act where they do in a machine. Noise
 plus mains hum, quantised. Every session draws its own protocol.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import erf
 
 Array = NDArray[np.float64]
 STEP_S = 1 / 4000
+RELAXING = ("relaxation", "second_relaxation", "third_relaxation")
+PLAYS = np.array([[0.8], [0.9], [1.0], [1.1], [1.2]])  # widths of a hysteresis, in shares of their mean
 
 
 @dataclass(frozen=True)
@@ -113,6 +117,12 @@ def elastic(bench: Bench, hidden: Hidden, depth: Array) -> Array:
     return force
 
 
+def energy(bench: Bench, depth: Array) -> Array:
+    """Work of the index law up to a depth, over a: the integral of x exp(b x) in closed form."""
+    x, b = np.maximum(depth, 0.0), bench.b
+    return np.asarray((np.exp(b * x) * (b * x - 1) + 1) / b**2)
+
+
 def run(bench: Bench, hidden: Hidden, rng: np.random.Generator) -> list[IndentationCycle]:
     """Integrates the whole session and writes down what the devices saw."""
     path = trajectory(bench)
@@ -130,7 +140,9 @@ def run(bench: Bench, hidden: Hidden, rng: np.random.Generator) -> list[Indentat
     gain = gain * np.where(number >= count // 2, 1 + hidden.get("unknown_session_step", "share"), 1.0)
     surface0 = bench.surface + hidden.get("contact_offset", "mm") + rng.normal(0, bench.touch_sd, count)
     motion = hidden.causes.get("surface_motion", {"mm": 0.0, "hz": 1.0, "phase": 0.0})
-    state = _State(path[0].copy(), count)
+    twice = hidden.causes.get("surface_motion_harmonic", {"mm": 0.0, "phase": 0.0})
+    reached = np.concatenate([[0.0], np.maximum.accumulate(bench.depths)[:-1]])
+    state = _State(path[0].copy(), count, memories(hidden), reached, float(path.max()))
     axis, tip_log, force_log = np.empty_like(path), np.empty_like(path), np.empty_like(path)
     warm = 4.0 * (1 - np.exp(-(begin[None] + np.arange(steps)[:, None] * STEP_S) / 60.0))
     kelvin_gain = 1 + hidden.get("temperature", "per_kelvin") * (warm - warm.mean())
@@ -139,7 +151,9 @@ def run(bench: Bench, hidden: Hidden, rng: np.random.Generator) -> list[Indentat
         speed_wanted = (path[min(k + 1, steps - 1)] - path[max(k - 1, 0)]) / (2 * STEP_S)
         phase = 2 * np.pi * motion["hz"] * time + motion["phase"]
         surface = surface0 + motion["mm"] * np.sin(phase)
+        surface = surface + twice["mm"] * np.sin(2 * phase + twice["phase"])
         rise = motion["mm"] * 2 * np.pi * motion["hz"] * np.cos(phase)
+        rise = rise + twice["mm"] * 4 * np.pi * motion["hz"] * np.cos(2 * phase + twice["phase"])
         state.motor(path[k], speed_wanted)
         tip, tip_speed = state.kinematics(hidden)
         force = state.contact(bench, hidden, tip, tip_speed, surface, rise, gain * kelvin_gain[k])
@@ -148,16 +162,35 @@ def run(bench: Bench, hidden: Hidden, rng: np.random.Generator) -> list[Indentat
     return _written(bench, hidden, rng, begin, axis, tip_log, force_log, warm)
 
 
+def memories(hidden: Hidden) -> tuple[Array, Array]:
+    """Shares and times [s] of all that relaxes, each shape (terms, 1); none: (0, 1)."""
+    terms = [hidden.causes[name] for name in RELAXING if name in hidden.causes]
+    shares, taus = np.array([term["share"] for term in terms]), np.array([term["tau_s"] for term in terms])
+    spread = hidden.get("power_law_relaxation", "spread")
+    if spread:
+        # (1 + x)^-n as exponentials: trapezoids in u = ln s of the integral of s^n exp(-s (1 + x)) / Gamma(n).
+        n, u = 1 / spread, np.arange(-12.0, 2.5, 0.25)
+        shares = shares[0] * 0.25 * np.exp(n * u - np.exp(u)) / math.gamma(n)
+        taus = taus[0] / spread * np.exp(-u)
+    return shares[:, None], taus[:, None]
+
+
 class _State:
     """Motor, lost motion, memory and sensor of all cycles."""
 
-    def __init__(self, place: Array, count: int) -> None:
+    def __init__(
+        self, place: Array, count: int, memories: tuple[Array, Array], deepest: Array, place_most: float
+    ) -> None:
+        self.top, self.place_most = float(place.min()), place_most
         self.place, self.speed = place, np.zeros(count)
         self.follower = place.copy()
         self.tip_before = place.copy()
         self.lag_mm = np.zeros(count)
         self.bristle = np.zeros(count)
-        self.memory, self.elastic_before = np.zeros(count), np.zeros(count)
+        self.shares, self.taus_s = memories
+        self.memory, self.elastic_before = np.zeros((len(self.shares), count)), np.zeros(count)
+        self.deepest = deepest
+        self.plays = np.zeros((len(PLAYS), count))
         self.filtered = np.zeros(count)
         self.force_before: Array | None = None
         self.speed_before = np.zeros(count)
@@ -182,17 +215,16 @@ class _State:
         self, bench: Bench, hidden: Hidden, tip: Array, speed: Array, surface: Array, rise: Array, gain: Array
     ) -> Array:
         depth = tip - surface
-        spring = gain * elastic(bench, hidden, depth)
-        relax = hidden.causes.get("relaxation")
-        if relax:
-            self.memory += relax["share"] * (spring - self.elastic_before) - STEP_S * self.memory / relax["tau_s"]
-            self.elastic_before = spring
+        spring = gain * elastic(bench, hidden, depth) * self.softened(bench, hidden, depth)
+        self.memory += self.shares * (spring - self.elastic_before) - STEP_S * self.memory / self.taus_s
+        self.elastic_before = spring
         v = speed - rise
         drag = bench.viscosity * v
         if "rate_law" in hidden.causes:
             drag = bench.viscosity * 10 * np.sign(v) * (np.abs(v) / 10) ** hidden.get("rate_law", "exponent")
         wave = 1 + hidden.get("unknown_speed_gain", "share") * np.tanh((v - 5) / 8)
-        force = np.maximum(spring * wave + self.memory + np.where(depth > 0, drag, 0.0), 0.0)
+        drag = drag + hidden.get("hunt_crossley", "s_per_mm") * v * spring
+        force = np.maximum(spring * wave + self.memory.sum(axis=0) + np.where(depth > 0, drag, 0.0), 0.0)
         self.touched |= depth > 0
         pull = hidden.causes.get("adhesion")
         if pull:
@@ -201,7 +233,16 @@ class _State:
         give = hidden.get("frame_compliance", "mm_per_n")
         if give:  # the frame as a spring with a little damping: the lag settles within a few milliseconds
             self.lag_mm += STEP_S / 0.002 * (give * force - self.lag_mm)
-        return force
+        return np.asarray(force)
+
+    def softened(self, bench: Bench, hidden: Hidden, depth: Array) -> Array | float:
+        """What is left of the spring below the deepest place so far (Ogden and Roxburgh 1999)."""
+        known = hidden.causes.get("mullins")
+        if not known:
+            return 1.0
+        self.deepest = np.maximum(self.deepest, depth)
+        below = energy(bench, self.deepest) - energy(bench, depth)
+        return np.asarray(1 - known["share"] * erf(below / (known["energy"] * energy(bench, bench.depths).max())))
 
     def sensor(self, hidden: Hidden, force: Array, tip: Array, speed: Array) -> Array:
         rub = hidden.causes.get("friction")
@@ -209,8 +250,13 @@ class _State:
             travel = STEP_S * speed
             self.bristle += travel / rub["mm"] * (1 - np.sign(travel) * self.bristle)
             force = force + rub["newton"] * self.bristle
+        force = force + self.along_the_axis(hidden)
         force = force + 1e-3 * hidden.get("tip_inertia", "kg") * (speed - self.speed_before) / STEP_S
         self.speed_before = speed
+        hysteresis = hidden.causes.get("sensor_hysteresis")
+        if hysteresis:
+            self.plays = np.minimum(np.maximum(self.plays, force), force + hysteresis["width_n"] * PLAYS)
+            force = force + hysteresis["newton"] / hysteresis["width_n"] * (self.plays.mean(axis=0) - force)
         lag = hidden.get("filter_lag", "s")
         if not lag:
             return force
@@ -219,6 +265,14 @@ class _State:
         self.filtered += (middle - self.filtered) * STEP_S / (lag + 0.5 * STEP_S)
         self.force_before = force
         return self.filtered.copy()
+
+    def along_the_axis(self, hidden: Hidden) -> Array:
+        """What the axis adds to the force by where it is: magnets, and a cable that is drawn out."""
+        magnets = hidden.causes.get("cogging", {"newton": 0.0, "half": 0.0, "pitch_mm": 1.0, "phase": 0.0})
+        turn = 2 * np.pi * self.place / magnets["pitch_mm"] + magnets["phase"]
+        way = np.maximum(self.place - self.top, 0.0) / (self.place_most - self.top)
+        pulled = magnets["newton"] * np.sin(turn) + magnets["half"] * np.cos(2 * turn)
+        return np.asarray(pulled + hidden.get("cross_talk", "newton") * way**2)
 
 
 def _written(
@@ -235,7 +289,7 @@ def _written(
         drift = hidden.get("zero_drift", "n_per_h") * (stamps - 0.5 * begin[-1]) / 3600
         reading = force[pick, i] * (1 + hidden.get("gain_error", "share")) + bench.zero_n + rng.normal(0, 0.003) + drift
         reading = np.round((reading + force_noise(rng, stamps, bench.noise_n)) / 0.001) * 0.001
-        late = hidden.get("time_offset", "s")
+        late = hidden.get("time_offset", "s") + 1e-6 * hidden.get("clock_drift", "ppm") * (stamps - begin[0])
         frames = np.arange(time[0] + rng.uniform(0, 0.02), time[-1], 1 / bench.tracker_hz)
         delay = bench.camera_delay_s + hidden.get("tracker_latency", "s")
         along = np.interp(frames - delay, time, tip[:, i])

@@ -15,10 +15,11 @@ import pytest
 
 RAN = "__ran__"
 Line: TypeAlias = tuple[str, int]
-LONGEST_S = 8.0
-"""Of tests for one mutant. All of them take 35 s, and that once for each of some 300 survivors were three hours; of 600
-mutants two were killed only by what comes later."""
-QUICK_S = 0.05
+LONGEST = 0.25
+"""What the tests for one mutant may take of the time of all, on this computer. All of them take 35 s on a quick one,
+and that once for each of some 300 survivors were three hours; of 600 mutants two were killed by what comes later."""
+QUICK = 0.0015
+"""Of the time of all, for one test: 0.05 s of 35."""
 
 
 def with_probes(tree: ast.Module) -> ast.Module:
@@ -61,7 +62,7 @@ class Coverage:
 
         What runs at import (constants, defaults) is for all tests of the same file, and for the quick ones beside
         those, for what a class declares is checked without a line of it; for all there are where none is.
-        Of more tests than take ``LONGEST_S`` together, the first: what only others would notice counts as survived.
+        Of more tests than ``LONGEST`` lets take part, the first: what only others would notice counts as survived.
         """
         near = self._quickest(test for test, lines in self.lines.items() if (path, line) in lines)
         if not at_import:
@@ -69,12 +70,18 @@ class Coverage:
         same = self._quickest(test for test, lines in self.lines.items() if any(at == path for at, _ in lines))
         found = self._affordable(list(dict.fromkeys([*near, *same])) or self._quickest(self.lines))
         files = {test.partition("::")[0] for test in found}
-        beside = (test for test in self.lines if test.partition("::")[0] in files and self.seconds[test] < QUICK_S)
+        beside = (
+            test for test in self.lines if test.partition("::")[0] in files and self.seconds[test] < QUICK * self._all_s
+        )
         return self._quickest({*found, *beside})
 
     def _affordable(self, tests: list[str]) -> list[str]:
         until = accumulate((self.seconds[test] for test in tests), initial=0.0)
-        return [test for test, begins_s in zip(tests, until, strict=False) if begins_s < LONGEST_S]
+        return [test for test, begins_s in zip(tests, until, strict=False) if begins_s < LONGEST * self._all_s]
+
+    @property
+    def _all_s(self) -> float:
+        return sum(self.seconds.values())
 
     def _quickest(self, tests: Iterable[str]) -> list[str]:
         """Of several cases of one test the second counts as twice as long, and so on: other tests notice other things.

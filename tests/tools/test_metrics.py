@@ -8,6 +8,7 @@ import grimp
 import pytest
 
 from tools import metrics
+from tools.counted_apart import APART
 from tools.metrics import Source
 
 HEAD = "from collections.abc import Mapping\nfrom typing import Any\n"
@@ -117,7 +118,8 @@ def test_no_number_falls_back() -> None:
 
 BETTER = {
     "class_names_twice": 0, "untyped_dicts": 9, "upward_imports": 0, "cycles": 0, "source_lines": metrics.MOST_LINES,
-    "source_lines_safety": 8126, "function_median": 6, "function_p90": 20, "file_max": 400, "test_to_source": 0.8,
+    "source_lines_safety": 8126, "source_lines_data": 7300, "source_lines_criticism": 2400,
+    "source_lines_service": 9700, "function_median": 6, "function_p90": 20, "file_max": 400, "test_to_source": 0.8,
     "thresholds_with_reason": 0.9,
 }  # fmt: skip
 
@@ -144,11 +146,13 @@ def test_whoever_runs_it_sees_each_number_beside_its_goal_and_how_it_ended(
         assert "a <-> b" in told
 
 
-def test_safety_is_counted_apart_by_folders_and_files_that_exist() -> None:
-    assert metrics.for_safety("controller/stop/word.py")
-    assert metrics.for_safety("rig/trials/quality.py")
-    assert not metrics.for_safety("rig/trials/curves.py")
-    assert [path for path in metrics.SAFETY if not (metrics.ROOT / path).exists()] == []
+def test_what_came_later_is_counted_apart_by_folders_and_files_that_exist_and_once() -> None:
+    assert metrics.is_apart("controller/stop/word.py")
+    assert metrics.is_apart("rig/intake/text.py")
+    assert not metrics.is_apart("rig/trials/curves.py")
+    paths = [path for entries in APART.values() for path in entries]
+    assert [path for path in paths if not (metrics.ROOT / path).exists()] == []
+    assert len(paths) == len(set(paths))
 
 
 def test_a_goal_is_reached_from_the_side_it_names() -> None:

@@ -3,6 +3,8 @@
 import zipfile
 from pathlib import Path
 
+import pytest
+
 from tools.packaged import PACKAGES, ROOT, missing
 
 
@@ -10,8 +12,9 @@ def lay_out(root: Path) -> None:
     for package in PACKAGES:
         (root / package).mkdir()
         (root / package / "__init__.py").write_text("")
-    (root / "api" / "page").mkdir()
-    (root / "api" / "page" / "index.html").write_text("<html>")
+    (root / "api" / "page" / "sources").mkdir(parents=True)
+    (root / "api" / "page" / "sources" / "main.tsx").write_text("")
+    (root / "rig" / "template.html").write_text("<html>")
     (root / "rig" / "__pycache__").mkdir()
     (root / "rig" / "__pycache__" / "a.pyc").write_text("")
 
@@ -21,17 +24,19 @@ def pack(root: Path, without: str = "") -> Path:
     with zipfile.ZipFile(wheel, "w") as archive:
         for package in PACKAGES:
             archive.writestr(f"{package}/__init__.py", "")
-        if not without:
-            archive.writestr("api/page/index.html", "<html>")
+        for name in ("rig/template.html", "api/page/built/index.html"):
+            if name != without:
+                archive.writestr(name, "<html>")
     return wheel
 
 
-def test_a_file_that_was_not_packed_is_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["rig/template.html", "api/page/built/index.html"])
+def test_a_file_that_was_not_packed_is_named_and_so_is_a_page_that_was_not_built(name: str, tmp_path: Path) -> None:
     lay_out(tmp_path)
-    assert missing(pack(tmp_path, without="page"), tmp_path) == ["api/page/index.html"]
+    assert missing(pack(tmp_path, without=name), tmp_path) == [name]
 
 
-def test_a_whole_wheel_lacks_nothing_and_caches_are_not_asked_for(tmp_path: Path) -> None:
+def test_a_whole_wheel_lacks_nothing_and_caches_and_sources_of_the_page_are_not_asked_for(tmp_path: Path) -> None:
     lay_out(tmp_path)
     assert not missing(pack(tmp_path), tmp_path)
 

@@ -129,9 +129,9 @@ def test_every_route_stands_in_the_reference_with_body_and_answers() -> None:
     text = fill("<!-- generated: http -->")
     start = text.partition("## POST /api/v1/jobs\n")[2].partition("\n## ")[0]
     assert "- `X-Control-Lease` (header): text" in start
-    assert "- body: table `CaptureRequest` or table `TrackRequest`" in start
+    assert "- body: table `CaptureJob` or table `TrackJob`" in start
     assert "- 409: not in the present state" in start
-    for name in ("CaptureRequest", "LeaseView", "Problem"):
+    for name in ("CaptureParams", "LeaseView", "Problem"):
         assert f"## `{name}`\n" in text
     assert "## POST /api/v1/estop\n" in text
 
@@ -147,7 +147,7 @@ def test_a_law_stands_in_the_reference_with_units_bounds_and_what_is_given() -> 
 
 def test_a_cause_stands_in_the_reference_with_its_smallest_size_and_what_to_do() -> None:
     text = fill("<!-- generated: causes -->")
-    substrate = text.partition("## `substrate`\n")[2].partition("\n## ")[0]
+    substrate = text.partition("## `substrate` (substrate_per_mm3)\n")[2].partition("\n## ")[0]
     assert "Something stiff lies below: the force grows by 1 + `substrate_per_mm3` x^3." in substrate
     assert "- what to do: measure over thicker tissue" in substrate
     assert "- acts: in the elastic law\n" in substrate
@@ -160,8 +160,8 @@ def test_a_cause_stands_in_the_reference_with_its_smallest_size_and_what_to_do()
 
 def test_what_import_rig_offers_stands_in_the_reference() -> None:
     text = fill("<!-- generated: python -->")
-    assert "## `rig.open(folder: str | Path) -> SessionData`" in text
-    assert "Raises DataError where there is none." in text
+    assert "## `rig.open(place: str | Path, mapping: str | Path | None=None, only: str='') -> SessionData`" in text
+    assert "Raises DataError or UsageError where there is none" in " ".join(text.split())
     trial = text.partition("## class `rig.TrialData`\n")[2].partition("\n## ")[0]
     assert "### `arrow(stream: str='force') -> pa.Table`" in trial
     assert "### `name`\n" in trial

@@ -11,6 +11,7 @@ from rig.diagnosis.noise import Array
 from rig.diagnosis.search import Search, testable
 
 STLSQ_SHARE = 0.05
+METHODS = ("residual look-up", "in-sample BIC", "STLSQ", "FROLS")
 
 
 def look_up(t: Tangents) -> set[str]:

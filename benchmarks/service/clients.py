@@ -1,0 +1,141 @@
+"""The load: `python -m benchmarks.service.clients PORT` until its standard input ends; then one JSON object.
+
+50 WebSockets of `rig.v1`, most of them as a page subscribes, every tenth with every sample of two streams, and 200
+requests a second over eight connections. All of it at low priority, in one process that is no part of the
+service. What counts is what came: answers of 200, and samples that batches stand for or gaps name.
+"""
+
+import asyncio
+import contextlib
+import json
+import os
+import struct
+import sys
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+from websockets.typing import Subprotocol
+
+LIVE, REQUESTS_HZ, CONNECTIONS = 50, 200, 8
+EVERY_SAMPLE_EACH = 10
+PAGE = {"type": "subscribe", "streams": ["force", "setpoint", "error", "depth", "marker"], "max_rate_hz": 30.0}
+WHOLE = {"type": "subscribe", "streams": ["force", "depth"]}
+# A page asks for the bench now and then, and a list rarely.
+PATHS = ("/rig", "/rig", "/info", "/rig", "/jobs", "/rig", "/rig", "/protocols", "/rig", "/recordings")
+BATCH = struct.Struct("<HHIqII")
+# As a program beside the bench runs: whoever starts the service computes at this priority too.
+LOW_PRIORITY = 10
+
+
+@dataclass
+class Load:
+    """What was asked, and what came of it."""
+
+    served: int = 0
+    failed: int = 0
+    seconds: float = 0.0
+    answer_ms: list[float] = field(default_factory=list)
+    messages: int = 0
+    samples: int = 0
+    lost_live: int = 0
+    lost_connections: int = 0
+
+
+def main() -> None:
+    """Until whoever started this closes our standard input."""
+    os.nice(LOW_PRIORITY)
+    load = asyncio.run(_loaded(int(sys.argv[1]), os.environ.get("TISSUE_RIG_TOKEN", "")))
+    times_ms = load.answer_ms or [float("nan")]
+    shown = asdict(load) | {"answer_ms": {f"p{q}": round(float(np.percentile(times_ms, q)), 2) for q in (50, 99)}}
+    print(json.dumps(shown), flush=True)
+
+
+async def _loaded(port: int, token: str) -> Load:
+    load = Load()
+    clients = [_watch(load, port, token, number) for number in range(LIVE)]
+    requests = [_ask(load, port, token, number) for number in range(CONNECTIONS)]
+    began = time.monotonic()
+    tasks = [asyncio.ensure_future(_again(load, part)) for part in (*clients, *requests)]
+    await asyncio.to_thread(sys.stdin.read)
+    load.seconds = time.monotonic() - began
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+    return load
+
+
+async def _again(load: Load, part: Callable[[], Awaitable[None]]) -> None:
+    """A client that is thrown out comes back, and is counted."""
+    while True:
+        with contextlib.suppress(OSError, ConnectionClosed, asyncio.IncompleteReadError):
+            await part()
+        load.lost_connections += 1
+        await asyncio.sleep(1.0)
+
+
+def _watch(load: Load, port: int, token: str, number: int) -> Callable[[], Awaitable[None]]:
+    offered = [Subprotocol("rig.v1"), *([Subprotocol(f"rig.token.{token}")] if token else [])]
+    wanted = json.dumps(PAGE if number % EVERY_SAMPLE_EACH else WHOLE)
+
+    async def watched() -> None:
+        address = f"ws://127.0.0.1:{port}/api/v1/stream"
+        async with connect(address, subprotocols=offered, compression=None) as socket:
+            await socket.send(wanted)
+            await _count(load, socket)
+
+    return watched
+
+
+async def _count(load: Load, socket: ClientConnection) -> None:
+    async for message in socket:
+        load.messages += 1
+        if isinstance(message, bytes):
+            load.samples += sum(_covered(message))
+        elif '"gap"' in message and (gap := json.loads(message))["channel"]:
+            load.lost_live += gap["dropped"]
+
+
+def _covered(message: bytes) -> list[int]:
+    found, at = list[int](), 0
+    while at < len(message):
+        _, columns, _, _, n, covered = BATCH.unpack_from(message, at)
+        found.append(covered)
+        at += BATCH.size + 4 * n * (1 + columns)
+    return found
+
+
+def _ask(load: Load, port: int, token: str, number: int) -> Callable[[], Awaitable[None]]:
+    authorised = f"Authorization: Bearer {token}\r\n" if token else ""
+
+    async def asked() -> None:
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        due = time.monotonic() + number / REQUESTS_HZ
+        with contextlib.closing(writer):
+            for turn in range(number, sys.maxsize):
+                await asyncio.sleep(due - time.monotonic())
+                path = PATHS[turn % len(PATHS)]
+                head = f"GET /api/v1{path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n{authorised}\r\n"
+                began = time.monotonic()
+                writer.write(head.encode())
+                status = await _answered(reader)
+                load.answer_ms.append((time.monotonic() - began) * 1e3)
+                load.served += status == 200
+                load.failed += status != 200
+                due += CONNECTIONS / REQUESTS_HZ
+
+    return asked
+
+
+async def _answered(reader: asyncio.StreamReader) -> int:
+    head = (await reader.readuntil(b"\r\n\r\n")).decode("latin-1").lower()
+    length = head.partition("content-length: ")[2].partition("\r\n")[0]
+    await reader.readexactly(int(length))
+    return int(head.split(" ", 2)[1])
+
+
+if __name__ == "__main__":
+    main()

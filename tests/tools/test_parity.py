@@ -1,0 +1,61 @@
+"""Every command has a route, or a reason why it has none; every route, view and command that is named is there."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from api.cli.app import COMMANDS
+from api.http import app
+from api.http.jobs.kinds import KINDS
+from api.http.service import Service
+from rig.config.wiring import Wiring
+from tools import parity
+from tools.reference import fill
+
+VIEWS = Path(__file__).parents[2] / "api" / "page" / "sources" / "src" / "views" / "index.ts"
+
+
+def described() -> set[str]:
+    paths = app.build(Service(Wiring(), Path("sessions"), Path("examples"))).openapi()["paths"]
+    return {f"{method.upper()} {path.removeprefix('/api/v1')}" for path, methods in paths.items() for method in methods}
+
+
+def lacking(rows: list[parity.Row]) -> list[str]:
+    """Commands with neither route nor reason, or with both."""
+    return [row.command for row in rows if bool(row.routes) == bool(row.reason)]
+
+
+def test_every_command_has_a_route_or_a_reason() -> None:
+    names = list(parity.commands())
+    assert {"fit", "subject erase", "calibrate force", "protocol check", "token create"} <= set(names)
+    assert len(names) == len(set(names)) > 40
+    assert lacking(parity.rows()) == []
+
+
+def test_a_command_without_either_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(COMMANDS, "planted", "api.cli.hardware:mock")
+    assert lacking(parity.rows()) == ["planted"]
+    monkeypatch.setattr("tools.parity.KINDS", {name: kind for name, kind in KINDS.items() if name != "fit"})
+    assert set(lacking(parity.rows())) == {"planted", "fit"}
+
+
+def test_every_route_that_is_named_is_there() -> None:
+    named = {route.partition(", kind")[0] for row in parity.rows() for route in row.routes}
+    assert named - described() == set()
+    assert set(parity.ROUTES) | set(parity.WITHOUT) <= set(parity.commands())
+
+
+def test_every_view_that_is_named_is_there() -> None:
+    views = set(re.findall(r"(\w+): [A-Z]\w+", VIEWS.read_text()))
+    rows = parity.rows()
+    assert {row.view for row in rows} - {""} <= views
+    named = re.findall(r'^  "([^"]+)": ', parity.VIEWS.read_text(), re.MULTILINE)
+    assert set(named) <= set(parity.commands()) and len(named) == len(set(named))
+
+
+def test_the_table_stands_in_the_reference() -> None:
+    text = fill("<!-- generated: parity -->")
+    assert "| `rig fit` | `POST /jobs, kind fit` | session |" in text
+    assert "| `rig serve` | none: is the service itself | none |" in text
+    assert text.count("\n| `rig ") == len(list(parity.commands()))
