@@ -6,19 +6,43 @@ READY := $(VENV)/ready
 # Modules are compiled once, not by each of the processes that a bench is made of.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test check metrics docs package wheels mutants mutants-sample lock clean
+.PHONY: demo page test test-page test-documents test-campaigns test-extras check metrics docs package wheels mutants mutants-sample lock clean
 
 demo: $(READY)
 	$(BIN)/rig demo --out demo
 
+# Built once for its sources; .venv/ready has done it where nothing has changed since.
+page: $(READY)
+	$(BIN)/python hatch_build.py
+
+# What a change breaks in most cases; what takes as long again is in the four targets below.
 # Tests that start processes first and by themselves: beside others that compute, a simulated device came too late.
-test: $(READY) browser
+MAIN := not campaign and not documents and not extra
+test: $(READY) page browser postgresql
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2 --dist loadgroup -m bench --durations 15
-	$(BIN)/pytest -n 2 -m "not bench" --durations 10
+	$(BIN)/pytest -n 2 --dist loadgroup -m "bench and $(MAIN)" --ignore tests/page --durations 15
+	$(BIN)/pytest -n 2 --dist loadfile -m "not bench and $(MAIN)" --ignore tests/page --durations 10
+
+# The page in a real browser over the service and the mock bench; what needs no bench runs beside it and gives way to it.
+PAGE ?= tests/page
+test-page: $(READY) page browser
+	@nice -n 15 $(BIN)/pytest $(PAGE) -m "not bench" & alone=$$!; \
+	  $(BIN)/pytest $(PAGE) -m bench --durations 10; beside=$$?; wait $$alone && exit $$beside
+
+# Every command, cell and example of README and docs, as somebody would run it.
+test-documents: $(READY) page
+	$(BIN)/pytest -n 2 --dist worksteal -m documents tests/test_docs.py tests/system/test_api_docs.py --durations 5
+
+# Diagnoses of many sessions, made and measured, and safety checks that are switched off one by one.
+test-campaigns: $(READY)
+	$(BIN)/pytest -n 2 --dist loadgroup -m campaign --ignore tests/page --durations 10
+
+# Stops and crashes in contact, every answer of the service while the tip presses, a second product.
+test-extras: $(READY) page
+	$(BIN)/pytest -n 2 --dist loadgroup -m extra --ignore tests/page --durations 10
 
 # What to run before each commit, in less than half a minute: all checks, and the tests of what changed.
 check: $(READY)
@@ -37,7 +61,7 @@ docs: $(READY)
 	$(BIN)/python -m tools.offline docs/_build
 
 # Wheel and source distribution are installed where there is no checkout, and the demonstration runs from there.
-package: $(READY)
+package: $(READY) page
 	rm -rf dist
 	$(BIN)/uv build --quiet --python $(BIN)/python --no-build-isolation --out-dir dist
 	$(BIN)/python -m tools.packaged dist
@@ -69,6 +93,13 @@ browser:
 	  && $(APT) update -qq && $(APT) install -y -qq --no-install-recommends chromium >/dev/null; } \
 	  || echo "no Chromium here and no right to install it: the browser tests will skip"
 
+# Debian keeps the server's own programs out of the path.
+.PHONY: postgresql
+postgresql:
+	@ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || command -v initdb >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null \
+	  && $(APT) update -qq && $(APT) install -y -qq --no-install-recommends postgresql >/dev/null; } \
+	  || echo "no PostgreSQL here and no right to install it: its tests will skip"
+
 # Debian's venv has no pip of its own, and a plain Debian no pip at all; uv then installs in seconds what pip takes a
 # minute for.
 $(READY): requirements.lock pyproject.toml
@@ -84,4 +115,4 @@ lock:
 	$(BIN)/uv pip compile --quiet --universal --generate-hashes --no-annotate --no-header --extra dev --extra docs pyproject.toml -o requirements.lock
 
 clean:
-	rm -rf $(VENV) demo dist docs/_build
+	rm -rf $(VENV) demo dist docs/_build api/page/built api/page/sources/node_modules

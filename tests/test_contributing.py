@@ -1,7 +1,7 @@
 """CONTRIBUTING.md is executed: the blocks of each walk-through, in order, in a process and a folder of its own.
 
 A Python block that begins with `# folder/file.py` is that file, as if it stood in the repository; the others are run
-one after another. Blocks of other languages are given to them as ``BLOCKS["html"]`` and so on.
+one after another. Blocks of other languages are given to them as ``BLOCKS["tsx"]`` and so on.
 """
 
 import os
@@ -73,7 +73,7 @@ def test_there_is_a_walk_through_of_each_kind() -> None:
 
 @pytest.mark.parametrize("title", WALKS)
 def test_each_walk_through_works_as_it_stands(title: str, tmp_path: Path) -> None:
-    if any(block.language == "html" for block in WALKS[title]):
+    if any(block.language == "tsx" for block in WALKS[title]):
         find()
     done = run(WALKS[title], tmp_path)
     assert done.returncode == 0, done.stderr

@@ -87,7 +87,7 @@ def test_pages_in_folders_are_found_and_their_commands_too() -> None:
 
 
 @pytest.mark.bench
-@pytest.mark.xdist_group("commands")
+@pytest.mark.documents
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("page", EXECUTED, ids=name)
 def test_every_command_of_the_page_works_in_order(page: Path, tmp_path: Path) -> None:
@@ -101,6 +101,7 @@ def test_every_command_of_the_page_works_in_order(page: Path, tmp_path: Path) ->
             run(command, tmp_path)
 
 
+@pytest.mark.documents
 @pytest.mark.parametrize("page", NOTEBOOKS, ids=name)
 def test_every_cell_of_a_notebook_runs_in_order(page: Path, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples", tmp_path / "examples")

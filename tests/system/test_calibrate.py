@@ -17,6 +17,8 @@ from rig.errors import CheckFailed
 from tests.calibrations import force_calibration
 from tests.system.test_stop import asked
 
+pytestmark = pytest.mark.xdist_group("commands")
+
 WEIGHTS = ["--weights", "2 N,5 N,10 N", "--load", "pressed", "--pause", "0.3"]
 PORT = re.compile(r"POST http://127.0.0.1:(\d+)/estop")
 REQUEST = re.compile(r"put (\d+) N on the tip|take every weight off")
@@ -160,4 +162,6 @@ def test_a_scale_or_sense_that_is_wrong_stops_at_the_first_step(tmp_path: Path, 
     said = axis(tmp_path, "--set", setting)
     assert said.code == 1
     assert re.search(sentence, said.sentence)
-    assert not list(tmp_path.rglob("*.json"))
+    written = tmp_path / "result.json"
+    assert list(tmp_path.rglob("*.json")) == [written]
+    assert re.search(sentence, json.loads(written.read_text())["reason"])

@@ -9,6 +9,8 @@ import pytest
 
 from mock_devices.testing.commands import ROOT
 
+pytestmark = pytest.mark.campaign
+
 
 def campaign(*options: str | Path) -> tuple[int, dict[str, int], str]:
     """Exit code, last line and all that was printed."""

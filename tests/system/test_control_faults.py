@@ -17,6 +17,7 @@ from rig.config.table import merged, parse
 from rig.config.wiring import Wiring
 from rig.recording.reader import read_recording
 
+pytestmark = pytest.mark.extra
 HEARTBEAT_S = 0.2
 
 

@@ -11,6 +11,8 @@ from mock_devices.testing.commands import Running, ServedBench, children, presse
 from mock_devices.testing.models import index_model
 from rig.recording.ring import new_path
 
+pytestmark = [pytest.mark.extra, pytest.mark.xdist_group("recovery")]
+
 MODULES = {"loop": "controller.loop.process", "recorder": "rig.recording.recorder", "stop": "controller.stop.server"}
 
 

@@ -19,6 +19,8 @@ from mock_devices.testing.models import index_model
 from mock_devices.testing.service import ServedRig
 from rig.recording.sessions import SessionInfo, write_session
 
+pytestmark = [pytest.mark.extra, pytest.mark.xdist_group("recovery")]
+
 
 @pytest.fixture
 def served(tmp_path: Path) -> Iterator[ServedRig]:
@@ -80,7 +82,7 @@ def test_a_loop_killed_under_a_service_is_recovered_through_it(served: ServedRig
 
 def test_a_killed_service_leaves_a_bench_that_one_command_recovers(served: ServedRig) -> None:
     lease = served.lease()
-    request = {"kind": "track", "session": "known", "forces_N": [2.0], "seconds": 60.0}
+    request = {"kind": "track", "params": {"model": {"session": "known"}, "forces_N": [2.0], "seconds": 60.0}}
     served.ask("POST", "/jobs", request, lease)
     pressed(served.bench, 1.5)
     served.running.kill()

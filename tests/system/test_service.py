@@ -2,15 +2,17 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
 from api.cli.mock_bench import plug_into
 from api.cli.options import built_in
-from api.http.app import build
+from api.http.jobs.states import ENDS
 from api.http.lease import LeaseRegistry
 from api.http.service import Service
+from mock_devices.testing.access import client_of
 from mock_devices.testing.clock import Clock
 from mock_devices.testing.commands import (
     PATIENCE_S,
@@ -49,7 +51,7 @@ def served(clock: Clock, tmp_path_factory: pytest.TempPathFactory) -> Iterator[t
             folder / "protocols",
         )
         service.control = LeaseRegistry(clock.seconds)
-        with TestClient(build(service), base_url="http://127.0.0.1:8000") as client:
+        with client_of(service) as client:
             yield bench, client, folder
 
 
@@ -64,15 +66,15 @@ def in_control(served: tuple[ServedBench, TestClient, Path]) -> Iterator[None]:
 
 
 def start(client: TestClient, protocol: str, session: str) -> str:
-    answer = client.post("/api/v1/jobs", json={"kind": "capture", "protocol": protocol, "session": session})
+    answer = client.post("/api/v1/jobs", json={"kind": "capture", "params": {"protocol": protocol, "session": session}})
     assert answer.status_code == 202, answer.text
     assert answer.headers["location"] == f"/api/v1/jobs/{answer.json()['id']}"
     return str(answer.json()["id"])
 
 
-def ended(client: TestClient, job: str) -> dict[str, object]:
-    until(lambda: client.get(f"/api/v1/jobs/{job}").json()["state"] != "running", PATIENCE_S, "the job's end")
-    found: dict[str, object] = client.get(f"/api/v1/jobs/{job}").json()
+def ended(client: TestClient, job: str) -> dict[str, Any]:
+    until(lambda: client.get(f"/api/v1/jobs/{job}").json()["state"] in ENDS, PATIENCE_S, "the job's end")
+    found: dict[str, Any] = client.get(f"/api/v1/jobs/{job}").json()
     return found
 
 
@@ -109,7 +111,7 @@ def test_a_capture_runs_as_a_job_and_its_recording_can_be_downloaded(
 def test_a_session_is_never_overwritten(served: tuple[ServedBench, TestClient, Path]) -> None:
     _, client, folder = served
     (folder / "sessions" / "taken").mkdir(parents=True)
-    answer = client.post("/api/v1/jobs", json={"kind": "capture", "protocol": "short", "session": "taken"})
+    answer = client.post("/api/v1/jobs", json={"kind": "capture", "params": {"protocol": "short", "session": "taken"}})
     assert (answer.status_code, answer.json()["code"]) == (409, "session-exists")
 
 
@@ -117,13 +119,13 @@ def test_one_job_at_a_time_and_a_stop_names_its_job(served: tuple[ServedBench, T
     bench, client, _ = served
     job = start(client, "slow", "second")
     pressed(bench)
-    second = client.post("/api/v1/jobs", json={"kind": "capture", "protocol": "short", "session": "third"})
+    second = client.post("/api/v1/jobs", json={"kind": "capture", "params": {"protocol": "short", "session": "third"}})
     assert (second.status_code, second.json()["code"]) == (409, "busy")
     assert job in second.json()["detail"]
-    assert client.post("/api/v1/jobs/nobody/stop").status_code == 404
-    assert client.post(f"/api/v1/jobs/{job}/stop").status_code == 200
+    assert client.post("/api/v1/jobs/nobody/cancel").status_code == 404
+    assert client.post(f"/api/v1/jobs/{job}/cancel").status_code == 200
     freed(bench)
-    assert ended(client, job)["state"] == "stopped"
+    assert ended(client, job)["state"] == "cancelled"
     assert client.get("/api/v1/rig").json()["state"] == "stopped"
     reset(client)
 
@@ -131,22 +133,23 @@ def test_one_job_at_a_time_and_a_stop_names_its_job(served: tuple[ServedBench, T
 def test_the_emergency_stop_holds_until_acknowledged_and_moves_nothing_then(
     served: tuple[ServedBench, TestClient, Path],
 ) -> None:
-    bench, client, _ = served
+    bench, client, folder = served
     job = start(client, "slow", "fourth")
     pressed(bench)
     answer = client.post("/api/v1/estop")
     assert (answer.status_code, answer.json()["detail"]) == (200, "braked")
-    assert ended(client, job)["state"] == "stopped"
+    assert ended(client, job)["state"] == "cancelled"
     again = client.post("/api/v1/estop").json()
     assert (again["detail"], again["id"] > answer.json()["id"]) == ("braked", True)
-    refused = client.post("/api/v1/jobs", json={"kind": "capture", "protocol": "short", "session": "fifth"})
-    assert ended(client, refused.json()["id"])["state"] == "stopped"
+    refused = client.post("/api/v1/jobs", json={"kind": "capture", "params": {"protocol": "short", "session": "fifth"}})
+    assert (refused.status_code, refused.json()["code"]) == (409, "stopped")
+    assert not (folder / "sessions" / "fifth").exists()
     before_mm = bench.control.number("axis.position_mm")
     reset(client)
     stands_still(bench)
     assert bench.control.number("axis.position_mm") == pytest.approx(before_mm, abs=0.05)
     assert bench.control.number("tip.force_N") > 0.5
-    out = client.post("/api/v1/jobs", json={"kind": "retract"})
+    out = client.post("/api/v1/jobs", json={"kind": "retract", "params": {}})
     done = ended(client, out.json()["id"])
     assert done["state"] == "succeeded", done["message"]
     freed(bench)
@@ -163,7 +166,7 @@ def test_the_subjects_pain_stop_retracts(served: tuple[ServedBench, TestClient, 
     first, second = client.post("/api/v1/pain"), client.post("/api/v1/pain")
     assert (first.json()["detail"], second.json()["detail"]) == ("retracting", "retracting")
     freed(bench)
-    assert ended(client, job)["state"] == "stopped"
+    assert ended(client, job)["state"] == "cancelled"
     events = read_recording(folder / "sessions" / "sixth" / "trial_001.mcap").events
     assert "pain_stop" in {event.code for event in events}
     reset(client)
@@ -177,7 +180,8 @@ def test_a_user_who_does_not_renew_the_lease_is_retracted_from(
     pressed(bench)
     clock.advance(31.0)
     freed(bench)
-    assert ended(client, job)["state"] == "stopped"
+    found = ended(client, job)
+    assert (found["state"], found["problem"]["code"]) == ("failed", "operator_silent")
     events = read_recording(folder / "sessions" / "seventh" / "trial_001.mcap").events
     assert "operator_silent" in {event.code for event in events}
     taken = client.post("/api/v1/control/lease", json={"holder": "the next one", "ttl_s": 30.0})

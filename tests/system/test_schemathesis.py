@@ -1,0 +1,102 @@
+"""Requests made from the service's own description, while the tip presses: each answer is one that it describes.
+
+What ends the run by design (the stops), takes control away, never ends, or counts guesses of passwords is left out, and
+tested where it belongs.
+"""
+
+import contextlib
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import uvicorn
+from fastapi import FastAPI
+
+from api.http.access.scopes import Scope
+from mock_devices.testing.access import token
+from mock_devices.testing.commands import ServedBench, free_port, pressed, until
+from mock_devices.testing.service import ServedRig
+
+pytestmark = pytest.mark.extra
+
+SECONDS = 40
+LEFT_OUT = "/(estop|pain|stop|cancel|pause|resume|live|events|control/take|control/lease)$|/auth/"
+CHECKS = (
+    "not_a_server_error", "status_code_conformance", "content_type_conformance", "response_schema_conformance",
+    "response_headers_conformance", "negative_data_rejection",
+)  # fmt: skip
+HOLD = (
+    'kind = "indentation"\nspeeds_mm_s = [20]\ntrials = 1\ndepth_mm = 6\nair_dwell_s = 0.2\napproach_speed_mm_s = 20\n'
+    "hold_s = 600\nretract_speed_mm_s = 20\nclearance_mm = 4\nforce_limit_N = 12\n[quality]\nrepeats = 0\n"
+)
+
+
+def judged(address: str, seconds: int, folder: Path, *more: str) -> subprocess.CompletedProcess[str]:
+    """Schemathesis over the description at ``address``; it ends with 1 where an answer is not as described."""
+    program = Path(sys.executable).with_name("schemathesis")
+    return subprocess.run(
+        [program, "run", address, "--max-time", str(seconds), "--phases", "coverage,fuzzing", "--request-timeout", "30",
+         "--checks", ",".join(CHECKS), "--exclude-path-regex", LEFT_OUT, "--no-color", *more],
+        cwd=folder, capture_output=True, text=True, timeout=300, check=False, env=os.environ | {"NO_COLOR": "1"},
+    )  # fmt: skip
+
+
+@pytest.mark.timeout(400)
+def test_every_answer_is_as_described_while_the_tip_presses(bench: ServedBench, tmp_path: Path) -> None:
+    (tmp_path / "protocols").mkdir()
+    (tmp_path / "protocols" / "hold.toml").write_text(HOLD)
+    settings = bench.settings("stop.port=0", "loop.lease_s=0")
+    rig = ServedRig(bench, tmp_path, ["--protocols", "protocols", *settings])
+    lease = rig.lease()
+    job = rig.ask("POST", "/jobs", {"kind": "capture", "params": {"protocol": "hold", "session": "held"}}, lease)["id"]
+    pressed(bench)
+    renewing, over = threading.Event(), threading.Event()
+
+    def renew() -> None:
+        while not over.wait(5.0):
+            rig.ask("PUT", "/control/lease", lease=lease)
+            renewing.set()
+
+    keeper = threading.Thread(target=renew)
+    keeper.start()
+    try:
+        credential = f"Authorization: Bearer {token(Scope.ADMIN)}"
+        done = judged(f"{rig.address}/api/v1/openapi.json", SECONDS, tmp_path, "-H", credential)
+    finally:
+        over.set()
+        keeper.join()
+    assert done.returncode == 0, done.stdout[-6000:]
+    shown = rig.ask("GET", f"/jobs/{job}")
+    assert renewing.is_set() and shown["state"] == "running", shown["message"]
+    assert bench.control.number("tip.force_N") > 1.0
+
+
+@contextlib.contextmanager
+def served(app: FastAPI) -> Iterator[str]:
+    server = uvicorn.Server(uvicorn.Config(app, port=free_port(), log_level="critical"))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    until(lambda: server.started, 20.0, "the planted service listening")
+    yield f"http://127.0.0.1:{server.config.port}/openapi.json"
+    server.should_exit = True
+    thread.join(20)
+
+
+@pytest.mark.parametrize(("answer", "found"), [({"count": 3}, 0), ({"count": "three"}, 1), ({}, 1)])
+def test_the_judge_says_no_where_an_answer_is_not_as_described(
+    tmp_path: Path, answer: dict[str, object], found: int
+) -> None:
+    app = FastAPI()
+    described = {"type": "object", "properties": {"count": {"type": "integer"}}, "required": ["count"]}
+
+    @app.get("/counted", responses={200: {"content": {"application/json": {"schema": described}}}})
+    def counted() -> dict[str, object]:  # planted: what is described is not what comes
+        return answer
+
+    with served(app) as address:
+        done = judged(address, 5, tmp_path)
+    assert done.returncode == found, done.stdout[-3000:]
