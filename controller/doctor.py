@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from functools import partial
 from typing import TypeVar
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from controller.devices.drivers import open_axis, open_force, open_tracker
 from controller.loop.realtime import promptly
-from drivers.roles import Device, ForceSensor, Identity, MarkerTracker, ServoAxis
+from drivers.roles import Device, Identity, ServoAxis
 from rig.channels import AxisSample, ForceSample, MarkerSample
 from rig.config.force_map import CHANNELS
 from rig.config.products.roles import Product
@@ -18,6 +19,7 @@ from rig.errors import RigError
 from rig.progress import Progress, silent
 from rig.results.bench import DeviceReport
 
+LOOKS = 3
 LISTEN_S = 2.0  # 120 frames of a tracker, whose noise is then known to 7 %
 PERIOD_S = 0.001
 RATE_TOLERANCE = 0.1  # half of what lies between neighbouring rates of a sensor
@@ -31,7 +33,7 @@ Listen = Callable[[AnyDevice], Samples]
 def examine(wiring: Wiring, seconds: float = LISTEN_S, tell: Progress = silent) -> tuple[DeviceReport, ...]:
     """One finding a configured device; a device that fails is a finding with a problem, not an error.
 
-    They are listened to at the loop's priority: what a busy computer keeps from a desktop program, the loop would get.
+    They are listened to at the loop's priority, as the loop will; a rate is wrong where it was in each of ``LOOKS``.
     """
     with promptly(wiring.loop.priority):
         return _examined(wiring, seconds, tell)
@@ -41,13 +43,15 @@ def _examined(wiring: Wiring, seconds: float, tell: Progress) -> tuple[DeviceRep
     force, axis, tracker = wiring.force, wiring.axis, wiring.tracker
     channel = CHANNELS.index(force.axis)
     tell("force", 0.0)
-    findings = [_look("force", force, lambda: open_force(force), partial(_poll_force, seconds), channel)]
+    findings = [_look("force", force, lambda: open_force(force), lambda device: _listen(device.poll, seconds), channel)]
     tell("axis", 1 / 3)
     opener = partial(open_axis, axis, wiring.limits, 1 / PERIOD_S)
     findings.append(_look("axis", axis, opener, partial(_poll_axis, seconds)))
     if tracker:
         tell("tracker", 2 / 3)
-        findings.append(_look("tracker", tracker, lambda: open_tracker(tracker), partial(_poll_tracker, seconds)))
+        findings.append(
+            _look("tracker", tracker, lambda: open_tracker(tracker), lambda device: _listen(device.poll, seconds))
+        )
     return tuple(findings)
 
 
@@ -55,15 +59,19 @@ def _look(
     role: str, config: Product, opener: Callable[[], AnyDevice], listen: Listen[AnyDevice], channel: int = 0
 ) -> DeviceReport:
     try:
-        device = opener()
-        try:
+        with closing(opener()) as device:
             device.start()
-            samples = listen(device)
-        finally:
-            device.close()
+            return _heard(role, device, listen, channel)
     except RigError as error:
         return DeviceReport(role=role, problem=str(error), advice=config.advice)
-    return _finding(role, device.identity, 1e9 / device.period_ns, samples, channel)
+
+
+def _heard(role: str, device: AnyDevice, listen: Listen[AnyDevice], channel: int) -> DeviceReport:
+    for _ in range(LOOKS):
+        found = _finding(role, device.identity, 1e9 / device.period_ns, listen(device), channel)
+        if not found.problem:
+            break
+    return found
 
 
 def _listen(poll: Callable[[int], Samples], seconds: float) -> Samples:
@@ -73,14 +81,6 @@ def _listen(poll: Callable[[int], Samples], seconds: float) -> Samples:
         found.extend(poll(now_ns))
         time.sleep(PERIOD_S)
     return found
-
-
-def _poll_force(seconds: float, device: ForceSensor) -> Samples:
-    return _listen(device.poll, seconds)
-
-
-def _poll_tracker(seconds: float, device: MarkerTracker) -> Samples:
-    return _listen(device.poll, seconds)
 
 
 def _poll_axis(seconds: float, device: ServoAxis) -> Samples:

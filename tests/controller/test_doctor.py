@@ -2,12 +2,13 @@
 
 import contextlib
 from collections.abc import Iterator
+from typing import cast
 
 import numpy as np
 import pytest
 
 from controller import doctor
-from drivers.roles import Identity
+from drivers.roles import Device, Identity
 from rig.channels import ForceSample
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
@@ -31,6 +32,34 @@ def test_noise_is_that_of_the_channel_along_the_tip(channel: int) -> None:
     said = doctor._finding("force", WHO, 1000.0, samples(noise_N), channel)
     assert float(said.noise.split()[0]) == pytest.approx(noise_N[channel], rel=0.1)
     assert said.problem == ""
+
+
+class Slow:
+    """A sensor of 1 kHz; every second sample is lost in the first looks at it."""
+
+    identity, period_ns = WHO, 1_000_000
+
+    def __init__(self, slow_looks: int) -> None:
+        self.slow_looks, self.looks, self.closed = slow_looks, 0, 0
+
+    def start(self) -> None:
+        assert self.looks == 0
+
+    def close(self) -> None:
+        self.closed += 1
+
+    def listen(self, device: object) -> list[ForceSample]:
+        assert device is self
+        self.looks += 1
+        return samples((0.1, 0.1, 0.1))[:: 2 if self.looks <= self.slow_looks else 1]
+
+
+@pytest.mark.parametrize(("slow_looks", "looks", "problem"), [(0, 1, ""), (2, 3, ""), (9, 3, "rate 500.0 Hz is not")])
+def test_a_wrong_rate_is_said_where_it_was_wrong_each_time(slow_looks: int, looks: int, problem: str) -> None:
+    device = Slow(slow_looks)
+    said = doctor._look("force", BotaWiring(), lambda: cast(Device, device), device.listen)
+    assert said.problem.startswith(problem) and bool(said.problem) == bool(problem)
+    assert (device.looks, device.closed) == (looks, 1)
 
 
 def test_a_device_that_is_not_there_comes_with_where_to_look() -> None:
