@@ -13,25 +13,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import ClassVar, TypeVar
 
-from drivers.bota.codec import (
-    BAUD_CODES,
-    CONFIG_MODE,
-    CONVERTER_HZ,
-    DEFAULT_BAUD,
-    HARD_RESET,
-    RUN_MODE,
-    BootText,
-    ForceFrame,
-    StatusBits,
-    encode_communication,
-    encode_filter,
-    find_ack,
-    find_boot_text,
-    line_rate_Hz,
-    make_decoder,
-    rate_Hz,
-    sinc_for,
-)
+from drivers.bota import codec
 from drivers.ports import Port, open_port, read_until
 from drivers.roles import Identity, LinkCounters
 from rig.channels import ForceSample
@@ -41,7 +23,7 @@ from rig.timing import ClockMap, Unwrapper
 
 PRODUCT = "bota-sensone"
 NAME_PREFIX = "BFT"
-UNUSABLE = int(StatusBits.OVERRANGE | StatusBits.INVALID | StatusBits.RAW)
+UNUSABLE = int(codec.StatusBits.OVERRANGE | codec.StatusBits.INVALID | codec.StatusBits.RAW)
 # The maker's driver allows 2 s for the settings and 2 s for the rest of the text after a reset.
 BOOT_S = 4.0
 # A command and its answer are 30 characters, 31 ms at 9600 baud; the rest is for the host.
@@ -57,7 +39,7 @@ LISTEN_S = 0.25
 
 
 # A frame and the sensor's unwrapped clock [us].
-Timed = tuple[int, ForceFrame]
+Timed = tuple[int, codec.ForceFrame]
 
 
 class BotaSensOne:
@@ -66,7 +48,7 @@ class BotaSensOne:
     Raises UsageError, with the port closed, where the configured rate or baud cannot be had.
     """
 
-    DEFAULT_BAUD: ClassVar = DEFAULT_BAUD
+    DEFAULT_BAUD: ClassVar = codec.DEFAULT_BAUD
 
     def __init__(self, port: Port, config: BotaWiring, now: Callable[[], int] = time.monotonic_ns) -> None:
         self.counters = LinkCounters()
@@ -77,7 +59,7 @@ class BotaSensOne:
         except UsageError:
             port.close()
             raise
-        self._period_ns = round(self._sinc * 1e9 / CONVERTER_HZ)
+        self._period_ns = round(self._sinc * 1e9 / codec.CONVERTER_HZ)
         self._identity = Identity(PRODUCT, "", "")
         self._latency_ns = round(config.latency_ms * 1e6)
         self.next_seq = 0
@@ -103,11 +85,11 @@ class BotaSensOne:
         """Resets, identifies, configures and runs the sensor; raises DeviceError with one sentence."""
         boot = _repeated(self._reset)
         self._forget_clock()
-        setup = encode_communication(temperature_compensation=False, calibrated=True, baud=self._baud)
-        for command in (CONFIG_MODE, setup, encode_filter(self._sinc)):
+        setup = codec.encode_communication(temperature_compensation=False, calibrated=True, baud=self._baud)
+        for command in (codec.CONFIG_MODE, setup, codec.encode_filter(self._sinc)):
             _repeated(partial(self._command, command))
-        self._await_frames(_repeated(partial(self._command, RUN_MODE)))
-        settings = {"rate": f"{rate_Hz(self._sinc):.1f} Hz", "sinc": str(self._sinc), "baud": str(self._baud)}
+        self._await_frames(_repeated(partial(self._command, codec.RUN_MODE)))
+        settings = {"rate": f"{codec.rate_Hz(self._sinc):.1f} Hz", "sinc": str(self._sinc), "baud": str(self._baud)}
         self._identity = Identity(boot.name, boot.serial, boot.firmware, settings)
 
     def poll(self, now_ns: int) -> Sequence[ForceSample]:
@@ -122,22 +104,22 @@ class BotaSensOne:
     def close(self) -> None:
         """Takes the sensor out of run mode and gives the port back."""
         with contextlib.suppress(DeviceError):
-            self._port.write(CONFIG_MODE)
+            self._port.write(codec.CONFIG_MODE)
         self._port.close()
 
     def _forget_clock(self) -> None:
         """The sensor's clock starts anew with every reset."""
-        self._decoder = make_decoder(self.counters)
+        self._decoder = codec.make_decoder(self.counters)
         self._unwrap = Unwrapper(32)
         self._clock.restart()
         self._last_us: int | None = None
         self._taken = []
 
-    def _reset(self) -> BootText:
+    def _reset(self) -> codec.BootText:
         self._port.read()
-        self._port.write(HARD_RESET)
-        text = read_until(self._port, lambda data: find_boot_text(data) is not None, BOOT_S)
-        boot = find_boot_text(text)
+        self._port.write(codec.HARD_RESET)
+        text = read_until(self._port, lambda data: codec.find_boot_text(data) is not None, BOOT_S)
+        boot = codec.find_boot_text(text)
         if boot is None:
             why = f"no boot text within {BOOT_S:g} s of a reset, {_came(text)}; {self._advice(text)}"
             raise _Misheard(self._about(why)) if text else self._error(why)
@@ -157,8 +139,8 @@ class BotaSensOne:
     def _command(self, command: bytes) -> bytes:
         """Sends ``command`` and waits for its acknowledgement; returns what came behind it."""
         self._port.write(command)
-        text = read_until(self._port, lambda data: find_ack(data, command) is not None, ACK_S)
-        ack = find_ack(text, command)
+        text = read_until(self._port, lambda data: codec.find_ack(data, command) is not None, ACK_S)
+        ack = codec.find_ack(text, command)
         if ack is None:
             raise _Misheard(
                 self._about(f"no answer to {command!r} within {ACK_S:g} s, {_came(text)}; run `rig doctor`")
@@ -184,13 +166,13 @@ class BotaSensOne:
             select.select([self._port.fileno()], [], [], min(left_s, LISTEN_S))
             data = self._port.read()
 
-    def _no_valid_frame(self, frames: Sequence[ForceFrame], timeout_s: float) -> str:
+    def _no_valid_frame(self, frames: Sequence[codec.ForceFrame], timeout_s: float) -> str:
         if not frames:
             return (
                 f"no frame within {timeout_s:.1f} s of run mode, {self.counters.discarded_bytes} bytes without "
                 "a good checksum; check cable and baud"
             )
-        status = StatusBits(frames[-1].status)
+        status = codec.StatusBits(frames[-1].status)
         return f"no valid reading within {timeout_s:.1f} s of run mode, status {status!r}; unload it and check power"
 
     def _take(self, data: bytes, arrival_ns: int) -> None:
@@ -206,7 +188,7 @@ class BotaSensOne:
         pairs = zip(timed, captures_ns, strict=True)
         return [self._sample(device_us, frame, capture_ns, arrival_ns) for (device_us, frame), capture_ns in pairs]
 
-    def _sample(self, device_us: int, frame: ForceFrame, capture_ns: int, arrival_ns: int) -> ForceSample:
+    def _sample(self, device_us: int, frame: codec.ForceFrame, capture_ns: int, arrival_ns: int) -> ForceSample:
         self.next_seq += 1
         valid = int(_is_valid(frame))
         return ForceSample(
@@ -234,7 +216,7 @@ class BotaSensOne:
 
 def open_sensor(config: BotaWiring) -> BotaSensOne:
     """The sensor at the configured port, not yet started; raises DeviceError where that cannot be opened."""
-    return BotaSensOne(open_port(config.port, config.baud or DEFAULT_BAUD), config)
+    return BotaSensOne(open_port(config.port, config.baud or codec.DEFAULT_BAUD), config)
 
 
 class _Misheard(DeviceError):
@@ -251,19 +233,21 @@ def _repeated(say: Callable[[], Said]) -> Said:
 
 def _line_settings(config: BotaWiring) -> tuple[int, int]:
     """Baud and filter length; raises UsageError where one is unknown or the line too slow for the other."""
-    baud = config.baud or DEFAULT_BAUD
-    if baud not in BAUD_CODES:
-        raise UsageError(f"force.baud {baud}: a {PRODUCT} takes {', '.join(map(str, BAUD_CODES))}; write one of these")
-    sinc = sinc_for(config.rate_Hz)
-    if rate_Hz(sinc) > line_rate_Hz(baud):
+    baud = config.baud or codec.DEFAULT_BAUD
+    if baud not in codec.BAUD_CODES:
         raise UsageError(
-            f"force.rate_Hz {rate_Hz(sinc):.0f}: {baud} baud carries at most {line_rate_Hz(baud):.0f} frames/s; "
+            f"force.baud {baud}: a {PRODUCT} takes {', '.join(map(str, codec.BAUD_CODES))}; write one of these"
+        )
+    sinc, most_Hz = codec.sinc_for(config.rate_Hz), codec.line_rate_Hz(baud)
+    if (rate_Hz := codec.rate_Hz(sinc)) > most_Hz:
+        raise UsageError(
+            f"force.rate_Hz {rate_Hz:.0f}: {baud} baud carries at most {most_Hz:.0f} frames/s; "
             "lower rate_Hz or raise baud"
         )
     return baud, sinc
 
 
-def _is_valid(frame: ForceFrame) -> bool:
+def _is_valid(frame: codec.ForceFrame) -> bool:
     return not frame.status & UNUSABLE and math.isfinite(sum(frame[1:7]))
 
 

@@ -17,24 +17,7 @@ from pymodbus.client import ModbusSerialClient
 from pymodbus.exceptions import ModbusException
 
 from drivers.ports import Port, open_port, read_until
-from drivers.robotiq.codec import (
-    DEFAULT_BAUD,
-    FIRMWARE,
-    FORCES,
-    PRODUCTION_YEAR,
-    SERIAL_NUMBER,
-    SLAVE_ID,
-    START_STREAM,
-    STOP_BURST,
-    STREAM_HZ,
-    STREAM_STARTED,
-    Wrench,
-    decode_firmware,
-    decode_forces,
-    decode_serial_number,
-    make_decoder,
-    refusal,
-)
+from drivers.robotiq import codec
 from drivers.robotiq.frame_clock import LISTEN_NS, PERIOD_NS, FrameClock
 from drivers.roles import Identity, LinkCounters
 from rig.channels import ForceSample
@@ -54,14 +37,14 @@ RETRIES = 2
 # A command that arrives damaged is not obeyed, and starting a stream twice starts it once.
 START_TRIES = 2
 # Twenty frames of the stream; the rest is for the host.
-FIRST_FRAME_S = 1.0 + 20 / STREAM_HZ
+FIRST_FRAME_S = 1.0 + 20 / codec.STREAM_HZ
 
 # pymodbus logs each failed try; here a failure is one sentence in a DeviceError.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
 # A frame and its place in the stream [ns].
-Timed = tuple[int, Wrench]
+Timed = tuple[int, codec.Wrench]
 
 
 class RobotiqFt300:
@@ -71,7 +54,7 @@ class RobotiqFt300:
     DeviceError where the port cannot be opened.
     """
 
-    DEFAULT_BAUD: ClassVar = DEFAULT_BAUD
+    DEFAULT_BAUD: ClassVar = codec.DEFAULT_BAUD
 
     def __init__(
         self, open_port: Callable[[int], Port], config: Ft300Wiring, now: Callable[[], int] = time.monotonic_ns
@@ -79,9 +62,9 @@ class RobotiqFt300:
         self.counters = LinkCounters()
         self._open_port = open_port
         self._now = now
-        self._port = open_port(DEFAULT_BAUD)
+        self._port = open_port(codec.DEFAULT_BAUD)
         self._clock = FrameClock(round(config.latency_ms * 1e6))
-        self._decoder = make_decoder(self.counters)
+        self._decoder = codec.make_decoder(self.counters)
         self._identity = Identity(PRODUCT, "", "")
         self.next_seq = 0
         self._taken: list[tuple[list[Timed], int]] = []
@@ -105,7 +88,7 @@ class RobotiqFt300:
         self._stop_stream()
         self._port.close()
         self._identity = self._read_identity()
-        self._port = self._open_port(DEFAULT_BAUD)
+        self._port = self._open_port(codec.DEFAULT_BAUD)
         self._start_stream()
         self._listen()
 
@@ -121,7 +104,7 @@ class RobotiqFt300:
     def close(self) -> None:
         """Stops the stream and gives the port back."""
         with suppress(DeviceError):
-            self._port.write(STOP_BURST)
+            self._port.write(codec.STOP_BURST)
         self._port.close()
 
     def _stop_stream(self) -> None:
@@ -132,7 +115,7 @@ class RobotiqFt300:
                     f"still sends bytes after {STOP_S:g} s of stop bursts; check force.port and force.product, "
                     "then power the sensor off and on"
                 )
-            self._port.write(STOP_BURST)
+            self._port.write(codec.STOP_BURST)
 
     def _falls_silent(self) -> bool:
         """Whether the line is quiet for ``SILENCE_S`` within ``BURST_S``."""
@@ -144,10 +127,12 @@ class RobotiqFt300:
 
     def _read_identity(self) -> Identity:
         address = self._port.address.replace("tcp://", "socket://")
-        with closing(ModbusSerialClient(address, baudrate=DEFAULT_BAUD, timeout=ANSWER_S, retries=RETRIES)) as client:
+        with closing(
+            ModbusSerialClient(address, baudrate=codec.DEFAULT_BAUD, timeout=ANSWER_S, retries=RETRIES)
+        ) as client:
             if not client.connect():
                 raise self._error("cannot be opened again for Modbus; check who else uses the port")
-            firmware = decode_firmware(self._registers(client, FIRMWARE, 3))
+            firmware = codec.decode_firmware(self._registers(client, codec.FIRMWARE, 3))
             if not firmware.startswith(FIRMWARE_LETTER):
                 raise self._error(
                     f"firmware {firmware!r} is not that of a force sensor ({FIRMWARE_LETTER}...); "
@@ -155,19 +140,19 @@ class RobotiqFt300:
                 )
             return Identity(
                 PRODUCT,
-                decode_serial_number(self._registers(client, SERIAL_NUMBER, 4)),
+                codec.decode_serial_number(self._registers(client, codec.SERIAL_NUMBER, 4)),
                 firmware,
                 {
-                    "rate": f"{STREAM_HZ} Hz",
-                    "production year": str(self._registers(client, PRODUCTION_YEAR, 1)[0]),
-                    "forces at start": _described(decode_forces(self._registers(client, FORCES, 6))),
+                    "rate": f"{codec.STREAM_HZ} Hz",
+                    "production year": str(self._registers(client, codec.PRODUCTION_YEAR, 1)[0]),
+                    "forces at start": _described(codec.decode_forces(self._registers(client, codec.FORCES, 6))),
                 },
             )
 
     def _registers(self, client: ModbusSerialClient, address: int, count: int) -> Sequence[int]:
-        asked = f"slave {SLAVE_ID}, registers {address} to {address + count - 1}"
+        asked = f"slave {codec.SLAVE_ID}, registers {address} to {address + count - 1}"
         try:
-            answer = client.read_holding_registers(address, count=count, device_id=SLAVE_ID)
+            answer = client.read_holding_registers(address, count=count, device_id=codec.SLAVE_ID)
         except ModbusException as error:
             raise self._error(
                 f"no Modbus answer from {asked} in {RETRIES + 1} tries of {ANSWER_S:g} s; "
@@ -181,17 +166,17 @@ class RobotiqFt300:
         """The answer to the command may be lost in the stream it starts: frames are answer enough."""
         text = b""
         for _ in range(START_TRIES):
-            self._port.write(START_STREAM)
+            self._port.write(codec.START_STREAM)
             text = read_until(self._port, _started_or_refused, FIRST_FRAME_S)
             if _started_or_refused(text):
                 break
-        code = refusal(text)
+        code = codec.refusal(text)
         if code is not None:
             raise self._error(f"refused to start its stream with Modbus exception {code}; check its firmware")
-        self._decoder = make_decoder(self.counters)
+        self._decoder = codec.make_decoder(self.counters)
         self._clock.restart()
         self._taken = []
-        self._take(text.replace(STREAM_STARTED, b"", 1), self._now())
+        self._take(text.replace(codec.STREAM_STARTED, b"", 1), self._now())
         if not any(frames for frames, _ in self._taken):
             raise self._error(
                 f"no stream frame within {FIRST_FRAME_S:.1f} s of the start command, {len(text)} bytes came; "
@@ -216,7 +201,7 @@ class RobotiqFt300:
         pairs = zip(frames, captures_ns, strict=True)
         return [self._sample(device_ns, wrench, capture_ns, arrival_ns) for (device_ns, wrench), capture_ns in pairs]
 
-    def _sample(self, device_ns: int, wrench: Wrench, capture_ns: int, arrival_ns: int) -> ForceSample:
+    def _sample(self, device_ns: int, wrench: codec.Wrench, capture_ns: int, arrival_ns: int) -> ForceSample:
         self.next_seq += 1
         return ForceSample(
             self.next_seq - 1, capture_ns, arrival_ns, device_ns // 1000, *wrench, float("nan"), 0, int(wrench.in_range)
@@ -232,8 +217,8 @@ def open_sensor(config: Ft300Wiring) -> RobotiqFt300:
 
 
 def _started_or_refused(text: bytes) -> bool:
-    return refusal(text) is not None or bool(make_decoder(LinkCounters()).feed(text))
+    return codec.refusal(text) is not None or bool(codec.make_decoder(LinkCounters()).feed(text))
 
 
-def _described(wrench: Wrench) -> str:
+def _described(wrench: codec.Wrench) -> str:
     return " ".join(f"{name} {value:g}" for name, value in wrench._asdict().items())

@@ -1,14 +1,17 @@
 """Commands that move refuse what cannot be before any device is opened: number, bound, next step."""
 
+import contextlib
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from api.cli import demo
 from api.cli.app import build
 from api.cli.demo import forces_within
 from mock_devices.testing.models import index_model
-from rig.errors import UsageError
+from rig.config.wiring import Wiring
+from rig.errors import SafetyStop, UsageError
 
 runner = CliRunner()
 
@@ -114,6 +117,32 @@ def test_a_demonstration_of_a_wrong_protocol_is_refused_and_removes_nothing(
     assert isinstance(answer.exception, UsageError), answer.exception
     assert sentence in str(answer.exception)
     assert (tmp_path / "demo" / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("stops", "begun"),
+    [(["axis_lost"], 2), (["force_lost", "drive_fault"], 3), (["axis_lost"] * 3, 3), (["pain_stop"], 1)],
+)
+def test_a_demonstration_begins_again_where_the_computer_was_late_and_for_no_other_stop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stops: list[str], begun: int
+) -> None:
+    left, begins = list(stops), list[str]()
+
+    def captured(_bench: object, _plan: object, session: Path) -> None:
+        session.mkdir()
+        begins.append(str(session))
+        if left:
+            raise SafetyStop("stopped", left.pop(0))
+
+    monkeypatch.setattr("api.cli.live.running", lambda *_: contextlib.nullcontext())
+    monkeypatch.setattr(demo, "captured", captured)
+    monkeypatch.setattr(demo, "fit_session", lambda _: "fitted")
+    monkeypatch.setattr(demo, "_track", lambda *_: "tracked")
+    refused = pytest.raises(SafetyStop) if begun <= len(stops) else contextlib.nullcontext()
+    with refused:
+        found: object = demo._measured(Wiring(), (), demo.PLAN, tmp_path / "demo")
+        assert found == ("fitted", "tracked")
+    assert len(begins) == begun
 
 
 @pytest.mark.parametrize(("largest_N", "forces_N"), [(5.2, (1, 2, 3, 4, 5)), (2.0, (0.34, 0.68, 1.02, 1.36, 1.7))])
