@@ -26,7 +26,7 @@ from benchmarks.faults.trial import Spoilt, Trial, trial
 from controller.safety.table import TABLE
 from rig.errors import DeviceError, RigError, UsageError
 
-ATTEMPTS = 5
+ATTEMPTS = 12
 
 
 class Campaign:
