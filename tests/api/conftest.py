@@ -1,13 +1,19 @@
-"""Every problem that a test of this folder is answered with has to be one that its route tells of."""
+"""Every problem that a test of this folder is answered with has to be one that its route tells of, and no job outlasts
+its module: it would meet what other tests put in the place of processes.
+"""
 
 import functools
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
+from api.http.jobs.board import JobBoard
 from tests.api import described
+
+PATIENCE_S = 30.0
 
 
 @functools.cache
@@ -28,3 +34,22 @@ def _only_described_problems(monkeypatch: pytest.MonkeyPatch) -> None:
         return answer
 
     monkeypatch.setattr(TestClient, "request", request)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _jobs_end_with_their_module() -> Iterator[None]:
+    boards, make = list[JobBoard](), JobBoard.__init__
+
+    def made(board: JobBoard, *arguments: Any) -> None:
+        boards.append(board)
+        make(board, *arguments)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(JobBoard, "__init__", made)
+        yield
+    for board in boards:
+        board.close()
+    left = [thread for thread in threading.enumerate() if thread.name.startswith("job-")]
+    for thread in left:
+        thread.join(PATIENCE_S)
+    assert not [thread.name for thread in left if thread.is_alive()]

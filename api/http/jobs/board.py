@@ -248,8 +248,8 @@ class JobBoard:
         return JobList(items=after[:limit], next=following)
 
     def close(self) -> None:
-        """The service ends: whatever computes is ended with it."""
-        for job in self.active:
+        """The service ends: whatever computes is ended with it, what waits first, so that none of it begins."""
+        for job in reversed(self.active):
             if not job.asked.moves:
                 with contextlib.suppress(RigError):
                     self.cancel(job.id)

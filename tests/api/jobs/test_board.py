@@ -1,6 +1,8 @@
 """Jobs are listed page by page, outlast the service, and none is left as if it still ran."""
 
 import json
+import threading
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -114,6 +116,29 @@ def test_a_queue_has_an_end(client: TestClient, service: Service, first: Path, m
     refused = client.post("/api/v1/jobs", json={"kind": "verify", "params": {"session": first.name}})
     assert (refused.status_code, refused.json()["code"]) == (429, "queue-full")
     assert client.get("/api/v1/jobs").json()["items"] == []
+
+
+def test_what_waits_does_not_begin_where_the_service_ends(jobs: JobBoard, monkeypatch: pytest.MonkeyPatch) -> None:
+    began, released = list[str](), threading.Event()
+    first, *others = (
+        jobs.new(KINDS["verify"], VerifyParams(session=name), "Ann", name, Operation("verify"))
+        for name in ("first", "second", "third")
+    )
+
+    def work(name: str) -> None:
+        began.append(name)
+        assert released.wait(10.0)
+
+    def cancel() -> None:
+        released.set()
+        until(lambda: jobs.find(first.id) is None, 10.0, "the end of the first")
+
+    monkeypatch.setattr(first, "cancel", cancel)
+    jobs.start_computing(first, lambda: work("first"))
+    for job in others:
+        jobs.start_computing(job, partial(work, job.id))
+    jobs.close()
+    assert began == ["first"] and jobs.active == []
 
 
 def test_each_state_of_a_job_is_an_event(jobs: JobBoard) -> None:
