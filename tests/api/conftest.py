@@ -4,7 +4,7 @@ its module: it would meet what other tests put in the place of processes.
 
 import functools
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -23,14 +23,15 @@ def _schema() -> dict[str, Any]:
 
 @pytest.fixture(autouse=True)
 def _only_described_problems(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: Callable[..., Any] = TestClient.request
+    # Here, and not in the threads of a test, where several would make it at once.
+    schema, asked = _schema(), TestClient.request
 
     def request(client: TestClient, method: str, url: Any, **more: Any) -> Any:
         answer = asked(client, method, url, **more)
         if answer.headers.get("content-type") == described.PROBLEM:
             problem = f"{answer.status_code} {answer.json()['code']}"
             path = answer.request.url.path
-            assert not described.undescribed(_schema(), method, path, problem), (method, path, problem)
+            assert not described.undescribed(schema, method, path, problem), (method, path, problem)
         return answer
 
     monkeypatch.setattr(TestClient, "request", request)
