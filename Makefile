@@ -66,11 +66,11 @@ package: $(READY) page
 	$(BIN)/uv build --quiet --python $(BIN)/python --no-build-isolation --out-dir dist
 	$(BIN)/python -m tools.packaged dist
 
-# All that is locked comes as wheels, for each Python and machine; two clients of the tracker, which only tests use, are
-# pure Python and published as source.
+# All that is locked comes as wheels, for each Python and machine with the C library of Debian 12 or newer; what tests use or extras bring is
+# in four cases published as source, without anything to compile that is needed.
 PYTHONS := 3.11 3.12 3.13
-PLATFORMS := x86_64-manylinux_2_28 aarch64-manylinux_2_28
-AS_SOURCE := scikit-surgerycore scikit-surgerynditracker
+PLATFORMS := x86_64-manylinux_2_36 aarch64-manylinux_2_36
+AS_SOURCE := scikit-surgerycore scikit-surgerynditracker crcmod pyigtl
 wheels: $(READY)
 	@set -e; for python in $(PYTHONS); do for platform in $(PLATFORMS); do \
 	  $(BIN)/uv pip install --quiet --dry-run --require-hashes --target $(VENV)/none --python-version $$python \

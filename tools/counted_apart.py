@@ -109,9 +109,20 @@ SERVICE: dict[str, str] = {
     "api/cli/catalogue.py": "the catalogue",
     "rig/results/catalogue.py": "the catalogue",
 }
+# What came for benches that labs plug in, likewise.
+DEVICES: dict[str, str] = {}
+# What came for a force law that makes every tissue the same plant, likewise.
+LAW = {
+    "rig/config/axis_response.py": "the axis as it was identified",
+}
+# What came for speed, cohorts and more than one computer, likewise.
+SCALE: dict[str, str] = {}
 APART = {
     "source_lines_safety": SAFETY,
     "source_lines_data": DATA,
     "source_lines_criticism": CRITICISM,
     "source_lines_service": SERVICE,
+    "source_lines_devices": DEVICES,
+    "source_lines_law": LAW,
+    "source_lines_scale": SCALE,
 }
