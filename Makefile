@@ -40,7 +40,7 @@ test-documents: $(READY) page
 test-campaigns: $(READY)
 	$(BIN)/pytest -n 2 --dist loadgroup -m campaign --ignore tests/page --durations 10
 
-# Stops and crashes in contact, every answer of the service while the tip presses, a second product.
+# The demonstration, stops and crashes in contact, every answer of the service while the tip presses, further products.
 test-extras: $(READY) page
 	$(BIN)/pytest -n 2 --dist loadgroup -m extra --ignore tests/page --durations 10
 

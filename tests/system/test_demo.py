@@ -26,7 +26,7 @@ from tests.conftest import STALLS
 from tests.system.browser import find, launch
 from tests.witness import Witness
 
-pytestmark = [pytest.mark.timeout(600), pytest.mark.xdist_group("commands")]
+pytestmark = [pytest.mark.extra, pytest.mark.timeout(600), pytest.mark.xdist_group("commands")]
 LARGEST_STEADY_ERROR_PERCENT = 5.0
 # Relaxation: slow enough that a busy computer's time stamps, a few ms off, leave it as it is.
 HIDES_RELAXATION = "12"
