@@ -24,7 +24,6 @@ SetOption = Annotated[
 
 
 ModelOption = Annotated[Path, typer.Option("--model", help="model.json as `rig fit` writes it.")]
-GainsOption = Annotated[str, typer.Option("--gains", help="tangent, secant, constant or admittance; else loop.gains.")]
 PLACE = "Session folder, one recording (.mcap), or files of any laboratory, with their mapping."
 PlaceArgument = Annotated[Path, typer.Argument(help=PLACE)]
 MappingOption = Annotated[
