@@ -10,6 +10,9 @@ from controller.experiments import capture, comparison, tracked, tracking
 from controller.experiments.comparison import compared_run, study_levels
 from controller.experiments.recorded import Recorded
 from controller.experiments.references import Reference
+from controller.law import synthesis
+from controller.law.axis_response import rates_of, response_of
+from controller.law.synthesis import Span
 from controller.loop.steps import Program
 from controller.operation import Operation
 from controller.safety.table import BY_PERSON
@@ -35,6 +38,7 @@ LEARNT_N = 10.3
 # What stops a run where the computer, and not the law, was late; such a run is done again.
 STALLED = ("axis_lost", "force_lost", "tracker_lost", "loop_overrun")
 ATTEMPTS = 3
+MIDDLING_RAD_S = 20.0, 60.0, 180.0  # k / B of the five subjects is 10 to 500 rad/s
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,8 @@ def refuse_comparison(wanted: Comparison) -> None:
     wiring = wanted.wiring
     _refuse_strong(max(wanted.reference.forces_N), wiring)
     tracking.refuse_beyond_bench(wanted.reference, wiring)
+    # Where no law holds the middle of the subjects' tissue, none holds theirs.
+    synthesis.constants(response_of(wiring), rates_of(wiring), Span(MIDDLING_RAD_S, (1.0,) * len(MIDDLING_RAD_S)))
     capture.check(LEARNING, wiring)
     for subject in wanted.subjects:
         if wanted.model_file(subject).exists():

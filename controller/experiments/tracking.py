@@ -15,6 +15,7 @@ from controller.law.inverse_model import GainRow
 from controller.law.stability import Loop
 from controller.loop.modes import Mode
 from controller.loop.steps import Approach, Hold, Program, Retract, TrackForce, Zero
+from rig.config.axis_response import AxisResponse
 from rig.config.wiring import Wiring
 from rig.errors import DataError, UsageError
 from rig.results.tracking import Followed, Plateau
@@ -80,15 +81,16 @@ def following(reference: Reference, model: Model, wiring: Wiring) -> Program:
     )
 
 
-def loop_for(model: Model, wiring: Wiring) -> Loop:
-    """The force loop on this bench and tissue; raises UsageError where no law holds it."""
+def loop_for(model: Model, wiring: Wiring, axis: AxisResponse | None = None) -> Loop:
+    """The force loop on this bench and tissue; raises UsageError where no law holds it. ``axis``: else the bench's."""
     rates = rates_of(wiring)
-    return stability.loop_for(response_of(wiring), rates, span_of(model, rows_of(model), rates))
+    return stability.loop_for(axis or response_of(wiring), rates, span_of(model, rows_of(model), rates))
 
 
-def force_law(model: Model, wiring: Wiring) -> TrackForce:
-    """A track step with its law, without a reference of its own yet."""
-    loop, axis = loop_for(model, wiring), response_of(wiring)
+def force_law(model: Model, wiring: Wiring, response: AxisResponse | None = None) -> TrackForce:
+    """A track step with its law, without a reference of its own yet. ``response``: else the bench's."""
+    loop = loop_for(model, wiring, response)
+    axis = loop.axis
     speed_mm_s = min(TRACK_MM_S, wiring.limits.speed_mm_s)
     friction_N, friction_mm = model.law.friction
     return TrackForce(
