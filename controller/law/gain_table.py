@@ -9,10 +9,8 @@ from controller.law.inverse_model import GainRow
 from controller.law.loop_response import Rates
 from controller.law.synthesis import LARGEST_STIFFNESS, LEAST_STIFFNESS, Span
 from rig.errors import UsageError
-from rig.tissue.control_table import control_rows
 from rig.tissue.laws import FloatArray, Law
 from rig.tissue.model import Model
-from rig.tissue.summary import ControlRow
 
 # The law divides by k + B s: with B smaller than this share of k its gain rises until the sensor's noise is all it has.
 LEAST_DAMPING_S = 0.0015
@@ -20,14 +18,16 @@ LEAST_DAMPING_S = 0.0015
 STIFFEST_N_MM, STIFFEST_SLOW_N_MM = 20.0, 10.0
 FAST_SAMPLE_S = 0.0021  # a sensor of 500 Hz or more counts as fast; the slow one that was simulated has 100 Hz
 SPAN_ROWS = 6
+STEP = 1e-6  # of a parameter, for slopes: the root of what a double resolves is 1.5e-8
 
 
 class Known(NamedTuple):
-    """A model's law as `control_rows` takes it."""
+    """Tangent [N/mm] and damping [N s/mm] at some depths, the least and the largest of their intervals, shape (n,)."""
 
-    law: Law
-    covariance: FloatArray
-    reach: float
+    depth_mm: FloatArray
+    middle: FloatArray
+    low: FloatArray
+    high: FloatArray
 
 
 def gain_rows(model: Model, depths_mm: Sequence[float]) -> tuple[GainRow, ...]:
@@ -48,22 +48,38 @@ def span_of(model: Model, rows: Sequence[GainRow], rates: Rates) -> Span:
     Raises UsageError for a model whose damping is not known, or whose tissue may be stiffer than the limit.
     """
     shown = [rows[round(at)] for at in np.linspace(0, len(rows) - 1, SPAN_ROWS)]
-    known = control_rows(Known(model.law, model.covariance, _reach(model)), [row.force_N for row in shown])
-    _refuse_undamped(model, known)
-    _refuse_stiff(known, rates)
-    middle = known[len(known) // 2]
+    tangent, damping = known_at(model, np.array([row.depth_mm for row in shown]))
+    _refuse_undamped(damping)
+    _refuse_stiff(tangent, rates)
     return Span(
         tuple(row.tangent_N_mm / row.damping_N_s_mm for row in shown),
         tuple(model.damping_N_s_mm / row.damping_N_s_mm for row in shown),
         (
-            min(LEAST_STIFFNESS, *(row.tangent_low_N_mm / row.tangent_N_mm for row in known)),
-            max(LARGEST_STIFFNESS, *(row.tangent_high_N_mm / row.tangent_N_mm for row in known)),
+            min(LEAST_STIFFNESS, float(np.min(tangent.low / tangent.middle))),
+            max(LARGEST_STIFFNESS, float(np.max(tangent.high / tangent.middle))),
         ),
-        (
-            middle.damping_low_N_s_mm / middle.damping_N_s_mm,
-            middle.damping_high_N_s_mm / middle.damping_N_s_mm,
-        ),
+        (float(np.min(damping.low / damping.middle)), float(np.max(damping.high / damping.middle))),
     )
+
+
+def known_at(model: Model, depth_mm: FloatArray) -> tuple[Known, Known]:
+    """Tangent and damping with their intervals: the parameters' covariance carried through (delta method)."""
+    law, here = model.law, _tangent_and_damping(model.law, depth_mm)
+    slopes = []
+    for index, parameter in enumerate(law.parameters):
+        step = STEP * max(abs(parameter.value), 1e-3)
+        step = step if parameter.value + step <= parameter.upper else -step
+        values = law.values
+        values[index] += step
+        slopes.append((_tangent_and_damping(law.from_values(values), depth_mm) - here) / step)
+    variances = np.einsum("pkr,pq,qkr->kr", np.array(slopes), model.covariance, np.array(slopes))
+    reach = _reach(model) * np.sqrt(np.maximum(variances, 0.0))
+    low, high = np.maximum(here - reach, 0.0), here + reach
+    return Known(depth_mm, here[0], low[0], high[0]), Known(depth_mm, here[1], low[1], high[1])
+
+
+def _tangent_and_damping(law: Law, depth_mm: FloatArray) -> FloatArray:
+    return np.array([law.tangent_stiffness(depth_mm), law.damping(depth_mm)])
 
 
 def _reach(model: Model) -> float:
@@ -82,21 +98,22 @@ def _refuse_flat(depths_mm: Sequence[float], forces: Sequence[float], tangents: 
             )
 
 
-def _refuse_undamped(model: Model, known: Sequence[ControlRow]) -> None:
-    low = min(row.damping_low_N_s_mm for row in known)
-    if not (model.damping_N_s_mm > 0 and low > 0):
-        high = max(row.damping_high_N_s_mm for row in known)
+def _refuse_undamped(damping: Known) -> None:
+    """Raises UsageError where B may be 0: the law divides by it at the frequencies that count."""
+    at = int(np.argmin(damping.low))
+    if not damping.low[at] > 0:
         raise UsageError(
-            f"the model's damping is {model.damping_N_s_mm:.3g} N s/mm, {low:.3g} to {high:.3g}; the force law needs"
-            " it above 0 with its whole interval: fit trials of several speeds (rig fit --model index)"
+            f"the model's damping is {damping.middle[at]:.3g} N s/mm, {damping.low[at]:.3g} to {damping.high[at]:.3g};"
+            " the force law needs it above 0 with its whole interval: fit trials of several speeds"
+            " (rig fit --model index)"
         )
 
 
-def _refuse_stiff(known: Sequence[ControlRow], rates: Rates) -> None:
-    stiffest = max(known, key=lambda row: row.tangent_high_N_mm)
+def _refuse_stiff(tangent: Known, rates: Rates) -> None:
+    at = int(np.argmax(tangent.high))
     limit = STIFFEST_N_MM if rates.sample_s <= FAST_SAMPLE_S else STIFFEST_SLOW_N_MM
-    if stiffest.tangent_high_N_mm > limit:
+    if tangent.high[at] > limit:
         raise UsageError(
-            f"at {stiffest.force_N:.3g} N the tissue may have {stiffest.tangent_high_N_mm:.3g} N/mm, above the"
+            f"at {tangent.depth_mm[at]:.3g} mm the tissue may have {tangent.high[at]:.3g} N/mm, above the"
             f" {limit:g} N/mm up to which the force limit holds with this sensor: track lower forces"
         )

@@ -227,12 +227,14 @@ def _columns(step: TrackForce) -> Columns:
     return Columns(*map(np.array, columns(step.gains)))
 
 
-def follow(step: TrackForce, reference_N: Column, bench: SimulatedBench, dt_s: float = 0.001) -> Trace:
-    """The force law alone, from contact on, along ``reference_N`` of shape (cycles,); compiled."""
+def follow(
+    step: TrackForce, reference_N: Column, bench: SimulatedBench, dt_s: float = 0.001, clearance_mm: float = 0.0
+) -> Trace:
+    """The force law alone, from ``clearance_mm`` above the surface on, along ``reference_N`` of (cycles,); compiled."""
     table, surface_mm = _columns(step), bench.limb.surface_mm
     noise = np.random.default_rng(bench.seed).standard_normal(len(reference_N))
-    late = bench.sensing.delay_cycles + 1
-    start = BenchState(at_rest(surface_mm), np.zeros(late), 0.0, Setpoint(surface_mm, 0.0))
+    late, start_mm = bench.sensing.delay_cycles + 1, surface_mm - clearance_mm
+    start = BenchState(at_rest(start_mm), np.zeros(late), 0.0, Setpoint(start_mm, 0.0))
     memory = force_position.begin(table, step.settings.inverse, 0.0)
     done, _ = segments.track(
         start, memory, table, step.settings, reference_N, noise,

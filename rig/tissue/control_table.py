@@ -1,28 +1,17 @@
 """K and B for control: what a fitted law means to a force loop at each force, and how sure that is."""
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
+from rig.tissue.judging import Judged
 from rig.tissue.laws import FloatArray, Law
 from rig.tissue.summary import ControlRow
 
 STEP = 1e-6
 
 
-class KnownLaw(Protocol):
-    """A law, the covariance of its parameters, and how many standard errors an interval reaches from its middle."""
-
-    @property
-    def law(self) -> Law: ...
-    @property
-    def covariance(self) -> FloatArray: ...
-    @property
-    def reach(self) -> float: ...
-
-
-def control_rows(judged: KnownLaw, force_N: Sequence[float] | FloatArray) -> tuple[ControlRow, ...]:
+def control_rows(judged: Judged, force_N: Sequence[float] | FloatArray) -> tuple[ControlRow, ...]:
     """One row a force; intervals carry the parameters' covariance through (delta method), at their level."""
     forces = np.asarray(force_N, float)
     found = _table(judged.law, forces)
@@ -50,7 +39,7 @@ def _table(law: Law, force_N: FloatArray) -> FloatArray:
     return np.array([depth_mm, law.secant_stiffness(depth_mm), law.tangent_stiffness(depth_mm), law.damping(depth_mm)])
 
 
-def _deviations(judged: KnownLaw, force_N: FloatArray) -> FloatArray:
+def _deviations(judged: Judged, force_N: FloatArray) -> FloatArray:
     """Standard deviations of the table, shape (4, r)."""
     law, here = judged.law, _table(judged.law, force_N)
     columns = []

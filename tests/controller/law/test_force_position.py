@@ -1,4 +1,4 @@
-"""The force law by itself: closed forms of each part, what a sample changes, what limits leave, where it starts anew."""
+"""The force law by itself: closed forms of each part, what samples and limits change, where it starts anew."""
 
 import math
 

@@ -11,9 +11,7 @@ AHEAD = Inverse(damping_N_s_mm=0.0, ahead_mm_s=1e3)
 
 def linear() -> Columns:
     """1 N/mm up to 10 N."""
-    return columns(
-        [GainRow(force_N=at, depth_mm=at, tangent_N_mm=1.0, damping_N_s_mm=0.01) for at in (0.0, 10.0)]
-    )
+    return columns([GainRow(force_N=at, depth_mm=at, tangent_N_mm=1.0, damping_N_s_mm=0.01) for at in (0.0, 10.0)])
 
 
 def test_interpolation_is_linear_between_points_and_constant_beyond_them() -> None:

@@ -41,7 +41,9 @@ def physical(axis: AxisResponse, tissue: Tissue) -> control.TransferFunction:
 
 
 @settings(deadline=None, max_examples=30)
-@given(st.floats(20, 120), st.floats(0, 0.006), st.floats(1, 40), st.floats(10, 500), st.floats(0.5, 2), st.floats(0.5, 2))
+@given(
+    st.floats(20, 120), st.floats(0, 0.006), st.floats(1, 40), st.floats(10, 500), st.floats(0.5, 2), st.floats(0.5, 2)
+)
 def test_the_open_loop_is_the_one_of_python_control(
     crossover: float, lead_s: float, drift: float, corner: float, stiffness: float, damping: float
 ) -> None:

@@ -44,7 +44,7 @@ def test_the_step_in_time_is_the_one_over_frequency(force_N: float) -> None:
     trace = follow(step, reference_N, SimulatedBench(limb_of(model), SMOOTH, POSITION_LOOP, QUIET))
     in_time = (trace.sensed_N[3000:] - force_N) / 0.02
     turns = 2 * np.arange(500) + 1
-    omega = np.pi * turns
+    omega = np.asarray(np.pi * turns, dtype=np.float64)
     tissue = Tissue(row.tangent_N_mm / row.damping_N_s_mm, 1.0, 1.0)
     loop = open_loop(RESPONSE, Rates(0.001, 0.001), law, tissue, omega)
     closed, time_s = loop / (1 + loop), np.arange(1000) * 1e-3

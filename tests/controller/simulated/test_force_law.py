@@ -78,9 +78,8 @@ def test_a_limb_that_rests_is_left_at_rest(force_N: float) -> None:
 
 def peak(step: TrackForce, name: str, force_N: float = 0.3) -> float:
     """Of a contact after 1 mm of air, over the force asked for."""
-    there, depths_mm = limb_of(subject(name)), np.linspace(0.0, 6.0, 600)
-    limb = there._replace(depth_mm=depths_mm, force_N=np.asarray(subject(name).law.force(depths_mm - 1.0)))
-    trace = follow(step, np.full(3000, force_N), SimulatedBench(limb))
+    bench = SimulatedBench(limb_of(subject(name)))
+    trace = follow(step, np.full(3000, force_N), bench, clearance_mm=1.0)
     return float(np.max(trace.force_N)) / force_N
 
 

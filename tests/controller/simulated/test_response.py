@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from controller.simulated.bench import MOTOR, POSITION_LOOP, SENSING
@@ -9,6 +10,7 @@ from controller.simulated.segments import hold_compiled
 from rig.simulation.axis_plant import ForceSensing, ModelledLimb, at_rest
 from tests.controller.simulated.subjects import RESPONSE, SLOW_RESPONSE
 
+Column = NDArray[np.float64]
 FREQUENCIES_HZ = np.array([1, 2, 3, 5, 8, 10, 15, 20, 25, 30, 40, 50, 60])
 SPRING = ModelledLimb(np.array([0.0, 100.0]), np.array([0.0, 100.0]), 0.0)
 
@@ -31,11 +33,11 @@ def fitted(sensing: ForceSensing, up_to_Hz: float) -> tuple[float, float, float]
     found = np.array([response(int(frequency_Hz), sensing)[0] for frequency_Hz in frequencies_Hz])
     s = 2j * np.pi * frequencies_Hz
 
-    def error(values: tuple[float, float, float]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    def error(values: Column) -> Column:
         ratio = np.exp(-s * values[0]) / ((1 + s * values[1]) * (1 + s * values[2])) / found - 1
         return np.concatenate([ratio.real, ratio.imag])
 
-    delay_s, one_s, other_s = least_squares(error, (0.002, 0.002, 0.004)).x
+    delay_s, one_s, other_s = least_squares(error, np.array([0.002, 0.002, 0.004])).x
     return delay_s, min(one_s, other_s), max(one_s, other_s)
 
 
