@@ -114,6 +114,13 @@ DEVICES: dict[str, str] = {}
 # What came for a force law that makes every tissue the same plant, likewise.
 LAW = {
     "rig/config/axis_response.py": "the axis as it was identified",
+    "rig/report/loop_figures.py": "stability is shown",
+    "controller/law/axis_response.py": "the axis as it was identified",
+    "controller/law/gain_table.py": "the tissue that the law divides by, and how well it is known",
+    "controller/law/inverse_model.py": "the inverse tissue model, beside the feedback",
+    "controller/law/loop_response.py": "the open loop over frequency",
+    "controller/law/stability.py": "stability is shown",
+    "controller/law/synthesis.py": "the law's numbers from the axis' response",
 }
 # What came for speed, cohorts and more than one computer, likewise.
 SCALE: dict[str, str] = {}

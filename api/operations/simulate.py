@@ -11,7 +11,7 @@ import numpy as np
 from controller.experiments import comparison, tracked, tracking
 from controller.experiments.references import Reference
 from controller.law.loop_response import grid
-from controller.law.stability import Loop, nearest
+from controller.law.stability import ForceLoop, nearest
 from controller.loop.modes import Mode
 from controller.operation import Operation
 from controller.simulated import bench as simulated
@@ -67,7 +67,7 @@ def _timed(operation: Operation, play: Callable[[], Trace]) -> tuple[Trace, floa
     return trace, float(trace.time_s[-1] / min(took_s))
 
 
-def _result(trace: Trace, times_real_time: float, reference: str, loop: Loop) -> SimulateResult:
+def _result(trace: Trace, times_real_time: float, reference: str, loop: ForceLoop) -> SimulateResult:
     on = (trace.mode == Mode.CONTACT) & np.isfinite(trace.reference_N)
     return SimulateResult(
         reference=reference,
@@ -90,14 +90,14 @@ def _jumps(trace: Trace) -> tuple[Jump, ...]:
         return ()
 
 
-def _loops(model: Model, wiring: Wiring) -> list[tuple[float, float, Loop]]:
+def _loops(model: Model, wiring: Wiring) -> list[tuple[float, float, ForceLoop]]:
     """Force, tangent and loop at each force that is shown."""
     loop, rows = tracking.loop_for(model, wiring), tracking.rows_of(model)
     shown = nearest(rows, [force for force in SHOWN_N if force <= model.valid.force_N])
     return [(row.force_N, row.tangent_N_mm, loop.at(row, model.damping_N_s_mm)) for row in shown]
 
 
-def _margins(force_N: float, tangent_N_mm: float, loop: Loop, stiffness: float) -> LoopMargins:
+def _margins(force_N: float, tangent_N_mm: float, loop: ForceLoop, stiffness: float) -> LoopMargins:
     """Margins at one force, on tissue ``stiffness`` times as stiff as the model, and the worst of the span."""
     found, (worst_deg, worst_gain) = loop.margins(stiffness), loop.worst()
     return LoopMargins(
@@ -112,7 +112,7 @@ def _margins(force_N: float, tangent_N_mm: float, loop: Loop, stiffness: float) 
     )
 
 
-def _reach(loop: Loop) -> LoopReach:
+def _reach(loop: ForceLoop) -> LoopReach:
     return LoopReach(
         crossover_Hz=loop.law.crossover_rad_s / (2 * math.pi),
         lead_ms=1000 * loop.law.lead_s,
@@ -140,7 +140,7 @@ def _draw(trace: Trace, bench: SimulatedBench, out: Path, title: str) -> None:
     save_figure(figure, out, "simulation")
 
 
-def _draw_loops(loops: Sequence[tuple[float, float, Loop]], stiffness: float, out: Path) -> None:
+def _draw_loops(loops: Sequence[tuple[float, float, ForceLoop]], stiffness: float, out: Path) -> None:
     from rig.report.drawing import svg  # noqa: PLC0415 - drawing takes a second to load
     from rig.report.loop_figures import bode_figure, nyquist_figure  # noqa: PLC0415
 

@@ -12,7 +12,7 @@ from controller.law import stability
 from controller.law.axis_response import rates_of, response_of
 from controller.law.gain_table import gain_rows, span_of
 from controller.law.inverse_model import GainRow
-from controller.law.stability import Loop
+from controller.law.stability import ForceLoop
 from controller.loop.modes import Mode
 from controller.loop.steps import Approach, Hold, Program, Retract, TrackForce, Zero
 from rig.config.axis_response import AxisResponse
@@ -81,7 +81,7 @@ def following(reference: Reference, model: Model, wiring: Wiring) -> Program:
     )
 
 
-def loop_for(model: Model, wiring: Wiring, axis: AxisResponse | None = None) -> Loop:
+def loop_for(model: Model, wiring: Wiring, axis: AxisResponse | None = None) -> ForceLoop:
     """The force loop on this bench and tissue; raises UsageError where no law holds it. ``axis``: else the bench's."""
     rates = rates_of(wiring)
     return stability.loop_for(axis or response_of(wiring), rates, span_of(model, rows_of(model), rates))

@@ -53,7 +53,7 @@ class Settings(NamedTuple):
     feedback: Feedback
 
 
-class Measured(NamedTuple):
+class ForceReading(NamedTuple):
     """The newest force and how many samples there have been: the same number means the same sample."""
 
     force_N: float
@@ -92,10 +92,10 @@ class Memory(NamedTuple):
 
 def begin(table: Columns, inverse: Inverse, force_N: float) -> Memory:
     """Memory at hand-over: what is measured now is what was foreseen, so nothing moves."""
-    return start_anew((0.0,) * LINE_CYCLES, table, inverse, Measured(force_N, -1))
+    return start_anew((0.0,) * LINE_CYCLES, table, inverse, ForceReading(force_N, -1))
 
 
-def start_anew(line_N: tuple[float, ...], table: Columns, inverse: Inverse, measured: Measured) -> Memory:
+def start_anew(line_N: tuple[float, ...], table: Columns, inverse: Inverse, measured: ForceReading) -> Memory:
     """The same with a line that is there already, the sample having been seen."""
     force_N = measured.force_N
     expected = Expected(line_N, 0, force_N, force_N, force_N)
@@ -139,7 +139,7 @@ def limit(correction: Correction, feedback: Feedback, ahead_mm_s: float, dt_s: f
 
 
 def increment(
-    memory: Memory, table: Columns, settings: Settings, reference_N: float, measured: Measured, dt_s: float
+    memory: Memory, table: Columns, settings: Settings, reference_N: float, measured: ForceReading, dt_s: float
 ) -> tuple[float, Memory]:
     """The step to add to the commanded position [mm], within the speed limits, and what to remember."""
     inverse, feedback = settings

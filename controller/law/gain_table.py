@@ -21,7 +21,7 @@ SPAN_ROWS = 6
 STEP = 1e-6  # of a parameter, for slopes: the root of what a double resolves is 1.5e-8
 
 
-class Known(NamedTuple):
+class TissueBounds(NamedTuple):
     """Tangent [N/mm] and damping [N s/mm] at some depths, the least and the largest of their intervals, shape (n,)."""
 
     depth_mm: FloatArray
@@ -62,7 +62,7 @@ def span_of(model: Model, rows: Sequence[GainRow], rates: Rates) -> Span:
     )
 
 
-def known_at(model: Model, depth_mm: FloatArray) -> tuple[Known, Known]:
+def known_at(model: Model, depth_mm: FloatArray) -> tuple[TissueBounds, TissueBounds]:
     """Tangent and damping with their intervals: the parameters' covariance carried through (delta method)."""
     law, here = model.law, _tangent_and_damping(model.law, depth_mm)
     slopes = []
@@ -75,7 +75,7 @@ def known_at(model: Model, depth_mm: FloatArray) -> tuple[Known, Known]:
     variances = np.einsum("pkr,pq,qkr->kr", np.array(slopes), model.covariance, np.array(slopes))
     reach = _reach(model) * np.sqrt(np.maximum(variances, 0.0))
     low, high = np.maximum(here - reach, 0.0), here + reach
-    return Known(depth_mm, here[0], low[0], high[0]), Known(depth_mm, here[1], low[1], high[1])
+    return TissueBounds(depth_mm, here[0], low[0], high[0]), TissueBounds(depth_mm, here[1], low[1], high[1])
 
 
 def _tangent_and_damping(law: Law, depth_mm: FloatArray) -> FloatArray:
@@ -98,7 +98,7 @@ def _refuse_flat(depths_mm: Sequence[float], forces: Sequence[float], tangents: 
             )
 
 
-def _refuse_undamped(damping: Known) -> None:
+def _refuse_undamped(damping: TissueBounds) -> None:
     """Raises UsageError where B may be 0: the law divides by it at the frequencies that count."""
     at = int(np.argmin(damping.low))
     if not damping.low[at] > 0:
@@ -109,7 +109,7 @@ def _refuse_undamped(damping: Known) -> None:
         )
 
 
-def _refuse_stiff(tangent: Known, rates: Rates) -> None:
+def _refuse_stiff(tangent: TissueBounds, rates: Rates) -> None:
     at = int(np.argmax(tangent.high))
     limit = STIFFEST_N_MM if rates.sample_s <= FAST_SAMPLE_S else STIFFEST_SLOW_N_MM
     if tangent.high[at] > limit:

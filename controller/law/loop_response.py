@@ -38,7 +38,7 @@ class Rates(NamedTuple):
     sample_s: float
 
 
-class Tissue(NamedTuple):
+class TrueTissue(NamedTuple):
     """The tissue at one depth against what the law takes it for; arrays broadcast.
 
     ``corner_rad_s`` is k / B of the law, ``stiffness`` and ``damping`` are true over law's.
@@ -72,7 +72,7 @@ def common(axis: AxisResponse, rates: Rates, lead_s: float, omega: Column) -> Co
     return np.asarray(lead**2 * hold * rates.cycle_s / (1 - cycle_back) * axis_there)
 
 
-def tissue_ratio(tissue: Tissue, rates: Rates, omega: Column) -> Complex:
+def tissue_ratio(tissue: TrueTissue, rates: Rates, omega: Column) -> Complex:
     """True tissue over the law's, 1 where they agree and sampling is fast, shape (tissues, frequencies)."""
     corner, stiffness, damping = (np.asarray(part, dtype=np.float64)[..., None] for part in tissue)
     s, t = 1j * omega, rates.sample_s
@@ -84,7 +84,7 @@ def drift(drift_rad_s: float, rates: Rates, omega: Column) -> Complex:
     return np.asarray(1 + drift_rad_s * rates.sample_s / (1 - np.exp(-1j * omega * rates.sample_s)))
 
 
-def open_loop(axis: AxisResponse, rates: Rates, law: Constants, tissue: Tissue, omega: Column) -> Complex:
+def open_loop(axis: AxisResponse, rates: Rates, law: Constants, tissue: TrueTissue, omega: Column) -> Complex:
     """L, shape (tissues, frequencies)."""
     same = common(axis, rates, law.lead_s, omega) * drift(law.drift_rad_s, rates, omega)
     return np.asarray(law.crossover_rad_s * same * tissue_ratio(tissue, rates, omega))

@@ -14,7 +14,7 @@ from controller.law.loop_response import (
     Constants,
     Margins,
     Rates,
-    Tissue,
+    TrueTissue,
     grid,
     margins,
     noise_share,
@@ -26,7 +26,7 @@ from rig.config.axis_response import AxisResponse
 MOTION_HZ = 1.0  # between breathing (0.25 Hz) and the pulse and a limb that is moved (2 Hz)
 
 
-class Loop(NamedTuple):
+class ForceLoop(NamedTuple):
     """The law on its axis, for the tissue that it was made for."""
 
     axis: AxisResponse
@@ -34,7 +34,7 @@ class Loop(NamedTuple):
     law: Constants
     span: Span
 
-    def at(self, row: GainRow, damping_N_s_mm: float) -> "Loop":
+    def at(self, row: GainRow, damping_N_s_mm: float) -> "ForceLoop":
         """The same at one depth alone."""
         corners, shares = (row.tangent_N_mm / row.damping_N_s_mm,), (damping_N_s_mm / row.damping_N_s_mm,)
         return self._replace(span=self.span._replace(corners_rad_s=corners, damping_shares=shares))
@@ -43,7 +43,7 @@ class Loop(NamedTuple):
         """Open loop at each of the span's depths on tissue so many times as stiff, shape (depths, frequencies)."""
         tissue = as_modelled(self.span)
         factor = np.full_like(np.asarray(tissue.stiffness), stiffness)
-        return open_loop(self.axis, self.rates, self.law, Tissue(tissue[0], factor, tissue[2]), omega)
+        return open_loop(self.axis, self.rates, self.law, TrueTissue(tissue[0], factor, tissue[2]), omega)
 
     def margins(self, stiffness: float = 1.0) -> Margins:
         """At each of the span's depths on tissue so many times as stiff."""
@@ -76,9 +76,9 @@ class Loop(NamedTuple):
         return float(np.max(np.abs(1 / (1 + loop))))
 
 
-def loop_for(axis: AxisResponse, rates: Rates, span: Span) -> Loop:
+def loop_for(axis: AxisResponse, rates: Rates, span: Span) -> ForceLoop:
     """The loop with the law that is made for it; raises UsageError where there is none."""
-    return Loop(axis, rates, synthesis.constants(axis, rates, span), span)
+    return ForceLoop(axis, rates, synthesis.constants(axis, rates, span), span)
 
 
 def nearest(rows: Sequence[GainRow], forces_N: Sequence[float]) -> list[GainRow]:

@@ -18,7 +18,7 @@ from controller.law.loop_response import (
     Constants,
     Margins,
     Rates,
-    Tissue,
+    TrueTissue,
     grid,
     margins,
     noise_share,
@@ -55,18 +55,18 @@ class Span(NamedTuple):
     damping: tuple[float, float] = (1.0, 1.0)
 
 
-def tissues(span: Span) -> Tissue:
+def tissues(span: Span) -> TrueTissue:
     """Every depth with every stiffness and damping at the span's ends, and as the model says."""
     depths = np.arange(len(span.corners_rad_s))
     at, stiffness, damping = np.meshgrid(depths, np.unique([*span.stiffness, 1.0]), np.unique([*span.damping, 1.0]))
     corners, shares = np.asarray(span.corners_rad_s), np.asarray(span.damping_shares)
-    return Tissue(corners[at.ravel()], stiffness.ravel(), (damping * shares[at]).ravel())
+    return TrueTissue(corners[at.ravel()], stiffness.ravel(), (damping * shares[at]).ravel())
 
 
-def as_modelled(span: Span) -> Tissue:
+def as_modelled(span: Span) -> TrueTissue:
     """Every depth as the model says."""
     shares = np.asarray(span.damping_shares)
-    return Tissue(np.asarray(span.corners_rad_s), np.ones_like(shares), shares)
+    return TrueTissue(np.asarray(span.corners_rad_s), np.ones_like(shares), shares)
 
 
 def over_span(axis: AxisResponse, rates: Rates, law: Constants, span: Span, points: int = 1000) -> Margins:
@@ -125,7 +125,7 @@ def tolerated(axis: AxisResponse, rates: Rates, law: Constants, span: Span) -> C
     omega, stable = grid(rates, 400), np.ones(len(span.corners_rad_s))
     factors = np.geomspace(1.0, 100.0, 60)
     for at, (corner, share) in enumerate(zip(span.corners_rad_s, span.damping_shares, strict=True)):
-        tissue = Tissue(np.full_like(factors, corner), factors, np.full_like(factors, share))
+        tissue = TrueTissue(np.full_like(factors, corner), factors, np.full_like(factors, share))
         kept = margins(open_loop(axis, rates, law, tissue, omega), omega).phase_deg > 0
         stable[at] = factors[-1] if kept.all() else factors[max(int(np.argmin(kept)) - 1, 0)]
     return stable

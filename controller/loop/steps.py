@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from controller.law import force_position, force_profile
-from controller.law.force_position import Feedback, Measured, Settings
+from controller.law.force_position import Feedback, ForceReading, Settings
 from controller.law.force_profile import Line
 from controller.law.inverse_model import GainRow, Inverse, columns
 from controller.loop.modes import Mode
@@ -330,7 +330,7 @@ class TrackForceRun:
             return over
         if state.memory is None:
             state.memory = force_position.begin(self._table, self._settings.inverse, state.force_N)
-        measured = Measured(state.force_N, state.force_samples)
+        measured = ForceReading(state.force_N, state.force_samples)
         step_mm, state.memory = force_position.increment(
             state.memory, self._table, self._settings, asked_N, measured, state.dt_s
         )

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.law import force_position, inverse_model
-from controller.law.force_position import Measured, Memory, Settings
+from controller.law.force_position import ForceReading, Memory, Settings
 from controller.law.inverse_model import Columns
 from controller.loop import setpoint
 from controller.loop.setpoint import Setpoint
@@ -112,7 +112,7 @@ def _track(
         if beyond(bounds, zeros, raw_N, state.position_mm, command_mm):
             break
         force_N = raw_N - zeros.now_N
-        measured = Measured(force_N, (clock.cycle + i) // sensing.every_cycles)
+        measured = ForceReading(force_N, (clock.cycle + i) // sensing.every_cycles)
         step_mm, after = increment(memory, table, settings, reference_N[i], measured, clock.dt_s)
         if command_mm + step_mm < bounds.low_mm or command_mm + step_mm > bounds.high_mm:
             break

@@ -7,7 +7,7 @@ import numpy as np
 
 from controller.experiments.tracking import force_law
 from controller.law import force_position
-from controller.law.force_position import Measured
+from controller.law.force_position import ForceReading
 from controller.law.inverse_model import columns
 from mock_devices.bench import Bench
 from mock_devices.parameters import Parameters
@@ -43,7 +43,7 @@ def rms_error_N(model: Model, in_time: bool = True) -> float:
     commanded = deque([place_mm] * COMMAND_TICKS, maxlen=COMMAND_TICKS)
     start_ns, errors = bench.now_ns, []
     for cycle in range(4000):
-        measured = Measured(sensed[0], cycle)
+        measured = ForceReading(sensed[0], cycle)
         move_mm, memory = force_position.increment(memory, table, settings, wanted_N(cycle + early), measured, 1e-3)
         place_mm += move_mm
         bench.axis.target(commanded[0])

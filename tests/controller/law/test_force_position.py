@@ -11,7 +11,7 @@ from controller.law.force_position import (
     Correction,
     Expected,
     Feedback,
-    Measured,
+    ForceReading,
     Memory,
     Settings,
     begin,
@@ -80,7 +80,7 @@ def test_an_error_that_stays_moves_stiff_tissue_at_the_crossover_times_error_ove
     """Where B is nothing, w = wc e / k: an integral of force error over stiffness."""
     settings, memory = Settings(NO_INVERSE, PLAIN), holding()
     for cycle in range(200):
-        step_mm, memory = increment(memory, linear(2.0, 1e-9), settings, 5.0, Measured(3.0, cycle), DT_S)
+        step_mm, memory = increment(memory, linear(2.0, 1e-9), settings, 5.0, ForceReading(3.0, cycle), DT_S)
     assert step_mm == pytest.approx(10.0 * 2.0 / 2.0 * DT_S)
 
 
@@ -110,18 +110,18 @@ def test_a_slope_is_taken_over_the_time_between_samples(cycles: int) -> None:
     settings, table = Settings(NO_INVERSE, feedback), linear(1e-9, 1.0)
     for cycle in range(20 * cycles + 1):
         sample = cycle // cycles
-        _, memory = increment(memory, table, settings, 0.0, Measured(-sample * cycles * DT_S, sample), DT_S)
+        _, memory = increment(memory, table, settings, 0.0, ForceReading(-sample * cycles * DT_S, sample), DT_S)
     assert memory.correction.led_N - memory.correction.error_N == pytest.approx(0.02)
     assert memory.since_s == pytest.approx(0.0)
 
 
 def test_the_same_sample_is_acted_on_once_and_its_speed_kept() -> None:
     settings = Settings(NO_INVERSE, PLAIN)
-    first_mm, memory = increment(holding(), linear(), settings, 5.0, Measured(3.0, 0), DT_S)
-    again_mm, kept = increment(memory, linear(), settings, 5.0, Measured(3.0, 0), DT_S)
+    first_mm, memory = increment(holding(), linear(), settings, 5.0, ForceReading(3.0, 0), DT_S)
+    again_mm, kept = increment(memory, linear(), settings, 5.0, ForceReading(3.0, 0), DT_S)
     assert first_mm == again_mm > 0
     assert (kept.correction, kept.since_s) == (memory.correction, DT_S)
-    more_mm, _ = increment(kept, linear(), settings, 5.0, Measured(3.0, 1), DT_S)
+    more_mm, _ = increment(kept, linear(), settings, 5.0, ForceReading(3.0, 1), DT_S)
     assert more_mm > first_mm
 
 
@@ -149,16 +149,16 @@ def test_a_limited_axis_winds_nothing_up() -> None:
     """Ten seconds against a limit, then the error turns: the tip turns with the next sample but for what B asks for."""
     settings, memory = Settings(NO_INVERSE, PLAIN._replace(speed_limit_mm_s=1.0)), holding()
     for cycle in range(10_000):
-        step_mm, memory = increment(memory, linear(), settings, 9.0, Measured(3.0, cycle), DT_S)
+        step_mm, memory = increment(memory, linear(), settings, 9.0, ForceReading(3.0, cycle), DT_S)
     assert step_mm == pytest.approx(1.0 * DT_S)
-    step_mm, _ = increment(memory, linear(), settings, -1.0, Measured(3.0, 10_000), DT_S)
+    step_mm, _ = increment(memory, linear(), settings, -1.0, ForceReading(3.0, 10_000), DT_S)
     assert step_mm < 0
 
 
 def test_a_change_of_tangent_and_damping_alone_moves_nothing() -> None:
     memory = holding()
     for table in (linear(0.1, 0.001), linear(9.0, 0.1)):
-        step_mm, memory = increment(memory, table, Settings(NO_INVERSE, PLAIN), 3.0, Measured(3.0, 1), DT_S)
+        step_mm, memory = increment(memory, table, Settings(NO_INVERSE, PLAIN), 3.0, ForceReading(3.0, 1), DT_S)
         assert step_mm == 0.0
 
 
@@ -168,7 +168,7 @@ def test_tangent_and_damping_are_those_at_the_force_measured() -> None:
     table = columns([GainRow(**dict(zip(GainRow.model_fields, row, strict=True))) for row in rows])
     steps_mm = [
         increment(begin(table, NO_INVERSE, force_N), table, Settings(NO_INVERSE, PLAIN), force_N + 1.0,
-                  Measured(force_N, 0), DT_S)[0]
+                  ForceReading(force_N, 0), DT_S)[0]
         for force_N in (1.0, 5.0)
     ]  # fmt: skip
     assert steps_mm[0] == pytest.approx(4 * steps_mm[1])
@@ -176,14 +176,14 @@ def test_tangent_and_damping_are_those_at_the_force_measured() -> None:
 
 def test_the_inverse_model_moves_by_what_the_reference_needs_and_feedback_then_sees_no_error() -> None:
     memory = begin(linear(), AHEAD.inverse, 3.0)
-    step_mm, memory = increment(memory, linear(), AHEAD, 3.25, Measured(3.25, 0), DT_S)
+    step_mm, memory = increment(memory, linear(), AHEAD, 3.25, ForceReading(3.25, 0), DT_S)
     assert step_mm == pytest.approx(0.25)
     assert memory.correction.speed_mm_s == pytest.approx(0.0)
 
 
 def test_a_jump_is_spread_at_the_speed_allowed_and_feedback_expects_no_more_than_that() -> None:
     slow = Settings(Inverse(0.0, 20.0), PLAIN)
-    _, memory = increment(begin(linear(), slow.inverse, 1.0), linear(), slow, 5.0, Measured(1.0, 0), DT_S)
+    _, memory = increment(begin(linear(), slow.inverse, 1.0), linear(), slow, 5.0, ForceReading(1.0, 0), DT_S)
     assert memory.ahead.depth_mm == pytest.approx(1.02)
     assert memory.expected.force_N == pytest.approx(1.02)
 
@@ -192,17 +192,17 @@ def test_while_it_searches_everything_starts_anew_at_the_force_measured() -> Non
     settings = Settings(AHEAD.inverse, PLAIN._replace(lost_N=0.05, drift_rad_s=3.0, delay_s=0.005))
     memory = begin(linear(), AHEAD.inverse, 3.0)
     for cycle in range(50):
-        _, memory = increment(memory, linear(), settings, 5.0, Measured(3.0, cycle), DT_S)
+        _, memory = increment(memory, linear(), settings, 5.0, ForceReading(3.0, cycle), DT_S)
     assert memory.correction.drift_mm_s > 0
-    step_mm, memory = increment(memory, linear(), settings, 5.0, Measured(0.02, 50), DT_S)
+    step_mm, memory = increment(memory, linear(), settings, 5.0, ForceReading(0.02, 50), DT_S)
     assert step_mm == pytest.approx(5.0 * DT_S)
     assert memory.correction == NONE
     assert (memory.ahead.depth_mm, memory.expected.force_N) == pytest.approx((0.02, 0.02))
-    _, memory = increment(memory, linear(), settings, 5.0, Measured(0.06, 51), DT_S)
+    _, memory = increment(memory, linear(), settings, 5.0, ForceReading(0.06, 51), DT_S)
     assert memory.expected.force_N == pytest.approx(0.02), "what was foreseen before the search is not expected"
 
 
 def test_a_reference_below_contact_is_no_search() -> None:
     settings = Settings(NO_INVERSE, PLAIN._replace(lost_N=0.05))
-    step_mm, _ = increment(holding(0.0), linear(), settings, 0.04, Measured(0.0, 0), DT_S)
+    step_mm, _ = increment(holding(0.0), linear(), settings, 0.04, ForceReading(0.0, 0), DT_S)
     assert 0 < step_mm < 0.001

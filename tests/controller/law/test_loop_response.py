@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from controller.law.loop_response import (
     Constants,
     Rates,
-    Tissue,
+    TrueTissue,
     common,
     grid,
     margins,
@@ -23,10 +23,10 @@ from rig.config.axis_response import AxisResponse
 
 AXIS = AxisResponse(0.002, 0.0025, 0.0037, 0.0067)
 FAST = Rates(0.001, 0.001)
-AS_TOLD = Tissue(100.0, 1.0, 1.0)
+AS_TOLD = TrueTissue(100.0, 1.0, 1.0)
 
 
-def discrete(axis: AxisResponse, law: Constants, tissue: Tissue, sample_s: float) -> control.TransferFunction:
+def discrete(axis: AxisResponse, law: Constants, tissue: TrueTissue, sample_s: float) -> control.TransferFunction:
     """The law as difference equations, the axis as Pade and two lags: exact at frequencies far below the rate's."""
     z = control.tf([1.0, 0.0], [1.0], sample_s)
     step = (1 - 1 / z) / sample_s
@@ -34,7 +34,7 @@ def discrete(axis: AxisResponse, law: Constants, tissue: Tissue, sample_s: float
     return law.crossover_rad_s * (1 + law.lead_s * step) ** 2 * tissue_side * (1 + law.drift_rad_s / step) / step
 
 
-def physical(axis: AxisResponse, tissue: Tissue) -> control.TransferFunction:
+def physical(axis: AxisResponse, tissue: TrueTissue) -> control.TransferFunction:
     delay = control.tf(*control.pade(axis.delay_s, 6))
     lags = control.tf([1.0], [axis.lag1_s, 1.0]) * control.tf([1.0], [axis.lag2_s, 1.0])
     return control.tf([tissue.damping, tissue.stiffness * tissue.corner_rad_s], [1.0]) * lags * delay
@@ -47,7 +47,7 @@ def physical(axis: AxisResponse, tissue: Tissue) -> control.TransferFunction:
 def test_the_open_loop_is_the_one_of_python_control(
     crossover: float, lead_s: float, drift: float, corner: float, stiffness: float, damping: float
 ) -> None:
-    law, tissue = Constants(crossover, lead_s, drift), Tissue(corner, stiffness, damping)
+    law, tissue = Constants(crossover, lead_s, drift), TrueTissue(corner, stiffness, damping)
     omega = np.geomspace(0.5, 1000.0, 30)
     theirs = discrete(AXIS, law, tissue, 0.001)(np.exp(1j * omega * 0.001)) * physical(AXIS, tissue)(1j * omega)
     np.testing.assert_allclose(open_loop(AXIS, FAST, law, tissue, omega), theirs, rtol=1e-3)
@@ -55,7 +55,7 @@ def test_the_open_loop_is_the_one_of_python_control(
 
 @pytest.mark.parametrize("stiffness", [0.5, 1.0, 2.0])
 def test_margins_are_those_of_python_control(stiffness: float) -> None:
-    law, tissue = Constants(70.0, 0.004, 20.0), Tissue(100.0, stiffness, 1.0)
+    law, tissue = Constants(70.0, 0.004, 20.0), TrueTissue(100.0, stiffness, 1.0)
     omega = grid(FAST, 1000)
     loop = open_loop(AXIS, FAST, law, tissue, omega)
     found = margins(loop[None, :], omega)
@@ -109,5 +109,5 @@ def test_noise_through_a_slow_integral_keeps_the_share_of_a_first_order_filter()
     rates, law = Rates(0.001, 0.001), Constants(5.0, 0.0, 0.0)
     omega = np.geomspace(0.01, math.pi / 0.001, 4000)
     quick = AxisResponse(0.0, 0.0, 0.0, 0.0)
-    loop = open_loop(quick, rates, law, Tissue(np.array([100.0]), np.ones(1), np.ones(1)), omega)
+    loop = open_loop(quick, rates, law, TrueTissue(np.array([100.0]), np.ones(1), np.ones(1)), omega)
     assert noise_share(loop, omega, rates)[0] == pytest.approx(math.sqrt(0.005 / (2 - 0.005)), rel=0.02)

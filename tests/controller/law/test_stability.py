@@ -7,7 +7,7 @@ import pytest
 
 from controller.law.inverse_model import GainRow
 from controller.law.loop_response import Constants, Rates
-from controller.law.stability import Loop, loop_for, nearest
+from controller.law.stability import ForceLoop, loop_for, nearest
 from controller.law.synthesis import Span
 from rig.config.axis_response import AxisResponse
 
@@ -55,7 +55,7 @@ def test_sensitivity_is_no_larger_than_margins_of_45_degrees_allow_and_no_smalle
 
 
 def test_a_slow_law_plays_back_less_noise() -> None:
-    slow = Loop(AXIS, FAST, Constants(10.0, 0.0, 2.0), SPAN)
+    slow = ForceLoop(AXIS, FAST, Constants(10.0, 0.0, 2.0), SPAN)
     assert slow.noise_share() < 0.5 * LOOP.noise_share()
 
 

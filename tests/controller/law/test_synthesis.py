@@ -6,7 +6,7 @@ import pytest
 
 from controller.law import synthesis
 from controller.law.force_position import LINE_CYCLES
-from controller.law.loop_response import Constants, Rates, Tissue, grid, noise_share, open_loop
+from controller.law.loop_response import Constants, Rates, TrueTissue, grid, noise_share, open_loop
 from controller.law.synthesis import Span, constants, over_span, tissues, tolerated
 from rig.config.axis_response import AxisResponse
 from rig.errors import UsageError
@@ -16,7 +16,7 @@ FAST, SLOW = Rates(0.001, 0.001), Rates(0.001, 0.01)
 SPAN = Span((20.0, 80.0, 300.0), (1.0, 1.0, 1.0))
 
 
-def judged(axis: AxisResponse, rates: Rates, law: Constants, tissue: Tissue) -> tuple[float, float]:
+def judged(axis: AxisResponse, rates: Rates, law: Constants, tissue: TrueTissue) -> tuple[float, float]:
     """Phase and gain margin by python-control, of one tissue."""
     omega = grid(rates, 2000)
     gain, phase, *_ = control.margin(control.frd(open_loop(axis, rates, law, tissue, omega), omega))
@@ -29,7 +29,7 @@ def test_margins_hold_with_delay_to_spare_on_all_tissues(rates: Rates, extra_s: 
     axis = AXIS._replace(delay_s=AXIS.delay_s + extra_s)
     law, late = constants(axis, rates, SPAN), axis._replace(delay_s=axis.delay_s + 0.001)
     every = np.transpose([np.asarray(part) for part in tissues(SPAN)])
-    found = [judged(late, rates, law, Tissue(*map(float, values))) for values in every]
+    found = [judged(late, rates, law, TrueTissue(*map(float, values))) for values in every]
     assert min(phase for phase, _ in found) > 45.0 - 0.5
     assert min(gain for _, gain in found) > 2.0 * 0.99
 
@@ -100,5 +100,5 @@ def test_the_stiffest_tissue_that_is_tolerated_is_at_the_edge_of_stability(at: i
     factor = float(tolerated(AXIS, FAST, law, SPAN)[at])
     assert factor > 2.0
     corner = SPAN.corners_rad_s[at]
-    assert judged(AXIS, FAST, law, Tissue(corner, factor, 1.0))[0] > 0
-    assert judged(AXIS, FAST, law, Tissue(corner, 1.2 * factor, 1.0))[0] < 0
+    assert judged(AXIS, FAST, law, TrueTissue(corner, factor, 1.0))[0] > 0
+    assert judged(AXIS, FAST, law, TrueTissue(corner, 1.2 * factor, 1.0))[0] < 0

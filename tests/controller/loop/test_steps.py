@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from controller.law import force_position
-from controller.law.force_position import Measured
+from controller.law.force_position import ForceReading
 from controller.law.inverse_model import GainRow, columns
 from controller.loop.modes import Mode
 from controller.loop.setpoint import Setpoint
@@ -347,7 +347,10 @@ def expected_mm(here: LoopState, step: TrackForce, asked_N: float) -> float:
     """One increment of the law from where it begins, which has tests of its own."""
     table = columns(step.gains)
     memory = force_position.begin(table, step.settings.inverse, here.force_N)
-    step_mm, _ = force_position.increment(memory, table, step.settings, asked_N, Measured(here.force_N, 1), here.dt_s)
+    reading = ForceReading(here.force_N, 1)
+    step_mm, _ = force_position.increment(memory, table, step.settings, asked_N, reading, here.dt_s)
+        memory, table, step.settings, asked_N, ForceReading(here.force_N, 1), here.dt_s
+    )
     return step_mm
 
 

@@ -8,7 +8,7 @@ import pytest
 from controller.experiments import comparison, tracking
 from controller.experiments.references import parse_reference
 from controller.law.gain_table import gain_rows
-from controller.law.loop_response import Constants, Rates, Tissue, open_loop
+from controller.law.loop_response import Constants, Rates, TrueTissue, open_loop
 from controller.loop.modes import Mode
 from controller.loop.steps import TrackForce
 from controller.simulated import bench as simulated
@@ -45,7 +45,7 @@ def test_the_step_in_time_is_the_one_over_frequency(force_N: float) -> None:
     in_time = (trace.sensed_N[3000:] - force_N) / 0.02
     turns = 2 * np.arange(500) + 1
     omega = np.asarray(np.pi * turns, dtype=np.float64)
-    tissue = Tissue(row.tangent_N_mm / row.damping_N_s_mm, 1.0, 1.0)
+    tissue = TrueTissue(row.tangent_N_mm / row.damping_N_s_mm, 1.0, 1.0)
     loop = open_loop(RESPONSE, Rates(0.001, 0.001), law, tissue, omega)
     closed, time_s = loop / (1 + loop), np.arange(1000) * 1e-3
     waves = np.exp(1j * np.outer(time_s, omega)) * (closed / (1j * turns))

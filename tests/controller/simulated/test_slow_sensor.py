@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controller.experiments import tracking
-from controller.law.stability import Loop
+from controller.law.stability import ForceLoop
 from controller.loop.steps import TrackForce
 from controller.simulated.bench import SENSING, SimulatedBench, follow, limb_of
 from rig.config.wiring import Wiring
@@ -22,7 +22,7 @@ def law(name: str) -> TrackForce:
     return tracking.force_law(subject(name), FT300, SLOW_RESPONSE)
 
 
-def loop(name: str) -> Loop:
+def loop(name: str) -> ForceLoop:
     return tracking.loop_for(subject(name), FT300, SLOW_RESPONSE)
 
 
