@@ -349,8 +349,6 @@ def expected_mm(here: LoopState, step: TrackForce, asked_N: float) -> float:
     memory = force_position.begin(table, step.settings.inverse, here.force_N)
     reading = ForceReading(here.force_N, 1)
     step_mm, _ = force_position.increment(memory, table, step.settings, asked_N, reading, here.dt_s)
-        memory, table, step.settings, asked_N, ForceReading(here.force_N, 1), here.dt_s
-    )
     return step_mm
 
 
