@@ -56,9 +56,9 @@ STUDY = {
     "error (%)": "error_percent:+.2f", "position error (mm)": "position_error_mm:.3f",
 }  # fmt: skip
 MARGINS = {
-    "force (N)": "force_N:.2f", "tangent (N/mm)": "tangent_N_mm:.2f", "crossover (Hz)": "crossover_Hz:.1f",
-    "phase margin (deg)": "phase_deg:.0f", "gain margin": "gain:.1f", "worst (deg)": "worst_phase_deg:.0f",
-    "worst gain": "worst_gain:.1f", "stable up to (N/mm)": "stiffest_N_mm:.1f",
+    "N": "force_N:.2f", "N/mm": "tangent_N_mm:.2f", "crossover Hz": "crossover_Hz:.1f",
+    "phase deg": "phase_deg:.0f", "gain": "gain:.1f", "worst deg": "worst_phase_deg:.0f",
+    "worst gain": "worst_gain:.1f", "stable to N/mm": "stiffest_N_mm:.1f",
 }  # fmt: skip
 
 

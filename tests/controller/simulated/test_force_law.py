@@ -152,3 +152,16 @@ def test_feedback_that_is_limited_by_the_axis_does_not_overshoot_when_it_comes_f
     """Twice as soft a limb, a jump of 8 N: the axis is at its limit for a tenth of a second."""
     trace = follow(law("soft"), np.repeat((1.0, 9.0), 1500), SimulatedBench(limb_of(subject("soft"), 0.5)))
     assert np.max(trace.force_N) < 9.0 + 0.08 * 8.0
+
+
+@pytest.mark.parametrize(("later_s", "phase_deg", "gain"), [(0.0, 58.0, 3.0), (0.001, 45.0, 2.0)])
+def test_the_margins_over_half_to_twice_the_stiffness_are_those_that_the_documentation_states(
+    later_s: float, phase_deg: float, gain: float
+) -> None:
+    for name in NAMES:
+        loop = tracking.loop_for(subject(name), WIRING, RESPONSE)
+        late = loop._replace(axis=RESPONSE._replace(delay_s=RESPONSE.delay_s + later_s))
+        found = late.worst()
+        assert found[0] > phase_deg - 0.5
+        assert found[1] > 0.99 * gain
+        assert loop.largest_sensitivity() < 1.7
