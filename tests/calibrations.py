@@ -64,12 +64,10 @@ def axis_dynamics(
     serial: str = "A1",
     date: datetime | None = None,
     delay: TimeEstimate = DELAY,
-    **other: object,
 ) -> AxisDynamics:
     """Of an axis with two lags of about 3 ms, as this computer would find it, beside a sensor of 1 kHz."""
     wiring = wiring or Wiring()
-    lags = {"lag1": TimeEstimate(s=0.0025, within_s=0.001), "lag2": TimeEstimate(s=0.0037, within_s=0.001)}
-    known = AxisDynamics(
+    return AxisDynamics(
         product=product,
         serial=serial,
         date=date or datetime.now(UTC),
@@ -86,9 +84,9 @@ def axis_dynamics(
         misfit=0.02,
         force_filter_s=0.5 / wiring.force.sampled_Hz,
         force_age_s=0.5 / wiring.force.sampled_Hz,
-        **lags,
+        lag1=TimeEstimate(s=0.0025, within_s=0.001),
+        lag2=TimeEstimate(s=0.0037, within_s=0.001),
     )
-    return known.model_copy(update=other)
 
 
 def with_calibration(wiring: Wiring, product: str, serial: str, drive: str = "FakeAxis") -> Wiring:

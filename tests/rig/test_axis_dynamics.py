@@ -16,7 +16,8 @@ NOW = datetime(2026, 3, 1, 9, 0, tzinfo=UTC)
 
 
 def test_the_response_counts_hold_filter_and_age_once() -> None:
-    known = axis_dynamics(date=NOW, delay=TimeEstimate(s=0.001, within_s=0.0), force_age_s=0.0012)
+    known = axis_dynamics(date=NOW, delay=TimeEstimate(s=0.001, within_s=0.0))
+    known = known.model_copy(update={"force_age_s": 0.0012})
     found = known.response
     # 1 ms, half a cycle of 1 kHz, half a sample of 1 kHz, and 1.2 ms until the loop looks.
     assert found.delay_s == pytest.approx(0.001 + 0.0005 + 0.0005 + 0.0012)
@@ -49,7 +50,7 @@ def test_a_file_is_read_as_it_was_written_and_named_by_the_wiring(tmp_path: Path
 )
 def test_what_says_too_little_is_unfit_with_number_and_bound(changes: dict[str, object], sentence: str) -> None:
     assert Calibration(of_dynamics=axis_dynamics(date=NOW)).unfit(NOW) == []
-    [reason] = Calibration(of_dynamics=axis_dynamics(date=NOW, **changes)).unfit(NOW)
+    [reason] = Calibration(of_dynamics=axis_dynamics(date=NOW).model_copy(update=changes)).unfit(NOW)
     with pytest.raises(UsageError, match=sentence):
         raise UsageError(reason)
 
@@ -71,7 +72,7 @@ def test_an_old_one_is_unfit_and_names_the_command() -> None:
 def test_one_of_another_loop_does_not_hold_here(changes: dict[str, object], sentence: str) -> None:
     here = (computer_id(), 1000.0, "bota-sensone")
     assert axis_dynamics().elsewhere(*here) == []
-    [reason] = axis_dynamics(**changes).elsewhere(*here)
+    [reason] = axis_dynamics().model_copy(update=changes).elsewhere(*here)
     assert sentence in reason
 
 

@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from typing import cast
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from controller.commissioning.axis_dynamics import identify, response_of
 from controller.commissioning.sweep import Sweep, amplitude_mm, offset_mm, sweep_for
 from controller.commissioning.sweep_moves import SweepRun, refuse_outside
 from controller.devices.drivers import Devices
-from drivers.roles import Identity, LinkCounters
+from drivers.roles import ForceSensor, Identity, LinkCounters, ServoAxis
 from mock_devices.parameters import Axis
 from mock_devices.physics import STEP_S
 from mock_devices.physics.drive_plant import DrivePlant
@@ -87,16 +88,17 @@ class PlantMechanics(Mechanics):
 
 @dataclass
 class SweptAxis:
-    """A drive on ``mechanics``; a set-point is followed ``late_cycles`` later, every ``drops``-th is lost."""
+    """A drive on ``mechanics``; a set-point is followed ``late_cycles`` later; ``shaken_mm`` is noise of its place."""
 
     mechanics: Mechanics = field(default_factory=Mechanics)
     late_cycles: int = 0
-    drops: int = 0
+    shaken_mm: float = 0.0
     fault: str = ""
     frozen_after: int = 10**9
     identity: Identity = DRIVE
     counters: LinkCounters = field(default_factory=LinkCounters)
     braked: bool = False
+    noise: np.random.Generator = field(default_factory=lambda: np.random.default_rng(2))
     _due: deque[float] = field(default_factory=deque)
     _samples: list[AxisSample] = field(default_factory=list)
     _target_mm: float = HOME_MM
@@ -117,7 +119,8 @@ class SweptAxis:
     def request(self, now_ns: int) -> None:
         """The place of this moment, as the encoder counts it."""
         self._advance(now_ns)
-        counted_mm = round(self.mechanics.position_mm / COUNT_MM) * COUNT_MM
+        shaken_mm = self.mechanics.position_mm + self.shaken_mm * float(self.noise.standard_normal())
+        counted_mm = round(shaken_mm / COUNT_MM) * COUNT_MM
         self._samples.append(AxisSample(0, now_ns, now_ns, counted_mm, 0.0, 0.1, 0, 1))
 
     def command(self, position_mm: float, now_ns: int) -> None:
@@ -126,8 +129,7 @@ class SweptAxis:
         self._commands += 1
         self._due.append(position_mm)
         if len(self._due) > self.late_cycles:
-            next_mm = self._due.popleft()
-            self._target_mm = self._target_mm if self.drops and self._commands % self.drops == 0 else next_mm
+            self._target_mm = self._due.popleft()
 
     def quick_stop(self) -> None:
         """Noted."""
@@ -172,7 +174,7 @@ class SweptBench:
     def found(self, sweep: Sweep | None = None) -> AxisDynamics:
         """Swept and identified."""
         sweep = sweep or sweep_for(self.wiring, 0.5, 4, 2)
-        devices = Devices(self.force, self.axis, None)  # type: ignore[arg-type] - what a sweep asks of them
+        devices = Devices(cast(ForceSensor, self.force), cast(ServoAxis, self.axis), None)
         stopped = lambda: self._cycles > self.stopped_after  # noqa: E731
         followed = SweepRun(devices, self.wiring, sweep, stopped, self.now, self.sleep).played()
         return identify(DRIVE, self.wiring, sweep, followed, NOW, "here")
@@ -258,12 +260,12 @@ def sine_lag_s(mechanics: Mechanics, frequency_Hz: float) -> float:
     [
         (SweptBench(SweptAxis(Mechanics(gain=-1.0))), CheckFailed, r"goes -1.0\d mm for each millimetre"),
         (SweptBench(SweptAxis(Mechanics(gain=0.0))), CheckFailed, r"goes .* mm for each millimetre .*\(least 0.5\)"),
-        (SweptBench(SweptAxis(drops=3)), CheckFailed, r"(coherent to|delay).* \((bound \+- 1 ms|bound 0.9)\)"),
+        (SweptBench(SweptAxis(shaken_mm=0.02)), CheckFailed, r"coherent to 0.\d\d only \(bound 0.9\)"),
         (SweptBench(stall=20), CheckFailed, r"% of the cycles were missed \(bound 2 %\)"),
         (SweptBench(SweptAxis(frozen_after=300)), DeviceError, r"axis: newest sample is 5\d ms old"),
         (SweptBench(SweptAxis(fault="overcurrent")), DeviceError, "the drive reports: overcurrent"),
     ],
-    ids=["wrong sense", "does not move", "loses set-points", "busy computer", "frozen", "fault"],
+    ids=["wrong sense", "does not move", "shaken", "busy computer", "frozen", "fault"],
 )
 def test_what_is_wrong_is_refused_with_number_and_bound(
     bench: SweptBench, error: type[RigError], sentence: str
@@ -335,13 +337,13 @@ def test_a_sweep_that_would_show_nothing_is_refused(wiring: Wiring, sentence: st
 def test_a_sweep_that_would_leave_the_workspace_is_refused(at_mm: float) -> None:
     sweep = sweep_for(Wiring(), 0.5, 4, 2)
     refuse_outside(2.0, sweep, Wiring())
-    with pytest.raises(UsageError, match=r"sweeps go from .* mm; \[limits\] have 0 to 60 mm"):
+    with pytest.raises(UsageError, match=r"sweeps go from .* in the air; \[limits\] have 0 to 60 mm"):
         refuse_outside(at_mm, sweep, Wiring())
 
 
 def test_the_measured_response_is_the_closed_form_at_each_frequency() -> None:
     bench, sweep = SweptBench(jitter_ns=1), sweep_for(Wiring(), 0.5, 4, 2)
-    devices = Devices(bench.force, bench.axis, None)  # type: ignore[arg-type] - what a sweep asks of them
+    devices = Devices(cast(ForceSensor, bench.force), cast(ServoAxis, bench.axis), None)
     followed = SweepRun(devices, bench.wiring, sweep, lambda: False, bench.now, bench.sleep).played()
     found = response_of(sweep, followed)
     s = 2j * np.pi * found.frequency_Hz
