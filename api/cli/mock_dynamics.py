@@ -66,11 +66,11 @@ def _swept(wiring: Wiring) -> AxisDynamics:
         with promptly(wiring.loop.priority):
             devices.axis.enable()
             followed = SweepRun(devices, wiring, sweep).played()
-        return identify(devices.axis.identity, wiring, sweep, followed, datetime.now(UTC), computer_id())
     except DeviceError:
         # What the computer was too late for must not be found in fault by what comes next.
         with contextlib.suppress(RigError):
             devices.axis.reset_fault()
         raise
     finally:
-        devices.close()
+        devices.close()  # before the fit: a drive that hears nothing for so long goes into fault
+    return identify(devices.axis.identity, wiring, sweep, followed, datetime.now(UTC), computer_id())

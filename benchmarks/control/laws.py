@@ -1,7 +1,7 @@
 """The law, its ablations and its rivals, each made for one subject on one plant."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -95,7 +95,8 @@ def pi(subject: str, plant: Plant, shape: Shape, tuning: Tuning, ahead: bool = T
     """PI with gains of ``shape``; ``ahead``: with inverse model, expectation and preview."""
     step, rows = track_step(subject, plant), rows_of(subject)
     integral = tuning.integral * rival_tuning.factors(shape, rows)
-    table = RivalColumns(*map(np.array, columns(step.gains)), tuning.lead_s * integral, integral)
+    force, depth, tangent, damping = map(np.array, columns(step.gains))
+    table = RivalColumns(force, depth, tangent, damping, tuning.lead_s * integral, integral)
     inverse, feedback = step.settings
     inverse = inverse if ahead else inverse._replace(ahead_mm_s=0.0)
     rival = RivalFeedback(feedback, tuning.drift_rad_s, ahead, tuning.mass_s, VARY if tuning.mass_s else 0.0)
@@ -150,8 +151,6 @@ OTHERS: Mapping[str, Maker] = {
 
 def makers(names: Sequence[str] = ()) -> Mapping[str, Maker]:
     """All laws, or those named."""
-    ablated: dict[str, Maker] = {
-        name: (lambda subject, plant, off=off: shaped(subject, plant, off)) for name, off in ABLATIONS.items()
-    }
+    ablated: dict[str, Maker] = {name: partial(shaped, ablation=off) for name, off in ABLATIONS.items()}
     every: dict[str, Maker] = {LAW: shaped, **CONSTANTS, **OTHERS, **ablated}
     return {name: every[name] for name in names or every}

@@ -134,14 +134,13 @@ def _follower(kind: str) -> Callable[..., Column]:
     law: dict[str, Callable[..., Any]] = {**interpolate, "expect": compiled(force_position.expect)}
     law["foresee"] = compiled(inverse_model.foresee, interpolate)
     law["resting"] = compiled(inverse_model.resting, interpolate)
-    if kind == "rival":
-        law["correct"] = compiled(rival_law.correct, interpolate)
-        step_of = compiled(rival_law.increment, law)
-    else:
-        law["start_anew"] = compiled(force_position.start_anew, law)
-        law |= {"react": compiled(force_position.react), "limit": compiled(force_position.limit)}
-        step_of = compiled(force_position.increment, law)
-    return compiled(follow, {"increment": step_of, "reading": compiled(reading), "moved": moved_compiled()})
+    law["correct"] = compiled(rival_law.correct, interpolate)
+    law["start_anew"] = compiled(force_position.start_anew, law)
+    law |= {"react": compiled(force_position.react), "limit": compiled(force_position.limit)}
+    increments: dict[str, Callable[..., Any]] = {"rival": rival_law.increment, "shaped": force_position.increment}
+    return compiled(
+        follow, {"increment": compiled(increments[kind], law), "reading": compiled(reading), "moved": moved_compiled()}
+    )
 
 
 def run(law: Law, reference_N: Column, bench: Bench, seed: int, dt_s: float = 0.001) -> Run:
