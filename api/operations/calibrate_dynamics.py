@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 
 from api.operations.calibrate import resting_axis
 from controller.commissioning.axis_dynamics import identify
-from controller.commissioning.sweep import Sweep, sweep_for
+from controller.commissioning.sweep import AirSweep, sweep_for
 from controller.commissioning.sweep_moves import SweepRun, refuse_outside, refuse_touching
 from controller.operation import Operation
 from rig.computer import computer_id
@@ -17,7 +17,7 @@ from rig.config.wiring import Wiring
 SWEEP_S, REPEATS, TURNS = 0.5, 16, 6
 
 
-def sweep_asked(wiring: Wiring, from_mm: float) -> Sweep:
+def sweep_asked(wiring: Wiring, from_mm: float) -> AirSweep:
     """The sweep that limits and product allow; raises UsageError, before anything is opened, where none fits."""
     sweep = sweep_for(wiring, SWEEP_S, REPEATS, TURNS)
     refuse_outside(from_mm, sweep, wiring)

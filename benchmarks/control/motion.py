@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from benchmarks.control import rival_law
 from controller.law import force_position, inverse_model
-from controller.law.force_position import Measured
+from controller.law.force_position import ForceReading
 from rig.machine_code import compiled
 from rig.simulation import axis_plant
 from rig.simulation.axis_plant import (
@@ -106,7 +106,7 @@ def follow(
     for i in range(cycles):
         if i % sensing.every_cycles == 0:
             held_N = reading(sensed[i], noise[i], sensing)
-        measured = Measured(held_N, i // sensing.every_cycles)
+        measured = ForceReading(held_N, i // sensing.every_cycles)
         step_mm, memory = increment(memory, table, settings, reference_N[i], measured, dt_s)
         command_mm += step_mm
         rows[0, i], rows[1, i], rows[2, i] = state.force_N, held_N, command_mm

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.control.motion import FAR_MM, Bench, Column, Contact, moved_compiled
-from controller.commissioning.axis_dynamics import Followed, identify
+from controller.commissioning.axis_dynamics import SweepRecord, identify
 from controller.commissioning.sweep import offset_mm, sweep_for
 from drivers.roles import Identity
 from mock_devices.parameters import load_parameters
@@ -73,7 +73,7 @@ def dynamics_of(plant: Plant, wiring: Wiring) -> AxisDynamics:
     told_mm = np.array([offset_mm(sweep, at_s) for at_s in told_s])
     sensing = plant.late_sensing
     force_age_s = (sensing.delay_cycles + 0.5 * (sensing.every_cycles - 1)) * period_s
-    followed = Followed(
+    followed = SweepRecord(
         told_s, told_mm, np.full(len(told_s), force_age_s), told_s, _positions(plant, told_mm), np.zeros(len(told_s)), 0
     )
     drive = Identity("simulated", str(plant.bandwidth_Hz), "")

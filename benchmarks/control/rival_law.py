@@ -12,7 +12,7 @@ as in robots for massage and ultrasound. Plain arithmetic on numbers and tuples 
 
 from typing import NamedTuple
 
-from controller.law.force_position import LINE_CYCLES, Expected, Feedback, Measured, expect
+from controller.law.force_position import LINE_CYCLES, Expected, Feedback, ForceReading, expect
 from controller.law.inverse_model import Foreseen, Inverse, Values, foresee, interpolate, resting
 
 FLOOR_N = 0.5  # below it the relative error of a contact would take away all damping
@@ -78,7 +78,7 @@ def correct(
 
 
 def increment(
-    memory: RivalMemory, table: RivalColumns, settings: RivalSettings, reference_N: float, measured: Measured,
+    memory: RivalMemory, table: RivalColumns, settings: RivalSettings, reference_N: float, measured: ForceReading,
     dt_s: float,
 ) -> tuple[float, RivalMemory]:  # fmt: skip
     """The step to add to the commanded position [mm], within the speed limits, and what to remember."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from controller.commissioning.sweep import RUN_IN_S, TURN_MM_S, Sweep, steady_mm
+from controller.commissioning.sweep import RUN_IN_S, TURN_MM_S, AirSweep, steady_mm
 from drivers.roles import Identity
 from rig.config.axis_dynamics import AxisDynamics, Reversal, TimeEstimate
 from rig.config.wiring import Wiring
@@ -32,7 +32,7 @@ LEAST_DEVIATION = 0.01
 LEAST_GAIN = 0.5
 
 
-class Followed(NamedTuple):
+class SweepRecord(NamedTuple):
     """What was told and what came: columns by cycle and by axis sample; times in s from the begin of the first sweep.
 
     ``told_s`` is when the loop looked at its inputs, ``force_age_s`` how old the newest force was then.
@@ -52,7 +52,7 @@ class Followed(NamedTuple):
         return float(np.median(np.diff(self.told_s)))
 
 
-class Response(NamedTuple):
+class FrequencyResponse(NamedTuple):
     """Set-point to position by frequency, shape (lines,): of all repeats, with each left out in turn, and coherence."""
 
     frequency_Hz: Column
@@ -68,7 +68,7 @@ class Response(NamedTuple):
         return np.asarray(np.hypot(random, LEAST_DEVIATION))
 
 
-class Fitted(NamedTuple):
+class ResponseFit(NamedTuple):
     """Parameters of the fit; ``product_s2`` is lag1 times lag2, ``sum_s`` their sum."""
 
     gain: float
@@ -84,7 +84,7 @@ class Fitted(NamedTuple):
 
 
 def identify(
-    drive: Identity, wiring: Wiring, sweep: Sweep, followed: Followed, now: datetime, computer: str
+    drive: Identity, wiring: Wiring, sweep: AirSweep, followed: SweepRecord, now: datetime, computer: str
 ) -> AxisDynamics:
     """The calibration that a record gives; raises CheckFailed with number and bound where it says too little."""
     _refuse_missed(followed)
@@ -119,7 +119,7 @@ def identify(
     return dynamics
 
 
-def response_of(sweep: Sweep, followed: Followed) -> Response:
+def response_of(sweep: AirSweep, followed: SweepRecord) -> FrequencyResponse:
     """Each way stands for itself: off its steady speed it begins and ends at rest, so that no window is needed."""
     low_Hz, high_Hz = max(1.5 * sweep.lowest_Hz, 1 / sweep.sweep_s), sweep.highest_Hz - sweep.resolution_Hz
     frequency_Hz = np.geomspace(low_Hz, high_Hz, LINES)
@@ -129,10 +129,10 @@ def response_of(sweep: Sweep, followed: Followed) -> Response:
     coherence = np.abs(cross) ** 2 / (told_power * np.sum(np.abs(went) ** 2, axis=0))
     crosses, powers = np.conj(told) * went, np.abs(told) ** 2
     left_out = (cross - crosses) / (told_power - powers)
-    return Response(frequency_Hz, cross / told_power, left_out, coherence)
+    return FrequencyResponse(frequency_Hz, cross / told_power, left_out, coherence)
 
 
-def _spectra(sweep: Sweep, followed: Followed, frequency_Hz: Column, way: int) -> tuple[Spectrum, Spectrum]:
+def _spectra(sweep: AirSweep, followed: SweepRecord, frequency_Hz: Column, way: int) -> tuple[Spectrum, Spectrum]:
     """Fourier integrals of what was told, held from cycle to cycle, and of where the axis was."""
     begin_s, end_s = way * sweep.each_s + RUN_IN_S, (way + 1) * sweep.each_s
     omega = 2 * np.pi * frequency_Hz[:, None]
@@ -144,7 +144,7 @@ def _spectra(sweep: Sweep, followed: Followed, frequency_Hz: Column, way: int) -
 
 
 def _off_way(
-    sweep: Sweep, time_s: Column, along_mm: Column, begin_s: float, end_s: float, held_s: float
+    sweep: AirSweep, time_s: Column, along_mm: Column, begin_s: float, end_s: float, held_s: float
 ) -> tuple[Column, Column]:
     """Times and places in the window, less the steady way; ``held_s``: how old a set-point is on average."""
     inside = (time_s >= begin_s) & (time_s < end_s)
@@ -161,7 +161,7 @@ def model(frequency_Hz: Column, gain: float, delay_s: float, sum_s: float, produ
     return np.asarray(gain * np.exp(-s * delay_s) / (1 + sum_s * s + product_s2 * s**2))
 
 
-def fit(response: Response, measured: Spectrum) -> Fitted:
+def fit(response: FrequencyResponse, measured: Spectrum) -> ResponseFit:
     """Weighted least squares of fitted over ``measured`` response, by what is known of each frequency."""
 
     def residuals(values: Column) -> Column:
@@ -174,17 +174,17 @@ def fit(response: Response, measured: Spectrum) -> Fitted:
     bounds = ([LEAST_GAIN, 0.0, 0.0, 0.0], [1 / LEAST_GAIN, 100.0, 200.0, 1.0])
     found = least_squares(residuals, [1.0, 1.0, 5.0, 0.8], bounds=bounds, x_scale="jac").x
     gain, delay_ms, sum_ms, share = (float(value) for value in found)
-    return Fitted(gain, 1e-3 * delay_ms, 1e-3 * sum_ms, 1e-6 * share * (0.5 * sum_ms) ** 2)
+    return ResponseFit(gain, 1e-3 * delay_ms, 1e-3 * sum_ms, 1e-6 * share * (0.5 * sum_ms) ** 2)
 
 
-def _misfit(response: Response, best: Fitted) -> float:
+def _misfit(response: FrequencyResponse, best: ResponseFit) -> float:
     """Rms over all frequencies, each by what is known of it."""
     weights = response.deviation**-2
     off = np.abs(model(response.frequency_Hz, *best) / response.mean - 1) ** 2
     return float(np.sqrt(np.sum(weights * off) / np.sum(weights)))
 
 
-def _within(response: Response, best: Fitted) -> Column:
+def _within(response: FrequencyResponse, best: ResponseFit) -> Column:
     """Half 95 % intervals of the four parameters and of delay and sum together.
 
     What repeats scatter by (jackknife), and what the shape that was fitted leaves over, which no repeat shows.
@@ -197,7 +197,7 @@ def _within(response: Response, best: Fitted) -> Column:
     return np.asarray(np.hypot(scatter, shape))
 
 
-def _covariance(response: Response, best: Fitted) -> Column:
+def _covariance(response: FrequencyResponse, best: ResponseFit) -> Column:
     """Of the four parameters, by the residuals' own size where that is larger than their deviations."""
     steps = np.diag([1e-4, 1e-6, 1e-6, 1e-9])
 
@@ -211,13 +211,13 @@ def _covariance(response: Response, best: Fitted) -> Column:
     return np.asarray(size * np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-20))
 
 
-def _lag_within_s(best: Fitted, within: Column) -> float:
+def _lag_within_s(best: ResponseFit, within: Column) -> float:
     """Lags of the least and the largest product that the interval holds, at its sum: equal ones are known worst."""
     ends = [best._replace(product_s2=best.product_s2 + side * within[3]).lags_s for side in (-1, 1)]
     return 0.5 * float(within[2]) + max(abs(end[0] - best.lags_s[0]) for end in ends)
 
 
-def reversal_of(sweep: Sweep, followed: Followed, lag_s: float) -> Reversal:
+def reversal_of(sweep: AirSweep, followed: SweepRecord, lag_s: float) -> Reversal:
     """Of the slow ways: the second half of each, one value a turn."""
     begin_s = sweep.turns_begin_s + 0.25 * sweep.turn_s
     turns = [_turn(sweep, followed, begin_s + at * sweep.turn_s) for at in range(sweep.turns)]
@@ -231,7 +231,7 @@ def reversal_of(sweep: Sweep, followed: Followed, lag_s: float) -> Reversal:
     )
 
 
-def _turn(sweep: Sweep, followed: Followed, begin_s: float) -> tuple[float, float]:
+def _turn(sweep: AirSweep, followed: SweepRecord, begin_s: float) -> tuple[float, float]:
     """Half of the band between both ways [mm], and half of the difference of current [A]."""
     told_mm = np.interp(followed.position_s, followed.told_s, followed.told_mm)
     ways = []
@@ -244,7 +244,7 @@ def _turn(sweep: Sweep, followed: Followed, begin_s: float) -> tuple[float, floa
     return 0.5 * (forth[0] - back[0]), 0.5 * (forth[1] - back[1])
 
 
-def _refuse_missed(followed: Followed) -> None:
+def _refuse_missed(followed: SweepRecord) -> None:
     share = followed.missed / (followed.missed + len(followed.told_s))
     if share > LARGEST_MISSED:
         raise CheckFailed(
@@ -253,7 +253,7 @@ def _refuse_missed(followed: Followed) -> None:
         )
 
 
-def _refuse_sense(response: Response) -> None:
+def _refuse_sense(response: FrequencyResponse) -> None:
     """The lowest lines say gain and sense before anything is fitted."""
     gain = float(np.mean(response.mean[:3].real))
     if not gain > LEAST_GAIN:

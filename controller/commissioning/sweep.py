@@ -32,7 +32,7 @@ EDGE = 0.05  # of a sweep, over which it fades in and out
 TURN_MM, TURN_MM_S = 0.05, 1.0
 
 
-class Sweep(NamedTuple):
+class AirSweep(NamedTuple):
     """``repeats`` ways, there and back in turn, with a sweep on each; then ``turns`` slow ones over TURN_MM."""
 
     lowest_Hz: float
@@ -76,12 +76,14 @@ class Sweep(NamedTuple):
         return math.sqrt((self.highest_Hz - self.lowest_Hz) / self.sweep_s)
 
 
-def sweep_for(wiring: Wiring, sweep_s: float, repeats: int, turns: int) -> Sweep:
+def sweep_for(wiring: Wiring, sweep_s: float, repeats: int, turns: int) -> AirSweep:
     """What limits and product allow; raises UsageError with number and bound where it would show nothing."""
     limits, axis = wiring.limits, wiring.axis
-    sweep = Sweep(
+    counted_Hz = math.sqrt(ACCELERATION_SHARE * axis.acceleration_mm_s2 * axis.increments_per_mm / FEWEST_COUNTS)
+    counted_Hz /= 2 * math.pi
+    sweep = AirSweep(
         LOWEST_HZ,
-        min(BAND * axis.bandwidth_Hz, RATE_SHARE * wiring.loop.rate_Hz),
+        min(BAND * axis.bandwidth_Hz, RATE_SHARE * wiring.loop.rate_Hz, counted_Hz),
         LARGEST_SWING_MM,
         SWING_SHARE * limits.speed_mm_s,
         STEADY_SHARE * limits.speed_mm_s,
@@ -94,30 +96,26 @@ def sweep_for(wiring: Wiring, sweep_s: float, repeats: int, turns: int) -> Sweep
     return sweep
 
 
-def _refuse_blind(sweep: Sweep, wiring: Wiring) -> None:
+def _refuse_blind(sweep: AirSweep, wiring: Wiring) -> None:
+    """What cannot be seen up to the axis' own bandwidth says nothing of its lags."""
     axis = wiring.axis
-    counts = float(amplitude_mm(sweep, np.array([sweep.highest_Hz]))[0]) * axis.increments_per_mm
-    if counts < FEWEST_COUNTS:
-        raise UsageError(
-            f"at {sweep.highest_Hz:.3g} Hz limits.speed_mm_s and axis.acceleration_mm_s2 allow {counts:.2g} counts of"
-            f" the encoder (least {FEWEST_COUNTS:g}): the axis' dynamics cannot be seen; raise them, or check"
-            " axis.bandwidth_Hz"
-        )
     if sweep.highest_Hz < axis.bandwidth_Hz:
         raise UsageError(
-            f"loop.rate_Hz {wiring.loop.rate_Hz:g} shows the axis up to {sweep.highest_Hz:g} Hz, below"
-            f" axis.bandwidth_Hz {axis.bandwidth_Hz:g}: raise loop.rate_Hz"
+            f"loop.rate_Hz {wiring.loop.rate_Hz:g}, axis.acceleration_mm_s2 {axis.acceleration_mm_s2:g} and"
+            f" axis.increments_per_mm {axis.increments_per_mm:g} show the axis up to {sweep.highest_Hz:.3g} Hz (a fifth"
+            f" of the rate, swings of {FEWEST_COUNTS:g} counts), below axis.bandwidth_Hz {axis.bandwidth_Hz:g}: raise"
+            " them, or check axis.bandwidth_Hz"
         )
 
 
-def amplitude_mm(sweep: Sweep, frequency_Hz: Column) -> Column:
+def amplitude_mm(sweep: AirSweep, frequency_Hz: Column) -> Column:
     """Of a sine of each frequency, shape of ``frequency_Hz``: the smallest that swing, speed, acceleration allow."""
     omega = 2 * np.pi * frequency_Hz
     bounds = np.full_like(omega, sweep.swing_mm), sweep.swing_mm_s / omega, sweep.acceleration_mm_s2 / omega**2
     return np.asarray(np.minimum.reduce(bounds))
 
 
-def sweep_mm(sweep: Sweep, time_s: Column) -> Column:
+def sweep_mm(sweep: AirSweep, time_s: Column) -> Column:
     """One sweep from 0 to ``sweep_s``, 0 elsewhere; its frequency rises evenly, its edges fade."""
     share = np.clip(time_s / sweep.sweep_s, 0.0, 1.0)
     rise_Hz = sweep.highest_Hz - sweep.lowest_Hz
@@ -127,14 +125,14 @@ def sweep_mm(sweep: Sweep, time_s: Column) -> Column:
     return np.asarray(np.sin(0.5 * np.pi * fade) ** 2 * swing)
 
 
-def steady_mm(sweep: Sweep, elapsed_s: float) -> float:
+def steady_mm(sweep: AirSweep, elapsed_s: float) -> float:
     """The way without its sweeps: there on even ones, back on odd ones; at its ends braked as the sines may be."""
     way, within_s = divmod(elapsed_s, sweep.each_s)
     along = sweep.steady_mm_s * within_s
     return along if way % 2 == 0 else sweep.steady_mm_s * sweep.each_s - along
 
 
-def offset_mm(sweep: Sweep, elapsed_s: float) -> float:
+def offset_mm(sweep: AirSweep, elapsed_s: float) -> float:
     """Where the set-point stands, from the place at which all began."""
     if elapsed_s < sweep.each_s * sweep.repeats:
         swing_mm = sweep_mm(sweep, np.array([elapsed_s % sweep.each_s - RUN_IN_S]))
@@ -143,7 +141,7 @@ def offset_mm(sweep: Sweep, elapsed_s: float) -> float:
     return ended_mm + turning_mm(sweep, elapsed_s - sweep.turns_begin_s)
 
 
-def turning_mm(sweep: Sweep, elapsed_s: float) -> float:
+def turning_mm(sweep: AirSweep, elapsed_s: float) -> float:
     """The slow way: a triangle that begins and ends in its middle."""
     if not 0.0 <= elapsed_s < sweep.turn_s * (sweep.turns + 0.5):
         return 0.0

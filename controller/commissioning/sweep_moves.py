@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from controller.commissioning.axis_dynamics import Followed
+from controller.commissioning.axis_dynamics import SweepRecord
 from controller.commissioning.axis_moves import LARGEST_TOUCH_N, RestingAxis
-from controller.commissioning.sweep import LARGEST_SWING_MM, Sweep, offset_mm
+from controller.commissioning.sweep import LARGEST_SWING_MM, AirSweep, offset_mm
 from controller.devices.drivers import Devices
 from controller.loop.executive import Cycle, Executive, sleep_until
 from drivers.epos4.walker import never
@@ -26,7 +26,7 @@ CLEAR_MM = 5.0
 LISTEN_S = 0.1
 
 
-def refuse_outside(at_mm: float, sweep: Sweep, wiring: Wiring) -> None:
+def refuse_outside(at_mm: float, sweep: AirSweep, wiring: Wiring) -> None:
     """Raises UsageError, before anything is opened, where a sweep from ``at_mm`` on would leave the workspace."""
     low_mm, high_mm = wiring.limits.position_min_mm, wiring.limits.position_max_mm
     to_mm = at_mm + sweep.way_mm + CLEAR_MM
@@ -37,7 +37,7 @@ def refuse_outside(at_mm: float, sweep: Sweep, wiring: Wiring) -> None:
         )
 
 
-def refuse_touching(axis: RestingAxis, at_mm: float, sweep: Sweep) -> None:
+def refuse_touching(axis: RestingAxis, at_mm: float, sweep: AirSweep) -> None:
     """Goes through all that must be air, and back to ``at_mm``; raises SafetyStop where something presses."""
     for position_mm in (at_mm, at_mm + sweep.way_mm, at_mm + sweep.way_mm + CLEAR_MM, at_mm):
         axis.go(position_mm)
@@ -51,7 +51,7 @@ class SweepRun:
         self,
         devices: Devices,
         wiring: Wiring,
-        sweep: Sweep,
+        sweep: AirSweep,
         interrupted: Callable[[], bool] = never,
         now: Callable[[], int] = time.monotonic_ns,
         sleep: Callable[[int], None] = sleep_until,
@@ -64,7 +64,7 @@ class SweepRun:
         self._unloaded: ForceSample | None = None
         self._begin_ns = self._missed = 0
 
-    def played(self) -> Followed:
+    def played(self) -> SweepRecord:
         """Raises SafetyStop, CheckFailed or DeviceError where it was ended; the axis stands then, braked."""
         try:
             Executive(round(1e9 / self._wiring.loop.rate_Hz), self._now, self._sleep).run(self._turn)
@@ -134,10 +134,10 @@ class SweepRun:
             if age_ms > limit_ms:
                 raise DeviceError(f"{whose}: newest sample is {age_ms:.0f} ms old in the sweep (limit {limit_ms:g} ms)")
 
-    def _followed(self) -> Followed:
+    def _followed(self) -> SweepRecord:
         told = np.array(self._told)
         axis = np.array([(one.capture_ns, one.position_mm, one.current_A) for one in self._axis if one.valid])
-        return Followed(
+        return SweepRecord(
             told_s=(told[:, 0] - self._begin_ns) * 1e-9,
             told_mm=told[:, 1] - self._home_mm,
             force_age_s=told[:, 2],
