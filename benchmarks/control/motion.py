@@ -78,7 +78,8 @@ def moved(
         after = step(state, motor, loop, limb, sensing, target_mm)
         surface_mm = from_mm + surface_mm_s * (at + 1) * STEP_S
         speed_mm_s = after.speed_rad_s * motor.lead_mm / (2 * math.pi)
-        rest_N = tissue_force(limb, state.position_mm - surface_mm, 0.0)
+        before_mm = state.position_mm - surface_mm + surface_mm_s * STEP_S
+        rest_N = tissue_force(limb, before_mm, 0.0)
         depth_mm, into_mm_s = after.position_mm - surface_mm, speed_mm_s - surface_mm_s
         force_N = tissue_force(limb, depth_mm, into_mm_s)
         risen_N = tissue_force(limb, depth_mm, 0.0) - rest_N

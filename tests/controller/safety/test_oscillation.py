@@ -132,6 +132,7 @@ def test_the_same_jumps_that_do_not_cease_are_heard() -> None:
     assert heard(asked_N + swing(0.5, 25.0), asked_N) != []
 
 
+@pytest.mark.extra
 @RATES
 @pytest.mark.parametrize("reference", ["vibrate:0.5", "knead:2", "sine:0.5,mean_N=2,frequency_Hz=10"])
 @pytest.mark.parametrize("stiffness", [0.5, 1.0, 2.0])
