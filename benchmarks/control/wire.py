@@ -53,7 +53,7 @@ def tracked(subject: str, folder: Path) -> list[float]:
     """Rms error [N] at each force of FORCES_N, as `rig track` found it."""
     model, result = folder / "model.json", folder / "result.json"
     model_of(subject).save(model)
-    hidden = [f"breathing.amplitude_mm={LIMB_MM}", f"breathing.frequency_Hz={MOTION_HZ}"]
+    hidden = [f"surface_motion.amplitude_mm={LIMB_MM}", f"surface_motion.frequency_Hz={MOTION_HZ}"]
     command = [
         str(Path(sys.executable).with_name("rig")), "track", "--model", str(model),
         "--force", ",".join(f"{force_N:g}" for force_N in FORCES_N), "--seconds", f"{SECONDS:g}",
