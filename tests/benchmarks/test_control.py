@@ -9,7 +9,7 @@ from benchmarks.control import __main__ as program
 from benchmarks.control import cases, laws
 from benchmarks.control.cases import Asked, held, limb_motion, settling, swing
 from benchmarks.control.laws import LAW, admittance, constant, shaped
-from benchmarks.control.motion import Bench, Contact, Run, run
+from benchmarks.control.motion import Bench, Contact, Law, Run, run
 from benchmarks.control.plants import FAST, PLANT, SUBJECTS, limb_of, model_of, wiring_of
 from benchmarks.control.rival_tuning import LEAST_N, TissueAt, Tuning, fastest, tissue_at, worst
 from benchmarks.control.scores import Score, gain_of, headline, mean_of
@@ -25,7 +25,7 @@ QUIET = ForceSensing(noise_N=0.0, quantum_N=0.0)
 FAST_RATES = Rates(1e-5, 1e-5)
 
 
-def still(subject: str) -> "laws.Law":
+def still(subject: str) -> Law:
     """A law that moves nothing."""
     return laws.pi(subject, PLANT, "constant", Tuning(0.0, 0.0, 0.0), ahead=False)
 
@@ -41,8 +41,8 @@ def on_spring(k_N_mm: float, surface_mm: np.ndarray, contact: Contact = Contact(
 
 
 def test_a_limb_that_moves_under_a_still_tip_presses_by_its_stiffness() -> None:
-    time_s = np.arange(1001) * 1e-3
-    surface_mm = -2.0 + swing(time_s, 0.5, 2.0)
+    time_s = np.arange(1001, dtype=np.float64) / 1000.0
+    surface_mm = -2.0 + swing(np.asarray(time_s, dtype=np.float64), 0.5, 2.0)
     found = on_spring(0.8, surface_mm)
     # The axis gives way by less than a hundredth of a millimetre; the force is that of the end of the cycle before.
     assert found.tissue_N[200:] == pytest.approx(-0.8 * surface_mm[200:1000], abs=0.015)
