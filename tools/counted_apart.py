@@ -121,6 +121,16 @@ LAW = {
     "controller/law/loop_response.py": "the open loop over frequency",
     "controller/law/stability.py": "stability is shown",
     "controller/law/synthesis.py": "the law's numbers from the axis' response",
+    "rig/config/axis_dynamics.py": "the axis as it was identified",
+    "rig/computer.py": "what was identified holds for one computer",
+    "controller/commissioning/axis_dynamics.py": "identification of the axis",
+    "controller/commissioning/dynamics_refusals.py": "no force loop on an axis that was not identified",
+    "controller/commissioning/sweep.py": "identification of the axis",
+    "controller/commissioning/sweep_moves.py": "identification of the axis",
+    "api/operations/calibrate_dynamics.py": "identification of the axis",
+    "api/cli/calibrate_dynamics.py": "identification of the axis",
+    "api/cli/mock_dynamics.py": "identification of the mock axis",
+    "controller/safety/oscillation.py": "what oscillates is softened",
 }
 # What came for speed, cohorts and more than one computer, likewise.
 SCALE: dict[str, str] = {}

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 
 from api.cli.mock_calibration import mock_axis_calibration, mock_force_calibration
+from api.cli.mock_dynamics import mock_axis_dynamics
 from api.cli.options import calibrated
 from controller.commissioning.refusals import refuse_uncalibrated
 from rig.config.endpoints import Endpoints
@@ -90,6 +91,8 @@ def plug_into(wiring: Wiring, endpoints: Endpoints) -> Wiring:
     seen = tracker is not None and tracker.port == wiring.axis.port == MOCK_PORT
     if seen and not known.of_axis:
         known = known.model_copy(update={"of_axis": mock_axis_calibration(live, endpoints)})
+    if wiring.force.port == wiring.axis.port == MOCK_PORT and not known.of_dynamics:
+        known = known.model_copy(update={"of_dynamics": mock_axis_dynamics(live, endpoints)})
     return live.model_copy(update={"calibration": known})
 
 

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from rig.config.calibration import KINDS
 from rig.config.calibration_files import with_files
 from rig.config.table import load, merged, parse
 from rig.config.wiring import Wiring
@@ -78,5 +79,5 @@ def _beside(wiring: Wiring, folder: Path) -> Wiring:
     """Paths in the file are relative to the file."""
     mock, known = wiring.mock, wiring.calibration
     mock = mock.model_copy(update={"parameters": mock.parameters and folder / mock.parameters})
-    files = {"force": known.force and folder / known.force, "axis": known.axis and folder / known.axis}
+    files: dict[str, Path] = {what: folder / named for what in KINDS if isinstance(named := getattr(known, what), Path)}
     return wiring.model_copy(update={"mock": mock, "calibration": known.model_copy(update=files)})

@@ -24,6 +24,7 @@ from controller.safety.first_touch import FirstTouch
 from controller.safety.giving_way import give_way
 from controller.safety.inputs import SafetyInputs
 from controller.safety.load import LoadMonitor, calibrated_zero
+from controller.safety.oscillation import OscillationMonitor
 from controller.safety.table import TABLE, Action, Check, Incident
 from rig.channel import Channel
 from rig.channels import (
@@ -100,7 +101,7 @@ class BenchLoop:
         self._status_every = round(STATUS_EVERY_S / period_s)
         self._cycles = self._events = self._program = 0
         self._load_monitor = LoadMonitor(devices.force.period_ns)
-        self._first_touch = FirstTouch(wiring)
+        self._first_touch, self._oscillation = FirstTouch(wiring), OscillationMonitor()
         self._calibrated_zero = calibrated_zero(wiring)
         self._force_map = wiring.force_map
         self.braked = False
@@ -219,6 +220,7 @@ class BenchLoop:
         state.force_late = health["force"].age_ns(now_ns) > LATE_PERIODS * health["force"].period_ns
         state.following_mm = state.setpoint.position_mm - state.position_mm if self.machine.busy else 0.0
         inputs.touch_wrong = self._first_touch.update(state) if self.machine.mode in TOUCHING else ""
+        inputs.oscillation = self._oscillation.update(state) if self.machine.mode is Mode.CONTACT else ""
         inputs.force_valid, inputs.force_frozen = health["force"].valid, health["force"].frozen
         inputs.force_age_ms = health["force"].age_ns(now_ns) * 1e-6
         inputs.axis_age_ms = health["axis"].age_ns(now_ns) * 1e-6
