@@ -110,7 +110,12 @@ SERVICE: dict[str, str] = {
     "rig/results/catalogue.py": "the catalogue",
 }
 # What came for benches that labs plug in, likewise.
-DEVICES: dict[str, str] = {}
+DEVICES: dict[str, str] = {
+    "drivers/threaded_source.py": "SDKs that block or call back",
+    "drivers/udp_port.py": "devices on UDP",
+    "drivers/testing/": "the conformance kit of drivers",
+    "controller/replay/": "recordings played through the loop again",
+}
 # What came for a force law that makes every tissue the same plant, likewise.
 LAW = {
     "rig/config/axis_response.py": "the axis as it was identified",
