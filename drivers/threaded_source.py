@@ -90,7 +90,7 @@ class ThreadedSource(Generic[Item]):
             raise DeviceError(f"{self._name}: this end closed it; start the device again")
         with contextlib.suppress(BlockingIOError):
             os.eventfd_read(self._fd)
-        taken = []
+        taken: list[Arrived[Item]] = []
         with contextlib.suppress(IndexError):
             while len(taken) < self._capacity:
                 taken.append(self._items.popleft())
