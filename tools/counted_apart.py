@@ -114,6 +114,8 @@ DEVICES: dict[str, str] = {
     "drivers/threaded_source.py": "SDKs that block or call back",
     "drivers/udp_port.py": "devices on UDP",
     "drivers/testing/": "the conformance kit of drivers",
+    "rig/plugins.py": "products, laws and causes of other distributions",
+    "rig/config/products/usable.py": "products of other distributions",
     "controller/replay/": "recordings played through the loop again",
 }
 # What came for a force law that makes every tissue the same plant, likewise.
