@@ -68,6 +68,11 @@ def met() -> Mapping[str, tuple[Plugin, ...]]:
     return _met
 
 
+def declaring(group: str, name: str) -> Plugin | None:
+    """The plug-in in use that declares ``name``; None where it is one of ours."""
+    return next((one for one in _met.get(group, ()) if one.declares == name and not one.error), None)
+
+
 def failures() -> Iterator[Plugin]:
     """Those that cannot be used."""
     return (plugin for plugins in _met.values() for plugin in plugins if plugin.error)

@@ -116,6 +116,8 @@ DEVICES: dict[str, str] = {
     "drivers/testing/": "the conformance kit of drivers",
     "rig/plugins.py": "products, laws and causes of other distributions",
     "rig/config/products/usable.py": "products of other distributions",
+    "controller/devices/guard.py": "drivers of other distributions",
+    "mock_devices/udp_wire.py": "devices on UDP",
     "controller/replay/": "recordings played through the loop again",
 }
 # What came for a force law that makes every tissue the same plant, likewise.
