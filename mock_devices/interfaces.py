@@ -98,3 +98,10 @@ class Sampled(Protocol):
     """A sensor that notes mark and true time of each sample, for whoever measures its driver."""
 
     sampled: deque[tuple[int, int]]
+
+
+@runtime_checkable
+class Late(Protocol):
+    """A device whose data sheet states from event to sample [ms]."""
+
+    latency_ms: float

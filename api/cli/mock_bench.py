@@ -120,7 +120,7 @@ def _served(device: Product, endpoints: Endpoints) -> Product:
     known = {"port": device.mock.address(endpoints)}
     if not isinstance(device, ForceProduct | TrackerProduct):
         return device.model_copy(update=known)
-    stated_ms = endpoints.latency_ms.get(device.mock.role)
+    stated_ms = endpoints.latency_ms.get(device.mock.role, 0.0)
     return device.model_copy(update=known | {"latency_ms": device.latency_ms or stated_ms})
 
 

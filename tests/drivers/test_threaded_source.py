@@ -115,7 +115,12 @@ def test_it_may_be_closed_twice_and_gives_its_descriptor_back() -> None:
 
 def test_producers_and_consumer_together_lose_nothing_uncounted() -> None:
     source = ThreadedSource[int]("acme", capacity=50)
-    producers = [threading.Thread(target=lambda: [source.put(1) for _ in range(5000)]) for _ in range(3)]
+
+    def put() -> None:
+        for _ in range(5000):
+            source.put(1)
+
+    producers = [threading.Thread(target=put) for _ in range(3)]
     for producer in producers:
         producer.start()
     taken = 0
