@@ -22,7 +22,7 @@ CAPACITY = 1000
 CLOSE_S = 2.0
 
 
-class Arrived(NamedTuple, Generic[Item]):
+class Stamped(NamedTuple, Generic[Item]):
     """One item, and when it came on the host's monotonic clock."""
 
     item: Item
@@ -46,7 +46,7 @@ class ThreadedSource(Generic[Item]):
     ) -> None:
         self.dropped = 0
         self._name, self._read, self._close_s, self._now = name, read, close_s, now
-        self._items: deque[Arrived[Item]] = deque()
+        self._items: deque[Stamped[Item]] = deque()
         self._capacity = capacity
         self._fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._putting = threading.Lock()
@@ -66,7 +66,7 @@ class ThreadedSource(Generic[Item]):
 
     def put(self, item: Item) -> None:
         """From any thread: one item that came now; after ``close`` it is thrown away."""
-        arrived = Arrived(item, self._now())
+        arrived = Stamped(item, self._now())
         with self._putting:
             if self._fd < 0:
                 return
@@ -84,13 +84,13 @@ class ThreadedSource(Generic[Item]):
             if self._fd >= 0:
                 self._wake()
 
-    def take(self) -> list[Arrived[Item]]:
+    def take(self) -> list[Stamped[Item]]:
         """All that came, oldest first; raises DeviceError once nothing is left before a failure."""
         if self._fd < 0:
             raise DeviceError(f"{self._name}: this end closed it; start the device again")
         with contextlib.suppress(BlockingIOError):
             os.eventfd_read(self._fd)
-        taken: list[Arrived[Item]] = []
+        taken: list[Stamped[Item]] = []
         with contextlib.suppress(IndexError):
             while len(taken) < self._capacity:
                 taken.append(self._items.popleft())

@@ -5,8 +5,7 @@ to that time, and ``receive`` when bytes came. What a mock does follows these ti
 to note when it really took a SYNC.
 """
 
-from collections import deque
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol
 
 NEVER_NS = 1 << 62  # after 146 years; its difference to any time still has 64 bits
 # Times of samples that a mock keeps for whoever asks: ten seconds at 1 kHz.
@@ -84,24 +83,3 @@ class ProtocolMock(Protocol):
 
     def close(self) -> None:
         """Cuts the wire."""
-
-
-@runtime_checkable
-class Numbered(Protocol):
-    """A device that has a serial number: its calibration is kept by that."""
-
-    serial_number: str
-
-
-@runtime_checkable
-class Sampled(Protocol):
-    """A sensor that notes mark and true time of each sample, for whoever measures its driver."""
-
-    sampled: deque[tuple[int, int]]
-
-
-@runtime_checkable
-class Late(Protocol):
-    """A device whose data sheet states from event to sample [ms]."""
-
-    latency_ms: float

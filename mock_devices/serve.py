@@ -21,9 +21,9 @@ from mock_devices.control import ControlPort, RequestHandler
 from mock_devices.devices import ALL, CHOICES, DeviceFactory, MockDevice
 from mock_devices.epos4.mock import Epos4Mock
 from mock_devices.faults.wires import Fault
-from mock_devices.interfaces import Late, Numbered, Sampled
 from mock_devices.parameters import Parameters, load_parameters
 from mock_devices.physics.effects import EFFECTS, complete, knobs, parse_hidden, statement
+from mock_devices.stating import Numbered, Sampled, StatedLatency
 from rig.config.endpoints import Endpoints
 from rig.config.products.registry import AXES
 from rig.errors import RigError
@@ -77,7 +77,9 @@ class MockServer:
             if isinstance(device.mock, Numbered):
                 serials[device.role] = device.mock.serial_number
         about = {"control": self.control.endpoint, "pid": os.getpid(), "serials": serials}
-        late = {device.role: device.mock.latency_ms for device in self._devices if isinstance(device.mock, Late)}
+        late = {
+            device.role: device.mock.latency_ms for device in self._devices if isinstance(device.mock, StatedLatency)
+        }
         stated = stated_latency_ms(self._bench.parameters) | late
         return Endpoints.model_validate(addresses | about | {"latency_ms": stated})
 

@@ -117,6 +117,7 @@ DEVICES: dict[str, str] = {
     "rig/plugins.py": "products, laws and causes of other distributions",
     "rig/config/products/usable.py": "products of other distributions",
     "controller/devices/guard.py": "drivers of other distributions",
+    "mock_devices/stating.py": "mocks of other distributions",
     "mock_devices/udp_wire.py": "devices on UDP",
     "controller/replay/": "recordings played through the loop again",
 }

@@ -50,7 +50,7 @@ def marker_tracker(config: TrackerProduct, make: Callable[[], MarkerTracker]) ->
     return GuardedTracker(plugin, config, make) if plugin else make()
 
 
-class Guard(ABC, Generic[Made, Sample]):
+class Guarded(ABC, Generic[Made, Sample]):
     """What every role has. ``now`` is the monotonic clock, ``waits`` how often this thread has waited so far."""
 
     KIND: type[Sample]
@@ -157,7 +157,7 @@ class Guard(ABC, Generic[Made, Sample]):
         )
 
 
-class GuardedForce(Guard[ForceSensor, ForceSample]):
+class GuardedForce(Guarded[ForceSensor, ForceSample]):
     """A force sensor."""
 
     KIND = ForceSample
@@ -173,7 +173,7 @@ class GuardedForce(Guard[ForceSensor, ForceSample]):
         return "" if fits else f"{largest_N:g} N from a sensor of {self._config.range_N:g} N: wrong unit?"
 
 
-class GuardedTracker(Guard[MarkerTracker, MarkerSample]):
+class GuardedTracker(Guarded[MarkerTracker, MarkerSample]):
     """A marker tracker."""
 
     KIND = MarkerSample
@@ -191,7 +191,7 @@ class GuardedTracker(Guard[MarkerTracker, MarkerSample]):
         return "" if far_mm <= FARTHEST_MM else f"a marker {far_mm:g} mm away: wrong unit?"
 
 
-class GuardedAxis(Guard[ServoAxis, AxisSample]):
+class GuardedAxis(Guarded[ServoAxis, AxisSample]):
     """A servo axis."""
 
     KIND = AxisSample

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from drivers.roles import LinkCounters
-from drivers.testing.subject import FEW_S, AnyDevice, AnySample, Nonconformity, Subject
+from drivers.testing.under_test import FEW_S, AnyDevice, AnySample, Nonconformity, UnderTest
 from rig.channels import ForceSample, MarkerSample
 from rig.config.products.roles import ForceProduct
 from rig.errors import DeviceError
@@ -34,7 +34,7 @@ FARTHEST_MM = 10_000.0
 LEAST_STEP = 0.02
 
 
-def identity(subject: Subject) -> None:
+def identity(subject: UnderTest) -> None:
     """A driver says who the device is once it has started, and a second one the same."""
     found = []
     for _ in range(2):
@@ -47,7 +47,7 @@ def identity(subject: Subject) -> None:
         raise Nonconformity(f"it calls itself {found[0]} first and {found[1]} when it is started again")
 
 
-def rate(subject: Subject) -> None:
+def rate(subject: UnderTest) -> None:
     """Samples come as often as the driver and its declaration say."""
     with subject.started() as device:
         samples = subject.listen(device, LISTEN_S).samples
@@ -64,7 +64,7 @@ def rate(subject: Subject) -> None:
             raise Nonconformity(f"{seen_Hz:.1f} Hz came where {what} says {said_Hz:.1f} Hz")
 
 
-def numbering(subject: Subject) -> None:
+def numbering(subject: UnderTest) -> None:
     """Samples are numbered one after another, from the number that the driver was given."""
     with subject.started(NEXT_SEQ) as device:
         seqs = [sample.seq for sample in subject.listen(device, FEW_S).samples]
@@ -73,7 +73,7 @@ def numbering(subject: Subject) -> None:
         raise Nonconformity(f"samples from {NEXT_SEQ} on are numbered {seqs[:3]}... and next_seq is then {next_seq}")
 
 
-def clock(subject: Subject) -> None:
+def clock(subject: UnderTest) -> None:
     """Captures go on upwards, each of its own, and none is later than its arrival."""
     with subject.started() as device:
         samples = subject.listen(device, LISTEN_S).samples
@@ -106,7 +106,7 @@ def _in_order(samples: Sequence[AnySample], period_ns: int) -> None:
         )
 
 
-def quantities(subject: Subject) -> None:
+def quantities(subject: UnderTest) -> None:
     """Values are finite where they are valid, in the range of the product, and in its unit: newton, millimetre."""
     with subject.started() as device:
         unloaded = subject.listen(device, FEW_S).samples
@@ -122,7 +122,7 @@ def quantities(subject: Subject) -> None:
     _weighed(unloaded, loaded, subject.config)
 
 
-def _possible(samples: Sequence[AnySample], subject: Subject) -> None:
+def _possible(samples: Sequence[AnySample], subject: UnderTest) -> None:
     valid = [sample for sample in samples if sample.valid]
     if not valid:
         raise Nonconformity(f"{len(samples)} samples came in {FEW_S:g} s, none of them valid")
@@ -132,7 +132,7 @@ def _possible(samples: Sequence[AnySample], subject: Subject) -> None:
             raise Nonconformity(f"sample {sample.seq} is marked valid, and {wrong}")
 
 
-def _impossible(sample: AnySample, subject: Subject) -> str:
+def _impossible(sample: AnySample, subject: UnderTest) -> str:
     if isinstance(sample, ForceSample):
         range_N = subject.config.range_N if isinstance(subject.config, ForceProduct) else math.inf
         known = [value for value in sample[4:7] if not math.isnan(value)]
@@ -157,7 +157,7 @@ def _weighed(unloaded: Sequence[AnySample], loaded: Sequence[AnySample], config:
         )
 
 
-def waiting(subject: Subject) -> None:
+def waiting(subject: UnderTest) -> None:
     """The descriptor turns readable, and a poll never waits for what has not come."""
     with subject.started() as device:
         if subject.sampled_Hz is not None and not subject.wait(device, FEW_S):
@@ -171,7 +171,7 @@ def waiting(subject: Subject) -> None:
         )
 
 
-def damage(subject: Subject) -> None:
+def damage(subject: UnderTest) -> None:
     """What a wire spoils is dropped and counted, and never becomes a sample; afterwards all is as before."""
     for kind in subject.damage:
         with subject.started() as device:
@@ -188,7 +188,7 @@ def _losses(counters: LinkCounters) -> int:
     return counters.checksum_errors + counters.discarded_bytes + counters.device_lost + counters.repeated
 
 
-def _stands(subject: Subject, device: AnyDevice, kind: str) -> None:
+def _stands(subject: UnderTest, device: AnyDevice, kind: str) -> None:
     try:
         samples = subject.listen(device, LISTEN_S).samples
     except DeviceError:
@@ -200,7 +200,7 @@ def _stands(subject: Subject, device: AnyDevice, kind: str) -> None:
             raise Nonconformity(f"{kind} on the wire became a sample: {_impossible(sample, subject)}")
 
 
-def lost_and_back(subject: Subject) -> None:
+def lost_and_back(subject: UnderTest) -> None:
     """A cable that is pulled ends the samples; a new driver goes on once it is plugged in again."""
     if not subject.unplugs:
         return
@@ -222,7 +222,7 @@ def lost_and_back(subject: Subject) -> None:
         again.close()
 
 
-def _ends(subject: Subject, device: AnyDevice) -> None:
+def _ends(subject: UnderTest, device: AnyDevice) -> None:
     """Raises DeviceError, or falls silent: a link without a connection cannot know more."""
     try:
         subject.listen(device, LOST_S)
@@ -235,7 +235,7 @@ def _ends(subject: Subject, device: AnyDevice) -> None:
         raise Nonconformity(f"unplugged for {LOST_S:g} s it still gives samples: {len(left)} in {FEW_S:g} s")
 
 
-def closing(subject: Subject) -> None:
+def closing(subject: UnderTest) -> None:
     """Closing may be done twice, leaves neither thread nor descriptor behind, and nothing can be polled after it."""
     descriptors, threads = _descriptors(), set(threading.enumerate())
     device = subject.open()
@@ -267,6 +267,6 @@ def _descriptors() -> int:
     return sum(1 for _ in Path("/proc/self/fd").iterdir())
 
 
-CHECKS: tuple[Callable[[Subject], None], ...] = (
+CHECKS: tuple[Callable[[UnderTest], None], ...] = (
     identity, rate, numbering, clock, quantities, waiting, damage, lost_and_back, closing,
 )  # fmt: skip

@@ -8,7 +8,7 @@ import pytest
 from rig_netft.netft import NetFt, NetFtWiring, Scale, open_sensor, parse, request, scale_of
 
 from drivers.roles import Identity
-from drivers.testing import CHECKS, Subject
+from drivers.testing import CHECKS, UnderTest
 from drivers.testing.checks import quantities
 from mock_devices.testing.hand import MockBench
 from rig.errors import DeviceError, UsageError
@@ -107,10 +107,10 @@ def test_a_port_that_is_no_network_address_is_one_sentence() -> None:
 
 
 @pytest.fixture
-def subject(mock_bench: MockBench) -> Subject:
+def subject(mock_bench: MockBench) -> UnderTest:
     config = mock_bench.wiring(NETFT).force
     assert isinstance(config, NetFtWiring)
-    return Subject(
+    return UnderTest(
         config,
         lambda: open_sensor(config),
         lambda kind, value: mock_bench.fault("netft", kind, value),
@@ -120,11 +120,11 @@ def subject(mock_bench: MockBench) -> Subject:
 
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
-def test_it_conforms(check: Callable[[Subject], None], subject: Subject) -> None:
+def test_it_conforms(check: Callable[[UnderTest], None], subject: UnderTest) -> None:
     check(subject)
 
 
-def test_a_sensor_that_counts_in_pounds_is_read_in_newton(mock_bench: MockBench, subject: Subject) -> None:
+def test_a_sensor_that_counts_in_pounds_is_read_in_newton(mock_bench: MockBench, subject: UnderTest) -> None:
     mock_bench.fault("netft", "pounds", True)
     try:
         quantities(subject)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from drivers.roles import Identity, LinkCounters
-from drivers.testing.subject import AnyDevice, Subject
+from drivers.testing.under_test import AnyDevice, UnderTest
 from rig.channels import ForceSample
 from rig.config.products.roles import ForceProduct
 from rig.errors import DeviceError
@@ -51,8 +51,8 @@ class World:
     def put_on(self, load_N: float) -> None:
         self.load_N = load_N
 
-    def subject(self) -> Subject:
-        return Subject(
+    def subject(self) -> UnderTest:
+        return UnderTest(
             MadeProduct(),
             lambda: MadeSensor(self),
             self.fault,

@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from drivers.testing import CHECKS, Nonconformity, Subject, checks
+from drivers.testing import CHECKS, Nonconformity, UnderTest, checks
 from tests.drivers.conformance.made import World, nothing_left
 
-Check = Callable[[Subject], None]
+Check = Callable[[UnderTest], None]
 
 
 @pytest.fixture(autouse=True)

@@ -43,7 +43,7 @@ def no_fault(kind: str, value: bool | float) -> None:
 
 
 @dataclass(frozen=True)
-class Subject:
+class UnderTest:
     """``open`` gives a new driver, not started, of the device that ``config`` describes.
 
     ``fault`` switches a fault of the mock by its name, as the bench's control channel does; ``damage`` are those of the
