@@ -18,11 +18,12 @@ from typing import Protocol
 
 from mock_devices.bench import Bench
 from mock_devices.control import ControlPort, RequestHandler
-from mock_devices.devices import ALL, CHOICES, DeviceFactory, MockDevice
+from mock_devices.devices import DeviceFactory
 from mock_devices.epos4.mock import Epos4Mock
 from mock_devices.faults.wires import Fault
 from mock_devices.parameters import Parameters, load_parameters
 from mock_devices.physics.effects import EFFECTS, complete, knobs, parse_hidden, statement
+from mock_devices.played import ALL, CHOICES, MockDevice
 from mock_devices.stating import Numbered, Sampled, StatedLatency
 from rig.config.endpoints import Endpoints
 from rig.config.products.registry import AXES

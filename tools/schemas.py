@@ -24,6 +24,7 @@ from rig.results.catalogue import (
     WorkList,
 )
 from rig.results.demo import DemoSummary
+from rig.results.devices import DevicesResult, FindResult
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
 from rig.results.fit import FitResult
 from rig.results.recorded import CaptureResult, ExportResult, ImportResult, RepairResult, ReportResult, VerifyResult
@@ -45,7 +46,9 @@ WRITTEN: Mapping[str, type[Result]] = {
     "compare": CompareResult,
     "demo": DemoSummary,
     "diagnosis": DiagnosisResult,
+    "devices": DevicesResult,
     "doctor": DoctorResult,
+    "find": FindResult,
     "came-in": CameInResult,
     "export": ExportResult,
     "failure": Failure,

@@ -39,6 +39,8 @@ COMMANDS = {
     "mock": "api.cli.hardware:mock",
     "reset": "api.cli.recovery:reset",
     "doctor": "api.cli.hardware:doctor",
+    "devices": "api.cli.devices:devices",
+    "find": "api.cli.devices:find",
     "calibrate": "api.cli.calibrate:calibrate",
     "demo": "api.cli.demo:demo",
 }

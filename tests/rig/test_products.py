@@ -4,7 +4,8 @@ from pkgutil import resolve_name
 
 import pytest
 
-from mock_devices.devices import CHOICES, DeviceFactory
+from mock_devices.devices import DeviceFactory
+from mock_devices.played import CHOICES
 from rig.config.endpoints import Endpoints
 from rig.config.products.registry import AXES, FORCE_SENSORS, ROLES, TRACKERS, choice_of, name_of, read
 from rig.config.products.robotiq_ft300 import Ft300Wiring

@@ -6,10 +6,11 @@ import pytest
 
 from drivers.ports import PortClosed, SerialPort, TcpPort, read_until
 from mock_devices.bench import Bench
-from mock_devices.devices import ALL, CHOICES, DeviceFactory
+from mock_devices.devices import DeviceFactory
 from mock_devices.faults.wires import WIRE_FAULTS, FaultyWire, as_number, faults_of
 from mock_devices.interfaces import NEVER_NS
 from mock_devices.parameters import Parameters
+from mock_devices.played import ALL, CHOICES
 from mock_devices.testing.clock import Clock
 from mock_devices.testing.wire import MemoryWire
 from mock_devices.wire import PtyWire, TcpWire

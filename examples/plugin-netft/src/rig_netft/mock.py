@@ -4,11 +4,12 @@ import contextlib
 import re
 from collections.abc import Mapping
 
-from mock_devices.devices import DeviceFactory, MockDevice, number_of, served
+from mock_devices.devices import DeviceFactory
 from mock_devices.faults.sensing import SENSOR_FAULTS
 from mock_devices.faults.wires import FaultKind, faults_of, switching
 from mock_devices.interfaces import NEVER_NS, SensorPlant
 from mock_devices.parameters import Parameters
+from mock_devices.played import MockDevice, number_of, served
 from mock_devices.udp_wire import UdpWire
 from mock_devices.wire import OnWire, TcpWire, Wire
 from rig_netft.netft import HEADER, INTERNAL_HZ, RECORD, REQUEST, STOP, STREAM
