@@ -46,6 +46,7 @@ WITHOUT: Mapping[str, str] = {
     "calibrate force": AT_THE_BENCH,
     "calibrate axis": AT_THE_BENCH,
     "track --table": "compares gains on simulated subjects of its own, never on the bench that is served",
+    "replay": "tests the program that is installed against a recording, and writes a test beside its sources",
     "find": "writes to ports of the computer that may be anybody's: a person beside them allows each",
     "catalogue backup": "names of people leave the computer by its own account alone",
     "catalogue restore": "names of people come back by the computer's own account alone",

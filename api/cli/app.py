@@ -27,6 +27,7 @@ COMMANDS = {
     "report": "api.cli.report:report",
     "diagnose": "api.cli.diagnose:diagnose",
     "protocol": "api.cli.diagnose:protocol",
+    "replay": "api.cli.replay:replay",
     "verify": "api.cli.records:verify",
     "repair": "api.cli.records:repair",
     "import": "api.cli.records:import_",
