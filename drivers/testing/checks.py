@@ -13,8 +13,8 @@ from rig.channels import ForceSample, MarkerSample
 from rig.config.products.roles import ForceProduct
 from rig.errors import DeviceError
 
-# 120 frames of a tracker: a rate is then known to a percent.
-LISTEN_S = 2.0
+# 60 frames of a tracker: a rate is then known to two percent.
+LISTEN_S = 1.0
 # As `rig doctor` judges: half of what lies between neighbouring rates of a sensor.
 RATE_TOLERANCE = 0.1
 # A loop has a millisecond for everything; a busy computer takes more now and then, which a median does not see.

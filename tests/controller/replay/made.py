@@ -1,6 +1,7 @@
 """Recordings of a bench that is not there: everything its loop put into the ring, with the metadata of a real one."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -10,7 +11,9 @@ import numpy as np
 from controller.loop.messages import Finished
 from controller.loop.steps import Program, Step
 from rig.channels import BY_NAME, EVENT, STREAMS
+from rig.recording.mcap_file import RecordingWriter
 from rig.recording.reader import Recording
+from rig.recording.sessions import SessionInfo, TrialInfo, write_session
 from tests.controller.fake_bench import FakeBench
 
 LEAD_S = 0.15
@@ -53,6 +56,16 @@ def without(recording: Recording, part: str) -> Recording:
     return Recording(recording.path, dict(metadata), recording.tables, recording.events, True, ())
 
 
-def fields() -> tuple[str, ...]:
-    """Of a row of the loop."""
-    return tuple(BY_NAME["loop"].kinds)
+def session_of(recording: Recording, folder: Path) -> Path:
+    """A session with that one recording, as `rig capture` leaves it."""
+    folder.mkdir()
+    begin = {name: table for name, table in recording.metadata.items() if name != "summary"}
+    writer = RecordingWriter(folder / recording.path.name, begin)
+    for name, rows in recording.tables.items():
+        writer.add_rows(BY_NAME[name], rows)
+    for event in recording.events:
+        writer.add(EVENT.id, EVENT.pack(event))
+    writer.finish(recording.metadata["summary"])
+    trial = TrialInfo("trial_001", recording.path.name, math.nan, math.nan, "complete")
+    write_session(folder, SessionInfo("made", "capture", "2026-11-24", "tissue-rig", trials=(trial,)))
+    return folder
