@@ -40,7 +40,7 @@ def test_a_recorded_stop_becomes_a_test_that_passes_alone(session: Path, tmp_pat
     assert sorted(path.name for path in tmp_path.iterdir()) == ["replay.json", "test_frozen", "test_frozen.py"]
     runpy.run_path(str(file))["test_the_loop_decides_as_it_did"]()
     file.write_text(file.read_text().replace("repeats the same value", "repeats another value"))
-    with pytest.raises(AssertionError, match="another value"):
+    with pytest.raises(AssertionError):
         runpy.run_path(str(file))["test_the_loop_decides_as_it_did"]()
 
 

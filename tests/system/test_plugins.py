@@ -34,7 +34,7 @@ def installed(project: Path, target: Path) -> dict[str, str]:
     return os.environ | {"PYTHONPATH": paths, "XDG_STATE_HOME": str(target / "state"), "COLUMNS": "200"}
 
 
-def tested(project: Path, environment: Mapping[str, str]) -> None:
+def passes_its_own_tests(project: Path, environment: Mapping[str, str]) -> None:
     """Its own tests pass, each of them."""
     found = run(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", folder=project, environment=environment)
     assert found.returncode == 0, found.stdout[-4000:] + found.stderr[-2000:]
@@ -51,7 +51,7 @@ def test_the_net_ft_is_a_distribution_of_its_own(tmp_path: Path) -> None:
     assert listed.returncode == 0
     said = run(Path(sys.executable).with_name("rig"), "devices", "ati-netft", folder=tmp_path, environment=environment)
     assert "tissue-rig-netft 1.0.0" in said.stdout and "force.http_port" in said.stdout, said.stderr
-    tested(project, environment)
+    passes_its_own_tests(project, environment)
 
 
 def test_the_template_makes_a_plug_in_that_works(tmp_path: Path) -> None:
@@ -60,7 +60,7 @@ def test_the_template_makes_a_plug_in_that_works(tmp_path: Path) -> None:
     run_copy(str(ROOT / "examples" / "plugin-template"), project, data=answers, defaults=True, quiet=True)
     assert not [path for path in project.rglob("*") if "{{" in str(path) or path.suffix == ".jinja"]
     assert all("{{" not in path.read_text() for path in project.rglob("*") if path.is_file())
-    tested(project, installed(project, tmp_path / "target"))
+    passes_its_own_tests(project, installed(project, tmp_path / "target"))
 
 
 def test_a_laboratorys_own_checks_run_as_the_workflow_says(tmp_path: Path) -> None:

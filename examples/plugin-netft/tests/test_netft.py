@@ -149,7 +149,7 @@ def test_capture_and_track_on_a_mixed_bench(mock_bench: MockBench, tmp_path: Pat
     recording = read_recording(tmp_path / "session" / "trial_001.mcap")
     assert "FT27462" in recording.metadata["devices"]["force"]
     assert recording.tables["force"]["device_us"].max() > 0
-    tracking = ("track", "--model", MODEL, "--force", "2", "--seconds", "1", "--out", "run")
+    tracking = ("track", "--model", MODEL, "--force", "2", "--seconds", "2", "--out", "run")
     tracked = mock_bench.rig(*tracking, folder=tmp_path, settings=(NETFT,))
     assert tracked.code in (0, 4), tracked.err
     assert replay(tmp_path / "run").identical
