@@ -73,3 +73,43 @@ def test_a_laboratorys_own_checks_run_as_the_workflow_says(tmp_path: Path) -> No
         program, *arguments = step.split()
         done = run(Path(sys.executable).with_name(program), *arguments, folder=tmp_path / "ci", environment=environment)
         assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+
+
+ACME = """
+from typing import ClassVar, Literal
+from pydantic import Field
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.products.ndi_polaris import PolarisWiring
+
+class Axis(Epos4Wiring):
+    "Another maker's axis, spoken to like ours, with a key of its own."
+    product: Literal["acme-axis"] = Field(default="acme-axis", description="what stands on the bench")
+    brake_test: bool = Field(default=False, description="before each session")
+
+class Tracker(PolarisWiring):
+    "Another maker's tracker."
+    product: Literal["acme-eye"] = Field(default="acme-eye", description="what stands on the bench")
+    rate_Hz: float = Field(default=60.0, gt=0, le=500, description="frames a second")
+"""
+
+
+def test_axis_and_tracker_of_plug_ins_stand_on_the_mock_bench(tmp_path: Path) -> None:
+    """Doctor sees both through the guard, beside our own sensor."""
+    about = tmp_path / "site" / "acme-1.0.dist-info"
+    about.mkdir(parents=True)
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: acme\nVersion: 1.0\n")
+    points = "[tissue_rig.axis]\na = acme_bench:Axis\n[tissue_rig.tracker]\nt = acme_bench:Tracker\n"
+    (about / "entry_points.txt").write_text(points)
+    (tmp_path / "site" / "acme_bench.py").write_text(ACME)
+    paths = os.pathsep.join(map(str, (tmp_path / "site", ROOT)))
+    environment = os.environ | {"PYTHONPATH": paths, "XDG_STATE_HOME": str(tmp_path / "state"), "COLUMNS": "200"}
+    settings = [part for key in ("axis.product=acme-axis", "axis.brake_test=true", "tracker.product=acme-eye")
+                for part in ("--set", key)]  # fmt: skip
+    said = run(Path(sys.executable).with_name("rig"), "doctor", *settings, folder=tmp_path, environment=environment)
+    assert said.returncode == 0, said.stderr
+    assert "EPOS4" in said.stdout.upper() and "POLARIS" in said.stdout.upper()
+    refused = run(
+        Path(sys.executable).with_name("rig"), "doctor", "--set", "tracker.product=acme-eye", "--set",
+        "tracker.rate_Hz=600", folder=tmp_path, environment=environment,
+    )  # fmt: skip
+    assert refused.returncode == 2 and "tracker.rate_Hz: Input should be less than or equal to 500" in refused.stderr

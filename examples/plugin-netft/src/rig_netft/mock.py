@@ -38,7 +38,7 @@ class NetFtMock(OnWire):
         self._every = INTERNAL_HZ // 1000
         self._due_tick: int | None = None
         self._left = self._rdt = 0
-        self._counts = (0,) * 6
+        self._counts: tuple[int, ...] = (0,) * 6
 
     def endpoints(self) -> dict[str, str]:
         """Where records come from."""

@@ -188,10 +188,13 @@ class NetFt:
 
     def _sample(self, record: Record, device_us: int, capture_ns: int, arrival_ns: int) -> ForceSample:
         self.next_seq += 1
-        forces = [count * self._scale.N for count in record.counts[:3]]
-        moments = [count * self._scale.N_m for count in record.counts[3:]]
-        stamps = (self.next_seq - 1, capture_ns, arrival_ns, device_us)
-        return ForceSample(*stamps, *forces, *moments, math.nan, record.status, int(record.status == 0))
+        fx_N, fy_N, fz_N = (count * self._scale.N for count in record.counts[:3])
+        mx_N_m, my_N_m, mz_N_m = (count * self._scale.N_m for count in record.counts[3:])
+        valid = int(record.status == 0)
+        return ForceSample(
+            self.next_seq - 1, capture_ns, arrival_ns, device_us,
+            fx_N, fy_N, fz_N, mx_N_m, my_N_m, mz_N_m, math.nan, record.status, valid,
+        )  # fmt: skip
 
     def close(self) -> None:
         """Stops the stream, which would go on without a listener, and gives the port back."""
