@@ -160,6 +160,7 @@ def _weighed(unloaded: Sequence[AnySample], loaded: Sequence[AnySample], config:
 def waiting(subject: UnderTest) -> None:
     """The descriptor turns readable, and a poll never waits for what has not come."""
     with subject.started() as device:
+        device.poll(subject.now())  # some devices are asked, and answer
         if subject.sampled_Hz is not None and not subject.wait(device, FEW_S):
             raise Nonconformity(f"its descriptor is not readable within {FEW_S:g} s, while samples come")
         polls_ns = subject.listen(device, FEW_S).polls_ns

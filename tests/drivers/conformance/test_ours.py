@@ -13,18 +13,24 @@ from mock_devices.testing.hand import MockBench, serving
 pytestmark = [pytest.mark.campaign, pytest.mark.bench, pytest.mark.xdist_group("conformance")]
 
 
+EACH = ("drop", "corrupt", "truncate", "garbage")
+# A line of SLCAN has no checksum: against flipped bits there is only that of USB, which a pseudo-terminal lacks.
+OF_USB = ("drop", "truncate", "garbage")
+
+
 class Ours(NamedTuple):
-    """A product, and where its mock stands on the bench."""
+    """A product, where its mock stands on the bench, and the damage that its protocol stands by itself."""
 
     role: str
     product: str
     mock: str
+    damage: tuple[str, ...] = EACH
 
 
 OURS = (
     Ours("force", "bota-sensone", "force"),
     Ours("force", "robotiq-ft300", "force_modbus"),
-    Ours("axis", "maxon-epos4", "axis"),
+    Ours("axis", "maxon-epos4", "axis", OF_USB),
     Ours("tracker", "ndi-polaris", "tracker"),
 )
 
@@ -46,6 +52,7 @@ def under_test(bench: MockBench, ours: Ours) -> UnderTest:
         getattr(wiring, ours.role),
         openers[ours.role],  # type: ignore[arg-type] # one for each role
         lambda kind, value: bench.fault(ours.mock, kind, value),
+        damage=ours.damage,
         load=bench.load if ours.role == "force" else None,
     )
 
