@@ -24,7 +24,9 @@ def test_the_mock_bench_is_not_asked_for_a_product_that_only_the_real_device_is(
     real = BotaWiring.model_construct(product="ati-axia", port="/dev/ttyUSB7")
     asked = _arguments(Wiring.model_construct(force=real, mock=Wiring().mock), (), None, every_product=False)
     assert "ati-axia" not in asked
-    assert _arguments(Wiring(), (), None, every_product=False)[-2:] == ["--force", "bota-sensone"]
+    assert _arguments(Wiring(), (), None, every_product=False)[-6:] == [
+        "--force", "bota-sensone", "--axis", "maxon-epos4", "--tracker", "ndi-polaris",
+    ]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
