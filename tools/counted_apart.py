@@ -110,7 +110,27 @@ SERVICE: dict[str, str] = {
     "rig/results/catalogue.py": "the catalogue",
 }
 # What came for benches that labs plug in, likewise.
-DEVICES: dict[str, str] = {}
+DEVICES: dict[str, str] = {
+    "drivers/threaded_source.py": "SDKs that block or call back",
+    "drivers/udp_port.py": "devices on UDP",
+    "drivers/testing/": "the conformance kit of drivers",
+    "rig/plugins.py": "products, laws and causes of other distributions",
+    "rig/config/products/usable.py": "products of other distributions",
+    "controller/devices/finding.py": "what could stand on the bench",
+    "controller/devices/guard.py": "drivers of other distributions",
+    "mock_devices/played.py": "mocks of other distributions",
+    "mock_devices/stating.py": "mocks of other distributions",
+    "api/cli/replay.py": "recordings played through the loop again",
+    "api/operations/replay.py": "recordings played through the loop again",
+    "controller/loop/carried.py": "recordings played through the loop again",
+    "rig/results/replay.py": "recordings played through the loop again",
+    "api/cli/devices.py": "what could stand on the bench",
+    "api/operations/devices.py": "what could stand on the bench",
+    "rig/config/words.py": "what could stand on the bench",
+    "rig/results/devices.py": "what could stand on the bench",
+    "mock_devices/udp_wire.py": "devices on UDP",
+    "controller/replay/": "recordings played through the loop again",
+}
 # What came for a force law that makes every tissue the same plant, likewise.
 LAW = {
     "rig/config/axis_response.py": "the axis as it was identified",

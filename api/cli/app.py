@@ -27,6 +27,7 @@ COMMANDS = {
     "report": "api.cli.report:report",
     "diagnose": "api.cli.diagnose:diagnose",
     "protocol": "api.cli.diagnose:protocol",
+    "replay": "api.cli.replay:replay",
     "verify": "api.cli.records:verify",
     "repair": "api.cli.records:repair",
     "import": "api.cli.records:import_",
@@ -39,6 +40,8 @@ COMMANDS = {
     "mock": "api.cli.hardware:mock",
     "reset": "api.cli.recovery:reset",
     "doctor": "api.cli.hardware:doctor",
+    "devices": "api.cli.devices:devices",
+    "find": "api.cli.devices:find",
     "calibrate": "api.cli.calibrate:calibrate",
     "demo": "api.cli.demo:demo",
 }

@@ -19,7 +19,7 @@ from rig.errors import UsageError
 BENCH_PRIORITY = 10
 
 
-def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, both_sensors: bool) -> list[str]:
+def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, every_product: bool) -> list[str]:
     command = [sys.executable, "-m", "mock_devices.serve", "--with-parent", "--priority", str(BENCH_PRIORITY)]
     if wiring.mock.parameters:
         command += ["--parameters", str(wiring.mock.parameters)]
@@ -27,18 +27,18 @@ def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, both_sen
         command += ["--seed", str(seed)]
     for effect in (*wiring.mock.hide, *hide):
         command += ["--hide", effect]
-    # A real sensor's product may be one that the bench cannot play, and need not.
-    both_sensors = both_sensors or wiring.force.port != MOCK_PORT
-    return [*command, "--force", "both" if both_sensors else wiring.force.product]
+    # A real device's product may be one that the bench cannot play, and need not: it then plays them all.
+    played = {} if every_product else mocks(wiring)
+    return command + [part for role, device in played.items() for part in (f"--{role}", device.product)]
 
 
 @contextmanager
 def bench_process(
-    wiring: Wiring, hide: tuple[str, ...] = (), seed: int | None = None, both_sensors: bool = False
+    wiring: Wiring, hide: tuple[str, ...] = (), seed: int | None = None, every_product: bool = False
 ) -> Iterator[tuple["subprocess.Popen[str]", Endpoints]]:
     """The mock bench as a process, and its endpoints; it ends with the block, or with this process."""
     process = subprocess.Popen(
-        _arguments(wiring, hide, seed, both_sensors),
+        _arguments(wiring, hide, seed, every_product),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         start_new_session=True,
@@ -123,7 +123,7 @@ def _served(device: Product, endpoints: Endpoints) -> Product:
     known = {"port": device.mock.address(endpoints)}
     if not isinstance(device, ForceProduct | TrackerProduct):
         return device.model_copy(update=known)
-    stated_ms = endpoints.latency_ms.get(device.mock.role)
+    stated_ms = endpoints.latency_ms.get(device.mock.role, 0.0)
     return device.model_copy(update=known | {"latency_ms": device.latency_ms or stated_ms})
 
 

@@ -315,6 +315,7 @@ class BenchLoop:
             zero_N=None if math.isnan(state.zero_N) else state.zero_N,
             touch=state.touch,
             wire_damage=self._wire_damage.shares(self.devices.by_role()),
+            carried=state.carried,
         )
         self._channel.send(Finished(program=self._program, outcome=outcome_of))
 

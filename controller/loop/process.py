@@ -24,7 +24,7 @@ from controller.loop.touch import warm_up
 from controller.safety.table import TABLE, Check
 from controller.stop.start import StartGuard
 from controller.stop.word import Responder, StopWord
-from drivers.roles import Identity, ServoAxis
+from drivers.roles import Device, ServoAxis
 from rig.channel import Channel
 from rig.config.wiring import Wiring
 from rig.errors import RigError, SafetyStop
@@ -90,8 +90,10 @@ def _prepare(axis: ServoAxis, held: str) -> str:
     return held
 
 
-def _found(device: Identity) -> DeviceFound:
-    return DeviceFound(product=device.product, serial=device.serial, firmware=device.firmware, settings=device.settings)
+def _found(device: Device) -> DeviceFound:
+    who = device.identity
+    settings = {**who.settings, "period_ns": str(device.period_ns)}
+    return DeviceFound(product=who.product, serial=who.serial, firmware=who.firmware, settings=settings)
 
 
 def _run(
@@ -104,7 +106,7 @@ def _run(
     table: tuple[Check, ...],
     held: str,
 ) -> None:
-    found = {role: _found(device.identity) for role, device in devices.by_role().items()}
+    found = {role: _found(device) for role, device in devices.by_role().items()}
     channel.send(Ready(devices=found, realtime=granted))
     opens = openers(wiring, inbox.interruption)
     loop = BenchLoop(wiring, devices, ring, channel, inbox, time.monotonic_ns, table, opens, held)

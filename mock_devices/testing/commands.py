@@ -111,7 +111,8 @@ class Running:
     started: ClassVar[list["Running"]] = []
 
     def __init__(self, arguments: Sequence[str | Path], folder: Path, stdin: int = subprocess.DEVNULL) -> None:
-        environment = os.environ | {"COLUMNS": "200", "PYTHONPATH": str(ROOT)}
+        path = os.pathsep.join([str(ROOT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]).strip(os.pathsep)
+        environment = os.environ | {"COLUMNS": "200", "PYTHONPATH": path}
         self.process = subprocess.Popen(
             [*RIG, *map(str, arguments)],
             cwd=folder,
