@@ -123,8 +123,10 @@ def _end_of_alike(data: bytes, at: int, end: int) -> int:
     (first, last) = struct.unpack_from("<Q", data, at), struct.unpack_from("<I", data, at + 7)
     while end + size <= len(data):
         count = min((len(data) - end) // size, _AT_ONCE)
-        others = np.flatnonzero((_column(data, "<u8", end, count, size) != first[0])
-                                | (_column(data, "<u4", end + 7, count, size) != last[0]))
+        others = np.flatnonzero(
+            (_column(data, "<u8", end, count, size) != first[0])
+            | (_column(data, "<u4", end + 7, count, size) != last[0])
+        )
         end += size * (int(others[0]) if others.size else count)
         if others.size:
             break

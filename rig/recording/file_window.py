@@ -1,6 +1,4 @@
-"""The bytes of a file by slices, of which one window at a time is in memory: an hour's recording is larger than its tables
-may be beside it.
-"""
+"""The bytes of a file by slices, of which one window at a time is in memory: beside an hour's tables there is no room."""
 
 import os
 from pathlib import Path

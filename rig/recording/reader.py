@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from rig.channels import BY_ID, BY_NAME, EVENT, STREAMS, EventSample, Stream
 from rig.errors import DataError
-from rig.recording.mcap_file import SUMMARY
 from rig.recording.chunk import Chunk, Definition
 from rig.recording.file_window import FileWindow
 from rig.recording.growing_table import GrowingTable
+from rig.recording.mcap_file import SUMMARY
 from rig.recording.mcap_layout import MAGIC, schema_words
 from rig.recording.scan import Scan, good_chunks
 
@@ -147,7 +147,9 @@ class Streams:
                 continue
             size = bodies.shape[1]
             if not stream.has_text and size != stream.fixed.size:
-                raise DataError(f"{self._path}: a {stream.name} row of {size} bytes; its layout has {stream.fixed.size}")
+                raise DataError(
+                    f"{self._path}: a {stream.name} row of {size} bytes; its layout has {stream.fixed.size}"
+                )
             yield stream, bodies
 
 
