@@ -155,7 +155,7 @@ def test_a_sample_that_comes_too_late_is_used_in_the_next_cycle_and_holds_none_u
     sensor = Sensor(1_000_000, first_ns=0)
     held_up = [number for number in range(2000, 4000) if number % 10 == 0]
     arrives = sensor.arrives_ns
-    sensor.arrives_ns = lambda n: arrives(n) + (500_000 if n in held_up else 0)  # type: ignore[method-assign]
+    sensor.arrives_ns = lambda number: arrives(number) + (500_000 if number in held_up else 0)  # type: ignore[method-assign]
     run = bench(sensor)
     assert max(cycle.waited_ns for cycle in run.cycles[1000:]) <= EARLY_NS + PATIENCE * CYCLE_NS + 2 * LOOK_NS + 10_000
     assert run.cycles[-1].missed == 0
