@@ -1,4 +1,4 @@
-"""The bytes of a file by slices, of which one window at a time is in memory: beside an hour's tables there is no room."""
+"""The bytes of a file by slices, of which one window at a time is in memory: an hour's tables leave no room for it."""
 
 import os
 from pathlib import Path

@@ -34,7 +34,7 @@ from rig.recording.messages import TO_RECORDER, Close, Closed, Open, Opened, Qui
 from rig.recording.ring import RingReader
 from rig.recording.slots import Slots, bodies_of, rows_of
 
-DRAIN_PERIOD_S = 0.05  # commands wake it at once; half of its processor time went into waking 50 times a second
+DRAIN_PERIOD_S = 0.1  # half of a flush period, and commands wake it at once: waking up costs as much as all else
 FLUSH_PERIOD_NS = 200_000_000  # what dies with the process: less than the loading of the fastest trial, 8 mm at 30 mm/s
 SYNC_PERIOD_NS = 1_000_000_000  # what a power failure takes; a sync was seen to last 0.13 s
 SILENCE_NS = 2_000_000_000  # twice the longest pause after which a loop still goes on (`loop.overrun_ms`)
@@ -74,7 +74,7 @@ class Tally:
 
 
 class Recorder:
-    """Ring to files. Time and commands are given; ``step`` is to be called every 50 ms or so."""
+    """Ring to files. Time and commands are given; ``step`` is to be called every 100 ms or so."""
 
     def __init__(self, ring: RingReader, resume: bool = False) -> None:
         """With ``resume`` what a predecessor left in the ring stays there for the first recording."""

@@ -152,7 +152,7 @@ def _is_cut(data: Source, at: int) -> bool:
     if at == 0:
         return MAGIC.startswith(data[: len(MAGIC)]) and len(data) <= len(MAGIC)
     head = data[at : at + RECORD.size]
-    known = head[0] in (Opcode.HEADER, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.METADATA, Opcode.DATA_END)
+    known = not head or head[0] in (Opcode.HEADER, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.METADATA, Opcode.DATA_END)
     return known and (len(head) < RECORD.size or at + RECORD.size + RECORD.unpack(head)[1] > len(data))
 
 
