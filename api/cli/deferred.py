@@ -36,7 +36,7 @@ class Names(dict[str, object]):
             self[name] = _member(*self._imported[name])
         return self[name]
 
-    def get(self, name: str, default: object = None) -> object:  # type: ignore[override]
+    def get(self, name: str, default: object = None) -> object:
         """As ``[name]``, or ``default``."""
         try:
             return self[name]

@@ -147,8 +147,8 @@ class BenchLoop:
         for sample in self._polled("axis", self.devices.axis.poll, now_ns):
             self._take_axis(sample)
         if self.devices.tracker:
-            for sample in self._polled("marker", self.devices.tracker.poll, now_ns):
-                self._take_marker(sample)
+            for marker in self._polled("marker", self.devices.tracker.poll, now_ns):
+                self._take_marker(marker)
 
     def take_force(self, now_ns: int) -> None:
         """Takes what the force sensor said."""
