@@ -118,6 +118,7 @@ LAW = {
 # What came for speed, cohorts and more than one computer, likewise.
 SCALE: dict[str, str] = {
     "controller/loop/phase_lock.py": "the grid in step with the force sensor",
+    "rig/recording/channel_streams.py": "recordings read a window at a time",
     "rig/recording/chunk.py": "recordings read a window at a time",
     "rig/recording/file_window.py": "recordings read a window at a time",
     "rig/recording/growing_table.py": "recordings read a window at a time",

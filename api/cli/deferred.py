@@ -20,7 +20,7 @@ PACKAGE = "api.cli."
 _FLAGS = __future__.annotations.compiler_flag
 
 
-class Names(dict[str, object]):
+class DeferredNames(dict[str, object]):
     """Global names of the module ``path``; a name comes to be when it is first used."""
 
     def __init__(self, module: ModuleType, body: Sequence[ast.stmt], path: str) -> None:
@@ -52,11 +52,11 @@ class Names(dict[str, object]):
 
 
 class DeferringLoader(SourceFileLoader):
-    """Gives a module ``Names`` instead of running it."""
+    """Gives a module ``DeferredNames`` instead of running it."""
 
     def exec_module(self, module: ModuleType) -> None:
         """Nothing is run yet."""
-        names = Names(module, ast.parse(self.get_data(self.path)).body, self.path)
+        names = DeferredNames(module, ast.parse(self.get_data(self.path)).body, self.path)
 
         def found(name: str) -> object:
             try:

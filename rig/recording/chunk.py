@@ -29,6 +29,9 @@ _unpacker = zstandard.ZstdDecompressor()
 Record = TypeVar("Record", records.Schema, records.Channel, records.Metadata)
 
 
+Bodies = NDArray[np.uint8]
+
+
 class Definition(NamedTuple):
     """A channel as the file defines it."""
 
@@ -40,7 +43,7 @@ class Messages(NamedTuple):
     """Messages of one channel, alike in length, that follow each other: bodies without CDR header, shape (n, bytes)."""
 
     channel: int
-    bodies: NDArray[np.uint8]
+    bodies: Bodies
 
 
 class Chunk(NamedTuple):

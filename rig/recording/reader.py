@@ -1,6 +1,6 @@
 """A recording as numpy tables: opens a finished file, any prefix of one, and what a damaged one still holds."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,23 +8,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.channels import BY_ID, BY_NAME, EVENT, STREAMS, EventSample, Stream
+from rig.channels import EVENT, STREAMS, EventSample, Stream
 from rig.errors import DataError
-from rig.recording.chunk import Chunk, Definition
+from rig.recording.channel_streams import ChannelStreams
+from rig.recording.chunk import Bodies
 from rig.recording.file_window import FileWindow
 from rig.recording.growing_table import GrowingTable
 from rig.recording.mcap_file import SUMMARY
-from rig.recording.mcap_layout import MAGIC, schema_words
+from rig.recording.mcap_layout import MAGIC
 from rig.recording.scan import Scan, good_chunks
 
-# Fields of recordings that were made before they had the name on the right.
-RENAMED = {"slot": "cycle"}
 # The kind of a trial that tracked a force; one that indents has none.
 TRACKING = "tracking"
 # What is longer is not held whole: 220 bytes a row were measured for one that is read and looked at.
 LONGEST_ROWS = 4_000_000
 NUMERIC = tuple(stream for stream in STREAMS if not stream.has_text)
-Bodies = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,7 @@ def messages(path: Path, found: Scan) -> Iterator[tuple[Stream, Bodies]]:
     or has another layout.
     """
     with opened(path) as data:
-        streams = Streams(path)
+        streams = ChannelStreams(path)
         begins = data[: len(MAGIC)] == MAGIC[: len(data)]
         for chunk in good_chunks(data, found):
             begins = True
@@ -98,61 +96,3 @@ def opened(path: Path) -> Iterator[FileWindow]:
         raise DataError(f"{path}: no such recording; `rig verify FOLDER` lists what a session holds") from error
     except OSError as error:
         raise DataError(f"{path}: cannot be read: {error.strerror}") from error
-
-
-class Streams:
-    """Which stream a channel is, by the definitions that came so far.
-
-    Messages wait until there is a definition. Where the chunk that has them is lost, the numbers are those of our own
-    writer.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._known: dict[int, Stream] = {}
-        self._defined = False
-        self._waiting: list[Chunk] = []
-
-    def sorted(self, chunk: Chunk) -> Iterator[tuple[Stream, Bodies]]:
-        """What stands in ``chunk``, and in those that waited for its definitions."""
-        for number, definition in chunk.definitions.items():
-            self._define(number, definition)
-        self._waiting.append(chunk)
-        if self._defined:
-            yield from self._all(self._known)
-
-    def rest(self) -> Iterator[tuple[Stream, Bodies]]:
-        """What still waits at the end of the file."""
-        if self._defined and not self._known:
-            raise DataError(f"{self._path}: an MCAP file, but with no stream of this bench")
-        yield from self._all(self._known or BY_ID)
-
-    def _define(self, number: int, definition: Definition) -> None:
-        self._defined = True
-        stream = BY_NAME.get(definition.topic)
-        if stream is None:
-            return
-        if layout(definition.schema) != layout(stream.schema()):
-            raise DataError(
-                f"{self._path}: stream {stream.name} has other fields than this version of the program; "
-                "read it with the version named in its metadata"
-            )
-        self._known[number] = stream
-
-    def _all(self, known: Mapping[int, Stream]) -> Iterator[tuple[Stream, Bodies]]:
-        waiting, self._waiting = self._waiting, []
-        for channel, bodies in (alike for chunk in waiting for alike in chunk.messages):
-            stream = known.get(channel)
-            if stream is None:
-                continue
-            size = bodies.shape[1]
-            if not stream.has_text and size != stream.fixed.size:
-                raise DataError(
-                    f"{self._path}: a {stream.name} row of {size} bytes; its layout has {stream.fixed.size}"
-                )
-            yield stream, bodies
-
-
-def layout(schema: str) -> list[list[str]]:
-    """Types and names, as they are now, of a ``ros2msg`` text without comments."""
-    return [[RENAMED.get(word, word) for word in words] for words in schema_words(schema)]
