@@ -153,7 +153,17 @@ LAW = {
     "controller/safety/oscillation.py": "what oscillates is softened",
 }
 # What came for speed, cohorts and more than one computer, likewise.
-SCALE: dict[str, str] = {}
+SCALE: dict[str, str] = {
+    "controller/loop/phase_lock.py": "the grid in step with the force sensor",
+    "rig/recording/channel_streams.py": "recordings read a window at a time",
+    "rig/recording/chunk.py": "recordings read a window at a time",
+    "rig/recording/file_window.py": "recordings read a window at a time",
+    "rig/recording/growing_table.py": "recordings read a window at a time",
+    "rig/recording/slots.py": "the ring emptied as a table",
+    "api/cli/deferred.py": "help at once",
+    "api/catalogue/settings.py": "help at once",
+    "api/operations/judged.py": "help at once",
+}
 APART = {
     "source_lines_safety": SAFETY,
     "source_lines_data": DATA,

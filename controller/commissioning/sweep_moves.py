@@ -15,6 +15,7 @@ from controller.commissioning.axis_moves import LARGEST_TOUCH_N, RestingAxis
 from controller.commissioning.sweep import LARGEST_SWING_MM, AirSweep, offset_mm
 from controller.devices.drivers import Devices
 from controller.loop.executive import Cycle, Executive, sleep_until
+from controller.loop.phase_lock import PhaseLock
 from drivers.epos4.walker import never
 from rig.channels import AxisSample, ForceSample
 from rig.config.wiring import Wiring
@@ -24,6 +25,8 @@ from rig.errors import CheckFailed, DeviceError, SafetyStop, UsageError
 CLEAR_MM = 5.0
 # What the drive rests before it is told anything, and listens for after the last set-point: ten lags of 10 ms.
 LISTEN_S = 0.1
+# Between two looks for a force sample: a twentieth of a cycle of 1 kHz, which is what its age may be wrong by.
+LOOK_NS = 50_000
 
 
 def refuse_outside(at_mm: float, sweep: AirSweep, wiring: Wiring) -> None:
@@ -63,19 +66,34 @@ class SweepRun:
         self._force: ForceSample | None = None
         self._unloaded: ForceSample | None = None
         self._begin_ns = self._missed = 0
+        self._phase = PhaseLock(round(1e9 / wiring.loop.rate_Hz), devices.force.period_ns)
 
     def played(self) -> SweepRecord:
         """Raises SafetyStop, CheckFailed or DeviceError where it was ended; the axis stands then, braked."""
         try:
-            Executive(round(1e9 / self._wiring.loop.rate_Hz), self._now, self._sleep).run(self._turn)
+            Executive(self._now, self._sleep, self._sleep, self._rest).run(self, self._phase)
         except BaseException:
             self._devices.axis.quick_stop()
             raise
         return self._followed()
 
-    def _turn(self, cycle: Cycle) -> bool:
-        now_ns = cycle.wake_ns
-        self._look(now_ns)
+    def prepare(self, now_ns: int) -> None:
+        """Takes what the axis sent since the last cycle."""
+        self._axis += self._devices.axis.poll(now_ns)
+
+    def take_force(self, now_ns: int) -> None:
+        """Takes samples of the force sensor, and shows them to the phase lock."""
+        for sample in self._devices.force.poll(now_ns):
+            self._phase.observe(sample.capture_ns, sample.arrival_ns)
+            self._force = sample if sample.valid else self._force
+
+    def _rest(self, until_ns: int) -> None:
+        self._sleep(min(until_ns, self._now() + LOOK_NS))
+
+    def run_cycle(self, cycle: Cycle) -> bool:
+        """The turn itself; False where it is the last."""
+        now_ns = cycle.began_ns
+        self._axis += self._devices.axis.poll(now_ns)
         ready = self._force is not None and bool(self._axis)
         if not self._begin_ns:
             self._begin_ns = cycle.scheduled_ns + round(LISTEN_S * 1e9)
@@ -89,11 +107,6 @@ class SweepRun:
         self._command(now_ns, offset_mm(self._sweep, elapsed_s))
         self._missed = cycle.missed
         return elapsed_s < self._sweep.duration_s + LISTEN_S
-
-    def _look(self, now_ns: int) -> None:
-        self._axis += self._devices.axis.poll(now_ns)
-        forces = [sample for sample in self._devices.force.poll(now_ns) if sample.valid]
-        self._force = forces[-1] if forces else self._force
 
     def _command(self, now_ns: int, offset: float) -> None:
         assert self._force
