@@ -97,10 +97,11 @@ def track(
 
 def _tracked(wiring: Wiring, folder: Path, asked: "TrackOptions", against: Path | None, json_file: Path | None) -> None:
     """One run, after one with the other model where there is one; all is checked before anything is opened."""
-    wanted = TrackPlan(_planned(wiring, asked), str(asked.model))
-    other = TrackPlan(_planned(wiring, asked._replace(model=against)), str(against)) if against else None
+    _plans(wiring, asked, against)
     tracked.refuse_foreign(folder)
     with live.running(wiring) as bench:
+        # By the axis that answered: a simulated one is identified when it is first asked for.
+        wanted, other = _plans(bench.wiring, asked, against)
         found = followed(bench, wanted, folder, other)
     quality = "quality: " + "; ".join([found.quality, *found.reasons])
     show(*track_parts(found), quality, f"recorded in {folder}")
@@ -108,6 +109,12 @@ def _tracked(wiring: Wiring, folder: Path, asked: "TrackOptions", against: Path 
     for run in (found.against, found):
         if run is not None:
             tracked.refuse_bad(run)
+
+
+def _plans(wiring: Wiring, asked: "TrackOptions", against: Path | None) -> tuple[TrackPlan, TrackPlan | None]:
+    """What is to be tracked, and the same with the other model."""
+    other = TrackPlan(_planned(wiring, asked._replace(model=against)), str(against)) if against else None
+    return TrackPlan(_planned(wiring, asked), str(asked.model)), other
 
 
 def followed(bench: Supervisor, wanted: TrackPlan, folder: Path, against: TrackPlan | None = None) -> TrackResult:

@@ -32,9 +32,10 @@ def threshold(
     Example: rig threshold --model sessions/first/fit/model.json --up-to 10
     """
     wiring, fitted = wiring_from(config, overrides), load_model(model)
-    ramp = TrackPlan(experiment.plan(up_to, rate, fitted, wiring), str(model))
+    experiment.plan(up_to, rate, fitted, wiring)  # refused before anything is opened
     tracked.refuse_foreign(out)
     with live.running(wiring) as bench:
+        ramp = TrackPlan(experiment.plan(up_to, rate, fitted, bench.wiring), str(model))
         operation = Operation("threshold", total=1, unit="ramps")
         found = live.run(bench, operation, lambda: motion.threshold(operation, bench, ramp, up_to, out))
     if found.force_N is None:

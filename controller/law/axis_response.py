@@ -15,10 +15,9 @@ def response_of(wiring: Wiring) -> AxisResponse:
 
     A sensor slower than the loop is taken to average over its period, which delays by half of it.
     """
-    known = getattr(wiring.calibration, "of_dynamics", None)
+    known = wiring.calibration.of_dynamics
     if known is not None:
-        found: AxisResponse = known.response
-        return found
+        return known.response
     axis, force, cycle_s = wiring.axis, wiring.force, 1.0 / wiring.loop.rate_Hz
     corner_s = 1.0 / (2 * math.pi * axis.bandwidth_Hz)
     lag_s = LAG_AT_3_DB * corner_s
