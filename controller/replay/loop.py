@@ -139,7 +139,11 @@ class ReplayedLoop:
         if self._marker:
             self._marker.upto(row.capture_ns, row.marker_age_ns)
         self._give(given, row.capture_ns)
-        self.loop.run_cycle(Cycle(row.cycle, row.scheduled_ns, row.capture_ns, row.missed))
+        wake_ns = row.scheduled_ns + row.wake_latency_ns
+        self.loop.prepare(row.capture_ns)
+        self.loop.take_force(row.capture_ns)
+        waited_ns = row.capture_ns - wake_ns
+        self.loop.run_cycle(Cycle(row.cycle, row.scheduled_ns, wake_ns, row.missed, waited_ns=waited_ns))
         return self.ring.loop[-1]
 
     def _give(self, given: Given, now_ns: int) -> None:
