@@ -15,7 +15,6 @@ PROTOCOL = "speeds_mm_s = [10]\ntrials = 1\ndepth_mm = 8\n"
 MISSED_SHARE = 0.05
 
 
-@pytest.mark.flaky(reruns=2)
 def test_two_cycles_go_with_each_sample_of_a_sensor_at_half_the_rate(tmp_path: Path) -> None:
     (tmp_path / "one.toml").write_text(PROTOCOL)
     with served_bench("--seed", "3") as bench:
