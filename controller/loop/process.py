@@ -7,12 +7,10 @@ why, or with a drive in fault, it moves nothing and waits for recovery.
 
 import contextlib
 import os
-import select
 import signal
 import socket
 import sys
 import time
-from functools import partial
 from pathlib import Path
 
 from controller.devices.absent import start_what_answers
@@ -92,12 +90,6 @@ def _prepare(axis: ServoAxis, held: str) -> str:
     return held
 
 
-def _await(loop: BenchLoop, until_ns: int) -> None:
-    """Sleeps until the force sensor says something: who watches keeps the kernel's worker from filling the line."""
-    left_s = (until_ns - time.monotonic_ns()) * 1e-9
-    select.select([loop.devices.force], [], [], max(left_s, 0.0))
-
-
 def _found(device: Device) -> DeviceFound:
     who = device.identity
     settings = {**who.settings, "period_ns": str(device.period_ns)}
@@ -120,7 +112,7 @@ def _run(
     loop = BenchLoop(wiring, devices, ring, channel, inbox, time.monotonic_ns, table, opens, held)
     spin_ns = min(realtime.spin_ns(granted), round(AHEAD * loop.phase.period_ns))
     try:
-        Executive(sleep=sleep_then_spin(spin_ns), rest=partial(_await, loop)).run(loop, loop.phase)
+        Executive(sleep=sleep_then_spin(spin_ns)).run(loop, loop.phase)
     finally:
         loop.close()
 
