@@ -23,6 +23,7 @@ from mock_devices.testing.wire import MemoryWire
 from mock_devices.wire import PtyWire
 
 MS = 1_000_000
+ACCELERATION_PER_CURRENT = 100.0  # mm/s2 for each ampere
 TIME_CONSTANT_S = 1 / (2 * math.pi * 25)
 
 
@@ -37,24 +38,33 @@ class LaggingPlant:
         self.has_switch = True
         self.powered = False
         self.target_mm = position_mm
+        self.pushed_A: float | None = None
         self.stop_mm = -1e9
         self.at_reference = position_mm <= 0
 
     def power(self, on: bool) -> None:
         self.powered = on
-        self.target_mm = self.position_mm
+        self.target_mm, self.pushed_A = self.position_mm, None
 
     def target(self, position_mm: float) -> None:
         self.target_mm = position_mm
+        self.pushed_A = None
+
+    def push(self, current_A: float) -> None:
+        self.pushed_A = current_A
 
     def advance(self, dt_s: float) -> None:
         """Moves on; where the carriage meets ``stop_mm`` the current grows with the lag."""
         before = self.position_mm
-        if self.powered:
+        if self.powered and self.pushed_A is not None:
+            self.velocity_mm_s += self.pushed_A * ACCELERATION_PER_CURRENT * dt_s
+            self.position_mm = self.target_mm = before + self.velocity_mm_s * dt_s
+        elif self.powered:
             self.position_mm += (self.target_mm - before) * (1 - math.exp(-dt_s / TIME_CONSTANT_S))
             self.position_mm = max(self.position_mm, self.stop_mm)
         self.velocity_mm_s = (self.position_mm - before) / dt_s
-        self.current_A = 2 * (self.target_mm - self.position_mm) if self.powered else 0.0
+        pulled_A = 2 * (self.target_mm - self.position_mm) if self.pushed_A is None else self.pushed_A
+        self.current_A = pulled_A if self.powered else 0.0
         self.at_reference = self.has_switch and self.position_mm <= 0
 
 

@@ -108,7 +108,7 @@ def test_each_tool_needs_its_definition(bench: TrackerBench, tmp_path: Path) -> 
 
 
 def test_more_tools_named_than_plugged_in_are_told(bench: TrackerBench) -> None:
-    with pytest.raises(DeviceError, match="2 tools are .* names 3 .*; plug them in, or give tracker.roms"):
+    with pytest.raises(DeviceError, match=r"2 tools are .* names 3 .*; plug them in, or give tracker.roms"):
         started(bench, tools=("tip", "arm", "couch"))
     assert bench.closed
 
