@@ -6,7 +6,6 @@ is passed over, as terminal programs send one. After Z1 each frame carries the m
 """
 
 from binascii import hexlify
-from typing import Protocol
 
 from drivers.can.slcan import LONGEST, CanFrame, decode_line
 from mock_devices.wire import Wire
@@ -14,19 +13,6 @@ from mock_devices.wire import Wire
 OK, BEL = b"\r", b"\a"
 STAMP_MS = 60_000
 FRAME_SENT = {b"t": b"z\r", b"r": b"z\r", b"T": b"Z\r", b"R": b"Z\r"}
-
-
-class BusAdapter(Protocol):
-    """What is between a mock node and whoever talks to it over CAN."""
-
-    def receive(self) -> list[CanFrame]:
-        """Frames for the node since the last call."""
-
-    def send(self, can_id: int, data: bytes, now_ns: int) -> None:
-        """A frame of the node."""
-
-    def flush(self) -> None:
-        """Hands over what was sent."""
 
 
 class SlcanAdapter:

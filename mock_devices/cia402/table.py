@@ -17,7 +17,7 @@ ACCESS = {("rww", "1"): "rw+", ("ro", "1"): "ro+"}
 
 
 @dataclass(frozen=True)
-class Table:
+class ObjectTable:
     """``delivered`` are values that differ from the defaults in a drive that was set up for its motor.
 
     ``status_mask`` has the statusword's bits that this kind of drive uses.

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from drivers.epos4.objects import DISABLED, MAX_MAPPED, TEXT, Entry
 from mock_devices.canopen.sdo_server import SdoAbort
-from mock_devices.cia402.table import Key, Table
+from mock_devices.cia402.table import Key, ObjectTable
 
 WRITE_ONLY, READ_ONLY, NO_OBJECT, NOT_MAPPABLE, TOO_LONG = (
     0x06010001, 0x06010002, 0x06020000, 0x06040041, 0x06040042
@@ -24,7 +24,7 @@ TYPES = frozenset((*range(241), 253, 255))
 class Dictionary:
     """Objects of node ``node`` by index and sub-index, of the kind that ``table`` says."""
 
-    def __init__(self, node: int, table: Table) -> None:
+    def __init__(self, node: int, table: ObjectTable) -> None:
         self.table = table
         self.objects = table.objects
         self.values: defaultdict[Key, int] = defaultdict(int)  # an object it does not have counts as 0

@@ -12,9 +12,10 @@ from drivers.can.slcan import CanFrame
 from drivers.canopen.nmt import EMERGENCY_ID, HEARTBEAT_ID, SDO_REQUEST_ID, SDO_RESPONSE_ID, SYNC, NmtCommand, NmtState
 from drivers.epos4.faults import FAULTS, UNKNOWN
 from drivers.epos4.objects import SERIAL
-from mock_devices.can.slcan_adapter import BusAdapter, SlcanAdapter
+from mock_devices.can.bus_adapter import BusAdapter
+from mock_devices.can.slcan_adapter import SlcanAdapter
 from mock_devices.canopen.sdo_server import SdoServer
-from mock_devices.cia402.table import Table
+from mock_devices.cia402.table import ObjectTable
 from mock_devices.epos4 import torque
 from mock_devices.epos4.dictionary import Dictionary
 from mock_devices.epos4.drive import Drive
@@ -56,7 +57,7 @@ class Epos4Mock(OnWire):
         increments_per_rev: float = 10_000.0,
         clock_ns: Callable[[], int] | None = None,
         number: int = int(SERIAL.default),
-        table: Table = EPOS4,
+        table: ObjectTable = EPOS4,
         speed_unit: float = 0.0,
         adapter: BusAdapter | None = None,
     ) -> None:
@@ -293,6 +294,7 @@ class Epos4Mock(OnWire):
                 (0x606B, 0): lambda: drive.rpm,
                 (0x606C, 0): lambda: drive.rpm,
                 (0x6077, 0): lambda: torque.per_mille(values, drive.current_mA),
+                (0x6078, 0): lambda: round(1000 * drive.current_mA / max(values[0x6075, 0], 1)),
                 (0x60F4, 0): lambda: drive.following_error,
                 (0x60FD, 0): lambda: int(plant.at_reference),
             }
@@ -304,6 +306,7 @@ class Epos4Mock(OnWire):
                 (0x1016, 1): lambda _: self._forget_producer(1),
                 (0x1016, 2): lambda _: self._forget_producer(2),
                 (0x3001, 2): self._set_current_limit,
+                (0x6073, 0): lambda share: self._set_current_limit(share * values[0x6075, 0] // 1000),
                 (0x6040, 0): drive.control,
                 (0x6060, 0): drive.set_mode,
                 (0x607A, 0): drive.set_target,

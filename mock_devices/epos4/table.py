@@ -4,7 +4,7 @@ a drive holds that was set up for a motor."""
 from pathlib import Path
 
 from drivers.epos4.objects import DEVICE_NAME, I32_MAX, I32_MIN, PRODUCT, REVISION, SERIAL, TEXT, U8, VENDOR, Entry
-from mock_devices.cia402.table import Table, read_objects
+from mock_devices.cia402.table import ObjectTable, read_objects
 
 LATER = (
     Entry(0x100A, 0, "software version", TEXT, "const"),
@@ -12,7 +12,7 @@ LATER = (
     Entry(0x1029, 1, "behaviour on communication error", U8, "rw", 0, 0, 2),
 )
 RATED_TORQUE_uN_m, TORQUE_CONSTANT_uN_m_A = 128_000, 36_900
-EPOS4 = Table(
+EPOS4 = ObjectTable(
     read_objects(Path(__file__).parent / "dictionary.csv") | {(entry.index, entry.sub): entry for entry in LATER},
     delivered={
         (0x1000, 0): 0x0002_0192,
