@@ -25,6 +25,8 @@ TYPES = {
     "b": datatypes.INTEGER8,
     "h": datatypes.INTEGER16,
     "i": datatypes.INTEGER32,
+    "?": datatypes.BOOLEAN,
+    "Q": datatypes.UNSIGNED64,
     TEXT: datatypes.VISIBLE_STRING,
 }
 PATIENCE_S = 10.0
