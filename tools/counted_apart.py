@@ -148,8 +148,6 @@ DEVICES: dict[str, str] = {
     "rig/config/can_adapter.py": "CAN by any adapter",
     "rig/config/products/can_axis.py": "CAN by any adapter",
     "rig/config/products/cia402.py": "any drive by its data sheet",
-    "drivers/threaded_source.py": "SDKs that block or call back",
-    "drivers/udp_port.py": "devices on UDP",
 }
 # What came for a force law that makes every tissue the same plant, likewise.
 LAW = {
