@@ -71,7 +71,7 @@ def _heard(role: str, device: AnyDevice, listen: Listen[AnyDevice], channel: int
         found = _finding(role, device.identity, 1e9 / device.period_ns, listen(device), channel)
         if not found.problem:
             break
-    return found
+    return found.model_copy(update={"problem": found.problem or device.counters.trouble})
 
 
 def _listen(poll: Callable[[int], Samples], seconds: float) -> Samples:

@@ -31,6 +31,7 @@ class LinkCounters:
     discarded_bytes: int = 0
     device_lost: int = 0
     repeated: int = 0
+    trouble: str = ""  # what is wrong with the link though it carries, in words
 
 
 class Device(Protocol):

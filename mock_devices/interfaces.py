@@ -52,6 +52,9 @@ class AxisPlant(Protocol):
     def target(self, position_mm: float) -> None:
         """Set-point of the drive's position loop from now on."""
 
+    def push(self, current_A: float) -> None:
+        """This motor current instead of the position loop's, until the next ``target`` or ``power``."""
+
 
 class TrackerPlant(Protocol):
     """The camera's view."""

@@ -28,7 +28,7 @@ def of_stream(health: StreamHealth, lost: str, now_ns: int) -> Observation:
 
 def of_axis(health: StreamHealth, lost: str, axis: ServoAxis, now_ns: int) -> Observation:
     """What the axis shows; how often it answers is the loop's doing, so its rate says nothing about it."""
-    seen = replace(of_stream(health, lost, now_ns), imperfect="")
+    seen = replace(of_stream(health, lost, now_ns), imperfect=axis.counters.trouble)
     if lost or seen.age_ns is None:
         return seen
     fault = axis.fault or ("" if axis.referenced else NO_REFERENCE)

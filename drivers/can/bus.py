@@ -16,6 +16,7 @@ from typing import Protocol, cast
 import can
 from can.interfaces.slcan import slcanBus
 
+from drivers.can.health import BusHealth, Counted
 from drivers.can.slcan import BITRATE_COMMANDS, CanFrame, SlcanDecoder, encode_frame
 from drivers.ports import PortClosed, read_waiting
 from rig.errors import DeviceError, UsageError
@@ -27,7 +28,13 @@ TEXT = frozenset(b"\a\r\n" + bytes(range(0x20, 0x7F)))
 class CanLink(Protocol):
     """An open way to a CAN bus; ``wait`` is the only method that sleeps."""
 
-    decoder: SlcanDecoder
+    @property
+    def decoder(self) -> Counted:
+        """What the link counts."""
+
+    @property
+    def health(self) -> BusHealth:
+        """Load, errors and state of the bus."""
 
     def fileno(self) -> int:
         """Descriptor that turns readable when frames may have come."""
@@ -52,6 +59,8 @@ class SlcanLink:
         """Opens, sets the bit rate and waits for a first answer; raises DeviceError or UsageError in one sentence."""
         self.path = path
         self.decoder = SlcanDecoder()
+        self.health = BusHealth(bitrate)
+        self._now = now
         self._waiting = array.array("i", [0])
         self._poller = select.poll()
         self._lock = _locked(path)
@@ -75,7 +84,10 @@ class SlcanLink:
     def read(self) -> list[CanFrame]:
         """Frames that have arrived, possibly none; raises PortClosed."""
         data = self._read_raw()
-        return self.decoder.feed(data) if data else []
+        frames = self.decoder.feed(data) if data else []
+        self.health.refused = self.decoder.refused
+        self.health.passed(frames, self._now())
+        return frames
 
     def wait(self, timeout_s: float) -> None:
         """Sleeps until something arrives or the time is over; for set-up only."""
@@ -84,6 +96,7 @@ class SlcanLink:
     def send(self, *frames: CanFrame) -> None:
         """Hands over ``frames`` in one write; raises PortClosed, also where the adapter takes no more."""
         self._write(b"".join(map(encode_frame, frames)))
+        self.health.passed(frames, self._now())
 
     def _write(self, lines: bytes) -> None:
         try:

@@ -6,9 +6,9 @@ from functools import partial
 from drivers.canopen.nmt import NmtCommand, NmtState
 from drivers.epos4 import objects, setup
 from drivers.epos4.node import TRIES, Node
+from drivers.epos4.objects import Entry
 from drivers.roles import Identity
-from rig.config.products.maxon_epos4 import Epos4Wiring
-from rig.config.wiring import Limits
+from rig.config.products.can_axis import CanAxisProduct
 from rig.errors import DeviceError
 
 VENDOR, PRODUCT_FAMILY = 0xFB, 0x6150
@@ -37,9 +37,8 @@ def identify(node: Node) -> Identity:
     )
 
 
-def configure(node: Node, config: Epos4Wiring, limits: Limits) -> None:
-    """Writes limits, stops, heartbeats and PDOs, then reads all of it back; raises DeviceError where one differs."""
-    writes = setup.parameters(config, limits) + setup.process_data(config)
+def configure(node: Node, writes: list[tuple[Entry, int]]) -> None:
+    """Writes all of it, then reads it back; raises DeviceError where a value differs."""
     for entry, value in writes:
         node.write(entry, value)
     for entry, value in setup.expected(writes).items():
@@ -48,7 +47,7 @@ def configure(node: Node, config: Epos4Wiring, limits: Limits) -> None:
             raise DeviceError(f"{node.name}: {entry} was set to {value} and reads back as {got}; restart the drive")
 
 
-def go_operational(node: Node, config: Epos4Wiring, now: Callable[[], int]) -> None:
+def go_operational(node: Node, config: CanAxisProduct, now: Callable[[], int]) -> None:
     """Starts the node and waits until its heartbeat says so; raises DeviceError where it does not."""
     node.state = None
     node.order(NmtCommand.START)

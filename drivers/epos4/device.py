@@ -1,4 +1,4 @@
-"""The servo axis on a maxon EPOS4: set-up, homing, profile moves, cyclic positions, stops and faults.
+"""The servo axis on a CiA 402 drive, a maxon EPOS4 unless said: set-up, homing, moves, cyclic positions, stops, faults.
 
 Set-up and moves wait and use SDO; each wait has a deadline from distance and speed, or the SDO time-out. In the cycle
 ``command`` is one write (RPDO1 and SYNC) and ``poll`` one read. The drive stops by itself when the host falls silent:
@@ -10,20 +10,22 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator, Sequence
 
-from drivers.can.bus import CanLink, SlcanLink
+from drivers.can.bus import CanLink
+from drivers.can.opening import OpenLink, opener
 from drivers.can.slcan import CanFrame
 from drivers.canopen.nmt import RPDO_IDS, SYNC, TPDO_IDS, NmtCommand
 from drivers.epos4 import objects, setup
-from drivers.epos4.bringup import CYCLIC_POSITION, HOMING, PROFILE_POSITION, configure, go_operational, identify
+from drivers.epos4.bringup import CYCLIC_POSITION, HOMING, PROFILE_POSITION, configure, go_operational
 from drivers.epos4.cia402 import Controlword, Goal, PdsState, Statusword
 from drivers.epos4.codec import encode_setpoint
 from drivers.epos4.faults import describe
+from drivers.epos4.kind import DriveKind, Epos4Kind
 from drivers.epos4.node import Node
 from drivers.epos4.samples import SampleBuilder
 from drivers.epos4.walker import REACTION_S, Walker, never
 from drivers.roles import Identity, LinkCounters
 from rig.channels import AxisSample
-from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.products.can_axis import CanAxisProduct
 from rig.config.wiring import Limits
 from rig.errors import DeviceError, RigError, SafetyStop
 
@@ -32,8 +34,6 @@ HOMING_START_S = 0.05
 CLOSING_TIMEOUT_S = 0.3  # a drive that is gone costs it several times over, and a person waits
 SLACK_MM = 0.05
 """How far beyond a limit a position is still rounding and ripple, and is taken as the limit itself."""
-
-OpenLink = Callable[[str, int, Callable[[], int]], CanLink]
 
 
 class Epos4Axis:
@@ -44,23 +44,25 @@ class Epos4Axis:
 
     def __init__(
         self,
-        config: Epos4Wiring,
+        config: CanAxisProduct,
         limits: Limits,
         now: Callable[[], int] = time.monotonic_ns,
         rate_Hz: float = 1000.0,
-        open_link: OpenLink = SlcanLink,
+        open_link: OpenLink | None = None,
         interrupted: Callable[[], bool] = never,
+        kind: DriveKind | None = None,
     ) -> None:
         self.counters = LinkCounters()
         self._period_ns = round(1e9 / rate_Hz)
         self._config = config
         self._limits = limits
         self._now = now
-        self._open_link = open_link
+        self._open_link = open_link or opener(config)
         self._interrupted = interrupted
-        self._units = setup.units(config)
+        self._kind = kind or Epos4Kind(config)
+        self._homed = False
         self._name = f"servo axis on {config.port}, node {config.node}"
-        self._samples = SampleBuilder(self._units)
+        self._samples = SampleBuilder(self._kind)
         self._identity = Identity("", "", "")
         self._link: CanLink | None = None
         self._walker: Walker | None = None
@@ -105,28 +107,30 @@ class Epos4Axis:
     @property
     def referenced(self) -> bool:
         """Whether positions count from home, as the drive last said."""
-        return self._walker is not None and bool(self._walker.status & Statusword.REFERENCED)
+        return self._walker is not None and self._is_referenced(self._walker.status)
 
     def fileno(self) -> int:
-        """Descriptor of the adapter's serial line; raises DeviceError before ``start``."""
+        """Descriptor of the CAN link; raises DeviceError before ``start``."""
         return self._started().node.link.fileno()
 
     def start(self) -> None:
         """Opens the adapter, identifies the drive, writes limits and stops and reads them back, maps the PDOs."""
         self.close()
+        self._homed = False
         config = self._config
         self._link = self._open_link(config.port, config.bitrate, self._now)
         node = Node(self._link, config.node, setup.host_node(config), config.heartbeat_ms, self._name, self._now)
-        self._samples = SampleBuilder(self._units, self._samples.next_seq)
+        self._samples = SampleBuilder(self._kind, self._samples.next_seq)
         node.handlers[TPDO_IDS[0] + config.node] = self._samples.take_state
         node.handlers[TPDO_IDS[1] + config.node] = self._samples.take_motion
         walker = Walker(node, self._now, self._limits.speed_mm_s / config.acceleration_mm_s2)
         try:
             node.order(NmtCommand.ENTER_PRE_OPERATIONAL)
-            self._identity = identify(node)
+            self._identity = self._kind.identify(node)
             self._walker = walker
+            walker.standstill = self._kind.standstill
             walker.make_safe()
-            configure(node, config, self._limits)
+            configure(node, self._kind.writes(self._limits))
             go_operational(node, config, self._now)
             walker.note_old_fault()
         except BaseException:
@@ -148,7 +152,8 @@ class Epos4Axis:
             walker.watch(HOMING_START_S, lambda status: not status & done)
             limit_s = self._homing_time_s()
             walker.watch(limit_s, lambda status: status & done == done or bool(status & ended))
-            found = walker.status & done == done and walker.status & Statusword.REFERENCED
+            self._homed = walker.status & done == done and not walker.status & ended
+            found = self._is_referenced(walker.status) and self._homed
             if walker.status & ended or not found:
                 raise DeviceError(
                     f"{self._name}: homing by method {self._config.homing_method} found no reference within "
@@ -164,11 +169,11 @@ class Epos4Axis:
         self._check_speed(speed_mm_s)
         node = walker.node
         with self._moving(walker):
-            distance_mm = abs(position_mm - self._units.mm(node.read(objects.POSITION)))
+            distance_mm = abs(position_mm - self._kind.scale.mm(node.read(objects.POSITION)))
             travel_s = distance_mm / speed_mm_s + 2 * speed_mm_s / self._config.acceleration_mm_s2
             walker.set_mode(PROFILE_POSITION)
             walker.walk(Goal.ENABLED)
-            node.write(objects.PROFILE_VELOCITY, self._units.rpm(speed_mm_s))
+            node.write(objects.PROFILE_VELOCITY, self._kind.scale.rpm(speed_mm_s))
             node.write(objects.TARGET, target)
             walker.control(Controlword.ENABLE_OPERATION)
             walker.control(Controlword.ENABLE_OPERATION | Controlword.START | Controlword.IMMEDIATELY)
@@ -184,7 +189,7 @@ class Epos4Axis:
         walker = self._started()
         self._check_referenced(walker, "enabling")
         with self._moving(walker):
-            self._target = self._checked(self._units.mm(walker.node.read(objects.POSITION)))
+            self._target = self._checked(self._kind.scale.mm(walker.node.read(objects.POSITION)))
             walker.node.write(objects.TARGET, self._target)
             walker.set_mode(CYCLIC_POSITION)
             walker.walk(Goal.ENABLED)
@@ -203,6 +208,7 @@ class Epos4Axis:
         counters, decoder = self.counters, node.link.decoder
         counters.frames = decoder.frames
         counters.discarded_bytes = decoder.discarded_bytes
+        counters.trouble = node.link.health.trouble
         counters.device_lost = self._samples.matcher.lost + decoder.refused - self._refused_before
         return samples
 
@@ -255,6 +261,11 @@ class Epos4Axis:
             self._link.close()
         self._walker = self._link = None
 
+    def _is_referenced(self, status: int) -> bool:
+        """By the bit in which this kind of drive says it; where it has none, since it was homed in this session."""
+        bit = self._kind.referenced_bit
+        return bool(status & bit) if bit else self._homed
+
     def _started(self) -> Walker:
         if self._walker is None:
             raise DeviceError(f"{self._name}: is not started or was closed; start it first")
@@ -276,7 +287,7 @@ class Epos4Axis:
             )
 
     def _check_referenced(self, walker: Walker, what: str) -> None:
-        if not walker.read_status() & Statusword.REFERENCED:
+        if not self._is_referenced(walker.read_status()):
             raise DeviceError(f"{self._name}: has no reference, and {what} needs one; home the axis first")
 
     def _check_speed(self, speed_mm_s: float) -> None:
@@ -294,7 +305,7 @@ class Epos4Axis:
                 f"{self._name}: refused to go to {position_mm:g} mm; limits.position_min_mm and position_max_mm are "
                 f"{low_mm:g} and {high_mm:g} mm"
             )
-        return self._units.increments(min(max(position_mm, low_mm), high_mm))
+        return self._kind.scale.increments(min(max(position_mm, low_mm), high_mm))
 
     @contextlib.contextmanager
     def _moving(self, walker: Walker) -> Iterator[None]:

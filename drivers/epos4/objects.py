@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 U8, U16, U32, I8, I16, I32, TEXT = "B", "H", "I", "b", "h", "i", "s"
-Access = Literal["ro", "ro+", "rw", "rw+", "const"]
+Access = Literal["ro", "ro+", "rw", "rw+", "const", "wo"]
 # Ranges of INTEGER32 and UNSIGNED32 (CiA 301).
 I32_MIN, I32_MAX, U32_MAX = -(1 << 31), (1 << 31) - 1, (1 << 32) - 1
 
@@ -93,59 +93,6 @@ TARGET_VELOCITY = Entry(0x60FF, 0, "target velocity", I32, "rw+")
 SUPPORTED_MODES = Entry(0x6502, 0, "supported modes", U32, "ro", 0x3A5)
 HOMING_METHODS = (-4, -3, -2, -1, 1, 2, 7, 11, 17, 18, 23, 27, 33, 34, 37)
 
-_OTHERS = (
-    Entry(0x1000, 0, "device type", U32, "ro", 0x0002_0192),
-    ERROR_COUNT,
-    *ERROR_HISTORY,
-    Entry(0x1005, 0, "SYNC identifier", U32, "const", 0x80),
-    Entry(0x100A, 0, "software version", TEXT, "const", "0x0170"),
-    Entry(0x1010, 0, "store parameters", U8, "const", 1),
-    Entry(0x1010, 1, "store all parameters", U32, "rw", 1),
-    Entry(0x1011, 0, "restore parameters", U8, "const", 1),
-    Entry(0x1011, 1, "restore all parameters", U32, "rw", 1),
-    Entry(0x1014, 0, "emergency identifier", U32, "const", 0x80, by_node=True),
-    Entry(0x1016, 0, "consumer heartbeat entries", U8, "const", 2),
-    Entry(0x1016, 2, "consumer heartbeat time 2", U32, "rw"),
-    Entry(0x1018, 0, "identity entries", U8, "const", 4),
-    Entry(0x1029, 0, "error behaviour entries", U8, "const", 1),
-    Entry(0x1029, 1, "behaviour on communication error", U8, "rw", 0, 0, 2),
-    Entry(0x2000, 0, "node number", U8, "rw", 0, 1, 127, by_node=True),
-    Entry(0x2001, 0, "CAN bit rate code", U8, "rw", 0, 0, 9),
-    Entry(0x3001, 0, "motor data entries", U8, "const", 5),
-    Entry(0x3001, 1, "nominal current", U32, "rw", 5000),
-    Entry(0x3001, 5, "torque constant", U32, "rw", 36_900),
-    Entry(0x30B0, 0, "home position", I32, "rw"),
-    Entry(0x30B1, 0, "home offset move distance", I32, "rw"),
-    Entry(0x30B2, 0, "current threshold for homing", U16, "rw", 500),
-    Entry(0x30D1, 0, "current entries", U8, "const", 2),
-    Entry(0x30D3, 0, "velocity entries", U8, "const", 1),
-    Entry(0x30D3, 1, "velocity averaged", I32, "ro+"),
-    Entry(0x3141, 0, "digital input entries", U8, "const", 2),
-    Entry(0x3141, 1, "digital inputs, logic state", U16, "ro+"),
-    Entry(0x3141, 2, "digital inputs, polarity", U16, "rw"),
-    Entry(0x606B, 0, "velocity demand", I32, "ro+"),
-    Entry(0x6071, 0, "target torque", I16, "rw+"),
-    Entry(0x6076, 0, "motor rated torque", U32, "ro", 128_000),
-    Entry(0x6077, 0, "torque actual", I16, "ro+"),
-    Entry(0x607D, 0, "software position limit entries", U8, "const", 2),
-    Entry(0x6080, 0, "maximal motor speed", U32, "rw", 50_000, 1),
-    Entry(0x6086, 0, "motion profile type", I16, "rw", 0, 0, 0),
-    Entry(0x6099, 0, "homing speed entries", U8, "const", 2),
-    Entry(0x60A8, 0, "SI unit position", U32, "ro", 0x00B5_0000),
-    Entry(0x60A9, 0, "SI unit velocity", U32, "ro", 0x00B4_4700),
-    Entry(0x60AA, 0, "SI unit acceleration", U32, "ro", 0x00C0_0300),
-    Entry(0x60B0, 0, "position offset", I32, "rw+"),
-    Entry(0x60B1, 0, "velocity offset", I32, "rw+"),
-    Entry(0x60B2, 0, "torque offset", I16, "rw+"),
-    Entry(0x60C2, 0, "interpolation entries", U8, "const", 2),
-    Entry(0x60C2, 2, "interpolation time index", I8, "rw", -3, -3, -3),
-    Entry(0x60C5, 0, "maximal acceleration", U32, "rw", U32_MAX, 1),
-    Entry(0x60F4, 0, "following error actual", I32, "ro+"),
-    Entry(0x60FD, 0, "digital inputs", U32, "ro+"),
-    Entry(0x60FE, 0, "digital output entries", U8, "const", 1),
-    Entry(0x60FE, 1, "physical outputs", U32, "rw+"),
-)
-
 MAX_MAPPED = 12  # sub-indices of a mapping in the maker's electronic data sheet
 DISABLED = 1 << 31
 NO_RTR = 1 << 30
@@ -184,7 +131,8 @@ def _pdos() -> list[Entry]:
 
 
 _NAMED = (
-    ERROR_REGISTER, DEVICE_NAME, HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER, VENDOR, PRODUCT, REVISION, SERIAL,
+    ERROR_REGISTER, ERROR_COUNT, *ERROR_HISTORY, DEVICE_NAME, HEARTBEAT_CONSUMER, HEARTBEAT_PRODUCER,
+    VENDOR, PRODUCT, REVISION, SERIAL,
     CURRENT_LIMIT, CURRENT_AVERAGED, CURRENT_ACTUAL, ABORT_OPTION, ERROR_CODE, CONTROLWORD, STATUSWORD,
     QUICK_STOP_OPTION, SHUTDOWN_OPTION, DISABLE_OPTION, FAULT_OPTION, MODE, MODE_DISPLAY, DEMAND, POSITION,
     FOLLOWING_WINDOW, VELOCITY, TARGET, LIMIT_LOW, LIMIT_HIGH, MAX_PROFILE_VELOCITY, PROFILE_VELOCITY,
@@ -192,7 +140,6 @@ _NAMED = (
     HOMING_SPEED_ZERO, HOMING_ACCELERATION, INTERPOLATION, TARGET_VELOCITY, SUPPORTED_MODES,
 )  # fmt: skip
 OBJECTS: dict[tuple[int, int], Entry] = {
-    (entry.index, entry.sub): entry
-    for entry in sorted([*_NAMED, *_OTHERS, *_pdos()], key=lambda entry: (entry.index, entry.sub))
+    (entry.index, entry.sub): entry for entry in sorted([*_NAMED, *_pdos()], key=lambda entry: (entry.index, entry.sub))
 }
 """Every object the drive is asked for, by index and sub-index."""

@@ -7,7 +7,8 @@ an answer was lost, every later one would also fit the SYNC after that, and this
 from collections import deque
 
 from drivers.epos4.cia402 import Statusword
-from drivers.epos4.codec import DriveState, Units, decode_motion_pdo, decode_state_pdo
+from drivers.epos4.codec import DriveState, decode_state_pdo
+from drivers.epos4.kind import DriveKind
 from rig.channels import AxisSample
 
 # Fifteen deliveries of a USB adapter: an answer still to come would be taken for the next SYNC's. Motion stops
@@ -58,10 +59,10 @@ class SyncMatcher:
 class SampleBuilder:
     """Joins the two PDOs of one SYNC to a sample; numbers are contiguous, so a loss shows in ``lost`` only."""
 
-    def __init__(self, units: Units, next_seq: int = 0) -> None:
+    def __init__(self, kind: DriveKind, next_seq: int = 0) -> None:
         self.matcher = SyncMatcher()
         self.next_seq = next_seq
-        self._units = units
+        self._kind = kind
         self._state: DriveState | None = None
         self._ready: list[AxisSample] = []
 
@@ -76,7 +77,7 @@ class SampleBuilder:
 
     def take_motion(self, data: bytes, now_ns: int) -> None:
         """TPDO2 came, which completes a sample."""
-        motion, state = decode_motion_pdo(data), self._state
+        motion, state = self._kind.decode_motion(data), self._state
         self._state = None
         if motion is None or state is None:
             self.matcher.drop()
@@ -84,7 +85,7 @@ class SampleBuilder:
         sync_ns = self.matcher.answered(now_ns)
         if sync_ns is None:
             return
-        units = self._units
+        units = self._kind.scale
         valid = 0 if state.status & Statusword.FAULT else 1
         current_A = units.direction * motion.current_mA / 1000
         self._ready.append(

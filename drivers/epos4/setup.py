@@ -3,7 +3,7 @@
 from drivers.epos4 import objects
 from drivers.epos4.codec import Units, pdo_maps
 from drivers.epos4.objects import DISABLED, Entry
-from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.products.can_axis import CanAxisProduct
 from rig.config.wiring import Limits
 
 HOST_NODES = (127, 126)
@@ -19,23 +19,23 @@ HOST_MISSES = 2
 DRIVE_MISSES = 3
 
 
-def host_node(config: Epos4Wiring) -> int:
+def host_node(config: CanAxisProduct) -> int:
     """The number under which the host sends its heartbeat: 127, or 126 where the drive is 127."""
     return HOST_NODES[config.node == HOST_NODES[0]]
 
 
-def host_heartbeat_limit_ms(config: Epos4Wiring) -> int:
+def host_heartbeat_limit_ms(config: CanAxisProduct) -> int:
     """Silence of the host after which the drive stops: two periods, but 20 ms more than one, as the maker advises."""
     return max(HOST_MISSES * config.heartbeat_ms, config.heartbeat_ms + LEAST_CONSUMER_MARGIN_MS)
 
 
-def drive_heartbeat_limit_ns(config: Epos4Wiring) -> int:
+def drive_heartbeat_limit_ns(config: CanAxisProduct) -> int:
     """Silence of the drive after which it counts as lost: three periods, but 20 ms more than one."""
     limit_ms = max(DRIVE_MISSES * config.heartbeat_ms, config.heartbeat_ms + LEAST_CONSUMER_MARGIN_MS)
     return limit_ms * 1_000_000
 
 
-def units(config: Epos4Wiring) -> Units:
+def units(config: CanAxisProduct) -> Units:
     """Scale of the configured axis."""
     return Units(config.increments_per_mm, config.increments_per_rev, config.direction)
 
@@ -47,13 +47,12 @@ def drive_limits(limits: Limits, scale: Units) -> tuple[int, int]:
     return low, high
 
 
-def parameters(config: Epos4Wiring, limits: Limits) -> list[tuple[Entry, int]]:
+def parameters(config: CanAxisProduct, limits: Limits, scale: Units) -> list[tuple[Entry, int]]:
     """Limits, stops, speeds and heartbeats; all of it is read back after it was written.
 
     The interpolation time stays 0: otherwise a single late set-point is a fault (8250), and the host is no real-time
     system. Sub 1 of 1016 is written last, it arms the stop that follows the host's silence.
     """
-    scale = units(config)
     low, high = drive_limits(limits, scale)
     acceleration = scale.rpm(config.acceleration_mm_s2)
     homing = scale.rpm(config.homing_speed_mm_s)
@@ -81,7 +80,7 @@ def parameters(config: Epos4Wiring, limits: Limits) -> list[tuple[Entry, int]]:
     ]
 
 
-def process_data(config: Epos4Wiring) -> list[tuple[Entry, int]]:
+def process_data(config: CanAxisProduct) -> list[tuple[Entry, int]]:
     """Writes that configure the PDOs, in their order."""
     return [write for pdo in pdo_maps(config.node) for write in pdo.writes()]
 

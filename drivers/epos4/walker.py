@@ -35,6 +35,7 @@ class Walker:
     def __init__(self, node: Node, now: Callable[[], int], braking_s: float) -> None:
         self.node = node
         self.status = 0
+        self.standstill = STANDSTILL_RPM
         self.mode = 0
         self.controlword = int(Controlword.DISABLE_VOLTAGE)
         self.interrupted: Callable[[], bool] = never
@@ -92,7 +93,7 @@ class Walker:
         """From wherever it is: stopped by its ramp, then without torque."""
         self.walk(Goal.STOPPED)
         deadline_ns = self._deadline_ns(REACTION_S + self._braking_s)
-        while abs(self.node.read(objects.VELOCITY)) > STANDSTILL_RPM and self._now() < deadline_ns:
+        while abs(self.node.read(objects.VELOCITY)) > self.standstill and self._now() < deadline_ns:
             self._pause()
         self.walk(Goal.DISABLED)
 

@@ -1,12 +1,11 @@
 """What the replies of the combined API say: tracking data (TX, BX), port handles, identity, errors in words.
 
-Parsers return None for a reply that is not of its kind; they never raise on wire input. The encoders serve the mock.
+Parsers return None for a reply that is not of its kind; they never raise on wire input.
 """
 
 import math
 import re
 import struct
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
@@ -110,7 +109,10 @@ ERRORS = {
     0x2E: "invalid port description",
     0x2F: "port already assigned to a handle",
     0x33: "feature not available",
-    0x34: "invalid user parameter",
+    0x34: "no such user parameter",
+    0x35: "bad value of the user parameter",
+    0x36: "value of the user parameter out of range",
+    0x39: "permission denied",
     0xF4: "flash memory cannot be read",
     0xF5: "flash memory cannot be written",
     0xF6: "flash memory cannot be erased",
@@ -125,7 +127,6 @@ _LINE = re.compile(
 _HEX = re.compile(r"[0-9A-F]+")
 _POSE_STATUS_FRAME = struct.Struct("<8fII")
 _STATUS_FRAME = struct.Struct("<II")
-_POSE = struct.Struct("<8f")
 _VALID_CODE, _MISSING_CODE, _DISABLED_CODE = 1, 2, 4
 
 
@@ -254,39 +255,3 @@ def _parse_tools(body: bytes) -> tuple[list[ToolReading], int]:
         else:
             raise ValueError(code)
     return tools, at
-
-
-def encode_tx(tools: Sequence[ToolReading], system_status: int = 0, options: int = TRANSFORMS) -> str:
-    """The text of a TX reply, without strays; ValueError where a number has no place in its digits."""
-    lines = "".join(f"{tool.handle:02X}{_tx_state(tool)}\n" for tool in tools)
-    return f"{len(tools):02X}{lines}{'00' if options & STRAYS else ''}{system_status:04X}"
-
-
-def _tx_state(tool: ToolReading) -> str:
-    if tool.pose == DISABLED:
-        return DISABLED
-    pose = MISSING if isinstance(tool.pose, str) else _tx_pose(tool.pose)
-    return f"{pose}{tool.port_status:08X}{tool.frame or 0:08X}"
-
-
-def _tx_pose(pose: Pose) -> str:
-    text = "".join(f"{round(value * 10000):+06d}" for value in pose[:4])
-    text += "".join(f"{round(value * 100):+07d}" for value in pose[4:7]) + f"{round(pose.error_mm * 10000):+06d}"
-    if len(text) != 51:
-        raise ValueError(f"{pose} does not fit into the digits of TX")
-    return text
-
-
-def encode_bx(tools: Sequence[ToolReading], system_status: int = 0, options: int = TRANSFORMS) -> bytes:
-    """The body of a BX reply, without strays."""
-    body = bytes([len(tools)]) + b"".join(_bx_tool(tool) for tool in tools)
-    return body + (b"\0" if options & STRAYS else b"") + system_status.to_bytes(2, "little")
-
-
-def _bx_tool(tool: ToolReading) -> bytes:
-    if tool.pose == DISABLED:
-        return bytes([tool.handle, _DISABLED_CODE])
-    tail = _STATUS_FRAME.pack(tool.port_status, tool.frame or 0)
-    if isinstance(tool.pose, str):
-        return bytes([tool.handle, _MISSING_CODE]) + tail
-    return bytes([tool.handle, _VALID_CODE]) + _POSE.pack(*tool.pose) + tail

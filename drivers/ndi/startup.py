@@ -236,9 +236,13 @@ def load_tools(dialogue: Dialogue, roms: Sequence[bytes], tools: Sequence[str]) 
     if len(handles) != len(tools):
         raise DeviceError(
             f"{dialogue.port.address}: {len(handles)} tools are enabled where the configuration names {len(tools)}"
-            f" ({', '.join(tools)}); plug them in, or give tracker.roms"
+            f" ({', '.join(tools)}); {_remedy(len(handles) > len(tools))}"
         )
     return handles
+
+
+def _remedy(too_many: bool) -> str:
+    return "unplug the others, or name them in tracker.tools" if too_many else "plug them in, or give tracker.roms"
 
 
 def _free(dialogue: Dialogue, ports: Sequence[replies.PortHandle]) -> None:

@@ -20,9 +20,10 @@ from drivers.bota.codec import (
     encode_frame,
 )
 from mock_devices.interfaces import NEVER_NS, SAMPLES_KEPT, SensorPlant
+from mock_devices.opening import PortPower
 from mock_devices.wire import OnWire, Wire
 
-Mode = Literal["booting", "init", "config", "run"]
+Mode = Literal["off", "booting", "init", "config", "run"]
 
 NAME = "BFT-SENS-SER-M8"
 FIRMWARE = "1.0.6"
@@ -80,7 +81,10 @@ class CommandParser:
 
 
 class BotaMock(OnWire):
-    """Gets power at ``start_ns`` and boots; its counter runs ``drift_ppm`` faster than the bench's clock.
+    """Its counter runs ``drift_ppm`` faster than the bench's clock.
+
+    On a serial line it gets its power, as over USB, from the first client that opens it, who so sees the boot text;
+    on any other wire at ``start_ns``.
 
     Failures of the device, plain attributes to be set at any time: ``silent`` sends nothing; ``frozen`` repeats the
     last forces under running time; ``invalid`` sets the status bit of that name; ``wrong_identity`` prints another
@@ -105,14 +109,30 @@ class BotaMock(OnWire):
         self.serial_number = serial_number
         self._speed = 1 + drift_ppm * 1e-6
         self._parser = CommandParser()
-        self._mode: Mode = "booting"
-        self._power_ns = start_ns
-        self._due_ns = start_ns + BOOT_NS
+        self._port = PortPower(wire.endpoint)
+        self._mode: Mode = "off" if self._port.watched else "booting"
+        self._power_ns = self._seen_ns = start_ns
+        self._due_ns = NEVER_NS if self._port.watched else start_ns + BOOT_NS
         self._run_ns = start_ns
         self._frames = 0
         self._sinc = SINC_LENGTHS[-1]
         self._setup = ("0", "1", "0", "4")
         self._wrench = (0.0,) * 6
+
+    def filenos(self) -> list[int]:
+        """Descriptors to wait on."""
+        return [*super().filenos(), *self._port.filenos()]
+
+    def close(self) -> None:
+        """Cuts the wire."""
+        super().close()
+        self._port.close()
+
+    def restart(self) -> None:
+        """Loses its power: boots again at once where a client is there, else when the next one comes."""
+        self._mode, self._due_ns = "off", NEVER_NS
+        if self._port.taken():
+            self._boot(self._seen_ns)
 
     @property
     def due_ns(self) -> int:
@@ -121,6 +141,7 @@ class BotaMock(OnWire):
 
     def tick(self, now_ns: int) -> None:
         """Finishes booting, or sends one frame."""
+        self._seen_ns = now_ns
         if now_ns < self._due_ns:
             return
         if self._mode == "booting":
@@ -132,8 +153,11 @@ class BotaMock(OnWire):
 
     def receive(self, now_ns: int) -> None:
         """Executes what the client sent; a booting sensor hears nothing."""
+        self._seen_ns = now_ns
+        if self._port.opened() and self._mode == "off":
+            self._boot(now_ns)
         data = self._wire.read()
-        if self._mode == "booting":
+        if self._mode in ("off", "booting"):
             return
         for command in self._parser.feed(data):
             self._execute(command, now_ns)

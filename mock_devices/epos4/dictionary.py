@@ -4,27 +4,30 @@ Plain values stand in ``values``; ``live`` objects are asked when read; ``hooks`
 and may refuse it by raising SdoAbort, which puts the former value back.
 """
 
+from collections import defaultdict
 from collections.abc import Callable
 
-from drivers.epos4.objects import DISABLED, HOMING_METHOD, HOMING_METHODS, MAX_MAPPED, OBJECTS, TEXT, Entry
+from drivers.epos4.objects import DISABLED, MAX_MAPPED, TEXT, Entry
 from mock_devices.canopen.sdo_server import SdoAbort
+from mock_devices.cia402.table import Key, ObjectTable
 
-READ_ONLY, NO_OBJECT, NOT_MAPPABLE, TOO_LONG = 0x06010002, 0x06020000, 0x06040041, 0x06040042
+WRITE_ONLY, READ_ONLY, NO_OBJECT, NOT_MAPPABLE, TOO_LONG = (
+    0x06010001, 0x06010002, 0x06020000, 0x06040041, 0x06040042
+)  # fmt: skip
 WRONG_LENGTH, NO_SUB, OUT_OF_RANGE = 0x06070010, 0x06090011, 0x06090030
 NOT_STORED, WRONG_STATE = 0x08000020, 0x08000022
-INDICES = frozenset(index for index, _ in OBJECTS)
 SIGNATURES = {(0x1010, 1): 0x65766173, (0x1011, 1): 0x64616F6C}
 """What must be written to store or restore parameters: ``save`` and ``load``."""
 TYPES = frozenset((*range(241), 253, 255))
 
-Key = tuple[int, int]
-
 
 class Dictionary:
-    """Objects of node ``node`` by index and sub-index."""
+    """Objects of node ``node`` by index and sub-index, of the kind that ``table`` says."""
 
-    def __init__(self, node: int) -> None:
-        self.values: dict[Key, int] = {}
+    def __init__(self, node: int, table: ObjectTable) -> None:
+        self.table = table
+        self.objects = table.objects
+        self.values: defaultdict[Key, int] = defaultdict(int)  # an object it does not have counts as 0
         self.live: dict[Key, Callable[[], int]] = {}
         self.hooks: dict[Key, Callable[[int], None]] = {}
         self.pdo_changed: Callable[[], None] = lambda: None
@@ -33,9 +36,10 @@ class Dictionary:
 
     def reset(self, first: int = 0, last: int = 0xFFFF) -> None:
         """Defaults for the objects from index ``first`` to ``last``."""
-        for key, entry in OBJECTS.items():
+        for key, entry in self.objects.items():
             if first <= key[0] <= last and isinstance(entry.default, int):
-                self.values[key] = entry.default + (self._node if entry.by_node else 0)
+                default = self.table.delivered.get(key, entry.default)
+                self.values[key] = default + (self._node if entry.by_node else 0)
 
     def value(self, index: int, sub: int = 0) -> int:
         """The value of a known object now."""
@@ -45,8 +49,10 @@ class Dictionary:
     def read(self, index: int, sub: int) -> bytes:
         """What an SDO upload gets; raises SdoAbort."""
         entry = self._entry(index, sub)
+        if entry.access == "wo":
+            raise SdoAbort(WRITE_ONLY)
         if entry.kind == TEXT:
-            return str(entry.default).encode()
+            return self.table.texts.get((index, sub), "").encode()
         return entry.pack(self.value(index, sub))
 
     def write(self, index: int, sub: int, data: bytes) -> None:
@@ -75,14 +81,14 @@ class Dictionary:
 
     def _entry(self, index: int, sub: int) -> Entry:
         try:
-            return OBJECTS[index, sub]
+            return self.objects[index, sub]
         except KeyError:
-            raise SdoAbort(NO_SUB if index in INDICES else NO_OBJECT) from None
+            raise SdoAbort(NO_SUB if (index, 0) in self.objects else NO_OBJECT) from None
 
     def _check(self, entry: Entry, value: int) -> None:
         if (entry.low is not None and value < entry.low) or (entry.high is not None and value > entry.high):
             raise SdoAbort(OUT_OF_RANGE)
-        if entry is HOMING_METHOD and value not in HOMING_METHODS:
+        if entry.index == 0x6098 and value not in self.table.homing_methods:
             raise SdoAbort(OUT_OF_RANGE)
         if (entry.index, entry.sub) in SIGNATURES and value != SIGNATURES[entry.index, entry.sub]:
             raise SdoAbort(NOT_STORED)
@@ -116,7 +122,7 @@ class Dictionary:
             raise SdoAbort(NOT_MAPPABLE)
 
     def _check_mappable(self, value: int, receive: bool) -> None:
-        entry = OBJECTS.get((value >> 16, value >> 8 & 0xFF))
+        entry = self.objects.get((value >> 16, value >> 8 & 0xFF))
         allowed = "rw+" if receive else "ro+"
         if entry is None or entry.access != allowed or entry.size * 8 != value & 0xFF:
             raise SdoAbort(NOT_MAPPABLE)

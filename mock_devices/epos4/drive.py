@@ -1,7 +1,7 @@
 """The mock drive's inside: CiA 402 state machine, modes of operation and fault reactions, moving an AxisPlant.
 
 Knows no bus and no clock. Positions are increments; the raw counter starts at 0 with the drive and ``zero`` is where
-home is on it. Torque modes are refused, because an AxisPlant takes positions only.
+home is on it.
 """
 
 import math
@@ -11,45 +11,17 @@ from drivers.epos4.cia402 import STATE_WORDS, Controlword, PdsState, Statusword
 from drivers.epos4.faults import FAULTS, UNKNOWN
 from drivers.epos4.objects import U32_MAX
 from mock_devices.canopen.sdo_server import SdoAbort
+from mock_devices.cia402.states import TRANSITIONS, command_of
+from mock_devices.epos4 import torque
 from mock_devices.epos4.dictionary import Dictionary
 from mock_devices.epos4.motion import NEEDS_HOME_SWITCH, HomingSetup, Inputs, TrapezoidalProfile, homing
 from mock_devices.interfaces import AxisPlant
 
 PROFILE_POSITION, PROFILE_VELOCITY, HOMING, CYCLIC_POSITION, CYCLIC_VELOCITY, CYCLIC_TORQUE = 1, 3, 6, 8, 9, 10
-MODES = (PROFILE_POSITION, PROFILE_VELOCITY, HOMING, CYCLIC_POSITION, CYCLIC_VELOCITY)
+MODES = (PROFILE_POSITION, PROFILE_VELOCITY, HOMING, CYCLIC_POSITION, CYCLIC_VELOCITY, CYCLIC_TORQUE)
 STANDSTILL_RPM = 30  # the EPOS4's standstill window as delivered (object 30E0:1)
-HARDWARE_ABORT, RANGE_ABORT = 0x06060000, 0x06090030
+RANGE_ABORT = 0x06090030
 MODE_BITS = Statusword.TARGET_REACHED | Statusword.ACKNOWLEDGE | Statusword.MODE_ERROR
-
-OFF, SHUTDOWN, SWITCH_ON, ENABLE, STOP = range(5)
-TRANSITIONS = {
-    (PdsState.SWITCH_ON_DISABLED, SHUTDOWN): PdsState.READY,
-    (PdsState.READY, SWITCH_ON): PdsState.SWITCHED_ON,
-    (PdsState.READY, ENABLE): PdsState.SWITCHED_ON,
-    (PdsState.READY, OFF): PdsState.SWITCH_ON_DISABLED,
-    (PdsState.READY, STOP): PdsState.SWITCH_ON_DISABLED,
-    (PdsState.SWITCHED_ON, ENABLE): PdsState.ENABLED,
-    (PdsState.SWITCHED_ON, SHUTDOWN): PdsState.READY,
-    (PdsState.SWITCHED_ON, OFF): PdsState.SWITCH_ON_DISABLED,
-    (PdsState.SWITCHED_ON, STOP): PdsState.SWITCH_ON_DISABLED,
-    (PdsState.ENABLED, SWITCH_ON): PdsState.SWITCHED_ON,
-    (PdsState.ENABLED, SHUTDOWN): PdsState.READY,
-    (PdsState.ENABLED, OFF): PdsState.SWITCH_ON_DISABLED,
-    (PdsState.ENABLED, STOP): PdsState.QUICK_STOP,
-    (PdsState.QUICK_STOP, ENABLE): PdsState.ENABLED,
-    (PdsState.QUICK_STOP, OFF): PdsState.SWITCH_ON_DISABLED,
-}
-
-
-def command_of(word: int) -> int:
-    """The state machine's command in a controlword without fault reset (CiA 402)."""
-    if not word & 0x02:
-        return OFF
-    if not word & 0x04:
-        return STOP
-    if not word & 0x01:
-        return SHUTDOWN
-    return ENABLE if word & 0x08 else SWITCH_ON
 
 
 def _counter(value: float) -> int:
@@ -67,7 +39,9 @@ class Drive:
         report: Callable[[int], None],
         increments_per_mm: float,
         increments_per_rev: float,
+        speed_unit: float = 0.0,
     ) -> None:
+        """``speed_unit`` is what the drive's unit of speed is in increments/s; 0: it counts in rpm."""
         self.state = PdsState.SWITCH_ON_DISABLED
         self.mode = PROFILE_POSITION
         self.remote = False
@@ -78,7 +52,7 @@ class Drive:
         self._values = dictionary.values
         self._report = report
         self._scale = increments_per_mm
-        self._per_rpm = increments_per_rev / 60
+        self._per_rpm = speed_unit or increments_per_rev / 60
         self._index_spacing = increments_per_rev
         self._ramp = TrapezoidalProfile(0.0)
         self._inputs = Inputs()
@@ -107,8 +81,10 @@ class Drive:
     def status(self) -> int:
         """The statusword."""
         word = STATE_WORDS[self.state] | Statusword.VOLTAGE | self._bits
-        if self.state is PdsState.ENABLED and self.mode in (CYCLIC_POSITION, CYCLIC_VELOCITY):
+        still = self.mode == PROFILE_VELOCITY and abs(self.rpm) <= STANDSTILL_RPM
+        if self.state is PdsState.ENABLED and (still or self.mode >= CYCLIC_POSITION):
             word |= Statusword.ACKNOWLEDGE
+        word &= self._dictionary.table.status_mask
         return int(word | Statusword.REMOTE if self.remote else word)
 
     @property
@@ -166,12 +142,12 @@ class Drive:
 
     def set_mode(self, mode: int) -> None:
         """Object 6060 was written; raises SdoAbort."""
-        if mode == CYCLIC_TORQUE:
-            raise SdoAbort(HARDWARE_ABORT)
-        if mode not in MODES:
+        if mode not in MODES or not self._values[0x6502, 0] >> (mode - 1) & 1:
             raise SdoAbort(RANGE_ABORT)
         if mode == self.mode:
             return
+        if self.mode == CYCLIC_TORQUE and self.powered:
+            self._aim()
         self.mode = mode
         self._bits &= ~MODE_BITS
         self._goal = self._queued = self._homing = None
@@ -210,6 +186,8 @@ class Drive:
         """Time passes: own profiles advance, ramps end, the following error is watched."""
         if self.state in (PdsState.FAULT_REACTION, PdsState.QUICK_STOP) or self._leaving:
             self._braked(dt_s)
+        elif self.state is PdsState.ENABLED and self.mode == CYCLIC_TORQUE:
+            self._push()
         elif self.state is PdsState.ENABLED and self.mode != CYCLIC_POSITION:
             self._advance(dt_s)
             self._aim()
@@ -344,13 +322,19 @@ class Drive:
         values, rpm = self._values, self._per_rpm
         cyclic = self.mode == CYCLIC_VELOCITY
         top = min(values[0x607F, 0], values[0x6080, 0])
-        speed = max(min(values[0x60FF, 0], top), -top) * rpm
+        wanted = values[0x60FF, 0] + (values[0x60B1, 0] if cyclic else 0)
+        speed = max(min(wanted, top), -top) * rpm
         acceleration = min(values[0x60C5 if cyclic else 0x6083, 0], values[0x60C5, 0]) * rpm
         deceleration = min(values[0x60C5 if cyclic else 0x6084, 0], values[0x60C5, 0]) * rpm
         if self._ramp.at_speed(speed, acceleration, deceleration, dt_s):
             self._bits |= Statusword.TARGET_REACHED
         else:
             self._bits &= ~Statusword.TARGET_REACHED
+
+    def _push(self) -> None:
+        """By torque: the demand is wherever the axis is."""
+        self._ramp.position, self._ramp.speed = self._raw(), self._plant.velocity_mm_s * self._scale
+        self._plant.push(math.copysign(1.0, self._scale) * torque.current_A(self._values, self.rpm))
 
     def _home(self, dt_s: float) -> None:
         if self._homing is None:

@@ -11,12 +11,16 @@ from collections.abc import Callable
 from drivers.can.slcan import CanFrame
 from drivers.canopen.nmt import EMERGENCY_ID, HEARTBEAT_ID, SDO_REQUEST_ID, SDO_RESPONSE_ID, SYNC, NmtCommand, NmtState
 from drivers.epos4.faults import FAULTS, UNKNOWN
-from drivers.epos4.objects import PRODUCT, SERIAL, VENDOR
+from drivers.epos4.objects import SERIAL
+from mock_devices.can.bus_adapter import BusAdapter
 from mock_devices.can.slcan_adapter import SlcanAdapter
 from mock_devices.canopen.sdo_server import SdoServer
+from mock_devices.cia402.table import ObjectTable
+from mock_devices.epos4 import torque
 from mock_devices.epos4.dictionary import Dictionary
 from mock_devices.epos4.drive import Drive
 from mock_devices.epos4.pdo import ProcessData
+from mock_devices.epos4.table import EPOS4
 from mock_devices.interfaces import NEVER_NS, AxisPlant
 from mock_devices.wire import OnWire, Wire
 
@@ -53,6 +57,9 @@ class Epos4Mock(OnWire):
         increments_per_rev: float = 10_000.0,
         clock_ns: Callable[[], int] | None = None,
         number: int = int(SERIAL.default),
+        table: ObjectTable = EPOS4,
+        speed_unit: float = 0.0,
+        adapter: BusAdapter | None = None,
     ) -> None:
         super().__init__(wire)
         self.serial_number = f"{number:08X}"
@@ -60,10 +67,10 @@ class Epos4Mock(OnWire):
         self.wrong_identity = False
         self.node = node
         self.nmt = NmtState.BOOT_UP
-        self.dictionary = Dictionary(node)
-        self.drive = Drive(plant, self.dictionary, self._report, increments_per_mm, increments_per_rev)
+        self.dictionary = Dictionary(node, table)
+        self.drive = Drive(plant, self.dictionary, self._report, increments_per_mm, increments_per_rev, speed_unit)
         self._plant = plant
-        self._adapter = SlcanAdapter(wire)
+        self._adapter = adapter or SlcanAdapter(wire)
         self._sdo = SdoServer(self.dictionary.read, self.dictionary.write)
         self._pdo = ProcessData(self.dictionary, self._send, self.drive.fault)
         self._frozen_at: int | None = None
@@ -267,15 +274,16 @@ class Epos4Mock(OnWire):
     # The dictionary's live side
 
     def _connect(self) -> None:
-        drive, plant = self.drive, self._plant
+        drive, plant, values = self.drive, self._plant, self.dictionary.values
         self.dictionary.live.update(
             {
                 (0x1001, 0): lambda: self._error_register,
-                (0x1018, 1): lambda: STRANGE_VENDOR if self.wrong_identity else int(VENDOR.default),
-                (0x1018, 2): lambda: STRANGE_PRODUCT if self.wrong_identity else int(PRODUCT.default),
+                (0x1018, 1): lambda: STRANGE_VENDOR if self.wrong_identity else values[0x1018, 1],
+                (0x1018, 2): lambda: STRANGE_PRODUCT if self.wrong_identity else values[0x1018, 2],
                 (0x1018, 4): lambda: int(self.serial_number, 16),
                 (0x30D1, 1): lambda: drive.current_mA,
                 (0x30D1, 2): lambda: drive.current_mA,
+                (0x30D2, 1): lambda: torque.per_mille(values, drive.current_mA),
                 (0x30D3, 1): lambda: drive.rpm,
                 (0x3141, 1): lambda: int(plant.at_reference),
                 (0x603F, 0): lambda: self._error_code,
@@ -285,6 +293,8 @@ class Epos4Mock(OnWire):
                 (0x6064, 0): lambda: drive.position if self._frozen_at is None else self._frozen_at,
                 (0x606B, 0): lambda: drive.rpm,
                 (0x606C, 0): lambda: drive.rpm,
+                (0x6077, 0): lambda: torque.per_mille(values, drive.current_mA),
+                (0x6078, 0): lambda: round(1000 * drive.current_mA / max(values[0x6075, 0], 1)),
                 (0x60F4, 0): lambda: drive.following_error,
                 (0x60FD, 0): lambda: int(plant.at_reference),
             }
@@ -296,6 +306,7 @@ class Epos4Mock(OnWire):
                 (0x1016, 1): lambda _: self._forget_producer(1),
                 (0x1016, 2): lambda _: self._forget_producer(2),
                 (0x3001, 2): self._set_current_limit,
+                (0x6073, 0): lambda share: self._set_current_limit(share * values[0x6075, 0] // 1000),
                 (0x6040, 0): drive.control,
                 (0x6060, 0): drive.set_mode,
                 (0x607A, 0): drive.set_target,

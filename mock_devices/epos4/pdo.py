@@ -4,7 +4,7 @@ import struct
 from collections.abc import Callable
 from typing import NamedTuple
 
-from drivers.epos4.objects import DISABLED, OBJECTS, Entry
+from drivers.epos4.objects import DISABLED, Entry
 from mock_devices.canopen.sdo_server import SdoAbort
 from mock_devices.epos4.dictionary import Dictionary
 from mock_devices.interfaces import NEVER_NS
@@ -118,7 +118,7 @@ class ProcessData:
     def _mapped(self, index: int) -> list[Entry]:
         values = self._dictionary.values
         names = [values[index + 0x200, sub] for sub in range(1, values[index + 0x200, 0] + 1)]
-        return [OBJECTS[name >> 16, name >> 8 & 0xFF] for name in names]
+        return [self._dictionary.objects[name >> 16, name >> 8 & 0xFF] for name in names]
 
     def _storer(self, entry: Entry) -> Callable[[int], None]:
         def store(value: int) -> None:

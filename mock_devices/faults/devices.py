@@ -51,9 +51,9 @@ def _error(axis: Epos4Mock, value: Value) -> None:
     axis.inject_fault(_whole(value, 0xFFFF))
 
 
-def _restart(axis: Epos4Mock, value: Value) -> None:
+def _restart(device: Epos4Mock | BotaMock, value: Value) -> None:
     if as_switch(value):
-        axis.restart()
+        device.restart()
 
 
 def _lasting_error(axis: Epos4Mock, value: Value) -> None:
@@ -66,6 +66,7 @@ BOTA_FAULTS: Mapping[str, FaultKind[BotaMock]] = {
     "invalid": FaultKind("flags its measurements as invalid", True, switching("invalid")),
     "wrong_identity": FaultKind("prints another maker's name after a reset", True, switching("wrong_identity")),
     "corrupt_every": FaultKind("spoils the checksum of every n-th frame; 0: none", 10, _corrupt),
+    "restart": FaultKind("loses its power for a moment, and boots again", True, _restart),
     "refuse": FaultKind("answers these commands with code 1", "R", _refuse),
 }
 ROBOTIQ_FAULTS: Mapping[str, FaultKind[RobotiqMock]] = {

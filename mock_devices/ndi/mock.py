@@ -12,7 +12,10 @@ from drivers.crc import crc16_arc
 from drivers.ndi import replies
 from drivers.ndi.codec import encode_binary, encode_text
 from mock_devices.interfaces import MarkerPose, TrackerPlant
+from mock_devices.ndi import gbf
+from mock_devices.ndi.encoding import ALL_OPTIONS, Point, Scene, encode_bx, encode_tx
 from mock_devices.ndi.port_handles import CommandRefused, PortHandles
+from mock_devices.ndi.user_parameters import UserParameters
 from mock_devices.wire import OnWire, Wire
 
 FRAME_HZ = 60
@@ -20,13 +23,11 @@ MAX_COMMAND = 1024  # the longest command, PVWR with its 64 bytes, has 144 chara
 SYSTEM_PORT_UNOCCUPIED = 0x0080
 _COMMAND = re.compile(r"([A-Z0-9]+)(?:([: ])(.*))?", re.DOTALL)
 _COMM = re.compile(r"[0-7A][01][012][01][01]")
-_OPTIONS = re.compile(r"[0-9A-F]{4}")
-_TRACKING_OPTIONS = replies.TRANSFORMS | replies.OUT_OF_VOLUME | replies.STRAYS
+_OPTIONS = re.compile(r"[0-9A-Fa-f]{4}")
 _PRODUCTS = {
-    "polaris": ("Polaris Control Firmware", "P4-00001", "POLARIS Rev 021"),
-    "vega": ("Polaris Vega Control Firmware", "P9-00001", "Polaris Vega 024"),
+    "polaris": ("Polaris Control Firmware", "P4-00001", "POLARIS Rev 021", "D.001.007"),
+    "vega": ("Polaris Vega Control Firmware", "P9-00001", "Polaris Vega 024", "G.003.005"),
 }
-_FIRMWARE = "Features.Firmware.Version"
 
 Mode = Literal["reset", "setup", "tracking"]
 _ALWAYS: tuple[Mode, ...] = ("reset", "setup", "tracking")
@@ -47,6 +48,8 @@ class NdiMock(OnWire):
     * ``corrupt_every``: one bit is wrong in every n-th reply; 0 for none
     * ``error_reply``: this ERROR code answers TX and BX; None for none
 
+    ``strays`` are markers that belong to no tool; ``keeps_handles``: INIT does not free what was loaded.
+
     ``freeze_tag`` is what VER:0 gives; with "Polaris Vega 008" scikit-surgerynditracker asks by TX instead of BX.
     """
 
@@ -65,7 +68,9 @@ class NdiMock(OnWire):
         self._plant = plant
         self._start_ns = start_ns
         self._ports = PortHandles(tuple(tools))
-        self._product, self._serial, self.freeze_tag = _PRODUCTS[kind]
+        self._product, self._serial, self.freeze_tag, self._revision = _PRODUCTS[kind]
+        self._parameters = UserParameters(self._serial, self._product)
+        self.strays: Sequence[Point] = ()
         self.silent = self.frozen = False
         self.missing: set[int] = set()
         self.corrupt_every = 0
@@ -81,7 +86,10 @@ class NdiMock(OnWire):
             "RESET": (_ALWAYS, self._reset),
             "INIT": (_ALWAYS, self._initialise),
             "VER": (_ALWAYS, self._version),
-            "GETINFO": (_ALWAYS, self._information),
+            "APIREV": (_ALWAYS, lambda _: self._revision),
+            "GETINFO": (_ALWAYS, self._parameters.describe),
+            "GET": (_ALWAYS, self._parameters.get),
+            "SET": (_ALWAYS, self._parameters.set),
             "COMM": (("reset", "setup"), self._communication),
             "PHSR": (_READY, self._ports.search),
             "PHRQ": (_READY, self._ports.request),
@@ -95,6 +103,7 @@ class NdiMock(OnWire):
             "TSTOP": (_TRACKING, self._stop),
             "TX": (_TRACKING, self._tx),
             "BX": (_TRACKING, self._bx),
+            "BX2": (_TRACKING, self._bx2),
         }
 
     @property
@@ -105,6 +114,15 @@ class NdiMock(OnWire):
     @unplugged.setter
     def unplugged(self, tools: set[int]) -> None:
         self._ports.unplugged = tools
+
+    @property
+    def keeps_handles(self) -> bool:
+        """Whether what was loaded outlives INIT, as with firmware that leaves freeing to the client."""
+        return self._ports.outlive_init
+
+    @keeps_handles.setter
+    def keeps_handles(self, keeps: bool) -> None:
+        self._ports.outlive_init = keeps
 
     @property
     def due_ns(self) -> int:
@@ -122,7 +140,7 @@ class NdiMock(OnWire):
         """Answers each complete command by one write."""
         *lines, rest = (self._input + self._wire.read()).split(b"\r")
         self._input = rest[: MAX_COMMAND + 1]
-        for line in lines:
+        for line in (line.lstrip(b"\n") for line in lines):
             if not self.silent:
                 self._wire.write(self._damaged(self._answer(line)))
 
@@ -152,7 +170,7 @@ class NdiMock(OnWire):
         return "RESET"
 
     def _initialise(self, _: str) -> str:
-        """Ends tracking; port handles stay, which the manual's front matter leaves open."""
+        """Ends tracking and frees what was loaded."""
         self._ports.initialise_system()
         self._mode = "setup"
         return "OKAY"
@@ -166,11 +184,6 @@ class NdiMock(OnWire):
             f"{self._product}\nNDI S/N: {self._serial}\nCharacterization Date: 01/02/03\n"
             f"Freeze Tag: {self.freeze_tag}\nFreeze Date: 01/02/03\n(C) Northern Digital Inc.\n"
         )
-
-    def _information(self, params: str) -> str:
-        if params not in ("", _FIRMWARE, "Features.Firmware.*"):
-            raise CommandRefused(0x34)
-        return f"{_FIRMWARE}=007.000.012;3;1;0;12;;Current firmware revision number"
 
     def _communication(self, params: str) -> str:
         """A pseudo-terminal has no speed to change, a TCP connection has no COMM."""
@@ -193,23 +206,28 @@ class NdiMock(OnWire):
         return "OKAY"
 
     def _tx(self, params: str) -> str:
-        options = self._options(params)
-        return replies.encode_tx(self._readings(), self._system_status(), options)
+        return encode_tx(self._scene(), self._options(params))
 
     def _bx(self, params: str) -> bytes:
-        options = self._options(params)
-        return replies.encode_bx(self._readings(), self._system_status(), options)
+        return encode_bx(self._scene(), self._options(params))
+
+    def _bx2(self, params: str) -> bytes:
+        asked = gbf.parse_request(params)
+        return gbf.encode(self._scene(), asked, self._frame, self._ticks * 1_000_000_000 // FRAME_HZ)
 
     def _options(self, params: str) -> int:
-        """Reply options; markers of their own (0002, 0004, 0008) the mock does not have."""
+        """Reply options; none asked for are transforms."""
         if self.error_reply is not None:
             raise CommandRefused(self.error_reply)
         if params and not _OPTIONS.fullmatch(params):
             raise CommandRefused(0x07)
         options = int(params or "0001", 16)
-        if not options & replies.TRANSFORMS or options & ~_TRACKING_OPTIONS:
+        if not options or options & ~ALL_OPTIONS:
             raise CommandRefused(0x23)
         return options
+
+    def _scene(self) -> Scene:
+        return Scene(self._readings(), self.strays, self._system_status())
 
     def _system_status(self) -> int:
         return SYSTEM_PORT_UNOCCUPIED if self.unplugged else 0
@@ -246,6 +264,6 @@ def parse_command(line: bytes) -> tuple[str, str]:
     name, separator, rest = match.groups(default="")
     if separator != ":":
         return name, rest.strip()
-    if f"{crc16_arc(line[:-4]):04X}" != text[-4:]:
+    if f"{crc16_arc(line[:-4]):04X}" != text[-4:].upper():
         raise CommandRefused(0x04)
     return name, text[len(name) + 1 : -4]

@@ -36,13 +36,14 @@ class Handle:
 class PortHandles:
     """At power-up each tool sits in a port of its own; further handles are asked for by PHRQ and filled by PVWR.
 
-    The definitions loaded since INIT follow the tools in the order in which they were written; those loaded before
-    stay and follow theirs too, as two handles with one definition do on the device.
+    INIT frees them. Where handles ``outlive_init``, definitions loaded since follow the tools in the order in which
+    they were written, and those loaded before follow theirs too, as two handles with one definition do on the device.
     """
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self._names = names
         self.unplugged: set[int] = set()
+        self.outlive_init = False
         self.power_up()
 
     def power_up(self) -> None:
@@ -51,7 +52,9 @@ class PortHandles:
         self._earlier: set[int] = set()
 
     def initialise_system(self) -> None:
-        """INIT: handles stay, and definitions are counted anew."""
+        """INIT: what was loaded is freed; where it is not, definitions are counted anew."""
+        if not self.outlive_init:
+            self.power_up()
         self._earlier = set(self._handles)
 
     def tracked(self) -> list[Handle]:

@@ -28,6 +28,7 @@ class DrivePlant:
         self._off_steps = self._brake_steps
         self._x = axis.start_mm
         self._v = 0.0
+        self._pushed_A: float | None = None
         self._rest(axis.start_mm)
 
     def _rest(self, position_mm: float) -> None:
@@ -42,13 +43,20 @@ class DrivePlant:
             self._rest(self._x)
         if not on and self.powered:
             self._off_steps = 0
-        self.powered = on
+        self.powered, self._pushed_A = on, None
 
     def target(self, position_mm: float) -> None:
         """Goes to ``position_mm`` over one interpolation period."""
+        if self._pushed_A is not None:
+            self._rest(self._x)
+            self._pushed_A = None
         self.target_mm = position_mm
         self._steps_left = self._interpolation_steps
         self._raw_step = (position_mm - self._raw) / self._interpolation_steps
+
+    def push(self, current_A: float) -> None:
+        """The motor gets this current, within its limit, whatever that does to the position."""
+        self._pushed_A = current_A
 
     def step(self, load_N: float) -> tuple[float, float]:
         """Position and velocity one step later, under ``load_N`` against the direction of positive motion."""
@@ -80,6 +88,8 @@ class DrivePlant:
 
     def _motor_N(self) -> float:
         axis = self._axis
+        if self._pushed_A is not None:
+            return max(-self.current_limit_A, min(self._pushed_A, self.current_limit_A)) * axis.force_per_current_N_A
         velocity, accel = self._follow()
         error = self._reference - self._x
         wanted = axis.velocity_feed_forward * velocity + axis.position_gain_per_s * error + self._integral_mm_s

@@ -13,9 +13,13 @@ import sys
 import time
 from typing import Any
 
+import can
+
+from drivers.can.health import BusHealth
 from drivers.can.slcan import CanFrame, SlcanDecoder, encode_frame
 from drivers.canopen.nmt import NmtState
 from drivers.ports import PortClosed
+from mock_devices.can.bus_adapter import BusNode
 from mock_devices.epos4.mock import Epos4Mock
 from mock_devices.interfaces import NEVER_NS
 from mock_devices.testing.remote import RemoteMock, say
@@ -23,6 +27,7 @@ from mock_devices.testing.wire import MemoryWire
 from mock_devices.wire import PtyWire
 
 MS = 1_000_000
+ACCELERATION_PER_CURRENT = 100.0  # mm/s2 for each ampere
 TIME_CONSTANT_S = 1 / (2 * math.pi * 25)
 
 
@@ -37,24 +42,33 @@ class LaggingPlant:
         self.has_switch = True
         self.powered = False
         self.target_mm = position_mm
+        self.pushed_A: float | None = None
         self.stop_mm = -1e9
         self.at_reference = position_mm <= 0
 
     def power(self, on: bool) -> None:
         self.powered = on
-        self.target_mm = self.position_mm
+        self.target_mm, self.pushed_A = self.position_mm, None
 
     def target(self, position_mm: float) -> None:
         self.target_mm = position_mm
+        self.pushed_A = None
+
+    def push(self, current_A: float) -> None:
+        self.pushed_A = current_A
 
     def advance(self, dt_s: float) -> None:
         """Moves on; where the carriage meets ``stop_mm`` the current grows with the lag."""
         before = self.position_mm
-        if self.powered:
+        if self.powered and self.pushed_A is not None:
+            self.velocity_mm_s += self.pushed_A * ACCELERATION_PER_CURRENT * dt_s
+            self.position_mm = self.target_mm = before + self.velocity_mm_s * dt_s
+        elif self.powered:
             self.position_mm += (self.target_mm - before) * (1 - math.exp(-dt_s / TIME_CONSTANT_S))
             self.position_mm = max(self.position_mm, self.stop_mm)
         self.velocity_mm_s = (self.position_mm - before) / dt_s
-        self.current_A = 2 * (self.target_mm - self.position_mm) if self.powered else 0.0
+        pulled_A = 2 * (self.target_mm - self.position_mm) if self.pushed_A is None else self.pushed_A
+        self.current_A = pulled_A if self.powered else 0.0
         self.at_reference = self.has_switch and self.position_mm <= 0
 
 
@@ -75,7 +89,7 @@ class DriveBench:
         self.plant = LaggingPlant(position_mm)
         self.wire = MemoryWire()
         self.mock = Epos4Mock(self.wire, self.plant, self.clock_ns, **kind)
-        self.decoder = SlcanDecoder()
+        self.decoder, self.health = SlcanDecoder(), BusHealth(1_000_000)
         self.sent: list[CanFrame] = []
         self.cut = False
         self.closed = False
@@ -153,9 +167,14 @@ class DriveBench:
             self.mock.tick(until_ns)
 
 
-def remote_drive() -> contextlib.closing[RemoteMock]:
-    """The mock in another process until the block ends."""
-    return contextlib.closing(RemoteMock("mock_devices.testing.epos4"))
+def remote_drive(*bus: str) -> contextlib.closing[RemoteMock]:
+    """The mock in another process until the block ends; ``bus``: group, port and node on udp_multicast."""
+    return contextlib.closing(RemoteMock("mock_devices.testing.epos4", *bus))
+
+
+def multicast_bus(group: str, port: int) -> can.BusABC:
+    """A bus that stays on this computer."""
+    return can.Bus(interface="udp_multicast", channel=group, port=port, hop_limit=0, ignore_config=True)
 
 
 def _obey(mock: Epos4Mock, plant: LaggingPlant, order: dict[str, Any]) -> dict[str, object]:
@@ -175,11 +194,13 @@ def _obey(mock: Epos4Mock, plant: LaggingPlant, order: dict[str, Any]) -> dict[s
     return {"position_mm": plant.position_mm, "powered": plant.powered, "limit_A": plant.current_limit_A}
 
 
-def serve() -> None:
+def serve(*bus: str) -> None:
     """Physics in steps of at most 1 ms up to now, then whatever is due or was said."""
     plant = LaggingPlant()
     moved_ns = time.monotonic_ns()
-    mock = Epos4Mock(PtyWire(), plant, moved_ns)
+    on_bus = BusNode(multicast_bus(bus[0], int(bus[1]))) if bus else None
+    node = int(bus[2]) if len(bus) > 2 else 1
+    mock = Epos4Mock(on_bus or PtyWire(), plant, moved_ns, node, adapter=on_bus)
     while mock.nmt is NmtState.BOOT_UP:
         mock.tick(mock.due_ns)
     say(mock.endpoints())
@@ -204,4 +225,4 @@ def serve() -> None:
 
 
 if __name__ == "__main__":
-    serve()
+    serve(*sys.argv[1:])

@@ -160,6 +160,8 @@ def _set_fault(mock: NdiMock, name: str, value: Any) -> None:
             mock.corrupt_every = value
         case "error_reply":
             mock.error_reply = value
+        case "strays":
+            mock.strays = value
         case "freeze_tag":
             mock.freeze_tag = value
         case "cut":

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from controller import doctor
-from drivers.roles import Device, Identity
+from drivers.roles import Device, Identity, LinkCounters
 from rig.channels import ForceSample
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
@@ -41,6 +41,7 @@ class Slow:
 
     def __init__(self, slow_looks: int) -> None:
         self.slow_looks, self.looks, self.closed = slow_looks, 0, 0
+        self.counters = LinkCounters()
 
     def start(self) -> None:
         assert self.looks == 0
@@ -60,6 +61,13 @@ def test_a_wrong_rate_is_said_where_it_was_wrong_each_time(slow_looks: int, look
     said = doctor._look("force", BotaWiring(), lambda: cast(Device, device), device.listen)
     assert said.problem.startswith(problem) and bool(said.problem) == bool(problem)
     assert (device.looks, device.closed) == (looks, 1)
+
+
+def test_trouble_of_the_link_is_a_problem_though_the_rate_is_right() -> None:
+    device = Slow(0)
+    device.counters.trouble = "the CAN bus is loaded to 93%: take nodes or messages off it"
+    said = doctor._look("force", BotaWiring(), lambda: cast(Device, device), device.listen)
+    assert said.problem == device.counters.trouble
 
 
 def test_a_device_that_is_not_there_comes_with_where_to_look() -> None:

@@ -88,7 +88,8 @@ def configured(port: Port) -> bool:
 @pytest.mark.xdist_group("wire")
 def test_one_line_tells_where_everything_is_and_every_product_answers_there() -> None:
     with started("--hide", "friction.level_N=0.2") as (process, endpoints):
-        assert set(endpoints) == {"force", "force_modbus", "axis", "tracker", "control", "pid", "serials", "latency_ms"}
+        devices = {"force", "force_modbus", "axis", "axis_cia402", "tracker"}
+        assert set(endpoints) == devices | {"control", "pid", "serials", "latency_ms"}
         assert endpoints["pid"] == process.pid
         assert "friction" not in json.dumps(endpoints)
         with opened(endpoints["force"]["serial"]) as port:
@@ -98,7 +99,8 @@ def test_one_line_tells_where_everything_is_and_every_product_answers_there() ->
         )
         assert forces[:3] == bytes.fromhex("09 03 0C")
         assert len(forces) == 17
-        assert reply(endpoints["axis"]["slcan"], b"V\r", lambda data: data.endswith(b"\r"))[:1] == b"V"
+        for axis in ("axis", "axis_cia402"):
+            assert reply(endpoints[axis]["slcan"], b"V\r", lambda data: data.endswith(b"\r"))[:1] == b"V"
         for address in endpoints["tracker"].values():
             assert reply(address, b"INIT \r", lambda data: data.endswith(b"\r")) == b"OKAYA896\r"
 

@@ -6,7 +6,8 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from rig.config.maxima import Maximum
-from rig.config.products.roles import AxisProduct, MockPort, Positive
+from rig.config.products.can_axis import CanAxisProduct
+from rig.config.products.roles import AxisProduct, MockPort
 
 # Methods of CiA 402-2 (6098) that search for a switch or stop, by the direction in which they begin. Those that take
 # the next index or the present position (33, 34, 37) would make any place the home, also one in the tissue.
@@ -18,7 +19,7 @@ MAXIMA = (
 )
 
 
-class Epos4Wiring(AxisProduct):
+class Epos4Wiring(CanAxisProduct):
     """A maxon EPOS4 behind a CAN adapter."""
 
     driver: ClassVar[str] = "drivers.epos4.device:Epos4Axis"
@@ -29,15 +30,9 @@ class Epos4Wiring(AxisProduct):
     }  # fmt: skip
 
     product: Literal["maxon-epos4"] = Field(default="maxon-epos4", description="what stands on the bench")
-    interface: Literal["slcan"] = Field(default="slcan", description="how the CAN adapter is spoken to")
-    bitrate: int = Field(default=1_000_000, description="of the CAN bus, bit/s")
-    node: int = Field(default=1, ge=1, le=127, description="CANopen node of the drive")
-    increments_per_rev: Positive = Field(default=10_000.0, description="four times the encoder's lines; scales rpm")
     homing_method: Literal[-4, -3, -2, -1, 1, 2, 7, 11, 17, 18, 23, 27, 33, 34, 37] = Field(
         default=17, description="of CiA 402-2; 17: negative limit switch"
     )
-    heartbeat_ms: int = Field(default=50, ge=5, description="period of the heartbeat each side sends")
-    current_limit_A: Positive = Field(default=5.0, description="of the motor")
 
     @property
     def maxima(self) -> tuple[Maximum, ...]:

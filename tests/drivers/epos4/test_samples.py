@@ -5,8 +5,9 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.epos4.codec import Units
+from drivers.epos4.kind import Epos4Kind
 from drivers.epos4.samples import SUSPICIONS, SampleBuilder, SyncMatcher
+from rig.config.products.maxon_epos4 import Epos4Wiring
 
 MS = 1_000_000
 STATE = bytes.fromhex("37 16 20 4E 00 00")
@@ -14,7 +15,7 @@ MOTION = bytes.fromhex("3C 00 00 00 F4 01 00 00")
 
 
 def test_a_sample_has_the_time_of_its_sync_and_of_its_arrival() -> None:
-    builder = SampleBuilder(Units(2000, 10_000))
+    builder = SampleBuilder(Epos4Kind(Epos4Wiring()))
     builder.matcher.sent(5 * MS)
     builder.take_state(STATE, 6 * MS)
     assert builder.collect() == []
@@ -25,7 +26,7 @@ def test_a_sample_has_the_time_of_its_sync_and_of_its_arrival() -> None:
 
 
 def test_a_drive_in_fault_gives_samples_that_are_not_valid() -> None:
-    builder = SampleBuilder(Units(2000, 10_000))
+    builder = SampleBuilder(Epos4Kind(Epos4Wiring()))
     builder.matcher.sent(5 * MS)
     builder.take_state(bytes.fromhex("18 02 20 4E 00 00"), 6 * MS)
     builder.take_motion(MOTION, 6 * MS)
@@ -33,7 +34,7 @@ def test_a_drive_in_fault_gives_samples_that_are_not_valid() -> None:
 
 
 def test_a_sync_of_which_one_answer_is_missing_counts_as_lost() -> None:
-    builder = SampleBuilder(Units(2000, 10_000))
+    builder = SampleBuilder(Epos4Kind(Epos4Wiring()))
     for sync_ms in (0, 1, 2):
         builder.matcher.sent(sync_ms * MS)
     builder.take_state(STATE, 3 * MS)
@@ -45,7 +46,7 @@ def test_a_sync_of_which_one_answer_is_missing_counts_as_lost() -> None:
 
 
 def test_answers_nobody_asked_for_and_of_wrong_length_make_no_sample() -> None:
-    builder = SampleBuilder(Units(2000, 10_000))
+    builder = SampleBuilder(Epos4Kind(Epos4Wiring()))
     builder.take_state(STATE, 0)
     builder.take_motion(MOTION, 0)
     builder.matcher.sent(MS)
@@ -97,7 +98,7 @@ def test_late_answers_alone_are_never_taken_for_a_loss(delays_us: list[int]) -> 
 
 @given(events=st.lists(st.sampled_from("sma"), max_size=200))
 def test_numbers_are_contiguous_and_times_never_go_back_whatever_comes(events: list[str]) -> None:
-    builder = SampleBuilder(Units(2000, 10_000))
+    builder = SampleBuilder(Epos4Kind(Epos4Wiring()))
     for tick, event in enumerate(events):
         if event == "s":
             builder.matcher.sent(tick * MS)

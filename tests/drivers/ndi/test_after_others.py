@@ -1,4 +1,4 @@
-"""The tracker keeps what a session leaves behind; ours leaves nothing, and starts after whatever came before."""
+"""Whether INIT frees what a session leaves behind or not, ours leaves nothing and starts after whatever came before."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,9 +11,10 @@ from mock_devices.testing.ndi import TrackerBench, run, started
 ROM = b"NDI\0".ljust(1024, b"\x07")
 
 
-@pytest.fixture
-def bench() -> Iterator[TrackerBench]:
+@pytest.fixture(params=[False, True], ids=["INIT frees", "INIT keeps"])
+def bench(request: pytest.FixtureRequest) -> Iterator[TrackerBench]:
     bench = TrackerBench()
+    bench.mock.keeps_handles = request.param
     yield bench
     bench.release()
 
@@ -46,6 +47,7 @@ def other_client(bench: TrackerBench) -> None:
     said(bench, "INIT:")
     for _ in range(2):
         (handle,) = said(bench, "PHRQ:*********1****")
+        assert len(handle) == 2
         for at in range(0, 1024, 64):
             said(bench, f"PVWR:{handle}{at:04X}{ROM[at : at + 64].hex().upper()}")
         assert said(bench, f"PINIT:{handle}", f"PENA:{handle}D") == ["OKAY", "OKAY"]
@@ -53,7 +55,7 @@ def other_client(bench: TrackerBench) -> None:
 
 
 def killed_while_loading(bench: TrackerBench) -> None:
-    said(bench, "INIT:", "PHRQ:*********1****", f"PVWR:030000{ROM[:64].hex().upper()}")
+    said(bench, "INIT:", "PHRQ:*********1****", f"PVWR:030000{ROM[:64].hex()}")
 
 
 def killed_while_tracking(bench: TrackerBench) -> None:

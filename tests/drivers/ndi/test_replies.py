@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from drivers.ndi import replies
 from drivers.ndi.replies import DISABLED, MISSING, STRAYS, TRANSFORMS, Pose, ToolReading, TrackingReply
+from mock_devices.ndi.encoding import Scene, encode_bx, encode_tx
 from tests.drivers.ndi.test_codec import BX_BODY, TX_REPLY
 
 POSE = Pose(0.5, -0.5, 0.5, -0.5, 12.25, -34.5, -1000.0, 0.125)
@@ -148,7 +149,7 @@ def test_a_warning_is_no_error() -> None:
 
 def test_a_number_without_room_in_tx_is_the_callers_mistake() -> None:
     with pytest.raises(ValueError, match="does not fit"):
-        replies.encode_tx([ToolReading(1, POSE._replace(x_mm=10_000.0), 0, 0)])
+        encode_tx(Scene([ToolReading(1, POSE._replace(x_mm=10_000.0), 0, 0)]))
 
 
 rotation = st.integers(-10000, 10000).map(lambda n: n / 10000)
@@ -166,13 +167,13 @@ def tools(poses: st.SearchStrategy[Pose]) -> st.SearchStrategy[list[ToolReading]
 
 @given(tools(tx_poses), st.integers(0, 0xFFFF), st.sampled_from([0x0001, 0x0801, 0x1001]))
 def test_tx_there_and_back(readings: list[ToolReading], status: int, options: int) -> None:
-    text = replies.encode_tx(readings, status, options)
+    text = encode_tx(Scene(readings, system_status=status), options)
     assert replies.parse_tx(text, options) == TrackingReply(tuple(readings), status)
 
 
 @given(tools(bx_poses), st.integers(0, 0xFFFF), st.sampled_from([0x0001, 0x0801, 0x1001]))
 def test_bx_there_and_back(readings: list[ToolReading], status: int, options: int) -> None:
-    body = replies.encode_bx(readings, status, options)
+    body = encode_bx(Scene(readings, system_status=status), options)
     assert replies.parse_bx(body, options) == TrackingReply(tuple(readings), status)
 
 

@@ -108,9 +108,16 @@ def test_each_tool_needs_its_definition(bench: TrackerBench, tmp_path: Path) -> 
 
 
 def test_more_tools_named_than_plugged_in_are_told(bench: TrackerBench) -> None:
-    with pytest.raises(DeviceError, match="2 tools are enabled where the configuration names 3"):
+    with pytest.raises(DeviceError, match=r"2 tools are .* names 3 .*; plug them in, or give tracker.roms"):
         started(bench, tools=("tip", "arm", "couch"))
     assert bench.closed
+
+
+def test_more_tools_plugged_in_than_named_are_told_with_what_to_do(bench: TrackerBench) -> None:
+    with pytest.raises(
+        DeviceError, match=r"2 tools are .* names 1 \(tip\); unplug the others, or name them in tracker"
+    ):
+        started(bench, tools=("tip",))
 
 
 def test_another_device_behind_the_port_is_told(bench: TrackerBench) -> None:

@@ -11,10 +11,12 @@ import pytest
 from can.interfaces.slcan import slcanBus
 from canopen.objectdictionary import ODRecord, ODVariable, datatypes
 
-from drivers.epos4.objects import OBJECTS, TEXT, Entry
+from drivers.epos4.objects import TEXT, Entry
+from mock_devices.epos4.table import EPOS4
 from mock_devices.testing.epos4 import remote_drive
 from mock_devices.testing.remote import RemoteMock
 
+OBJECTS = EPOS4.objects
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
 TYPES = {
     "B": datatypes.UNSIGNED8,
@@ -23,6 +25,8 @@ TYPES = {
     "b": datatypes.INTEGER8,
     "h": datatypes.INTEGER16,
     "i": datatypes.INTEGER32,
+    "?": datatypes.BOOLEAN,
+    "Q": datatypes.UNSIGNED64,
     TEXT: datatypes.VISIBLE_STRING,
 }
 PATIENCE_S = 10.0

@@ -6,10 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.can.slcan import CanFrame
-from drivers.epos4.objects import OBJECTS
+from mock_devices.epos4.table import EPOS4
 from mock_devices.testing.epos4 import DriveBench
 from tests.mock_devices.epos4.wire import exchange, status, upload
 
+OBJECTS = EPOS4.objects
 FRAMES = st.tuples(
     st.sampled_from((0x000, 0x080, 0x201, 0x301, 0x401, 0x501, 0x601, 0x701, 0x77F)), st.binary(max_size=8)
 )
@@ -22,7 +23,7 @@ WRITES = st.builds(
 WORDS = st.sampled_from([0x06, 0x07, 0x0F, 0x1F, 0x3F, 0x5F, 0x10F, 0x0B, 0x00, 0x80]).map(
     lambda word: (0x601, struct.pack("<BHBi", 0x2B, 0x6040, 0, word))
 )
-MODES = st.sampled_from([1, 3, 6, 8, 9]).map(lambda mode: (0x601, struct.pack("<BHBi", 0x2F, 0x6060, 0, mode)))
+MODES = st.sampled_from([1, 3, 6, 8, 9, 10]).map(lambda mode: (0x601, struct.pack("<BHBi", 0x2F, 0x6060, 0, mode)))
 
 
 @given(frames=st.lists(st.one_of(FRAMES, ORDERS, WRITES, WORDS, MODES), max_size=60))

@@ -151,6 +151,7 @@ def test_every_device_has_every_wire_fault_and_its_own_and_takes_each_at_its_def
         ("force", "serial"),
         ("force_modbus", "serial"),
         ("axis", "slcan"),
+        ("axis_cia402", "slcan"),
         ("tracker", "serial"),
         ("tracker", "tcp"),
     ]

@@ -59,6 +59,34 @@ ndi.ndiClose(device) if serial else ndi.ndiCloseNetwork(device)
 print(json.dumps(result))
 """
 
+OPTIONS = """
+import json, sys
+import ndicapy as ndi
+
+kind, endpoint = sys.argv[1:]
+host, _, port = endpoint.rpartition(":")
+device = ndi.ndiOpen(endpoint) if kind == "serial" else ndi.ndiOpenNetwork(host, int(port))
+say = lambda command: ndi.ndiCommand(device, command)
+for command in ("INIT:", "PINIT:01", "PENA:01D", "TSTART:"):
+    say(command)
+poses = []
+for options in ("180F", "1009", "1803"):
+    try:
+        say("BX:" + options)
+    except UnicodeDecodeError:
+        pass  # it has parsed the reply; only its text form cannot hold the length's byte
+    poses.append(ndi.ndiGetBXTransform(device, b"\\x01"))
+result = {"poses": poses, "bx_strays": ndi.ndiGetBXNumberOfPassiveStrays(device)}
+result["stray"] = list(ndi.ndiGetBXPassiveStray(device, 1))
+say("TX:1001")
+result["tx_strays"] = ndi.ndiGetTXNumberOfPassiveStrays(device)
+result["revision"] = say("APIREV:")
+say("SET:Param.Tracking.Frame Frequency=30")
+result["parameter"] = say("GET:Param.Tracking.Frame Frequency")
+ndi.ndiClose(device) if kind == "serial" else ndi.ndiCloseNetwork(device)
+print(json.dumps(result))
+"""
+
 SCIKIT_SURGERY = """
 import json, sys
 from sksurgerynditracker.nditracker import NDITracker
@@ -139,6 +167,16 @@ def test_scikit_surgery_tracks_over_both_wires(remote: RemoteMock, tmp_path: Pat
     assert result["quality"] == [0.125, 0.25]
 
 
+def test_ndicapi_reads_markers_and_strays_by_all_reply_options(remote: RemoteMock) -> None:
+    remote.fault("strays", [[1.5, -2.0, 3.25], [10.0, 20.0, -30.0]])
+    result = client(OPTIONS, remote)
+    assert result["poses"] == [[*TIP_WIRE, 0.125]] * 3
+    assert result["bx_strays"] == result["tx_strays"] == 2
+    assert result["stray"] == [10.0, 20.0, -30.0]
+    assert result["revision"] == "G.003.005"
+    assert result["parameter"] == "Param.Tracking.Frame Frequency=30"
+
+
 def test_scikit_surgery_sees_a_missing_tool(tmp_path: Path) -> None:
     with remote_tracker("serial") as mock:
         mock.fault("missing", [1])
@@ -151,16 +189,12 @@ def test_scikit_surgery_sees_a_missing_tool(tmp_path: Path) -> None:
 
 
 def test_scikit_surgery_tracks_in_each_of_its_sessions_and_our_driver_starts_after_them(tmp_path: Path) -> None:
-    """It frees nothing it loads; and one of its sessions is killed while it tracks.
-
-    By TX: ndicapi reads a BX reply as text, and the length of one with four tools (171) is no UTF-8.
-    """
+    """It frees nothing it loads; and one of its sessions is killed while it tracks."""
     with remote_tracker("tcp") as mock:
-        mock.fault("freeze_tag", "Polaris Vega 008")
         roms = [tmp_path / name for name in ("tip.rom", "arm.rom")]
         for rom in roms:
             rom.write_bytes(b"NDI\0" + bytes(range(256)))
-        for _ in range(3):
+        for _ in range(4):
             result = client(SCIKIT_SURGERY, mock, *map(str, roms), folder=pretended_ping(tmp_path))
             assert result["poses"] == [TIP_WIRE, ARM_WIRE]
         killed = SCIKIT_SURGERY.replace("tracker.stop_tracking()", "import os; os._exit(0)")

@@ -151,7 +151,7 @@ def test_while_tracking_ports_are_left_alone(tracking: NdiClient, command: str) 
     assert tracking.ask(command) == "ERROR0C"
 
 
-@pytest.mark.parametrize("command", ["TX:0002", "BX:0009", "TX:8001", "BX:0000"])
+@pytest.mark.parametrize("command", ["TX:0010", "BX:0021", "TX:4001", "BX:0000"])
 def test_reply_options_it_does_not_have_are_refused(tracking: NdiClient, command: str) -> None:
     assert tracking.ask(command) == "ERROR23"
 

@@ -1,0 +1,25 @@
+"""From configuration to an open CAN link: the two fast paths of our own, and python-can for every other adapter."""
+
+from collections.abc import Callable
+
+from drivers.can.bus import CanLink, SlcanLink
+from drivers.can.generic import ECHOING, PythonCanLink, open_bus
+from drivers.can.socketcan import SocketCanLink, open_socket
+from rig.config.products.can_axis import CanAxisProduct
+
+OpenLink = Callable[[str, int, Callable[[], int]], CanLink]
+
+
+def opener(config: CanAxisProduct) -> OpenLink:
+    """What opens the bus that ``config`` names, given port, bit rate and clock."""
+    interface = config.interface
+
+    def by_socket(port: str, bitrate: int, now: Callable[[], int]) -> CanLink:
+        return SocketCanLink(open_socket(port), port, bitrate, now)
+
+    def by_library(port: str, bitrate: int, now: Callable[[], int]) -> CanLink:
+        bus = open_bus(interface, port, bitrate, config.adapter)
+        return PythonCanLink(bus, f"{interface} {port}", bitrate, interface in ECHOING, now)
+
+    fast: dict[str, OpenLink] = {"slcan": SlcanLink, "socketcan": by_socket}
+    return fast.get(interface, by_library)

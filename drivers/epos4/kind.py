@@ -1,0 +1,53 @@
+"""What kinds of CiA 402 drive differ in: who they are, what they are told, their units and their second PDO."""
+
+from typing import Protocol
+
+from drivers.epos4 import setup
+from drivers.epos4.bringup import identify
+from drivers.epos4.cia402 import Statusword
+from drivers.epos4.codec import DriveMotion, Units, decode_motion_pdo
+from drivers.epos4.node import Node
+from drivers.epos4.objects import Entry
+from drivers.epos4.walker import STANDSTILL_RPM
+from drivers.roles import Identity
+from rig.config.products.can_axis import CanAxisProduct
+from rig.config.wiring import Limits
+
+
+class DriveKind(Protocol):
+    """What one kind of CiA 402 drive has of its own; ``referenced_bit`` 0: no bit of the statusword says it."""
+
+    referenced_bit: int
+
+    @property
+    def standstill(self) -> int:
+        """Speed, in the drive's unit, up to which it stands."""
+
+    @property
+    def scale(self) -> Units:
+        """Units of position and speed, known after ``identify``."""
+
+    def identify(self, node: Node) -> Identity:
+        """Who the node says it is; raises DeviceError where it is another or lacks what is needed."""
+
+    def writes(self, limits: Limits) -> list[tuple[Entry, int]]:
+        """Limits, stops, heartbeats and PDOs, in their order."""
+
+    def decode_motion(self, data: bytes) -> DriveMotion | None:
+        """TPDO2; None where the length is wrong."""
+
+
+class Epos4Kind:
+    """A maxon EPOS4."""
+
+    referenced_bit, standstill = int(Statusword.REFERENCED), STANDSTILL_RPM
+    identify = staticmethod(identify)
+    decode_motion = staticmethod(decode_motion_pdo)
+
+    def __init__(self, config: CanAxisProduct) -> None:
+        self._config = config
+        self.scale = setup.units(config)
+
+    def writes(self, limits: Limits) -> list[tuple[Entry, int]]:
+        """Limits, stops, heartbeats and PDOs, in their order."""
+        return setup.parameters(self._config, limits, self.scale) + setup.process_data(self._config)
