@@ -1,5 +1,6 @@
 """All products of the bench on their wires: each mock with its plant, its wire and the faults either can have."""
 
+import os
 import random
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -12,11 +13,17 @@ from drivers.epos4.objects import SERIAL
 from mock_devices.bench import Bench
 from mock_devices.bota.mock import BotaMock
 from mock_devices.epos4.mock import Epos4Mock
+from mock_devices.evdev.mock import SwitchMock, own_path
 from mock_devices.faults.devices import BOTA_FAULTS, EPOS4_FAULTS, NDI_FAULTS, ROBOTIQ_FAULTS
+from mock_devices.faults.inputs import BREATHING_FAULTS, GLOVE_FAULTS, SWITCH_FAULTS
 from mock_devices.faults.sensing import CAMERA_FAULTS, SENSOR_FAULTS
 from mock_devices.faults.wires import WIRE_FAULTS, Fault, FaultKind, FaultyWire, faults_of
+from mock_devices.firmata.glove import GlovePlant
+from mock_devices.firmata.mock import FirmataMock
 from mock_devices.interfaces import ProtocolMock
+from mock_devices.lsl.mock import BreathingMock
 from mock_devices.ndi.mock import NdiMock
+from mock_devices.no_wire import NoWire
 from mock_devices.parameters import Axis, Parameters, Sensor
 from mock_devices.robotiq.mock import RobotiqMock
 from mock_devices.wire import PtyWire, TcpWire, Wire
@@ -102,6 +109,24 @@ class DeviceFactory:
             _device("tracker", NdiMock(serial, tracker, self._start_ns, TOOLS, "polaris"), serial, NDI_FAULTS, inside),
             _device("tracker", NdiMock(tcp, tracker, self._start_ns, TOOLS, "vega"), tcp, NDI_FAULTS, inside),
         ]
+
+    def glove(self) -> list[MockDevice]:
+        """The pain glove."""
+        wire = self._faulty(self._line("glove"))
+        return [_device("glove", FirmataMock(wire, GlovePlant(), self._start_ns), wire, GLOVE_FAULTS)]
+
+    def switch(self) -> list[MockDevice]:
+        """The foot switch."""
+        path = self._links / "switch" if self._links else own_path()
+        return [self._wireless(SwitchMock(path), SWITCH_FAULTS)]
+
+    def breathing(self) -> list[MockDevice]:
+        """The respiration belt, which follows the limb's surface."""
+        mock = BreathingMock(f"mock-belt-{os.getpid()}", lambda: self._bench.limb.position_mm, self._start_ns)
+        return [self._wireless(mock, BREATHING_FAULTS)]
+
+    def _wireless(self, mock: AnyMock, kinds: Mapping[str, FaultKind[AnyMock]]) -> MockDevice:
+        return MockDevice(mock.name, mock, self._faulty(NoWire()), faults_of(mock, kinds))
 
     def _line(self, role: str) -> PtyWire:
         return PtyWire(self._links / role if self._links else None)

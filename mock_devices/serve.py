@@ -26,6 +26,7 @@ from mock_devices.parameters import Parameters, load_parameters
 from mock_devices.physics.effects import EFFECTS, complete, knobs, parse_hidden, statement
 from mock_devices.robotiq.mock import RobotiqMock
 from rig.config.endpoints import Endpoints
+from rig.config.products.inputs import INPUTS
 from rig.errors import RigError
 from rig.realtime import ask_fifo, lock_memory, shorten_timer_slack
 
@@ -209,7 +210,7 @@ def _server(options: argparse.Namespace) -> MockServer:
     start_ns = time.monotonic_ns() - POWERED_BEFORE_NS
     bench = Bench(parameters, options.seed, start_ns)
     factory = DeviceFactory(bench, start_ns, time.monotonic_ns, options.seed, options.links)
-    devices = factory.devices(FORCE_CHOICES[options.force])
+    devices = factory.devices((*FORCE_CHOICES[options.force], *map(INPUTS.named, options.input)))
     return MockServer(bench, devices, time.monotonic_ns)
 
 
@@ -245,6 +246,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--hide", action="append", default=[], metavar="EFFECT[.PARAMETER=VALUE]", help="repeatable")
     parser.add_argument("--list-effects", action="store_true", help="print what --hide takes, and end")
     parser.add_argument("--force", choices=tuple(FORCE_CHOICES), default="both")
+    parser.add_argument("--input", action="append", default=[], choices=tuple(INPUTS), help="repeatable")
     parser.add_argument("--seed", type=int, default=0, help="of all noise")
     parser.add_argument("--tracker-tcp-port", type=int, metavar="N", help="instead of 8765; 0: any")
     parser.add_argument("--links", type=Path, metavar="FOLDER", help="serial lines there, and again after an unplug")

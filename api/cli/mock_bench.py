@@ -26,6 +26,8 @@ def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, both_sen
         command += ["--seed", str(seed)]
     for effect in (*wiring.mock.hide, *hide):
         command += ["--hide", effect]
+    for product in dict.fromkeys(each.product for each in mock_inputs(wiring).values()):
+        command += ["--input", product]
     # A real sensor's product may be one that the bench cannot play, and need not.
     both_sensors = both_sensors or wiring.force.port != MOCK_PORT
     return [*command, "--force", "both" if both_sensors else wiring.force.product]
@@ -99,8 +101,9 @@ def at_endpoints(wiring: Wiring, endpoints: Endpoints) -> Wiring:
     Where the wiring states no latency for a mock device, it takes what the device's data sheet would say.
     """
     live = patient(wiring)
-    devices = {role: _served(device, endpoints) for role, device in mocks(live).items()}
-    return live.model_copy(update=devices)
+    devices: dict[str, object] = {role: _served(device, endpoints) for role, device in mocks(live).items()}
+    inputs = {name: _served(device, endpoints) for name, device in mock_inputs(live).items()}
+    return live.model_copy(update={**devices, "input": {**live.input, **inputs}})
 
 
 def mocks(wiring: Wiring) -> dict[str, Product]:
@@ -112,6 +115,17 @@ def mocks(wiring: Wiring) -> dict[str, Product]:
         if device.mock is None:
             raise UsageError(f"{role}.port mock: the mock bench has no {device.product}; give the port of a real one")
         found[role] = device
+    return found
+
+
+def mock_inputs(wiring: Wiring) -> dict[str, Product]:
+    """The inputs that the mock bench is to serve, by name; raises UsageError where it cannot serve one."""
+    found: dict[str, Product] = {name: each for name, each in wiring.input.items() if each.port == MOCK_PORT}
+    for name, each in found.items():
+        if each.mock is None:
+            raise UsageError(
+                f"input.{name}.port mock: the mock bench has no {each.product}; give the port of a real one"
+            )
     return found
 
 

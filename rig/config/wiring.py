@@ -1,5 +1,6 @@
 """`rig.toml`: which products stand on the bench, where they are plugged in, and what must never be exceeded."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeAlias
 
@@ -9,19 +10,24 @@ from rig.config.calibration import Calibration
 from rig.config.force_map import UNIT, ForceMap
 from rig.config.maxima import beyond
 from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.input_role import InputProduct, input_trouble
+from rig.config.products.inputs import INPUTS
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
 from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS, choice_of
 from rig.config.products.roles import MOCK_PORT, AxisProduct, ForceProduct, TrackerProduct
 from rig.config.stop import Stop
 from rig.config.table import Table
+from rig.input_streams import InputChannel
 
 Positive = Annotated[float, Field(gt=0)]
 if TYPE_CHECKING:
     AnyForce: TypeAlias = ForceProduct
     AnyAxis: TypeAlias = AxisProduct
     AnyTracker: TypeAlias = TrackerProduct
+    AnyInput: TypeAlias = InputProduct
 else:
+    AnyInput = choice_of(INPUTS)
     AnyForce, AnyAxis, AnyTracker = choice_of(FORCE_SENSORS), choice_of(AXES), choice_of(TRACKERS)
 
 
@@ -114,6 +120,13 @@ class Wiring(Table):
     stop: Stop = Stop()
     mock: MockBenchSettings = MockBenchSettings()
     calibration: Calibration = Calibration()
+    input: Mapping[str, AnyInput] = Field(default={}, description="by name, which is that of its stream")
+
+    @model_validator(mode="after")
+    def _sound_inputs(self) -> Self:
+        if trouble := input_trouble(self.input, self.stop.keypad):
+            raise ValueError(trouble)
+        return self
 
     @model_validator(mode="after")
     def _loop_within_axis(self) -> Self:
@@ -142,6 +155,11 @@ class Wiring(Table):
         return self
 
     @property
+    def input_channels(self) -> dict[str, tuple[InputChannel, ...]]:
+        """What each input brings, by its name."""
+        return {name: product.channels for name, product in self.input.items()}
+
+    @property
     def force_map(self) -> ForceMap:
         """From the sensor's readings to compression; without a calibration by the configured channel and sign alone."""
         known = self.calibration.of_force
@@ -164,5 +182,5 @@ class Wiring(Table):
     @property
     def uses_mock(self) -> bool:
         """Whether any device is to be served by the mock bench."""
-        ports = [self.force.port, self.axis.port, *([self.tracker.port] if self.tracker else [])]
-        return MOCK_PORT in ports
+        devices = (self.force, self.axis, self.tracker, *self.input.values())
+        return any(device is not None and device.port == MOCK_PORT for device in devices)

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.csv as arrow_csv
 from numpy.typing import NDArray
 
-from rig.channels import FORCE, STREAMS
+from rig.channels import BY_NAME, FORCE, Stream
 from rig.errors import UsageError
 from rig.recording.files import whole_file, whole_folder, write_text
 from rig.recording.sessions import Session, TrialInfo, plain
@@ -65,7 +65,7 @@ def _csv(session: Session, out: Path) -> None:
     with whole_folder(out) as folder:
         facts = dict(filter(None, (_csv_trial(folder, session, trial) for trial in session.trials)))
         write_text(folder / "mapping.toml", _mapping(session, facts, folder))
-        write_text(folder / COLUMNS_FILE, _legend())
+        write_text(folder / COLUMNS_FILE, _legend(streams_in(session)))
         write_text(folder / "session.json", _information(session))
 
 
@@ -127,14 +127,20 @@ def _toml(values: Mapping[str, object], above: str = "") -> str:
     return "".join(lines + tables)
 
 
-def _legend() -> str:
+def streams_in(session: Session) -> tuple[Stream, ...]:
+    """Those of the bench, and of inputs that a recording has samples of."""
+    more = (session.recording(trial.name) for trial in session.trials if not trial.samples.keys() <= BY_NAME.keys())
+    return tuple((BY_NAME | {stream.name: stream for recording in more for stream in recording.streams}).values())
+
+
+def _legend(streams: Iterable[Stream]) -> str:
     extra = [
         'force,force_N,N,"force in compression, by the calibration, before any zero"',
         '*,time_s,s,"capture_ns in seconds"',
     ]
     lines = [
         f'{stream.name},{name},{unit},"{meaning}"'
-        for stream in STREAMS
+        for stream in streams
         for name, (unit, meaning) in stream.units.items()
     ]
     return "\n".join(["stream,column,unit,meaning", *extra, *lines]) + "\n"
@@ -180,14 +186,15 @@ def _mat(session: Session, out: Path) -> None:
     """One struct a trial (``trial_01.force.fz_N``), ``units.force.fz_N``, and ``session`` as JSON text."""
     import scipy.io  # noqa: PLC0415 - as above
 
+    streams = streams_in(session)
     size = sum(
-        stream.dtype.itemsize * trial.samples.get(stream.name, 0) for trial in session.trials for stream in STREAMS
+        stream.dtype.itemsize * trial.samples.get(stream.name, 0) for trial in session.trials for stream in streams
     )
     if size >= MAT_LIMIT:
         raise UsageError(
             f"{out}: {size >> 20} MiB are more than a MAT file holds; export hdf5, which MATLAB also reads"
         )
-    content: dict[str, MatValue] = {"session": _information(session), "units": _units()}
+    content: dict[str, MatValue] = {"session": _information(session), "units": _units(streams)}
     for trial in session.trials:
         content[_variable(trial.name, content)] = _struct(session, trial)
     with whole_file(out) as scratch:
@@ -204,8 +211,8 @@ def _struct(session: Session, trial: TrialInfo) -> dict[str, MatValue]:
     return {**streams, **facts, "metadata": json.dumps(recording.metadata)}
 
 
-def _units() -> dict[str, dict[str, str]]:
-    return {stream.name: {name: unit for name, (unit, _) in stream.units.items()} for stream in STREAMS}
+def _units(streams: Iterable[Stream]) -> dict[str, dict[str, str]]:
+    return {stream.name: {name: unit for name, (unit, _) in stream.units.items()} for stream in streams}
 
 
 def _variable(name: str, taken: Collection[str]) -> str:

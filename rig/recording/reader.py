@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.channels import BY_ID, BY_NAME, EVENT, STREAMS, EventSample, Stream
+from rig.channels import EVENT, STREAMS, EventSample, Stream
 from rig.errors import DataError
+from rig.input_streams import all_streams
 from rig.recording.mcap_file import SUMMARY
 from rig.recording.mcap_layout import MAGIC, schema_words
 from rig.recording.scan import Chunk, Definition, Scan, scan
@@ -41,6 +42,11 @@ class Recording:
     cut: str = ""
 
     @property
+    def streams(self) -> tuple[Stream, ...]:
+        """Every stream it can hold, its inputs' behind those of the bench."""
+        return all_streams(self.metadata)
+
+    @property
     def tracks_force(self) -> bool:
         """Whether a force was tracked in it, rather than a cycle made."""
         return self.metadata.get("trial", {}).get("kind") == TRACKING
@@ -49,13 +55,14 @@ class Recording:
 def read_recording(path: Path) -> Recording:
     """The recording at ``path``; raises DataError only where there is no file or it never was a recording."""
     found = scan(read_bytes(path))
-    bodies: dict[str, list[Bodies]] = {stream.name: [] for stream in STREAMS}
+    streams = all_streams(found.metadata)
+    bodies: dict[str, list[Bodies]] = {stream.name: [] for stream in streams}
     for stream, alike in messages(path, found):
         bodies[stream.name].append(alike)
     return Recording(
         path,
         found.metadata,
-        {stream.name: _table(stream, bodies[stream.name]) for stream in NUMERIC},
+        {stream.name: _table(stream, bodies[stream.name]) for stream in streams if not stream.has_text},
         tuple(EventSample(*EVENT.unpack(body.tobytes())) for alike in bodies[EVENT.name] for body in alike),
         found.footer and SUMMARY in found.metadata,
         tuple(found.damage),
@@ -85,7 +92,7 @@ def _table(stream: Stream, bodies: list[Bodies]) -> NDArray[np.void]:
 
 def messages(path: Path, found: Scan) -> Iterator[tuple[Stream, Bodies]]:
     """Every good sample in file order: a stream, and bodies alike in length; DataError for a file of another layout."""
-    streams = _streams(path, found.chunks)
+    streams = _streams(path, found.chunks, all_streams(found.metadata))
     for chunk in found.chunks:
         for channel, bodies in chunk.messages:
             stream = streams.get(channel)
@@ -97,22 +104,23 @@ def messages(path: Path, found: Scan) -> Iterator[tuple[Stream, Bodies]]:
             yield stream, bodies
 
 
-def _streams(path: Path, chunks: Iterable[Chunk]) -> Mapping[int, Stream]:
+def _streams(path: Path, chunks: Iterable[Chunk], known: Iterable[Stream]) -> Mapping[int, Stream]:
     """Channel number to stream; the numbers of our own writer where the chunk with the definitions is lost."""
+    by_name = {stream.name: stream for stream in known}
     definitions: dict[int, Definition] = {}
     for chunk in chunks:
         definitions |= chunk.definitions
     for definition in definitions.values():
-        stream = BY_NAME.get(definition.topic)
+        stream = by_name.get(definition.topic)
         if stream is not None and layout(definition.schema) != layout(stream.schema()):
             raise DataError(
                 f"{path}: stream {stream.name} has other fields than this version of the program; "
                 "read it with the version named in its metadata"
             )
-    known = {number: BY_NAME[item.topic] for number, item in definitions.items() if item.topic in BY_NAME}
-    if definitions and not known:
+    found = {number: by_name[item.topic] for number, item in definitions.items() if item.topic in by_name}
+    if definitions and not found:
         raise DataError(f"{path}: an MCAP file, but with no stream of this bench")
-    return known or BY_ID
+    return found or dict(enumerate(by_name.values(), 1))
 
 
 def layout(schema: str) -> list[list[str]]:

@@ -19,12 +19,13 @@ import sys
 import threading
 import time
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from select import select
 from typing import cast
 
 from rig.channel import Answer, Channel, Message, Received
-from rig.channels import BY_ID
+from rig.channels import BY_ID, Stream
 from rig.errors import RigError
 from rig.recording.mcap_file import RecordingFailed, RecordingWriter
 from rig.recording.messages import TO_RECORDER, Close, Closed, Open, Opened, Quit, RecorderFailed, Started
@@ -41,7 +42,8 @@ _SEQ = struct.Struct("<q")
 class Tally:
     """What one recording got: samples and gaps in their numbers, per stream."""
 
-    def __init__(self) -> None:
+    def __init__(self, streams: Mapping[int, Stream] = BY_ID) -> None:
+        self.streams = streams
         self.samples: Counter[str] = Counter()
         self.missing: Counter[str] = Counter()
         self.unreadable = 0
@@ -49,7 +51,7 @@ class Tally:
 
     def accepts(self, stream_id: int, body: bytes) -> bool:
         """Counts the sample; False if it has not the layout of its stream and would spoil the file."""
-        stream = BY_ID.get(stream_id)
+        stream = self.streams.get(stream_id)
         try:
             if stream is None or (not stream.has_text and len(body) != stream.fixed.size):
                 raise IndexError
@@ -124,7 +126,7 @@ class Recorder:
             self._drain_to(self._ring.head)
             self._dropped, self._damaged = self._ring.dropped, self._ring.damaged
         self._writer = RecordingWriter(path, metadata)
-        self._hold, self._failure, self._tally = False, "", Tally()
+        self._hold, self._failure, self._tally = False, "", Tally(self._writer.streams)
         unrecorded, self.unrecorded = self.unrecorded, 0
         return Opened(to=number, path=str(path), unrecorded=unrecorded)
 
@@ -146,13 +148,13 @@ class Recorder:
         return closed
 
     def _counted(self, number: int, path: Path) -> Closed:
-        dropped = Counter(self._ring.dropped)
+        dropped, known = Counter(self._ring.dropped), self._tally.streams
         dropped.subtract(self._dropped)
         return Closed(
             to=number,
             path=str(path),
             samples=dict(self._tally.samples),
-            dropped={BY_ID[stream].name: count for stream, count in dropped.items() if count and stream in BY_ID},
+            dropped={known[stream].name: count for stream, count in dropped.items() if count and stream in known},
             missing={name: count for name, count in self._tally.missing.items() if count},
             unreadable=self._tally.unreadable + self._ring.damaged - self._damaged,
         )
