@@ -67,6 +67,11 @@ def input_stream(number: int, name: str, channels: Sequence[InputChannel]) -> St
     return Stream(FIRST_ID + number, name, row, units)
 
 
+def channels_of(stream: Stream) -> tuple[str, ...]:
+    """Names of an input's channels."""
+    return tuple(name for name in stream.units if name not in taken_fields())
+
+
 def taken_names() -> frozenset[str]:
     """Names that no input can have, since a stream of the bench has them."""
     return frozenset(BY_NAME)

@@ -44,6 +44,7 @@ BY_THE_ACCOUNT = "only the account that owns the files: whoever may do this over
 WITHOUT: Mapping[str, str] = {
     "calibrate force": AT_THE_BENCH,
     "calibrate axis": AT_THE_BENCH,
+    "calibrate glove": AT_THE_BENCH,
     "track --table": "compares gains on simulated subjects of its own, never on the bench that is served",
     "catalogue backup": "names of people leave the computer by its own account alone",
     "catalogue restore": "names of people come back by the computer's own account alone",

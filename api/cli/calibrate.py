@@ -10,6 +10,7 @@ import typer
 from api.cli.asking import Person
 from api.cli.calibrate_axis import AxisAsked, calibrate_axis
 from api.cli.calibrate_force import ForceAsked, Load, calibrate_force
+from api.cli.calibrate_glove import GloveAsked, calibrate_glove, keep_and_say
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_file, wiring_from
 from api.cli.output import show, write_json
 from api.operations.calibrations import What, keep, refuse_out, refuse_unfit
@@ -19,11 +20,12 @@ from rig.results.bench import CalibrateResult
 
 OF_FORCE = ("weights", "load", "tolerance_percent", "gravity")
 OF_AXIS = ("from_mm", "to_mm", "clear", "toward_limb", "gauge_block_mm", "near_mm")
+OTHERS = {"force": (*OF_AXIS, "input_name"), "axis": (*OF_FORCE, "input_name"), "glove": (*OF_AXIS, "load")}
 
 
 def calibrate(
     context: typer.Context,
-    what: Annotated[Literal["force", "axis"], typer.Argument(help="What to calibrate.")],
+    what: Annotated[Literal["force", "axis", "glove"], typer.Argument(help="What to calibrate.")],
     weights: Annotated[
         str, typer.Option("--weights", help="force: known weights, as '100 g,200 g,5 N'; a mock sensor has its own.")
     ] = "",
@@ -46,6 +48,7 @@ def calibrate(
     near_mm: Annotated[
         float | None, typer.Option("--near-mm", help="axis: position just before the table, for the block.")
     ] = None,
+    input_name: Annotated[str, typer.Option("--input", help="glove: its name, where there are several.")] = "",
     pause: Annotated[
         float | None, typer.Option("--pause", min=0, max=600, help="Seconds to wait instead of Enter each time.")
     ] = None,
@@ -54,16 +57,20 @@ def calibrate(
     overrides: SetOption = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Calibrates force sensor (known weights) or axis (tracker, gauge block), and says what is wrong with it.
+    """Calibrates force sensor or glove (known weights) or axis (tracker, gauge block); says what is wrong with it.
 
     force: nothing moves; unloaded, each weight up and down again, unloaded, step by step. axis: the tip moves in the
     air between rests. What contradicts the configuration is refused, never corrected, and then nothing is written.
 
     Example: rig calibrate force --weights "100 g,200 g,500 g" --load pressed
     """
-    _refuse_options(context, OF_AXIS if what == "force" else OF_FORCE, what)
+    _refuse_options(context, OTHERS[what], what)
     wiring = wiring_from(config, overrides)
     refuse_out(out)
+    if what == "glove":
+        of_glove = GloveAsked(weights, tolerance_percent / 100, gravity, input_name)
+        keep_and_say(*calibrate_glove(wiring, of_glove, Person(pause)), out, config, json_file)
+        return
     found: ForceCalibration | AxisCalibration
     if what == "force":
         asked = ForceAsked(weights, load, tolerance_percent / 100, gravity)

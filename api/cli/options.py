@@ -6,7 +6,9 @@ from typing import Annotated
 
 import typer
 
-from rig.config.calibration_files import with_files
+from rig.config.calibration_files import read_glove, with_files
+from rig.config.products.firmata_glove import FirmataGlove
+from rig.config.products.input_role import InputProduct
 from rig.config.table import load, merged, parse
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
@@ -67,7 +69,19 @@ def wiring_file(config: Path | None) -> Path | None:
 
 def calibrated(wiring: Wiring) -> Wiring:
     """``wiring`` with what its calibration files hold; raises UsageError naming the file that is not as it must be."""
-    return wiring.model_copy(update={"calibration": with_files(wiring.calibration)})
+    return with_gloves(wiring.model_copy(update={"calibration": with_files(wiring.calibration)}))
+
+
+def with_gloves(wiring: Wiring) -> Wiring:
+    """``wiring`` with what the calibration files of its gloves hold."""
+    return wiring.model_copy(update={"input": {name: _known(name, one) for name, one in wiring.input.items()}})
+
+
+def _known(name: str, product: InputProduct) -> InputProduct:
+    if not isinstance(product, FirmataGlove) or product.calibration is None:
+        return product
+    role = f"input.{name}.calibration"
+    return product.model_copy(update={"of_fingers": read_glove(product.calibration, role)})
 
 
 def built_in(overrides: list[str] | None = None) -> Wiring:
@@ -80,4 +94,12 @@ def _beside(wiring: Wiring, folder: Path) -> Wiring:
     mock, known = wiring.mock, wiring.calibration
     mock = mock.model_copy(update={"parameters": mock.parameters and folder / mock.parameters})
     files = {"force": known.force and folder / known.force, "axis": known.axis and folder / known.axis}
-    return wiring.model_copy(update={"mock": mock, "calibration": known.model_copy(update=files)})
+    inputs = {name: _glove_beside(product, folder) for name, product in wiring.input.items()}
+    update = {"mock": mock, "calibration": known.model_copy(update=files), "input": inputs}
+    return wiring.model_copy(update=update)
+
+
+def _glove_beside(product: InputProduct, folder: Path) -> InputProduct:
+    if not isinstance(product, FirmataGlove) or product.calibration is None:
+        return product
+    return product.model_copy(update={"calibration": folder / product.calibration})

@@ -13,7 +13,10 @@ COUNTS_MAX = 1023
 
 @dataclass(frozen=True)
 class GloveFigures:
-    """Of the resistors, the hand in the glove, and how somebody presses who looks for pain."""
+    """Of the resistors, the hand in the glove, and how somebody presses who looks for pain.
+
+    Before the first press comes ``lead_s``, in which a client starts the board.
+    """
 
     half_N: float = 12.0
     fabric_N: float = 0.5
@@ -21,6 +24,7 @@ class GloveFigures:
     rate_N_s: float = 4.0
     release_s: float = 0.25
     pause_s: float = 1.0
+    lead_s: float = 4.0
     rest_s: float = 0.2
 
 
@@ -47,7 +51,7 @@ class GlovePlant:
 
     def press(self, peaks_N: tuple[float, ...], from_s: float) -> None:
         """Presses one after another, from ``from_s`` on."""
-        begin_s, planned = from_s + self.figures.pause_s, []
+        begin_s, planned = from_s + self.figures.lead_s, []
         for peak_N in peaks_N:
             planned.append(Press(begin_s, peak_N))
             begin_s += peak_N / self.figures.rate_N_s + self.figures.rest_s + self.figures.release_s

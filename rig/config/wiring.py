@@ -97,6 +97,15 @@ class Subject(Table):
     id: str = Field(default="phantom", description="a code, no person's name; kept with each recording")
     site: str = Field(default="forearm", description="where the tip presses, kept with each recording")
     pain_threshold_N: Positive = Field(default=15.0, description="the lower of it and limits.force_N holds")
+    # At most what subject.pain_threshold_N may be, for the reason that stands there (rig.config.maxima).
+    site_thresholds_N: Mapping[str, Annotated[float, Field(gt=0, le=50)]] = Field(
+        default={}, description="found at single sites, by their names; at its site each holds beside the others"
+    )
+
+    @property
+    def threshold_N(self) -> float:
+        """At this site: never more than the subject's own."""
+        return min(self.pain_threshold_N, self.site_thresholds_N.get(self.site, self.pain_threshold_N))
 
 
 class MockBenchSettings(Table):
@@ -168,7 +177,7 @@ class Wiring(Table):
     @property
     def force_limit_N(self) -> float:
         """The lower of machine limit and subject's pain threshold."""
-        return min(self.limits.force_N, self.subject.pain_threshold_N)
+        return min(self.limits.force_N, self.subject.threshold_N)
 
     @property
     def stale_force_ms(self) -> float:

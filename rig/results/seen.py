@@ -9,7 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.channels import STREAMS
 from rig.errors import DataError
+from rig.input_streams import channels_of
 from rig.recording.alignment import Alignment, read_alignments
 from rig.recording.converter import Array, at_the_end_of_range, ends_of_range, resolution
 from rig.recording.mcap_file import SUMMARY
@@ -41,6 +43,10 @@ class _Raw(NamedTuple):
     time_s: Array
     value: Array
     sound: NDArray[np.bool_]
+    unit: str
+
+
+NO_RESTS = Rests(np.zeros(0), np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -48,6 +54,7 @@ class Seen:
     """Numbers of the streams of a recording, where each of them was at rest, and how their clocks lie."""
 
     streams: tuple[StreamIn, ...]
+    inputs: tuple[StreamIn, ...]
     rests: tuple[Rests, ...]
     one_clock: bool
     alignments: Mapping[str, Alignment]
@@ -65,6 +72,7 @@ def see(recording: Recording) -> Seen:
     full = np.zeros(0, bool) if force is None else _full(*drawn[1:])
     return Seen(
         streams=tuple(_numbers(*one, left_out.get(one[0].name, 0), full) for one in zip(raw, rests, strict=True)),
+        inputs=tuple(_numbers(one, NO_RESTS, 0, full) for one in _inputs(recording)),
         rests=tuple(rests), one_clock=all(np.array_equal(raw[0].time_s, other.time_s) for other in raw[1:]),
         alignments=_alignments(recording), tracks_force=recording.tracks_force,
         trace=trace_of(*drawn, full if len(full) else np.zeros(len(drawn[0]), bool)),
@@ -76,14 +84,24 @@ def _raw(recording: Recording) -> Iterator[_Raw]:
     tip = marker["tool"] == TIP_TOOL
     tables = {**recording.tables, "marker": marker if tip.all() else marker[tip]}
     start_ns = min((int(tables[name]["capture_ns"][0]) for name in UNITS if len(tables[name])), default=0)
-    for name in UNITS:
+    for name, unit in UNITS.items():
         rows = tables[name]
         if len(rows):
             value = _value(recording, name, rows)
             sound = rows["valid"] != 0
             for column in value.reshape(len(rows), -1).T:
                 sound &= np.isfinite(column)
-            yield _Raw(name, (rows["capture_ns"] - start_ns) * 1e-9, value, sound)
+            yield _Raw(name, (rows["capture_ns"] - start_ns) * 1e-9, value, sound, unit)
+
+
+def _inputs(recording: Recording) -> Iterator[_Raw]:
+    """Each channel of each input, under the names of both; a value that is no number is missing."""
+    for stream in recording.streams[len(STREAMS) :]:
+        rows = recording.tables[stream.name]
+        time_s = (rows["capture_ns"] - rows["capture_ns"][:1].sum()) * 1e-9
+        for channel in channels_of(stream) if len(rows) else ():
+            value = rows[channel]
+            yield _Raw(f"{stream.name}.{channel}", time_s, value, np.isfinite(value), stream.units[channel][0])
 
 
 def _value(recording: Recording, name: str, rows: NDArray[np.void]) -> Array:
@@ -110,14 +128,13 @@ def _alignments(recording: Recording) -> dict[str, Alignment]:
 
 def _rests(raw: _Raw, axis: _Raw | None) -> Rests:
     """Deviation about a straight line of each fifth of a second in which the axis goes nowhere."""
-    nothing = Rests(np.zeros(0), np.zeros(0))
     time_s, value = raw.time_s[raw.sound], raw.value[raw.sound].reshape(np.count_nonzero(raw.sound), -1)
     if axis is None or np.count_nonzero(axis.sound) < 2 or len(time_s) < 2:
-        return nothing
+        return NO_RESTS
     count = max(FEWEST_AT_REST, round(REST_S / max(float(np.median(np.diff(time_s))), 1e-9)))
     pieces = len(time_s) // count
     if not pieces:
-        return nothing
+        return NO_RESTS
     place_mm = axis.value[axis.sound]
     there_mm = np.interp(time_s[: pieces * count].reshape(pieces, count), axis.time_s[axis.sound], place_mm)
     still_mm = REST_SHARE * float(np.ptp(place_mm)) + SPREADS * sample_noise(place_mm)
@@ -156,7 +173,7 @@ def _numbers(raw: _Raw, rests: Rests, left_out: int, of_force: NDArray[np.bool_]
     full = of_force if raw.name == "force" else np.zeros(len(value), bool)
     at_rest = len(rests.deviation) > 0
     return StreamIn(
-        stream=raw.name, unit=UNITS[raw.name], samples=len(time_s), missing=len(raw.time_s) - len(time_s),
+        stream=raw.name, unit=raw.unit, samples=len(time_s), missing=len(raw.time_s) - len(time_s),
         left_out=left_out, span_s=float(np.ptp(time_s)) if len(time_s) else 0.0, rate_Hz=1 / clock.period_s,
         lowest_rate_Hz=1 / clock.longest_s, gaps=clock.gaps, longest_gap_s=clock.longest_s if clock.gaps else None,
         lost=clock.lost, lowest=float(value.min(initial=np.inf)), highest=float(value.max(initial=-np.inf)),
