@@ -370,7 +370,7 @@ class BenchLoop:
             "rates_Hz": {name: round(stream.rate_Hz, 1) for name, stream in self.health.items()},
             "lost": {name: cause for name, cause in lost.items() if cause},
             "devices": takeover.as_status((*self.connections.statuses.items(), *self.input_statuses.items())),
-            "ready": self.connections.ready,
+            "ready": self.connections.ready and not inputs.input_lost,
             "latched": {"code": latched.code, "text": latched.text, "action": latched.action.name} if latched else None,
         }
 

@@ -169,7 +169,7 @@ def _full(force_N: Array, place_mm: Array) -> NDArray[np.bool_]:
 
 def _numbers(raw: _Raw, rests: Rests, left_out: int, of_force: NDArray[np.bool_]) -> StreamIn:
     time_s, value = raw.time_s[raw.sound], raw.value[raw.sound]
-    clock, columns = sampling_of(time_s), value.reshape(len(value), -1).T
+    clock, columns = sampling_of(time_s), np.atleast_2d(value.T)
     full = of_force if raw.name == "force" else np.zeros(len(value), bool)
     at_rest = len(rests.deviation) > 0
     return StreamIn(

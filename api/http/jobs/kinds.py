@@ -34,8 +34,8 @@ from rig.results.recorded import CaptureResult, ExportResult, ImportResult, Repa
 from rig.results.tracking import SimulateResult, Threshold, TrackResult
 
 AnyResult = (
-    CaptureResult | TrackResult | RetractResult | GloveThreshold | Threshold | DoctorResult | FitResult | DiagnosisResult
-    | ProtocolCheckResult | SimulateResult | ReportResult | ExportResult | VerifyResult | RepairResult
+    CaptureResult | TrackResult | RetractResult | GloveThreshold | Threshold | DoctorResult | FitResult
+    | DiagnosisResult | ProtocolCheckResult | SimulateResult | ReportResult | ExportResult | VerifyResult | RepairResult
     | ProposalResult | ImportResult
 )  # fmt: skip
 
@@ -157,8 +157,8 @@ class ImportJob(JobBody):
 
 
 AnyJob = Annotated[
-    CaptureJob | TrackJob | RetractJob | ThresholdJob | GloveThresholdJob | DoctorJob | FitJob | DiagnoseJob | ProtocolCheckJob
-    | SimulateJob | ReportJob | ExportJob | VerifyJob | RepairJob | ProposeJob | ImportJob,
+    CaptureJob | TrackJob | RetractJob | ThresholdJob | GloveThresholdJob | DoctorJob | FitJob | DiagnoseJob
+    | ProtocolCheckJob | SimulateJob | ReportJob | ExportJob | VerifyJob | RepairJob | ProposeJob | ImportJob,
     Field(discriminator="kind"),
 ]  # fmt: skip
 

@@ -20,7 +20,7 @@ class EvdevSwitch(InputProduct):
 
     product: Literal["evdev-switch"] = Field(default="evdev-switch", description="what it is")
     key: str = Field(default="", description="name or number of the one key that counts; empty: any of them")
-    stops: StopKind | Literal[""] = Field(
+    stops: Literal["", "stop", "pain", "emergency"] = Field(
         default="", description="what pressing it asks for; such a switch is needed. Empty: it is a marker alone"
     )
 
