@@ -122,10 +122,10 @@ def test_a_needed_input_that_is_lost_retracts_by_name(made: InputBench) -> None:
 
 
 def test_nothing_begins_without_a_needed_input_but_leaving_the_tissue(made: InputBench) -> None:
-    assert made.bench.link.statuses[-1]["ready"]
+    before = made.bench.link.statuses[-1]["ready"]
     made.saying["pedal"] = ("lost", "/dev/pedal: the switch is gone")
     made.cycles(200)
-    assert not made.bench.link.statuses[-1]["ready"]
+    assert (before, made.bench.link.statuses[-1]["ready"]) == (True, False)
     made.bench.begin(ZERO, APPROACH)
     (answer,) = [said for said in made.bench.link.of("answer") if said["refused"]]
     assert answer["refused"] == "input pedal is lost: /dev/pedal: the switch is gone; without it nothing moves"

@@ -39,7 +39,8 @@ def test_of_a_ring_only_what_comes_from_now_on(tmp_path: Path) -> None:
     ring = RingWriter.create(tmp_path / "a.ring", 64)
     ring.put(STREAM.id, row(0))
     rows = by_ring(ring.path, STREAM, times(50))
-    threading.Timer(0.1, lambda: [ring.put(STREAM.id, row(seq)) for seq in (1, 2)]).start()
+    for seq in (1, 2):
+        threading.Timer(0.1 * seq, ring.put, (STREAM.id, row(seq))).start()
     assert [int(found[0]) for found in itertools.islice(rows, 2)] == [1, 2]
     rows.close()  # type: ignore[attr-defined]
     ring.close()

@@ -68,7 +68,7 @@ def test_where_the_kernel_gives_the_hosts_clock_capture_is_its_time(
     # _IOW('E', 0x90, int) and _IOW('E', 0xa0, int) of linux/input.h; CLOCK_MONOTONIC is 1.
     assert asked == [(0x40044590, 1), (0x400445A0, struct.pack("i", time.CLOCK_MONOTONIC))]
     monkeypatch.undo()
-    mock._clock_ns = lambda: 7_000_123_000  # type: ignore[method-assign]
+    mock._clock_ns = lambda: 7_000_123_000
     mock.press(True)
     (sample,) = switch.poll(7_000_900_000)
     assert (sample.capture_ns, sample.device_ns, sample.uncertainty_ns) == (7_000_123_000, 7_000_123_000, 0)
