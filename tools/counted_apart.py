@@ -110,7 +110,39 @@ SERVICE: dict[str, str] = {
     "rig/results/catalogue.py": "the catalogue",
 }
 # What came for benches that labs plug in, likewise.
-DEVICES: dict[str, str] = {}
+DEVICES: dict[str, str] = {
+    "api/cli/calibrate_glove.py": "inputs",
+    "api/cli/glove.py": "inputs",
+    "api/cli/mock_inputs.py": "inputs",
+    "api/operations/glove.py": "inputs",
+    "controller/commissioning/glove.py": "inputs",
+    "controller/experiments/glove.py": "inputs",
+    "controller/experiments/presses.py": "inputs",
+    "controller/inputs/": "inputs",
+    "drivers/evdev/": "inputs",
+    "drivers/firmata/": "inputs",
+    "drivers/input_role.py": "inputs",
+    "drivers/lsl/": "inputs",
+    "mock_devices/evdev/": "inputs",
+    "mock_devices/faults/inputs.py": "inputs",
+    "mock_devices/firmata/": "inputs",
+    "mock_devices/inputs.py": "inputs",
+    "mock_devices/lsl/": "inputs",
+    "mock_devices/no_wire.py": "inputs",
+    "rig/config/glove.py": "inputs",
+    "rig/config/glove_files.py": "inputs",
+    "rig/config/products/evdev_switch.py": "inputs",
+    "rig/config/products/firmata_glove.py": "inputs",
+    "rig/config/products/input_role.py": "inputs",
+    "rig/config/products/inputs.py": "inputs",
+    "rig/config/products/lsl_stream.py": "inputs",
+    "rig/config/subject.py": "thresholds by site",
+    "rig/input_streams.py": "inputs",
+    "rig/recording/columns.py": "inputs among the streams of a session",
+    "rig/recording/file_streams.py": "inputs among the streams of a file",
+    "rig/results/glove.py": "inputs",
+    "rig/results/inputs_in.py": "inputs",
+}
 # What came for a force law that makes every tissue the same plant, likewise.
 LAW = {
     "rig/config/axis_response.py": "the axis as it was identified",

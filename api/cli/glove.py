@@ -5,11 +5,11 @@ from pathlib import Path
 
 from api.cli.computing import here
 from api.cli.mock_bench import bench_for
-from api.cli.options import with_gloves
 from api.cli.output import show, write_json
 from api.operations.glove import check, threshold_alone, threshold_operation
 from mock_devices.control import BenchControl
 from rig.config.endpoints import Endpoints
+from rig.config.glove_files import with_gloves
 from rig.config.products.roles import MOCK_PORT
 from rig.config.wiring import Wiring
 from rig.results.glove import GloveThreshold

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 
 from api.cli.mock_calibration import mock_axis_calibration, mock_force_calibration
+from api.cli.mock_inputs import input_options, mock_inputs
 from api.cli.options import calibrated
 from controller.commissioning.refusals import refuse_uncalibrated
 from rig.config.endpoints import Endpoints
@@ -26,8 +27,7 @@ def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, both_sen
         command += ["--seed", str(seed)]
     for effect in (*wiring.mock.hide, *hide):
         command += ["--hide", effect]
-    for product in dict.fromkeys(each.product for each in mock_inputs(wiring).values()):
-        command += ["--input", product]
+    command += input_options(wiring)
     # A real sensor's product may be one that the bench cannot play, and need not.
     both_sensors = both_sensors or wiring.force.port != MOCK_PORT
     return [*command, "--force", "both" if both_sensors else wiring.force.product]
@@ -115,17 +115,6 @@ def mocks(wiring: Wiring) -> dict[str, Product]:
         if device.mock is None:
             raise UsageError(f"{role}.port mock: the mock bench has no {device.product}; give the port of a real one")
         found[role] = device
-    return found
-
-
-def mock_inputs(wiring: Wiring) -> dict[str, Product]:
-    """The inputs that the mock bench is to serve, by name; raises UsageError where it cannot serve one."""
-    found: dict[str, Product] = {name: each for name, each in wiring.input.items() if each.port == MOCK_PORT}
-    for name, each in found.items():
-        if each.mock is None:
-            raise UsageError(
-                f"input.{name}.port mock: the mock bench has no {each.product}; give the port of a real one"
-            )
     return found
 
 

@@ -6,9 +6,8 @@ from typing import Annotated
 
 import typer
 
-from rig.config.calibration_files import read_glove, with_files
-from rig.config.products.firmata_glove import FirmataGlove
-from rig.config.products.input_role import InputProduct
+from rig.config.calibration_files import with_files
+from rig.config.glove_files import gloves_beside, with_gloves
 from rig.config.table import load, merged, parse
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
@@ -72,18 +71,6 @@ def calibrated(wiring: Wiring) -> Wiring:
     return with_gloves(wiring.model_copy(update={"calibration": with_files(wiring.calibration)}))
 
 
-def with_gloves(wiring: Wiring) -> Wiring:
-    """``wiring`` with what the calibration files of its gloves hold."""
-    return wiring.model_copy(update={"input": {name: _known(name, one) for name, one in wiring.input.items()}})
-
-
-def _known(name: str, product: InputProduct) -> InputProduct:
-    if not isinstance(product, FirmataGlove) or product.calibration is None:
-        return product
-    role = f"input.{name}.calibration"
-    return product.model_copy(update={"of_fingers": read_glove(product.calibration, role)})
-
-
 def built_in(overrides: list[str] | None = None) -> Wiring:
     """The wiring of the mock bench: every port is `mock`."""
     return parse(Wiring, merged({}, overrides or []), "--set")
@@ -94,12 +81,5 @@ def _beside(wiring: Wiring, folder: Path) -> Wiring:
     mock, known = wiring.mock, wiring.calibration
     mock = mock.model_copy(update={"parameters": mock.parameters and folder / mock.parameters})
     files = {"force": known.force and folder / known.force, "axis": known.axis and folder / known.axis}
-    inputs = {name: _glove_beside(product, folder) for name, product in wiring.input.items()}
-    update = {"mock": mock, "calibration": known.model_copy(update=files), "input": inputs}
-    return wiring.model_copy(update=update)
-
-
-def _glove_beside(product: InputProduct, folder: Path) -> InputProduct:
-    if not isinstance(product, FirmataGlove) or product.calibration is None:
-        return product
-    return product.model_copy(update={"calibration": folder / product.calibration})
+    wiring = wiring.model_copy(update={"mock": mock, "calibration": known.model_copy(update=files)})
+    return gloves_beside(wiring, folder)

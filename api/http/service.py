@@ -21,8 +21,9 @@ from controller.recovery.situation import Consent
 from controller.stop.word import NOT_CONFIRMED, StopOutcome, StopReason
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
+from rig.config.subject import Subject
 from rig.config.table import load
-from rig.config.wiring import Subject, Wiring
+from rig.config.wiring import Wiring
 from rig.errors import RigError, UsageError
 from rig.recording.tap import Slots
 from rig.results.bench import DeviceReport, ResetResult

@@ -11,7 +11,7 @@ from api.operations.claimed import claimed
 from controller.commissioning.glove import calibrate, read
 from controller.commissioning.weights import Weights
 from controller.experiments.glove import find, glove_of, keep, record, refuse_uncalibrated, stream_of
-from controller.experiments.presses import PRESSES, Press
+from controller.experiments.presses import PRESSES, GlovePress
 from controller.experiments.tracked import refuse_foreign
 from controller.inputs.runner import open_input
 from controller.inputs.watch import Row, by_driver, by_ring
@@ -51,7 +51,7 @@ def threshold_beside(operation: Operation, bench: Supervisor, name: str, folder:
 
 def _threshold(operation: Operation, wiring: Wiring, name: str, folder: Path, rows: Iterator[Row]) -> GloveThreshold:
     seen: list[Row] = []
-    outcome, presses = "failed", tuple[Press, ...]()
+    outcome, presses = "failed", tuple[GlovePress, ...]()
     try:
         presses = find(operation, wiring, name, _noted(rows, seen))
         outcome = "presses"

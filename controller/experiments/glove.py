@@ -13,7 +13,7 @@ import numpy as np
 
 import rig
 from controller.experiments.capture import new_session
-from controller.experiments.presses import MOST, PRESSES, RULE, Press, gathered, threshold_N
+from controller.experiments.presses import MOST, PRESSES, RULE, GlovePress, gathered, threshold_N
 from controller.inputs.watch import Row
 from controller.operation import Operation
 from rig.channels import Stream
@@ -99,10 +99,10 @@ def _free_name(folder: Path) -> str:
     return f"glove_{number:03d}"
 
 
-def find(operation: Operation, wiring: Wiring, name: str, rows: Iterable[Row]) -> tuple[Press, ...]:
+def find(operation: Operation, wiring: Wiring, name: str, rows: Iterable[Row]) -> tuple[GlovePress, ...]:
     """Presses until three count; CheckFailed where too many do not, SafetyStop where the operator ended it."""
     glove, stream = glove_of(wiring, name)[1], stream_of(wiring, name)
-    presses: tuple[Press, ...] = ()
+    presses: tuple[GlovePress, ...] = ()
     operation.say(f"on {wiring.subject.site}, {PRESSES} times: press slowly until the subject says stop, then let go")
     for presses in gathered((int(row[1]), total_N(stream, glove, row)) for row in rows):
         newest = presses[-1]
@@ -116,11 +116,11 @@ def find(operation: Operation, wiring: Wiring, name: str, rows: Iterable[Row]) -
     raise CheckFailed(f"{len(presses)} presses gave no {PRESSES} that agree: {refused}; rest, then try again")
 
 
-def _sentence(number: int, press: Press) -> str:
+def _sentence(number: int, press: GlovePress) -> str:
     return f"press {number}: {press.peak_N:.1f} N" + (f", refused: {press.refused}" if press.refused else "")
 
 
-def keep(presses: Sequence[Press], wiring: Wiring, name: str, file: Path) -> GloveThreshold:
+def keep(presses: Sequence[GlovePress], wiring: Wiring, name: str, file: Path) -> GloveThreshold:
     """The result, written beside its recording ``file``."""
     known = glove_of(wiring, name)[1].of_fingers
     assert known, "without a calibration no press is found"

@@ -22,7 +22,7 @@ RULE = f"median of {PRESSES} peaks, none farther than {SPREAD:.0%} from it; one 
 
 
 @dataclass(frozen=True)
-class Press:
+class GlovePress:
     """One press; ``refused`` says why it does not count, and is empty where it does."""
 
     peak_N: float
@@ -42,7 +42,7 @@ class PressFinder:
         """Whether somebody presses now."""
         return self._begun_ns is not None
 
-    def update(self, at_ns: int, force_N: float | None) -> Press | None:
+    def update(self, at_ns: int, force_N: float | None) -> GlovePress | None:
         """The press that ends with this sample."""
         if self._begun_ns is None:
             if force_N is not None and force_N >= BEGIN_N:
@@ -55,7 +55,7 @@ class PressFinder:
         if force_N > END_N:
             return None
         seconds, self._begun_ns = (at_ns - self._begun_ns) * 1e-9, None
-        return Press(self._peak_N, seconds, self._trouble(seconds))
+        return GlovePress(self._peak_N, seconds, self._trouble(seconds))
 
     def _trouble(self, seconds: float) -> str:
         if self._unknown:
@@ -65,7 +65,7 @@ class PressFinder:
         return ""
 
 
-def judged(presses: Sequence[Press]) -> tuple[Press, ...]:
+def judged(presses: Sequence[GlovePress]) -> tuple[GlovePress, ...]:
     """The presses, with that refused which lies too far from the median of those that count."""
     sound = [number for number, press in enumerate(presses) if not press.refused]
     if len(sound) < PRESSES:
@@ -76,20 +76,20 @@ def judged(presses: Sequence[Press]) -> tuple[Press, ...]:
     if off <= SPREAD:
         return tuple(presses)
     why = f"{off:.0%} off the median of {middle_N:.1f} N (at most {SPREAD:.0%}): repeated"
-    found = Press(presses[farthest].peak_N, presses[farthest].seconds, why)
+    found = GlovePress(presses[farthest].peak_N, presses[farthest].seconds, why)
     return (*presses[:farthest], found, *presses[farthest + 1 :])
 
 
-def threshold_N(presses: Iterable[Press]) -> float | None:
+def threshold_N(presses: Iterable[GlovePress]) -> float | None:
     """The value, once three presses count; None before."""
     peaks_N = [press.peak_N for press in presses if not press.refused]
     return median(peaks_N) if len(peaks_N) >= PRESSES else None
 
 
-def gathered(samples: Iterable[tuple[int, float | None]]) -> Iterator[tuple[Press, ...]]:
+def gathered(samples: Iterable[tuple[int, float | None]]) -> Iterator[tuple[GlovePress, ...]]:
     """All presses so far, whenever one has ended, until three count or too many were made."""
     finder = PressFinder()
-    presses: tuple[Press, ...] = ()
+    presses: tuple[GlovePress, ...] = ()
     for at_ns, force_N in samples:
         press = finder.update(at_ns, force_N)
         if press:

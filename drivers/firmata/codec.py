@@ -19,7 +19,7 @@ DATA_BYTES = {ANALOG: 2, 0x90: 2, REPORT_ANALOG: 1, 0xD0: 1}
 
 
 @dataclass(frozen=True)
-class Reading:
+class PinReading:
     """One analogue input: its number and its counts."""
 
     channel: int
@@ -42,7 +42,7 @@ class Protocol:
     minor: int
 
 
-FirmataMessage = Reading | Sysex | Protocol
+FirmataMessage = PinReading | Sysex | Protocol
 
 
 def seven_bits(value: int) -> bytes:
@@ -139,6 +139,6 @@ class FirmataParser:
 
 def _meaning(kind: int, channel: int, data: list[int]) -> Iterator[FirmataMessage]:
     if kind == ANALOG:
-        yield Reading(channel, data[0] | data[1] << 7)
+        yield PinReading(channel, data[0] | data[1] << 7)
     elif kind == VERSION:
         yield Protocol(data[0], data[1])

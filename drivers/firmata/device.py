@@ -15,7 +15,7 @@ from drivers.firmata.codec import (
     MAPPING_QUERY,
     FirmataMessage,
     FirmataParser,
-    Reading,
+    PinReading,
     Sysex,
     analog_channels,
     firmware_of,
@@ -110,11 +110,11 @@ class FirmataBoard:
         """Samples since the last call."""
         samples = []
         for message in self._parser.feed(self._port.read()):
-            if isinstance(message, Reading) and message.channel in self._pins:
+            if isinstance(message, PinReading) and message.channel in self._pins:
                 samples += self._take(message, now_ns)
         return samples
 
-    def _take(self, found: Reading, now_ns: int) -> list[InputSample]:
+    def _take(self, found: PinReading, now_ns: int) -> list[InputSample]:
         """A board sends its inputs in turn: a sample is whole once each has come."""
         if found.channel in self._counts:
             self.counters.device_lost += 1

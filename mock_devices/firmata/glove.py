@@ -28,7 +28,7 @@ class GloveFigures:
     rest_s: float = 0.2
 
 
-class Press(NamedTuple):
+class HandPress(NamedTuple):
     """One press: rises to ``peak_N`` at a steady rate, rests there, and is let go."""
 
     begin_s: float
@@ -44,7 +44,7 @@ class GlovePlant:
     seed: int = 0
     weights_N: dict[int, float] = field(default_factory=dict)
     cut: set[int] = field(default_factory=set)
-    presses: tuple[Press, ...] = ()
+    presses: tuple[HandPress, ...] = ()
 
     def __post_init__(self) -> None:
         self._rng = random.Random(self.seed)
@@ -53,7 +53,7 @@ class GlovePlant:
         """Presses one after another, from ``from_s`` on."""
         begin_s, planned = from_s + self.figures.lead_s, []
         for peak_N in peaks_N:
-            planned.append(Press(begin_s, peak_N))
+            planned.append(HandPress(begin_s, peak_N))
             begin_s += peak_N / self.figures.rate_N_s + self.figures.rest_s + self.figures.release_s
             begin_s += self.figures.pause_s
         self.presses = tuple(planned)
@@ -62,7 +62,7 @@ class GlovePlant:
         """Force of the whole hand."""
         return max((self._of(press, time_s) for press in self.presses), default=0.0)
 
-    def _of(self, press: Press, time_s: float) -> float:
+    def _of(self, press: HandPress, time_s: float) -> float:
         figures = self.figures
         since_s = time_s - press.begin_s
         top_s = press.peak_N / figures.rate_N_s

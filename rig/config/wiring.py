@@ -17,6 +17,7 @@ from rig.config.products.ndi_polaris import PolarisWiring
 from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS, choice_of
 from rig.config.products.roles import MOCK_PORT, AxisProduct, ForceProduct, TrackerProduct
 from rig.config.stop import Stop
+from rig.config.subject import Subject
 from rig.config.table import Table
 from rig.input_streams import InputChannel
 
@@ -89,23 +90,6 @@ class Limits(Table):
         if self.retract_speed_mm_s > self.speed_mm_s:
             raise ValueError(f"retract_speed_mm_s {self.retract_speed_mm_s:g} is above speed_mm_s {self.speed_mm_s:g}")
         return self
-
-
-class Subject(Table):
-    """Who lies under the tip."""
-
-    id: str = Field(default="phantom", description="a code, no person's name; kept with each recording")
-    site: str = Field(default="forearm", description="where the tip presses, kept with each recording")
-    pain_threshold_N: Positive = Field(default=15.0, description="the lower of it and limits.force_N holds")
-    # At most what subject.pain_threshold_N may be, for the reason that stands there (rig.config.maxima).
-    site_thresholds_N: Mapping[str, Annotated[float, Field(gt=0, le=50)]] = Field(
-        default={}, description="found at single sites, by their names; at its site each holds beside the others"
-    )
-
-    @property
-    def threshold_N(self) -> float:
-        """At this site: never more than the subject's own."""
-        return min(self.pain_threshold_N, self.site_thresholds_N.get(self.site, self.pain_threshold_N))
 
 
 class MockBenchSettings(Table):

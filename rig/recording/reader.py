@@ -1,6 +1,6 @@
 """A recording as numpy tables: opens a finished file, any prefix of one, and what a damaged one still holds."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from rig.channels import EVENT, STREAMS, EventSample, Stream
 from rig.errors import DataError
 from rig.input_streams import all_streams
+from rig.recording.file_streams import streams_of
 from rig.recording.mcap_file import SUMMARY
-from rig.recording.mcap_layout import MAGIC, schema_words
-from rig.recording.scan import Chunk, Definition, Scan, scan
+from rig.recording.mcap_layout import MAGIC
+from rig.recording.scan import Scan, scan
 
-# Fields of recordings that were made before they had the name on the right.
-RENAMED = {"slot": "cycle"}
 # The kind of a trial that tracked a force; one that indents has none.
 TRACKING = "tracking"
 # What is longer is not held whole: 220 bytes a row were measured for one that is read and looked at.
@@ -92,7 +91,7 @@ def _table(stream: Stream, bodies: list[Bodies]) -> NDArray[np.void]:
 
 def messages(path: Path, found: Scan) -> Iterator[tuple[Stream, Bodies]]:
     """Every good sample in file order: a stream, and bodies alike in length; DataError for a file of another layout."""
-    streams = _streams(path, found.chunks, all_streams(found.metadata))
+    streams = streams_of(path, found.chunks, all_streams(found.metadata))
     for chunk in found.chunks:
         for channel, bodies in chunk.messages:
             stream = streams.get(channel)
@@ -102,27 +101,3 @@ def messages(path: Path, found: Scan) -> Iterator[tuple[Stream, Bodies]]:
             if not stream.has_text and size != stream.fixed.size:
                 raise DataError(f"{path}: a {stream.name} row of {size} bytes; its layout has {stream.fixed.size}")
             yield stream, bodies
-
-
-def _streams(path: Path, chunks: Iterable[Chunk], known: Iterable[Stream]) -> Mapping[int, Stream]:
-    """Channel number to stream; the numbers of our own writer where the chunk with the definitions is lost."""
-    by_name = {stream.name: stream for stream in known}
-    definitions: dict[int, Definition] = {}
-    for chunk in chunks:
-        definitions |= chunk.definitions
-    for definition in definitions.values():
-        stream = by_name.get(definition.topic)
-        if stream is not None and layout(definition.schema) != layout(stream.schema()):
-            raise DataError(
-                f"{path}: stream {stream.name} has other fields than this version of the program; "
-                "read it with the version named in its metadata"
-            )
-    found = {number: by_name[item.topic] for number, item in definitions.items() if item.topic in by_name}
-    if definitions and not found:
-        raise DataError(f"{path}: an MCAP file, but with no stream of this bench")
-    return found or dict(enumerate(by_name.values(), 1))
-
-
-def layout(schema: str) -> list[list[str]]:
-    """Types and names, as they are now, of a ``ros2msg`` text without comments."""
-    return [[RENAMED.get(word, word) for word in words] for words in schema_words(schema)]

@@ -9,9 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.channels import STREAMS
 from rig.errors import DataError
-from rig.input_streams import channels_of
 from rig.recording.alignment import Alignment, read_alignments
 from rig.recording.converter import Array, at_the_end_of_range, ends_of_range, resolution
 from rig.recording.mcap_file import SUMMARY
@@ -20,6 +18,7 @@ from rig.recording.slope import TIP_TOOL
 from rig.recording.tables import compression_N
 from rig.results.came_in import StreamIn
 from rig.results.came_in_trace import RecordingTrace, trace_of
+from rig.results.inputs_in import channels_in
 from rig.trials.streams import longest_repeat, sample_noise, sampling_of
 
 UNITS = {"force": "N", "axis": "mm", "marker": "mm"}
@@ -72,7 +71,7 @@ def see(recording: Recording) -> Seen:
     full = np.zeros(0, bool) if force is None else _full(*drawn[1:])
     return Seen(
         streams=tuple(_numbers(*one, left_out.get(one[0].name, 0), full) for one in zip(raw, rests, strict=True)),
-        inputs=tuple(_numbers(one, NO_RESTS, 0, full) for one in _inputs(recording)),
+        inputs=tuple(_numbers(_Raw(*one), NO_RESTS, 0, full) for one in channels_in(recording)),
         rests=tuple(rests), one_clock=all(np.array_equal(raw[0].time_s, other.time_s) for other in raw[1:]),
         alignments=_alignments(recording), tracks_force=recording.tracks_force,
         trace=trace_of(*drawn, full if len(full) else np.zeros(len(drawn[0]), bool)),
@@ -92,16 +91,6 @@ def _raw(recording: Recording) -> Iterator[_Raw]:
             for column in value.reshape(len(rows), -1).T:
                 sound &= np.isfinite(column)
             yield _Raw(name, (rows["capture_ns"] - start_ns) * 1e-9, value, sound, unit)
-
-
-def _inputs(recording: Recording) -> Iterator[_Raw]:
-    """Each channel of each input, under the names of both; a value that is no number is missing."""
-    for stream in recording.streams[len(STREAMS) :]:
-        rows = recording.tables[stream.name]
-        time_s = (rows["capture_ns"] - rows["capture_ns"][:1].sum()) * 1e-9
-        for channel in channels_of(stream) if len(rows) else ():
-            value = rows[channel]
-            yield _Raw(f"{stream.name}.{channel}", time_s, value, np.isfinite(value), stream.units[channel][0])
 
 
 def _value(recording: Recording, name: str, rows: NDArray[np.void]) -> Array:

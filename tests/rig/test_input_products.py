@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-from mock_devices.devices import DeviceFactory
 from rig.config.products.input_role import InputProduct
 from rig.config.products.inputs import INPUTS
 from rig.config.table import merged, parse
@@ -23,7 +22,7 @@ def test_each_product_declares_what_the_bench_needs(name: str) -> None:
     product = wired({"one": {"product": name}}).input["one"]
     assert type(product) is INPUTS[name]
     assert callable(resolve_name(product.driver))
-    assert product.mock and resolve_name(product.mock.maker).__qualname__.startswith(DeviceFactory.__name__)
+    assert product.mock and callable(resolve_name(product.mock.maker))
     (stream,) = input_streams({"one": product.channels})
     assert not product.switch or product.switch in stream.kinds
     assert not product.is_needed and product.nominal_Hz in (0.0, 50.0)

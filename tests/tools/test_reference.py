@@ -12,8 +12,9 @@ from rig.config.products.registry import ROLES
 from rig.config.protocol import Indentation
 from rig.config.quality import Bounds, QualityLimits
 from rig.config.stop import Stop
+from rig.config.subject import Subject
 from rig.config.table import Table
-from rig.config.wiring import Limits, Loop, MockBenchSettings, Subject, Wiring
+from rig.config.wiring import Limits, Loop, MockBenchSettings, Wiring
 from rig.diagnosis.effects.registry import CAUSES
 from rig.tissue.registry import LAWS
 from tools.keys import tables

@@ -14,7 +14,7 @@ class EvdevSwitch(InputProduct):
     """A foot switch by Linux' input events; its port is a path, or `name:` and the name that the device has."""
 
     driver: ClassVar[str] = "drivers.evdev.device:open_switch"
-    mock: ClassVar[MockPort | None] = MockPort("mock_devices.devices:DeviceFactory.switch", "switch", "events")
+    mock: ClassVar[MockPort | None] = MockPort("mock_devices.inputs:switch", "switch", "events")
     advice: ClassVar[str] = "its cable, its port, and whether you are in the group input"
     switch: ClassVar[str] = "pressed"
 

@@ -19,7 +19,7 @@ class FirmataGlove(InputProduct):
     """A pain glove on a microcontroller with StandardFirmata."""
 
     driver: ClassVar[str] = "drivers.firmata.device:open_glove"
-    mock: ClassVar[MockPort | None] = MockPort("mock_devices.devices:DeviceFactory.glove", "glove")
+    mock: ClassVar[MockPort | None] = MockPort("mock_devices.inputs:glove", "glove")
     advice: ClassVar[str] = "its USB cable, its port, and that StandardFirmata is on the board"
 
     product: Literal["firmata-glove"] = Field(default="firmata-glove", description="what it is")

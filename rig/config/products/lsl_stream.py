@@ -14,7 +14,7 @@ class LslStream(InputProduct):
     """A stream by Lab Streaming Layer; its port is the stream's name."""
 
     driver: ClassVar[str] = "drivers.lsl.device:open_stream"
-    mock: ClassVar[MockPort | None] = MockPort("mock_devices.devices:DeviceFactory.breathing", "breathing", "lsl")
+    mock: ClassVar[MockPort | None] = MockPort("mock_devices.inputs:breathing", "breathing", "lsl")
     advice: ClassVar[str] = "whether its program sends, its port (the stream's name), and input.NAME.scope"
 
     product: Literal["lsl-stream"] = Field(default="lsl-stream", description="what it is")

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.experiments.presses import MOST, SPREAD, Press, PressFinder, gathered, judged, threshold_N
+from controller.experiments.presses import MOST, SPREAD, GlovePress, PressFinder, gathered, judged, threshold_N
 
 PERIOD_NS = 20_000_000
 Forces = list[float | None]
@@ -17,7 +17,7 @@ def pressed(peak_N: float, samples: int = 40) -> Forces:
     return [*(peak_N * number / samples for number in range(1, samples + 1)), *[0.0] * 10]
 
 
-def seen(*presses: Forces) -> list[Press]:
+def seen(*presses: Forces) -> list[GlovePress]:
     finder = PressFinder()
     forces = [force_N for press in presses for force_N in press]
     found = (finder.update(number * PERIOD_NS, force_N) for number, force_N in enumerate(forces))
@@ -73,7 +73,7 @@ def test_the_one_that_lies_apart_is_refused_and_repeated() -> None:
 
 @pytest.mark.parametrize(("third_N", "kept"), [(10.0, True), (10.001, False), (6.0, True), (5.999, False)])
 def test_a_quarter_off_the_median_is_still_the_same_and_more_is_not(third_N: float, kept: bool) -> None:
-    found = judged([Press(8.0, 1.0), Press(8.0, 1.0), Press(third_N, 1.0)])
+    found = judged([GlovePress(8.0, 1.0), GlovePress(8.0, 1.0), GlovePress(third_N, 1.0)])
     assert (not found[-1].refused) is kept
 
 
@@ -86,9 +86,9 @@ def test_presses_that_never_agree_come_to_an_end() -> None:
 
 @given(st.lists(st.floats(1.0, 40.0), min_size=3, max_size=MOST))
 def test_whatever_is_pressed_those_that_count_agree(peaks_N: list[float]) -> None:
-    presses: tuple[Press, ...] = ()
+    presses: tuple[GlovePress, ...] = ()
     for peak_N in peaks_N:
-        presses = judged((*presses, Press(peak_N, 1.0)))
+        presses = judged((*presses, GlovePress(peak_N, 1.0)))
         value_N = threshold_N(presses)
         if value_N is not None:
             counted = [press.peak_N for press in presses if not press.refused]

@@ -8,8 +8,8 @@ from drivers.firmata.codec import (
     LONGEST,
     FirmataMessage,
     FirmataParser,
+    PinReading,
     Protocol,
-    Reading,
     Sysex,
     analog_channels,
     firmware_of,
@@ -27,7 +27,7 @@ FIRMWARE_AB = bytes.fromhex("f0 79 01 02 41 00 42 00 f7")
 MAPPING = bytes.fromhex("f0 6a 7f 7f 00 01 f7")
 ALL = READS_421 + VERSION_2_5 + FIRMWARE_AB + MAPPING
 MEANS: list[FirmataMessage] = [
-    Reading(2, 421),
+    PinReading(2, 421),
     Protocol(2, 5),
     Sysex(0x79, bytes.fromhex("0102 4100 4200")),
     Sysex(0x6A, bytes.fromhex("7f7f 0001")),
@@ -57,12 +57,12 @@ def test_pieces_of_any_size_make_the_same(size: int) -> None:
 @pytest.mark.parametrize(
     ("damaged", "found", "discarded"),
     [
-        (READS_421[:2] + READS_421, [Reading(2, 421)], 2),  # a byte was lost: the next message begins
-        (b"\x25\x03" + READS_421, [Reading(2, 421)], 2),  # data without a head
-        (FIRMWARE_AB[:-1] + READS_421, [Reading(2, 421)], 8),  # a report without its end
-        (b"\xf7" + READS_421, [Reading(2, 421)], 1),  # an end without a beginning
-        (b"\xf0\xf7" + READS_421, [Reading(2, 421)], 2),  # an empty report
-        (b"\x90\x01\x00" + READS_421, [Reading(2, 421)], 0),  # digital ports are read, and not wanted
+        (READS_421[:2] + READS_421, [PinReading(2, 421)], 2),  # a byte was lost: the next message begins
+        (b"\x25\x03" + READS_421, [PinReading(2, 421)], 2),  # data without a head
+        (FIRMWARE_AB[:-1] + READS_421, [PinReading(2, 421)], 8),  # a report without its end
+        (b"\xf7" + READS_421, [PinReading(2, 421)], 1),  # an end without a beginning
+        (b"\xf0\xf7" + READS_421, [PinReading(2, 421)], 2),  # an empty report
+        (b"\x90\x01\x00" + READS_421, [PinReading(2, 421)], 0),  # digital ports are read, and not wanted
     ],
 )
 def test_what_is_damaged_is_counted_and_the_next_message_read(
@@ -76,12 +76,12 @@ def test_what_is_damaged_is_counted_and_the_next_message_read(
 @given(st.lists(st.binary(max_size=40)))
 def test_random_bytes_never_crash_it_and_the_next_message_is_read(noise: list[bytes]) -> None:
     messages, _ = parsed(*noise, READS_421)
-    assert messages[-1] == Reading(2, 421)
+    assert messages[-1] == PinReading(2, 421)
 
 
 def test_an_endless_report_is_not_kept() -> None:
     messages, counters = parsed(b"\xf0" + b"\x01" * (3 * LONGEST), READS_421)
-    assert messages == [Reading(2, 421)]
+    assert messages == [PinReading(2, 421)]
     assert counters.discarded_bytes >= 3 * LONGEST - 1
 
 
