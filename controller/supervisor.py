@@ -12,8 +12,7 @@ from pathlib import Path
 from socket import socket
 
 from controller.claims import Claim, take
-from controller.inputs.client import InputsProcess
-from controller.inputs.client import started as started_inputs
+from controller.inputs.client import InputsProcess, started_inputs
 from controller.loop.client import ANSWER_TIMEOUT_S, LoopClient
 from controller.loop.messages import Heartbeat, Note, Outcome, Ready, Recover, Reset, Run, Shutdown, Status, Stopped
 from controller.loop.steps import Program

@@ -114,6 +114,7 @@ DEVICES: dict[str, str] = {
     "api/cli/calibrate_glove.py": "inputs",
     "api/cli/glove.py": "inputs",
     "api/cli/mock_inputs.py": "inputs",
+    "api/cli/threshold.py": "thresholds by glove",
     "api/operations/glove.py": "inputs",
     "controller/commissioning/glove.py": "inputs",
     "controller/experiments/glove.py": "inputs",

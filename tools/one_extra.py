@@ -35,9 +35,7 @@ SMOKES: Mapping[str, Smoke] = {
     "igtl": Smoke("pyigtl", "import pyigtl, crcmod; crcmod.mkCrcFun(0x142F0E1EBA9EA3693)(b'1')"),
     "lsl": Smoke("pylsl", "from drivers.lsl.library import load; load('machine').local_clock()"),
     "multicast": Smoke("msgpack", "from can.interfaces.udp_multicast import UdpMulticastBus"),
-    "pandas": Smoke(
-        "pandas", "from rig.notebook import to_pandas; import pyarrow as p; to_pandas(p.table({'a': [1]}))"
-    ),
+    "pandas": Smoke("pandas", "import rig.notebook as n, pyarrow as p; n.to_pandas(p.table({'a': [1]}))"),
     "postgresql": Smoke("psycopg", "import api.catalogue.database, psycopg"),
     "s3": Smoke("s3fs", "import fsspec; fsspec.get_filesystem_class('s3')"),
     "zaber": Smoke("zaber_motion", "from zaber_motion.ascii import Connection"),
@@ -81,15 +79,8 @@ def _uv(*arguments: str) -> None:
 def run(python: Path, code: str) -> str:
     """What ``code`` says in that environment, tissue-rig on its path; empty where all is well."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [python, "-c", code],
-        cwd=python.parent,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    command = [str(python), "-c", code]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
     return "" if done.returncode == 0 else done.stderr.strip() or f"exit code {done.returncode}"
 
 

@@ -18,6 +18,7 @@ from controller.inputs.watch import Row
 from controller.operation import Operation
 from rig.channels import Stream
 from rig.config.products.firmata_glove import FirmataGlove
+from rig.config.products.input_role import brought_by
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed, SafetyStop, UsageError
 from rig.input_streams import METADATA, input_streams, layouts
@@ -52,7 +53,7 @@ def refuse_uncalibrated(name: str, glove: FirmataGlove) -> None:
 
 def stream_of(wiring: Wiring, name: str) -> Stream:
     """The stream of input ``name``."""
-    return next(stream for stream in input_streams(wiring.input_channels) if stream.name == name)
+    return next(stream for stream in input_streams(brought_by(wiring.input)) if stream.name == name)
 
 
 def total_N(stream: Stream, glove: FirmataGlove, row: Row) -> float | None:
@@ -85,7 +86,7 @@ def _metadata(wiring: Wiring, session: str, trial: str) -> dict[str, dict[str, s
             "wall_start_iso": datetime.now(UTC).isoformat(),
             "monotonic_start_ns": str(time.monotonic_ns()),
         },
-        METADATA: layouts(wiring.input_channels),
+        METADATA: layouts(brought_by(wiring.input)),
         "wiring": {name: json.dumps(table) for name, table in wiring.model_dump(mode="json").items()},
         "subject": {name: str(value) for name, value in wiring.subject.model_dump().items()},
         "trial": {"kind": TRACKING, "name": "threshold by glove"},

@@ -55,6 +55,6 @@ def inputs_path(ring: Path) -> Path:
     return ring.with_suffix(".inputs")
 
 
-def started(wiring: Wiring, ring: Path) -> InputsProcess | None:
+def started_inputs(wiring: Wiring, ring: Path) -> InputsProcess | None:
     """The process; None where no input is configured."""
     return InputsProcess(wiring, inputs_path(ring)) if wiring.input else None

@@ -18,6 +18,7 @@ from typing import Protocol
 from controller.devices.states import DeviceStatus
 from controller.inputs.runner import InputRunner
 from controller.inputs.states import INPUT_STATE, SAY_EVERY_S, packed
+from rig.config.products.input_role import brought_by
 from rig.config.wiring import Wiring
 from rig.input_streams import input_streams
 from rig.recording.ring import RingWriter
@@ -55,7 +56,7 @@ class Publisher:
 def run(wiring: Wiring, ring: RingWriter, until: int) -> None:
     """Serves the inputs until descriptor ``until`` is closed at its other end."""
     publisher = Publisher(ring)
-    streams = input_streams(wiring.input_channels)
+    streams = input_streams(brought_by(wiring.input))
     runners = [
         InputRunner(product, stream, publisher.put)
         for product, stream in zip(wiring.input.values(), streams, strict=True)

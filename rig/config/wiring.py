@@ -10,7 +10,7 @@ from rig.config.calibration import Calibration
 from rig.config.force_map import UNIT, ForceMap
 from rig.config.maxima import beyond
 from rig.config.products.bota_sensone import BotaWiring
-from rig.config.products.input_role import InputProduct, input_trouble
+from rig.config.products.input_role import InputProduct, input_troubles
 from rig.config.products.inputs import INPUTS
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
@@ -19,7 +19,6 @@ from rig.config.products.roles import MOCK_PORT, AxisProduct, ForceProduct, Trac
 from rig.config.stop import Stop
 from rig.config.subject import Subject
 from rig.config.table import Table
-from rig.input_streams import InputChannel
 
 Positive = Annotated[float, Field(gt=0)]
 if TYPE_CHECKING:
@@ -116,12 +115,6 @@ class Wiring(Table):
     input: Mapping[str, AnyInput] = Field(default={}, description="by name, which is that of its stream")
 
     @model_validator(mode="after")
-    def _sound_inputs(self) -> Self:
-        if trouble := input_trouble(self.input, self.stop.keypad):
-            raise ValueError(trouble)
-        return self
-
-    @model_validator(mode="after")
     def _loop_within_axis(self) -> Self:
         if self.loop.crossover_Hz >= self.axis.bandwidth_Hz:
             raise ValueError(
@@ -142,15 +135,10 @@ class Wiring(Table):
     @model_validator(mode="after")
     def _within_maxima(self) -> Self:
         tables = {"limits": self.limits, "subject": self.subject, "axis": self.axis, "loop": self.loop}
-        reasons = beyond(tables, (*self.force.maxima, *self.axis.maxima))
+        reasons = beyond(tables, (*self.force.maxima, *self.axis.maxima)) + input_troubles(self.input, self.stop.keypad)
         if reasons:
             raise ValueError("; ".join(reasons))
         return self
-
-    @property
-    def input_channels(self) -> dict[str, tuple[InputChannel, ...]]:
-        """What each input brings, by its name."""
-        return {name: product.channels for name, product in self.input.items()}
 
     @property
     def force_map(self) -> ForceMap:

@@ -13,7 +13,7 @@ from rig.recording.reader import Recording
 
 
 class ChannelIn(NamedTuple):
-    """Times [s] and values, shape (n,), and which of them are numbers; named after input and channel."""
+    """A stream as it was recorded: times [s], values (n,) or (n, 3), and which of them are numbers vouched for."""
 
     name: str
     time_s: Array
@@ -23,7 +23,7 @@ class ChannelIn(NamedTuple):
 
 
 def channels_in(recording: Recording) -> Iterator[ChannelIn]:
-    """Each channel of each input that has rows."""
+    """Each channel of each input that has rows, named after both."""
     for stream in recording.streams[len(STREAMS) :]:
         rows = recording.tables[stream.name]
         time_s = (rows["capture_ns"] - rows["capture_ns"][:1].sum()) * 1e-9

@@ -71,8 +71,17 @@ def channel_trouble(channels: Sequence[InputChannel]) -> str:
     return ""
 
 
-def input_trouble(inputs: Mapping[str, InputProduct], keypad: str) -> str:
-    """What is wrong with ``inputs`` as a whole, ``keypad`` being that of the stop process; empty where nothing is."""
+def brought_by(inputs: Mapping[str, InputProduct]) -> dict[str, tuple[InputChannel, ...]]:
+    """What each input brings, by its name."""
+    return {name: product.channels for name, product in inputs.items()}
+
+
+def input_troubles(inputs: Mapping[str, InputProduct], keypad: str) -> list[str]:
+    """What is wrong with ``inputs`` as a whole, ``keypad`` being that of the stop process: a sentence, or none."""
+    return [trouble for trouble in [_input_trouble(inputs, keypad)] if trouble]
+
+
+def _input_trouble(inputs: Mapping[str, InputProduct], keypad: str) -> str:
     if len(inputs) > MOST_INPUTS:
         return f"{len(inputs)} inputs; a recording takes {MOST_INPUTS}"
     places: dict[str, str] = {keypad: "stop.keypad"} if keypad else {}

@@ -12,6 +12,7 @@ from controller.inputs.commands import WithInputs, with_inputs
 from controller.inputs.feed import MOST_ROWS, InputFeed
 from controller.inputs.states import INPUT_STATE, InputState, packed
 from controller.loop.modes import Mode
+from rig.config.products.input_role import brought_by
 from rig.config.wiring import Wiring
 from rig.input_streams import InputSample, input_streams
 from rig.recording.ring import RingReader, RingWriter
@@ -23,7 +24,7 @@ INPUTS = {
     "belt": {"product": "lsl-stream", "port": "Belt"},
 }
 WIRING = Wiring.model_validate({"input": INPUTS})
-STREAMS = {stream.name: stream for stream in input_streams(WIRING.input_channels)}
+STREAMS = {stream.name: stream for stream in input_streams(brought_by(WIRING.input))}
 
 
 @dataclass
