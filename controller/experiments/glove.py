@@ -105,10 +105,11 @@ def find(operation: Operation, wiring: Wiring, name: str, rows: Iterable[Row]) -
     glove, stream = glove_of(wiring, name)[1], stream_of(wiring, name)
     presses: tuple[GlovePress, ...] = ()
     operation.say(f"on {wiring.subject.site}, {PRESSES} times: press slowly until the subject says stop, then let go")
-    for presses in gathered((int(row[1]), total_N(stream, glove, row)) for row in rows):
-        newest = presses[-1]
-        operation.advance(sum(not press.refused for press in presses), f"{newest.peak_N:.1f} N")
-        operation.say(_sentence(len(presses), newest))
+    for found in gathered((int(row[1]), total_N(stream, glove, row)) for row in rows):
+        operation.advance(sum(not press.refused for press in found), f"{found[-1].peak_N:.1f} N")
+        changed = [number for number, press in enumerate(found) if press not in presses[number : number + 1]]
+        operation.say(*(_sentence(number + 1, found[number]) for number in reversed(changed)))
+        presses = found
     if threshold_N(presses) is not None:
         return presses
     if len(presses) < MOST:
