@@ -1,12 +1,9 @@
 """All products of the bench on their wires: each mock with its plant, its wire and the faults either can have."""
 
 import random
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TypeVar
-from zlib import crc32
 
 from drivers.epos4.objects import SERIAL
 from mock_devices.bench import Bench
@@ -14,35 +11,16 @@ from mock_devices.bota.mock import BotaMock
 from mock_devices.epos4.mock import Epos4Mock
 from mock_devices.faults.devices import BOTA_FAULTS, EPOS4_FAULTS, NDI_FAULTS, ROBOTIQ_FAULTS
 from mock_devices.faults.sensing import CAMERA_FAULTS, SENSOR_FAULTS
-from mock_devices.faults.wires import WIRE_FAULTS, Fault, FaultKind, FaultyWire, faults_of
-from mock_devices.interfaces import ProtocolMock
+from mock_devices.faults.wires import FaultyWire, faults_of
 from mock_devices.ndi.mock import NdiMock
-from mock_devices.parameters import Axis, Parameters, Sensor
+from mock_devices.parameters import Axis, Parameters
+from mock_devices.played import MockDevice, number_of, served
 from mock_devices.robotiq.mock import RobotiqMock
 from mock_devices.wire import PtyWire, TcpWire, Wire
-from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS
 from rig.config.products.roles import Product
 
-AnyMock = TypeVar("AnyMock", bound=ProtocolMock)
 TOOLS = ("tip", "arm")
 BOTA_NUMBER, ROBOTIQ_NUMBER, AXIS_NUMBER = 271, 1234, int(SERIAL.default)
-# Six digits are what the Bota sensor prints.
-OTHER_DEVICES = 900_000
-# The force sensors that the bench can play, and all of them at once.
-FORCE_CHOICES: dict[str, tuple[type[Product], ...]] = {
-    "both": tuple(sensor for sensor in FORCE_SENSORS.values() if sensor.mock),
-    **{name: (sensor,) for name, sensor in FORCE_SENSORS.items() if sensor.mock},
-}
-
-
-@dataclass(frozen=True)
-class MockDevice:
-    """One product on one wire; ``role`` is where its endpoint stands among the bench's."""
-
-    role: str
-    mock: ProtocolMock
-    wire: FaultyWire
-    faults: dict[str, Fault]
 
 
 class DeviceFactory:
@@ -58,9 +36,8 @@ class DeviceFactory:
         self._clock_ns = clock_ns
         self._rng = random.Random(seed)
 
-    def devices(self, sensors: Iterable[type[Product]]) -> list[MockDevice]:
-        """Those ``sensors``, and every axis and tracker there is."""
-        products = [*sensors, *AXES.values(), *TRACKERS.values()]
+    def devices(self, products: Iterable[type[Product]]) -> list[MockDevice]:
+        """Those that can be played."""
         makers = [resolve_name(product.mock.maker) for product in products if product.mock]
         return [device for maker in makers for device in maker(self)]
 
@@ -110,22 +87,6 @@ class DeviceFactory:
     def faulty(self, wire: Wire) -> FaultyWire:
         """The wire with all the faults that one can have."""
         return FaultyWire(wire, self._rng, self._clock_ns)
-
-
-def number_of(device: Sensor | Axis, usual: Sensor | Axis, number: int) -> int:
-    """A device made of other figures is another device, and has another serial number."""
-    return number if device == usual else number + 1 + crc32(device.model_dump_json().encode()) % OTHER_DEVICES
-
-
-def served(
-    role: str,
-    mock: AnyMock,
-    wire: FaultyWire,
-    kinds: Mapping[str, FaultKind[AnyMock]],
-    inside: Mapping[str, Fault] | None = None,
-) -> MockDevice:
-    """A device with its faults: those of the wire, of ``kinds``, and of what is ``inside``."""
-    return MockDevice(role, mock, wire, faults_of(wire, WIRE_FAULTS) | faults_of(mock, kinds) | dict(inside or {}))
 
 
 def _listen(port: int) -> TcpWire:

@@ -2,7 +2,7 @@
 
 import os
 
-from mock_devices.devices import AnyMock, DeviceFactory, MockDevice, served
+from mock_devices.devices import DeviceFactory
 from mock_devices.evdev.mock import SwitchMock, own_path
 from mock_devices.faults.inputs import BREATHING_FAULTS, GLOVE_FAULTS, SWITCH_FAULTS
 from mock_devices.faults.wires import Fault, faults_of
@@ -10,6 +10,7 @@ from mock_devices.firmata.glove import GlovePlant
 from mock_devices.firmata.mock import FirmataMock
 from mock_devices.lsl.mock import BreathingMock
 from mock_devices.no_wire import NoWire
+from mock_devices.played import AnyMock, MockDevice, served
 
 
 def glove(factory: DeviceFactory) -> list[MockDevice]:

@@ -10,7 +10,7 @@ from api.cli.options import JsonOption, MappingOption, OnlyOption, PlaceArgument
 from api.cli.output import show, write_json
 from api.cli.records import mapping_for
 from api.operations import diagnose as work
-from api.operations.diagnose import Simulation
+from api.operations.judged import Simulation
 from controller.operation import Operation
 from rig.config.protocol import Indentation
 from rig.config.table import load

@@ -25,7 +25,7 @@ from rig.config.subject import Subject
 from rig.config.table import load
 from rig.config.wiring import Wiring
 from rig.errors import RigError, UsageError
-from rig.recording.tap import Slots
+from rig.recording.slots import Slots
 from rig.results.bench import DeviceReport, ResetResult
 
 # As long as the stop process itself waits for the loop.

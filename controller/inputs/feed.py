@@ -4,7 +4,7 @@ It looks into shared memory alone. An input that is lost is shown; motion depend
 """
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Protocol
 
 from controller.devices.states import DeviceState, DeviceStatus, connecting
@@ -57,7 +57,7 @@ class InputFeed:
         """Relays what has come, takes down states, and returns the stops that were asked for."""
         now_ns = loop.state.now_ns
         asked: frozenset[str] = frozenset()
-        for _, stream_id, body in self._source.drain(MOST_ROWS):
+        for stream_id, body in self._rows():
             if stream_id == INPUT_STATE.id:
                 self._hear(loop, InputState(*INPUT_STATE.unpack(body)), now_ns)
             else:
@@ -67,6 +67,13 @@ class InputFeed:
         loop.input_statuses = self.statuses
         loop.inputs.input_lost = self.lost()
         return asked
+
+    def _rows(self) -> Iterator[tuple[int, bytes]]:
+        """Numbers of streams and bodies; most cycles bring none, and look at one word alone."""
+        if self._source.head == self._source.position:
+            return
+        for slot in self._source.drain(MOST_ROWS):
+            yield int(slot["stream"]), slot["body"][: slot["size"]].tobytes()
 
     def _asked(self, stream_id: int, body: bytes) -> frozenset[str]:
         stream, product = self._switches.get(stream_id, (None, None))

@@ -10,7 +10,8 @@ from drivers.input_role import Input
 from rig.channels import Stream
 from rig.config.products.input_role import InputProduct
 from rig.errors import DeviceError
-from rig.recording.tap import RingTap, rows_of
+from rig.recording.slots import rows_of
+from rig.recording.tap import RingTap
 
 PERIOD_S = 0.01
 AT_ONCE = 4096

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from drivers.lsl.library import Correction
+from drivers.lsl.library import ClockCorrection
 from drivers.roles import LinkCounters
 
 UNKNOWN_NS = -1
@@ -30,7 +30,7 @@ class SenderClock:
         self._last_s, self._last_ns = -math.inf, -(1 << 62)
         self.foreign = 0
 
-    def correct(self, known: Correction) -> None:
+    def correct(self, known: ClockCorrection) -> None:
         """What the library says of the offset from now on."""
         self._offset_ns, self._uncertainty_ns = round(known.offset_s * 1e9), math.ceil(known.uncertainty_s * 1e9)
 

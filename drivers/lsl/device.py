@@ -7,7 +7,7 @@ from types import ModuleType
 from typing import Any
 
 from drivers.lsl.clock import SenderClock
-from drivers.lsl.library import Correction, correction, load
+from drivers.lsl.library import ClockCorrection, correction, load
 from drivers.lsl.puller import Pulled, Puller
 from drivers.roles import Identity, LinkCounters
 from rig.config.products.lsl_stream import LslStream
@@ -25,7 +25,9 @@ BUFFER_S = 10  # of samples that wait in the library while this process is held 
 class LslInlet:
     """Owns the inlet from ``start`` to ``close``; ``ask`` says what the library knows of the sender's clock."""
 
-    def __init__(self, config: LslStream, ask: Callable[[ModuleType, Any, float], Correction] = correction) -> None:
+    def __init__(
+        self, config: LslStream, ask: Callable[[ModuleType, Any, float], ClockCorrection] = correction
+    ) -> None:
         self.counters, self.next_seq = LinkCounters(), 0
         self.identity = Identity(config.product, "", "")
         self.period_ns = round(1e9 / config.rate_Hz) if config.rate_Hz else 0
@@ -102,7 +104,7 @@ class LslInlet:
         """Samples since the last call; raises DeviceError where there were none for too long."""
         found: list[InputSample] = []
         for item in self._running.take():
-            if isinstance(item, Correction):
+            if isinstance(item, ClockCorrection):
                 self._clock.correct(item)
             else:
                 found += self._samples(item)

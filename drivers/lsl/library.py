@@ -21,7 +21,7 @@ QUIET = -3
 _loaded: dict[str, ModuleType] = {}
 
 
-class Correction(NamedTuple):
+class ClockCorrection(NamedTuple):
     """What the sender's clock lacks on ours [s], and the most that it may be wrong."""
 
     offset_s: float
@@ -57,7 +57,7 @@ def _file(text: str) -> Path:
     return path
 
 
-def correction(pylsl: ModuleType, inlet: Any, timeout_s: float) -> Correction:
+def correction(pylsl: ModuleType, inlet: Any, timeout_s: float) -> ClockCorrection:
     """As the library knows it now; raises its TimeoutError where it does not know it in time."""
     ask = pylsl.lib.lib.lsl_time_correction_ex
     ask.restype = ctypes.c_double
@@ -66,4 +66,4 @@ def correction(pylsl: ModuleType, inlet: Any, timeout_s: float) -> Correction:
         inlet.obj, ctypes.byref(remote_s), ctypes.byref(uncertainty_s), ctypes.c_double(timeout_s), ctypes.byref(code)
     )
     pylsl.util.handle_error(code)
-    return Correction(float(offset_s), uncertainty_s.value)
+    return ClockCorrection(float(offset_s), uncertainty_s.value)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from drivers.lsl.library import Correction
+from drivers.lsl.library import ClockCorrection
 from rig.errors import DeviceError
 
 # Samples of ten seconds at 1 kHz: whoever takes none for so long has lost them, which is counted.
@@ -31,9 +31,9 @@ class Pulled(NamedTuple):
 class Puller:
     """Runs from its making to ``close``. What it holds is bounded; ``dropped`` counts what found no place."""
 
-    def __init__(self, pylsl: ModuleType, inlet: Any, ask: Callable[[ModuleType, Any, float], Correction]) -> None:
+    def __init__(self, pylsl: ModuleType, inlet: Any, ask: Callable[[ModuleType, Any, float], ClockCorrection]) -> None:
         self._pylsl, self._inlet, self._ask = pylsl, inlet, ask
-        self._held: deque[Pulled | Correction] = deque()
+        self._held: deque[Pulled | ClockCorrection] = deque()
         self._error = ""
         self.dropped = 0
         self._event = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
@@ -45,7 +45,7 @@ class Puller:
         """Turns readable when something came."""
         return self._event
 
-    def take(self) -> list[Pulled | Correction]:
+    def take(self) -> list[Pulled | ClockCorrection]:
         """What came since the last call; raises DeviceError where the stream is lost, once nothing is left of it."""
         with contextlib.suppress(BlockingIOError):
             os.eventfd_read(self._event)
@@ -86,7 +86,7 @@ class Puller:
         with contextlib.suppress(self._pylsl.util.TimeoutError):
             self._hold(self._ask(self._pylsl, self._inlet, WAIT_S))
 
-    def _hold(self, item: Pulled | Correction) -> None:
+    def _hold(self, item: Pulled | ClockCorrection) -> None:
         if len(self._held) >= MOST:
             self.dropped += 1
             return

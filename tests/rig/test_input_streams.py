@@ -27,8 +27,9 @@ from rig.recording.export import export
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.reader import read_recording
 from rig.recording.recorder import Recorder
-from rig.recording.ring import BODY_LIMIT, RingReader, RingWriter
+from rig.recording.ring import RingReader, RingWriter
 from rig.recording.sessions import Session, SessionInfo, TrialInfo
+from rig.recording.slots import BODY_LIMIT
 from rig.recording.verify import repair, verify
 from rig.results.seen import see
 

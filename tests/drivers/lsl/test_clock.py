@@ -5,7 +5,7 @@ import math
 import pytest
 
 from drivers.lsl.clock import OTHER_CLOCK_NS, SenderClock, Stamps
-from drivers.lsl.library import Correction
+from drivers.lsl.library import ClockCorrection
 from drivers.roles import LinkCounters
 
 HOST_NS = 50_000_000_000  # our clock shows this when the library's shows zero
@@ -15,7 +15,7 @@ S = 1_000_000_000
 def clock(offset_s: float = 2.0, uncertainty_s: float = 1e-4) -> tuple[SenderClock, LinkCounters]:
     counters = LinkCounters()
     made = SenderClock(counters, HOST_NS)
-    made.correct(Correction(offset_s, uncertainty_s))
+    made.correct(ClockCorrection(offset_s, uncertainty_s))
     return made, counters
 
 
@@ -36,7 +36,7 @@ def test_what_comes_again_after_a_recovery_is_dropped_and_counted() -> None:
 def test_no_capture_is_after_its_arrival_and_none_goes_back() -> None:
     made, _ = clock(offset_s=2.0)
     first = made.stamps(1.0, 53 * S - 5)  # 5 ns after the arrival by the correction of now
-    made.correct(Correction(1.5, 1e-4))  # a better one sets the clock back by half a second
+    made.correct(ClockCorrection(1.5, 1e-4))  # a better one sets the clock back by half a second
     second = made.stamps(1.02, 54 * S)
     assert first and second
     assert first.capture_ns == 53 * S - 5

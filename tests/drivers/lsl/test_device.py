@@ -12,7 +12,7 @@ import pytest
 
 from drivers.lsl import library
 from drivers.lsl.device import LslInlet, open_stream
-from drivers.lsl.library import Correction, load
+from drivers.lsl.library import ClockCorrection, load
 from drivers.lsl.puller import MOST, Puller
 from mock_devices.lsl.mock import BreathingMock
 from rig.config.products.lsl_stream import LslStream
@@ -82,8 +82,8 @@ def test_a_belt_comes_with_its_times_and_a_planted_shift_is_seen(belt: Breathing
 def test_the_correction_of_the_library_goes_into_capture(belt: BreathingMock) -> None:
     """A sender whose clock is known to lag by 0.1 s, as the library would say of another computer."""
 
-    def lagging(pylsl: ModuleType, inlet: Any, timeout_s: float) -> Correction:
-        return Correction(library.correction(pylsl, inlet, timeout_s).offset_s - 0.1, 0.002)
+    def lagging(pylsl: ModuleType, inlet: Any, timeout_s: float) -> ClockCorrection:
+        return ClockCorrection(library.correction(pylsl, inlet, timeout_s).offset_s - 0.1, 0.002)
 
     inlet = LslInlet(LslStream(port=belt.endpoints()["lsl"]), lagging)
     inlet.start()
