@@ -19,6 +19,8 @@ WAIT_S = 0.1
 CORRECT_EVERY_S = 5.0
 LEAVE_S = 2.0
 
+Ask = Callable[[ModuleType, Any, float], ClockCorrection]
+
 
 class Pulled(NamedTuple):
     """One sample as the library gave it."""
@@ -31,7 +33,7 @@ class Pulled(NamedTuple):
 class Puller:
     """Runs from its making to ``close``. What it holds is bounded; ``dropped`` counts what found no place."""
 
-    def __init__(self, pylsl: ModuleType, inlet: Any, ask: Callable[[ModuleType, Any, float], ClockCorrection]) -> None:
+    def __init__(self, pylsl: ModuleType, inlet: Any, ask: Ask) -> None:
         self._pylsl, self._inlet, self._ask = pylsl, inlet, ask
         self._held: deque[Pulled | ClockCorrection] = deque()
         self._error = ""
