@@ -6,7 +6,7 @@ READY := $(VENV)/ready
 # Modules are compiled once, not by each of the processes that a bench is made of.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo page test test-page test-documents test-campaigns test-extras check metrics docs package wheels mutants mutants-sample lock clean
+.PHONY: demo page test test-page test-documents test-campaigns test-extras test-one-extra check metrics docs package wheels mutants mutants-sample lock clean
 
 demo: $(READY)
 	$(BIN)/rig demo --out demo
@@ -43,6 +43,11 @@ test-campaigns: $(READY)
 # The demonstration, stops and crashes in contact, every answer of the service while the tip presses, further products.
 test-extras: $(READY) page
 	$(BIN)/pytest -n 2 --dist loadgroup -m extra --ignore tests/page --durations 10
+	$(MAKE) --no-print-directory test-one-extra
+
+# Each extra in an environment of its own, without the others.
+test-one-extra: $(READY)
+	$(BIN)/python -m tools.one_extra
 
 # What to run before each commit, in less than half a minute: all checks, and the tests of what changed.
 check: $(READY)

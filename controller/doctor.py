@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from controller.devices.drivers import open_axis, open_force, open_tracker
+from controller.inputs.examination import look_at
 from controller.loop.realtime import promptly
 from drivers.roles import Device, Identity, ServoAxis
 from rig.channels import AxisSample, ForceSample, MarkerSample
@@ -52,6 +53,7 @@ def _examined(wiring: Wiring, seconds: float, tell: Progress) -> tuple[DeviceRep
         findings.append(
             _look("tracker", tracker, lambda: open_tracker(tracker), lambda device: _listen(device.poll, seconds))
         )
+    findings += [look_at(name, one, seconds) for name, one in wiring.input.items()]
     return tuple(findings)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from socket import socket
 
 from controller.claims import Claim, take
+from controller.inputs.client import InputsProcess, started_inputs
 from controller.loop.client import ANSWER_TIMEOUT_S, LoopClient
 from controller.loop.messages import Heartbeat, Note, Outcome, Ready, Recover, Reset, Run, Shutdown, Status, Stopped
 from controller.loop.steps import Program
@@ -60,6 +61,7 @@ class Supervisor:
         self._loop_module = loop_module
         self._ring_path = new_path()
         self._stop: StopProcess | None = None
+        self._inputs: InputsProcess | None = None
         self._client: LoopClient | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self.recorder: RecorderClient | None = None
@@ -100,6 +102,7 @@ class Supervisor:
         remove_abandoned()
         self._claim = take(self.wiring, self._address)
         self.prepare()
+        self._inputs = started_inputs(self.wiring, self._ring_path)
         self._client = LoopClient(self._start_loop(self._claim), self._exit_text)
         self.ready = self._client.ready(START_TIMEOUT_S)
         self.recorder = RecorderClient(self._ring_path)
@@ -300,6 +303,9 @@ class Supervisor:
         if self.recorder:
             self.recorder.quit()
             self.recorder = None
+        if self._inputs:
+            self._inputs.close()
+            self._inputs = None
         if self._stop:
             self._stop.close()
             self._stop = None

@@ -26,6 +26,7 @@ from mock_devices.physics.effects import EFFECTS, complete, knobs, parse_hidden,
 from mock_devices.played import ALL, CHOICES, MockDevice
 from mock_devices.stating import Numbered, Sampled, StatedLatency
 from rig.config.endpoints import Endpoints
+from rig.config.products.inputs import INPUTS
 from rig.config.products.registry import AXES
 from rig.errors import RigError
 from rig.realtime import ask_fifo, lock_memory, shorten_timer_slack
@@ -214,7 +215,8 @@ def _server(options: argparse.Namespace) -> MockServer:
     start_ns = time.monotonic_ns() - POWERED_BEFORE_NS
     bench = Bench(parameters, options.seed, start_ns)
     factory = DeviceFactory(bench, start_ns, time.monotonic_ns, options.seed, options.links)
-    devices = factory.devices(product for role in CHOICES for product in CHOICES[role][vars(options)[role]])
+    chosen = [product for role in CHOICES for product in CHOICES[role][vars(options)[role]]]
+    devices = factory.devices((*chosen, *map(INPUTS.named, options.input)))
     return MockServer(bench, devices, time.monotonic_ns)
 
 
@@ -251,6 +253,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--list-effects", action="store_true", help="print what --hide takes, and end")
     for role, choices in CHOICES.items():
         parser.add_argument(f"--{role}", choices=tuple(choices), default=ALL)
+    parser.add_argument("--input", action="append", default=[], choices=tuple(INPUTS), help="repeatable")
     parser.add_argument("--seed", type=int, default=0, help="of all noise")
     parser.add_argument("--tracker-tcp-port", type=int, metavar="N", help="instead of 8765; 0: any")
     parser.add_argument("--links", type=Path, metavar="FOLDER", help="serial lines there, and again after an unplug")

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Literal
 
 import pyarrow as pa
 
-from rig.channels import STREAMS
 from rig.errors import UsageError
 from rig.progress import Progress, silent
 from rig.recording.reader import Recording
@@ -133,7 +132,7 @@ class TrialData:
 
         Raises UsageError for a stream that there is not.
         """
-        found = {known.name: known for known in STREAMS}
+        found = {known.name: known for known in self.recording.streams}
         if stream not in found:
             raise UsageError(f"there is no stream {stream!r}; choose one of {', '.join(found)}")
         return arrow_table(self.recording, found[stream])

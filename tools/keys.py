@@ -3,7 +3,7 @@
 import inspect
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import get_args
+from typing import get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -39,6 +39,7 @@ def _nested(model: type[BaseModel], path: str) -> Iterator[tuple[str, type[BaseM
     for name, field in model.model_fields.items():
         for inner in _models(field.annotation):
             here = f"{path}.{name}" if path else name
+            here += ".NAME" if get_origin(field.annotation) is Mapping else ""
             yield here, inner
             yield from _nested(inner, here)
 

@@ -45,6 +45,7 @@ BY_THE_ACCOUNT = "only the account that owns the files: whoever may do this over
 WITHOUT: Mapping[str, str] = {
     "calibrate force": AT_THE_BENCH,
     "calibrate axis": AT_THE_BENCH,
+    "calibrate glove": AT_THE_BENCH,
     "track --table": "compares gains on simulated subjects of its own, never on the bench that is served",
     "replay": "tests the program that is installed against a recording, and writes a test beside its sources",
     "find": "writes to ports of the computer that may be anybody's: a person beside them allows each",

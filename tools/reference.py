@@ -36,6 +36,7 @@ MARK = re.compile(r"^<!-- generated: ([a-z-]+) -->$", re.MULTILINE)
 HELP_COLUMNS = 100
 COMMANDS_OF = {
     "came-in": "import`, file `what-came-in.json",
+    "calibrate-glove": "calibrate glove", "threshold-glove": "threshold --glove",
     "compare": "track --table", "diagnosis": "diagnose", "protocol-check": "protocol check",
     "catalogue-names": "catalogue backup|restore",
     **{f"catalogue-{what}": f"catalogue {what}" for what in (

@@ -27,6 +27,7 @@ from rig.results.demo import DemoSummary
 from rig.results.devices import DevicesResult, FindResult
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
 from rig.results.fit import FitResult
+from rig.results.glove import GloveCalibrated, GloveThreshold
 from rig.results.recorded import CaptureResult, ExportResult, ImportResult, RepairResult, ReportResult, VerifyResult
 from rig.results.replay import ReplayResult
 from rig.results.tracking import CompareResult, SimulateResult, Threshold, TrackResult
@@ -35,6 +36,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 WRITTEN: Mapping[str, type[Result]] = {
     "capture": CaptureResult,
     "calibrate": CalibrateResult,
+    "calibrate-glove": GloveCalibrated,
     "catalogue-causes": CauseList,
     "catalogue-diagnoses": DiagnosisList,
     "catalogue-models": ModelList,
@@ -67,6 +69,7 @@ WRITTEN: Mapping[str, type[Result]] = {
     "subject-list": SubjectList,
     "subject-show": SubjectHistory,
     "threshold": Threshold,
+    "threshold-glove": GloveThreshold,
     "track": TrackResult,
     "verify": VerifyResult,
 }

@@ -11,6 +11,7 @@ from api.cli.asking import Person
 from api.cli.calibrate_axis import AxisAsked, calibrate_axis
 from api.cli.calibrate_dynamics import calibrate_dynamics
 from api.cli.calibrate_force import ForceAsked, Load, calibrate_force
+from api.cli.calibrate_glove import GloveAsked, calibrate_glove, keep_and_say
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_file, wiring_from
 from api.cli.output import show, write_json
 from api.operations.calibrations import keep, refuse_out, refuse_unfit
@@ -21,11 +22,16 @@ from rig.results.bench import CalibrateResult
 OF_FORCE = ("weights", "load", "tolerance_percent", "gravity")
 OF_AXIS = ("from_mm", "to_mm", "clear", "toward_limb", "gauge_block_mm", "near_mm", "dynamics")
 OF_SCALE = ("to_mm", "toward_limb", "gauge_block_mm", "near_mm")
+OTHERS = {
+    "force": (*OF_AXIS, "input_name"),
+    "axis": (*OF_FORCE, "input_name"),
+    "glove": (*OF_AXIS, "load"),
+}
 
 
 def calibrate(
     context: typer.Context,
-    what: Annotated[Literal["force", "axis"], typer.Argument(help="What to calibrate.")],
+    what: Annotated[Literal["force", "axis", "glove"], typer.Argument(help="What to calibrate.")],
     weights: Annotated[
         str, typer.Option("--weights", help="force: known weights, as '100 g,200 g,5 N'; a mock sensor has its own.")
     ] = "",
@@ -48,6 +54,7 @@ def calibrate(
     near_mm: Annotated[
         float | None, typer.Option("--near-mm", help="axis: position just before the table, for the block.")
     ] = None,
+    input_name: Annotated[str, typer.Option("--input", help="glove: its name, where there are several.")] = "",
     dynamics: Annotated[
         bool, typer.Option("--dynamics", help="axis: how it follows its set-point, by small sweeps in the air.")
     ] = False,
@@ -59,7 +66,7 @@ def calibrate(
     overrides: SetOption = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Calibrates force sensor (known weights) or axis (tracker, gauge block, sweeps), and says what is wrong with it.
+    """Calibrates force sensor or glove (known weights) or axis (tracker, block, sweeps); says what is wrong with it.
 
     force: nothing moves; unloaded, each weight up and down again, unloaded, step by step. axis: the tip moves in the
     air between rests; with --dynamics it swings by less than a millimetre, and what a force loop needs to know of the
@@ -67,9 +74,13 @@ def calibrate(
 
     Example: rig calibrate force --weights "100 g,200 g,500 g" --load pressed
     """
-    _refuse_options(context, OF_AXIS if what == "force" else OF_FORCE, what)
+    _refuse_options(context, OTHERS[what], what)
     wiring = wiring_from(config, overrides)
     refuse_out(out)
+    if what == "glove":
+        of_glove = GloveAsked(weights, tolerance_percent / 100, gravity, input_name)
+        keep_and_say(*calibrate_glove(wiring, of_glove, Person(pause)), out, config, json_file)
+        return
     found: AnyCalibration
     if dynamics:
         _refuse_options(context, OF_SCALE, "axis --dynamics")

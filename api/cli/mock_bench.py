@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 
 from api.cli.mock_calibration import mock_axis_calibration, mock_force_calibration
 from api.cli.mock_dynamics import mock_axis_dynamics
+from api.cli.mock_inputs import input_options, mock_inputs
 from api.cli.options import calibrated
 from controller.commissioning.refusals import refuse_uncalibrated
 from rig.config.endpoints import Endpoints
@@ -27,6 +28,7 @@ def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, every_pr
         command += ["--seed", str(seed)]
     for effect in (*wiring.mock.hide, *hide):
         command += ["--hide", effect]
+    command += input_options(wiring)
     # A real device's product may be one that the bench cannot play, and need not: it then plays them all.
     played = {} if every_product else mocks(wiring)
     return command + [part for role, device in played.items() for part in (f"--{role}", device.product)]
@@ -102,8 +104,9 @@ def at_endpoints(wiring: Wiring, endpoints: Endpoints) -> Wiring:
     Where the wiring states no latency for a mock device, it takes what the device's data sheet would say.
     """
     live = patient(wiring)
-    devices = {role: _served(device, endpoints) for role, device in mocks(live).items()}
-    return live.model_copy(update=devices)
+    devices: dict[str, object] = {role: _served(device, endpoints) for role, device in mocks(live).items()}
+    inputs = {name: _served(device, endpoints) for name, device in mock_inputs(live).items()}
+    return live.model_copy(update={**devices, "input": {**live.input, **inputs}})
 
 
 def mocks(wiring: Wiring) -> dict[str, Product]:

@@ -8,6 +8,7 @@ import typer
 
 from rig.config.calibration import KINDS
 from rig.config.calibration_files import with_files
+from rig.config.glove_files import gloves_beside, with_gloves
 from rig.config.table import load, merged, parse
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
@@ -67,7 +68,7 @@ def wiring_file(config: Path | None) -> Path | None:
 
 def calibrated(wiring: Wiring) -> Wiring:
     """``wiring`` with what its calibration files hold; raises UsageError naming the file that is not as it must be."""
-    return wiring.model_copy(update={"calibration": with_files(wiring.calibration)})
+    return with_gloves(wiring.model_copy(update={"calibration": with_files(wiring.calibration)}))
 
 
 def built_in(overrides: list[str] | None = None) -> Wiring:
@@ -80,4 +81,5 @@ def _beside(wiring: Wiring, folder: Path) -> Wiring:
     mock, known = wiring.mock, wiring.calibration
     mock = mock.model_copy(update={"parameters": mock.parameters and folder / mock.parameters})
     files: dict[str, Path] = {what: folder / named for what in KINDS if isinstance(named := getattr(known, what), Path)}
-    return wiring.model_copy(update={"mock": mock, "calibration": known.model_copy(update=files)})
+    wiring = wiring.model_copy(update={"mock": mock, "calibration": known.model_copy(update=files)})
+    return gloves_beside(wiring, folder)

@@ -6,32 +6,44 @@ from typing import Annotated
 import typer
 
 from api.cli import live
-from api.cli.options import ConfigOption, JsonOption, ModelOption, SetOption, wiring_from
+from api.cli.glove import by_glove
+from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import show, write_json
 from api.operations import motion
 from api.operations.motion import TrackPlan
 from controller.experiments import threshold as experiment
 from controller.experiments import tracked
 from controller.operation import Operation
+from rig.errors import UsageError
 from rig.tissue.model import load_model
 
 
 def threshold(
-    model: ModelOption,
-    up_to: Annotated[float, typer.Option("--up-to", help="Force in N at which the ramp ends.")],
+    model: Annotated[Path | None, typer.Option("--model", help="Model of the ramp's gains, by `rig fit`.")] = None,
+    up_to: Annotated[float | None, typer.Option("--up-to", help="Force in N at which the ramp ends.")] = None,
     rate: Annotated[float, typer.Option("--rate", help="How fast force rises, N/s.")] = 0.5,
     out: Annotated[Path, typer.Option("--out", help="Session folder of the recording; new or existing.")] = Path(
         "threshold"
     ),
+    glove: Annotated[bool, typer.Option("--glove", help="By three presses with a glove; the axis stays off.")] = False,
+    input_name: Annotated[str, typer.Option("--input", help="The glove's name, where there are several.")] = "",
     config: ConfigOption = None,
     overrides: SetOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Raises force slowly until the subject presses p, and prints the line of `rig.toml` that keeps it.
 
+    With --glove somebody presses with the glove instead, three times at subject.site, until the subject says stop.
+
     Example: rig threshold --model sessions/first/fit/model.json --up-to 10
     """
-    wiring, fitted = wiring_from(config, overrides), load_model(model)
+    wiring = wiring_from(config, overrides)
+    if glove:
+        by_glove(wiring, input_name, out, json_file)
+        return
+    if model is None or up_to is None:
+        raise UsageError("rig threshold: give --model and --up-to for a ramp of the axis, or --glove")
+    fitted = load_model(model)
     experiment.plan(up_to, rate, fitted, wiring)  # refused before anything is opened
     tracked.refuse_foreign(out)
     with live.running(wiring) as bench:

@@ -21,8 +21,9 @@ from controller.recovery.situation import Consent
 from controller.stop.word import NOT_CONFIRMED, StopOutcome, StopReason
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
+from rig.config.subject import Subject
 from rig.config.table import load
-from rig.config.wiring import Subject, Wiring
+from rig.config.wiring import Wiring
 from rig.errors import RigError, UsageError
 from rig.recording.slots import Slots
 from rig.results.bench import DeviceReport, ResetResult
@@ -138,7 +139,7 @@ class Service:
             if bench and bench.alive:
                 self.refuse_stopped()
             self.wiring = before.model_copy(update={"subject": subject})
-            if bench and bench.alive and subject.pain_threshold_N != before.subject.pain_threshold_N:
+            if bench and bench.alive and self.wiring.force_limit_N != before.force_limit_N:
                 self._start_bench(waiting=False)
             elif bench:
                 bench.wiring = self.wiring
@@ -162,7 +163,9 @@ class Service:
     def devices(self, bench: Supervisor) -> dict[str, DeviceView]:
         """Who each device is, and how it is."""
         states = bench.status.get("devices", {})
-        return {role: {**identity, **states.get(role, {})} for role, identity in bench.ready.devices.items()}
+        inputs: dict[str, DeviceView] = {name: {"product": one.product} for name, one in bench.wiring.input.items()}
+        known = {**bench.ready.devices, **inputs}
+        return {role: {**identity, **states.get(role, {})} for role, identity in known.items()}
 
     def plan(self, name: str) -> Indentation:
         """The protocol called ``name``."""

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from rig.config.calibration import AnyCalibration, Calibration, What
 from rig.config.calibration_files import text_of
+from rig.config.glove import GloveCalibration
 from rig.errors import CheckFailed, UsageError
 from rig.recording.files import make_folder, refuse_unwritable, whole_file
 
@@ -30,6 +31,15 @@ def keep(what: What, found: AnyCalibration, out: Path | None) -> Path:
     make_folder(path.parent)
     with whole_file(path) as scratch:
         scratch.write_text(text_of(found), encoding="utf-8")
+    return path
+
+
+def keep_glove(found: GloveCalibration, out: Path | None) -> Path:
+    """Likewise that of a glove, which has no serial number."""
+    path = out or FOLDER / f"glove-{_stamp(found.date)}.json"
+    make_folder(path.parent)
+    with whole_file(path) as scratch:
+        scratch.write_text(found.model_dump_json(indent=2) + "\n", encoding="utf-8")
     return path
 
 

@@ -12,7 +12,7 @@ from http.client import HTTPConnection
 
 from benchmarks.faults.fault import Act, Live
 from controller.loop.steps import Hold, Program
-from controller.stop.keypad import DOWN, EV_KEY, EVENT
+from drivers.evdev.codec import DOWN, EV_KEY, EVENT
 from mock_devices.faults.wires import Value
 from rig.config.stop import KEY_CODES
 

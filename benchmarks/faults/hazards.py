@@ -50,7 +50,7 @@ HAZARDS = (
     Hazard(
         "A person wants to stop the motion and nothing happens",
         "nobody at the keyboard, a hung page, a busy service, a lost connection, a lease that ran out",
-        ("emergency_stop", "operator_stop", "pain_stop", "stop_lost", "operator_silent"),
+        ("emergency_stop", "operator_stop", "pain_stop", "stop_lost", "input_lost", "operator_silent"),
         "All these ways end in software; for a second after the stop process froze a press is not heard (the page then"
         " says NOT CONFIRMED). From another computer the network and, where there is one, a reverse proxy come before"
         " them. The hardware emergency stop does not depend on it.",
@@ -88,6 +88,7 @@ TESTS: dict[str, str] = {
         ),
         IN_ITS_TIME,
     ),
+    "input_lost": "tests/controller/inputs/test_feed.py::test_a_needed_input_that_is_lost_retracts_by_name",
     "axis_frozen": "tests/controller/safety/test_table.py::test_a_frozen_axis_is_stopped_at_once",
     "pushed": "tests/controller/safety/test_giving_way.py::test_at_rest_each_of_the_two_force_checks_is_needed",
     "force_rate": "tests/controller/safety/test_force_limit.py::test_a_rate_above_its_limit_stops_with_either_sensor",

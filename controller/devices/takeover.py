@@ -81,7 +81,9 @@ def refusal(loop: "BenchLoop", program: Program, now_ns: int) -> str:
     """Why ``program`` cannot start as the devices are now; empty if it can. Leaving the tissue takes the axis alone."""
     loop.connections.note(observed(loop, now_ns), now_ns)
     leaves = all(isinstance(step, Retract) for step in program.steps)
-    return loop.connections.refusal(["axis"] if leaves else None)
+    missing = loop.connections.refusal(["axis"] if leaves else None)
+    lost = "" if leaves or not loop.inputs.input_lost else f"{loop.inputs.input_lost}; without it nothing moves"
+    return missing or lost
 
 
 def record_state_change(loop: "BenchLoop", role: str, status: DeviceStatus) -> None:

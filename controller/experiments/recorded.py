@@ -14,8 +14,10 @@ from controller.loop.messages import Outcome
 from controller.loop.steps import Program
 from controller.supervisor import Supervisor
 from drivers.roles import Identity
+from rig.config.products.input_role import brought_by
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, RigError
+from rig.input_streams import METADATA, layouts
 from rig.recording.mcap_file import RecordingFailed
 from rig.recording.messages import Closed
 
@@ -49,6 +51,7 @@ def metadata(bench: Supervisor, session: str, trial: str, about: Mapping[str, ob
             "wall_start_ns": str(time.time_ns()),
             "monotonic_start_ns": str(time.monotonic_ns()),
         },
+        **({METADATA: layouts(brought_by(wiring.input))} if wiring.input else {}),
         "devices": {role: json.dumps(identity) for role, identity in bench.ready.devices.items()},
         "realtime": dict(bench.ready.realtime),
         "wiring": {name: json.dumps(table) for name, table in wiring.model_dump(mode="json").items()},

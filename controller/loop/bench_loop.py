@@ -10,6 +10,7 @@ from controller.devices.connections import Connections
 from controller.devices.drivers import Devices, openers
 from controller.devices.health import Standstill
 from controller.devices.reopening import Openers
+from controller.devices.states import DeviceStatus
 from controller.devices.wire_damage import WireDamage
 from controller.loop.executive import Cycle
 from controller.loop.messages import Finished, Outcome, Status, StatusSaid, Stopped
@@ -108,6 +109,7 @@ class BenchLoop:
         self._calibrated_zero = calibrated_zero(wiring)
         self._force_map = wiring.force_map
         self.braked = False
+        self.input_statuses: dict[str, DeviceStatus] = {}
         self._touch_said: Touch | None = None
         self._limb_seen_ns = 0
         if held:
@@ -366,8 +368,8 @@ class BenchLoop:
             "depth_mm": _finite(row.depth_mm),
             "rates_Hz": {name: round(stream.rate_Hz, 1) for name, stream in self.health.items()},
             "lost": {name: cause for name, cause in lost.items() if cause},
-            "devices": takeover.as_status(self.connections.statuses.items()),
-            "ready": self.connections.ready,
+            "devices": takeover.as_status((*self.connections.statuses.items(), *self.input_statuses.items())),
+            "ready": self.connections.ready and not inputs.input_lost,
             "latched": {"code": latched.code, "text": latched.text, "action": latched.action.name} if latched else None,
         }
 

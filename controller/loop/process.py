@@ -15,6 +15,7 @@ from pathlib import Path
 
 from controller.devices.absent import start_what_answers
 from controller.devices.drivers import Devices, Interruption, openers, start_devices
+from controller.inputs.commands import with_inputs
 from controller.loop import realtime
 from controller.loop.bench_loop import BenchLoop
 from controller.loop.commands import Inbox
@@ -109,7 +110,8 @@ def _run(
     found = {role: _found(device) for role, device in devices.by_role().items()}
     channel.send(Ready(devices=found, realtime=granted))
     opens = openers(wiring, inbox.interruption)
-    loop = BenchLoop(wiring, devices, ring, channel, inbox, time.monotonic_ns, table, opens, held)
+    commands = with_inputs(inbox, wiring, ring, ring.path, time.monotonic_ns())
+    loop = BenchLoop(wiring, devices, ring, channel, commands, time.monotonic_ns, table, opens, held)
     spin_ns = min(realtime.spin_ns(granted), round(AHEAD * loop.phase.period_ns))
     try:
         Executive(sleep=sleep_then_spin(spin_ns)).run(loop, loop.phase)

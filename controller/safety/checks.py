@@ -210,6 +210,11 @@ def stop_lost(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
     )
 
 
+def input_lost(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
+    """An input is gone without which nothing is to move."""
+    return inputs.input_lost
+
+
 def supervisor_lost(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
     """The program that started the loop is gone."""
     return "the program that started the loop is gone" if inputs.supervisor_lost else ""

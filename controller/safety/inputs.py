@@ -13,6 +13,7 @@ class SafetyInputs:
     force_lost: str = ""
     axis_lost: str = ""
     marker_lost: str = ""
+    input_lost: str = ""
     drive_fault: str = ""
     force_valid: bool = True
     force_frozen: bool = False

@@ -64,6 +64,8 @@ TOUCH_S = 2.0
 OSCILLATION_S = 0.5 + 0.5 + TURN_S
 # From the first motion: 2 mm of it at 1 mm/s, and one turn.
 SCALE_S = 2.0 + TURN_S
+# A needed input names its loss within 1 s and tells it every 0.2 s, or says nothing for 1 s; and one turn.
+INPUT_S = 1.2 + TURN_S
 # checks.STOP_SILENT_S, and one turn.
 STOP_S = checks.STOP_SILENT_S + TURN_S
 # The lease of 3 s, and one turn; what says by itself that nobody is there is faster.
@@ -94,6 +96,7 @@ TABLE: tuple[Check, ...] = (
     Check("loop_overrun", Action.SOFT, checks.loop_overrun, TURN_S),
     Check("recorder_stalled", Action.SOFT, checks.recorder_stalled, RECORDER_S),
     Check("stop_lost", Action.SOFT, checks.stop_lost, STOP_S),
+    Check("input_lost", Action.SOFT, checks.input_lost, INPUT_S),
     Check("supervisor_lost", Action.SOFT, checks.supervisor_lost, TURN_S),
     Check("operator_silent", Action.SOFT, checks.operator_silent, OPERATOR_S),
 )

@@ -12,7 +12,8 @@ from controller.loop.steps import Approach, Compress, Program, Retract, Step, Ze
 from controller.safety.inputs import SafetyInputs
 from controller.safety.load import NO_WRENCH, LoadMonitor
 from controller.safety.table import TABLE, Action, Check, Incident
-from rig.config.wiring import Subject, Wiring
+from rig.config.subject import Subject
+from rig.config.wiring import Wiring
 
 SURFACE_MM = 20.0
 STIFFNESS_N_MM = 1.0

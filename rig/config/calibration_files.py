@@ -5,6 +5,7 @@ from pathlib import Path
 
 from rig.config.axis_dynamics import AxisDynamics
 from rig.config.calibration import VERSION, AnyCalibration, AxisCalibration, Calibration, ForceCalibration
+from rig.config.glove import GloveCalibration
 from rig.config.table import AnyTable, TomlTable, parse, read_toml, refuse_newer
 from rig.errors import UsageError
 
@@ -34,6 +35,11 @@ def read_force(path: Path) -> ForceCalibration:
 def read_axis(path: Path) -> AxisCalibration:
     """The axis calibration in ``path``; raises UsageError."""
     return _read(AxisCalibration, path, "axis calibration")
+
+
+def read_glove(path: Path, role: str) -> GloveCalibration:
+    """The calibration of a glove in ``path``; raises UsageError."""
+    return _read(GloveCalibration, path, role)
 
 
 def read_dynamics(path: Path) -> AxisDynamics:

@@ -29,6 +29,13 @@ KEY_CODES = {
 KEY_CODE_MAX = 0x2FF  # KEY_MAX of Linux' input-event-codes.h
 
 
+def key_number(name: str) -> int:
+    """The code of a key by its name or number; raises ValueError where there is no such key."""
+    if name not in KEY_CODES and not (name.isdecimal() and 0 < int(name) <= KEY_CODE_MAX):
+        raise ValueError(f"no key {name!r}: write a number from 1 to {KEY_CODE_MAX}, or {', '.join(KEY_CODES)}")
+    return KEY_CODES.get(name) or int(name)
+
+
 class Stop(Table):
     """How a person stops the bench beside the program that runs it."""
 
@@ -47,11 +54,10 @@ class Stop(Table):
     @classmethod
     def _known(cls, keys: dict[str, StopKind]) -> dict[str, StopKind]:
         for name in keys:
-            if name not in KEY_CODES and not (name.isdecimal() and 0 < int(name) <= KEY_CODE_MAX):
-                raise ValueError(f"no key {name!r}: write a number from 1 to {KEY_CODE_MAX}, or {', '.join(KEY_CODES)}")
+            key_number(name)
         return keys
 
     @property
     def key_codes(self) -> dict[int, StopKind]:
         """What each key does, by its number."""
-        return {KEY_CODES.get(name) or int(name): kind for name, kind in self.keys.items()}
+        return {key_number(name): kind for name, kind in self.keys.items()}

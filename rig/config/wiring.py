@@ -1,5 +1,6 @@
 """`rig.toml`: which products stand on the bench, where they are plugged in, and what must never be exceeded."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeAlias
 
@@ -9,11 +10,14 @@ from rig.config.calibration import Calibration
 from rig.config.force_map import UNIT, ForceMap
 from rig.config.maxima import beyond
 from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.input_role import InputProduct, input_troubles
+from rig.config.products.inputs import INPUTS
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
 from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS, choice_of
 from rig.config.products.roles import MOCK_PORT, AxisProduct, ForceProduct, TrackerProduct
 from rig.config.stop import Stop
+from rig.config.subject import Subject
 from rig.config.table import Table
 
 Positive = Annotated[float, Field(gt=0)]
@@ -21,7 +25,9 @@ if TYPE_CHECKING:
     AnyForce: TypeAlias = ForceProduct
     AnyAxis: TypeAlias = AxisProduct
     AnyTracker: TypeAlias = TrackerProduct
+    AnyInput: TypeAlias = InputProduct
 else:
+    AnyInput = choice_of(INPUTS)
     AnyForce, AnyAxis, AnyTracker = choice_of(FORCE_SENSORS), choice_of(AXES), choice_of(TRACKERS)
 
 
@@ -74,14 +80,6 @@ class Limits(Table):
         return self
 
 
-class Subject(Table):
-    """Who lies under the tip."""
-
-    id: str = Field(default="phantom", description="a code, no person's name; kept with each recording")
-    site: str = Field(default="forearm", description="where the tip presses, kept with each recording")
-    pain_threshold_N: Positive = Field(default=15.0, description="the lower of it and limits.force_N holds")
-
-
 class MockBenchSettings(Table):
     """Where ports are ``mock``: what the simulated bench is made of."""
 
@@ -103,6 +101,7 @@ class Wiring(Table):
     stop: Stop = Stop()
     mock: MockBenchSettings = MockBenchSettings()
     calibration: Calibration = Calibration()
+    input: Mapping[str, AnyInput] = Field(default={}, description="by name, which is that of its stream")
 
     @model_validator(mode="after")
     def _gives_way(self) -> Self:
@@ -116,7 +115,7 @@ class Wiring(Table):
     @model_validator(mode="after")
     def _within_maxima(self) -> Self:
         tables = {"limits": self.limits, "subject": self.subject, "axis": self.axis, "loop": self.loop}
-        reasons = beyond(tables, (*self.force.maxima, *self.axis.maxima))
+        reasons = beyond(tables, (*self.force.maxima, *self.axis.maxima)) + input_troubles(self.input, self.stop.keypad)
         if reasons:
             raise ValueError("; ".join(reasons))
         return self
@@ -130,7 +129,7 @@ class Wiring(Table):
     @property
     def force_limit_N(self) -> float:
         """The lower of machine limit and subject's pain threshold."""
-        return min(self.limits.force_N, self.subject.pain_threshold_N)
+        return min(self.limits.force_N, self.subject.threshold_N)
 
     @property
     def stale_force_ms(self) -> float:
@@ -144,5 +143,5 @@ class Wiring(Table):
     @property
     def uses_mock(self) -> bool:
         """Whether any device is to be served by the mock bench."""
-        ports = [self.force.port, self.axis.port, *([self.tracker.port] if self.tracker else [])]
-        return MOCK_PORT in ports
+        devices = (self.force, self.axis, self.tracker, *self.input.values())
+        return any(device is not None and device.port == MOCK_PORT for device in devices)

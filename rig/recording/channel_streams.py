@@ -3,8 +3,9 @@
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from rig.channels import BY_ID, BY_NAME, Stream
+from rig.channels import Stream
 from rig.errors import DataError
+from rig.input_streams import all_streams
 from rig.recording.chunk import Bodies, Chunk, Definition
 from rig.recording.mcap_layout import schema_words
 
@@ -19,8 +20,9 @@ class ChannelStreams:
     writer.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, path: Path, metadata: Mapping[str, Mapping[str, str]]) -> None:
+        """``metadata`` is what was read so far, in front of the first chunk all that names inputs."""
+        self._path, self._metadata = path, metadata
         self._known: dict[int, Stream] = {}
         self._defined = False
         self._waiting: list[Chunk] = []
@@ -37,11 +39,12 @@ class ChannelStreams:
         """What still waits at the end of the file."""
         if self._defined and not self._known:
             raise DataError(f"{self._path}: an MCAP file, but with no stream of this bench")
-        yield from self._all(self._known or BY_ID)
+        yield from self._all(self._known or dict(enumerate(all_streams(self._metadata), 1)))
 
     def _define(self, number: int, definition: Definition) -> None:
         self._defined = True
-        stream = BY_NAME.get(definition.topic)
+        by_name = {stream.name: stream for stream in all_streams(self._metadata)}
+        stream = by_name.get(definition.topic)
         if stream is None:
             return
         if layout(definition.schema) != layout(stream.schema()):

@@ -12,8 +12,9 @@ import pyarrow as pa
 import pyarrow.csv as arrow_csv
 from numpy.typing import NDArray
 
-from rig.channels import FORCE, STREAMS
+from rig.channels import FORCE
 from rig.errors import UsageError
+from rig.recording.columns import legend, streams_in, units
 from rig.recording.files import whole_file, whole_folder, write_text
 from rig.recording.sessions import Session, TrialInfo, plain
 from rig.recording.tables import arrow_table, compression_N, filled, write_parquet
@@ -65,7 +66,7 @@ def _csv(session: Session, out: Path) -> None:
     with whole_folder(out) as folder:
         facts = dict(filter(None, (_csv_trial(folder, session, trial) for trial in session.trials)))
         write_text(folder / "mapping.toml", _mapping(session, facts, folder))
-        write_text(folder / COLUMNS_FILE, _legend())
+        write_text(folder / COLUMNS_FILE, legend(streams_in(session)))
         write_text(folder / "session.json", _information(session))
 
 
@@ -127,19 +128,6 @@ def _toml(values: Mapping[str, object], above: str = "") -> str:
     return "".join(lines + tables)
 
 
-def _legend() -> str:
-    extra = [
-        'force,force_N,N,"force in compression, by the calibration, before any zero"',
-        '*,time_s,s,"capture_ns in seconds"',
-    ]
-    lines = [
-        f'{stream.name},{name},{unit},"{meaning}"'
-        for stream in STREAMS
-        for name, (unit, meaning) in stream.units.items()
-    ]
-    return "\n".join(["stream,column,unit,meaning", *extra, *lines]) + "\n"
-
-
 def _parquet(session: Session, out: Path) -> None:
     """``TRIAL.STREAM.parquet`` with units in the metadata of each field."""
     with whole_folder(out) as folder:
@@ -180,14 +168,15 @@ def _mat(session: Session, out: Path) -> None:
     """One struct a trial (``trial_01.force.fz_N``), ``units.force.fz_N``, and ``session`` as JSON text."""
     import scipy.io  # noqa: PLC0415 - as above
 
+    streams = streams_in(session)
     size = sum(
-        stream.dtype.itemsize * trial.samples.get(stream.name, 0) for trial in session.trials for stream in STREAMS
+        stream.dtype.itemsize * trial.samples.get(stream.name, 0) for trial in session.trials for stream in streams
     )
     if size >= MAT_LIMIT:
         raise UsageError(
             f"{out}: {size >> 20} MiB are more than a MAT file holds; export hdf5, which MATLAB also reads"
         )
-    content: dict[str, MatValue] = {"session": _information(session), "units": _units()}
+    content: dict[str, MatValue] = {"session": _information(session), "units": units(streams)}
     for trial in session.trials:
         content[_variable(trial.name, content)] = _struct(session, trial)
     with whole_file(out) as scratch:
@@ -202,10 +191,6 @@ def _struct(session: Session, trial: TrialInfo) -> dict[str, MatValue]:
     }
     facts: dict[str, MatValue] = {"speed_mm_s": trial.speed_mm_s, "depth_mm": trial.depth_mm, "outcome": trial.outcome}
     return {**streams, **facts, "metadata": json.dumps(recording.metadata)}
-
-
-def _units() -> dict[str, dict[str, str]]:
-    return {stream.name: {name: unit for name, (unit, _) in stream.units.items()} for stream in STREAMS}
 
 
 def _variable(name: str, taken: Collection[str]) -> str:

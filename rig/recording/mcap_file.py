@@ -16,8 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.channels import BY_ID, STREAMS, Stream
+from rig.channels import Stream
 from rig.errors import RigError, UsageError
+from rig.input_streams import all_streams
 from rig.recording.files import wait_for_disk
 from rig.recording.mcap_layout import McapLayout
 
@@ -53,7 +54,8 @@ class RecordingWriter:
         self._batch = _Batch()
         self._fd = self._create()
         self._layout = McapLayout(self._batch, "tissue-rig")
-        self._channels = {stream.id: self._register(stream) for stream in STREAMS}
+        self.streams = {stream.id: stream for stream in all_streams(metadata)}
+        self._channels = {stream.id: self._register(stream) for stream in self.streams.values()}
         self._bodies: dict[int, list[bytes]] = {}
         self._pending = 0
         for name, values in metadata.items():
@@ -88,7 +90,7 @@ class RecordingWriter:
 
     def _end_chunk(self) -> None:
         for stream_id, bodies in self._bodies.items():
-            self._lay_out(BY_ID[stream_id], bodies)
+            self._lay_out(self.streams[stream_id], bodies)
         self._bodies, self._pending = {}, 0
         self._layout.end_chunk()
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rig.channels import EVENT, STREAMS, EventSample, Stream
 from rig.errors import DataError
+from rig.input_streams import all_streams
 from rig.recording.channel_streams import ChannelStreams
 from rig.recording.chunk import Bodies
 from rig.recording.file_window import FileWindow
@@ -43,6 +44,11 @@ class Recording:
     cut: str = ""
 
     @property
+    def streams(self) -> tuple[Stream, ...]:
+        """Every stream it can hold, its inputs' behind those of the bench."""
+        return all_streams(self.metadata)
+
+    @property
     def tracks_force(self) -> bool:
         """Whether a force was tracked in it, rather than a cycle made."""
         return self.metadata.get("trial", {}).get("kind") == TRACKING
@@ -50,18 +56,19 @@ class Recording:
 
 def read_recording(path: Path) -> Recording:
     """The recording at ``path``; raises DataError only where there is no file or it never was a recording."""
-    tables = {stream.name: GrowingTable(stream.fixed.size) for stream in NUMERIC}
+    tables: dict[str, GrowingTable] = {}
     events: list[EventSample] = []
     found = Scan()
     for stream, bodies in messages(path, found):
         if stream is EVENT:
             events += [EventSample(*EVENT.unpack(body.tobytes())) for body in bodies]
         else:
-            tables[stream.name].add(bodies)
+            tables.setdefault(stream.name, GrowingTable(stream.fixed.size)).add(bodies)
+    streams = [stream for stream in all_streams(found.metadata) if not stream.has_text]
     return Recording(
         path,
         found.metadata,
-        {stream.name: tables[stream.name].rows(stream.dtype) for stream in NUMERIC},
+        {one.name: tables.get(one.name, GrowingTable(one.fixed.size)).rows(one.dtype) for one in streams},
         tuple(events),
         found.footer and SUMMARY in found.metadata,
         tuple(found.damage),
@@ -76,7 +83,7 @@ def messages(path: Path, found: Scan) -> Iterator[tuple[Stream, Bodies]]:
     or has another layout.
     """
     with opened(path) as data:
-        streams = ChannelStreams(path)
+        streams = ChannelStreams(path, found.metadata)
         begins = data[: len(MAGIC)] == MAGIC[: len(data)]
         for chunk in good_chunks(data, found):
             begins = True

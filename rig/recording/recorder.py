@@ -18,7 +18,7 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from select import select
 from typing import cast
@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.channel import Answer, Channel, Message, Received
-from rig.channels import BY_ID, STREAMS, Stream
+from rig.channels import BY_ID, Stream
 from rig.errors import RigError
 from rig.recording.mcap_file import RecordingFailed, RecordingWriter
 from rig.recording.messages import TO_RECORDER, Close, Closed, Open, Opened, Quit, RecorderFailed, Started
@@ -44,7 +44,8 @@ BATCH = 8192  # 5 ms of writing at 0.6 us a row; then commands are looked at aga
 class Tally:
     """What one recording got: samples and gaps in their numbers, per stream."""
 
-    def __init__(self) -> None:
+    def __init__(self, streams: Mapping[int, Stream] = BY_ID) -> None:
+        self.streams = streams
         self.samples: Counter[str] = Counter()
         self.missing: Counter[str] = Counter()
         self.unreadable = 0
@@ -56,7 +57,7 @@ class Tally:
         What has not the layout of its stream would spoil the file: it is counted and left out.
         """
         self.unreadable += slots.size
-        for stream in STREAMS:
+        for stream in self.streams.values():
             if stream.has_text:
                 for body, row in bodies_of(slots, stream):
                     self._count(stream, np.array([row[0]]))
@@ -134,7 +135,7 @@ class Recorder:
             self._drain_to(self._ring.head)
             self._dropped, self._damaged = self._ring.dropped, self._ring.damaged
         self._writer = RecordingWriter(path, metadata)
-        self._hold, self._failure, self._tally = False, "", Tally()
+        self._hold, self._failure, self._tally = False, "", Tally(self._writer.streams)
         unrecorded, self.unrecorded = self.unrecorded, 0
         return Opened(to=number, path=str(path), unrecorded=unrecorded)
 
@@ -156,13 +157,13 @@ class Recorder:
         return closed
 
     def _counted(self, number: int, path: Path) -> Closed:
-        dropped = Counter(self._ring.dropped)
+        dropped, known = Counter(self._ring.dropped), self._tally.streams
         dropped.subtract(self._dropped)
         return Closed(
             to=number,
             path=str(path),
             samples=dict(self._tally.samples),
-            dropped={BY_ID[stream].name: count for stream, count in dropped.items() if count and stream in BY_ID},
+            dropped={known[stream].name: count for stream, count in dropped.items() if count and stream in known},
             missing={name: count for name, count in self._tally.missing.items() if count},
             unreadable=self._tally.unreadable + self._ring.damaged - self._damaged,
         )

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
-from rig.channels import EVENT, FORCE, STREAMS, Stream
+from rig.channels import EVENT, FORCE, Stream
 from rig.config.force_map import CHANNELS, UNIT, ForceMap, Matrix
 from rig.errors import DataError
 from rig.recording.files import whole_file
@@ -21,7 +21,7 @@ FORCE_FIELDS = ("fx_N", "fy_N", "fz_N")
 
 def filled(recording: Recording) -> Iterator[tuple[Stream, pa.Table]]:
     """Every stream that has rows, as ``arrow_table`` gives it."""
-    for stream in STREAMS:
+    for stream in recording.streams:
         if len(recording.events if stream is EVENT else recording.tables[stream.name]):
             yield stream, arrow_table(recording, stream)
 

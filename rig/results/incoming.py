@@ -83,7 +83,8 @@ def _recording(
     tracks = seen is not None and seen.tracks_force
     out = "it tracks a force" if tracks else "; ".join(reasons) or "it is left out"
     return RecordingIn(
-        name=info.name, streams=streams, one_clock=seen is not None and seen.one_clock,
+        name=info.name, streams=(*streams, *(seen.inputs if seen else ())),
+        one_clock=seen is not None and seen.one_clock,
         alignments={} if seen is None else seen.alignments, cycles=cycles,
         quality=_quality(info, trial is not None or tracks, said), reasons=tuple(reasons),
         fit=_fitted(cycles) if trial else Use(used=False, why=out),

@@ -18,6 +18,7 @@ from rig.recording.slope import TIP_TOOL
 from rig.recording.tables import compression_N
 from rig.results.came_in import StreamIn
 from rig.results.came_in_trace import RecordingTrace, trace_of
+from rig.results.inputs_in import ChannelIn, channels_in
 from rig.trials.streams import longest_repeat, sample_noise, sampling_of
 
 UNITS = {"force": "N", "axis": "mm", "marker": "mm"}
@@ -34,20 +35,12 @@ class Rests(NamedTuple):
     deviation: Array
 
 
-class _Raw(NamedTuple):
-    """A stream as it was recorded: times [s], values (n,) or (n, 3), and which of them are numbers vouched for."""
-
-    name: str
-    time_s: Array
-    value: Array
-    sound: NDArray[np.bool_]
-
-
 @dataclass(frozen=True)
 class Seen:
     """Numbers of the streams of a recording, where each of them was at rest, and how their clocks lie."""
 
     streams: tuple[StreamIn, ...]
+    inputs: tuple[StreamIn, ...]
     rests: tuple[Rests, ...]
     one_clock: bool
     alignments: Mapping[str, Alignment]
@@ -65,25 +58,26 @@ def see(recording: Recording) -> Seen:
     full = np.zeros(0, bool) if force is None else _full(*drawn[1:])
     return Seen(
         streams=tuple(_numbers(*one, left_out.get(one[0].name, 0), full) for one in zip(raw, rests, strict=True)),
+        inputs=tuple(_numbers(one, Rests(np.zeros(0), np.zeros(0)), 0, full) for one in channels_in(recording)),
         rests=tuple(rests), one_clock=all(np.array_equal(raw[0].time_s, other.time_s) for other in raw[1:]),
         alignments=_alignments(recording), tracks_force=recording.tracks_force,
         trace=trace_of(*drawn, full if len(full) else np.zeros(len(drawn[0]), bool)),
     )  # fmt: skip
 
 
-def _raw(recording: Recording) -> Iterator[_Raw]:
+def _raw(recording: Recording) -> Iterator[ChannelIn]:
     marker = recording.tables["marker"]
     tip = marker["tool"] == TIP_TOOL
     tables = {**recording.tables, "marker": marker if tip.all() else marker[tip]}
     start_ns = min((int(tables[name]["capture_ns"][0]) for name in UNITS if len(tables[name])), default=0)
-    for name in UNITS:
+    for name, unit in UNITS.items():
         rows = tables[name]
         if len(rows):
             value = _value(recording, name, rows)
             sound = rows["valid"] != 0
             for column in value.reshape(len(rows), -1).T:
                 sound &= np.isfinite(column)
-            yield _Raw(name, (rows["capture_ns"] - start_ns) * 1e-9, value, sound)
+            yield ChannelIn(name, (rows["capture_ns"] - start_ns) * 1e-9, value, sound, unit)
 
 
 def _value(recording: Recording, name: str, rows: NDArray[np.void]) -> Array:
@@ -108,7 +102,7 @@ def _alignments(recording: Recording) -> dict[str, Alignment]:
     return {}
 
 
-def _rests(raw: _Raw, axis: _Raw | None) -> Rests:
+def _rests(raw: ChannelIn, axis: ChannelIn | None) -> Rests:
     """Deviation about a straight line of each fifth of a second in which the axis goes nowhere."""
     nothing = Rests(np.zeros(0), np.zeros(0))
     time_s, value = raw.time_s[raw.sound], raw.value[raw.sound].reshape(np.count_nonzero(raw.sound), -1)
@@ -135,7 +129,7 @@ def _about_lines(parts: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum((centred**2).sum(axis=1) - slope**2 * (at @ at), 0.0) / (count - 2)))
 
 
-def _drawn(force: _Raw | None, axis: _Raw | None) -> tuple[Array, Array, Array]:
+def _drawn(force: ChannelIn | None, axis: ChannelIn | None) -> tuple[Array, Array, Array]:
     """Times, force and place at them, each (n,): at those of force, where there is one; NaN where nobody knows."""
     lead, nowhere = force or axis, np.zeros(0)
     time_s = nowhere if lead is None else lead.time_s[lead.sound]
@@ -150,13 +144,13 @@ def _full(force_N: Array, place_mm: Array) -> NDArray[np.bool_]:
     return at_the_end_of_range(force_N, place_mm if np.isfinite(place_mm).any() else None)
 
 
-def _numbers(raw: _Raw, rests: Rests, left_out: int, of_force: NDArray[np.bool_]) -> StreamIn:
+def _numbers(raw: ChannelIn, rests: Rests, left_out: int, of_force: NDArray[np.bool_]) -> StreamIn:
     time_s, value = raw.time_s[raw.sound], raw.value[raw.sound]
-    clock, columns = sampling_of(time_s), value.reshape(len(value), -1).T
+    clock, columns = sampling_of(time_s), np.atleast_2d(value.T)
     full = of_force if raw.name == "force" else np.zeros(len(value), bool)
     at_rest = len(rests.deviation) > 0
     return StreamIn(
-        stream=raw.name, unit=UNITS[raw.name], samples=len(time_s), missing=len(raw.time_s) - len(time_s),
+        stream=raw.name, unit=raw.unit, samples=len(time_s), missing=len(raw.time_s) - len(time_s),
         left_out=left_out, span_s=float(np.ptp(time_s)) if len(time_s) else 0.0, rate_Hz=1 / clock.period_s,
         lowest_rate_Hz=1 / clock.longest_s, gaps=clock.gaps, longest_gap_s=clock.longest_s if clock.gaps else None,
         lost=clock.lost, lowest=float(value.min(initial=np.inf)), highest=float(value.max(initial=-np.inf)),

@@ -9,6 +9,7 @@ PARAMS: dict[str, dict[str, object]] = {
     "track": {"model": MODEL, "forces_N": [1.0, 2.0, 5.0], "seconds": 5.0},
     "retract": {},
     "threshold": {"model": MODEL, "up_to_N": 10.0, "rate_N_s": 0.5},
+    "threshold-glove": {"session": "first"},
     "doctor": {},
     "fit": {"sessions": ["first"], "laws": ["fung", "qlv"], "known": {}},
     "diagnose": {"session": "first", "simulation": "index"},

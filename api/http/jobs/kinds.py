@@ -12,6 +12,7 @@ from api.http.jobs.params import (
     DiagnoseParams,
     ExportParams,
     FitParams,
+    GloveThresholdParams,
     ImportParams,
     NothingAsked,
     ProposeParams,
@@ -28,12 +29,13 @@ from rig.results.base import SavedResult
 from rig.results.bench import DoctorResult, RetractResult
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
 from rig.results.fit import FitResult
+from rig.results.glove import GloveThreshold
 from rig.results.recorded import CaptureResult, ExportResult, ImportResult, RepairResult, ReportResult, VerifyResult
 from rig.results.tracking import SimulateResult, Threshold, TrackResult
 
 AnyResult = (
-    CaptureResult | TrackResult | RetractResult | Threshold | DoctorResult | FitResult | DiagnosisResult
-    | ProtocolCheckResult | SimulateResult | ReportResult | ExportResult | VerifyResult | RepairResult
+    CaptureResult | TrackResult | RetractResult | GloveThreshold | Threshold | DoctorResult | FitResult
+    | DiagnosisResult | ProtocolCheckResult | SimulateResult | ReportResult | ExportResult | VerifyResult | RepairResult
     | ProposalResult | ImportResult
 )  # fmt: skip
 
@@ -68,6 +70,13 @@ class ThresholdJob(JobBody):
 
     kind: Literal["threshold"]
     params: ThresholdParams
+
+
+class GloveThresholdJob(JobBody):
+    """Takes the subject's pain threshold at a site from presses with a glove."""
+
+    kind: Literal["threshold-glove"]
+    params: GloveThresholdParams
 
 
 class DoctorJob(JobBody):
@@ -148,8 +157,8 @@ class ImportJob(JobBody):
 
 
 AnyJob = Annotated[
-    CaptureJob | TrackJob | RetractJob | ThresholdJob | DoctorJob | FitJob | DiagnoseJob | ProtocolCheckJob
-    | SimulateJob | ReportJob | ExportJob | VerifyJob | RepairJob | ProposeJob | ImportJob,
+    CaptureJob | TrackJob | RetractJob | ThresholdJob | GloveThresholdJob | DoctorJob | FitJob | DiagnoseJob
+    | ProtocolCheckJob | SimulateJob | ReportJob | ExportJob | VerifyJob | RepairJob | ProposeJob | ImportJob,
     Field(discriminator="kind"),
 ]  # fmt: skip
 
@@ -187,6 +196,7 @@ KINDS: Mapping[str, Kind] = {
         Kind(TrackJob, TrackResult, "track", moves=True),
         Kind(RetractJob, RetractResult, "reset", moves=True),
         Kind(ThresholdJob, Threshold, "threshold", moves=True),
+        Kind(GloveThresholdJob, GloveThreshold, "threshold", moves=True),
         Kind(DoctorJob, DoctorResult, "doctor", f"{BENCH}:doctor"),
         Kind(FitJob, FitResult, "fit", f"{SCIENCE}:fit"),
         Kind(DiagnoseJob, DiagnosisResult, "diagnose", f"{SCIENCE}:diagnose"),

@@ -4,11 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from api.http.jobs.kinds import AnyJob, CaptureJob, RetractJob, ThresholdJob, TrackJob
-from api.http.jobs.params import ModelRef, TrackParams
+from api.http.jobs.kinds import AnyJob, CaptureJob, GloveThresholdJob, RetractJob, ThresholdJob, TrackJob
+from api.http.jobs.params import GloveThresholdParams, ModelRef, TrackParams
 from api.http.jobs.places import Places
 from api.http.jobs.references import reference_of
-from api.operations import motion
+from api.operations import glove, motion
 from api.operations.motion import TrackPlan
 from controller.experiments import capture as experiment
 from controller.experiments import threshold as ramp
@@ -39,6 +39,8 @@ def planned(body: AnyJob, bench: Supervisor, places: Places) -> Planned:
             return _track(body.params, bench, places)
         case ThresholdJob():
             return _threshold(body, bench, places)
+        case GloveThresholdJob():
+            return _by_glove(body.params, bench, places)
         case RetractJob():
             operation = Operation("retract", total=1, unit="moves")
             return Planned(operation, None, lambda: motion.retract(operation, bench))
@@ -84,3 +86,9 @@ def _threshold(body: ThresholdJob, bench: Supervisor, places: Places) -> Planned
     tracked.refuse_foreign(folder)
     operation = Operation("threshold", total=1, unit="ramps")
     return Planned(operation, name, lambda: motion.threshold(operation, bench, plan, asked.up_to_N, folder))
+
+
+def _by_glove(asked: GloveThresholdParams, bench: Supervisor, places: Places) -> Planned:
+    folder, operation = places.recorded_into(asked.session), glove.threshold_operation()
+    name = glove.check(bench.wiring, asked.input, folder)
+    return Planned(operation, asked.session, lambda: glove.threshold_beside(operation, bench, name, folder))

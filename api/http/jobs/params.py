@@ -88,6 +88,13 @@ class ThresholdParams(RequestBody):
     session: Existing | None = Field(default=None, description="where it is recorded; null: the session of the model")
 
 
+class GloveThresholdParams(RequestBody):
+    """Three presses with the glove at the subject's site; nothing of the bench moves."""
+
+    session: Existing = Field(description="where it is recorded")
+    input: str = Field(default="", max_length=24, description="name of the glove, where there are several")
+
+
 class CalibrateForceParams(RequestBody):
     """Known weights, one after the other."""
 

@@ -11,7 +11,6 @@ from api.http.models import RequestBody
 from api.http.problems import RequestRefused, responses
 from api.http.routes.common import LeaseHeader
 from api.http.service import Service
-from rig.config.wiring import Subject
 
 MatchHeader = Annotated[str, Header(alias="If-Match", max_length=80, description="the ETag of what is to be changed")]
 
@@ -28,7 +27,7 @@ def add(router: APIRouter, service: Service) -> None:
     """Its routes."""
 
     def shown(response: Response) -> SubjectSettings:
-        found = SubjectSettings(**service.wiring.subject.model_dump())
+        found = SubjectSettings(**service.wiring.subject.model_dump(include=set(SubjectSettings.model_fields)))
         response.headers["ETag"] = etag_of(found)
         return found
 
@@ -47,7 +46,7 @@ def add(router: APIRouter, service: Service) -> None:
     ) -> SubjectSettings:
         service.control.check(lease)
         _refuse_stale(match, etag_of(shown(response)))
-        service.use_subject(Subject(**wanted.model_dump()))
+        service.use_subject(service.wiring.subject.model_copy(update=wanted.model_dump()))
         return shown(response)
 
 

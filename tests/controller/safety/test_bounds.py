@@ -43,6 +43,7 @@ LINES = [
     ("loop_overrun", SOFT, 0.1, False),
     ("recorder_stalled", SOFT, 3.1, False),
     ("stop_lost", SOFT, 1.1, False),
+    ("input_lost", SOFT, 1.3, False),
     ("supervisor_lost", SOFT, 0.1, False),
     ("operator_silent", SOFT, 3.1, False),
 ]
@@ -155,6 +156,7 @@ CASES = [
          "the recorder is silent for 0.0 s, its buffer 51 % full"),
     Case("recorder_stalled", {"recorder_silent_s": 3.0}, {"recorder_silent_s": 3.1},
          "the recorder is silent for 3.1 s, its buffer 0 % full"),
+    Case("input_lost", {"input_lost": ""}, {"input_lost": "input pedal is lost: gone"}, "input pedal is lost: gone"),
     Case("stop_lost", {"stop_silent_s": 1.0}, {"stop_silent_s": 1.01},
          "the stop process is silent for 1.0 s (limit 1 s), so nobody could stop what moves: start the bench again"),
     Case("supervisor_lost", {}, {"supervisor_lost": True}, "the program that started the loop is gone"),

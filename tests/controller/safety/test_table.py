@@ -28,6 +28,7 @@ from rig.config.wiring import Wiring
         ({"recorder_fill": 0.9}, "recorder_stalled"),
         ({"recorder_silent_s": 10.0}, "recorder_stalled"),
         ({"stop_silent_s": 1.5}, "stop_lost"),
+        ({"input_lost": "input pedal is lost: gone"}, "input_lost"),
         ({"supervisor_lost": True}, "supervisor_lost"),
         ({"operator_silent_s": 4.0}, "operator_silent"),
         ({"requests": frozenset({"unattended"})}, "operator_silent"),

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from controller.stop.keypad import EventParser, Keys, Pad, open_device
+from controller.stop.keypad import Keys, Pad, open_device
 from controller.stop.word import StopReason
+from drivers.evdev.codec import EventParser
 from rig.config.stop import Stop
 from rig.errors import DeviceError
 from tests.controller.descriptors import open_files

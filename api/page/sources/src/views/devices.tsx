@@ -32,7 +32,10 @@ function Row({ stream, role }: { stream: string; role: string }) {
 }
 
 function Streams() {
-  const rows = Object.entries(STREAMS).filter(([, role]) => rig.value?.devices[role]);
+  const devices = rig.value?.devices ?? {};
+  // An input's stream has its own name; its health is its state.
+  const inputs = Object.keys(devices).filter((name) => !Object.values<string>(STREAMS).includes(name)).map((name) => [name, name] as const);
+  const rows = [...Object.entries(STREAMS).filter(([, role]) => devices[role]), ...inputs];
   if (!rows.length) return <div class="empty"><p>{t.bench.noDevices}</p></div>;
   return (
     <div class={fresh.value ? "" : "stale"}>

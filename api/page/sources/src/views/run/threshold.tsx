@@ -11,6 +11,7 @@ import { JobState } from "../../parts/job";
 import { Start, whyNotMove } from "../../parts/may";
 import { ModelChoice, Origin, keyOf, ownModel, refOf, useModels } from "../../parts/models";
 import { Now } from "../../parts/now";
+import { Glove } from "./glove";
 import { pressStop } from "../../stop";
 import { link } from "../../route";
 import { keepSubject, type OnBench } from "../../subject";
@@ -118,6 +119,7 @@ export function ThresholdStep({ subject }: { subject: Loaded<OnBench> }) {
           <>
             <Known key={on.value.pain_threshold_N} on={on} reload={subject.reload} />
             <details id="ramp"><summary>{t.run.ramp}</summary><Ramp on={on} reload={subject.reload} /></details>
+            <details id="glove"><summary>{t.run.glove}</summary><Glove on={on} reload={subject.reload} /></details>
           </>
         )}
       </Show>

@@ -1,0 +1,50 @@
+// The pain threshold by three presses with a glove; the bench stands still.
+import { useState } from "preact/hooks";
+import type { Schema } from "../../api";
+import { attempt } from "../../attempt";
+import { ended, startInControl, useWork } from "../../jobs";
+import { shown } from "../../parts/basics";
+import { JobState } from "../../parts/job";
+import { Start, whyNotMove } from "../../parts/may";
+import { keepSubject, type OnBench } from "../../subject";
+import { t } from "../../texts";
+
+type Found = Schema["GloveThreshold"];
+
+export function Glove({ on, reload }: { on: OnBench; reload: () => void }) {
+  const [session, name] = useState(`thresholds-${on.value.id}`);
+  const [job, follow] = useWork<Found>("threshold-glove");
+  const begin = (event: Event) => {
+    event.preventDefault();
+    void attempt(async () => follow((await startInControl<Found>("threshold-glove", { session })).id));
+  };
+  return (
+    <>
+      <p>{t.run.gloveText}</p>
+      {(!job || ended(job)) && (
+        <form onSubmit={begin}>
+          <label>{t.run.gloveSession}
+            <input id="glove-session" required maxLength={80} value={session} onInput={(event) => name(event.currentTarget.value)} />
+          </label>
+          <Start id="glove-start" why={whyNotMove() || (session ? "" : t.run.gloveNoSession)}>{t.run.gloveStart}</Start>
+        </form>
+      )}
+      <JobState job={job} />
+      {job?.result && <Answer found={job.result} on={on} reload={reload} />}
+    </>
+  );
+}
+
+function Answer({ found, on, reload }: { found: Found; on: OnBench; reload: () => void }) {
+  const force_N = found.force_N ?? 0;
+  // Never above what was found.
+  const limit_N = Math.floor(force_N * 10) / 10;
+  const keep = () => attempt(async () => (await keepSubject(on, { pain_threshold_N: limit_N }), t.run.thresholdKept(shown(limit_N, 1)))).then(reload);
+  return (
+    <div class="notice" id="glove-result">
+      <ol>{found.presses.map((one, number) => <li key={number}>{t.run.glovePress(number + 1, shown(one.peak_N, 1), one.refused ?? "")}</li>)}</ol>
+      <p>{t.run.gloveFound(shown(force_N, 2), found.site, found.rule)}</p>
+      {limit_N !== on.value.pain_threshold_N && <Start id="glove-keep" why={whyNotMove()} onClick={() => void keep()}>{t.run.rampKeep(shown(limit_N, 1))}</Start>}
+    </div>
+  );
+}

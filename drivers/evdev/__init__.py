@@ -1,0 +1,1 @@
+"""Input events of Linux: foot switches, buttons and keypads."""

@@ -1,0 +1,1 @@
+"""Firmata: microcontrollers whose firmware shows its pins to a computer."""

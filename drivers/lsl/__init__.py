@@ -1,0 +1,1 @@
+"""Lab Streaming Layer: streams of other programs, with their clocks."""

@@ -1,0 +1,1 @@
+"""Simulated foot switch."""

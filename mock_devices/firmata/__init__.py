@@ -1,0 +1,1 @@
+"""Simulated microcontroller with StandardFirmata, and the glove on its inputs."""
