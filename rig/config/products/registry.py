@@ -13,6 +13,7 @@ from pydantic import Discriminator, Tag, TypeAdapter
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
+from rig.config.products.openigtlink import OpenIgtLinkWiring
 from rig.config.products.robotiq_ft300 import Ft300Wiring
 from rig.config.products.roles import AxisProduct, ForceProduct, Product, TrackerProduct
 from rig.config.products.usable import refusal_of
@@ -35,7 +36,9 @@ FORCE_SENSORS: Registry[type[ForceProduct]] = products_of(
     "force", "force sensor", ForceProduct, (BotaWiring, Ft300Wiring)
 )
 AXES: Registry[type[AxisProduct]] = products_of("axis", "servo axis", AxisProduct, (Epos4Wiring,))
-TRACKERS: Registry[type[TrackerProduct]] = products_of("tracker", "marker tracker", TrackerProduct, (PolarisWiring,))
+TRACKERS: Registry[type[TrackerProduct]] = products_of(
+    "tracker", "marker tracker", TrackerProduct, (PolarisWiring, OpenIgtLinkWiring)
+)
 ROLES: Mapping[str, Registry[Any]] = {"force": FORCE_SENSORS, "axis": AXES, "tracker": TRACKERS}
 
 
