@@ -17,6 +17,7 @@ from rig.config.products.openigtlink import OpenIgtLinkWiring
 from rig.config.products.robotiq_ft300 import Ft300Wiring
 from rig.config.products.roles import AxisProduct, ForceProduct, Product, TrackerProduct
 from rig.config.products.usable import refusal_of
+from rig.config.products.zaber_ascii import ZaberWiring
 from rig.registry import Registry
 
 AnyProduct = TypeVar("AnyProduct", bound=Product)
@@ -35,7 +36,7 @@ def products_of(role: str, what: str, kind: type[AnyProduct], own: Iterable[type
 FORCE_SENSORS: Registry[type[ForceProduct]] = products_of(
     "force", "force sensor", ForceProduct, (BotaWiring, Ft300Wiring)
 )
-AXES: Registry[type[AxisProduct]] = products_of("axis", "servo axis", AxisProduct, (Epos4Wiring,))
+AXES: Registry[type[AxisProduct]] = products_of("axis", "servo axis", AxisProduct, (Epos4Wiring, ZaberWiring))
 TRACKERS: Registry[type[TrackerProduct]] = products_of(
     "tracker", "marker tracker", TrackerProduct, (PolarisWiring, OpenIgtLinkWiring)
 )
