@@ -6,7 +6,7 @@ import math
 import numpy as np
 from pydantic import ValidationError
 
-from rig.config.products.registry import FORCE_SENSORS, TRACKERS, read
+from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS, read
 from rig.config.wiring import Loop
 from rig.errors import DataError
 from rig.recording.converter import at_the_end_of_range, run_lengths
@@ -31,7 +31,7 @@ def nominal_Hz(recording: Recording) -> dict[str, float]:
     try:
         rates = {
             "force": read(FORCE_SENSORS, wiring["force"]).sampled_Hz,
-            "axis": Loop.model_validate_json(wiring["loop"]).rate_Hz,
+            "axis": min(Loop.model_validate_json(wiring["loop"]).rate_Hz, read(AXES, wiring["axis"]).reports_Hz),
         }
         tracker = wiring.get("tracker", "null")
         return rates | ({} if tracker == "null" else {"marker": read(TRACKERS, tracker).rate_Hz})

@@ -4,6 +4,7 @@ A product is one class in one file: its table in `rig.toml`, and beside it what 
 and mock are named as ``module:object``, because they belong to packages that are not imported here.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
@@ -110,6 +111,11 @@ class AxisProduct(Product):
         default=True, description="a brake or a self-locking screw: without power a limb cannot push it back"
     )
     delay_ms: float = Field(default=4.0, ge=0, description="from command to motion, sensor included")
+
+    @property
+    def reports_Hz(self) -> float:
+        """The most positions a second that it gives, however often it is asked."""
+        return math.inf
 
     @property
     def homes_outward(self) -> bool:

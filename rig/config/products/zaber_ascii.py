@@ -42,6 +42,11 @@ class ZaberWiring(AxisProduct):
     delay_ms: float = Field(default=25.0, ge=0, description="from command to motion, sensor included")
 
     @property
+    def reports_Hz(self) -> float:
+        """One for each move."""
+        return self.rate_Hz
+
+    @property
     def homes_outward(self) -> bool:
         """It homes towards smaller positions."""
         return self.direction == 1
