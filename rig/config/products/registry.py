@@ -11,6 +11,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import Discriminator, Tag, TypeAdapter
 
 from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.laumas_tlb import LaumasWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
 from rig.config.products.openigtlink import OpenIgtLinkWiring
@@ -34,7 +35,7 @@ def products_of(role: str, what: str, kind: type[AnyProduct], own: Iterable[type
 
 
 FORCE_SENSORS: Registry[type[ForceProduct]] = products_of(
-    "force", "force sensor", ForceProduct, (BotaWiring, Ft300Wiring)
+    "force", "force sensor", ForceProduct, (BotaWiring, Ft300Wiring, LaumasWiring)
 )
 AXES: Registry[type[AxisProduct]] = products_of("axis", "servo axis", AxisProduct, (Epos4Wiring, ZaberWiring))
 TRACKERS: Registry[type[TrackerProduct]] = products_of(
