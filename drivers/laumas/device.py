@@ -62,6 +62,7 @@ class LaumasTransmitter:
         try:
             about = self._registers(codec.ABOUT, codec.ABOUT_COUNT)
             weights = codec.decode_weights(self._registers(codec.STATUS, codec.WEIGHTS_COUNT))
+            self._refuse_errors(weights.status)
         except BaseException:
             self.close()
             raise
@@ -85,6 +86,15 @@ class LaumasTransmitter:
         if self._port is not None:
             self._port.close()
         self._port = None
+
+    def _refuse_errors(self, status: int) -> None:
+        wrong = status & self._config.error_bits
+        if wrong:
+            raise self._error(
+                f"bits {', '.join(str(bit) for bit in range(16) if wrong >> bit & 1)} of its status register 40007 are"
+                " set, which count as errors; look at the load cell, or name in force.error_bits those that its manual"
+                " calls errors"
+            )
 
     def _started(self) -> Port:
         if self._port is None:

@@ -5,7 +5,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from rig.config.maxima import Maximum
-from rig.config.products.roles import MOCK_PORT, ForceProduct, MockPort, Positive
+from rig.config.products.roles import ForceProduct, MockPort, Positive
 
 BITS = 10  # of a character, with start and stop
 USUAL_BAUD = 115_200
@@ -31,7 +31,7 @@ class LaumasWiring(ForceProduct):
     counts_per_N: Positive = Field(default=1000.0, description="what it shows for one newton, without the point")
     capacity_N: Positive = Field(default=100.0, le=1000, description="of the load cell: beyond it nothing is valid")
     error_bits: int = Field(
-        default=0, ge=0, le=0xFFFF, description="of register 40007, those that its manual calls errors"
+        default=0xFFFF, ge=1, le=0xFFFF, description="of register 40007, those that its manual calls errors; else any"
     )
 
     @property
@@ -43,15 +43,6 @@ class LaumasWiring(ForceProduct):
     def maxima(self) -> tuple[Maximum, ...]:
         """It knows no torque, so nothing limits what is asked of it there."""
         return (Maximum("limits.force_N", self.capacity_N, "N", f"the load cell of the {self.product} bears no more"),)
-
-    @model_validator(mode="after")
-    def _knows_its_errors(self) -> Self:
-        if not self.error_bits and self.port != MOCK_PORT:
-            raise ValueError(
-                "error_bits: say which bits of status register 40007 are errors, as the manual of your transmitter"
-                " lists them; without them a broken load cell would be taken for a force"
-            )
-        return self
 
     @model_validator(mode="after")
     def _line_carries_the_rate(self) -> Self:

@@ -128,9 +128,17 @@ def test_a_transmitter_of_another_address_is_not_found(monkeypatch: pytest.Monke
         Session(slave=7).sensor.start()
 
 
-def test_a_real_one_needs_to_be_told_which_bits_are_errors() -> None:
-    with pytest.raises(UsageError, match="say which bits of status register 40007 are errors"):
-        parse(Wiring, merged({}, ["force.product=laumas-tlb", "force.port=/dev/ttyUSB0"]), "rig.toml")
+def test_any_bit_of_its_status_is_an_error_until_those_that_are_were_named() -> None:
+    session = Session(error_bits=0xFFFF)
+    session.mock.invalid = True
+    with pytest.raises(DeviceError, match=r"bits 0 of its status register 40007 are set, .* force.error_bits"):
+        session.sensor.start()
+    told = Session(error_bits=0x0002)
+    told.mock.invalid = True
+    told.sensor.start()
+    assert told.run(30)[-1].valid == 1
+    with pytest.raises(UsageError, match=r"force\.error_bits: Input should be greater than or equal to 1"):
+        parse(Wiring, merged({}, ["force.product=laumas-tlb", "force.error_bits=0"]), "rig.toml")
 
 
 def test_no_torque_of_the_limits_is_refused_and_no_force_beyond_the_cell_taken() -> None:
