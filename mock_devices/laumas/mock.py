@@ -14,7 +14,8 @@ from mock_devices.wire import OnWire, Wire
 
 ERROR_BIT = 0x0001
 FIRMWARE, KIND, YEAR, PROGRAM = 105, 4, 2021, 0
-COUNTS_PER_N = 1000
+COUNTS_PER_N = 10_000
+CONVERSIONS = 8  # behind one weight: its converter is faster than it is asked
 WEIGHT_MAX = 999_999  # six digits
 DIVISION = 0
 
@@ -69,7 +70,8 @@ class LaumasMock(OnWire):
     def _registers(self) -> list[int]:
         """40001 to 40016."""
         if not self.frozen:
-            self._gross = round(self._plant.wrench()[2] * COUNTS_PER_N)
+            mean_N = sum(self._plant.wrench()[2] for _ in range(CONVERSIONS)) / CONVERSIONS
+            self._gross = round(mean_N * COUNTS_PER_N)
         status = ERROR_BIT if self.invalid or self._plant.overrange() or abs(self._gross) > WEIGHT_MAX else 0
         weights = [_words(value) for value in (self._gross, self._gross - self.tare, 0)]
         about = [FIRMWARE, KIND, YEAR, self._number & 0xFFFF, PROGRAM, 0, status]

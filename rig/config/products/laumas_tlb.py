@@ -22,13 +22,14 @@ class LaumasWiring(ForceProduct):
     # What its load cell bears is the cell's: `capacity_N`.
     range_N: ClassVar[float] = 1000.0
     range_N_m: ClassVar[float] = 0.0
+    channels: ClassVar[tuple[str, ...]] = ("fz",)
 
     product: Literal["laumas-tlb"] = Field(default="laumas-tlb", description="what stands on the bench")
     rate_Hz: float = Field(default=100.0, ge=10, le=150, description="questions a second")
     axis: Literal["fz"] = Field(default="fz", description="the one channel that it has")
     slave: int = Field(default=1, ge=1, le=247, description="its Modbus address")
     weight: Literal["gross", "net"] = Field(default="gross", description="net changes with each tare at its keys")
-    counts_per_N: Positive = Field(default=1000.0, description="what it shows for one newton, without the point")
+    counts_per_N: Positive = Field(default=10_000.0, description="what it shows for one newton, without the point")
     capacity_N: Positive = Field(default=100.0, le=1000, description="of the load cell: beyond it nothing is valid")
     error_bits: int = Field(
         default=0xFFFF, ge=1, le=0xFFFF, description="of register 40007, those that its manual calls errors; else any"

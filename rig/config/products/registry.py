@@ -15,6 +15,7 @@ from rig.config.products.laumas_tlb import LaumasWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
 from rig.config.products.openigtlink import OpenIgtLinkWiring
+from rig.config.products.optitrack_natnet import NatNetWiring
 from rig.config.products.robotiq_ft300 import Ft300Wiring
 from rig.config.products.roles import AxisProduct, ForceProduct, Product, TrackerProduct
 from rig.config.products.usable import refusal_of
@@ -39,7 +40,7 @@ FORCE_SENSORS: Registry[type[ForceProduct]] = products_of(
 )
 AXES: Registry[type[AxisProduct]] = products_of("axis", "servo axis", AxisProduct, (Epos4Wiring, ZaberWiring))
 TRACKERS: Registry[type[TrackerProduct]] = products_of(
-    "tracker", "marker tracker", TrackerProduct, (PolarisWiring, OpenIgtLinkWiring)
+    "tracker", "marker tracker", TrackerProduct, (PolarisWiring, NatNetWiring, OpenIgtLinkWiring)
 )
 ROLES: Mapping[str, Registry[Any]] = {"force": FORCE_SENSORS, "axis": AXES, "tracker": TRACKERS}
 

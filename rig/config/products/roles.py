@@ -61,6 +61,8 @@ class ForceProduct(Product):
 
     range_N: ClassVar[float]
     range_N_m: ClassVar[float]
+    # What it measures of these; the others are 0 in its samples.
+    channels: ClassVar[tuple[str, ...]] = ("fx", "fy", "fz", "mx", "my", "mz")
     # A simulated device is one more process of a busy computer: without real-time priority it may come a few tenths of
     # a second late where a real one does not. An axis that stands still for 400 ms falls behind by 12 mm at 30 mm/s.
     patience: ClassVar[Mapping[str, Mapping[str, float]]] = {

@@ -80,21 +80,21 @@ def test_it_is_asked_a_hundred_times_a_second_and_gives_newtons() -> None:
 def test_net_weight_follows_the_tare_and_gross_does_not() -> None:
     net, gross = started(weight="net"), started()
     for session in (net, gross):
-        session.mock.tare = -500
+        session.mock.tare = -5_000
     assert (net.run(30)[-1].fz_N, gross.run(30)[-1].fz_N) == (-2.0, -2.5)
 
 
 def test_counts_are_newtons_as_configured() -> None:
-    assert started(counts_per_N=100.0).run(30)[-1].fz_N == -25.0
+    assert started(counts_per_N=1000.0).run(30)[-1].fz_N == -25.0
 
 
 @pytest.mark.parametrize("wrong", ["error bit", "beyond capacity"])
 def test_what_it_does_not_vouch_for_is_invalid(wrong: str) -> None:
-    session = started()
+    session = started(capacity_N=50.0)
     if wrong == "error bit":
         session.mock.invalid = True
     else:
-        session.cell.force_N = -100.1
+        session.cell.force_N = -50.1
     sample = session.run(30)[-1]
     assert (sample.valid, sample.status) == (0, ERROR_BIT if wrong == "error bit" else 0)
 

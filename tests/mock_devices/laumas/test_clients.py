@@ -21,7 +21,7 @@ def test_pymodbus_reads_weights_and_is_refused_what_there_is_not(mock: LaumasMoc
     with played(mock), ModbusSerialClient(mock.endpoints()["serial"], baudrate=115_200, timeout=2) as client:
         answer = client.read_holding_registers(6, count=5, device_id=1)
         weight = client.convert_from_registers(answer.registers[1:3], client.DATATYPE.INT32, word_order="big")
-        assert (answer.registers[0], weight) == (0, -2500)
+        assert (answer.registers[0], weight) == (0, -25_000)
         assert client.read_holding_registers(0, count=4, device_id=1).registers[3] == 4711
         assert client.read_holding_registers(16, count=1, device_id=1).exception_code == 2
         assert client.read_holding_registers(0, count=33, device_id=1).exception_code == 3
@@ -33,7 +33,7 @@ def test_minimalmodbus_reads_the_same(mock: LaumasMock) -> None:
         instrument = minimalmodbus.Instrument(mock.endpoints()["serial"], 1)
         instrument.serial.baudrate, instrument.serial.timeout = 115_200, 2
         try:
-            assert instrument.read_long(7, signed=True) == -2500
+            assert instrument.read_long(7, signed=True) == -25_000
             assert instrument.read_register(6) == 0
             with pytest.raises(minimalmodbus.IllegalRequestError):
                 instrument.read_register(40)
