@@ -111,6 +111,22 @@ SERVICE: dict[str, str] = {
 }
 # What came for benches that labs plug in, likewise.
 DEVICES: dict[str, str] = {
+    "drivers/poses.py": "trackers that date their frames themselves",
+    "drivers/openigtlink/": "trackers behind OpenIGTLink",
+    "drivers/optitrack/": "OptiTrack cameras",
+    "drivers/zaber/": "Zaber axes",
+    "drivers/laumas/": "load-cell transmitters",
+    "mock_devices/openigtlink/": "trackers behind OpenIGTLink",
+    "mock_devices/optitrack/": "OptiTrack cameras",
+    "mock_devices/zaber/": "Zaber axes",
+    "mock_devices/laumas/": "load-cell transmitters",
+    "mock_devices/faults/trackers.py": "faults that several products have alike",
+    "mock_devices/testing/played.py": "clients of other makers in the tests",
+    "mock_devices/testing/zaber.py": "Zaber axes",
+    "rig/config/products/openigtlink.py": "trackers behind OpenIGTLink",
+    "rig/config/products/optitrack_natnet.py": "OptiTrack cameras",
+    "rig/config/products/zaber_ascii.py": "Zaber axes",
+    "rig/config/products/laumas_tlb.py": "load-cell transmitters",
     "drivers/threaded_source.py": "SDKs that block or call back",
     "drivers/udp_port.py": "devices on UDP",
     "drivers/testing/": "the conformance kit of drivers",

@@ -21,7 +21,7 @@ LONGEST = AROUND + 2 * MOST_REGISTERS
 _WEIGHTS = struct.Struct(">Hii")
 
 
-class Weights(NamedTuple):
+class ScaleWeights(NamedTuple):
     """The status word, and the weights in counts of the smallest digit."""
 
     status: int
@@ -42,9 +42,9 @@ def encode_read(slave: int, address: int, count: int) -> bytes:
     return request + crc16_modbus(request).to_bytes(2, "little")
 
 
-def decode_weights(registers: tuple[int, ...]) -> Weights:
+def decode_weights(registers: tuple[int, ...]) -> ScaleWeights:
     """Status, gross and net weight of the five registers from 40007 on."""
-    return Weights(*_WEIGHTS.unpack(struct.pack(f">{WEIGHTS_COUNT}H", *registers)))
+    return ScaleWeights(*_WEIGHTS.unpack(struct.pack(f">{WEIGHTS_COUNT}H", *registers)))
 
 
 class AnswerDecoder:

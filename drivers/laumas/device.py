@@ -134,7 +134,7 @@ class LaumasTransmitter:
             self._decoder.reset()
             port.write(codec.encode_read(self._config.slave, address, count))
             answers: list[codec.RegisterAnswer] = []
-            read_until(port, lambda data, seen=answers: self._hears(data, seen), ANSWER_S)
+            read_until(port, partial(self._hears, answers), ANSWER_S)
             if answers and (answers[0].exception or len(answers[0].registers) != count):
                 raise self._refused(answers[0], address)
             if answers:
@@ -144,7 +144,7 @@ class LaumasTransmitter:
             " force.port, force.baud, force.slave, and that the transmitter is set to Modbus RTU without parity"
         )
 
-    def _hears(self, data: bytes, seen: list[codec.RegisterAnswer]) -> bool:
+    def _hears(self, seen: list[codec.RegisterAnswer], data: bytes) -> bool:
         self._decoder.reset()
         seen[:] = self._decoder.feed(data)
         return bool(seen)

@@ -26,7 +26,7 @@ LAYOUTS = (3, 4)
 NAMES_TOLD = 8
 
 
-class Datagrams(Protocol):
+class DatagramLink(Protocol):
     """A link that carries whole datagrams."""
 
     def fileno(self) -> int:
@@ -46,12 +46,12 @@ class OptiTrackTracker:
     """A marker tracker (role ``drivers.roles.MarkerTracker``); nothing is opened before ``start``."""
 
     def __init__(
-        self, open_link: Callable[[], Datagrams], config: NatNetWiring, now: Callable[[], int] = time.monotonic_ns
+        self, open_link: Callable[[], DatagramLink], config: NatNetWiring, now: Callable[[], int] = time.monotonic_ns
     ) -> None:
         self.counters = LinkCounters()
         self._open_link, self._config, self._now = open_link, config, now
         self._frames = PoseFrames(config, self.counters)
-        self._link: Datagrams | None = None
+        self._link: DatagramLink | None = None
         self._server = packets.ServerInfo("", "", (0, 0), 0)
         self._bodies: dict[str, int] = {}
         self._newest: MotiveFrame | None = None
@@ -131,7 +131,7 @@ class OptiTrackTracker:
             self._link.close()
         self._link = None
 
-    def _started(self) -> Datagrams:
+    def _started(self) -> DatagramLink:
         if self._link is None:
             raise DeviceError(f"tracker on {self._config.port}: not started; call start first")
         return self._link

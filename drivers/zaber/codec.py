@@ -18,7 +18,7 @@ _REPLY = re.compile(rb"([@!])(\d\d) (\d)(?: (\d\d))?(?: (OK|RJ))? (BUSY|IDLE) (-
 _NOTE = re.compile(rb"#(\d\d) (\d)(?: (\d\d))? ([^:\r\n]*)", re.ASCII)
 
 
-class Reply(NamedTuple):
+class ZaberReply(NamedTuple):
     """What a device said; ``number`` is that of the command, None where it has none."""
 
     kind: Literal["@", "!", "#"]
@@ -42,7 +42,7 @@ def encode_command(device: int, axis: int, number: int, command: str) -> bytes:
     return text + b":" + checksum(text) + b"\n"
 
 
-def encode_reply(reply: Reply, with_checksum: bool = True) -> bytes:
+def encode_reply(reply: ZaberReply, with_checksum: bool = True) -> bytes:
     """One line of a device."""
     number = "" if reply.number is None else f" {reply.number:02d}"
     head = f"{reply.kind}{reply.device:02d} {reply.axis}{number}"
@@ -68,7 +68,7 @@ class LineDecoder:
         """Bytes kept for the next call."""
         return len(self._rest)
 
-    def feed(self, data: bytes) -> list[Reply]:
+    def feed(self, data: bytes) -> list[ZaberReply]:
         """Good lines completed by ``data``, oldest first."""
         *lines, rest = (self._rest + data).replace(b"\r", b"\n").split(b"\n")
         if len(rest) > LONGEST:
@@ -77,7 +77,7 @@ class LineDecoder:
         self._rest = rest
         return [reply for line in lines if line and (reply := self._decoded(line)) is not None]
 
-    def _decoded(self, line: bytes) -> Reply | None:
+    def _decoded(self, line: bytes) -> ZaberReply | None:
         text, mark, digits = line.partition(b":")
         bad_sum = digits != checksum(text) if mark else self.demanding
         reply = None if bad_sum else _parsed(text)
@@ -89,11 +89,11 @@ class LineDecoder:
         return reply
 
 
-def _parsed(text: bytes) -> Reply | None:
+def _parsed(text: bytes) -> ZaberReply | None:
     note = _NOTE.fullmatch(text)
     if note:
         device, axis, number, data = (part.decode() if part else "" for part in note.groups())
-        return Reply("#", int(device), int(axis), int(number) if number else None, True, False, "--", data)
+        return ZaberReply("#", int(device), int(axis), int(number) if number else None, True, False, "--", data)
     match = _REPLY.fullmatch(text)
     if not match:
         return None
@@ -102,7 +102,7 @@ def _parsed(text: bytes) -> Reply | None:
         return None
     known: Literal["@", "!"] = "@" if kind == "@" else "!"
     count = int(number) if number else None
-    return Reply(known, int(device), int(axis), count, verdict != "RJ", state == "BUSY", flag, data)
+    return ZaberReply(known, int(device), int(axis), count, verdict != "RJ", state == "BUSY", flag, data)
 
 
 class Scale(NamedTuple):

@@ -15,8 +15,8 @@ from drivers.epos4.walker import never
 from drivers.ports import Port, open_port
 from drivers.roles import Identity, LinkCounters
 from drivers.zaber import flags, setup
-from drivers.zaber.codec import Reply, Scale
-from drivers.zaber.dialogue import Dialogue
+from drivers.zaber.codec import Scale, ZaberReply
+from drivers.zaber.dialogue import AsciiDialogue
 from drivers.zaber.following import BoundedMove, Follower
 from drivers.zaber.samples import PositionSamples
 from rig.channels import AxisSample
@@ -56,7 +56,7 @@ class ZaberAxis:
         self._follower = Follower(self._period_ns * 1e-9, config.lag_ms * 1e-3, *span, limits.speed_mm_s)
         self._samples = PositionSamples(self._scale)
         self._identity = Identity("", "", "")
-        self._dialogue: Dialogue | None = None
+        self._dialogue: AsciiDialogue | None = None
         self._following = self._stopping = self._referenced = False
         self._flag, self._refused, self._busy = flags.NONE, "", False
         self._moved, self._due_ns, self._heard_ns, self._unanswered_ns = -1, 0, 0, 0
@@ -107,7 +107,9 @@ class ZaberAxis:
         """Identifies the axis, stops it, and writes the limits that it keeps by itself."""
         self.close()
         config, port = self._config, self._open_port()
-        dialogue = Dialogue(port, config.device, config.axis_number, self._name, self.counters, self._now, self._sleep)
+        dialogue = AsciiDialogue(
+            port, config.device, config.axis_number, self._name, self.counters, self._now, self._sleep
+        )
         self._dialogue = dialogue
         try:
             self._identity = setup.identify(dialogue, config)
@@ -215,7 +217,7 @@ class ZaberAxis:
                 dialogue.ask("stop", tries=1)
             dialogue.port.close()
 
-    def _started(self) -> Dialogue:
+    def _started(self) -> AsciiDialogue:
         if self._dialogue is None:
             raise DeviceError(f"{self._name}: is not started or was closed; start it first")
         return self._dialogue
@@ -241,14 +243,14 @@ class ZaberAxis:
     def _character_ns(self) -> int:
         return BITS * 1_000_000_000 // self._config.baud
 
-    def _take(self, reply: Reply, now_ns: int) -> AxisSample | None:
+    def _take(self, reply: ZaberReply, now_ns: int) -> AxisSample | None:
         self._heard_ns, self._unanswered_ns = now_ns, 0
         self._note(reply)
         if reply.number == self._moved and not reply.accepted and self._following:
             self._refused = f"it refused a set-point: {flags.reason(reply.data)}"
         return self._samples.take(reply, now_ns, self._status, not flags.is_fault(self._flag))
 
-    def _note(self, reply: Reply) -> None:
+    def _note(self, reply: ZaberReply) -> None:
         self._flag, self._busy = reply.flag, reply.busy
         if reply.flag in flags.WITHOUT_REFERENCE:
             self._referenced = False
@@ -265,20 +267,20 @@ class ZaberAxis:
         referenced = Statusword.REFERENCED if self._referenced else 0
         return int(STATE_WORDS[state] | referenced | (0 if self._busy else Statusword.TARGET_REACHED))
 
-    def _look(self, dialogue: Dialogue) -> None:
+    def _look(self, dialogue: AsciiDialogue) -> None:
         """Takes down the flags that are up now."""
         up = dialogue.flags()
         self._referenced = not set(up) & set(flags.WITHOUT_REFERENCE)
         self._flag = next((flag for flag in up if flags.is_fault(flag)), flags.NONE)
 
-    def _place_mm(self, dialogue: Dialogue) -> float:
+    def _place_mm(self, dialogue: AsciiDialogue) -> float:
         return self._scale.mm(float(dialogue.value(self._config.position)))
 
-    def _halt(self, dialogue: Dialogue) -> None:
+    def _halt(self, dialogue: AsciiDialogue) -> None:
         dialogue.ask("stop")
         dialogue.wait_idle(REACTION_S + self._limits.speed_mm_s / self._config.acceleration_mm_s2, "a stop", never)
 
-    def _go(self, dialogue: Dialogue, target_mm: float, speed_mm_s: float) -> None:
+    def _go(self, dialogue: AsciiDialogue, target_mm: float, speed_mm_s: float) -> None:
         """Leg by leg, each ``LEG_S`` long and begun before the last one ends."""
         place_mm = self._place_mm(dialogue)
         travel_s = abs(target_mm - place_mm) / speed_mm_s + 2 * speed_mm_s / self._config.acceleration_mm_s2
@@ -311,7 +313,7 @@ class ZaberAxis:
         return min(max(position_mm, low_mm), high_mm)
 
     @contextlib.contextmanager
-    def _moving(self, dialogue: Dialogue) -> Iterator[None]:
+    def _moving(self, dialogue: AsciiDialogue) -> Iterator[None]:
         """With torque; whatever goes wrong here stops the axis."""
         self._following = self._stopping = False
         self._refused = ""

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from drivers.ports import Port, read_until
 from drivers.roles import LinkCounters
 from drivers.zaber import flags
-from drivers.zaber.codec import NUMBERS, LineDecoder, Reply, encode_command
+from drivers.zaber.codec import NUMBERS, LineDecoder, ZaberReply, encode_command
 from rig.errors import DeviceError, SafetyStop
 
 REPLY_S = 0.3  # a device answers within some milliseconds; USB adapters hold bytes back for 16
@@ -13,7 +13,7 @@ TRIES = 3  # one damaged line is the cable's noise, three in a row are its state
 POLL_S = 0.005
 
 
-class Dialogue:
+class AsciiDialogue:
     """A device's axis behind ``port``; ``name`` is what messages call it."""
 
     def __init__(
@@ -36,11 +36,11 @@ class Dialogue:
         self._number = (self._number + 1) % NUMBERS
         return self._number, encode_command(self._device, self._axis, self._number, command)
 
-    def heard(self, data: bytes) -> list[Reply]:
+    def heard(self, data: bytes) -> list[ZaberReply]:
         """Replies of this device among what came."""
         return [reply for reply in self.decoder.feed(data) if reply.device == self._device and reply.kind == "@"]
 
-    def ask(self, command: str, tries: int = TRIES) -> Reply:
+    def ask(self, command: str, tries: int = TRIES) -> ZaberReply:
         """The reply; a command without one is said again, which none of those here minds. Raises DeviceError."""
         for _ in range(tries):
             number, text = self.sent(command)
@@ -61,7 +61,7 @@ class Dialogue:
         """All flags that are up, `01 WR` for one."""
         return tuple(self.ask("warnings").data.split()[1:])
 
-    def wait_idle(self, seconds: float, what: str, interrupted: Callable[[], bool]) -> Reply:
+    def wait_idle(self, seconds: float, what: str, interrupted: Callable[[], bool]) -> ZaberReply:
         """Polls until it stands; raises SafetyStop where it is interrupted, DeviceError where it does not stand."""
         deadline_ns = self._now() + round(seconds * 1e9)
         while (reply := self.ask("")).busy:
@@ -72,7 +72,7 @@ class Dialogue:
             self._sleep(POLL_S)
         return reply
 
-    def _answer(self, number: int) -> Reply | None:
+    def _answer(self, number: int) -> ZaberReply | None:
         """None where none comes, or a damaged one."""
         deadline_ns, damaged = self._now() + round(REPLY_S * 1e9), self._counters.checksum_errors
         while (left_s := (deadline_ns - self._now()) * 1e-9) > 0 and self._counters.checksum_errors == damaged:
@@ -82,7 +82,7 @@ class Dialogue:
                     return reply
         return None
 
-    def _accepted(self, command: str, reply: Reply) -> Reply:
+    def _accepted(self, command: str, reply: ZaberReply) -> ZaberReply:
         if not reply.accepted:
             raise DeviceError(f"{self.name}: refused {command!r}: {flags.reason(reply.data)}")
         return reply

@@ -24,7 +24,7 @@ class BoundedMove(NamedTuple):
     speed_mm_s: float
 
 
-class Place(NamedTuple):
+class AxisPlace(NamedTuple):
     """Where the axis was, and when."""
 
     taken_s: float
@@ -48,7 +48,7 @@ class Follower:
         """Whatever set-point comes next stands still, and always stood there."""
         self._past.clear()
 
-    def move(self, setpoint_mm: float, now_s: float, place: Place) -> BoundedMove:
+    def move(self, setpoint_mm: float, now_s: float, place: AxisPlace) -> BoundedMove:
         """The move for a set-point at ``now_s``."""
         velocity_mm_s = self._velocity(setpoint_mm, now_s)
         self._past.append((now_s, setpoint_mm))

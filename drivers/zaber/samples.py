@@ -2,8 +2,8 @@
 
 from collections import deque
 
-from drivers.zaber.codec import Reply, Scale
-from drivers.zaber.following import Place
+from drivers.zaber.codec import Scale, ZaberReply
+from drivers.zaber.following import AxisPlace
 from rig.channels import AxisSample
 
 LOST_NS = 250_000_000  # a later reply could be that of the next command with the same number
@@ -26,18 +26,18 @@ class PositionSamples:
         return len(self._open)
 
     @property
-    def place(self) -> Place | None:
+    def place(self) -> AxisPlace | None:
         """Where the axis was last, and how fast; None before the first reply."""
         if not self._past:
             return None
         taken_ns, position_mm = self._past[-1]
-        return Place(taken_ns * 1e-9, position_mm, self._velocity_mm_s())
+        return AxisPlace(taken_ns * 1e-9, position_mm, self._velocity_mm_s())
 
     def asked(self, number: int, heard_ns: int) -> None:
         """Command ``number`` reaches the device at ``heard_ns``."""
         self._open[number] = heard_ns
 
-    def take(self, reply: Reply, now_ns: int, status: int, valid: bool) -> AxisSample | None:
+    def take(self, reply: ZaberReply, now_ns: int, status: int, valid: bool) -> AxisSample | None:
         """The sample that ``reply`` completes; None where it is no position that was asked for."""
         heard_ns = self._open.get(reply.number) if reply.number is not None else None
         if heard_ns is not None and reply.number is not None:

@@ -1,6 +1,6 @@
 """Who the axis is, and the limits that the device itself keeps; a setting is written only where it differs.
 
-Settings outlive the power, and the memory behind them wears: hence the look before each write.
+ZaberSettings outlive the power, and the memory behind them wears: hence the look before each write.
 """
 
 import statistics
@@ -8,7 +8,7 @@ import time
 
 from drivers.roles import Identity
 from drivers.zaber.codec import Scale
-from drivers.zaber.dialogue import Dialogue
+from drivers.zaber.dialogue import AsciiDialogue
 from rig.config.products.zaber_ascii import ZaberWiring
 from rig.config.wiring import Limits
 from rig.errors import DeviceError
@@ -17,7 +17,7 @@ FIRMWARE_MIN = 7.0  # from it on a move has a speed of its own
 ROUND_TRIPS = 9
 
 
-def identify(dialogue: Dialogue, config: ZaberWiring) -> Identity:
+def identify(dialogue: AsciiDialogue, config: ZaberWiring) -> Identity:
     """Raises DeviceError where the firmware is too old, or the line too slow for ``axis.rate_Hz``."""
     version = dialogue.value("version")
     try:
@@ -39,7 +39,7 @@ def identify(dialogue: Dialogue, config: ZaberWiring) -> Identity:
     return Identity(config.product, dialogue.value("system.serial"), version, settings)
 
 
-def _round_trip_s(dialogue: Dialogue) -> float:
+def _round_trip_s(dialogue: AsciiDialogue) -> float:
     taken_s = []
     for _ in range(ROUND_TRIPS):
         begin_s = time.perf_counter()
@@ -48,7 +48,7 @@ def _round_trip_s(dialogue: Dialogue) -> float:
     return statistics.median(taken_s)
 
 
-def configure(dialogue: Dialogue, config: ZaberWiring, limits: Limits) -> None:
+def configure(dialogue: AsciiDialogue, config: ZaberWiring, limits: Limits) -> None:
     """Checksums on, then the limits; each is read back."""
     _set(dialogue, "comm.checksum", 1)
     dialogue.decoder.demanding = True
@@ -65,7 +65,7 @@ def configure(dialogue: Dialogue, config: ZaberWiring, limits: Limits) -> None:
         _set(dialogue, setting, value)
 
 
-def _set(dialogue: Dialogue, setting: str, value: int) -> None:
+def _set(dialogue: AsciiDialogue, setting: str, value: int) -> None:
     if dialogue.value(setting) == str(value):
         return
     dialogue.ask(f"set {setting} {value}")

@@ -6,12 +6,12 @@ open: a message for another device is passed over, and a move beyond the limits 
 
 from collections.abc import Callable
 
-from drivers.zaber.codec import Reply, encode_reply
+from drivers.zaber.codec import ZaberReply, encode_reply
 from mock_devices.interfaces import NEVER_NS, AxisPlant
 from mock_devices.wire import OnWire, Wire
 from mock_devices.zaber.commands import CommandLines, Refused, Request
 from mock_devices.zaber.motion import AxisMotion
-from mock_devices.zaber.settings import Settings
+from mock_devices.zaber.settings import ZaberSettings
 
 MS = 1_000_000
 
@@ -32,7 +32,7 @@ class ZaberMock(OnWire):
         self.serial_number = str(serial_number)
         self.silent = self.old = False
         self.corrupt_every = 0
-        self.settings = Settings(serial_number)
+        self.settings = ZaberSettings(serial_number)
         self.motion = AxisMotion(plant, self.settings, abs(microsteps_per_mm))
         self._lines = CommandLines()
         self._frozen_at: int | None = None
@@ -86,7 +86,7 @@ class ZaberMock(OnWire):
                     self._ticked_ns = now_ns
                 self._send(reply)
 
-    def _answer(self, request: Request) -> Reply:
+    def _answer(self, request: Request) -> ZaberReply:
         try:
             if request.axis > 1:
                 raise Refused("BADAXIS")
@@ -97,12 +97,12 @@ class ZaberMock(OnWire):
         except Refused as refusal:
             return self._reply(request, refusal.word, accepted=False)
 
-    def _reply(self, request: Request, data: str, accepted: bool = True) -> Reply:
+    def _reply(self, request: Request, data: str, accepted: bool = True) -> ZaberReply:
         motion = self.motion
         device = self.settings.device
-        return Reply("@", device, request.axis, request.number, accepted, motion.busy, motion.flag, data)
+        return ZaberReply("@", device, request.axis, request.number, accepted, motion.busy, motion.flag, data)
 
-    def _send(self, reply: Reply) -> None:
+    def _send(self, reply: ZaberReply) -> None:
         self._replies += 1
         raw = encode_reply(reply, bool(self.settings.values["comm.checksum"]))
         if self.corrupt_every and self._replies % self.corrupt_every == 0:

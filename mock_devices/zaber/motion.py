@@ -11,7 +11,7 @@ from drivers.zaber.flags import NONE, is_fault
 from mock_devices.epos4.motion import HomingSetup, Inputs, TrapezoidalProfile, homing
 from mock_devices.interfaces import AxisPlant
 from mock_devices.zaber.commands import Refused
-from mock_devices.zaber.settings import Settings
+from mock_devices.zaber.settings import ZaberSettings
 
 LIMIT_SWITCH = 17  # of CiA 402-2: onto the negative switch, then slowly off it, which is how these axes home
 SLOW_SHARE = 0.1
@@ -22,7 +22,7 @@ ORDER = "FWN"  # flags rank by their first letter
 class AxisMotion:
     """Leads ``plant``, which it takes hold of with its first move: before, another device may have it."""
 
-    def __init__(self, plant: AxisPlant, settings: Settings, per_mm: float) -> None:
+    def __init__(self, plant: AxisPlant, settings: ZaberSettings, per_mm: float) -> None:
         self._plant, self._values, self._per_mm = plant, settings.values, per_mm
         self._up: set[str] = {"WR"}
         self._powered = True

@@ -29,7 +29,7 @@ READABLE = {
 NOT_NEGATIVE = ("comm.checksum", "comm.alert", "limit.approach.maxspeed", "maxspeed", "accel")
 
 
-class Settings:
+class ZaberSettings:
     """``values`` holds those that can be written; they outlive a restart."""
 
     def __init__(self, serial_number: int) -> None:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.laumas.codec import LONGEST, AnswerDecoder, RegisterAnswer, Weights, decode_weights, encode_read
+from drivers.laumas.codec import LONGEST, AnswerDecoder, RegisterAnswer, ScaleWeights, decode_weights, encode_read
 from drivers.roles import LinkCounters
 
 # The Modbus specification's own example, slave 1: registers 107 to 109 hold 555, 0, 100 (checksum by `pymodbus`).
@@ -33,7 +33,7 @@ def test_answers_are_read_in_pieces_of_any_size(size: int) -> None:
 
 
 def test_weights_are_32_bits_high_word_first_and_signed() -> None:
-    assert decode_weights((0x8001, 0xFFFF, 0xFC18, 0x0001, 0x0000)) == Weights(0x8001, -1000, 65_536)
+    assert decode_weights((0x8001, 0xFFFF, 0xFC18, 0x0001, 0x0000)) == ScaleWeights(0x8001, -1000, 65_536)
 
 
 def test_a_damaged_answer_is_counted_and_the_next_one_read() -> None:

@@ -155,7 +155,7 @@ def test_a_pose_turns_into_its_matrix_and_back_whichever_component_is_largest() 
     for turn in ((1.0, 0, 0, 0), (0.1, 0.7, 0.5, 0.5), (0, 0.1, 0.99, 0), (-0.5, 0.5, -0.5, 0.5), (0.1, 0, 0, -0.99)):
         length = sum(part * part for part in turn) ** 0.5
         unit = [part / length for part in turn]
-        pose = ToolPose(1, 2, 3, *unit, 0.0)
+        pose = ToolPose(1, 2, 3, unit[0], unit[1], unit[2], unit[3], 0.0)
         back = tools_in(TimedMessage("TRANSFORM", "tip", 0, 1, codec.encode_transform(pose)))["tip"]
         assert back is not None
         same = sum(a * b for a, b in zip(back[3:7], unit, strict=True))

@@ -35,8 +35,8 @@ class Session:
         return [(sample.frame, sample.tool, sample.valid) for sample in self.tracker.poll(self.clock())]
 
 
-def started(**settings: object) -> Session:
-    session = Session(**settings)
+def started(waiting: bytes = transform("tip", 0) + transform("arm", 0), **settings: object) -> Session:
+    session = Session(waiting, **settings)
     session.tracker.start()
     assert session.frame() == [(1, 0, 1), (1, 1, 1)]
     return session

@@ -66,7 +66,8 @@ def test_bodies_and_markers_are_tools() -> None:
     assert [(sample.tool, sample.valid, round(sample.x_mm, 3)) for sample in samples] == [
         (tool, 1, 1.0) for tool in (0, 1, 2)
     ]
-    assert (samples[0].q0, samples[2].y_mm) == (1.0, pytest.approx(32.0))
+    assert samples[0].q0 == 1.0
+    assert samples[2].y_mm == pytest.approx(32.0)
 
 
 def test_a_body_that_is_not_tracked_is_invalid_though_it_has_a_place() -> None:

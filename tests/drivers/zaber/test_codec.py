@@ -6,10 +6,10 @@ from hypothesis import strategies as st
 
 from drivers.roles import LinkCounters
 from drivers.zaber import flags
-from drivers.zaber.codec import LONGEST, LineDecoder, Reply, Scale, encode_command, encode_reply
+from drivers.zaber.codec import LONGEST, LineDecoder, Scale, ZaberReply, encode_command, encode_reply
 
 
-def fed(data: bytes, size: int = 1 << 16, demanding: bool = False) -> tuple[list[Reply], LinkCounters]:
+def fed(data: bytes, size: int = 1 << 16, demanding: bool = False) -> tuple[list[ZaberReply], LinkCounters]:
     counters = LinkCounters()
     decoder = LineDecoder(counters)
     decoder.demanding = demanding
@@ -37,16 +37,16 @@ def test_commands_are_those_of_the_makers_own_library(number: int, command: str,
 def test_a_reply_says_who_state_flag_and_data(size: int) -> None:
     wire = b"@01 1 07 OK BUSY WR 0\r\n@01 1 OK IDLE -- 123456\r\n@02 0 08 RJ IDLE FS BADDATA\n"
     assert fed(wire, size)[0] == [
-        Reply("@", 1, 1, 7, True, True, "WR", "0"),
-        Reply("@", 1, 1, None, True, False, "--", "123456"),
-        Reply("@", 2, 0, 8, False, False, "FS", "BADDATA"),
+        ZaberReply("@", 1, 1, 7, True, True, "WR", "0"),
+        ZaberReply("@", 1, 1, None, True, False, "--", "123456"),
+        ZaberReply("@", 2, 0, 8, False, False, "FS", "BADDATA"),
     ]
 
 
 def test_notes_and_alerts_are_told_apart_from_replies() -> None:
     assert fed(b"!01 1 IDLE --\r\n#01 1 07 further text\r\n")[0] == [
-        Reply("!", 1, 1, None, True, False, "--", ""),
-        Reply("#", 1, 1, 7, True, False, "--", "further text"),
+        ZaberReply("!", 1, 1, None, True, False, "--", ""),
+        ZaberReply("#", 1, 1, 7, True, False, "--", "further text"),
     ]
 
 
@@ -72,7 +72,7 @@ def test_what_is_no_reply_is_discarded(line: bytes) -> None:
 
 
 replies = st.builds(
-    Reply,
+    ZaberReply,
     st.just("@"),
     st.integers(0, 99),
     st.integers(0, 9),
@@ -85,7 +85,7 @@ replies = st.builds(
 
 
 @given(st.lists(replies, max_size=5), st.integers(1, 30))
-def test_what_was_packed_is_read_in_any_pieces(sent: list[Reply], size: int) -> None:
+def test_what_was_packed_is_read_in_any_pieces(sent: list[ZaberReply], size: int) -> None:
     assert fed(b"".join(map(encode_reply, sent)), size, demanding=True)[0] == sent
 
 
@@ -102,7 +102,8 @@ def test_units_are_those_of_the_manual() -> None:
     scale = Scale(1000 / 0.047625, 1)
     assert scale.speed(26.0) == 894_455
     assert scale.acceleration(1000.0) == 3440  # 20,997,375 microsteps/s2 x 1.6384 / 10,000
-    assert (scale.steps(1.0), scale.mm(20_997)) == (20_997, pytest.approx(1.0, abs=1e-4))
+    assert scale.steps(1.0) == 20_997
+    assert scale.mm(20_997) == pytest.approx(1.0, abs=1e-4)
     assert Scale(100.0, -1).steps(2.5) == -250 and Scale(100.0, -1).mm(-250) == 2.5
 
 
