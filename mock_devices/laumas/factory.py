@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 
-from mock_devices.devices import DeviceFactory, MockDevice, number_of, served
+from mock_devices.devices import DeviceFactory
 from mock_devices.faults.sensing import SENSOR_FAULTS
 from mock_devices.faults.trackers import spoiling
 from mock_devices.faults.wires import FaultKind, faults_of, switching
 from mock_devices.laumas.mock import LaumasMock
 from mock_devices.parameters import Parameters
+from mock_devices.played import MockDevice, number_of, served
 
 NUMBER = 4711
 MOST_NUMBERS = 60_000  # its register has 16 bits

@@ -3,11 +3,12 @@
 import time
 from collections.abc import Mapping
 
-from mock_devices.devices import TOOLS, DeviceFactory, MockDevice, served
+from mock_devices.devices import TOOLS, DeviceFactory
 from mock_devices.faults.sensing import CAMERA_FAULTS
 from mock_devices.faults.trackers import hiding, spoiling
 from mock_devices.faults.wires import FaultKind, faults_of, switching
 from mock_devices.openigtlink.mock import OpenIgtLinkMock
+from mock_devices.played import MockDevice, served
 from mock_devices.wire import TcpWire
 
 FAULTS: Mapping[str, FaultKind[OpenIgtLinkMock]] = {

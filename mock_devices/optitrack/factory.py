@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 
-from mock_devices.devices import TOOLS, DeviceFactory, MockDevice, served
+from mock_devices.devices import TOOLS, DeviceFactory
 from mock_devices.faults.sensing import CAMERA_FAULTS
 from mock_devices.faults.trackers import hiding, spoiling
 from mock_devices.faults.wires import FaultKind, faults_of, switching
 from mock_devices.optitrack.mock import OptiTrackMock
+from mock_devices.played import MockDevice, served
 from mock_devices.udp_wire import UdpWire
 
 FAULTS: Mapping[str, FaultKind[OptiTrackMock]] = {

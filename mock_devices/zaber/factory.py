@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 
 from drivers.zaber.flags import FLAGS
-from mock_devices.devices import AXIS_NUMBER, DeviceFactory, MockDevice, number_of, served
+from mock_devices.devices import AXIS_NUMBER, DeviceFactory
 from mock_devices.faults.trackers import spoiling
 from mock_devices.faults.wires import FaultKind, Value, as_switch, switching
 from mock_devices.parameters import Axis
+from mock_devices.played import MockDevice, number_of, served
 from mock_devices.zaber.mock import ZaberMock
 from rig.errors import UsageError
 
