@@ -63,7 +63,8 @@ class MockServer:
         self._mocks = [device.mock for device in devices]
         self._timed: list[Timed] = [*self._mocks, *(device.wire for device in devices)]
         self._devices = devices
-        self._axis = next(device for device in devices if device.role in AXIS_ROLES)
+        self._axes = [device for device in devices if device.role in AXIS_ROLES]
+        self._axis = self._axes[0]
         self._clock_ns = clock_ns
         drives = [mock for mock in self._mocks if isinstance(mock, Epos4Mock)]
         synced_ns = drives[0].synced_ns if drives else None
@@ -95,6 +96,8 @@ class MockServer:
 
     def turn(self, ready: Sequence[int]) -> None:
         """Brings time up to now and hears what came on the descriptors ``ready``."""
+        axes = (device for device in self._axes if not set(device.wire.filenos()).isdisjoint(ready))
+        self._axis = next(axes, self._axis)
         # Read before the clock: what comes while this process is held up after that belongs to the next turn.
         told = b"" if set(self._axis.wire.filenos()).isdisjoint(ready) else self._axis.wire.read()
         now_ns = self._clock_ns()

@@ -6,7 +6,8 @@ import math
 import numpy as np
 from pydantic import ValidationError
 
-from rig.config.products.registry import FORCE_SENSORS, TRACKERS, read
+from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS, read
+from rig.config.products.roles import ForceProduct
 from rig.config.wiring import Loop
 from rig.errors import DataError
 from rig.recording.converter import at_the_end_of_range, run_lengths
@@ -31,7 +32,7 @@ def nominal_Hz(recording: Recording) -> dict[str, float]:
     try:
         rates = {
             "force": read(FORCE_SENSORS, wiring["force"]).sampled_Hz,
-            "axis": Loop.model_validate_json(wiring["loop"]).rate_Hz,
+            "axis": min(Loop.model_validate_json(wiring["loop"]).rate_Hz, read(AXES, wiring["axis"]).reports_Hz),
         }
         tracker = wiring.get("tracker", "null")
         return rates | ({} if tracker == "null" else {"marker": read(TRACKERS, tracker).rate_Hz})
@@ -121,7 +122,16 @@ def frozen_samples(recording: Recording) -> float:
 def dead_channels(recording: Recording) -> tuple[str, ...]:
     """Channels of force and torque whose reading never changes."""
     force = recording.tables["force"]
-    return tuple(name for name in CHANNELS if len(force) > 1 and np.ptp(force[name]) == 0)
+    measured = [name for name in CHANNELS if name.partition("_")[0] in _channels(recording)]
+    return tuple(name for name in measured if len(force) > 1 and np.ptp(force[name]) == 0)
+
+
+def _channels(recording: Recording) -> tuple[str, ...]:
+    """Those that its sensor has; all where the product is not known."""
+    try:
+        return read(FORCE_SENSORS, recording.metadata["wiring"]["force"]).channels
+    except (KeyError, ValidationError):
+        return ForceProduct.channels
 
 
 def tracker_lost(recording: Recording, nominal_Hz: float) -> float:

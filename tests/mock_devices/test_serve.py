@@ -32,6 +32,7 @@ from mock_devices.testing.force import collect
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
+from rig.config.products.registry import ROLES
 from rig.config.wiring import Limits
 
 COMMAND = [sys.executable, "-m", "mock_devices.serve", "--tracker-tcp-port", "0"]
@@ -88,8 +89,9 @@ def configured(port: Port) -> bool:
 @pytest.mark.xdist_group("wire")
 def test_one_line_tells_where_everything_is_and_every_product_answers_there() -> None:
     with started("--hide", "friction.level_N=0.2") as (process, endpoints):
-        devices = {"force", "force_modbus", "axis", "axis_cia402", "tracker"}
-        assert set(endpoints) == devices | {"control", "pid", "serials", "latency_ms"}
+        served = {product.mock.role for products in ROLES.values() for product in products.values() if product.mock}
+        assert {"force", "force_modbus", "axis", "tracker"} <= served
+        assert set(endpoints) == served | {"control", "pid", "serials", "latency_ms"}
         assert endpoints["pid"] == process.pid
         assert "friction" not in json.dumps(endpoints)
         with opened(endpoints["force"]["serial"]) as port:

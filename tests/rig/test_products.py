@@ -4,6 +4,9 @@ from pkgutil import resolve_name
 
 import pytest
 
+from mock_devices.bench import Bench
+from mock_devices.devices import DeviceFactory
+from mock_devices.parameters import Parameters
 from mock_devices.played import CHOICES
 from rig.config.endpoints import Endpoints
 from rig.config.products.registry import AXES, FORCE_SENSORS, ROLES, TRACKERS, choice_of, name_of, read
@@ -35,7 +38,12 @@ def test_each_has_a_driver_and_says_where_to_look(role: str, product: type[Produ
 
 @each_product
 def test_each_mock_is_made_by_the_workshop(role: str, product: type[Product]) -> None:
-    assert product.mock and callable(resolve_name(product.mock.maker))
+    assert product.mock
+    factory = DeviceFactory(Bench(Parameters()), 0, lambda: 0, seed=0)
+    made = resolve_name(product.mock.maker)(factory)
+    assert any(device.role == product.mock.role and product.mock.kind in device.mock.endpoints() for device in made)
+    for device in made:
+        device.mock.close()
     printed = {
         "control": "",
         "pid": 1,
@@ -59,7 +67,7 @@ def test_an_unknown_product_is_answered_with_the_nearest_and_all() -> None:
         wiring("force.product=robotik-ft300")
     assert str(refusal.value) == (
         "rig.toml: force.product: unknown product 'robotik-ft300'; nearest: robotiq-ft300;"
-        " all: bota-sensone, robotiq-ft300"
+        " all: bota-sensone, robotiq-ft300, laumas-tlb"
     )
 
 

@@ -12,11 +12,15 @@ from pydantic import Discriminator, Tag, TypeAdapter
 
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.cia402 import Cia402Wiring
+from rig.config.products.laumas_tlb import LaumasWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
+from rig.config.products.openigtlink import OpenIgtLinkWiring
+from rig.config.products.optitrack_natnet import NatNetWiring
 from rig.config.products.robotiq_ft300 import Ft300Wiring
 from rig.config.products.roles import AxisProduct, ForceProduct, Product, TrackerProduct
 from rig.config.products.usable import refusal_of
+from rig.config.products.zaber_ascii import ZaberWiring
 from rig.registry import Registry
 
 AnyProduct = TypeVar("AnyProduct", bound=Product)
@@ -33,10 +37,14 @@ def products_of(role: str, what: str, kind: type[AnyProduct], own: Iterable[type
 
 
 FORCE_SENSORS: Registry[type[ForceProduct]] = products_of(
-    "force", "force sensor", ForceProduct, (BotaWiring, Ft300Wiring)
+    "force", "force sensor", ForceProduct, (BotaWiring, Ft300Wiring, LaumasWiring)
 )
-AXES: Registry[type[AxisProduct]] = products_of("axis", "servo axis", AxisProduct, (Epos4Wiring, Cia402Wiring))
-TRACKERS: Registry[type[TrackerProduct]] = products_of("tracker", "marker tracker", TrackerProduct, (PolarisWiring,))
+AXES: Registry[type[AxisProduct]] = products_of(
+    "axis", "servo axis", AxisProduct, (Epos4Wiring, Cia402Wiring, ZaberWiring)
+)
+TRACKERS: Registry[type[TrackerProduct]] = products_of(
+    "tracker", "marker tracker", TrackerProduct, (PolarisWiring, NatNetWiring, OpenIgtLinkWiring)
+)
 ROLES: Mapping[str, Registry[Any]] = {"force": FORCE_SENSORS, "axis": AXES, "tracker": TRACKERS}
 
 

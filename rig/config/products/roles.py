@@ -4,6 +4,7 @@ A product is one class in one file: its table in `rig.toml`, and beside it what 
 and mock are named as ``module:object``, because they belong to packages that are not imported here.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
@@ -60,6 +61,8 @@ class ForceProduct(Product):
 
     range_N: ClassVar[float]
     range_N_m: ClassVar[float]
+    # What it measures of these; the others are 0 in its samples.
+    channels: ClassVar[tuple[str, ...]] = ("fx", "fy", "fz", "mx", "my", "mz")
     # A simulated device is one more process of a busy computer: without real-time priority it may come a few tenths of
     # a second late where a real one does not. An axis that stands still for 400 ms falls behind by 12 mm at 30 mm/s.
     patience: ClassVar[Mapping[str, Mapping[str, float]]] = {
@@ -110,6 +113,11 @@ class AxisProduct(Product):
         default=True, description="a brake or a self-locking screw: without power a limb cannot push it back"
     )
     delay_ms: float = Field(default=4.0, ge=0, description="from command to motion, sensor included")
+
+    @property
+    def reports_Hz(self) -> float:
+        """The most positions a second that it gives, however often it is asked."""
+        return math.inf
 
     @property
     def homes_outward(self) -> bool:

@@ -1,0 +1,1 @@
+"""Load-cell transmitters of the LAUMAS TLB and TLU family by Modbus RTU."""

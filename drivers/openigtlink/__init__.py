@@ -1,0 +1,1 @@
+"""OpenIGTLink trackers: any program that sends TRANSFORM or TDATA messages over TCP."""

@@ -1,0 +1,1 @@
+"""OptiTrack cameras by NatNet 3 and 4, as Motive streams them over UDP."""
