@@ -25,7 +25,7 @@ SetOption = Annotated[
 
 ModelOption = Annotated[Path, typer.Option("--model", help="model.json as `rig fit` writes it.")]
 GainsOption = Annotated[str, typer.Option("--gains", help="tangent, secant, constant or admittance; else loop.gains.")]
-PLACE = "Session folder, one recording (.mcap), or files of any laboratory, with their mapping."
+PLACE = "Session folder, one recording (.mcap), or files of any laboratory, with their mapping; a path or s3://..."
 PlaceArgument = Annotated[Path, typer.Argument(help=PLACE)]
 MappingOption = Annotated[
     Path | None, typer.Option("--mapping", help="TOML file: what the files hold; else that beside them, or a proposal.")

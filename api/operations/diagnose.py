@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Literal
 
-from api.operations.opening import opened
+from api.operations.opening import at_hand, opened
 from controller.operation import Operation
 from rig.config.protocol import Indentation
 from rig.diagnosis.answers import Diagnosis
@@ -40,7 +40,8 @@ def diagnose(
     """
     if out is not None:
         refuse_unwritable(out / FILE)
-    found = _found(place, simulation, opening, reference, detectability, operation.step)
+    with at_hand(place, operation.step) as near:
+        found = _found(near, simulation, opening, reference, detectability, operation.step)
     result = DiagnosisResult.model_validate(found)
     if out is not None:
         _write(operation, found, result, out)

@@ -2,25 +2,42 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rig.errors import UsageError
 from rig.progress import Progress
+from rig.recording.remote import Store, address_of
 from rig.recording.sessions import Session
 from rig.trials.opening import AS_IT_IS, Opening, is_session, open_place
 
 
 @contextmanager
+def at_hand(place: Path, tell: Progress) -> Iterator[Path]:
+    """``place``, or a copy of what lies at its address in an object store, for the block."""
+    address = address_of(place)
+    if address is None:
+        yield place
+        return
+    with TemporaryDirectory(prefix="rig-") as scratch:
+        yield Store(address).fetch(Path(scratch), tell)
+
+
+@contextmanager
 def opened(place: Path, tell: Progress, opening: Opening = AS_IT_IS) -> Iterator[Session]:
     """The session, recording or foreign files in ``place`` as a session; what is made of files lasts for the block."""
-    with TemporaryDirectory(prefix="rig-") as scratch:
-        yield open_place(place, opening, Path(scratch), datetime.now().astimezone(), tell)
+    with at_hand(place, tell) as near, TemporaryDirectory(prefix="rig-") as scratch:
+        session = open_place(near, opening, Path(scratch), datetime.now().astimezone(), tell)
+        yield session if near is place else replace(session, origin=place)
 
 
 def results_in(place: Path, own: str, out: Path | None) -> Path:
     """``out``, else ``own`` in the session's folder; raises UsageError where the place is none to keep results in."""
+    address = address_of(place)
+    if out is None and address is not None:
+        raise UsageError(f"{address}: is read, never written to: give a place for the results with --out")
     if out is None and place.exists() and not is_session(place):
         raise UsageError(
             f"{place}: is no session, and results are not put beside others' files: give a place with --out"
