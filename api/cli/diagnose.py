@@ -5,15 +5,18 @@ from typing import Annotated, Literal
 
 import typer
 
+from api.cli.cohort import SchedulerOption, only_one, work_on_cohort
 from api.cli.computing import compute
-from api.cli.options import JsonOption, MappingOption, OnlyOption, PlaceArgument, YesOption
+from api.cli.options import JsonOption, MappingOption, OnlyOption, PlacesArgument, YesOption
 from api.cli.output import show, write_json
 from api.cli.records import mapping_for
 from api.operations import diagnose as work
+from api.operations.cohort.task import Wanted
 from api.operations.diagnose import Simulation
 from controller.operation import Operation
 from rig.config.protocol import Indentation
 from rig.config.table import load
+from rig.errors import UsageError
 from rig.results.diagnosis import FOLDER, DiagnosisResult
 from rig.results.diagnosis_tables import check_parts, diagnosis_parts
 from rig.tissue.model import load_model
@@ -21,7 +24,7 @@ from rig.trials.opening import AS_IT_IS, Opening, is_session
 
 
 def diagnose(
-    place: PlaceArgument,
+    places: PlacesArgument,
     simulation: Annotated[Simulation, typer.Option(help="Which simulation is judged.")] = "index",
     mapping: MappingOption = None,
     only: OnlyOption = "",
@@ -36,14 +39,22 @@ def diagnose(
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures and the extended model; else SESSION/diagnosis.")
     ] = None,
+    scheduler: SchedulerOption = "",
     json_file: JsonOption = None,
 ) -> None:
     """Says what the simulation gets wrong on a session, names the cause, extends the model and measures the gain.
 
-    Ends with 1 where nothing could be judged.
+    Ends with 1 where nothing could be judged. Of several sessions each is diagnosed by itself, in parallel.
 
     Example: rig diagnose sessions/first --json diagnosis.json
     """
+    place = only_one(places, scheduler)
+    if place is None:
+        if reference is not None:
+            raise UsageError("--reference is for one drive axis; leave it out, or diagnose that axis alone")
+        wanted = Wanted("diagnose", simulation=simulation, detectability=detectability, only=only)
+        work_on_cohort(places, out, wanted, scheduler, mapping, json_file)
+        return
     folder = place / FOLDER if out is None and is_session(place) else out
     opening = Opening(mapping_for(place, mapping, out or Path(place.stem), yes), only)
     result = diagnosed(place, simulation, folder, json_file, opening, reference, detectability)

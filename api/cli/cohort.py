@@ -1,0 +1,54 @@
+"""`rig fit`, `diagnose` and `report` of many sessions: each by itself, in parallel, and what they share."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from api.cli.computing import compute
+from api.cli.output import show, write_json
+from api.operations.cohort import cohort as work
+from api.operations.cohort.runners import on_cluster, on_cores
+from api.operations.cohort.task import Wanted
+from rig.errors import UsageError
+from rig.results.cohort import FILE
+from rig.results.cohort_tables import cohort_parts
+
+SchedulerOption = Annotated[
+    str,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers take the sessions; else this computer's cores.",
+    ),
+]
+CohortOption = Annotated[
+    bool, typer.Option("--cohort", help="Each session by itself, in parallel, then a summary over subjects.")
+]
+
+
+def work_on_cohort(
+    places: Sequence[Path],
+    out: Path | None,
+    wanted: Wanted,
+    scheduler: str,
+    mapping: Path | None,
+    json_file: Path | None,
+) -> None:
+    """Works on all, shows and writes what was found; raises CheckFailed where some have no result."""
+    if out is None:
+        raise UsageError(f"{len(places)} sessions have no one place for results: give a folder with --out")
+    runner = on_cluster(scheduler) if scheduler else on_cores
+    result = compute(
+        work.cohort_operation(wanted, places),
+        lambda operation: work.cohort(operation, places, out, wanted, runner, mapping),
+    )
+    show(*cohort_parts(result), f"{out / FILE} is written; each session's results are in its folder beside it")
+    write_json(json_file, result)
+    work.refuse_failed(result)
+
+
+def only_one(places: Sequence[Path], scheduler: str) -> Path | None:
+    """The one place of an ordinary command; None of a cohort."""
+    return places[0] if len(places) == 1 and not scheduler else None
