@@ -116,7 +116,16 @@ LAW = {
     "rig/config/axis_response.py": "the axis as it was identified",
 }
 # What came for speed, cohorts and more than one computer, likewise.
-SCALE: dict[str, str] = {}
+SCALE = {
+    "api/operations/cohort/": "many sessions at once, on cores and computers",
+    "api/cli/cohort.py": "many sessions at once, on cores and computers",
+    "api/http/cohorts/": "many sessions at once, on cores and computers",
+    "api/operations/at_hand.py": "recordings in an object store",
+    "rig/results/cohort.py": "many sessions at once, on cores and computers",
+    "rig/results/cohort_tables.py": "many sessions at once, on cores and computers",
+    "rig/tissue/mixed_effects.py": "what subjects share",
+    "rig/recording/remote.py": "recordings in an object store",
+}
 APART = {
     "source_lines_safety": SAFETY,
     "source_lines_data": DATA,

@@ -23,6 +23,7 @@ from rig.results.catalogue import (
     TrialList,
     WorkList,
 )
+from rig.results.cohort import CohortResult
 from rig.results.demo import DemoSummary
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
 from rig.results.fit import FitResult
@@ -42,6 +43,7 @@ WRITTEN: Mapping[str, type[Result]] = {
     "catalogue-sessions": SessionList,
     "catalogue-sites": SiteList,
     "catalogue-trials": TrialList,
+    "cohort": CohortResult,
     "compare": CompareResult,
     "demo": DemoSummary,
     "diagnosis": DiagnosisResult,

@@ -6,14 +6,8 @@ from typing import Annotated
 
 import typer
 
-from api.cli.computing import compute
-from api.cli.output import show, write_json
-from api.operations.cohort import cohort as work
-from api.operations.cohort.runners import on_cluster, on_cores
-from api.operations.cohort.task import Wanted
+from api.operations.cohort.wanted import Wanted
 from rig.errors import UsageError
-from rig.results.cohort import FILE
-from rig.results.cohort_tables import cohort_parts
 
 SchedulerOption = Annotated[
     str,
@@ -37,6 +31,14 @@ def work_on_cohort(
     json_file: Path | None,
 ) -> None:
     """Works on all, shows and writes what was found; raises CheckFailed where some have no result."""
+    # What a cohort needs takes a second to load, and the options above are told by every command's help.
+    from api.cli.computing import compute  # noqa: PLC0415
+    from api.cli.output import show, write_json  # noqa: PLC0415
+    from api.operations.cohort import cohort as work  # noqa: PLC0415
+    from api.operations.cohort.runners import on_cluster, on_cores  # noqa: PLC0415
+    from rig.results.cohort import FILE  # noqa: PLC0415
+    from rig.results.cohort_tables import cohort_parts  # noqa: PLC0415
+
     if out is None:
         raise UsageError(f"{len(places)} sessions have no one place for results: give a folder with --out")
     runner = on_cluster(scheduler) if scheduler else on_cores

@@ -11,7 +11,7 @@ from api.cli.options import JsonOption, MappingOption, OnlyOption, PlacesArgumen
 from api.cli.output import show, write_json
 from api.cli.records import mapping_for
 from api.operations import diagnose as work
-from api.operations.cohort.task import Wanted
+from api.operations.cohort.wanted import Wanted
 from api.operations.diagnose import Simulation
 from controller.operation import Operation
 from rig.config.protocol import Indentation

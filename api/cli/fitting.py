@@ -13,7 +13,7 @@ from api.cli.options import PLACE, JsonOption, MappingOption, OnlyOption, YesOpt
 from api.cli.output import show, write_json
 from api.cli.records import mapping_for
 from api.operations import fit as work
-from api.operations.cohort.task import Wanted
+from api.operations.cohort.wanted import Wanted
 from api.operations.fit import DEFAULT_LAWS, Lattice, Laws
 from rig.errors import UsageError
 from rig.results.fit import FILE, FitResult

@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Literal
 
-from api.operations.opening import at_hand, opened
+from api.operations.at_hand import at_hand
+from api.operations.opening import opened
 from controller.operation import Operation
 from rig.config.protocol import Indentation
 from rig.diagnosis.answers import Diagnosis

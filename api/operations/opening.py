@@ -7,22 +7,11 @@ from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from api.operations.at_hand import at_hand, refuse_store
 from rig.errors import UsageError
 from rig.progress import Progress
-from rig.recording.remote import Store, address_of
 from rig.recording.sessions import Session
 from rig.trials.opening import AS_IT_IS, Opening, is_session, open_place
-
-
-@contextmanager
-def at_hand(place: Path, tell: Progress) -> Iterator[Path]:
-    """``place``, or a copy of what lies at its address in an object store, for the block."""
-    address = address_of(place)
-    if address is None:
-        yield place
-        return
-    with TemporaryDirectory(prefix="rig-") as scratch:
-        yield Store(address).fetch(Path(scratch), tell)
 
 
 @contextmanager
@@ -35,9 +24,8 @@ def opened(place: Path, tell: Progress, opening: Opening = AS_IT_IS) -> Iterator
 
 def results_in(place: Path, own: str, out: Path | None) -> Path:
     """``out``, else ``own`` in the session's folder; raises UsageError where the place is none to keep results in."""
-    address = address_of(place)
-    if out is None and address is not None:
-        raise UsageError(f"{address}: is read, never written to: give a place for the results with --out")
+    if out is None:
+        refuse_store(place)
     if out is None and place.exists() and not is_session(place):
         raise UsageError(
             f"{place}: is no session, and results are not put beside others' files: give a place with --out"

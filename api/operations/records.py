@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 
-from api.operations.opening import at_hand, opened
+from api.operations.at_hand import at_hand
+from api.operations.opening import opened
 from controller.operation import Operation
 from rig.errors import CheckFailed, DataError
 from rig.intake.rows import FIELDS

@@ -1,18 +1,21 @@
 """The sessions of a cohort: those whose results are kept are taken from there, the rest is worked on in parallel."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
 from api.operations.cohort import kept
 from api.operations.cohort.runners import Runner, on_cores
-from api.operations.cohort.task import Files, Outcome, Task, Wanted
+from api.operations.cohort.task import Files, Task, TaskOutcome
+from api.operations.cohort.wanted import Wanted
 from controller.operation import Operation
 from rig.errors import CheckFailed, DataError, RigError, UsageError
 from rig.recording.files import make_folder, refuse_unwritable, whole_file
 from rig.recording.remote import address_of
+from rig.results import diagnosis, fit
 from rig.results.cohort import FILE, CohortResult, CohortSession, PopulationParameter
 from rig.results.diagnosis import DiagnosisResult
 from rig.results.fit import MODEL, FitResult
@@ -20,6 +23,7 @@ from rig.tissue.intervals import LEVEL
 from rig.tissue.mixed_effects import population
 from rig.tissue.model import load_model
 
+TOLD_BY = {"fit": fit.FILE, "diagnose": diagnosis.FILE}
 MOST_NAMED = 3  # of the sessions that failed, in a sentence: the table has them all
 
 
@@ -27,7 +31,7 @@ MOST_NAMED = 3  # of the sessions that failed, in a sentence: the table has them
 class _Found:
     """A session's outcome, and whether it was there already."""
 
-    outcome: Outcome
+    outcome: TaskOutcome
     state: Literal["done", "kept", "failed"]
 
 
@@ -89,15 +93,16 @@ def _parts(place: Path) -> tuple[str, ...]:
 
 def _written(operation: Operation, tasks: Sequence[Task], out: Path, runner: Runner) -> Iterator[_Found]:
     """Each session as soon as its results stand in its folder."""
-    for done, each in enumerate(_outcomes(operation, tasks, runner), start=1):
-        if each.outcome.files:
-            _write(each.outcome.files, out / each.outcome.task.name)
-        operation.step(f"{done} of {len(tasks)} sessions", done)
-        yield each
+    with closing(_outcomes(operation, tasks, runner)) as outcomes:
+        for done, each in enumerate(outcomes, start=1):
+            if each.outcome.files:
+                _write(each.outcome.files, out / each.outcome.task.name)
+            operation.step(f"{done} of {len(tasks)} sessions", done)
+            yield each
     kept.forget_oldest()
 
 
-def _outcomes(operation: Operation, tasks: Sequence[Task], runner: Runner) -> Iterator[_Found]:
+def _outcomes(operation: Operation, tasks: Sequence[Task], runner: Runner) -> Generator[_Found]:
     """Those that are kept first, then the rest as they finish."""
     keys: dict[str, str] = {}
     for task in tasks:
@@ -106,10 +111,13 @@ def _outcomes(operation: Operation, tasks: Sequence[Task], runner: Runner) -> It
         if found is not None:
             yield found
     rest = [task for task in tasks if task.name in keys]
-    for outcome in runner(rest) if rest else ():
-        if not outcome.reason:
-            kept.keep(keys[outcome.task.name], outcome.files)
-        yield _Found(outcome, "failed" if outcome.reason else "done")
+    if not rest:
+        return
+    with closing(runner(rest)) as outcomes:
+        for outcome in outcomes:
+            if not outcome.reason:
+                kept.keep(keys[outcome.task.name], outcome.files)
+            yield _Found(outcome, "failed" if outcome.reason else "done")
 
 
 def _looked_up(task: Task, keys: dict[str, str]) -> _Found | None:
@@ -117,14 +125,14 @@ def _looked_up(task: Task, keys: dict[str, str]) -> _Found | None:
     try:
         key = kept.key_of(task)
     except RigError as error:
-        return _Found(Outcome(task, {}, 0.0, str(error)), "failed")
+        return _Found(TaskOutcome(task, {}, 0.0, str(error)), "failed")
     except OSError as error:
-        return _Found(Outcome(task, {}, 0.0, f"{task.place}: cannot be read: {error.strerror}"), "failed")
+        return _Found(TaskOutcome(task, {}, 0.0, f"{task.place}: cannot be read: {error.strerror}"), "failed")
     files = kept.recall(key)
     if files is None:
         keys[task.name] = key
         return None
-    return _Found(Outcome(task, files), "kept")
+    return _Found(TaskOutcome(task, files), "kept")
 
 
 def _write(files: Files, folder: Path) -> None:
@@ -136,7 +144,9 @@ def _write(files: Files, folder: Path) -> None:
 
 def _result(wanted: Wanted, found: Sequence[_Found], out: Path) -> CohortResult:
     sessions = tuple(_session(wanted, each, out) for each in found)
-    fits = [FitResult.read(out / each.folder / wanted.told_by) for each in sessions if each.folder and each.parameters]
+    fits = [
+        FitResult.read(out / each.folder / TOLD_BY[wanted.work]) for each in sessions if each.folder and each.parameters
+    ]
     parameters, remarks = _shared(wanted.model, sessions, fits)
     return CohortResult(
         work=wanted.work,
@@ -160,14 +170,14 @@ def _session(wanted: Wanted, found: _Found, out: Path) -> CohortSession:
 
 
 def _fitted(wanted: Wanted, folder: Path) -> Mapping[str, object]:
-    law = FitResult.read(folder / wanted.told_by).laws[wanted.model]
+    law = FitResult.read(folder / TOLD_BY[wanted.work]).laws[wanted.model]
     subject = load_model(folder / MODEL).data.subject or folder.name
     values = {name: each.value for name, each in law.parameters.items() if not each.known}
     return {"subject": subject, "parameters": values}
 
 
 def _diagnosed(wanted: Wanted, folder: Path) -> Mapping[str, object]:
-    found = DiagnosisResult.read(folder / wanted.told_by)
+    found = DiagnosisResult.read(folder / TOLD_BY[wanted.work])
     return {"verdict": found.verdict, "causes": tuple(each.effects[0] for each in found.findings)}
 
 

@@ -1,13 +1,14 @@
 """Where tasks run: one after the other, on the cores of this computer, or on those of a Dask cluster."""
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+import warnings
+from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
-from api.operations.cohort.task import Outcome, Task, run
+from api.operations.cohort.task import Task, TaskOutcome, run
 from rig.errors import RigError, UsageError
 
-Runner = Callable[[Sequence[Task]], Iterator[Outcome]]
+Runner = Callable[[Sequence[Task]], Generator[TaskOutcome]]
 # A scheduler on the same network answers in milliseconds; one that is being started takes a few seconds.
 TIMEOUT_S = 15.0
 RETRIES = 3  # of a session whose worker died: a computer is switched off, and twice more is no accident
@@ -18,12 +19,12 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def one_by_one(tasks: Sequence[Task]) -> Iterator[Outcome]:
+def one_by_one(tasks: Sequence[Task]) -> Generator[TaskOutcome]:
     """In this process."""
     yield from map(run, tasks)
 
 
-def on_cores(tasks: Sequence[Task], most: int | None = None) -> Iterator[Outcome]:
+def on_cores(tasks: Sequence[Task], most: int | None = None) -> Generator[TaskOutcome]:
     """A process for each core, as they finish; raises RigError where one of them dies."""
     from joblib import Parallel, delayed  # noqa: PLC0415 - a tenth of a second
     from joblib.externals.loky.process_executor import TerminatedWorkerError  # noqa: PLC0415
@@ -33,13 +34,24 @@ def on_cores(tasks: Sequence[Task], most: int | None = None) -> Iterator[Outcome
         yield from one_by_one(tasks)
         return
     work = Parallel(n_jobs=count, return_as="generator_unordered")
+    found = work(delayed(run)(task) for task in tasks)
     try:
-        yield from work(delayed(run)(task) for task in tasks)
+        for outcome in found:  # noqa: UP028 - whoever ends early must not end this from within
+            yield outcome
     except TerminatedWorkerError as error:
         raise RigError(
             "a process of the cohort was killed, by hand or because memory ran out; what is finished is kept: the same "
             "command goes on from there"
         ) from error
+    finally:
+        _end(found)
+
+
+def _end(found: Any) -> None:
+    """Ends what still runs. That it is ended early is what somebody asked for, and no warning."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        found.close()
 
 
 def on_cluster(address: str) -> Runner:
@@ -51,7 +63,7 @@ def on_cluster(address: str) -> Runner:
     return lambda tasks: _distributed(distributed, address, tasks)
 
 
-def _distributed(dask: Any, address: str, tasks: Sequence[Task]) -> Iterator[Outcome]:
+def _distributed(dask: Any, address: str, tasks: Sequence[Task]) -> Generator[TaskOutcome]:
     client = _connected(dask, address)
     try:
         asked = {future: task for task in tasks for future in [client.submit(run, task, pure=False, retries=RETRIES)]}
@@ -78,10 +90,10 @@ def _connected(dask: Any, address: str) -> Any:
     return client
 
 
-def _outcome(future: Any, task: Task) -> Outcome:
+def _outcome(future: Any, task: Task) -> TaskOutcome:
     """A worker without this program, or one that died too often, is the reason of that session alone."""
     error = future.exception()
     if error is None:
-        found: Outcome = future.result()
+        found: TaskOutcome = future.result()
         return found
-    return Outcome(task, {}, 0.0, f"{task.place}: no worker could do it: {type(error).__name__}: {error}")
+    return TaskOutcome(task, {}, 0.0, f"{task.place}: no worker could do it: {type(error).__name__}: {error}")

@@ -6,36 +6,16 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal
 
+from api.operations.cohort.wanted import Wanted
 from controller.operation import Operation
 from rig.errors import RigError
 from rig.recording.remote import address_of
-from rig.results import diagnosis, fit
+from rig.results import fit
 from rig.trials.opening import Opening
 
-Work = Literal["fit", "diagnose", "report"]
-Simulation = Literal["index", "constant"]
 PAGE = "report.html"
 Files = Mapping[str, bytes]
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What is done with each session: the options that ``work`` has for one."""
-
-    work: Work
-    laws: tuple[str, ...] = ()
-    known: tuple[tuple[str, float], ...] = ()
-    model: str = "index"
-    simulation: Simulation = "index"
-    detectability: bool = False
-    only: str = ""
-
-    @property
-    def told_by(self) -> str:
-        """The file that says what was found."""
-        return {"fit": fit.FILE, "diagnose": diagnosis.FILE, "report": PAGE}[self.work]
 
 
 @dataclass(frozen=True)
@@ -60,7 +40,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TaskOutcome:
     """The files made, by name, or the ``reason`` why there are none."""
 
     task: Task
@@ -69,19 +49,19 @@ class Outcome:
     reason: str = ""
 
 
-def run(task: Task) -> Outcome:
+def run(task: Task) -> TaskOutcome:
     """Works on one session; whatever it meets ends with it and not with the others."""
     began = time.monotonic()
     try:
         with TemporaryDirectory(prefix="rig-") as folder:
             _WORKS[task.wanted.work](task, Path(folder))
             files = {file.name: file.read_bytes() for file in sorted(Path(folder).iterdir())}
-        return Outcome(task, files, time.monotonic() - began)
+        return TaskOutcome(task, files, time.monotonic() - began)
     except RigError as error:
-        return Outcome(task, {}, time.monotonic() - began, str(error))
+        return TaskOutcome(task, {}, time.monotonic() - began, str(error))
     except Exception as error:
         reason = f"{task.place}: the work met an error of its own: {type(error).__name__}: {error}"
-        return Outcome(task, {}, time.monotonic() - began, reason)
+        return TaskOutcome(task, {}, time.monotonic() - began, reason)
 
 
 def _fit(task: Task, folder: Path) -> None:

@@ -7,14 +7,15 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
 from api.operations.cohort.cohort import cohort, cohort_operation
 from api.operations.cohort.runners import on_cluster, one_by_one
-from api.operations.cohort.task import Outcome, Task, Wanted
+from api.operations.cohort.task import Task, TaskOutcome
+from api.operations.cohort.wanted import Wanted
 from rig.errors import UsageError
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("cluster"), pytest.mark.timeout(180)]
@@ -71,10 +72,10 @@ def test_a_cohort_outlives_a_worker_that_is_killed(
     workers = [started("worker", scheduler, *alone) for _ in range(2)]
     killed: list[int] = []
 
-    def cut(tasks: Sequence[Task]) -> Iterator[Outcome]:
+    def cut(tasks: Sequence[Task]) -> Generator[TaskOutcome]:
         from distributed import Client  # noqa: PLC0415
 
-        with Client(scheduler, set_as_default=False) as client:
+        with Client(scheduler, set_as_default=False) as client:  # type: ignore[no-untyped-call]
             client.wait_for_workers(2, timeout=60)
         for outcome in on_cluster(scheduler)(tasks):
             if not killed:

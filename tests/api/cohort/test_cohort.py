@@ -5,7 +5,7 @@ import os
 import shutil
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,8 @@ from api.cli.app import build
 from api.operations.cohort import kept, runners
 from api.operations.cohort.cohort import cohort, cohort_operation, named
 from api.operations.cohort.runners import Runner, on_cores, one_by_one
-from api.operations.cohort.task import Outcome, Task, Wanted
+from api.operations.cohort.task import Task, TaskOutcome
+from api.operations.cohort.wanted import Wanted
 from controller.operation import Cancelled, Operation, Progress
 from rig.errors import CheckFailed, DataError, RigError, UsageError
 from rig.results.cohort import CohortResult
@@ -34,7 +35,7 @@ def states(found: CohortResult) -> list[str]:
     return [each.state for each in found.sessions]
 
 
-def never(_tasks: Sequence[Task]) -> Iterator[Outcome]:
+def never(_tasks: Sequence[Task]) -> Generator[TaskOutcome]:
     raise AssertionError("all of it is kept")
 
 
@@ -186,7 +187,7 @@ def test_a_killed_process_is_a_sentence_and_what_is_finished_stays(
         done(sessions[:2], tmp_path / "out", runner=lambda tasks: on_cores(tasks, most=2))
 
 
-def _dies(_task: Task) -> Outcome:
+def _dies(_task: Task) -> TaskOutcome:
     os.kill(os.getpid(), signal.SIGKILL)
     raise AssertionError
 
