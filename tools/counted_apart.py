@@ -124,6 +124,7 @@ SCALE = {
     "rig/results/cohort.py": "many sessions at once, on cores and computers",
     "rig/results/cohort_tables.py": "many sessions at once, on cores and computers",
     "rig/tissue/mixed_effects.py": "what subjects share",
+    "rig/tissue/lattice/tip_edge.py": "stiffness that converges with the mesh",
     "rig/recording/remote.py": "recordings in an object store",
 }
 APART = {

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from rig.errors import UsageError
 from rig.tissue.lattice.kernels import Shape
-from rig.tissue.lattice.numba_types import Matrix
+from rig.tissue.lattice.numba_types import Floats, Matrix
 from rig.tissue.lattice.rows import FRONT, LONGEST_ROW, PAD
+from rig.tissue.lattice.tip_edge import LEAST_SHARE, MOST_SHARE, covered_shares, tie_ratios
 
 _LANES = 8  # float64 values in the widest vector register; rows are padded to a multiple
 _MOST_NODES = 4_000_000  # 0.6 GB of state; larger blocks are a slip of the unit more often than a wish
@@ -23,14 +24,16 @@ class Block:
     """A block of ``nodes`` vertices with 18 neighbours each; the defaults are the study's (51 x 51 x 40, 1 mm, 6 mm
     tip).
 
-    ``quarter`` stores x >= 0, y >= 0 only and mirrors the rest. The tip is a rigid disc bonded to the nodes under it;
-    the four lateral faces are held by the tissue around, of which the study does not say anything.
+    ``quarter`` stores x >= 0, y >= 0 only and mirrors the rest. The tip is a rigid disc to which the nodes under it are
+    bonded, or along which they slide; of its edge see `tip_edge`. The four lateral faces are held by the tissue around,
+    of which the study does not say anything.
     """
 
     nodes: tuple[int, int, int] = (51, 51, 40)
     spacing_mm: float = 1.0
     tip_diameter_mm: float = 6.0
     quarter: bool = False
+    bonded: bool = True
 
     def __post_init__(self) -> None:
         nx, ny, nz = self.nodes
@@ -111,14 +114,27 @@ class Block:
         return flat
 
     def tip_nodes(self) -> NDArray[np.int64]:
-        """Flat indices of the nodes under the tip (29 for the study's block)."""
-        rest = self.rest()
-        inside = np.zeros(rest.shape, dtype=bool)
-        x, y, _ = self.inner(rest)
-        under = x**2 + y**2 <= (0.5 * self.tip_diameter_mm) ** 2 * (1.0 + 1e-9)
-        under[..., :-1] = False
-        self.inner(inside)[0] = under
-        return np.flatnonzero(inside[0])
+        """Flat indices of the nodes that the tip covers, the middle one first."""
+        top, shares = self._under_tip()
+        return top[(shares > MOST_SHARE) | (top == top[0])]
+
+    def tip_edge(self) -> tuple[NDArray[np.int64], Floats]:
+        """Flat indices of the nodes that it covers in part, and their ties over k, as far as they are stored."""
+        top, shares = self._under_tip()
+        edge = (shares > LEAST_SHARE) & (shares <= MOST_SHARE) & (top != top[0])
+        x, y, _ = self.rest()[:, top[edge]]
+        stored = np.where(x == 0.0, 0.5, 1.0) * np.where(y == 0.0, 0.5, 1.0) if self.quarter else 1.0
+        return top[edge], tie_ratios(shares[edge]) * stored
+
+    def _under_tip(self) -> tuple[NDArray[np.int64], Floats]:
+        """Nodes of the top face, the nearest to the middle first, and the share of each that the tip covers."""
+        rest, on_top = self.rest(), np.zeros(self.allocate().shape, dtype=bool)
+        self.inner(on_top)[0, ..., -1] = True
+        top = np.flatnonzero(on_top[0])
+        x, y, _ = rest[:, top]
+        nearest = np.argsort(x**2 + y**2, kind="stable")
+        shares = covered_shares(x[nearest], y[nearest], 0.5 * self.tip_diameter_mm, self.spacing_mm)
+        return top[nearest], shares
 
     def free(self) -> Matrix:
         """1 where a node may move along a direction, 0 where the bone, the tip, a side or a mirror plane holds it."""
@@ -134,5 +150,5 @@ class Block:
         else:
             inner[:, 0] = 0.0
             inner[:, :, 0] = 0.0
-        free[:, self.tip_nodes()] = 0.0
+        free[(slice(None) if self.bonded else 2), self.tip_nodes()] = 0.0
         return free
