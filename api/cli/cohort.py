@@ -1,6 +1,6 @@
 """`rig fit`, `diagnose` and `report` of many sessions: each by itself, in parallel, and what they share."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -51,6 +51,23 @@ def work_on_cohort(
     work.refuse_failed(result)
 
 
-def only_one(places: Sequence[Path], scheduler: str) -> Path | None:
-    """The one place of an ordinary command; None of a cohort."""
-    return places[0] if len(places) == 1 and not scheduler else None
+def taken_as_cohort(
+    places: Sequence[Path],
+    out: Path | None,
+    wanted: Wanted,
+    scheduler: str,
+    mapping: Path | None,
+    json_file: Path | None,
+) -> bool:
+    """Whether there are several, or a cluster is named: they have then been worked on."""
+    if len(places) == 1 and not scheduler:
+        return False
+    work_on_cohort(places, out, wanted, scheduler, mapping, json_file)
+    return True
+
+
+def refuse_with_cohort(options: Mapping[str, object]) -> None:
+    """Raises UsageError where one of ``options``, which are for one session, is given."""
+    given = [name for name, value in options.items() if value]
+    if given:
+        raise UsageError(f"{', '.join(given)}: is for one session at a time; leave it out, or give that session alone")

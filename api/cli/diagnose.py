@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from api.cli.cohort import SchedulerOption, only_one, work_on_cohort
+from api.cli.cohort import SchedulerOption, refuse_with_cohort, taken_as_cohort
 from api.cli.computing import compute
 from api.cli.options import JsonOption, MappingOption, OnlyOption, PlacesArgument, YesOption
 from api.cli.output import show, write_json
@@ -16,7 +16,6 @@ from api.operations.diagnose import Simulation
 from controller.operation import Operation
 from rig.config.protocol import Indentation
 from rig.config.table import load
-from rig.errors import UsageError
 from rig.results.diagnosis import FOLDER, DiagnosisResult
 from rig.results.diagnosis_tables import check_parts, diagnosis_parts
 from rig.tissue.model import load_model
@@ -48,13 +47,11 @@ def diagnose(
 
     Example: rig diagnose sessions/first --json diagnosis.json
     """
-    place = only_one(places, scheduler)
-    if place is None:
-        if reference is not None:
-            raise UsageError("--reference is for one drive axis; leave it out, or diagnose that axis alone")
-        wanted = Wanted("diagnose", simulation=simulation, detectability=detectability, only=only)
-        work_on_cohort(places, out, wanted, scheduler, mapping, json_file)
+    wanted = Wanted("diagnose", simulation=simulation, detectability=detectability, only=only)
+    refuse_with_cohort({"--reference": reference} if len(places) > 1 else {})
+    if taken_as_cohort(places, out, wanted, scheduler, mapping, json_file):
         return
+    (place,) = places
     folder = place / FOLDER if out is None and is_session(place) else out
     opening = Opening(mapping_for(place, mapping, out or Path(place.stem), yes), only)
     result = diagnosed(place, simulation, folder, json_file, opening, reference, detectability)

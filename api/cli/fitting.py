@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from api.cli.cohort import CohortOption, SchedulerOption, work_on_cohort
+from api.cli.cohort import CohortOption, SchedulerOption, refuse_with_cohort, work_on_cohort
 from api.cli.computing import compute
 from api.cli.options import PLACE, JsonOption, MappingOption, OnlyOption, YesOption
 from api.cli.output import show, write_json
@@ -69,8 +69,7 @@ def fit(
     """
     compared = laws_from(laws, known or [], model, extended)
     if cohort or scheduler:
-        if extended or lattice or per_spring:
-            raise UsageError("--with, --lattice and --per-spring are for one fit; leave out --cohort and --scheduler")
+        refuse_with_cohort({"--with": extended, "--lattice": lattice, "--per-spring": per_spring})
         named, given = tuple(law.name for law in compared.compared), tuple(compared.known.items())
         wanted = Wanted("fit", named, given, compared.saved, only=only)
         work_on_cohort(places, out, wanted, scheduler, mapping, json_file)

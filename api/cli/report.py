@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from api.cli.cohort import SchedulerOption, only_one, work_on_cohort
+from api.cli.cohort import SchedulerOption, taken_as_cohort
 from api.cli.computing import compute
 from api.cli.options import JsonOption, MappingOption, OnlyOption, PlacesArgument, YesOption
 from api.cli.output import write_json
@@ -32,9 +32,8 @@ def report(
 
     Example: rig report sessions/first --out first.html
     """
-    place = only_one(places, scheduler)
-    if place is None:
-        work_on_cohort(places, out, Wanted("report", only=only), scheduler, mapping, json_file)
+    if taken_as_cohort(places, out, Wanted("report", only=only), scheduler, mapping, json_file):
         return
+    (place,) = places
     opening = Opening(mapping_for(place, mapping, out or Path(place.stem), yes), only)
     write_json(json_file, compute("report", lambda operation: work.report(operation, place, out, opening)))

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from rig.errors import UsageError
 from rig.tissue.lattice.kernels import Shape
-from rig.tissue.lattice.numba_types import Floats, Matrix
+from rig.tissue.lattice.numba_types import Matrix
 from rig.tissue.lattice.rows import FRONT, LONGEST_ROW, PAD
-from rig.tissue.lattice.tip_edge import LEAST_SHARE, MOST_SHARE, covered_shares, tie_ratios
+from rig.tissue.lattice.tip_edge import rigid_nodes
 
 _LANES = 8  # float64 values in the widest vector register; rows are padded to a multiple
 _MOST_NODES = 4_000_000  # 0.6 GB of state; larger blocks are a slip of the unit more often than a wish
@@ -115,26 +115,7 @@ class Block:
 
     def tip_nodes(self) -> NDArray[np.int64]:
         """Flat indices of the nodes that the tip covers, the middle one first."""
-        top, shares = self._under_tip()
-        return top[(shares > MOST_SHARE) | (top == top[0])]
-
-    def tip_edge(self) -> tuple[NDArray[np.int64], Floats]:
-        """Flat indices of the nodes that it covers in part, and their ties over k, as far as they are stored."""
-        top, shares = self._under_tip()
-        edge = (shares > LEAST_SHARE) & (shares <= MOST_SHARE) & (top != top[0])
-        x, y, _ = self.rest()[:, top[edge]]
-        stored = np.where(x == 0.0, 0.5, 1.0) * np.where(y == 0.0, 0.5, 1.0) if self.quarter else 1.0
-        return top[edge], tie_ratios(shares[edge]) * stored
-
-    def _under_tip(self) -> tuple[NDArray[np.int64], Floats]:
-        """Nodes of the top face, the nearest to the middle first, and the share of each that the tip covers."""
-        rest, on_top = self.rest(), np.zeros(self.allocate().shape, dtype=bool)
-        self.inner(on_top)[0, ..., -1] = True
-        top = np.flatnonzero(on_top[0])
-        x, y, _ = rest[:, top]
-        nearest = np.argsort(x**2 + y**2, kind="stable")
-        shares = covered_shares(x[nearest], y[nearest], 0.5 * self.tip_diameter_mm, self.spacing_mm)
-        return top[nearest], shares
+        return rigid_nodes(self)
 
     def free(self) -> Matrix:
         """1 where a node may move along a direction, 0 where the bone, the tip, a side or a mirror plane holds it."""

@@ -63,7 +63,8 @@ def tangent_stiffness_N_mm(lattice: Loaded, tolerance: float = 1e-7) -> float:
     push, out = block.allocate(), block.allocate()
     push[2, lattice.tip] = -1.0
     lattice.product(push, out)
-    right, edge, pulled = aligned_copy(block, -out), lattice.edge.nodes, lattice.follow_tip()
+    right, edge = aligned_copy(block, -out), lattice.edge.nodes
+    pulled = lattice.edge.follow_N_mm(lattice.x, lattice.depth_mm)
     right[:, edge] += pulled
     follow = solve(lattice, right, tolerance)
     follow += push

@@ -71,12 +71,6 @@ class Loaded:
         edge = np.sum(self.edge.pull_N(self.x, self.depth_mm)[2])
         return float(self.block.copies * (np.sum(self.f[2, self.tip]) - edge))
 
-    def follow_tip(self) -> Matrix:
-        """What pulls at the edge's nodes for each mm that the tip sinks."""
-        sunk = np.zeros_like(self.edge.rest)
-        sunk[2] = -1.0
-        return self.edge.tangent_N(self.x, self.depth_mm, sunk)
-
 
 def aligned_copy(block: Block, source: Matrix) -> Matrix:
     """A copy that keeps the alignment."""

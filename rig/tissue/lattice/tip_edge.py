@@ -42,6 +42,33 @@ def tie_ratios(shares: Floats) -> Floats:
     return np.asarray(TIE * shares / (1.0 - shares))
 
 
+def rigid_nodes(block: "Block") -> Nodes:
+    """Flat indices of the nodes that the tip holds, the middle one, which it always does, first."""
+    top, shares = _under_tip(block)
+    return np.asarray(top[(shares > MOST_SHARE) | (top == top[0])])
+
+
+def edge_nodes(block: "Block") -> tuple[Nodes, Floats]:
+    """Flat indices of the nodes that it covers in part, and their ties over k, as far as the block stores them."""
+    top, shares = _under_tip(block)
+    edge = (shares > LEAST_SHARE) & (shares <= MOST_SHARE) & (top != top[0])
+    x, y, _ = block.rest()[:, top[edge]]
+    stored = np.where(x == 0.0, 0.5, 1.0) * np.where(y == 0.0, 0.5, 1.0) if block.quarter else 1.0
+    return top[edge], tie_ratios(shares[edge]) * stored
+
+
+def _under_tip(block: "Block") -> tuple[Nodes, Floats]:
+    """Nodes of the top face, the nearest to the middle first, and the share of each that the tip covers."""
+    rest = block.rest()
+    on_top = np.zeros(rest.shape, dtype=bool)
+    block.inner(on_top)[0, ..., -1] = True
+    top = np.flatnonzero(on_top[0])
+    x, y, _ = rest[:, top]
+    nearest = np.argsort(x**2 + y**2, kind="stable")
+    shares = covered_shares(x[nearest], y[nearest], 0.5 * block.tip_diameter_mm, block.spacing_mm)
+    return top[nearest], shares
+
+
 @dataclass(frozen=True)
 class TipEdge:
     """Ties of ``nodes`` with ``stiffness`` [N/mm], which hold along ``axes``; T = c exp(b |g|/d) g of the gap g."""
@@ -55,7 +82,7 @@ class TipEdge:
     @classmethod
     def of(cls, block: "Block", springs: "Springs") -> "TipEdge":
         """That of the tip on ``block``."""
-        nodes, ratios = block.tip_edge()
+        nodes, ratios = edge_nodes(block)
         axes = (0, 1, 2) if block.bonded else (2,)
         return cls(nodes, springs.k_N_mm * ratios, axes, springs.b / block.spacing_mm, block.rest()[:, nodes])
 
@@ -80,6 +107,12 @@ class TipEdge:
         held[list(self.axes)] = u[list(self.axes)]
         along = np.divide(np.sum(gap * held, axis=0), length, out=np.zeros_like(length), where=length > 0.0)
         return np.asarray(self._grown(length) * (held + self.b_per_mm * along * gap))
+
+    def follow_N_mm(self, x: Matrix, depth_mm: float) -> Matrix:
+        """What the ties pull more for each mm that the tip sinks."""
+        sunk = np.zeros_like(self.rest)
+        sunk[2] = -1.0
+        return self.tangent_N(x, depth_mm, sunk)
 
     def bound_N_mm(self, x: Matrix, depth_mm: float) -> Matrix:
         """Bound of the tangent's diagonal."""

@@ -216,8 +216,8 @@ def test_names_tell_places_apart(tmp_path: Path) -> None:
     ("options", "words"),
     [
         (["fit", "a", "b", "--cohort"], "give a folder with --out"),
-        (["fit", "a", "b", "--cohort", "--lattice", "--out", "o"], "leave out --cohort"),
-        (["diagnose", "a", "b", "--out", "o", "--reference", "r.toml"], "diagnose that axis alone"),
+        (["fit", "a", "b", "--cohort", "--lattice", "--out", "o"], "--lattice: is for one session at a time"),
+        (["diagnose", "a", "b", "--out", "o", "--reference", "r.toml"], "--reference: is for one session at a time"),
         (["report", "a", "b"], "give a folder with --out"),
         (["fit", "a", "--scheduler", "tcp://127.0.0.1:1", "--out", "o"], "no Dask scheduler answers there"),
     ],

@@ -11,7 +11,7 @@ from rig.tissue.lattice import newton
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.springs import Springs
 from rig.tissue.lattice.state import Loaded
-from rig.tissue.lattice.tip_edge import TIE, covered_shares, tie_ratios
+from rig.tissue.lattice.tip_edge import TIE, covered_shares, edge_nodes, tie_ratios
 
 RADIUS_MM, LAYER_MM, HALF_MM = 3.0, 12.0, 24.0
 
@@ -50,7 +50,7 @@ def test_the_middle_node_is_held_however_small_the_tip() -> None:
 
 def test_a_quarter_holds_a_quarter_of_the_ties() -> None:
     whole, quarter = Block((11, 11, 8), tip_diameter_mm=5.0), Block((11, 11, 8), tip_diameter_mm=5.0, quarter=True)
-    assert 4.0 * quarter.tip_edge()[1].sum() == pytest.approx(whole.tip_edge()[1].sum())
+    assert 4.0 * edge_nodes(quarter)[1].sum() == pytest.approx(edge_nodes(whole)[1].sum())
 
 
 @pytest.mark.parametrize("bonded", [True, False])
@@ -92,8 +92,8 @@ def test_stiffness_goes_with_the_mesh_to_that_of_the_layer() -> None:
 @pytest.mark.extra
 def test_a_staircase_would_jump_from_mesh_to_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bug this is there against: a node under the tip is held, any other is free."""
-    monkeypatch.setattr("rig.tissue.lattice.block.MOST_SHARE", 0.5)
-    monkeypatch.setattr("rig.tissue.lattice.block.LEAST_SHARE", 0.5)
+    monkeypatch.setattr("rig.tissue.lattice.tip_edge.MOST_SHARE", 0.5)
+    monkeypatch.setattr("rig.tissue.lattice.tip_edge.LEAST_SHARE", 0.5)
     spacings_mm = [1.0, 0.75, 0.6, 0.5, 0.4]
     assert fitted_limit(spacings_mm, [stiffness_N_mm(spacing) for spacing in spacings_mm])[1] > 0.01 * 2.01
 
