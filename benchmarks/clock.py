@@ -115,7 +115,7 @@ def measured(product: str, load: str, seconds: float, priority: int) -> Row:
     assert kind.mock
     role = kind.mock.role
     with contextlib.ExitStack() as stack:
-        _, endpoints = stack.enter_context(bench_process(Wiring(), both_sensors=True))
+        _, endpoints = stack.enter_context(bench_process(Wiring(), every_product=True))
         control = stack.enter_context(BenchControl(endpoints.control))
         config = kind(port=kind.mock.address(endpoints))
         sensor = stack.enter_context(contextlib.closing(open_force(config)))

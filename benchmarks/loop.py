@@ -5,8 +5,8 @@ the loop's core at the same rate and policy, one priority above, so that it sees
 alternate, idle and with the HTTP interface under load (Debian: wrk), in one run. What counts are the
 ratios. The table and the JSON are written after every round: a run may be ended with Ctrl-C at any time.
 
-Loop to drive: from the loop's wake-up to the moment at which the mock drive's process has its SYNC and set-point, both
-on this computer's monotonic clock.
+Sensor to drive: from the moment at which the mock sensor took a sample to the moment at which the mock drive's process
+has the SYNC and set-point made from it, both on the mock bench's clock, which is this computer's monotonic one.
 """
 
 import argparse
@@ -32,6 +32,7 @@ from uuid import uuid4
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.sensor_to_drive import chain_us, delays_us
 from mock_devices.control import BenchControl
 from mock_devices.testing.access import bearer
 from mock_devices.testing.commands import RIG, ROOT, ServedBench, served_bench
@@ -61,6 +62,7 @@ class Load:
     wake_us: list[float] = field(default_factory=list)
     execution_us: list[float] = field(default_factory=list)
     to_drive_us: list[float] = field(default_factory=list)
+    sensor_to_drive_us: list[float] = field(default_factory=list)
     answered_us: list[float] = field(default_factory=list)
     cycles: int = 0
     missed: int = 0
@@ -138,10 +140,11 @@ def hammered(load: Load, seconds: float) -> Iterator[None]:
 
 
 class Arrivals:
-    """Collects when the drive took its SYNCs, over a connection of its own."""
+    """Collects when the sensor took its samples and the drive its SYNCs, over a connection of its own."""
 
     def __init__(self, address: str) -> None:
         self.found_ns: list[int] = []
+        self.taken: list[tuple[int, int]] = []
         self._control = BenchControl(address)
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._collect)
@@ -150,6 +153,7 @@ class Arrivals:
     def _collect(self) -> None:
         while not self._over.wait(COLLECT_S):
             self.found_ns += self._control.synced_ns()
+            self.taken += self._control.sampled("force")
 
     def close(self) -> None:
         """Ends it."""
@@ -158,21 +162,8 @@ class Arrivals:
         self._control.close()
 
 
-def delays_us(sent_ns: NDArray[np.int64], found_ns: list[int]) -> list[float]:
-    """Each SYNC with the first arrival after it that no earlier one has; both rise."""
-    delays, at = [], 0
-    for sent in sent_ns.tolist():
-        while at < len(found_ns) and found_ns[at] < sent:
-            at += 1
-        if at == len(found_ns):
-            break
-        delays.append((found_ns[at] - sent) / 1000)
-        at += 1
-    return delays
-
-
-def take(load: Load, recording: Path, found_ns: list[int]) -> None:
-    """Adds what the recording's loop and axis streams say, and when the drive heard of it."""
+def take(load: Load, recording: Path, arrivals: Arrivals) -> None:
+    """Adds what the recording's streams say, and when the devices say it was."""
     tables = read_recording(recording).tables
     loop, axis = tables["loop"], tables[AXIS.name]
     loop = loop[loop["capture_ns"] > loop["capture_ns"][0] + SETTLING_S * 1e9]
@@ -180,7 +171,9 @@ def take(load: Load, recording: Path, found_ns: list[int]) -> None:
     load.wake_us += (loop["wake_latency_ns"] / 1000).tolist()
     load.execution_us += (loop["execution_ns"] / 1000).tolist()
     load.answered_us += ((axis["arrival_ns"] - axis["capture_ns"]) / 1000).tolist()
-    load.to_drive_us += delays_us(axis["capture_ns"], found_ns)
+    load.to_drive_us += delays_us(axis["capture_ns"], arrivals.found_ns)
+    chained = {"force": tables["force"], "loop": loop, "axis": axis}
+    load.sensor_to_drive_us += chain_us(chained, arrivals.taken, arrivals.found_ns)
     load.cycles += int(loop["cycle"][-1] - loop["cycle"][0]) + 1
     load.missed += int(loop["missed"][-1] - loop["missed"][0])
 
@@ -220,10 +213,12 @@ def summary(load: Load, period_us: float) -> Summary:
         "execution p50 us": at(load.execution_us, 50),
         "execution p99 us": execution,
         "execution p99 / period": ratio(execution, period_us),
-        "loop to drive p50 us": at(load.to_drive_us, 50),
-        "loop to drive p99 us": at(load.to_drive_us, 99),
-        "loop to drive's answer read p50 us": at(load.answered_us, 50),
-        "loop to drive's answer read p99 us": at(load.answered_us, 99),
+        "sensor to drive p50 us": at(load.sensor_to_drive_us, 50),
+        "sensor to drive p99 us": at(load.sensor_to_drive_us, 99),
+        "SYNC to drive p50 us": at(load.to_drive_us, 50),
+        "SYNC to drive p99 us": at(load.to_drive_us, 99),
+        "SYNC to its answer read p50 us": at(load.answered_us, 50),
+        "SYNC to its answer read p99 us": at(load.answered_us, 99),
         "missed cycles %": round(100 * load.missed / load.cycles, 3) if load.cycles else None,
         "cyclictest over a cycle %": round(100 * len(late) / len(load.reference_us), 3) if load.reference_us else None,
         "presses stopped by a stall": load.spoilt,
@@ -255,7 +250,7 @@ def phase(bench: ServedBench, service: Service, load: Load, name: str, seconds: 
     with hammered(load, hammered_s), contextlib.closing(Arrivals(bench.endpoints.control)) as arrivals:
         recording = service.press(name)
     if recording:
-        take(load, recording, arrivals.found_ns)
+        take(load, recording, arrivals)
     else:
         load.spoilt += 1
     if shutil.which("cyclictest"):

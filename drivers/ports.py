@@ -1,6 +1,6 @@
 """Ports move bytes and nothing else: a serial line or a TCP connection, never blocking once open.
 
-An address is a device path (``/dev/ttyUSB0``), or ``tcp://host:port``.
+An address is a device path (``/dev/ttyUSB0``), ``tcp://host:port`` or ``udp://host:port``.
 """
 
 import array
@@ -16,6 +16,7 @@ from typing import Protocol
 
 import serial
 
+from drivers.udp_port import UdpPort, udp_address
 from rig.errors import DeviceError
 
 CONNECT_TIMEOUT_S = 2.0  # a first packet that was lost is sent again after 1 s (RFC 6298)
@@ -168,6 +169,8 @@ class TcpPort:
 
 def open_port(address: str, baud: int) -> Port:
     """The port at ``address``; raises DeviceError with one sentence."""
+    if address.startswith("udp://"):
+        return UdpPort(*udp_address(address))
     if not address.startswith("tcp://"):
         return SerialPort(address, baud)
     host, _, port = address.removeprefix("tcp://").rpartition(":")

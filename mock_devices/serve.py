@@ -17,15 +17,16 @@ from pathlib import Path
 from typing import Protocol
 
 from mock_devices.bench import Bench
-from mock_devices.bota.mock import BotaMock
 from mock_devices.control import ControlPort, RequestHandler
-from mock_devices.devices import FORCE_CHOICES, DeviceFactory, MockDevice
+from mock_devices.devices import DeviceFactory
 from mock_devices.epos4.mock import Epos4Mock
 from mock_devices.faults.wires import Fault
 from mock_devices.parameters import Parameters, load_parameters
 from mock_devices.physics.effects import EFFECTS, complete, knobs, parse_hidden, statement
-from mock_devices.robotiq.mock import RobotiqMock
+from mock_devices.played import ALL, CHOICES, MockDevice
+from mock_devices.stating import Numbered, Sampled, StatedLatency
 from rig.config.endpoints import Endpoints
+from rig.config.products.registry import AXES
 from rig.errors import RigError
 from rig.realtime import ask_fifo, lock_memory, shorten_timer_slack
 
@@ -39,6 +40,7 @@ NAP_S = 0.1  # of physics are 1.2 ms of work, which is in time (LATE_NS)
 LEAD_S = 0.001
 # All devices have booted when the endpoints are printed.
 POWERED_BEFORE_NS = 500_000_000
+AXIS_ROLES = {axis.mock.role for axis in AXES.values() if axis.mock}
 
 
 class Timed(Protocol):
@@ -60,12 +62,11 @@ class MockServer:
         self._mocks = [device.mock for device in devices]
         self._timed: list[Timed] = [*self._mocks, *(device.wire for device in devices)]
         self._devices = devices
-        self._axis = next(device for device in devices if device.role == "axis")
+        self._axis = next(device for device in devices if device.role in AXIS_ROLES)
         self._clock_ns = clock_ns
         drives = [mock for mock in self._mocks if isinstance(mock, Epos4Mock)]
         synced_ns = drives[0].synced_ns if drives else None
-        roles = {device.role: device.mock for device in devices}
-        sampled = {role: mock.sampled for role, mock in roles.items() if isinstance(mock, BotaMock | RobotiqMock)}
+        sampled = {device.role: device.mock.sampled for device in devices if isinstance(device.mock, Sampled)}
         self.control = ControlPort(RequestHandler(bench, _by_role(devices), synced_ns, sampled).answer)
 
     def endpoints(self) -> Endpoints:
@@ -74,10 +75,14 @@ class MockServer:
         serials: dict[str, str] = {}
         for device in self._devices:
             addresses.setdefault(device.role, {}).update(device.mock.endpoints())
-            if isinstance(device.mock, BotaMock | RobotiqMock | Epos4Mock):
+            if isinstance(device.mock, Numbered):
                 serials[device.role] = device.mock.serial_number
         about = {"control": self.control.endpoint, "pid": os.getpid(), "serials": serials}
-        return Endpoints.model_validate(addresses | about | {"latency_ms": stated_latency_ms(self._bench.parameters)})
+        late = {
+            device.role: device.mock.latency_ms for device in self._devices if isinstance(device.mock, StatedLatency)
+        }
+        stated = stated_latency_ms(self._bench.parameters) | late
+        return Endpoints.model_validate(addresses | about | {"latency_ms": stated})
 
     def serve(self, ended: Callable[[], bool], parent: int | None = None) -> None:
         """Plays until ``ended``, or until the pipe ``parent`` is closed at its other end."""
@@ -209,7 +214,7 @@ def _server(options: argparse.Namespace) -> MockServer:
     start_ns = time.monotonic_ns() - POWERED_BEFORE_NS
     bench = Bench(parameters, options.seed, start_ns)
     factory = DeviceFactory(bench, start_ns, time.monotonic_ns, options.seed, options.links)
-    devices = factory.devices(FORCE_CHOICES[options.force])
+    devices = factory.devices(product for role in CHOICES for product in CHOICES[role][vars(options)[role]])
     return MockServer(bench, devices, time.monotonic_ns)
 
 
@@ -244,7 +249,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--parameters", type=Path, metavar="FILE", help="TOML file, see mock_devices/default.toml")
     parser.add_argument("--hide", action="append", default=[], metavar="EFFECT[.PARAMETER=VALUE]", help="repeatable")
     parser.add_argument("--list-effects", action="store_true", help="print what --hide takes, and end")
-    parser.add_argument("--force", choices=tuple(FORCE_CHOICES), default="both")
+    for role, choices in CHOICES.items():
+        parser.add_argument(f"--{role}", choices=tuple(choices), default=ALL)
     parser.add_argument("--seed", type=int, default=0, help="of all noise")
     parser.add_argument("--tracker-tcp-port", type=int, metavar="N", help="instead of 8765; 0: any")
     parser.add_argument("--links", type=Path, metavar="FOLDER", help="serial lines there, and again after an unplug")

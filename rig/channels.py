@@ -219,7 +219,7 @@ LOOP = Stream(4, "loop", LoopSample, STAMP | {
     "missed": ("1", "cycles missed since the loop started"),
     "scheduled_ns": ("ns", "when the cycle was due"),
     "wake_latency_ns": ("ns", "wake-up after the cycle was due"),
-    "execution_ns": ("ns", "from wake-up to this row"),
+    "execution_ns": ("ns", "work for this row: inputs taken before it was due, and from its sample to this row"),
     "force_age_ns": ("ns", "age of the newest force sample when it was used"),
     "axis_age_ns": ("ns", "age of the newest axis sample when it was used"),
     "marker_age_ns": ("ns", "age of the newest tracker frame when it was used"),

@@ -1,15 +1,14 @@
 """Declarations by name: products, laws, causes. Each is registered once; a wrong name is answered with the nearest.
 
-A distribution adds its own by entry points: `cubic = "acme.cubic:Cubic"` in group `tissue_rig.laws`, for example.
+A distribution adds its own by entry points: `cubic = "acme.cubic:Cubic"` in group `tissue_rig.law`, for example.
 """
 
 import difflib
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import cache
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from rig.errors import UsageError
+from rig.plugins import Admission, admit, hint
 
 Item = TypeVar("Item")
 
@@ -27,35 +26,25 @@ def known(name: str, names: Iterable[str], what: str) -> str:
     if not choices:
         raise UsageError(f"unknown {what} {name!r}; there is no {what} here")
     raise UsageError(
-        f"unknown {what} {name!r}; nearest valid {what}: {nearest(name, choices)}; all: {', '.join(choices)}"
+        f"unknown {what} {name!r}; nearest valid {what}: {nearest(name, choices)}; all: {', '.join(choices)}{hint()}"
     )
-
-
-# Looking through all distributions takes 10 ms.
-_advertised = cache(entry_points)
-
-
-def _loaded(point: EntryPoint) -> Any:
-    try:
-        return point.load()
-    except Exception as error:
-        whose = point.dist.name if point.dist else "a distribution"
-        raise UsageError(
-            f"{point.group} {point.name!r} of {whose} cannot be loaded: {error!r}; mend or uninstall it"
-        ) from error
 
 
 class Registry(Mapping[str, Item], Generic[Item]):
     """Declarations in the order in which they were registered; ``what`` is what one of them is called in messages.
 
-    After ``items`` come the entry points of ``group``; raises UsageError where one cannot be loaded.
+    After ``items`` come the entry points of ``group`` that ``refusal`` says nothing against (`rig.plugins`).
     """
 
-    def __init__(self, what: str, name_of: Callable[[Item], str], items: Iterable[Item], group: str = "") -> None:
+    def __init__(
+        self, what: str, name_of: Callable[[Item], str], items: Iterable[Item], group: str = "",
+        refusal: Callable[[object], str] = lambda _: "",
+    ) -> None:  # fmt: skip
         self._what, self._name_of = what, name_of
         self._items: dict[str, Item] = {}
-        for item in (*items, *map(_loaded, _advertised().select(group=group))):
+        for item in items:
             self.register(item)
+        admit(group, Admission(name_of, refusal, self.register))
 
     def register(self, item: Item) -> Item:
         """Adds ``item`` and returns it; raises ValueError where its name is taken."""

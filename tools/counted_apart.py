@@ -110,10 +110,47 @@ SERVICE: dict[str, str] = {
     "rig/results/catalogue.py": "the catalogue",
 }
 # What came for benches that labs plug in, likewise.
-DEVICES: dict[str, str] = {}
+DEVICES: dict[str, str] = {
+    "drivers/threaded_source.py": "SDKs that block or call back",
+    "drivers/udp_port.py": "devices on UDP",
+    "drivers/testing/": "the conformance kit of drivers",
+    "rig/plugins.py": "products, laws and causes of other distributions",
+    "rig/config/products/usable.py": "products of other distributions",
+    "controller/devices/finding.py": "what could stand on the bench",
+    "controller/devices/guard.py": "drivers of other distributions",
+    "mock_devices/played.py": "mocks of other distributions",
+    "mock_devices/stating.py": "mocks of other distributions",
+    "api/cli/replay.py": "recordings played through the loop again",
+    "api/operations/replay.py": "recordings played through the loop again",
+    "controller/loop/carried.py": "recordings played through the loop again",
+    "rig/results/replay.py": "recordings played through the loop again",
+    "api/cli/devices.py": "what could stand on the bench",
+    "api/operations/devices.py": "what could stand on the bench",
+    "rig/config/words.py": "what could stand on the bench",
+    "rig/results/devices.py": "what could stand on the bench",
+    "mock_devices/udp_wire.py": "devices on UDP",
+    "controller/replay/": "recordings played through the loop again",
+}
 # What came for a force law that makes every tissue the same plant, likewise.
 LAW = {
     "rig/config/axis_response.py": "the axis as it was identified",
+    "rig/report/loop_figures.py": "stability is shown",
+    "controller/law/axis_response.py": "the axis as it was identified",
+    "controller/law/gain_table.py": "the tissue that the law divides by, and how well it is known",
+    "controller/law/inverse_model.py": "the inverse tissue model, beside the feedback",
+    "controller/law/loop_response.py": "the open loop over frequency",
+    "controller/law/stability.py": "stability is shown",
+    "controller/law/synthesis.py": "the law's numbers from the axis' response",
+    "rig/config/axis_dynamics.py": "the axis as it was identified",
+    "rig/computer.py": "what was identified holds for one computer",
+    "controller/commissioning/axis_dynamics.py": "identification of the axis",
+    "controller/commissioning/dynamics_refusals.py": "no force loop on an axis that was not identified",
+    "controller/commissioning/sweep.py": "identification of the axis",
+    "controller/commissioning/sweep_moves.py": "identification of the axis",
+    "api/operations/calibrate_dynamics.py": "identification of the axis",
+    "api/cli/calibrate_dynamics.py": "identification of the axis",
+    "api/cli/mock_dynamics.py": "identification of the mock axis",
+    "controller/safety/oscillation.py": "what oscillates is softened",
 }
 # What came for speed, cohorts and more than one computer, likewise.
 SCALE = {
@@ -126,6 +163,16 @@ SCALE = {
     "rig/tissue/mixed_effects.py": "what subjects share",
     "rig/tissue/lattice/tip_edge.py": "stiffness that converges with the mesh",
     "rig/recording/remote.py": "recordings in an object store",
+SCALE: dict[str, str] = {
+    "controller/loop/phase_lock.py": "the grid in step with the force sensor",
+    "rig/recording/channel_streams.py": "recordings read a window at a time",
+    "rig/recording/chunk.py": "recordings read a window at a time",
+    "rig/recording/file_window.py": "recordings read a window at a time",
+    "rig/recording/growing_table.py": "recordings read a window at a time",
+    "rig/recording/slots.py": "the ring emptied as a table",
+    "api/cli/deferred.py": "help at once",
+    "api/catalogue/settings.py": "help at once",
+    "api/operations/judged.py": "help at once",
 }
 APART = {
     "source_lines_safety": SAFETY,

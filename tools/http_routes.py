@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tools.words import Schema, value_words
+from rig.config.words import Schema, value_words
 
 HEADER = "| key | value | |\n|---|---|---|"
 SUCCESS = "Successful Response"

@@ -8,7 +8,7 @@ from typing import get_args
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from tools.words import Schema, toml, value_words
+from rig.config.words import Schema, toml, value_words
 
 HEADER = "| key | value | default | meaning |\n|---|---|---|---|"
 

@@ -16,6 +16,7 @@ import rig
 from api.cli.app import COMMANDS, build
 from api.http import app as service
 from api.http.service import Service
+from api.operations.devices import devices as known_devices
 from rig.config.maxima import MAXIMA
 from rig.config.products.registry import AXES
 from rig.config.protocol import Indentation
@@ -66,6 +67,16 @@ def _help(name: str) -> str:
     return answer.output.strip()
 
 
+def devices() -> str:
+    """A row each product of this repository."""
+    rows = [
+        f"| {one.role} | `{one.product}` | {one.meaning} | {f'{one.rate_Hz:g}' if one.rate_Hz else 'as asked'} |"
+        f" {'yes' if one.simulated else 'no'} |"
+        for one in known_devices().products
+    ]
+    return "\n".join(["| role | product | is | samples a second | simulated |", "|---|---|---|---|---|", *rows])
+
+
 def schemas() -> str:
     """A row each result: the command, and its schema as a file to take away."""
     return "\n".join(_schema_row(name) for name in WRITTEN)
@@ -102,6 +113,7 @@ def python() -> str:
 
 GENERATORS: dict[str, Callable[[], str]] = {
     "wiring": wiring, "protocol": protocol, "commands": commands, "schemas": schemas,
+    "devices": devices,
     "http": http,
     "parity": parity,
     "laws": laws,

@@ -25,9 +25,11 @@ from rig.results.catalogue import (
 )
 from rig.results.cohort import CohortResult
 from rig.results.demo import DemoSummary
+from rig.results.devices import DevicesResult, FindResult
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
 from rig.results.fit import FitResult
 from rig.results.recorded import CaptureResult, ExportResult, ImportResult, RepairResult, ReportResult, VerifyResult
+from rig.results.replay import ReplayResult
 from rig.results.tracking import CompareResult, SimulateResult, Threshold, TrackResult
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -47,7 +49,9 @@ WRITTEN: Mapping[str, type[Result]] = {
     "compare": CompareResult,
     "demo": DemoSummary,
     "diagnosis": DiagnosisResult,
+    "devices": DevicesResult,
     "doctor": DoctorResult,
+    "find": FindResult,
     "came-in": CameInResult,
     "export": ExportResult,
     "failure": Failure,
@@ -55,6 +59,7 @@ WRITTEN: Mapping[str, type[Result]] = {
     "import": ImportResult,
     "protocol-check": ProtocolCheckResult,
     "repair": RepairResult,
+    "replay": ReplayResult,
     "report": ReportResult,
     "reset": ResetResult,
     "retract": RetractResult,

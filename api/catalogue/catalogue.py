@@ -17,6 +17,7 @@ from api.catalogue.people import NamedPerson
 from api.catalogue.queries import EVERYTHING, FIRST, Asked, Page, every, listed, sites
 from api.catalogue.refresh import refill, refresh
 from api.catalogue.schema import TABLES
+from api.catalogue.settings import ENVIRONMENT
 from api.catalogue.stiffness import compared
 from rig.errors import UsageError
 from rig.results.catalogue import (
@@ -42,7 +43,6 @@ from rig.results.catalogue import (
     storable,
 )
 
-ENVIRONMENT = "RIG_CATALOGUE"
 # Clocks that a person set differ by a minute; one that is further ahead was wrong.
 LARGEST_AHEAD_S = 60.0
 

@@ -11,13 +11,11 @@ from sqlalchemy import ColumnElement, Connection, Table, and_, func, or_, select
 
 from api.catalogue.folder import utc_of
 from api.catalogue.schema import TABLES, entry
+from api.catalogue.settings import MOST, USUAL
 from rig.errors import UsageError
 from rig.results.catalogue import CatalogueEntry, CauseEntry, SessionEntry, SiteEntry, storable
 
-# A page of a table that a person looks through; more are a script's, which can turn pages.
-MOST = 500
 DAY = re.compile(r"\d{4}-\d\d-\d\d")
-USUAL = 100
 Kind = TypeVar("Kind", bound=CatalogueEntry)
 
 

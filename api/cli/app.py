@@ -7,15 +7,16 @@ import ast
 import os
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 import rig
+from api.cli.deferred import deferred
 from rig.errors import RigError
 
 COMMANDS = {
@@ -27,6 +28,7 @@ COMMANDS = {
     "report": "api.cli.report:report",
     "diagnose": "api.cli.diagnose:diagnose",
     "protocol": "api.cli.diagnose:protocol",
+    "replay": "api.cli.replay:replay",
     "verify": "api.cli.records:verify",
     "repair": "api.cli.records:repair",
     "import": "api.cli.records:import_",
@@ -39,12 +41,14 @@ COMMANDS = {
     "mock": "api.cli.hardware:mock",
     "reset": "api.cli.recovery:reset",
     "doctor": "api.cli.hardware:doctor",
+    "devices": "api.cli.devices:devices",
+    "find": "api.cli.devices:find",
     "calibrate": "api.cli.calibrate:calibrate",
     "demo": "api.cli.demo:demo",
 }
 
 
-def build(wanted: str | None = None) -> typer.Typer:
+def build(wanted: str | None = None, for_help: bool = False) -> typer.Typer:
     """The application with the command ``wanted``; where it is no command, with the name and summary of each."""
     app = typer.Typer(
         help="Software for a soft-tissue bench: capture, fit, track, report. Exit codes: 0 ok, 1 check failed,"
@@ -58,7 +62,7 @@ def build(wanted: str | None = None) -> typer.Typer:
     # A callback keeps the name of the command on the line also where only one is loaded.
     app.callback()(_common)
     if wanted in COMMANDS:
-        app.command(wanted)(_load(COMMANDS[wanted]))
+        app.command(wanted)((_declared if for_help else _load)(COMMANDS[wanted]))
         return app
     for name, target in COMMANDS.items():
         app.command(name, short_help=_summary(target))(lambda: None)
@@ -81,6 +85,13 @@ def _summary(target: str) -> str:
     return (ast.get_docstring(definition) or "").partition("\n")[0]
 
 
+def _declared(target: str) -> Callable[..., None]:
+    """The command with its options, not to be run."""
+    module, _, function = target.partition(":")
+    command: Callable[..., None] = getattr(import_module(module), function)
+    return command
+
+
 def _load(target: str) -> Callable[..., None]:
     from api.cli.output import with_reason  # noqa: PLC0415 - loads pydantic
 
@@ -94,7 +105,12 @@ def main() -> None:
     # Its matrices are small: threads of linear algebra mostly wait for one another, and take a core from the loop.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        build(next((word for word in sys.argv[1:] if word != "--"), None))()
+        words = sys.argv[1:]
+        for_help = "--help" in words and "--" not in words
+        with deferred() if for_help else nullcontext():
+            build(next((word for word in words if word != "--"), None), for_help)()
     except RigError as error:
+        from rich.console import Console  # noqa: PLC0415 - help needs none
+
         Console(stderr=True, highlight=False, soft_wrap=True, emoji=False).print(f"rig: {error}", markup=False)
         sys.exit(error.exit_code)

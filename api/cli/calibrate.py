@@ -9,16 +9,18 @@ import typer
 
 from api.cli.asking import Person
 from api.cli.calibrate_axis import AxisAsked, calibrate_axis
+from api.cli.calibrate_dynamics import calibrate_dynamics
 from api.cli.calibrate_force import ForceAsked, Load, calibrate_force
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_file, wiring_from
 from api.cli.output import show, write_json
-from api.operations.calibrations import What, keep, refuse_out, refuse_unfit
-from rig.config.calibration import AxisCalibration, ForceCalibration
+from api.operations.calibrations import keep, refuse_out, refuse_unfit
+from rig.config.calibration import AnyCalibration, What, what_of
 from rig.errors import UsageError
 from rig.results.bench import CalibrateResult
 
 OF_FORCE = ("weights", "load", "tolerance_percent", "gravity")
-OF_AXIS = ("from_mm", "to_mm", "clear", "toward_limb", "gauge_block_mm", "near_mm")
+OF_AXIS = ("from_mm", "to_mm", "clear", "toward_limb", "gauge_block_mm", "near_mm", "dynamics")
+OF_SCALE = ("to_mm", "toward_limb", "gauge_block_mm", "near_mm")
 
 
 def calibrate(
@@ -46,6 +48,9 @@ def calibrate(
     near_mm: Annotated[
         float | None, typer.Option("--near-mm", help="axis: position just before the table, for the block.")
     ] = None,
+    dynamics: Annotated[
+        bool, typer.Option("--dynamics", help="axis: how it follows its set-point, by small sweeps in the air.")
+    ] = False,
     pause: Annotated[
         float | None, typer.Option("--pause", min=0, max=600, help="Seconds to wait instead of Enter each time.")
     ] = None,
@@ -54,26 +59,31 @@ def calibrate(
     overrides: SetOption = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Calibrates force sensor (known weights) or axis (tracker, gauge block), and says what is wrong with it.
+    """Calibrates force sensor (known weights) or axis (tracker, gauge block, sweeps), and says what is wrong with it.
 
     force: nothing moves; unloaded, each weight up and down again, unloaded, step by step. axis: the tip moves in the
-    air between rests. What contradicts the configuration is refused, never corrected, and then nothing is written.
+    air between rests; with --dynamics it swings by less than a millimetre, and what a force loop needs to know of the
+    axis is found. What contradicts the configuration is refused, never corrected, and then nothing is written.
 
     Example: rig calibrate force --weights "100 g,200 g,500 g" --load pressed
     """
     _refuse_options(context, OF_AXIS if what == "force" else OF_FORCE, what)
     wiring = wiring_from(config, overrides)
     refuse_out(out)
-    found: ForceCalibration | AxisCalibration
-    if what == "force":
+    found: AnyCalibration
+    if dynamics:
+        _refuse_options(context, OF_SCALE, "axis --dynamics")
+        found = calibrate_dynamics(wiring, from_mm, clear, Person(pause))
+    elif what == "force":
         asked = ForceAsked(weights, load, tolerance_percent / 100, gravity)
         found = calibrate_force(wiring, asked, Person(pause))
     else:
         way = AxisAsked(from_mm, to_mm, clear, toward_limb, gauge_block_mm, near_mm)
         found = calibrate_axis(wiring, way, Person(pause))
     refuse_unfit(wiring.calibration, found, datetime.now(UTC))
-    path = keep(what, found, out)
-    say_use(what, path, (wiring_file(config) or Path()).parent)
+    kind = what_of(found)
+    path = keep(kind, found, out)
+    say_use(kind, path, (wiring_file(config) or Path()).parent)
     write_json(json_file, CalibrateResult(file=str(path), calibration=found))
 
 

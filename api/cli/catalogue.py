@@ -6,8 +6,9 @@ from typing import Annotated, Literal
 
 import typer
 
-from api.catalogue.catalogue import ENVIRONMENT, Catalogue
-from api.catalogue.queries import USUAL, Asked, Page
+from api.catalogue.catalogue import Catalogue
+from api.catalogue.queries import Asked, Page
+from api.catalogue.settings import ENVIRONMENT, USUAL
 from api.catalogue.subjects import erase_subject, export_subject
 from api.cli.options import JsonOption
 from api.cli.output import show, write_json

@@ -1,4 +1,4 @@
-"""`rig track --table`: every choice of gains on the simulated subjects."""
+"""`rig track --table`: jumps of force on the simulated subjects."""
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
@@ -12,12 +12,11 @@ from api.operations.compare import Comparison, comparison_operation
 from api.operations.compare import compare as work
 from controller.experiments import comparison, tracked
 from controller.experiments.references import Reference, Stairs
-from controller.law.gains import Choice
 from controller.supervisor import Supervisor
 from rig.config.table import parse
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
-from rig.results.tables import run_table
+from rig.results.tables import run_table, study_table
 from rig.results.tracking import CompareResult
 
 SUBJECTS = Path(mock_devices.__file__).parent / "subjects"
@@ -26,16 +25,14 @@ BREATHES = ("surface_motion.amplitude_mm=1.5", "surface_motion.frequency_Hz=0.25
 ALL = (*sorted(path.stem for path in SUBJECTS.glob("*.toml")), BREATHING)
 
 
-def compare(
-    wiring: Wiring, out: Path, subjects: Sequence[str], choices: Sequence[Choice], reference: Reference
-) -> CompareResult:
-    """Runs all of it on mock benches and prints the table."""
+def compare(wiring: Wiring, out: Path, subjects: Sequence[str], reference: Reference) -> CompareResult:
+    """Runs all of it on mock benches and prints the tables."""
     _refuse_subjects(wiring, subjects)
     whose = {subject: _who(subject) for subject in subjects}
-    wanted = Comparison(wiring, out, whose, choices, reference, lambda subject: _bench(wiring, subject))
+    wanted = Comparison(wiring, out, whose, reference, lambda subject: _bench(wiring, subject))
     operation = comparison_operation(wanted)
     result = here(operation, lambda: work(operation, wanted))
-    show(run_table(result.runs, reference.name), f"comparison.svg is in {out}")
+    show(study_table(result.runs), run_table(result.runs, reference.name), f"comparison.svg is in {out}")
     return result
 
 

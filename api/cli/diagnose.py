@@ -12,7 +12,7 @@ from api.cli.output import show, write_json
 from api.cli.records import mapping_for
 from api.operations import diagnose as work
 from api.operations.cohort.wanted import Wanted
-from api.operations.diagnose import Simulation
+from api.operations.judged import Simulation
 from controller.operation import Operation
 from rig.config.protocol import Indentation
 from rig.config.table import load

@@ -32,7 +32,7 @@ def mock(
 
     Example: rig mock --json --hide friction.level_N=0.2
     """
-    with bench_process(wiring_from(config, overrides), tuple(hide or ()), seed, both_sensors=True) as (
+    with bench_process(wiring_from(config, overrides), tuple(hide or ()), seed, every_product=True) as (
         process,
         endpoints,
     ):

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 
 from api.cli.mock_calibration import mock_axis_calibration, mock_force_calibration
+from api.cli.mock_dynamics import mock_axis_dynamics
 from api.cli.options import calibrated
 from controller.commissioning.refusals import refuse_uncalibrated
 from rig.config.endpoints import Endpoints
@@ -18,7 +19,7 @@ from rig.errors import UsageError
 BENCH_PRIORITY = 10
 
 
-def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, both_sensors: bool) -> list[str]:
+def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, every_product: bool) -> list[str]:
     command = [sys.executable, "-m", "mock_devices.serve", "--with-parent", "--priority", str(BENCH_PRIORITY)]
     if wiring.mock.parameters:
         command += ["--parameters", str(wiring.mock.parameters)]
@@ -26,18 +27,18 @@ def _arguments(wiring: Wiring, hide: tuple[str, ...], seed: int | None, both_sen
         command += ["--seed", str(seed)]
     for effect in (*wiring.mock.hide, *hide):
         command += ["--hide", effect]
-    # A real sensor's product may be one that the bench cannot play, and need not.
-    both_sensors = both_sensors or wiring.force.port != MOCK_PORT
-    return [*command, "--force", "both" if both_sensors else wiring.force.product]
+    # A real device's product may be one that the bench cannot play, and need not: it then plays them all.
+    played = {} if every_product else mocks(wiring)
+    return command + [part for role, device in played.items() for part in (f"--{role}", device.product)]
 
 
 @contextmanager
 def bench_process(
-    wiring: Wiring, hide: tuple[str, ...] = (), seed: int | None = None, both_sensors: bool = False
+    wiring: Wiring, hide: tuple[str, ...] = (), seed: int | None = None, every_product: bool = False
 ) -> Iterator[tuple["subprocess.Popen[str]", Endpoints]]:
     """The mock bench as a process, and its endpoints; it ends with the block, or with this process."""
     process = subprocess.Popen(
-        _arguments(wiring, hide, seed, both_sensors),
+        _arguments(wiring, hide, seed, every_product),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         start_new_session=True,
@@ -90,6 +91,8 @@ def plug_into(wiring: Wiring, endpoints: Endpoints) -> Wiring:
     seen = tracker is not None and tracker.port == wiring.axis.port == MOCK_PORT
     if seen and not known.of_axis:
         known = known.model_copy(update={"of_axis": mock_axis_calibration(live, endpoints)})
+    if wiring.force.port == wiring.axis.port == MOCK_PORT and not known.of_dynamics:
+        known = known.model_copy(update={"of_dynamics": mock_axis_dynamics(live, endpoints)})
     return live.model_copy(update={"calibration": known})
 
 
@@ -120,7 +123,7 @@ def _served(device: Product, endpoints: Endpoints) -> Product:
     known = {"port": device.mock.address(endpoints)}
     if not isinstance(device, ForceProduct | TrackerProduct):
         return device.model_copy(update=known)
-    stated_ms = endpoints.latency_ms.get(device.mock.role)
+    stated_ms = endpoints.latency_ms.get(device.mock.role, 0.0)
     return device.model_copy(update=known | {"latency_ms": device.latency_ms or stated_ms})
 
 

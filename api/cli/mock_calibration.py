@@ -20,6 +20,7 @@ from controller.commissioning.axis_moves import Pace, RestingAxis, drive_to_posi
 from controller.commissioning.weights import Weights
 from controller.devices.drivers import start_devices
 from mock_devices.control import BenchControl
+from rig.config.axis_dynamics import AxisDynamics
 from rig.config.calibration import AxisCalibration, ForceCalibration
 from rig.config.calibration_files import read_axis, read_force, text_of
 from rig.config.endpoints import Endpoints
@@ -35,18 +36,18 @@ BY_ITSELF = ReadingTime(settle_s=0.05, read_s=0.12)
 # The simulated camera is 15 ms late; 18 frames at each place know the slope to 0.2 %.
 PACE = Pace(speed_mm_s=20.0, settle_s=0.15, read_s=0.3)
 AXIS_STEPS_MM = (2.0, 14.0, 2.0)
-Made = TypeVar("Made", ForceCalibration, AxisCalibration)
+Made = TypeVar("Made", ForceCalibration, AxisCalibration, AxisDynamics)
 
 
 def force_file(wiring: Wiring, endpoints: Endpoints) -> Path:
     """Where the calibration of this mock sensor is kept."""
-    return _file(wiring.force, endpoints)
+    return mock_file(wiring.force, endpoints)
 
 
-def _file(device: Product, endpoints: Endpoints) -> Path:
+def mock_file(device: Product, endpoints: Endpoints, suffix: str = "") -> Path:
     """Another serial number, another file."""
     assert device.mock, "only what the mock bench serves is calibrated by itself"
-    return state_folder() / f"{device.product}-{endpoints.serials[device.mock.role]}.json"
+    return state_folder() / f"{device.product}-{endpoints.serials[device.mock.role]}{suffix}.json"
 
 
 def mock_force_calibration(wiring: Wiring, endpoints: Endpoints) -> ForceCalibration:
@@ -56,7 +57,7 @@ def mock_force_calibration(wiring: Wiring, endpoints: Endpoints) -> ForceCalibra
         known = read_force(file)
         if not wiring.calibration.alone(known).unfit(datetime.now(UTC)):
             return known
-    return _kept("the mock force sensor", _measured_force(wiring, endpoints), file)
+    return kept("the mock force sensor", _measured_force(wiring, endpoints), file)
 
 
 def mock_axis_calibration(wiring: Wiring, endpoints: Endpoints) -> AxisCalibration | None:
@@ -65,7 +66,7 @@ def mock_axis_calibration(wiring: Wiring, endpoints: Endpoints) -> AxisCalibrati
     None where a marker is out of view or the limb's does not tell the sense, where the workspace is too short, and
     where the computer was too busy for it: the approach does not need it.
     """
-    file = _file(wiring.axis, endpoints)
+    file = mock_file(wiring.axis, endpoints)
     with contextlib.suppress(UsageError):
         known = read_axis(file)
         if not wiring.calibration.alone(known).unfit(datetime.now(UTC)):
@@ -73,9 +74,9 @@ def mock_axis_calibration(wiring: Wiring, endpoints: Endpoints) -> AxisCalibrati
     try:
         made = _measured_axis(wiring, endpoints)
     except DeviceError as error:
-        _say(f"the mock axis was not calibrated, next time again: {error}")
+        say(f"the mock axis was not calibrated, next time again: {error}")
         return None
-    return made and _kept("the mock axis", made, file)
+    return made and kept("the mock axis", made, file)
 
 
 def mock_weights(wiring: Wiring, hung: bool = False) -> Weights:
@@ -88,7 +89,7 @@ def _measured_force(wiring: Wiring, endpoints: Endpoints) -> ForceCalibration:
     weights = mock_weights(wiring)
     with (
         BenchControl(endpoints.control) as control,
-        _nothing_hidden(control),
+        nothing_hidden(control),
         weights_on(control) as put_on,
     ):
         return measured_force(force_calibration_operation(weights), wiring.force, weights, put_on, BY_ITSELF)
@@ -98,7 +99,7 @@ def _measured_axis(wiring: Wiring, endpoints: Endpoints) -> AxisCalibration | No
     places_mm = [wiring.limits.position_min_mm + step_mm for step_mm in AXIS_STEPS_MM]
     if max(places_mm) > wiring.limits.position_max_mm:
         return None
-    with BenchControl(endpoints.control) as control, _nothing_hidden(control), _in_the_air(control):
+    with BenchControl(endpoints.control) as control, nothing_hidden(control), in_the_air(control):
         if not all(control.get("tracker.tip_in_view", "tracker.arm_in_view").values()):
             return None
         devices = start_devices(wiring)
@@ -132,7 +133,7 @@ def weights_on(control: BenchControl) -> Iterator[Callable[[float], None]]:
 
 
 @contextlib.contextmanager
-def _in_the_air(control: BenchControl) -> Iterator[None]:
+def in_the_air(control: BenchControl) -> Iterator[None]:
     """Without the limb."""
     present = bool(control.get("tissue.present")["tissue.present"])
     control.set({"tissue.present": False})
@@ -143,7 +144,8 @@ def _in_the_air(control: BenchControl) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _nothing_hidden(control: BenchControl) -> Iterator[None]:
+def nothing_hidden(control: BenchControl) -> Iterator[None]:
+    """Without the effects that are hidden in it."""
     hidden = {f"{effect}.{name}": value for effect, values in control.truth().items() for name, value in values.items()}
     if hidden:
         control.hide({})
@@ -154,11 +156,12 @@ def _nothing_hidden(control: BenchControl) -> Iterator[None]:
             control.hide(hidden)
 
 
-def _say(sentence: str) -> None:
+def say(sentence: str) -> None:
+    """On stderr, beside what the command itself says."""
     typer.echo(sentence, err=True)
 
 
-def _kept(whose: str, made: Made, file: Path) -> Made:
+def kept(whose: str, made: Made, file: Path) -> Made:
     """``made``, said and kept in ``file``; a folder that cannot be written costs a calibration each time."""
     try:
         make_folder(file.parent)
@@ -166,5 +169,5 @@ def _kept(whose: str, made: Made, file: Path) -> Made:
         where = f"; kept in {file}"
     except RigError as error:
         where = f", and again next time: {error}"
-    _say(f"{whose} {made.product} {made.serial} was calibrated by itself{where}")
+    say(f"{whose} {made.product} {made.serial} was calibrated by itself{where}")
     return made

@@ -7,13 +7,12 @@ from typing import Annotated, NamedTuple
 import typer
 
 from api.cli import live
-from api.cli.options import ConfigOption, GainsOption, JsonOption, SetOption, wiring_from
+from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import show, write_json
 from api.operations import motion
 from api.operations.motion import Captured, TrackPlan
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
-from controller.experiments.comparison import CHOICES, choice_from, choices_from
 from controller.experiments.references import parse_reference
 from controller.experiments.verdicts import refuse_bad
 from controller.loop.steps import Program
@@ -68,9 +67,8 @@ def track(
         str, typer.Option("--reference", help="Instead of --force: step:5, sine:0.5,mean_N=2, press:3, csv:FILE, ...")
     ] = "",
     seconds: Annotated[float | None, typer.Option("--seconds", help="Time on each force; else 10.")] = None,
-    gains: GainsOption = "",
     compare: Annotated[
-        bool, typer.Option("--table", help="All gains on simulated subjects, 1 to 10 N; needs no model.")
+        bool, typer.Option("--table", help="Jumps on simulated subjects, 1 to 10 N; needs no model.")
     ] = False,
     subjects: Annotated[str, typer.Option("--subjects", help="With --table: which; else all.")] = "",
     out: Annotated[
@@ -80,14 +78,14 @@ def track(
     overrides: SetOption = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Tracks a force with gains from a tissue model, and prints given and actual force.
+    """Tracks a force with a law made from a tissue model, and prints given and actual force.
 
     With --against the error is also measured with another model, and what the first gains over it is printed.
 
     Example: rig track --model sessions/first/fit/model.json --force 1,2,5 --seconds 5 --json track.json
     """
     wiring = wiring_from(config, overrides)
-    asked = TrackOptions(model, force, reference, seconds, gains, subjects)
+    asked = TrackOptions(model, force, reference, seconds, subjects)
     if compare and against:
         raise UsageError("--table learns its own models: leave out --against")
     folder = out or Path("sessions") / f"track-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
@@ -125,7 +123,6 @@ class TrackOptions(NamedTuple):
     force: str
     reference: str
     seconds: float | None
-    gains: str
     subjects: str
 
 
@@ -134,15 +131,14 @@ def _planned(wiring: Wiring, asked: TrackOptions) -> Program:
     if asked.model is None or bool(asked.force) == bool(asked.reference) or asked.subjects:
         raise UsageError("tracking needs --model, and either --force or --reference; or --table, which has --subjects")
     fitted = load_model(asked.model)
-    choice = choice_from(asked.gains) if asked.gains else None
     if asked.reference:
         if asked.seconds is not None:
             raise UsageError(
                 "--seconds goes with --force; a --reference has its own duration, as in step:5,duration_s=4"
             )
-        return tracked.plan_reference(parse_reference(asked.reference), fitted, wiring, choice)
+        return tracked.plan_reference(parse_reference(asked.reference), fitted, wiring)
     seconds = 10.0 if asked.seconds is None else asked.seconds
-    return tracked.plan(tracked.forces(asked.force), seconds, fitted, wiring, choice)
+    return tracked.plan(tracked.forces(asked.force), seconds, fitted, wiring)
 
 
 def _compared(wiring: Wiring, folder: Path, asked: TrackOptions) -> CompareResult:
@@ -151,6 +147,5 @@ def _compared(wiring: Wiring, folder: Path, asked: TrackOptions) -> CompareResul
     if asked.model or asked.reference:
         raise UsageError("--table learns its own models and jumps by itself: leave out --model and --reference")
     subjects = asked.subjects.split(",") if asked.subjects else comparison.ALL
-    choices = choices_from(asked.gains) if asked.gains else CHOICES
     jumps = comparison.stairs(asked.force or "1,10", 1.5 if asked.seconds is None else asked.seconds)
-    return comparison.compare(wiring, folder, subjects, choices, jumps)
+    return comparison.compare(wiring, folder, subjects, jumps)

@@ -6,11 +6,10 @@ from typing import Annotated
 import typer
 
 from api.cli.computing import compute
-from api.cli.options import ConfigOption, GainsOption, JsonOption, ModelOption, SetOption, wiring_from
+from api.cli.options import ConfigOption, JsonOption, ModelOption, SetOption, wiring_from
 from api.cli.output import show, write_json
 from api.operations import simulate as work
 from api.operations.simulate import SimulatedRun
-from controller.experiments import comparison
 from controller.experiments.references import parse_reference
 from rig.results.tables import simulation_parts
 from rig.tissue.model import load_model
@@ -21,7 +20,6 @@ def simulate(
     reference: Annotated[
         str, typer.Option("--reference", help="step:5, ramp:5, stairs:10, sine:0.5, press:3, knead:3, csv:FILE, ...")
     ],
-    gains: GainsOption = "",
     stiffness: Annotated[
         float, typer.Option("--stiffness", min=0.1, max=10.0, help="How much stiffer the tissue is than the model.")
     ] = 1.0,
@@ -38,8 +36,7 @@ def simulate(
     Example: rig simulate --model sessions/first/fit/model.json --reference step:5 --json simulation.json
     """
     wiring, fitted, asked = wiring_from(config, overrides), load_model(model), parse_reference(reference)
-    choice = comparison.choice_from(gains) if gains else wiring.loop.gains
-    wanted = SimulatedRun(asked, fitted, choice, stiffness, breathing)
+    wanted = SimulatedRun(asked, fitted, stiffness, breathing)
     result = compute("simulate", lambda operation: work.simulate(operation, wiring, wanted, out))
-    show(*simulation_parts(result), f"simulation.svg, simulation.png and bode.svg are in {out}")
+    show(*simulation_parts(result), f"simulation.svg, simulation.png, bode.svg and nyquist.svg are in {out}")
     write_json(json_file, result)

@@ -24,7 +24,7 @@ from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.config.wiring import Subject, Wiring
 from rig.errors import RigError, UsageError
-from rig.recording.tap import Slots
+from rig.recording.slots import Slots
 from rig.results.bench import DeviceReport, ResetResult
 
 # As long as the stop process itself waits for the loop.

@@ -1,7 +1,7 @@
 """The force sensor against known weights, and the axis against tracker or gauge block; nobody else has the bench."""
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from datetime import UTC, datetime
 from itertools import count
 from typing import NamedTuple
@@ -20,10 +20,9 @@ from controller.commissioning.force import calibrate
 from controller.commissioning.readings import read
 from controller.commissioning.stoppable import stoppable
 from controller.commissioning.weights import Weights
-from controller.devices.drivers import open_force, start_devices
+from controller.devices.drivers import Devices, open_force, start_devices
 from controller.loop.realtime import promptly
 from controller.operation import Operation
-from drivers.roles import Identity
 from rig.config.calibration import AxisCalibration, ForceCalibration
 from rig.config.products.roles import ForceProduct
 from rig.config.wiring import Wiring
@@ -128,8 +127,17 @@ def refuse_outside(ends_mm: tuple[float, float], wiring: Wiring) -> None:
             )
 
 
+class Resting(NamedTuple):
+    """An axis at rest, its devices, what is to be around each motion, and whether a stop was asked for."""
+
+    axis: RestingAxis
+    devices: Devices
+    moving: Callable[[], AbstractContextManager[None]]
+    interrupted: Callable[[], bool]
+
+
 @contextmanager
-def _resting(operation: Operation, wiring: Wiring) -> Iterator[tuple[RestingAxis, Identity]]:
+def resting_axis(operation: Operation, wiring: Wiring) -> Iterator[Resting]:
     """Devices started and the axis homed; a stop brakes it, and whatever happens the devices are closed.
 
     At the loop's priority, as the drive brakes where its heartbeat comes late.
@@ -146,7 +154,7 @@ def _resting(operation: Operation, wiring: Wiring) -> Iterator[tuple[RestingAxis
         with closing(start_devices(wiring, guard.interrupted)) as devices:
             with moving():
                 devices.axis.home()
-            yield RestingAxis(devices, moving), devices.axis.identity
+            yield Resting(RestingAxis(devices, moving), devices, moving, guard.interrupted)
 
 
 def axis_by_tracker(
@@ -154,10 +162,10 @@ def axis_by_tracker(
 ) -> AxisCalibration:
     """The axis against the tracker; where no marker on the limb tells it, ``toward_limb`` says where the tip went."""
     refuse_travel(travel, wiring)
-    with _resting(operation, wiring) as (axis, drive):
-        places = drive_to_positions(axis, _told(operation, steps_mm(travel.from_mm, travel.to_mm, STEPS)))
+    with resting_axis(operation, wiring) as resting:
+        places = drive_to_positions(resting.axis, _told(operation, steps_mm(travel.from_mm, travel.to_mm, STEPS)))
     known_by = known_direction(ahead_mm(places)) or _said(toward_limb)
-    return against_tracker(drive, wiring.axis, places, known_by, datetime.now(UTC))
+    return against_tracker(resting.devices.axis.identity, wiring.axis, places, known_by, datetime.now(UTC))
 
 
 def _told(operation: Operation, positions_mm: Sequence[float]) -> Iterator[float]:
@@ -176,7 +184,8 @@ def axis_by_block(
     operation: Operation, wiring: Wiring, from_mm: float, block: GaugeBlock, put: Callable[[], object]
 ) -> AxisCalibration:
     """The axis against a gauge block, which ``put`` lays on the table while the axis waits."""
-    with _resting(operation, wiring) as (axis, drive):
+    with resting_axis(operation, wiring) as resting:
+        axis, drive = resting.axis, resting.devices.axis.identity
         axis.go(from_mm)
         axis.place()
         operation.advance(0.0, "table")

@@ -2,15 +2,13 @@
 
 from datetime import datetime
 from pathlib import Path
-from typing import Literal
 
-from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
+from rig.config.calibration import AnyCalibration, Calibration, What
 from rig.config.calibration_files import text_of
 from rig.errors import CheckFailed, UsageError
 from rig.recording.files import make_folder, refuse_unwritable, whole_file
 
 FOLDER = Path("calibration")
-What = Literal["force", "axis"]
 
 
 def refuse_out(out: Path | None) -> None:
@@ -20,13 +18,13 @@ def refuse_out(out: Path | None) -> None:
     refuse_unwritable(out or FOLDER / "new.json")
 
 
-def refuse_unfit(stated: Calibration, found: ForceCalibration | AxisCalibration, now: datetime) -> None:
+def refuse_unfit(stated: Calibration, found: AnyCalibration, now: datetime) -> None:
     """Raises CheckFailed where the new calibration is not as good as the wiring states: it would be refused at use."""
     if reasons := stated.alone(found).unfit(now):
         raise CheckFailed("; ".join(reasons))
 
 
-def keep(what: What, found: ForceCalibration | AxisCalibration, out: Path | None) -> Path:
+def keep(what: What, found: AnyCalibration, out: Path | None) -> Path:
     """Writes it, whole or not at all, to ``out`` or calibration/WHAT-SERIAL-TIME.json; returns the path."""
     path = out or FOLDER / f"{what}-{_plain(found.serial)}-{_stamp(found.date)}.json"
     make_folder(path.parent)

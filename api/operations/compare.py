@@ -1,16 +1,18 @@
-"""Every choice of gains on several subjects, each learnt first by indentation and fit."""
+"""Jumps of force on several subjects, each learnt first by indentation and fit: given against actual force."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
 from controller.experiments import capture, comparison, tracked, tracking
-from controller.experiments.comparison import compared_run
+from controller.experiments.comparison import compared_run, study_levels
 from controller.experiments.recorded import Recorded
 from controller.experiments.references import Reference
-from controller.law.gains import Choice, pi_gains
+from controller.law import synthesis
+from controller.law.axis_response import rates_of, response_of
+from controller.law.synthesis import Span
 from controller.loop.steps import Program
 from controller.operation import Operation
 from controller.safety.table import BY_PERSON
@@ -33,9 +35,10 @@ LEARNING = Indentation(
     hold_s=0.1, retract_speed_mm_s=20.0, clearance_mm=3.0, rest_s=0.1, force_limit_N=11.5,
 )  # fmt: skip
 LEARNT_N = 10.3
-# What stops a run where the computer, and not the gains, was late; such a run is done again.
+# What stops a run where the computer, and not the law, was late; such a run is done again.
 STALLED = ("axis_lost", "force_lost", "tracker_lost", "loop_overrun")
 ATTEMPTS = 3
+MIDDLING_RAD_S = 20.0, 60.0, 180.0  # k / B of the five subjects is 10 to 500 rad/s
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,6 @@ class Comparison:
     wiring: Wiring
     out: Path
     subjects: Mapping[str, str]
-    choices: Sequence[Choice]
     reference: Reference
     bench: Callable[[str], AbstractContextManager[Supervisor]]
 
@@ -63,8 +65,8 @@ def refuse_comparison(wanted: Comparison) -> None:
     wiring = wanted.wiring
     _refuse_strong(max(wanted.reference.forces_N), wiring)
     tracking.refuse_beyond_bench(wanted.reference, wiring)
-    # Without damping, which only helps, whether a law exists does not depend on stiffness: one tissue speaks for all.
-    pi_gains(1.0, 0.0, tracking.design_for(wiring))
+    # Where no law holds the middle of the subjects' tissue, none holds theirs.
+    synthesis.constants(response_of(wiring), rates_of(wiring), Span(MIDDLING_RAD_S, (1.0,) * len(MIDDLING_RAD_S)))
     capture.check(LEARNING, wiring)
     for subject in wanted.subjects:
         if wanted.model_file(subject).exists():
@@ -81,11 +83,11 @@ def _refuse_strong(force_N: float, wiring: Wiring) -> None:
 
 def comparison_operation(wanted: Comparison) -> Operation:
     """The operation that ``compare`` is to report to."""
-    return Operation("compare", total=len(wanted.subjects) * len(wanted.choices), unit="runs")
+    return Operation("compare", total=len(wanted.subjects), unit="runs")
 
 
 def compare(operation: Operation, wanted: Comparison) -> CompareResult:
-    """Learns every subject and runs every choice on it; what a stall of the computer stopped is done again.
+    """Learns every subject and tracks on it; what a stall of the computer stopped is done again.
 
     Raises SafetyStop where a person stops a run, or a limit the learning: nothing moves after that.
     """
@@ -96,9 +98,9 @@ def compare(operation: Operation, wanted: Comparison) -> CompareResult:
         operation.step(f"learning {subject}", len(runs))
         model = _learnt(operation, wanted, subject)
         models[subject] = {parameter.name: parameter.value for parameter in model.law.parameters}
-        for run in _on_subject(operation, wanted, subject, model, len(runs)):
-            runs.append(run)
-            operation.say("  ".join([*run_table([run]).rows[0], run.stopped]).rstrip())
+        operation.step(f"tracking on {subject}", len(runs))
+        runs.append(_on_subject(operation, wanted, subject, model))
+        operation.say("  ".join([*run_table([runs[-1]]).rows[0], runs[-1].stopped]).rstrip())
     _draw(runs, wanted.out)
     return CompareResult(reference=wanted.reference.name, models=models, runs=tuple(runs))
 
@@ -130,37 +132,33 @@ def _indented(operation: Operation, wanted: Comparison, subject: str, attempt: i
     return folder
 
 
-def _on_subject(
-    operation: Operation, wanted: Comparison, subject: str, model: Model, done: int
-) -> Iterator[ComparedRun]:
-    for number, choice in enumerate(wanted.choices):
-        operation.step(f"{subject}, {choice} gains", done + number)
-        try:
-            program = tracked.plan_reference(wanted.reference, model, wanted.wiring, choice)
-        except UsageError as refusal:
-            yield compared_run(subject, choice, (), str(refusal))
-        else:
-            yield _tracked(operation, wanted, subject, choice, program)
+def _on_subject(operation: Operation, wanted: Comparison, subject: str, model: Model) -> ComparedRun:
+    try:
+        program = tracked.plan_reference(wanted.reference, model, wanted.wiring)
+    except UsageError as refusal:
+        return compared_run(subject, (), (), str(refusal))
+    return _tracked(operation, wanted, subject, model, program)
 
 
 def _tracked(
-    operation: Operation, wanted: Comparison, subject: str, choice: Choice, program: Program, attempt: int = 1
+    operation: Operation, wanted: Comparison, subject: str, model: Model, program: Program, attempt: int = 1
 ) -> ComparedRun:
     """One run on a bench of its own; what a stall of the computer stopped is said, and done again."""
     try:
         with wanted.bench(subject) as bench:
             done = tracked.recorded_run(bench, program, wanted.out / subject, str(wanted.model_file(subject)))
     except DeviceError as cause:
-        found, stalled = compared_run(subject, choice, (), str(cause)), True
+        found, stalled = compared_run(subject, (), (), str(cause)), True
     else:
         if done.outcome.outcome in BY_PERSON:
             raise stop_error(done.outcome)
-        found = compared_run(subject, choice, _jumps(done), done.outcome.cause)
+        jumps = _jumps(done)
+        found = compared_run(subject, jumps, study_levels(jumps, model), done.outcome.cause)
         stalled = done.outcome.outcome in STALLED
     if not stalled or attempt == ATTEMPTS:
         return found
-    operation.say(f"{subject}  {choice}: {found.stopped}; once more")
-    return _tracked(operation, wanted, subject, choice, program, attempt + 1)
+    operation.say(f"{subject}: {found.stopped}; once more")
+    return _tracked(operation, wanted, subject, model, program, attempt + 1)
 
 
 def _jumps(done: Recorded) -> tuple[Jump, ...]:
@@ -175,14 +173,9 @@ def _jumps(done: Recorded) -> tuple[Jump, ...]:
 
 
 def _draw(runs: Sequence[ComparedRun], out: Path) -> None:
-    subjects, choices = dict.fromkeys(run.subject for run in runs), dict.fromkeys(run.gains for run in runs)
-    found = {(run.subject, run.gains): run.worst.model_dump() for run in runs}
-
-    def heights(figure: str) -> dict[str, list[float]]:
-        return {choice: [_height(found[subject, choice][figure]) for subject in subjects] for choice in choices}
-
-    picture = comparison_figure(list(subjects), heights("overshoot_percent"), heights("settling_s"))
-    write_text(out / "comparison.svg", svg(picture))
+    worst = [run.worst.model_dump() for run in runs]
+    heights = [[_height(one[figure]) for one in worst] for figure in ("overshoot_percent", "settling_s")]
+    write_text(out / "comparison.svg", svg(comparison_figure([run.subject for run in runs], *heights)))
 
 
 def _height(value: float | None) -> float:

@@ -1,9 +1,9 @@
 """What a session shows of the simulation's errors, and what a protocol could show."""
 
 from pathlib import Path
-from typing import Literal
 
 from api.operations.at_hand import at_hand
+from api.operations.judged import Simulation
 from api.operations.opening import opened
 from controller.operation import Operation
 from rig.config.protocol import Indentation
@@ -21,8 +21,6 @@ from rig.results.diagnosis import FILE, MOCK_LIMB, MODEL, PICTURES, DiagnosisRes
 from rig.tissue.model import Model
 from rig.trials.opening import AS_IT_IS, Opening, stated_mapping
 from rig.trials.reading import trials_of
-
-Simulation = Literal["index", "constant"]
 
 
 def diagnose(

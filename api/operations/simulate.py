@@ -1,5 +1,6 @@
 """A reference on a tissue model, before anything real moves."""
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,17 +10,16 @@ import numpy as np
 
 from controller.experiments import comparison, tracked, tracking
 from controller.experiments.references import Reference
-from controller.law.force_position import GainRow
-from controller.law.gains import Choice, margins
+from controller.law.loop_response import grid
+from controller.law.stability import ForceLoop, nearest
 from controller.loop.modes import Mode
-from controller.loop.steps import TrackForce
 from controller.operation import Operation
 from controller.simulated import bench as simulated
 from controller.simulated.bench import SimulatedBench, Trace, limb_of
 from rig.config.wiring import Wiring
 from rig.errors import DataError
 from rig.recording.files import make_folder, write_text
-from rig.results.tracking import Jump, LoopMargins, SimulateResult
+from rig.results.tracking import Jump, LoopMargins, LoopReach, SimulateResult
 from rig.tissue.model import Model
 
 PLAYS = 3
@@ -28,26 +28,27 @@ SHOWN_N = (0.5, 1.0, 2.0, 5.0, 10.0)
 
 @dataclass(frozen=True)
 class SimulatedRun:
-    """What is played: a reference, with gains from a model, on tissue that may be stiffer and may breathe [mm]."""
+    """What is played: a reference, with a law from a model, on tissue that may be stiffer and may breathe [mm]."""
 
     reference: Reference
     model: Model
-    gains: Choice
     stiffness: float = 1.0
     breathing_mm: float = 0.0
 
 
 def simulate(operation: Operation, wiring: Wiring, wanted: SimulatedRun, out: Path) -> SimulateResult:
     """Plays it on a virtual clock with the loop's own code, and draws force, displacement and effort into ``out``."""
-    model, choice, stiffness = wanted.model, wanted.gains, wanted.stiffness
-    program = tracked.plan_reference(wanted.reference, model, wiring, choice)
+    model, stiffness = wanted.model, wanted.stiffness
+    program = tracked.plan_reference(wanted.reference, model, wiring)
     bench = SimulatedBench(limb_of(model, stiffness, wanted.breathing_mm))
     trace, times_real_time = _timed(operation, lambda: simulated.run(program, wiring, bench))
-    loop = _margins(model, wiring, choice, stiffness)
-    result = _result(trace, times_real_time, wanted.reference.name, choice, loop)
+    loops = _loops(model, wiring)
+    result = _result(trace, times_real_time, wanted.reference.name, tracking.loop_for(model, wiring)).model_copy(
+        update={"margins": tuple(_margins(force_N, tangent, loop, stiffness) for force_N, tangent, loop in loops)}
+    )
     make_folder(out)
-    _draw(trace, bench, out, f"{wanted.reference.name}, {choice} gains")
-    _draw_bode(model, wiring, choice, stiffness, out)
+    _draw(trace, bench, out, wanted.reference.name)
+    _draw_loops(loops, stiffness, out)
     return result
 
 
@@ -66,20 +67,18 @@ def _timed(operation: Operation, play: Callable[[], Trace]) -> tuple[Trace, floa
     return trace, float(trace.time_s[-1] / min(took_s))
 
 
-def _result(
-    trace: Trace, times_real_time: float, reference: str, choice: Choice, loop: Sequence[LoopMargins]
-) -> SimulateResult:
+def _result(trace: Trace, times_real_time: float, reference: str, loop: ForceLoop) -> SimulateResult:
     on = (trace.mode == Mode.CONTACT) & np.isfinite(trace.reference_N)
     return SimulateResult(
         reference=reference,
-        gains=choice,
         times_real_time=times_real_time,
         jumps=_jumps(trace),
         duration_s=float(trace.time_s[-1]),
         rms_error_N=float(np.sqrt(np.mean((trace.force_N[on] - trace.reference_N[on]) ** 2))),
         peak_force_N=float(np.max(trace.force_N)),
         largest_voltage_V=float(np.max(np.abs(trace.voltage_V[on]))),
-        margins=tuple(loop),
+        margins=(),
+        reach=_reach(loop),
     )
 
 
@@ -91,24 +90,38 @@ def _jumps(trace: Trace) -> tuple[Jump, ...]:
         return ()
 
 
-def _law(model: Model, wiring: Wiring, choice: Choice) -> TrackForce:
-    return tracking.force_law(model, wiring, choice, adapt=False)
+def _loops(model: Model, wiring: Wiring) -> list[tuple[float, float, ForceLoop]]:
+    """Force, tangent and loop at each force that is shown."""
+    loop, rows = tracking.loop_for(model, wiring), tracking.rows_of(model)
+    shown = nearest(rows, [force for force in SHOWN_N if force <= model.valid.force_N])
+    return [(row.force_N, row.tangent_N_mm, loop.at(row, model.damping_N_s_mm)) for row in shown]
 
 
-def _margins(model: Model, wiring: Wiring, choice: Choice, stiffness: float) -> list[LoopMargins]:
-    """Margins with the gains of each force, on tissue ``stiffness`` times as stiff as the model."""
-    design, found = tracking.design_for(wiring), []
-    for row in _shown(model, wiring, choice):
-        tangent = stiffness * model.tangent_N_mm(model.depth_mm(row.force_N))
-        loop = margins((row.proportional_mm_N, row.integral_mm_N_s), tangent, model.damping_N_s_mm, design)
-        found.append(LoopMargins(force_N=row.force_N, tangent_N_mm=tangent, **loop._asdict()))
-    return found
+def _margins(force_N: float, tangent_N_mm: float, loop: ForceLoop, stiffness: float) -> LoopMargins:
+    """Margins at one force, on tissue ``stiffness`` times as stiff as the model, and the worst of the span."""
+    found, (worst_deg, worst_gain) = loop.margins(stiffness), loop.worst()
+    return LoopMargins(
+        force_N=force_N,
+        tangent_N_mm=stiffness * tangent_N_mm,
+        crossover_Hz=float(found.crossover_rad_s[0]) / (2 * math.pi),
+        phase_deg=float(found.phase_deg[0]),
+        gain=float(found.gain[0]),
+        worst_phase_deg=worst_deg,
+        worst_gain=worst_gain,
+        stiffest_N_mm=tangent_N_mm * float(loop.tolerated()[0]),
+    )
 
 
-def _shown(model: Model, wiring: Wiring, choice: Choice) -> list[GainRow]:
-    rows = _law(model, wiring, choice).gains
-    forces = [force for force in SHOWN_N if force <= model.valid.force_N]
-    return [min(rows, key=lambda row: abs(row.force_N - force)) for force in forces]
+def _reach(loop: ForceLoop) -> LoopReach:
+    return LoopReach(
+        crossover_Hz=loop.law.crossover_rad_s / (2 * math.pi),
+        lead_ms=1000 * loop.law.lead_s,
+        drift_Hz=loop.law.drift_rad_s / (2 * math.pi),
+        delay_ms=1000 * loop.axis.delay_s,
+        left_of_motion=loop.left_of_motion(),
+        noise_share=loop.noise_share(),
+        largest_sensitivity=loop.largest_sensitivity(),
+    )
 
 
 def _draw(trace: Trace, bench: SimulatedBench, out: Path, title: str) -> None:
@@ -127,14 +140,11 @@ def _draw(trace: Trace, bench: SimulatedBench, out: Path, title: str) -> None:
     save_figure(figure, out, "simulation")
 
 
-def _draw_bode(model: Model, wiring: Wiring, choice: Choice, stiffness: float, out: Path) -> None:
-    from controller.law import transfer_functions  # noqa: PLC0415 - python-control loads slowly
-    from rig.report.control_figures import bode_figure  # noqa: PLC0415
-    from rig.report.drawing import svg  # noqa: PLC0415
+def _draw_loops(loops: Sequence[tuple[float, float, ForceLoop]], stiffness: float, out: Path) -> None:
+    from rig.report.drawing import svg  # noqa: PLC0415 - drawing takes a second to load
+    from rig.report.loop_figures import bode_figure, nyquist_figure  # noqa: PLC0415
 
-    design, curves = tracking.design_for(wiring), {}
-    for row in _shown(model, wiring, choice):
-        tangent = stiffness * model.tangent_N_mm(model.depth_mm(row.force_N))
-        loop = transfer_functions.bode(transfer_functions.open_loop(row, tangent, model.damping_N_s_mm, design))
-        curves[f"{row.force_N:.1f} N"] = (loop.frequency_Hz, loop.gain, loop.phase_deg)
-    write_text(out / "bode.svg", svg(bode_figure(curves)))
+    omega = grid(loops[0][2].rates)
+    curves = {f"{force_N:.1f} N": loop.response(stiffness, omega)[0] for force_N, _, loop in loops}
+    write_text(out / "bode.svg", svg(bode_figure(omega / (2 * math.pi), curves)))
+    write_text(out / "nyquist.svg", svg(nyquist_figure(omega / (2 * math.pi), curves)))

@@ -32,6 +32,10 @@ def _too_deep(truth: Truth) -> bool:
     return truth["tip.depth_mm"] > DEPTH_LIMIT_MM
 
 
+def _at_inclusion(truth: Truth) -> bool:
+    return truth["tip.depth_mm"] > 4.0
+
+
 def _outside(truth: Truth) -> bool:
     return truth["tip.position_mm"] > WORKSPACE_MM + 1.0
 
@@ -124,6 +128,11 @@ LIMB = (
         "limb.inclusion", "loading", ("force_limit",),
         set_quantities(tissue__inclusion_mm=4.0, tissue__inclusion_N_mm=20.0), _too_strong,
         latest_s=0.0, why="20 N/mm from 4 mm on, met at 10 mm/s",
+    ),
+    Fault(
+        "limb.stiffens", "press", ("oscillation",),
+        set_quantities(tissue__inclusion_mm=4.0, tissue__inclusion_N_mm=20.0), _at_inclusion,
+        before=True, why="20 N/mm from 4 mm on, met by the force loop",
     ),
     Fault("limb.leaves", "press", ("depth_limit",), set_quantities(tissue__present=False), _too_deep,
           settings=(f"limits.depth_mm={DEPTH_LIMIT_MM}",), why="the tip searches for it, down to the depth limit"),

@@ -20,9 +20,10 @@ HAZARDS = (
         "The tip presses harder than the person bears",
         "stiffer tissue than expected, a bone or implant under it, a limb that pushes, a tip beside its place, a"
         " reference or depth too large",
-        ("force_limit", "torque_limit", "force_rate", "depth_limit", "pain_stop", REFUSED),
+        ("force_limit", "torque_limit", "force_rate", "oscillation", "depth_limit", "pain_stop", REFUSED),
         "A blow: what rises faster than the axis can turn round passes the limit. Only slow approach, a low current"
-        " limit and the person's freedom to draw back bound it.",
+        " limit and the person's freedom to draw back bound it. A loop that swings more slowly than 12 Hz, as with a"
+        " slow axis and a slow sensor together, is stopped by the force limit only.",
     ),
     Hazard(
         "The force that is shown is not the force on the limb",
@@ -92,6 +93,8 @@ TESTS: dict[str, str] = {
     "force_rate": "tests/controller/safety/test_force_limit.py::test_a_rate_above_its_limit_stops_with_either_sensor",
     "first_touch": "tests/controller/safety/test_first_touch.py"
     "::test_a_sign_that_turned_since_the_calibration_is_found_before_2_N_and_named",
+    "oscillation": "tests/controller/safety/test_oscillation.py"
+    "::test_tissue_stiffer_than_the_loop_tolerates_is_left_and_named",
     "axis_scale": "tests/controller/safety/test_axis_scale.py"
     "::test_a_wrong_scale_is_found_within_three_millimetres_and_before_contact",
     "depth_limit": f"{LOOP}::test_deeper_than_the_limit_is_told_at_the_limit",

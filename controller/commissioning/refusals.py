@@ -5,6 +5,7 @@ A configuration that contradicts a calibration is refused; nothing is ever corre
 
 from datetime import datetime
 
+from controller.commissioning.dynamics_refusals import dynamics_reasons
 from controller.loop.steps import Approach, Program
 from drivers.roles import Identity
 from rig.config.calibration import AxisCalibration, ForceCalibration
@@ -26,6 +27,7 @@ def refuse_uncommissioned(program: Program, wiring: Wiring, sensor: Identity, ax
     reasons = [*_foreign(known.of_force, sensor, "force"), *contradictions(wiring), *known.unfit(now)]
     if known.of_axis:
         reasons += _foreign(known.of_axis, axis, "axis")
+    reasons += dynamics_reasons(program, wiring, axis)
     if reasons:
         raise UsageError(f"{program.name} refused before moving: " + "; ".join(reasons))
 

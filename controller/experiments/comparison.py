@@ -1,4 +1,4 @@
-"""Gain choices compared on jumps of the reference: error, overshoot and settling of each, and the worst of a run.
+"""Jumps of the reference judged: error, overshoot and settling of each, and the worst of a run.
 
 The force judged is the mean of SMOOTH_S around each sample, so that it is the tissue's load and not the sensor's noise.
 """
@@ -9,16 +9,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.law.gains import Choice
 from controller.loop.modes import Mode
-from rig.errors import DataError, UsageError
-from rig.results.tracking import ComparedRun, Jump, WorstJump
+from rig.errors import DataError
+from rig.results.tracking import ComparedRun, Jump, StudyLevel, WorstJump
+from rig.tissue.model import Model
 
 Column = NDArray[np.float64]
 
-CHOICES: tuple[Choice, ...] = ("tangent", "secant", "constant", "admittance")
-# Eleven samples of 1 kHz have 0.3 of one sample's noise, and are a fifth of a turn of the fastest loop
-# (`tracking.SAMPLES_A_TURN`).
+# Eleven samples of 1 kHz have 0.3 of one sample's noise, and are a third of a turn of the fastest loop
+# (30 Hz).
 SMOOTH_S = 0.011
 SETTLED_SHARE = 0.02  # the usual 2 % band of a settling time
 # A third of the 1.5 s of a stair; four turns of the fastest loop without leaving the band.
@@ -27,7 +26,9 @@ REMAINS_S = 0.2
 LEAST_JUMP_N = 0.2  # a fifth of the jumps compared (1 N), a hundred samples of the lead's 2 N/s
 
 
-def compared_run(subject: str, gains: str, jumps: Sequence[Jump], stopped: str = "") -> ComparedRun:
+def compared_run(
+    subject: str, jumps: Sequence[Jump], levels: Sequence[StudyLevel] = (), stopped: str = ""
+) -> ComparedRun:
     """A run with the worst of its jumps."""
     settling = [jump.settling_s for jump in jumps]
     worst = WorstJump(
@@ -37,7 +38,21 @@ def compared_run(subject: str, gains: str, jumps: Sequence[Jump], stopped: str =
         overshoot_percent=max((jump.overshoot_percent for jump in jumps), default=None),
         settling_s=None if None in settling else max((found for found in settling if found is not None), default=None),
     )
-    return ComparedRun(subject=subject, gains=gains, stopped=stopped, worst=worst, jumps=tuple(jumps))
+    return ComparedRun(subject=subject, stopped=stopped, worst=worst, jumps=tuple(jumps), levels=tuple(levels))
+
+
+def study_levels(jumps: Sequence[Jump], model: Model) -> tuple[StudyLevel, ...]:
+    """The rows of the study's table: how far the tip is from where the force would be right is the error over k."""
+    return tuple(
+        StudyLevel(
+            given_N=jump.to_N,
+            actual_N=jump.actual_N,
+            error_N=jump.error_N,
+            error_percent=jump.error_percent,
+            position_error_mm=jump.largest_error_N / model.tangent_N_mm(model.depth_mm(jump.to_N)),
+        )
+        for jump in jumps
+    )
 
 
 def jumps(time_s: Column, reference_N: Column, force_N: Column, mode: NDArray[np.int64]) -> tuple[Jump, ...]:
@@ -75,22 +90,3 @@ def _jump(time_s: Column, from_N: float, to_N: float, force_N: Column) -> Jump:
         overshoot_percent=100 * max(0.0, float(np.max(error_N * np.sign(height_N)))) / abs(height_N),
         settling_s=(float(time_s[outside[-1] + 1] - time_s[0]) if len(outside) else 0.0) if settled else None,
     )
-
-
-def choices_from(text: str) -> tuple[Choice, ...]:
-    """``tangent,constant`` as choices; raises UsageError naming those there are."""
-    found: list[Choice] = []
-    for part in text.split(","):
-        matching: list[Choice] = [choice for choice in CHOICES if choice == part.strip()]
-        if not matching:
-            raise UsageError(f"--gains {part}: choose among {', '.join(CHOICES)}")
-        found += matching
-    return tuple(found)
-
-
-def choice_from(text: str) -> Choice:
-    """One choice; raises UsageError for none or several."""
-    found = choices_from(text)
-    if len(found) > 1:
-        raise UsageError(f"--gains {text}: one choice for one run; --table compares several")
-    return found[0]

@@ -21,6 +21,9 @@ from rig.recording.messages import Closed
 
 Metadata = Mapping[str, Mapping[str, str]]
 LOOK_S = 0.1
+# What a cycle decides looks back 60 ms at most (controller.safety.load), and a tracker is 30 ms late: a recording holds
+# all of it before its program begins, so that it can be replayed.
+LEAD_S = 0.15
 CONTACT_METHOD = "onset of force, extrapolated back through the loading curve"
 
 
@@ -84,7 +87,8 @@ def record(bench: Supervisor, program: Program, file: Path, about: Metadata, tim
     recorder = bench.recorder
     if recorder is None:
         raise DeviceError("the bench is not running")
-    recorder.open(file, about)
+    recorder.open(file, {**about, "program": {"steps": program.model_dump_json()}})
+    time.sleep(LEAD_S)
     try:
         outcome = _run_watched(bench, program, timeout_s)
     except RigError as error:
@@ -141,4 +145,5 @@ def _summary(outcome: Outcome) -> dict[str, str]:
         "force_zero_N": "" if outcome.zero_N is None else repr(outcome.zero_N),
         "contact": json.dumps({"method": CONTACT_METHOD} | asdict(outcome.touch)) if outcome.touch else "",
         "wire_damage": json.dumps(dict(outcome.wire_damage)),
+        "carried": json.dumps(asdict(outcome.carried)),
     }

@@ -11,7 +11,6 @@ from controller.experiments.capture import new_session, refuse_used
 from controller.experiments.recorded import Recorded, metadata, record, refuse_bench
 from controller.experiments.references import Reference
 from controller.experiments.verdicts import with_quality, with_surface
-from controller.law.gains import Choice
 from controller.loop.steps import Program, TrackForce
 from controller.safety.program_limits import refuse_beyond_limits
 from controller.supervisor import Supervisor, stop_error
@@ -45,20 +44,16 @@ def refuse_foreign(folder: Path) -> None:
         refuse_used(folder)
 
 
-def plan(
-    forces_N: Sequence[float], seconds: float, model: Model, wiring: Wiring, choice: Choice | None = None
-) -> Program:
+def plan(forces_N: Sequence[float], seconds: float, model: Model, wiring: Wiring) -> Program:
     """The program, checked against model and limits before anything is opened."""
-    program = tracking.program(forces_N, seconds, model, wiring, choice)
+    program = tracking.program(forces_N, seconds, model, wiring)
     refuse_beyond_limits(program, wiring)
     return program
 
 
-def plan_reference(
-    reference: Reference, model: Model, wiring: Wiring, choice: Choice | None = None, adapt: bool | None = None
-) -> Program:
-    """The same for any reference and choice of gains; what is not given is as the wiring says."""
-    program = tracking.following(reference, model, wiring, choice, adapt)
+def plan_reference(reference: Reference, model: Model, wiring: Wiring) -> Program:
+    """The same for any reference."""
+    program = tracking.following(reference, model, wiring)
     refuse_beyond_limits(program, wiring)
     return program
 

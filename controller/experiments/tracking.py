@@ -1,17 +1,21 @@
-"""Force tracking: approach, follow a force with gains from a tissue model, retract; and how well it went."""
+"""Force tracking: approach, follow a force with a law made from a tissue model, retract; and how well it went."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.experiments.references import Reference
-from controller.law.gains import Choice, Design, schedule
+from controller.law import stability
+from controller.law.axis_response import rates_of, response_of
+from controller.law.gain_table import gain_rows, span_of
+from controller.law.inverse_model import GainRow
+from controller.law.stability import ForceLoop
 from controller.loop.modes import Mode
 from controller.loop.steps import Approach, Hold, Program, Retract, TrackForce, Zero
+from rig.config.axis_response import AxisResponse
 from rig.config.wiring import Wiring
 from rig.errors import DataError, UsageError
 from rig.results.tracking import Followed, Plateau
@@ -23,10 +27,9 @@ LEAD_N_S, LEAD_HOLD_S = 2.0, 0.5
 TRACK_MM_S = 30.0  # the fastest of the study's speeds: what the model was fitted at
 # The inverse model leaves this share of the speed to it, the rest to feedback.
 AHEAD_SHARE = 0.8
-FORGETTING = 0.998
+# A limb that moves 0.5 mm at 2 Hz has 6.3 mm/s, one that shifts by 2 mm in 0.3 s has 10 mm/s.
+DRIFT_SHARE = 0.5
 LINE_PARTS = 8
-# Samples in one turn of the crossover: with fewer the loop plays back more of the sensor's noise than it takes away.
-SAMPLES_A_TURN = 50.0
 # Slower is a drift that needs no loop; below ten times the sensor's noise of 0.005 N its phase says little.
 LEAST_HZ, LEAST_AMPLITUDE_N = 0.2, 0.05
 SETTLE_S = 1.0  # eighteen turns of a crossover of 18 Hz, two of the 2 Hz that a sensor of 100 Hz allows
@@ -38,9 +41,7 @@ CONTACT_N = 0.05  # ten times the sensor's noise
 Column = NDArray[np.float64]
 
 
-def program(
-    forces_N: Sequence[float], seconds: float, model: Model, wiring: Wiring, choice: Choice | None = None
-) -> Program:
+def program(forces_N: Sequence[float], seconds: float, model: Model, wiring: Wiring) -> Program:
     """Jumps through ``forces_N``, ``seconds`` each; raises UsageError beyond the model."""
     if not forces_N or not min(forces_N) > CONTACT_N or not SETTLE_S < seconds < math.inf:
         raise UsageError(
@@ -48,15 +49,13 @@ def program(
             f" not {', '.join(f'{force:g}' for force in forces_N) or 'none'} N for {seconds:g} s"
         )
     name = ", ".join(f"{force:g}" for force in forces_N) + " N"
-    return following(Reference(name, *_levels(forces_N, seconds)), model, wiring, choice)
+    return following(Reference(name, *_levels(forces_N, seconds)), model, wiring)
 
 
-def following(
-    reference: Reference, model: Model, wiring: Wiring, choice: Choice | None = None, adapt: bool | None = None
-) -> Program:
-    """Approach, follow ``reference`` with gains of ``choice``, retract; raises UsageError beyond model or limits."""
+def following(reference: Reference, model: Model, wiring: Wiring) -> Program:
+    """Approach, follow ``reference``, retract; raises UsageError beyond model or limits."""
     refuse_unreachable(reference, model, wiring)
-    law = force_law(model, wiring, choice or wiring.loop.gains, wiring.loop.adapt if adapt is None else adapt)
+    law = force_law(model, wiring)
     lead = (CONTACT_N, reference.forces_N[0])
     lead_s = abs(lead[1] - lead[0]) / LEAD_N_S
     tracks = []
@@ -82,47 +81,30 @@ def following(
     )
 
 
-def design_for(wiring: Wiring) -> Design:
-    """What the gains are designed for on this bench; a slow sensor makes the loop slower than it was asked to be."""
-    axis, loop = wiring.axis, wiring.loop
-    sensor_Hz = wiring.force.sampled_Hz
-    # Known for a sensor as fast as the loop; a slower one holds each sample for longer, on average this much.
-    slower_s = max(0.0, 1 / sensor_Hz - 1 / loop.rate_Hz)
-    share = min(1.0, sensor_Hz / SAMPLES_A_TURN / loop.crossover_Hz)
-    return Design(
-        axis.bandwidth_Hz,
-        axis.delay_ms * 1e-3 + slower_s,
-        share * loop.crossover_Hz,
-        loop.phase_margin_deg,
-        drift_Hz=share * loop.drift_Hz,
-    )
+def loop_for(model: Model, wiring: Wiring, axis: AxisResponse | None = None) -> ForceLoop:
+    """The force loop on this bench and tissue; raises UsageError where no law holds it. ``axis``: else the bench's."""
+    rates = rates_of(wiring)
+    return stability.loop_for(axis or response_of(wiring), rates, span_of(model, rows_of(model), rates))
 
 
-def sensor_lag_s(wiring: Wiring) -> float:
-    """How old a force is when the loop has it: its way here, and on average half of the time until the next one."""
-    return wiring.force.latency_ms * 1e-3 + 0.5 / wiring.force.sampled_Hz
-
-
-def force_law(model: Model, wiring: Wiring, choice: Choice, adapt: bool) -> TrackForce:
-    """A track step with its gains, without a reference of its own yet."""
-    design = design_for(wiring)
-    if choice == "admittance":  # plain: one integral and nothing else
-        design = replace(design, drift_Hz=0.0)
-    deepest_mm = model.valid.depth_mm
-    depths = [float(depth) for depth in np.linspace(0.0, deepest_mm, GAIN_ROWS)]
+def force_law(model: Model, wiring: Wiring, response: AxisResponse | None = None) -> TrackForce:
+    """A track step with its law, without a reference of its own yet. ``response``: else the bench's."""
+    loop = loop_for(model, wiring, response)
+    axis = loop.axis
     speed_mm_s = min(TRACK_MM_S, wiring.limits.speed_mm_s)
-    ahead = choice != "admittance"
     friction_N, friction_mm = model.law.friction
     return TrackForce(
         times_s=(0.0, 1.0),
         forces_N=(CONTACT_N, CONTACT_N),
-        gains=schedule(model, design, depths, choice),
+        gains=rows_of(model),
         damping_N_s_mm=model.damping_N_s_mm,
-        lag_s=design.lag_s if ahead else 0.0,
-        preview_s=max(0.0, design.lag_s - sensor_lag_s(wiring)) if ahead else 0.0,
-        ahead_mm_s=AHEAD_SHARE * speed_mm_s if ahead else 0.0,
-        forgetting=FORGETTING if adapt else 0.0,
-        drift_Hz=design.drift_Hz,
+        delay_s=axis.delay_s,
+        lag1_s=axis.lag1_s,
+        lag2_s=axis.lag2_s,
+        preview_s=axis.tip_lag_s,
+        ahead_mm_s=AHEAD_SHARE * speed_mm_s,
+        **loop.law._asdict(),
+        drift_limit_mm_s=DRIFT_SHARE * speed_mm_s,
         relaxation=tuple((term.ratio, term.tau_s) for term in model.law.terms[:2]),
         friction_N=friction_N,
         friction_mm=friction_mm,
@@ -130,6 +112,11 @@ def force_law(model: Model, wiring: Wiring, choice: Choice, adapt: bool) -> Trac
         search_speed_mm_s=min(APPROACH_MM_S, wiring.limits.speed_mm_s),
         contact_force_N=CONTACT_N,
     )
+
+
+def rows_of(model: Model) -> tuple[GainRow, ...]:
+    """What the law takes the tissue for, from contact to the deepest point of the model."""
+    return gain_rows(model, [float(depth) for depth in np.linspace(0.0, model.valid.depth_mm, GAIN_ROWS)])
 
 
 def refuse_unreachable(reference: Reference, model: Model, wiring: Wiring) -> None:

@@ -1,9 +1,9 @@
 """One turn of the loop: poll inputs, decide, command, publish. Nothing in it waits."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from controller.devices import takeover
 from controller.devices.connections import Connections
@@ -15,6 +15,7 @@ from controller.loop.executive import Cycle
 from controller.loop.messages import Finished, Outcome, Status, StatusSaid, Stopped
 from controller.loop.modes import AT_REST, Mode
 from controller.loop.paired_samples import Touch
+from controller.loop.phase_lock import PhaseLock
 from controller.loop.registration import Point, Registration
 from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
@@ -24,6 +25,7 @@ from controller.safety.first_touch import FirstTouch
 from controller.safety.giving_way import give_way
 from controller.safety.inputs import SafetyInputs
 from controller.safety.load import LoadMonitor, calibrated_zero
+from controller.safety.oscillation import OscillationMonitor
 from controller.safety.table import TABLE, Action, Check, Incident
 from rig.channel import Channel
 from rig.channels import (
@@ -43,6 +45,7 @@ from rig.errors import DeviceError
 
 STATUS_EVERY_S = 0.05
 TEXT_BYTES = 160
+Polled = TypeVar("Polled")
 TIP, ARM = 0, 1
 TOUCHING = (Mode.APPROACH, Mode.COMPRESS, Mode.CONTACT)
 # A sample this many periods old is not acted on; when it counts as lost is for the safety table to say.
@@ -81,7 +84,8 @@ class BenchLoop:
         """``held``: why a person is to look first; until that is acknowledged nothing starts."""
         self.wiring, self.devices, self._ring, self._channel, self.now = wiring, devices, ring, channel, now
         self._commands = commands
-        period_s = 1.0 / wiring.loop.rate_Hz
+        self.phase = PhaseLock(round(1e9 / wiring.loop.rate_Hz), devices.force.period_ns)
+        period_s = self.phase.period_ns * 1e-9
         self.state = LoopState(
             dt_s=period_s,
             acceleration_mm_s2=wiring.axis.acceleration_mm_s2,
@@ -100,7 +104,7 @@ class BenchLoop:
         self._status_every = round(STATUS_EVERY_S / period_s)
         self._cycles = self._events = self._program = 0
         self._load_monitor = LoadMonitor(devices.force.period_ns)
-        self._first_touch = FirstTouch(wiring)
+        self._first_touch, self._oscillation = FirstTouch(wiring), OscillationMonitor()
         self._calibrated_zero = calibrated_zero(wiring)
         self._force_map = wiring.force_map
         self.braked = False
@@ -121,9 +125,8 @@ class BenchLoop:
             self._standstill.begin()
 
     def run_cycle(self, cycle: Cycle) -> bool:
-        """One turn."""
-        now_ns = cycle.wake_ns
-        self._poll(now_ns)
+        """One turn, on what ``prepare`` and ``take_force`` took before."""
+        now_ns = cycle.began_ns
         self.inputs.requests = self._commands.collect(self)
         self._look(now_ns, cycle)
         resting = self.machine.mode in AT_REST
@@ -140,38 +143,31 @@ class BenchLoop:
         self._cycles += 1
         return self._commands.more(self)
 
-    def _poll(self, now_ns: int) -> None:
-        self._poll_axis(now_ns)  # before the force, which is placed by where the axis was
-        self._poll_force(now_ns)
-        if self.devices.tracker and not self.inputs.marker_lost:
-            try:
-                for sample in self.devices.tracker.poll(now_ns):
-                    self._take_marker(sample)
-            except DeviceError as error:
-                self.inputs.marker_lost = str(error)
+    def prepare(self, now_ns: int) -> None:
+        """Takes what axis and tracker said since the last turn: before the force, placed by where they were."""
+        for sample in self._polled("axis", self.devices.axis.poll, now_ns):
+            self._take_axis(sample)
+        if self.devices.tracker:
+            for marker in self._polled("marker", self.devices.tracker.poll, now_ns):
+                self._take_marker(marker)
 
-    def _poll_force(self, now_ns: int) -> None:
-        if self.inputs.force_lost:
-            return
-        try:
-            for sample in self.devices.force.poll(now_ns):
-                self._ring.put(FORCE.id, FORCE.pack(sample))
-                self._take_force(sample)
-        except DeviceError as error:
-            self.inputs.force_lost = str(error)
+    def take_force(self, now_ns: int) -> None:
+        """Takes what the force sensor said."""
+        for sample in self._polled("force", self.devices.force.poll, now_ns):
+            self._take_force(sample)
 
-    def _poll_axis(self, now_ns: int) -> None:
-        if self.inputs.axis_lost:
-            return
+    def _polled(self, stream: str, poll: Callable[[int], Sequence[Polled]], now_ns: int) -> Sequence[Polled]:
+        """What a device brought; nothing where it is lost."""
         try:
-            for sample in self.devices.axis.poll(now_ns):
-                self._ring.put(AXIS.id, AXIS.pack(sample))
-                self._take_axis(sample)
+            return () if getattr(self.inputs, f"{stream}_lost") else poll(now_ns)
         except DeviceError as error:
-            self.inputs.axis_lost = str(error)
+            setattr(self.inputs, f"{stream}_lost", str(error))
+            return ()
 
     def _take_force(self, sample: ForceSample) -> None:
+        self._ring.put(FORCE.id, FORCE.pack(sample))
         self.published["force"] = sample.seq
+        self.phase.observe(sample.capture_ns, sample.arrival_ns)
         self.state.raw_N = self._force_map.compression_N(sample.fx_N, sample.fy_N, sample.fz_N)
         self.state.wrench = self._force_map.wrench(sample[4:10])
         self.state.force_samples += 1
@@ -181,6 +177,7 @@ class BenchLoop:
         self.health["force"].update(sample.capture_ns, bool(sample.valid), sample[4:10])
 
     def _take_axis(self, sample: AxisSample) -> None:
+        self._ring.put(AXIS.id, AXIS.pack(sample))
         state = self.state
         if math.isnan(state.position_mm):  # until the axis has said where it is, it is not told where to be
             state.setpoint = Setpoint(sample.position_mm, 0.0)
@@ -219,6 +216,7 @@ class BenchLoop:
         state.force_late = health["force"].age_ns(now_ns) > LATE_PERIODS * health["force"].period_ns
         state.following_mm = state.setpoint.position_mm - state.position_mm if self.machine.busy else 0.0
         inputs.touch_wrong = self._first_touch.update(state) if self.machine.mode in TOUCHING else ""
+        inputs.oscillation = self._oscillation.update(state) if self.machine.mode is Mode.CONTACT else ""
         inputs.force_valid, inputs.force_frozen = health["force"].valid, health["force"].frozen
         inputs.force_age_ms = health["force"].age_ns(now_ns) * 1e-6
         inputs.axis_age_ms = health["axis"].age_ns(now_ns) * 1e-6
@@ -313,6 +311,7 @@ class BenchLoop:
             zero_N=None if math.isnan(state.zero_N) else state.zero_N,
             touch=state.touch,
             wire_damage=self._wire_damage.shares(self.devices.by_role()),
+            carried=state.carried,
         )
         self._channel.send(Finished(program=self._program, outcome=outcome_of))
 
@@ -327,7 +326,7 @@ class BenchLoop:
             cycle.missed,
             cycle.scheduled_ns,
             cycle.wake_ns - cycle.scheduled_ns,
-            self.now() - cycle.wake_ns,
+            self.now() - cycle.began_ns + cycle.prepared_ns,
             health["force"].age_ns(now_ns),
             health["axis"].age_ns(now_ns),
             health["marker"].age_ns(now_ns),

@@ -1,21 +1,35 @@
-"""The cyclic executive's clock: an absolute grid on the monotonic clock; a missed cycle is skipped and counted."""
+"""The cyclic executive's clock: a grid on the monotonic clock; a missed cycle is skipped and counted."""
 
 import time
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
+
+from controller.loop.phase_lock import PhaseLock
+
+# Share of a cycle before its beginning in which inputs that are there already are taken, and the clock is watched.
+AHEAD = 0.25
 
 
 class Cycle(NamedTuple):
-    """One turn of the loop."""
+    """One turn of the loop: ``prepared_ns`` is what was done before it was due, ``waited_ns`` how long it looked for
+    its sample after waking.
+    """
 
     number: int
     scheduled_ns: int
     wake_ns: int
     missed: int
+    prepared_ns: int = 0
+    waited_ns: int = 0
+
+    @property
+    def began_ns(self) -> int:
+        """When its inputs were complete."""
+        return self.wake_ns + self.waited_ns
 
 
 class Grid:
-    """Slots at ``start_ns + n * period_ns``.
+    """Slots ``period_ns`` apart from ``start_ns`` on, and as far away as ``move`` says.
 
     ``following`` never hands out a cycle twice and never two cycles for one time: a loop that comes late runs the cycle
     it is in, and what lay between is missed, not caught up.
@@ -33,6 +47,23 @@ class Grid:
         self.missed += number - self._last - 1
         self._last = number
         return number, self.start_ns + number * self.period_ns
+
+    def move(self, later_ns: int) -> None:
+        """Moves all cycles to come; by less than a period, as what lies between is no cycle missed."""
+        self.start_ns += later_ns
+
+
+class Work(Protocol):
+    """What is done in each cycle."""
+
+    def prepare(self, now_ns: int) -> None:
+        """Takes what has come in since the last cycle, shortly before the next."""
+
+    def take_force(self, now_ns: int) -> None:
+        """Takes samples of the force sensor, and shows them to the phase lock."""
+
+    def run_cycle(self, cycle: Cycle) -> bool:
+        """The turn itself; False where it is the last."""
 
 
 def sleep_until(due_ns: int) -> None:
@@ -59,21 +90,48 @@ def sleep_then_spin(
 
 
 class Executive:
-    """Calls ``cycle`` once a cycle until it returns False."""
+    """Runs ``work`` once a cycle.
+
+    ``sleep`` waits for a cycle's beginning, ``doze`` for what need not be on time; ``rest`` is called between two looks
+    for a sample, with the end of waiting.
+    """
 
     def __init__(
         self,
-        period_ns: int,
         now: Callable[[], int] = time.monotonic_ns,
         sleep: Callable[[int], None] = sleep_until,
+        doze: Callable[[int], None] = sleep_until,
+        rest: Callable[[int], None] = sleep_until,
     ) -> None:
-        self._period_ns, self._now, self._sleep = period_ns, now, sleep
+        self._now, self._sleep, self._doze, self._rest = now, sleep, doze, rest
 
-    def run(self, cycle: Callable[[Cycle], bool]) -> None:
-        """Runs until ``cycle`` says no more."""
-        grid = Grid(self._now() + self._period_ns, self._period_ns)
+    def run(self, work: Work, phase: PhaseLock) -> None:
+        """Runs until ``work`` says no more, in step with ``phase``."""
+        grid = Grid(self._now() + phase.period_ns, phase.period_ns)
+        ahead_ns = round(AHEAD * phase.period_ns)
         running = True
         while running:
             number, due_ns = grid.following(self._now())
+            prepared_ns = self._prepare(work, due_ns - ahead_ns)
             self._sleep(due_ns)
-            running = cycle(Cycle(number, due_ns, self._now(), grid.missed))
+            wake_ns = self._now()
+            waited_ns = self._look(work, phase, due_ns) - wake_ns
+            running = work.run_cycle(Cycle(number, due_ns, wake_ns, grid.missed, prepared_ns, waited_ns))
+            grid.move(phase.correction_ns(due_ns))
+
+    def _prepare(self, work: Work, from_ns: int) -> int:
+        """Between two cycles; how long it takes."""
+        self._doze(from_ns)
+        began_ns = self._now()
+        work.prepare(began_ns)
+        return self._now() - began_ns
+
+    def _look(self, work: Work, phase: PhaseLock, due_ns: int) -> int:
+        """Looks at the force sensor until its sample is there or the time is over; when it last looked."""
+        looked_ns = self._now()
+        work.take_force(looked_ns)
+        while looked_ns < (until_ns := phase.patience_ns(due_ns)):
+            self._rest(until_ns)
+            looked_ns = self._now()
+            work.take_force(looked_ns)
+        return looked_ns

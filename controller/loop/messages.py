@@ -7,6 +7,7 @@ from typing import ClassVar
 from pydantic import Field
 from typing_extensions import TypedDict
 
+from controller.loop.carried import UNZEROED, Carried
 from controller.loop.paired_samples import Touch
 from controller.loop.steps import Program
 from controller.recovery.situation import Situation
@@ -76,6 +77,7 @@ class Outcome:
     zero_N: float | None
     touch: Touch | None = None
     wire_damage: Mapping[str, float] = field(default_factory=dict)
+    carried: Carried = UNZEROED
 
     @property
     def stopped(self) -> bool:

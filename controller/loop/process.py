@@ -7,10 +7,12 @@ why, or with a drive in fault, it moves nothing and waits for recovery.
 
 import contextlib
 import os
+import select
 import signal
 import socket
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 from controller.devices.absent import start_what_answers
@@ -18,13 +20,13 @@ from controller.devices.drivers import Devices, Interruption, openers, start_dev
 from controller.loop import realtime
 from controller.loop.bench_loop import BenchLoop
 from controller.loop.commands import Inbox
-from controller.loop.executive import Executive, sleep_then_spin
+from controller.loop.executive import AHEAD, Executive, sleep_then_spin
 from controller.loop.messages import TO_LOOP, DeviceFound, LoopFailed, Ready
 from controller.loop.touch import warm_up
 from controller.safety.table import TABLE, Check
 from controller.stop.start import StartGuard
 from controller.stop.word import Responder, StopWord
-from drivers.roles import Identity, ServoAxis
+from drivers.roles import Device, ServoAxis
 from rig.channel import Channel
 from rig.config.wiring import Wiring
 from rig.errors import RigError, SafetyStop
@@ -90,8 +92,16 @@ def _prepare(axis: ServoAxis, held: str) -> str:
     return held
 
 
-def _found(device: Identity) -> DeviceFound:
-    return DeviceFound(product=device.product, serial=device.serial, firmware=device.firmware, settings=device.settings)
+def _await(loop: BenchLoop, until_ns: int) -> None:
+    """Sleeps until the force sensor says something: who watches keeps the kernel's worker from filling the line."""
+    left_s = (until_ns - time.monotonic_ns()) * 1e-9
+    select.select([loop.devices.force], [], [], max(left_s, 0.0))
+
+
+def _found(device: Device) -> DeviceFound:
+    who = device.identity
+    settings = {**who.settings, "period_ns": str(device.period_ns)}
+    return DeviceFound(product=who.product, serial=who.serial, firmware=who.firmware, settings=settings)
 
 
 def _run(
@@ -104,13 +114,13 @@ def _run(
     table: tuple[Check, ...],
     held: str,
 ) -> None:
-    found = {role: _found(device.identity) for role, device in devices.by_role().items()}
+    found = {role: _found(device) for role, device in devices.by_role().items()}
     channel.send(Ready(devices=found, realtime=granted))
     opens = openers(wiring, inbox.interruption)
     loop = BenchLoop(wiring, devices, ring, channel, inbox, time.monotonic_ns, table, opens, held)
-    pause = sleep_then_spin(realtime.spin_ns(granted))
+    spin_ns = min(realtime.spin_ns(granted), round(AHEAD * loop.phase.period_ns))
     try:
-        Executive(round(1e9 / wiring.loop.rate_Hz), sleep=pause).run(loop.run_cycle)
+        Executive(sleep=sleep_then_spin(spin_ns), rest=partial(_await, loop)).run(loop, loop.phase)
     finally:
         loop.close()
 

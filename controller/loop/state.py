@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field
 
 from controller.law.force_position import Memory
+from controller.loop.carried import UNZEROED, Carried
 from controller.loop.paired_samples import PairedSamples, Touch
 from controller.loop.registration import Interval
 from controller.loop.setpoint import Setpoint, arrived, toward
@@ -50,6 +51,7 @@ class LoopState:
     touch: Touch | None = None
     peak_force_N: float = 0.0
     outcome: str = ""
+    carried: Carried = UNZEROED
 
     @property
     def depth_mm(self) -> float:

@@ -7,6 +7,7 @@ any  -> (soft stop) -> RETRACT -> SAFE;   any -> (immediate stop) -> SAFE;   SAF
 import math
 from collections.abc import Callable
 
+from controller.loop.carried import carried_by
 from controller.loop.modes import AT_REST, Mode
 from controller.loop.setpoint import Setpoint, arrived, toward
 from controller.loop.state import LoopState
@@ -62,7 +63,7 @@ class MotionStateMachine:
     def start(self, program: Program) -> None:
         """Begins a program at the present position."""
         state = self.state
-        state.setpoint = self._here()
+        state.setpoint, state.carried = self._here(), carried_by(state)
         state.surface_mm = state.reference_N = state.tangent_N_mm = math.nan
         state.peak_force_N, state.outcome, state.memory, state.touch = 0.0, "", None, None
         self._program = program

@@ -10,10 +10,11 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from controller.law import force_position, force_profile
-from controller.law.force_position import GainRow, Settings
+from controller.law.force_position import Feedback, ForceReading, Settings
 from controller.law.force_profile import Line
+from controller.law.inverse_model import GainRow, Inverse, columns
 from controller.loop.modes import Mode
-from controller.loop.setpoint import Setpoint, clamp
+from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
 from controller.loop.touch import Touching, TouchRun
 from controller.safety.load import Wrench
@@ -272,11 +273,15 @@ class TrackForce(Table):
     repeats: int = Field(default=1, ge=1)
     gains: tuple[GainRow, ...] = Field(min_length=2)
     damping_N_s_mm: Annotated[float, Field(ge=0)] = 0.0
-    lag_s: Annotated[float, Field(ge=0)] = 0.0
+    delay_s: float = Field(default=0.0, ge=0, description="of the axis, from set-point to force")
+    lag1_s: float = Field(default=0.0, ge=0, description="the first of the axis' two lags")
+    lag2_s: float = Field(default=0.0, ge=0, description="the other")
     preview_s: float = Field(default=0.0, ge=0, description="how much earlier the law is asked for it")
     ahead_mm_s: float = Field(default=24.0, ge=0, description="speed of the inverse model; 0: it is not used")
-    forgetting: float = Field(default=0.0, ge=0, lt=1, description="0: stiffness is not adapted")
-    drift_Hz: float = Field(default=0.0, ge=0, description="corner of the second integral; 0: none")
+    crossover_rad_s: Positive
+    lead_s: float = Field(default=0.0, ge=0, description="of each of the two leads")
+    drift_rad_s: float = Field(default=0.0, ge=0, description="corner of the second integral; 0: none")
+    drift_limit_mm_s: Positive = 5.0
     relaxation: tuple[tuple[float, Positive], ...] = Field(
         default=(), max_length=2, description="the tissue's: force that dies out over force at rest, and its time in s"
     )
@@ -293,13 +298,14 @@ class TrackForce(Table):
 
     @property
     def settings(self) -> Settings:
-        """What of this step the law wants to know; the surface is believed to move no faster than the search."""
-        drift_per_s = 2 * math.pi * self.drift_Hz
+        """What of this step the law wants to know; below half the contact force there is no surface."""
         first, second = (*self.relaxation, (0.0, 1.0), (0.0, 1.0))[:2]
-        return Settings(
-            self.damping_N_s_mm, self.lag_s, self.ahead_mm_s, self.forgetting, drift_per_s, self.search_speed_mm_s,
-            *first, *second, self.friction_N, self.friction_mm,
+        inverse = Inverse(self.damping_N_s_mm, self.ahead_mm_s, *first, *second, self.friction_N, self.friction_mm)
+        feedback = Feedback(
+            self.delay_s, self.lag1_s, self.lag2_s, self.crossover_rad_s, self.lead_s, self.drift_rad_s,
+            self.drift_limit_mm_s, self.speed_limit_mm_s, self.search_speed_mm_s, 0.5 * self.contact_force_N,
         )  # fmt: skip
+        return Settings(inverse, feedback)
 
     def begin(self) -> "TrackForceRun":
         """A run of this step."""
@@ -310,30 +316,26 @@ class TrackForceRun:
     """The force loop; below the contact threshold it only searches, slowly."""
 
     def __init__(self, step: TrackForce) -> None:
-        self._step, self._given = step, step.given
+        self._given = step.given
         self._asked = force_profile.preview(step.given, step.preview_s)
-        self._table = force_position.columns(step.gains)
-        self._settings = step.settings
+        self._table, self._settings = columns(step.gains), step.settings
 
     def advance(self, state: LoopState, elapsed_s: float) -> bool:
         """One cycle of the force loop around the position loop."""
-        step = self._step
         state.reference_N = force_profile.at(self._given, elapsed_s)
         asked_N = force_profile.at(self._asked, elapsed_s)
         over = elapsed_s >= self._given.duration_s
         if state.force_late:  # an old force corrected again and again is how a stall becomes a push
-            state.setpoint = Setpoint(state.setpoint.position_mm, 0.0)
+            state.setpoint, state.memory = Setpoint(state.setpoint.position_mm, 0.0), None
             return over
         if state.memory is None:
-            state.memory = force_position.begin(self._table, state.force_N, state.depth_mm, self._settings.friction_N)
-        delta_mm, state.memory = force_position.increment(
-            state.memory, self._table, self._settings, asked_N, state.force_N, state.depth_mm, state.dt_s
+            state.memory = force_position.begin(self._table, self._settings.inverse, state.force_N)
+        measured = ForceReading(state.force_N, state.force_samples)
+        step_mm, state.memory = force_position.increment(
+            state.memory, self._table, self._settings, asked_N, measured, state.dt_s
         )
         state.tangent_N_mm = state.memory.tangent_N_mm
-        lost = state.force_N < 0.5 * step.contact_force_N < asked_N
-        limit_mm = (step.search_speed_mm_s if lost else step.speed_limit_mm_s) * state.dt_s
-        delta_mm = clamp(delta_mm, 0.0, limit_mm)
-        state.setpoint = Setpoint(state.setpoint.position_mm + delta_mm, delta_mm / state.dt_s)
+        state.setpoint = Setpoint(state.setpoint.position_mm + step_mm, step_mm / state.dt_s)
         return over
 
 

@@ -144,6 +144,11 @@ def first_touch(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
     return inputs.touch_wrong
 
 
+def oscillation(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
+    """The force loop swings by itself."""
+    return inputs.oscillation
+
+
 def axis_scale(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
     """The tracker sees the tip go another way than the axis says, beyond tolerance and chance."""
     seen = state.axis_scale

@@ -17,6 +17,7 @@ class SafetyInputs:
     force_valid: bool = True
     force_frozen: bool = False
     touch_wrong: str = ""
+    oscillation: str = ""
     force_age_ms: float = 0.0
     axis_age_ms: float = 0.0
     marker_age_ms: float = 0.0

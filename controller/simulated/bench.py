@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.law import force_position, force_profile
-from controller.law.force_position import Columns
 from controller.law.force_profile import Line
+from controller.law.inverse_model import Columns, columns
 from controller.loop.modes import Mode
 from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
@@ -28,7 +28,6 @@ from controller.simulated.segments import (
     InputBounds,
     Move,
     Plant,
-    Speeds,
     Stretch,
     Timing,
     Zeros,
@@ -127,7 +126,8 @@ class _Playback:
         sensing = self._plant.sensing
         if self._cycle % sensing.every_cycles == 0:
             held_N = axis_plant.reading(sensed[0], self._drawn(1)[0], sensing)
-        state.now_ns, state.raw_N, state.force_samples = round(self._cycle * self._period_s * 1e9), held_N, self._cycle
+        state.now_ns, state.raw_N = round(self._cycle * self._period_s * 1e9), held_N
+        state.force_samples = self._cycle // sensing.every_cycles
         state.wrench = (0.0, 0.0, held_N, 0.0, 0.0, 0.0)
         load_N = abs(held_N - self._zeros().first_N)
         state.load = TipLoad(load_N, 0.0, 0.0, 0.0, load_N)
@@ -182,8 +182,7 @@ class _Playback:
         asked_N = force_profile.along(self._law[2], elapsed_s)
         done, state.memory = segments.track(
             self._now, state.memory, self._law[1], step.settings, asked_N, self._drawn(len(asked_N)),
-            self._plant, Timing(self._cycle, self._period_s, steps), self._zeros(), _speeds(step, self._period_s),
-            self._bounds(),
+            self._plant, Timing(self._cycle, self._period_s, steps), self._zeros(), self._bounds(),
         )  # fmt: skip
         cycles = done.rows.shape[1]
         if cycles:
@@ -225,24 +224,22 @@ class _Playback:
 
 
 def _columns(step: TrackForce) -> Columns:
-    return Columns(*map(np.array, force_position.columns(step.gains)))
+    return Columns(*map(np.array, columns(step.gains)))
 
 
-def _speeds(step: TrackForce, dt_s: float) -> Speeds:
-    return Speeds(step.speed_limit_mm_s * dt_s, step.search_speed_mm_s * dt_s, 0.5 * step.contact_force_N)
-
-
-def follow(step: TrackForce, reference_N: Column, bench: SimulatedBench, dt_s: float = 0.001) -> Trace:
-    """The force law alone, from contact on, along ``reference_N`` of shape (cycles,); compiled."""
+def follow(
+    step: TrackForce, reference_N: Column, bench: SimulatedBench, dt_s: float = 0.001, clearance_mm: float = 0.0
+) -> Trace:
+    """The force law alone, from ``clearance_mm`` above the surface on, along ``reference_N`` of (cycles,); compiled."""
     table, surface_mm = _columns(step), bench.limb.surface_mm
     noise = np.random.default_rng(bench.seed).standard_normal(len(reference_N))
-    late = bench.sensing.delay_cycles + 1
-    start = BenchState(at_rest(surface_mm), np.zeros(late), 0.0, Setpoint(surface_mm, 0.0))
+    late, start_mm = bench.sensing.delay_cycles + 1, surface_mm - clearance_mm
+    start = BenchState(at_rest(start_mm), np.zeros(late), 0.0, Setpoint(start_mm, 0.0))
+    memory = force_position.begin(table, step.settings.inverse, 0.0)
     done, _ = segments.track(
-        start, force_position.begin(table, 0.0, 0.0, step.friction_N), table, step.settings, reference_N, noise,
+        start, memory, table, step.settings, reference_N, noise,
         Plant(bench.motor, bench.loop, bench.limb, bench.sensing),
-        Timing(0, dt_s, round(dt_s / axis_plant.STEP_S)), Zeros(0.0, 0.0, surface_mm), _speeds(step, dt_s),
-        InputBounds(),
+        Timing(0, dt_s, round(dt_s / axis_plant.STEP_S)), Zeros(0.0, 0.0, surface_mm), InputBounds(),
     )  # fmt: skip
     time_s, mode = np.arange(len(reference_N), dtype=np.float64) * dt_s, np.full(len(reference_N), int(Mode.CONTACT))
     return Trace(time_s, mode, reference_N, *done.rows)

@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.law import force_position
-from controller.law.force_position import Columns, Memory, Settings
+from controller.law import force_position, inverse_model
+from controller.law.force_position import ForceReading, Memory, Settings
+from controller.law.inverse_model import Columns
 from controller.loop import setpoint
 from controller.loop.setpoint import Setpoint
 from rig.machine_code import compiled
@@ -49,14 +50,6 @@ class Zeros(NamedTuple):
     now_N: float
     first_N: float
     surface_mm: float
-
-
-class Speeds(NamedTuple):
-    """Largest step of a cycle in contact and in search of the surface [mm], and the force that tells them apart."""
-
-    contact_mm: float
-    search_mm: float
-    lost_N: float
 
 
 class Move(NamedTuple):
@@ -106,7 +99,7 @@ def beyond(bounds: InputBounds, zeros: Zeros, raw_N: float, bench_position_mm: f
 
 def _track(
     bench: BenchState, memory: Memory, table: Columns, settings: Settings, reference_N: Column, noise: Column,
-    plant: Plant, clock: Timing, zeros: Zeros, speeds: Speeds, bounds: InputBounds,
+    plant: Plant, clock: Timing, zeros: Zeros, bounds: InputBounds,
 ) -> tuple[Column, AxisState, Column, float, float, float, Memory]:  # fmt: skip
     motor, loop, limb, sensing = plant
     state, past, held_N, setpoint = bench
@@ -118,10 +111,9 @@ def _track(
         raw_N = held_N if (clock.cycle + i) % sensing.every_cycles else reading(sensed[i], noise[i], sensing)
         if beyond(bounds, zeros, raw_N, state.position_mm, command_mm):
             break
-        force_N, depth_mm = raw_N - zeros.now_N, state.position_mm - zeros.surface_mm
-        wanted_mm, after = increment(memory, table, settings, reference_N[i], force_N, depth_mm, clock.dt_s)
-        largest_mm = speeds.search_mm if force_N < speeds.lost_N < reference_N[i] else speeds.contact_mm
-        step_mm = min(max(wanted_mm, -largest_mm), largest_mm)
+        force_N = raw_N - zeros.now_N
+        measured = ForceReading(force_N, (clock.cycle + i) // sensing.every_cycles)
+        step_mm, after = increment(memory, table, settings, reference_N[i], measured, clock.dt_s)
         if command_mm + step_mm < bounds.low_mm or command_mm + step_mm > bounds.high_mm:
             break
         held_N, memory, delta_mm = raw_N, after, step_mm
@@ -173,9 +165,11 @@ def hold_compiled() -> Callable[..., AxisState]:
 
 @cache
 def _parts() -> dict[str, Callable[..., Any]]:
-    law: dict[str, Callable[..., Any]] = {"interpolate": compiled(force_position.interpolate)}
-    law["foresee"] = compiled(force_position.foresee, law)
-    law["adapt"] = compiled(force_position.adapt, law)
+    law: dict[str, Callable[..., Any]] = {"interpolate": compiled(inverse_model.interpolate)}
+    for function in (inverse_model.resting, inverse_model.foresee):
+        law[function.__name__] = compiled(function, law)
+    for part in (force_position.expect, force_position.react, force_position.limit, force_position.start_anew):
+        law[part.__name__] = compiled(part, law)
     return {
         "increment": compiled(force_position.increment, law),
         "toward": compiled(setpoint.toward, {"clamp": compiled(setpoint.clamp)}),
@@ -197,13 +191,13 @@ def _traveller() -> Callable[..., tuple[Column, AxisState, Column, float, float,
 
 def track(
     bench: BenchState, memory: Memory, table: Columns, settings: Settings, reference_N: Column, noise: Column,
-    plant: Plant, clock: Timing, zeros: Zeros, speeds: Speeds, bounds: InputBounds,
+    plant: Plant, clock: Timing, zeros: Zeros, bounds: InputBounds,
 ) -> tuple[Stretch, Memory]:  # fmt: skip
     """The force law along ``reference_N`` of shape (cycles,), or less of it."""
     rows, state, sensed, held_N, position_mm, velocity_mm_s, after = _tracker()(
-        bench, memory, table, settings, reference_N, noise, plant, clock, zeros, speeds, bounds
+        bench, memory, table, settings, reference_N, noise, plant, clock, zeros, bounds
     )
-    return Stretch(rows, BenchState(state, sensed, held_N, Setpoint(position_mm, velocity_mm_s))), Memory(*after)
+    return Stretch(rows, BenchState(state, sensed, held_N, Setpoint(position_mm, velocity_mm_s))), after
 
 
 def travel(

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 
 from api.cli.mock_bench import plug_into
 from api.cli.mock_calibration import force_file
+from api.cli.mock_dynamics import dynamics_file
 from api.cli.options import built_in
 from mock_devices.control import BenchControl
 from rig.config.endpoints import Endpoints
@@ -44,19 +45,19 @@ class ServedBench:
     control: BenchControl
 
     def settings(self, *more: str) -> list[str]:
-        """Options that plug a command into this bench and make it patient, its force sensor calibrated."""
+        """Options that plug a command into this bench and make it patient, force sensor and axis calibrated."""
         force, axis, tracker = (self.endpoints.devices[role] for role in ("force", "axis", "tracker"))
         ports = (f"force.port={force['serial']}", f"axis.port={axis['slcan']}", f"tracker.port=tcp://{tracker['tcp']}")
         late = [f"{role}.latency_ms={self.endpoints.latency_ms[role]}" for role in ("force", "tracker")]
-        known = f"calibration.force={self.calibrated(*more)}"
-        return [part for setting in (*ports, *late, known, *PATIENT, *more) for part in ("--set", setting)]
+        force_known, axis_known = self.calibrated(*more)
+        known = [f"calibration.force={force_known}", f"calibration.dynamics={axis_known}"]
+        return [part for setting in (*ports, *late, *known, *PATIENT, *more) for part in ("--set", setting)]
 
-    def calibrated(self, *more: str) -> Path:
-        """File of the calibration of this bench's force sensor, of the product that ``more`` names."""
-        products = [setting for setting in more if setting.startswith("force.product=")]
-        wiring = built_in(products)
+    def calibrated(self, *more: str) -> tuple[Path, Path]:
+        """Files of force calibration and axis dynamics, for the product and the rate that ``more`` names."""
+        wiring = built_in([setting for setting in more if setting.startswith(("force.product=", "loop.rate_Hz="))])
         plug_into(wiring, self.endpoints)
-        return force_file(wiring, self.endpoints)
+        return force_file(wiring, self.endpoints), dynamics_file(wiring, self.endpoints)
 
 
 @contextlib.contextmanager
@@ -110,7 +111,8 @@ class Running:
     started: ClassVar[list["Running"]] = []
 
     def __init__(self, arguments: Sequence[str | Path], folder: Path, stdin: int = subprocess.DEVNULL) -> None:
-        environment = os.environ | {"COLUMNS": "200", "PYTHONPATH": str(ROOT)}
+        path = os.pathsep.join([str(ROOT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]).strip(os.pathsep)
+        environment = os.environ | {"COLUMNS": "200", "PYTHONPATH": path}
         self.process = subprocess.Popen(
             [*RIG, *map(str, arguments)],
             cwd=folder,

@@ -1,11 +1,13 @@
 """Calibrations: what `rig calibrate` measured of the force sensor and of the axis, whose it is, and how sure it is."""
 
+from collections.abc import Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, TypeAlias
 
 from pydantic import AwareDatetime, Field, model_validator
 
+from rig.config.axis_dynamics import AxisDynamics
 from rig.config.force_map import UNIT, ForceChannel, ForceMap, Matrix, Sign, Vector
 from rig.config.table import Table
 
@@ -132,38 +134,49 @@ class AxisCalibration(Table):
         return self
 
 
+AnyCalibration: TypeAlias = ForceCalibration | AxisCalibration | AxisDynamics
+What = Literal["force", "axis", "dynamics"]
+KINDS: Mapping[What, type[AnyCalibration]] = {
+    "force": ForceCalibration, "axis": AxisCalibration, "dynamics": AxisDynamics,
+}  # fmt: skip
+
+
 class Calibration(Table):
     """Where the calibrations are kept, what they must keep to, and, once read, the calibrations themselves."""
 
     force: Path | None = Field(default=None, description="file that `rig calibrate force` wrote")
     axis: Path | None = Field(default=None, description="file that `rig calibrate axis` wrote")
+    dynamics: Path | None = Field(default=None, description="file that `rig calibrate axis --dynamics` wrote")
     max_age_days: Positive = Field(default=365.0, description="makers of force sensors ask for one each year")
     max_uncertainty: Positive = Field(default=0.02, description="relative standard uncertainty of force and of scale")
     of_force: ForceCalibration | None = Field(default=None, description="read from the file that force names")
     of_axis: AxisCalibration | None = Field(default=None, description="read from the file that axis names")
+    of_dynamics: AxisDynamics | None = Field(default=None, description="read from the file that dynamics names")
 
-    def alone(self, one: ForceCalibration | AxisCalibration) -> Self:
+    def alone(self, one: AnyCalibration) -> Self:
         """What is asked of calibrations, and ``one`` in the place of all there are."""
-        role = "of_force" if isinstance(one, ForceCalibration) else "of_axis"
-        return self.model_copy(update={"of_force": None, "of_axis": None, role: one})
+        nothing = {f"of_{what}": None for what in KINDS}
+        return self.model_copy(update={**nothing, f"of_{what_of(one)}": one})
 
     def unfit(self, now: datetime) -> list[str]:
-        """Why a calibration may not be used at ``now``, one sentence each; empty if both may, or there is none."""
-        found: list[ForceCalibration | AxisCalibration] = [one for one in (self.of_force, self.of_axis) if one]
+        """Why a calibration may not be used at ``now``, one sentence each; empty if all may, or there is none."""
+        found: list[AnyCalibration] = [one for one in (self.of_force, self.of_axis, self.of_dynamics) if one]
         return [reason for one in found for reason in (*self._date(one, now), *self._uncertain(one))]
 
-    def _date(self, one: ForceCalibration | AxisCalibration, now: datetime) -> list[str]:
+    def _date(self, one: AnyCalibration, now: datetime) -> list[str]:
         age = now - one.date
         if age < -CLOCKS_AGREE:
             return [f"{_named(one)} is dated {one.date.isoformat()}, which is still to come: check the clocks"]
         if age > timedelta(days=self.max_age_days):
             return [
                 f"{_named(one)} is {age.days} days old, calibration.max_age_days is {self.max_age_days:g}:"
-                f" run `rig calibrate {_what(one)}`"
+                f" run `rig calibrate {_command(one)}`"
             ]
         return []
 
-    def _uncertain(self, one: ForceCalibration | AxisCalibration) -> list[str]:
+    def _uncertain(self, one: AnyCalibration) -> list[str]:
+        if isinstance(one, AxisDynamics):
+            return one.doubts
         share = one.uncertainty.combined if isinstance(one, ForceCalibration) else one.uncertainty / one.scale
         if share <= self.max_uncertainty:
             return []
@@ -173,9 +186,14 @@ class Calibration(Table):
         ]
 
 
-def _what(one: ForceCalibration | AxisCalibration) -> str:
-    return "force" if isinstance(one, ForceCalibration) else "axis"
+def what_of(one: AnyCalibration) -> What:
+    """Which of the calibrations it is."""
+    return next(what for what, kind in KINDS.items() if isinstance(one, kind))
 
 
-def _named(one: ForceCalibration | AxisCalibration) -> str:
+def _command(one: AnyCalibration) -> str:
+    return {"dynamics": "axis --dynamics"}.get(what_of(one), what_of(one))
+
+
+def _named(one: AnyCalibration) -> str:
     return f"the calibration of {one.product} {one.serial}"

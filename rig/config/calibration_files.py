@@ -3,22 +3,25 @@
 import json
 from pathlib import Path
 
-from rig.config.calibration import VERSION, AxisCalibration, Calibration, ForceCalibration
+from rig.config.axis_dynamics import AxisDynamics
+from rig.config.calibration import VERSION, AnyCalibration, AxisCalibration, Calibration, ForceCalibration
 from rig.config.table import AnyTable, TomlTable, parse, read_toml, refuse_newer
 from rig.errors import UsageError
 
 
 def with_files(calibration: Calibration) -> Calibration:
     """``calibration`` with what its files hold; raises UsageError naming file and key where one is malformed."""
-    found: dict[str, ForceCalibration | AxisCalibration] = {}
+    found: dict[str, AnyCalibration] = {}
     if calibration.force:
         found["of_force"] = _read(ForceCalibration, calibration.force, "calibration.force")
     if calibration.axis:
         found["of_axis"] = _read(AxisCalibration, calibration.axis, "calibration.axis")
+    if calibration.dynamics:
+        found["of_dynamics"] = _read(AxisDynamics, calibration.dynamics, "calibration.dynamics")
     return calibration.model_copy(update=found)
 
 
-def text_of(calibration: ForceCalibration | AxisCalibration) -> str:
+def text_of(calibration: AnyCalibration) -> str:
     """What a calibration file holds."""
     return calibration.model_dump_json(indent=2) + "\n"
 
@@ -31,6 +34,11 @@ def read_force(path: Path) -> ForceCalibration:
 def read_axis(path: Path) -> AxisCalibration:
     """The axis calibration in ``path``; raises UsageError."""
     return _read(AxisCalibration, path, "axis calibration")
+
+
+def read_dynamics(path: Path) -> AxisDynamics:
+    """The axis' dynamics in ``path``; raises UsageError."""
+    return _read(AxisDynamics, path, "axis dynamics")
 
 
 def _read(kind: type[AnyTable], path: Path, role: str) -> AnyTable:

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails, to_json
 
 from rig.errors import UsageError
+from rig.plugins import hint
 from rig.registry import nearest
 
 TomlTable = dict[str, Any]
@@ -92,7 +93,9 @@ def _sentence(kind: type[BaseModel], detail: ErrorDetails) -> str:
         return f"unknown key {place}; nearest valid key: {nearest(location[-1], sorted(table.model_fields))}"
     if detail["type"] == "union_tag_invalid":
         tag, known = str(detail["ctx"]["tag"]), re.findall("'(.*?)'", detail["ctx"]["expected_tags"])
-        return f"{place}.product: unknown product {tag!r}; nearest: {nearest(tag, known)}; all: {', '.join(known)}"
+        return (
+            f"{place}.product: unknown product {tag!r}; nearest: {nearest(tag, known)}; all: {', '.join(known)}{hint()}"
+        )
     got = "" if isinstance(detail["input"], dict | BaseModel) else f" (got {detail['input']!r})"
     return f"{place and f'{place}: '}{detail['msg'].removeprefix('Value error, ')}{got}"
 

@@ -42,17 +42,6 @@ class Loop(Table):
         default=3.0, ge=0, description="the operator's program must show itself this often; 0: not asked"
     )
     overrun_ms: Positive = Field(default=100.0, description="a wake-up later than this stops motion")
-    gains: Literal["tangent", "secant", "constant", "admittance"] = Field(
-        default="tangent", description="stiffness that sets the gains; all but tangent are for comparison"
-    )
-    crossover_Hz: Positive = Field(default=18.0, description="at most a fiftieth of the force sensor's rate is used")
-    phase_margin_deg: float = Field(
-        default=55.0, gt=20, lt=90, description="at the crossover, for which gains are solved"
-    )
-    drift_Hz: float = Field(
-        default=3.0, ge=0, description="corner of the second integral, for a moving surface; 0: none"
-    )
-    adapt: bool = Field(default=False, description="follow the tissue's stiffness while force moves")
 
 
 class Limits(Table):
@@ -114,15 +103,6 @@ class Wiring(Table):
     stop: Stop = Stop()
     mock: MockBenchSettings = MockBenchSettings()
     calibration: Calibration = Calibration()
-
-    @model_validator(mode="after")
-    def _loop_within_axis(self) -> Self:
-        if self.loop.crossover_Hz >= self.axis.bandwidth_Hz:
-            raise ValueError(
-                f"loop.crossover_Hz {self.loop.crossover_Hz:g} must stay below"
-                f" axis.bandwidth_Hz {self.axis.bandwidth_Hz:g}"
-            )
-        return self
 
     @model_validator(mode="after")
     def _gives_way(self) -> Self:

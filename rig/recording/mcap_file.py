@@ -77,7 +77,10 @@ class RecordingWriter:
         self._layout.add_metadata(name, {**values, CHECKSUM: checksum(values.items())})
 
     def add(self, stream_id: int, body: bytes) -> None:
-        """Appends one sample, ``body`` as packed by its stream; nothing reaches the disk before ``flush``."""
+        """Appends one sample, ``body`` as packed by its stream, or several of one without text, one behind the other.
+
+        Nothing reaches the disk before ``flush``.
+        """
         self._bodies.setdefault(stream_id, []).append(body)
         self._pending += len(body)
         if self._pending >= CHUNK_SIZE:

@@ -1,26 +1,28 @@
 """A recording as numpy tables: opens a finished file, any prefix of one, and what a damaged one still holds."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.channels import BY_ID, BY_NAME, EVENT, STREAMS, EventSample, Stream
+from rig.channels import EVENT, STREAMS, EventSample, Stream
 from rig.errors import DataError
+from rig.recording.channel_streams import ChannelStreams
+from rig.recording.chunk import Bodies
+from rig.recording.file_window import FileWindow
+from rig.recording.growing_table import GrowingTable
 from rig.recording.mcap_file import SUMMARY
-from rig.recording.mcap_layout import MAGIC, schema_words
-from rig.recording.scan import Chunk, Definition, Scan, scan
+from rig.recording.mcap_layout import MAGIC
+from rig.recording.scan import Scan, good_chunks
 
-# Fields of recordings that were made before they had the name on the right.
-RENAMED = {"slot": "cycle"}
 # The kind of a trial that tracked a force; one that indents has none.
 TRACKING = "tracking"
 # What is longer is not held whole: 220 bytes a row were measured for one that is read and looked at.
 LONGEST_ROWS = 4_000_000
 NUMERIC = tuple(stream for stream in STREAMS if not stream.has_text)
-Bodies = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -48,73 +50,49 @@ class Recording:
 
 def read_recording(path: Path) -> Recording:
     """The recording at ``path``; raises DataError only where there is no file or it never was a recording."""
-    found = scan(read_bytes(path))
-    bodies: dict[str, list[Bodies]] = {stream.name: [] for stream in STREAMS}
-    for stream, alike in messages(path, found):
-        bodies[stream.name].append(alike)
+    tables = {stream.name: GrowingTable(stream.fixed.size) for stream in NUMERIC}
+    events: list[EventSample] = []
+    found = Scan()
+    for stream, bodies in messages(path, found):
+        if stream is EVENT:
+            events += [EventSample(*EVENT.unpack(body.tobytes())) for body in bodies]
+        else:
+            tables[stream.name].add(bodies)
     return Recording(
         path,
         found.metadata,
-        {stream.name: _table(stream, bodies[stream.name]) for stream in NUMERIC},
-        tuple(EventSample(*EVENT.unpack(body.tobytes())) for alike in bodies[EVENT.name] for body in alike),
+        {stream.name: tables[stream.name].rows(stream.dtype) for stream in NUMERIC},
+        tuple(events),
         found.footer and SUMMARY in found.metadata,
         tuple(found.damage),
         found.cut,
     )
 
 
-def read_bytes(path: Path) -> bytes:
-    """The file's bytes; raises DataError where it cannot be read or is no recording in any state."""
+def messages(path: Path, found: Scan) -> Iterator[tuple[Stream, Bodies]]:
+    """Every good sample in file order, read as it is asked for: a stream, and bodies alike in length.
+
+    ``found`` is complete after the last. Raises DataError where the file cannot be read, is no recording in any state,
+    or has another layout.
+    """
+    with opened(path) as data:
+        streams = ChannelStreams(path)
+        begins = data[: len(MAGIC)] == MAGIC[: len(data)]
+        for chunk in good_chunks(data, found):
+            begins = True
+            yield from streams.sorted(chunk)
+        if not begins:
+            raise DataError(f"{path}: not a recording (no MCAP file)")
+        yield from streams.rest()
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[FileWindow]:
+    """The file's bytes; raises DataError where it cannot be read."""
     try:
-        data = path.read_bytes()
+        with FileWindow(path) as data:
+            yield data
     except FileNotFoundError as error:
         raise DataError(f"{path}: no such recording; `rig verify FOLDER` lists what a session holds") from error
     except OSError as error:
         raise DataError(f"{path}: cannot be read: {error.strerror}") from error
-    if not data.startswith(MAGIC[: len(data)]) and not scan(data).chunks:
-        raise DataError(f"{path}: not a recording (no MCAP file)")
-    return data
-
-
-def _table(stream: Stream, bodies: list[Bodies]) -> NDArray[np.void]:
-    size = stream.fixed.size
-    rows = np.concatenate([np.empty((0, size), np.uint8), *bodies]).view(stream.dtype)[:, 0]
-    rows.flags.writeable = False
-    return rows
-
-
-def messages(path: Path, found: Scan) -> Iterator[tuple[Stream, Bodies]]:
-    """Every good sample in file order: a stream, and bodies alike in length; DataError for a file of another layout."""
-    streams = _streams(path, found.chunks)
-    for chunk in found.chunks:
-        for channel, bodies in chunk.messages:
-            stream = streams.get(channel)
-            if stream is None:
-                continue
-            size = bodies.shape[1]
-            if not stream.has_text and size != stream.fixed.size:
-                raise DataError(f"{path}: a {stream.name} row of {size} bytes; its layout has {stream.fixed.size}")
-            yield stream, bodies
-
-
-def _streams(path: Path, chunks: Iterable[Chunk]) -> Mapping[int, Stream]:
-    """Channel number to stream; the numbers of our own writer where the chunk with the definitions is lost."""
-    definitions: dict[int, Definition] = {}
-    for chunk in chunks:
-        definitions |= chunk.definitions
-    for definition in definitions.values():
-        stream = BY_NAME.get(definition.topic)
-        if stream is not None and layout(definition.schema) != layout(stream.schema()):
-            raise DataError(
-                f"{path}: stream {stream.name} has other fields than this version of the program; "
-                "read it with the version named in its metadata"
-            )
-    known = {number: BY_NAME[item.topic] for number, item in definitions.items() if item.topic in BY_NAME}
-    if definitions and not known:
-        raise DataError(f"{path}: an MCAP file, but with no stream of this bench")
-    return known or BY_ID
-
-
-def layout(schema: str) -> list[list[str]]:
-    """Types and names, as they are now, of a ``ros2msg`` text without comments."""
-    return [[RENAMED.get(word, word) for word in words] for words in schema_words(schema)]

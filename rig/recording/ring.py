@@ -18,11 +18,11 @@ import tempfile
 from pathlib import Path
 from typing import Self
 
-from rig.errors import DeviceError, UsageError
+import numpy as np
 
-SLOT = 256
-TRAILER = struct.Struct("<QHH")
-BODY_LIMIT = SLOT - TRAILER.size
+from rig.errors import DeviceError, UsageError
+from rig.recording.slots import BODY_LIMIT, SLOT, SLOT_TYPE, TRAILER, Slots
+
 SLOTS = 1 << 17
 MAX_STREAMS = 64  # of which there are five; their counters stand in the header's page
 PAGE = 4096
@@ -155,6 +155,7 @@ class RingReader:
         self._fd, self._mapping = fd, mapping
         self._bytes, self._words = mapping.bytes, mapping.words
         self._mask = slots - 1
+        self._slots: Slots = np.frombuffer(mapping.bytes, SLOT_TYPE, slots, PAGE)
         self._next = self._words[_TAIL]
         self.damaged = 0
 
@@ -178,24 +179,21 @@ class RingReader:
             os.close(fd)
             raise
 
-    def drain(self, limit: int, commit: bool = True) -> list[tuple[int, int, bytes]]:
-        """Up to ``limit`` samples not drained before: ring number, stream, body.
+    def drain(self, limit: int, commit: bool = True) -> Slots:
+        """Copies of up to ``limit`` slots not drained before, in the order they were published.
 
         With ``commit`` false the slots stay taken, and would be read again by a successor, until ``commit`` is called.
         A slot that does not carry its own number is left out and counted in ``damaged``.
         """
-        found = []
-        for number in range(self._next, min(self._words[_HEAD], self._next + limit)):
-            at = PAGE + (number & self._mask) * SLOT
-            stamp, stream_id, size = TRAILER.unpack_from(self._bytes, at + BODY_LIMIT)
-            if stamp == number and size <= BODY_LIMIT:
-                found.append((number, stream_id, self._bytes[at : at + size]))
-            else:
-                self.damaged += 1
-            self._next = number + 1
+        numbers = np.arange(self._next, min(self._words[_HEAD], self._next + limit))
+        found = self._slots[numbers & self._mask]
+        good = (found["number"] == numbers) & (found["size"] <= BODY_LIMIT)
+        self._next += numbers.size
+        self.damaged += int(numbers.size - np.count_nonzero(good))
         if commit:
             self.commit()
-        return found
+        kept: Slots = found[good]
+        return kept
 
     def commit(self) -> None:
         """Gives the slots drained so far back to the producer."""
@@ -227,6 +225,7 @@ class RingReader:
 
     def close(self) -> None:
         """Lets go of the ring, may be called twice; the file stays."""
+        self._slots = self._slots[:0].copy()
         self._mapping.close()
         if self._fd >= 0:
             os.close(self._fd)

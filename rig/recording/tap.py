@@ -4,30 +4,16 @@ The file is mapped for reading only, so nothing that happens here can hold up or
 stays in its slot until the producer comes round again; whoever looks too late has missed it, and is told how much.
 """
 
-import contextlib
 import mmap
 import os
-import struct
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rig.channels import Stream
 from rig.errors import UsageError
-from rig.recording.ring import BODY_LIMIT, HEAD_BYTE, PAGE, SLOT, slots_of
-
-SLOT_TYPE = np.dtype(
-    {
-        "names": ["body", "number", "stream", "size"],
-        "formats": [(np.uint8, BODY_LIMIT), "<u8", "<u2", "<u2"],
-        "offsets": [0, BODY_LIMIT, BODY_LIMIT + 8, BODY_LIMIT + 10],
-        "itemsize": SLOT,
-    }
-)
-Slots = NDArray[np.void]
+from rig.recording.ring import HEAD_BYTE, PAGE, slots_of
+from rig.recording.slots import SLOT, SLOT_TYPE, Slots
 
 
 class RingTap:
@@ -87,22 +73,3 @@ class RingTap:
     def _oldest(self, head: int) -> int:
         # The slot behind the head is the one that the producer may be writing now.
         return max(head - self._mask, 0)
-
-
-def holding(slots: Slots, stream: Stream) -> NDArray[np.bool_]:
-    """Which of ``slots`` hold a whole row of ``stream``."""
-    found: NDArray[np.bool_] = slots["stream"] == stream.id
-    return found if stream.has_text else found & (slots["size"] == stream.dtype.itemsize)
-
-
-def rows_of(slots: Slots, stream: Stream) -> NDArray[np.void]:
-    """The rows of ``stream`` among ``slots``, as its table; streams with text have none."""
-    bodies = slots["body"][holding(slots, stream), : stream.dtype.itemsize]
-    return np.ascontiguousarray(bodies).view(stream.dtype).reshape(-1)
-
-
-def texts_of(slots: Slots, stream: Stream) -> Iterator[tuple[Any, ...]]:
-    """The rows of a ``stream`` with text among ``slots``; those cut short are left out."""
-    for slot in slots[holding(slots, stream)]:
-        with contextlib.suppress(struct.error, IndexError):
-            yield stream.unpack(slot["body"][: slot["size"]].tobytes())

@@ -14,8 +14,8 @@ from rig.channels import EVENT
 from rig.progress import Progress, silent
 from rig.recording.files import whole_file
 from rig.recording.mcap_file import SUMMARY, RecordingWriter
-from rig.recording.reader import Recording, messages, read_bytes, read_recording
-from rig.recording.scan import scan
+from rig.recording.reader import Recording, messages, read_recording
+from rig.recording.scan import Scan
 
 State = Literal["complete", "incomplete", "damaged"]
 ROWS_PER_CHUNK = 1000
@@ -149,12 +149,12 @@ def repair(path: Path, out: Path, tell: Progress = silent) -> Verdict:
     The metadata are kept; the summary gains ``repaired_from`` and ``damage``. ``out`` appears whole or not at all.
     """
     tell(f"reading {path.name}", 0.0)
-    found = scan(read_bytes(path))
+    found = Scan()
+    count = sum(len(bodies) for _, bodies in messages(path, found))
     metadata = {name: values for name, values in found.metadata.items() if name != SUMMARY}
     damage = [*found.damage, *([found.cut] if found.cut else [])]
     summary = {"outcome": "recording cut"} | found.metadata.get(SUMMARY, {})
-    count = sum(len(alike.bodies) for chunk in found.chunks for alike in chunk.messages)
-    samples = ((stream, body) for stream, bodies in messages(path, found) for body in bodies)
+    samples = ((stream, body) for stream, bodies in messages(path, Scan()) for body in bodies)
     with whole_file(out) as scratch, closing(RecordingWriter(scratch, metadata)) as writer:
         for number, (stream, body) in enumerate(samples):
             writer.add(stream.id, body.tobytes())

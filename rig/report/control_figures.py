@@ -1,18 +1,17 @@
-"""Pictures of the force loop: a run over time, its open loop over frequency, gain choices side by side."""
+"""Pictures of the force loop: a run over time, and subjects side by side."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rig.report.drawing import dress, new_figure, speed_colors, thinned
-from rig.report.ink import ACTUAL, INK, MODEL, OTHER, QUIET, SMALL_PT
+from rig.report.drawing import dress, new_figure, thinned
+from rig.report.ink import ACTUAL, INK, MODEL, OTHER, SMALL_PT
 from rig.tissue.laws import FloatArray
 
 POINTS = 1200
-CHOICE_COLORS = {"tangent": ACTUAL, "secant": "#56b4e9", "constant": OTHER, "admittance": MODEL}
 
 
 class Signals(NamedTuple):
@@ -43,44 +42,18 @@ def run_figure(signals: Signals, title: str) -> Figure:
     return figure
 
 
-def bode_figure(curves: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]]) -> Figure:
-    """Open loops by name as (frequency Hz, gain, phase deg): gain and phase over frequency."""
-    figure = new_figure(8.0, 5.4)
-    gain, phase = figure.subplots(2, 1, sharex=True)
-    dress(gain, "Open loop at several forces", "", "gain")
-    dress(phase, "", "frequency, Hz", "phase, deg")
-    for (name, (frequency, size, angle)), color in zip(curves.items(), speed_colors(len(curves)), strict=True):
-        gain.loglog(frequency, size, color=color, linewidth=1.3, label=name)
-        phase.semilogx(frequency, angle, color=color, linewidth=1.3)
-    gain.axhline(1.0, color=QUIET, linewidth=0.8)
-    phase.axhline(-180.0, color=QUIET, linewidth=0.8)
-    phase.set_ylim(-360, 0)
-    _key(gain)
-    return figure
-
-
-def comparison_figure(
-    subjects: Sequence[str], overshoot: Mapping[str, Sequence[float]], settling: Mapping[str, Sequence[float]]
-) -> Figure:
-    """Worst overshoot [%] and settling [s] of each choice on each subject; NaN where there is none."""
+def comparison_figure(subjects: Sequence[str], overshoot: Sequence[float], settling: Sequence[float]) -> Figure:
+    """Worst overshoot [%] and settling [s] on each subject; NaN where there is none."""
     figure = new_figure(9.0, 3.8)
     left, right = figure.subplots(1, 2)
-    for axes, title, unit, values in (
+    for axes, title, unit, heights in (
         (left, "Worst overshoot", "% of the jump", overshoot),
         (right, "Worst settling", "s", settling),
     ):
         dress(axes, title, "", unit)
-        _bars(axes, subjects, values)
-    _key(left)
+        axes.bar(np.arange(len(subjects)), heights, 0.6, color=ACTUAL)
+        axes.set_xticks(np.arange(len(subjects)), subjects, fontsize=SMALL_PT)
     return figure
-
-
-def _bars(axes: Axes, subjects: Sequence[str], values: Mapping[str, Sequence[float]]) -> None:
-    width = 0.8 / max(len(values), 1)
-    for number, (choice, heights) in enumerate(values.items()):
-        at = np.arange(len(subjects)) + (number - (len(values) - 1) / 2) * width
-        axes.bar(at, heights, width, color=CHOICE_COLORS[choice], label=choice)
-    axes.set_xticks(np.arange(len(subjects)), subjects, fontsize=SMALL_PT)
 
 
 def _key(axes: Axes) -> None:

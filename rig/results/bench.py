@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field, computed_field
 
-from rig.config.calibration import AxisCalibration, ForceCalibration
+from rig.config.calibration import AnyCalibration
 from rig.results.base import Result, SavedResult
 
 Act = Literal["clear", "retract", "home"]
@@ -35,7 +35,7 @@ class CalibrateResult(SavedResult):
     """A calibration, and the file it is kept in."""
 
     file: str
-    calibration: ForceCalibration | AxisCalibration
+    calibration: AnyCalibration
 
 
 class Question(Result):

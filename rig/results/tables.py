@@ -51,9 +51,14 @@ WORST = {
     "error (N)": "error_N:.4f", "error (%)": "error_percent:.2f", "largest (N)": "largest_error_N:.3f",
     "overshoot (%)": "overshoot_percent:.1f", "settling (s)": "settling_s:.2f",
 }  # fmt: skip
+STUDY = {
+    "given (N)": "given_N:.2f", "actual (N)": "actual_N:.3f", "error (N)": "error_N:+.3f",
+    "error (%)": "error_percent:+.2f", "position error (mm)": "position_error_mm:.3f",
+}  # fmt: skip
 MARGINS = {
-    "force (N)": "force_N:.2f", "tangent (N/mm)": "tangent_N_mm:.2f", "crossover (Hz)": "crossover_Hz:.1f",
-    "phase margin (deg)": "phase_deg:.0f", "gain margin": "gain:.1f",
+    "N": "force_N:.2f", "N/mm": "tangent_N_mm:.2f", "crossover Hz": "crossover_Hz:.1f",
+    "phase deg": "phase_deg:.0f", "gain": "gain:.1f", "worst deg": "worst_phase_deg:.0f",
+    "worst gain": "worst_gain:.1f", "stable to N/mm": "stiffest_N_mm:.1f",
 }  # fmt: skip
 
 
@@ -224,14 +229,26 @@ def gain_sentence(gain: TrackingGain, before: str, after: str) -> str:
 
 
 def run_table(runs: Sequence[ComparedRun], reference: str = "") -> TextTable:
-    """The worst jump of each choice of gains on each subject."""
-    rows = [[run.subject, run.gains, *cells(run.worst, WORST)] for run in runs]
-    return TextTable(f"Worst of {reference}; overshoot of the jump", ["subject", "gains", *WORST], rows, words=2)
+    """The worst jump on each subject."""
+    rows = [[run.subject, *cells(run.worst, WORST)] for run in runs]
+    return TextTable(f"Worst of {reference}; overshoot of the jump", ["subject", *WORST], rows)
+
+
+def study_table(runs: Sequence[ComparedRun]) -> TextTable:
+    """Given and actual force on each subject, as the study has them."""
+    rows = [[run.subject, *cells(level, STUDY)] for run in runs for level in run.levels]
+    return TextTable("Given and actual force, and what that is in position", ["subject", *STUDY], rows)
 
 
 def simulation_parts(found: SimulateResult) -> Iterator[Part]:
     """The simulation: how stable, how well, how fast."""
     yield numbers("Stability margins of the force loop", MARGINS, found.margins)
+    reach = found.reach
+    yield (
+        f"crossover {reach.crossover_Hz:.1f} Hz, two leads of {reach.lead_ms:.1f} ms, second integral from"
+        f" {reach.drift_Hz:.1f} Hz; of a limb's motion at 1 Hz {100 * reach.left_of_motion:.1f} % is left in the force,"
+        f" of the sensor's noise {100 * reach.noise_share:.0f} %"
+    )
     yield (
         f"{found.reference}: rms error {found.rms_error_N:.3f} N, peak {found.peak_force_N:.2f} N,"
         f" {found.times_real_time:.0f} times real time"

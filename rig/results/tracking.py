@@ -1,4 +1,4 @@
-"""What force tracking found: runs on the bench, gains compared, simulations, and the subject's threshold."""
+"""What force tracking found: runs on the bench, subjects compared, simulations, and the subject's threshold."""
 
 from collections.abc import Mapping
 
@@ -104,18 +104,28 @@ class WorstJump(Result):
     settling_s: float | None
 
 
+class StudyLevel(Result):
+    """One row of the study's table; ``position_error_mm`` is the largest in the last half second."""
+
+    given_N: float
+    actual_N: float
+    error_N: float
+    error_percent: float
+    position_error_mm: float
+
+
 class ComparedRun(Result):
-    """All jumps of one choice of gains on one subject; ``stopped`` is the sentence of what ended it early, if any."""
+    """All jumps on one subject; ``stopped`` is the sentence of what ended it early, if any."""
 
     subject: str
-    gains: str
     stopped: str
     worst: WorstJump
     jumps: tuple[Jump, ...]
+    levels: tuple[StudyLevel, ...]
 
 
 class CompareResult(SavedResult):
-    """Every choice of gains on simulated subjects; ``models`` are the parameters learnt of each."""
+    """Jumps of force on simulated subjects; ``models`` are the parameters learnt of each."""
 
     reference: str
     models: Mapping[str, Mapping[str, float]]
@@ -123,20 +133,41 @@ class CompareResult(SavedResult):
 
 
 class LoopMargins(Result):
-    """Stability margins of the force loop at one force."""
+    """The force loop at one force: on tissue as it was played, and at its worst over what the model leaves open.
+
+    ``stiffest_N_mm`` is the stiffness at which the loop would begin to oscillate there.
+    """
 
     force_N: float
     tangent_N_mm: float
     crossover_Hz: float
     phase_deg: float
     gain: float
+    worst_phase_deg: float
+    worst_gain: float
+    stiffest_N_mm: float
+
+
+class LoopReach(Result):
+    """What the law can do on this bench: its three numbers, limb motion that is left, and noise in the tissue's force.
+
+    ``left_of_motion`` is the force error of a limb that moves at 1 Hz over that without feedback,
+    ``largest_sensitivity`` the worst such ratio of all frequencies and tissues (1 / distance from -1).
+    """
+
+    crossover_Hz: float
+    lead_ms: float
+    drift_Hz: float
+    delay_ms: float
+    left_of_motion: float
+    noise_share: float
+    largest_sensitivity: float
 
 
 class SimulateResult(SavedResult):
     """A reference played on a tissue model."""
 
     reference: str
-    gains: str
     times_real_time: float
     jumps: tuple[Jump, ...]
     duration_s: float
@@ -144,6 +175,7 @@ class SimulateResult(SavedResult):
     peak_force_N: float
     largest_voltage_V: float
     margins: tuple[LoopMargins, ...]
+    reach: LoopReach
 
 
 class Threshold(SavedResult):

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from rig.errors import UsageError
+from rig.plugins import subclass_of
 from rig.registry import Registry
 from rig.tissue.laws import Constant, Index, Law
 from rig.tissue.laws_elastic import Fung, Layer, Power, Quadratic
@@ -13,7 +14,7 @@ COMPARED: tuple[type[Law], ...] = (Constant, Index)
 THREE_PARAMETER: tuple[type[Law], ...] = (Quadratic, Power, Fung)
 OTHERS: tuple[type[Law], ...] = (Layer, HuntCrossley, StandardLinear, Prony, QuasiLinear, Extended)
 LAWS = Registry[type[Law]](
-    "tissue law", lambda law: law.name, (*COMPARED, *THREE_PARAMETER, *OTHERS), "tissue_rig.laws"
+    "tissue law", lambda law: law.name, (*COMPARED, *THREE_PARAMETER, *OTHERS), "tissue_rig.law", subclass_of(Law)
 )
 ALSO = {"kelvin_voigt": Constant.name}
 

@@ -277,6 +277,8 @@ class FakeBench:
         self._renew()
         if self.stop_process_lives:
             StopWord.beat(self.page, wake_ns)
+        self.loop.prepare(wake_ns)
+        self.loop.take_force(wake_ns)
         self.going = self.loop.run_cycle(Cycle(self.cycle_number, due_ns, wake_ns, self.missed))
         self.clock.now_ns = wake_ns + self.execution_ns
         self.true_peak_N = max(self.true_peak_N, self.force.true_N)

@@ -135,7 +135,9 @@ class PlantBench(FakeBench):
         seed: int = 1,
         table: tuple[Check, ...] = TABLE,
     ) -> None:
-        known = with_calibration(wiring or wired(product.rate_Hz, tracker=None), PlantForce.__name__, "1")
+        known = with_calibration(
+            wiring or wired(product.rate_Hz, tracker=None), PlantForce.__name__, "1", PlantAxis.__name__
+        )
         super().__init__(known, position_mm=15.0, settled=0)
         self.axis: PlantAxis = PlantAxis(
             self.clock, self.period_ns, position_mm=15.0, limb=limb, filter_s=product.filter_s, state=at_rest(15.0)

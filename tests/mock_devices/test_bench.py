@@ -183,7 +183,7 @@ def test_sensor_at_its_end_says_so_and_reads_no_further() -> None:
     assert bench.force.wrench()[2] == -3.0
 
 
-def test_both_sensors_see_the_same_force_each_with_its_own_zero() -> None:
+def test_every_product_see_the_same_force_each_with_its_own_zero() -> None:
     bench = quiet_bench(force_modbus=QUIET.model_copy(update={"zero_N": (0.0, 0.0, -2.0)}))
     settle(bench, SURFACE_MM + 8, 3.0)
     assert bench.force.wrench()[2] - 0.8 == pytest.approx(bench.force_modbus.wrench()[2] + 2.0, abs=1e-6)

@@ -31,6 +31,7 @@ from mock_devices.testing.commands import served_bench
 from mock_devices.testing.force import collect
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.products.ndi_polaris import PolarisWiring
 from rig.config.wiring import Limits
 
 COMMAND = [sys.executable, "-m", "mock_devices.serve", "--tracker-tcp-port", "0"]
@@ -226,7 +227,7 @@ class ServerBench:
     def __init__(self) -> None:
         self.clock = Clock(0)
         self.bench = Bench(Parameters.model_validate({"tracker": {"tcp_port": 0}, "force": {"counter_drift_ppm": 0.0}}))
-        devices = DeviceFactory(self.bench, 0, self.clock, seed=0).devices((BotaWiring,))
+        devices = DeviceFactory(self.bench, 0, self.clock, seed=0).devices((BotaWiring, Epos4Wiring, PolarisWiring))
         self.line, self.axis = devices[0].wire, devices[1]
         self.server = MockServer(self.bench, devices, self.clock)
         self.port = open_port(self.line.endpoint, 460_800)

@@ -4,7 +4,8 @@ from pkgutil import resolve_name
 
 import pytest
 
-from mock_devices.devices import FORCE_CHOICES, DeviceFactory
+from mock_devices.devices import DeviceFactory
+from mock_devices.played import CHOICES
 from rig.config.endpoints import Endpoints
 from rig.config.products.registry import AXES, FORCE_SENSORS, ROLES, TRACKERS, choice_of, name_of, read
 from rig.config.products.robotiq_ft300 import Ft300Wiring
@@ -44,7 +45,7 @@ def test_each_mock_is_made_by_the_workshop(role: str, product: type[Product]) ->
         product.mock.role: {product.mock.kind: "there"},
     }
     assert product.mock.address(Endpoints.model_validate(printed)).endswith("there")
-    assert role != "force" or FORCE_CHOICES[name_of(product)] == (product,)
+    assert CHOICES[role][name_of(product)] == (product,)
 
 
 @each_product

@@ -22,14 +22,16 @@ MIXTURES = [mixture for mixture in product((False, True), repeat=3) if any(mixtu
 
 def test_the_mock_bench_is_not_asked_for_a_product_that_only_the_real_device_is() -> None:
     real = BotaWiring.model_construct(product="ati-axia", port="/dev/ttyUSB7")
-    asked = _arguments(Wiring.model_construct(force=real, mock=Wiring().mock), (), None, both_sensors=False)
+    asked = _arguments(Wiring.model_construct(force=real, mock=Wiring().mock), (), None, every_product=False)
     assert "ati-axia" not in asked
-    assert _arguments(Wiring(), (), None, both_sensors=False)[-2:] == ["--force", "bota-sensone"]
+    assert _arguments(Wiring(), (), None, every_product=False)[-6:] == [
+        "--force", "bota-sensone", "--axis", "maxon-epos4", "--tracker", "ndi-polaris",
+    ]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def real() -> Iterator[Endpoints]:
-    with bench_process(Wiring(), both_sensors=True) as (_, endpoints):
+    with bench_process(Wiring(), every_product=True) as (_, endpoints):
         yield endpoints
 
 

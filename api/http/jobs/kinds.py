@@ -49,7 +49,7 @@ class CaptureJob(JobBody):
 
 
 class TrackJob(JobBody):
-    """Tracks a force with gains from a model."""
+    """Tracks a force with a law made from a model."""
 
     kind: Literal["track"]
     params: TrackParams

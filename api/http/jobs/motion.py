@@ -71,8 +71,8 @@ def _plan(asked: TrackParams, ref: ModelRef, bench: Supervisor, places: Places) 
 def _program(asked: TrackParams, file: Path, bench: Supervisor) -> Program:
     model = load_model(file)
     if asked.forces_N:
-        return tracked.plan(asked.forces_N, asked.seconds, model, bench.wiring, asked.gains)
-    return tracked.plan_reference(reference_of(asked), model, bench.wiring, asked.gains)
+        return tracked.plan(asked.forces_N, asked.seconds, model, bench.wiring)
+    return tracked.plan_reference(reference_of(asked), model, bench.wiring)
 
 
 def _threshold(body: ThresholdJob, bench: Supervisor, places: Places) -> Planned:

@@ -14,7 +14,6 @@ MappingText = Annotated[str, Field(max_length=30_000, description="mapping of an
 Protocol = Annotated[Name, Field(description="name of a protocol as /protocols lists it")]
 NewSession = Annotated[Name, Field(description="name of the new session")]
 Force = Annotated[float, Field(gt=0, le=1000)]
-Gains = Literal["tangent", "secant", "constant", "admittance"]
 Point = Annotated[list[float], Field(min_length=2, max_length=2)]
 # As of a reference's file (`controller.experiments.references.MOST_POINTS`); they fit into a request's 64 kB.
 MOST_POINTS = 4000
@@ -69,13 +68,12 @@ class CaptureParams(RequestBody):
 
 
 class TrackParams(ForceOverTime):
-    """Force tracking with gains from a model."""
+    """Force tracking with a law made from a model."""
 
     model: ModelRef
     session: Existing | None = Field(default=None, description="where it is recorded; null: the session of the model")
     forces_N: list[Force] = Field(default=[], max_length=20)
     seconds: float = Field(default=10.0, gt=1, le=600, description="on each of forces_N")
-    gains: Gains | None = Field(default=None, description="null: loop.gains of the wiring")
     against: ModelRef | None = Field(default=None, description="another model, tracked with first")
 
     @model_validator(mode="after")
@@ -167,7 +165,6 @@ class SimulateParams(ForceOverTime):
     """A reference on a model, on a virtual clock."""
 
     model: ModelRef
-    gains: Gains | None = Field(default=None, description="null: loop.gains of the wiring")
     stiffness: float = Field(default=1.0, ge=0.1, le=10, description="how much stiffer the tissue is than the model")
     breathing_mm: float = Field(default=0.0, ge=0, le=10)
 
@@ -179,12 +176,11 @@ class SimulateParams(ForceOverTime):
 
 
 class CompareParams(RequestBody):
-    """Every choice of gains on simulated subjects."""
+    """Jumps of force on simulated subjects."""
 
     force_from_N: Force = 1.0
     force_to_N: Force = 10.0
     seconds: float = Field(default=1.5, gt=0.7, le=60, description="on each newton")
-    gains: list[Gains] = Field(default=[], max_length=4, description="empty: all")
     subjects: list[Name] = Field(default=[], max_length=20, description="empty: all")
 
 

@@ -82,6 +82,5 @@ def simulate(operation: Operation, asked: SimulateParams, desk: Desk) -> Simulat
     from api.operations import simulate as simulation  # noqa: PLC0415 - the loop's kernels take a second to load
 
     model = load_model(desk.places.model(asked.model))
-    gains = asked.gains or desk.wiring.loop.gains
-    wanted = simulation.SimulatedRun(reference_of(asked), model, gains, asked.stiffness, asked.breathing_mm)
+    wanted = simulation.SimulatedRun(reference_of(asked), model, asked.stiffness, asked.breathing_mm)
     return simulation.simulate(operation, desk.wiring, wanted, desk.places.files)

@@ -10,6 +10,7 @@ from api.http.routes import (
     catalogue,
     control,
     curves,
+    devices,
     foresight,
     jobs,
     problems,
@@ -26,7 +27,7 @@ from api.http.service import Service
 # Each adds its routes to the router, over the service; tried in this order, what is asked for all the time first.
 MODULES = (
     bench, control, stops, jobs, access, subject, protocols, foresight, uploads, recordings, sessions, curves,
-    catalogue, calibrations, problems,
+    catalogue, calibrations, devices, problems,
 )  # fmt: skip
 
 

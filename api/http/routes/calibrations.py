@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Literal
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
@@ -11,13 +10,14 @@ from pydantic import BaseModel, Field
 from api.http.access.rights import READ
 from api.http.service import Service
 from api.operations.calibrations import FOLDER
-from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration
-from rig.config.calibration_files import read_axis, read_force
+from rig.config.axis_dynamics import AxisDynamics
+from rig.config.calibration import AnyCalibration, Calibration, ForceCalibration, What
+from rig.config.calibration_files import read_axis, read_dynamics, read_force
 from rig.errors import RigError
 
-What = Literal["force", "axis"]
-Found = ForceCalibration | AxisCalibration
-READERS: Mapping[What, Callable[[Path], Found]] = {"force": read_force, "axis": read_axis}
+READERS: Mapping[What, Callable[[Path], AnyCalibration]] = {
+    "force": read_force, "axis": read_axis, "dynamics": read_dynamics,
+}  # fmt: skip
 
 
 class CalibrationView(BaseModel):
@@ -52,6 +52,8 @@ def _used(stated: Calibration, now: datetime) -> Iterator[CalibrationView]:
         yield _view("force", stated.force, stated.of_force, stated, now, used=True)
     if stated.of_axis:
         yield _view("axis", stated.axis, stated.of_axis, stated, now, used=True)
+    if stated.of_dynamics:
+        yield _view("dynamics", stated.dynamics, stated.of_dynamics, stated, now, used=True)
 
 
 def _lying(stated: Calibration, now: datetime) -> Iterator[CalibrationView]:
@@ -64,9 +66,8 @@ def _lying(stated: Calibration, now: datetime) -> Iterator[CalibrationView]:
 
 
 def _view(
-    what: What, file: Path | None, found: Found, stated: Calibration, now: datetime, used: bool = False
+    what: What, file: Path | None, found: AnyCalibration, stated: Calibration, now: datetime, used: bool = False
 ) -> CalibrationView:
-    share = found.uncertainty.combined if isinstance(found, ForceCalibration) else found.uncertainty / found.scale
     return CalibrationView(
         what=what,
         used=used,
@@ -74,6 +75,13 @@ def _view(
         product=found.product,
         serial=found.serial,
         date=found.date.isoformat(),
-        uncertainty_percent=100 * share,
+        uncertainty_percent=100 * _share(found),
         refused="; ".join(stated.alone(found).unfit(now)),
     )
+
+
+def _share(found: AnyCalibration) -> float:
+    """Relative standard uncertainty; of dynamics that of delay and lags together, half of what 95 % lie within."""
+    if isinstance(found, AxisDynamics):
+        return 0.5 * found.total.within_s / found.total.s
+    return found.uncertainty.combined if isinstance(found, ForceCalibration) else found.uncertainty / found.scale

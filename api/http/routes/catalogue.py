@@ -13,7 +13,8 @@ from starlette.background import BackgroundTask
 
 from api.catalogue.catalogue import Catalogue, NoSuchSubject
 from api.catalogue.database import CatalogueDamaged, CatalogueUnavailable
-from api.catalogue.queries import MOST, USUAL, Asked, Page
+from api.catalogue.queries import Asked, Page
+from api.catalogue.settings import MOST, USUAL
 from api.catalogue.subjects import erase_subject, export_subject
 from api.http.access.rights import ADMIN, CALLER, OPERATE, READ
 from api.http.access.scopes import Scope

@@ -13,7 +13,7 @@ import numpy as np
 from rig.channels import CDR_HEADER, STREAMS
 from rig.errors import UsageError
 from rig.recording.mcap_file import schema_name
-from rig.recording.tap import Slots
+from rig.recording.slots import Slots
 
 HOST = "127.0.0.1"
 # Every row begins with its number, when it was taken and when it arrived; a recording is in order of arrival.

@@ -14,7 +14,8 @@ from api.http.streams.live_run import LiveRun
 from rig.channels import EVENT, LOOP
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
-from rig.recording.tap import RingTap, Slots, texts_of
+from rig.recording.slots import Slots, texts_of
+from rig.recording.tap import RingTap
 
 PERIOD_S = 0.04
 # Two seconds of the bench, which take a few milliseconds.

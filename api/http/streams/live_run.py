@@ -9,7 +9,7 @@ from api.http.streams.history import LiveHistory, Rows
 from api.http.streams.signals import marker_source, rates_Hz, sources
 from rig.channels import AXIS, FORCE, LOOP, MARKER
 from rig.config.wiring import Wiring
-from rig.recording.tap import Slots, holding, rows_of
+from rig.recording.slots import Slots, holding, rows_of
 
 
 class LiveRun:

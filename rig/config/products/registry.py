@@ -3,7 +3,7 @@
 What is registered before `rig.config.wiring` is imported is a choice there like any other.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import reduce
 from operator import or_
 from typing import Annotated, Any, TypeVar
@@ -15,6 +15,7 @@ from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
 from rig.config.products.robotiq_ft300 import Ft300Wiring
 from rig.config.products.roles import AxisProduct, ForceProduct, Product, TrackerProduct
+from rig.config.products.usable import refusal_of
 from rig.registry import Registry
 
 AnyProduct = TypeVar("AnyProduct", bound=Product)
@@ -25,9 +26,16 @@ def name_of(product: type[Product]) -> str:
     return str(product.model_fields["product"].default)
 
 
-FORCE_SENSORS = Registry[type[ForceProduct]]("force sensor", name_of, (BotaWiring, Ft300Wiring), "tissue_rig.force")
-AXES = Registry[type[AxisProduct]]("servo axis", name_of, (Epos4Wiring,), "tissue_rig.axis")
-TRACKERS = Registry[type[TrackerProduct]]("marker tracker", name_of, (PolarisWiring,), "tissue_rig.tracker")
+def products_of(role: str, what: str, kind: type[AnyProduct], own: Iterable[type[AnyProduct]]) -> Any:
+    """The registry of ``role``: our own products, then those of plug-ins; ``what`` is what messages call one."""
+    return Registry[type[AnyProduct]](what, name_of, own, f"tissue_rig.{role}", refusal_of(kind))
+
+
+FORCE_SENSORS: Registry[type[ForceProduct]] = products_of(
+    "force", "force sensor", ForceProduct, (BotaWiring, Ft300Wiring)
+)
+AXES: Registry[type[AxisProduct]] = products_of("axis", "servo axis", AxisProduct, (Epos4Wiring,))
+TRACKERS: Registry[type[TrackerProduct]] = products_of("tracker", "marker tracker", TrackerProduct, (PolarisWiring,))
 ROLES: Mapping[str, Registry[Any]] = {"force": FORCE_SENSORS, "axis": AXES, "tracker": TRACKERS}
 
 

@@ -197,4 +197,4 @@ AXIS_EFFECTS = (
     COULOMB, VISCOUS, ASYMMETRIC, STRIBECK, POSITION_LOAD, GRAVITY, POSITION_RIPPLE, DEAD_TIME, FLEXIBLE_MODE, BACKLASH,
     COMPLIANCE,
 )  # fmt: skip
-AXIS_CAUSES = Registry[AxisEffect]("cause of an axis", lambda cause: cause.name, AXIS_EFFECTS, "tissue_rig.axis_causes")
+AXIS_CAUSES = Registry[AxisEffect]("cause of an axis", lambda cause: cause.name, AXIS_EFFECTS, "tissue_rig.axis_cause")

@@ -1,4 +1,4 @@
-"""Gains compared on subjects whose benches are played: what a stall or a cancel of the operation does."""
+"""Force tracked on subjects whose benches are played: what a stall or a cancel of the operation does."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +12,6 @@ from api.operations.compare import Comparison, compare, comparison_operation
 from controller.experiments import capture, tracked
 from controller.experiments.recorded import Recorded
 from controller.experiments.references import parse_reference
-from controller.law.gains import Choice
 from controller.loop.messages import Outcome
 from controller.operation import Cancelled
 from controller.supervisor import Supervisor
@@ -38,7 +37,7 @@ class PlayedRuns:
         return Recorded(folder / "track_001.mcap", end, {}, {})
 
 
-def comparison(out: Path, *choices: Choice) -> Comparison:
+def comparison(out: Path) -> Comparison:
     """Two subjects of one tissue, whose model is learnt already."""
     index_model(0.12, 0.22, 0.01, force_N=11.0).save(out / "average.json")
 
@@ -47,7 +46,7 @@ def comparison(out: Path, *choices: Choice) -> Comparison:
         yield cast(Supervisor, None)
 
     subjects = {"average": "average", "breathing": "average"}
-    return Comparison(Wiring(), out, subjects, choices, parse_reference("stairs:5"), bench)
+    return Comparison(Wiring(), out, subjects, parse_reference("stairs:5"), bench)
 
 
 @pytest.fixture(autouse=True)
@@ -60,16 +59,14 @@ def test_what_a_stall_of_the_computer_stopped_is_said_and_done_again(
 ) -> None:
     runs = PlayedRuns(LATE, DeviceError("the force sensor is silent"))
     monkeypatch.setattr(tracked, "recorded_run", runs)
-    wanted = comparison(tmp_path, "tangent")
+    wanted = comparison(tmp_path)
     operation = comparison_operation(wanted)
     found = compare(operation, wanted)
     assert runs.made == ["average", "average", "average", "breathing"]
-    assert [(run.subject, run.gains, run.stopped) for run in found.runs] == [
-        ("average", "tangent", ""), ("breathing", "tangent", "")
-    ]  # fmt: skip
+    assert [(run.subject, run.stopped) for run in found.runs] == [("average", ""), ("breathing", "")]
     assert operation.progress.log[:2] == (
-        "average  tangent: the loop was late; once more",
-        "average  tangent: the force sensor is silent; once more",
+        "average: the loop was late; once more",
+        "average: the force sensor is silent; once more",
     )
     assert (operation.progress.total, found.models["breathing"]["a_N_mm"]) == (2, 0.12)
     assert (tmp_path / "comparison.svg").exists()
@@ -78,7 +75,7 @@ def test_what_a_stall_of_the_computer_stopped_is_said_and_done_again(
 def test_one_that_stalls_each_time_is_given_up_with_its_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     runs = PlayedRuns(LATE, LATE, LATE)
     monkeypatch.setattr(tracked, "recorded_run", runs)
-    wanted = comparison(tmp_path, "tangent")
+    wanted = comparison(tmp_path)
     found = compare(comparison_operation(wanted), wanted)
     assert [run.stopped for run in found.runs] == ["the loop was late", ""]
     assert runs.made == ["average"] * 3 + ["breathing"]
@@ -88,7 +85,7 @@ def test_one_that_stalls_each_time_is_given_up_with_its_reason(tmp_path: Path, m
 def test_a_persons_stop_ends_the_comparison(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str) -> None:
     runs = PlayedRuns(Outcome(code, "stopped by the operator", 5.0, 20.0, 0.0))
     monkeypatch.setattr(tracked, "recorded_run", runs)
-    wanted = comparison(tmp_path, "tangent", "constant")
+    wanted = comparison(tmp_path)
     with pytest.raises(SafetyStop, match="stopped: stopped by the operator"):
         compare(comparison_operation(wanted), wanted)
     assert runs.made == ["average"]
@@ -98,7 +95,7 @@ def test_a_persons_stop_ends_the_comparison(tmp_path: Path, monkeypatch: pytest.
 def test_learning_is_done_again_only_where_the_computer_was_late(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, attempts: int
 ) -> None:
-    wanted, folders = comparison(tmp_path, "tangent"), list[str]()
+    wanted, folders = comparison(tmp_path), list[str]()
     (tmp_path / "average.json").unlink()
 
     def stopped_capture(_bench: object, _protocol: object, folder: Path, _operation: object) -> None:
@@ -112,7 +109,7 @@ def test_learning_is_done_again_only_where_the_computer_was_late(
 
 
 def test_one_that_is_cancelled_starts_no_further_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    wanted = comparison(tmp_path, "tangent", "constant")
+    wanted = comparison(tmp_path)
     operation, runs = comparison_operation(wanted), PlayedRuns()
 
     def run(*arguments: object) -> Recorded:
@@ -120,6 +117,6 @@ def test_one_that_is_cancelled_starts_no_further_run(tmp_path: Path, monkeypatch
         return runs(*arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(tracked, "recorded_run", run)
-    with pytest.raises(Cancelled, match="compare was cancelled before: average, constant gains"):
+    with pytest.raises(Cancelled, match="compare was cancelled before: learning breathing"):
         operation.run(lambda: compare(operation, wanted))
     assert runs.made == ["average"] and not (tmp_path / "comparison.svg").exists()

@@ -102,7 +102,7 @@ def test_a_report_that_is_cancelled_between_two_steps_writes_nothing(
 def test_a_simulation_that_is_cancelled_draws_nothing(tmp_path: Path) -> None:
     operation = Operation("simulate")
     cancelled_at(operation, "playing, 1 of 3")
-    wanted = SimulatedRun(parse_reference("step:2"), index_model(0.12, 0.22, 0.01, force_N=11.0), "tangent")
+    wanted = SimulatedRun(parse_reference("step:2"), index_model(0.12, 0.22, 0.01, force_N=11.0))
     with pytest.raises(Cancelled, match="simulate was cancelled before: playing, 2 of 3"):
         operation.run(lambda: simulate(operation, Wiring(), wanted, tmp_path / "out"))
     assert not (tmp_path / "out").exists()

@@ -22,7 +22,7 @@ from api.http.streams.feed import Feed
 from mock_devices.testing.commands import free_port
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
-from rig.recording.tap import Slots
+from rig.recording.slots import Slots
 from tests.api.streams.played import PlayedBench, force_N
 
 MESSAGE_DATA = 1

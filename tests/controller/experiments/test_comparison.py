@@ -7,10 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from controller.experiments import comparison, tracking
-from controller.experiments.comparison import choices_from, compared_run
+from controller.experiments.comparison import compared_run, study_levels
 from controller.loop.modes import Mode
-from rig.errors import DataError, UsageError
-from rig.results.tables import run_table
+from mock_devices.testing.models import index_model
+from rig.errors import DataError
+from rig.results.tables import run_table, study_table
 
 Column = NDArray[np.float64]
 TIME_S = np.arange(3000, dtype=np.float64) * 1e-3
@@ -49,10 +50,10 @@ def test_a_jump_down_overshoots_downwards() -> None:
 def test_force_that_leaves_the_band_again_has_not_settled() -> None:
     swinging = 1.0 + 0.05 * np.sin(2 * np.pi * TIME_S[:2000])
     (jump,) = comparison.jumps(TIME_S, STEP_N, after(swinging), CONTACT)
-    run = compared_run("firm", "tangent", (jump,))
+    run = compared_run("firm", (jump,))
     assert jump.settling_s is None
     assert run.worst.settling_s is None
-    assert run_table([run]).rows[0][6] == "–"
+    assert run_table([run]).rows[0][5] == "–"
 
 
 def test_the_response_to_the_next_jump_does_not_count_as_error_of_this_one() -> None:
@@ -66,10 +67,14 @@ def test_a_recording_without_a_jump_is_refused() -> None:
         comparison.jumps(TIME_S, np.ones(3000), np.ones(3000), CONTACT)
 
 
-def test_an_unknown_choice_of_gains_is_refused_with_those_there_are() -> None:
-    assert choices_from("tangent, constant") == ("tangent", "constant")
-    with pytest.raises(UsageError, match="choose among tangent, secant, constant, admittance"):
-        choices_from("fuzzy")
+def test_the_studys_table_has_the_error_in_newtons_percent_and_millimetres_of_the_tip() -> None:
+    """On 2 N/mm at every depth, 0.01 N are 5 um."""
+    jumps = comparison.jumps(TIME_S, STEP_N, after(np.full(2000, 1.01)), CONTACT)
+    (level,) = levels = study_levels(jumps, index_model(2.0, 0.0, 0.01))
+    assert (level.given_N, level.actual_N, level.error_percent) == pytest.approx((2.0, 2.01, 0.5))
+    assert level.position_error_mm == pytest.approx(0.005)
+    table = study_table([compared_run("firm", jumps, levels)])
+    assert list(table.rows[0]) == ["firm", "2.00", "2.010", "+0.010", "+0.50", "0.005"]
 
 
 def test_amplitude_and_lag_of_a_sine_are_found() -> None:

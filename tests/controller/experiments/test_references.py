@@ -10,7 +10,7 @@ from controller.loop.steps import TrackForce
 from controller.safety.program_limits import refuse_beyond_limits
 from mock_devices.testing.models import index_model
 from rig.config.products.maxon_epos4 import Epos4Wiring
-from rig.config.wiring import Loop, Wiring
+from rig.config.wiring import Wiring
 from rig.errors import UsageError
 
 MODEL = index_model(0.12, 0.22, 0.01, force_N=11.0)
@@ -131,32 +131,10 @@ def test_a_reference_without_end_is_refused() -> None:
         refuse_beyond_limits(tracking.following(parse_reference("step:5,duration_s=1e9"), MODEL, Wiring()), Wiring())
 
 
-def test_a_design_that_cannot_be_reached_is_refused() -> None:
-    wiring = Wiring(loop=Loop(crossover_Hz=20.0, phase_margin_deg=89.0), axis=Epos4Wiring(delay_ms=20.0))
-    stiff = index_model(2.0, 0.0, 0.0, force_N=11.0)
-    with pytest.raises(UsageError, match=r"no PI law reaches 20 Hz with 89 deg at 2 N/mm: lower loop\.crossover_Hz"):
-        tracking.following(parse_reference("step:5"), stiff, wiring)
-
-
-def test_a_slower_sensor_is_designed_for_with_its_delay() -> None:
-    fast, slow = (
-        Wiring.model_validate({"force": {"product": product}}) for product in ("bota-sensone", "robotiq-ft300")
-    )
-    assert tracking.design_for(slow).delay_s - tracking.design_for(fast).delay_s == pytest.approx(0.009)
-
-
-def test_a_sensor_of_100_Hz_gets_a_loop_of_a_fiftieth_of_that_and_a_fast_one_the_loop_asked_for() -> None:
-    fast, slow = (
-        tracking.design_for(Wiring.model_validate({"force": {"product": product}, "loop": {"crossover_Hz": 16.0}}))
-        for product in ("bota-sensone", "robotiq-ft300")
-    )
-    assert (fast.crossover_Hz, slow.crossover_Hz) == (16.0, 2.0)
-    assert slow.drift_Hz / slow.crossover_Hz == pytest.approx(fast.drift_Hz / fast.crossover_Hz)
-
-
-def test_a_loop_faster_than_its_axis_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"loop\.crossover_Hz 40 must stay below axis\.bandwidth_Hz 34"):
-        Wiring(loop=Loop(crossover_Hz=40.0))
+def test_a_delay_that_no_law_can_hold_is_refused() -> None:
+    wiring = Wiring(axis=Epos4Wiring(delay_ms=60.0))
+    with pytest.raises(UsageError, match=r"the axis answers 58\.7 ms late, above the 46 ms that a force law can hold"):
+        tracking.following(parse_reference("step:5"), MODEL, wiring)
 
 
 def test_a_periodic_reference_goes_on_where_the_lead_in_ended_and_repeats() -> None:

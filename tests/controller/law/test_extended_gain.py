@@ -7,6 +7,8 @@ import numpy as np
 
 from controller.experiments.tracking import force_law
 from controller.law import force_position
+from controller.law.force_position import ForceReading
+from controller.law.inverse_model import columns
 from mock_devices.bench import Bench
 from mock_devices.parameters import Parameters
 from mock_devices.testing.models import index_model
@@ -33,19 +35,17 @@ def rms_error_N(model: Model, in_time: bool = True) -> float:
     bench = Bench(Parameters.model_validate({"hide": {"friction": FRICTION}}))
     settle(bench, 19.5, 1.0)
     zero_N, place_mm = bench.force.wrench()[2], 19.5
-    step = force_law(model, Wiring(), "tangent", adapt=False)
+    step = force_law(model, Wiring())
     early = round(1e3 * step.preview_s) if in_time else 0
-    table, settings = force_position.columns(step.gains), step.settings
-    memory = force_position.begin(table, 0.0, 0.0, settings.friction_N)
+    table, settings = columns(step.gains), step.settings
+    memory = force_position.begin(table, settings.inverse, 0.0)
     sensed = deque([0.0] * LATE_TICKS, maxlen=LATE_TICKS)
     commanded = deque([place_mm] * COMMAND_TICKS, maxlen=COMMAND_TICKS)
     start_ns, errors = bench.now_ns, []
     for cycle in range(4000):
-        depth_mm = bench.axis.position_mm - 20.0
-        move_mm, memory = force_position.increment(
-            memory, table, settings, wanted_N(cycle + early), sensed[0], depth_mm, 1e-3
-        )
-        place_mm += min(max(move_mm, -0.03), 0.03)
+        measured = ForceReading(sensed[0], cycle)
+        move_mm, memory = force_position.increment(memory, table, settings, wanted_N(cycle + early), measured, 1e-3)
+        place_mm += move_mm
         bench.axis.target(commanded[0])
         commanded.append(place_mm)
         bench.advance(start_ns + (cycle + 1) * MS_NS)

@@ -200,6 +200,7 @@ def test_a_program_leaves_its_events_and_its_outcome() -> None:
         "outcome": "complete", "cause": "", "peak_force_N": state.peak_force_N, "surface_mm": state.surface_mm,
         "zero_N": pytest.approx(ZERO_N, abs=0.001), "touch": outcome["touch"],
         "wire_damage": {"force": 0.0, "axis": 0.0, "tracker": 0.0},
+        "carried": {"zero": None, "reference_zero": None, "zero_N": None, "noise_N": 0.0, "noise_N_m": 0.0},
     }  # fmt: skip
     assert outcome["touch"]["surface_mm"] == outcome["surface_mm"]
 

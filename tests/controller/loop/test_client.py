@@ -153,12 +153,10 @@ def test_status_incidents_and_what_was_found_are_kept(loop: PlayedLoop) -> None:
 
 def track(points: int) -> Run:
     """A program that follows so many points, each as long as a number can be."""
-    gains = [
-        {"force_N": force, "depth_mm": force, "tangent_N_mm": 1.0, "proportional_mm_N": 0.1, "integral_mm_N_s": 1.0}
-        for force in (1.0, 2.0)
-    ]
+    gains = [{"force_N": force, "depth_mm": force, "tangent_N_mm": 1.0, "damping_N_s_mm": 0.01} for force in (1.0, 2.0)]
     times = tuple(1e-4 * n / 3 for n in range(points))
-    values = {"step": "track", "times_s": times, "forces_N": (1 / 3,) * points, "gains": gains}
+    forces = (1 / 3,) * points
+    values = {"step": "track", "times_s": times, "forces_N": forces, "gains": gains, "crossover_rad_s": 10.0}
     return Run(program=Program(name="long", steps=(TrackForce.model_validate(values),)))
 
 

@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from controller.law.force_position import GainRow
-from controller.law.gains import pi_gains
+from controller.law.inverse_model import GainRow
 from controller.loop.modes import Mode
 from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
@@ -25,21 +24,16 @@ from mock_devices.testing.spring_bench import (
 )
 from rig.config.wiring import Limits, Wiring
 from rig.errors import UsageError
-from tests.controller.law.test_force_position import DESIGN
 
 
 def gains() -> tuple[GainRow, ...]:
-    proportional, integral = pi_gains(STIFFNESS_N_MM, 0.0, DESIGN)
     return tuple(
         GainRow(
-            force_N=force,
-            depth_mm=force / STIFFNESS_N_MM,
-            tangent_N_mm=STIFFNESS_N_MM,
-            proportional_mm_N=proportional,
-            integral_mm_N_s=integral,
+            force_N=force, depth_mm=force / STIFFNESS_N_MM, tangent_N_mm=STIFFNESS_N_MM,
+            damping_N_s_mm=0.0015 * STIFFNESS_N_MM,
         )
         for force in (0.0, 9.0)
-    )
+    )  # fmt: skip
 
 
 def touching(**speeds: float) -> Approach:
@@ -47,7 +41,8 @@ def touching(**speeds: float) -> Approach:
 
 
 def track(*points: tuple[float, float]) -> TrackForce:
-    return TrackForce(times_s=tuple(t for t, _ in points), forces_N=tuple(f for _, f in points), gains=gains())
+    times_s, forces_N = zip(*points, strict=True)
+    return TrackForce(times_s=times_s, forces_N=forces_N, gains=gains(), crossover_rad_s=30.0)
 
 
 def test_a_trial_zeroes_finds_the_surface_presses_to_depth_and_leaves() -> None:

@@ -7,7 +7,8 @@ import pytest
 from pydantic import ValidationError
 
 from controller.law import force_position
-from controller.law.force_position import GainRow
+from controller.law.force_position import ForceReading
+from controller.law.inverse_model import GainRow, columns
 from controller.loop.modes import Mode
 from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
@@ -28,8 +29,7 @@ from rig.errors import SafetyStop
 
 DT_S = 0.001
 ROWS = tuple(
-    GainRow(force_N=force_N, depth_mm=force_N, tangent_N_mm=1.0, proportional_mm_N=0.1, integral_mm_N_s=2.0)
-    for force_N in (0.0, 9.0)
+    GainRow(force_N=force_N, depth_mm=force_N, tangent_N_mm=1.0, damping_N_s_mm=0.01) for force_N in (0.0, 9.0)
 )
 
 
@@ -58,6 +58,11 @@ def ends_after(run: Run, here: LoopState, cycles: int = 100_000) -> int:
     raise AssertionError("the step did not end")
 
 
+GOOD_TRACK: dict[str, Any] = {
+    "times_s": (0.0, 1.0), "forces_N": (0.0, 0.0), "gains": ROWS, "crossover_rad_s": 0.5
+}  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("step", "kind", "mode"),
     [
@@ -67,7 +72,7 @@ def ends_after(run: Run, here: LoopState, cycles: int = 100_000) -> int:
         (Compress(depth_mm=1.0, speed_mm_s=1.0, force_limit_N=1.0), "compress", Mode.COMPRESS),
         (Hold(duration_s=0.0), "hold", Mode.COMPRESS),
         (Dither(amplitude_mm=1.0, frequency_Hz=1.0, duration_s=1.0), "dither", Mode.COMPRESS),
-        (TrackForce(times_s=(0.0, 1.0), forces_N=(0.0, 0.0), gains=ROWS), "track", Mode.CONTACT),
+        (TrackForce(**GOOD_TRACK), "track", Mode.CONTACT),
         (Retract(clearance_mm=1.0, speed_mm_s=1.0), "retract", Mode.RETRACT),
     ],
 )
@@ -81,15 +86,13 @@ def test_what_a_step_does_not_say_is_this() -> None:
     approach = Approach(speed_mm_s=1.0, contact_force_N=1.0, search_to_mm=1.0)
     assert (approach.within_mm, approach.touches, approach.touch_speed_mm_s) == (0.2, 0, 0.5)
     assert Retract(clearance_mm=1.0, speed_mm_s=1.0).floor_mm == 0.0
-    track = TrackForce(times_s=(0.0, 1.0), forces_N=(0.0, 0.0), gains=ROWS)
-    assert track.model_dump(exclude={"times_s", "forces_N", "gains", "step"}) == {
-        "repeats": 1, "damping_N_s_mm": 0.0, "lag_s": 0.0, "preview_s": 0.0, "ahead_mm_s": 24.0, "forgetting": 0.0,
-        "drift_Hz": 0.0, "relaxation": (), "friction_N": 0.0, "friction_mm": 1.0, "speed_limit_mm_s": 30.0,
-        "search_speed_mm_s": 5.0, "contact_force_N": 0.1,
+    track = TrackForce(**GOOD_TRACK)
+    assert track.model_dump(exclude={"times_s", "forces_N", "gains", "step", "crossover_rad_s"}) == {
+        "repeats": 1, "damping_N_s_mm": 0.0, "delay_s": 0.0, "lag1_s": 0.0, "lag2_s": 0.0, "preview_s": 0.0,
+        "ahead_mm_s": 24.0, "lead_s": 0.0, "drift_rad_s": 0.0, "drift_limit_mm_s": 5.0, "relaxation": (),
+        "friction_N": 0.0, "friction_mm": 1.0, "speed_limit_mm_s": 30.0, "search_speed_mm_s": 5.0,
+        "contact_force_N": 0.1,
     }  # fmt: skip
-
-
-GOOD_TRACK: dict[str, Any] = {"times_s": (0.0, 1.0), "forces_N": (0.0, 0.0), "gains": ROWS}
 
 
 @pytest.mark.parametrize(
@@ -104,9 +107,10 @@ GOOD_TRACK: dict[str, Any] = {"times_s": (0.0, 1.0), "forces_N": (0.0, 0.0), "ga
         *[(TrackForce, {**GOOD_TRACK, name: good}, {name: bad}) for name, good, bad in [
             ("times_s", (0.0, 0.5), (0.0,)), ("times_s", (0.0, 0.5), (-0.1, 0.5)), ("forces_N", (0.0, 0.5), (0.0,)),
             ("forces_N", (0.0, 0.5), (-0.1, 0.5)), ("gains", ROWS, ROWS[:1]), ("repeats", 1, 0),
-            ("damping_N_s_mm", 0.0, -0.1), ("damping_N_s_mm", 0.5, -0.1), ("lag_s", 0.0, -0.1),
-            ("preview_s", 0.0, -0.1), ("ahead_mm_s", 0.0, -0.1), ("forgetting", 0.0, -0.1), ("forgetting", 0.999, 1.0),
-            ("drift_Hz", 0.0, -0.1),
+            ("damping_N_s_mm", 0.0, -0.1), ("damping_N_s_mm", 0.5, -0.1), ("delay_s", 0.0, -0.1),
+            ("lag1_s", 0.0, -0.1), ("lag2_s", 0.0, -0.1), ("preview_s", 0.0, -0.1), ("ahead_mm_s", 0.0, -0.1),
+            ("crossover_rad_s", 0.1, 0.0), ("lead_s", 0.0, -0.1), ("drift_rad_s", 0.0, -0.1),
+            ("drift_limit_mm_s", 0.1, 0.0),
             ("relaxation", ((0.5, 0.5), (0.5, 0.5)), ((0.5, 0.5),) * 3), ("relaxation", ((0.5, 0.1),), ((0.5, 0.0),)),
             ("friction_N", 0.0, -0.1), ("friction_mm", 0.5, 0.0),
         ]],
@@ -314,12 +318,13 @@ def test_a_dither_is_a_sine_of_whole_periods_about_where_it_began() -> None:
 
 
 def tracking(**changes: Any) -> TrackForce:
-    values: dict[str, Any] = {"times_s": (0.0, 2.0), "forces_N": (1.0, 3.0), "gains": ROWS, "ahead_mm_s": 0.0}
+    values: dict[str, Any] = {"times_s": (0.0, 2.0), "forces_N": (1.0, 3.0), "gains": ROWS, "ahead_mm_s": 0.0,
+                              "crossover_rad_s": 10.0}  # fmt: skip
     return TrackForce(**{**values, **changes})
 
 
 def contacting(force_N: float = 1.0, **values: Any) -> LoopState:
-    return state(21.0, surface_mm=20.0, force_N=force_N, **values)
+    return state(21.0, surface_mm=20.0, force_N=force_N, force_samples=1, **values)
 
 
 def test_the_reference_is_joined_by_straight_lines_and_the_step_lasts_as_long() -> None:
@@ -340,12 +345,11 @@ def test_a_late_force_moves_nothing_and_the_reference_goes_on() -> None:
 
 def expected_mm(here: LoopState, step: TrackForce, asked_N: float) -> float:
     """One increment of the law from where it begins, which has tests of its own."""
-    table = force_position.columns(step.gains)
-    memory = force_position.begin(table, here.force_N, here.depth_mm, step.friction_N)
-    delta_mm, _ = force_position.increment(
-        memory, table, step.settings, asked_N, here.force_N, here.depth_mm, here.dt_s
-    )
-    return delta_mm
+    table = columns(step.gains)
+    memory = force_position.begin(table, step.settings.inverse, here.force_N)
+    reading = ForceReading(here.force_N, 1)
+    step_mm, _ = force_position.increment(memory, table, step.settings, asked_N, reading, here.dt_s)
+    return step_mm
 
 
 def test_the_set_point_moves_by_the_laws_increment() -> None:
@@ -359,12 +363,32 @@ def test_the_set_point_moves_by_the_laws_increment() -> None:
 
 def test_the_law_goes_on_where_the_track_step_before_it_ended() -> None:
     here = contacting()
-    tracking().begin().advance(here, 0.0)
-    memory = here.memory
-    run = tracking().begin()
+    tracking(drift_rad_s=1.0).begin().advance(here, 0.01)
+    assert here.memory
+    drift_mm_s = here.memory.correction.drift_mm_s
+    tracking(drift_rad_s=0.0).begin().advance(here, 0.0)
+    assert here.memory.correction.drift_mm_s == drift_mm_s > 0.0
+
+
+def test_after_a_late_force_the_law_starts_anew_at_the_force_measured() -> None:
+    here, run = contacting(), tracking(drift_rad_s=1.0).begin()
+    run.advance(here, 0.01)
     here.force_late = True
-    run.advance(here, 0.0)
-    assert here.memory is memory
+    run.advance(here, 0.02)
+    here.force_late, here.force_N = False, 2.0
+    run.advance(here, 0.5)
+    assert here.memory
+    assert (here.memory.expected.start_N, here.memory.samples) == (2.0, here.force_samples)
+
+
+def test_a_sample_is_acted_on_once_and_its_speed_kept_until_the_next() -> None:
+    here, run = contacting(), tracking(forces_N=(2.0, 2.0)).begin()
+    speeds_mm_s = []
+    for cycle in range(4):
+        here.force_samples += cycle == 2
+        run.advance(here, cycle * DT_S)
+        speeds_mm_s.append(here.setpoint.velocity_mm_s)
+    assert 0 < speeds_mm_s[0] == speeds_mm_s[1] < speeds_mm_s[2] == speeds_mm_s[3]
 
 
 def test_a_preview_asks_earlier_for_what_will_be_wanted() -> None:
@@ -378,16 +402,12 @@ def test_a_preview_asks_earlier_for_what_will_be_wanted() -> None:
 @pytest.mark.parametrize(
     ("force_N", "asked_N", "fastest_mm_s"),
     # Half the contact force of 0.1 N: below it and asked for more, the tip only searches.
-    [(0.04, 3.0, 5.0), (0.05, 3.0, 30.0), (0.04, 0.05, 5.0), (1.0, 3.0, 30.0)],
+    [(0.04, 3.0, 5.0), (0.05, 3.0, 30.0), (0.04, 0.06, 5.0), (1.0, 3.0, 30.0)],
 )
 def test_out_of_contact_the_tip_only_searches(force_N: float, asked_N: float, fastest_mm_s: float) -> None:
-    gains = tuple(row.model_copy(update={"proportional_mm_N": 100.0}) for row in ROWS)
     here = contacting(force_N)
-    run = tracking(forces_N=(asked_N, asked_N), gains=gains, drift_Hz=0.0).begin()
+    run = tracking(forces_N=(asked_N, asked_N), crossover_rad_s=1e6).begin()
     run.advance(here, 0.0)
-    here.force_N = force_N  # and the law is asked again, with an error that jumped
-    assert here.memory is not None
-    here.memory = here.memory._replace(tangent_N_mm=1.0)
     before_mm = here.setpoint.position_mm
     for _ in range(5):
         run.advance(here, 0.001)
@@ -397,40 +417,39 @@ def test_out_of_contact_the_tip_only_searches(force_N: float, asked_N: float, fa
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_no_increment_is_faster_than_the_limit_either_way(sign: float) -> None:
-    gains = tuple(row.model_copy(update={"integral_mm_N_s": 1e6}) for row in ROWS)
     here = contacting(5.0 - 4.0 * sign)
-    tracking(forces_N=(5.0, 5.0), gains=gains).begin().advance(here, 0.0)
+    tracking(forces_N=(5.0, 5.0), crossover_rad_s=1e6).begin().advance(here, 0.0)
     assert here.setpoint.velocity_mm_s == pytest.approx(sign * 30.0)
     assert here.setpoint.position_mm == pytest.approx(21.0 + sign * 0.03)
 
 
 def test_a_search_has_its_own_speed() -> None:
-    gains = tuple(row.model_copy(update={"integral_mm_N_s": 1e6}) for row in ROWS)
     for force_N, fastest_mm_s in ((0.049, 5.0), (0.05, 30.0)):
         here = contacting(force_N)
-        tracking(forces_N=(5.0, 5.0), gains=gains).begin().advance(here, 0.0)
+        tracking(forces_N=(5.0, 5.0), crossover_rad_s=1e6).begin().advance(here, 0.0)
         assert here.setpoint.velocity_mm_s == pytest.approx(fastest_mm_s)
     here = contacting(0.0)
-    tracking(forces_N=(0.05, 0.05), gains=gains).begin().advance(here, 0.0)
+    tracking(forces_N=(0.05, 0.05), crossover_rad_s=1e6).begin().advance(here, 0.0)
     assert here.setpoint.velocity_mm_s == pytest.approx(30.0), "a reference that is no contact is no search"
 
 
 def test_the_law_is_told_what_the_step_says_of_tissue_and_axis() -> None:
     step = tracking(
-        damping_N_s_mm=0.1, lag_s=0.2, ahead_mm_s=3.0, forgetting=0.4, drift_Hz=5.0, search_speed_mm_s=6.0,
-        relaxation=((0.7, 0.8), (0.9, 1.0)), friction_N=1.1, friction_mm=1.2,
+        damping_N_s_mm=0.1, ahead_mm_s=3.0, relaxation=((0.7, 0.8), (0.9, 1.0)), friction_N=1.1, friction_mm=1.2,
+        delay_s=1.3, lag1_s=1.4, lag2_s=1.5, crossover_rad_s=1.6, lead_s=1.7, drift_rad_s=1.8, drift_limit_mm_s=1.9,
+        speed_limit_mm_s=2.1, search_speed_mm_s=2.2, contact_force_N=4.6,
     )  # fmt: skip
-    assert tuple(step.settings) == pytest.approx(
-        (0.1, 0.2, 3.0, 0.4, 2 * math.pi * 5.0, 6.0, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)
-    )
-    assert tuple(tracking().settings)[6:10] == (0.0, 1.0, 0.0, 1.0)
-    assert tuple(tracking(relaxation=((0.7, 0.8),)).settings)[6:10] == (0.7, 0.8, 0.0, 1.0)
+    inverse, feedback = step.settings
+    assert tuple(inverse) == (0.1, 3.0, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)
+    assert tuple(feedback) == (1.3, 1.4, 1.5, 1.6, 1.7, 1.8, 1.9, 2.1, 2.2, 2.3)
+    assert tuple(tracking().settings.inverse)[2:6] == (0.0, 1.0, 0.0, 1.0)
+    assert tuple(tracking(relaxation=((0.7, 0.8),)).settings.inverse)[2:6] == (0.7, 0.8, 0.0, 1.0)
     assert tuple(step.given) == ((0.0, 2.0), (1.0, 3.0), 1)
 
 
 def test_a_retraction_ends_a_clearance_above_the_surface_and_forgets_the_law() -> None:
     here = state(25.0, surface_mm=20.0, reference_N=1.0, tangent_N_mm=2.0)
-    here.memory = force_position.begin(force_position.columns(ROWS), 1.0, 1.0, 0.0)
+    here.memory = force_position.begin(columns(ROWS), tracking().settings.inverse, 1.0)
     ends_after(Retract(clearance_mm=5.0, speed_mm_s=10.0).begin(), here)
     assert here.setpoint == Setpoint(15.0, 0.0)
     assert math.isnan(here.reference_N) and math.isnan(here.tangent_N_mm)
@@ -490,5 +509,5 @@ def test_the_law_is_told_where_the_tip_is_and_what_presses_on_it(monkeypatch: py
     step, here = tracking(friction_N=0.3), contacting(1.2)
     step.begin().advance(here, 0.01)
     (begun, asked) = told
-    assert begun[1:] == (1.2, 1.0, 0.3)
-    assert asked[2:] == (step.settings, pytest.approx(1.01), 1.2, 1.0, DT_S)
+    assert begun[1:] == (step.settings.inverse, 1.2)
+    assert asked[2:] == (step.settings, pytest.approx(1.01), (1.2, 1), DT_S)

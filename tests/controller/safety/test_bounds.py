@@ -34,6 +34,7 @@ LINES = [
     ("force_lost", SOFT, 0.6, False),
     ("force_invalid", SOFT, 0.1, False),
     ("force_rate", SOFT, 0.1, True),
+    ("oscillation", SOFT, 1.1, False),
     ("first_touch", SOFT, 2.0, False),
     ("axis_scale", SOFT, 2.1, False),
     ("depth_limit", SOFT, 0.1, False),
@@ -118,6 +119,7 @@ CASES = [
     Case("pushed", resting(9.0, math.nan), resting(7.5, 1.0, mode=Mode.SAFE),
          "the limb pushes: 6.50 N more than when the tip came to rest (limits.pushed_N 5 N)"),
     Case("first_touch", {"touch_wrong": ""}, {"touch_wrong": "another channel answers"}, "another channel answers"),
+    Case("oscillation", {"oscillation": ""}, {"oscillation": "the force swings"}, "the force swings"),
     Case("axis_scale", {"axis_scale": Interval(0.9, 0.95)}, {"axis_scale": Interval(0.9, 0.949)},
          "the tracker sees 0.900 to 0.949 mm for each mm of the axis (1 within 0.05): check axis.increments_per_mm,"
          " then `rig calibrate axis`"),
@@ -282,7 +284,7 @@ def test_what_the_table_looks_at_is_well_until_the_loop_says_otherwise() -> None
     inputs = SafetyInputs()
     assert inputs == SafetyInputs(
         mode=Mode.IDLE, force_lost="", axis_lost="", marker_lost="", drive_fault="", force_valid=True,
-        force_frozen=False, touch_wrong="", force_age_ms=0.0,
+        force_frozen=False, touch_wrong="", oscillation="", force_age_ms=0.0,
         axis_age_ms=0.0, marker_age_ms=0.0, limb_age_ms=0.0, wake_latency_ms=0.0,
         recorder_fill=0.0, recorder_silent_s=0.0, stop_silent_s=0.0,
         supervisor_lost=False, operator_silent_s=0.0, requests=frozenset(),

@@ -5,7 +5,9 @@ from typing import Any
 
 import pytest
 
-from controller.law.gains import Design, schedule
+from controller.law import synthesis
+from controller.law.gain_table import gain_rows, span_of
+from controller.law.loop_response import Rates
 from controller.loop.modes import Mode
 from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
@@ -15,6 +17,7 @@ from controller.safety.load import NO_WRENCH, LoadMonitor
 from controller.safety.table import TABLE, evaluate
 from mock_devices.testing.models import index_model
 from mock_devices.testing.spring_bench import WIRING
+from rig.config.axis_response import AxisResponse
 from rig.simulation.axis_plant import ModelledLimb
 from tests.controller.fake_bench import ZERO, wired
 from tests.controller.plant_bench import BOTA, FT300, PlantBench, Product, curve, exponential, linear, rammed
@@ -84,18 +87,17 @@ def test_without_the_check_a_wrong_channel_presses_as_deep_as_the_search_goes() 
 
 RAMPS_N = (0.1, 13.5, 13.5, 0.5, 13.5, 13.5)
 SINE_N = (0.1, *(7.0 + 6.5 * math.sin(0.2 * math.pi * at) for at in range(40)))
-TRACKED = index_model(a_N_mm=0.5, b_per_mm=0.1, damping_N_s_mm=0.0, force_N=15.0)
+TRACKED = index_model(a_N_mm=0.5, b_per_mm=0.1, damping_N_s_mm=0.001, force_N=15.0)
 
 
 def tracking(product: Product, forces_N: tuple[float, ...], every_s: float) -> TrackForce:
-    """Follows ``forces_N`` one after the other with the gains that the product's rate allows."""
-    crossover_Hz = min(18.0, product.rate_Hz / 50.0)
-    design = Design(bandwidth_Hz=34.0, delay_s=0.5 / product.rate_Hz + 0.004, crossover_Hz=crossover_Hz,
-                    phase_margin_deg=55.0)  # fmt: skip
-    depths = [TRACKED.valid.depth_mm * share / 20 for share in range(21)]
+    """Follows ``forces_N`` one after the other with the law that the product's rate allows."""
+    axis, rates = AxisResponse(0.002 + 0.5 / product.rate_Hz, 0.003, 0.003, 0.0065), Rates(0.001, 1 / product.rate_Hz)
+    rows = gain_rows(TRACKED, [TRACKED.valid.depth_mm * share / 20 for share in range(21)])
     return TrackForce(
         times_s=tuple(every_s * at for at in range(len(forces_N))), forces_N=forces_N,
-        gains=schedule(TRACKED, design, depths), lag_s=design.lag_s, preview_s=design.lag_s,
+        gains=rows, delay_s=axis.delay_s, lag1_s=axis.lag1_s, lag2_s=axis.lag2_s, preview_s=axis.tip_lag_s,
+        **synthesis.constants(axis, rates, span_of(TRACKED, rows, rates))._asdict(),
     )  # fmt: skip
 
 

@@ -6,10 +6,11 @@ import pytest
 
 from drivers.ports import PortClosed, SerialPort, TcpPort, read_until
 from mock_devices.bench import Bench
-from mock_devices.devices import FORCE_CHOICES, DeviceFactory
+from mock_devices.devices import DeviceFactory
 from mock_devices.faults.wires import WIRE_FAULTS, FaultyWire, as_number, faults_of
 from mock_devices.interfaces import NEVER_NS
 from mock_devices.parameters import Parameters
+from mock_devices.played import ALL, CHOICES
 from mock_devices.testing.clock import Clock
 from mock_devices.testing.wire import MemoryWire
 from mock_devices.wire import PtyWire, TcpWire
@@ -143,7 +144,9 @@ def test_a_share_outside_zero_to_one_is_refused(wire: FaultyWire, value: bool | 
 
 def test_every_device_has_every_wire_fault_and_its_own_and_takes_each_at_its_default() -> None:
     bench = Bench(Parameters.model_validate({"tracker": {"tcp_port": 0}}))
-    devices = DeviceFactory(bench, 0, lambda: 0, seed=0).devices(FORCE_CHOICES["both"])
+    devices = DeviceFactory(bench, 0, lambda: 0, seed=0).devices(
+        product for choices in CHOICES.values() for product in choices[ALL]
+    )
     assert [(device.role, *device.mock.endpoints()) for device in devices] == [
         ("force", "serial"),
         ("force_modbus", "serial"),

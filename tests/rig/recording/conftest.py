@@ -7,6 +7,7 @@ import pytest
 
 from rig.channels import AXIS, EVENT, FORCE, AxisSample, EventSample, ForceSample
 from rig.recording.mcap_file import RecordingWriter
+from rig.recording.ring import RingReader
 from tests.rig.recording.measured import measured
 
 METADATA = {"recording": {"id": "r1", "trial": "indent-1"}, "trial": {"speed_mm_s": "5.0", "depth_mm": "8.0"}}
@@ -61,6 +62,12 @@ def write_recording(tmp_path: Path) -> WriteRecording:
         return path
 
     return write
+
+
+def drained(reader: RingReader, limit: int, commit: bool = True) -> list[tuple[int, int, bytes]]:
+    """Ring number, stream and body of each sample that is drained."""
+    slots = reader.drain(limit, commit)
+    return [(int(slot["number"]), int(slot["stream"]), slot["body"][: slot["size"]].tobytes()) for slot in slots]
 
 
 @pytest.fixture

@@ -13,9 +13,10 @@ from rig.channels import BY_ID, BY_NAME, EVENT, LOOP, STREAMS, EventSample, Loop
 from rig.errors import DataError
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.reader import Recording, read_recording
-from rig.recording.ring import BODY_LIMIT, RingReader, RingWriter
+from rig.recording.ring import RingReader, RingWriter
 from rig.recording.scan import scan
-from tests.rig.recording.conftest import METADATA, WriteRecording, axis, event, force
+from rig.recording.slots import BODY_LIMIT
+from tests.rig.recording.conftest import METADATA, WriteRecording, axis, drained, event, force
 
 SEED = 20
 
@@ -260,10 +261,10 @@ def test_whatever_goes_into_the_ring_comes_out_of_the_file(
         assert len(body) <= BODY_LIMIT
         ring.put(stream_id, body)
         if flush:
-            for _, number, data in reader.drain(100):
+            for _, number, data in drained(reader, 100):
                 writer.add(number, data)
             writer.flush()
-    for _, number, data in reader.drain(100):
+    for _, number, data in drained(reader, 100):
         writer.add(number, data)
     writer.finish({})
     reader.close()

@@ -10,7 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.errors import DeviceError, UsageError
-from rig.recording.ring import BODY_LIMIT, PAGE, SLOT, RingReader, RingWriter, new_path
+from rig.recording.ring import PAGE, RingReader, RingWriter, new_path
+from rig.recording.slots import BODY_LIMIT, SLOT
+from tests.rig.recording.conftest import drained
 
 
 @pytest.fixture
@@ -30,16 +32,16 @@ def reader(writer: RingWriter) -> Iterator[RingReader]:
 def test_samples_come_out_in_the_order_they_went_in(writer: RingWriter, reader: RingReader) -> None:
     writer.put(1, b"one")
     writer.put(5, b"")
-    assert reader.drain(10) == [(0, 1, b"one"), (1, 5, b"")]
-    assert reader.drain(10) == []
+    assert drained(reader, 10) == [(0, 1, b"one"), (1, 5, b"")]
+    assert drained(reader, 10) == []
     assert (writer.head, reader.head, writer.fill) == (2, 2, 0.0)
 
 
 def test_drain_stops_at_its_limit(writer: RingWriter, reader: RingReader) -> None:
     for number in range(5):
         writer.put(1, bytes([number]))
-    assert [body for _, _, body in reader.drain(3)] == [b"\0", b"\1", b"\2"]
-    assert [body for _, _, body in reader.drain(3)] == [b"\3", b"\4"]
+    assert [body for _, _, body in drained(reader, 3)] == [b"\0", b"\1", b"\2"]
+    assert [body for _, _, body in drained(reader, 3)] == [b"\3", b"\4"]
 
 
 def test_the_layout_in_the_file_is_the_documented_one(writer: RingWriter) -> None:
@@ -58,32 +60,32 @@ def test_a_full_ring_keeps_what_is_unread_and_counts_what_it_drops(writer: RingW
         writer.put(1 + number % 2, bytes([number]))
     assert writer.fill == 1.0
     assert writer.dropped == reader.dropped == {1: 2, 2: 1}
-    assert [body[0] for _, _, body in reader.drain(100)] == list(range(8))
+    assert [body[0] for _, _, body in drained(reader, 100)] == list(range(8))
     writer.put(1, b"after")
-    assert reader.drain(100) == [(8, 1, b"after")]
+    assert drained(reader, 100) == [(8, 1, b"after")]
 
 
 def test_an_uncommitted_batch_is_read_again_by_the_next_reader(writer: RingWriter) -> None:
     for number in range(4):
         writer.put(1, bytes([number]))
     first = RingReader.open(writer.path)
-    first.drain(2)
-    first.drain(2, commit=False)
+    drained(first, 2)
+    drained(first, 2, commit=False)
     first.close()
     second = RingReader.open(writer.path)
-    assert [number for number, _, _ in second.drain(10)] == [2, 3]
+    assert [number for number, _, _ in drained(second, 10)] == [2, 3]
     second.close()
 
 
 def test_uncommitted_slots_are_not_overwritten(writer: RingWriter, reader: RingReader) -> None:
     for number in range(8):
         writer.put(1, bytes([number]))
-    assert len(reader.drain(8, commit=False)) == 8
+    assert len(drained(reader, 8, commit=False)) == 8
     writer.put(1, b"no room")
     assert writer.dropped == {1: 1}
     reader.commit()
     writer.put(1, b"room")
-    assert [body for _, _, body in reader.drain(8)] == [b"room"]
+    assert [body for _, _, body in drained(reader, 8)] == [b"room"]
 
 
 def test_the_reader_leaves_a_sign_of_life(writer: RingWriter, reader: RingReader) -> None:
@@ -97,7 +99,7 @@ def test_what_was_published_outlives_the_producer(tmp_path: Path) -> None:
     writer.put(2, b"kept")
     writer.close(unlink=False)
     reader = RingReader.open(tmp_path / "ring")
-    assert reader.drain(10) == [(0, 2, b"kept")]
+    assert drained(reader, 10) == [(0, 2, b"kept")]
     reader.close()
 
 
@@ -107,7 +109,7 @@ def test_an_attached_reader_keeps_the_ring_that_its_producer_removed(tmp_path: P
     writer.put(2, b"kept")
     writer.close(unlink=True)
     assert not (tmp_path / "ring").exists()
-    assert reader.drain(10) == [(0, 2, b"kept")]
+    assert drained(reader, 10) == [(0, 2, b"kept")]
     reader.close()
 
 
@@ -116,7 +118,7 @@ def test_a_slot_without_its_own_number_is_left_out_and_counted(writer: RingWrite
         writer.put(1, bytes([number]))
     with writer.path.open("r+b") as file, mmap.mmap(file.fileno(), 0) as raw:
         raw[PAGE + SLOT + BODY_LIMIT : PAGE + SLOT + BODY_LIMIT + 8] = b"\xff" * 8
-    assert [body for _, _, body in reader.drain(10)] == [b"\0", b"\2"]
+    assert [body for _, _, body in drained(reader, 10)] == [b"\0", b"\2"]
     assert reader.damaged == 1
 
 
@@ -124,7 +126,7 @@ def test_a_body_larger_than_a_slot_is_refused(writer: RingWriter, reader: RingRe
     writer.put(1, b"x" * BODY_LIMIT)
     with pytest.raises(ValueError, match="244 bytes"):
         writer.put(1, b"x" * (BODY_LIMIT + 1))
-    assert [len(body) for _, _, body in reader.drain(10)] == [BODY_LIMIT]
+    assert [len(body) for _, _, body in drained(reader, 10)] == [BODY_LIMIT]
 
 
 def test_a_stream_without_a_counter_is_refused(writer: RingWriter) -> None:
@@ -196,8 +198,8 @@ def test_whatever_is_put_is_read_or_counted(
     read: list[tuple[int, bytes]] = []
     for drain, stream_id, body in steps:
         writer.put(stream_id, body)
-        read += [(stream, data) for _, stream, data in reader.drain(2)] if drain else []
-    read += [(stream, data) for _, stream, data in reader.drain(100)]
+        read += [(stream, data) for _, stream, data in drained(reader, 2)] if drain else []
+    read += [(stream, data) for _, stream, data in drained(reader, 100)]
     put = iter([(stream, body) for _, stream, body in steps])
     assert all(item in put for item in read), "a subsequence, in order"
     assert len(read) + sum(reader.dropped.values()) == len(steps)

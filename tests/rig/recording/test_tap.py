@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 
 from rig.channels import EVENT, FORCE, EventSample, ForceSample
 from rig.errors import UsageError
-from rig.recording.ring import PAGE, SLOT, RingReader, RingWriter
-from rig.recording.tap import RingTap, rows_of, texts_of
+from rig.recording.ring import PAGE, RingReader, RingWriter
+from rig.recording.slots import SLOT, rows_of, texts_of
+from rig.recording.tap import RingTap
+from tests.rig.recording.conftest import drained
 
 
 @pytest.fixture
@@ -29,7 +31,7 @@ def numbers(tap: RingTap, limit: int = 100) -> list[int]:
 def publish(ring: RingWriter, reader: RingReader, values: range) -> None:
     for value in values:
         ring.put(1, bytes([value]))
-        reader.drain(1)
+        drained(reader, 1)
 
 
 def test_reader_and_tap_see_the_same_and_neither_takes_from_the_other(writer: RingWriter) -> None:
@@ -37,7 +39,7 @@ def test_reader_and_tap_see_the_same_and_neither_takes_from_the_other(writer: Ri
     for value in range(5):
         writer.put(1, bytes([value]))
     assert numbers(tap, 2) == [0, 1]
-    assert [body[0] for _, _, body in reader.drain(9)] == [0, 1, 2, 3, 4]
+    assert [body[0] for _, _, body in drained(reader, 9)] == [0, 1, 2, 3, 4]
     assert numbers(tap) == [2, 3, 4]
     assert (numbers(tap), tap.missed, reader.tail) == ([], 0, 5)
     before = writer.path.read_bytes()

@@ -1,0 +1,76 @@
+"""What this installation knows: products with their options, and plug-ins with what is wrong with them."""
+
+import inspect
+
+import rig
+from rig import plugins
+from rig.config.products.registry import ROLES
+from rig.config.products.roles import ForceProduct, Product, TrackerProduct
+from rig.config.words import toml, value_words
+from rig.diagnosis.effects.axis import AXIS_CAUSES
+from rig.diagnosis.effects.registry import CAUSES
+from rig.registry import known
+from rig.results.devices import DevicesResult, PluginListed, ProductListed, ProductOption
+from rig.tissue.registry import LAWS
+
+# Each has looked at its own group of entry points when it was loaded.
+REGISTRIES = (*ROLES.values(), LAWS, CAUSES, AXIS_CAUSES)
+
+
+def devices(product: str = "") -> DevicesResult:
+    """All products, or that one; raises UsageError with the nearest where there is none of that name."""
+    listed = [_listed(role, name, one) for role, products in ROLES.items() for name, one in products.items()]
+    if product:
+        known(product, [one.product for one in listed], "product")
+    return DevicesResult(
+        software=f"tissue-rig {rig.__version__}",
+        products=tuple(one for one in listed if product in ("", one.product)),
+        plugins=tuple(_plugin(one) for group in sorted(plugins.met()) for one in plugins.met()[group]),
+    )
+
+
+def _listed(role: str, name: str, product: type[Product]) -> ProductListed:
+    plugin = plugins.declaring(f"tissue_rig.{role}", name)
+    whose, version = (plugin.distribution, plugin.version) if plugin else ("tissue-rig", rig.__version__)
+    return ProductListed(
+        role=role,
+        product=name,
+        meaning=(inspect.getdoc(product) or "").partition("\n")[0],
+        distribution=whose,
+        distribution_version=version,
+        rate_Hz=_rate_Hz(product()),
+        simulated=product.mock is not None,
+        options=options(product),
+    )
+
+
+def _rate_Hz(usual: Product) -> float | None:
+    if isinstance(usual, ForceProduct):
+        return usual.sampled_Hz
+    return usual.rate_Hz if isinstance(usual, TrackerProduct) else None
+
+
+def options(product: type[Product]) -> tuple[ProductOption, ...]:
+    """The keys of its table."""
+    schema = product.model_json_schema()
+    return tuple(
+        ProductOption(
+            key=name,
+            value=value_words(schema["properties"][name], schema.get("$defs", {})),
+            default=toml(field.get_default(call_default_factory=True)),
+            meaning=field.description or "",
+        )
+        for name, field in product.model_fields.items()
+        if name != "product"
+    )
+
+
+def _plugin(plugin: plugins.Plugin) -> PluginListed:
+    return PluginListed(
+        group=plugin.group,
+        name=plugin.name,
+        distribution=plugin.distribution,
+        distribution_version=plugin.version,
+        declares=plugin.declares,
+        error=plugin.error,
+    )

@@ -1,0 +1,108 @@
+"""From single runs to numbers with intervals: over subjects, each the mean of its seeds."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+
+from benchmarks.control.cases import FORCES_N
+from benchmarks.control.laws import CONSTANTS, LAW
+from rig.config.table import Table
+
+
+class Score(NamedTuple):
+    """One run: which law, case and subject, and its number."""
+
+    law: str
+    case: str
+    subject: str
+    seed: int
+    value: float
+
+
+class Mean(Table):
+    """A mean over subjects with half of its 95 % interval, and the worst of them."""
+
+    value: float
+    within: float
+    worst: float
+
+
+class Gain(Table):
+    """Rival over law: geometric mean over subjects, its 95 % interval, and the ratio of the worst subjects of both."""
+
+    value: float
+    low: float
+    high: float
+    of_worst: float
+
+
+def by_subject(scores: Iterable[Score], law: str, cases: Sequence[str]) -> dict[str, float]:
+    """Of each subject the mean over seeds of the largest of ``cases``."""
+    runs: dict[tuple[str, int], float] = {}
+    for score in scores:
+        if score.law == law and score.case in cases:
+            key = score.subject, score.seed
+            runs[key] = max(runs.get(key, 0.0), score.value)
+    subjects = sorted({subject for subject, _ in runs})
+    return {one: float(np.mean([value for (subject, _), value in runs.items() if subject == one])) for one in subjects}
+
+
+def mean_of(scores: Sequence[Score], law: str, cases: Sequence[str]) -> Mean:
+    """Over subjects, by Student's t."""
+    values = np.array(list(by_subject(scores, law, cases).values()))
+    return Mean(value=float(values.mean()), within=_half(values), worst=float(values.max()))
+
+
+def gain_of(scores: Sequence[Score], rival: str, cases: Sequence[str], law: str = LAW) -> Gain:
+    """How many times smaller the law's number is than the rival's."""
+    ours, theirs = by_subject(scores, law, cases), by_subject(scores, rival, cases)
+    logs = np.log([theirs[subject] / ours[subject] for subject in ours])
+    middle, half = float(logs.mean()), _half(logs)
+    worst = max(theirs.values()) / max(ours.values())
+    return Gain(value=math.exp(middle), low=math.exp(middle - half), high=math.exp(middle + half), of_worst=worst)
+
+
+def _half(values: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> float:
+    count = len(values)
+    if count < 2:
+        return 0.0
+    return float(student.ppf(0.975, count - 1) * values.std(ddof=1) / math.sqrt(count))
+
+
+def wrong_models(what: str) -> list[str]:
+    """Names of the jumps with half, right and twice the stiffness."""
+    return [f"{what}, x{stiffness}" for stiffness in ("0.5", "1", "2")]
+
+
+class Headline(Table):
+    """What the benchmark promises, against the best constant per subject; the last line of its output."""
+
+    limb_2Hz_gain: Mapping[str, float]
+    low_jump_settling_gain: float
+    jump_settling_gain: float
+    contact_peak: float
+    margins_deg_dB: tuple[float, float]
+
+
+def limb_gains(scores: Sequence[Score], rival: str) -> dict[str, Gain]:
+    """By force, where the limb moves at 2 Hz."""
+    return {f"{force_N:g}": gain_of(scores, rival, [f"limb 2 Hz, {force_N:g} N"]) for force_N in FORCES_N}
+
+
+def headline(scores: Sequence[Score], margins_deg_dB: tuple[float, float]) -> Headline:
+    """The constant is the one that is tuned best for a limb that moves, and the same in all tests.
+
+    The peak is that of the tip that meets a limb at rest, at its search speed of 5 mm/s.
+    """
+    constant = next(iter(CONSTANTS))
+    peaks = mean_of(scores, LAW, ["contact, 0 mm/s"])
+    return Headline(
+        limb_2Hz_gain={force_N: round(gain.value, 2) for force_N, gain in limb_gains(scores, constant).items()},
+        low_jump_settling_gain=round(gain_of(scores, constant, wrong_models("low jumps")).value, 2),
+        jump_settling_gain=round(gain_of(scores, constant, wrong_models("jumps")).value, 2),
+        contact_peak=round(peaks.worst, 3),
+        margins_deg_dB=(round(margins_deg_dB[0], 1), round(margins_deg_dB[1], 1)),
+    )

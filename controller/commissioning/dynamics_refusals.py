@@ -1,0 +1,37 @@
+"""No force loop on an axis that was not identified, or was on another computer, at another rate, by another drive."""
+
+from controller.loop.steps import Program, TrackForce
+from drivers.roles import Identity
+from rig.computer import computer_id
+from rig.config.axis_dynamics import AxisDynamics
+from rig.config.wiring import Wiring
+
+
+def dynamics_reasons(program: Program, wiring: Wiring, axis: Identity) -> list[str]:
+    """Why ``program`` may not close its force loop, one sentence each; empty where it has none, or may.
+
+    Age and width of intervals are told by `Calibration.unfit`.
+    """
+    if not any(isinstance(step, TrackForce) for step in program.steps):
+        return []
+    known = wiring.calibration.of_dynamics
+    if known is None:
+        return [
+            f"no dynamics of {axis.product} {axis.serial}: run `rig calibrate axis --dynamics` and give its file as"
+            " calibration.dynamics"
+        ]
+    return [*_foreign(known, axis), *dynamics_elsewhere(known, wiring)]
+
+
+def dynamics_elsewhere(known: AxisDynamics, wiring: Wiring) -> list[str]:
+    """Why they do not hold for a loop of ``wiring`` on this computer."""
+    return known.elsewhere(computer_id(), wiring.loop.rate_Hz, wiring.force.product)
+
+
+def _foreign(known: AxisDynamics, axis: Identity) -> list[str]:
+    if (known.product, known.serial) == (axis.product, axis.serial):
+        return []
+    return [
+        f"calibration.dynamics is of {known.product} {known.serial}, but {axis.product} {axis.serial} answered: give"
+        " its own, or run `rig calibrate axis --dynamics`"
+    ]

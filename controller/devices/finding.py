@@ -1,0 +1,122 @@
+"""Which ports the computer has and who answers there. USB is read from the system; nothing is written without consent.
+
+An unknown port may be somebody else's pump or printer: what is sent to it is for a person to allow. The drivers
+themselves ask who is there; starting one moves nothing.
+"""
+
+import contextlib
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from serial.tools import list_ports
+
+from controller.devices.drivers import open_axis, open_force, open_tracker
+from drivers.roles import Device, Identity
+from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS
+from rig.config.products.roles import Product
+from rig.config.wiring import Limits
+from rig.errors import RigError
+from rig.results.devices import PortFound
+
+# Vendor and product numbers of the USB ID repository (usb.ids) and of the makers' own documents: what an adapter is,
+# not who is behind it.
+ADAPTERS = {
+    (0x0403, 0x6001): "FTDI serial adapter",
+    (0x0403, 0x6010): "FTDI adapter of two lines",
+    (0x0403, 0x6015): "FTDI serial adapter",
+    (0x0403, 0xFFA8): "Lawicel CANUSB, CAN by SLCAN",
+    (0x067B, 0x2303): "Prolific serial adapter",
+    (0x0C72, 0x000C): "PEAK PCAN-USB",
+    (0x10C4, 0xEA60): "Silicon Labs serial adapter",
+    (0x16D0, 0x117E): "CANable, CAN by SLCAN",
+    (0x1A86, 0x7523): "CH340 serial adapter",
+    (0x1D50, 0x606F): "CAN adapter of the gs_usb kind",
+    (0x2341, 0x0043): "Arduino Uno",
+    (0xAD50, 0x60C4): "CANable, CAN by SLCAN",
+}
+BY_ID = Path("/dev/serial/by-id")
+ASKED_Hz = 100.0
+Consent = Callable[[PortFound], bool]
+
+
+class AtPort(NamedTuple):
+    """A product that may be at a port."""
+
+    role: str
+    product: type[Product]
+
+
+def candidates() -> Iterator[AtPort]:
+    """Products that stand at a serial line: those that only listen for a moment first, what must be set up last."""
+    roles: tuple[tuple[str, Iterable[type[Product]]], ...] = (
+        ("force", FORCE_SENSORS.values()), ("axis", AXES.values()), ("tracker", TRACKERS.values()),
+    )  # fmt: skip
+    yield from (AtPort(role, product) for role, products in roles for product in products)
+
+
+def ports() -> list[PortFound]:
+    """Serial ports of this computer as USB describes them, under their lasting names; nothing is opened."""
+    return [
+        PortFound(
+            address=_lasting(port.device), usb=_usb(port), kind=ADAPTERS.get((port.vid, port.pid), ""), asked=False
+        )
+        for port in sorted(list_ports.comports())
+        if port.vid is not None
+    ]
+
+
+def named(address: str) -> PortFound:
+    """A port that a person names."""
+    return PortFound(address=address, usb="", kind="named by you", asked=False)
+
+
+def _usb(port: "list_ports.ListPortInfo") -> str:  # type: ignore[name-defined] # of pyserial's platforms
+    texts = (port.manufacturer, port.product, port.serial_number)
+    return " ".join([f"{port.vid:04x}:{port.pid:04x}", *(text for text in texts if text)])
+
+
+def _lasting(device: str) -> str:
+    """The link that names the adapter itself, whatever else is plugged in."""
+    links = sorted(BY_ID.iterdir()) if BY_ID.is_dir() else []
+    return next((str(link) for link in links if link.resolve() == Path(device).resolve()), device)
+
+
+def find(seen: Iterable[PortFound], consent: Consent) -> Iterator[PortFound]:
+    """Each port, asked who is there where ``consent`` says so."""
+    for port in seen:
+        yield ask(port) if consent(port) else port
+
+
+def ask(port: PortFound) -> PortFound:
+    """Lets each product's driver look for its device at ``port``, until one answers."""
+    why = ""
+    for role, product in candidates():
+        try:
+            found = _identity(role, product, port.address)
+        except RigError as error:
+            why = str(error)
+            continue
+        said = {"role": role, "product": found.product, "device": f"{found.product}, firmware {found.firmware}"}
+        name = product.model_fields["product"].default
+        lines = f'[{role}]\nproduct = "{name}"\nport = "{port.address}"\n'
+        more = {"product": name, "serial": found.serial, "asked": True, "lines": lines}
+        return port.model_copy(update=said | more)
+    nobody = f"no device of {len(list(candidates()))} products answers there; the last said: {why}"
+    return port.model_copy(update={"asked": True, "problem": nobody})
+
+
+def _identity(role: str, product: type[Product], address: str) -> Identity:
+    device = _opened(role, product.model_validate({"port": address}))
+    with contextlib.closing(device):
+        device.start()
+        return device.identity
+
+
+def _opened(role: str, config: Product) -> Device:
+    openers: dict[str, Callable[[], Device]] = {
+        "force": lambda: open_force(config),  # type: ignore[arg-type] # each role has its products
+        "axis": lambda: open_axis(config, Limits(), ASKED_Hz),  # type: ignore[arg-type]
+        "tracker": lambda: open_tracker(config),  # type: ignore[arg-type]
+    }
+    return openers[role]()

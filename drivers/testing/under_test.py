@@ -1,0 +1,124 @@
+"""The driver under test, on a device that can be made to fail, and what is heard of it."""
+
+import contextlib
+import select
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from drivers.roles import ForceSensor, MarkerTracker, ServoAxis
+from rig.channels import AxisSample, ForceSample, MarkerSample
+from rig.config.products.roles import ForceProduct, Product, TrackerProduct
+from rig.errors import DeviceError
+
+AnySample = ForceSample | AxisSample | MarkerSample
+AnyDevice = ForceSensor | ServoAxis | MarkerTracker
+# A cycle of the loop.
+TURN_S = 0.001
+# The slowest stream of a bench, a tracker at 20 Hz, then gives ten samples.
+FEW_S = 0.5
+# Devices boot: a drive or a camera answers within ten seconds, or its driver's own deadline is too short.
+BACK_S = 10.0
+
+
+class Nonconformity(AssertionError):
+    """What the driver does not keep, in one sentence."""
+
+
+class Heard(NamedTuple):
+    """What came, and how long each poll took [ns]."""
+
+    samples: list[AnySample]
+    polls_ns: list[int]
+
+
+def readable(device: AnyDevice, timeout_s: float) -> bool:
+    """Waits until the device's descriptor turns readable; False where it does not in time."""
+    return bool(select.select([device.fileno()], [], [], timeout_s)[0])
+
+
+def no_fault(kind: str, value: bool | float) -> None:
+    """For a device that cannot be made to fail."""
+
+
+@dataclass(frozen=True)
+class UnderTest:
+    """``open`` gives a new driver, not started, of the device that ``config`` describes.
+
+    ``fault`` switches a fault of the mock by its name, as the bench's control channel does; ``damage`` are those of the
+    wire that the protocol must stand. ``load`` puts a force on the sensor [N]; what the tip bears already stays.
+    ``unplugs``: whether the fault `unplug` can be switched on and off. ``now`` and ``wait`` are the time it runs in.
+    """
+
+    config: Product
+    open: Callable[[], AnyDevice]
+    fault: Callable[[str, bool | float], None] = no_fault
+    damage: tuple[str, ...] = ("drop", "corrupt", "truncate", "garbage")
+    unplugs: bool = True
+    load: Callable[[float], None] | None = None
+    now: Callable[[], int] = time.monotonic_ns
+    wait: Callable[[AnyDevice, float], bool] = field(default=readable)
+
+    @property
+    def sampled_Hz(self) -> float | None:
+        """The rate that the declaration promises; None for an axis, which answers what it is asked."""
+        if isinstance(self.config, ForceProduct):
+            return self.config.sampled_Hz
+        return self.config.rate_Hz if isinstance(self.config, TrackerProduct) else None
+
+    @contextlib.contextmanager
+    def started(self, next_seq: int = 0) -> Iterator[AnyDevice]:
+        """A driver that runs, its samples numbered from ``next_seq``."""
+        device = self.open()
+        try:
+            device.next_seq = next_seq
+            device.start()
+            yield device
+        finally:
+            device.close()
+
+    @contextlib.contextmanager
+    def failing(self, kind: str, value: bool | float) -> Iterator[None]:
+        """The fault is there until the block ends."""
+        self.fault(kind, value)
+        try:
+            yield
+        finally:
+            self.fault("unplug" if kind == "unplug" else "heal", kind != "unplug")
+
+    def listen(self, device: AnyDevice, seconds: float) -> Heard:
+        """Polls as the loop does; an axis is asked for a sample each turn."""
+        heard, end_ns = Heard([], []), self.now() + round(seconds * 1e9)
+        while (begun_ns := self.now()) < end_ns:
+            if self.sampled_Hz is None:
+                device.request(begun_ns)  # type: ignore[union-attr] # an axis is the role without a rate of its own
+            heard.samples.extend(device.poll(begun_ns))
+            heard.polls_ns.append(self.now() - begun_ns)
+            self.wait(device, TURN_S)
+        return heard
+
+    def restarted(self, next_seq: int) -> AnyDevice:
+        """A new driver that runs, tried again until ``BACK_S`` are over; raises Nonconformity."""
+        end_ns, why = self.now() + round(BACK_S * 1e9), ""
+        while self.now() < end_ns:
+            device = self.open_or_say()
+            if isinstance(device, str):
+                why = device
+                continue
+            try:
+                device.next_seq = next_seq
+                device.start()
+                return device
+            except DeviceError as error:
+                device.close()
+                why = str(error)
+        raise Nonconformity(f"it does not start again within {BACK_S:g} s of its return: {why}")
+
+    def open_or_say(self) -> AnyDevice | str:
+        """A new driver, or why there is none yet."""
+        try:
+            return self.open()
+        except DeviceError as error:
+            time.sleep(TURN_S)
+            return str(error)

@@ -1,0 +1,1 @@
+"""ATI Net F/T sensors for tissue-rig."""

@@ -1,0 +1,119 @@
+"""What other distributions declare by entry points: each is admitted, or named with what is wrong and harms nothing.
+
+The groups are `tissue_rig.force`, `.axis`, `.tracker`, `.input`, `.cause`, `.axis_cause` and `.law`. Two distributions
+that declare one name are both refused: which of two drivers moves a tip is not left to the order of folders.
+"""
+
+import inspect
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from importlib.metadata import EntryPoint, entry_points
+from typing import Generic, TypeVar
+
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """One entry point: what it declares under ``name``, whose it is, and why it is not used; empty where it is."""
+
+    group: str
+    name: str
+    distribution: str
+    version: str
+    declares: str = ""
+    error: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """For a person."""
+        return f"{self.group} {self.name!r} of {self.distribution} {self.version}: {self.error}"
+
+
+@dataclass(frozen=True)
+class Admission(Generic[Item]):
+    """How a registry takes what is declared: its name, why it cannot be used, and how it is entered."""
+
+    name_of: Callable[[Item], str]
+    refusal: Callable[[object], str]
+    register: Callable[[Item], object]
+
+
+def subclass_of(kind: type) -> Callable[[object], str]:
+    """What says why an object is no class of that ``kind``."""
+    return lambda item: (
+        "" if inspect.isclass(item) and issubclass(item, kind) else _expected(item, f"a subclass of {kind.__name__}")
+    )
+
+
+def instance_of(kind: type) -> Callable[[object], str]:
+    """What says why an object is none of that ``kind``."""
+    return lambda item: "" if isinstance(item, kind) else _expected(item, f"a {kind.__name__}")
+
+
+def _expected(item: object, what: str) -> str:
+    return f"is {item!r}, where {what} is expected"
+
+
+_met: dict[str, tuple[Plugin, ...]] = {}
+
+# Looking through all distributions takes 10 ms.
+_advertised = cache(entry_points)
+
+
+def met() -> Mapping[str, tuple[Plugin, ...]]:
+    """Every plug-in that was looked at so far, by group."""
+    return _met
+
+
+def declaring(group: str, name: str) -> Plugin | None:
+    """The plug-in in use that declares ``name``; None where it is one of ours."""
+    return next((one for one in _met.get(group, ()) if one.declares == name and not one.error), None)
+
+
+def failures() -> Iterator[Plugin]:
+    """Those that cannot be used."""
+    return (plugin for plugins in _met.values() for plugin in plugins if plugin.error)
+
+
+def hint() -> str:
+    """Behind a name nobody knows: which plug-ins failed, as far as that may be why; empty where none did."""
+    failed = "; ".join(plugin.sentence for plugin in failures())
+    return f"; plug-ins that cannot be used: {failed}" if failed else ""
+
+
+def admit(group: str, admission: Admission[Item]) -> None:
+    """Registers every usable entry point of ``group``; the others are kept with their error."""
+    if not group:
+        return
+    loaded = partial(_loaded, admission)
+    found = [loaded(point) for point in _advertised().select(group=group)]
+    names = Counter(plugin.declares for plugin, _ in found if not plugin.error)
+    _met[group] = tuple(_admitted(plugin, item, names, admission) for plugin, item in found)
+
+
+def _loaded(admission: Admission[Item], point: EntryPoint) -> tuple[Plugin, Item | None]:
+    whose, version = (point.dist.name, point.dist.version) if point.dist else ("a distribution", "")
+    plugin = Plugin(point.group, point.name, whose, version)
+    try:
+        item = point.load()
+        error = admission.refusal(item)
+        return (
+            (replace(plugin, error=error), None) if error else (replace(plugin, declares=admission.name_of(item)), item)
+        )
+    except (Exception, SystemExit) as error:  # whatever a plug-in does while it is imported is its own failure
+        return replace(plugin, error=f"{type(error).__name__}: {error}"), None
+
+
+def _admitted(plugin: Plugin, item: Item | None, names: Counter[str], admission: Admission[Item]) -> Plugin:
+    if item is None:
+        return plugin
+    if names[plugin.declares] > 1:
+        return replace(plugin, error=f"{names[plugin.declares]} plug-ins declare {plugin.declares!r}; uninstall others")
+    try:
+        admission.register(item)
+    except ValueError as error:
+        return replace(plugin, error=f"{error}; give it another name")
+    return plugin

@@ -1,0 +1,188 @@
+"""`rig devices` and `rig find`: what there is, what failed, and that no port is written to without consent."""
+
+import json
+import os
+import pty
+import select
+import subprocess
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from serial.tools import list_ports
+from serial.tools.list_ports_common import ListPortInfo
+from typer.testing import CliRunner
+
+from api.cli.app import build
+from api.http import app as service
+from api.http.service import Service
+from api.operations.devices import devices
+from controller.devices import finding
+from mock_devices.testing.access import client_of
+from mock_devices.testing.commands import RIG, ROOT, ServedBench, served_bench
+from rig.config.wiring import Wiring
+from rig.errors import DeviceError, UsageError
+from rig.results.devices import DevicesResult, FindResult, PortFound
+
+
+def rig(*arguments: str | Path) -> Any:
+    return CliRunner().invoke(build(str(arguments[0])), [*map(str, arguments)])
+
+
+def test_every_product_is_listed_with_its_options(tmp_path: Path) -> None:
+    said = rig("devices", "robotiq-ft300", "--json", tmp_path / "devices.json")
+    assert said.exit_code == 0, said.output
+    result = DevicesResult.read(tmp_path / "devices.json")
+    (found,) = result.products
+    assert (found.role, found.distribution, found.rate_Hz, found.simulated) == ("force", "tissue-rig", 100.0, True)
+    options = {option.key: (option.value, option.default) for option in found.options}
+    assert options["baud"] == ("`0`, `19200`", "0")
+    assert "force.baud" in said.output
+
+
+def test_of_an_axis_no_rate_is_promised() -> None:
+    rates = {one.product: one.rate_Hz for one in devices().products}
+    assert (rates["maxon-epos4"], rates["ndi-polaris"], rates["bota-sensone"]) == (None, 60.0, 1000.0)
+
+
+def test_an_unknown_product_is_answered_with_the_nearest() -> None:
+    with pytest.raises(UsageError, match="unknown product 'bota'; nearest valid product: bota-sensone"):
+        devices("bota")
+
+
+def test_help_says_which_keys_a_product_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "300")
+    assert "increments_per_rev" in rig("devices", "--help").output
+
+
+def test_the_service_says_the_same(tmp_path: Path) -> None:
+    bench = Service(Wiring(), tmp_path / "sessions", tmp_path / "protocols")
+    with client_of(bench) as client:
+        answer = client.get("/api/v1/devices")
+    assert DevicesResult.model_validate(answer.json()) == devices()
+    assert "/api/v1/devices" in service.build(bench).openapi()["paths"]
+
+
+def planted(folder: Path) -> dict[str, str]:
+    """Three distributions of one group: one whose import fails, and two that declare one name."""
+    for name, line in (("broken", "broken_plug:X"), ("one", "twin_plug:Twin"), ("two", "twin_plug:Twin")):
+        about = folder / f"{name}-1.0.dist-info"
+        about.mkdir()
+        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        (about / "entry_points.txt").write_text(f"[tissue_rig.force]\n{name} = {line}\n")
+    (folder / "broken_plug.py").write_text("raise RuntimeError('no licence')\n")
+    (folder / "twin_plug.py").write_text(
+        "from typing import ClassVar, Literal\nfrom pydantic import Field\n"
+        "from rig.config.products.roles import ForceProduct\n"
+        "class Twin(ForceProduct):\n    'One of two.'\n"
+        "    driver: ClassVar[str] = 'x:y'\n    advice: ClassVar[str] = 'force.port'\n"
+        "    range_N: ClassVar[float] = 1.0\n    range_N_m: ClassVar[float] = 1.0\n"
+        "    product: Literal['twin'] = Field(default='twin', description='x')\n"
+    )
+    return os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)]), "COLUMNS": "300"}
+
+
+def test_plug_ins_that_fail_are_listed_and_harm_no_command(tmp_path: Path) -> None:
+    environment = planted(tmp_path)
+
+    def run(*arguments: str) -> "subprocess.CompletedProcess[str]":
+        return subprocess.run(
+            [*RIG, *arguments], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60, check=False
+        )
+
+    assert run("devices", "--json", "all.json").returncode == 0
+    found = json.loads((tmp_path / "all.json").read_text())
+    assert {one["distribution"]: one["error"] for one in found["plugins"] if one["group"] == "tissue_rig.force"} == {
+        "broken": "RuntimeError: no licence",
+        "one": "2 plug-ins declare 'twin'; uninstall others",
+        "two": "2 plug-ins declare 'twin'; uninstall others",
+    }
+    assert {one["product"] for one in found["products"]} == {one.product for one in devices().products}
+    said = run("doctor", "--set", "force.product=twin")
+    assert said.returncode == 2
+    assert "unknown product 'twin'" in said.stderr and "tissue_rig.force 'one' of one 1.0: 2 plug-ins" in said.stderr
+    assert "Traceback" not in said.stderr
+
+
+@pytest.fixture
+def line() -> Iterator[tuple[int, str]]:
+    """A serial line with somebody else's device at its far end."""
+    far, near = pty.openpty()
+    tty.setraw(near)
+    yield far, os.ttyname(near)
+    os.close(far)
+    os.close(near)
+
+
+def test_without_consent_nothing_is_written_to_any_port(
+    line: tuple[int, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    far, near = line
+    port = ListPortInfo(near, skip_link_detection=True)
+    port.vid, port.pid, port.manufacturer, port.product, port.serial_number = (
+        0x16D0,
+        0x117E,
+        "Openlight",
+        "CANable2",
+        "7",
+    )
+    monkeypatch.setattr(list_ports, "comports", lambda: [port])
+    said = rig("find", "--json", tmp_path / "found.json")
+    assert said.exit_code == 0, said.output
+    (found,) = FindResult.read(tmp_path / "found.json").ports
+    assert (found.usb, found.kind, found.asked) == ("16d0:117e Openlight CANable2 7", "CANable, CAN by SLCAN", False)
+    assert not select.select([far], [], [], 0.2)[0]
+
+
+def test_consent_is_asked_for_each_port_and_a_no_is_kept() -> None:
+    asked = []
+
+    def consent(port: PortFound) -> bool:
+        asked.append(port.address)
+        return False
+
+    seen = [finding.named("/dev/null"), finding.named("tcp://127.0.0.1:1")]
+    assert list(finding.find(seen, consent)) == seen
+    assert asked == ["/dev/null", "tcp://127.0.0.1:1"]
+
+
+def test_where_nobody_answers_each_product_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = []
+
+    def refused(role: str, product: type, address: str) -> None:
+        tried.append(role)
+        raise DeviceError("silent")
+
+    monkeypatch.setattr(finding, "_identity", refused)
+    found = finding.ask(finding.named("/dev/ttyUSB9"))
+    assert found.asked and "the last said: silent" in found.problem
+    assert tried == [role for role, _ in finding.candidates()]
+
+
+def test_asking_where_nobody_can_answer_says_the_option() -> None:
+    said = rig("find", "/dev/ttyUSB9", "--ask")
+    assert isinstance(said.exception, UsageError) and "no terminal to answer at; give --yes" in str(said.exception)
+    both = rig("find", "--ask", "--yes")
+    assert isinstance(both.exception, UsageError)
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[ServedBench]:
+    with served_bench("--seed", "1") as served:
+        yield served
+
+
+@pytest.mark.bench
+@pytest.mark.extra
+@pytest.mark.xdist_group("commands")
+def test_each_device_of_the_mock_bench_is_found_at_its_port(bench: ServedBench) -> None:
+    ports = bench.endpoints.devices
+    found = [
+        finding.ask(finding.named(address))
+        for address in (ports["force"]["serial"], ports["axis"]["slcan"], f"tcp://{ports['tracker']['tcp']}")
+    ]
+    assert [one.product for one in found] == ["bota-sensone", "maxon-epos4", "ndi-polaris"]
+    assert found[1].lines == f'[axis]\nproduct = "maxon-epos4"\nport = "{ports["axis"]["slcan"]}"\n'
+    assert found[0].serial == bench.endpoints.serials["force"]

@@ -1,0 +1,211 @@
+"""A plug-in's driver that does anything wrong is lost, named, and takes nothing else along."""
+
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+
+import pytest
+
+from controller.devices import drivers, guard
+from controller.devices.guard import AMONG_POLLS, BLOCKED_NS, BLOCKED_POLLS, GuardedAxis, GuardedForce, GuardedTracker
+from drivers.roles import Device
+from mock_devices.testing.clock import Clock
+from rig import plugins
+from rig.channels import AxisSample, ForceSample, MarkerSample
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.products.ndi_polaris import PolarisWiring
+from rig.errors import DeviceError
+from rig.plugins import Plugin
+from tests.controller.fake_bench import FakeBench, wired
+from tests.controller.fake_devices import FakeAxis, FakeDevice
+
+PLUGIN = Plugin("tissue_rig.force", "x", "acme-rig", "2.1", "acme-one")
+FORCE = ForceSample(0, 900, 1000, 0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 20.0, 0, 1)
+MARKER = MarkerSample(0, 900, 1000, 0, 0, 1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0, 0.1, 1)
+AXIS = AxisSample(0, 900, 1000, 1.0, 0.0, 0.0, 0, 1)
+
+
+class Given(FakeDevice):
+    """Gives what it is told to, or does it."""
+
+    def __init__(self, given: Callable[[], Sequence[ForceSample]] | Sequence[object]) -> None:
+        super().__init__(Clock(), 1_000_000)
+        self.given = given
+
+    def poll(self, now_ns: int) -> Sequence[ForceSample]:
+        return self.given() if callable(self.given) else self.given  # type: ignore[return-value] # that is the test
+
+
+def force(given: Callable[[], Sequence[ForceSample]] | Sequence[object]) -> GuardedForce:
+    return GuardedForce(PLUGIN, BotaWiring(), lambda: Given(given))
+
+
+def test_what_is_right_passes_as_it_is() -> None:
+    good = [FORCE, FORCE._replace(seq=1, capture_ns=901), FORCE._replace(seq=2, capture_ns=901, fx_N=math.nan, valid=0)]
+    assert force(good).poll(1000) == good
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        (lambda: dict[str, int]()["counts"], "KeyError: 'counts'"),
+        (lambda: sys.exit("dongle"), "SystemExit: dongle"),
+        ([MARKER], "it gives MarkerSample.*, where a ForceSample is expected"),
+        ([FORCE, FORCE._replace(seq=1, capture_ns=899)], "its times run back by 0.000 ms at sample 1"),
+        ([FORCE, FORCE._replace(seq=1, capture_ns=-5_000_000)], "its times run back by 5.001 ms at sample 1"),
+        ([FORCE._replace(capture_ns=3_000_000)], "sample 0 was taken 2.999 ms after it came"),
+        ([FORCE._replace(fz_N=-981.0)], "981 N from a sensor of 100 N: wrong unit"),
+    ],
+)
+def test_what_is_wrong_is_an_error_that_names_the_plug_in(given: Sequence[object], sentence: str) -> None:
+    with pytest.raises(DeviceError, match=f"acme-one, a plug-in of acme-rig 2.1: {sentence}"):
+        force(given).poll(1000)
+
+
+def test_what_a_driver_says_itself_stays() -> None:
+    def lost() -> Sequence[ForceSample]:
+        raise DeviceError("the line is gone")
+
+    with pytest.raises(DeviceError, match=r"^the line is gone$"):
+        force(lost).poll(1000)
+
+
+def test_wrong_units_of_tracker_and_axis() -> None:
+    camera = GuardedTracker(PLUGIN, PolarisWiring(), lambda: Given([MARKER._replace(x_mm=3e6)]))  # type: ignore[arg-type,return-value]
+    with pytest.raises(DeviceError, match=r"a marker 3e.06 mm away: wrong unit"):
+        camera.poll(1000)
+    axis = GuardedAxis(PLUGIN, Epos4Wiring(), lambda: Given([AXIS._replace(position_mm=2e4)]))  # type: ignore[arg-type,return-value]
+    with pytest.raises(DeviceError, match="position 20000 mm: wrong unit"):
+        axis.poll(1000)
+
+
+def test_tools_of_a_tracker_have_times_of_their_own() -> None:
+    frames = [
+        MARKER,
+        MARKER._replace(seq=1, tool=1),
+        MARKER._replace(seq=2, tool=1, capture_ns=950),
+        MARKER._replace(seq=3),
+    ]
+    camera = GuardedTracker(PLUGIN, PolarisWiring(), lambda: Given(frames))  # type: ignore[arg-type,return-value]
+    assert camera.poll(1000) == frames
+
+
+class Waits:
+    """A driver whose poll takes ``took_ns``, and whether it waits meanwhile."""
+
+    def __init__(self, took_ns: int, waits: bool) -> None:
+        self.now_ns = self.waited = 0
+        self.took_ns, self.waits = took_ns, waits
+
+    def guarded(self) -> GuardedForce:
+        return GuardedForce(
+            PLUGIN, BotaWiring(), lambda: Given(self.poll), now=lambda: self.now_ns, waits=lambda: self.waited,
+        )  # fmt: skip
+
+    def poll(self) -> Sequence[ForceSample]:
+        self.now_ns += self.took_ns
+        self.waited += self.waits
+        return []
+
+
+def test_a_poll_that_waits_is_named_and_one_that_is_interrupted_is_not() -> None:
+    blocking = Waits(BLOCKED_NS + 1_000_000, waits=True).guarded()
+    for _ in range(BLOCKED_POLLS - 1):
+        blocking.poll(0)
+    with pytest.raises(DeviceError, match=r"its poll blocks, for 21 ms just now .limit 20 ms.; .* ThreadedSource"):
+        blocking.poll(0)
+    for good in (Waits(BLOCKED_NS + 1_000_000, waits=False), Waits(BLOCKED_NS, waits=True)):
+        guarded = good.guarded()
+        for _ in range(AMONG_POLLS):
+            guarded.poll(0)
+
+
+def test_a_real_wait_is_one() -> None:
+    def asleep() -> Sequence[ForceSample]:
+        time.sleep(BLOCKED_NS * 1.1e-9)
+        return []
+
+    guarded = force(asleep)
+    with pytest.raises(DeviceError, match="its poll blocks"):
+        for _ in range(AMONG_POLLS):
+            guarded.poll(0)
+
+
+def test_it_closes_whatever_the_plug_in_does() -> None:
+    class Stubborn(Given):
+        def close(self) -> None:
+            raise OSError("busy")
+
+    GuardedForce(PLUGIN, BotaWiring(), lambda: Stubborn([])).close()
+
+
+@pytest.fixture
+def declared(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """The three usual products as if plug-ins declared them."""
+    names = {"force": BotaWiring().product, "axis": Epos4Wiring().product, "tracker": PolarisWiring().product}
+    groups = {
+        f"tissue_rig.{role}": (Plugin(f"tissue_rig.{role}", "x", "acme-rig", "2.1", name),)
+        for role, name in names.items()
+    }
+    monkeypatch.setattr(plugins, "_met", groups)
+    yield
+
+
+@pytest.mark.usefixtures("declared")
+def test_a_driver_that_cannot_even_be_imported_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(BotaWiring, "driver", "acme_sdk_not_here.device:open_sensor")
+    with pytest.raises(DeviceError, match=r"bota-sensone, a plug-in of acme-rig 2.1: ModuleNotFoundError: .*acme_sdk"):
+        drivers.open_force(BotaWiring())
+
+
+def test_ours_are_not_wrapped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(BotaWiring, "driver", f"{__name__}:made_device")
+    assert isinstance(drivers.open_force(BotaWiring()), FakeDevice)
+
+
+def made_device(*_: object, **__: object) -> Device:
+    return FakeDevice(Clock(), 1_000_000)
+
+
+@pytest.mark.usefixtures("declared")
+def test_a_bench_of_plug_ins_works_and_one_that_raises_stops_it_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The whole loop on guarded devices, until the sensor's driver raises something of its own."""
+    bench = FakeBench(wired())
+    wiring, devices = bench.wiring, bench.loop.devices
+    bench.loop.devices = drivers.Devices(
+        guard.force_sensor(wiring.force, lambda: devices.force),
+        guard.servo_axis(wiring.axis, lambda: devices.axis),
+        guard.marker_tracker(wiring.tracker, lambda: devices.tracker) if wiring.tracker and devices.tracker else None,  # type: ignore[arg-type,return-value]
+    )
+    assert isinstance(bench.loop.devices.force, GuardedForce)
+    bench.press(2.0)
+
+    def broken(now_ns: int) -> Sequence[ForceSample]:
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(bench.force, "poll", broken)
+    bench.until(lambda: bench.latched == "force_lost")
+    said = bench.link.of("incident")[-1]["text"]
+    assert "force sensor lost: bota-sensone, a plug-in of acme-rig 2.1: ZeroDivisionError: division by zero" in said
+
+
+@pytest.mark.usefixtures("declared")
+def test_an_axis_behind_the_guard_is_the_axis_itself() -> None:
+    clock = Clock()
+    inner = FakeAxis(clock, 1_000_000, position_mm=3.0, target_mm=3.0)
+    axis = guard.servo_axis(Epos4Wiring(), lambda: inner)
+    assert isinstance(axis, GuardedAxis)
+    axis.next_seq = 7
+    axis.start()
+    axis.home()
+    axis.enable()
+    axis.command(3.5, clock())
+    axis.request(clock())
+    assert (axis.next_seq, axis.enabled, axis.referenced, axis.fault) == (7, inner.enabled, inner.referenced, "")
+    axis.quick_stop()
+    axis.power_off()
+    axis.reset_fault()
+    assert axis.history() == inner.history()
+    assert {"home", "enable", "command", "quick_stop", "power_off", "reset_fault"} <= set(inner.calls)

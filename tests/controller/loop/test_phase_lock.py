@@ -1,0 +1,237 @@
+"""The grid in step with a sensor, on a clock that the test sets; what is true is known to the sensor alone."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import pairwise
+from random import Random
+
+import pytest
+
+from controller.loop.executive import Cycle, Executive
+from controller.loop.phase_lock import EARLY_NS, MOST_PULL, PATIENCE, PhaseLock
+from rig.timing import ClockMap
+
+CYCLE_NS = 1_000_000
+LINE_NS = 90_000
+"""From the sample to its bytes on the line, at least."""
+LOOK_NS = 5_000
+
+
+@dataclass
+class Sensor:
+    """Samples every ``period_ns`` by a clock of its own, ``jitter_ns`` late on the line at most."""
+
+    period_ns: float
+    jitter_ns: int = 0
+    drift_ppm: float = 0.0
+    first_ns: int = 377_000
+    silent: tuple[int, int] = (0, 0)
+    burst_ns: int = 0
+    random: Random = field(default_factory=lambda: Random(4))
+
+    def sampled_ns(self, number: int) -> int:
+        """On the computer's clock."""
+        return self.first_ns + round(number * self.period_ns * (1 + self.drift_ppm * 1e-6))
+
+    def arrives_ns(self, number: int) -> int:
+        """On the line; an adapter delivers what it has at the end of each of its own periods."""
+        came_ns = self.sampled_ns(number) + LINE_NS + Random(number).randint(0, self.jitter_ns)
+        return math.ceil(came_ns / self.burst_ns) * self.burst_ns if self.burst_ns else came_ns
+
+
+@dataclass
+class Bench:
+    """Runs the executive on a sensor; ``cycles`` and, for each sample, when it was taken and when it was looked at."""
+
+    sensor: Sensor
+    cycles_wanted: int
+    lock: PhaseLock
+    observed: Callable[[int, int], tuple[int, int]] = lambda capture_ns, arrival_ns: (capture_ns, arrival_ns)
+    stalls: dict[int, int] = field(default_factory=dict)
+    now_ns: int = 0
+    next_number: int = 0
+    cycles: list[Cycle] = field(default_factory=list)
+    waits_us: list[float] = field(default_factory=list)
+    used: list[tuple[int, int]] = field(default_factory=list)
+    clock: ClockMap = field(default_factory=ClockMap)
+    prepared: int = 0
+
+    def time(self) -> int:
+        return self.now_ns
+
+    def sleep(self, until_ns: int) -> None:
+        self.now_ns = max(self.now_ns, until_ns)
+
+    def rest(self, until_ns: int) -> None:
+        """A sleep that the sensor's bytes end."""
+        self.now_ns = max(self.now_ns, min(until_ns, self.sensor.arrives_ns(self.next_number)))
+
+    def prepare(self, now_ns: int) -> None:
+        self.prepared += 1
+
+    def take_force(self, now_ns: int) -> None:
+        while self.sensor.arrives_ns(self.next_number) <= now_ns:
+            self._take(self.next_number, now_ns)
+            self.next_number += 1
+        self.now_ns += LOOK_NS
+
+    def _take(self, number: int, now_ns: int) -> None:
+        sampled_ns = self.sensor.sampled_ns(number)
+        if self.sensor.silent[0] <= sampled_ns < self.sensor.silent[1]:
+            return
+        device_ns = round(number * self.sensor.period_ns)
+        self.clock.observe(device_ns, now_ns)
+        (capture_ns,) = self.clock.captures([device_ns], now_ns)
+        self.lock.observe(*self.observed(capture_ns, now_ns))
+        self.used.append((number, now_ns))
+
+    def run_cycle(self, cycle: Cycle) -> bool:
+        self.cycles.append(cycle)
+        self.now_ns += 100_000 + self.stalls.get(cycle.number, 0)
+        return len(self.cycles) < self.cycles_wanted
+
+    def run(self) -> "Bench":
+        Executive(self.time, self.sleep, self.sleep, self.rest).run(self, self.lock)
+        return self
+
+    def late_us(self, since_s: float = 1.0) -> list[float]:
+        """From each sample's arrival on the line to the look that found it."""
+        return [
+            (looked_ns - self.sensor.arrives_ns(number)) * 1e-3
+            for number, looked_ns in self.used
+            if looked_ns > since_s * 1e9
+        ]
+
+
+def bench(sensor: Sensor, seconds: float = 5.0, **options: object) -> Bench:
+    lock = PhaseLock(CYCLE_NS, round(sensor.period_ns))
+    return Bench(sensor, round(seconds * 1e9 / CYCLE_NS), lock, **options).run()  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("drift_ppm", "jitter_ns", "seconds"),
+    [
+        (-300.0, 0, 5.0),
+        (0.0, 0, 5.0),
+        (300.0, 0, 5.0),
+        (0.0, 80_000, 5.0),
+        (-300.0, 80_000, 40.0),
+        (300.0, 80_000, 40.0),
+    ],
+)
+def test_each_sample_is_used_as_it_comes_however_the_crystals_drift(
+    drift_ppm: float, jitter_ns: int, seconds: float
+) -> None:
+    """Forty seconds are longer than the clock map remembers: it then lives on what the locked loop sees."""
+    run = bench(Sensor(996_094, jitter_ns, drift_ppm), seconds)
+    assert max(run.late_us()) <= 1e-3 * LOOK_NS
+    assert run.cycles[-1].missed == 0
+    steps = [after.scheduled_ns - before.scheduled_ns for before, after in pairwise(run.cycles)]
+    assert abs(sum(steps[1000:]) / len(steps[1000:]) - 996_094 * (1 + drift_ppm * 1e-6)) < 5
+    assert max(abs(step - 996_094) for step in steps) <= MOST_PULL * 996_094 + 1
+
+
+def test_it_waits_no_longer_than_the_line_is_quicker_at_times_than_at_others() -> None:
+    run = bench(Sensor(1_000_000, 80_000))
+    waits_us = sorted(cycle.waited_ns * 1e-3 for cycle in run.cycles[1000:])
+    assert waits_us[-1] <= 1e-3 * (EARLY_NS + 80_000 + LOOK_NS + MOST_PULL * CYCLE_NS)
+    assert waits_us[0] >= 0
+
+
+def free_running(sensor: Sensor) -> Bench:
+    lock = PhaseLock(CYCLE_NS, round(sensor.period_ns))
+    lock.locks = False
+    return Bench(sensor, 5000, lock).run()
+
+
+def test_a_grid_that_runs_free_lets_samples_wait_for_half_a_cycle() -> None:
+    """What the lock is for: the same sensor, the same clock, without it."""
+    late_us = free_running(Sensor(996_094)).late_us()
+    assert 400 < sum(late_us) / len(late_us) < 600
+
+
+def test_a_sample_that_comes_too_late_is_used_in_the_next_cycle_and_holds_none_up() -> None:
+    sensor = Sensor(1_000_000, first_ns=0)
+    held_up = [number for number in range(2000, 4000) if number % 10 == 0]
+    arrives = sensor.arrives_ns
+    sensor.arrives_ns = lambda number: arrives(number) + (500_000 if number in held_up else 0)  # type: ignore[method-assign]
+    run = bench(sensor)
+    assert max(cycle.waited_ns for cycle in run.cycles[1000:]) <= EARLY_NS + PATIENCE * CYCLE_NS + 2 * LOOK_NS + 10_000
+    assert run.cycles[-1].missed == 0
+    assert [cycle.number for cycle in run.cycles] == list(range(5000))
+
+
+def test_without_the_sensor_the_grid_goes_on_and_finds_it_again() -> None:
+    run = bench(Sensor(996_094, 20_000, 250.0, silent=(2_000_000_000, 3_500_000_000)), 8.0)
+    quiet = [cycle for cycle in run.cycles if 2.1e9 < cycle.scheduled_ns < 3.4e9]
+    steps = {after.scheduled_ns - before.scheduled_ns for before, after in pairwise(quiet)}
+    assert steps == {996_094}
+    assert {cycle.waited_ns for cycle in quiet} == {0}
+    assert max(run.late_us(4.0)) <= 1e-3 * LOOK_NS
+
+
+def test_of_a_slow_sensor_one_cycle_in_ten_waits_and_the_others_do_not() -> None:
+    run = bench(Sensor(10_000_000, 50_000, 100.0), 10.0)
+    waiting = [cycle for cycle in run.cycles[2000:] if cycle.waited_ns > 0]
+    assert len(waiting) == pytest.approx(800, abs=2)
+    assert {(after.number - before.number) for before, after in pairwise(waiting)} == {10}
+    assert max(run.late_us(2.0)) <= 1e-3 * LOOK_NS
+
+
+@pytest.mark.parametrize("sensor_Hz", [800.0, 512.0, 1300.0])
+def test_a_sensor_at_no_fraction_of_the_loops_rate_is_not_locked_to(sensor_Hz: float) -> None:
+    lock = PhaseLock(CYCLE_NS, round(1e9 / sensor_Hz))
+    lock.observe(5_000_000, 5_100_000)
+    assert (lock.locks, lock.period_ns) == (False, CYCLE_NS)
+    assert (lock.correction_ns(6_000_000), lock.patience_ns(6_000_000)) == (0, 6_000_000)
+
+
+@pytest.mark.parametrize(
+    ("loop_Hz", "sensor_Hz", "period_ns"),
+    [(1000, 1003.92, 996_095), (2000, 1003.92, 498_048), (1000, 100.0, 1_000_000), (500, 1003.92, 2_000_000)],
+)
+def test_the_cycle_is_a_whole_fraction_of_the_sensors_period(loop_Hz: int, sensor_Hz: float, period_ns: int) -> None:
+    assert PhaseLock(round(1e9 / loop_Hz), round(1e9 / sensor_Hz)).period_ns == period_ns
+
+
+def test_an_adapter_that_delivers_several_samples_at_once_is_not_waited_for_between() -> None:
+    run = bench(Sensor(1_000_000, burst_ns=16_000_000), 5.0)
+    assert sum(cycle.waited_ns > 0 for cycle in run.cycles[1000:]) < 0.1 * 4000
+    assert run.cycles[-1].missed == 0
+
+
+def test_a_stall_is_skipped_and_counted_and_the_grid_keeps_its_phase() -> None:
+    run = bench(Sensor(1_000_000, 10_000), stalls={2000: 5_300_000})
+    numbers = [cycle.number for cycle in run.cycles]
+    assert numbers == sorted(set(numbers))
+    assert run.cycles[-1].missed == numbers[-1] + 1 - len(numbers) == 4
+    assert max(run.late_us(2.1)) <= 1e-3 * LOOK_NS
+    starts = [cycle.wake_ns for cycle in run.cycles]
+    assert min(after - before for before, after in pairwise(starts)) > 0.5 * CYCLE_NS
+
+
+class TurnedLock(PhaseLock):
+    """The plant: a correction of the wrong sign."""
+
+    def correction_ns(self, due_ns: int) -> int:
+        return -super().correction_ns(due_ns)
+
+
+def test_a_correction_of_the_wrong_sign_is_seen() -> None:
+    sensor = Sensor(996_094, 0, 300.0)
+    run = Bench(sensor, 5000, TurnedLock(CYCLE_NS, 996_094)).run()
+    late_us = run.late_us()
+    assert sum(late > 50 for late in late_us) > 0.5 * len(late_us)
+
+
+def test_a_grid_locked_to_when_it_looked_follows_the_sensor_no_longer() -> None:
+    """The plant: arrival in place of capture. What the loop looks at late, it takes for the sensor's phase."""
+
+    def at_arrival(_capture_ns: int, arrival_ns: int) -> tuple[int, int]:
+        return arrival_ns, arrival_ns
+
+    sensor = Sensor(996_094, 150_000, 300.0)
+    right, wrong = (bench(sensor, observed=how).late_us() for how in (lambda *pair: pair, at_arrival))
+    assert max(right) <= 1e-3 * LOOK_NS
+    assert sum(late > 20 for late in wrong) > 0.05 * len(wrong)

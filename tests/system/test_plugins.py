@@ -1,0 +1,115 @@
+"""Plug-ins as a laboratory has them: built as wheels, installed beside, and tested by their own tests."""
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from copier import run_copy
+
+from mock_devices.testing.commands import ROOT
+
+pytestmark = [pytest.mark.extra, pytest.mark.xdist_group("commands"), pytest.mark.timeout(300)]
+
+
+def run(
+    *command: str | Path, folder: Path, environment: Mapping[str, str] = os.environ
+) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        list(map(str, command)), cwd=folder, env=environment, capture_output=True, text=True, timeout=280, check=False
+    )
+
+
+def installed(project: Path, target: Path) -> dict[str, str]:
+    """The wheel of ``project`` unpacked with its metadata, as an installer does; the environment that finds it."""
+    built = run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", target / "wheels", folder=project)
+    assert built.returncode == 0, built.stderr
+    (wheel,) = (target / "wheels").iterdir()
+    zipfile.ZipFile(wheel).extractall(target / "site")
+    paths = os.pathsep.join(map(str, (target / "site", ROOT)))
+    return os.environ | {"PYTHONPATH": paths, "XDG_STATE_HOME": str(target / "state"), "COLUMNS": "200"}
+
+
+def passes_its_own_tests(project: Path, environment: Mapping[str, str]) -> None:
+    """Its own tests pass, each of them."""
+    found = run(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", folder=project, environment=environment)
+    assert found.returncode == 0, found.stdout[-4000:] + found.stderr[-2000:]
+    assert " passed" in found.stdout and "skipped" not in found.stdout
+
+
+def test_the_net_ft_is_a_distribution_of_its_own(tmp_path: Path) -> None:
+    project = tmp_path / "plugin"
+    shutil.copytree(ROOT / "examples" / "plugin-netft", project)
+    sources = [path.name for path in (project / "src" / "rig_netft").glob("*.py")]
+    assert sorted(sources) == ["__init__.py", "mock.py", "netft.py"]
+    environment = installed(project, tmp_path / "target")
+    listed = run(sys.executable, "-m", "pytest", "--version", folder=project, environment=environment)
+    assert listed.returncode == 0
+    said = run(Path(sys.executable).with_name("rig"), "devices", "ati-netft", folder=tmp_path, environment=environment)
+    assert "tissue-rig-netft 1.0.0" in said.stdout and "force.http_port" in said.stdout, said.stderr
+    passes_its_own_tests(project, environment)
+
+
+def test_the_template_makes_a_plug_in_that_works(tmp_path: Path) -> None:
+    answers = {"distribution": "rig-lab", "package": "rig_lab", "product": "lab-seven", "range_N": 25.0, "rate_Hz": 500}
+    project = tmp_path / "made"
+    run_copy(str(ROOT / "examples" / "plugin-template"), project, data=answers, defaults=True, quiet=True)
+    assert not [path for path in project.rglob("*") if "{{" in str(path) or path.suffix == ".jinja"]
+    assert all("{{" not in path.read_text() for path in project.rglob("*") if path.is_file())
+    passes_its_own_tests(project, installed(project, tmp_path / "target"))
+
+
+def test_a_laboratorys_own_checks_run_as_the_workflow_says(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "examples" / "ci", tmp_path / "ci")
+    workflow = (tmp_path / "ci" / "laboratory.yml").read_text()
+    steps = [line.partition("run: ")[2] for line in workflow.splitlines() if "run: " in line]
+    assert steps == ["pip install tissue-rig pytest", "rig devices", "pytest test_laboratory.py"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "XDG_STATE_HOME": str(tmp_path / "state")}
+    for step in steps[1:]:
+        program, *arguments = step.split()
+        done = run(Path(sys.executable).with_name(program), *arguments, folder=tmp_path / "ci", environment=environment)
+        assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+
+
+ACME = """
+from typing import ClassVar, Literal
+from pydantic import Field
+from rig.config.products.maxon_epos4 import Epos4Wiring
+from rig.config.products.ndi_polaris import PolarisWiring
+
+class Axis(Epos4Wiring):
+    "Another maker's axis, spoken to like ours, with a key of its own."
+    product: Literal["acme-axis"] = Field(default="acme-axis", description="what stands on the bench")
+    brake_test: bool = Field(default=False, description="before each session")
+
+class Tracker(PolarisWiring):
+    "Another maker's tracker."
+    product: Literal["acme-eye"] = Field(default="acme-eye", description="what stands on the bench")
+    rate_Hz: float = Field(default=60.0, gt=0, le=500, description="frames a second")
+"""
+
+
+def test_axis_and_tracker_of_plug_ins_stand_on_the_mock_bench(tmp_path: Path) -> None:
+    """Doctor sees both through the guard, beside our own sensor."""
+    about = tmp_path / "site" / "acme-1.0.dist-info"
+    about.mkdir(parents=True)
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: acme\nVersion: 1.0\n")
+    points = "[tissue_rig.axis]\na = acme_bench:Axis\n[tissue_rig.tracker]\nt = acme_bench:Tracker\n"
+    (about / "entry_points.txt").write_text(points)
+    (tmp_path / "site" / "acme_bench.py").write_text(ACME)
+    paths = os.pathsep.join(map(str, (tmp_path / "site", ROOT)))
+    environment = os.environ | {"PYTHONPATH": paths, "XDG_STATE_HOME": str(tmp_path / "state"), "COLUMNS": "200"}
+    settings = [part for key in ("axis.product=acme-axis", "axis.brake_test=true", "tracker.product=acme-eye")
+                for part in ("--set", key)]  # fmt: skip
+    said = run(Path(sys.executable).with_name("rig"), "doctor", *settings, folder=tmp_path, environment=environment)
+    assert said.returncode == 0, said.stderr
+    assert "EPOS4" in said.stdout.upper() and "POLARIS" in said.stdout.upper()
+    refused = run(
+        Path(sys.executable).with_name("rig"), "doctor", "--set", "tracker.product=acme-eye", "--set",
+        "tracker.rate_Hz=600", folder=tmp_path, environment=environment,
+    )  # fmt: skip
+    assert refused.returncode == 2 and "tracker.rate_Hz: Input should be less than or equal to 500" in refused.stderr
