@@ -163,7 +163,6 @@ SCALE = {
     "rig/tissue/mixed_effects.py": "what subjects share",
     "rig/tissue/lattice/tip_edge.py": "stiffness that converges with the mesh",
     "rig/recording/remote.py": "recordings in an object store",
-SCALE: dict[str, str] = {
     "controller/loop/phase_lock.py": "the grid in step with the force sensor",
     "rig/recording/channel_streams.py": "recordings read a window at a time",
     "rig/recording/chunk.py": "recordings read a window at a time",
