@@ -218,7 +218,16 @@ LAW = {
     "controller/safety/oscillation.py": "what oscillates is softened",
 }
 # What came for speed, cohorts and more than one computer, likewise.
-SCALE: dict[str, str] = {
+SCALE = {
+    "api/operations/cohort/": "many sessions at once, on cores and computers",
+    "api/cli/cohort.py": "many sessions at once, on cores and computers",
+    "api/http/cohorts/": "many sessions at once, on cores and computers",
+    "api/operations/at_hand.py": "recordings in an object store",
+    "rig/results/cohort.py": "many sessions at once, on cores and computers",
+    "rig/results/cohort_tables.py": "many sessions at once, on cores and computers",
+    "rig/tissue/mixed_effects.py": "what subjects share",
+    "rig/tissue/lattice/tip_edge.py": "stiffness that converges with the mesh",
+    "rig/recording/remote.py": "recordings in an object store",
     "controller/loop/phase_lock.py": "the grid in step with the force sensor",
     "rig/recording/channel_streams.py": "recordings read a window at a time",
     "rig/recording/chunk.py": "recordings read a window at a time",

@@ -23,6 +23,7 @@ from rig.results.catalogue import (
     TrialList,
     WorkList,
 )
+from rig.results.cohort import CohortResult
 from rig.results.demo import DemoSummary
 from rig.results.devices import DevicesResult, FindResult
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
@@ -46,6 +47,7 @@ WRITTEN: Mapping[str, type[Result]] = {
     "catalogue-sessions": SessionList,
     "catalogue-sites": SiteList,
     "catalogue-trials": TrialList,
+    "cohort": CohortResult,
     "compare": CompareResult,
     "demo": DemoSummary,
     "diagnosis": DiagnosisResult,

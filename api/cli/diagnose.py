@@ -5,11 +5,13 @@ from typing import Annotated, Literal
 
 import typer
 
+from api.cli.cohort import SchedulerOption, refuse_with_cohort, taken_as_cohort
 from api.cli.computing import compute
-from api.cli.options import JsonOption, MappingOption, OnlyOption, PlaceArgument, YesOption
+from api.cli.options import JsonOption, MappingOption, OnlyOption, PlacesArgument, YesOption
 from api.cli.output import show, write_json
 from api.cli.records import mapping_for
 from api.operations import diagnose as work
+from api.operations.cohort.wanted import Wanted
 from api.operations.judged import Simulation
 from controller.operation import Operation
 from rig.config.protocol import Indentation
@@ -21,7 +23,7 @@ from rig.trials.opening import AS_IT_IS, Opening, is_session
 
 
 def diagnose(
-    place: PlaceArgument,
+    places: PlacesArgument,
     simulation: Annotated[Simulation, typer.Option(help="Which simulation is judged.")] = "index",
     mapping: MappingOption = None,
     only: OnlyOption = "",
@@ -36,14 +38,20 @@ def diagnose(
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures and the extended model; else SESSION/diagnosis.")
     ] = None,
+    scheduler: SchedulerOption = "",
     json_file: JsonOption = None,
 ) -> None:
     """Says what the simulation gets wrong on a session, names the cause, extends the model and measures the gain.
 
-    Ends with 1 where nothing could be judged.
+    Ends with 1 where nothing could be judged. Of several sessions each is diagnosed by itself, in parallel.
 
     Example: rig diagnose sessions/first --json diagnosis.json
     """
+    wanted = Wanted("diagnose", simulation=simulation, detectability=detectability, only=only)
+    refuse_with_cohort({"--reference": reference} if len(places) > 1 else {})
+    if taken_as_cohort(places, out, wanted, scheduler, mapping, json_file):
+        return
+    (place,) = places
     folder = place / FOLDER if out is None and is_session(place) else out
     opening = Opening(mapping_for(place, mapping, out or Path(place.stem), yes), only)
     result = diagnosed(place, simulation, folder, json_file, opening, reference, detectability)

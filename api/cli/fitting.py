@@ -7,11 +7,13 @@ from typing import Annotated
 
 import typer
 
+from api.cli.cohort import CohortOption, SchedulerOption, refuse_with_cohort, work_on_cohort
 from api.cli.computing import compute
 from api.cli.options import PLACE, JsonOption, MappingOption, OnlyOption, YesOption
 from api.cli.output import show, write_json
 from api.cli.records import mapping_for
 from api.operations import fit as work
+from api.operations.cohort.wanted import Wanted
 from api.operations.fit import DEFAULT_LAWS, Lattice, Laws
 from rig.errors import UsageError
 from rig.results.fit import FILE, FitResult
@@ -46,6 +48,8 @@ def fit(
     per_spring: Annotated[
         bool, typer.Option("--per-spring", help="The lattice, and stiffness a exp(b |strain|) in each of its springs.")
     ] = False,
+    cohort: CohortOption = False,
+    scheduler: SchedulerOption = "",
     mapping: MappingOption = None,
     only: OnlyOption = "",
     yes: YesOption = False,
@@ -54,13 +58,22 @@ def fit(
     """Fits constant stiffness, the index model and other tissue laws to sessions, and says how wrong each is.
 
     Writes fit.json, pictures, table.csv and model.json. Errors are taken on the trials fitted and on
-    trials, speeds and, with several sessions, subjects left out.
+    trials, speeds and, with several sessions, subjects left out. With --cohort each session is fitted by itself, in
+    parallel, and random effects say what subjects share.
 
     Example: rig fit sessions/first --laws fung,qlv --json fit.json
+
+    Example: rig fit sessions/* --cohort --out cohort
 
     Example: rig fit sessions/second --with sessions/first/diagnosis/model.json
     """
     compared = laws_from(laws, known or [], model, extended)
+    if cohort or scheduler:
+        refuse_with_cohort({"--with": extended, "--lattice": lattice, "--per-spring": per_spring})
+        named, given = tuple(law.name for law in compared.compared), tuple(compared.known.items())
+        wanted = Wanted("fit", named, given, compared.saved, only=only)
+        work_on_cohort(places, out, wanted, scheduler, mapping, json_file)
+        return
     simulated = _lattice(block, springs, per_spring) if lattice or per_spring else None
     target = work.target_of(places, out)
     chosen = mapping_for(places[0], mapping, target, yes) if len(places) == 1 else mapping

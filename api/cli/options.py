@@ -26,8 +26,9 @@ SetOption = Annotated[
 
 
 ModelOption = Annotated[Path, typer.Option("--model", help="model.json as `rig fit` writes it.")]
-PLACE = "Session folder, one recording (.mcap), or files of any laboratory, with their mapping."
+PLACE = "Session folder, one recording (.mcap), or files of any laboratory, with their mapping; a path or s3://..."
 PlaceArgument = Annotated[Path, typer.Argument(help=PLACE)]
+PlacesArgument = Annotated[list[Path], typer.Argument(help=f"{PLACE} Several: each by itself, in parallel.")]
 MappingOption = Annotated[
     Path | None, typer.Option("--mapping", help="TOML file: what the files hold; else that beside them, or a proposal.")
 ]

@@ -21,6 +21,7 @@ from rig.intake.questions import Question
 from rig.intake.rows import FIELDS
 from rig.recording.export import FORMATS, Format
 from rig.recording.files import write_text
+from rig.recording.remote import address_of
 from rig.recording.sessions import TrialInfo
 from rig.results.came_in import NAME
 from rig.results.came_in_tables import short_parts
@@ -34,7 +35,7 @@ MADE = {"speed (mm/s)": "speed_mm_s:g", "depth (mm)": "depth_mm:g", "peak (N)": 
 
 
 def verify(
-    path: Annotated[Path, typer.Argument(help="Session folder, or one recording (.mcap).")],
+    path: Annotated[Path, typer.Argument(help="Session folder, or one recording (.mcap); a path or s3://...")],
     json_file: JsonOption = None,
 ) -> None:
     """Reads every byte of a recording or session and says per stream what is complete, missing, dropped or damaged.
@@ -114,7 +115,7 @@ def import_(
 
 def mapping_for(place: Path, mapping: Path | None, out: Path, yes: bool) -> Path | None:
     """The mapping given; else None of what says itself what it holds, and of the rest one proposed, as OUT.toml."""
-    if mapping or is_recorded(place) or (place / MAPPING_FILE).is_file():
+    if mapping or address_of(place) or is_recorded(place) or (place / MAPPING_FILE).is_file():
         return mapping
     return _proposed(place, out.with_name(f"{out.name}.toml"), yes)
 

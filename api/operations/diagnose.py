@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from api.operations.at_hand import at_hand
 from api.operations.judged import Simulation
 from api.operations.opening import opened
 from controller.operation import Operation
@@ -38,7 +39,8 @@ def diagnose(
     """
     if out is not None:
         refuse_unwritable(out / FILE)
-    found = _found(place, simulation, opening, reference, detectability, operation.step)
+    with at_hand(place, operation.step) as near:
+        found = _found(near, simulation, opening, reference, detectability, operation.step)
     result = DiagnosisResult.model_validate(found)
     if out is not None:
         _write(operation, found, result, out)

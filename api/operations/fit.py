@@ -72,6 +72,7 @@ def fit(
     laws: Laws = DEFAULT_LAWS,
     lattice: Lattice | None = None,
     opening: Opening = AS_IT_IS,
+    drawn: bool = True,
 ) -> FitResult:
     """Fits what ``places`` hold and writes all to ``out``, else to the one session's fit/; ``lattice`` adds its own."""
     target = target_of(places, out)
@@ -79,7 +80,7 @@ def fit(
     _refuse_axis(places, opening)
     with ExitStack() as stack:
         sessions = [stack.enter_context(opened(place, operation.step, opening)) for place in places]
-        return _fitted(operation, sessions, target, laws, lattice)
+        return _fitted(operation, sessions, target, laws, lattice, drawn)
 
 
 def _refuse_axis(places: Sequence[Path], opening: Opening) -> None:
@@ -94,13 +95,13 @@ def _refuse_axis(places: Sequence[Path], opening: Opening) -> None:
 
 
 def _fitted(
-    operation: Operation, sessions: Sequence[Session], target: Path, laws: Laws, lattice: Lattice | None
+    operation: Operation, sessions: Sequence[Session], target: Path, laws: Laws, lattice: Lattice | None, drawn: bool
 ) -> FitResult:
     study = study_sessions(sessions, laws.compared, laws.known, operation.step)
     result = fit_result(study, str(target / MODEL), laws.saved, laws.known, _recordings(sessions))
     make_folder(target)
-    for name, picture in (("fit", fit_figure(study)), ("residuals", residual_figure(study))):
-        save_figure(picture, target, name)
+    for name, picture in (("fit", fit_figure), ("residuals", residual_figure)) if drawn else ():
+        save_figure(picture(study), target, name)
     write_text(target / "table.csv", as_csv(result))
     model_of(study, laws.saved, sessions[0].info.subject if len(sessions) == 1 else {}).save(target / MODEL)
     if lattice:

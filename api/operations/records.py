@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 
+from api.operations.at_hand import at_hand
 from api.operations.opening import opened
 from controller.operation import Operation
 from rig.errors import CheckFailed, DataError
@@ -28,6 +29,11 @@ SUFFIXES: Mapping[Format, str] = {"csv": "csv", "parquet": "parquet", "hdf5": "s
 
 def verify(operation: Operation, path: Path) -> VerifyResult:
     """Reads every byte of a session or of one recording; what is no recording at all is damaged, and hides no other."""
+    with at_hand(path, operation.step) as near:
+        return _verified_all(operation, near)
+
+
+def _verified_all(operation: Operation, path: Path) -> VerifyResult:
     if path.is_file():
         trial = TrialInfo(path.stem, path.name, math.nan, math.nan, "")
         return _result((), {path.stem: _verified(read_recording(path), trial)})

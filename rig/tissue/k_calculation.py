@@ -68,8 +68,7 @@ class Simulator:
         Half as deep again as ``near_mm`` is the deepest it looks; a k that needs more is far too small, and that is all
         the search asks.
         """
-        self._lattice.springs = Springs(k_N_mm, self._lattice.springs.b, self._ratio)
-        self._lattice.law = self._lattice.springs.for_kernels(self._block.spacing_mm)
+        self._lattice.take(Springs(k_N_mm, self._lattice.springs.b, self._ratio))
         deepest = 1.5 * near_mm
         low, high = (0.0, 0.0), (0.0, 0.0)
         depth = near_mm

@@ -20,6 +20,9 @@ PARAMS: dict[str, dict[str, object]] = {
     "verify": {"session": "first"},
     "repair": {"session": "first", "recording": "trial_003"},
     "propose": {"upload": UPLOAD},
+    "fit-cohort": {"sessions": ["first", "second"], "laws": ["fung"]},
+    "diagnose-cohort": {"sessions": ["first", "second"], "simulation": "index"},
+    "report-cohort": {"sessions": ["first", "second"]},
     "import": {"upload": UPLOAD, "session": "measured", "usual": True},
 }
 EXAMPLES: Any = {name: {"summary": name, "value": {"kind": name, "params": params}} for name, params in PARAMS.items()}

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, get_args, get_type_hints
 
 from pydantic import Field
 
+from api.http.cohorts.params import DiagnoseCohortJob, FitCohortJob, ReportCohortJob
 from api.http.jobs.params import (
     CaptureParams,
     DataPlace,
@@ -14,6 +15,7 @@ from api.http.jobs.params import (
     FitParams,
     GloveThresholdParams,
     ImportParams,
+    JobBody,
     NothingAsked,
     ProposeParams,
     ProtocolCheckParams,
@@ -27,6 +29,7 @@ from api.http.jobs.proposal import ProposalResult
 from api.http.models import RequestBody
 from rig.results.base import SavedResult
 from rig.results.bench import DoctorResult, RetractResult
+from rig.results.cohort import CohortResult
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
 from rig.results.fit import FitResult
 from rig.results.glove import GloveThreshold
@@ -36,12 +39,8 @@ from rig.results.tracking import SimulateResult, Threshold, TrackResult
 AnyResult = (
     CaptureResult | TrackResult | RetractResult | GloveThreshold | Threshold | DoctorResult | FitResult
     | DiagnosisResult | ProtocolCheckResult | SimulateResult | ReportResult | ExportResult | VerifyResult | RepairResult
-    | ProposalResult | ImportResult
+    | ProposalResult | ImportResult | CohortResult
 )  # fmt: skip
-
-
-class JobBody(RequestBody):
-    """Root of what starts a job."""
 
 
 class CaptureJob(JobBody):
@@ -158,7 +157,8 @@ class ImportJob(JobBody):
 
 AnyJob = Annotated[
     CaptureJob | TrackJob | RetractJob | ThresholdJob | GloveThresholdJob | DoctorJob | FitJob | DiagnoseJob
-    | ProtocolCheckJob | SimulateJob | ReportJob | ExportJob | VerifyJob | RepairJob | ProposeJob | ImportJob,
+    | ProtocolCheckJob | SimulateJob | ReportJob | ExportJob | VerifyJob | RepairJob | ProposeJob | ImportJob
+    | FitCohortJob | DiagnoseCohortJob | ReportCohortJob,
     Field(discriminator="kind"),
 ]  # fmt: skip
 
@@ -189,6 +189,7 @@ class Kind:
 
 
 RECORDINGS, SCIENCE, BENCH = (f"api.http.jobs.work_{part}" for part in ("recordings", "science", "bench"))
+COHORT = "api.http.cohorts.work"
 KINDS: Mapping[str, Kind] = {
     kind.name: kind
     for kind in (
@@ -208,5 +209,8 @@ KINDS: Mapping[str, Kind] = {
         Kind(RepairJob, RepairResult, "repair", f"{RECORDINGS}:repair"),
         Kind(ProposeJob, ProposalResult, "import", f"{RECORDINGS}:propose_mapping"),
         Kind(ImportJob, ImportResult, "import", f"{RECORDINGS}:import_upload"),
+        Kind(FitCohortJob, CohortResult, "fit", f"{COHORT}:fit_cohort"),
+        Kind(DiagnoseCohortJob, CohortResult, "diagnose", f"{COHORT}:diagnose_cohort"),
+        Kind(ReportCohortJob, CohortResult, "report", f"{COHORT}:report_cohort"),
     )
 }  # fmt: skip

@@ -21,6 +21,10 @@ MOST_POINTS = 4000
 MOST_SESSIONS = 20
 
 
+class JobBody(RequestBody):
+    """Root of what starts a job."""
+
+
 class ModelRef(RequestBody):
     """A model: of a fit, or the extended one of a diagnosis."""
 

@@ -13,6 +13,7 @@ from rig.errors import UsageError
 from rig.tissue.lattice.kernels import Shape
 from rig.tissue.lattice.numba_types import Matrix
 from rig.tissue.lattice.rows import FRONT, LONGEST_ROW, PAD
+from rig.tissue.lattice.tip_edge import rigid_nodes
 
 _LANES = 8  # float64 values in the widest vector register; rows are padded to a multiple
 _MOST_NODES = 4_000_000  # 0.6 GB of state; larger blocks are a slip of the unit more often than a wish
@@ -23,14 +24,16 @@ class Block:
     """A block of ``nodes`` vertices with 18 neighbours each; the defaults are the study's (51 x 51 x 40, 1 mm, 6 mm
     tip).
 
-    ``quarter`` stores x >= 0, y >= 0 only and mirrors the rest. The tip is a rigid disc bonded to the nodes under it;
-    the four lateral faces are held by the tissue around, of which the study does not say anything.
+    ``quarter`` stores x >= 0, y >= 0 only and mirrors the rest. The tip is a rigid disc to which the nodes under it are
+    bonded, or along which they slide; of its edge see `tip_edge`. The four lateral faces are held by the tissue around,
+    of which the study does not say anything.
     """
 
     nodes: tuple[int, int, int] = (51, 51, 40)
     spacing_mm: float = 1.0
     tip_diameter_mm: float = 6.0
     quarter: bool = False
+    bonded: bool = True
 
     def __post_init__(self) -> None:
         nx, ny, nz = self.nodes
@@ -111,14 +114,8 @@ class Block:
         return flat
 
     def tip_nodes(self) -> NDArray[np.int64]:
-        """Flat indices of the nodes under the tip (29 for the study's block)."""
-        rest = self.rest()
-        inside = np.zeros(rest.shape, dtype=bool)
-        x, y, _ = self.inner(rest)
-        under = x**2 + y**2 <= (0.5 * self.tip_diameter_mm) ** 2 * (1.0 + 1e-9)
-        under[..., :-1] = False
-        self.inner(inside)[0] = under
-        return np.flatnonzero(inside[0])
+        """Flat indices of the nodes that the tip covers, the middle one first."""
+        return rigid_nodes(self)
 
     def free(self) -> Matrix:
         """1 where a node may move along a direction, 0 where the bone, the tip, a side or a mirror plane holds it."""
@@ -134,5 +131,5 @@ class Block:
         else:
             inner[:, 0] = 0.0
             inner[:, :, 0] = 0.0
-        free[:, self.tip_nodes()] = 0.0
+        free[(slice(None) if self.bonded else 2), self.tip_nodes()] = 0.0
         return free

@@ -93,19 +93,9 @@ def _fill_mask(masks: Floats, shape: Shape, j: int, count: int, dj: int, dk: int
 
 @driver
 def _springs(
-    spring: RowKernel,
-    add: RowKernel,
-    far: float,
-    x: Matrix,
-    u: Matrix,
-    f: Matrix,
-    shape: Shape,
-    law: Stiffness,
-    first: int,
-    stop: int,
-    t: Floats,
-    masks: Floats,
-) -> None:
+    spring: RowKernel, add: RowKernel, far: float, x: Matrix, u: Matrix, f: Matrix,
+    shape: Shape, law: Stiffness, first: int, stop: int, t: Floats, masks: Floats,
+) -> None:  # fmt: skip
     """All springs that act on planes first ... stop-1."""
     s, plane, most = shape.stride, shape.ny * shape.stride, max(1, SPRING_NODES // shape.stride)
     _fill_masks(masks, shape, most)
@@ -128,19 +118,9 @@ def _springs(
 
 @piece
 def _scatter(
-    add: RowKernel,
-    f: Matrix,
-    shape: Shape,
-    p: int,
-    n: int,
-    own: bool,
-    own_next: bool,
-    last_plane: bool,
-    lowest: bool,
-    highest: bool,
-    far: float,
-    t: Floats,
-) -> None:
+    add: RowKernel, f: Matrix, shape: Shape, p: int, n: int, own: bool,
+    own_next: bool, last_plane: bool, lowest: bool, highest: bool, far: float, t: Floats,
+) -> None:  # fmt: skip
     """Add the buffers of nine directions to both ends; ``far`` is the sign at the far end.
 
     ``lowest`` and ``highest`` rows of a plane have no neighbour below and above. Adding their zeros would write to the
@@ -171,18 +151,9 @@ def _scatter(
 
 @driver
 def _cells(
-    cell: RowKernel,
-    add: RowKernel,
-    x: Matrix,
-    u: Matrix,
-    f: Matrix,
-    shape: Shape,
-    law: Stiffness,
-    first: int,
-    stop: int,
-    t: Floats,
-    masks: Floats,
-) -> None:
+    cell: RowKernel, add: RowKernel, x: Matrix, u: Matrix, f: Matrix,
+    shape: Shape, law: Stiffness, first: int, stop: int, t: Floats, masks: Floats,
+) -> None:  # fmt: skip
     """All corners of cells that act on planes first ... stop-1."""
     s, plane, most = shape.stride, shape.ny * shape.stride, max(1, CELL_NODES // shape.stride)
     nil = _at(ZEROS)

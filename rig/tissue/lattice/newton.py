@@ -63,7 +63,11 @@ def tangent_stiffness_N_mm(lattice: Loaded, tolerance: float = 1e-7) -> float:
     push, out = block.allocate(), block.allocate()
     push[2, lattice.tip] = -1.0
     lattice.product(push, out)
-    follow = solve(lattice, aligned_copy(block, -out), tolerance)
+    right, edge = aligned_copy(block, -out), lattice.edge.nodes
+    pulled = lattice.edge.follow_N_mm(lattice.x, lattice.depth_mm)
+    right[:, edge] += pulled
+    follow = solve(lattice, right, tolerance)
     follow += push
     lattice.product(follow, out)
-    return float(-block.copies * np.sum(out[2, lattice.tip]))
+    left = pulled - lattice.edge.tangent_N(lattice.x, lattice.depth_mm, follow[:, edge])
+    return float(-block.copies * (np.sum(out[2, lattice.tip]) + np.sum(left[2])))

@@ -74,19 +74,9 @@ def store(t: Floats, row: int, s: float, a: Vector) -> None:
 
 @row_kernel(SPRING)
 def constant_force(
-    x: Matrix,
-    _u: Matrix,
-    p: int,
-    q: int,
-    n: int,
-    k: float,
-    length: float,
-    _b: float,
-    t: Floats,
-    out: int,
-    masks: Floats,
-    m: int,
-) -> None:
+    x: Matrix, _u: Matrix, p: int, q: int, n: int, k: float, length: float, _b: float,
+    t: Floats, out: int, masks: Floats, m: int,
+) -> None:  # fmt: skip
     """Pull of springs from row p to row q: k (r - L) d / r, in N."""
     for c in range(n):
         d = between(x, p + c, q + c)
@@ -95,19 +85,9 @@ def constant_force(
 
 @row_kernel(SPRING)
 def exponential_force(
-    x: Matrix,
-    _u: Matrix,
-    p: int,
-    q: int,
-    n: int,
-    k: float,
-    length: float,
-    b: float,
-    t: Floats,
-    out: int,
-    masks: Floats,
-    m: int,
-) -> None:
+    x: Matrix, _u: Matrix, p: int, q: int, n: int, k: float, length: float, b: float,
+    t: Floats, out: int, masks: Floats, m: int,
+) -> None:  # fmt: skip
     """Pull of springs whose stiffness is k exp(b |r/L - 1|), in N."""
     inverse = 1.0 / length
     for c in range(n):
@@ -118,19 +98,9 @@ def exponential_force(
 
 @row_kernel(SPRING)
 def spring_product(
-    x: Matrix,
-    u: Matrix,
-    p: int,
-    q: int,
-    n: int,
-    k: float,
-    length: float,
-    b: float,
-    t: Floats,
-    out: int,
-    masks: Floats,
-    m: int,
-) -> None:
+    x: Matrix, u: Matrix, p: int, q: int, n: int, k: float, length: float, b: float,
+    t: Floats, out: int, masks: Floats, m: int,
+) -> None:  # fmt: skip
     """Change of the pull for a small displacement u: [(T' - T/r) n (n.du) + (T/r) du]; b = 0 is the constant spring."""
     for c in range(n):
         d, du = between(x, p + c, q + c), between(u, p + c, q + c)
@@ -147,19 +117,9 @@ def spring_product(
 
 @row_kernel(SPRING)
 def spring_diagonal(
-    x: Matrix,
-    _u: Matrix,
-    p: int,
-    q: int,
-    n: int,
-    k: float,
-    length: float,
-    b: float,
-    t: Floats,
-    out: int,
-    masks: Floats,
-    m: int,
-) -> None:
+    x: Matrix, _u: Matrix, p: int, q: int, n: int, k: float, length: float, b: float,
+    t: Floats, out: int, masks: Floats, m: int,
+) -> None:  # fmt: skip
     """Bound of the diagonal of a spring's Hessian, one positive value per direction, in N/mm."""
     for c in range(n):
         d = between(x, p + c, q + c)

@@ -8,6 +8,7 @@ from rig.tissue.lattice.kernels import Shape
 from rig.tissue.lattice.numba_types import Matrix
 from rig.tissue.lattice.springs import Springs
 from rig.tissue.lattice.threads import threads
+from rig.tissue.lattice.tip_edge import TipEdge
 
 # Below this many nodes a thread takes longer to be woken than to do its share, and much longer on a busy computer.
 NODES_A_THREAD = 5_000
@@ -24,45 +25,51 @@ class Loaded:
 
     def __init__(self, block: Block, springs: Springs) -> None:
         self.block = block
-        self.springs = springs
         self.shape = block.shape
-        self.law = springs.for_kernels(block.spacing_mm)
+        self.take(springs)
         self.tip = block.tip_nodes()
+        self.depth_mm = 0.0
         self.free = block.free()
         self.rest = block.rest()
         self.x = aligned_copy(block, self.rest)
         self.f = block.allocate()
         self.slabs = slabs_for(self.shape)
 
+    def take(self, springs: Springs) -> None:
+        """Put other springs into every place."""
+        self.springs, self.law = springs, springs.for_kernels(self.block.spacing_mm)
+        self.edge = TipEdge.of(self.block, springs)
+
     def force(self) -> Matrix:
         """Fill and return the force on every node in N."""
         kernels.assemble(kernels.FORCE, self.x, self.x, self.f, self.shape, self.law, self.slabs)
+        self.f[:, self.edge.nodes] += self.edge.pull_N(self.x, self.depth_mm)
         return self.f
 
     def product(self, u: Matrix, out: Matrix) -> Matrix:
         """Hessian times ``u`` in N."""
         kernels.assemble(kernels.PRODUCT, self.x, u, out, self.shape, self.law, self.slabs)
         np.negative(out, out=out)
+        out[:, self.edge.nodes] += self.edge.tangent_N(self.x, self.depth_mm, u[:, self.edge.nodes])
         return out
 
     def diagonal(self, out: Matrix) -> Matrix:
         """Positive bound of the Hessian's diagonal in N/mm."""
         kernels.assemble(kernels.DIAGONAL, self.x, self.x, out, self.shape, self.law, self.slabs)
+        out[:, self.edge.nodes] += self.edge.bound_N_mm(self.x, self.depth_mm)
         return out
 
     def press(self, depth_mm: float) -> None:
         """Put the rigid tip at ``depth_mm``; nothing else moves."""
-        self.x[:, self.tip] = self.rest[:, self.tip]
+        held = slice(None) if self.block.bonded else slice(2, None)
+        self.x[held, self.tip] = self.rest[held, self.tip]
         self.x[2, self.tip] -= depth_mm
-
-    @property
-    def depth_mm(self) -> float:
-        """How deep the rigid tip is."""
-        return float(self.rest[2, self.tip[0]] - self.x[2, self.tip[0]])
+        self.depth_mm = float(depth_mm)
 
     def reaction_N(self) -> float:
-        """Force of the tissue against the tip; call after `force`."""
-        return float(self.block.copies * np.sum(self.f[2, self.tip]))
+        """Force of the tissue against the tip and its edge; call after `force`."""
+        edge = np.sum(self.edge.pull_N(self.x, self.depth_mm)[2])
+        return float(self.block.copies * (np.sum(self.f[2, self.tip]) - edge))
 
 
 def aligned_copy(block: Block, source: Matrix) -> Matrix:

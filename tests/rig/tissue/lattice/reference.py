@@ -1,5 +1,6 @@
 """The lattice written a second time, slowly and without any trick: loops over pairs of nodes and corners of cells."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.numba_types import Floats
 from rig.tissue.lattice.springs import Springs
+from rig.tissue.lattice.state import Loaded
 
 STEPS = [s for s in product((-1, 0, 1), repeat=3) if 0 < sum(map(abs, s)) < 3 and s > (0, 0, 0)]
 
@@ -16,6 +18,24 @@ def moduli(springs: Springs) -> tuple[float, float]:
     lame_MPa, shear_MPa = springs.k_N_mm * (1.0 + springs.cell_ratio), springs.k_N_mm
     nu = lame_MPa / (2.0 * (lame_MPa + shear_MPa))
     return 2.0 * shear_MPa * (1.0 + nu), nu
+
+
+def untied(lattice: Loaded) -> Loaded:
+    """The same without the ties of the tip's edge: springs and cells alone."""
+    lattice.edge = replace(
+        lattice.edge, nodes=lattice.edge.nodes[:0], stiffness=lattice.edge.stiffness[:0], rest=lattice.edge.rest[:, :0]
+    )
+    return lattice
+
+
+def tie_energy(lattice: Loaded) -> float:
+    """Energy of the ties in N mm: each is a spring of length 0 between a node and where the tip would have it."""
+    total, d, b = 0.0, lattice.block.spacing_mm, lattice.springs.b
+    for node, stiffness in zip(lattice.edge.nodes, lattice.edge.stiffness, strict=True):
+        place = lattice.rest[:, node] - [0.0, 0.0, lattice.depth_mm]
+        e = float(np.linalg.norm(place - lattice.x[:, node])) / d
+        total += stiffness * d**2 * (0.5 * e * e if b == 0.0 else ((b * e - 1.0) * np.exp(b * e) + 1.0) / b**2)
+    return float(total)
 
 
 def energy(inner: Floats, springs: Springs, block: Block) -> float:

@@ -1,0 +1,1 @@
+"""Cohorts over HTTP: jobs on many sessions at once."""
