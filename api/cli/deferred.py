@@ -27,11 +27,15 @@ class DeferredNames(dict[str, object]):
         super().__init__(vars(module))
         self._path = path
         self._imported = {name: place for part in body for name, place in _imports(part)}
-        self._defined = {name: part for part in body for name in _definitions(part)}
+        self._defined: dict[str, list[ast.stmt]] = {}
+        for part in body:
+            for name in _definitions(part):
+                self._defined.setdefault(name, []).append(part)
 
     def __missing__(self, name: str) -> object:
         if name in self._defined:
-            self._define(self._defined[name])
+            for part in self._defined.pop(name):  # its definition, then what is set on it
+                self._define(part)
         else:
             self[name] = _member(*self._imported[name])
         return self[name]

@@ -54,9 +54,10 @@ def _in_help() -> str:
     """The products with their own keys, for whoever asks for help."""
     lines = []
     for role, products in ROLES.items():
+        shared = set.intersection(*(set(product.model_fields) for product in products.values()))
         for name, product in products.items():
-            own = ", ".join(key for key in vars(product).get("__annotations__", {}) if key in product.model_fields)
-            lines.append(f'[{role}] product = "{name}": {own}')
+            own = ", ".join(key for key in product.model_fields if key not in shared)
+            lines.append(f'[{role}] product = "{name}": {own or "those of the role"}')
     return "\n\n".join(["Products and the keys that only they have:", *lines])
 
 

@@ -28,6 +28,7 @@ class ScriptedBench:
         self.status: Status = {"mode": "safe", "ready": False}
         self.ready = type("Ready", (), {"devices": {"force": {"product": "BFT"}, "axis": {"product": "EPOS4"}}})()
         self.stop_port = 0
+        self.wiring = Wiring()
 
     def recover(self, consent: Consent) -> ResetResult:
         self.consents.append(consent)

@@ -235,6 +235,7 @@ class ServerBench:
         self.line, self.axis = devices[0].wire, devices[1]
         self.server = MockServer(self.bench, devices, self.clock)
         self.port = open_port(self.line.endpoint, 460_800)
+        self.server.turn([fileno for one in devices for fileno in one.mock.filenos()])  # the sensor has power from here
 
     def pass_ms(self, milliseconds: int) -> None:
         self.clock.now_ns += milliseconds * 1_000_000

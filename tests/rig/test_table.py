@@ -25,7 +25,7 @@ def wiring(*settings: str) -> Wiring:
         ('axis.node="1"', r"axis.node: Input should be a valid integer \(got '1'\)"),
         ("axis.node=1.0", r"axis.node: Input should be a valid integer \(got 1.0\)"),
         ("subject.id=5", r"subject.id: Input should be a valid string \(got 5\)"),
-        ('loop.adapt="yes"', r"loop.adapt: Input should be a valid boolean \(got 'yes'\)"),
+        ('axis.holds_unpowered="yes"', r"axis.holds_unpowered: Input should be a valid boolean \(got 'yes'\)"),
         ("tracker.tools=[1]", r"tracker.tools.0: Input should be a valid string \(got 1\)"),
     ],
 )
