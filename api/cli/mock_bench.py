@@ -93,7 +93,7 @@ def plug_into(wiring: Wiring, endpoints: Endpoints) -> Wiring:
     seen = tracker is not None and tracker.port == wiring.axis.port == MOCK_PORT
     if seen and not known.of_axis:
         known = known.model_copy(update={"of_axis": mock_axis_calibration(live, endpoints)})
-    if wiring.force.port == wiring.axis.port == MOCK_PORT and not known.of_dynamics:
+    if wiring.axis.port == MOCK_PORT and not known.of_dynamics:
         known = known.model_copy(update={"of_dynamics": mock_axis_dynamics(live, endpoints)})
     return live.model_copy(update={"calibration": known})
 
