@@ -127,6 +127,11 @@ def stop_process(live: Live) -> int:
     return live.child("controller.stop.server")
 
 
+def inputs_process(live: Live) -> int:
+    """The process of the inputs."""
+    return live.child("controller.inputs.process")
+
+
 def at_stop_port(path: str) -> Act:
     """A request to the stop process, as page and REST send it."""
 

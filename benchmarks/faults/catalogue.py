@@ -27,6 +27,9 @@ FROZEN_S = 0.2
 RECORDER_GONE_S = 0.3
 DISK_FULL_S = 0.7
 
+PEDAL = ("input.pedal.product=evdev-switch", "input.pedal.port=mock", "input.pedal.stops=pain")
+GLOVE = ("input.glove.product=firmata-glove", "input.glove.port=mock", "input.glove.needed=true")
+
 
 def _too_deep(truth: Truth) -> bool:
     return truth["tip.depth_mm"] > DEPTH_LIMIT_MM
@@ -142,6 +145,12 @@ LIMB = (
     Fault("limb.moves", "press", ("patient_moved",), set_quantities(surface__position_mm=35.0), _limb_moved),
 )  # fmt: skip
 
+INPUTS = (
+    Fault("switch.unplugged", "press", ("input_lost",), device("switch", "unplug", True), settings=PEDAL),
+    Fault("glove.silent", "press", ("input_lost",), device("glove", "silent"), settings=GLOVE),
+    Fault("inputs.frozen", "press", ("input_lost",), acts.frozen(acts.inputs_process), settings=PEDAL),
+)
+
 OPERATOR = (
     Fault("port.estop", "press", ("emergency_stop",), acts.at_stop_port("/estop")),
     Fault("port.stop", "press", ("operator_stop",), acts.at_stop_port("/stop")),
@@ -235,7 +244,7 @@ COMMISSIONING = tuple(
     )
 )  # fmt: skip
 
-ALL = (*AXIS, *FORCE, *TRACKER, *LIMB, *OPERATOR, *PROCESSES, *WIRES, *TRIALS, *CONFIGURATION, *COMMISSIONING)
+ALL = (*AXIS, *FORCE, *TRACKER, *LIMB, *INPUTS, *OPERATOR, *PROCESSES, *WIRES, *TRIALS, *CONFIGURATION, *COMMISSIONING)
 FAULTS: dict[str, Fault] = {fault.name: fault for fault in ALL}
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from api.cli.mock_bench import plug_into
+from api.cli.mock_inputs import input_options
 from benchmarks.faults.evaluation import Notice, Outcome, evaluate
 from benchmarks.faults.fault import DRIVE, Fault, at_once
 from benchmarks.faults.observer import Observer
@@ -76,7 +77,7 @@ def trial(
     """
     moment_s = random.Random(f"{seed} {fault.name} {number}").uniform(0.0, fault.latest_s)
     with (
-        served_bench("--seed", str(seed + number)) as bench,
+        served_bench("--seed", str(seed + number), *input_options(wiring_for(fault))) as bench,
         contextlib.closing(Observer(bench.endpoints.control)) as observer,
     ):
         outcome = _outcome(fault, bench, folder, planted, observer, moment_s)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from api.cli.mock_inputs import input_options
 from benchmarks.faults import planted_loop
 from benchmarks.faults.catalogue import FAULTS, proofs, unproven
 from benchmarks.faults.commission import SCENARIO as COMMISSIONING
@@ -119,6 +120,13 @@ def test_every_fault_can_be_configured_and_is_expected_by_what_there_is() -> Non
         assert fault.scenario in (*SCENARIOS, COMMISSIONING)
         assert set(fault.expected) <= set(bounds())
         assert fault.named or QUALITY not in fault.expected
+
+
+def test_the_inputs_that_a_fault_is_about_are_needed_and_played_by_the_bench() -> None:
+    played = {name: input_options(wiring_for(fault)) for name, fault in FAULTS.items() if wiring_for(fault).input}
+    pedal, glove = ["--input", "evdev-switch"], ["--input", "firmata-glove"]
+    assert played == {"switch.unplugged": pedal, "glove.silent": glove, "inputs.frozen": pedal}
+    assert all(each.is_needed for name in played for each in wiring_for(FAULTS[name]).input.values())
 
 
 def test_every_line_of_the_table_is_planted_with_its_proof() -> None:
