@@ -6,7 +6,7 @@ import pytest
 from pydantic import Field
 
 from rig.config.products.registry import ROLES
-from rig.config.products.roles import AxisProduct, ForceProduct, MockPort, TrackerProduct
+from rig.config.products.roles import AxisProduct, ForceProduct, MockPort, Product, TrackerProduct
 from rig.config.products.usable import refusal_of
 
 refusal = refusal_of(ForceProduct)
@@ -64,9 +64,9 @@ def test_a_whole_product_is_usable_at_its_own_rate() -> None:
 
 @pytest.mark.parametrize("role", ROLES)
 def test_ours_pass_the_same_gate(role: str) -> None:
-    kind = {"force": ForceProduct, "axis": AxisProduct, "tracker": TrackerProduct}[role]
+    roles: dict[str, type[Product]] = {"force": ForceProduct, "axis": AxisProduct, "tracker": TrackerProduct}
     for product in ROLES[role].values():
-        assert refusal_of(kind)(product) == ""
+        assert refusal_of(roles[role])(product) == ""
 
 
 @pytest.mark.parametrize(
