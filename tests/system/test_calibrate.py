@@ -89,7 +89,8 @@ def test_a_mock_bench_is_calibrated_once_without_what_is_hidden_in_it(
     assert plug_into(built_in(), bench.endpoints).calibration == found
     said = capsys.readouterr().err
     assert said.count("000271 was calibrated by itself; kept in") == 1
-    assert said.count("62014711 was calibrated by itself; kept in") == 1
+    # Its scale, and how it follows its set-point.
+    assert said.count("62014711 was calibrated by itself; kept in") == 2
     assert force_file(built_in(), bench.endpoints).is_file()
 
 

@@ -2,7 +2,7 @@
 
 import json
 import math
-from bisect import bisect_left
+from bisect import bisect_right
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -105,10 +105,10 @@ def forces_are_the_loops(client: ForeignClient, recording: Path) -> None:
     arrived_ns = [row.arrival_ns for row in force.values()]
     numbers = list(force)
     compared = 0
-    for row, following in pairwise(loop):
-        newest = bisect_left(arrived_ns, following.capture_ns) - 1
-        # A reading keeps the zero of the cycle in which it came.
-        if newest >= 0 and arrived_ns[newest] >= row.capture_ns and not math.isnan(row.force_n):
+    for before, row in pairwise(loop):
+        newest = bisect_right(arrived_ns, row.capture_ns) - 1
+        # A cycle begins when its reading is there, and a reading keeps the zero of the cycle in which it came.
+        if newest >= 0 and arrived_ns[newest] > before.capture_ns and not math.isnan(row.force_n):
             assert shown[numbers[newest]][0] == pytest.approx(row.force_n, abs=2e-6)
             compared += 1
     assert compared > 500
