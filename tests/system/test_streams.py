@@ -19,6 +19,8 @@ from mock_devices.testing.commands import ServedBench
 from mock_devices.testing.service import ServedRig
 from tests.api.streams.foreign_client import ForeignClient
 
+# A look at the line takes tens of microseconds, and the next one follows half a cycle later at the soonest.
+LOOK_NS = 200_000
 WHOLE = ("force", "position", "depth", "setpoint", "error", "marker", "force.fz_N", "loop.force_N")
 PRESS = (
     'kind = "indentation"\nspeeds_mm_s = [30]\ntrials = 1\ndepth_mm = 6\nair_dwell_s = 0.2\napproach_speed_mm_s = 20\n'
@@ -106,9 +108,9 @@ def forces_are_the_loops(client: ForeignClient, recording: Path) -> None:
     numbers = list(force)
     compared = 0
     for before, row in pairwise(loop):
-        newest = bisect_right(arrived_ns, row.capture_ns) - 1
-        # A cycle begins when its reading is there, and a reading keeps the zero of the cycle in which it came.
-        if newest >= 0 and arrived_ns[newest] > before.capture_ns and not math.isnan(row.force_n):
+        newest = bisect_right(arrived_ns, row.capture_ns + LOOK_NS) - 1
+        # A cycle begins with the look that brought its reading, which keeps the zero of that cycle.
+        if newest >= 0 and arrived_ns[newest] > before.capture_ns + LOOK_NS and not math.isnan(row.force_n):
             assert shown[numbers[newest]][0] == pytest.approx(row.force_n, abs=2e-6)
             compared += 1
     assert compared > 500
