@@ -40,14 +40,16 @@ def _identified(wiring: Wiring, from_mm: float) -> AxisDynamics:
 
 
 def _say(found: AxisDynamics) -> None:
-    turn = found.reversal
+    turn, current = found.reversal, "not told by the drive"
+    if turn.friction_A is not None:
+        current = f"{turn.friction_A:.3f} +- {turn.friction_within_A:.3f} A"
     rows = [
         ("delay", str(found.delay)),
         ("first lag", str(found.lag1)),
         ("second lag", str(found.lag2)),
         ("delay and lags", str(found.total)),
         ("lost where it turns", f"{1e3 * turn.lost_mm:.1f} +- {1e3 * turn.lost_within_mm:.1f} um"),
-        ("current of dry friction", f"{turn.friction_A:.3f} +- {turn.friction_within_A:.3f} A"),
+        ("current of dry friction", current),
         ("set-point held", f"{1e3 * found.hold_s:.2f} ms (from the loop's rate)"),
         ("force sensor's filter", f"{1e3 * found.force_filter_s:.2f} ms (declared)"),
         ("age of its newest sample", f"{1e3 * found.force_age_s:.2f} ms (capture times)"),

@@ -223,11 +223,12 @@ def reversal_of(sweep: AirSweep, followed: SweepRecord, lag_s: float) -> Reversa
     turns = [_turn(sweep, followed, begin_s + at * sweep.turn_s) for at in range(sweep.turns)]
     lost_mm, friction_A = (np.array(side) for side in zip(*turns, strict=True))
     spread = student.ppf(0.975, len(turns) - 1) / math.sqrt(len(turns))
+    told = bool(np.isfinite(friction_A).all())  # not every drive tells its current
     return Reversal(
         lost_mm=float(lost_mm.mean()) - TURN_MM_S * lag_s,
         lost_within_mm=float(spread * lost_mm.std(ddof=1)),
-        friction_A=float(friction_A.mean()),
-        friction_within_A=float(spread * friction_A.std(ddof=1)),
+        friction_A=float(friction_A.mean()) if told else None,
+        friction_within_A=float(spread * friction_A.std(ddof=1)) if told else None,
     )
 
 

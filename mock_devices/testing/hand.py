@@ -6,6 +6,7 @@ from pathlib import Path
 
 from api.cli.mock_bench import mocks, plug_into
 from api.cli.mock_calibration import force_file
+from api.cli.mock_dynamics import dynamics_file
 from api.cli.options import built_in
 from mock_devices.control import BenchControl
 from mock_devices.testing.commands import PATIENT, Said, ServedBench, rig, served_bench
@@ -54,7 +55,10 @@ class MockBench:
     def settings(self, *settings: str) -> list[str]:
         """The same as options of a `rig` command, patient with a computer that others use too."""
         wiring = self.wiring(*settings)
-        found = [f"calibration.force={force_file(built_in(list(settings)), self.served.endpoints)}"]
+        asked, endpoints = built_in(list(settings)), self.served.endpoints
+        found = [f"calibration.force={force_file(asked, endpoints)}"]
+        if wiring.calibration.of_dynamics:
+            found.append(f"calibration.dynamics={dynamics_file(asked, endpoints)}")
         for role in mocks(built_in(list(settings))):
             device = getattr(wiring, role)
             found.append(f"{role}.port={device.port}")

@@ -44,8 +44,10 @@ class Reversal(Table):
 
     lost_mm: float = Field(description="half of the band between both ways, less what the lags explain")
     lost_within_mm: NotNegative = Field(description="half of its 95 % interval")
-    friction_A: float = Field(description="half of the difference of the drive's current between both ways")
-    friction_within_A: NotNegative = Field(description="half of its 95 % interval")
+    friction_A: float | None = Field(
+        description="half of the difference of the drive's current between both ways; null where it tells none"
+    )
+    friction_within_A: NotNegative | None = Field(description="half of its 95 % interval")
 
 
 class AxisDynamics(Table):
