@@ -1,26 +1,39 @@
 """Plays every law on every case and says what the force law gains; the last line is one JSON object.
 
-python -m benchmarks.control [--quick] [--seeds N] [--json FILE] [--pictures FOLDER] [--bench]
+python -m benchmarks.control [--quick] [--seeds N] [--json FILE] [--pictures FOLDER] [--processes N]
+python -m benchmarks.control --wire FILE [--minutes M] [--seeds N]
 """
 
 import argparse
 import math
+import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 
-from benchmarks.control import cases, pictures, wire
-from benchmarks.control.cases import Case, played
+from benchmarks.control import pictures
 from benchmarks.control.laws import ABLATIONS, CONSTANTS, LAW, OTHERS, makers, track_step
 from benchmarks.control.plants import FAST, PLANT, SLOW, SUBJECTS, Plant, model_of, wiring_of
-from benchmarks.control.scores import Headline, Mean, Score, gain_of, headline, limb_gains, mean_of, wrong_models
+from benchmarks.control.runs import jobs_of, play_all
+from benchmarks.control.scores import (
+    BEST,
+    Headline,
+    Mean,
+    Score,
+    best_constant,
+    gain_of,
+    headline,
+    limb_gains,
+    mean_of,
+    wrong_models,
+)
 from controller.experiments import tracking
 from controller.law.axis_response import rates_of, response_of
 from controller.law.loop_response import Constants
 from controller.law.synthesis import SPARE_S, over_span
 from rig.config.table import Table
-from rig.errors import UsageError
 
 SEEDS, QUICK_SEEDS = 4, 1
 QUICK_LAWS = (LAW, *CONSTANTS, "one constant for all")
@@ -61,15 +74,29 @@ class Result(Table):
 def main() -> None:
     """Plays, prints and writes; exit code 1 where a promise is not kept."""
     asked = _arguments()
+    sys.exit(1 if (_wire(asked) if asked.wire else _simulation(asked)) else 0)
+
+
+def _wire(asked: argparse.Namespace) -> list[str]:
+    from benchmarks.control import wire, wire_report  # noqa: PLC0415 - loads the bench
+
+    return wire_report.show(wire.measure(asked.wire, asked.minutes, asked.seeds or QUICK_SEEDS))
+
+
+def _simulation(asked: argparse.Namespace) -> list[str]:
+    """Prints what was found, the headline last; returns the promises that are not kept."""
     began = time.monotonic()
     names = QUICK_LAWS if asked.quick else tuple(makers())
     seeds = range(1, 1 + (asked.seeds or (QUICK_SEEDS if asked.quick else SEEDS)))
-    scores = list(scored(names, list(cases.every(asked.quick)), seeds))
+    done = play_all(jobs_of(names, "quick" if asked.quick else "every", seeds), asked.processes)
+    scores = [score for one in done for score in one.scores]
     shown = table(scores, names)
     if not asked.quick:
-        shown += list(other_plants(seeds[:1]))
+        shown += other_plants(asked.processes)
     found = headline(scores, worst_margins())
-    against = {rival: _against(scores, rival) for rival in names if rival != LAW and rival not in ABLATIONS}
+    compared = [*scores, *best_constant(scores)]
+    rivals = [BEST, *(name for name in names if name != LAW and name not in ABLATIONS)]
+    against = {rival: _against(compared, rival) for rival in rivals}
     seconds = time.monotonic() - began
     result = Result(
         date=time.strftime("%Y-%m-%d"), seconds=round(seconds, 1), seeds=len(seeds), runs=len(scores), headline=found,
@@ -80,30 +107,33 @@ def main() -> None:
         asked.json.write_text(result.model_dump_json(indent=1) + "\n")
     if asked.pictures:
         pictures.draw(result.cells, asked.pictures)
-    if asked.bench:
-        wire.confirm(scores)
     print(found.model_dump_json())
-    sys.exit(1 if missed(found) else 0)
+    return missed(found)
 
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.control", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="one seed, tuned constants only, the headline's tests")
-    parser.add_argument("--seeds", type=int, default=0, help=f"seeds of noise for each subject; else {SEEDS}")
+    parser.add_argument("--seeds", type=int, default=0, help=f"seeds of noise for each subject; else {SEEDS}, or 1")
     parser.add_argument("--json", type=Path, help="all numbers")
     parser.add_argument("--pictures", type=Path, help="folder for the pictures")
-    parser.add_argument("--bench", action="store_true", help="also the law on the mock bench, over the wire")
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1, help="that play at the same time")
+    parser.add_argument("--wire", type=Path, help="instead, law and constant on the mock bench; goes on with this file")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="with --wire: nothing begins after these")
     return parser.parse_args()
 
 
-def scored(names: Sequence[str], asked: Sequence[Case], seeds: range, plant: Plant = PLANT) -> Iterator[Score]:
-    """Every run."""
-    for name, maker in makers(names).items():
-        for subject in SUBJECTS:
-            law = maker(subject, plant)
-            for case in asked:
-                for seed in seeds:
-                    yield Score(name, case.name, subject, seed, played(case, law, subject, seed, plant))
+def other_plants(processes: int) -> list[Cell]:
+    """The law and the constant where axis, sensor or delay are others, each identified and synthesised anew."""
+    wanted = [job for plant in PLANTS.values() for job in jobs_of(PLANT_LAWS, "plants", (1,), plant)]
+    done, found = list(play_all(wanted, processes)), []
+    for (plant_name, plant), law in product(PLANTS.items(), PLANT_LAWS):
+        mine = [one for one in done if (one.job.plant, one.job.law) == (plant, law)]
+        refused = next((one.refused for one in mine if one.refused), "")
+        scores = [score for one in mine for score in one.scores]
+        found += [Cell(law=law, case="all", plant=plant_name, refused=refused)] if refused else []
+        found += table(scores, [law], plant_name)
+    return found
 
 
 def table(scores: Sequence[Score], names: Sequence[str], plant: str = "bench") -> list[Cell]:
@@ -114,18 +144,6 @@ def table(scores: Sequence[Score], names: Sequence[str], plant: str = "bench") -
         for case in every_case
         for name in names
     ]
-
-
-def other_plants(seeds: range) -> Iterator[Cell]:
-    """The law and the constant where axis, sensor or delay are others, each identified and synthesised anew."""
-    asked = [*(cases.limb_motion(force_N, 2.0) for force_N in (0.5, 2.0, 10.0)), cases.contact(0.0)]
-    asked.append(cases.stair("low jumps, x1", 0.3, 1.5, 0.3, 1.0, 1.0))
-    for plant_name, plant in PLANTS.items():
-        for law in PLANT_LAWS:
-            try:
-                yield from table(list(scored([law], asked, seeds, plant)), [law], plant_name)
-            except UsageError as error:
-                yield Cell(law=law, case="all", plant=plant_name, refused=str(error))
 
 
 def worst_margins() -> tuple[float, float]:

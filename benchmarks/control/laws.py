@@ -11,6 +11,7 @@ from benchmarks.control.motion import Law
 from benchmarks.control.plants import SUBJECTS, Plant, model_of, wiring_of
 from benchmarks.control.rival_law import RivalColumns, RivalFeedback, RivalSettings
 from benchmarks.control.rival_tuning import Shape, TissueAt, Tuning
+from benchmarks.control.tried_law import GIVES_WAY_MM, TURNING_MM_S, TriedSettings
 from controller.experiments import tracking
 from controller.law import synthesis
 from controller.law.axis_response import rates_of, response_of
@@ -20,6 +21,7 @@ from controller.loop.steps import TrackForce
 
 # A mass that answers a third as fast as the axis: what an admittance filters the sensor's noise with.
 MASS_S = 0.015
+NOISE_N = 0.005  # of the faster sensor's samples
 VARY = 1.0  # damping halves where the error is all of the force: more, and the margins of the half would be lost
 
 
@@ -65,6 +67,13 @@ def shaped(subject: str, plant: Plant, ablation: Ablation = Ablation()) -> Law: 
         inverse = inverse._replace(ahead_mm_s=0.0)
     table = Columns(*map(np.array, columns(step.gains)))
     return Law("shaped", table, step.settings._replace(inverse=inverse, feedback=feedback), step.preview_s)
+
+
+def tried(subject: str, plant: Plant, ahead_mm: float = 0.0, rests_below_N: float = 0.0) -> Law:
+    """The product's law with friction compensation, or with a dead zone of its second integral."""
+    law = shaped(subject, plant)
+    settings = TriedSettings(law.settings, law.settings.inverse, ahead_mm, TURNING_MM_S, rests_below_N)
+    return law._replace(kind="tried", settings=settings)
 
 
 def _leadless(subject: str, plant: Plant) -> Constants:
@@ -134,6 +143,11 @@ def plain(subject: str, plant: Plant) -> Law:
 
 Maker = Callable[[str, Plant], Law]
 LAW = "law"
+# Not in the product: what they gain and cost is for the table to say.
+TRIED: Mapping[str, Maker] = {
+    "friction compensation": partial(tried, ahead_mm=GIVES_WAY_MM),
+    "dead zone": partial(tried, rests_below_N=NOISE_N),
+}
 # Constants by the corner of their second integral [rad/s]: which is best depends on the test, and the best is taken.
 CONSTANTS: Mapping[str, Maker] = {
     "constant": constant,
@@ -152,5 +166,5 @@ OTHERS: Mapping[str, Maker] = {
 def makers(names: Sequence[str] = ()) -> Mapping[str, Maker]:
     """All laws, or those named."""
     ablated: dict[str, Maker] = {name: partial(shaped, ablation=off) for name, off in ABLATIONS.items()}
-    every: dict[str, Maker] = {LAW: shaped, **CONSTANTS, **OTHERS, **ablated}
+    every: dict[str, Maker] = {LAW: shaped, **CONSTANTS, **OTHERS, **ablated, **TRIED}
     return {name: every[name] for name in names or every}

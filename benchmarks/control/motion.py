@@ -1,14 +1,14 @@
 """One law on one limb that moves, relaxes and rubs, as machine code: the axis of the simulation, cycle by cycle."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.control import rival_law
+from benchmarks.control import rival_law, tried_law
 from controller.law import force_position, inverse_model
 from controller.law.force_position import ForceReading
 from rig.machine_code import compiled
@@ -138,20 +138,23 @@ def _follower(kind: str) -> Callable[..., Column]:
     law["correct"] = compiled(rival_law.correct, interpolate)
     law["start_anew"] = compiled(force_position.start_anew, law)
     law |= {"react": compiled(force_position.react), "limit": compiled(force_position.limit)}
-    increments: dict[str, Callable[..., Any]] = {"rival": rival_law.increment, "shaped": force_position.increment}
-    return compiled(
-        follow, {"increment": compiled(increments[kind], law), "reading": compiled(reading), "moved": moved_compiled()}
-    )
+    law["law_increment"] = compiled(force_position.increment, law)
+    law["rested"] = compiled(tried_law.rested)
+    increments: dict[str, Callable[..., Any]] = {"rival": rival_law.increment, "tried": tried_law.increment}
+    run_by = law["law_increment"] if kind == "shaped" else compiled(increments[kind], law)
+    return compiled(follow, {"increment": run_by, "reading": compiled(reading), "moved": moved_compiled()})
 
 
 def run(law: Law, reference_N: Column, bench: Bench, seed: int, dt_s: float = 0.001) -> Run:
     """The law from where the axis stands, 0 mm, along ``reference_N`` of shape (cycles,)."""
-    begin = rival_law.begin if law.kind == "rival" else force_position.begin
-    memory = begin(law.table, law.settings.inverse, 0.0)
+    memory = BEGIN[law.kind](law.table, law.settings.inverse, 0.0)
     noise = np.random.default_rng(seed).standard_normal(len(reference_N))
     state = at_rest(0.0)
     return Run(*_follower(law.kind)(state, memory, law.table, law.settings, reference_N, noise, bench, dt_s))
 
 
+BEGIN: Mapping[str, Callable[..., Any]] = {
+    "rival": rival_law.begin, "shaped": force_position.begin, "tried": tried_law.begin,
+}  # fmt: skip
 # The name that `follow` is bound to where it is compiled.
 increment = force_position.increment

@@ -1,65 +1,182 @@
-"""The law on the mock bench, over the wire: `rig track` on a limb that moves, beside what the simulation says."""
+"""Law and tuned constant on the mock bench: its processes, devices and wire protocols, each beside its simulation.
 
-import json
-import subprocess
-import sys
+Bench and simulation play the same reference and are judged by the same function, from the force sensed. Every part has
+a bench of its own and stands in the file as one line, so that a run that was cut short goes on where it ended.
+"""
+
+import os
 import tempfile
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.control.cases import FORCES_N, LIMB_MM
-from benchmarks.control.laws import LAW
-from benchmarks.control.plants import FOLDER, model_of
-from benchmarks.control.scores import Score, by_subject
+import numpy as np
 
-SUBJECTS = ("average", "firm")
-SECONDS, PATIENCE_S = 5.0, 110.0
-MOTION_HZ = 2.0
+from api.cli.mock_bench import bench_for
+from benchmarks.control import laws, rival_process, rival_tuning, wire_programs
+from benchmarks.control.cases import DT_S, LIMB_MM, Asked, swing
+from benchmarks.control.laws import CONSTANTS, LAW
+from benchmarks.control.motion import Column, run
+from benchmarks.control.plants import FOLDER, PLANT, SUBJECTS, limb_of, model_of
+from benchmarks.control.rival_tuning import DRIFTS_RAD_S
+from benchmarks.control.wire_programs import SWING_HZ, Kind
+from controller.experiments import tracked
+from controller.law import force_profile
+from controller.law.axis_response import rates_of, response_of
+from controller.loop.modes import Mode
+from controller.loop.steps import Program, TrackForce
+from controller.supervisor import LOOP_MODULE, Supervisor
+from mock_devices.parameters import load_parameters
+from rig.config.table import Table
+from rig.config.wiring import Wiring
+from rig.errors import RigError
+from rig.recording.reader import read_recording
+
+CONSTANT, BEST_AT_CONTACT = "constant", "constant, no drift"
+# What a limb does to both laws first, then contact, then wrong models: whoever has little time has the first of them.
+ROUNDS: Sequence[tuple[Kind, Sequence[float], Sequence[str]]] = (
+    ("limb", (1.0,), (LAW, CONSTANT)), ("contact", (1.0,), (LAW, CONSTANT, BEST_AT_CONTACT)),
+    ("low jumps", (0.5, 2.0), (LAW, CONSTANT)), ("jumps", (0.5, 2.0), (LAW, CONSTANT)),
+)  # fmt: skip
+TRIES = 2  # a computer that others use stalls now and then, and the bench stops for it
 
 
-class Wired(NamedTuple):
-    """Rms error [N] at one force, on the bench and in the simulation."""
+class Part(NamedTuple):
+    """One run: what is played, on whose tissue, how many times as stiff as the model, by which law."""
 
+    kind: Kind
     subject: str
-    force_N: float
-    bench_N: float
-    simulated_N: float
+    stiffness: float
+    law: str
+    seed: int
 
 
-def confirm(scores: Sequence[Score]) -> list[Wired]:
-    """Prints and returns both errors at each force and subject."""
-    found = [one for subject in SUBJECTS for one in _on(subject, scores)]
-    for one in found:
-        ratio = one.bench_N / one.simulated_N
-        print(
-            f"over the wire, {one.subject}, {one.force_N:g} N: {1000 * one.bench_N:.1f} mN, simulated"
-            f" {1000 * one.simulated_N:.1f} mN ({ratio:.2f} times)"
-        )
-    return found
+class Wired(Table):
+    """One number of a part on the bench, and of the simulation."""
+
+    case: str
+    bench: float
+    simulated: float
 
 
-def _on(subject: str, scores: Sequence[Score]) -> list[Wired]:
-    with tempfile.TemporaryDirectory() as folder:
-        errors_N = tracked(subject, Path(folder))
-    simulated = [by_subject(scores, LAW, [f"limb 2 Hz, {force_N:g} N"])[subject] for force_N in FORCES_N]
-    return [
-        Wired(subject, force_N, bench_N, simulated_N)
-        for force_N, bench_N, simulated_N in zip(FORCES_N, errors_N, simulated, strict=True)
-    ]
+class WiredPart(Table):
+    """A part as it stands in the file; ``missed`` are slots of the loop that came too late."""
+
+    part: Part
+    found: tuple[Wired, ...]
+    missed: int
 
 
-def tracked(subject: str, folder: Path) -> list[float]:
-    """Rms error [N] at each force of FORCES_N, as `rig track` found it."""
-    model, result = folder / "model.json", folder / "result.json"
-    model_of(subject).save(model)
-    hidden = [f"surface_motion.amplitude_mm={LIMB_MM}", f"surface_motion.frequency_Hz={MOTION_HZ}"]
-    command = [
-        str(Path(sys.executable).with_name("rig")), "track", "--model", str(model),
-        "--force", ",".join(f"{force_N:g}" for force_N in FORCES_N), "--seconds", f"{SECONDS:g}",
-        "--out", str(folder / "session"), "--json", str(result),
-        "--set", f"mock.parameters={json.dumps(str(FOLDER / f'{subject}.toml'))}",
-        "--set", f"mock.hide={json.dumps(hidden)}",
-    ]  # fmt: skip
-    subprocess.run(command, check=True, timeout=PATIENCE_S, cwd=folder)
-    return [plateau["rms_error_N"] for plateau in json.loads(result.read_text())["levels"]]
+def parts(seeds: int) -> Iterator[Part]:
+    """All, what matters most first."""
+    for seed, (kind, stiffness, names) in product(range(1, 1 + seeds), ROUNDS):
+        for subject, factor, law in product(SUBJECTS, stiffness, names):
+            yield Part(kind, subject, factor, law, seed)
+
+
+def measure(file: Path, minutes: float, seeds: int) -> list[WiredPart]:
+    """What is in ``file``, after all that is lacking there and begins within ``minutes`` was added."""
+    began = time.monotonic()
+    known = read(file)
+    # Identified once for the whole file, by the computer that runs it.
+    os.environ["XDG_STATE_HOME"] = str(file.resolve().with_suffix(".state"))
+    for part in parts(seeds):
+        if part in {one.part for one in known}:
+            continue
+        if time.monotonic() - began > 60 * minutes:
+            break
+        known.append(measured(part))
+        print(known[-1].model_dump_json(), flush=True)
+        with file.open("a") as lines:
+            lines.write(known[-1].model_dump_json() + "\n")
+    return known
+
+
+def read(file: Path) -> list[WiredPart]:
+    """The parts that ``file`` holds; none where there is none."""
+    return [WiredPart.model_validate_json(line) for line in file.read_text().splitlines()] if file.exists() else []
+
+
+def measured(part: Part) -> WiredPart:
+    """One part on the bench and in the simulation; what a stall stopped is done again."""
+    for again in reversed(range(TRIES)):
+        try:
+            program, asked, force_N, missed = on_bench(part)
+        except RigError as error:
+            if not again:
+                raise
+            print(f"{part}: {error}; once more", flush=True)
+        else:
+            break
+    on_wire = wire_programs.judge(part.kind, part.stiffness, asked, force_N)
+    simulated = wire_programs.judge(part.kind, part.stiffness, *in_simulation(part, program))
+    found = [Wired(case=case, bench=value, simulated=simulated[case]) for case, value in on_wire.items()]
+    return WiredPart(part=part, found=tuple(found), missed=missed)
+
+
+def on_bench(part: Part) -> tuple[Program, Asked, Column, int]:
+    """The program, what it asked for and the force sensed, each a millisecond apart, and slots missed."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        wiring = wiring_of(part, folder)
+        module = LOOP_MODULE if part.law == LAW else rival_process.MODULE
+        with bench_for(wiring) as (live, _):
+            program = with_law(part, wire_programs.program(part.kind, model_of(part.subject), live), live)
+            with Supervisor(live, loop_module=module) as bench:
+                done = tracked.recorded_run(bench, program, folder / "session", part.subject)
+        if done.outcome.stopped:
+            raise RigError(done.outcome.cause)
+        loop = read_recording(done.file).tables["loop"]
+    on = loop[loop["mode"] == Mode.CONTACT]
+    missed = int(loop["missed"][-1] - loop["missed"][0])
+    return program, *_by_milliseconds(on["capture_ns"] * 1e-9, on["reference_N"], on["force_N"]), missed
+
+
+def wiring_of(part: Part, folder: Path) -> Wiring:
+    """The built-in mock bench with the subject's tissue, its limb swinging where the part says so."""
+    tissue = load_parameters(FOLDER / f"{part.subject}.toml").tissue
+    told = {"a_N_mm": part.stiffness * tissue.a_N_mm, "b_per_mm": tissue.b_per_mm}
+    lines = [f"{name} = {value!r}" for name, value in (told | {"damping_N_s_mm": tissue.damping_N_s_mm}).items()]
+    (folder / "subject.toml").write_text("\n".join(["[tissue]", *lines]) + "\n")
+    swings = f"surface_motion.amplitude_mm={LIMB_MM}", f"surface_motion.frequency_Hz={SWING_HZ}"
+    hidden = swings if part.kind == "limb" else ()
+    return Wiring.model_validate({"mock": {"parameters": folder / "subject.toml", "hide": hidden}})
+
+
+def with_law(part: Part, program: Program, wiring: Wiring) -> Program:
+    """The program as it is for the law; for a constant with its numbers, tuned on this bench's own axis."""
+    if part.law == LAW:
+        return program
+    tissue = laws.tissue_of("constant", part.subject)
+    drifts = (0.0,) if part.law == BEST_AT_CONTACT else DRIFTS_RAD_S
+    tuning = rival_tuning.tuned(response_of(wiring), rates_of(wiring), [tissue], drifts)
+    numbers = {
+        "crossover_rad_s": tuning.integral, "lead_s": tuning.lead_s, "drift_rad_s": tuning.drift_rad_s,
+    }  # fmt: skip
+    steps = [step.model_copy(update=numbers) if isinstance(step, TrackForce) else step for step in program.steps]
+    return program.model_copy(update={"steps": tuple(steps)})
+
+
+def in_simulation(part: Part, program: Program) -> tuple[Asked, Column]:
+    """The same reference, by the same law as it is for the simulated axis."""
+    law = laws.shaped(part.subject, PLANT) if part.law == LAW else CONSTANTS[part.law](part.subject, PLANT)
+    line, gap_mm = wire_programs.simulated_line(part.kind, program)
+    time_s = np.arange(0.0, line.duration_s, DT_S)
+    along_s = np.append(time_s, time_s[-1] + DT_S)
+    surface_mm = swing(along_s, LIMB_MM, SWING_HZ) if part.kind == "limb" else np.full_like(along_s, gap_mm)
+    asked_N = force_profile.along(force_profile.preview(line, law.preview_s), time_s)
+    limb = limb_of(model_of(part.subject), part.stiffness)
+    found = run(law, asked_N, PLANT.bench(limb, surface_mm), part.seed, DT_S)
+    return Asked(time_s, force_profile.along(line, time_s)), found.sensed_N
+
+
+def _by_milliseconds(time_s: Column, reference_N: Column, force_N: Column) -> tuple[Asked, Column]:
+    """Rows of the loop on a grid: a slot that was missed has the row before it, time out of contact is left out."""
+    gaps_s = np.diff(time_s, prepend=time_s[0] - DT_S)
+    gaps_s[gaps_s > wire_programs.APART_S] = DT_S
+    own_s = np.cumsum(gaps_s)
+    grid_s = np.arange(own_s[0], own_s[-1], DT_S)
+    at = np.searchsorted(own_s, grid_s, side="right") - 1
+    return Asked(grid_s, reference_N[at]), force_N[at]
