@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 import typer
 
 from api.cli import live
-from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
+from api.cli.options import ConfigOption, JsonOption, SetOption, calibrated, wiring_from
 from api.cli.output import show, write_json
 from api.operations import motion
 from api.operations.motion import Captured, TrackPlan
@@ -97,10 +97,10 @@ def track(
 
 def _tracked(wiring: Wiring, folder: Path, asked: "TrackOptions", against: Path | None, json_file: Path | None) -> None:
     """One run, after one with the other model where there is one; all is checked before anything is opened."""
-    _plans(wiring, asked, against)
+    _plans(calibrated(wiring), asked, against)
     tracked.refuse_foreign(folder)
     with live.running(wiring) as bench:
-        # By the axis that answered: a simulated one is identified when it is first asked for.
+        # By the axis that answered: a simulated one is identified when it is first asked for, else it is the same law.
         wanted, other = _plans(bench.wiring, asked, against)
         found = followed(bench, wanted, folder, other)
     quality = "quality: " + "; ".join([found.quality, *found.reasons])

@@ -14,7 +14,7 @@ from itertools import product
 from pathlib import Path
 
 from benchmarks.control import pictures
-from benchmarks.control.laws import ABLATIONS, CONSTANTS, LAW, OTHERS, makers, track_step
+from benchmarks.control.laws import ABLATIONS, CONSTANTS, LAW, LEAVES, OTHERS, TRIED, makers, track_step
 from benchmarks.control.plants import FAST, PLANT, SLOW, SUBJECTS, Plant, model_of, wiring_of
 from benchmarks.control.runs import jobs_of, play_all
 from benchmarks.control.scores import (
@@ -93,9 +93,11 @@ def _simulation(asked: argparse.Namespace) -> list[str]:
     shown = table(scores, names)
     if not asked.quick:
         shown += other_plants(asked.processes)
+        touched = [score for one in play_all(jobs_of([LEAVES], "touch", (1,)), 1) for score in one.scores]
+        shown += table(touched, [LEAVES], "no law")
     found = headline(scores, worst_margins())
     compared = [*scores, *best_constant(scores)]
-    rivals = [BEST, *(name for name in names if name != LAW and name not in ABLATIONS)]
+    rivals = [BEST, *(name for name in names if name not in {LAW, *ABLATIONS, *TRIED})]
     against = {rival: _against(compared, rival) for rival in rivals}
     seconds = time.monotonic() - began
     result = Result(
@@ -183,7 +185,7 @@ def _against(scores: Sequence[Score], rival: str) -> dict[str, tuple[float, floa
 
 
 def _print(result: Result, names: Sequence[str]) -> None:
-    laws_shown = [name for name in (LAW, *CONSTANTS, *OTHERS, *ABLATIONS) if name in names]
+    laws_shown = [name for name in (LAW, *CONSTANTS, *OTHERS, *ABLATIONS, *TRIED, LEAVES) if name in (*names, LEAVES)]
     print("mean of five subjects (worst); errors in mN, jumps in ms, contact and bone over what was asked")
     for name in laws_shown:
         print(f"  {laws_shown.index(name)}: {name}")

@@ -17,7 +17,7 @@ RAMP_N_S, SETTLE_S = 5.0, 1.5
 FORCES_N = (0.5, 1.0, 2.0, 5.0, 10.0)
 LIMB_MM, LIMB_HZ = 0.5, (0.2, 0.5, 1.0, 2.0, 3.0)
 WRONG = (0.5, 1.0, 2.0)
-COMING_MM_S = (0.0, 5.0, 15.0)
+COMING_MM_S, CONTACT_N = (0.0, 5.0, 15.0), 0.3
 SINE_HZ = (0.5, 1.0, 2.0, 5.0, 10.0)
 # The usual band, and where that is less than three standard deviations of the sensor's noise (0.005 N), these.
 BAND, LEAST_BAND_N = 0.02, 0.015
@@ -181,14 +181,14 @@ def _settled(reference_N: Column, mean_N: Column, band: float, least_N: float) -
     return (int(outside[-1]) + 1) * DT_S if len(outside) else 0.0
 
 
-def contact(speed_mm_s: float) -> Case:
+def contact(speed_mm_s: float, asked_N: float = CONTACT_N) -> Case:
     """A limb that is met, at rest or coming at a speed, where 0.3 N are asked for: the peak over them."""
-    line = Line((0.0, 2.0), (0.3, 0.3))
+    line = Line((0.0, 2.0), (asked_N, asked_N))
 
     def coming(time_s: Column) -> Column:
         return np.asarray(np.maximum(1.0 - speed_mm_s * time_s, 0.0) if speed_mm_s else np.full_like(time_s, 0.5))
 
-    return Case(f"contact, {speed_mm_s:g} mm/s", line, coming, lambda _, found: float(found.tissue_N.max()) / 0.3)
+    return Case(f"contact, {speed_mm_s:g} mm/s", line, coming, lambda _, found: float(found.tissue_N.max()) / CONTACT_N)
 
 
 def relaxing() -> Case:

@@ -141,8 +141,14 @@ def plain(subject: str, plant: Plant) -> Law:
     return pi(subject, plant, "constant", tuning_of("constant", (subject,), plant, (0.0,)), ahead=False)
 
 
+def leaves(subject: str, plant: Plant) -> Law:
+    """No law: a tip that searches, and leaves at full speed with the first force that is felt."""
+    return pi(subject, plant, "constant", Tuning(1e6, 0.0, 0.0), ahead=False)
+
+
 Maker = Callable[[str, Plant], Law]
 LAW = "law"
+LEAVES = "leaves when touched"
 # Not in the product: what they gain and cost is for the table to say.
 TRIED: Mapping[str, Maker] = {
     "friction compensation": partial(tried, ahead_mm=GIVES_WAY_MM),
@@ -164,7 +170,7 @@ OTHERS: Mapping[str, Maker] = {
 
 
 def makers(names: Sequence[str] = ()) -> Mapping[str, Maker]:
-    """All laws, or those named."""
+    """All that are compared, or those named."""
     ablated: dict[str, Maker] = {name: partial(shaped, ablation=off) for name, off in ABLATIONS.items()}
-    every: dict[str, Maker] = {LAW: shaped, **CONSTANTS, **OTHERS, **ablated, **TRIED}
-    return {name: every[name] for name in names or every}
+    every: dict[str, Maker] = {LAW: shaped, **CONSTANTS, **OTHERS, **ablated, **TRIED, LEAVES: leaves}
+    return {name: every[name] for name in names or tuple(every)[:-1]}

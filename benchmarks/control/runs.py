@@ -10,6 +10,7 @@ from benchmarks.control.cases import Case, played_all
 from benchmarks.control.laws import makers
 from benchmarks.control.plants import PLANT, SUBJECTS, Plant
 from benchmarks.control.scores import Score
+from controller.experiments.tracking import CONTACT_N
 from rig.errors import UsageError
 
 
@@ -37,10 +38,16 @@ def jobs_of(names: Sequence[str], asked: str, seeds: Sequence[int], plant: Plant
 
 
 def cases_of(asked: str) -> Sequence[Case]:
-    """``every``, those of the headline alone (``quick``), or those played on another axis or sensor (``plants``)."""
+    """``every``, those of the headline alone (``quick``), those played on another axis or sensor (``plants``).
+
+    ``touch``: contacts where hardly more is asked for than what says that there is one.
+    """
     if asked == "plants":
         limbs = [cases.limb_motion(force_N, 2.0) for force_N in (0.5, 2.0, 10.0)]
-        return [*limbs, cases.contact(0.0), cases.stair("low jumps", 0.3, 1.5, 0.3, 1.0, 1.0)]
+        others = cases.breathing(10.0), cases.contact(0.0), cases.stair("low jumps", 0.3, 1.5, 0.3, 1.0, 1.0)
+        return [*limbs, *others]
+    if asked == "touch":
+        return [cases.contact(speed_mm_s, asked_N=0.501 * CONTACT_N) for speed_mm_s in cases.COMING_MM_S]
     return list(cases.every(quick=asked == "quick"))
 
 

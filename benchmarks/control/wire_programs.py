@@ -23,8 +23,8 @@ from rig.tissue.model import Model
 
 Kind = Literal["limb", "contact", "low jumps", "jumps"]
 SWING_HZ = 2.0
-# Two seconds of a hold are judged, four turns of the limb; the loop has settled for 1.5 s then.
-HOLD_S, JUDGED_S, JUMP_S = 3.5, 2.0, 1.0
+# Three turns of the limb are judged; the loop has settled for a second then.
+HOLD_S, JUDGED_S, JUMP_S = 2.5, 1.5, 1.0
 STAIRS = {"low jumps": (0.3, 1.5, 0.3), "jumps": (1.0, 10.0, 1.0)}
 TOUCH_N, TOUCH_S, TOUCHES, GAP_MM = 0.3, 0.6, 5, 0.5
 TOUCH_SMOOTH = 5  # samples of a peak: of a sample's noise, 0.017 of 0.3 N, less than a hundredth is left

@@ -66,9 +66,9 @@ def test_the_simulation_plays_what_the_bench_is_asked_for(kind: wire_programs.Ki
 
 
 def test_an_error_of_a_limb_is_judged_at_the_end_of_each_level() -> None:
-    time_s = np.arange(0.0, 17.5, 1e-3)
-    asked_N = np.array([0.5, 1.0, 2.0, 5.0, 10.0])[np.minimum((time_s / 3.5).astype(int), 4)]
-    late = (time_s % 3.5) < 1.4  # far off while it settles, then a sine of 20 mN
+    time_s = np.arange(0.0, 12.5, 1e-3)
+    asked_N = np.array([0.5, 1.0, 2.0, 5.0, 10.0])[np.minimum((time_s / 2.5).astype(int), 4)]
+    late = (time_s % 2.5) < 0.9  # far off while it settles, then a sine of 20 mN
     force_N = asked_N + np.where(late, 1.0, 0.02 * np.sqrt(2) * np.sin(2 * np.pi * 2.0 * time_s))
     found = wire_programs.judge("limb", 1.0, Asked(time_s, asked_N), force_N)
     assert list(found.values()) == pytest.approx([0.02] * 5, rel=0.02)

@@ -41,6 +41,17 @@ def test_a_law_a_tenth_faster_would_not_keep_them() -> None:
     assert np.min(found.phase_deg) < 45.0 or np.min(found.gain) < 2.0
 
 
+@pytest.mark.parametrize("rates", [FAST, SLOW], ids=["1 kHz", "100 Hz"])
+@pytest.mark.parametrize("extra_s", [0.0, 0.012])
+def test_what_is_not_searched_could_not_have_been_the_best(rates: Rates, extra_s: float) -> None:
+    axis = AXIS._replace(delay_s=AXIS.delay_s + extra_s)
+    leads_s = np.linspace(0.0, 1.5 * max(axis.lag1_s + axis.lag2_s, rates.sample_s), synthesis.LEAD_STEPS)
+    every = [synthesis._fastest(axis, rates, SPAN, lead_s, share) for lead_s in leads_s for share in synthesis.SHARES]
+    best = max(law.crossover_rad_s * law.drift_rad_s for law in every)
+    found = constants(axis, rates, SPAN)
+    assert found.crossover_rad_s * found.drift_rad_s == best
+
+
 def test_both_leads_are_worth_it() -> None:
     """Without them the loop that keeps the margins resists a moving limb a fifth as well."""
     law = constants(AXIS, FAST, SPAN)
