@@ -133,7 +133,7 @@ def on_bench(part: Part) -> tuple[Program, Asked, Column, int]:
         if done.outcome.stopped:
             raise RigError(done.outcome.cause)
         loop = read_recording(done.file).tables["loop"]
-    on = loop[loop["mode"] == Mode.CONTACT]
+    on = loop[(loop["mode"] == Mode.CONTACT) & np.isfinite(loop["reference_N"])]
     missed = int(loop["missed"][-1] - loop["missed"][0])
     return program, *_by_milliseconds(on["capture_ns"] * 1e-9, on["reference_N"], on["force_N"]), missed
 

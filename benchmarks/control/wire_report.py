@@ -81,10 +81,10 @@ def show(found: Sequence[WiredPart]) -> list[str]:
             mean = mean_of(scores, law, [case])
             print(f"{where:10} {case:22} {law:20} {mean.value:8.4f} +- {mean.within:.4f} (worst {mean.worst:.4f})")
     confirmed = list(gains(found))
-    for what, subjects, bench, simulated, promised in confirmed:
-        spread = f"{bench.value:6.2f} ({bench.low:.2f} to {bench.high:.2f})"
-        print(f"{what:18} {subjects} subjects: bench {spread}, simulated {simulated.value:.2f}, ratio"
-              f" {bench.value / simulated.value:.2f}, promised {promised:g}")  # fmt: skip
+    for one in confirmed:
+        spread = f"{one.bench.value:6.2f} ({one.bench.low:.2f} to {one.bench.high:.2f})"
+        print(f"{one.what:18} {one.subjects} subjects: bench {spread}, simulated {one.simulated.value:.2f}, ratio"
+              f" {one.ratio:.2f}, promised {one.promised:g}")  # fmt: skip
     print(f"slots of the loop missed: {sum(one.missed for one in found)} in {len(found)} runs")
     touched = [score for score in scores_of(found, True) if score.case == CONTACT]
     peaks = {law: mean_of(touched, law, [CONTACT]).worst for law in (LAW, CONSTANT, BEST_AT_CONTACT)

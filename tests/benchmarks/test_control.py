@@ -12,7 +12,7 @@ from benchmarks.control.laws import LAW, admittance, constant, shaped
 from benchmarks.control.motion import Bench, Contact, Law, Run, run
 from benchmarks.control.plants import FAST, PLANT, SUBJECTS, Plant, limb_of, model_of, wiring_of
 from benchmarks.control.rival_tuning import LEAST_N, TissueAt, Tuning, fastest, tissue_at, worst
-from benchmarks.control.runs import jobs_of, play_all
+from benchmarks.control.runs import cases_of, jobs_of, play_all
 from benchmarks.control.scores import BEST, Score, best_constant, gain_of, headline, mean_of
 from controller.law.axis_response import rates_of, response_of
 from controller.law.loop_response import Rates
@@ -220,3 +220,25 @@ def test_the_law_beats_the_tuned_constant_where_a_limb_moves_and_its_plant_does_
     assert cases.played(case, bare, "average", 1) > 3.0 * ours
     line, steady_s = held(1.0, 3.0)
     assert line.duration_s == pytest.approx(steady_s + 3.0)
+
+
+def test_a_tip_that_leaves_when_touched_is_pressed_by_damping_and_the_way_it_takes_to_turn() -> None:
+    """No law is gentler: B (v + 5 mm/s) at once, and stiffness times the way until the axis has turned."""
+    for subject in ("soft", "tense"):
+        model, law = model_of(subject), laws.leaves(subject, PLANT)
+        (case,) = (one for one in cases_of("touch") if one.name == "contact, 15 mm/s")
+        peak_N = 0.3 * cases.played(case, law, subject, 1)
+        at_once_N = model.damping_N_s_mm * 20.0
+        assert at_once_N < peak_N < at_once_N + 1.2 * model.tangent_N_mm(0.0) * 20.0 * 0.01
+        assert cases.played(cases.contact(15.0), shaped(subject, PLANT), subject, 1) >= 0.99 * peak_N / 0.3
+
+
+def test_parts_that_were_tried_are_the_law_itself_where_they_are_off() -> None:
+    case = limb_motion(1.0, 2.0)
+    assert cases.played(case, laws.tried("lean", PLANT), "lean", 1) == cases.played(
+        case, shaped("lean", PLANT), "lean", 1
+    )
+    # Ahead in the direction of motion, so that a stiff limb comes to rest nearer.
+    standing = cases.standing(10.0)
+    ahead = laws.makers(["friction compensation"])["friction compensation"]("tense", PLANT)
+    assert cases.played(standing, ahead, "tense", 1) < 0.6 * cases.played(standing, shaped("tense", PLANT), "tense", 1)

@@ -11,9 +11,12 @@ from benchmarks.control.cases import Asked
 from benchmarks.control.laws import LAW
 from benchmarks.control.plants import PLANT, limb_of, model_of, wiring_of
 from benchmarks.control.rival_process import ConstantLaw
+from benchmarks.control.rival_tuning import DRIFTS_RAD_S
 from benchmarks.control.wire import CONSTANT, Part, Wired, WiredPart
 from controller.law.force_position import ForceReading
+from controller.law.inverse_model import columns
 from controller.loop.steps import TrackForce
+from mock_devices.parameters import load_parameters
 
 LIMB = Part("limb", "average", 1.0, CONSTANT, 1)
 GAINS = {"limb 2 Hz, 0.5 N": 4.0, "limb 2 Hz, 1 N": 4.0, "limb 2 Hz, 2 N": 3.0, "limb 2 Hz, 5 N": 2.0,
@@ -30,19 +33,19 @@ def track_of(part: Part) -> TrackForce:
 def test_the_loop_runs_the_constant_that_the_simulation_runs() -> None:
     """The step that goes over the wire, cycle by cycle, against `rival_law` with the tables it was tuned with."""
     step, simulated = track_of(LIMB), laws.constant("average", PLANT)
-    memory = ConstantLaw.begin(laws.columns(step.gains), step.settings.inverse, 0.5)
+    memory = ConstantLaw.begin(columns(step.gains), step.settings.inverse, 0.5)
     other = rival_law.begin(simulated.table, simulated.settings.inverse, 0.5)
     for cycle in range(400):
         reading = ForceReading(0.5 + 0.1 * math.sin(0.05 * cycle), cycle)
         asked_N = 0.5 if cycle < 100 else 1.0
-        ours, memory = ConstantLaw.increment(memory, laws.columns(step.gains), step.settings, asked_N, reading, 0.001)
+        ours, memory = ConstantLaw.increment(memory, columns(step.gains), step.settings, asked_N, reading, 0.001)
         theirs, other = rival_law.increment(other, simulated.table, simulated.settings, asked_N, reading, 0.001)
         assert ours == pytest.approx(theirs, abs=1e-12)
     assert math.isnan(memory.tangent_N_mm)
 
 
 def test_a_constant_goes_over_the_wire_with_its_own_numbers_and_the_law_with_its_own() -> None:
-    tuning = laws.tuning_of("constant", ("average",), PLANT, wire.DRIFTS_RAD_S)
+    tuning = laws.tuning_of("constant", ("average",), PLANT, DRIFTS_RAD_S)
     rival, ours = track_of(LIMB), track_of(LIMB._replace(law=LAW))
     numbers = rival.crossover_rad_s, rival.lead_s, rival.drift_rad_s
     assert numbers == pytest.approx((tuning.integral, tuning.lead_s, tuning.drift_rad_s))
@@ -66,7 +69,7 @@ def test_the_simulation_plays_what_the_bench_is_asked_for(kind: wire_programs.Ki
 
 
 def test_an_error_of_a_limb_is_judged_at_the_end_of_each_level() -> None:
-    time_s = np.arange(0.0, 12.5, 1e-3)
+    time_s = 1e-3 * np.arange(12_500, dtype=np.float64)
     asked_N = np.array([0.5, 1.0, 2.0, 5.0, 10.0])[np.minimum((time_s / 2.5).astype(int), 4)]
     late = (time_s % 2.5) < 0.9  # far off while it settles, then a sine of 20 mN
     force_N = asked_N + np.where(late, 1.0, 0.02 * np.sqrt(2) * np.sin(2 * np.pi * 2.0 * time_s))
@@ -144,7 +147,7 @@ def test_a_measurement_goes_on_where_its_file_ended(tmp_path: Path, monkeypatch:
 def test_the_tissue_on_the_bench_is_as_many_times_as_stiff(tmp_path: Path) -> None:
     wiring = wire.wiring_of(Part("jumps", "firm", 2.0, LAW, 1), tmp_path)
     assert wiring.mock.parameters
-    tissue = wire.load_parameters(wiring.mock.parameters).tissue
+    tissue = load_parameters(wiring.mock.parameters).tissue
     stiff = limb_of(model_of("firm"), 2.0)
     depth_mm = float(stiff.depth_mm[300])
     force_N = tissue.a_N_mm * depth_mm * math.exp(tissue.b_per_mm * depth_mm)
