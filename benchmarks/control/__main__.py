@@ -86,7 +86,7 @@ def _wire(asked: argparse.Namespace) -> list[str]:
 def _simulation(asked: argparse.Namespace) -> list[str]:
     """Prints what was found, the headline last; returns the promises that are not kept."""
     began = time.monotonic()
-    names = QUICK_LAWS if asked.quick else tuple(makers())
+    names = asked.laws or (QUICK_LAWS if asked.quick else tuple(makers()))
     seeds = range(1, 1 + (asked.seeds or (QUICK_SEEDS if asked.quick else SEEDS)))
     done = play_all(jobs_of(names, "quick" if asked.quick else "every", seeds), asked.processes)
     scores = [score for one in done for score in one.scores]
@@ -116,6 +116,7 @@ def _simulation(asked: argparse.Namespace) -> list[str]:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.control", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="one seed, tuned constants only, the headline's tests")
+    parser.add_argument("--laws", nargs="*", choices=list(makers()), help="these alone; law and constants first")
     parser.add_argument("--seeds", type=int, default=0, help=f"seeds of noise for each subject; else {SEEDS}, or 1")
     parser.add_argument("--json", type=Path, help="all numbers")
     parser.add_argument("--pictures", type=Path, help="folder for the pictures")
