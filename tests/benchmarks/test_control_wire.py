@@ -81,7 +81,7 @@ def test_a_peak_is_the_mean_of_all_touches() -> None:
     touch = np.full(600, 0.3)
     peaked = touch.copy()
     peaked[150:160] = 0.45
-    asked = Asked(np.arange(1200) * 1e-3, np.full(1200, 0.3))
+    asked = Asked(1e-3 * np.arange(1200, dtype=np.float64), np.full(1200, 0.3))
     found = wire_programs.judge("contact", 1.0, asked, np.concatenate([touch, peaked]))
     assert found == {"contact, 0 mm/s": pytest.approx((1.0 + 1.5) / 2)}
 
