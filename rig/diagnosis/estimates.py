@@ -95,9 +95,10 @@ class OwnSpread:
 class ErrorBudget:
     """Errors [N] on recordings left out, each with its own contact, zero and stiffness; None where data tell nothing.
 
-    ``floor_N`` is what could be reached, ``repeatability_N`` what repeats of one motion differ by,
-    ``shared_by_repeats`` what their errors have in common, over what they differ by (power), ``explained_share`` how
-    much of what could be taken off the error of the simulation as it was the causes named take off (power).
+    ``base_N`` is of the simulation as it is, where these stay as the causes named leave them, ``floor_N`` what could be
+    reached, ``repeatability_N`` what repeats of one motion differ by, ``shared_by_repeats`` what their errors have in
+    common, over what they differ by (power), ``explained_share`` how much of what could be taken off the error of the
+    simulation as it was the causes named take off (power).
     ``stiffness_N_mm``, how force rises with depth where the tip presses, turns such an error into one of depth.
     """
 

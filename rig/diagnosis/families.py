@@ -6,7 +6,6 @@ cause they take is computed from the tangents of the final model, contact and re
 
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -19,12 +18,10 @@ from rig.diagnosis.problem import Effect
 from rig.diagnosis.search import Named, Search, testable
 from rig.diagnosis.support import stands_on_any_law
 from rig.diagnosis.whitening import shifted
-from rig.simulation.chain import Operator, Series, Tip
-from rig.tissue.index_law import Fields
 
 # Of the evidence for a cause: what another elastic law leaves of it is then less than what that law takes.
 MOST_TAKEN = 0.5
-STEP_SHARE = 1e-3  # of the force's range, for the slope over a spline's height
+STEP_SHARE = 1e-3  # of the law's force, for the slope over a spline's height
 FORM = "elastic_law"
 
 
@@ -84,20 +81,17 @@ def power_left(columns: Array, model: Array) -> float:
 
 
 def elastic_columns(fit: Fit) -> Array:
-    """White change of all channels for each spline of depth in the tissue's law at rest, shape (n, splines)."""
+    """White change of all channels for each spline of depth in the tissue's law at rest, shape (n, splines).
+
+    It bends the law that the causes act on: beside a force that a cause scales, none of it may be left unscaled.
+    """
     problem = fit.problem
     assert isinstance(problem, IndentationProblem)
     values = shifted(problem, fit.values, fit.whitener.noise.shifts)
     depth_mm = problem.data.drive.position_mm - values["surface_mm"] - values["contact_offset_mm"]
     depths, splines = Basis(problem.data.drive, ROOM * max(float(depth_mm.max()), 1e-3)).table
-    step_N = STEP_SHARE * float(np.ptp(problem.data.force_N))
     found = []
     for spline in splines.T:
-        bent = problem.predict(values, (Operator("elastic", partial(_bent, depths, step_N * spline)),))
-        found.append(fit.whitener([(a - b) / step_N for a, b in zip(bent, fit.prediction, strict=True)]))
+        bent = problem.predict({**values, "bend_mm": depths, "bend": STEP_SHARE * spline})
+        found.append(fit.whitener([(a - b) / STEP_SHARE for a, b in zip(bent, fit.prediction, strict=True)]))
     return np.stack(found, axis=1)
-
-
-def _bent(depths: Array, bend_N: Array, tip: Tip, force_N: Series, _: Fields) -> Series:
-    """The law at rest and a curve over depth beside it."""
-    return np.asarray(force_N + np.interp(tip.depth_mm, depths, bend_N))

@@ -7,14 +7,16 @@ from itertools import pairwise
 import numpy as np
 
 from rig.diagnosis.bootstrap import bootstrap
+from rig.diagnosis.descent import descend
 from rig.diagnosis.estimates import ErrorBudget, Estimate, OwnSpread
-from rig.diagnosis.fit import Fit
+from rig.diagnosis.fit import LM_STEPS, Fit, assemble, free_parameters
 from rig.diagnosis.flexible import ROOM, Basis, Flexible
 from rig.diagnosis.indentation import IndentationProblem
 from rig.diagnosis.left_out import LeftOut, left_out, with_own_terms
 from rig.diagnosis.noise import Array, Mask
 from rig.diagnosis.problem import Effect
 from rig.diagnosis.repeats import compare_repeats
+from rig.diagnosis.whitening import Whitener
 from rig.remembered import known_of
 from rig.simulation.drive import MeasuredMotion
 from rig.trials.segments import Kind, rows_in, segments_of
@@ -42,11 +44,12 @@ def error_budget(before: Fit, after: Fit) -> JudgedErrors:
     assert isinstance(problem, IndentationProblem)
     own = with_own_terms(after, blind)
     own_before = closest_before(before, after) if after.effects else own
-    base, extended = left_out(own_before), left_out(own)
+    extended = left_out(own)
+    base = without_causes(own, own_before) if after.effects else extended
     # Contact has local minima, and a model that misses much may stand in one.
     flexible = _least([flexible_errors(start, (), True) for start in (own, *([own_before] if after.effects else []))])
     bench = tuple(effect for effect in after.effects if effect.is_of_bench)
-    floor = _least([base, extended, flexible, *([flexible_errors(own, bench, True)] if bench else [])])
+    floor = _least([left_out(own_before), extended, flexible, *([flexible_errors(own, bench, True)] if bench else [])])
     repeats = compare_repeats(extended, problem.data.drive, contacts_mm(own))
     return JudgedErrors(
         base=base,
@@ -69,6 +72,19 @@ def closest_before(before: Fit, after: Fit) -> Fit:
     null = {par.name: par.null for effect in after.effects for par in effect.pars}
     starts = before, replace(after, effects=(), values={**after.values, **null})
     return min((with_own_terms(one, after.whitener.blind) for one in starts), key=lambda own: left_out(own).rms)
+
+
+def without_causes(own: Fit, own_before: Fit) -> LeftOut:
+    """Errors of the simulation as it is, where what recordings have of their own stays as the causes named leave it.
+
+    Terms fitted again would take up what a cause does between recordings, as softening by cycles or a drift of zero do.
+    """
+    problem, noise = own.problem, own.whitener.noise
+    held = Whitener(problem, noise, None, np.zeros_like(own.whitener.secants), own.whitener.blind)
+    free = free_parameters(problem, ())
+    null = {par.name: par.null for effect in own.effects for par in effect.pars}
+    ends = (descend(free, start, held, 3 * LM_STEPS)[0] for start in ({**own.values, **null}, own_before.values))
+    return _least([left_out(assemble(problem, (), end, held)) for end in ends])
 
 
 def _least(found: Sequence[LeftOut]) -> LeftOut:

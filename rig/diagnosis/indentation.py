@@ -14,7 +14,7 @@ from rig.diagnosis.effects.tissue import STIFFENING, STIFFENING_EFFECT
 from rig.diagnosis.observations import Observations
 from rig.diagnosis.problem import Array, Effect, Par, Scatter, Signal, Values, operators
 from rig.remembered import exp
-from rig.simulation.chain import Operator, respond
+from rig.simulation.chain import respond
 from rig.simulation.drive import SETTLE_MM_S, MeasuredMotion
 from rig.tissue.index_law import Fields, index_force
 
@@ -115,10 +115,10 @@ class IndentationProblem:
     def _nulls(self) -> Values:
         return nulls()
 
-    def predict(self, values: Fields, beside: Sequence[Operator] = ()) -> tuple[Array, ...]:
-        """Force, and tip where it was measured; ``beside`` acts after the causes."""
+    def predict(self, values: Fields) -> tuple[Array, ...]:
+        """Force, and tip where it was measured."""
         values = {**self._nulls, **values}
-        response = respond(self.data.drive, values, [*operators(self.effects, values), *beside])
+        response = respond(self.data.drive, values, operators(self.effects, values))
         return response if self.data.has_tracker else (response.force_N,)
 
     def blind(self, values: Fields) -> NDArray[np.bool_]:

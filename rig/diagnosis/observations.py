@@ -134,11 +134,18 @@ def _labels(usable: Sequence[Trial], parts: Sequence[_Gridded]) -> dict[str, tup
 
 
 def jitter_mm(trial: Trial) -> float:
-    """How far positions typically lie off a smooth motion, as a standard deviation; of their third differences."""
-    rough = np.diff(trial.axis_mm, 3)
+    """How far positions typically lie off a smooth motion through their stamps, as a standard deviation.
+
+    By third divided differences: a device that is read at uneven times, each stamped as it was, is no rough one.
+    """
+    four_s = np.stack([trial.axis_s[k : len(trial.axis_s) - 3 + k] for k in range(4)])
+    apart_s = four_s[:, None] - four_s[None] + np.eye(4)[:, :, None]
+    weights = 1 / apart_s.prod(axis=1)
+    places = np.stack([trial.axis_mm[k : len(trial.axis_mm) - 3 + k] for k in range(4)])
+    rough = (weights * places).sum(axis=0) / np.linalg.norm(weights, axis=0)
     moving = np.abs(np.diff(trial.axis_mm))[1:-1] > 0
     # Nine in ten lie within 1.645 standard deviations; the rest are corners of the motion.
-    return float(np.quantile(np.abs(rough[moving]), 0.9)) / (1.645 * np.sqrt(20)) if moving.any() else 0.0
+    return float(np.quantile(np.abs(rough[moving]), 0.9)) / 1.645 if moving.any() else 0.0
 
 
 def working_period(recordings: Sequence[Trial], rate_Hz: float = WORKING_RATE_HZ) -> float:

@@ -58,7 +58,8 @@ class DiagnosisResult(SavedResult):
     base_N: Number = Field(
         default=None,
         validation_alias=_of_budget("base_N"),
-        description="error on recordings left out, each with its own contact, zero and stiffness; so are those below",
+        description="error of the simulation as it is on recordings left out, each with its own contact, zero and "
+        "stiffness as the causes named leave them; with terms of their own are those below, too",
     )
     extended_N: Number = Field(
         default=None, validation_alias=_of_budget("extended_N"), description="with the causes named"

@@ -40,6 +40,8 @@ def explained(result: DiagnosisResult) -> str:
 
 def _share(result: DiagnosisResult) -> str:
     share, error = result.explained_share, _error(result)
+    if share is None and result.findings:
+        return f"what is named takes little off the error of force{error}"
     if share is None:
         return f"no model tried does better than the simulation as it is{error}"
     return f"{_percent(share)} any model tried could take off the error{error}"
@@ -55,7 +57,9 @@ def _error(result: DiagnosisResult) -> str:
     """What the share is of."""
     if result.base_N is None or result.extended_N is None:
         return ""
-    falls = f", which falls from {result.base_N:.2g} to {result.extended_N:.2g} N"
+    falls = (
+        f", which {'falls' if result.explained_share else 'goes'} from {result.base_N:.2g} to {result.extended_N:.2g} N"
+    )
     stays = f": the error is {result.extended_N:.2g} N"
     return f"{falls if result.findings else stays} ({result.floor_N:.2g} N could be reached)"
 
@@ -118,6 +122,8 @@ def cost(result: DiagnosisResult) -> str:
     if not result.findings:
         return f"the force is predicted within {_force_and_depth(result.extended_N, result)}"
     wrong_N = sqrt(max(result.base_N**2 - result.extended_N**2, 0.0))
+    if not wrong_N:
+        return "none in force: a model without it predicts that as well"
     return f"a model without it gets the force wrong by {_force_and_depth(wrong_N, result)}"
 
 

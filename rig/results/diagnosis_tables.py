@@ -13,7 +13,7 @@ def diagnosis_parts(result: DiagnosisResult) -> Iterator[Part]:
     """All of a diagnosis: five lines, the verdict in a sentence, then tables."""
     yield from five_lines(result)
     if result.verdict != "not judged":  # the lines say why
-        yield f"{result.verdict}: {result.statement}"
+        yield f"verdict: {result.verdict}. {result.statement}"
     yield from named_parts(result)
     yield from further_parts(result)
 

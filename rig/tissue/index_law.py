@@ -33,7 +33,7 @@ def index_force(depth_mm: FloatArray, a_N_mm: float | FloatArray, b_per_mm: floa
 def extended_force(depth_mm: FloatArray, values: Fields) -> FloatArray:
     """The index law times (x / 5 mm)^(n-1), 1 + q x, 1 + s x^3 and other laws' forms where these are off their null.
 
-    In N, for depths >= 0.
+    In N, for depths >= 0. ``bend`` over ``bend_mm`` is a curve of depth to bend any of them by, which no law has.
     """
     force_N = index_force(depth_mm, values["a_N_mm"], values["b_per_mm"])
     if values["exponent"] != 1:
@@ -48,6 +48,8 @@ def extended_force(depth_mm: FloatArray, values: Fields) -> FloatArray:
         force_N = force_N * ogden_form(depth_mm, values["ogden_per_mm"], values["ogden_exponent"])
     if values["layer_ratio"]:
         force_N = force_N * layer_form(depth_mm, values["layer_ratio"])
+    if "bend" in values:
+        force_N = force_N * (1 + np.interp(depth_mm, values["bend_mm"], values["bend"]))
     return force_N
 
 

@@ -9,7 +9,7 @@ from rig.config.protocol import Indentation
 from rig.diagnosis.design import LIMB, noiseless, planned
 from rig.diagnosis.effects.bench import FRICTION, POSITION_RIPPLE
 from rig.diagnosis.effects.memory import RELAXATION
-from rig.diagnosis.effects.tissue import ELASTIC_LAW, QUADRATIC_LAW, SUBSTRATE
+from rig.diagnosis.effects.tissue import ELASTIC_LAW, HUNT_CROSSLEY, PRECONDITIONING, QUADRATIC_LAW, SUBSTRATE
 from rig.diagnosis.estimates import ErrorGain, NamedCause
 from rig.diagnosis.evidence import tangents
 from rig.diagnosis.families import taken_by_elasticity, with_families
@@ -44,6 +44,22 @@ def test_an_elastic_law_takes_all_of_another_and_little_of_what_remembers_or_rub
     taken = taken_by_elasticity(fit, [SUBSTRATE, ELASTIC_LAW, RELAXATION, FRICTION])
     assert min(taken["substrate_per_mm3"], taken["exponent"]) > 0.9
     assert max(taken["relaxation_ratio"], taken["friction_N"]) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("cause", "sizes"),
+    [
+        (PRECONDITIONING, {"preconditioning_gain": 0.25, "preconditioning_cycles": 2.0}),
+        (HUNT_CROSSLEY, {"hunt_crossley_s_mm": 0.02}),
+    ],
+)
+def test_what_scales_the_force_of_the_law_is_no_law_but_leaves_a_family_one(
+    problem: IndentationProblem, cause: Effect, sizes: dict[str, float]
+) -> None:
+    fit = model(problem, SUBSTRATE, cause, substrate_per_mm3=0.001, **sizes)
+    taken = taken_by_elasticity(fit, [SUBSTRATE, cause])
+    assert taken["substrate_per_mm3"] > 0.9
+    assert taken[cause.key] < 0.1
 
 
 @pytest.mark.parametrize(("pitch_mm", "is_taken"), [(0.7, False), (6.0, True)])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
-from rig.diagnosis.observations import derivative, lost_times, observe
+from rig.diagnosis.observations import derivative, jitter_mm, lost_times, observe
 from rig.trials.trial import Trial, TrialSet
 
 
@@ -47,3 +47,13 @@ def test_lost_samples_are_rows_that_are_not_judged_with_the_motion_that_was_meas
 def test_breaks_are_filled_evenly_whatever_is_left_between_them_and_long_ones_are_breaks() -> None:
     assert lost_times(np.array([0.0, 0.01, 0.0205, 0.05]), 0.01) == pytest.approx([0.0303333, 0.0401667], abs=1e-6)
     assert not lost_times(np.array([0.0, 0.0149, 0.02, 6.0]), 0.01).size
+
+
+@pytest.mark.parametrize(("told", "expected_mm"), [(True, 0.0005 / np.sqrt(12)), (False, 20 * 5e-5)])
+def test_only_stamps_that_are_not_told_make_a_motion_rough(told: bool, expected_mm: float) -> None:
+    """At 20 mm/s, read 50 us early or late: with true stamps what is left is the rounding of an encoder of 0.5 um."""
+    rng, even_s = np.random.default_rng(4), np.arange(0, 1, 1e-3)
+    read_s = even_s + rng.normal(0, 5e-5, len(even_s))
+    place_mm = np.round(20 * read_s / 0.0005) * 0.0005
+    trial = Trial("one", even_s, even_s, read_s if told else even_s, place_mm)
+    assert jitter_mm(trial) == pytest.approx(expected_mm, rel=0.15)
