@@ -52,19 +52,12 @@ def error_budget(before: Fit, after: Fit) -> JudgedErrors:
     floor = _least([left_out(own_before), extended, flexible, *([flexible_errors(own, bench, True)] if bench else [])])
     repeats = compare_repeats(extended, problem.data.drive, contacts_mm(own))
     return JudgedErrors(
-        base=base,
-        extended=extended,
-        base_N=base.rms,
-        extended_N=extended.rms,
-        flexible_N=flexible.rms,
-        floor_N=floor.rms,
-        noise_N=noise_N(own),
-        repeatability_N=repeats.pure_error_N if repeats else None,
-        shared_by_repeats=repeats.shared if repeats else None,
+        base=base, extended=extended, base_N=base.rms, extended_N=extended.rms, flexible_N=flexible.rms,
+        floor_N=floor.rms, noise_N=noise_N(own), repeatability_N=repeats.pure_error_N if repeats else None,
+        shared_by_repeats=repeats.shared if repeats else None, scatter=own_spread(own),
         explained_share=explained_share(base.square_errors, extended.square_errors, floor.square_errors),
-        scatter=own_spread(own),
         stiffness_N_mm=stiffness_N_mm(own),
-    )
+    )  # fmt: skip
 
 
 def closest_before(before: Fit, after: Fit) -> Fit:

@@ -45,12 +45,8 @@ def outcome(step: SearchStep, named: Sequence[str]) -> str:
 def draw_step(axes: Axes, step: SearchStep, title: str) -> None:
     """Its bars, the cause that was taken in the model's colour."""
     bars = best_bars(step)
-    axes.barh(
-        [name for name, _ in bars],
-        [gain for _, gain in bars],
-        color=[MODEL if name == step.taken else OTHER for name, _ in bars],
-        height=0.7,
-    )
+    colors = [MODEL if name == step.taken else OTHER for name, _ in bars]
+    axes.barh([name for name, _ in bars], [gain for _, gain in bars], color=colors, height=0.7)
     axes.axvline(step.level, color=INK, linestyle=":", linewidth=1.2)
     dress(axes, title, "", "")
     if not bars:

@@ -6,20 +6,14 @@ from math import sqrt
 from rig.diagnosis.estimates import SAFE_NATS, Estimate, NamedCause, NextExperiment
 from rig.results.diagnosis import DiagnosisResult
 
-WIDTH = len("explained: ")
+LINES, WIDTH = ("asked", "explained", "cause", "cost", "next"), len("explained: ")
 LONGEST_MIN = 60.0  # nobody holds still for longer
 
 
 def five_lines(result: DiagnosisResult) -> list[str]:
     """What was asked, how much is explained, by which cause, what it costs, and what to do next."""
-    said = {
-        "asked": asked(result),
-        "explained": explained(result),
-        "cause": causes(result),
-        "cost": cost(result),
-        "next": advice(result),
-    }
-    return [f"{name + ':':<{WIDTH}}{text}" for name, text in said.items()]
+    texts = asked(result), explained(result), causes(result), cost(result), advice(result)
+    return [f"{name + ':':<{WIDTH}}{text}" for name, text in zip(LINES, texts, strict=True)]
 
 
 def asked(result: DiagnosisResult) -> str:
