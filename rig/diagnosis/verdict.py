@@ -48,7 +48,7 @@ def shortfalls(budget: ErrorBudget) -> list[str]:
     if left_N > MOST_OVER_FLOOR * budget.floor_N:
         found.append(f"{budget.floor_N:.2g} N could be reached (at most {MOST_OVER_FLOOR:g} times that)")
     if shared is not None and shared.high > MOST_SHARED:
-        found.append(f"repeats share {shared.value:.2g} times the power that they differ by (at most {MOST_SHARED:g})")
+        found.append(f"repeats share up to {shared.high:.2g} times the power they differ by (at most {MOST_SHARED:g})")
     if chance_N is not None and left_N > MOST_OVER_NOISE * chance_N:
         by = "the noise" if budget.noise_N is not None else "what repeats differ by"
         found.append(f"it is {left_N / chance_N:.3g} times {by} (at most {MOST_OVER_NOISE:g})")
