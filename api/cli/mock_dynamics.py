@@ -22,7 +22,7 @@ from rig.errors import CheckFailed, DeviceError, RigError, UsageError
 # Four sweeps know delay and lags together to a tenth of a millisecond, and last three seconds.
 SWEEP_S, REPEATS, TURNS = 0.5, 4, 2
 FROM_MM, SPEED_MM_S = 2.0, 20.0
-# A busy computer may miss the bounds once.
+# A busy computer may miss the bounds once, or stand still for longer than a sample may be old.
 TRIES = 3
 
 
@@ -52,7 +52,7 @@ def dynamics_file(wiring: Wiring, endpoints: Endpoints) -> Path:
 def _identified(wiring: Wiring, endpoints: Endpoints) -> AxisDynamics:
     with BenchControl(endpoints.control) as control, nothing_hidden(control), in_the_air(control):
         for _ in range(TRIES - 1):
-            with contextlib.suppress(CheckFailed):
+            with contextlib.suppress(CheckFailed, DeviceError):
                 return _swept(wiring)
         return _swept(wiring)
 

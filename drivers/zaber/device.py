@@ -197,7 +197,7 @@ class ZaberAxis:
 
     def history(self) -> tuple[str, ...]:
         """The flags that are up, in words: the device remembers no others."""
-        return tuple(flags.described(flag) for flag in self._started().flags())
+        return tuple(flags.described(flag) for flag in self._flags(self._started()))
 
     def reset_fault(self) -> None:
         """Clears the flags; raises DeviceError where one is still there."""
@@ -269,9 +269,14 @@ class ZaberAxis:
 
     def _look(self, dialogue: AsciiDialogue) -> None:
         """Takes down the flags that are up now."""
-        up = dialogue.flags()
+        up = self._flags(dialogue)
         self._referenced = not set(up) & set(flags.WITHOUT_REFERENCE)
         self._flag = next((flag for flag in up if flags.is_fault(flag)), flags.NONE)
+
+    def _flags(self, dialogue: AsciiDialogue) -> tuple[str, ...]:
+        """Those that are up; whatever was asked before is answered before, and waited for by nobody."""
+        self._unanswered_ns = 0
+        return dialogue.flags()
 
     def _place_mm(self, dialogue: AsciiDialogue) -> float:
         return self._scale.mm(float(dialogue.value(self._config.position)))
@@ -318,7 +323,7 @@ class ZaberAxis:
         self._following = self._stopping = False
         self._refused = ""
         try:
-            if set(dialogue.flags()) & set(flags.POWERLESS):
+            if set(self._flags(dialogue)) & set(flags.POWERLESS):
                 dialogue.ask("driver enable")
             yield
         except BaseException:
