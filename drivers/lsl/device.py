@@ -7,15 +7,13 @@ from types import ModuleType
 from typing import Any
 
 from drivers.lsl.clock import SenderClock
-from drivers.lsl.library import ClockCorrection, correction, load
+from drivers.lsl.library import RESOLVE_S, ClockCorrection, correction, load
 from drivers.lsl.puller import Pulled, Puller
 from drivers.roles import Identity, LinkCounters
 from rig.config.products.lsl_stream import LslStream
 from rig.errors import DeviceError
 from rig.input_streams import InputSample
 
-# Twice what a resolver waits between its questions (0.5 s), and the answer's way.
-RESOLVE_S = 1.5
 # Five exchanges of the first estimate take half a second.
 CORRECT_S = 3.0
 RATE_TOLERANCE = 0.1  # senders state the rate they were asked for, and crystals are better than that
