@@ -37,20 +37,10 @@ class LaumasTransmitter:
         self._heard_after_ns = len(self._question) * BITS * 1_000_000_000 // config.line_baud
         self._latency_ns = round(config.latency_ms * 1e6)
         self._decoder = codec.AnswerDecoder(config.slave, self.counters)
-        self._identity = Identity("", "", "")
+        self.identity, self.period_ns = Identity("", "", ""), round(1e9 / config.rate_Hz)
         self._port: Port | None = None
         self._asked_ns: int | None = None
         self._due_ns = self._unanswered = self._last_capture_ns = 0
-
-    @property
-    def identity(self) -> Identity:
-        """Known after ``start``."""
-        return self._identity
-
-    @property
-    def period_ns(self) -> int:
-        """Time between questions."""
-        return round(1e9 / self._config.rate_Hz)
 
     def fileno(self) -> int:
         """Descriptor of the line."""
@@ -70,7 +60,7 @@ class LaumasTransmitter:
         firmware, kind, year, serial, program = about
         settings = {"channels": "fz", "type": str(kind), "year": str(year), "program": str(program)}
         status = {"status at start": f"{weights.status:016b}"}
-        self._identity = Identity(self._config.product, str(serial), str(firmware), settings | status)
+        self.identity = Identity(self._config.product, str(serial), str(firmware), settings | status)
         self._asked_ns, self._due_ns, self._unanswered = None, 0, 0
 
     def poll(self, now_ns: int) -> Sequence[ForceSample]:

@@ -158,7 +158,10 @@ def _impossible(sample: AnySample, subject: UnderTest) -> str:
 def _weighed(unloaded: Sequence[AnySample], loaded: Sequence[AnySample], config: ForceProduct) -> None:
     channel = ("fx", "fy", "fz").index(config.axis)
     sign = 1.0 if config.compression == "positive" else -1.0
-    before_N, after_N = (statistics.fmean(s[4:7][channel] for s in side if s.valid) for side in (unloaded, loaded))
+    before_N, after_N = (
+        statistics.fmean(s[4:7][channel] for s in side if isinstance(s, ForceSample) and s.valid)
+        for side in (unloaded, loaded)
+    )
     read_N = sign * (after_N - before_N)
     if abs(read_N - LOAD_N) > LOAD_TOLERANCE * LOAD_N:
         raise Nonconformity(

@@ -43,12 +43,8 @@ def readable(device: AnyDevice, timeout_s: float) -> bool:
     return bool(select.select([device.fileno()], [], [], timeout_s)[0])
 
 
-def nothing() -> None:
-    """For a device that gives samples by itself."""
-
-
-def no_fault(kind: str, value: bool | float) -> None:
-    """For a device that cannot be made to fail."""
+def nothing(*_: object) -> None:
+    """For a device that cannot be made to fail, or gives samples by itself."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +59,7 @@ class UnderTest:
 
     config: Product
     open: Callable[[], AnyDevice]
-    fault: Callable[[str, bool | float], None] = no_fault
+    fault: Callable[[str, bool | float], None] = nothing
     damage: tuple[str, ...] = ("drop", "corrupt", "truncate", "garbage")
     unplugs: bool = True
     load: Callable[[float], None] | None = None

@@ -12,6 +12,7 @@ from api.cli.options import built_in
 from controller.devices.drivers import open_axis, open_force, open_tracker
 from controller.inputs.runner import open_input
 from drivers.testing import CHECKS, UnderTest
+from drivers.testing.under_test import nothing
 from mock_devices.testing.hand import MockBench, serving
 from rig.config.glove import FingerCalibration, GloveCalibration
 from rig.config.products.firmata_glove import FirmataGlove
@@ -24,7 +25,9 @@ EACH = ("drop", "corrupt", "truncate", "garbage")
 # A line of SLCAN has no checksum: against flipped bits there is only that of USB, which a pseudo-terminal lacks; and
 # those of UDP and Firmata are that of the network, and none.
 NO_CHECKSUM = ("drop", "truncate", "garbage")
-# Firmata has no numbers either: of what is lost a pause alone tells, where two in a row are.
+# OpenIGTLink has no numbers: TCP loses nothing, and a frame that was not sent cannot be told from one that was lost.
+NUMBERLESS = ("corrupt", "truncate", "garbage")
+# Firmata has neither: of what is lost a pause alone tells, where two in a row are.
 NO_NUMBERS = ("truncate", "garbage")
 
 
@@ -46,7 +49,7 @@ OURS = (
     Ours("axis", "zaber-ascii", "axis_ascii"),
     Ours("tracker", "ndi-polaris", "tracker"),
     Ours("tracker", "optitrack-natnet", "tracker_natnet", NO_CHECKSUM),
-    Ours("tracker", "openigtlink", "tracker_igtl"),
+    Ours("tracker", "openigtlink", "tracker_igtl", NUMBERLESS),
     Ours("input", "firmata-glove", "glove", NO_NUMBERS),
     Ours("input", "evdev-switch", "switch", ()),
     Ours("input", "lsl-stream", "breathing", ()),
@@ -84,7 +87,7 @@ def under_test(bench: MockBench, ours: Ours) -> UnderTest:
         lambda kind, value: bench.fault(ours.mock, kind, value),
         damage=ours.damage,
         load=bench.load if ours.role == "force" else None,
-        **({"act": press} if ours.mock == "switch" else {}),
+        act=press if ours.mock == "switch" else nothing,
     )
 
 
