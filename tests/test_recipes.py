@@ -26,7 +26,7 @@ class Stood:
     def __getattr__(self, name: str) -> Callable[..., Any]:
         def call(*arguments: object, **named: object) -> Any:
             self.called.append(name)
-            return self._gives.get(name, lambda *_, **__: None)(*arguments, **named)
+            return self._gives[name](*arguments, **named) if name in self._gives else None
 
         return call
 

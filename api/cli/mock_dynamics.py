@@ -29,13 +29,16 @@ TRIES = 3
 def mock_axis_dynamics(wiring: Wiring, endpoints: Endpoints) -> AxisDynamics | None:
     """The dynamics of the mock axis as this computer drives it, identified now where there are none that may be used.
 
-    None where the workspace is too short, and where the computer was too busy: the force loop is then refused.
+    None where the workspace is too short, the axis is told less often than the loop decides, or the computer was too
+    busy: the force loop is then refused.
     """
     file = dynamics_file(wiring, endpoints)
     with contextlib.suppress(UsageError):
         known = read_dynamics(file)
         if not [*wiring.calibration.alone(known).unfit(datetime.now(UTC)), *dynamics_elsewhere(known, wiring)]:
             return known
+    if wiring.axis.reports_Hz < wiring.loop.rate_Hz:
+        return None  # it holds what it is told from one report to the next, which no sweep of each cycle allows for
     try:
         made = _identified(wiring, endpoints)
     except (CheckFailed, DeviceError, UsageError) as error:
