@@ -41,6 +41,12 @@ CLIENTS = (
     Client("Bota SensONE", "pyserial", "bota/test_opening.py", "client"),
     Client("Robotiq FT 300", "pymodbus", "robotiq/test_mock.py", "test_pymodbus_"),
     Client("Robotiq FT 300", "minimalmodbus", "robotiq/test_mock.py", "test_minimalmodbus_"),
+    Client("LAUMAS TLB", "pymodbus", "laumas/test_clients.py", "test_pymodbus_"),
+    Client("LAUMAS TLB", "minimalmodbus", "laumas/test_clients.py", "test_minimalmodbus_"),
+    Client("Zaber axis", "zaber-motion", "zaber/test_clients.py", "test_zaber_motion_"),
+    Client("OptiTrack Motive", "natnet", "optitrack/test_clients.py", "test_natnet_"),
+    Client("OpenIGTLink server", "pyigtl", "openigtlink/test_clients.py", "pyigtl"),
+    Client("Glove, StandardFirmata", "pyfirmata2", "firmata/test_with_pyfirmata2.py", "test_pyfirmata2_"),
 )
 
 

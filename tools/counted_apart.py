@@ -142,6 +142,7 @@ DEVICES: dict[str, str] = {
     "rig/recording/columns.py": "inputs among the streams of a session",
     "rig/results/glove.py": "inputs",
     "rig/results/inputs_in.py": "inputs",
+    "drivers/sampled.py": "what drivers of one role have alike",
     "drivers/poses.py": "trackers that date their frames themselves",
     "drivers/openigtlink/": "trackers behind OpenIGTLink",
     "drivers/optitrack/": "OptiTrack cameras",

@@ -11,7 +11,7 @@ from api.cli.output import show, write_json
 from api.operations import devices as work
 from controller.devices import finding
 from controller.operation import Operation
-from rig.config.products.registry import ROLES
+from rig.config.products.inputs import EVERY_ROLE
 from rig.errors import CheckFailed, UsageError
 from rig.results.devices import DevicesResult, FindResult, PortFound, ProductListed
 from rig.results.tables import TextTable
@@ -46,14 +46,15 @@ def _products(result: DevicesResult) -> TextTable:
 
 
 def _options(product: ProductListed) -> TextTable:
-    rows = [(f"{product.role}.{one.key}", one.value, one.default, one.meaning) for one in product.options]
+    table = f"{product.role}.NAME" if product.role == "input" else product.role
+    rows = [(f"{table}.{one.key}", one.value, one.default, one.meaning) for one in product.options]
     return TextTable(f"Keys of {product.product}", ("key", "value", "default", "meaning"), rows, words=4)
 
 
 def _in_help() -> str:
     """The products with their own keys, for whoever asks for help."""
     lines = []
-    for role, products in ROLES.items():
+    for role, products in EVERY_ROLE.items():
         shared = set.intersection(*(set(product.model_fields) for product in products.values()))
         for name, product in products.items():
             own = ", ".join(key for key in product.model_fields if key not in shared)
@@ -72,7 +73,7 @@ def find(
     yes: Annotated[bool, typer.Option("--yes", help="Writes to every port that it lists, without asking you.")] = False,
     json_file: JsonOption = None,
 ) -> None:
-    """Looks which ports the computer has; with your consent asks each who is there, and says the lines for rig.toml.
+    """Lists ports, switches and streams; with your consent asks at each port who is there. Says the lines for rig.toml.
 
     Without --ask or --yes nothing is written to any port: it may be somebody else's device.
 
@@ -80,7 +81,7 @@ def find(
     """
     if ask and yes:
         raise UsageError("--ask and --yes: give one of them")
-    seen = [*finding.ports(), *map(finding.named, addresses or [])]
+    seen = [*finding.ports(), *finding.switches(), *finding.streams(), *map(finding.named, addresses or [])]
     result = compute("find", lambda operation: _found(operation, seen, ask, yes))
     show(TextTable("Ports", ("port", "USB", "adapter", "who answers"), [_row(port) for port in result.ports], words=4))
     show(*(port.lines for port in result.ports if port.lines))
@@ -105,5 +106,5 @@ def _found(operation: Operation, seen: list[PortFound], ask: bool, yes: bool) ->
 
 
 def _row(port: PortFound) -> tuple[str, ...]:
-    answers = f"{port.device}, serial {port.serial}" if port.product else ("nobody" if port.asked else "not asked")
+    answers = f"{port.device}, serial {port.serial}" if port.serial else ("nobody" if port.asked else "not asked")
     return port.address, port.usb or "none", port.kind or "unknown", answers

@@ -22,20 +22,23 @@ from rig.errors import CheckFailed, DeviceError, RigError, UsageError
 # Four sweeps know delay and lags together to a tenth of a millisecond, and last three seconds.
 SWEEP_S, REPEATS, TURNS = 0.5, 4, 2
 FROM_MM, SPEED_MM_S = 2.0, 20.0
-# A busy computer may miss the bounds once.
+# A busy computer may miss the bounds once, or stand still for longer than a sample may be old.
 TRIES = 3
 
 
 def mock_axis_dynamics(wiring: Wiring, endpoints: Endpoints) -> AxisDynamics | None:
     """The dynamics of the mock axis as this computer drives it, identified now where there are none that may be used.
 
-    None where the workspace is too short, and where the computer was too busy: the force loop is then refused.
+    None where the workspace is too short, the axis is told less often than the loop decides, or the computer was too
+    busy: the force loop is then refused.
     """
     file = dynamics_file(wiring, endpoints)
     with contextlib.suppress(UsageError):
         known = read_dynamics(file)
         if not [*wiring.calibration.alone(known).unfit(datetime.now(UTC)), *dynamics_elsewhere(known, wiring)]:
             return known
+    if wiring.axis.reports_Hz < wiring.loop.rate_Hz:
+        return None  # it holds what it is told from one report to the next, which no sweep of each cycle allows for
     try:
         made = _identified(wiring, endpoints)
     except (CheckFailed, DeviceError, UsageError) as error:
@@ -52,7 +55,7 @@ def dynamics_file(wiring: Wiring, endpoints: Endpoints) -> Path:
 def _identified(wiring: Wiring, endpoints: Endpoints) -> AxisDynamics:
     with BenchControl(endpoints.control) as control, nothing_hidden(control), in_the_air(control):
         for _ in range(TRIES - 1):
-            with contextlib.suppress(CheckFailed):
+            with contextlib.suppress(CheckFailed, DeviceError):
                 return _swept(wiring)
         return _swept(wiring)
 

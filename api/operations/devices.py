@@ -4,7 +4,8 @@ import inspect
 
 import rig
 from rig import plugins
-from rig.config.products.registry import ROLES
+from rig.config.products.input_role import InputProduct
+from rig.config.products.inputs import EVERY_ROLE
 from rig.config.products.roles import ForceProduct, Product, TrackerProduct
 from rig.config.words import toml, value_words
 from rig.diagnosis.effects.axis import AXIS_CAUSES
@@ -14,12 +15,12 @@ from rig.results.devices import DevicesResult, PluginListed, ProductListed, Prod
 from rig.tissue.registry import LAWS
 
 # Each has looked at its own group of entry points when it was loaded.
-REGISTRIES = (*ROLES.values(), LAWS, CAUSES, AXIS_CAUSES)
+REGISTRIES = (*EVERY_ROLE.values(), LAWS, CAUSES, AXIS_CAUSES)
 
 
 def devices(product: str = "") -> DevicesResult:
     """All products, or that one; raises UsageError with the nearest where there is none of that name."""
-    listed = [_listed(role, name, one) for role, products in ROLES.items() for name, one in products.items()]
+    listed = [_listed(role, name, one) for role, products in EVERY_ROLE.items() for name, one in products.items()]
     if product:
         known(product, [one.product for one in listed], "product")
     return DevicesResult(
@@ -47,6 +48,8 @@ def _listed(role: str, name: str, product: type[Product]) -> ProductListed:
 def _rate_Hz(usual: Product) -> float | None:
     if isinstance(usual, ForceProduct):
         return usual.sampled_Hz
+    if isinstance(usual, InputProduct):
+        return usual.nominal_Hz or None
     return usual.rate_Hz if isinstance(usual, TrackerProduct) else None
 
 

@@ -6,16 +6,25 @@ themselves ask who is there; starting one moves nothing.
 
 import contextlib
 from collections.abc import Callable, Iterable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
 from serial.tools import list_ports
 
 from controller.devices.drivers import open_axis, open_force, open_tracker
+from controller.inputs.runner import open_input
+from drivers.evdev.device import BY_NAME
+from drivers.evdev.port import NAMES, key_devices
+from drivers.lsl.library import streams_there
 from drivers.roles import Device, Identity
-from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS
+from rig.config.products.evdev_switch import EvdevSwitch
+from rig.config.products.inputs import INPUTS
+from rig.config.products.lsl_stream import LslStream
+from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS, name_of
 from rig.config.products.roles import Product
 from rig.config.wiring import Limits
+from rig.config.words import toml
 from rig.errors import RigError
 from rig.results.devices import PortFound
 
@@ -51,6 +60,7 @@ def candidates() -> Iterator[AtPort]:
     """Products that stand at a serial line: those that only listen for a moment first, what must be set up last."""
     roles: tuple[tuple[str, Iterable[type[Product]]], ...] = (
         ("force", FORCE_SENSORS.values()), ("axis", AXES.values()), ("tracker", TRACKERS.values()),
+        ("input", (product for product in INPUTS.values() if product.at_line)),
     )  # fmt: skip
     yield from (AtPort(role, product) for role, products in roles for product in products)
 
@@ -64,6 +74,30 @@ def ports() -> list[PortFound]:
         for port in sorted(list_ports.comports())
         if port.vid is not None
     ]
+
+
+def switches(names: Path = NAMES) -> list[PortFound]:
+    """Input devices of Linux by their names; nothing is opened, and which of them is a foot switch a person knows."""
+    return [_listed(EvdevSwitch, f"{BY_NAME}{name}", "keys, as of a foot switch") for name in key_devices(names)]
+
+
+def streams() -> list[PortFound]:
+    """Streams of Lab Streaming Layer on this computer, which their programs announce; none without that extra."""
+    found = streams_there() if find_spec("pylsl") else []
+    return [_listed(LslStream, name, f"stream of kind {kind or 'unknown'}") for name, kind in found]
+
+
+def _listed(product: type[Product], address: str, kind: str) -> PortFound:
+    lines = lines_of("input", product, address)
+    return PortFound(
+        address=address, usb="", kind=kind, asked=False, role="input", product=name_of(product), lines=lines
+    )
+
+
+def lines_of(role: str, product: type[Product], address: str) -> str:
+    """For `rig.toml`; of an input with a name that a person may change."""
+    table = f"{role}.{product.mock.role if product.mock else 'one'}" if role == "input" else role
+    return f'[{table}]\nproduct = "{name_of(product)}"\nport = {toml(address)}\n'
 
 
 def named(address: str) -> PortFound:
@@ -83,9 +117,9 @@ def _lasting(device: str) -> str:
 
 
 def find(seen: Iterable[PortFound], consent: Consent) -> Iterator[PortFound]:
-    """Each port, asked who is there where ``consent`` says so."""
+    """Each port, asked who is there where ``consent`` says so; what says by itself what it is need not be asked."""
     for port in seen:
-        yield ask(port) if consent(port) else port
+        yield ask(port) if not port.product and consent(port) else port
 
 
 def ask(port: PortFound) -> PortFound:
@@ -98,9 +132,8 @@ def ask(port: PortFound) -> PortFound:
             why = str(error)
             continue
         said = {"role": role, "product": found.product, "device": f"{found.product}, firmware {found.firmware}"}
-        name = product.model_fields["product"].default
-        lines = f'[{role}]\nproduct = "{name}"\nport = "{port.address}"\n'
-        more = {"product": name, "serial": found.serial, "asked": True, "lines": lines}
+        lines = lines_of(role, product, port.address)
+        more = {"product": name_of(product), "serial": found.serial, "asked": True, "lines": lines}
         return port.model_copy(update=said | more)
     nobody = f"no device of {len(list(candidates()))} products answers there; the last said: {why}"
     return port.model_copy(update={"asked": True, "problem": nobody})
@@ -118,5 +151,6 @@ def _opened(role: str, config: Product) -> Device:
         "force": lambda: open_force(config),  # type: ignore[arg-type] # each role has its products
         "axis": lambda: open_axis(config, Limits(), ASKED_Hz),  # type: ignore[arg-type]
         "tracker": lambda: open_tracker(config),  # type: ignore[arg-type]
+        "input": lambda: open_input(config),  # type: ignore[arg-type]
     }
     return openers[role]()

@@ -24,6 +24,7 @@ from drivers.epos4.node import Node
 from drivers.epos4.samples import SampleBuilder
 from drivers.epos4.walker import REACTION_S, Walker, never
 from drivers.roles import Identity, LinkCounters
+from drivers.sampled import SampledDevice, allowed_mm
 from rig.channels import AxisSample
 from rig.config.products.can_axis import CanAxisProduct
 from rig.config.wiring import Limits
@@ -32,15 +33,15 @@ from rig.errors import DeviceError, RigError, SafetyStop
 HOMING_START_S = 0.05
 """Within this a drive takes back an older "homing attained"; one that has homed already shows it again."""
 CLOSING_TIMEOUT_S = 0.3  # a drive that is gone costs it several times over, and a person waits
-SLACK_MM = 0.05
-"""How far beyond a limit a position is still rounding and ripple, and is taken as the limit itself."""
 
 
-class Epos4Axis:
+class Epos4Axis(SampledDevice):
     """ServoAxis on one drive; nothing is opened before ``start``. ``rate_Hz`` is how often ``command`` will come.
 
     ``interrupted`` is asked while the axis homes, moves or is enabled; a yes brakes it and raises SafetyStop.
     """
+
+    _samples: SampleBuilder
 
     def __init__(
         self,
@@ -68,20 +69,6 @@ class Epos4Axis:
         self._walker: Walker | None = None
         self._target = 0
         self._refused_before = 0
-
-    @property
-    def identity(self) -> Identity:
-        """Product, serial number and firmware, known after ``start``."""
-        return self._identity
-
-    @property
-    def next_seq(self) -> int:
-        """Number of the next sample."""
-        return self._samples.next_seq
-
-    @next_seq.setter
-    def next_seq(self, number: int) -> None:
-        self._samples.next_seq = number
 
     @property
     def period_ns(self) -> int:
@@ -299,13 +286,7 @@ class Epos4Axis:
 
     def _checked(self, position_mm: float) -> int:
         """The position in increments, if the limits allow it."""
-        low_mm, high_mm = self._limits.position_min_mm, self._limits.position_max_mm
-        if not low_mm - SLACK_MM <= position_mm <= high_mm + SLACK_MM:
-            raise SafetyStop(
-                f"{self._name}: refused to go to {position_mm:g} mm; limits.position_min_mm and position_max_mm are "
-                f"{low_mm:g} and {high_mm:g} mm"
-            )
-        return self._kind.scale.increments(min(max(position_mm, low_mm), high_mm))
+        return self._kind.scale.increments(allowed_mm(position_mm, self._limits, self._name))
 
     @contextlib.contextmanager
     def _moving(self, walker: Walker) -> Iterator[None]:

@@ -76,7 +76,7 @@ def open_device(path: str, what: str) -> int:
 
 def path_of(name: str, names: Path = NAMES) -> str:
     """The device that calls itself ``name``; raises DeviceError where there is none of it, or more than one."""
-    known = {found.parents[1].name: found.read_text().strip() for found in sorted(names.glob("event*/device/name"))}
+    known = _by_node(names)
     paths = [f"/dev/input/{node}" for node, its_name in known.items() if its_name == name]
     if len(paths) == 1:
         return paths[0]
@@ -84,3 +84,18 @@ def path_of(name: str, names: Path = NAMES) -> str:
         raise DeviceError(f"{len(paths)} input devices are called {name!r}: {', '.join(paths)}; give one by its port")
     there = ", ".join(repr(its_name) for its_name in known.values()) or "none at all"
     raise DeviceError(f"no input device is called {name!r}; there are: {there}; plug it in, or correct the name")
+
+
+def key_devices(names: Path = NAMES) -> list[str]:
+    """Names of the input devices that have keys or buttons, each once; nothing is opened."""
+    with_keys = (node for node in names.glob("event*") if _has_keys(node / "device/capabilities/key"))
+    known = _by_node(names)
+    return list(dict.fromkeys(known[node.name] for node in sorted(with_keys) if node.name in known))
+
+
+def _by_node(names: Path) -> dict[str, str]:
+    return {found.parents[1].name: found.read_text().strip() for found in sorted(names.glob("event*/device/name"))}
+
+
+def _has_keys(capabilities: Path) -> bool:
+    return capabilities.is_file() and capabilities.read_text().strip(" 0\n") != ""

@@ -19,7 +19,8 @@ from rig.errors import DeviceError
 ANSWER_S, TRIES = 0.3, 3  # the family answers within 5 to 50 ms, as its configured delay says
 # Ten periods of 100 Hz: then a question is asked again, the answer was lost.
 REPEAT_NS = 100_000_000
-LOST_AFTER_NS = 500_000_000
+# Half a second of them. Questions are counted, not time: it is asked by ``poll``, and while an axis homes nobody polls.
+MOST_UNANSWERED = 5
 NO_OTHER_CHANNELS = (0.0, 0.0)
 NO_MOMENTS = (0.0, 0.0, 0.0)
 
@@ -36,20 +37,10 @@ class LaumasTransmitter:
         self._heard_after_ns = len(self._question) * BITS * 1_000_000_000 // config.line_baud
         self._latency_ns = round(config.latency_ms * 1e6)
         self._decoder = codec.AnswerDecoder(config.slave, self.counters)
-        self._identity = Identity("", "", "")
+        self.identity, self.period_ns = Identity("", "", ""), round(1e9 / config.rate_Hz)
         self._port: Port | None = None
         self._asked_ns: int | None = None
-        self._due_ns = self._answered_ns = self._last_capture_ns = 0
-
-    @property
-    def identity(self) -> Identity:
-        """Known after ``start``."""
-        return self._identity
-
-    @property
-    def period_ns(self) -> int:
-        """Time between questions."""
-        return round(1e9 / self._config.rate_Hz)
+        self._due_ns = self._unanswered = self._last_capture_ns = 0
 
     def fileno(self) -> int:
         """Descriptor of the line."""
@@ -69,15 +60,13 @@ class LaumasTransmitter:
         firmware, kind, year, serial, program = about
         settings = {"channels": "fz", "type": str(kind), "year": str(year), "program": str(program)}
         status = {"status at start": f"{weights.status:016b}"}
-        self._identity = Identity(self._config.product, str(serial), str(firmware), settings | status)
-        self._asked_ns, self._due_ns, self._answered_ns = None, 0, self._now()
+        self.identity = Identity(self._config.product, str(serial), str(firmware), settings | status)
+        self._asked_ns, self._due_ns, self._unanswered = None, 0, 0
 
     def poll(self, now_ns: int) -> Sequence[ForceSample]:
-        """Samples since the last call; raises DeviceError where none comes for half a second, or it refuses."""
+        """Samples since the last call; raises DeviceError where five questions had no answer, or it refuses."""
         answers = self._decoder.feed(self._started().read())
         samples = [self._sample(answer, now_ns) for answer in answers[-1:] if self._asked_ns is not None]
-        if now_ns - self._answered_ns > LOST_AFTER_NS:
-            raise self._error(f"no answer for {LOST_AFTER_NS / 1e9:g} s; check its power and the cable")
         self._keep_asking(now_ns)
         return samples
 
@@ -104,7 +93,10 @@ class LaumasTransmitter:
     def _keep_asking(self, now_ns: int) -> None:
         if self._asked_ns is not None and now_ns - self._asked_ns > REPEAT_NS:
             self.counters.device_lost += 1
-            self._asked_ns = None
+            self._asked_ns, self._unanswered = None, self._unanswered + 1
+        if self._unanswered >= MOST_UNANSWERED:
+            silent_s = MOST_UNANSWERED * REPEAT_NS / 1e9
+            raise self._error(f"no answer for {silent_s:g} s; check its power and the cable")
         if self._asked_ns is None and now_ns >= self._due_ns:
             self._decoder.reset()
             self._started().write(self._question)
@@ -118,7 +110,7 @@ class LaumasTransmitter:
         assert self._asked_ns is not None
         heard_ns = min(self._asked_ns + self._heard_after_ns, now_ns) - self._latency_ns
         self._last_capture_ns = capture_ns = max(heard_ns, self._last_capture_ns + 1)
-        self._asked_ns, self._answered_ns = None, now_ns
+        self._asked_ns, self._unanswered = None, 0
         weights = codec.decode_weights(answer.registers)
         counts = weights.gross if self._config.weight == "gross" else weights.net
         force_N = counts / self._config.counts_per_N

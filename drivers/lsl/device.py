@@ -7,18 +7,19 @@ from types import ModuleType
 from typing import Any
 
 from drivers.lsl.clock import SenderClock
-from drivers.lsl.library import ClockCorrection, correction, load
+from drivers.lsl.library import RESOLVE_S, ClockCorrection, correction, load
 from drivers.lsl.puller import Pulled, Puller
 from drivers.roles import Identity, LinkCounters
+from drivers.threaded_source import ThreadedSource
 from rig.config.products.lsl_stream import LslStream
 from rig.errors import DeviceError
 from rig.input_streams import InputSample
 
-# Twice what a resolver waits between its questions (0.5 s), and the answer's way.
-RESOLVE_S = 1.5
 # Five exchanges of the first estimate take half a second.
 CORRECT_S = 3.0
 RATE_TOLERANCE = 0.1  # senders state the rate they were asked for, and crystals are better than that
+# Ten seconds at 1 kHz: whoever takes none for so long has lost them, which is counted.
+MOST = 10_000
 BUFFER_S = 10  # of samples that wait in the library while this process is held up
 
 
@@ -32,7 +33,7 @@ class LslInlet:
         self.identity = Identity(config.product, "", "")
         self.period_ns = round(1e9 / config.rate_Hz) if config.rate_Hz else 0
         self._config, self._ask = config, ask
-        self._puller: Puller | None = None
+        self._source: ThreadedSource[Pulled | ClockCorrection] | None = None
         self._heard_ns = 0
 
     def start(self) -> None:
@@ -54,7 +55,8 @@ class LslInlet:
         about = {"host": info.hostname(), "source_id": info.source_id(), "type": info.type()}
         self.identity = Identity(self._config.product, info.source_id(), f"protocol {info.version()}", about)
         self._heard_ns = time.monotonic_ns()
-        self._puller = Puller(pylsl, inlet, self._ask)
+        self._source = ThreadedSource(self._name, Puller(pylsl, inlet, self._ask).read, MOST)
+        self._source.start()
 
     @property
     def _name(self) -> str:
@@ -95,19 +97,19 @@ class LslInlet:
         return self._running.fileno()
 
     @property
-    def _running(self) -> Puller:
-        if self._puller is None:
+    def _running(self) -> ThreadedSource[Pulled | ClockCorrection]:
+        if self._source is None:
             raise DeviceError(f"{self._name}: is not open; start it first")
-        return self._puller
+        return self._source
 
     def poll(self, now_ns: int) -> Sequence[InputSample]:
         """Samples since the last call; raises DeviceError where there were none for too long."""
         found: list[InputSample] = []
-        for item in self._running.take():
+        for item, arrival_ns in self._running.take():
             if isinstance(item, ClockCorrection):
                 self._clock.correct(item)
             else:
-                found += self._samples(item)
+                found += self._samples(item, arrival_ns)
         if found:
             self._heard_ns = now_ns
         silent_s = (now_ns - self._heard_ns) * 1e-9
@@ -119,15 +121,15 @@ class LslInlet:
         self.counters.device_lost = self._running.dropped
         return found
 
-    def _samples(self, item: Pulled) -> list[InputSample]:
-        stamps = self._clock.stamps(item.stamp_s, item.arrival_ns)
+    def _samples(self, item: Pulled, arrival_ns: int) -> list[InputSample]:
+        stamps = self._clock.stamps(item.stamp_s, arrival_ns)
         if stamps is None:
             return []
         seq, self.next_seq = self.next_seq, self.next_seq + 1
         self.counters.frames += 1
         valid = all(map(math.isfinite, item.values))
         clock = (stamps.device_ns, stamps.correction_ns, stamps.uncertainty_ns)
-        return [InputSample(seq, stamps.capture_ns, item.arrival_ns, *clock, item.values, 0, int(valid))]
+        return [InputSample(seq, stamps.capture_ns, arrival_ns, *clock, item.values, 0, int(valid))]
 
     def concern(self) -> str:
         """A sender without a clock that is known."""
@@ -140,8 +142,9 @@ class LslInlet:
 
     def close(self) -> None:
         """Lets go of the stream."""
-        if self._puller:
-            self._puller.close()
+        source, self._source = self._source, None
+        if source:
+            source.close()
 
 
 def open_stream(config: LslStream) -> LslInlet:

@@ -18,6 +18,8 @@ from rig.errors import UsageError
 CONFIGURATION = "LSLAPICFG"
 # Its log goes to standard error of whoever loads it: only what ends the program.
 QUIET = -3
+# Twice what a resolver waits between its questions (0.5 s), and the answer's way.
+RESOLVE_S = 1.5
 _loaded: dict[str, ModuleType] = {}
 
 
@@ -46,6 +48,13 @@ def load(scope: str) -> ModuleType:
     except (ImportError, RuntimeError) as error:
         raise UsageError(f"product lsl-stream needs an extra: pip install 'tissue-rig[lsl]' ({error})") from error
     return _loaded.setdefault(scope, pylsl)
+
+
+def streams_there(scope: str = "machine", wait_s: float = RESOLVE_S) -> list[tuple[str, str]]:
+    """Name and kind of each stream of numbers that is announced within ``scope``."""
+    pylsl = load(scope)
+    numbers = (info for info in pylsl.resolve_streams(wait_s) if info.channel_format() != pylsl.cf_string)
+    return sorted({(info.name(), info.type()) for info in numbers})
 
 
 def _file(text: str) -> Path:

@@ -14,6 +14,7 @@ from drivers.ndi import codec, replies, startup
 from drivers.ndi.frames import FrameReader
 from drivers.ports import Port, open_port
 from drivers.roles import Identity, LinkCounters
+from drivers.sampled import SampledTracker
 from rig.channels import MarkerSample
 from rig.config.products.ndi_polaris import PolarisWiring
 from rig.errors import DeviceError
@@ -25,11 +26,15 @@ LOST_AFTER_NS = 1_000_000_000
 _CLOSE_S = 0.5
 
 
-class NdiTracker:
+class NdiTracker(SampledTracker):
     """A marker tracker (role ``drivers.roles.MarkerTracker``).
 
     ``open_port`` gives the port at a speed in baud, which TCP passes over; ``now`` is the host's monotonic clock [ns].
     """
+
+    _config: PolarisWiring
+    _samples: FrameReader
+    _identity: Identity | None  # type: ignore[assignment] # None until it is known
 
     def __init__(
         self, open_port: Callable[[int], Port], config: PolarisWiring, now: Callable[[], int] = time.monotonic_ns
@@ -40,7 +45,7 @@ class NdiTracker:
         self._now = now
         self._question = codec.encode_command(config.reply, f"{replies.TRANSFORMS:04X}")
         self._decoder = codec.ReplyDecoder()
-        self._frames = FrameReader((), config, self.counters)
+        self._samples = FrameReader((), config, self.counters)
         self._dialogue: startup.Dialogue | None = None
         self._identity: Identity | None = None
         self._waiting = False
@@ -53,25 +58,6 @@ class NdiTracker:
         if self._identity is None:
             raise DeviceError(f"tracker on {self._config.port}: not started; call start first")
         return self._identity
-
-    @property
-    def next_seq(self) -> int:
-        """Number of the next sample."""
-        return self._frames.next_seq
-
-    @next_seq.setter
-    def next_seq(self, number: int) -> None:
-        self._frames.next_seq = number
-
-    @property
-    def period_ns(self) -> int:
-        """Time between frames as configured."""
-        return round(1e9 / self._config.rate_Hz)
-
-    @property
-    def tools(self) -> tuple[str, ...]:
-        """Names of the tools by index."""
-        return self._config.tools
 
     @property
     def _port(self) -> Port:
@@ -106,7 +92,7 @@ class NdiTracker:
         startup.start_tracking(dialogue)
         settings = {"reply": self._config.reply, "warnings": " ".join(dialogue.warnings)}
         self._identity = replace(identity, settings=identity.settings | settings)
-        self._frames = FrameReader(handles, self._config, self.counters, self.next_seq)
+        self._samples = FrameReader(handles, self._config, self.counters, self.next_seq)
         self._waiting = False
         self._asked_ns = self._due_ns = 0
         self._silent_since_ns = None
@@ -162,7 +148,7 @@ class NdiTracker:
             self._decoder.discarded_bytes += len(reply[0])
             return []
         self._silent_since_ns = None
-        samples = self._frames.samples(tracking, self._asked_ns, now_ns)
+        samples = self._samples.samples(tracking, self._asked_ns, now_ns)
         # The next frame is one period away: look shortly before, then often, so that it is met soon after it is there.
         self._due_ns = self._asked_ns + (self.period_ns * 3 // 4 if samples else self.period_ns // 8)
         return samples

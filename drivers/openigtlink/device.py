@@ -13,6 +13,7 @@ from drivers.openigtlink import codec
 from drivers.ports import Port, open_port, read_until
 from drivers.poses import PoseFrames, ToolPose
 from drivers.roles import Identity, LinkCounters
+from drivers.sampled import SampledTracker
 from rig.channels import MarkerSample
 from rig.config.products.openigtlink import OpenIgtLinkWiring
 from rig.errors import DeviceError
@@ -62,41 +63,20 @@ def _tracked(poses: dict[str, ToolPose | None]) -> dict[str, ToolPose]:
     return {tool: pose for tool, pose in poses.items() if pose is not None}
 
 
-class OpenIgtLinkTracker:
+class OpenIgtLinkTracker(SampledTracker):
     """A marker tracker (role ``drivers.roles.MarkerTracker``); nothing is opened before ``start``."""
+
+    _config: OpenIgtLinkWiring
+    _samples: PoseFrames
 
     def __init__(
         self, open_port: Callable[[], Port], config: OpenIgtLinkWiring, now: Callable[[], int] = time.monotonic_ns
     ) -> None:
         self.counters = LinkCounters()
         self._open_port, self._config, self._now = open_port, config, now
-        self._frames = PoseFrames(config, self.counters)
+        self._samples = PoseFrames(config, self.counters)
         self._port: Port | None = None
         self._identity = Identity("", "", "")
-
-    @property
-    def identity(self) -> Identity:
-        """Known after ``start``."""
-        return self._identity
-
-    @property
-    def next_seq(self) -> int:
-        """Number of the next sample."""
-        return self._frames.next_seq
-
-    @next_seq.setter
-    def next_seq(self, number: int) -> None:
-        self._frames.next_seq = number
-
-    @property
-    def period_ns(self) -> int:
-        """Time between frames as configured."""
-        return round(1e9 / self._config.rate_Hz)
-
-    @property
-    def tools(self) -> tuple[str, ...]:
-        """Names of the tools by index."""
-        return self._config.tools
 
     def fileno(self) -> int:
         """Descriptor of the connection."""
@@ -108,7 +88,7 @@ class OpenIgtLinkTracker:
         self._port = self._open_port()
         self._decoder = codec.MessageDecoder(self.counters)
         self._gatherer = FrameGatherer(self._config)
-        self._frames.restart()
+        self._samples.restart()
         self._number, self._heard_ns = 0, self._now()
         self._waiting: list[codec.TimedMessage] = []
         try:
@@ -180,12 +160,12 @@ class OpenIgtLinkTracker:
         return [
             sample
             for taken_ns, poses in self._gatherer.add(sent_ns, seen, whole)
-            for sample in self._samples(taken_ns, poses, now_ns)
+            for sample in self._samples_of(taken_ns, poses, now_ns)
         ]
 
-    def _samples(self, taken_ns: int, poses: dict[str, ToolPose], now_ns: int) -> list[MarkerSample]:
+    def _samples_of(self, taken_ns: int, poses: dict[str, ToolPose], now_ns: int) -> list[MarkerSample]:
         self._number += 1
-        return self._frames.samples(self._number, taken_ns, poses, now_ns)
+        return self._samples.samples(self._number, taken_ns, poses, now_ns)
 
 
 def open_tracker(config: OpenIgtLinkWiring) -> OpenIgtLinkTracker:

@@ -15,6 +15,7 @@ from drivers.optitrack.link import MotiveLink
 from drivers.optitrack.models import decode_models
 from drivers.poses import PoseFrames, ToolPose
 from drivers.roles import Identity, LinkCounters
+from drivers.sampled import SampledTracker
 from rig.channels import MarkerSample
 from rig.config.products.optitrack_natnet import NatNetWiring
 from rig.errors import DeviceError
@@ -42,15 +43,18 @@ class DatagramLink(Protocol):
         """Gives it back."""
 
 
-class OptiTrackTracker:
+class OptiTrackTracker(SampledTracker):
     """A marker tracker (role ``drivers.roles.MarkerTracker``); nothing is opened before ``start``."""
+
+    _config: NatNetWiring
+    _samples: PoseFrames
 
     def __init__(
         self, open_link: Callable[[], DatagramLink], config: NatNetWiring, now: Callable[[], int] = time.monotonic_ns
     ) -> None:
         self.counters = LinkCounters()
         self._open_link, self._config, self._now = open_link, config, now
-        self._frames = PoseFrames(config, self.counters)
+        self._samples = PoseFrames(config, self.counters)
         self._link: DatagramLink | None = None
         self._server = packets.ServerInfo("", "", (0, 0), 0)
         self._bodies: dict[str, int] = {}
@@ -68,25 +72,6 @@ class OptiTrackTracker:
         address = self._config.port.removeprefix("udp://")
         return Identity(self._config.product, address, f"{server.name} {server.version}", settings)
 
-    @property
-    def next_seq(self) -> int:
-        """Number of the next sample."""
-        return self._frames.next_seq
-
-    @next_seq.setter
-    def next_seq(self, number: int) -> None:
-        self._frames.next_seq = number
-
-    @property
-    def period_ns(self) -> int:
-        """Time between frames as configured."""
-        return round(1e9 / self._config.rate_Hz)
-
-    @property
-    def tools(self) -> tuple[str, ...]:
-        """Names of the tools by index."""
-        return self._config.tools
-
     def fileno(self) -> int:
         """Descriptor of the socket."""
         return self._started().fileno()
@@ -95,7 +80,7 @@ class OptiTrackTracker:
         """Asks who streams and which bodies there are, waits for a frame; raises DeviceError in one sentence."""
         self.close()
         self._link = self._open_link()
-        self._frames.restart()
+        self._samples.restart()
         self._bodies, self._newest = {}, None
         self._server = self._server._replace(name="")
         try:
@@ -115,7 +100,7 @@ class OptiTrackTracker:
         samples: list[MarkerSample] = []
         for frame in self._received():
             self._heard_ns = now_ns
-            samples += self._frames.samples(frame.number, self._taken_ns(frame), self._poses(frame), now_ns)
+            samples += self._samples.samples(frame.number, self._taken_ns(frame), self._poses(frame), now_ns)
         if now_ns - self._heard_ns > LOST_AFTER_NS:
             raise DeviceError(
                 f"{self._config.port}: no frame for {LOST_AFTER_NS / 1e9:g} s; check Motive's streaming and the network"

@@ -10,8 +10,10 @@ from pathlib import Path
 from drivers.roles import LinkCounters
 from drivers.testing.under_test import FEW_S, AnyDevice, AnySample, Nonconformity, UnderTest
 from rig.channels import ForceSample, MarkerSample
-from rig.config.products.roles import ForceProduct
+from rig.config.products.input_role import InputProduct
+from rig.config.products.roles import AxisProduct, ForceProduct
 from rig.errors import DeviceError
+from rig.input_streams import InputSample
 
 # 60 frames of a tracker: a rate is then known to two percent.
 LISTEN_S = 1.0
@@ -26,6 +28,8 @@ NEXT_SEQ = 41
 LOAD_N, LOAD_TOLERANCE = 5.0, 0.25
 # A tenth of all messages.
 DAMAGE_SHARE = 0.1
+# An axis homes over its travel for seconds, in which nobody polls; more than any driver waits for a silent device.
+AWAY_S = 1.5
 # `SILENT_NS` of the loop, and once more: a device that is gone is known to be by then.
 LOST_S = 2.0
 # Beyond it a place is no place on a bench: the largest volume of a camera.
@@ -40,7 +44,8 @@ def identity(subject: UnderTest) -> None:
     for _ in range(2):
         with subject.started() as device:
             found.append(device.identity)
-    for what in ("product", "serial"):
+    # Not every board with a switch or a sensor on it has a number.
+    for what in ("product",) if isinstance(subject.config, InputProduct) else ("product", "serial"):
         if not getattr(found[0], what):
             raise Nonconformity(f"its identity has no {what} after start")
     if (found[0].product, found[0].serial) != (found[1].product, found[1].serial):
@@ -51,7 +56,7 @@ def rate(subject: UnderTest) -> None:
     """Samples come as often as the driver and its declaration say."""
     with subject.started() as device:
         samples = subject.listen(device, LISTEN_S).samples
-        nominal_Hz = 1e9 / device.period_ns
+        period_ns = device.period_ns
     captures = sorted({sample.capture_ns for sample in samples})
     if len(captures) < 3:
         raise Nonconformity(f"{len(samples)} samples with {len(captures)} times of capture came in {LISTEN_S:g} s")
@@ -59,7 +64,7 @@ def rate(subject: UnderTest) -> None:
     promised_Hz = subject.sampled_Hz
     if promised_Hz is None:
         return
-    for what, said_Hz in (("period_ns", nominal_Hz), ("its declaration", promised_Hz)):
+    for what, said_Hz in (("period_ns", 1e9 / (period_ns or math.inf)), ("its declaration", promised_Hz)):
         if abs(seen_Hz - said_Hz) > RATE_TOLERANCE * said_Hz:
             raise Nonconformity(f"{seen_Hz:.1f} Hz came where {what} says {said_Hz:.1f} Hz")
 
@@ -143,13 +148,20 @@ def _impossible(sample: AnySample, subject: UnderTest) -> str:
         place_mm = math.hypot(sample.x_mm, sample.y_mm, sample.z_mm)
         fits = abs(length - 1.0) < 1e-3 and place_mm <= FARTHEST_MM
         return "" if fits else f"it is {place_mm:.3g} mm away with a quaternion of length {length:.3g}"
+    if isinstance(sample, InputSample):
+        count = len(subject.config.channels) if isinstance(subject.config, InputProduct) else 0
+        fits = len(sample.values) == count and all(map(math.isfinite, sample.values))
+        return "" if fits else f"{sample.values} are no values of {count} channels"
     return "" if abs(sample.position_mm) <= FARTHEST_MM else f"its position is {sample.position_mm:g} mm"
 
 
 def _weighed(unloaded: Sequence[AnySample], loaded: Sequence[AnySample], config: ForceProduct) -> None:
     channel = ("fx", "fy", "fz").index(config.axis)
     sign = 1.0 if config.compression == "positive" else -1.0
-    before_N, after_N = (statistics.fmean(s[4:7][channel] for s in side if s.valid) for side in (unloaded, loaded))
+    before_N, after_N = (
+        statistics.fmean(s[4:7][channel] for s in side if isinstance(s, ForceSample) and s.valid)
+        for side in (unloaded, loaded)
+    )
     read_N = sign * (after_N - before_N)
     if abs(read_N - LOAD_N) > LOAD_TOLERANCE * LOAD_N:
         raise Nonconformity(
@@ -170,6 +182,20 @@ def waiting(subject: UnderTest) -> None:
             f"a poll takes {longest_ns * 1e-6:.1f} ms (limit {POLL_NS * 1e-6:g} ms): it must return at once;"
             " what blocks belongs into a ThreadedSource"
         )
+
+
+def away(subject: UnderTest) -> None:
+    """Nobody polls while an axis homes: that is no silence of the device, which gives samples afterwards as before."""
+    if isinstance(subject.config, AxisProduct):
+        return  # it is what is waited for meanwhile
+    with subject.started() as device:
+        subject.sleep(AWAY_S)
+        try:
+            samples = subject.listen(device, FEW_S).samples
+        except DeviceError as error:
+            raise Nonconformity(f"not polled for {AWAY_S:g} s, as while an axis homes, it is lost: {error}") from error
+        if not samples or not samples[-1].valid:
+            raise Nonconformity(f"not polled for {AWAY_S:g} s, as while an axis homes, it gives no valid sample")
 
 
 def damage(subject: UnderTest) -> None:
@@ -269,5 +295,5 @@ def _descriptors() -> int:
 
 
 CHECKS: tuple[Callable[[UnderTest], None], ...] = (
-    identity, rate, numbering, clock, quantities, waiting, damage, lost_and_back, closing,
+    identity, rate, numbering, clock, quantities, waiting, away, damage, lost_and_back, closing,
 )  # fmt: skip

@@ -7,17 +7,22 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from drivers.input_role import Input
 from drivers.roles import ForceSensor, MarkerTracker, ServoAxis
 from rig.channels import AxisSample, ForceSample, MarkerSample
-from rig.config.products.roles import ForceProduct, Product, TrackerProduct
+from rig.config.products.input_role import InputProduct
+from rig.config.products.roles import AxisProduct, ForceProduct, Product, TrackerProduct
 from rig.errors import DeviceError
+from rig.input_streams import InputSample
 
-AnySample = ForceSample | AxisSample | MarkerSample
-AnyDevice = ForceSensor | ServoAxis | MarkerTracker
+AnySample = ForceSample | AxisSample | MarkerSample | InputSample
+AnyDevice = ForceSensor | ServoAxis | MarkerTracker | Input
 # A cycle of the loop.
 TURN_S = 0.001
 # The slowest stream of a bench, a tracker at 20 Hz, then gives ten samples.
 FEW_S = 0.5
+# Nobody presses more often; a rate of its own is then not asked for.
+ACT_NS = 50_000_000
 # Devices boot: a drive or a camera answers within ten seconds, or its driver's own deadline is too short.
 BACK_S = 10.0
 
@@ -38,8 +43,8 @@ def readable(device: AnyDevice, timeout_s: float) -> bool:
     return bool(select.select([device.fileno()], [], [], timeout_s)[0])
 
 
-def no_fault(kind: str, value: bool | float) -> None:
-    """For a device that cannot be made to fail."""
+def nothing(*_: object) -> None:
+    """For a device that cannot be made to fail, or gives samples by itself."""
 
 
 @dataclass(frozen=True)
@@ -48,23 +53,28 @@ class UnderTest:
 
     ``fault`` switches a fault of the mock by its name, as the bench's control channel does; ``damage`` are those of the
     wire that the protocol must stand. ``load`` puts a force on the sensor [N]; what the tip bears already stays.
-    ``unplugs``: whether the fault `unplug` can be switched on and off. ``now`` and ``wait`` are the time it runs in.
+    ``unplugs``: whether the fault `unplug` can be switched on and off. ``act`` makes an input give a sample that has no
+    rate, as a press does. ``now``, ``wait`` and ``sleep`` are the time it runs in.
     """
 
     config: Product
     open: Callable[[], AnyDevice]
-    fault: Callable[[str, bool | float], None] = no_fault
+    fault: Callable[[str, bool | float], None] = nothing
     damage: tuple[str, ...] = ("drop", "corrupt", "truncate", "garbage")
     unplugs: bool = True
     load: Callable[[float], None] | None = None
+    act: Callable[[], None] = nothing
     now: Callable[[], int] = time.monotonic_ns
     wait: Callable[[AnyDevice, float], bool] = field(default=readable)
+    sleep: Callable[[float], None] = time.sleep
 
     @property
     def sampled_Hz(self) -> float | None:
-        """The rate that the declaration promises; None for an axis, which answers what it is asked."""
+        """The rate that the declaration promises; None for an axis, which answers what it is asked, and a switch."""
         if isinstance(self.config, ForceProduct):
             return self.config.sampled_Hz
+        if isinstance(self.config, InputProduct):
+            return self.config.nominal_Hz or None
         return self.config.rate_Hz if isinstance(self.config, TrackerProduct) else None
 
     @contextlib.contextmanager
@@ -88,11 +98,15 @@ class UnderTest:
             self.fault("unplug" if kind == "unplug" else "heal", kind != "unplug")
 
     def listen(self, device: AnyDevice, seconds: float) -> Heard:
-        """Polls as the loop does; an axis is asked for a sample each turn."""
+        """Polls as the loop does; an axis is asked for a sample each turn, and a switch pressed now and then."""
         heard, end_ns = Heard([], []), self.now() + round(seconds * 1e9)
+        act_ns = self.now()
         while (begun_ns := self.now()) < end_ns:
-            if self.sampled_Hz is None:
-                device.request(begun_ns)  # type: ignore[union-attr] # an axis is the role without a rate of its own
+            if begun_ns >= act_ns:
+                self.act()
+                act_ns += ACT_NS
+            if isinstance(self.config, AxisProduct):
+                device.request(begun_ns)  # type: ignore[union-attr] # an axis is what has that
             heard.samples.extend(device.poll(begun_ns))
             heard.polls_ns.append(self.now() - begun_ns)
             self.wait(device, TURN_S)

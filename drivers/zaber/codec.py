@@ -14,8 +14,10 @@ NUMBERS = 100  # a command's number has two digits
 LONGEST = 512
 SPEED_PER_STEP = 1.6384  # units of speed in a microstep a second: devices count in 1/10,000 s of 16,384 fractions
 ACCELERATION_PER_STEP = SPEED_PER_STEP / 10_000
-_REPLY = re.compile(rb"([@!])(\d\d) (\d)(?: (\d\d))?(?: (OK|RJ))? (BUSY|IDLE) (--|[A-Z]{2})(?: ([^:\r\n]*))?", re.ASCII)
-_NOTE = re.compile(rb"#(\d\d) (\d)(?: (\d\d))? ([^:\r\n]*)", re.ASCII)
+# What is said is printable ASCII; anything else is a damaged line, whatever its checksum.
+_DATA = rb"([ -9;-~]*)"
+_REPLY = re.compile(rb"([@!])(\d\d) (\d)(?: (\d\d))?(?: (OK|RJ))? (BUSY|IDLE) (--|[A-Z]{2})(?: " + _DATA + rb")?")
+_NOTE = re.compile(rb"#(\d\d) (\d)(?: (\d\d))? " + _DATA)
 
 
 class ZaberReply(NamedTuple):

@@ -14,6 +14,7 @@ from drivers.epos4.cia402 import STATE_WORDS, PdsState, Statusword
 from drivers.epos4.walker import never
 from drivers.ports import Port, open_port
 from drivers.roles import Identity, LinkCounters
+from drivers.sampled import SampledDevice, allowed_mm
 from drivers.zaber import flags, setup
 from drivers.zaber.codec import Scale, ZaberReply
 from drivers.zaber.dialogue import AsciiDialogue
@@ -26,15 +27,16 @@ from rig.errors import DeviceError, RigError, SafetyStop
 
 LOST_AFTER_NS = 500_000_000  # fifty replies of the usual rate
 MOST_OUTSTANDING = 3  # more, and what is told would be older than the move that it ends in
-SLACK_MM = 0.05  # rounding beyond a limit, taken as the limit itself
 ARRIVED_MM = 0.02  # where a move ends: some microsteps of the coarsest screw
 # A move of its own is led by set-points too, so that it ends by itself where the host dies; this long at most in one.
 LEG_S = 0.25
 REACTION_S = 1.0  # to begin and end what takes no way
 
 
-class ZaberAxis:
+class ZaberAxis(SampledDevice):
     """ServoAxis on one Zaber axis; nothing is opened before ``start``."""
+
+    _samples: PositionSamples
 
     def __init__(
         self,
@@ -51,34 +53,15 @@ class ZaberAxis:
         self._interrupted, self._now, self._sleep = interrupted, now, sleep
         self._name = f"servo axis on {config.port}, device {config.device}"
         self._scale = Scale(config.increments_per_mm, config.direction)
-        self._period_ns = round(1e9 / min(rate_Hz, config.rate_Hz))
+        self.period_ns = round(1e9 / min(rate_Hz, config.rate_Hz))
         span = limits.position_min_mm, limits.position_max_mm
-        self._follower = Follower(self._period_ns * 1e-9, config.lag_ms * 1e-3, *span, limits.speed_mm_s)
+        self._follower = Follower(self.period_ns * 1e-9, config.lag_ms * 1e-3, *span, limits.speed_mm_s)
         self._samples = PositionSamples(self._scale)
         self._identity = Identity("", "", "")
         self._dialogue: AsciiDialogue | None = None
         self._following = self._stopping = self._referenced = False
         self._flag, self._refused, self._busy = flags.NONE, "", False
         self._moved, self._due_ns, self._heard_ns, self._unanswered_ns = -1, 0, 0, 0
-
-    @property
-    def identity(self) -> Identity:
-        """Product, serial number and firmware, known after ``start``."""
-        return self._identity
-
-    @property
-    def next_seq(self) -> int:
-        """Number of the next sample."""
-        return self._samples.next_seq
-
-    @next_seq.setter
-    def next_seq(self, number: int) -> None:
-        self._samples.next_seq = number
-
-    @property
-    def period_ns(self) -> int:
-        """Time between moves, and between samples."""
-        return self._period_ns
 
     @property
     def fault(self) -> str:
@@ -139,7 +122,7 @@ class ZaberAxis:
         """Moves in legs that end by themselves, waits; raises SafetyStop beyond a limit, else DeviceError."""
         dialogue = self._started()
         self._check_referenced("moving")
-        target_mm = self._checked(position_mm)
+        target_mm = allowed_mm(position_mm, self._limits, self._name)
         if not 0 < speed_mm_s <= self._limits.speed_mm_s:
             raise SafetyStop(
                 f"{self._name}: refused to move at {speed_mm_s:g} mm/s; limits.speed_mm_s is"
@@ -153,7 +136,7 @@ class ZaberAxis:
         dialogue = self._started()
         self._check_referenced("enabling")
         with self._moving(dialogue):
-            self._checked(self._place_mm(dialogue))
+            allowed_mm(self._place_mm(dialogue), self._limits, self._name)
             self._look(dialogue)
         if self.fault:
             raise DeviceError(f"{self._name}: cannot be enabled: {self.fault}; remove its cause, then reset it")
@@ -171,7 +154,7 @@ class ZaberAxis:
 
     def command(self, position_mm: float, now_ns: int) -> None:
         """The newest set-point, sent when the next move is due; raises SafetyStop beyond the limits."""
-        setpoint_mm = self._checked(position_mm)
+        setpoint_mm = allowed_mm(position_mm, self._limits, self._name)
         if not self._is_due(now_ns):
             return
         place = self._samples.place
@@ -197,7 +180,7 @@ class ZaberAxis:
 
     def history(self) -> tuple[str, ...]:
         """The flags that are up, in words: the device remembers no others."""
-        return tuple(flags.described(flag) for flag in self._started().flags())
+        return tuple(flags.described(flag) for flag in self._flags(self._started()))
 
     def reset_fault(self) -> None:
         """Clears the flags; raises DeviceError where one is still there."""
@@ -225,7 +208,7 @@ class ZaberAxis:
     def _is_due(self, now_ns: int) -> bool:
         if now_ns < self._due_ns or self._samples.outstanding(now_ns) >= MOST_OUTSTANDING:
             return False
-        self._due_ns = max(self._due_ns + self._period_ns, now_ns)
+        self._due_ns = max(self._due_ns + self.period_ns, now_ns)
         return True
 
     def _send(self, now_ns: int, order: str) -> None:
@@ -269,9 +252,14 @@ class ZaberAxis:
 
     def _look(self, dialogue: AsciiDialogue) -> None:
         """Takes down the flags that are up now."""
-        up = dialogue.flags()
+        up = self._flags(dialogue)
         self._referenced = not set(up) & set(flags.WITHOUT_REFERENCE)
         self._flag = next((flag for flag in up if flags.is_fault(flag)), flags.NONE)
+
+    def _flags(self, dialogue: AsciiDialogue) -> tuple[str, ...]:
+        """Those that are up; whatever was asked before is answered before, and waited for by nobody."""
+        self._unanswered_ns = 0
+        return dialogue.flags()
 
     def _place_mm(self, dialogue: AsciiDialogue) -> float:
         return self._scale.mm(float(dialogue.value(self._config.position)))
@@ -302,23 +290,13 @@ class ZaberAxis:
         if not self._referenced:
             raise DeviceError(f"{self._name}: has no reference, and {what} needs one; home the axis first")
 
-    def _checked(self, position_mm: float) -> float:
-        """The position within the limits."""
-        low_mm, high_mm = self._limits.position_min_mm, self._limits.position_max_mm
-        if not low_mm - SLACK_MM <= position_mm <= high_mm + SLACK_MM:
-            raise SafetyStop(
-                f"{self._name}: refused to go to {position_mm:g} mm; limits.position_min_mm and position_max_mm are "
-                f"{low_mm:g} and {high_mm:g} mm"
-            )
-        return min(max(position_mm, low_mm), high_mm)
-
     @contextlib.contextmanager
     def _moving(self, dialogue: AsciiDialogue) -> Iterator[None]:
         """With torque; whatever goes wrong here stops the axis."""
         self._following = self._stopping = False
         self._refused = ""
         try:
-            if set(dialogue.flags()) & set(flags.POWERLESS):
+            if set(self._flags(dialogue)) & set(flags.POWERLESS):
                 dialogue.ask("driver enable")
             yield
         except BaseException:

@@ -40,8 +40,8 @@ def _foot(switch: SwitchMock, value: Value) -> None:
     switch.press(as_switch(value))
 
 
-def _unplug(switch: SwitchMock, value: Value) -> None:
-    (switch.close if as_switch(value) else switch.plug)()
+def _unplug(device: SwitchMock | BreathingMock, value: Value) -> None:
+    (device.close if as_switch(value) else device.plug)()
 
 
 def _shift(belt: BreathingMock, value: Value) -> None:
@@ -61,5 +61,6 @@ SWITCH_FAULTS: Mapping[str, FaultKind[SwitchMock]] = {
 }
 BREATHING_FAULTS: Mapping[str, FaultKind[BreathingMock]] = {
     "silent": FaultKind("the belt sends nothing", True, switching("silent")),
+    "unplug": FaultKind("its program ends; false: it is started again", True, _unplug),
     "shift": FaultKind("its clock is wrong by so many seconds", 0.25, _shift),
 }

@@ -34,7 +34,7 @@ INTERVAL_MS, LEAST_INTERVAL_MS = 19, 10
 LONGEST = 64  # StandardFirmata's own buffer of a message
 
 
-class _Requests:
+class BoardRequests:
     """Finds what a client asks for: a head and its data; holds one message."""
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ class FirmataMock(OnWire):
         self.silent = self.stuck = False
         self.plant = plant
         self._start_ns = self.now_ns = start_ns
-        self._requests = _Requests()
+        self._requests = BoardRequests()
         self._interval_ns = INTERVAL_MS * 1_000_000
         self._reported: set[int] = set()
         self._due_ns = NEVER_NS

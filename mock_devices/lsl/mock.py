@@ -5,6 +5,8 @@ wrong by so much.
 """
 
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 from drivers.lsl.library import load
 from mock_devices.interfaces import NEVER_NS
@@ -29,11 +31,13 @@ class BreathingMock:
         info = pylsl.StreamInfo(stream, "Respiration", 1, rate_Hz, pylsl.cf_double64, SOURCE_ID)
         info.set_channel_labels(["respiration"])
         info.set_channel_units(["mm"])
-        self._clock, self._outlet = pylsl.local_clock, pylsl.StreamOutlet(info)
+        self._clock, self._open = pylsl.local_clock, partial(pylsl.StreamOutlet, info)
+        self._outlet: Any = None
         self._stream, self._surface_mm = stream, surface_mm
         self.shift_s, self.silent = 0.0, False
         self._period_ns = round(1e9 / rate_Hz)
         self._due_ns = start_ns
+        self.plug()
 
     @property
     def due_ns(self) -> int:
@@ -58,6 +62,10 @@ class BreathingMock:
 
     def receive(self, now_ns: int) -> None:
         """Nothing comes."""
+
+    def plug(self) -> None:
+        """The stream is there; under its name again where it was taken away."""
+        self._outlet = self._outlet or self._open()
 
     def close(self) -> None:
         """Takes the stream away."""

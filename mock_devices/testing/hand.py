@@ -42,11 +42,11 @@ class MockBench:
         self.load(0.0)
         self.hide({})
         for device, kinds in self.control.faults().items():
-            self.fault(device, "unplug", False)
             for kind in kinds:
-                if kind in ("silent", "frozen", "invalid", "freeze", "wrong_identity"):
+                if kind in ("unplug", "silent", "frozen", "invalid", "freeze", "wrong_identity"):
                     self.fault(device, kind, False)
-            self.fault(device, "heal", True)
+            if "heal" in kinds:
+                self.fault(device, "heal", True)
 
     def wiring(self, *settings: str) -> Wiring:
         """A wiring of products that this bench plays, each at its port, the force sensor and the axis calibrated."""
@@ -72,7 +72,7 @@ class MockBench:
 
 
 @contextlib.contextmanager
-def serving(links: Path) -> Iterator[MockBench]:
+def serving(links: Path, *options: str) -> Iterator[MockBench]:
     """A bench whose lines can be unplugged and plugged in again; they are found under ``links``."""
-    with served_bench("--seed", "1", "--links", str(links)) as served:
+    with served_bench("--seed", "1", "--links", str(links), *options) as served:
         yield MockBench(served)

@@ -42,6 +42,15 @@ def test_every_product_is_listed_with_its_options(tmp_path: Path) -> None:
     assert "force.baud" in said.output
 
 
+def test_inputs_are_products_like_any_other() -> None:
+    found = {one.product: one for one in devices().products if one.role == "input"}
+    assert {name: one.rate_Hz for name, one in found.items()} == {
+        "firmata-glove": 50.0, "evdev-switch": None, "lsl-stream": 50.0,
+    }  # fmt: skip
+    said = rig("devices", "evdev-switch")
+    assert said.exit_code == 0 and "input.NAME.stops" in said.output
+
+
 def test_of_an_axis_no_rate_is_promised() -> None:
     rates = {one.product: one.rate_Hz for one in devices().products}
     assert (rates["maxon-epos4"], rates["ndi-polaris"], rates["bota-sensone"]) == (None, 60.0, 1000.0)
@@ -168,10 +177,53 @@ def test_asking_where_nobody_can_answer_says_the_option() -> None:
     assert isinstance(both.exception, UsageError)
 
 
+def event_device(names: Path, node: str, name: str, keys: str) -> None:
+    device = names / node / "device"
+    (device / "capabilities").mkdir(parents=True)
+    (device / "name").write_text(f"{name}\n")
+    (device / "capabilities/key").write_text(f"{keys}\n")
+
+
+def test_foot_switches_are_found_by_their_names_and_never_opened(tmp_path: Path) -> None:
+    event_device(tmp_path, "event0", "PCsensor FootSwitch", "1000000000007 ff800000000007ff febeffdff3cfffff")
+    event_device(tmp_path, "event1", "PCsensor FootSwitch", "10000 0 0 0 0")
+    event_device(tmp_path, "event2", 'Lid "Switch"', "0 0")
+    (found,) = finding.switches(tmp_path)
+    assert (found.role, found.product, found.address, found.asked) == (
+        "input", "evdev-switch", "name:PCsensor FootSwitch", False,
+    )  # fmt: skip
+    assert found.lines == '[input.switch]\nproduct = "evdev-switch"\nport = "name:PCsensor FootSwitch"\n'
+    assert list(finding.find([found], lambda _: pytest.fail("what names itself is not asked"))) == [found]
+
+
+@pytest.mark.parametrize("installed", [True, False])
+def test_streams_are_found_where_the_extra_is_installed(installed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(finding, "find_spec", lambda _: object() if installed else None)
+    monkeypatch.setattr(finding, "streams_there", lambda: [("belt", "Respiration")])
+    found = [(one.address, one.kind, one.lines) for one in finding.streams()]
+    line = '[input.breathing]\nproduct = "lsl-stream"\nport = "belt"\n'
+    assert found == ([("belt", "stream of kind Respiration", line)] if installed else [])
+
+
+def test_a_glove_is_looked_for_at_lines_and_what_has_no_line_is_not() -> None:
+    asked = [product for role, product in finding.candidates() if role == "input"]
+    assert [product.__name__ for product in asked] == ["FirmataGlove"]
+
+
 @pytest.fixture(scope="module")
 def bench() -> Iterator[ServedBench]:
-    with served_bench("--seed", "1") as served:
+    with served_bench("--seed", "1", "--input", "firmata-glove", "--input", "lsl-stream") as served:
         yield served
+
+
+@pytest.mark.bench
+@pytest.mark.extra
+@pytest.mark.xdist_group("commands")
+def test_glove_and_stream_of_the_mock_bench_are_found(bench: ServedBench) -> None:
+    ports = bench.endpoints.devices
+    glove = finding.ask(finding.named(ports["glove"]["serial"]))
+    assert (glove.role, glove.product, glove.lines.partition("\n")[0]) == ("input", "firmata-glove", "[input.glove]")
+    assert ports["breathing"]["lsl"] in [stream.address for stream in finding.streams()]
 
 
 @pytest.mark.bench

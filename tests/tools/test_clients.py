@@ -1,8 +1,12 @@
 """The table of clients says what the tests that run them did, and cannot go stale unseen."""
 
+import ast
 import re
 import subprocess
 import sys
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
@@ -28,9 +32,10 @@ def test_a_report_is_read_case_by_case() -> None:
 
 
 def test_passed_failed_and_skipped_are_counted_by_client() -> None:
-    lines = {line.split("|")[2].strip(): line for line in clients.table(clients.outcomes(REPORT)).splitlines()[2:]}
-    assert lines["pymodbus"].endswith("| 1 | 0 |")
-    assert lines["being"] == "| maxon EPOS4 | being | 1.0.2 | 0 | 1 |"
+    rows = clients.table(clients.outcomes(REPORT)).splitlines()[2:]
+    lines = {tuple(map(str.strip, line.split("|")[1:3])): line for line in rows}
+    assert lines["Robotiq FT 300", "pymodbus"].endswith("| 1 | 0 |")
+    assert lines["maxon EPOS4", "being"] == "| maxon EPOS4 | being | 1.0.2 | 0 | 1 |"
     canopen = [line for line in clients.table(clients.outcomes(REPORT)).splitlines() if "| canopen |" in line]
     assert canopen[0].endswith("| 1 | 1 |")
 
@@ -50,6 +55,48 @@ def test_a_failed_client_ends_it_with_1_and_stands_in_the_table(tmp_path: Path) 
 def test_a_page_without_a_place_for_it_is_told() -> None:
     with pytest.raises(ValueError, match="no place for the table"):
         clients.written("nothing here", "table")
+
+
+# Modules that tests of mocks import and that are no client: what tests are made with.
+NO_CLIENTS = {"serial", "pytest", "hypothesis", "numpy", "scipy", "pydantic"}
+
+
+@cache
+def distributions() -> Mapping[str, list[str]]:
+    return packages_distributions()
+
+
+def clients_in(source: str) -> set[str]:
+    """Distributions that the imports of a test file bring in, also those that are skipped where they are absent."""
+    named = {
+        name.partition(".")[0]
+        for node in ast.walk(ast.parse(source))
+        for name in (
+            [alias.name for alias in node.names] if isinstance(node, ast.Import)
+            else [node.module or ""] if isinstance(node, ast.ImportFrom)
+            else [str(ast.literal_eval(node.args[0]))]
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == "pytest.importorskip"
+            else []
+        )
+    } - NO_CLIENTS - sys.stdlib_module_names  # fmt: skip
+    known = distributions()
+    return {known[name][0].lower().replace("_", "-") for name in named if name in known}
+
+
+def test_every_client_that_a_test_of_a_mock_uses_is_in_the_table() -> None:
+    used = {
+        (str(file.relative_to(ROOT / TESTS)), distribution)
+        for file in (ROOT / TESTS).rglob("test_*.py")
+        for distribution in clients_in(file.read_text())
+    }
+    assert used - {(client.file, client.distribution) for client in CLIENTS} == set()
+    assert len(used) >= 9
+
+
+def test_a_client_is_seen_however_it_is_imported() -> None:
+    ways = ("import pymodbus", "from pymodbus.client import X", 'x = pytest.importorskip("pymodbus", reason="no")')
+    assert [clients_in(way) for way in ways] == [{"pymodbus"}] * 3
+    assert clients_in("import os, pytest\nfrom drivers import crc\nfrom tests import x") == set()
 
 
 def test_the_page_has_as_many_tests_of_each_client_as_there_are_and_all_passed() -> None:

@@ -17,6 +17,7 @@ class EvdevSwitch(InputProduct):
     mock: ClassVar[MockPort | None] = MockPort("mock_devices.inputs:switch", "switch", "events")
     advice: ClassVar[str] = "its cable, its port, and whether you are in the group input"
     switch: ClassVar[str] = "pressed"
+    at_line: ClassVar[bool] = False
 
     product: Literal["evdev-switch"] = Field(default="evdev-switch", description="what it is")
     key: str = Field(default="", description="name or number of the one key that counts; empty: any of them")

@@ -29,6 +29,8 @@ class InputProduct(Product):
     """
 
     switch: ClassVar[str] = ""
+    # Whether it stands at a serial line, where `rig find` may look for it.
+    at_line: ClassVar[bool] = True
 
     needed: bool = Field(default=False, description="without it nothing moves, and losing it retracts the tip")
 

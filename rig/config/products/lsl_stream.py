@@ -16,6 +16,7 @@ class LslStream(InputProduct):
     driver: ClassVar[str] = "drivers.lsl.device:open_stream"
     mock: ClassVar[MockPort | None] = MockPort("mock_devices.inputs:breathing", "breathing", "lsl")
     advice: ClassVar[str] = "whether its program sends, its port (the stream's name), and input.NAME.scope"
+    at_line: ClassVar[bool] = False
 
     product: Literal["lsl-stream"] = Field(default="lsl-stream", description="what it is")
     source_id: str = Field(default="", description="tells streams of one name apart; empty: there is one of that name")

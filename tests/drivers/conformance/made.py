@@ -48,6 +48,9 @@ class World:
         self.now_ns += round(seconds * 1e9)
         return not self.faults and self.defect != "deaf"
 
+    def sleep(self, seconds: float) -> None:
+        self.now_ns += round(seconds * 1e9)
+
     def put_on(self, load_N: float) -> None:
         self.load_N = load_N
 
@@ -60,6 +63,7 @@ class World:
             load=self.put_on,
             now=lambda: self.now_ns,
             wait=self.wait,
+            sleep=self.sleep,
         )
 
 
@@ -72,6 +76,7 @@ class MadeSensor:
         self.identity, self.period_ns = Identity("", "", ""), 5 * MS
         self.fd = os.eventfd(0)
         self.due_ns, self.closed = world.now_ns, False
+        self.polled_ns, self.dazed = world.now_ns, False
 
     def has(self, defect: str) -> bool:
         return self.world.defect == defect
@@ -88,6 +93,10 @@ class MadeSensor:
         if self.closed:
             return self.closed_poll()
         self.world.now_ns += 3 * MS if self.has("blocks") else 0
+        away_ns, self.polled_ns = now_ns - self.polled_ns, now_ns
+        if self.has("impatient") and away_ns > 500 * MS:
+            raise DeviceError("no answer for 0.5 s")
+        self.dazed = self.dazed or (self.has("dazed") and away_ns > 500 * MS)
         step_ns = 2 * self.period_ns if self.has("slow") else self.period_ns
         samples = []
         while now_ns - self.due_ns >= 2 * step_ns:
@@ -121,7 +130,7 @@ class MadeSensor:
         self.next_seq += 2 if self.has("skips") else 1
         fz_N = -self.world.load_N * {"millinewton": 1000.0, "pounds": 0.2248, "sign": -1.0}.get(self.world.defect, 1.0)
         return ForceSample(self.next_seq - 1, capture_ns, now_ns, 0, -1.0, 0.0, fz_N, *(0.0,) * 3, 20.0, 0,
-                           int(not self.has("invalid")))  # fmt: skip
+                           int(not (self.has("invalid") or self.dazed)))  # fmt: skip
 
     def closed_poll(self) -> list[ForceSample]:
         if self.has("closed oddly"):

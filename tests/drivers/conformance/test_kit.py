@@ -36,6 +36,8 @@ PLANTED: tuple[tuple[str, Check, str], ...] = (
     ("invalid", checks.quantities, "none of them valid"),
     ("blocks", checks.waiting, "a poll takes 3.0 ms .limit 1 ms.: it must return at once; .* ThreadedSource"),
     ("deaf", checks.waiting, "its descriptor is not readable within 0.5 s"),
+    ("impatient", checks.away, "not polled for 1.5 s, .* it is lost: no answer for 0.5 s"),
+    ("dazed", checks.away, "not polled for 1.5 s, .* gives no valid sample"),
     ("breaks", checks.damage, "corrupt on the wire: poll raises IndexError: list index out of range"),
     ("uncounted", checks.damage, "corrupt of a tenth of all messages is in none of its counters"),
     (

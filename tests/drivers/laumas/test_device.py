@@ -115,6 +115,19 @@ def test_silence_is_told_after_half_a_second() -> None:
         session.run(700)
 
 
+def test_a_pause_in_which_nobody_polls_is_no_silence() -> None:
+    """An axis that homes takes seconds, and whoever waits for it does not look at the sensor."""
+    session = started()
+    for _ in range(2):
+        session.clock.advance(3.0)
+        assert session.run(30)[-1].valid == 1
+    session.mock.silent = True
+    session.run(15)  # asked, and not answered, when nobody looks any more
+    session.clock.advance(3.0)
+    session.mock.silent = False
+    assert session.run(30)[-1].valid == 1
+
+
 def test_a_refusal_is_told_in_words() -> None:
     session = Session()
     session.mock.refusing = True

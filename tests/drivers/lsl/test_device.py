@@ -13,7 +13,7 @@ import pytest
 from drivers.lsl import library
 from drivers.lsl.device import LslInlet, open_stream
 from drivers.lsl.library import ClockCorrection, load
-from drivers.lsl.puller import MOST, Puller
+from drivers.lsl.puller import Pulled, Puller
 from mock_devices.lsl.mock import BreathingMock
 from rig.config.products.lsl_stream import LslStream
 from rig.errors import DeviceError, UsageError
@@ -176,20 +176,35 @@ def test_one_program_has_one_scope(pylsl: ModuleType) -> None:
     assert "IPv6 = disable" in library.configuration("machine")
 
 
-class FullInlet:
-    """As a library that has ever more."""
+class Ended:
+    """As a library whose stream is gone after one sample."""
 
-    def pull_sample(self, timeout: float) -> tuple[list[float], float]:
-        time.sleep(0.0)
-        return [1.0], time.monotonic()
+    def __init__(self) -> None:
+        self.left = 1
+
+    def pull_sample(self, timeout: float) -> tuple[list[float] | None, float]:
+        assert 0 < timeout < 1
+        self.left -= 1
+        if self.left < -1:
+            raise RuntimeError("gone")
+        return ([1.0], 2.5) if self.left == 0 else (None, 0.0)
 
 
-def test_what_nobody_takes_is_bounded_and_counted(pylsl: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("drivers.lsl.puller.MOST", 50)
-    puller = Puller(pylsl, FullInlet(), library.correction)
-    end_s = time.monotonic() + 5.0
-    while not puller.dropped and time.monotonic() < end_s:
-        time.sleep(0.01)
-    assert puller.dropped > 0
-    assert len(puller.take()) == 50 < MOST
-    puller.close()
+def test_a_sample_then_the_clock_then_the_end(pylsl: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("drivers.lsl.puller.CORRECT_EVERY_S", 0.0)
+    known = ClockCorrection(0.1, 0.002)
+    puller = Puller(pylsl, Ended(), lambda *_: known)
+    assert puller.read() == [Pulled((1.0,), 2.5), known]
+    assert puller.read() == [known]
+    with pytest.raises(DeviceError, match="the stream is lost: gone; start its program again"):
+        puller.read()
+
+
+def test_the_librarys_sockets_are_given_back(belt: BreathingMock) -> None:
+    """A stream that is lost and found again for a night must not use up what a process may open."""
+    opened(belt.endpoints()["lsl"]).close()  # the library opens some for good with the first
+    before = len(os.listdir("/proc/self/fd"))  # noqa: PTH208 - numbers, not paths
+    held = [opened(belt.endpoints()["lsl"]) for _ in range(3)]
+    for inlet in held:
+        inlet.close()
+    assert len(os.listdir("/proc/self/fd")) <= before  # noqa: PTH208

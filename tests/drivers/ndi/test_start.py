@@ -155,6 +155,12 @@ def test_old_firmware_without_information_is_known_by_its_freeze_tag(bench: Trac
     assert started(bench).identity.firmware == "Polaris Vega 024"
 
 
+def test_a_camera_that_names_no_freeze_tag_starts_and_its_firmware_is_unknown(bench: TrackerBench) -> None:
+    bench.canned = {"GETINFO": "ERROR01", "VER": "Polaris Vega Control Firmware\nNDI S/N: P9-01234"}
+    identity = started(bench).identity
+    assert (identity.product, identity.serial, identity.firmware) == ("Polaris Vega Control Firmware", "P9-01234", "")
+
+
 def leaping() -> Callable[[], int]:
     """A clock on which every deadline is over at once."""
     ticks = itertools.count(0, 10_000_000_000)

@@ -64,7 +64,15 @@ def test_where_checksums_are_demanded_a_line_without_one_is_damaged() -> None:
 
 @pytest.mark.parametrize(
     "line",
-    [b"@1 1 OK IDLE -- 0", b"@01 1 07 XX IDLE -- 0", b"@01 1 07 OK AWAKE -- 0", b"!01 1 07 OK IDLE --", b"01 1 07 OK"],
+    [
+        b"@1 1 OK IDLE -- 0",
+        b"@01 1 07 XX IDLE -- 0",
+        b"@01 1 07 OK AWAKE -- 0",
+        b"!01 1 07 OK IDLE --",
+        b"01 1 07 OK",
+        b"@01 1 07 OK IDLE -- \xde",
+        b"#01 1 \xb4",
+    ],
 )
 def test_what_is_no_reply_is_discarded(line: bytes) -> None:
     replies, counters = fed(line + b"\r\n")

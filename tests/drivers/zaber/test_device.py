@@ -92,6 +92,17 @@ def test_a_move_arrives_and_no_order_of_it_reaches_further_than_a_leg() -> None:
     assert max(np.diff([0.0, *targets])) <= 20.0 * 0.25 + 0.01 and targets[-1] == pytest.approx(40.0, abs=0.03)
 
 
+@pytest.mark.parametrize("waiting", ["home", "move", "history"])
+def test_what_was_asked_before_a_wait_is_not_missed_behind_it(waiting: str) -> None:
+    """What waits takes all replies: a position that was asked for just before it has come, and is no silence."""
+    bench = ZaberBench()
+    axis = homed(bench)
+    axis.request(bench.clock.now_ns)
+    {"home": axis.home, "move": lambda: axis.move_to(30.0, 20.0), "history": axis.history}[waiting]()
+    bench.sleep(1.0)
+    assert len(idle(bench, axis, 0.1)) > 5
+
+
 @pytest.mark.parametrize(
     ("frequency_Hz", "amplitude_mm", "gain", "within"),
     [

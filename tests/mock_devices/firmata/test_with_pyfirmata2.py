@@ -36,7 +36,9 @@ def board() -> Iterator[FirmataMock]:
     mock.close()
 
 
-def test_it_finds_the_inputs_and_reads_what_lies_on_them(board: FirmataMock, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pyfirmata2_finds_the_inputs_and_reads_what_lies_on_them(
+    board: FirmataMock, monkeypatch: pytest.MonkeyPatch
+) -> None:
     # A real board resets when its port is opened, for which the client waits five seconds.
     monkeypatch.setattr(pyfirmata2.pyfirmata2, "BOARD_SETUP_WAIT_TIME", 0.1)
     client = pyfirmata2.Board(os.fspath(board.endpoints()["serial"]))

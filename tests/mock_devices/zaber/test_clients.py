@@ -39,7 +39,7 @@ def makers_axis(wire: TcpWire) -> Iterator[Axis]:
         yield connection.get_device(1).get_axis(1)
 
 
-def test_it_homes_moves_and_reads_its_place() -> None:
+def test_zaber_motion_homes_moves_and_reads_its_place() -> None:
     with simulated(wire := TcpWire()) as (_, bench), makers_axis(wire) as axis:
         assert not axis.is_homed()
         axis.home()
@@ -54,7 +54,7 @@ def test_it_homes_moves_and_reads_its_place() -> None:
         assert not axis.is_busy() and 3.0 < bench.axis.position_mm < 60.0
 
 
-def test_settings_flags_and_refusals_are_understood() -> None:
+def test_zaber_motion_understands_settings_flags_and_refusals() -> None:
     with simulated(wire := TcpWire()) as (mock, _), makers_axis(wire) as axis:
         axis.settings.set("limit.max", 100_000)
         assert axis.settings.get("limit.max") == 100_000
@@ -74,7 +74,7 @@ def test_settings_flags_and_refusals_are_understood() -> None:
         axis.move_absolute(2000)
 
 
-def test_a_stall_on_the_way_fails_the_makers_move() -> None:
+def test_zaber_motion_is_told_of_a_stall_on_the_way() -> None:
     with simulated(wire := TcpWire()) as (mock, _), makers_axis(wire) as axis:
         axis.home()
         axis.move_absolute(100_000, NATIVE, False, 20 * 2000 * 1.6384, NATIVE)
@@ -83,7 +83,7 @@ def test_a_stall_on_the_way_fails_the_makers_move() -> None:
             axis.wait_until_idle()
 
 
-def test_it_is_found_on_its_line_and_our_driver_follows_the_maker() -> None:
+def test_zaber_motion_finds_it_on_its_line_and_our_driver_follows() -> None:
     """Checksums that our driver switched on stay on, and the maker's library reads them."""
     wire = TcpWire()
     with simulated(wire):
