@@ -29,6 +29,8 @@ from rig.intake.units import ros_unit, unit_in, unit_of
 Vectors = dict[str, NDArray[np.generic] | StoredVector]
 BATCH_ROWS = 1 << 18  # two megabytes a column
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
+# Time, force and position.
+FEWEST_CHANNELS = 3
 # Longer lists in a message are images and clouds of points.
 LONGEST_LIST = 64
 OBJECT_ADVICE = "; save objects of MATLAB as plain vectors, a table by table2struct(T, 'ToScalar', true)"
@@ -51,6 +53,7 @@ def open_mat(path: Path) -> list[Sheet]:
         raise unreadable(path, "a MAT file", error, "copy it again, or save it with -v7") from error
     groups: dict[str, dict[str, object]] = {}
     _sort("", {name: value for name, value in found.items() if not name.startswith("__")}, groups)
+    _join_beside(groups)
     _join(groups)
     titles = list(_titles(groups))
     return [_of_values(path, name, values, titles) for name, values in groups.items()]
@@ -87,9 +90,23 @@ def _join(groups: dict[str, dict[str, object]]) -> None:
         above = [name[: match.start()] for match in re.finditer(r"[.]", name)][::-1]
         sizes = {_sized(value) for value in own.values()}
         home = next((up for up in above if any(_sized(value) in sizes for value in groups.get(up, {}).values())), None)
-        if len(own) == 1 and home is not None:
+        if home is not None and 1 in (len(own), sum(_sized(value) > 1 for value in groups[home].values())):
             groups[home] |= {f"{name[len(home) + 1 :]}.{key}": value for key, value in own.items()}
             del groups[name]
+
+
+def _join_beside(groups: dict[str, dict[str, object]]) -> None:
+    """Structs of one vector beside each other, as channels with their units, into the one above, if alike in length."""
+    alike: dict[tuple[str, int], dict[str, str]] = {}
+    for name, values in groups.items():
+        vectors = [key for key, value in values.items() if _sized(value) > 1]
+        if len(vectors) == 1 and name and not name.endswith(")"):
+            alike.setdefault((name.rpartition(".")[0], _sized(values[vectors[0]])), {})[name] = vectors[0]
+    for (above, _), channels in alike.items():
+        for name, key in channels.items() if len(channels) >= FEWEST_CHANNELS else ():
+            values = groups.pop(name)
+            unit = next((f" ({value})" for fact, value in values.items() if fact.lower() in UNIT_NAMES), "")
+            groups[above][name.rpartition(".")[2] + unit] = values[key]
 
 
 def _sized(value: object) -> int:
@@ -163,14 +180,9 @@ def open_hdf5(path: Path) -> list[Sheet]:
         with h5py.File(path) as file:
             groups: dict[str, Any] = {}
             file.visititems(groups.__setitem__)
-            found = [
-                (name, group)
-                for name, group in {"": file, **groups}.items()
-                if isinstance(group, h5py.Group) and not name.startswith("#")
-            ]
-            return [
-                sheet for name, group in found for sheet in (_of_group(path, name, group), *_members(path, name, group))
-            ]
+            found = {"": file, **{name: group for name, group in groups.items() if name[:1] != "#"}}
+            known = [(path, name, group) for name, group in found.items() if isinstance(group, h5py.Group)]
+            return [sheet for group in known for sheet in (_of_group(*group), *_members(*group))]
     except DAMAGE as error:
         raise unreadable(path, "HDF5", error) from error
 
@@ -190,11 +202,8 @@ def _members(path: Path, name: str, group: Any) -> Iterator[Sheet]:
 
 
 def _refers(item: Any) -> bool:
-    return (
-        isinstance(item, h5py.Dataset)
-        and bool(h5py.check_ref_dtype(item.dtype))
-        and not item.attrs.get("MATLAB_object_decode")
-    )
+    is_reference = isinstance(item, h5py.Dataset) and bool(h5py.check_ref_dtype(item.dtype))
+    return is_reference and not item.attrs.get("MATLAB_object_decode")
 
 
 def _of_group(path: Path, name: str, group: Any) -> Sheet:
@@ -209,7 +218,7 @@ def _of_group(path: Path, name: str, group: Any) -> Sheet:
             vectors |= fields_of(path, item)
             units |= zip(item.dtype.names, _attribute(item, UNIT_NAMES), strict=False)
         elif item.ndim in (1, 2) and item.size > 1 and item.dtype.kind in "biuf" and _is_numeric(item):
-            split = _named(lines_of(path, key, item), _attribute(item, COLUMN_NAMES))
+            split = _named(lines_of(path, key, item), _attribute(item, COLUMN_NAMES) or _names_beside(group, key, item))
             vectors |= split
             units |= zip(split, _spread(_attribute(item, UNIT_NAMES), len(split)), strict=False)
         elif item.size == 1:
@@ -217,6 +226,14 @@ def _of_group(path: Path, name: str, group: Any) -> Sheet:
         facts |= {name: " ".join(map(_text, np.ravel(value))) for name, value in item.attrs.items()}
     unread = f"; {', '.join(objects)} cannot be read{OBJECT_ADVICE}" if objects else ""
     return _of_vectors(path, name, vectors, units, facts, unread)
+
+
+def _names_beside(group: Any, key: str, matrix: Any) -> list[str]:
+    """The texts of the dataset that is called most like ``key``, as pandas puts `block0_items` beside its values."""
+    texts = {name: item for name, item in group.items() if isinstance(item, h5py.Dataset) and item.dtype.kind in "SO"}
+    lists = [name for name, item in texts.items() if item.ndim == 1 and h5py.check_string_dtype(item.dtype)]
+    best = max(lists, key=lambda name: sum(map(str.__eq__, name, key)), default="")
+    return [_text(one) for one in group[best][()]] if best and matrix.ndim > 1 else []
 
 
 def _attribute(item: Any, names: Sequence[str]) -> list[str]:
@@ -233,11 +250,8 @@ def _spread(units: Sequence[str], count: int) -> list[str]:
 
 def _named(vectors: Mapping[str, NDArray[np.generic] | StoredVector], names: Sequence[str]) -> Vectors:
     """With other names, where there is one for each and none twice."""
-    return (
-        dict(zip(names, vectors.values(), strict=True))
-        if len(set(names)) == len(names) == len(vectors)
-        else dict(vectors)
-    )
+    told = len(set(names)) == len(names) == len(vectors)
+    return dict(zip(names, vectors.values(), strict=True)) if told else dict(vectors)
 
 
 def _is_numeric(item: Any) -> bool:
@@ -278,7 +292,7 @@ def _unit_field(metadata: Mapping[bytes, bytes]) -> str:
 
 
 def _array(column: Any) -> NDArray[np.generic]:
-    found = column.to_numpy(zero_copy_only=False)
+    found = (column.cast(pa.float64()) if pa.types.is_decimal(column.type) else column).to_numpy(zero_copy_only=False)
     return np.asarray(found.astype(f"{found.dtype.kind}8[ns]").astype(np.int64) if found.dtype.kind in "Mm" else found)
 
 
@@ -301,14 +315,11 @@ def _of_topic(
 ) -> Sheet:
     decode = _DECODERS.get(channel.message_encoding)
     vectors = decode(schema, bodies) if decode else Vectors()
-    unread = (
-        ""
-        if vectors
-        else f"; its messages are {channel.message_encoding}, of which only JSON and plain numbers are read"
-    )
+    unread = f"; its messages are {channel.message_encoding}, of which only JSON and plain numbers are read"
     log_ns, publish_ns = np.array(times, np.int64).T
     units = {"log_time": "ns", "publish_time": "ns", **{name: ros_unit(name) for name in vectors if decode is _of_cdr}}
-    return _of_vectors(path, topic, {"log_time": log_ns, "publish_time": publish_ns, **vectors}, units, {}, unread)
+    found = {"log_time": log_ns, "publish_time": publish_ns, **vectors}
+    return _of_vectors(path, topic, found, units, {}, "" if vectors else unread)
 
 
 def open_json_lines(path: Path) -> list[Sheet]:

@@ -12,8 +12,8 @@ from rig.intake.units import unit_in
 # Written for a number that is not there, besides an empty cell, by loggers, spreadsheets and statistics programs.
 NO_VALUE = frozenset((
     "na", "n/a", "n.a.", "nan", "-nan", "null", "none", "nil", "missing", "-", "--", "---", "*", "**", "***", ".", "?",
-    "#n/a", "#nv", "#value!", "#wert!", "#div/0!", "#num!", "overflow", "over", "ol", "inf", "-inf", "∞", "-∞", "bad",
-    "invalid",
+    "#n/a", "#nv", "#value!", "#wert!", "#div/0!", "#num!", "overflow", "over", "overload", "overrange",
+    "ol", "ovld", "out of range", "inf", "-inf", "∞", "-∞", "bad", "invalid",
 ))  # fmt: skip
 COMMENT = ("#", "%", "//")
 _AFFIXED = re.compile(

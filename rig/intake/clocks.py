@@ -81,10 +81,8 @@ def on_one_clock(tables: Sequence[FoundTable]) -> list[Part]:
     if len(shared) == len(tables):
         return [Part(tables)]
     if not shared:
-        raise DataError(
-            f"{tables[0].sheet.where}: every table of its recording has a clock of its own; one must be without "
-            "clock = 'own', the others are brought onto it"
-        )
+        said = f"{tables[0].sheet.where}: every table of its recording has a clock of its own"
+        raise DataError(f"{said}; one must be without clock = 'own', the others are brought onto it")
     ours = _clock(shared)
     kept, alignments, parts = list(shared), dict[int, Alignment](), list[Part]()
     for table in (table for table in tables if table.form.clock == "own"):

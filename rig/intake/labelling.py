@@ -4,12 +4,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.config.table import TomlTable
 from rig.intake.families import ColumnGroup
 from rig.intake.naming import templates_of
 from rig.intake.notation import is_stamp
 from rig.intake.roles import WORDS, words_of
+from rig.intake.survey import Numbers
 
 # A label holds for many rows: one that changes more often is a state of the machine, or noise.
 FEWEST_ROWS = 5
@@ -28,8 +30,8 @@ class Labels(NamedTuple):
 
 def labels_in(table: ColumnGroup, taken: Sequence[int], time: int | None) -> Labels:
     """The columns of labels of a table; those that tell recordings apart are named in the template of `recording`."""
-    texts = {number: texts for number, texts in _labelled(table, taken) if _holds(texts)}
     anew = _anew(table, time)
+    texts = {number: texts for number, texts in _labelled(table, taken, anew) if _holds(texts)}
     telling = _telling(table, texts, anew)
     kept = [number for number in texts if number in telling or _rank(table, number) < UNKNOWN]
     if not kept:
@@ -43,8 +45,8 @@ def labels_in(table: ColumnGroup, taken: Sequence[int], time: int | None) -> Lab
     return Labels({called[number]: table.place(number) for number in kept}, templates, doubts)
 
 
-def _labelled(table: ColumnGroup, taken: Sequence[int]) -> Iterator[tuple[int, list[str]]]:
-    """Columns called as labels are, or of texts that are no numbers, as texts."""
+def _labelled(table: ColumnGroup, taken: Sequence[int], anew: Sequence[int]) -> Iterator[tuple[int, list[str]]]:
+    """Columns called as labels are, of texts that are no numbers, or that change where time begins anew, as texts."""
     for number in table.columns:
         words = words_of(table.layout.sheet.header[number])
         named = any(word in WORDS["label"] for word in words)
@@ -54,8 +56,10 @@ def _labelled(table: ColumnGroup, taken: Sequence[int]) -> Iterator[tuple[int, l
             continue
         if number in table.texts and (named or len(set(table.texts[number])) > 1):
             yield number, table.texts[number]
-        elif named and number in table.looks and not table.looks[number].counts:
-            yield number, [f"{value:g}" for value in table.looks[number].values]
+        elif number in table.looks and not table.looks[number].counts:
+            rows, steps = _steps(table.looks[number].values)
+            if named or (anew and np.array_equal(rows[steps != 0], anew)):
+                yield number, [f"{value:g}" for value in table.looks[number].values]
 
 
 def _holds(texts: Sequence[str]) -> bool:
@@ -75,7 +79,14 @@ def _anew(table: ColumnGroup, time: int | None) -> list[int]:
     """Rows at which time starts anew."""
     if time is None or time not in table.looks:
         return []
-    return [int(row) + 1 for row in np.flatnonzero(np.diff(table.looks[time].values) < 0)]
+    rows, steps = _steps(table.looks[time].values)
+    return list(map(int, rows[steps < 0]))
+
+
+def _steps(values: Numbers) -> tuple[NDArray[np.intp], Numbers]:
+    """Rows that hold a number, but the first, and by how much it differs from the one before."""
+    known = np.flatnonzero(np.isfinite(values))
+    return known[1:], np.diff(values[known])
 
 
 def _telling(table: ColumnGroup, texts: Mapping[int, Sequence[str]], anew: Sequence[int]) -> list[int]:

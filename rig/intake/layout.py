@@ -169,6 +169,8 @@ def _beginning(source: Source, section: str = "") -> tuple[list[str], str, tuple
     if b"\r" in head and b"\n" not in head:
         raise DataError(f"{source}: its lines end as old Macs wrote them; save it with the line ends of today")
     encoding, doubts = encoding_of(head)
+    if not encoding:
+        raise DataError(f"{source}: its bytes are not those of a text; copy it again, or save it as CSV or xlsx")
     lines = head.decode(encoding, errors="replace").removeprefix("\ufeff").splitlines()[:HEAD_ROWS]
     whole = lines[:-1] if len(head) == HEAD_BYTES and len(lines) < HEAD_ROWS else lines
     return joined(whole), encoding, doubts
@@ -236,17 +238,19 @@ def _understood(found: Found) -> tuple[int, int]:
 
 
 def encoding_of(head: bytes) -> tuple[str, tuple[str, ...]]:
-    """The encoding whose header has the most words that are known, and a doubt where others have as many."""
+    """The encoding whose header has most words that are known, empty of no text; a doubt where others have as many."""
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16", ()
     zeros = [head[start:HEAD_ROWS:2].count(0) for start in (0, 1)]
     if max(zeros) > len(head[:HEAD_ROWS]) // 4:  # of two bytes of a digit one is none
         return ("utf-16-be" if zeros[0] > zeros[1] else "utf-16-le"), ()
     if _decodes(head, "utf-8"):
-        return "utf-8", ()
+        return ("" if b"\0" in head else "utf-8"), ()
     header = b"\n".join(head.splitlines()[:HEAD_ROWS])
     known = {name: _words(header, name) for name in ENCODINGS if _decodes(head, name)}
-    best = max(known, key=lambda name: known[name], default="cp1252")
+    if not known or b"\0" in header:
+        return "", ()
+    best = max(known, key=lambda name: known[name])
     others = [name for name in known if known[name] == known[best] and name != best]
     said = {name: next((line for line in header.decode(name).splitlines() if not line.isascii()), "") for name in known}
     texts = "; ".join(f"{name}: {said[name]!r}" for name in (best, *others))
@@ -262,7 +266,7 @@ def _decodes(head: bytes, name: str) -> bool:
 
 
 def _words(header: bytes, name: str) -> int:
-    words = re.split(r"[\s,;|\"()\[\]]+", header.decode(name))
+    words = re.split(r"[\s,;|\"()\[\]/]+", header.decode(name))
     return sum(knows(word) or bool(unit_in(word)) for word in words if not word.isascii())
 
 

@@ -59,9 +59,7 @@ def _shared(sheet: Sheet, others: Sequence[int], channels: Sequence[ChannelRows]
         return []
     texts = _columns(sheet, dict.fromkeys(others, True))
     first = channels[0].rows
-    same = [
-        number for number, own in texts.items() if all(np.array_equal(own[first], own[one.rows]) for one in channels)
-    ]
+    same = [at for at, own in texts.items() if all(np.array_equal(own[first], own[one.rows]) for one in channels)]
     lost = (texts[number][one.rows] for number in others if number not in same for one in channels)
     return [] if any(np.unique(own).size > 1 for own in lost) else same
 

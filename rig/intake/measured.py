@@ -163,10 +163,8 @@ def spoilt(table: ColumnGroup, quantity: str, column: int) -> Iterator[str]:
     row, count = _full_rows(table, column) if quantity == "force" else (0, 0)
     if count:
         end = float(np.abs(looks.values[row : row + count]).min())
-        yield (
-            f"{sheet.place(row)}, column {sheet.header[column]}: {count} rows stay at {end:g}, its largest; if that is "
-            f"the end of its range, say saturates = [{-end:g}, {end:g}]"
-        )
+        said = f"{sheet.place(row)}, column {sheet.header[column]}: {count} rows stay at {end:g}, its largest"
+        yield f"{said}; if that is the end of its range, say saturates = [{-end:g}, {end:g}]"
 
 
 def _full_rows(table: ColumnGroup, column: int) -> tuple[int, int]:
@@ -187,9 +185,8 @@ def _question(
         Choice(str(table.place(column)), value_of(table, quantity, column, known), _why(table, column))
         for column in left
     )
-    signals = [
-        choice for choice, column in zip(choices, left, strict=True) if table.layout.sheet.units[column] in SIGNALS
-    ]
+    units = table.layout.sheet.units
+    signals = [choice for choice, column in zip(choices, left, strict=True) if units[column] in SIGNALS]
     clear = signals if len(signals) == 1 else choices if len(choices) == 1 else ()
     usual = clear[0].name if len(clear) == 1 and clear[0].whole else ""
     shown = "; ".join(f"{choice.name} ({choice.why})" for choice in choices) or "none whose cells are mostly numbers"

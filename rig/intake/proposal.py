@@ -242,7 +242,7 @@ def _late(table: ColumnGroup, at: int | None, label: object) -> list[str]:
     if at is None or at not in table.looks or label is not None:
         return []
     values = table.looks[at].values
-    late = np.flatnonzero(values[1:] <= np.maximum.accumulate(values)[:-1])
+    late = np.flatnonzero(values[1:] <= np.fmax.accumulate(values)[:-1])
     if not 0 < late.size <= LATE_SHARE * values.size:
         return []
     place = table.layout.sheet.place(int(late[0]) + 1)

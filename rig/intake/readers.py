@@ -15,6 +15,8 @@ from rig.intake.workbook import sheet_names
 WORKBOOKS = (".xls", ".xlsx", ".xlsm", ".xlsb", ".ods")
 # Besides plain ones: LabVIEW (lvm), Zwick (tra), MTS and Instron (raw), Windows printing to a file (prn).
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".tab", ".log", ".lvm", ".tra", ".raw", ".prn", ".ascii", ".out")
+# Texts without a table; one may stand in those of any other ending.
+NO_TABLES = (".json", ".xml", ".html", ".htm", ".md", ".py", ".m", ".r", ".toml", ".yaml", ".yml", ".svg", ".tex")
 # By the name of their function in `rig.intake.arrays`, whose libraries take as long to load as a small text to import.
 ARRAYS = {
     ".mat": "open_mat", ".h5": "open_hdf5", ".hdf5": "open_hdf5", ".hdf": "open_hdf5", ".parquet": "open_parquet",
@@ -25,13 +27,13 @@ ARRAYS = {
 def kind_of(path: Path) -> str:
     """``text``, ``workbook``, ``arrays``, or empty where no reader takes the file."""
     suffix = (path.with_suffix("") if path.suffix == ".gz" else path).suffix.lower()
-    if suffix in WORKBOOKS:
-        return "text" if _is_text(path) else "workbook"
-    return "text" if suffix in TEXTS else "arrays" if suffix in ARRAYS else ""
+    if suffix in (*TEXTS, *ARRAYS, *NO_TABLES):
+        return "text" if suffix in TEXTS else "arrays" if suffix in ARRAYS else ""
+    return "text" if _is_text(path) else "workbook" if suffix in WORKBOOKS else ""
 
 
 def _is_text(path: Path) -> bool:
-    """Whether a workbook by its name is a text with tabs, as many programs write for spreadsheets to open."""
+    """Whether what is no text by its name is one, as many programs write tabs for spreadsheets to open."""
     try:
         with path.open("rb") as file:
             head = file.read(4096)
@@ -48,10 +50,8 @@ def open_sheets(path: Path, form: FileForm) -> Iterable[tuple[dict[str, str], Sh
         sheets = [long for _, sheet in whole for long in by_channel(sheet, form.long)]
         chosen = [(matched(form.sheets, sheet.name) or {}, sheet) for sheet in sheets if _is_named(form, sheet)]
     elif kind == "text":
-        tables = [
-            (matched(form.sheets, sheet.name) if sheet.name else {}, sheet) for sheet in open_texts(Source(path), form)
-        ]
-        chosen = [(labels, sheet) for labels, sheet in tables if labels is not None]
+        texts = open_texts(Source(path), form)
+        chosen = [(matched(form.sheets, sheet.name) or {}, sheet) for sheet in texts if _is_named(form, sheet)]
     elif kind == "workbook":
         names = [(name, matched(form.sheets, name)) for name in sheet_names(path)]
         books = [(Source(path, name), labels) for name, labels in names if labels is not None]
@@ -60,9 +60,7 @@ def open_sheets(path: Path, form: FileForm) -> Iterable[tuple[dict[str, str], Sh
         found = [(matched(form.sheets, sheet.name), sheet) for sheet in _array_sheets(path)]
         chosen = [(labels, sheet) for labels, sheet in found if labels is not None]
     else:
-        raise DataError(
-            f"{path}: no reader for {path.suffix or 'a file without a suffix'}; leave it out of the pattern"
-        )
+        raise DataError(f"{path}: no reader for {path.suffix or 'such a file'}; leave it out of the pattern")
     if not chosen:
         raise DataError(f"{path}: none of its sheets is of the pattern {form.sheets!r}")
     yield from chosen

@@ -9,24 +9,27 @@ from rig.intake.units import LINEAR, ROTARY, SIGNALS
 # What a column of the quantity is called, the surest words first; whole words of a name, in any case.
 WORDS: dict[str, tuple[str, ...]] = {
     "time": (
-        "time", "timestamp", "zeit", "temps", "tiempo", "tempo", "时间", "時間", "시간", "zeitstempel", "elapsed",
-        "stamp", "seconds", "sec", "secs", "ms", "msec", "t",
+        "time", "timestamp", "zeit", "temps", "tiempo", "tempo", "时间", "時間", "시간", "время", "czas", "čas", "tijd",
+        "zeitstempel", "elapsed", "stamp", "seconds", "sec", "secs", "ms", "msec", "t",
     ),
     "force": (
         "force", "kraft", "standardkraft", "fuerza", "forza", "力", "负荷", "荷重", "载荷", "하중", "힘", "load",
-        "loadcell", "charge", "last", "fz", "fn", "f", "torque", "drehmoment", "moment", "effort", "tau", "fy", "fx",
+        "сила", "усилие", "нагрузка", "siła", "síla", "kracht", "força", "kuvvet", "loadcell", "charge", "last", "fz",
+        "fn", "f", "torque", "drehmoment", "moment", "effort", "tau", "fy", "fx",
     ),
     "position": (
         "position", "displacement", "extension", "depth", "stroke", "travel", "crosshead", "traverse", "standardweg",
-        "位移", "変位", "변위", "ストローク", "行程", "变形", "allongement", "déplacement", "deplacement", "weg",
-        "desplazamiento", "spostamento", "deformation", "verformung", "distance", "deflection", "indentation",
-        "penetration", "eindringtiefe", "enfoncement", "lvdt", "disp", "displ", "pos", "gap", "height", "hub", "pose",
-        "z", "pz", "q", "angle", "winkel", "y", "x", "py", "px",
+        "位移", "変位", "변위", "ストローク", "行程", "变形", "перемещение", "przemieszczenie", "dráha", "verplaatsing",
+        "allongement", "déplacement", "deplacement", "weg", "desplazamiento", "deslocamento", "spostamento",
+        "deformation", "verformung", "distance", "deflection", "indentation", "penetration", "eindringtiefe",
+        "enfoncement", "lvdt", "disp", "displ", "pos", "gap", "height", "hub", "pose", "z", "pz", "q", "angle",
+        "winkel", "y", "x", "py", "px",
     ),
     "velocity": ("velocity", "speed", "geschwindigkeit", "vitesse", "速度", "vel", "dq", "qd"),
     "label": (
         "recording", "sample", "specimen", "trial", "test", "run", "échantillon", "probe", "试样", "試験片", "subject",
-        "patient", "participant", "setname", "cycle", "operator", "material", "condition", "id", "temperature", "speed",
+        "patient", "participant", "setname", "cycle", "operator", "material", "condition", "site", "id", "temperature",
+        "speed", "repetition", "rep",
     ),
     "counter": ("frame", "sample", "index", "counter", "seq", "sequence", "point", "scan", "row", "no", "nr", "n"),
 }  # fmt: skip

@@ -42,14 +42,14 @@ class Piece(NamedTuple):
 def pieces(sheet: Sheet, form: FileForm) -> Iterator[Piece]:
     """The rows of a sheet in pieces of the same labels; raises DataError with the place of what is wrong."""
     wanted = _wanted(sheet, form)
-    first, clocks = 0, dict[tuple[tuple[str, ...], float], int]()
+    clocks = dict[tuple[tuple[str, ...], float], int]()
     last_ns: int | None = None
-    for batch in sheet.read(dict(wanted.values())):
-        length, count = len(batch[0]), _filled_rows(batch)
-        found = {name: column[:count] for name, column in zip(wanted, batch, strict=True)}
+    for first, batch in _said(sheet.read(dict(wanted.values()))):
+        count = len(batch[0])
+        found = dict(zip(wanted, batch, strict=True))
         at_ns = times_ns([found.get(name) for name in ("time", "finer")], first, count, form.time, sheet)
         at_ns = unwrapped(at_ns, last_ns, period_ns(form.time, sheet))
-        last_ns = int(at_ns[-1]) if at_ns.size else last_ns
+        last_ns = int(at_ns[-1])
         values, saturated = _values(found, sheet, form)
         for labels, rows in _runs([found[LABEL + name] for name in form.label_columns], count):
             part = {name: column[rows] for name, column in values.items()}
@@ -57,14 +57,16 @@ def pieces(sheet: Sheet, form: FileForm) -> Iterator[Piece]:
             kept = {name: column[keep] for name, column in part.items()}
             named = dict(zip(form.label_columns, labels, strict=True))
             yield Piece(named, at_ns[rows][keep], kept, int(saturated[rows].sum()), int((~keep).sum()))
-        first += length
 
 
-def _filled_rows(batch: Batch) -> int:
-    """How many rows there are up to the last that says anything: a shorter table beside a longer one ends above."""
-    said = [_says(column) for column in batch]
-    rows = np.flatnonzero(np.any(said, axis=0))
-    return int(rows[-1]) + 1 if rows.size else 0
+def _said(batches: Iterator[Batch]) -> Iterator[tuple[int, list[Column]]]:
+    """Runs of rows that say anything, each with the number of its first: empty ones stand between cycles, and below."""
+    first = 0
+    for batch in batches:
+        said = np.any([_says(column) for column in batch], axis=0)
+        for start, end in np.flatnonzero(np.diff(said, prepend=False, append=False)).reshape(-1, 2).tolist():
+            yield first + start, [column[start:end] for column in batch]
+        first += len(batch[0])
 
 
 def _says(column: Column) -> NDArray[np.bool_]:

@@ -104,10 +104,8 @@ def _parted(table: FoundTable, mapping: DataMapping) -> bool:
 
 def _check_new(name: str, names: set[str], table: FoundTable) -> None:
     if name in names:
-        raise DataError(
-            f"{table.sheet.where}: recording {name} was there before; name what tells the two apart in `recording`, "
-            "or sort the file so that its rows stand together"
-        )
+        twice = f"{table.sheet.where}: recording {name} was there before; name what tells the two apart in "
+        raise DataError(f"{twice}`recording`, or sort the file so that its rows stand together")
     names.add(name)
 
 

@@ -70,10 +70,8 @@ class Sheet:
             if place > len(self.header):
                 raise DataError(f"{self.where}: no column {place}; there are {len(self.header)}")
             return place - 1
-        if self.header.count(place) > 1:
-            raise DataError(
-                f"{self.where}: column {place!r} stands there {self.header.count(place)} times; name it by number"
-            )
+        if (times := self.header.count(place)) > 1:
+            raise DataError(f"{self.where}: column {place!r} stands there {times} times; name it by number")
         if place not in self.header:
             raise DataError(f"{self.where}: no column {place!r}; there are {self._shown()}{self.unread}")
         return self.header.index(place)

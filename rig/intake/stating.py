@@ -65,10 +65,8 @@ def _measure(key: str, said: str, text: str, where: str) -> float:
     found = _MEASURE.fullmatch(text)
     unit = unit_in(found[2]) if found and found[2] else ""
     if found is None or (found[2] and not unit):
-        raise DataError(
-            f"{where}: {key} = {said!r} says {text!r} here, which is no number with a unit; mend the name, or state "
-            "the unit in the mapping, as in '{speed} mm/min'"
-        )
+        told = f"{where}: {key} = {said!r} says {text!r} here, which is no number with a unit"
+        raise DataError(f"{told}; mend the name, or state the unit in the mapping, as in '{{speed}} mm/min'")
     try:
         factor = factor_of(QUANTITIES[key], unit) if unit else 1.0
     except DataError as error:

@@ -193,9 +193,7 @@ def _decoded(source: Source, number: int, line: bytes) -> str:
     try:
         return line.decode()
     except UnicodeDecodeError as error:
-        raise DataError(
-            f"{source.line(number)}: not UTF-8; state its encoding, for example encoding = 'latin-1'"
-        ) from error
+        raise DataError(f"{source.line(number)}: not UTF-8; state its encoding, as in encoding = 'latin-1'") from error
 
 
 def _width(above: list[list[str]], first: list[str], form: FileForm) -> int:

@@ -49,9 +49,8 @@ def _column_ns(found: Column | None, first: int, count: int, form: TimeColumn, s
 def _numbers_ns(found: Numbers, first: int, factor: float, sheet: Sheet, number: int) -> Times:
     bad = np.flatnonzero(~np.isfinite(found))
     if bad.size:
-        raise DataError(
-            f"{sheet.place(first + int(bad[0]))}, column {sheet.header[number]}: no time where one is needed"
-        )
+        place = f"{sheet.place(first + int(bad[0]))}, column {sheet.header[number]}"
+        raise DataError(f"{place}: no time where one is needed; write it, or take the row out")
     if found.dtype.kind in "iu" and factor == int(factor):
         return found.astype(np.int64) * int(factor)
     scaled = found.astype(np.float64) * factor
@@ -92,9 +91,8 @@ def _iso_ns(texts: Sequence[str], first: int, sheet: Sheet) -> Times:
         return _parsed_ns(texts)
     except pa.ArrowInvalid:
         bad = next((row for row, text in enumerate(texts) if not is_iso(text)), 0)
-        raise DataError(
-            f"{sheet.place(first + bad)}: {texts[bad]!r} is no ISO time such as 2025-11-12T10:03:29.555Z"
-        ) from None
+        said = f"{sheet.place(first + bad)}: {texts[bad]!r}"
+        raise DataError(f"{said} is no ISO time such as 2025-11-12T10:03:29.555Z") from None
 
 
 def _written_ns(texts: Sequence[str], first: int, form: str, sheet: Sheet) -> Times:

@@ -29,17 +29,17 @@ SIGNALS = ("V", "mV", "uV", "count", "counts")
 RAW = (*SIGNALS, "%", "Pa", "kPa", "MPa", "1")
 # Other spellings, in small letters: plurals, whole words, other scripts, and units that mean nothing else in capitals.
 SPELLINGS = {
-    **dict.fromkeys(("sec", "secs", "second", "seconds", "sekunden", "秒", "초"), "s"),
-    **dict.fromkeys(("msec", "millisecond", "milliseconds", "毫秒", "ミリ秒"), "ms"),
+    **dict.fromkeys(("sec", "secs", "second", "seconds", "sekunden", "秒", "초", "с", "сек"), "s"),
+    **dict.fromkeys(("msec", "millisecond", "milliseconds", "毫秒", "ミリ秒", "мс"), "ms"),
     **dict.fromkeys(("usec", "usecs", "microsec", "microsecond", "microseconds", "微秒"), "us"),
     **dict.fromkeys(("nsec", "nsecs", "nanosec", "nanosecs", "nanosecond", "nanoseconds", "纳秒"), "ns"),
     **dict.fromkeys(("minute", "minutes", "分"), "min"),
-    **dict.fromkeys(("newton", "newtons", "牛", "牛顿", "ニュートン"), "N"),
-    **dict.fromkeys(("kilonewton", "kilonewtons", "千牛"), "kN"),
+    **dict.fromkeys(("newton", "newtons", "牛", "牛顿", "ニュートン", "н"), "N"),
+    **dict.fromkeys(("kilonewton", "kilonewtons", "千牛", "кн"), "kN"),
     **dict.fromkeys(("gram", "grams", "克"), "g"),
-    **dict.fromkeys(("millimeter", "millimeters", "millimetre", "millimetres", "毫米", "ミリ"), "mm"),
+    **dict.fromkeys(("millimeter", "millimeters", "millimetre", "millimetres", "毫米", "ミリ", "мм"), "mm"),
     **dict.fromkeys(("meter", "meters", "metre", "metres", "米"), "m"),
-    **dict.fromkeys(("micrometer", "micrometers", "micron", "microns", "微米"), "um"),
+    **dict.fromkeys(("micrometer", "micrometers", "micron", "microns", "微米", "мкм"), "um"),
     **{unit.lower(): unit for unit in ("s", "ms", "min", "kN", "gf", "kgf", "lbf", "kg", "lb")},
     **{unit: unit for unit in ("mm", "cm", "um", "in", "inch")},
     **dict.fromkeys(("inches", '"'), "inch"), "kgs": "kg", "lbs": "lb", "volt": "V", "volts": "V",
@@ -86,11 +86,8 @@ def unit_of(name: str) -> str:
     """
     plain = _plain(name).strip()
     ending = re.search(r"(?<=[\s_/,])([^\s_,()\[\]{}]+)$", plain)
-    found = [
-        *re.findall(r"[(\[{]([^)\]}]*)[)\]}]", plain)[::-1],
-        ending[1] if ending else "",
-        plain if plain[1:] else "",
-    ]
+    bracketed = re.findall(r"[(\[{]([^)\]}]*)[)\]}]", plain)[::-1]
+    found = [*bracketed, ending[1] if ending else "", plain if plain[1:] else ""]
     return next((unit for unit in map(unit_in, found) if unit not in ("", "1")), "")
 
 

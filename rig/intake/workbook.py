@@ -50,9 +50,8 @@ def _written(cell: object, decimal: str) -> str:
     if isinstance(cell, float):
         return repr(cell).removesuffix(".0").replace(".", decimal)
     if isinstance(cell, datetime.timedelta):
-        cell = (
-            (datetime.datetime.min + cell).time() if cell < datetime.timedelta(days=1) else cell.total_seconds() / DAY_S
-        )
+        days = cell.total_seconds() / DAY_S
+        cell = (datetime.datetime.min + cell).time() if days < 1 else days
     return cell.isoformat() if isinstance(cell, datetime.date | datetime.time) else " ".join(str(cell).split())
 
 

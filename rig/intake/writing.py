@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -60,10 +59,8 @@ class OpenRecording:
             return
         for stream, rows in stream_rows(piece, self._last).items():
             if self._sources.setdefault(stream, table.sheet.where) != table.sheet.where:
-                raise DataError(
-                    f"{table.sheet.where}: {stream} of recording {self.info.name} was there before; name what "
-                    "tells the two apart in `recording`"
-                )
+                twice = f"{table.sheet.where}: {stream} of recording {self.info.name} was there before"
+                raise DataError(f"{twice}; name what tells the two apart in `recording`")
             self._left_out[stream] = self._left_out.get(stream, 0) + piece.dropped
             self._write(stream, rows)
 
@@ -78,10 +75,9 @@ class OpenRecording:
         samples = {**self.info.samples, stream: self.info.samples.get(stream, 0) + rows.size}
         if sum(samples.values()) > LONGEST_ROWS:
             self._rows = {}
-        peak_N = (
-            float(np.fmax.reduce(rows["fz_N"], initial=self.info.peak_force_N)) if stream == FORCE.name else math.nan
-        )
-        self.info = replace(self.info, samples=samples, peak_force_N=np.fmax(peak_N, self.info.peak_force_N).item())
+        peak_N = self.info.peak_force_N
+        peak_N = float(np.fmax.reduce(rows["fz_N"], initial=peak_N)) if stream == FORCE.name else peak_N
+        self.info = replace(self.info, samples=samples, peak_force_N=peak_N)
 
     def finish(self) -> Written:
         """Closes the file; raises DataError where it holds too little."""

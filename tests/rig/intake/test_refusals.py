@@ -82,7 +82,7 @@ BAD: list[tuple[str, Spoil, str]] = [
     (
         "latin-1",
         lambda source: (source / "trial_02/force.csv").write_bytes(b"time_s,force_N \xb0\n0,1\n1,2\n"),
-        r"force\.csv line 1: not UTF-8; state its encoding, for example encoding = 'latin-1'",
+        r"force\.csv line 1: not UTF-8; state its encoding, as in encoding = 'latin-1'",
     ),
     (
         "utf-16",

@@ -1,0 +1,164 @@
+"""Further forms of laboratories that came in wrongly, with too many questions or not at all before they were tried.
+
+Each is written by another library, or letter by letter, and has to come out as the press it was made from.
+"""
+
+import decimal
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import openpyxl
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import scipy.io
+
+from rig.errors import DataError
+from rig.intake.proposal import propose
+from tests.rig.intake.instruments import PRESS, comma, text
+from tests.rig.intake.test_foreign import COUNT, FORCE_N, ROWS, TIME_S, WAY_MM, came_in, check, lines
+
+HEAD = "Time (s),Position (mm),Force (N)\n"
+# As Cyrillic machines name time, force and way, with the units s, N and mm.
+CYRILLIC = "Время, с;Перемещение, мм;Сила, Н\n"
+ROW = lines("{:.3f};{:.5f};{:.5f}", TIME_S, WAY_MM, FORCE_N)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "in").mkdir()
+    return tmp_path / "in"
+
+
+def pandas_fixed(folder: Path) -> None:
+    """`DataFrame.to_hdf` with its fixed format: the names of a block's columns stand beside its values."""
+    with h5py.File(folder / "a.h5", "w") as file:
+        group = file.create_group("frame")
+        group["axis0"] = np.array([b"note", b"time_s", b"position_mm", b"force_N"])
+        group["axis1"] = np.arange(COUNT)
+        group["block0_items"] = np.array([b"time_s", b"position_mm", b"force_N"])
+        group["block0_values"] = np.column_stack([TIME_S, WAY_MM, FORCE_N])
+        group["block1_items"] = np.array([b"note"])
+        group["block1_values"] = np.ones((COUNT, 1), np.int8)
+
+
+def channels_with_units(folder: Path) -> None:
+    """A struct a channel, with its unit."""
+    found = {"Time": (TIME_S, "s"), "Load": (FORCE_N * 1e3, "mN"), "Stroke": (WAY_MM, "mm")}
+    channels = {name: {"data": values, "unit": unit} for name, (values, unit) in found.items()}
+    scipy.io.savemat(folder / "a.mat", {**channels, "Operator": "x"})
+
+
+def time_above_channels(folder: Path) -> None:
+    """Time in the struct of the recording, and its channels in one below."""
+    recording = {"time_s": TIME_S, "channels": {"load_N": FORCE_N, "stroke_mm": WAY_MM}}
+    scipy.io.savemat(folder / "a.mat", {"recording": recording})
+
+
+def decimals(folder: Path) -> None:
+    """Numbers of a database, which are no floats."""
+    force = pa.array([decimal.Decimal(f"{force:.5f}") for force in FORCE_N])
+    pq.write_table(pa.table({"time_s": TIME_S, "force_N": force, "position_mm": WAY_MM}), folder / "a.parquet")
+
+
+def gaps_in_a_sheet(folder: Path) -> None:
+    """A workbook with empty rows between its cycles."""
+    book = openpyxl.Workbook()
+    book["Sheet"].append(["Time (s)", "Position (mm)", "Force (N)"])
+    for row in ROWS[:30]:
+        book["Sheet"].append(list(map(float, row)))
+    for number, row in enumerate(ROWS[30:], start=35):
+        for column, value in enumerate(row, start=1):
+            book["Sheet"].cell(number, column, float(value))
+    book.save(folder / "a.xlsx")
+
+
+def with_gaps(folder: Path) -> None:
+    """Empty rows between cycles, as a spreadsheet saves them: nothing but separators."""
+    rows = PRESS.splitlines(keepends=True)
+    text(HEAD, "".join([*rows[:20], ",,\n", *rows[20:40], "\n", ",,\n", *rows[40:]]))(folder)
+
+
+FORMS: dict[str, Callable[[Path], None]] = {
+    "pandas' fixed format": pandas_fixed,
+    "a struct a channel with its unit": channels_with_units,
+    "time above a struct of channels": time_above_channels,
+    "decimals in Parquet": decimals,
+    "empty rows between cycles": with_gaps,
+    "empty rows in a sheet": gaps_in_a_sheet,
+    "Cyrillic": text(CYRILLIC, comma(ROW), encoding="cp1251"),
+    "micrometres behind a slash": text(
+        "Zeit/s;Weg/\u00b5m;Kraft/N\n", lines("{:.3f};{:.2f};{:.5f}", TIME_S, WAY_MM * 1e3, FORCE_N), encoding="cp1252"
+    ),
+    "an ending of its own": text(HEAD, name="run1.xyz"),
+    "no ending": text(HEAD, name="run1"),
+    "words for a force beyond the range": text(
+        HEAD, PRESS + f"{TIME_S[-1] + 0.02:.3f},2.0,OVERLOAD\n{TIME_S[-1] + 0.04:.3f},2.0,OVLD\n"
+    ),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_further_form_comes_in_without_a_question(folder: Path, form: str) -> None:
+    FORMS[form](folder)
+    session = came_in(folder)
+    assert [trial.samples["force"] for trial in session.trials] == [COUNT + 2 * form.startswith("words")]
+    if form.startswith("words"):
+        force = session.recording("a").tables["force"]
+        assert force["fz_N"][:COUNT] == pytest.approx(FORCE_N)
+        assert not force["valid"][COUNT:].any()
+    else:
+        check(session, abs_N=2e-4)
+
+
+@pytest.mark.parametrize("column", ["repetition", "series_4711"])
+def test_a_number_that_changes_where_time_begins_anew_tells_recordings_apart(folder: Path, column: str) -> None:
+    rows = [lines(f"arm,{number},{{:.3f}},{{:.5f}},{{:.5f}}", TIME_S, WAY_MM, FORCE_N + number) for number in (1, 2)]
+    text(f"site,{column},time_s,position_mm,force_N\n", "".join(rows))(folder)
+    session = came_in(folder)
+    found = [session.recording(trial.name).tables["force"]["fz_N"] for trial in session.trials]
+    assert found == [pytest.approx(FORCE_N + number) for number in (1, 2)]
+
+
+def test_time_that_begins_anew_below_an_empty_row_is_another_recording(folder: Path) -> None:
+    rows = [lines(f"{number},{{:.3f}},{{:.5f}},{{:.5f}}", TIME_S, WAY_MM, FORCE_N + number) for number in (1, 2)]
+    text("series,time_s,position_mm,force_N\n", ",,,\n".join(rows))(folder)
+    assert [trial.samples["force"] for trial in came_in(folder).trials] == [COUNT, COUNT]
+
+
+def test_one_name_beside_one_vector_is_no_name_of_it(folder: Path) -> None:
+    with h5py.File(folder / "a.h5", "w") as file:
+        file["operator"] = np.array([b"time_s"])
+        file["time_s"], file["force_N"], file["position_mm"] = TIME_S, FORCE_N, WAY_MM
+    check(came_in(folder))
+
+
+def test_a_time_that_is_missing_is_named_and_no_rate_is_asked(folder: Path) -> None:
+    rows = PRESS.splitlines(keepends=True)
+    text(HEAD, "".join([*rows[:20], rows[20][rows[20].index(",") :], *rows[21:]]))(folder)
+    with pytest.raises(DataError, match=r"a\.csv line 22, column Time \(s\): no time .*write it, or take the row out"):
+        came_in(folder)
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda path: path.write_bytes(np.column_stack([TIME_S, WAY_MM, FORCE_N]).tobytes()),
+        lambda path: openpyxl.Workbook().save(path),
+        lambda path: path.write_bytes((HEAD + PRESS).encode()[:500] + bytes(300)),
+    ],
+    ids=["numbers as a program holds them", "a workbook by another name", "zeros after a power failure"],
+)
+def test_bytes_of_no_text_are_one_sentence(folder: Path, write: Callable[[Path], None]) -> None:
+    write(folder / "a.dat")
+    with pytest.raises(DataError, match=r"a\.dat: its bytes are not those of a text; copy it again, or save it as"):
+        propose(folder)
+
+
+@pytest.mark.parametrize("name", ["a.json", "a.xml", "a.md", "a.py"])
+def test_a_text_of_another_kind_is_no_table(folder: Path, name: str) -> None:
+    text(HEAD, name=name)(folder)
+    with pytest.raises(DataError, match=f"no reader for {name}"):
+        propose(folder)
