@@ -12,6 +12,7 @@ from pathlib import Path
 
 from benchmarks.control import cases, pictures, wire
 from benchmarks.control.cases import Case, played
+from benchmarks.control.goals import DB, DEG, GOALS, JUMPS, LOW_JUMPS, PEAK, ROUNDED
 from benchmarks.control.laws import ABLATIONS, CONSTANTS, LAW, OTHERS, makers, track_step
 from benchmarks.control.plants import FAST, PLANT, SLOW, SUBJECTS, Plant, model_of, wiring_of
 from benchmarks.control.scores import Headline, Mean, Score, gain_of, headline, limb_gains, mean_of, wrong_models
@@ -30,10 +31,6 @@ PLANTS = {
     **{f"{more} ms later": Plant(sensing=FAST, extra_cycles=more) for more in (1, 2, 5, 12)},
 }  # fmt: skip
 PLANT_LAWS = LAW, "constant"
-# A headline that is missed by chance of one subject would be missed by half; these are the promises themselves.
-GOALS = {"0.5": 3.0, "1": 3.0, "2": 2.0, "5": 1.0, "10": 0.7}
-LOW_JUMPS, JUMPS, PEAK, DEG, DB = 3.0, 1.8, 1.05, 45.0, 6.0
-ROUNDED = 0.05  # a margin that is searched to three digits may be this much below
 
 
 class Cell(Table):
