@@ -12,7 +12,7 @@ from benchmarks.control.wire import BEST_AT_CONTACT, CONSTANT, WiredPart
 PROMISED = {**{f"limb 2 Hz, {at:g} N": least for at, least in zip(FORCES_N, (3.0, 3.0, 2.0, 1.0, 0.7), strict=True)},
             "low jumps": 3.0, "jumps": 1.8}  # fmt: skip
 CONFIRMED = 1 - 1 / 3
-PEAK = 1.05
+
 CONTACT = "contact, 0 mm/s"
 
 
