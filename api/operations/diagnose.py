@@ -12,7 +12,7 @@ from rig.diagnosis.design import LIMB, check, limb_of
 from rig.diagnosis.extended import extended_model
 from rig.diagnosis.planting import with_tried_sizes
 from rig.diagnosis.run import diagnose_session
-from rig.errors import UsageError
+from rig.errors import DataError, UsageError
 from rig.intake.mapping import AxisFacts, DataMapping
 from rig.progress import Progress
 from rig.recording.files import make_folder, refuse_unwritable
@@ -93,7 +93,11 @@ def _write(operation: Operation, found: Diagnosis, result: DiagnosisResult, out:
     result.write(out / FILE)
     operation.say(f"pictures and {FILE} are in {out}" if figures else f"{out / FILE} is written")
     if found.search is not None and found.simulation != "axis":
-        model = extended_model(found)
+        try:
+            model = extended_model(found)
+        except DataError as error:
+            operation.say(f"no {MODEL}: {error}")
+            return
         model.save(out / MODEL)
         what = "extended model" if model.effects else "simulation's own model, with nothing added,"
         operation.say(f"{out / MODEL} is the {what} for rig track, simulate and fit --with")

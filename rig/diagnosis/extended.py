@@ -81,9 +81,13 @@ def _provenance(fit: Fit, session: str) -> Provenance:
 
 
 def _quality(fit: Fit, law: Extended) -> Quality:
-    """Errors of force, turned into depth by the tangent; percentages of the deepest depth."""
+    """Errors of force, turned into depth by the tangent; percentages of the deepest depth. Raises where it falls."""
     deepest_mm = float(_depth_mm(fit).max())
-    largest_mm = float(np.abs(fit.residual).max() / law.tangent_stiffness(0.5 * deepest_mm))
+    tangent_N_mm = float(law.tangent_stiffness(0.5 * deepest_mm))
+    if not tangent_N_mm > 0:
+        where = f"at {0.5 * deepest_mm:.3g} mm the fitted force does not rise with depth ({tangent_N_mm:.2g} N/mm)"
+        raise DataError(f"{where}, so there is no model to control by; record strokes that begin above the tissue")
+    largest_mm = float(np.abs(fit.residual).max() / tangent_N_mm)
     return Quality(
         rmse_N=float(np.sqrt(np.mean(fit.residual**2))),
         max_error_mm=largest_mm,
