@@ -3,7 +3,8 @@
 The real loop runs on the mock bench behind `rig serve`, pressing and recording; `cyclictest` (Debian: rt-tests) runs on
 the loop's core at the same rate and policy, one priority above, so that it sees the machine and not the loop. Phases
 alternate, idle and with the HTTP interface under load (Debian: wrk), in one run. What counts are the
-ratios. The table and the JSON are written after every round: a run may be ended with Ctrl-C at any time.
+ratios. The table and the JSON are written after every round: a run may be ended with Ctrl-C at any time. The last line
+is one JSON object.
 
 Sensor to drive: from the moment at which the mock sensor took a sample to the moment at which the mock drive's process
 has the SYNC and set-point made from it, both on the mock bench's clock, which is this computer's monotonic one.
@@ -274,13 +275,17 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
 
+    said: dict[str, Summary] = {}
+
     def report(found: dict[str, Summary]) -> None:
         say(found)
+        said.update(found)
         if options.json:
             write_text(options.json, json.dumps(found, indent=2) + "\n")
 
     with contextlib.suppress(KeyboardInterrupt):
         measure(options.seconds, options.rounds, report)
+    print(json.dumps(said))
 
 
 if __name__ == "__main__":

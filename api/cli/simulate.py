@@ -37,6 +37,8 @@ def simulate(
     """
     wiring, fitted, asked = wiring_from(config, overrides), load_model(model), parse_reference(reference)
     wanted = SimulatedRun(asked, fitted, stiffness, breathing)
-    result = compute("simulate", lambda operation: work.simulate(operation, wiring, wanted, out))
-    show(*simulation_parts(result), f"simulation.svg, simulation.png, bode.svg and nyquist.svg are in {out}")
-    write_json(json_file, result)
+    played = compute("simulate", lambda operation: work.play(operation, wiring, wanted))
+    show(*simulation_parts(played.result))
+    write_json(json_file, played.result)
+    played.draw(out)
+    show(f"simulation.svg, simulation.png, bode.svg and nyquist.svg are in {out}")

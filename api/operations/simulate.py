@@ -36,8 +36,32 @@ class SimulatedRun:
     breathing_mm: float = 0.0
 
 
+@dataclass(frozen=True)
+class Played:
+    """A result whose figures are not drawn yet, which takes longer than all that it says."""
+
+    result: SimulateResult
+    trace: Trace
+    surface_mm: float
+    loops: Sequence[tuple[float, float, ForceLoop]]
+    stiffness: float
+
+    def draw(self, out: Path) -> None:
+        """Force, displacement and effort, Bode and Nyquist plots."""
+        make_folder(out)
+        _draw(self.trace, self.surface_mm, out, self.result.reference)
+        _draw_loops(self.loops, self.stiffness, out)
+
+
 def simulate(operation: Operation, wiring: Wiring, wanted: SimulatedRun, out: Path) -> SimulateResult:
-    """Plays it on a virtual clock with the loop's own code, and draws force, displacement and effort into ``out``."""
+    """As `play`, with the figures in ``out``."""
+    played = play(operation, wiring, wanted)
+    played.draw(out)
+    return played.result
+
+
+def play(operation: Operation, wiring: Wiring, wanted: SimulatedRun) -> Played:
+    """Plays it on a virtual clock with the loop's own code."""
     model, stiffness = wanted.model, wanted.stiffness
     program = tracked.plan_reference(wanted.reference, model, wiring)
     bench = SimulatedBench(limb_of(model, stiffness, wanted.breathing_mm))
@@ -46,10 +70,7 @@ def simulate(operation: Operation, wiring: Wiring, wanted: SimulatedRun, out: Pa
     result = _result(trace, times_real_time, wanted.reference.name, tracking.loop_for(model, wiring)).model_copy(
         update={"margins": tuple(_margins(force_N, tangent, loop, stiffness) for force_N, tangent, loop in loops)}
     )
-    make_folder(out)
-    _draw(trace, bench, out, wanted.reference.name)
-    _draw_loops(loops, stiffness, out)
-    return result
+    return Played(result, trace, bench.limb.surface_mm, loops, stiffness)
 
 
 def _timed(operation: Operation, play: Callable[[], Trace]) -> tuple[Trace, float]:
@@ -124,7 +145,7 @@ def _reach(loop: ForceLoop) -> LoopReach:
     )
 
 
-def _draw(trace: Trace, bench: SimulatedBench, out: Path, title: str) -> None:
+def _draw(trace: Trace, surface_mm: float, out: Path, title: str) -> None:
     from rig.report.control_figures import Signals, run_figure  # noqa: PLC0415 - drawing takes a second to load
     from rig.report.drawing import save_figure  # noqa: PLC0415
 
@@ -133,7 +154,7 @@ def _draw(trace: Trace, bench: SimulatedBench, out: Path, title: str) -> None:
     figure = run_figure(
         Signals(
             time_s - time_s[0], trace.reference_N[on], trace.force_N[on],
-            trace.position_mm[on] - bench.limb.surface_mm, trace.current_A[on], trace.voltage_V[on],
+            trace.position_mm[on] - surface_mm, trace.current_A[on], trace.voltage_V[on],
         ),
         title,
     )  # fmt: skip

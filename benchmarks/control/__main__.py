@@ -14,6 +14,7 @@ from itertools import product
 from pathlib import Path
 
 from benchmarks.control import pictures
+from benchmarks.control.goals import DB, DEG, GOALS, JUMPS, LOW_JUMPS, PEAK, ROUNDED
 from benchmarks.control.laws import ABLATIONS, CONSTANTS, LAW, LEAVES, OTHERS, TRIED, makers, track_step
 from benchmarks.control.plants import FAST, PLANT, SLOW, SUBJECTS, Plant, model_of, wiring_of
 from benchmarks.control.runs import jobs_of, play_all
@@ -43,10 +44,6 @@ PLANTS = {
     **{f"{more} ms later": Plant(sensing=FAST, extra_cycles=more) for more in (1, 2, 5, 12)},
 }  # fmt: skip
 PLANT_LAWS = LAW, "constant"
-# A headline that is missed by chance of one subject would be missed by half; these are the promises themselves.
-GOALS = {"0.5": 3.0, "1": 3.0, "2": 2.0, "5": 1.0, "10": 0.7}
-LOW_JUMPS, JUMPS, PEAK, DEG, DB = 3.0, 1.8, 1.05, 45.0, 6.0
-ROUNDED = 0.05  # a margin that is searched to three digits may be this much below
 
 
 class Cell(Table):
