@@ -17,7 +17,7 @@ from pydantic import JsonValue
 
 from benchmarks.control.goals import GOALS, JUMPS, LOW_JUMPS, PEAK
 
-QUICK_S, WHOLE_S = 150.0, 1800.0  # for each: ten minutes hold all that run long in their quick form
+QUICK_S, WHOLE_S = 200.0, 1800.0  # for each: one alone takes as long in its quick form, and all together six minutes
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from pydantic import JsonValue
 
 from benchmarks import all as table
 from benchmarks.all import Measure, Part, last_json, line_of, number_at, row_of, rows_of
+from benchmarks.control.goals import GOALS
+from benchmarks.control.scores import Headline
 from benchmarks.growth import Curve
+from benchmarks.loop import Load, summary
 
 SAID = '{"force_ms": {"constant": {"ours": 1.0, "numpy slices": 8.0}}, "rig fit --help": {"clock_s": 0.3}}'
 
@@ -85,3 +89,20 @@ def test_growth_tells_linear_from_quadratic() -> None:
     assert linear.slope(linear.seconds)[0] == pytest.approx(1.0)
     assert quadratic.slope(quadratic.seconds)[0] == pytest.approx(2.0)
     assert (linear.is_worse_than_linear, quadratic.is_worse_than_linear) == (False, True)
+
+
+def test_what_the_table_asks_of_loop_law_and_commands_is_what_they_say() -> None:
+    asked = {part.name: part.measures for part in table.PARTS}
+    said: JsonValue = {kind: dict.fromkeys(summary(Load(), 1000.0), 1.0) for kind in ("idle", "http")}
+    limbs: dict[str, JsonValue] = dict.fromkeys(map(str, GOALS), 1.0)
+    law: JsonValue = {**dict.fromkeys(Headline.model_fields, 1.0), "limb_2Hz_gain": limbs}
+    for name, found in (("benchmarks.loop", said), ("benchmarks.control", law)):
+        for measure in asked[name]:
+            assert [number_at(found, place) for place in (measure.here, measure.rival) if place]
+
+
+def test_a_benchmark_that_ends_with_1_for_what_it_found_is_judged_by_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part = planted(tmp_path, monkeypatch, "print('{\"here\": 1.5}')\nraise SystemExit(1)")
+    assert [row.here for row in rows_of(part, quick=True)] == [1.5]

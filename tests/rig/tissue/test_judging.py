@@ -1,10 +1,14 @@
 """The study's error, on numbers one can check by hand, and on curves the law was not fitted to."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rig.errors import DataError
-from rig.tissue.fitting import fit_law
+from rig.tissue import judging
+from rig.tissue.fitting import LawFit, fit_law
 from rig.tissue.judging import Errors, Prediction, displacement_at, errors_of, given_forces, judge
 from rig.tissue.laws import Constant, Index
 from rig.tissue.laws_viscous import StandardLinear
@@ -135,3 +139,18 @@ def test_what_the_data_say_nothing_of_is_uncertain_by_its_whole_range(trials: in
     judged = judge(fit, curves, given_forces(curves), fit.offsets_mm)
     assert judged.intervals["tau_s"] == (1e-3, 1e3)
     assert judged.interval_method.startswith("least squares" if trials == 3 else "jackknife over trials")
+
+
+def test_of_many_trials_some_leave_together_and_each_is_left_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    curves = [made_curve([0.0, 2.0, 4.0, 6.0], [0.0, 0.5, 1.6, 3.6], f"t{number}") for number in range(100)]
+    fit, without = fit_law(Index, curves[:3]), list[int]()
+
+    def counted(law: type[Index], kept: Sequence[Curve], _start: LawFit) -> LawFit:
+        without.append(len(curves) - len(kept))
+        return fit
+
+    monkeypatch.setattr(judging, "fit_law", counted)
+    fit = replace(fit, offsets_mm=np.zeros(100), holds_N2_mm2=np.ones(100))
+    pairs = judging._without_each(curves, fit, lambda curve: curve.name)
+    assert sorted(without) == [2] * 20 + [3] * 20
+    assert sorted(curve.name for curve, _ in pairs) == sorted(curve.name for curve in curves)
