@@ -84,7 +84,7 @@ PARTS: Sequence[Part] = (
         Measure("low jumps, settling, constant over law", "low_jump_settling_gain", LOW_JUMPS, "x",
                 is_least=True),
         Measure("jumps, settling, constant over law", "jump_settling_gain", JUMPS, "x", is_least=True),
-        Measure("contact, largest force over asked", "contact_peak", PEAK, "x"),
+        Measure("contact, peak over that of the gentlest constant", "contact_peak", PEAK, "x"),
     )),
     Part("benchmarks.lattice", ("--part", "force"), ("--part", "force"), (
         Measure("lattice, constant", "force_ms.constant.ours", 0.13, "ms", "force_ms.constant.numpy slices"),
