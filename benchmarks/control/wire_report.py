@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from benchmarks.control.cases import FORCES_N
+from benchmarks.control.goals import PEAK
 from benchmarks.control.laws import LAW
 from benchmarks.control.scores import Gain, Score, gain_of, mean_of
 from benchmarks.control.wire import BEST_AT_CONTACT, CONSTANT, WiredPart
@@ -12,7 +13,6 @@ from benchmarks.control.wire import BEST_AT_CONTACT, CONSTANT, WiredPart
 PROMISED = {**{f"limb 2 Hz, {at:g} N": least for at, least in zip(FORCES_N, (3.0, 3.0, 2.0, 1.0, 0.7), strict=True)},
             "low jumps": 3.0, "jumps": 1.8}  # fmt: skip
 CONFIRMED = 1 - 1 / 3
-
 CONTACT = "contact, 0 mm/s"
 
 

@@ -36,7 +36,7 @@ def _too_deep(truth: Truth) -> bool:
 
 
 def _at_inclusion(truth: Truth) -> bool:
-    return truth["tip.depth_mm"] > 4.0
+    return truth["tip.depth_mm"] > 2.0
 
 
 def _outside(truth: Truth) -> bool:
@@ -134,8 +134,8 @@ LIMB = (
     ),
     Fault(
         "limb.stiffens", "press", ("oscillation",),
-        set_quantities(tissue__inclusion_mm=4.0, tissue__inclusion_N_mm=20.0), _at_inclusion,
-        before=True, why="20 N/mm from 4 mm on, met by the force loop",
+        set_quantities(tissue__inclusion_mm=2.0, tissue__inclusion_N_mm=40.0), _at_inclusion,
+        before=True, why="40 N/mm from 2 mm on, met by the force loop",
     ),
     Fault("limb.leaves", "press", ("depth_limit",), set_quantities(tissue__present=False), _too_deep,
           settings=(f"limits.depth_mm={DEPTH_LIMIT_MM}",), why="the tip searches for it, down to the depth limit"),

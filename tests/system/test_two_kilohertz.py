@@ -13,7 +13,7 @@ pytestmark = [pytest.mark.bench, pytest.mark.extra, pytest.mark.xdist_group("two
 PROTOCOL = "speeds_mm_s = [10]\ntrials = 1\ndepth_mm = 8\n"
 # Of the computer, which plays the devices too: `cyclictest` beside it misses as many.
 MISSED_SHARE = 0.05
-# Of the samples: the simulated sensor, which shares the cores, sends the others late and two at a time, of which one is used.
+# Of the samples: the simulated sensor shares the cores and sends the others late, two at a time, of which one is used.
 IN_TIME_SHARE = 0.75
 
 
