@@ -128,7 +128,19 @@ def curves_in(found: TrialSet, subject: str = "") -> tuple[list[Curve], list[Ski
                 skipped.append(Skipped(part.name, str(error).removeprefix(f"{part.name}: ")))
             else:
                 curves.append(replace(curve, subject=subject, recording=recording, findings=(*curve.findings, *kept)))
-    return curves, skipped
+    return _said_if_several(found, curves), skipped
+
+
+def _said_if_several(found: TrialSet, curves: list[Curve]) -> list[Curve]:
+    """The first of ``curves`` says so where they are of several specimens or sites."""
+    fitted = {curve.trial for curve in curves}
+    labels = [trial.labels for trial in found.trials if trial.name in fitted]
+    counts = {name: len({of[name] for of in labels if name in of}) for name in ("specimen", "site")}
+    several = " and ".join(f"{count} {name}s" for name, count in counts.items() if count > 1)
+    if not several:
+        return curves
+    text = f"{several} are fitted as one tissue: what differs between them is in the errors; --only NAME fits some"
+    return [replace(curves[0], findings=(*curves[0].findings, Finding("", "session", "several", text))), *curves[1:]]
 
 
 def study_curves(

@@ -21,9 +21,11 @@ from rig.results.study import fit_result
 from rig.tissue.laws_viscous import QuasiLinear
 from rig.tissue.model import load_model
 from rig.tissue.registry import COMPARED
-from rig.tissue.study import Study, fingerprint, model_of, rows, study_curves, study_session, study_sessions
+from rig.tissue.study import Study, curves_in, fingerprint, model_of, rows, study_curves, study_session, study_sessions
 from rig.tissue.summary import Skipped
 from rig.trials.cycles import IndentationCycle
+from rig.trials.reading import trials_of
+from rig.trials.trial import inspected
 from tests.rig.recording.measured import turned_tables
 from tests.rig.tissue.synthetic import Bench, index_force, metadata, tables, write_made_session, write_recording
 
@@ -57,6 +59,16 @@ def test_every_trial_with_a_curve_counts_and_the_others_say_why_not(study: Study
     ]  # fmt: skip
     assert [one.trial for one in study.skipped] == ["trial_999"]
     assert "no contact" in study.skipped[0].reason
+
+
+@pytest.mark.parametrize(("specimens", "said"), [("ab", ["2 specimens are fitted as one tissue"]), ("aa", [])])
+def test_several_specimens_in_one_fit_are_said_once(folder: Path, specimens: str, said: list[str]) -> None:
+    found = inspected(trials_of(open_session(folder)))
+    labels = [{"specimen": specimens[number % 2], "site": "thigh"} for number in range(len(found.trials))]
+    trials = tuple(replace(trial, labels=one) for trial, one in zip(found.trials, labels, strict=True))
+    curves, _ = curves_in(replace(found, trials=trials))
+    texts = [one.text for curve in curves for one in curve.findings if one.kind == "several"]
+    assert [text.partition(":")[0] for text in texts] == said
 
 
 def test_samples_that_were_left_out_are_said_with_the_fit(tmp_path: Path) -> None:
