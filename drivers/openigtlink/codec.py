@@ -23,6 +23,8 @@ VERSIONS = (PLAIN, WITH_EXTENDED)
 LARGEST_BODY = 65_536
 # The largest image of the standard's own test, 4 GB: a length above it is no length.
 LARGEST_PASSED = 1 << 32
+# What carries tools is kept whole: such a message with a longer body is a header put together from two torn ones.
+WITH_TOOLS = (b"TRANSFORM", b"TDATA")
 TRACKER_6D = 2
 START_TDATA, STOP_TDATA, ANSWER_TDATA = "STT_TDATA", "STP_TDATA", "RTS_TDATA"
 POLYNOMIAL = 0x42F0E1EBA9EA3693  # ECMA-182
@@ -124,7 +126,8 @@ class MessageDecoder:
 def _is_header(data: bytes, at: int) -> bool:
     version, kind, _, _, _, length, _ = HEADER.unpack_from(data, at)
     name = kind.rstrip(b"\0")
-    return version in VERSIONS and name.replace(b"_", b"").isalnum() and name.isupper() and length < LARGEST_PASSED
+    fits = length <= LARGEST_BODY if name in WITH_TOOLS else length < LARGEST_PASSED
+    return version in VERSIONS and name.replace(b"_", b"").isalnum() and name.isupper() and fits
 
 
 def _message(fields: tuple[int, bytes, bytes, int, int, int, int], body: bytes) -> TimedMessage | None:

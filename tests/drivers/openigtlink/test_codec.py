@@ -117,6 +117,11 @@ def test_a_damaged_length_loses_no_later_message() -> None:
     assert len(fed(longer + PLAIN)[0]) == 1
 
 
+def test_a_header_torn_within_its_length_swallows_nothing() -> None:
+    messages, counters, _ = fed(PLAIN[:46] + 3 * PLAIN)  # with what follows: a TRANSFORM of 0x15452 bytes
+    assert (len(messages), counters.discarded_bytes) == (3, 46)
+
+
 def test_a_large_body_is_passed_over_without_being_kept() -> None:
     image = struct.pack(">H12s20sIIQQ", 1, b"IMAGE", b"camera", 0, 0, 1_000_000, 0)
     decoder = MessageDecoder(LinkCounters())
