@@ -12,9 +12,10 @@ import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, get_type_hints
+from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np
 
 CDR_HEADER = b"\x00\x01\x00\x00"
 STAMP = {
@@ -142,6 +143,8 @@ class Stream:
     @cached_property
     def dtype(self) -> "np.dtype[np.void]":
         """The same layout as a numpy record; streams with text have no array form."""
+        import numpy as np  # noqa: PLC0415 - help tells products and their streams without it
+
         return np.dtype(
             [(name, "<i8" if kind is int else "<f8") for name, kind in self.kinds.items() if kind is not str]
         )

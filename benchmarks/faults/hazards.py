@@ -23,7 +23,8 @@ HAZARDS = (
         ("force_limit", "torque_limit", "force_rate", "oscillation", "depth_limit", "pain_stop", REFUSED),
         "A blow: what rises faster than the axis can turn round passes the limit. Only slow approach, a low current"
         " limit and the person's freedom to draw back bound it. A loop that swings more slowly than 12 Hz, as with a"
-        " slow axis and a slow sensor together, is stopped by the force limit only.",
+        " slow axis and a slow sensor together, or between soft tissue and something stiff beneath, is stopped by the"
+        " force limit only.",
     ),
     Hazard(
         "The force that is shown is not the force on the limb",

@@ -264,8 +264,8 @@ def test_recordings_stacked_in_one_file_are_told_apart_and_chosen_by_name(clean:
     assert any("2 of 4 recordings" in finding.text for finding in chosen.findings)
     with pytest.raises(UsageError, match=r"no recording matches --only 'pork\*'; they are called like beef_0"):
         read(tmp_path, Opening(only="pork*"))
-    (tmp_path / "stacked.csv").write_text("\n".join([*lines, "beef|1,9,OVERLOAD,2"]) + "\n")
-    with pytest.raises(DataError, match=rf"line {len(lines) + 1}, column force_N: 'OVERLOAD' is not a number"):
+    (tmp_path / "stacked.csv").write_text("\n".join([*lines, "beef|1,9,UNREAD,2"]) + "\n")
+    with pytest.raises(DataError, match=rf"line {len(lines) + 1}, column force_N: 'UNREAD' is not a number"):
         read(tmp_path)
 
 
