@@ -4,9 +4,8 @@ import inspect
 
 import rig
 from rig import plugins
-from rig.config.products.input_role import InputProduct
 from rig.config.products.inputs import EVERY_ROLE
-from rig.config.products.roles import ForceProduct, Product, TrackerProduct
+from rig.config.products.roles import Product
 from rig.config.words import toml, value_words
 from rig.diagnosis.effects.axis import AXIS_CAUSES
 from rig.diagnosis.effects.registry import CAUSES
@@ -39,18 +38,10 @@ def _listed(role: str, name: str, product: type[Product]) -> ProductListed:
         meaning=(inspect.getdoc(product) or "").partition("\n")[0],
         distribution=whose,
         distribution_version=version,
-        rate_Hz=_rate_Hz(product()),
+        rate_Hz=product().promised_Hz,
         simulated=product.mock is not None,
         options=options(product),
     )
-
-
-def _rate_Hz(usual: Product) -> float | None:
-    if isinstance(usual, ForceProduct):
-        return usual.sampled_Hz
-    if isinstance(usual, InputProduct):
-        return usual.nominal_Hz or None
-    return usual.rate_Hz if isinstance(usual, TrackerProduct) else None
 
 
 def options(product: type[Product]) -> tuple[ProductOption, ...]:

@@ -11,6 +11,7 @@ from benchmarks.control.motion import Column, Contact, Law, Run, run
 from benchmarks.control.plants import PLANT, Plant, bone_limb, limb_of, model_of
 from controller.law import force_profile
 from controller.law.force_profile import Line
+from rig.simulation.axis_plant import ModelledLimb
 
 DT_S = 0.001
 RAMP_N_S, SETTLE_S = 5.0, 1.5
@@ -41,6 +42,15 @@ class Case(NamedTuple):
     others: Mapping[str, Callable[["Asked", Run], float]] = {}  # the same run by other measures, each with a name
 
 
+class Followed(NamedTuple):
+    """What a law is given: the reference, and where the limb's surface is at times [s]."""
+
+    line: Line
+    surface_mm: Callable[[Column], Column]
+    limb: ModelledLimb
+    contact: Contact = Contact()
+
+
 class Asked(NamedTuple):
     """Times [s] and the reference, each of shape (cycles,)."""
 
@@ -63,11 +73,17 @@ def played_all(case: Case, law: Law, subject: str, seed: int, plant: Plant = PLA
 def _run(case: Case, law: Law, subject: str, seed: int, plant: Plant) -> tuple["Asked", Run]:
     model = model_of(subject)
     limb = bone_limb(0.1, 5.0, 8.0, model.damping_N_s_mm) if case.bone else limb_of(model, case.stiffness)
-    time_s = np.arange(0.0, case.line.duration_s, DT_S)
-    surface_mm = case.surface_mm(np.append(time_s, time_s[-1] + DT_S))
-    asked_N = force_profile.along(force_profile.preview(case.line, law.preview_s), time_s)
-    found = run(law, asked_N, plant.bench(limb, surface_mm, case.contact), seed, DT_S)
-    return Asked(time_s, force_profile.along(case.line, time_s)), found
+    along = Followed(case.line, case.surface_mm, limb, case.contact)
+    return follow(along, law, seed, plant)
+
+
+def follow(what: Followed, law: Law, seed: int, plant: Plant = PLANT) -> tuple["Asked", Run]:
+    """One run, and what was asked for."""
+    time_s = np.arange(0.0, what.line.duration_s, DT_S)
+    surface_mm = what.surface_mm(np.append(time_s, time_s[-1] + DT_S))
+    asked_N = force_profile.along(force_profile.preview(what.line, law.preview_s), time_s)
+    found = run(law, asked_N, plant.bench(what.limb, surface_mm, what.contact), seed, DT_S)
+    return Asked(time_s, force_profile.along(what.line, time_s)), found
 
 
 def every(quick: bool = False) -> Iterator[Case]:

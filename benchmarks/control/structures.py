@@ -30,7 +30,7 @@ from controller.law.loop_response import (
     tissue_ratio,
 )
 from controller.law.stability import ForceLoop
-from controller.law.synthesis import LEAD_STEPS, MARGIN_DEG, MARGIN_GAIN, NOISE_SHARE, SPARE_S, as_modelled, tissues
+from controller.law.synthesis import MARGIN_DEG, MARGIN_GAIN, NOISE_SHARE, SPARE_S, as_modelled, leads, tissues
 from rig.config.axis_response import AxisResponse
 
 SUBJECT = "average"
@@ -86,8 +86,8 @@ STRUCTURES: dict[str, tuple[OpenLoop, Sequence[float]]] = {
 
 def best(loop: ForceLoop, structure: OpenLoop, thirds: Sequence[float]) -> Candidate | None:
     """That which leaves least of a limb at 2 Hz."""
-    leads_s = np.linspace(0.0, 1.5 * max(loop.axis.lag1_s + loop.axis.lag2_s, loop.rates.sample_s), LEAD_STEPS)
-    tried = [_fastest(loop, structure, float(lead_s), third) for lead_s in leads_s for third in thirds]
+    leads_s = leads(loop.axis, loop.rates).tolist()
+    tried = [_fastest(loop, structure, lead_s, third) for lead_s in leads_s for third in thirds]
     return min(filter(None, tried), key=lambda by: left(loop, structure, by)[-1], default=None)
 
 

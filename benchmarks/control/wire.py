@@ -16,14 +16,13 @@ import numpy as np
 
 from api.cli.mock_bench import bench_for
 from benchmarks.control import laws, rival_process, rival_tuning, wire_programs
-from benchmarks.control.cases import DT_S, LIMB_MM, Asked, swing
+from benchmarks.control.cases import DT_S, LIMB_MM, Asked, Followed, follow, swing
 from benchmarks.control.laws import CONSTANTS, LAW
-from benchmarks.control.motion import Column, run
+from benchmarks.control.motion import Column
 from benchmarks.control.plants import FOLDER, PLANT, SUBJECTS, limb_of, model_of
 from benchmarks.control.rival_tuning import DRIFTS_RAD_S
 from benchmarks.control.wire_programs import SWING_HZ, Kind
 from controller.experiments import tracked
-from controller.law import force_profile
 from controller.law.axis_response import rates_of, response_of
 from controller.loop.modes import Mode
 from controller.loop.steps import Program, TrackForce
@@ -167,13 +166,13 @@ def in_simulation(part: Part, program: Program) -> tuple[Asked, Column]:
     """The same reference, by the same law as it is for the simulated axis."""
     law = laws.shaped(part.subject, PLANT) if part.law == LAW else CONSTANTS[part.law](part.subject, PLANT)
     line, gap_mm = wire_programs.simulated_line(part.kind, program)
-    time_s = np.arange(0.0, line.duration_s, DT_S)
-    along_s = np.append(time_s, time_s[-1] + DT_S)
-    surface_mm = swing(along_s, LIMB_MM, SWING_HZ) if part.kind == "limb" else np.full_like(along_s, gap_mm)
-    asked_N = force_profile.along(force_profile.preview(line, law.preview_s), time_s)
+
+    def surface_mm(time_s: Column) -> Column:
+        return swing(time_s, LIMB_MM, SWING_HZ) if part.kind == "limb" else np.full_like(time_s, gap_mm)
+
     limb = limb_of(model_of(part.subject), part.stiffness)
-    found = run(law, asked_N, PLANT.bench(limb, surface_mm), part.seed, DT_S)
-    return Asked(time_s, force_profile.along(line, time_s)), found.sensed_N
+    asked, found = follow(Followed(line, surface_mm, limb), law, part.seed)
+    return asked, found.sensed_N
 
 
 def _by_milliseconds(time_s: Column, reference_N: Column, force_N: Column) -> tuple[Asked, Column]:

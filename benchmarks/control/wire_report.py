@@ -3,15 +3,16 @@
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from benchmarks.control.cases import FORCES_N
-from benchmarks.control.goals import PEAK
+from benchmarks.control.goals import GOALS, JUMPS, LOW_JUMPS, PEAK
 from benchmarks.control.laws import LAW
 from benchmarks.control.scores import Gain, Score, gain_of, mean_of
 from benchmarks.control.wire import BEST_AT_CONTACT, CONSTANT, WiredPart
 
 # What is promised of a limb that moves, of low jumps and of jumps; a bench confirms what is within a third of it.
-PROMISED = {**{f"limb 2 Hz, {at:g} N": least for at, least in zip(FORCES_N, (3.0, 3.0, 2.0, 1.0, 0.7), strict=True)},
-            "low jumps": 3.0, "jumps": 1.8}  # fmt: skip
+PROMISED = {
+    **{f"limb 2 Hz, {force} N": least for force, least in GOALS.items()},
+    "low jumps": LOW_JUMPS, "jumps": JUMPS,
+}  # fmt: skip
 CONFIRMED = 1 - 1 / 3
 CONTACT = "contact, 0 mm/s"
 

@@ -80,7 +80,7 @@ def over_span(axis: AxisResponse, rates: Rates, law: Constants, span: Span, poin
 def constants(axis: AxisResponse, rates: Rates, span: Span) -> Constants:
     """The law's numbers for this axis and tissue; raises UsageError where no law keeps the margins."""
     _refuse_late(axis, rates)
-    leads_s = np.linspace(0.0, 1.5 * max(axis.lag1_s + axis.lag2_s, rates.sample_s), LEAD_STEPS)
+    leads_s = leads(axis, rates)
     best = Constants(SLOWEST_RAD_S, 0.0, 0.0)
     # From the middle, where the best mostly is: no search where not even what would be as good as the best so far keeps
     # the margins, which is one look instead of ten.
@@ -97,6 +97,11 @@ def constants(axis: AxisResponse, rates: Rates, span: Span) -> Constants:
             f" (bound {least_Hz:g} Hz): fit more trials, or shorten the axis' delay"
         )
     return best
+
+
+def leads(axis: AxisResponse, rates: Rates) -> Column:
+    """Leads that are tried [s]: up to half as much again as the lags."""
+    return np.linspace(0.0, 1.5 * max(axis.lag1_s + axis.lag2_s, rates.sample_s), LEAD_STEPS)
 
 
 def resistance(law: Constants) -> float:

@@ -10,8 +10,7 @@ from typing import NamedTuple
 from drivers.input_role import Input
 from drivers.roles import ForceSensor, MarkerTracker, ServoAxis
 from rig.channels import AxisSample, ForceSample, MarkerSample
-from rig.config.products.input_role import InputProduct
-from rig.config.products.roles import AxisProduct, ForceProduct, Product, TrackerProduct
+from rig.config.products.roles import AxisProduct, Product
 from rig.errors import DeviceError
 from rig.input_streams import InputSample
 
@@ -71,11 +70,7 @@ class UnderTest:
     @property
     def sampled_Hz(self) -> float | None:
         """The rate that the declaration promises; None for an axis, which answers what it is asked, and a switch."""
-        if isinstance(self.config, ForceProduct):
-            return self.config.sampled_Hz
-        if isinstance(self.config, InputProduct):
-            return self.config.nominal_Hz or None
-        return self.config.rate_Hz if isinstance(self.config, TrackerProduct) else None
+        return self.config.promised_Hz
 
     @contextlib.contextmanager
     def started(self, next_seq: int = 0) -> Iterator[AnyDevice]:

@@ -59,7 +59,7 @@ class MockBench:
         found = [f"calibration.force={force_file(asked, endpoints)}"]
         if wiring.calibration.of_dynamics:
             found.append(f"calibration.dynamics={dynamics_file(asked, endpoints)}")
-        for role in mocks(built_in(list(settings))):
+        for role in mocks(asked):
             device = getattr(wiring, role)
             found.append(f"{role}.port={device.port}")
             if isinstance(device, ForceProduct | TrackerProduct):

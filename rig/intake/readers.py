@@ -48,10 +48,9 @@ def open_sheets(path: Path, form: FileForm) -> Iterable[tuple[dict[str, str], Sh
     if form.long is not None:
         whole = open_sheets(path, form.model_copy(update={"long": None, "sheets": "**/*"}))
         sheets = [long for _, sheet in whole for long in by_channel(sheet, form.long)]
-        chosen = [(matched(form.sheets, sheet.name) or {}, sheet) for sheet in sheets if _is_named(form, sheet)]
+        chosen = _named(form, sheets)
     elif kind == "text":
-        texts = open_texts(Source(path), form)
-        chosen = [(matched(form.sheets, sheet.name) or {}, sheet) for sheet in texts if _is_named(form, sheet)]
+        chosen = _named(form, open_texts(Source(path), form))
     elif kind == "workbook":
         names = [(name, matched(form.sheets, name)) for name in sheet_names(path)]
         books = [(Source(path, name), labels) for name, labels in names if labels is not None]
@@ -66,8 +65,10 @@ def open_sheets(path: Path, form: FileForm) -> Iterable[tuple[dict[str, str], Sh
     yield from chosen
 
 
-def _is_named(form: FileForm, sheet: Sheet) -> bool:
-    return not sheet.name or matched(form.sheets, sheet.name) is not None
+def _named(form: FileForm, sheets: Iterable[Sheet]) -> list[tuple[dict[str, str], Sheet]]:
+    """Those that ``form`` names; one without a name is all that there is."""
+    found = [(matched(form.sheets, sheet.name) if sheet.name else {}, sheet) for sheet in sheets]
+    return [(labels, sheet) for labels, sheet in found if labels is not None]
 
 
 def _array_sheets(path: Path) -> list[Sheet]:

@@ -45,6 +45,11 @@ class InputProduct(Product):
         raise NotImplementedError
 
     @property
+    def promised_Hz(self) -> float | None:
+        """As nominal."""
+        return self.nominal_Hz or None
+
+    @property
     def asks_for(self) -> StopKind | None:
         """The stop that pressing it asks for."""
         return None

@@ -51,6 +51,11 @@ class Product(Table):
     port: str = Field(default=MOCK_PORT, description="where it is plugged in; mock: the simulated bench serves it")
 
     @property
+    def promised_Hz(self) -> float | None:
+        """Samples a second that come by themselves; None where they answer what is asked, or are irregular."""
+        return None
+
+    @property
     def maxima(self) -> tuple[Maximum, ...]:
         """What the product adds to the maxima of every configuration."""
         return ()
@@ -81,6 +86,11 @@ class ForceProduct(Product):
     def sampled_Hz(self) -> float:
         """Samples a second that really come."""
         return self.rate_Hz
+
+    @property
+    def promised_Hz(self) -> float:
+        """As sampled."""
+        return self.sampled_Hz
 
     @property
     def maxima(self) -> tuple[Maximum, ...]:
@@ -135,3 +145,8 @@ class TrackerProduct(Product):
     )
     rate_Hz: Positive = Field(default=60.0, description="frames a second")
     latency_ms: float = Field(default=0.0, ge=0, le=200, description="known smallest delay from capture to arrival")
+
+    @property
+    def promised_Hz(self) -> float:
+        """Frames a second."""
+        return self.rate_Hz
