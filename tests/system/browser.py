@@ -1,6 +1,9 @@
 """The Chromium that is there, started as a test machine needs it."""
 
+import shlex
 import shutil
+import tempfile
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Playwright
@@ -29,6 +32,14 @@ def find() -> str:
     return found
 
 
+# At a bench the browser is on another computer; on this one it must not take the processor from the simulated devices.
+GIVES_WAY = 10
+
+
 def launch(playwright: Playwright, executable: str) -> Browser:
-    """A headless browser."""
-    return playwright.chromium.launch(executable_path=executable, args=list(ARGUMENTS))
+    """A headless browser that gives way to the bench: what starts here keeps the niceness that it is started with."""
+    with tempfile.TemporaryDirectory() as folder:
+        starter = Path(folder) / "browser"
+        starter.write_text(f'#!/bin/sh\nexec nice -n {GIVES_WAY} {shlex.quote(executable)} "$@"\n')
+        starter.chmod(0o755)
+        return playwright.chromium.launch(executable_path=starter, args=list(ARGUMENTS))

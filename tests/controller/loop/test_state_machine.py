@@ -161,6 +161,7 @@ def test_a_zero_far_from_the_first_one_is_refused() -> None:
         ((ZERO, APPROACH, track((0.0, 0.0), (1.0, 9.5))), "the largest force of the model, 9 N"),
         ((ZERO, APPROACH, track((1.0, 1.0), (0.0, 1.0))), "times go backwards"),
         ((ZERO, MoveTo(position_mm=70.0, speed_mm_s=5.0)), "position 70 mm is outside 0 to 60 mm"),
+        ((ZERO, touching(search_to_mm=70.0)), "search_to_mm 70 mm is outside 0 to 60 mm"),
         ((ZERO, Retract(clearance_mm=1.0, speed_mm_s=30.0)), "retract speed 30 mm/s is above"),
         ((ZERO, APPROACH, Dither(amplitude_mm=1.0, frequency_Hz=20.0, duration_s=1.0)), "speed of the dither"),
         ((ZERO, touching(touch_speed_mm_s=99.0)), "touch speed 99 mm/s is above limits.speed_mm_s, 60 mm/s"),

@@ -1,15 +1,21 @@
 """What steps call themselves and channels: the page shows the mode, and a refusal of a zero names the channel."""
 
+from controller.loop import steps
 from controller.loop.modes import Mode
-from controller.loop.steps import CHANNELS, Approach, Compress, Retract, TrackForce
 
 
 def test_each_step_says_what_the_bench_is_doing() -> None:
-    shown = {step: step.mode for step in (Approach, Compress, TrackForce, Retract)}
+    shown = {
+        step: step.mode for step in (steps.Zero, steps.Approach, steps.Compress, steps.TrackForce, steps.Retract)
+    }
     assert shown == {
-        Approach: Mode.APPROACH, Compress: Mode.COMPRESS, TrackForce: Mode.CONTACT, Retract: Mode.RETRACT
-    }  # fmt: skip
+        steps.Zero: Mode.FREE,
+        steps.Approach: Mode.APPROACH,
+        steps.Compress: Mode.COMPRESS,
+        steps.TrackForce: Mode.CONTACT,
+        steps.Retract: Mode.RETRACT,
+    }
 
 
 def test_channels_are_forces_then_moments_along_x_y_and_z() -> None:
-    assert tuple(f"{kind}{along}" for kind in "fm" for along in "xyz") == CHANNELS
+    assert tuple(f"{kind}{along}" for kind in "fm" for along in "xyz") == steps.CHANNELS

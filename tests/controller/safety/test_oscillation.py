@@ -106,6 +106,13 @@ def test_what_is_small_or_slow_is_not(amplitude_N: float, frequency_Hz: float) -
     assert heard(two_N + swing(amplitude_N, frequency_Hz), two_N) == []
 
 
+def test_what_is_quicker_than_any_loop_swings_is_not() -> None:
+    """Half waves of 2 ms, as 250 Hz has: a grid that hears each sample twice would show such."""
+    two_N = np.full_like(SECONDS, 2.0)
+    quick_N = 0.5 * np.where(np.arange(len(SECONDS)) % 4 < 2, 1.0, -1.0)
+    assert heard(two_N + quick_N, two_N) == []
+
+
 def test_a_noisy_sensor_is_none() -> None:
     noise_N = 0.05 * np.repeat(np.random.default_rng(3).standard_normal(len(SECONDS) // 10), 10)
     two_N = np.full_like(SECONDS, 2.0)
