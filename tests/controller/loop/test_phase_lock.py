@@ -235,3 +235,65 @@ def test_a_grid_locked_to_when_it_looked_follows_the_sensor_no_longer() -> None:
     right, wrong = (bench(sensor, observed=how).late_us() for how in (lambda *pair: pair, at_arrival))
     assert max(right) <= 1e-3 * LOOK_NS
     assert sum(late > 20 for late in wrong) > 0.05 * len(wrong)
+
+
+TOOK_NS, SAMPLED_NS = 600_000, 7_000_000
+"""More than half a period from the sample to its bytes, as an adapter with a latency timer has."""
+
+
+def locked(sensor_ns: int = 1_000_000) -> PhaseLock:
+    """One sample was seen; the next can be here at SAMPLED_NS + TOOK_NS + ``sensor_ns``."""
+    lock = PhaseLock(1_000_000, sensor_ns)
+    lock.observe(SAMPLED_NS, SAMPLED_NS + TOOK_NS)
+    return lock
+
+
+def due_ns(off_ns: int, sensor_ns: int = 1_000_000, periods: int = 1) -> int:
+    """When a cycle is due that begins ``off_ns`` later than it should."""
+    return SAMPLED_NS + TOOK_NS + periods * sensor_ns - EARLY_NS + off_ns
+
+
+@pytest.mark.parametrize(
+    ("off_ns", "moved_ns"),
+    [(0, 0), (1000, -100), (-1000, 100), (100_000, -10_000), (-99_990, 9999), (400_000, -10_000), (-400_000, 10_000),
+     (499_000, -10_000), (501_000, 10_000)],
+)  # fmt: skip
+def test_a_tenth_is_mended_and_a_hundredth_of_a_period_at_most_the_shorter_way(off_ns: int, moved_ns: int) -> None:
+    assert locked().correction_ns(due_ns(off_ns)) == moved_ns
+
+
+@pytest.mark.parametrize("sensor_ns", [1_000_000, 996_095])
+@pytest.mark.parametrize("off_ns", [0, 1001, -1001, 150_000, -150_000])
+def test_a_sample_is_waited_for_until_a_fifth_of_a_cycle_after_it_should_come(off_ns: int, sensor_ns: int) -> None:
+    due = due_ns(off_ns, sensor_ns)
+    assert locked(sensor_ns).patience_ns(due) == due - off_ns + EARLY_NS + round(0.2 * sensor_ns)
+
+
+@pytest.mark.parametrize(
+    ("off_ns", "periods"), [(200_000, 1), (-200_000, 1), (0, 0), (0, 2), (0, 3)],
+    ids=["later", "earlier", "here", "one is missing", "two are"],
+)  # fmt: skip
+def test_who_is_a_fifth_of_a_cycle_off_or_has_it_or_misses_one_does_not_wait(off_ns: int, periods: int) -> None:
+    due = due_ns(off_ns, periods=periods)
+    assert locked().patience_ns(due) == due
+
+
+def test_ten_periods_without_a_sample_are_the_end_of_following() -> None:
+    lock, end_ns = locked(), SAMPLED_NS + TOOK_NS + 10_000_000
+    assert (lock.correction_ns(end_ns - 1), lock.correction_ns(end_ns)) == (round(-0.1 * (EARLY_NS - 1)), 0)
+
+
+@pytest.mark.parametrize(("after_ns", "risen_ns"), [(1_000_000_000, 50_000), (10_001, 0), (40_000, 2)])
+def test_a_line_that_became_slower_is_believed_by_50_ppm(after_ns: int, risen_ns: int) -> None:
+    lock = locked()
+    lock.observe(SAMPLED_NS + after_ns, SAMPLED_NS + after_ns + 5 * TOOK_NS)
+    due = due_ns(after_ns)
+    assert lock.patience_ns(due) == due + risen_ns + EARLY_NS + 200_000
+    assert lock.correction_ns(due + risen_ns) == 0
+
+
+@pytest.mark.parametrize(
+    ("sensor_ns", "locks"), [(990_000, True), (1_010_000, True), (989_999, False), (1_010_001, False)]
+)
+def test_a_sensor_a_hundredth_off_is_locked_to_and_none_further(sensor_ns: int, locks: bool) -> None:
+    assert PhaseLock(1_000_000, sensor_ns).locks is locks

@@ -8,8 +8,7 @@ from controller.law.inverse_model import GainRow
 from controller.loop.modes import Mode
 from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
-from controller.loop.steps import Approach, Compress, Dither, Hold, MoveTo, Program, Retract, Step, TrackForce, Zero
-from controller.safety.program_limits import refuse_beyond_limits
+from controller.loop.steps import Approach, Compress, Dither, Hold, MoveTo, Program, TrackForce, Zero
 from controller.safety.table import Action, Incident
 from mock_devices.testing.spring_bench import (
     APPROACH,
@@ -17,13 +16,11 @@ from mock_devices.testing.spring_bench import (
     PRESS,
     STIFFNESS_N_MM,
     SURFACE_MM,
-    WIRING,
     ZERO,
     ZERO_N,
     SpringBench,
 )
 from rig.config.wiring import Limits, Wiring
-from rig.errors import UsageError
 
 
 def gains() -> tuple[GainRow, ...]:
@@ -34,10 +31,6 @@ def gains() -> tuple[GainRow, ...]:
         )
         for force in (0.0, 9.0)
     )  # fmt: skip
-
-
-def touching(**speeds: float) -> Approach:
-    return APPROACH.model_copy(update={"touches": 2, **speeds})
 
 
 def track(*points: tuple[float, float]) -> TrackForce:
@@ -150,35 +143,6 @@ def test_a_zero_far_from_the_first_one_is_refused() -> None:
     bench.sense()
     bench.run(ZERO)
     assert "since the first zero" in bench.machine.latched.text if bench.machine.latched else False
-
-
-@pytest.mark.parametrize(
-    ("steps", "reason"),
-    [
-        ((ZERO, APPROACH, Compress(depth_mm=16.0, speed_mm_s=5.0, force_limit_N=5.0)), "depth 16 mm is above"),
-        ((ZERO, APPROACH, Compress(depth_mm=5.0, speed_mm_s=99.0, force_limit_N=5.0)), "speed 99 mm/s is above"),
-        ((ZERO, APPROACH, Compress(depth_mm=5.0, speed_mm_s=5.0, force_limit_N=12.0)), "force_limit_N 12 N is above"),
-        ((ZERO, APPROACH, track((0.0, 0.0), (1.0, 9.5))), "the largest force of the model, 9 N"),
-        ((ZERO, APPROACH, track((1.0, 1.0), (0.0, 1.0))), "times go backwards"),
-        ((ZERO, MoveTo(position_mm=70.0, speed_mm_s=5.0)), "position 70 mm is outside 0 to 60 mm"),
-        ((ZERO, touching(search_to_mm=70.0)), "search_to_mm 70 mm is outside 0 to 60 mm"),
-        ((ZERO, Retract(clearance_mm=1.0, speed_mm_s=30.0)), "retract speed 30 mm/s is above"),
-        ((ZERO, APPROACH, Dither(amplitude_mm=1.0, frequency_Hz=20.0, duration_s=1.0)), "speed of the dither"),
-        ((ZERO, touching(touch_speed_mm_s=99.0)), "touch speed 99 mm/s is above limits.speed_mm_s, 60 mm/s"),
-        ((ZERO, touching(back_off_mm_s=30.0)), "back-off speed 30 mm/s is above limits.retract_speed_mm_s, 20 mm/s"),
-        ((APPROACH, PRESS), "the first step must be a zero"),
-        ((ZERO, PRESS), "no approach comes before it"),
-    ],
-)
-def test_a_program_beyond_the_limits_is_refused_with_the_number_and_its_bound(
-    steps: tuple[Step, ...], reason: str
-) -> None:
-    with pytest.raises(UsageError, match=reason.replace("(", r"\(")):
-        refuse_beyond_limits(Program(name="test", steps=steps), WIRING)
-
-
-def test_a_program_within_the_limits_is_accepted() -> None:
-    refuse_beyond_limits(Program(name="test", steps=(ZERO, APPROACH, PRESS, LEAVE)), WIRING)
 
 
 def test_limits_that_contradict_each_other_are_refused_with_both_numbers() -> None:

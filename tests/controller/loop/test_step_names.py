@@ -5,9 +5,7 @@ from controller.loop.modes import Mode
 
 
 def test_each_step_says_what_the_bench_is_doing() -> None:
-    shown = {
-        step: step.mode for step in (steps.Zero, steps.Approach, steps.Compress, steps.TrackForce, steps.Retract)
-    }
+    shown = {step: step.mode for step in (steps.Zero, steps.Approach, steps.Compress, steps.TrackForce, steps.Retract)}
     assert shown == {
         steps.Zero: Mode.FREE,
         steps.Approach: Mode.APPROACH,

@@ -113,6 +113,50 @@ def test_what_is_quicker_than_any_loop_swings_is_not() -> None:
     assert heard(two_N + quick_N, two_N) == []
 
 
+def sides(count: int) -> Column:
+    """An error of 1 N that changes its sign every 10 ms, ``count`` times in all, and is none after that."""
+    return np.concatenate([np.full(10, (-1.0) ** side) for side in range(count)])
+
+
+def spoke(error_N: Column, before_N: float = math.nan) -> bool:
+    """Whether a monitor says so of this error, of which there is none before."""
+    monitor, state = OscillationMonitor(), LoopState(reference_N=0.0)
+    state.force_N = before_N
+    monitor.update(state)
+    said = []
+    for now_N in error_N:
+        state.force_N = float(now_N)
+        said.append(monitor.update(state))
+    return any(said)
+
+
+@pytest.mark.parametrize(("count", "heard_then"), [(13, False), (14, True)])
+def test_twelve_half_waves_are_six_turns(count: int, heard_then: bool) -> None:
+    """The first side is that of the error itself, of whose mean nothing is known; the second is the first beyond it."""
+    assert spoke(sides(count)) is heard_then
+
+
+@pytest.mark.parametrize(("count", "heard_then"), [(11, False), (12, True)])
+def test_what_swung_before_a_rest_does_not_count(count: int, heard_then: bool) -> None:
+    assert spoke(np.concatenate([sides(8), np.zeros(150), sides(count)])) is heard_then
+
+
+def test_what_swung_before_the_force_was_unknown_does_not_count() -> None:
+    assert not spoke(np.concatenate([sides(8), [math.nan], sides(10)]))
+    assert spoke(np.concatenate([sides(8), sides(10)]))
+
+
+def test_a_swing_about_a_standing_error_is_heard() -> None:
+    two_N = np.full_like(SECONDS, 2.0)
+    assert 0.15 < heard(two_N + 1.0 + swing(0.3, 40.0), two_N)[0] < 0.3
+
+
+def test_how_the_reference_moved_is_forgotten_in_half_a_second() -> None:
+    asked_N = np.where(SECONDS < 1.0, 2.0, 3.0)
+    late_N = np.where(SECONDS < 1.5, 0.0, swing(0.4, 40.0))
+    assert 1.65 < heard(asked_N + late_N, asked_N)[0] < 2.0
+
+
 def test_a_noisy_sensor_is_none() -> None:
     noise_N = 0.05 * np.repeat(np.random.default_rng(3).standard_normal(len(SECONDS) // 10), 10)
     two_N = np.full_like(SECONDS, 2.0)
