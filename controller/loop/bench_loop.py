@@ -111,7 +111,7 @@ class BenchLoop:
         self.braked = False
         self.input_statuses: dict[str, DeviceStatus] = {}
         self._touch_said: Touch | None = None
-        self._limb_seen_ns = 0
+        self._limb_seen_ns = self._next_ns = 0
         if held:
             self.machine.hold(Incident(Action.IMMEDIATE, "recovery", held))
 
@@ -226,7 +226,9 @@ class BenchLoop:
         # Only a marker that was there can be lost: not every bench has one on the limb.
         inputs.limb_age_ms = (now_ns - self._limb_seen_ns) * 1e-6 if self._limb_seen_ns else 0.0
         inputs.drive_fault = self.devices.axis.fault
-        inputs.wake_latency_ms = (cycle.wake_ns - cycle.scheduled_ns) * 1e-6
+        # Against the cycle before, as a loop that was held up inside one skips what it missed and is on time again.
+        inputs.late_ms = (cycle.began_ns - (self._next_ns or cycle.scheduled_ns)) * 1e-6
+        self._next_ns = cycle.scheduled_ns + self.phase.period_ns
         inputs.recorder_fill = self._ring.fill
         inputs.recorder_silent_s = self._ring.reader_age_ns(now_ns) * 1e-9
         inputs.supervisor_lost = self._channel.lost

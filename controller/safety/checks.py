@@ -185,11 +185,11 @@ def patient_moved(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str
 
 
 def loop_overrun(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
-    """The loop woke late."""
+    """A cycle began late, or the one before was held up."""
     limit_ms = wiring.loop.overrun_ms
-    if inputs.wake_latency_ms <= limit_ms:
+    if inputs.late_ms <= limit_ms:
         return ""
-    return f"the loop woke {inputs.wake_latency_ms:.0f} ms late (limit {limit_ms:g} ms): is the computer overloaded?"
+    return f"the loop came {inputs.late_ms:.0f} ms late (limit {limit_ms:g} ms): is the computer overloaded?"
 
 
 def recorder_stalled(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:

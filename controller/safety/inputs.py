@@ -23,7 +23,7 @@ class SafetyInputs:
     axis_age_ms: float = 0.0
     marker_age_ms: float = 0.0
     limb_age_ms: float = 0.0
-    wake_latency_ms: float = 0.0
+    late_ms: float = 0.0
     recorder_fill: float = 0.0
     recorder_silent_s: float = 0.0
     supervisor_lost: bool = False

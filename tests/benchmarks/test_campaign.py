@@ -92,7 +92,7 @@ def test_torque_lost_before_the_fault_is_not_its_doing() -> None:
 
 
 @pytest.mark.parametrize(("code", "text", "is_stall"), [
-    ("loop_overrun", "the loop woke 120 ms late (limit 100 ms)", True),
+    ("loop_overrun", "the loop came 120 ms late (limit 100 ms)", True),
     ("axis_lost", "axis: newest sample is 51 ms old (limit 50 ms)", True), ("axis_lost", "axis lost: cable", False),
     ("force_limit", "force 16.00 N is above limits.force_N, 15 N", False),
 ])  # fmt: skip

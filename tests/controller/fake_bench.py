@@ -268,8 +268,8 @@ class FakeBench:
         """Since the start."""
         return (self.clock.now_ns - self.start_ns) * 1e-9
 
-    def cycle(self, late_ns: int = 0) -> bool:
-        """One cycle, woken ``late_ns`` after it was due; whole periods of lateness are missed cycles."""
+    def cycle(self, late_ns: int = 0, held_ns: int = 0) -> bool:
+        """One cycle, woken ``late_ns`` after it was due, held up for ``held_ns``; whole periods are missed."""
         due_ns = self.start_ns + self.cycle_number * self.period_ns
         wake_ns = due_ns + late_ns
         self.axis.advance(wake_ns)
@@ -280,9 +280,9 @@ class FakeBench:
         self.loop.prepare(wake_ns)
         self.loop.take_force(wake_ns)
         self.going = self.loop.run_cycle(Cycle(self.cycle_number, due_ns, wake_ns, self.missed))
-        self.clock.now_ns = wake_ns + self.execution_ns
+        self.clock.now_ns = wake_ns + self.execution_ns + held_ns
         self.true_peak_N = max(self.true_peak_N, self.force.true_N)
-        skipped = late_ns // self.period_ns
+        skipped = (late_ns + held_ns) // self.period_ns
         self.cycle_number, self.missed = self.cycle_number + 1 + skipped, self.missed + skipped
         return self.going
 

@@ -93,7 +93,7 @@ def test_a_row_says_how_late_the_cycle_began_and_the_checks_hear_it_in_milliseco
     bench = FakeBench()
     bench.cycle(late_ns=3_400_000)
     assert bench.ring.loop[-1].wake_latency_ns == 3_400_000
-    assert inputs(bench).wake_latency_ms == pytest.approx(3.4)
+    assert inputs(bench).late_ms == pytest.approx(3.4)
     assert bench.ring.asked_ns == bench.ring.loop[-1].capture_ns
 
 

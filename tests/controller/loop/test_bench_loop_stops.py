@@ -34,6 +34,12 @@ def overslept(bench: FakeBench) -> None:
     bench.cycle(late_ns=101_000_000)
 
 
+def held_up(bench: FakeBench) -> None:
+    """In the middle of a cycle, which began on time, as does the next one that there is time for."""
+    bench.cycle(held_ns=101_000_000)
+    bench.cycle()
+
+
 def go_on(bench: FakeBench) -> None:
     """The set-point goes on, 20 mm/s into the tissue, in the place of the hold."""
     bench.loop.machine._run = MoveTo(position_mm=bench.loop.state.position_mm + 8.0, speed_mm_s=20.0)
@@ -76,6 +82,8 @@ FAULTS = [
     # Six frames of 60 Hz are averaged: (0, 9, 12) is 15 mm away, so more than two thirds of them must have moved.
     Fault("patient_moved", knob("tracker", limb_mm=(0.0, 9.0, 12.0)), (66, 102), (66, 102), "limit 10 mm"),
     Fault("loop_overrun", overslept, (101, 103), (101, 103), "101 ms late",
+          {"loop": {"missed_periods": 0, "stale_force_ms": 400.0, "stale_axis_ms": 400.0}}),
+    Fault("loop_overrun", held_up, (101, 104), (101, 104), "101 ms late",
           {"loop": {"missed_periods": 0, "stale_force_ms": 400.0, "stale_axis_ms": 400.0}}),
     Fault("recorder_stalled", knob("ring", fill=0.6), (0, 2), (0, 2), "60 % full"),
     Fault("recorder_stalled", knob("ring", silent_s=3.2), (0, 2), (0, 2), "silent for 3.2 s"),

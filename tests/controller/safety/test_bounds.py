@@ -150,8 +150,8 @@ CASES = [
     Case("tracker_lost", {}, {"marker_lost": "cable"}, "tracker lost: cable"),
     Case("patient_moved", {"patient_mm": 10.0}, {"patient_mm": 10.5},
          "the limb moved by 10.5 mm against the robot (limit 10 mm)"),
-    Case("loop_overrun", {"wake_latency_ms": 100.0}, {"wake_latency_ms": 101.0},
-         "the loop woke 101 ms late (limit 100 ms): is the computer overloaded?"),
+    Case("loop_overrun", {"late_ms": 100.0}, {"late_ms": 101.0},
+         "the loop came 101 ms late (limit 100 ms): is the computer overloaded?"),
     Case("recorder_stalled", {"recorder_fill": 0.5}, {"recorder_fill": 0.51},
          "the recorder is silent for 0.0 s, its buffer 51 % full"),
     Case("recorder_stalled", {"recorder_silent_s": 3.0}, {"recorder_silent_s": 3.1},
@@ -287,7 +287,7 @@ def test_what_the_table_looks_at_is_well_until_the_loop_says_otherwise() -> None
     assert inputs == SafetyInputs(
         mode=Mode.IDLE, force_lost="", axis_lost="", marker_lost="", drive_fault="", force_valid=True,
         force_frozen=False, touch_wrong="", oscillation="", force_age_ms=0.0,
-        axis_age_ms=0.0, marker_age_ms=0.0, limb_age_ms=0.0, wake_latency_ms=0.0,
+        axis_age_ms=0.0, marker_age_ms=0.0, limb_age_ms=0.0, late_ms=0.0,
         recorder_fill=0.0, recorder_silent_s=0.0, stop_silent_s=0.0,
         supervisor_lost=False, operator_silent_s=0.0, requests=frozenset(),
     )  # fmt: skip

@@ -24,7 +24,7 @@ from rig.config.wiring import Wiring
         ({"marker_lost": "cable"}, "tracker_lost"),
         ({"marker_age_ms": 1000.0}, "tracker_lost"),
         ({"limb_age_ms": 1000.0}, "tracker_lost"),
-        ({"wake_latency_ms": 500.0}, "loop_overrun"),
+        ({"late_ms": 500.0}, "loop_overrun"),
         ({"recorder_fill": 0.9}, "recorder_stalled"),
         ({"recorder_silent_s": 10.0}, "recorder_stalled"),
         ({"stop_silent_s": 1.5}, "stop_lost"),
