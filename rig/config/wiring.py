@@ -47,7 +47,7 @@ class Loop(Table):
     lease_s: float = Field(
         default=3.0, ge=0, description="the operator's program must show itself this often; 0: not asked"
     )
-    overrun_ms: Positive = Field(default=100.0, description="a wake-up later than this stops motion")
+    overrun_ms: Positive = Field(default=100.0, description="a cycle that begins later than this stops motion")
 
 
 class Limits(Table):

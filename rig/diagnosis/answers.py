@@ -17,9 +17,17 @@ from rig.diagnosis.estimates import (
     Unexplained,
     Verdict,
 )
-from rig.diagnosis.evidence import Tangents, held_out_square_error, information, is_alias, jackknife
+from rig.diagnosis.evidence import (
+    PARTS,
+    Tangents,
+    held_out_square_error,
+    information,
+    is_alias,
+    jackknife,
+    jackknife_along,
+)
 from rig.diagnosis.fit import Fit, least_squares
-from rig.diagnosis.lack_of_fit import LackOfFit
+from rig.diagnosis.lack_of_fit import LackOfFit, variables
 from rig.diagnosis.noise import Array
 from rig.diagnosis.problem import Effect, InverseProblem, Par
 from rig.diagnosis.search import Named, Search, chance_level, testable
@@ -68,13 +76,13 @@ class Diagnosis:
         return Unexplained(self.depends_on, self.lack_of_fit_p) if self.verdict == "unexplained" else None
 
 
-def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Estimate]:
+def intervals(fit: Fit, wanted: Sequence[Par], is_left: bool = False) -> dict[str, Estimate]:
     """95 % intervals with Student's t on recordings, the wider of curvature and jackknife; a pair becomes its size.
 
-    To amplitudes 1.5 % is added, in quadrature: what the operators themselves are good for.
+    Where something ``is_left`` that no cause explains, what leaving out parts of the data does is added in quadrature.
+    To amplitudes 1.5 % is added too: what the operators themselves are good for.
     """
-    wide = student_reach(fit.problem.recordings - 1)
-    covariances = fit.covariance, jackknife(fit)
+    covariances = _covariances(fit, is_left)
     place = {par.name: k for k, par in enumerate(fit.free)}
     found: dict[str, Estimate] = {}
     for par in wanted:
@@ -82,10 +90,9 @@ def intervals(fit: Fit, wanted: Sequence[Par]) -> dict[str, Estimate]:
         if par.name not in place:
             found[par.name] = Estimate(value, par.low, par.high, unit=par.unit)
         elif "_sin" in par.name:
-            found[par.name.replace("_sin", "")] = _amplitude(fit, par.name, place, wide, covariances)
+            found[par.name.replace("_sin", "")] = _amplitude(fit, par.name, place, covariances)
         elif "_cos" not in par.name:
-            k = place[par.name]
-            half = wide * max(float(np.sqrt(c[k, k])) for c in covariances)
+            half = _half(covariances, np.eye(len(fit.free))[place[par.name]])
             half = min(half, LARGEST_LOG) if par.log else half
             half = float(np.hypot(half, OPERATOR_SHARE * abs(value - par.null))) if par.least else half
             low, high = (value / np.exp(half), value * np.exp(half)) if par.log else (value - half, value + half)
@@ -99,14 +106,28 @@ def stopped(par: Par, value: float) -> bool:
     return bool(par.least and abs(value - par.null) >= NEAR_BOUND * abs(bound - par.null))
 
 
-def _amplitude(fit: Fit, sine: str, place: Mapping[str, int], wide: float, covariances: Sequence[Array]) -> Estimate:
+def _covariances(fit: Fit, is_left: bool) -> list[Array]:
+    """Of the parameters, one set a source of error, each times the square of its reach; (kinds, p, p)."""
+    reach = student_reach(fit.problem.recordings - 1) ** 2
+    sources = [reach * np.array([fit.covariance, jackknife(fit)])]
+    if is_left:
+        parts = [jackknife_along(fit, variable) for variable in variables(fit).values()]
+        sources.append(student_reach(PARTS - 1) ** 2 * np.array(parts))
+    return sources
+
+
+def _half(covariances: Sequence[Array], direction: Array) -> float:
+    """Half the interval along ``direction``: of each source the widest, in quadrature."""
+    return float(np.sqrt(sum(float(np.max(direction @ source @ direction)) for source in covariances)))
+
+
+def _amplitude(fit: Fit, sine: str, place: Mapping[str, int], covariances: Sequence[Array]) -> Estimate:
     cosine = sine.replace("_sin", "_cos")
     pair = np.array([fit.values[sine], fit.values[cosine]])
-    index = [place[sine], place[cosine]]
-    size = float(np.hypot(*pair))
-    variance = max(float(pair @ c[np.ix_(index, index)] @ pair) for c in covariances) / max(size**2, 1e-300)
-    half = float(np.hypot(wide * np.sqrt(variance), OPERATOR_SHARE * size))
-    return Estimate(size, max(size - half, 0.0), size + half, unit=fit.free[index[0]].unit)
+    size, direction = float(np.hypot(*pair)), np.zeros(len(fit.free))
+    direction[[place[sine], place[cosine]]] = pair / max(size, 1e-150)
+    half = float(np.hypot(_half(covariances, direction), OPERATOR_SHARE * size))
+    return Estimate(size, max(size - half, 0.0), size + half, unit=fit.free[place[sine]].unit)
 
 
 def gain_of(before: Fit, after: Fit) -> ErrorGain:
@@ -125,14 +146,14 @@ def sentence(effect: Effect, values: Mapping[str, float]) -> str:
     return effect.statement.format(**values, amplitude=float(np.hypot.reduce(pair)))
 
 
-def answer(named: Named, after: Fit, provisional: bool) -> NamedCause:
+def answer(named: Named, after: Fit, provisional: bool, is_left: bool) -> NamedCause:
     """One finding of the final model."""
     effect = named.effect
     return NamedCause(
         tuple(dict.fromkeys((effect.name, *named.alternatives, *named.family))),
         sentence(effect, after.values),
         named.share * (PROVISIONAL_SHARE if provisional else 1.0),
-        intervals(after, effect.pars),
+        intervals(after, effect.pars, is_left),
         gain_of(named.without, after),
         float(named.support.nats.sum()),
         named.p_value,

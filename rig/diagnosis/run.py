@@ -54,8 +54,9 @@ def judge(
     budget = error_budget(before, search_result.after) if isinstance(problem, IndentationProblem) else None
     verdict, depends = verdict_of(search_result, found_after, budget)
     after, is_explained = search_result.after, verdict == "explained"
+    is_left = verdict == "unexplained"
     named = [on_any_law(one, after) if is_explained else one for one in search_result.named]
-    answers = [answer(one, after, not (is_explained and one.stands)) for one in named]
+    answers = [answer(one, after, not (is_explained and one.stands), is_left) for one in named]
     findings = tuple(sorted(answers, key=lambda found: -found.evidence_nats))
     visible, reasons = limits(problem, search_result, budget)
     progress("done", 1.0)
@@ -72,7 +73,7 @@ def judge(
         not_testable=reasons,
         next_experiment=None,
         quality=quality,
-        base=intervals(after, [par for par in problem.base if par.name not in held_values(problem, after.effects)]),
+        base=intervals(after, [p for p in problem.base if p.name not in held_values(problem, after.effects)], is_left),
         search=search_result,
         before=found_before,
         after=found_after,

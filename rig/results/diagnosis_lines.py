@@ -89,8 +89,7 @@ def sized(finding: NamedCause) -> str:
     """A cause in words with its size, the interval of that, and what it cannot be told from."""
     _, size = first_size(finding)
     others = f", or {', '.join(finding.effects[1:])}" if finding.effects[1:] else ""
-    right = " if nothing else were left" * finding.provisional  # beside what is left half of the sizes lie outside
-    return f"{finding.statement} ({_interval(size)}{right}){others}" if size else f"{finding.statement}{others}"
+    return f"{finding.statement} ({_interval(size)}){others}" if size else f"{finding.statement}{others}"
 
 
 def first_size(finding: NamedCause) -> tuple[str, Estimate | None]:
