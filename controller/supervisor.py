@@ -133,8 +133,9 @@ class Supervisor:
         while not self._closing.wait(period_s):
             try:
                 self._tell(Heartbeat(attending=self.attended()))
-            except DeviceError:
-                return
+            except DeviceError:  # a loop that hears nothing for a while may hear again
+                if not self.alive:
+                    return
 
     def _exit_text(self) -> str:
         code = self._process.wait(5) if self._process else None
@@ -180,14 +181,17 @@ class Supervisor:
         """
         self.await_ready()
         self.refuse_held()
-        if not self.attended():
-            raise SafetyStop(NOT_IN_CONTROL, "operator_silent")
+        self._refuse_unattended()
         try:
             return self._loop().run(Run(program=program), timeout_s)
         except DeviceError:
             if self.alive:
                 self.stop()
             raise
+
+    def _refuse_unattended(self) -> None:
+        if not self.attended():
+            raise SafetyStop(NOT_IN_CONTROL, "operator_silent")
 
     def await_ready(self, timeout_s: float = READY_TIMEOUT_S) -> bool:
         """Whether every device is ok within that time, or a stop is in force; what the loop says in the end counts."""
@@ -260,7 +264,8 @@ class Supervisor:
         return self._loop().survey()
 
     def act(self, act: Act) -> None:
-        """One act of recovery, to its end; raises DeviceError where it does not succeed."""
+        """One act of recovery, to its end; raises DeviceError where it does not succeed, SafetyStop as ``run``."""
+        self._refuse_unattended()
         try:
             self._loop().ask(Recover(act=act), act, ACT_TIMEOUT_S)
         except UsageError as refusal:

@@ -1,10 +1,11 @@
 """What the routes call: one bench, at most one job that uses it, stops that never wait for either."""
 
 import asyncio
+import contextlib
 import threading
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -58,6 +59,7 @@ class Service:
         self.away: AwayStops | None = None
         """Takes stops from other computers, where any may use the service."""
         self._coming: Supervisor | None = None
+        self._lease = ""
         self.starting = threading.RLock()
         """Held while the bench begins anything: a start, a recovery, a job."""
 
@@ -67,9 +69,36 @@ class Service:
         bench = self._coming or self.bench
         return bench.stop_port if bench else 0
 
-    def connect(self) -> None:
-        """Starts loop and recorder; what fails is kept as ``reason`` and shown, the service goes on."""
+    @contextlib.contextmanager
+    def _under(self, lease: str) -> Iterator[None]:
+        """The bench begins something under ``lease``, if any; raises RequestRefused where that has just been lost."""
         with self.starting:
+            before, self._lease = self._lease, lease
+            try:
+                if lease:
+                    self.control.check(lease)
+                yield
+            finally:
+                self._lease = before
+
+    @property
+    def moves(self) -> bool:
+        """Whether something uses the bench: a job, a start or a recovery, which home."""
+        if not self.starting.acquire(blocking=False):
+            return True
+        self.starting.release()
+        return self.running is not None
+
+    def stop_taken_over(self) -> None:
+        """Ends a homing, which hears nothing else, after a takeover; a job ends by itself, as nobody attends it."""
+        bench = self._coming or self.bench
+        if self._lease and self.running is None and bench:
+            with contextlib.suppress(RigError):  # it has just ended
+                bench.stop()
+
+    def connect(self, lease: str = "") -> None:
+        """Starts loop and recorder; what fails is kept as ``reason`` and shown, the service goes on."""
+        with self._under(lease):
             if self.bench and self.bench.alive:
                 return
             self._start_bench(waiting=False)
@@ -94,9 +123,9 @@ class Service:
             self._coming = None
             self.settled.set()
 
-    def recover(self, consent: Consent) -> ResetResult:
+    def recover(self, consent: Consent, lease: str = "") -> ResetResult:
         """The way back after a crash, a fault or a stop, as far as ``consent`` goes; a dead loop is replaced."""
-        with self.starting:
+        with self._under(lease):
             if self.running:
                 raise RequestRefused(409, "busy", "a job is under way; stop it, then recover")
             if not (self.bench and self.bench.alive):
@@ -120,8 +149,11 @@ class Service:
 
     def attended(self) -> bool:
         """Whether whoever started what is under way still is in control; the loop stops motion where this stays no."""
-        job = self.running
-        return job is None or self.control.holds(job.lease)
+        job, held = self.running, self.control.lease
+        if job:
+            return held is not None and held.id == job.lease
+        # A recovery takes longer than a lease lasts, so it ends only where somebody else is in control.
+        return not self._lease or held is None or held.id == self._lease
 
     def the_bench(self) -> Supervisor:
         """The bench, or RequestRefused with why there is none."""
@@ -131,9 +163,9 @@ class Service:
             raise RequestRefused(503, "disconnected", "the loop's process is gone; connect again")
         return self.bench
 
-    def use_subject(self, subject: Subject) -> None:
+    def use_subject(self, subject: Subject, lease: str = "") -> None:
         """Whose recordings follow; the loop, which holds the force below the threshold, is started anew for another."""
-        with self.starting:
+        with self._under(lease):
             self.jobs.refuse_busy()
             before, bench = self.wiring, self.bench
             if bench and bench.alive:

@@ -17,6 +17,7 @@ from controller.loop.messages import (
     Note,
     Outcome,
     Ready,
+    Recover,
     Reset,
     Run,
     Shutdown,
@@ -25,7 +26,7 @@ from controller.loop.messages import (
 from controller.loop.messages import Stopped as StoppedSaid
 from controller.stop.word import StopReason
 from controller.supervisor import Supervisor, process_environment, stop_error
-from rig.channel import Answer, Received
+from rig.channel import Answer, Message, Received
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, SafetyStop, UsageError
 from tests.controller.played_loop import (
@@ -113,6 +114,9 @@ def test_a_program_of_somebody_who_is_not_in_control_any_more_is_never_begun(aro
             bench.run(PROGRAM, 2.0)
         assert refused.value.code == "operator_silent"
         assert around.loop.of(Run) == []
+        with pytest.raises(SafetyStop, match="not in control any more"):
+            bench.act("home")
+        assert around.loop.of(Recover) == []
 
 
 def test_a_program_that_is_refused_is_not_stopped(around: Surroundings) -> None:
@@ -242,6 +246,23 @@ def test_the_lease_is_renewed_four_times_in_it_and_says_whether_somebody_attends
         # The thread ends by itself once the loop is gone.
         around.loop.ended.set()
         until(lambda: not any(thread.name == "lease" for thread in threading.enumerate()))
+
+
+def test_a_loop_that_hears_nothing_for_a_while_is_told_again(
+    around: Surroundings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told, refused = Supervisor._tell, list[Message]()
+
+    def tell(bench: Supervisor, message: Message) -> None:
+        if isinstance(message, Heartbeat) and not refused:
+            refused.append(message)
+            raise DeviceError("the loop takes no messages for 5 s; stop and restart the bench")
+        told(bench, message)
+
+    monkeypatch.setattr(Supervisor, "_tell", tell)
+    with Supervisor(Wiring.model_validate({"loop": {"lease_s": 0.2}})):
+        until(lambda: len(around.loop.of(Heartbeat)) > 1)
+    assert len(refused) == 1
 
 
 def test_the_end_stops_motion_asks_the_loop_to_leave_and_ends_all_processes(around: Surroundings) -> None:

@@ -46,7 +46,7 @@ def add(router: APIRouter, service: Service) -> None:
         refuse_without_key(key)
         if service.running:
             raise RequestRefused(409, "busy", "a job is under way")
-        service.connect()
+        service.connect(lease)
         return views.rig(service)
 
     @router.get(

@@ -47,12 +47,9 @@ def add(router: APIRouter, service: Service) -> None:
         responses=responses("423 lease-moving"),
     )
     async def take_over(request: TakeoverRequest, caller: WhoAsks) -> LeaseView:
+        may_stop = caller.may(Scope.ADMIN)
         lease = service.control.take_over(
-            request.holder,
-            request.ttl_s,
-            request.purpose,
-            request.reason,
-            moving=service.running is not None,
-            may_stop=caller.may(Scope.ADMIN),
+            request.holder, request.ttl_s, request.purpose, request.reason, service.moves, may_stop
         )
+        service.stop_taken_over()
         return views.lease(service, lease)

@@ -37,7 +37,7 @@ def add(router: APIRouter, service: Service) -> None:
     def recover(request: RecoverRequest, lease: LeaseHeader = "", key: KeyHeader = "") -> ResetResult:
         service.control.check(lease)
         refuse_without_key(key)
-        return service.recover(Consent(request.clear, request.retract, request.home))
+        return service.recover(Consent(request.clear, request.retract, request.home), lease)
 
 
 def _stops(router: APIRouter, service: Service) -> None:

@@ -46,7 +46,7 @@ def add(router: APIRouter, service: Service) -> None:
     ) -> SubjectSettings:
         service.control.check(lease)
         _refuse_stale(match, etag_of(shown(response)))
-        service.use_subject(service.wiring.subject.model_copy(update=wanted.model_dump()))
+        service.use_subject(service.wiring.subject.model_copy(update=wanted.model_dump()), lease)
         return shown(response)
 
 
