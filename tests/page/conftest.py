@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, Playwright, expect, sync_playwright
 
 import hatch_build
 from mock_devices.testing.commands import PATIENCE_S, RIG, ROOT, ServedBench, free_port, served_bench
@@ -104,12 +104,18 @@ def service(bench: ServedBench, tmp_path: Path, protocols: dict[str, str]) -> It
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
+def playwright() -> Iterator[Playwright]:
+    """What starts browsers; there is one in a process."""
+    with sync_playwright() as started:
+        yield started
+
+
+@pytest.fixture(scope="session")
+def browser(playwright: Playwright) -> Iterator[Browser]:
     """One browser for all; each test has a context of its own."""
-    with sync_playwright() as playwright:
-        browser = launch(playwright, find())
-        yield browser
-        browser.close()
+    browser = launch(playwright, find())
+    yield browser
+    browser.close()
 
 
 @pytest.fixture

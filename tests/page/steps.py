@@ -1,13 +1,50 @@
 """What a person does on the page, a step a function."""
 
+import json
 import re
+from typing import Any
 
 from playwright.sync_api import Page, expect
 
+from mock_devices.testing.commands import PATIENCE_S, ServedBench, until
 
-def state(page: Page, name: str) -> None:
-    """Waits until the page says that the bench is in state ``name``."""
-    expect(page.locator("#state")).to_have_text(re.compile(name, re.IGNORECASE))
+# As the service shows it, asked for as the page does; what does not answer within 5 s says that instead.
+RIG = """async () => {
+  const answer = await fetch("/api/v1/rig", { signal: AbortSignal.timeout(5000) }).catch((error) => error);
+  return answer.ok ? answer.json() : { reason: `the service says ${answer.status ?? answer.message}` };
+}"""
+ASKED = ("state", "reason", "mode", "force_N", "position_mm", "missed", "lost", "devices", "job")
+
+
+def standing(page: Page) -> dict[str, Any]:
+    """What keeps the bench from going on, as the service says it."""
+    now = page.evaluate(RIG)
+    return {name: now[name] for name in ASKED if name in now}
+
+
+def state(page: Page, name: str, within_ms: float | None = None) -> None:
+    """Waits until the page says that the bench is in state ``name``; fails with why it is in another."""
+    try:
+        expect(page.locator("#state")).to_have_text(re.compile(name, re.IGNORECASE), timeout=within_ms)
+    except AssertionError as error:
+        error.add_note(json.dumps(standing(page), indent=1))
+        raise
+
+
+def out_or_named(page: Page, bench: ServedBench) -> None:
+    """Waits until the tip is out of the tissue, or left where an immediate stop had to leave it, for a stated reason.
+
+    Whoever only lost control does not leave it there: that stop retracts.
+    """
+
+    def over() -> bool:
+        at_rest = standing(page).get("mode") == "safe"
+        return bench.control.number("tip.force_N") == 0.0 or at_rest
+
+    until(over, PATIENCE_S, "the tip out, or stopped where it is")
+    if bench.control.number("tip.force_N") != 0.0:
+        reason = standing(page)["reason"]
+        assert reason and "not in control any more" not in reason, standing(page)
 
 
 def view(page: Page, name: str) -> None:

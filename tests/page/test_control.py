@@ -8,7 +8,7 @@ from mock_devices.testing.commands import ServedBench, freed, pressed
 from tests.page.conftest import Served
 from tests.page.looks import holds_up
 from tests.page.people import somebody
-from tests.page.steps import start, state, view
+from tests.page.steps import out_or_named, start, state, view
 
 
 @pytest.mark.timeout(240)
@@ -58,6 +58,6 @@ def test_an_administrator_who_takes_over_stops_what_moves(
         expect(page.locator("#takeover")).to_contain_text("it stops and the tip is retracted")
         page.fill("#takeover-reason", "the limb slipped")
         page.get_by_role("button", name="Take control", exact=True).click()
-        freed(bench)
+        out_or_named(page, bench)
         expect(page.locator("#control")).to_contain_text("(this page)")
         expect(other.locator("#message")).to_contain_text("The reason given: the limb slipped")

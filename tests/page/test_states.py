@@ -12,6 +12,7 @@ from hatch_build import SOURCES, built_folder
 from tests.page import told
 from tests.page.looks import holds_up, violations
 from tests.page.pretend import IDLE, INFO, OPERATOR, STOPPED, Pretended, opened
+from tests.page.steps import state
 
 VIEWS = {"run": "run", "session": f"session/{told.NAME}", "track": "track", "bench": "bench"}
 TOO_MUCH = "40 N is more than the 6 N that bench, subject and model allow."
@@ -42,6 +43,16 @@ def show(browser: Browser, service: Pretended, errors: list[str]) -> Iterator[An
     yield at
     for page in pages:
         page.context.close()
+
+
+def test_a_state_that_does_not_come_is_told_with_the_reason_of_the_one_there_is(show: Any, service: Pretended) -> None:
+    service.says(rig=IDLE.model_copy(update={"state": "stopped", "reason": "the drive reports: 8130 heartbeat"}))
+    page = show("bench")
+    state(page, "stopped")
+    with pytest.raises(AssertionError) as failed:
+        state(page, "ready", 300.0)
+    (said,) = failed.value.__notes__
+    assert '"reason": "the drive reports: 8130 heartbeat"' in said and '"mode": "idle"' in said
 
 
 def listed(job: dict[str, Any]) -> dict[str, Any]:

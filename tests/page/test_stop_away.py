@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, Playwright, expect
 
 from mock_devices.testing.commands import RIG, ROOT, ServedBench, children, free_port, until
 from tests.api.access.tls import made
 from tests.page.conftest import Served
 from tests.page.steps import state
-from tests.system.browser import ARGUMENTS, find
+from tests.system.browser import find, launch
 
 NAME = "bench.example.org"
 
@@ -36,10 +36,9 @@ def service(bench: ServedBench, tmp_path: Path) -> Iterator[Served]:
 
 
 @pytest.fixture
-def page(service: Served, browser: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
+def page(service: Served, playwright: Playwright, request: pytest.FixtureRequest) -> Iterator[Page]:
     """The page at the name in the test's parameter, once stops have a way past the service."""
-    rules = f"--host-resolver-rules=MAP {NAME} 127.0.0.1"
-    other = browser.browser_type.launch(executable_path=find(), args=[*ARGUMENTS, rules])
+    other = launch(playwright, find(), f"--host-resolver-rules=MAP {NAME} 127.0.0.1")
     page = other.new_page(ignore_https_errors=True)
     page.goto(service.address.replace(NAME, request.param))
 

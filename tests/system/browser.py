@@ -36,10 +36,10 @@ def find() -> str:
 GIVES_WAY = 10
 
 
-def launch(playwright: Playwright, executable: str) -> Browser:
+def launch(playwright: Playwright, executable: str, *more: str) -> Browser:
     """A headless browser that gives way to the bench: what starts here keeps the niceness that it is started with."""
     with tempfile.TemporaryDirectory() as folder:
         starter = Path(folder) / "browser"
         starter.write_text(f'#!/bin/sh\nexec nice -n {GIVES_WAY} {shlex.quote(executable)} "$@"\n')
         starter.chmod(0o755)
-        return playwright.chromium.launch(executable_path=starter, args=list(ARGUMENTS))
+        return playwright.chromium.launch(executable_path=starter, args=[*ARGUMENTS, *more])
