@@ -1,4 +1,4 @@
-"""The table of parity: for each command its route and its view of the page, or the reason why there is none.
+"""The table of parity: for each command its route and its view of the page, or the reasons why there is none.
 
 Commands come from the command line itself, kinds of jobs from the service, views from `api/page/sources/parity.json`.
 """
@@ -57,6 +57,16 @@ WITHOUT: Mapping[str, str] = {
     "mock": "a simulated bench is started beside a service, not by it",
     "demo": "runs a bench of its own; with --serve it ends in a service",
 }
+# What has a route and no view, and why; what has no route needs no second reason.
+UNSEEN: Mapping[str, str] = {
+    "catalogue causes": "asked across all subjects by programs; a diagnosis is read with its session",
+    "catalogue operations": "each session shows what was made of it",
+    "catalogue rebuild": "asked for by a message that names it, of a catalogue that nobody can read",
+    "catalogue sites": "each subject shows its own",
+    "devices": "what could be installed; the page shows what stands on the bench",
+    "repair": "makes another recording beside the one that is not whole, which a person compares first",
+    "simulate": "the runs' own forecast stands beside each start; a simulation is of a bench that is not there",
+}
 # Options that make another command of one.
 ALSO = ("track --table",)
 
@@ -68,6 +78,7 @@ class Row(NamedTuple):
     routes: tuple[str, ...]
     reason: str
     view: str
+    unseen: str
 
 
 def commands() -> Iterator[str]:
@@ -95,7 +106,10 @@ def _is_argument(hint: Any) -> bool:
 def rows() -> list[Row]:
     """The table."""
     views = json.loads(VIEWS.read_text())
-    return [Row(name, _routes(name), WITHOUT.get(name, ""), views.get(name, "")) for name in commands()]
+    return [
+        Row(name, _routes(name), WITHOUT.get(name, ""), views.get(name, ""), UNSEEN.get(name, ""))
+        for name in commands()
+    ]
 
 
 def _routes(command: str) -> tuple[str, ...]:
@@ -112,4 +126,5 @@ def parity() -> str:
 
 def _line(row: Row) -> str:
     rest = ", ".join(f"`{route}`" for route in row.routes) or f"none: {row.reason}"
-    return f"| `rig {row.command}` | {rest} | {row.view or 'none'} |"
+    page = row.view or (f"none: {row.unseen}" if row.unseen else "none")
+    return f"| `rig {row.command}` | {rest} | {page} |"

@@ -17,6 +17,7 @@ from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError
 
 from api.http.access.rights import CALLER, STOP
+from api.http.access.secrets import awake_s
 from api.http.problems import RequestRefused
 from rig.recording.files import make_folder, write_text
 
@@ -28,6 +29,12 @@ LONGEST_KEY = 100
 REFUSED = 400
 SENT_AGAIN = ("location", "etag", "content-type")
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
+
+
+def steady_s() -> Callable[[], float]:
+    """The time of day, carried on by a clock that nobody sets: who sets the date makes no key be forgotten [s]."""
+    ahead_s = time.time() - awake_s()
+    return lambda: ahead_s + awake_s()
 
 
 class KeptAnswer(BaseModel):
@@ -51,8 +58,8 @@ class KeptAnswer(BaseModel):
 class AnswerStore:
     """Answers of a service, in ``file``. Safe from any thread; the event loop waits for one short line of it."""
 
-    def __init__(self, file: Path, now_s: Callable[[], float] = time.time) -> None:
-        self._file, self._now_s, self._lock = file, now_s, threading.Lock()
+    def __init__(self, file: Path, now_s: Callable[[], float] | None = None) -> None:
+        self._file, self._now_s, self._lock = file, now_s or steady_s(), threading.Lock()
         self._kept: dict[str, KeptAnswer] | None = None
         self._under_way: set[str] = set()
 

@@ -1,10 +1,12 @@
 """The same request twice is one; another one under the same key is refused; a stop stops each time."""
 
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
 import pytest
+from fastapi import Response
 from fastapi.testclient import TestClient
 
 from api.http.idempotency import KEPT_S, AnswerStore
@@ -119,6 +121,23 @@ def test_an_answer_is_kept_for_a_day(tmp_path: Path) -> None:
         store.begin("p", b"y")
     clock.advance(2)
     assert store.begin("p", b"y") is None
+
+
+@pytest.mark.parametrize("jump_s", [2 * KEPT_S, -2 * KEPT_S])
+def test_whoever_sets_the_date_makes_no_key_be_forgotten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jump_s: float
+) -> None:
+    file, real_s, set_by_s = tmp_path / "answers.jsonl", time.time, [0.0]
+    monkeypatch.setattr(time, "time", lambda: real_s() + set_by_s[0])
+    store = AnswerStore(file)
+    assert store.begin("p", b"x") is None
+    store.end("p", Response(b"{}", 202))
+    set_by_s[0] = jump_s
+    again = store.begin("p", b"x")
+    assert again and again.status == 202
+    # A store that asks for the date each time forgets it when that is set forward.
+    dated = AnswerStore(file, time.time)
+    assert (dated.begin("p", b"x") is None) is (jump_s > 0)
 
 
 def test_a_line_that_was_cut_is_no_answer(tmp_path: Path, store: AnswerStore) -> None:

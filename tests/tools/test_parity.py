@@ -26,6 +26,19 @@ def lacking(rows: list[parity.Row]) -> list[str]:
     return [row.command for row in rows if bool(row.routes) == bool(row.reason)]
 
 
+def unshown(rows: list[parity.Row]) -> list[str]:
+    """Commands that have a route, and neither a view nor a reason for none, or both."""
+    return [row.command for row in rows if row.routes and bool(row.view) == bool(row.unseen)]
+
+
+def test_every_command_with_a_route_has_a_view_or_a_reason_for_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert unshown(parity.rows()) == []
+    assert set(parity.UNSEEN) <= {row.command for row in parity.rows() if row.routes}
+    monkeypatch.delitem(parity.UNSEEN, "repair")  # type: ignore[arg-type]
+    monkeypatch.setitem(parity.UNSEEN, "fit", "planted")  # type: ignore[arg-type]
+    assert unshown(parity.rows()) == ["fit", "repair"]
+
+
 def test_every_command_has_a_route_or_a_reason() -> None:
     names = list(parity.commands())
     assert {"fit", "subject erase", "calibrate force", "protocol check", "token create"} <= set(names)
@@ -60,4 +73,5 @@ def test_the_table_stands_in_the_reference() -> None:
     text = fill("<!-- generated: parity -->")
     assert "| `rig fit` | `POST /jobs, kind fit`, `POST /jobs, kind fit-cohort` | session |" in text
     assert "| `rig serve` | none: is the service itself | none |" in text
+    assert "| `rig catalogue sites` | `GET /sites` | none: each subject shows its own |" in text
     assert text.count("\n| `rig ") == len(list(parity.commands()))

@@ -182,15 +182,6 @@ class SimulateParams(ForceOverTime):
         return self
 
 
-class CompareParams(RequestBody):
-    """Jumps of force on simulated subjects."""
-
-    force_from_N: Force = 1.0
-    force_to_N: Force = 10.0
-    seconds: float = Field(default=1.5, gt=0.7, le=60, description="on each newton")
-    subjects: list[Name] = Field(default=[], max_length=20, description="empty: all")
-
-
 class ExportParams(DataPlace):
     """Recordings in other formats."""
 
