@@ -39,11 +39,10 @@ ROUTES: Mapping[str, tuple[str, ...]] = {
     "token link": ("POST /auth/links",),
     "account list": ("GET /accounts",),
 }  # fmt: skip
-AT_THE_BENCH = "weights and blocks are put on by hand, and the loop must not run meanwhile"
+AT_THE_BENCH = "moves the tip or asks at each finger while no loop runs: a person stands beside it, at the terminal"
 BY_THE_ACCOUNT = "only the account that owns the files: whoever may do this over HTTP could make any other right"
 # What has no route, and why.
 WITHOUT: Mapping[str, str] = {
-    "calibrate force": AT_THE_BENCH,
     "calibrate axis": AT_THE_BENCH,
     "calibrate glove": AT_THE_BENCH,
     "track --table": "compares gains on simulated subjects of its own, never on the bench that is served",

@@ -8,7 +8,7 @@ from api.cli.mock_bench import bench_for
 from api.cli.mock_calibration import BY_ITSELF, mock_weights, weights_on
 from api.cli.output import show
 from api.operations.calibrate import calibrate_force as measure
-from api.operations.calibrate import force_calibration_operation
+from api.operations.calibrate import force_calibration_operation, load_request
 from controller.commissioning.weights import Weights, parse_weights
 from mock_devices.control import BenchControl
 from rig.config.calibration import ForceCalibration
@@ -42,7 +42,7 @@ def calibrate_force(wiring: Wiring, asked: ForceAsked, person: Person) -> ForceC
     else:
         weights = _weights(wiring, asked, person)
         operation = force_calibration_operation(weights)
-        found = here(operation, lambda: measure(operation, wiring, weights, lambda N: person.do(_request(N))))
+        found = here(operation, lambda: measure(operation, wiring, weights, lambda N: person.do(load_request(N))))
     _say(found)
     return found
 
@@ -57,12 +57,6 @@ def _weights(wiring: Wiring, asked: ForceAsked, person: Person) -> Weights:
             raise UsageError(f"{said!r}: answer pressed or hung, or give --load")
         load = "hung" if said == "hung" else "pressed"
     return parse_weights(text, load == "hung", asked.tolerance, wiring.limits.force_N, asked.gravity_m_s2)
-
-
-def _request(load_N: float) -> str:
-    if not load_N:
-        return "take every weight off the tip and let nothing touch it"
-    return f"{'hang' if load_N < 0 else 'put'} {abs(load_N):.4g} N {'from' if load_N < 0 else 'on'} the tip, alone"
 
 
 def _say(found: ForceCalibration) -> None:

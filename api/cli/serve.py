@@ -27,6 +27,7 @@ from api.http.stops.process import AwayStops
 from api.http.streams.bridge import bridged
 from api.operations.remote import folder_name, socket_path
 from controller.stop.http import LOCAL
+from rig.config.products.roles import MOCK_PORT
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
 
@@ -121,9 +122,11 @@ def run_service(
         _listening(place.host, place.port) as listening,
         _away(place) as away,
         own_socket(socket_path(place.here)) as own,
-        bench_for(settings, refuses=False) as (wiring, _),
+        bench_for(settings, refuses=False) as (wiring, endpoints),
     ):
         service = Service(wiring, sessions, protocols, place.here)
+        if endpoints and settings.force.port == MOCK_PORT:
+            service.hands, service.works["calibrate-force"] = endpoints.control, "api.cli.mock_work:calibrate_force"
         service.access.address = place.address
         if away:
             service.away = away

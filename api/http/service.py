@@ -16,6 +16,7 @@ from api.http.lease import LeaseRegistry
 from api.http.problems import RequestRefused
 from api.http.stops.process import AwayStops
 from api.http.streams.events import EventLog
+from api.http.turn import Turn
 from api.operations.doctor import reports_of
 from controller.loop.messages import DeviceView
 from controller.recovery.situation import Consent
@@ -59,9 +60,7 @@ class Service:
         self.away: AwayStops | None = None
         """Takes stops from other computers, where any may use the service."""
         self._coming: Supervisor | None = None
-        self._lease = ""
-        self.starting = threading.RLock()
-        """Held while the bench begins anything: a start, a recovery, a job."""
+        self.starting = Turn(lambda: self.control)
 
     @property
     def stop_port(self) -> int:
@@ -69,36 +68,21 @@ class Service:
         bench = self._coming or self.bench
         return bench.stop_port if bench else 0
 
-    @contextlib.contextmanager
-    def _under(self, lease: str) -> Iterator[None]:
-        """The bench begins something under ``lease``, if any; raises RequestRefused where that has just been lost."""
-        with self.starting:
-            before, self._lease = self._lease, lease
-            try:
-                if lease:
-                    self.control.check(lease)
-                yield
-            finally:
-                self._lease = before
-
     @property
     def moves(self) -> bool:
         """Whether something uses the bench: a job, a start or a recovery, which home."""
-        if not self.starting.acquire(blocking=False):
-            return True
-        self.starting.release()
-        return self.running is not None
+        return self.starting.taken or self.running is not None
 
     def stop_taken_over(self) -> None:
         """Ends a homing, which hears nothing else, after a takeover; a job ends by itself, as nobody attends it."""
         bench = self._coming or self.bench
-        if self._lease and self.running is None and bench:
+        if self.starting.lease and self.running is None and bench:
             with contextlib.suppress(RigError):  # it has just ended
                 bench.stop()
 
     def connect(self, lease: str = "") -> None:
         """Starts loop and recorder; what fails is kept as ``reason`` and shown, the service goes on."""
-        with self._under(lease):
+        with self.starting.under(lease):
             if self.bench and self.bench.alive:
                 return
             self._start_bench(waiting=False)
@@ -125,7 +109,7 @@ class Service:
 
     def recover(self, consent: Consent, lease: str = "") -> ResetResult:
         """The way back after a crash, a fault or a stop, as far as ``consent`` goes; a dead loop is replaced."""
-        with self._under(lease):
+        with self.starting.under(lease):
             if self.running:
                 raise RequestRefused(409, "busy", "a job is under way; stop it, then recover")
             if not (self.bench and self.bench.alive):
@@ -142,6 +126,17 @@ class Service:
             self.bench.close()
         self.bench = None
 
+    @contextlib.contextmanager
+    def released(self) -> Iterator[None]:
+        """Another process has the devices meanwhile; a person connects again, as that homes."""
+        with self.starting:
+            self.disconnect()
+            self.reason = "another process has the devices, and nothing moves; connect when it has ended"
+        try:
+            yield
+        finally:
+            self.reason = "the devices are free again: see that nothing is in the tip's way, then connect"
+
     @property
     def running(self) -> Job | None:
         """The job that uses the bench."""
@@ -149,11 +144,8 @@ class Service:
 
     def attended(self) -> bool:
         """Whether whoever started what is under way still is in control; the loop stops motion where this stays no."""
-        job, held = self.running, self.control.lease
-        if job:
-            return held is not None and held.id == job.lease
-        # A recovery takes longer than a lease lasts, so it ends only where somebody else is in control.
-        return not self._lease or held is None or held.id == self._lease
+        job = self.running
+        return self.control.holds(job.lease) if job else self.starting.attended
 
     def the_bench(self) -> Supervisor:
         """The bench, or RequestRefused with why there is none."""
@@ -165,7 +157,7 @@ class Service:
 
     def use_subject(self, subject: Subject, lease: str = "") -> None:
         """Whose recordings follow; the loop, which holds the force below the threshold, is started anew for another."""
-        with self._under(lease):
+        with self.starting.under(lease):
             self.jobs.refuse_busy()
             before, bench = self.wiring, self.bench
             if bench and bench.alive:

@@ -65,6 +65,13 @@ def force_calibration_operation(weights: Weights) -> Operation:
     return Operation("calibrate force", total=len(weights.sequence_N), unit="loads")
 
 
+def load_request(load_N: float) -> str:
+    """What a person is asked to do for it."""
+    if not load_N:
+        return "take every weight off the tip and let nothing touch it"
+    return f"{'hang' if load_N < 0 else 'put'} {abs(load_N):.4g} N {'from' if load_N < 0 else 'on'} the tip, alone"
+
+
 def calibrate_force(
     operation: Operation,
     wiring: Wiring,

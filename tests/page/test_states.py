@@ -14,7 +14,7 @@ from tests.page.looks import holds_up, violations
 from tests.page.pretend import IDLE, INFO, OPERATOR, STOPPED, Pretended, opened
 from tests.page.steps import state
 
-VIEWS = {"run": "run", "session": f"session/{told.NAME}", "track": "track", "bench": "bench"}
+VIEWS = {"run": "run", "session": f"session/{told.NAME}", "track": "track", "bench": "bench", "devices": "devices"}
 TOO_MUCH = "40 N is more than the 6 N that bench, subject and model allow."
 
 
@@ -53,6 +53,20 @@ def test_a_state_that_does_not_come_is_told_with_the_reason_of_the_one_there_is(
         state(page, "ready", 300.0)
     (said,) = failed.value.__notes__
     assert '"reason": "the drive reports: 8130 heartbeat"' in said and '"mode": "idle"' in said
+
+
+def test_a_calibration_shows_what_it_asks_for_and_goes_on_once_a_person_says_so(show: Any, service: Pretended) -> None:
+    asks = {"message": "put 1 N on the tip, alone", "can": ["cancel", "resume"], "session": None}
+    under_way = told.job("calibrate-force", "paused", **asks)
+    lease = {"lease_id": "l", "epoch": 1, "expires": told.AT}
+    service.answers |= listed(under_way) | {"POST control/lease": lease, "PUT control/lease": lease}
+    service.answers |= {"POST jobs/job-calibrate-force/resume": under_way}
+    page = show("devices")
+    expect(page.locator("#calibrate-force-asks")).to_have_text("put 1 N on the tip, alone")
+    holds_up(page, "state-calibrating-devices", (390,))
+    with page.expect_request("**/jobs/job-calibrate-force/resume") as asked:
+        page.click("#calibrate-force-resume")
+    assert asked.value.headers["x-control-lease"] == "l"
 
 
 def listed(job: dict[str, Any]) -> dict[str, Any]:

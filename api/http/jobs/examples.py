@@ -23,6 +23,7 @@ PARAMS: dict[str, dict[str, object]] = {
     "fit-cohort": {"sessions": ["first", "second"], "laws": ["fung"]},
     "diagnose-cohort": {"sessions": ["first", "second"], "simulation": "index"},
     "report-cohort": {"sessions": ["first", "second"]},
+    "calibrate-force": {"weights": "100 g,200 g,500 g", "load": "pressed"},
     "import": {"upload": UPLOAD, "session": "measured", "usual": True},
 }
 EXAMPLES: Any = {name: {"summary": name, "value": {"kind": name, "params": params}} for name, params in PARAMS.items()}

@@ -74,7 +74,6 @@ class Job:
     wrong: Wrong | None = None
     request: str = ""
     """What a person is asked to do."""
-    stop_port: int = 0
     times: Times = field(default_factory=lambda: Times(stamp()))
     _turn: threading.Condition = field(default_factory=threading.Condition)
 

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, get_args, get_type_hints
 from pydantic import Field
 
 from api.http.cohorts.params import DiagnoseCohortJob, FitCohortJob, ReportCohortJob
+from api.http.commissioning.params import CalibrateForceJob
 from api.http.jobs.params import (
     CaptureParams,
     DataPlace,
@@ -28,7 +29,7 @@ from api.http.jobs.params import (
 from api.http.jobs.proposal import ProposalResult
 from api.http.models import RequestBody
 from rig.results.base import SavedResult
-from rig.results.bench import DoctorResult, RetractResult
+from rig.results.bench import CalibrateResult, DoctorResult, RetractResult
 from rig.results.cohort import CohortResult
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
 from rig.results.fit import FitResult
@@ -39,7 +40,7 @@ from rig.results.tracking import SimulateResult, Threshold, TrackResult
 AnyResult = (
     CaptureResult | TrackResult | RetractResult | GloveThreshold | Threshold | DoctorResult | FitResult
     | DiagnosisResult | ProtocolCheckResult | SimulateResult | ReportResult | ExportResult | VerifyResult | RepairResult
-    | ProposalResult | ImportResult | CohortResult
+    | ProposalResult | ImportResult | CohortResult | CalibrateResult
 )  # fmt: skip
 
 
@@ -158,14 +159,17 @@ class ImportJob(JobBody):
 AnyJob = Annotated[
     CaptureJob | TrackJob | RetractJob | ThresholdJob | GloveThresholdJob | DoctorJob | FitJob | DiagnoseJob
     | ProtocolCheckJob | SimulateJob | ReportJob | ExportJob | VerifyJob | RepairJob | ProposeJob | ImportJob
-    | FitCohortJob | DiagnoseCohortJob | ReportCohortJob,
+    | FitCohortJob | DiagnoseCohortJob | ReportCohortJob | CalibrateForceJob,
     Field(discriminator="kind"),
 ]  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Kind:
-    """``work`` names the function that a process of its own calls; without one it uses the bench of the service."""
+    """``work`` names the function that a process of its own calls; without one it uses the bench of the service.
+
+    One with ``work`` that ``moves`` has the bench's ports to itself meanwhile: the service's loop ends.
+    """
 
     body: type[JobBody]
     result: type[SavedResult]
@@ -212,5 +216,6 @@ KINDS: Mapping[str, Kind] = {
         Kind(FitCohortJob, CohortResult, "fit", f"{COHORT}:fit_cohort"),
         Kind(DiagnoseCohortJob, CohortResult, "diagnose", f"{COHORT}:diagnose_cohort"),
         Kind(ReportCohortJob, CohortResult, "report", f"{COHORT}:report_cohort"),
+        Kind(CalibrateForceJob, CalibrateResult, "calibrate", "api.http.commissioning.work:calibrate_force", moves=True),
     )
 }  # fmt: skip

@@ -99,26 +99,6 @@ class GloveThresholdParams(RequestBody):
     input: str = Field(default="", max_length=24, description="name of the glove, where there are several")
 
 
-class CalibrateForceParams(RequestBody):
-    """Known weights, one after the other."""
-
-    weights: str = Field(default="", max_length=200, description="as '100 g,200 g,5 N'; a mock sensor has its own")
-    load: Literal["pressed", "hung"] | None = None
-    tolerance_percent: float = Field(default=0.5, ge=0, le=10, description="bound on the error of each weight")
-    gravity_m_s2: float | None = Field(default=None, ge=9.7, le=9.9)
-
-
-class CalibrateAxisParams(RequestBody):
-    """The axis against the tracker, or a gauge block."""
-
-    clear: Literal[True] = Field(description="the tip's way is free, and the limb out")
-    from_mm: float = 2.0
-    to_mm: float = 14.0
-    toward_limb: bool | None = Field(default=None, description="where the tip goes at first, if no marker tells it")
-    gauge_block_mm: float | None = Field(default=None, ge=1, le=100)
-    near_mm: float | None = Field(default=None, description="position just before the table, for the block")
-
-
 class LatticeParams(RequestBody):
     """The mass-spring lattice, spring by spring."""
 

@@ -29,9 +29,9 @@ class Crashed(RigError):
 class Computation:
     """One order, computed by a process of its own. ``run`` once; ``cancel`` and ``done`` from any thread."""
 
-    def __init__(self, order: Order, asked: Callable[[str], None], stop_port: Callable[[int], None]) -> None:
-        """``asked`` is called where a person is to do something, ``stop_port`` where it moves and can be stopped."""
-        self._order, self._asked, self._stop_port = order, asked, stop_port
+    def __init__(self, order: Order, asked: Callable[[str], None]) -> None:
+        """``asked`` is called where a person is to do something."""
+        self._order, self._asked = order, asked
         self._process: subprocess.Popen[str] | None = None
         self._lock, self._cancelled = threading.Lock(), False
 
@@ -61,8 +61,6 @@ class Computation:
                     operation.say(told.text)
                 case "ask":
                     self._asked(told.text)
-                case "stop-port":
-                    self._stop_port(int(told.text))
                 case _:
                     return told
         return None

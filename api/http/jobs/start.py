@@ -1,5 +1,8 @@
 """From a request to a job: names are looked up and limits checked before anything begins."""
 
+from collections.abc import Callable
+
+from api.http.commissioning.params import CalibrateForceParams
 from api.http.jobs.job import Job
 from api.http.jobs.kinds import KINDS, AnyJob, Kind
 from api.http.jobs.motion import planned
@@ -17,7 +20,9 @@ from rig.results.bench import DoctorResult
 def start(service: Service, body: AnyJob, by: str, lease: str = "") -> Job:
     """The job that ``body`` asks for; raises what it refuses, and then nothing has begun."""
     kind = KINDS[body.kind]
-    return _moving(service, body, kind, by, lease) if kind.moves else _computing(service, body, kind, by)
+    if not kind.moves:
+        return _computing(service, body, kind, by)
+    return (_alone if kind.work else _moving)(service, body, kind, by, lease)
 
 
 def _moving(service: Service, body: AnyJob, kind: Kind, by: str, lease: str) -> Job:
@@ -30,20 +35,42 @@ def _moving(service: Service, body: AnyJob, kind: Kind, by: str, lease: str) -> 
         return service.jobs.start_moving(job, plan.work)
 
 
+def _alone(service: Service, body: AnyJob, kind: Kind, by: str, lease: str) -> Job:
+    """In a process that has the devices to itself: the loop ends for it, which leaves the tip out."""
+    if isinstance(body.params, CalibrateForceParams):
+        body.params.up_to(service.wiring.limits.force_N)
+    job = service.jobs.new(kind, body.params, by, None, Operation(kind.name))
+    job.lease, work = lease, _work(service, job, kind)
+
+    def with_the_ports() -> SavedResult:
+        with service.released():
+            return work()
+
+    with service.starting:
+        service.jobs.refuse_busy()
+        if service.seen_devices() is not None:
+            service.refuse_stopped()
+        return service.jobs.start_moving(job, with_the_ports)
+
+
 def _computing(service: Service, body: AnyJob, kind: Kind, by: str) -> Job:
     _check(service.jobs.places(""), body.params)
-    operation = Operation(kind.name)
-    job = service.jobs.new(kind, body.params, by, _session(body.params), operation)
+    job = service.jobs.new(kind, body.params, by, _session(body.params), Operation(kind.name))
     seen = service.seen_devices() if kind.name == "doctor" else None
     if seen is not None:
         return service.jobs.start_computing(job, lambda: DoctorResult(devices=seen))
+    return service.jobs.start_computing(job, _work(service, job, kind))
+
+
+def _work(service: Service, job: Job, kind: Kind) -> Callable[[], SavedResult]:
+    """Of a process of its own."""
     order = Order(
         kind=kind.name, work=service.works.get(kind.name, kind.work), params=job.asked.params,
         wiring=service.wiring.model_dump_json(), hands=service.hands, **service.jobs.places(job.id)._asdict(),
     )  # fmt: skip
-    computation = Computation(order, job.ask, lambda port: setattr(job, "stop_port", port))
+    computation = Computation(order, job.ask)
     job.interrupt, job.go_on = computation.cancel, computation.done
-    return service.jobs.start_computing(job, lambda: _result(kind, computation.run(operation)))
+    return lambda: _result(kind, computation.run(job.operation))
 
 
 def _result(kind: Kind, text: str) -> SavedResult:

@@ -35,7 +35,7 @@ class Told(BaseModel):
     ``text`` of a result is its JSON; of an error its sentence, whose ``name`` is that of its class.
     """
 
-    type: Literal["step", "say", "ask", "stop-port", "result", "error"]
+    type: Literal["step", "say", "ask", "result", "error"]
     text: str = ""
     done: float = 0.0
     name: str = ""

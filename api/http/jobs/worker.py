@@ -11,7 +11,7 @@ import sys
 import threading
 from collections.abc import Callable
 from importlib import import_module
-from typing import NamedTuple, Protocol, TextIO
+from typing import NamedTuple, TextIO
 
 from api.http.jobs.kinds import KINDS
 from api.http.jobs.places import Places
@@ -28,13 +28,6 @@ NICENESS = 5
 ENDED = 1
 
 
-class Tell(Protocol):
-    """Sends one message to the service."""
-
-    def __call__(self, message: Told) -> None:
-        """In one piece, from any thread."""
-
-
 class Desk(NamedTuple):
     """What a function works with beside its parameters: where, on which bench, and who does what only a person can."""
 
@@ -42,7 +35,6 @@ class Desk(NamedTuple):
     wiring: Wiring
     ask: Callable[[str], None]
     """Asks a person to do something, and returns when it is done; raises Cancelled where it was cancelled."""
-    tell: Tell
     hands: str = ""
 
 
@@ -81,7 +73,7 @@ def compute(order: Order, pipes: Pipes) -> None:
     kind = KINDS[order.kind]
     operation = pipes.operation = Operation(order.kind)
     operation.watch = _watch(pipes.tell)
-    desk = Desk(order.places, Wiring.model_validate_json(order.wiring), pipes.ask, pipes.tell, order.hands)
+    desk = Desk(order.places, Wiring.model_validate_json(order.wiring), pipes.ask, order.hands)
     try:
         asked = kind.params.model_validate(order.params)
         found = function_at(order.work)(operation, asked, desk)
@@ -101,7 +93,7 @@ def function_at(name: str) -> Callable[[Operation, RequestBody, Desk], SavedResu
     return found
 
 
-def _watch(tell: Tell) -> Callable[[Progress], None]:
+def _watch(tell: Callable[[Told], None]) -> Callable[[Progress], None]:
     told = 0
 
     def watch(now: Progress) -> None:

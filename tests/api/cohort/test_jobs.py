@@ -21,7 +21,7 @@ def desk(tmp_path: Path, sessions: list[Path]) -> Desk:
     for place in sessions[:3]:
         shutil.copytree(place, tmp_path / "sessions" / place.name)
     places = Places(*(tmp_path / name for name in ("sessions", "protocols", "uploads", "files")))
-    return Desk(places, Wiring(), ask=pytest.fail, tell=lambda message: pytest.fail(message.text))
+    return Desk(places, Wiring(), ask=pytest.fail)
 
 
 def test_a_job_fits_each_and_says_what_subjects_share(desk: Desk) -> None:

@@ -51,7 +51,7 @@ def desk(tmp_path: Path, made: Path) -> Desk:
     measured(tmp_path / "uploads" / UPLOAD)
     (tmp_path / "protocols" / "p.toml").write_text('kind = "indentation"\ndepth_mm = 8\n')
     places = Places(*(tmp_path / name for name in ("sessions", "protocols", "uploads", "files")))
-    return Desk(places, Wiring(), ask=pytest.fail, tell=lambda message: pytest.fail(message.text))
+    return Desk(places, Wiring(), ask=pytest.fail)
 
 
 def run() -> Operation:

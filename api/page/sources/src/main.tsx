@@ -7,6 +7,7 @@ import { Shell } from "./parts/shell";
 import { followAddress, place } from "./route";
 import { me, signIn } from "./session";
 import { listenForEscape } from "./stop";
+import { t } from "./texts";
 import { SHOWN } from "./views";
 import { Login } from "./views/login";
 
@@ -18,6 +19,7 @@ function App() {
   return <Shell><View key={`${view}/${of}`} of={of} /></Shell>;
 }
 
+document.documentElement.lang = t.lang;
 // The stop first: it works while the rest still loads, and if the rest fails.
 listenForEscape();
 void signIn(() => {

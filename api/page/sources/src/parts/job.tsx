@@ -44,6 +44,7 @@ export function JobState({ job }: { job: Job | null }) {
   return (
     <div class="notice" id={`${job.kind}-under-way`}>
       <p role="status"><Dot kind="good" /> <strong>{t.job.states[job.state] ?? t.job.progress(named(job), job.message, job.done, job.total, job.unit)}</strong></p>
+      {job.state === "paused" && <p id={`${job.kind}-asks`}><strong>{job.message}</strong></p>}
       <Left job={job} />
       <Verbs job={job} />
       <Log job={job} />

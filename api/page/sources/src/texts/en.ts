@@ -2,6 +2,7 @@
 const STOPS = { estop: "Emergency stop", pain: "Pain stop" };
 
 export const en = {
+  lang: "en",
   title: "tissue-rig",
   skip: "Go to the content",
   noAnswer: "the service does not answer",
@@ -120,7 +121,7 @@ export const en = {
   } as Record<string, string>,
   kinds: {
     capture: "Capture", track: "Force tracking", threshold: "Pain threshold", "threshold-glove": "Pain threshold by glove", retract: "Retract", "calibrate-force": "Calibrate the force sensor",
-    "calibrate-axis": "Calibrate the axis", fit: "Fit", diagnose: "Diagnosis", simulate: "Simulation", report: "Make the report",
+    fit: "Fit", diagnose: "Diagnosis", simulate: "Simulation", report: "Make the report",
     export: "Export", import: "Import", verify: "Read every byte", repair: "Repair", "protocol-check": "What can be found", doctor: "Check of the devices",
   } as Record<string, string>,
   quality: { good: "good", usable: "usable", bad: "bad", none: "not judged" } as Record<string, string>,
@@ -310,7 +311,10 @@ export const en = {
     calibrationColumns: ["device", "product", "made", "uncertainty", "may be used"],
     used: "in use", ownFile: "of the simulated bench", fit: "yes",
     noCalibration: "Neither the force sensor nor the axis is calibrated: until they are, the bench does not approach anybody.",
-    calibrateText: "A new calibration asks a person for each step, at the bench's own computer: `rig calibrate force`, `rig calibrate axis`. What it finds goes to a file of its own; the bench uses it once rig.toml names it.",
+    weights: "Known weights, as 100 g,200 g,5 N", load: "How they load the tip", loads: { pressed: "they press on it", hung: "they hang from it" } as Record<string, string>,
+    weightsText: "Nothing moves: the devices are disconnected meanwhile, and each weight is asked for in turn, up and down again. Connect them again when nothing is in the tip's way.",
+    calibrateStart: "Disconnect and begin", calibrated: (file: string) => `Calibrated: ${file}. The bench uses it once rig.toml names it.`,
+    calibrateText: "A new calibration of the axis asks a person for each step, at the bench's own computer: `rig calibrate axis`. What it finds goes to a file of its own; the bench uses it once rig.toml names it.",
     recovery: "Recovery",
     recoveryText: "After a crash, a fault or a stop: says what happened and asks before anything moves.",
     limits: "Limits", limitsText: "Beyond these the bench stops by itself. They are set in rig.toml, at the bench's own computer.",

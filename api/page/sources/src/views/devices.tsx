@@ -4,6 +4,7 @@ import { startRecovery } from "../parts/attention";
 import { fresh, rig } from "../live";
 import { may } from "../session";
 import { t } from "../texts";
+import { CalibrateForce } from "./devices/calibrate_force";
 import { Calibrations } from "./devices/calibrations";
 import { Doctor } from "./devices/doctor";
 
@@ -64,6 +65,7 @@ export function Devices() {
       <Card title={t.devices.each}><Streams /></Card>
       <Doctor />
       <Calibrations />
+      <CalibrateForce />
       <div class="grid">
         <Card title={t.devices.recovery}>
           <p>{t.devices.recoveryText}</p>

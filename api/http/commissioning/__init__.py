@@ -1,0 +1,1 @@
+"""Calibrations as jobs: the service asks, and a person at the bench does."""
