@@ -1,4 +1,4 @@
-"""Another language is another file: with every text of it marked, each view shows no word of its own without the mark."""
+"""Another language is another file: with every text of it marked, no view shows a word of its own without the mark."""
 
 import json
 import re

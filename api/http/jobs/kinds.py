@@ -193,7 +193,7 @@ class Kind:
 
 
 RECORDINGS, SCIENCE, BENCH = (f"api.http.jobs.work_{part}" for part in ("recordings", "science", "bench"))
-COHORT = "api.http.cohorts.work"
+COHORT, COMMISSIONING = "api.http.cohorts.work", "api.http.commissioning.work"
 KINDS: Mapping[str, Kind] = {
     kind.name: kind
     for kind in (
@@ -216,6 +216,6 @@ KINDS: Mapping[str, Kind] = {
         Kind(FitCohortJob, CohortResult, "fit", f"{COHORT}:fit_cohort"),
         Kind(DiagnoseCohortJob, CohortResult, "diagnose", f"{COHORT}:diagnose_cohort"),
         Kind(ReportCohortJob, CohortResult, "report", f"{COHORT}:report_cohort"),
-        Kind(CalibrateForceJob, CalibrateResult, "calibrate", "api.http.commissioning.work:calibrate_force", moves=True),
+        Kind(CalibrateForceJob, CalibrateResult, "calibrate", f"{COMMISSIONING}:calibrate_force", moves=True),
     )
 }  # fmt: skip
