@@ -1,4 +1,4 @@
-"""How often the page draws while the loop presses: `python -m benchmarks.page [--seconds 20]`; last line one JSON object.
+"""How often the page draws while the loop presses: `python -m benchmarks.page [--seconds 20]`; last line JSON.
 
 Headless Chromium beside the mock bench, `rig serve` and the loop on this computer: three traces of 10,000 points each
 (half a minute at 200 pairs a second) on the view Bench. A frame is one drawing of that plot, as its canvas is cleared
@@ -94,7 +94,7 @@ def main() -> None:
         (folder / "protocols").mkdir()
         hold_s = FILLED_S + seconds + 30.0
         (folder / "protocols" / "hold.toml").write_text(PROTOCOL.format(hold_s=hold_s))
-        settings = bench.settings("loop.lease_s=3")
+        settings = bench.settings()
         served = ServedRig(bench, folder, ["--protocols", "protocols", *settings])
         found = measured(served, seconds)
         served.running.interrupt()
