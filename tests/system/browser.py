@@ -5,8 +5,9 @@ import shutil
 import tempfile
 from pathlib import Path
 
-import pytest
 from playwright.sync_api import Browser, Playwright
+
+from tests.lacking import lacking
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 ARGUMENTS = (
@@ -25,10 +26,10 @@ def installed() -> str | None:
 
 
 def find() -> str:
-    """Path of the browser; skips the test, saying so, where there is none."""
+    """Path of the browser; without one the test cannot run."""
     found = installed()
     if found is None:
-        pytest.skip(f"no browser here: looked for {', '.join(NAMES)}")
+        lacking(f"no browser here: looked for {', '.join(NAMES)}")
     return found
 
 

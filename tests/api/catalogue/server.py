@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import psycopg
-import pytest
+
+from tests.lacking import lacking
 
 STARTS_S = 60.0
 # Debian keeps the server's programs out of the path.
@@ -34,10 +35,10 @@ def account() -> str | None:
 
 @contextlib.contextmanager
 def cluster() -> Iterator[Path]:
-    """A server for the block, by the folder of its socket; skips where none is installed."""
+    """A server for the block, by the folder of its socket; without one the test cannot run."""
     found = programs()
     if found is None:
-        pytest.skip("no PostgreSQL here; `make test` installs it where it may (apt-get install postgresql)")
+        lacking("no PostgreSQL here; `make test` installs it where it may (apt-get install postgresql)")
     user = account()
     with tempfile.TemporaryDirectory(prefix="rig-pg-") as name:
         folder = Path(name)
