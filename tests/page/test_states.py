@@ -1,18 +1,21 @@
 """What each view says in states of its own; the states that all share are in `test_every_view`."""
 
+import contextlib
 import math
 import re
 from collections.abc import Iterator
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from hatch_build import SOURCES, built_folder
+from mock_devices.testing.commands import ServedBench
 from tests.page import told
 from tests.page.looks import holds_up, violations
 from tests.page.pretend import IDLE, INFO, OPERATOR, STOPPED, Pretended, opened
-from tests.page.steps import state
+from tests.page.steps import out_or_named, state
 
 VIEWS = {"run": "run", "session": f"session/{told.NAME}", "track": "track", "bench": "bench", "devices": "devices"}
 TOO_MUCH = "40 N is more than the 6 N that bench, subject and model allow."
@@ -67,6 +70,24 @@ def test_a_calibration_shows_what_it_asks_for_and_goes_on_once_a_person_says_so(
     with page.expect_request("**/jobs/job-calibrate-force/resume") as asked:
         page.click("#calibrate-force-resume")
     assert asked.value.headers["x-control-lease"] == "l"
+
+
+@pytest.mark.parametrize(
+    ("reason", "named"),
+    [
+        ("axis lost: newest sample is 1200 ms old (limit 1000 ms)", True),
+        ("whoever started this is not in control any more: the lease was given back or ran out", False),
+        ("", False),
+    ],
+)
+def test_a_tip_that_a_takeover_leaves_in_the_tissue_needs_a_reason_that_left_it_there(
+    show: Any, service: Pretended, reason: str, named: bool
+) -> None:
+    service.says(rig=IDLE.model_copy(update={"state": "stopped", "mode": "safe", "reason": reason}))
+    pressing = cast(ServedBench, SimpleNamespace(control=SimpleNamespace(number=lambda _: 1.0)))
+    page = show("bench")
+    with contextlib.nullcontext() if named else pytest.raises(AssertionError):
+        out_or_named(page, pressing)
 
 
 def listed(job: dict[str, Any]) -> dict[str, Any]:
