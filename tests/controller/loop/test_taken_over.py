@@ -23,7 +23,7 @@ def moments() -> list[FakeBench]:
     bench, found = FakeBench(), list[FakeBench]()
     bench.begin(ZERO, APPROACH, PRESS, Hold(duration_s=0.5), LEAVE)
     for moment_s in MOMENTS_S:
-        bench.until(lambda at_s=moment_s: bench.time_s >= at_s)
+        bench.wait(moment_s - bench.time_s)
         found.append(copy.deepcopy(bench))
         found[-1].keep_lease = False  # it hears nothing but what the test says
     modes = {one.mode for one in found}
