@@ -1,7 +1,7 @@
 """A takeover while the bench recovers, starts or changes its subject: by rule, and nothing more of it moves."""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ class HomingBench(ScriptedBench):
         super().__init__()
         self.homes, self.over = threading.Event(), threading.Event()
         self.stopped = 0
-        self.attended = lambda: True
+        self.attended: Callable[[], bool] = lambda: True
 
     def stop(self) -> None:
         self.stopped += 1

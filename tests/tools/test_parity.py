@@ -34,8 +34,8 @@ def unshown(rows: list[parity.Row]) -> list[str]:
 def test_every_command_with_a_route_has_a_view_or_a_reason_for_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert unshown(parity.rows()) == []
     assert set(parity.UNSEEN) <= {row.command for row in parity.rows() if row.routes}
-    monkeypatch.delitem(parity.UNSEEN, "repair")  # type: ignore[arg-type]
-    monkeypatch.setitem(parity.UNSEEN, "fit", "planted")  # type: ignore[arg-type]
+    monkeypatch.delitem(parity.UNSEEN, "repair")
+    monkeypatch.setitem(parity.UNSEEN, "fit", "planted")
     assert unshown(parity.rows()) == ["fit", "repair"]
 
 
