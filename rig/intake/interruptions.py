@@ -9,12 +9,10 @@ from rig.intake.edited import loosened
 from rig.intake.headings import ROWS
 from rig.intake.mapping import FileForm
 from rig.intake.sheet import Source
-from rig.intake.text import BLANK_CELLS, FilePart, Head, head_of, lines_in, open_utf8
+from rig.intake.text import BLANK_CELLS, NUMBER_BEGINS, FilePart, Head, head_of, lines_in, open_utf8
 
 # Of more lines than these only the first are looked at, in about a second.
 MOST_LINES = 4_000_000
-# A line that begins with one of these is a row, where it has as many cells as the first and that begins with a number.
-_NUMBER_BEGINS = b"0123456789+-.,"
 
 
 class Interruptions(NamedTuple):
@@ -60,7 +58,7 @@ def interruptions_of(source: Source, form: FileForm) -> Interruptions:
 
 def _usual(first: bytes, form: FileForm, head: Head) -> Callable[[bytes], bool]:
     """Whether a line looks like the ``first`` row, so that its cells need not be parted."""
-    sign, begins = form.delimiter.encode(), _NUMBER_BEGINS if head.first and is_value(head.first[0]) else b""
+    sign, begins = form.delimiter.encode(), NUMBER_BEGINS if head.first and is_value(head.first[0]) else b""
     blank, count = sign == b" ", len(first.split()) if sign == b" " else first.count(sign)
 
     def is_usual(line: bytes) -> bool:

@@ -19,7 +19,16 @@ from rig.intake.readers import ARRAYS, kind_of, open_sheets
 from rig.intake.roles import WORDS, candidates, knows, words_of
 from rig.intake.sheet import DAMAGE, Sheet, Source, unreadable
 from rig.intake.survey import texts_of
-from rig.intake.text import BLANK_CELLS, bytes_of, lines_in, open_texts, open_utf8, section_in, section_name
+from rig.intake.text import (
+    BLANK_CELLS,
+    bytes_of,
+    lines_in,
+    open_texts,
+    open_utf8,
+    refuse_units,
+    section_in,
+    section_name,
+)
 from rig.intake.units import unit_in, unit_of
 from rig.intake.workbook import hidden_sheets, sheet_names
 
@@ -145,10 +154,12 @@ def _of_text(source: Source, section: str = "") -> list[Layout]:
     form: TomlTable = ({"encoding": encoding} if encoding != "utf-8" else {}) | best.form
     form |= {"section": section} if section else {}
     more, said = ({}, "") if section else _between(source, form)
-    sheets = open_texts(source, FileForm.model_construct(**form, **more))
-    if best.notation.unsure:
-        shown = f"{source.path.name}: {best.notation.unsure!r}"
-        doubts = (*doubts, f"{shown} is read with a decimal comma; it may part thousands")
+    first, *later = sheets = open_texts(source, FileForm.model_construct(**form, **more))
+    for sheet in later:
+        refuse_units(sheet.place(0), sheet.units, first.header, first.units)
+    shown = {best.notation.unsure: "is read with a decimal comma; it may part thousands"}
+    shown[best.notation.minus] = "has a sign that is no hyphen; it is read as a minus"
+    doubts = (*doubts, *(f"{source.path.name}: {cell!r} {how}" for cell, how in shown.items() if cell))
     heads = best.headings.heads
     padded = [tuple([*heads, *sheet.header[len(heads) :]][: len(sheet.header)]) for sheet in sheets]
     return [Layout(sheet, source, form | more, own, doubts, said) for sheet, own in zip(sheets, padded, strict=True)]
@@ -296,6 +307,7 @@ def _of_rows(
     form |= {"decimal": ","} if notation.decimal == "," else {}
     form |= {"thousands": notation.thousands} if notation.thousands else {}
     form |= {"exponent": "D"} if notation.exponent == "D" else {}
+    form |= {"minus": "\u2212"} if notation.minus else {}
     place = {"header_row": headings.header_row, "unit_row": headings.unit_row, **_first(headings, start - sooner)}
     return Found({**form, **place}, headings, notation, _share(data))
 

@@ -2,12 +2,13 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from rig.config.table import TomlTable
-from rig.intake.families import ColumnGroup
+from rig.intake.families import COMPONENTS, DIRECTIONS, ColumnGroup, parts_of
 from rig.intake.questions import Choice, OpenQuestion
 from rig.intake.roles import candidates, words_of
 from rig.intake.survey import Looks, sign_of
@@ -26,6 +27,11 @@ REACH_M = 3.0
 LEAST_MM = 0.05
 # As OptiTrack's Motive states them above its columns.
 _LENGTHS = re.compile(r"length units?\W+(\w+)", re.IGNORECASE)
+# What a force cell reads across its axis, and another's noise, is a few percent of the force.
+RIVAL_SHARE = 0.1
+# The same force in another unit differs by rounding only, which is a few thousandths of it at most.
+COPY_SHARE = 0.01
+Values = np.ndarray[tuple[int], np.dtype[np.float64]]
 USUAL = {"force": "N", "position": "mm", "velocity": "mm/s"}
 
 
@@ -52,6 +58,38 @@ def chosen(table: ColumnGroup) -> dict[str, int]:
     return found
 
 
+def _forces(table: ColumnGroup, known: Mapping[str, int]) -> list[int]:
+    """The force, and others called alike that move as well and are neither its directions nor copies; [] without it."""
+    if "force" not in known:
+        return []
+    ranks, mine = ranks_of(table, "force"), known["force"]
+    alike = [number for number, rank in ranks.items() if rank == ranks[mine] and number in table.looks]
+    names = [set(parts_of(table.layout.sheet.header[number])) for number in alike]
+    apart = set[str]().union(*(name ^ names[0] for name in names))
+    others = [] if apart <= DIRECTIONS or apart in COMPONENTS else [number for number in alike if number != mine]
+    return [mine, *(number for number in others if _is_another(_in_N(table, number), _in_N(table, mine)))]
+
+
+def _in_N(table: ColumnGroup, column: int) -> Values:
+    return table.looks[column].values * LINEAR["force"].get(table.layout.sheet.units[column], 1.0)
+
+
+def _is_another(force_N: Values, ours_N: Values) -> bool:
+    """Whether it moves as a force does, and is not the same one."""
+    (moved_N, way_N), apart_N = (np.ptp(own[np.isfinite(own)]) for own in (force_N, ours_N)), np.abs(force_N - ours_N)
+    return bool(moved_N > RIVAL_SHARE * way_N and np.nan_to_num(apart_N).max() > COPY_SHARE * way_N)
+
+
+def _which(table: ColumnGroup, forces: Sequence[int], known: Mapping[str, int]) -> OpenQuestion:
+    """Which of several forces under one motion it is."""
+    asked = _question(table, "force", forces, known, 0)
+    first, *_ = asked.choices
+    unit = "" if first.whole else _usual(table, "force", forces[0])
+    shown = "; ".join(f"{choice.name} ({choice.why})" for choice in asked.choices)
+    text = f"{table.path.name}: {len(forces)} forces under one motion: {shown}; name the one to read, a mapping for each reads all"
+    return replace(asked, text=text, usual=f"{first.name} {unit}".strip() if first.whole or unit else "")
+
+
 def ranks_of(table: ColumnGroup, quantity: str) -> dict[int, tuple[bool, int, int]]:
     """How likely each column is the quantity by word and unit, the smaller the likelier."""
     return {table.columns[item.column]: item.rank for item in candidates(quantity, table.names, table.units)}
@@ -63,7 +101,10 @@ def measured_in(table: ColumnGroup, time: int | None, quantities: Sequence[str])
     left = [number for number, looks in table.looks.items() if looks.moves and number not in (time, *known.values())]
     found = MeasuredColumns({}, [], [])
     for quantity in quantities:
-        if quantity in known:
+        forces = _forces(table, known) if quantity == "force" else []
+        if len(forces) > 1:
+            found.questions.append(_which(table, forces, known))
+        elif quantity in known:
             _take(found, table, quantity, known)
         else:
             found.questions.append(_question(table, quantity, left, known, len(found.questions)))
@@ -127,13 +168,13 @@ def _sense(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, i
     return "out" if way[min(most, way.size - 1)] < way[0] else "into"
 
 
-def _risen(looks: Looks) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _risen(looks: Looks) -> Values:
     """Above its first tenth, where the machine stands in air or at its preload."""
     force = np.nan_to_num(signed(looks))
     return np.asarray(force - np.median(force[: max(1, force.size // 10)]))
 
 
-def signed(looks: Looks) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def signed(looks: Looks) -> Values:
     """The numbers with the sign where it stands in a bit."""
     sign, values = sign_of(looks.values), looks.values
     if "bits" in sign:
