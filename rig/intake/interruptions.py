@@ -51,7 +51,9 @@ def interruptions_of(source: Source, form: FileForm) -> Interruptions:
                 text = line.decode("utf-8" if whole else form.encoding, errors="replace").strip()
                 if not form.affixes and begins_another(text, form.delimiter, head.names):
                     another = (number, text)
-                others += [(number, text)] if _is_other(text, form, head) else []
+                cells = cells_of(loosened(text, form.delimiter) if form.affixes else text, form.delimiter)
+                cells = bare(cells, head.marks) if form.affixes else cells
+                others += [(number, text)] if text.startswith(COMMENT) or is_other(cells, head.first) else []
     first = another if another[1] else others[0] if others else (0, "")
     return Interruptions(number - form.rows_above, len(others), *first, headers, bool(another[1]), gap)
 
@@ -66,8 +68,3 @@ def _usual(first: bytes, form: FileForm, head: Head) -> Callable[[bytes], bool]:
         return cells == count and (not begins or line.lstrip(b" ")[:1] in begins)
 
     return is_usual
-
-
-def _is_other(line: str, form: FileForm, head: Head) -> bool:
-    cells = cells_of(loosened(line, form.delimiter) if form.affixes else line, form.delimiter)
-    return line.startswith(COMMENT) or is_other(bare(cells, head.marks) if form.affixes else cells, head.first)

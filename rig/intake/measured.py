@@ -31,7 +31,6 @@ _LENGTHS = re.compile(r"length units?\W+(\w+)", re.IGNORECASE)
 RIVAL_SHARE = 0.1
 # The same force in another unit differs by rounding only, which is a few thousandths of it at most.
 COPY_SHARE = 0.01
-Values = np.ndarray[tuple[int], np.dtype[np.float64]]
 USUAL = {"force": "N", "position": "mm", "velocity": "mm/s"}
 
 
@@ -58,36 +57,29 @@ def chosen(table: ColumnGroup) -> dict[str, int]:
     return found
 
 
-def _forces(table: ColumnGroup, known: Mapping[str, int]) -> list[int]:
-    """The force, and others called alike that move as well and are neither its directions nor copies; [] without it."""
-    if "force" not in known:
-        return []
-    ranks, mine = ranks_of(table, "force"), known["force"]
-    alike = [number for number, rank in ranks.items() if rank == ranks[mine] and number in table.looks]
-    names = [set(parts_of(table.layout.sheet.header[number])) for number in alike]
+def _forces(table: ColumnGroup, mine: int) -> list[int]:
+    """The force, and others called alike that move as a force does and are neither its directions nor copies of it."""
+    ranks, looks, sheet = ranks_of(table, "force"), table.looks, table.layout.sheet
+    alike = [number for number, rank in ranks.items() if rank == ranks[mine] and number in looks]
+    names = [set(parts_of(sheet.header[number])) for number in alike]
     apart = set[str]().union(*(name ^ names[0] for name in names))
-    others = [] if apart <= DIRECTIONS or apart in COMPONENTS else [number for number in alike if number != mine]
-    return [mine, *(number for number in others if _is_another(_in_N(table, number), _in_N(table, mine)))]
-
-
-def _in_N(table: ColumnGroup, column: int) -> Values:
-    return table.looks[column].values * LINEAR["force"].get(table.layout.sheet.units[column], 1.0)
-
-
-def _is_another(force_N: Values, ours_N: Values) -> bool:
-    """Whether it moves as a force does, and is not the same one."""
-    (moved_N, way_N), apart_N = (np.ptp(own[np.isfinite(own)]) for own in (force_N, ours_N)), np.abs(force_N - ours_N)
-    return bool(moved_N > RIVAL_SHARE * way_N and np.nan_to_num(apart_N).max() > COPY_SHARE * way_N)
+    if apart <= DIRECTIONS or apart in COMPONENTS:
+        return [mine]
+    in_N = {number: looks[number].values * LINEAR["force"].get(sheet.units[number], 1.0) for number in alike}
+    range_N = {number: float(np.nanmax(own) - np.nanmin(own)) for number, own in in_N.items()}
+    moving = [number for number in alike if range_N[number] > RIVAL_SHARE * range_N[mine]]
+    away_N = {number: float(np.nan_to_num(np.abs(in_N[number] - in_N[mine])).max()) for number in moving}
+    return [mine, *(number for number in moving if away_N[number] > COPY_SHARE * range_N[mine])]
 
 
 def _which(table: ColumnGroup, forces: Sequence[int], known: Mapping[str, int]) -> OpenQuestion:
     """Which of several forces under one motion it is."""
     asked = _question(table, "force", forces, known, 0)
-    first, *_ = asked.choices
-    unit = "" if first.whole else _usual(table, "force", forces[0])
+    first, unit = asked.choices[0], _usual(table, "force", forces[0])
     shown = "; ".join(f"{choice.name} ({choice.why})" for choice in asked.choices)
-    text = f"{table.path.name}: {len(forces)} forces under one motion: {shown}; name the one to read, a mapping for each reads all"
-    return replace(asked, text=text, usual=f"{first.name} {unit}".strip() if first.whole or unit else "")
+    text = f"{table.path.name}: {len(forces)} forces under one motion: {shown}; name the one to read"
+    usual = first.name if first.whole else f"{first.name} {unit}" if unit else ""
+    return replace(asked, text=f"{text}, a mapping for each reads all", usual=usual)
 
 
 def ranks_of(table: ColumnGroup, quantity: str) -> dict[int, tuple[bool, int, int]]:
@@ -101,7 +93,7 @@ def measured_in(table: ColumnGroup, time: int | None, quantities: Sequence[str])
     left = [number for number, looks in table.looks.items() if looks.moves and number not in (time, *known.values())]
     found = MeasuredColumns({}, [], [])
     for quantity in quantities:
-        forces = _forces(table, known) if quantity == "force" else []
+        forces = _forces(table, known["force"]) if quantity == "force" and "force" in known else []
         if len(forces) > 1:
             found.questions.append(_which(table, forces, known))
         elif quantity in known:
@@ -168,13 +160,13 @@ def _sense(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, i
     return "out" if way[min(most, way.size - 1)] < way[0] else "into"
 
 
-def _risen(looks: Looks) -> Values:
+def _risen(looks: Looks) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Above its first tenth, where the machine stands in air or at its preload."""
     force = np.nan_to_num(signed(looks))
     return np.asarray(force - np.median(force[: max(1, force.size // 10)]))
 
 
-def signed(looks: Looks) -> Values:
+def signed(looks: Looks) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """The numbers with the sign where it stands in a bit."""
     sign, values = sign_of(looks.values), looks.values
     if "bits" in sign:
@@ -222,11 +214,14 @@ def _question(
     table: ColumnGroup, quantity: str, left: Sequence[int], known: Mapping[str, int], asked: int
 ) -> OpenQuestion:
     """Which column it is, of those that move and are nothing else; its example is none of those ``asked``."""
-    choices = tuple(
-        Choice(str(table.place(column)), value_of(table, quantity, column, known), _why(table, column))
-        for column in left
-    )
     units = table.layout.sheet.units
+    choices = tuple(
+        Choice(
+            str(table.place(column)), value_of(table, quantity, column, known),
+            f"{units[column] or 'no unit'}, {table.looks[column].span}, moves",
+        )
+        for column in left
+    )  # fmt: skip
     signals = [choice for choice, column in zip(choices, left, strict=True) if units[column] in SIGNALS]
     clear = signals if len(signals) == 1 else choices if len(choices) == 1 else ()
     usual = clear[0].name if len(clear) == 1 and clear[0].whole else ""
@@ -234,8 +229,3 @@ def _question(
     text = f"{table.path.name}: no name tells which column is the {quantity}; it may be {shown}; say it with its unit"
     example = f"{choices[min(asked, len(choices) - 1)].name} {USUAL[quantity]}" if choices else ""
     return OpenQuestion(text, (), quantity, choices, usual, example)
-
-
-def _why(table: ColumnGroup, column: int) -> str:
-    unit = table.layout.sheet.units[column]
-    return f"{unit or 'no unit'}, {table.looks[column].span}, moves"
