@@ -20,7 +20,7 @@ from rig.results.study import fit_result
 from rig.tissue.laws import Law
 from rig.tissue.model import load_model
 from rig.tissue.registry import COMPARED, LAWS, law_named
-from rig.tissue.study import Study, model_of, study_sessions
+from rig.tissue.study import Study, model_of, refuse_at_bounds, study_sessions
 from rig.trials.opening import AS_IT_IS, Opening, stated_mapping
 
 
@@ -98,6 +98,7 @@ def _fitted(
     operation: Operation, sessions: Sequence[Session], target: Path, laws: Laws, lattice: Lattice | None, drawn: bool
 ) -> FitResult:
     study = study_sessions(sessions, laws.compared, laws.known, operation.step)
+    refuse_at_bounds(study, laws.saved)
     result = fit_result(study, str(target / MODEL), laws.saved, laws.known, _recordings(sessions))
     make_folder(target)
     for name, picture in (("fit", fit_figure), ("residuals", residual_figure)) if drawn else ():

@@ -189,7 +189,9 @@ def open_hdf5(path: Path) -> list[Sheet]:
 
 def _members(path: Path, name: str, group: Any) -> Iterator[Sheet]:
     """A sheet of each struct in an array of them, whose fields MATLAB stores as references to their values."""
-    fields = {key: item for key, item in group.items() if _refers(item)}
+    fields = {key: item for key, item in group.items() if isinstance(item, h5py.Dataset)}
+    plain = (key for key, item in fields.items() if "MATLAB_object_decode" not in item.attrs)
+    fields = {key: fields[key] for key in plain if h5py.check_ref_dtype(fields[key].dtype)}
     for number in range(min((item.size for item in fields.values()), default=0)):
         items = {key: group.file[np.ravel(item[()])[number]] for key, item in fields.items()}
         vectors = {
@@ -199,11 +201,6 @@ def _members(path: Path, name: str, group: Any) -> Iterator[Sheet]:
             for key, column in _split(key, item[()]).items()
         }
         yield _of_vectors(path, f"{name}({number + 1})", vectors, {}, {})
-
-
-def _refers(item: Any) -> bool:
-    is_reference = isinstance(item, h5py.Dataset) and bool(h5py.check_ref_dtype(item.dtype))
-    return is_reference and not item.attrs.get("MATLAB_object_decode")
 
 
 def _of_group(path: Path, name: str, group: Any) -> Sheet:
@@ -220,7 +217,8 @@ def _of_group(path: Path, name: str, group: Any) -> Sheet:
         elif item.ndim in (1, 2) and item.size > 1 and item.dtype.kind in "biuf" and _is_numeric(item):
             split = _named(lines_of(path, key, item), _attribute(item, COLUMN_NAMES) or _names_beside(group, key, item))
             vectors |= split
-            units |= zip(split, _spread(_attribute(item, UNIT_NAMES), len(split)), strict=False)
+            own = _attribute(item, UNIT_NAMES)
+            units |= zip(split, list(own) * len(split) if len(own) == 1 else own, strict=False)
         elif item.size == 1:
             facts[key] = _text(np.ravel(item[()])[0])
         facts |= {name: " ".join(map(_text, np.ravel(value))) for name, value in item.attrs.items()}
@@ -241,11 +239,6 @@ def _attribute(item: Any, names: Sequence[str]) -> list[str]:
     found = {name.lower(): value for name, value in item.attrs.items()}
     value = next((found[name] for name in names if name in found), None)
     return [] if value is None else [_text(one) for one in np.ravel(np.asarray(value, object))]
-
-
-def _spread(units: Sequence[str], count: int) -> list[str]:
-    """The unit of each column, one for all where there is one."""
-    return list(units) * count if len(units) == 1 else list(units)
 
 
 def _named(vectors: Mapping[str, NDArray[np.generic] | StoredVector], names: Sequence[str]) -> Vectors:
@@ -269,7 +262,11 @@ def open_parquet(path: Path) -> list[Sheet]:
             schema, rows = file.schema_arrow, file.metadata.num_rows
     except DAMAGE as error:
         raise unreadable(path, "Parquet", error) from error
-    stated = ["ns" if pa.types.is_temporal(field.type) else _unit_field(field.metadata or {}) for field in schema]
+    said = [[(field.metadata or {}).get(name.encode(), b"").decode() for name in UNIT_NAMES] for field in schema]
+    stated = [
+        "ns" if pa.types.is_temporal(own.type) else next(filter(None, one), "")
+        for own, one in zip(schema, said, strict=True)
+    ]
     units = tuple(unit_in(unit) or unit_of(name) for unit, name in zip(stated, schema.names, strict=True))
 
     def read(columns: Mapping[int, bool]) -> Iterator[Batch]:
@@ -285,10 +282,6 @@ def open_parquet(path: Path) -> list[Sheet]:
             raise unreadable(path, "Parquet", error) from error
 
     return [Sheet(path, "", tuple(schema.names), units, read, rows=rows)]
-
-
-def _unit_field(metadata: Mapping[bytes, bytes]) -> str:
-    return next((metadata[name.encode()].decode() for name in UNIT_NAMES if name.encode() in metadata), "")
 
 
 def _array(column: Any) -> NDArray[np.generic]:

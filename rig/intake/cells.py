@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from rig.intake.notation import is_number, is_stamp
+from rig.intake.notation import hyphened, is_number, is_stamp
 from rig.intake.roles import knows
 from rig.intake.units import unit_in
 
@@ -64,7 +64,7 @@ def above_columns(line: str, delimiter: str, below: str) -> list[str]:
 
 def affixed(cell: str) -> Affixed:
     """The parts of a cell; one that is no number between a name and a unit that is known is all number."""
-    match = _AFFIXED.fullmatch(cell)
+    match = _AFFIXED.fullmatch(hyphened(cell))
     if match is None or (match["unit"] and not unit_in(match["unit"])):
         return Affixed("", cell, "")
     return Affixed(match["name"] or "", match["number"], match["unit"] or "")

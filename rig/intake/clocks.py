@@ -157,13 +157,10 @@ def _lag(theirs: Clock, ours: Clock) -> tuple[By, Lag, TimedSignal]:
     if "force" in theirs.channels and ours.motion:
         return "events", lag_of_force(theirs.channels["force"], ours.motion), ours.motion
     if "force" in ours.channels and theirs.motion:
-        return "events", _reversed(lag_of_force(ours.channels["force"], theirs.motion)), theirs.motion
+        lag = lag_of_force(ours.channels["force"], theirs.motion)
+        turned = lag._replace(offset_s=-lag.offset_s, drift=-lag.drift, at_s=lag.at_s + lag.offset_s)
+        return "events", turned, theirs.motion
     raise ClocksApart(
         "neither a motion nor a force of it can be compared with the other clock; name a column of both that follows "
         "the same thing, in any unit: columns.sync = { column = 'NAME' }"
     )
-
-
-def _reversed(lag: Lag) -> Lag:
-    """The same from the other clock: what is added to the motion's times to be on the follower's."""
-    return lag._replace(offset_s=-lag.offset_s, drift=-lag.drift, at_s=lag.at_s + lag.offset_s)

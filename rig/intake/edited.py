@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 
 _DOUBLE = re.compile(rb"(?<![\w.])([+-]?(?:\d+[.,]\d*|[.,]\d+))[dD]([+-]?\d+)(?!\w)")
+# A minus sign, a dash or a wide hyphen (U+2212, U+2013, U+FF0D) before a number and behind none.
+_MINUS = re.compile(rb"(?<![\w.])(?:\xe2\x88\x92|\xe2\x80\x93|\xef\xbc\x8d)(?=[\d.,])")
 _ARROW = re.compile(r"\s*(?:->|=>|→)\s*")
 _BRACKETS = re.compile(r"\s*[(\[{](.*)[)\]}]\s*[,;]?\s*")
 # A cell that is opened and not closed in its line goes on in the next; names of columns have a few lines at most.
@@ -37,9 +39,14 @@ def single_blanks(line: bytes) -> bytes:
     return b" ".join(line.split()) + b"\n"
 
 
-def with_exponents(line: bytes, edit: Callable[[bytes], bytes] | None) -> bytes:
-    """With E in its numbers where Fortran writes D, after another change."""
-    return _DOUBLE.sub(rb"\1E\2", edit(line) if edit else line)
+def plain_numbers(line: bytes, edit: Callable[[bytes], bytes] | None) -> bytes:
+    """With E in its numbers where Fortran writes D, and a hyphen for a minus, after another change."""
+    return with_hyphens(_DOUBLE.sub(rb"\1E\2", edit(line) if edit else line))
+
+
+def with_hyphens(line: bytes) -> bytes:
+    """With a hyphen where a number has another sign for minus."""
+    return _MINUS.sub(b"-", line)
 
 
 def loosened(line: str, delimiter: str) -> str:

@@ -115,7 +115,7 @@ def _told_apart(whole: ColumnGroup) -> list[tuple[str, str]]:
     if len(indices) < 2 or len(own[0]) != len(indices) or sorted(own[0].values()) != sorted(own[1].values()):
         return [(name, "") for name in header]
     named = [own[0].get(number) or own[1].get(number) for number in range(len(header))]
-    others = [next((index for index in indices if index in _parts(name)), "") for name in header]
+    others = [next((index for index in indices if index in parts_of(name)), "") for name in header]
     return [(name, index or other) for name, index, other in zip(header, named, others, strict=True)]
 
 
@@ -123,7 +123,7 @@ def _own_parts(whole: ColumnGroup, quantity: str) -> dict[int, str]:
     """What the name of each column that may be the quantity has besides what they all have; nothing of directions."""
     header = whole.layout.sheet.header
     found = [item.column for item in candidates(quantity, header, whole.units) if not item.rank[0]]
-    parted = {number: _parts(header[number]) for number in found}
+    parted = {number: parts_of(header[number]) for number in found}
     shared = set(next(iter(parted.values()), [])).intersection(*parted.values())
     own = {number: "".join(part for part in parts if part not in shared) for number, parts in parted.items()}
     indices = set(own.values())
@@ -132,7 +132,7 @@ def _own_parts(whole: ColumnGroup, quantity: str) -> dict[int, str]:
     return {number: index or "0" for number, index in own.items()} if told and not vector else {}
 
 
-def _parts(name: str) -> list[str]:
+def parts_of(name: str) -> list[str]:
     """The words and numbers of a name in small letters, without the unit that it ends in."""
     parts = _PARTS.findall(_BRACKETED.sub(" ", name))
     unit = len(parts) > 1 and not _BRACKETED.search(name) and unit_in(parts[-1])

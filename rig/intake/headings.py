@@ -38,7 +38,10 @@ def headings_of(above: Sequence[Row], width: int, used: int) -> Headings:
     header_at = _names_at(above, [number for number in filled if number != unit_at], used)
     names = above[header_at] if header_at is not None else []
     between = unit_at is not None and unit_at == len(above) - 1 and header_at is not None and header_at < unit_at
-    stated = [] if unit_at is None or (not between and _contradict(names, above[unit_at])) else above[unit_at]
+    stated = [] if unit_at is None else above[unit_at]
+    # A name that has another unit is of other columns than a row of units that is not right below it.
+    agreed = all(stated_unit(name, unit_in(unit)) is not None for name, unit in zip(names, stated, strict=False))
+    stated = stated if between or agreed else []
     rows = [above[number] for number in _around(above, header_at, unit_at, used)]
     heads = tuple(
         " ".join(filter(None, (*(_cell(row, column) for row in rows), _unknown(_cell(stated, column)))))
@@ -51,11 +54,6 @@ def headings_of(above: Sequence[Row], width: int, used: int) -> Headings:
         tuple(head or str(number + 1) for number, head in enumerate(heads)),
         units,
     )
-
-
-def _contradict(names: Row, units: Row) -> bool:
-    """Whether a name has another unit than the row of units, which is of other columns if it is not right below."""
-    return any(stated_unit(name, unit_in(unit)) is None for name, unit in zip(names, units, strict=False))
 
 
 def stated_unit(name: str, below: str) -> str | None:
@@ -85,16 +83,13 @@ def _are_units(row: Row, last: bool) -> bool:
 
 def _names_at(above: Sequence[Row], rows: Sequence[int], width: int) -> int | None:
     """The row with the most words that are known, the lowest of them; else the one directly above, if it is names."""
-    scores = {number: _score(above[number]) for number in rows if _are_names(above[number], width)}
+    known = {number: sum(map(knows, above[number])) for number in rows if _are_names(above[number], width)}
+    # Words of settings have a value beside them.
+    scores = {at: score - sum(is_number(cell) or is_stamp(cell) for cell in above[at]) for at, score in known.items()}
     best = max(scores, key=lambda number: (scores[number], number), default=None)
     if best is not None and scores[best] <= 0:
         return max(scores)
     return best
-
-
-def _score(row: Row) -> int:
-    """Words that are known, without those of settings, which have a value beside them."""
-    return sum(knows(cell) for cell in row) - sum(is_number(cell) or is_stamp(cell) for cell in row)
 
 
 def _are_names(row: Row, width: int) -> bool:

@@ -9,12 +9,10 @@ from rig.intake.edited import loosened
 from rig.intake.headings import ROWS
 from rig.intake.mapping import FileForm
 from rig.intake.sheet import Source
-from rig.intake.text import BLANK_CELLS, FilePart, Head, head_of, lines_in, open_utf8
+from rig.intake.text import BLANK_CELLS, NUMBER_BEGINS, FilePart, Head, head_of, lines_in, open_utf8
 
 # Of more lines than these only the first are looked at, in about a second.
 MOST_LINES = 4_000_000
-# A line that begins with one of these is a row, where it has as many cells as the first and that begins with a number.
-_NUMBER_BEGINS = b"0123456789+-.,"
 
 
 class Interruptions(NamedTuple):
@@ -53,14 +51,16 @@ def interruptions_of(source: Source, form: FileForm) -> Interruptions:
                 text = line.decode("utf-8" if whole else form.encoding, errors="replace").strip()
                 if not form.affixes and begins_another(text, form.delimiter, head.names):
                     another = (number, text)
-                others += [(number, text)] if _is_other(text, form, head) else []
+                cells = cells_of(loosened(text, form.delimiter) if form.affixes else text, form.delimiter)
+                cells = bare(cells, head.marks) if form.affixes else cells
+                others += [(number, text)] if text.startswith(COMMENT) or is_other(cells, head.first) else []
     first = another if another[1] else others[0] if others else (0, "")
     return Interruptions(number - form.rows_above, len(others), *first, headers, bool(another[1]), gap)
 
 
 def _usual(first: bytes, form: FileForm, head: Head) -> Callable[[bytes], bool]:
     """Whether a line looks like the ``first`` row, so that its cells need not be parted."""
-    sign, begins = form.delimiter.encode(), _NUMBER_BEGINS if head.first and is_value(head.first[0]) else b""
+    sign, begins = form.delimiter.encode(), NUMBER_BEGINS if head.first and is_value(head.first[0]) else b""
     blank, count = sign == b" ", len(first.split()) if sign == b" " else first.count(sign)
 
     def is_usual(line: bytes) -> bool:
@@ -68,8 +68,3 @@ def _usual(first: bytes, form: FileForm, head: Head) -> Callable[[bytes], bool]:
         return cells == count and (not begins or line.lstrip(b" ")[:1] in begins)
 
     return is_usual
-
-
-def _is_other(line: str, form: FileForm, head: Head) -> bool:
-    cells = cells_of(loosened(line, form.delimiter) if form.affixes else line, form.delimiter)
-    return line.startswith(COMMENT) or is_other(bare(cells, head.marks) if form.affixes else cells, head.first)

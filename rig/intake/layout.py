@@ -19,7 +19,16 @@ from rig.intake.readers import ARRAYS, kind_of, open_sheets
 from rig.intake.roles import WORDS, candidates, knows, words_of
 from rig.intake.sheet import DAMAGE, Sheet, Source, unreadable
 from rig.intake.survey import texts_of
-from rig.intake.text import BLANK_CELLS, bytes_of, lines_in, open_texts, open_utf8, section_in, section_name
+from rig.intake.text import (
+    BLANK_CELLS,
+    bytes_of,
+    lines_in,
+    open_texts,
+    open_utf8,
+    refuse_units,
+    section_in,
+    section_name,
+)
 from rig.intake.units import unit_in, unit_of
 from rig.intake.workbook import hidden_sheets, sheet_names
 
@@ -28,6 +37,7 @@ HEAD_BYTES = 65_536
 HEAD_ROWS = 400
 # Of the encodings that laboratories' machines write; one that is no Unicode is told by the words of the header only.
 ENCODINGS = ("gb18030", "cp949", "shift_jis", "big5", "cp1252", "cp1251")
+_BETWEEN = re.compile(r"[\s,;|\"()\[\]/]+")
 DELIMITERS = ("\t", ";", ",", "|", " ")
 
 # A table of so few rows may lie across; a quantity each is fewer.
@@ -145,10 +155,12 @@ def _of_text(source: Source, section: str = "") -> list[Layout]:
     form: TomlTable = ({"encoding": encoding} if encoding != "utf-8" else {}) | best.form
     form |= {"section": section} if section else {}
     more, said = ({}, "") if section else _between(source, form)
-    sheets = open_texts(source, FileForm.model_construct(**form, **more))
-    if best.notation.unsure:
-        shown = f"{source.path.name}: {best.notation.unsure!r}"
-        doubts = (*doubts, f"{shown} is read with a decimal comma; it may part thousands")
+    first, *later = sheets = open_texts(source, FileForm.model_construct(**form, **more))
+    for sheet in later:
+        refuse_units(sheet.place(0), sheet.units, first.header, first.units)
+    shown = {best.notation.unsure: "is read with a decimal comma; it may part thousands"}
+    shown[best.notation.minus] = "has a sign that is no hyphen; it is read as a minus"
+    doubts = (*doubts, *(f"{source.path.name}: {cell!r} {how}" for cell, how in shown.items() if cell))
     heads = best.headings.heads
     padded = [tuple([*heads, *sheet.header[len(heads) :]][: len(sheet.header)]) for sheet in sheets]
     return [Layout(sheet, source, form | more, own, doubts, said) for sheet, own in zip(sheets, padded, strict=True)]
@@ -247,7 +259,8 @@ def encoding_of(head: bytes) -> tuple[str, tuple[str, ...]]:
     if _decodes(head, "utf-8"):
         return ("" if b"\0" in head else "utf-8"), ()
     header = b"\n".join(head.splitlines()[:HEAD_ROWS])
-    known = {name: _words(header, name) for name in ENCODINGS if _decodes(head, name)}
+    words = {name: _BETWEEN.split(header.decode(name)) for name in ENCODINGS if _decodes(head, name)}
+    known = {name: sum(knows(w) or bool(unit_in(w)) for w in own if not w.isascii()) for name, own in words.items()}
     if not known or b"\0" in header:
         return "", ()
     best = max(known, key=lambda name: known[name])
@@ -263,11 +276,6 @@ def _decodes(head: bytes, name: str) -> bool:
     except UnicodeDecodeError:
         return False
     return True
-
-
-def _words(header: bytes, name: str) -> int:
-    words = re.split(r"[\s,;|\"()\[\]/]+", header.decode(name))
-    return sum(knows(word) or bool(unit_in(word)) for word in words if not word.isascii())
 
 
 def _of_rows(
@@ -286,7 +294,8 @@ def _of_rows(
     used = sorted(sum(map(bool, row)) for row in data)[len(data) // 2]
     above = [above_columns(line, delimiter, lines[start]) for line in lines[:start]] if lines else rows[:start]
     headings = headings_of(above, len(data[0]), used)
-    sooner = _sooner(rows, headings.header_row) if lines else 0
+    at = headings.header_row - 1  # and its names may stand further above for the first time
+    sooner = at - list(rows).index(rows[at]) if lines and at >= 0 else 0
     headings = headings.moved(-sooner)
     if affixed_rows:
         headings = _from_cells(headings, [affixed(cell) for cell in affixed_rows[start]])
@@ -296,7 +305,9 @@ def _of_rows(
     form |= {"decimal": ","} if notation.decimal == "," else {}
     form |= {"thousands": notation.thousands} if notation.thousands else {}
     form |= {"exponent": "D"} if notation.exponent == "D" else {}
-    place = {"header_row": headings.header_row, "unit_row": headings.unit_row, **_first(headings, start - sooner)}
+    form |= {"minus": "\u2212"} if notation.minus else {}
+    place = {"header_row": headings.header_row, "unit_row": headings.unit_row}
+    place |= {"first_row": start - sooner + 1} if start - sooner != max(place.values()) else {}
     return Found({**form, **place}, headings, notation, _share(data))
 
 
@@ -311,11 +322,6 @@ def _begins(rows: Sequence[Sequence[str]], kinds: Sequence[int], longest: int) -
     return start
 
 
-def _sooner(rows: Sequence[Sequence[str]], header_row: int) -> int:
-    """How many rows above the row of names, counted from 1, it stands for the first time."""
-    return header_row - 1 - list(rows).index(rows[header_row - 1]) if header_row else 0
-
-
 def _from_cells(headings: Headings, cells: Sequence[Affixed]) -> Headings:
     """With the names and units in the cells where none stand above them."""
     heads = [cell.name or head for cell, head in zip(cells, headings.heads, strict=True)]
@@ -327,11 +333,6 @@ def _share(rows: Sequence[Sequence[str]]) -> float:
     """How many of the cells that say something are numbers or times."""
     filled = [cell for row in rows for cell in row if cell and cell.lower() not in NO_VALUE]
     return sum(map(is_value, filled)) / max(1, len(filled))
-
-
-def _first(headings: Headings, start: int) -> TomlTable:
-    """The first row of data, where it is not the one below names and units."""
-    return {"first_row": start + 1} if start != max(headings.header_row, headings.unit_row) else {}
 
 
 def _kind(row: Sequence[str], delimiter: str) -> int:

@@ -124,9 +124,9 @@ class FileForm(Table):
     again, called by its number in ``{sheet}``; with ``affixes`` cells have a name before or a unit behind their number
     (``F:1.2 N``), rows brackets around them or an arrow in them. With ``section`` the table stands below the line that
     is this text, from which rows are counted, and ends at an empty line; with ``long`` it has a row for each value.
-    ``exponent = "D"`` is as Fortran writes. ``clock = "own"`` says that times are
-    another clock's than those of the recording's other tables: they are brought onto it where the data say how, within
-    ``clock_within_ms`` where that is given, and else kept apart.
+    ``exponent = "D"`` is as Fortran writes, ``minus = "−"`` with another sign than a hyphen. ``clock = "own"`` says
+    that times are another clock's than those of the recording's other tables: they are brought onto it where the data
+    say how, within ``clock_within_ms`` where that is given, and else kept apart.
     """
 
     files: str | tuple[str, ...]
@@ -136,6 +136,7 @@ class FileForm(Table):
     decimal: Literal[".", ","] = "."
     thousands: str = Field(default="", max_length=1)
     exponent: Literal["E", "D"] = "E"
+    minus: Literal["-", "\u2212"] = "-"
     header_row: int = Field(default=1, ge=0)
     unit_row: int = Field(default=0, ge=0)
     first_row: int = Field(default=0, ge=0)

@@ -2,12 +2,13 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from rig.config.table import TomlTable
-from rig.intake.families import ColumnGroup
+from rig.intake.families import COMPONENTS, DIRECTIONS, ColumnGroup, parts_of
 from rig.intake.questions import Choice, OpenQuestion
 from rig.intake.roles import candidates, words_of
 from rig.intake.survey import Looks, sign_of
@@ -26,6 +27,10 @@ REACH_M = 3.0
 LEAST_MM = 0.05
 # As OptiTrack's Motive states them above its columns.
 _LENGTHS = re.compile(r"length units?\W+(\w+)", re.IGNORECASE)
+# What a force cell reads across its axis, and another's noise, is a few percent of the force.
+RIVAL_SHARE = 0.1
+# The same force in another unit differs by rounding only, which is a few thousandths of it at most.
+COPY_SHARE = 0.01
 USUAL = {"force": "N", "position": "mm", "velocity": "mm/s"}
 
 
@@ -52,6 +57,31 @@ def chosen(table: ColumnGroup) -> dict[str, int]:
     return found
 
 
+def _forces(table: ColumnGroup, mine: int) -> list[int]:
+    """The force, and others called alike that move as a force does and are neither its directions nor copies of it."""
+    ranks, looks, sheet = ranks_of(table, "force"), table.looks, table.layout.sheet
+    alike = [number for number, rank in ranks.items() if rank == ranks[mine] and number in looks]
+    names = [set(parts_of(sheet.header[number])) for number in alike]
+    apart = set[str]().union(*(name ^ names[0] for name in names))
+    if apart <= DIRECTIONS or apart in COMPONENTS:
+        return [mine]
+    in_N = {number: looks[number].values * LINEAR["force"].get(sheet.units[number], 1.0) for number in alike}
+    range_N = {number: float(np.nanmax(own) - np.nanmin(own)) for number, own in in_N.items()}
+    moving = [number for number in alike if range_N[number] > RIVAL_SHARE * range_N[mine]]
+    away_N = {number: float(np.nan_to_num(np.abs(in_N[number] - in_N[mine])).max()) for number in moving}
+    return [mine, *(number for number in moving if away_N[number] > COPY_SHARE * range_N[mine])]
+
+
+def _which(table: ColumnGroup, forces: Sequence[int], known: Mapping[str, int]) -> OpenQuestion:
+    """Which of several forces under one motion it is."""
+    asked = _question(table, "force", forces, known, 0)
+    first, unit = asked.choices[0], _usual(table, "force", forces[0])
+    shown = "; ".join(f"{choice.name} ({choice.why})" for choice in asked.choices)
+    text = f"{table.path.name}: {len(forces)} forces under one motion: {shown}; name the one to read"
+    usual = first.name if first.whole else f"{first.name} {unit}" if unit else ""
+    return replace(asked, text=f"{text}, a mapping for each reads all", usual=usual)
+
+
 def ranks_of(table: ColumnGroup, quantity: str) -> dict[int, tuple[bool, int, int]]:
     """How likely each column is the quantity by word and unit, the smaller the likelier."""
     return {table.columns[item.column]: item.rank for item in candidates(quantity, table.names, table.units)}
@@ -63,7 +93,10 @@ def measured_in(table: ColumnGroup, time: int | None, quantities: Sequence[str])
     left = [number for number, looks in table.looks.items() if looks.moves and number not in (time, *known.values())]
     found = MeasuredColumns({}, [], [])
     for quantity in quantities:
-        if quantity in known:
+        forces = _forces(table, known["force"]) if quantity == "force" and "force" in known else []
+        if len(forces) > 1:
+            found.questions.append(_which(table, forces, known))
+        elif quantity in known:
             _take(found, table, quantity, known)
         else:
             found.questions.append(_question(table, quantity, left, known, len(found.questions)))
@@ -181,11 +214,14 @@ def _question(
     table: ColumnGroup, quantity: str, left: Sequence[int], known: Mapping[str, int], asked: int
 ) -> OpenQuestion:
     """Which column it is, of those that move and are nothing else; its example is none of those ``asked``."""
-    choices = tuple(
-        Choice(str(table.place(column)), value_of(table, quantity, column, known), _why(table, column))
-        for column in left
-    )
     units = table.layout.sheet.units
+    choices = tuple(
+        Choice(
+            str(table.place(column)), value_of(table, quantity, column, known),
+            f"{units[column] or 'no unit'}, {table.looks[column].span}, moves",
+        )
+        for column in left
+    )  # fmt: skip
     signals = [choice for choice, column in zip(choices, left, strict=True) if units[column] in SIGNALS]
     clear = signals if len(signals) == 1 else choices if len(choices) == 1 else ()
     usual = clear[0].name if len(clear) == 1 and clear[0].whole else ""
@@ -193,8 +229,3 @@ def _question(
     text = f"{table.path.name}: no name tells which column is the {quantity}; it may be {shown}; say it with its unit"
     example = f"{choices[min(asked, len(choices) - 1)].name} {USUAL[quantity]}" if choices else ""
     return OpenQuestion(text, (), quantity, choices, usual, example)
-
-
-def _why(table: ColumnGroup, column: int) -> str:
-    unit = table.layout.sheet.units[column]
-    return f"{unit or 'no unit'}, {table.looks[column].span}, moves"

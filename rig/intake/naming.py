@@ -84,7 +84,8 @@ def _pattern(stems: Sequence[str]) -> tuple[str, list[str]] | None:
     for at in range(0, len(columns), 2):
         if len(set(columns[at])) > 1:
             called[at] = _called(columns, at, list(called.values()))
-    return "".join(_piece(column, called.get(at, "")) for at, column in enumerate(columns)), list(called.values())
+    pieces = [f"{_shared(own)}{{{called[at]}}}" if at in called else own[0] for at, own in enumerate(columns)]
+    return "".join(pieces), list(called.values())
 
 
 def _called(columns: Sequence[Sequence[str]], at: int, taken: Sequence[str]) -> str:
@@ -100,11 +101,6 @@ def _shared(column: Sequence[str]) -> str:
     """The word before the number in all of them, empty where they differ."""
     found = {match["word"] if match else "" for match in map(_WORD.fullmatch, column)}
     return found.pop() if len(found) == 1 else ""
-
-
-def _piece(column: Sequence[str], name: str) -> str:
-    """A place, behind the letters before its numbers; or what stands there always."""
-    return f"{_shared(column)}{{{name}}}" if name else column[0]
 
 
 def channels_of(first: Sequence[str], second: Sequence[str]) -> tuple[str, str, str] | None:

@@ -5,6 +5,8 @@ from collections.abc import Iterable, Sequence
 from datetime import datetime
 from typing import NamedTuple
 
+from rig.intake.edited import with_hyphens
+
 _PLAIN = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 # Fortran writes doubles with D, and always with a point: without one it is a name, such as 3D2.
 _DOUBLE = re.compile(r"[+-]?(\d+[.,]\d*|[.,]\d+)[dD][+-]?\d+")
@@ -23,17 +25,27 @@ HOURS = (
 
 
 class Notation(NamedTuple):
-    """The decimal sign, the sign that parts thousands, a cell of which that is not certain, the letter of exponents."""
+    """The decimal sign, the sign that parts thousands, the letter of exponents.
+
+    ``unsure`` is a cell of which the signs are not certain, ``minus`` one whose minus is no hyphen.
+    """
 
     decimal: str
     thousands: str
     unsure: str = ""
     exponent: str = "E"
+    minus: str = ""
 
 
 def is_number(cell: str) -> bool:
     """Whether the cell is a number in any notation."""
+    cell = hyphened(cell)
     return bool(_PLAIN.fullmatch(cell) or _GROUPED.fullmatch(cell) or _DOUBLE.fullmatch(cell))
+
+
+def hyphened(cell: str) -> str:
+    """The cell with a hyphen for its minus."""
+    return cell if cell.isascii() else with_hyphens(cell.encode()).decode()
 
 
 def is_stamp(cell: str) -> bool:
@@ -43,9 +55,10 @@ def is_stamp(cell: str) -> bool:
 
 def notation_of(cells: Iterable[str]) -> Notation:
     """What all the cells together say."""
-    numbers = [cell for cell in cells if is_number(cell)]
-    found = _signs_of(numbers)
-    return found._replace(exponent="D") if any(map(_DOUBLE.fullmatch, numbers)) else found
+    written = [cell for cell in cells if is_number(cell)]
+    numbers = list(map(hyphened, written))
+    minus = next((cell for cell, plain in zip(written, numbers, strict=True) if cell != plain), "")
+    return _signs_of(numbers)._replace(exponent="D" if any(map(_DOUBLE.fullmatch, numbers)) else "E", minus=minus)
 
 
 def _signs_of(numbers: Sequence[str]) -> Notation:

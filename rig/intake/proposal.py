@@ -55,16 +55,14 @@ class Proposal:
         """The same with an answer to each question; raises UsageError where one is none."""
         for question, said in zip(self.questions, answers, strict=True):
             question.answer(self.tree, said)
-        turning = [table for table in self.tree["tables"] if _turns(table)]
+        units = [
+            (table, name, own.get("unit")) for table in self.tree["tables"] for name, own in table["columns"].items()
+        ]
+        turning = [table for table, name, unit in units if unit in ROTARY.get(name, {})]
         for table in turning:
             table["lever_mm"] = LEVER_MM
         said = f"a torque and an angle are taken at a lever of {LEVER_MM:g} mm; state lever_mm where it is another"
         return replace(self, questions=(), doubts=(*self.doubts, *([said] if turning else [])))
-
-
-def _turns(table: TomlTable) -> bool:
-    units = {quantity: column.get("unit", "") for quantity, column in table["columns"].items()}
-    return any(unit in ROTARY.get(quantity, {}) for quantity, unit in units.items())
 
 
 def propose(folder: Path) -> Proposal:
@@ -108,7 +106,8 @@ def _picked(folder: Path, groups: Sequence[Group]) -> tuple[Picked, TomlTable]:
     if pair:
         return pair
     if both:
-        timed = [item for item in both if _is_timed(item[0][0])] or both
+        clocks = [clock_of(group[0]) for group, _ in both]
+        timed = [item for item, (time, _, asked) in zip(both, clocks, strict=True) if time and not asked] or both
         return [({}, group, _quantities(found)) for group, found in timed], {}
     most = max((len(found) for _, found in known), default=0)
     asked = [(group, found) for group, found in known if len(found) == most and _may_be(group[0], found)]
@@ -160,11 +159,6 @@ def _quantities(found: Mapping[str, int]) -> tuple[str, ...]:
     return ("force", "velocity" if "velocity" in found else "position")
 
 
-def _is_timed(table: ColumnGroup) -> bool:
-    time, _, asked = clock_of(table)
-    return bool(time) and not asked
-
-
 def _may_be(table: ColumnGroup, found: Mapping[str, int]) -> bool:
     """Whether numbers move in enough columns besides time to be force and position, in rows enough to see it."""
     time = _number(table, clock_of(table)[0])
@@ -182,8 +176,10 @@ def _proposed(
     at = None if {"wraps_at", "finer"} & time.keys() else _number(first, time)
     measured = measured_in(first, _number(first, time), quantities)
     files, templates = (pattern["files"], {}) if "files" in pattern else _files(folder, group)
+    forms = [own.layout.form for own in group]
     table: TomlTable = {
-        "files": files, **_sheets(group), **pattern, **first.layout.form, **_interrupted(group), **_missing(group),
+        "files": files, **_sheets(group), **pattern, **first.layout.form,
+        **{key: form[key] for form in forms for key in INTERRUPTED if key in form}, **_missing(group),
     }  # fmt: skip
     taken = [number for number in (_number(first, time), *chosen(first).values()) if number is not None]
     labels = labels_in(first, taken, at)
@@ -216,11 +212,6 @@ def _apart(group: Group, labels: Labels) -> TomlTable:
 
 def _number(table: ColumnGroup, time: TomlTable) -> int | None:
     return table.layout.sheet.number(time["column"]) if "column" in time else None
-
-
-def _interrupted(group: Group) -> TomlTable:
-    """The keys for lines that are no rows, where any of the tables has them."""
-    return {key: form[key] for form in (table.layout.form for table in group) for key in INTERRUPTED if key in form}
 
 
 def _broken(group: Group) -> Iterator[str]:

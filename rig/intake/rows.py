@@ -132,26 +132,19 @@ def _values(found: Mapping[str, Column], sheet: Sheet, form: FileForm) -> tuple[
     """Every quantity in the project's unit; a number at the end of its range is NaN, and counted."""
     values, saturated = dict[str, Numbers](), np.zeros(len(next(iter(found.values()))), bool)
     for quantity, column in form.columns.items():
-        raw = _present(np.asarray(found[quantity], np.float64), form)
-        full = _saturated(raw, column)
+        raw = np.asarray(found[quantity], np.float64)
+        raw = np.where(np.isin(raw, form.missing_numbers), math.nan, raw) if form.missing_numbers else raw
+        low, high = column.saturates or (math.nan, math.nan)
+        full = (raw <= low) | (raw >= high)
         values[quantity] = np.where(full, math.nan, _converted(raw, quantity, column, sheet, form.lever_mm))
         saturated |= full
     return values, saturated
 
 
-def _present(raw: Numbers, form: FileForm) -> Numbers:
-    """NaN where a number stands for none."""
-    return np.where(np.isin(raw, form.missing_numbers), math.nan, raw) if form.missing_numbers else raw
-
-
-def _saturated(raw: Numbers, column: ValueColumn) -> NDArray[np.bool_]:
-    low, high = column.saturates or (-math.inf, math.inf)
-    return (raw <= low) | (raw >= high) if column.saturates else np.zeros(raw.size, bool)
-
-
 def _converted(raw: Numbers, quantity: str, column: ValueColumn, sheet: Sheet, lever_mm: float | None) -> Numbers:
     if column.sign_bit is not None:
-        raw = _signed(raw, column.sign_bit)
+        weight = 2.0**column.sign_bit
+        raw = np.where(raw >= weight, weight - raw, raw)
     if column.bits is not None:
         raw = np.where(raw >= 2.0 ** (column.bits - 1), raw - 2.0**column.bits, raw)
     if quantity in UNITLESS:
@@ -169,12 +162,6 @@ def _scale(quantity: str, column: ValueColumn, sheet: Sheet, lever_mm: float | N
         return factor_of(quantity, unit, lever_mm)
     except DataError as error:
         raise DataError(f"{sheet.where}: column {sheet.header[number]!r}: {error}; or state a scale") from error
-
-
-def _signed(raw: Numbers, bit: int) -> Numbers:
-    """Numbers whose sign stands in ``bit``; what is missing stays so."""
-    weight = float(1 << bit)
-    return np.where(raw >= weight, weight - raw, raw)
 
 
 def stream_rows(piece: Piece, before: Mapping[str, NDArray[np.void]]) -> dict[str, NDArray[np.void]]:

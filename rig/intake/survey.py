@@ -144,11 +144,8 @@ def wraps_at(values: Numbers) -> float:
     on, back = steps[steps > 0], steps[steps < 0]
     if not on.size or not back.size or values.min() < 0:
         return 0.0
-    return next((end for end in WRAPS if values.max() < end and _as_long(back + end, on)), 0.0)
-
-
-def _as_long(steps: Numbers, others: Numbers) -> bool:
-    return bool(steps.min() > 0 and steps.max() <= 1.5 * others.max())
+    fitting = (end for end in WRAPS if values.max() < end and (back + end).min() > 0)
+    return next((end for end in fitting if (back + end).max() <= 1.5 * on.max()), 0.0)
 
 
 def sign_of(values: Numbers) -> dict[str, int]:

@@ -6,9 +6,9 @@ import gzip
 import io
 import re
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from itertools import islice, pairwise, takewhile, zip_longest
+from itertools import islice, pairwise, zip_longest
 from pathlib import Path
 from typing import IO, NamedTuple, cast
 
@@ -20,18 +20,21 @@ from numpy.typing import NDArray
 
 from rig.errors import DataError
 from rig.intake.cells import COMMENT, Affixed, above_columns, affixed, bare, begins_another, cells_of, is_other
-from rig.intake.edited import EditedLines, joined, loosened, single_blanks, with_exponents
+from rig.intake.edited import EditedLines, joined, loosened, plain_numbers, single_blanks
 from rig.intake.headings import stated_unit
 from rig.intake.mapping import FileForm
-from rig.intake.notation import GROUPS, is_number, is_stamp
+from rig.intake.notation import GROUPS, hyphened, is_number, is_stamp
+from rig.intake.roles import words_of
 from rig.intake.sheet import DAMAGE, Batch, Column, Sheet, Source, facts_in, unreadable
-from rig.intake.units import unit_in
+from rig.intake.units import unit_in, unit_of
 from rig.intake.workbook import sheet_text
 
 # Read at a time; Arrow reads some 32 of these ahead, so 16 MiB would be half a gigabyte of memory.
 BLOCK_BYTES = 1 << 22
 Kinds = Mapping[int, bool]  # of the columns that are read, whether they are text
 BLANK_CELLS = b" \t\r\n,;"
+# A line that begins with one of these is a row, where it has as many cells as the first and that begins with a number.
+NUMBER_BEGINS = b"0123456789+-.,"
 _SECTION = re.compile(r'"?\[?([^\W\d_][\w .-]*)\]?"?[\s,;]*')
 _UTF8 = ("utf-8", "utf8", "utf-8-sig", "ascii")
 
@@ -45,13 +48,14 @@ class FilePart(NamedTuple):
 
 
 class Head(NamedTuple):
-    """What stands above a table, its first row with marks, its line from 0, names of columns, about how many rows."""
+    """What stands above a table, its first row with marks, its line from 0, columns' names and units, how many rows."""
 
     above: list[list[str]]
     first: list[str]
     marks: list[Affixed]
     start: int
     names: tuple[str, ...]
+    units: tuple[str, ...]
     rows: int
 
 
@@ -97,12 +101,6 @@ def section_name(line: str) -> str:
 
 def _open(source: Source, form: FileForm, part: FilePart) -> Sheet:
     head = head_of(source, form, part)
-    below = _row(head.above, form.unit_row, len(head.names)) if form.unit_row else [""] * len(head.names)
-    behind = [*(mark.unit for mark in head.marks), *[""] * len(head.names)]
-    units = tuple(
-        stated_unit(name, unit_in(unit) or unit_in(own)) or ""
-        for unit, own, name in zip(below, behind, head.names, strict=False)
-    )
 
     def read(columns: Mapping[int, bool]) -> Iterator[Batch]:
         return _batches(source, form, part, head, columns)
@@ -114,7 +112,7 @@ def _open(source: Source, form: FileForm, part: FilePart) -> Sheet:
     if form.section and is_number("".join(head.above[0])):  # as Vicon has it
         stated |= {"sampling rate (Hz)": "".join(head.above[0])}
     return Sheet(
-        source.path, name, head.names, units, read, stated, head.start + 1,
+        source.path, name, head.names, head.units, read, stated, head.start + 1,
         "column" if form.across else kind, rows=head.rows,
     )  # fmt: skip
 
@@ -140,8 +138,14 @@ def head_of(source: Source, form: FileForm, part: FilePart) -> Head:
         ("" if is_stamp(name) else name.strip()) or own or str(number)
         for number, (name, own) in enumerate(zip(header, given, strict=False), 1)
     )
+    below = _row(above, form.unit_row, len(names)) if form.unit_row else [""] * len(names)
+    behind = [*(mark.unit for mark in marks), *[""] * len(names)]
+    units = tuple(
+        stated_unit(name, unit_in(unit) or unit_in(own)) or ""
+        for unit, own, name in zip(below, behind, names, strict=False)
+    )
     rows = 0 if source.sheet else _size(source.path) // len(raw[-1])
-    return Head(above, bare(first, marks) if marks else first, marks, part.start + start, names, rows)
+    return Head(above, bare(first, marks) if marks else first, marks, part.start + start, names, units, rows)
 
 
 def open_utf8(path: Path, encoding: str) -> IO[bytes]:
@@ -211,37 +215,54 @@ def _batches(source: Source, form: FileForm, part: FilePart, head: Head, columns
     texts = {number: text or bool(form.thousands) for number, text in columns.items()}
     with lines_in(source, form) as file:
         try:
-            for batch in _arrow(_rows(file, form, part, head), form, head.names, texts):
+            for batch in _arrow(_rows(file, source, form, part, head), form, head.names, texts):
                 yield [_column(batch.column(at), columns[number], form) for at, number in enumerate(columns)]
         except (pa.ArrowInvalid, *DAMAGE) as error:
             _explain(source, form, part, head, columns)
             raise unreadable(source.path, "text in columns", error) from error
 
 
-def _rows(file: IO[bytes], form: FileForm, part: FilePart, head: Head) -> IO[bytes] | EditedLines:
+def _rows(file: IO[bytes], source: Source, form: FileForm, part: FilePart, head: Head) -> IO[bytes] | EditedLines:
     """The lines of the table, as Arrow and csv read them; nothing is put between where they stand so in the file."""
     for _ in islice(file, head.start):
         pass
     edit = _edit(form, head)
     if edit is None and part.end is None:
         return file
-    return EditedLines(_until(file, part, head, form), edit or bytes)
+    return EditedLines(_until(file, source, part, head, form), edit or bytes)
 
 
-def _until(file: Iterable[bytes], part: FilePart, head: Head, form: FileForm) -> Iterator[bytes]:
+def _until(file: Iterable[bytes], source: Source, part: FilePart, head: Head, form: FileForm) -> Iterator[bytes]:
     """The lines of the part; where others are left out, those above one that begins another table."""
-    lines = islice(file, None if part.end is None else part.end - head.start)
-    if form.other_lines == "refuse" or form.affixes:
-        return lines
-    ends = partial(begins_another, delimiter=form.delimiter, names=head.names)
-    return takewhile(lambda line: not ends(line.decode(errors="replace")), lines)
+    is_left_out = form.other_lines == "drop" and not form.affixes
+    for number, line in enumerate(islice(file, None if part.end is None else part.end - head.start), head.start + 1):
+        if is_left_out and line[:1] not in NUMBER_BEGINS:
+            text = line.decode(errors="replace")
+            refuse_units(source.line(number), cells_of(text, form.delimiter), head.names, head.units)
+            if begins_another(text, form.delimiter, head.names):
+                return
+        yield line
+
+
+def refuse_units(place: str, cells: Sequence[str], names: Sequence[str], units: Sequence[str]) -> None:
+    """Raises DataError where cells are units, or the names with units, and one of these is another than above."""
+    own = ["" if is_number(cell) else unit_in(cell) for cell in cells]
+    columns = list(zip(own, cells, names, units, strict=False))
+    alike = (unit or not cell or words_of(cell)[:1] == words_of(name)[:1] for unit, cell, name, _ in columns)
+    if len(cells) != len(names) or not all(alike):
+        return
+    for unit, cell, name, above in columns:
+        said = unit or unit_of(cell)
+        if said and above and said != above:
+            why = f"{name!r} is in {said} from here on and in {above} above"
+            raise DataError(f"{place}: {why}; save what stands from here on as a file of its own")
 
 
 def _edit(form: FileForm, head: Head) -> Callable[[bytes], bytes] | None:
     edit = single_blanks if form.delimiter == " " else None
     if form.affixes or form.other_lines == "drop":
         edit = partial(_edited, form=form, head=head)
-    return partial(with_exponents, edit=edit) if form.exponent == "D" else edit
+    return partial(plain_numbers, edit=edit) if form.exponent == "D" or form.minus != "-" else edit
 
 
 def _edited(line: bytes, form: FileForm, head: Head) -> bytes:
@@ -302,6 +323,7 @@ def _explain(source: Source, form: FileForm, part: FilePart, head: Head, columns
     """Raises the sentence for the first line that is not of the form."""
     for line, cells in _lines(source, form, part, head):
         place = source.line(line)
+        refuse_units(place, cells, head.names, head.units)
         if len(cells) != len(head.names) and is_other([cell.strip() for cell in cells], head.first):
             said = " ".join(filter(None, cells))[:40]
             raise DataError(f"{place}: {said!r} is no row of the table; to leave such lines out, say {_LEFT_OUT}")
@@ -323,7 +345,7 @@ def _lines(source: Source, form: FileForm, part: FilePart, head: Head) -> Iterat
             pass
         edit = _edit(form, head) or bytes
         try:
-            rows = (edit(line).decode() for line in _until(file, part, head, form))
+            rows = (edit(line).decode() for line in _until(file, source, part, head, form))
             reader = csv.reader(rows, delimiter=form.delimiter)
             yield from ((head.start + reader.line_num, cells) for cells in reader if cells)
         except (UnicodeDecodeError, csv.Error, *DAMAGE) as error:
@@ -348,6 +370,8 @@ def _pointed(text: str, form: FileForm) -> str:
 
 
 def _hint(text: str, form: FileForm) -> str:
+    if hyphened(text) != text:
+        return "; if its sign is a minus, state it: minus = '\u2212'"
     digits = text.lstrip("+-")
     if digits.replace(",", "").replace(".", "").isdigit() and digits.count(",") + digits.count(".") > 1:
         return "; if digits are parted in thousands, state it: thousands = ',' (or '.', with decimal = ',')"

@@ -135,7 +135,8 @@ def _of_numbers(table: ColumnGroup, place: str | int, unit: str, looks: Looks) -
     """Times that are numbers."""
     if not looks.rises or (_rows_a_stamp(table) and (np.diff(looks.known) < 0).any()):
         return None
-    if kind_of(table.path) == "workbook" and _are_days(looks):
+    first, last = looks.known.min(), looks.known.max()
+    if kind_of(table.path) == "workbook" and DAYS[0] < first and last < DAYS[1] and last - first < 100:
         return {"column": place, "form": "spreadsheet"}, [], []
     if unit in TIME_NS:
         return {"column": place, "unit": unit}, [], []
@@ -159,11 +160,6 @@ def _of_texts(table: ColumnGroup, place: str | int, texts: Sequence[str]) -> Sai
     others = [pattern for pattern in patterns[1:] if "%d" in pattern]
     said = f"{table.path.name}: {texts[0]!r} is read as {patterns[0]}; it may be {', '.join(others)}"
     return {"column": place, "form": patterns[0]}, [said] if others else [], []
-
-
-def _are_days(looks: Looks) -> bool:
-    low, high = DAYS
-    return bool(low < looks.known.min() and looks.known.max() < high and looks.known.max() - looks.known.min() < 100)
 
 
 def _without_unit(table: ColumnGroup, place: str | int, looks: Looks) -> SaidTime:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.channels import AXIS, BY_NAME, FORCE, Stream
+from rig.channels import AXIS, BY_NAME, FORCE
 from rig.errors import DataError
 from rig.intake.folder import FoundTable
 from rig.intake.rows import FIELDS, Piece, stream_rows
@@ -95,12 +95,9 @@ class OpenRecording:
         if sum(self.info.samples.values()) > LONGEST_ROWS:
             return None
         metadata = {name: dict(values) for name, values in {**self._metadata, SUMMARY: summary}.items()}
-        tables = {stream.name: self._table(stream) for stream in NUMERIC}
+        parts = {own.name: self._rows.get(own.name, [np.zeros(0, own.dtype)]) for own in NUMERIC}
+        tables = {name: own[0] if len(own) == 1 else np.concatenate(own) for name, own in parts.items()}
         return Recording(self._writer.path, metadata, tables, (), complete=True, damage=())
-
-    def _table(self, stream: Stream) -> NDArray[np.void]:
-        parts = self._rows.get(stream.name, [np.zeros(0, stream.dtype)])
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def _remarks(self) -> list[str]:
         counts = {

@@ -58,12 +58,9 @@ def _over_time(box: Box, about: RecordingIn, trace: RecordingTrace) -> list[str]
     panel.line(points.time_s, value, LINE)
     panel.dots(trace.at_end.time_s, trace.at_end.force_N, MODEL)
     look = f'fill="{MODEL if about.quality == "bad" else INK}" font-weight="bold" font-size="{SMALL_PT}"'
-    return [*panel.parts, words(f"{_short(about.name)}: {about.quality}", (box.left, box.top - APART_PT), look=look)]
-
-
-def _short(name: str) -> str:
-    half = NAME_LETTERS // 2
-    return name if len(name) <= NAME_LETTERS else f"{name[: half - 1]}…{name[-half:]}"
+    half, name = NAME_LETTERS // 2, about.name
+    name = name if len(name) <= NAME_LETTERS else f"{name[: half - 1]}…{name[-half:]}"
+    return [*panel.parts, words(f"{name}: {about.quality}", (box.left, box.top - APART_PT), look=look)]
 
 
 def _over_depth(box: Box, about: RecordingIn, trace: RecordingTrace) -> list[str]:

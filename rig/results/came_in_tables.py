@@ -96,22 +96,13 @@ def _said(recording: RecordingIn) -> Iterator[tuple[str, str]]:
 
 def stream_table(result: CameInResult) -> TextTable:
     """One row a stream of a recording."""
-    rows = [
-        [recording.name, f"{stream.stream} ({stream.unit})", *_stream_cells(stream), stream.noise_from, _full(stream)]
-        for recording in result.recordings
-        for stream in recording.streams
-    ]
+    forms, rows = [text.partition(":") for text in STREAMS.values()], list[list[str]]()
+    for recording, stream in ((one, stream) for one in result.recordings for stream in one.streams):
+        cells = [render(getattr(stream, name), form) for name, _, form in forms]
+        ends = ", ".join(f"{end:g}" for end in stream.saturated_at)
+        full = f"{100 * stream.saturated:.2g} at {ends}" if ends else "0"
+        rows.append([recording.name, f"{stream.stream} ({stream.unit})", *cells, stream.noise_from, full])
     return TextTable("", ["recording", "stream", *STREAMS, "noise from", "full (%)"], rows, words=2)
-
-
-def _stream_cells(stream: StreamIn) -> list[str]:
-    forms = (text.partition(":") for text in STREAMS.values())
-    return [render(getattr(stream, name), form) for name, _, form in forms]
-
-
-def _full(stream: StreamIn) -> str:
-    ends = ", ".join(f"{end:g}" for end in stream.saturated_at)
-    return f"{100 * stream.saturated:.2g} at {ends}" if ends else "0"
 
 
 def as_csv(result: CameInResult) -> str:

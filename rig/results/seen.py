@@ -55,7 +55,8 @@ def see(recording: Recording) -> Seen:
     force = next((one for one in raw if one.name == "force"), None)
     rests = [_rests(one, axis) for one in raw]
     drawn = _drawn(force, axis)
-    full = np.zeros(0, bool) if force is None else _full(*drawn[1:])
+    place_mm = drawn[2] if np.isfinite(drawn[2]).any() else None
+    full = np.zeros(0, bool) if force is None else at_the_end_of_range(drawn[1], place_mm)
     return Seen(
         streams=tuple(_numbers(*one, left_out.get(one[0].name, 0), full) for one in zip(raw, rests, strict=True)),
         inputs=tuple(_numbers(one, Rests(np.zeros(0), np.zeros(0)), 0, full) for one in channels_in(recording)),
@@ -137,11 +138,6 @@ def _drawn(force: ChannelIn | None, axis: ChannelIn | None) -> tuple[Array, Arra
     if axis is not None and axis.sound.any():
         place_mm = np.interp(time_s, axis.time_s[axis.sound], axis.value[axis.sound])
     return time_s, np.full(len(time_s), np.nan) if force is None else force.value[force.sound], place_mm
-
-
-def _full(force_N: Array, place_mm: Array) -> NDArray[np.bool_]:
-    """Which samples of force stand at the end of its range, shape (n,)."""
-    return at_the_end_of_range(force_N, place_mm if np.isfinite(place_mm).any() else None)
 
 
 def _numbers(raw: ChannelIn, rests: Rests, left_out: int, of_force: NDArray[np.bool_]) -> StreamIn:

@@ -165,6 +165,21 @@ def study_curves(
     return Study(session, tuple(curves), tuple(skipped), force_N, judged, closest, rate_of(curves))
 
 
+def refuse_at_bounds(study: Study, law: str) -> None:
+    """Raises DataError where a parameter of the law stands at a bound: other than 0, no tissue has it.
+
+    At 0 an effect is absent, and a number without unit (an exponent of 1) may well be what its bound is.
+    """
+    fit = study.judged[law].fit
+    pushed = (p for p in fit.law.parameters if p.name in fit.at_bounds and p.value and p.unit != "1")
+    for p in pushed:
+        raise DataError(
+            f"{study.session}: these curves tell no stiffness: fitting {fit.law.formula} pushed {p.name} to its bound, "
+            f"{p.value:.3g} {p.unit}; look at the recordings in `rig report`, choose some with --only, or fit another "
+            "law with --model"
+        )
+
+
 def _known(law: type[Law], known: Known) -> Known:
     return {name: value for name, value in known.items() if name in law.bounds}
 

@@ -128,16 +128,13 @@ def import_files(
             see(info, recording)
 
     session = import_folder(place, mapping, out, now, tell, judge)
-    trials = tuple(_with_verdict(info, verdicts.get(info.name)) for info in session.trials)
+    found = [(info, verdicts.get(info.name)) for info in session.trials]
+    trials = tuple(replace(info, quality=own.verdict, reasons=own.reasons) if own else info for info, own in found)
     info = replace(session.info, trials=trials)
     write_session(out, info)
     long = [trial.name for trial in trials if trial.name not in verdicts]
     unjudged = f"what is stated of {', '.join(long)} was not held against its motion: above {LONGEST_ROWS} rows"
     return replace(session, info=info, remarks=(*session.remarks, *_remarks(trials), *([unjudged] if long else [])))
-
-
-def _with_verdict(info: TrialInfo, found: TrialQuality | None) -> TrialInfo:
-    return info if found is None else replace(info, quality=found.verdict, reasons=found.reasons)
 
 
 def _remarks(trials: Sequence[TrialInfo]) -> list[str]:

@@ -106,18 +106,14 @@ def _loading_of(trial: Trial) -> WayIn | None:
     most = int(np.argmax(risen_N))
     sense = -1 if cycle.position_mm[most] < cycle.position_mm[0] else 1
     place_mm = sense * cycle.position_mm
-    start = _start(place_mm[: most + 1])
+    way_mm = way_back(place_mm[: most + 1], TURN_SHARE * float(np.ptp(place_mm[: most + 1])))
+    start = most - int(np.argmin(way_mm))  # of the last way in
     unclear = np.flatnonzero(risen_N[start : most + 1] <= CLEAR_SHARE * risen_N[most])
     clear = start + (int(unclear[-1]) + 1 if len(unclear) else 0)
     most_of_it = place_mm[most] - place_mm[clear] > STEP_SHARE * (place_mm[most] - place_mm[start])
     first = clear if most - clear >= FEWEST_STEPS and most_of_it else start
     speeds = _speeds(cycle.time_s[first : most + 1], place_mm[first : most + 1])
     return WayIn(sense, *speeds, float(place_mm.min()), float(place_mm[clear]), float(place_mm.max()))
-
-
-def _start(place_mm: Array) -> int:
-    """The sample at which the last way in begins."""
-    return len(place_mm) - 1 - int(np.argmin(way_back(place_mm, TURN_SHARE * float(np.ptp(place_mm)))))
 
 
 def _speeds(time_s: Array, position_mm: Array) -> tuple[float, float]:

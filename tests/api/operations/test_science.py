@@ -14,9 +14,10 @@ from controller.operation import Cancelled, Operation, Progress
 from mock_devices.testing.models import index_model
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring
-from rig.errors import UsageError
+from rig.errors import DataError, UsageError
 from rig.results.fit import FitResult
 from rig.tissue.registry import law_named
+from tests.rig.intake.test_real_folders import imported
 from tests.rig.tissue.synthetic import Bench, write_made_session
 
 LAWS = Laws(compared=(law_named("constant"), law_named("index")))
@@ -48,6 +49,14 @@ def test_a_fit_tells_each_law_and_returns_what_it_saved(session: Path, tmp_path:
     ]  # fmt: skip
     assert found == FitResult.read(tmp_path / "fit.json")
     assert operation.progress.result is found
+
+
+def test_a_fit_that_a_bound_stopped_is_refused_and_writes_nothing(tmp_path: Path) -> None:
+    """A joint's torque over its angle: the recordings of an arm, where they are at hand."""
+    place = imported("franka_joint", tmp_path).place
+    with pytest.raises(DataError, match=r"tell no stiffness: fitting F = .* pushed a_N_mm to its bound, 1e-06 N/mm"):
+        fit_operation().run(lambda: fit(fit_operation(), [place], tmp_path / "out", LAWS))
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_fit_that_is_cancelled_writes_nothing(session: Path, tmp_path: Path) -> None:

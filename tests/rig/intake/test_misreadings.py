@@ -150,3 +150,61 @@ def test_an_abbreviated_inch_is_one(folder: Path) -> None:
     rows = lines("{:.3f}\t{:.6f}\t{:.8f}", TIME_S, FORCE_N, WAY_MM / 25.4)
     text("Time(sec.)\tLoad(N)\tExtension(in.)\n", rows, "a.txt")(folder)
     assert came_in(folder).recording("a").tables["axis"]["position_mm"] == pytest.approx(WAY_MM, abs=1e-4)
+
+
+MINUSES = "\u2212\u2013\uff0d"
+
+
+@pytest.mark.parametrize("minus", MINUSES)
+@pytest.mark.parametrize("head", ["Time (s),Force (N),Position (mm)\n", "Zeit [s];Kraft [N];Weg [mm]\n"])
+def test_a_minus_that_is_no_hyphen_is_read_as_one_and_said(folder: Path, minus: str, head: str) -> None:
+    rows = "".join(f"{t:.2f},{-1 - f:.4f},{w:.4f}\n" for t, w, f in ROWS).replace("-", minus)
+    text(head, rows if "," in head else rows.replace(",", ";").replace(".", ","))(folder)
+    (said,) = [doubt for doubt in propose(folder).doubts if "is read as a minus" in doubt]
+    assert f"a.csv: '{minus}" in said
+    session = came_in(folder)
+    found = session.recording("a").tables["force"]
+    assert found["valid"].all()
+    # Turned round, since a force that falls is taken for tension.
+    assert found["fz_N"] == pytest.approx(1 + FORCE_N, abs=1e-4)
+
+
+def test_a_minus_that_the_mapping_does_not_know_is_named_with_its_key(folder: Path) -> None:
+    text("Zeit [s];Kraft [mN];Weg [um]\n", "0;1;2\n1;\u22122;3\n2;5;6\n")(folder)
+    with pytest.raises(DataError, match=r"line 3, column Kraft \[mN\]: .* if its sign is a minus, state it: minus = "):
+        mapped(folder)
+    mapped(folder, minus="\u2212")
+
+
+ROWS_IN_N = "".join(f"{t:.2f},{f:.5f},{w:.5f}\n" for t, w, f in ROWS[:30])
+ROWS_IN_MN = "".join(f"{t:.2f},{1e3 * f:.5f},{w:.5f}\n" for t, w, f in ROWS[30:])
+PLAIN, UNITS = "Time,Force,Position\n", "s,N,mm\n"
+
+
+@pytest.mark.parametrize(
+    ("above", "between", "line"),
+    [
+        (PLAIN + UNITS, UNITS.replace("N", "mN"), 33),
+        (PLAIN + UNITS, "\n" + PLAIN + UNITS.replace("N", "mN"), 36),
+        ("Time [s],Force [N],Position [mm]\n", "Time [s],Force [mN],Position [mm]\n", 32),
+    ],
+)
+def test_a_unit_that_changes_further_down_is_refused_with_both(
+    folder: Path, above: str, between: str, line: int
+) -> None:
+    text(above, ROWS_IN_N + between + ROWS_IN_MN)(folder)
+    with pytest.raises(DataError, match=rf"line {line}: 'Force.*' is in mN from here on and in N above; save what"):
+        propose(folder)
+
+
+def test_a_unit_that_changes_is_refused_where_the_mapping_leaves_other_lines_out(folder: Path) -> None:
+    text("Zeit [s];Kraft [mN];Weg [um]\n", "0;1;2\n1;2;3\n s ;N;um\n2;5;6\n")(folder)
+    for more in ({"other_lines": "drop"}, {}):
+        with pytest.raises(DataError, match=r"line 4: 'Kraft \[mN\]' is in N from here on and in mN above"):
+            mapped(folder, **more)
+
+
+def test_the_same_units_further_down_are_left_out_as_any_other_line(folder: Path) -> None:
+    rows = "".join(f"{t:.2f},{f:.5f},{w:.5f}\n" for t, w, f in ROWS[30:])
+    text(PLAIN + UNITS, ROWS_IN_N + UNITS + rows)(folder)
+    assert came_in(folder).recording("a").tables["force"]["fz_N"] == pytest.approx(FORCE_N, abs=1e-4)

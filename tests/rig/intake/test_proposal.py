@@ -94,6 +94,39 @@ def test_two_columns_of_one_kind_are_a_doubt(tmp_path: Path) -> None:
     assert "a.csv: position is taken to be 'extension_mm'; it may be 'gap_mm'" in proposal.doubts
 
 
+def gels(second: str, share: float) -> str:
+    """Two forces under one motion, the second of them another one by its square."""
+    rows = [(t, force, share * force * force, way) for t, force, way in ROWS]
+    return table_of(f"t_s,Force gel A (N),{second},depth_mm", rows)
+
+
+def test_two_forces_under_one_motion_are_asked_with_the_line_that_names_one(tmp_path: Path) -> None:
+    proposal = propose(write(tmp_path / "in", {"a.csv": gels("Force gel B (N)", 0.05)}))
+    (question,) = proposal.questions
+    assert "2 forces under one motion: Force gel A (N) (N, 0 to 14, moves); Force gel B (N)" in question.text
+    assert question.usual == "Force gel A (N)"
+    assert question.line == 'columns.force = { column = "Force gel A (N)", unit = "N", positive = "compression" }'
+    answered = [propose(tmp_path / "in").answered([f"Force gel {name} (N)"]) for name in "BA"]
+    sessions = [session_of(own, tmp_path / "in", tmp_path / str(at)) for at, own in enumerate(answered)]
+    largest_N = [float(session.recording("a").tables["force"]["fz_N"].max()) for session in sessions]
+    assert largest_N == pytest.approx([9.8, 14.0])
+
+
+@pytest.mark.parametrize(
+    ("second", "share"), [("Force gel B (N)", 0.005), ("Force peak (N)", 0.05), ("Force gel B (V)", 0.05)]
+)
+def test_a_force_that_hardly_moves_or_is_less_likely_one_is_not_asked_for(
+    tmp_path: Path, second: str, share: float
+) -> None:
+    assert not propose(write(tmp_path / "in", {"a.csv": gels(second, share)})).questions
+
+
+@pytest.mark.parametrize("names", ["Force (N),Force (mN)", "force.x (N),force.y (N)"])
+def test_a_force_in_another_unit_and_directions_of_one_are_not_asked_for(tmp_path: Path, names: str) -> None:
+    rows = [(t, force, force * (1e3 if "mN" in names else 0.5), way) for t, force, way in ROWS]
+    assert not propose(write(tmp_path / "in", {"a.csv": table_of(f"t_s,{names},depth_mm", rows)})).questions
+
+
 def test_of_a_workbook_with_ten_sheets_the_two_with_data_are_taken(tmp_path: Path) -> None:
     book = openpyxl.Workbook()
     for number in range(10):

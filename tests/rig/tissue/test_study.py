@@ -21,7 +21,17 @@ from rig.results.study import fit_result
 from rig.tissue.laws_viscous import QuasiLinear
 from rig.tissue.model import load_model
 from rig.tissue.registry import COMPARED
-from rig.tissue.study import Study, curves_in, fingerprint, model_of, rows, study_curves, study_session, study_sessions
+from rig.tissue.study import (
+    Study,
+    curves_in,
+    fingerprint,
+    model_of,
+    refuse_at_bounds,
+    rows,
+    study_curves,
+    study_session,
+    study_sessions,
+)
 from rig.tissue.summary import Skipped
 from rig.trials.cycles import IndentationCycle
 from rig.trials.reading import trials_of
@@ -232,6 +242,29 @@ def test_a_session_without_a_usable_trial_is_refused_with_the_first_reason(tmp_p
     session = open_session(write_made_session(tmp_path / "air", [air]))
     with pytest.raises(DataError, match=r"no trial gives a curve \(1 skipped\); first: trial_003: no contact"):
         study_session(session)
+
+
+@pytest.mark.parametrize(
+    ("pushed", "refused"),
+    [
+        ({"a_N_mm": 1e-6}, "a_N_mm to its bound, 1e-06 N/mm"),
+        ({"b_per_mm": 5.0}, "b_per_mm to its bound, 5 1/mm"),
+        ({"damping_N_s_mm": 10.0}, "damping_N_s_mm to its bound, 10 N s/mm"),
+        ({"b_per_mm": 0.0, "damping_N_s_mm": 0.0}, ""),
+    ],
+)
+def test_a_fit_that_a_bound_stopped_tells_nothing_unless_an_effect_is_absent(
+    study: Study, pushed: dict[str, float], refused: str
+) -> None:
+    fit = study.judged["index"].fit
+    stopped = replace(study.judged["index"], fit=replace(fit, law=replace(fit.law, **pushed)))
+    other = replace(study, judged={**study.judged, "index": stopped})
+    refuse_at_bounds(other, "constant")
+    if refused:
+        with pytest.raises(DataError, match=f"these curves tell no stiffness: .* pushed {refused}; look at"):
+            refuse_at_bounds(other, "index")
+    else:
+        refuse_at_bounds(other, "index")
 
 
 def test_a_recording_that_was_never_finished_still_counts(tmp_path: Path) -> None:
