@@ -6,7 +6,7 @@ READY := $(VENV)/ready
 # Modules are compiled once, not by each of the processes that a bench is made of.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo page test test-page test-documents test-campaigns test-extras test-one-extra check metrics docs package wheels mutants mutants-sample lock clean
+.PHONY: demo page test test-page test-documents test-campaigns test-extras test-one-extra campaigns types contracts check metrics docs package wheels mutants mutants-sample lock clean
 
 demo: $(READY)
 	$(BIN)/rig demo --out demo
@@ -15,16 +15,22 @@ demo: $(READY)
 page: $(READY)
 	$(BIN)/python hatch_build.py
 
-# What a change breaks in most cases; what takes as long again is in the four targets below.
+# What a change breaks in most cases; what takes as long again is in the four targets below, what rarely breaks in `campaigns`.
 # Tests that start processes first and by themselves: beside others that compute, a simulated device came too late.
-MAIN := not campaign and not documents and not extra
+# The groups of those with the most to wait for come first, whatever their number of tests.
+MAIN := not campaign and not documents and not extra and not by_hand
 test: $(READY) page browser postgresql
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2 --dist loadgroup -m "bench and $(MAIN)" --ignore tests/page --durations 15
+	$(MAKE) --no-print-directory --jobs 2 types contracts
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "bench and $(MAIN)" --ignore tests/page --durations 15
 	$(BIN)/pytest -n 2 --dist loadfile -m "not bench and $(MAIN)" --ignore tests/page --durations 10
+
+types: $(READY)
+	$(BIN)/mypy
+
+contracts: $(READY)
+	$(BIN)/lint-imports --no-logo >$(VENV)/contracts || { cat $(VENV)/contracts; exit 1; }
 
 # The page in a real browser over the service and the mock bench; what needs no bench runs beside it and gives way to it.
 PAGE ?= tests/page

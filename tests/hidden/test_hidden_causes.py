@@ -24,8 +24,8 @@ DRAWN = {
     501: "friction", 503: "time_offset", 504: "frame_compliance", 505: "adhesion", 9001: "contact_offset",
     9002: "relaxation", 9003: "backlash", 9004: "substrate",
 }  # fmt: skip
-# One of each kind in every run of `make test`: of the machine, of the stated conditions, of the tissue.
-FIRST = (501, 9001, 9002)
+# The quickest of the tissue in every run of `make test`; the machine's and the stated conditions' are in the campaigns.
+FIRST = (9002,)
 SEEDS = [seed if seed in FIRST else pytest.param(seed, marks=pytest.mark.campaign) for seed in DRAWN]
 SEEN_BY_TRACKER_ONLY = {"frame_compliance", "tracker_latency"}
 
