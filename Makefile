@@ -6,7 +6,7 @@ READY := $(VENV)/ready
 # Modules are compiled once, not by each of the processes that a bench is made of.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo page test test-page test-documents test-campaigns test-extras test-one-extra check metrics docs package wheels mutants mutants-sample lock clean
+.PHONY: demo page test test-page test-documents test-campaigns test-extras test-one-extra campaigns types contracts check metrics docs package wheels mutants mutants-sample lock clean
 
 demo: $(READY)
 	$(BIN)/rig demo --out demo
@@ -15,16 +15,23 @@ demo: $(READY)
 page: $(READY)
 	$(BIN)/python hatch_build.py
 
-# What a change breaks in most cases; what takes as long again is in the four targets below.
+# What a change breaks in most cases; what takes as long again is in the four targets below, what rarely breaks in `campaigns`.
 # Tests that start processes first and by themselves: beside others that compute, a simulated device came too late.
-MAIN := not campaign and not documents and not extra
+# The groups of those that take longest come first, whatever their number of tests. The others wait for a third of their
+# time, for processes that start and connections that end: a third worker uses it.
+MAIN := not campaign and not documents and not extra and not by_hand
 test: $(READY) page browser postgresql
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(MAKE) --no-print-directory --jobs 2 types contracts
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "bench and $(MAIN)" --ignore tests/page --durations 15
+	$(BIN)/pytest -n 3 --dist loadfile -m "not bench and $(MAIN)" --ignore tests/page --durations 10
+
+types: $(READY)
 	$(BIN)/mypy
-	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2 --dist loadgroup -m "bench and $(MAIN)" --ignore tests/page --durations 15
-	$(BIN)/pytest -n 2 --dist loadfile -m "not bench and $(MAIN)" --ignore tests/page --durations 10
+
+contracts: $(READY)
+	$(BIN)/lint-imports --no-logo >$(VENV)/contracts || { cat $(VENV)/contracts; exit 1; }
 
 # The page in a real browser over the service and the mock bench; what needs no bench runs beside it and gives way to it.
 PAGE ?= tests/page
@@ -38,12 +45,25 @@ test-documents: $(READY) page
 
 # Diagnoses of many sessions, made and measured, and safety checks that are switched off one by one.
 test-campaigns: $(READY)
-	$(BIN)/pytest -n 2 --dist loadgroup -m campaign --ignore tests/page --durations 10
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m campaign --ignore tests/page --durations 10
 
 # The demonstration, stops and crashes in contact, every answer of the service while the tip presses, further products.
 test-extras: $(READY) page
-	$(BIN)/pytest -n 2 --dist loadgroup -m extra --ignore tests/page --durations 10
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m extra --ignore tests/page --durations 10
 	$(MAKE) --no-print-directory test-one-extra
+
+# By hand, for hours, on a quiet computer, dated in docs/validation: what takes long and rarely breaks, a hundred new examples of
+# each property, and the benchmarks that judge. The first that fails ends it.
+campaigns: $(READY) page
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m by_hand --ignore tests/page --durations 10
+	$(BIN)/pytest -n 2 --dist loadfile -m "hypothesis and $(MAIN)" --ignore tests/page --hypothesis-profile default
+	$(BIN)/python -m benchmarks.faults --trials 1
+	$(BIN)/python -m benchmarks.faults --plant all --trials 1
+	$(BIN)/python -m benchmarks.mutation
+	for campaign in forms hidden planted nothing calibration; do $(BIN)/python -m benchmarks.criticism --campaign $$campaign || exit; done
+	$(BIN)/python -m benchmarks.control
+	$(BIN)/python -m benchmarks.service --minutes 10
+	$(BIN)/python -m benchmarks.all
 
 # Each extra in an environment of its own, without the others.
 test-one-extra: $(READY)

@@ -1,10 +1,11 @@
 """What all tests share: how every property is searched, how much linear algebra may take, and a process of mocks.
 
 How long an example of a property takes says nothing on a machine that others use too, and a failure is worth most where
-it can be had again; ``pytest --hypothesis-profile=default`` looks for new examples.
+it can be had again; ``pytest --hypothesis-profile=default`` looks for new examples, and more of them.
 """
 
 import contextlib
+import gc
 import os
 import secrets
 import tempfile
@@ -30,10 +31,45 @@ NEW_SEED = os.environ.setdefault("TISSUE_RIG_SEED", str(10_000 + secrets.randbel
 # One file for all workers of a run.
 STALLS = Path(os.environ.setdefault("TISSUE_RIG_STALLS", str(Path(tempfile.gettempdir()) / f"stalls-{os.getpid()}")))
 
+# The same half of the library's hundred in each run; `make campaigns` draws a hundred new ones.
+EXAMPLES = 50
 settings.register_profile(
-    "shared machine", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+    "shared machine",
+    deadline=None,
+    derandomize=True,
+    max_examples=EXAMPLES,
+    suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("shared machine")
+
+
+# Markers of a few files: whoever asks for one of them need not load all the others, which takes ten seconds a worker.
+RARE = {"bench", "campaign", "extra", "by_hand"}
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leaves out a file in which, and in whose folder's conftest, a rare marker that is asked for does not stand."""
+    marker = config.getoption("markexpr").partition(" ")[0]
+    if marker not in RARE or not collection_path.name.startswith("test_"):
+        return None
+    sources = [collection_path, collection_path.with_name("conftest.py")]
+    return None if any(f"mark.{marker}" in file.read_text() for file in sources if file.exists()) else True
+
+
+# Groups that take longest, in that order: two workers end together where neither begins a long one last.
+LONGEST = ("conformance", "bench", "commands", "recovery", "wire", "postgresql", "cluster", "lsl")
+
+
+def _place(item: pytest.Item) -> int:
+    group = item.get_closest_marker("xdist_group")
+    return LONGEST.index(group.args[0]) if group and group.args[0] in LONGEST else len(LONGEST)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Long groups come first where whole groups are dealt out to workers."""
+    if config.getoption("markexpr").partition(" ")[0] in RARE:
+        items.sort(key=_place)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -45,6 +81,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Whoever runs tests without workers has witnesses for those of the bench; other tests need none."""
+    gc.freeze()  # what is loaded stays to the end: looking through it again and again finds nothing
     alone = not session.config.getoption("numprocesses", None) and "PYTEST_XDIST_WORKER" not in os.environ
     if alone and any(item.get_closest_marker("bench") for item in session.items):
         _watch(session.config)

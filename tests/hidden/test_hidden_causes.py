@@ -24,8 +24,8 @@ DRAWN = {
     501: "friction", 503: "time_offset", 504: "frame_compliance", 505: "adhesion", 9001: "contact_offset",
     9002: "relaxation", 9003: "backlash", 9004: "substrate",
 }  # fmt: skip
-# One of each kind in every run of `make test`: of the machine, of the stated conditions, of the tissue.
-FIRST = (501, 9001, 9002)
+# The quickest of the tissue in every run of `make test`; the machine's and the stated conditions' are in the campaigns.
+FIRST = (9002,)
 SEEDS = [seed if seed in FIRST else pytest.param(seed, marks=pytest.mark.campaign) for seed in DRAWN]
 SEEN_BY_TRACKER_ONLY = {"frame_compliance", "tracker_latency"}
 
@@ -57,8 +57,14 @@ def test_a_hidden_cause_is_named_with_its_size_inside_the_interval_and_a_gain(se
     assert secret.name in SEEN_BY_TRACKER_ONLY or found.gain.reduction > 0.02
 
 
-@pytest.mark.campaign
-@pytest.mark.parametrize(("seed", "name"), list(zip((9101, 9102, 9103), UNKNOWN, strict=True)))
+# The first takes a minute, as long as all hidden causes together.
+@pytest.mark.parametrize(
+    ("seed", "name"),
+    [
+        pytest.param(seed, name, marks=pytest.mark.campaign if rank else pytest.mark.by_hand)
+        for rank, (seed, name) in enumerate(zip((9101, 9102, 9103), UNKNOWN, strict=True))
+    ],
+)
 def test_what_the_library_does_not_hold_is_called_unexplained_with_the_variable_it_depends_on(
     seed: int, name: str
 ) -> None:

@@ -131,7 +131,7 @@ def test_a_second_user_is_told_that_the_bench_is_taken(bench: ServedBench, proto
         ("force", "cut", ("force",)),
         ("force", "freeze", ("force", "old")),
         ("force", "frozen", ("frozen",)),
-        ("force", "invalid", ("invalid",)),
+        pytest.param("force", "invalid", ("invalid",), marks=pytest.mark.by_hand),
         ("tracker", "cut", ("tracker",)),
     ],
 )
@@ -189,7 +189,14 @@ def test_ctrl_c_retracts_and_keeps_what_was_recorded(bench: ServedBench, protoco
     assert open_session(tmp_path / "session").trials[0].outcome == "operator_stop"
 
 
-@pytest.mark.parametrize(("key", "cause"), [("p", "pain stop"), (" ", "emergency stop"), ("s", "by the operator")])
+@pytest.mark.parametrize(
+    ("key", "cause"),
+    [
+        pytest.param("p", "pain stop", marks=pytest.mark.by_hand),
+        (" ", "emergency stop"),
+        pytest.param("s", "by the operator", marks=pytest.mark.by_hand),
+    ],
+)
 def test_a_key_in_the_terminal_stops(bench: ServedBench, protocol: Path, tmp_path: Path, key: str, cause: str) -> None:
     ours, theirs = os.openpty()
     arguments: list[str | Path] = ["capture", protocol, "--out", tmp_path / "session", *bench.settings()]

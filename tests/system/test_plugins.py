@@ -13,7 +13,7 @@ from copier import run_copy
 
 from mock_devices.testing.commands import ROOT
 
-pytestmark = [pytest.mark.extra, pytest.mark.xdist_group("commands"), pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.xdist_group("commands"), pytest.mark.timeout(300)]
 
 
 def run(
@@ -41,6 +41,7 @@ def passes_its_own_tests(project: Path, environment: Mapping[str, str]) -> None:
     assert " passed" in found.stdout and "skipped" not in found.stdout
 
 
+@pytest.mark.by_hand
 def test_the_net_ft_is_a_distribution_of_its_own(tmp_path: Path) -> None:
     project = tmp_path / "plugin"
     shutil.copytree(ROOT / "examples" / "plugin-netft", project)
@@ -54,6 +55,7 @@ def test_the_net_ft_is_a_distribution_of_its_own(tmp_path: Path) -> None:
     passes_its_own_tests(project, environment)
 
 
+@pytest.mark.extra
 def test_the_template_makes_a_plug_in_that_works(tmp_path: Path) -> None:
     answers = {"distribution": "rig-lab", "package": "rig_lab", "product": "lab-seven", "range_N": 25.0, "rate_Hz": 500}
     project = tmp_path / "made"
@@ -63,6 +65,7 @@ def test_the_template_makes_a_plug_in_that_works(tmp_path: Path) -> None:
     passes_its_own_tests(project, installed(project, tmp_path / "target"))
 
 
+@pytest.mark.extra
 def test_a_laboratorys_own_checks_run_as_the_workflow_says(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples" / "ci", tmp_path / "ci")
     workflow = (tmp_path / "ci" / "laboratory.yml").read_text()
@@ -93,6 +96,7 @@ class Tracker(PolarisWiring):
 """
 
 
+@pytest.mark.extra
 def test_axis_and_tracker_of_plug_ins_stand_on_the_mock_bench(tmp_path: Path) -> None:
     """Doctor sees both through the guard, beside our own sensor."""
     about = tmp_path / "site" / "acme-1.0.dist-info"

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
+from api.http.jobs import process
 from api.http.service import Service
 from mock_devices.testing.commands import until
 from rig.results.recorded import VerifyResult
@@ -18,6 +19,12 @@ PLANTED = "tests.api.jobs.planted"
 
 def planted(service: Service, function: str) -> None:
     service.works["verify"] = f"{PLANTED}:{function}"
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that does not listen is ended at once; how long it is given otherwise has a test of its own."""
+    monkeypatch.setattr(process, "CANCEL_S", 0.5)
 
 
 def test_a_job_gives_the_result_that_the_command_writes(client: TestClient, first: Path) -> None:
@@ -109,6 +116,7 @@ def test_what_a_person_is_asked_for_pauses_the_job_until_it_is_done(
     assert ended(client, job)["state"] == "cancelled"
 
 
+@pytest.mark.usefixtures("impatient")
 def test_one_computes_while_others_wait_in_their_order(client: TestClient, service: Service, first: Path) -> None:
     planted(service, "patient")
     one, two, three = (begun(client, "verify", session=first.name) for _ in range(3))
@@ -122,6 +130,7 @@ def test_one_computes_while_others_wait_in_their_order(client: TestClient, servi
     ended(client, three)
 
 
+@pytest.mark.usefixtures("impatient")
 def test_the_service_answers_while_something_computes(client: TestClient, service: Service, first: Path) -> None:
     planted(service, "deaf")
     job = begun(client, "verify", session=first.name)
@@ -134,6 +143,7 @@ def test_the_service_answers_while_something_computes(client: TestClient, servic
     ended(client, job)
 
 
+@pytest.mark.usefixtures("impatient")
 def test_nothing_computes_on_where_the_service_ends(client: TestClient, service: Service, first: Path) -> None:
     planted(service, "deaf")
     job = begun(client, "verify", session=first.name)

@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from benchmarks.mutation.__main__ import ROOT
 
 GUARD = '''"""Too much force stops."""
@@ -95,6 +97,7 @@ def test_a_gap_in_the_tests_is_reported_until_it_is_listed(tmp_path: Path) -> No
     assert run(tmp_path).returncode == 0
 
 
+@pytest.mark.extra
 def test_a_file_with_too_many_gaps_fails_although_all_are_listed(tmp_path: Path) -> None:
     project(tmp_path, GUARD, TESTS[: TESTS.index("def test_within")])
     run(tmp_path)

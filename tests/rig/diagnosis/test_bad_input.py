@@ -269,6 +269,7 @@ def test_recordings_stacked_in_one_file_are_told_apart_and_chosen_by_name(clean:
         read(tmp_path)
 
 
+@pytest.mark.campaign
 def test_what_the_index_law_gets_wrong_on_real_meat_is_relaxation() -> None:
     folder = recording("perineal_indentation")
     result = diagnose_session(read(folder, Opening(PERINEAL, "230411_C_Ind*_RDG*")))
