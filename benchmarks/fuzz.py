@@ -1,9 +1,9 @@
 """``python -m benchmarks.fuzz``: random, mutated and spliced strings into every codec; what is no answer is a crash.
 
-Each string goes to one codec, the codecs in turn. A third of them are random, the others are real messages, half of
-the time of the codec's own protocol, with bits turned, bytes cut, doubled, or put between those of another. A codec may
-return anything, or raise what its caller expects of it; everything else is a crash, and is printed with the string that
-makes it, in hexadecimal.
+One codec after another, each with strings of its own that depend on ``--seed`` and its name alone. A third of them are
+random, the others are real messages, mostly of the codec's own protocol, with bits turned, bytes cut, doubled, or put
+between those of another. A codec may return anything, or raise what its caller expects of it; everything else is a
+crash, and is printed with the string that makes it, in hexadecimal. What it prints is the table of the documents.
 """
 
 import argparse
@@ -11,11 +11,14 @@ import random
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 from benchmarks.fuzz_codecs import EXAMPLES, Codec, codecs
 
 LONGEST = 200  # of a random string: twice the longest message but a tool's list
+OWN = 0.75  # share of real messages that are of the codec's own protocol, others are told apart from them sooner
+MOST_SHOWN = 20  # crashes: those of one bug are alike, and `--only` shows those of one codec
 
 
 def a_string(rng: random.Random, own: Sequence[bytes] = ()) -> bytes:
@@ -23,7 +26,7 @@ def a_string(rng: random.Random, own: Sequence[bytes] = ()) -> bytes:
     kind = rng.randrange(6)
     if kind < 2:
         return rng.randbytes(rng.randrange(LONGEST))
-    example = bytearray(rng.choice(own if own and rng.random() < 0.5 else EXAMPLES))
+    example = bytearray(rng.choice(own if own and rng.random() < OWN else EXAMPLES))
     at = rng.randrange(len(example))
     if kind == 2:
         for _ in range(rng.randrange(1, 5)):
@@ -43,17 +46,20 @@ class Crash(NamedTuple):
     error: str
 
 
-def run(count: int, seed: int, tried: Mapping[str, Codec]) -> list[Crash]:
-    """``count`` strings, dealt out to the codecs in turn."""
-    rng = random.Random(seed)
-    named = list(tried.items())
-    crashes = []
-    for number in range(count):
-        name, codec = named[number % len(named)]
-        string = a_string(rng, codec.examples)
+def run(each: int, seed: int, tried: Mapping[str, Codec]) -> list[Crash]:
+    """``each`` strings into every codec."""
+    return [crash for name, codec in tried.items() for crash in run_one(each, seed, name, codec)]
+
+
+def run_one(count: int, seed: int, name: str, codec: Codec) -> list[Crash]:
+    """``count`` strings into one codec, which keeps its state between them as on a line."""
+    rng, crashes = random.Random(f"{seed} {name}"), []
+    take, may_raise, examples = codec
+    for _ in range(count):
+        string = a_string(rng, examples)
         try:
-            codec.take(string)
-        except codec.may_raise:
+            take(string)
+        except may_raise:
             continue
         except Exception as error:  # the point of it
             crashes.append(Crash(name, string, f"{type(error).__name__}: {error}"))
@@ -61,21 +67,32 @@ def run(count: int, seed: int, tried: Mapping[str, Codec]) -> list[Crash]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Prints how many strings and crashes there were; 1 where there was a crash."""
+    """Prints strings and crashes of each codec; 1 where there was a crash."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.fuzz", description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--count", type=int, default=100_000, help="strings; default: 100000")
+    parser.add_argument("--each", type=int, default=10_000, help="strings for each codec; default: 10000")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", default="*", help="codecs that are called like this, as `zaber*`")
     options = parser.parse_args(arguments)
-    begun = time.monotonic()
-    tried = codecs()
-    crashes = run(options.count, options.seed, tried)
-    for crash in crashes[:20]:
+    tried = {name: codec for name, codec in codecs().items() if fnmatchcase(name, options.only)}
+    if not tried:
+        parser.error(f"no codec is called like {options.only}; there are {', '.join(codecs())}")
+    print("| codec | strings | strings/s | crashes |\n|---|---|---|---|")
+    crashes = []
+    for name, codec in tried.items():
+        crashes += told(options.each, options.seed, name, codec)
+    print(f"| {len(tried)} codecs | {options.each * len(tried):,} | | {len(crashes)} |")
+    for crash in crashes[:MOST_SHOWN]:
         print(f"{crash.codec}: {crash.error} on {crash.string.hex()}")
-    print(
-        f"{options.count} strings, {len(tried)} codecs, seed {options.seed}: {len(crashes)} crashes in "
-        f"{time.monotonic() - begun:.0f} s"
-    )
     return int(bool(crashes))
+
+
+def told(count: int, seed: int, name: str, codec: Codec) -> list[Crash]:
+    """The codec's line of the table, printed; its crashes."""
+    begun = time.monotonic()
+    crashes = run_one(count, seed, name, codec)
+    rate = count / max(time.monotonic() - begun, 1e-9)
+    print(f"| {name} | {count:,} | {rate:,.0f} | {len(crashes)} |", flush=True)
+    return crashes
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ Check values, over the ASCII digits ``123456789``: X-25 0x906E, MODBUS 0x4B37, A
 """
 
 import binascii
+from collections.abc import Iterator
 
 
 def _reversed_bits(value: int, bits: int) -> int:
@@ -18,6 +19,7 @@ def _remainder(value: int, reflected_polynomial: int) -> int:
 
 _MIRROR = bytes(_reversed_bits(value, 8) for value in range(256))
 _TABLE_8005 = tuple(_remainder(byte, 0xA001) for byte in range(256))
+_BACK_8005 = [step for _, step in sorted((entry >> 8, entry << 8 | at) for at, entry in enumerate(_TABLE_8005))]
 
 
 def crc16_x25(data: bytes) -> int:
@@ -38,6 +40,19 @@ def crc16_modbus(data: bytes) -> int:
 def crc16_arc(data: bytes) -> int:
     """CRC-16/ARC: polynomial 0x8005 reflected, initial value 0."""
     return _crc_8005(data, 0)
+
+
+def modbus_starts(data: bytes) -> Iterator[int]:
+    """Where parts of two bytes and more begin whose CRC-16/MODBUS ends ``data``, the shortest first, in one pass.
+
+    Over a part and its own checksum the register ends at 0; backwards from there it is 0xFFFF where the part began.
+    """
+    crc, at = 0, len(data)
+    for byte in reversed(data):
+        crc = (crc << 8 ^ _BACK_8005[crc >> 8] ^ byte) & 0xFFFF
+        at -= 1
+        if crc == 0xFFFF and at + 4 <= len(data):
+            yield at
 
 
 def _crc_8005(data: bytes, crc: int) -> int:

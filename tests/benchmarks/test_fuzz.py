@@ -52,7 +52,7 @@ def reached(tried: dict[str, Codec]) -> set[str]:
     before = sys.getprofile()
     sys.setprofile(note)
     try:
-        fuzz.run(60 * len(tried), 5, tried)
+        fuzz.run(60, 5, tried)
     finally:
         sys.setprofile(before)
     return {f"{Path(file).relative_to(ROOT)} {name}" for file, name in entered if file.startswith(str(ROOT))}
@@ -60,7 +60,7 @@ def reached(tried: dict[str, Codec]) -> set[str]:
 
 def test_no_codec_crashes_on_a_few_thousand_strings() -> None:
     tried = fuzz_codecs.codecs()
-    assert fuzz.run(EACH * len(tried), 7, tried) == []
+    assert fuzz.run(EACH, 7, tried) == []
 
 
 def test_every_function_that_takes_bytes_apart_is_among_them() -> None:
@@ -105,11 +105,22 @@ def test_a_planted_crash_is_found_and_told_with_its_string(
         return data[3]
 
     monkeypatch.setattr(fuzz, "codecs", lambda: {"fragile": Codec(fragile), "well": Codec(len)})
-    assert fuzz.main(["--count", "2000", "--seed", "1"]) == 1
-    told = capsys.readouterr().out
-    assert "fragile: IndexError: index out of range on " in told
-    assert "2000 strings, 2 codecs, seed 1: " in told
-    assert "well:" not in told
+    assert fuzz.main(["--each", "1000", "--seed", "1"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    found, none, both = ([field.strip() for field in line.strip("|").split("|")] for line in lines[2:5])
+    assert (found[:2], none[0], none[3]) == (["fragile", "1,000"], "well", "0")
+    assert both == ["2 codecs", "2,000", "", found[3]] and int(found[3]) > fuzz.MOST_SHOWN
+    assert len(lines[5:]) == fuzz.MOST_SHOWN
+    assert all(line.startswith("fragile: IndexError: index out of range on ") for line in lines[5:])
+    assert max(len(bytes.fromhex(line.rpartition(" ")[2])) for line in lines[5:]) <= 3
+    assert fuzz.main(["--each", "1000", "--only", "we*"]) == 0
+
+
+def test_a_codec_that_is_not_there_is_wrong_use(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        fuzz.main(["--only", "zebra*"])
+    assert ended.value.code == 2
+    assert "no codec is called like zebra*; there are bota frames, " in capsys.readouterr().err
 
 
 def test_what_a_codec_may_raise_is_no_crash_and_anything_else_is() -> None:

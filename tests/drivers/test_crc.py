@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.crc import crc16_arc, crc16_modbus, crc16_x25
+from drivers.crc import crc16_arc, crc16_modbus, crc16_x25, modbus_starts
 
 DIGITS = b"123456789"
 
@@ -50,3 +50,10 @@ def test_modbus_and_arc_agree_with_the_loop_bit_by_bit(data: bytes) -> None:
 def test_modbus_and_arc_leave_no_residue_behind_their_own_checksum(data: bytes) -> None:
     assert crc16_modbus(data + crc16_modbus(data).to_bytes(2, "little")) == 0
     assert crc16_arc(data + crc16_arc(data).to_bytes(2, "little")) == 0
+
+
+@given(st.binary(max_size=40), st.binary(min_size=2, max_size=40))
+def test_where_a_checksum_begins_is_found_backwards_from_its_end(before: bytes, part: bytes) -> None:
+    data = before + part + bit_by_bit(part, 0xFFFF).to_bytes(2, "little")
+    begins = [at for at in range(len(data) - 3) if bit_by_bit(data[at:], 0xFFFF) == 0]
+    assert len(before) in begins and list(modbus_starts(data)) == begins[::-1]
