@@ -12,13 +12,15 @@ from controller.loop import bench_loop
 from controller.loop.modes import Mode
 from controller.loop.paired_samples import Touch
 from controller.loop.setpoint import Setpoint
+from controller.loop.state import LoopState
 from controller.loop.steps import Hold, Retract
 from controller.safety.inputs import SafetyInputs
 from controller.safety.load import UNKNOWN, LoadMonitor
+from controller.safety.oscillation import OscillationMonitor
 from controller.safety.table import Action, Incident
 from rig.channels import AxisSample, ForceSample
 from rig.errors import DeviceError
-from tests.controller.fake_bench import ZERO, FakeBench, wired
+from tests.controller.fake_bench import ZERO, FakeBench, pressing, wired
 from tests.controller.fake_devices import ARM
 
 MS = 1_000_000
@@ -362,3 +364,25 @@ def test_the_loop_asks_the_clock_it_was_given() -> None:
     bench = FakeBench()
     bench.clock.now_ns += 1
     assert bench.loop.now() == bench.clock.now_ns
+
+
+def test_the_grid_follows_the_force_sensors_newest_sample() -> None:
+    bench = FakeBench()
+    newest, phase = bench.force.samples[-1], bench.loop.phase
+    # Ten periods after the newest sample the sensor counts as silent, and not a moment before.
+    silent_ns = newest.capture_ns + phase._least_ns + 10 * phase._sensor_ns
+    assert (phase._follows(silent_ns - 1), phase._follows(silent_ns)) == (True, False)
+
+
+class Swinging(OscillationMonitor):
+    """Always has something to say."""
+
+    def update(self, state: LoopState) -> str:
+        return f"swings in {state.force_N:.0f} N"
+
+
+def test_outside_of_force_control_nothing_oscillates() -> None:
+    bench = pressing()
+    bench.loop._oscillation = Swinging()
+    bench.cycle()
+    assert (bench.mode, inputs(bench).oscillation) == (Mode.COMPRESS, "")

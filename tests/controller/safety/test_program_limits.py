@@ -83,7 +83,10 @@ def refused(*steps: Step) -> str:
             "reference force 9 N is above the largest force of the model, 8 N",
         ),
         (track((0.0, 1.0), (2.0, 1.0), (1.0, 1.0)), "the reference's times go backwards"),
-        (track((0.0, 1.0), (1201.0, 1.0), repeats=3), "duration of the reference 3603 s is above an hour, 3600 s"),
+        (
+            track((0.0, 1.0), (9.0, 1.0), (1201.0, 1.0), repeats=3),
+            "duration of the reference 3603 s is above an hour, 3600 s",
+        ),
         (track((0.0, 1.0), (1.0, 1.0), speed_limit_mm_s=61.0), "speed 61 mm/s is above limits.speed_mm_s, 60 mm/s"),
         (
             TrackForce(times_s=(0.0, 1.0, 2.0), forces_N=(1.0, 1.0), gains=ROWS, crossover_rad_s=30.0),
