@@ -35,7 +35,7 @@ class Indentation(Table):
     contact_within_mm: Positive = Field(
         default=0.2, description="how well the surface is to be known (95 %); else the tip touches again, slowly"
     )
-    touches: int = Field(default=5, ge=0, le=10, description="slow touches at most")
+    touches: int = Field(default=3, ge=0, le=10, description="slow touches at most")
     touch_speed_mm_s: Positive = Field(default=0.5, description="of a slow touch")
     search_to_mm: Positive = Field(default=40.0, description="axis position at which the search for contact gives up")
     run_up_mm: Positive = Field(default=2.0, description="back-off after contact, to be at speed on the surface")

@@ -2,9 +2,9 @@
 
 Force is modelled as level before the contact c, and after it as a jump (a viscous term acts at once) and shapes of the
 depth p - c, none with a negative factor: any tissue that resists and stiffens. Every c is tried with every family of
-shapes, with the jump and without; the sums of squares, read as likelihoods with a penalty for the jump, say how
-probable each c is: mean, deviation and the middle 95 % over all of them are the contact and its interval. With the
-penalty or without, they say what it may be at most (three deviations).
+shapes, with the jump and without; the sums of squares, read as likelihoods with a penalty for each family and for the
+jump, give the contact (mean and deviation over all of them) and, with a penalty for the jump or without, the 95 %
+interval; without any, what it may be at most (three deviations).
 
 No shapes are tissue's for long. ``find_contact`` takes as much of the loading as these shapes leave noise of, so that
 what is deeper does not speak for the surface.
@@ -27,12 +27,12 @@ Misfits = dict[tuple[float, int], tuple[float, float]]
 CANDIDATES = 61
 # In units of the variance: a candidate five deviations off is not looked at closely.
 FAR = 30.0
-# What lies below and above the middle 95 %.
-TAILS = (0.025, 0.975)
-# Of the likelihood ratio (Wilks 1938): three deviations of contact.
-LARGEST = 9.0
-# A jump costs two further parameters' worth of evidence (2 ln of the odds, as in Akaike's criterion).
+# Of the likelihood ratio (Wilks 1938): 95 % of contact and the form of the onset together, three deviations of contact.
+PROBABLE, LARGEST = 5.99, 9.0
+# A jump costs two further parameters' worth of evidence (2 ln of the odds, as in Akaike's criterion), a family that
+# starts without slope a further e^4 against: soft tissue under a tip a few millimetres wide does not.
 JUMP_PENALTY = 4.0
+POWERS_PENALTY = 8.0
 LEAST_SEARCH_MM = 0.1  # half of what contact is known to in a good trial
 # Finer than any converter's step, and above zero: an exact curve has no noise of its own.
 LEAST_NOISE_N = 1e-5
@@ -90,26 +90,29 @@ class Loading(NamedTuple):
     apart_mm: float = 0.0
 
 
-# Forces of shape (m, k) at depths of shape (m,) [mm], each growing from zero.
-Family = Callable[[FloatArray], FloatArray]
+class Family(NamedTuple):
+    """``shapes(depth_mm)``: forces of shape (m, k), each growing from zero; ``penalty``: 2 ln of the odds against."""
 
-
-def _powers(depth_mm: FloatArray) -> FloatArray:
-    """``POWERS`` of depth, as products: a power of each row takes ten times as long."""
-    share = depth_mm / max(float(depth_mm.max()), 1e-9)
-    root, square = np.sqrt(share), share * share
-    cube = square * share
-    return np.array([share, share * root, square, square * root, cube, square * square, cube * cube]).T
+    shapes: Callable[[FloatArray], FloatArray]
+    penalty: float
 
 
 def _onsets(depth_mm: FloatArray) -> FloatArray:
     """Powers of depth, and what relaxation leaves of the first and the second at steady speed."""
-    powers = _powers(depth_mm)
-    share, columns = powers[:, 0], list(powers.T)
+    share = depth_mm / max(float(depth_mm.max()), 1e-9)
+    root, square = np.sqrt(share), share * share
+    cube = square * share
+    # As products: a power of each row takes ten times as long.
+    columns = [share, share * root, square, square * root, cube, square * square, cube * cube]
     for length in FORGETTING:
         left = length * -np.expm1(-share / length)
         columns += [left, 2 * length * (share - left)]
     return np.array(columns).T
+
+
+def _powers(depth_mm: FloatArray) -> FloatArray:
+    share = depth_mm / max(float(depth_mm.max()), 1e-9)
+    return np.column_stack([share**power for power in (1, 2, 3, 4, 6)])
 
 
 def _stiffening(depth_mm: FloatArray) -> FloatArray:
@@ -118,10 +121,9 @@ def _stiffening(depth_mm: FloatArray) -> FloatArray:
 
 
 # A whole cycle says itself how its force grows.
-ANY_SHAPE: tuple[Family, ...] = (_onsets,)
-# A touch of a few tenths of a newton does not: a limb stiffens as the study's index law (b of 0.1 to 0.4 per mm), force
-# under a round tip begins without slope; both count alike.
-LIMB_SHAPE: tuple[Family, ...] = (_stiffening, _powers)
+ANY_SHAPE = (Family(_onsets, 0.0),)
+# A touch of a few tenths of a newton does not: limbs stiffen as the study's index law (b of 0.1 to 0.4 per mm).
+LIMB_SHAPE = (Family(_stiffening, 0.0), Family(_powers, POWERS_PENALTY))
 
 
 class ContactSearch:
@@ -198,12 +200,13 @@ class ContactSearch:
     def contact(self) -> Contact:
         """What was found; to be read once ``advance`` said that it is."""
         candidates, excess = self._candidates, self._excess()
-        penalised = excess + np.tile([0.0, JUMP_PENALTY], len(self._families))
+        families = np.repeat([family.penalty for family in self._families], 2)
+        penalised = excess + families + np.tile([0.0, JUMP_PENALTY], len(self._families))
         weights = np.exp(-(penalised - penalised.min()) / 2).sum(axis=1)
         found_mm = float(np.average(candidates, weights=weights))
-        below = np.cumsum(weights) / weights.sum()
-        low_mm, high_mm = candidates[np.minimum(np.searchsorted(below, TAILS), CANDIDATES - 1)]
-        likely = candidates[((excess <= LARGEST) | (penalised - penalised.min() <= LARGEST)).any(axis=1)]
+        # Without a jump's penalty alone, what the penalty makes likelier could lie outside its own interval.
+        probable = candidates[(_within(excess + families) | _within(penalised)).any(axis=1)]
+        likely = candidates[(excess <= LARGEST).any(axis=1)]
         step_mm = max(float(candidates[1] - candidates[0]), self._loading.apart_mm)
         spread_mm = np.sqrt(np.average((candidates - found_mm) ** 2, weights=weights))
         return Contact(
@@ -211,8 +214,8 @@ class ContactSearch:
             lower_mm=float(likely[0]) - step_mm,
             upper_mm=float(likely[-1]) + step_mm,
             deviation_mm=float(np.hypot(spread_mm, step_mm / 2)),
-            low_mm=min(float(low_mm) - step_mm, found_mm),
-            high_mm=max(float(high_mm) + step_mm, found_mm),
+            low_mm=min(float(probable[0]) - step_mm, found_mm),
+            high_mm=max(float(probable[-1]) + step_mm, found_mm),
         )
 
     @property
@@ -229,6 +232,11 @@ class ContactSearch:
         groups = np.array_split(inside, min(GROUPS, len(inside)))
         sums = [(np.sum(left[group] * np.sqrt(samples[group])), samples[group].sum()) for group in groups]
         return bool(sum(total**2 / count for total, count in sums) <= MOST_MISFIT * variance)
+
+
+def _within(excess: FloatArray) -> NDArray[np.bool_]:
+    """What lies in the 95 % region of its own best."""
+    return np.asarray(excess <= PROBABLE + excess.min())
 
 
 def find_contact(
@@ -312,7 +320,7 @@ def rows_of(position_mm: FloatArray, force_N: FloatArray, most: int = ROWS) -> L
 
 def _inside(depth_mm: FloatArray, inside: NDArray[np.bool_], family: Family) -> FloatArray:
     """Columns of the family's shapes and of the jump, zero in the air."""
-    shapes = family(depth_mm[inside]).T
+    shapes = family.shapes(depth_mm[inside]).T
     columns = np.zeros((len(shapes) + 1, len(depth_mm)))
     columns[:-1, inside], columns[-1] = shapes, inside
     return columns.T

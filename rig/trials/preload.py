@@ -148,4 +148,4 @@ def _pressed(depth_mm: FloatArray) -> FloatArray:
     return np.column_stack(columns)
 
 
-PRESSED: tuple[Family, ...] = (_pressed,)
+PRESSED = (Family(_pressed, 0.0),)

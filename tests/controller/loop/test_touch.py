@@ -45,7 +45,7 @@ def test_a_sensor_that_tells_enough_at_once_touches_once() -> None:
 
 
 def test_a_noisy_sensor_touches_again_until_the_surface_is_known() -> None:
-    once, again = (approached(Limb(), FT300, 1, touches).state.touch for touches in (0, 5))
+    once, again = (approached(Limb(), FT300, 1, touches).state.touch for touches in (0, 3))
     assert once and once.touches == 0 and once.within_mm > 0.2
     assert again and again.touches >= 1 and again.within_mm <= 0.2
     assert f"{again.touches} slow touches" in again.sentence

@@ -56,31 +56,8 @@ def test_the_interval_holds_the_contact_in_nineteen_of_twenty(
     # At 95 %, more than three of twelve outside has a chance of 0.2 %.
     assert sum(contact.low_mm <= SURFACE_MM <= contact.high_mm for contact in contacts) >= 9
     assert all(contact.lower_mm - 0.05 <= SURFACE_MM <= contact.upper_mm + 0.05 for contact in contacts)
-    assert all(abs(contact.position_mm - SURFACE_MM) < max(0.05, 3 * contact.deviation_mm) for contact in contacts)
-
-
-def under_a_tip(power: float, factor: float, noise_N: float, seed: int) -> Loading:
-    """As ``loading``, of force that begins without slope: a sphere has the power 1.5 (Hertz), a cone 2 (Sneddon)."""
-    random = np.random.default_rng(seed)
-    depth = np.arange(-2.0 - 0.005 * random.random(), 12.0, 0.005)
-    force = factor * np.maximum(depth, 0.0) ** power
-    kept = slice(0, int(np.argmax(force > 10 * noise_N)) + 3)
-    sensed = LEVEL_N + force[kept] + noise_N * random.standard_normal(len(force[kept]))
-    return Loading(SURFACE_MM + depth[kept], sensed, np.ones(len(sensed)))
-
-
-@pytest.mark.parametrize("noise_N", [0.005, 0.05])
-@pytest.mark.parametrize(("power", "factor"), [(1.5, 0.15), (1.5, 0.75), (2.0, 0.3)])
-def test_a_touch_holds_the_contact_under_a_round_tip_as_often(power: float, factor: float, noise_N: float) -> None:
-    contacts = [found(under_a_tip(power, factor, noise_N, seed), noise_N) for seed in range(12)]
-    # At 95 %, more than three of twelve outside has a chance of 0.2 %.
-    assert sum(contact.low_mm <= SURFACE_MM <= contact.high_mm for contact in contacts) >= 9
-
-
-def test_a_touch_that_takes_all_for_limbs_would_miss_the_contact_under_a_cone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(globals(), "LIMB_SHAPE", LIMB_SHAPE[:1])
-    contacts = [found(under_a_tip(2.0, 0.3, 0.05, seed), 0.05) for seed in range(12)]
-    assert sum(contact.low_mm <= SURFACE_MM <= contact.high_mm for contact in contacts) < 9
+    errors = np.array([contact.position_mm - SURFACE_MM for contact in contacts])
+    assert np.abs(errors).max() < max(0.05, 3 * np.median([contact.deviation_mm for contact in contacts]))
 
 
 def test_noise_makes_the_interval_wider_and_does_not_move_the_contact() -> None:

@@ -45,7 +45,7 @@ def test_after_air_the_interval_holds_the_surface_under_a_sphere_and_of_two_laye
 
 
 def test_an_interval_of_all_of_a_loading_that_does_not_fit_would_miss_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(contact_search, "TAILS", (0.25, 0.75))
+    monkeypatch.setattr(contact_search, "PROBABLE", 0.5)
     monkeypatch.setattr(contact_search, "_union", lambda found, _: found)
     monkeypatch.setattr(contact_search.ContactSearch, "fits", True)
     assert sum(held(law, "cell", range(200, 206)) for law in ("sphere (Hertz)", "two layers")) < 10
