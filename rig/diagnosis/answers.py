@@ -76,13 +76,12 @@ class Diagnosis:
         return Unexplained(self.depends_on, self.lack_of_fit_p) if self.verdict == "unexplained" else None
 
 
-def intervals(fit: Fit, wanted: Sequence[Par], is_left: bool = False) -> dict[str, Estimate]:
-    """95 % intervals with Student's t on recordings, the wider of curvature and jackknife; a pair becomes its size.
+def intervals(fit: Fit, wanted: Sequence[Par], sources: Sequence[Array] | None = None) -> dict[str, Estimate]:
+    """95 % intervals of what ``error_sources`` says of the fit; a pair becomes its size.
 
-    Where something ``is_left`` that no cause explains, what leaving out parts of the data does is added in quadrature.
-    To amplitudes 1.5 % is added too: what the operators themselves are good for.
+    To amplitudes 1.5 % is added, in quadrature: what the operators themselves are good for.
     """
-    covariances = _covariances(fit, is_left)
+    covariances = error_sources(fit) if sources is None else sources
     place = {par.name: k for k, par in enumerate(fit.free)}
     found: dict[str, Estimate] = {}
     for par in wanted:
@@ -106,8 +105,12 @@ def stopped(par: Par, value: float) -> bool:
     return bool(par.least and abs(value - par.null) >= NEAR_BOUND * abs(bound - par.null))
 
 
-def _covariances(fit: Fit, is_left: bool) -> list[Array]:
-    """Of the parameters, one set a source of error, each times the square of its reach; (kinds, p, p)."""
+def error_sources(fit: Fit, is_left: bool = False) -> list[Array]:
+    """Covariances of the parameters, one set a source of error, each times the square of its reach; (kinds, p, p).
+
+    Student's t on recordings, of curvature and jackknife; where something ``is_left`` that no cause explains, also what
+    leaving out parts of the data does.
+    """
     reach = student_reach(fit.problem.recordings - 1) ** 2
     sources = [reach * np.array([fit.covariance, jackknife(fit)])]
     if is_left:
@@ -146,14 +149,14 @@ def sentence(effect: Effect, values: Mapping[str, float]) -> str:
     return effect.statement.format(**values, amplitude=float(np.hypot.reduce(pair)))
 
 
-def answer(named: Named, after: Fit, provisional: bool, is_left: bool) -> NamedCause:
+def answer(named: Named, after: Fit, provisional: bool, sources: Sequence[Array]) -> NamedCause:
     """One finding of the final model."""
     effect = named.effect
     return NamedCause(
         tuple(dict.fromkeys((effect.name, *named.alternatives, *named.family))),
         sentence(effect, after.values),
         named.share * (PROVISIONAL_SHARE if provisional else 1.0),
-        intervals(after, effect.pars, is_left),
+        intervals(after, effect.pars, sources),
         gain_of(named.without, after),
         float(named.support.nats.sum()),
         named.p_value,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.diagnosis.answers import Diagnosis, answer, intervals, limits
+from rig.diagnosis.answers import Diagnosis, answer, error_sources, intervals, limits
 from rig.diagnosis.design import next_experiment
 from rig.diagnosis.estimates import NextExperiment
 from rig.diagnosis.families import on_any_law, with_families
@@ -54,9 +54,9 @@ def judge(
     budget = error_budget(before, search_result.after) if isinstance(problem, IndentationProblem) else None
     verdict, depends = verdict_of(search_result, found_after, budget)
     after, is_explained = search_result.after, verdict == "explained"
-    is_left = verdict == "unexplained"
+    sources = error_sources(after, is_left=verdict == "unexplained")
     named = [on_any_law(one, after) if is_explained else one for one in search_result.named]
-    answers = [answer(one, after, not (is_explained and one.stands), is_left) for one in named]
+    answers = [answer(one, after, not (is_explained and one.stands), sources) for one in named]
     findings = tuple(sorted(answers, key=lambda found: -found.evidence_nats))
     visible, reasons = limits(problem, search_result, budget)
     progress("done", 1.0)
@@ -73,7 +73,7 @@ def judge(
         not_testable=reasons,
         next_experiment=None,
         quality=quality,
-        base=intervals(after, [p for p in problem.base if p.name not in held_values(problem, after.effects)], is_left),
+        base=intervals(after, [p for p in problem.base if p.name not in held_values(problem, after.effects)], sources),
         search=search_result,
         before=found_before,
         after=found_after,
