@@ -50,6 +50,13 @@ def client_of(service: Service, scope: Scope | None = Scope.ADMIN, base: str = A
     return found
 
 
+def in_control(client: TestClient, holder: str = "test") -> TestClient:
+    """The same client, which has taken control for half a minute."""
+    taken = client.post("/api/v1/control/lease", json={"holder": holder, "ttl_s": 30.0})
+    client.headers["X-Control-Lease"] = taken.json()["lease_id"]
+    return client
+
+
 def _keyed(request: Any) -> None:
     """Each request is to happen once, unless a test says which."""
     request.headers.setdefault("Idempotency-Key", secrets.token_hex(8))

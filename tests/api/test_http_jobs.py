@@ -10,7 +10,7 @@ from fastapi.testclient import TestClient
 from api.http.service import Service
 from api.operations import motion
 from controller.operation import Operation
-from mock_devices.testing.access import client_of
+from mock_devices.testing.access import client_of, in_control
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, SafetyStop
 from rig.results.bench import RetractResult
@@ -30,10 +30,7 @@ def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Service:
 @pytest.fixture
 def client(service: Service) -> TestClient:
     """In control."""
-    found = client_of(service)
-    taken = found.post("/api/v1/control/lease", json={"holder": "test", "ttl_s": 30.0})
-    found.headers["X-Control-Lease"] = taken.json()["lease_id"]
-    return found
+    return in_control(client_of(service))
 
 
 def ended(client: TestClient, work: Work, monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:

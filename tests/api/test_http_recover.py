@@ -10,7 +10,7 @@ from api.http.service import Service
 from controller.loop.messages import Status
 from controller.operation import Operation
 from controller.recovery.situation import Consent
-from mock_devices.testing.access import client_of
+from mock_devices.testing.access import client_of, in_control
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError
 from rig.results.bench import Question, ResetResult
@@ -51,10 +51,7 @@ def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Service:
 @pytest.fixture
 def client(service: Service) -> TestClient:
     """In control."""
-    found = client_of(service)
-    taken = found.post("/api/v1/control/lease", json={"holder": "test", "ttl_s": 30.0})
-    found.headers["X-Control-Lease"] = taken.json()["lease_id"]
-    return found
+    return in_control(client_of(service))
 
 
 def bench_of(service: Service) -> Any:

@@ -7,7 +7,7 @@ from fastapi.testclient import TestClient
 
 from api.http.access.scopes import Scope
 from api.http.service import Service
-from mock_devices.testing.access import bearer, client_of
+from mock_devices.testing.access import bearer, client_of, in_control
 from rig.config.wiring import Wiring
 from tests.api.jobs.test_verbs import WiredBench
 
@@ -24,10 +24,7 @@ def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Service:
 
 @pytest.fixture
 def client(service: Service) -> TestClient:
-    found = client_of(service)
-    taken = found.post("/api/v1/control/lease", json={"holder": "test", "ttl_s": 30.0})
-    found.headers["X-Control-Lease"] = taken.json()["lease_id"]
-    return found
+    return in_control(client_of(service))
 
 
 @pytest.fixture

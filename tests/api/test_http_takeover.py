@@ -12,7 +12,7 @@ from api.http.access.scopes import Scope
 from api.http.service import Service
 from controller.recovery.situation import Consent
 from controller.supervisor import NOT_IN_CONTROL
-from mock_devices.testing.access import bearer, client_of
+from mock_devices.testing.access import bearer, client_of, in_control
 from mock_devices.testing.commands import until
 from rig.config.wiring import Wiring
 from rig.errors import SafetyStop
@@ -62,10 +62,7 @@ def bench(service: Service) -> HomingBench:
 @pytest.fixture
 def client(service: Service) -> TestClient:
     """In control."""
-    found = client_of(service)
-    taken = found.post("/api/v1/control/lease", json={"holder": "Ann", "ttl_s": 30.0})
-    found.headers["X-Control-Lease"] = taken.json()["lease_id"]
-    return found
+    return in_control(client_of(service), "Ann")
 
 
 @pytest.fixture

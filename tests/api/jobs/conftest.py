@@ -7,7 +7,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api.http.service import Service
-from mock_devices.testing.access import client_of
+from mock_devices.testing.access import client_of, in_control
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.wiring import Wiring
 from tests.rig.tissue.synthetic import Bench, write_made_session
@@ -31,6 +31,4 @@ def first(service: Service) -> Path:
 def client(service: Service) -> Iterator[TestClient]:
     """In control."""
     with client_of(service) as found:
-        taken = found.post("/api/v1/control/lease", json={"holder": "test", "ttl_s": 30.0})
-        found.headers["X-Control-Lease"] = taken.json()["lease_id"]
-        yield found
+        yield in_control(found)
