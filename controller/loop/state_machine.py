@@ -144,16 +144,17 @@ class MotionStateMachine:
             return
         if self.mode in AT_REST:  # what was wanted last may be far from where the tip was left
             self.state.setpoint = self._here()
-        self.latched = incident
+        self.latched, self._escape_mm = incident, self._way_out_mm()
         self._end(incident.code, incident)
-        if incident.action is Action.IMMEDIATE:
-            self.mode = Mode.SAFE
-            return
-        self.mode = Mode.RETRACT
-        state = self.state
-        outermost_mm = state.setpoint.position_mm if math.isnan(state.surface_mm) else state.surface_mm
-        nearer_mm = min(outermost_mm, state.setpoint.position_mm)
-        self._escape_mm = max(nearer_mm - SAFE_CLEARANCE_MM, self._wiring.limits.position_min_mm)
+        self.mode = Mode.SAFE if incident.action is Action.IMMEDIATE else Mode.RETRACT
+
+    def _way_out_mm(self) -> float:
+        """Clear of the surface, or of the tip where none was met yet; all the way where a retreat does not know it."""
+        state, outermost_mm = self.state, self._wiring.limits.position_min_mm
+        if self.mode is Mode.RETRACT and math.isnan(state.surface_mm):
+            return outermost_mm
+        surface_mm = state.setpoint.position_mm if math.isnan(state.surface_mm) else state.surface_mm
+        return max(min(surface_mm, state.setpoint.position_mm) - SAFE_CLEARANCE_MM, outermost_mm)
 
     def _escape(self) -> None:
         if self.mode is not Mode.RETRACT:

@@ -8,7 +8,9 @@ from typing import Any
 
 import pytest
 
+from benchmarks.mutation import trials
 from benchmarks.mutation.__main__ import ROOT
+from benchmarks.mutation.trials import LEAST_CPU_S, SLOWEST, Budget
 
 GUARD = '''"""Too much force stops."""
 LIMIT_N = 15.0
@@ -95,6 +97,25 @@ def test_a_gap_in_the_tests_is_reported_until_it_is_listed(tmp_path: Path) -> No
     assert [row["mutant"] for row in verdicts(tmp_path).values() if not row["killed"]] == [AT_LIMIT]
     lists(tmp_path, AT_LIMIT)
     assert run(tmp_path).returncode == 0
+
+
+def test_what_brings_a_mutated_module_with_it_is_left_to_the_trial(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Imported before the trial began, the unchanged module stood in the mutant's place, and each mutant survived."""
+    (tmp_path / "mutated_here.py").write_text("")
+    (tmp_path / "brings_it.py").write_text("import mutated_here")
+    (tmp_path / "needed_by_all.py").write_text("")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(trials, "FRESH", {"mutated_here"})
+    trials.warm(["needed_by_all", "brings_it"])
+    assert {"needed_by_all", "brings_it", "mutated_here"} & sys.modules.keys() == {"needed_by_all"}
+
+
+def test_a_fixture_that_a_file_shares_may_take_its_time_whichever_test_comes_first() -> None:
+    budget = Budget(["f.py::a"], {"f.py::a": 0.01, "f.py::makes_it": 2.0, "g.py::b": 9.0}, told=-1)
+    assert budget.cpu_s("f.py::a") == LEAST_CPU_S + SLOWEST * 2.0
+    assert budget.cpu_s("only_a_mutant_has.py::c") == LEAST_CPU_S + SLOWEST
 
 
 @pytest.mark.extra

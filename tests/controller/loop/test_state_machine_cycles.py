@@ -140,6 +140,21 @@ def test_a_soft_stop_retracts_ten_millimetres_clear_at_its_speed_and_stays(
     assert (bench.machine.busy, len(bench.ended)) == (False, 1)
 
 
+def test_a_retreat_that_is_stopped_goes_out_as_far_as_it_would_have_gone() -> None:
+    """After a restart nobody knows where the surface is: ten millimetres out of thirty in a limb were twenty in it."""
+    bench = Cycled(45.0, position_min_mm=1.0)
+    bench.start(Retract(clearance_mm=60.0, speed_mm_s=5.0, floor_mm=1.0))
+    assert bench.cycle("too much")
+    bench.cycles_until(Mode.SAFE)
+    assert bench.state.setpoint == Setpoint(1.0, 0.0)
+    known = Cycled(30.0)
+    known.start(Retract(clearance_mm=5.0, speed_mm_s=5.0))
+    known.state.surface_mm = 25.0
+    assert known.cycle("too much")
+    known.cycles_until(Mode.SAFE)
+    assert known.state.setpoint == Setpoint(15.0, 0.0)
+
+
 def test_during_a_retraction_a_soft_cause_changes_nothing_and_an_immediate_one_stops_it() -> None:
     soft = Cycled()
     soft.start(Hold(duration_s=1.0))
