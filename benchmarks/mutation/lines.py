@@ -56,31 +56,37 @@ class Coverage:
     lines: dict[str, set[Line]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     failed: list[str] = field(default_factory=list)
+    _owns: dict[str, set[str]] = field(default_factory=dict)
 
     def noticing(self, path: str, line: int, at_import: bool) -> list[str]:
-        """Tests that may notice a change of the statement there, those that take least time and run least code first.
+        """Tests that may notice a change of the statement there; those that take least time and run least code first.
 
-        What runs at import (constants, defaults) is for tests that pass any of the file, or for all where none does;
-        first for those beside which most of it is passed and little else, and for all quick tests there: what a class
-        declares is checked without a line of it. Of more tests than ``LONGEST`` lets take part, the first: what
-        only others would notice counts as survived.
+        What runs at import (constants, defaults) is for tests that pass any of the file, or for all where none does,
+        and for all quick tests beside them: what a class declares is checked without a line of it. Tests that are made
+        for the file come before others. Of more than ``LONGEST`` lets take part, the first: what only others would
+        notice counts as survived.
         """
-        if not at_import:
-            return self._affordable(self._quickest(test for test, ran in self.lines.items() if (path, line) in ran))
-        here, all_ran = self._passed(path), self._passed()
-        first = max(here, key=lambda file: len(here[file]) ** 2 / len(all_ran[file]), default="")
-        near = (test for test, ran in self.lines.items() if not here or any(at == path for at, _ in ran))
-        found = self._affordable(self._quickest(near))
-        beside = (test for test in self.lines if file_of(test) == first and self.seconds[test] < QUICK * self._all_s)
-        return sorted(self._quickest({*found, *beside}), key=lambda test: file_of(test) != first)
+        near = [test for test, ran in self.lines.items() if (path, line) in ran]
+        own = self._own(path)
+        if at_import:
+            near = [test for test, ran in self.lines.items() if any(at == path for at, _ in ran)] or list(self.lines)
+            quick_s = QUICK * self._all_s
+            near += [test for test in self.lines.keys() - near if file_of(test) in own and self.seconds[test] < quick_s]
+        return self._affordable(sorted(self._quickest(near), key=lambda test: file_of(test) not in own))
 
-    def _passed(self, path: str = "") -> dict[str, set[Line]]:
-        """Of each file of tests that passes any: the statements of ``path``, or of all."""
-        passed: dict[str, set[Line]] = {}
-        for test, ran in self.lines.items():
-            if here := {line for line in ran if not path or line[0] == path}:
-                passed.setdefault(file_of(test), set()).update(here)
-        return passed
+    def _own(self, path: str) -> set[str]:
+        if path not in self._owns:
+            self._owns[path] = self._made_for(path)
+        return self._owns[path]
+
+    def _made_for(self, path: str) -> set[str]:
+        """Files of tests that pass most of ``path`` and little else."""
+        here, all_ran = Counter[str](), Counter[str]()
+        for file, at in {(file_of(test), line) for test, ran in self.lines.items() for line in ran}:
+            all_ran[file] += 1
+            here[file] += at[0] == path
+        shares = {file: passed**2 / all_ran[file] for file, passed in here.items() if passed}
+        return {file for file, share in shares.items() if share > 0.5 * max(shares.values())}
 
     def _affordable(self, tests: list[str]) -> list[str]:
         until = accumulate((self.seconds[test] for test in tests), initial=0.0)

@@ -91,8 +91,8 @@ class Budget:
         signal.setitimer(signal.ITIMER_PROF, self.cpu_s(item.nodeid))
 
     def cpu_s(self, test: str) -> float:
-        """What ``test`` may take: what a file's tests share is made by whichever of them comes first."""
-        return LEAST_CPU_S + SLOWEST * self._slowest_s.get(file_of(test), 1.0)
+        """What ``test`` may take, with what its file's tests share, as whichever of them comes first makes that."""
+        return LEAST_CPU_S + SLOWEST * self._seconds.get(test, 1.0) + 2.0 * self._slowest_s.get(file_of(test), 0.0)
 
     def _late(self, test: str) -> None:
         os.write(self.told, f"out of time in {test}".encode())

@@ -73,6 +73,33 @@ def test_a_bench_is_a_stop_process_a_loop_with_its_words_and_a_recorder(around: 
     assert len(around.stops) == 1
 
 
+class PlayedInputs:
+    """The process of devices that only bring input: counts its ends."""
+
+    closed = 0
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+def test_the_process_of_inputs_begins_with_the_bench_and_ends_with_it(
+    around: Surroundings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inputs, started = PlayedInputs(), list[tuple[Wiring, Path]]()
+
+    def start(wiring: Wiring, ring: Path) -> PlayedInputs:
+        started.append((wiring, ring))
+        return inputs
+
+    monkeypatch.setattr(module, "started_inputs", start)
+    wiring = Wiring()
+    with Supervisor(wiring) as bench:
+        assert started == [(wiring, Path(around.process.command[4]))]
+        assert inputs.closed == 0
+    bench.close()
+    assert inputs.closed == 1
+
+
 def test_the_loop_may_be_another_module(around: Surroundings) -> None:
     with Supervisor(Wiring(), loop_module="planted.loop"):
         assert around.process.command[2] == "planted.loop"

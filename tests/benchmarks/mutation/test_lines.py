@@ -40,13 +40,17 @@ def test_each_statement_that_ran_is_named_by_its_first_line() -> None:
 
 def test_a_change_in_a_function_is_for_the_tests_that_run_it_and_a_constant_for_those_of_its_file() -> None:
     tests = Coverage(
-        lines={"slow": {("a.py", 1), ("a.py", 2)}, "quick": {("a.py", 1)}, "other": {("b.py", 1)}},
-        seconds={"slow": 2.0, "quick": 0.1, "other": 0.0},
+        lines={
+            "own": {("a.py", 1), ("a.py", 2)},
+            "near": {("a.py", 1), ("b.py", 1), ("b.py", 2)},
+            "other": {("b.py", 1)},
+        },
+        seconds={"own": 0.04, "near": 0.01, "other": 2.0},
     )
-    assert tests.noticing("a.py", 1, at_import=False) == ["quick", "slow"]
-    assert tests.noticing("a.py", 2, at_import=False) == ["slow"]
-    assert tests.noticing("a.py", 7, at_import=True) == ["slow", "quick"], "slow passes all of it"
-    assert tests.noticing("c.py", 7, at_import=True) == ["other", "quick", "slow"]
+    assert tests.noticing("a.py", 1, at_import=False) == ["own", "near"]
+    assert tests.noticing("a.py", 2, at_import=False) == ["own"]
+    assert tests.noticing("a.py", 7, at_import=True) == ["own", "near"]
+    assert tests.noticing("c.py", 7, at_import=True) == ["own", "near", "other"], "of all, as far as time goes"
 
 
 def test_a_second_case_of_a_test_comes_after_others_and_what_takes_too_long_not_at_all() -> None:

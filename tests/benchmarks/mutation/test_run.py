@@ -114,7 +114,7 @@ def test_what_brings_a_mutated_module_with_it_is_left_to_the_trial(
 
 def test_a_fixture_that_a_file_shares_may_take_its_time_whichever_test_comes_first() -> None:
     budget = Budget(["f.py::a"], {"f.py::a": 0.01, "f.py::makes_it": 2.0, "g.py::b": 9.0}, told=-1)
-    assert budget.cpu_s("f.py::a") == LEAST_CPU_S + SLOWEST * 2.0
+    assert budget.cpu_s("f.py::a") == LEAST_CPU_S + SLOWEST * 0.01 + 2.0 * 2.0
     assert budget.cpu_s("only_a_mutant_has.py::c") == LEAST_CPU_S + SLOWEST
 
 

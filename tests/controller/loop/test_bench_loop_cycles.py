@@ -8,19 +8,20 @@ from typing import Any, cast
 
 import pytest
 
+from controller.law.inverse_model import GainRow
 from controller.loop import bench_loop
 from controller.loop.modes import Mode
 from controller.loop.paired_samples import Touch
 from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
-from controller.loop.steps import Hold, Retract
+from controller.loop.steps import Hold, Retract, TrackForce
 from controller.safety.inputs import SafetyInputs
 from controller.safety.load import UNKNOWN, LoadMonitor
 from controller.safety.oscillation import OscillationMonitor
 from controller.safety.table import Action, Incident
 from rig.channels import AxisSample, ForceSample
 from rig.errors import DeviceError
-from tests.controller.fake_bench import ZERO, FakeBench, pressing, wired
+from tests.controller.fake_bench import APPROACH, LEAVE, ZERO, FakeBench, pressing, wired
 from tests.controller.fake_devices import ARM
 
 MS = 1_000_000
@@ -97,6 +98,22 @@ def test_a_row_says_how_late_the_cycle_began_and_the_checks_hear_it_in_milliseco
     assert bench.ring.loop[-1].wake_latency_ns == 3_400_000
     assert inputs(bench).late_ms == pytest.approx(3.4)
     assert bench.ring.asked_ns == bench.ring.loop[-1].capture_ns
+
+
+def test_a_loop_that_was_held_up_inside_a_cycle_is_late_in_the_next_although_that_begins_on_its_grid() -> None:
+    bench = FakeBench()
+    bench.cycle(held_ns=5_000_000)
+    bench.cycle()
+    assert bench.ring.loop[-1].wake_latency_ns == 0
+    assert inputs(bench).late_ms == pytest.approx(5.0)
+    bench.cycle()
+    assert inputs(bench).late_ms == 0.0
+
+
+def test_the_first_cycle_of_all_is_late_against_its_own_time() -> None:
+    bench = FakeBench(settled=0)
+    bench.cycle(late_ns=200_000)
+    assert inputs(bench).late_ms == pytest.approx(0.2)
 
 
 def test_the_axis_is_first_told_to_stand_where_it_says_it_is() -> None:
@@ -386,3 +403,18 @@ def test_outside_of_force_control_nothing_oscillates() -> None:
     bench.loop._oscillation = Swinging()
     bench.cycle()
     assert (bench.mode, inputs(bench).oscillation) == (Mode.COMPRESS, "")
+
+
+def test_in_force_control_an_oscillation_is_heard() -> None:
+    bench = FakeBench()
+    bench.loop._oscillation = Swinging()
+    gains = tuple(
+        GainRow(force_N=force_N, depth_mm=force_N, tangent_N_mm=1.0, damping_N_s_mm=0.01) for force_N in (0.0, 9.0)
+    )
+    track = TrackForce(times_s=(0.0, 9.0), forces_N=(0.0, 0.0), gains=gains, crossover_rad_s=1.0)
+    bench.begin(ZERO, APPROACH, track, LEAVE)
+    bench.until(lambda: bench.mode is Mode.CONTACT)
+    assert (inputs(bench).oscillation, bench.latched) == ("", ""), "the step has only begun"
+    bench.cycle()
+    assert inputs(bench).oscillation == f"swings in {bench.loop.state.force_N:.0f} N"
+    assert bench.latched == "oscillation"

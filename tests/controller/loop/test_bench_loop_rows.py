@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from controller.loop.bench_loop import LATE_PERIODS, STATUS_EVERY_S, TEXT_BYTES
+from controller.loop.executive import Cycle
 from controller.loop.messages import Stopped
 from controller.loop.modes import Mode
 from controller.loop.steps import Hold, MoveTo, Retract
@@ -59,6 +60,13 @@ def test_the_execution_time_in_a_row_is_from_waking_to_the_row() -> None:
     bench.cycle()
     assert bench.ring.loop[-1].execution_ns == 123_000
     assert bench.axis.commands[-1][0] == bench.ring.loop[-1].capture_ns + 123_000, "asked when it is asked"
+
+
+def test_what_was_prepared_before_a_cycle_was_due_is_of_its_execution_too() -> None:
+    bench = FakeBench()
+    due_ns = bench.clock.now_ns
+    bench.loop.run_cycle(Cycle(bench.cycle_number, due_ns, due_ns, 0, prepared_ns=7_000))
+    assert bench.ring.loop[-1].execution_ns == 7_000
 
 
 @pytest.mark.parametrize("sensor_Hz", [1000.0, 100.0])
@@ -203,6 +211,12 @@ def test_a_program_leaves_its_events_and_its_outcome() -> None:
         "carried": {"zero": None, "reference_zero": None, "zero_N": None, "noise_N": 0.0, "noise_N_m": 0.0},
     }  # fmt: skip
     assert outcome["touch"]["surface_mm"] == outcome["surface_mm"]
+
+
+def test_an_outcome_says_what_its_program_found_left_by_the_one_before() -> None:
+    bench = FakeBench()
+    before = bench.run(ZERO)
+    assert bench.run(Hold(duration_s=0.01))["carried"]["zero_N"] == before["zero_N"]
 
 
 def test_an_outcome_without_contact_or_zero_says_nothing_of_them() -> None:
