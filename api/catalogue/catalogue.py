@@ -4,6 +4,7 @@ import contextlib
 import os
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -13,10 +14,11 @@ from api.catalogue import people
 from api.catalogue.database import CatalogueDamaged, Database, address
 from api.catalogue.erasing import finish
 from api.catalogue.folder import short, utc
+from api.catalogue.pages import FIRST, Page, cut
 from api.catalogue.people import NamedPerson
-from api.catalogue.queries import EVERYTHING, FIRST, Asked, Page, every, listed, sites
+from api.catalogue.queries import EVERYTHING, Asked, every, listed, sites
 from api.catalogue.refresh import refill, refresh
-from api.catalogue.schema import TABLES
+from api.catalogue.schema import TABLES, Kind
 from api.catalogue.settings import ENVIRONMENT
 from api.catalogue.stiffness import compared
 from rig.errors import UsageError
@@ -83,10 +85,13 @@ class Catalogue:
             self.database.prepare()
             self._prepared = True
 
+    def _page(self, kind: type[Kind], asked: Asked, page: Page) -> tuple[tuple[Kind, ...], str | None, tuple[str, ...]]:
+        with self._fresh() as (connection, remarks):
+            return *listed(connection, kind, asked, page), remarks
+
     def sessions(self, asked: Asked = EVERYTHING, page: Page = FIRST) -> SessionList:
         """Sessions by subject, site, kind, quality, dates and causes found."""
-        with self._fresh() as (connection, remarks):
-            items, following = listed(connection, SessionEntry, asked, page)
+        items, following, remarks = self._page(SessionEntry, asked, page)
         return SessionList(items=tuple(map(self._dated, items)), next=following, remarks=remarks)
 
     def _dated(self, session: SessionEntry) -> SessionEntry:
@@ -98,44 +103,50 @@ class Catalogue:
 
     def trials(self, asked: Asked = EVERYTHING, page: Page = FIRST) -> TrialList:
         """Trials, also by quality."""
-        with self._fresh() as (connection, _):
-            items, following = listed(connection, TrialEntry, asked, page)
+        items, following, _ = self._page(TrialEntry, asked, page)
         return TrialList(items=items, next=following)
 
     def models(self, asked: Asked = EVERYTHING, page: Page = FIRST) -> ModelList:
         """Models, also by law."""
-        with self._fresh() as (connection, _):
-            items, following = listed(connection, ModelEntry, asked, page)
+        items, following, _ = self._page(ModelEntry, asked, page)
         return ModelList(items=items, next=following)
 
     def diagnoses(self, asked: Asked = EVERYTHING, page: Page = FIRST) -> DiagnosisList:
         """Diagnoses, also by verdict and by a cause they named."""
-        with self._fresh() as (connection, _):
-            items, following = listed(connection, DiagnosisEntry, asked, page)
+        items, following, _ = self._page(DiagnosisEntry, asked, page)
         return DiagnosisList(items=items, next=following)
 
     def causes(self, asked: Asked = EVERYTHING, page: Page = FIRST) -> CauseList:
         """Causes that were named, also by name."""
-        with self._fresh() as (connection, _):
-            items, following = listed(connection, CauseEntry, asked, page)
+        items, following, _ = self._page(CauseEntry, asked, page)
         return CauseList(items=items, next=following)
 
     def operations(self, asked: Asked = EVERYTHING, page: Page = FIRST) -> WorkList:
         """Operations that left a result, by kind and session."""
-        with self._fresh() as (connection, _):
-            items, following = listed(connection, WorkEntry, asked, page)
+        items, following, _ = self._page(WorkEntry, asked, page)
         return WorkList(items=items, next=following)
 
-    def subjects(self, site: str = "", named: bool = True) -> SubjectList:
-        """Subjects that have a session or a name, by code; without ``named`` no names."""
+    def subjects(self, asked: Asked = EVERYTHING, page: Page | None = None, named: bool = True) -> SubjectList:
+        """Subjects that have such a session, or a name where nothing is asked of one; by code, without ``page`` all.
+
+        Without ``named`` no names.
+        """
+        of_sessions = replace(asked, subject="")
         with self._fresh() as (connection, _):
             found = _subjects(connection, people.names(connection) if named else {})
-        return SubjectList(items=tuple(each for each in found if not site or site in each.sites))
+            having = {one.subject for one in sites(connection, of_sessions)} if of_sessions != EVERYTHING else None
+        shown = [
+            each for each in found if asked.subject in ("", each.subject) and (having is None or each.subject in having)
+        ]
+        items, following = cut(page, "subjects", shown, lambda each: (each.subject, ""))
+        return SubjectList(items=items, next=following)
 
-    def sites(self, asked: Asked = EVERYTHING) -> SiteList:
-        """Sites by subject, each with its number of sessions."""
+    def sites(self, asked: Asked = EVERYTHING, page: Page | None = None) -> SiteList:
+        """Sites by subject, each with its number of sessions; without ``page`` all."""
         with self._fresh() as (connection, _):
-            return SiteList(items=sites(connection, asked))
+            found = sites(connection, asked)
+        items, following = cut(page, "sites", found, lambda each: (each.subject, each.site))
+        return SiteList(items=items, next=following)
 
     def history(self, subject: str, named: bool = True) -> SubjectHistory:
         """All that is known of one subject; raises UsageError where nothing is."""

@@ -1,7 +1,5 @@
 """Questions to the tables: equal columns, newest first, page by page."""
 
-import base64
-import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -10,8 +8,8 @@ from typing import TypeVar
 from sqlalchemy import ColumnElement, Connection, Table, and_, func, or_, select
 
 from api.catalogue.folder import utc_of
+from api.catalogue.pages import FIRST, Page, Place
 from api.catalogue.schema import TABLES, entry
-from api.catalogue.settings import MOST, USUAL
 from rig.errors import UsageError
 from rig.results.catalogue import CatalogueEntry, CauseEntry, SessionEntry, SiteEntry, storable
 
@@ -36,28 +34,17 @@ class Asked:
     until: str = ""
 
 
-@dataclass(frozen=True)
-class Page:
-    """How many entries, and after which: the ``next`` of the page before."""
-
-    limit: int = USUAL
-    cursor: str = ""
-
-
-EVERYTHING, FIRST = Asked(), Page()
+EVERYTHING = Asked()
 
 
 def listed(
     connection: Connection, kind: type[Kind], asked: Asked = EVERYTHING, page: Page = FIRST
 ) -> tuple[tuple[Kind, ...], str | None]:
     """Entries of one kind, newest first, and the cursor of what follows; raises UsageError for a wrong page."""
-    if not 1 <= page.limit <= MOST:
-        raise UsageError(f"limit {page.limit}: a page has 1 to {MOST} entries; ask for the rest by its cursor")
     table = TABLES[kind]
-    wanted = select(table).where(*_conditions(table, asked), *_after(table, page.cursor))
-    rows = connection.execute(wanted.order_by(table.c.at.desc(), table.c.key).limit(page.limit + 1)).mappings().all()
-    found = tuple(entry(kind, row) for row in rows[: page.limit])
-    return found, _cursor(found[-1]) if len(rows) > page.limit else None
+    wanted = select(table).where(*_conditions(table, asked), *_after(table, page.after(_name(table))))
+    rows = connection.execute(wanted.order_by(table.c.at.desc(), table.c.key).limit(page.limit + 1)).mappings()
+    return page.first(_name(table), [entry(kind, row) for row in rows], lambda one: (one.at, one.key))
 
 
 def every(connection: Connection, kind: type[Kind], asked: Asked) -> tuple[Kind, ...]:
@@ -104,18 +91,13 @@ def _moment(given: str, name: str) -> str:
     return given if DAY.fullmatch(given) else found
 
 
-def _cursor(last: CatalogueEntry) -> str:
-    return base64.urlsafe_b64encode(json.dumps([last.at, last.key]).encode()).decode().rstrip("=")
+def _name(table: Table) -> str:
+    """As whoever asks knows the list."""
+    return table.name.removeprefix("rig_")
 
 
-def _after(table: Table, cursor: str) -> list[ColumnElement[bool]]:
-    if not cursor:
+def _after(table: Table, last: Place | None) -> list[ColumnElement[bool]]:
+    if last is None:
         return []
-    try:
-        at, key = json.loads(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)))
-        at, key = storable(at), storable(key)
-        if not (isinstance(at, str) and isinstance(key, str)):
-            raise ValueError(cursor)
-    except (ValueError, TypeError, AttributeError) as error:
-        raise UsageError(f"cursor {cursor[:40]}: is none that was given; leave it out to begin anew") from error
+    at, key = last
     return [or_(table.c.at < at, and_(table.c.at == at, table.c.key > key))]

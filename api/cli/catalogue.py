@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 import typer
 
 from api.catalogue.catalogue import Catalogue
-from api.catalogue.queries import Asked, Page
+from api.catalogue.pages import Page
+from api.catalogue.queries import Asked
 from api.catalogue.settings import ENVIRONMENT, USUAL
 from api.catalogue.subjects import erase_subject, export_subject
 from api.cli.options import JsonOption
@@ -114,7 +115,7 @@ def _asker(lists: Catalogue, what: str) -> Callable[[Asked, Page], SavedResult]:
         "diagnoses": lists.diagnoses,
         "causes": lists.causes,
         "operations": lists.operations,
-        "sites": lambda asked, _: lists.sites(asked),
+        "sites": lists.sites,
     }
     return askers[what]
 

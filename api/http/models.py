@@ -160,6 +160,14 @@ class SessionView(BaseModel):
     recordings: list[RecordingView]
 
 
+class RecordingList(BaseModel):
+    """Sessions with their recordings, newest first; ``next`` is the cursor of what follows, null at the end."""
+
+    items: list[SessionView]
+    next: str | None = None
+    remarks: list[str] = Field(default=[], description="folders that are not listed, and why")
+
+
 class Done(BaseModel):
     """A stop or a reset took effect."""
 

@@ -12,6 +12,7 @@ from api.http.lease import ControlLease
 from api.http.models import (
     ControlView,
     LeaseView,
+    RecordingList,
     RecordingView,
     RigView,
     SessionView,
@@ -20,6 +21,7 @@ from api.http.service import Service
 from controller.devices.health import ALIVE, ON_RATE, VALID
 from controller.loop.messages import Status
 from rig.recording.sessions import TrialInfo, read_listing
+from rig.results.catalogue import SessionList
 
 State = Literal["disconnected", "not ready", "idle", "running", "stopped"]
 STREAMS = ("force", "axis", "marker")
@@ -100,16 +102,13 @@ def _health(bits: int) -> dict[str, dict[str, bool]]:
     }
 
 
-def sessions(service: Service) -> list[SessionView]:
-    """Sessions with at least one recording, newest first."""
-    if not service.sessions.is_dir():
-        return []
-    found: list[tuple[float, SessionView]] = []
-    for path in service.sessions.iterdir():
-        with contextlib.suppress(FileNotFoundError):  # removed meanwhile
-            if is_text(path.name) and any(path.glob("*.mcap")):
-                found.append((path.stat().st_mtime, session(path)))
-    return [view for _, view in sorted(found, key=lambda each: each[0], reverse=True)]
+def recordings(root: Path, found: SessionList) -> RecordingList:
+    """Sessions in ``root`` with their recordings, without those that were removed meanwhile."""
+    items: list[SessionView] = []
+    for entry in found.items:
+        with contextlib.suppress(FileNotFoundError):
+            items.append(session(root / entry.session))
+    return RecordingList(items=items, next=found.next, remarks=list(found.remarks))
 
 
 def session(folder: Path) -> SessionView:

@@ -106,7 +106,7 @@ def test_a_session_of_a_long_name_is_no_job_s(client: TestClient) -> None:
 def test_names_that_are_no_text_hide_no_others(client: TestClient, first: Path) -> None:
     (first / os.fsdecode(b"bad\xff.json")).write_text("{}")
     shutil.copytree(first, first.with_name(os.fsdecode(b"bad\xfe")))
-    (listed,) = client.get("/api/v1/recordings").json()
+    (listed,) = client.get("/api/v1/recordings").json()["items"]
     shown = client.get(f"/api/v1/sessions/{first.name}").json()
     for found in (listed, shown):
         files = [each["file"] for each in found["recordings"]]
@@ -117,7 +117,7 @@ def test_names_that_are_no_text_hide_no_others(client: TestClient, first: Path) 
 def test_a_name_of_any_letters_comes_back_as_it_is_and_adds_no_header(client: TestClient, first: Path) -> None:
     name = "a\"b\r\nX-Planted: 1 ü;'"
     first.rename(first.with_name(name))
-    (listed,) = client.get("/api/v1/recordings").json()
+    (listed,) = client.get("/api/v1/recordings").json()["items"]
     assert listed["name"] == name
     answer = client.get(listed["recordings"][0]["href"])
     assert answer.status_code == 200 and "x-planted" not in answer.headers

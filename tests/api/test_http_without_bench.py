@@ -145,7 +145,7 @@ def test_one_bad_file_hides_no_other(tmp_path: Path) -> None:
     (sessions / "secret" / "b.mcap").symlink_to("/etc/hostname")
     with client_of(Service(Wiring(force=BotaWiring(port="/dev/no-such-sensor")), sessions, protocols)) as client:
         listed = {item["name"]: item["refusal"] for item in client.get("/api/v1/protocols").json()}
-        found = {item["name"]: item for item in client.get("/api/v1/recordings").json()}
+        found = {item["name"]: item for item in client.get("/api/v1/recordings").json()["items"]}
         assert client.get("/api/v1/recordings/secret/b.mcap").status_code == 404
     assert listed["fine"] == ""
     assert "nests its values too deeply" in listed["nested"]
@@ -162,7 +162,7 @@ def test_the_quality_of_a_recording_stands_in_the_list(tmp_path: Path) -> None:
     write_session(folder, replace(info, trials=(replace(info.trials[0], quality="usable", reasons=(reason,)),)))
     service = Service(Wiring(force=BotaWiring(port="/dev/no-such-sensor")), tmp_path / "sessions", EXAMPLES)
     with client_of(service) as client:
-        (session,) = client.get("/api/v1/recordings").json()
+        (session,) = client.get("/api/v1/recordings").json()["items"]
     found = {entry["file"]: (entry["quality"], entry["reasons"]) for entry in session["recordings"]}
     assert found[info.trials[0].file] == ("usable", [reason])
     assert found["session.json"] == ("", [])

@@ -98,7 +98,7 @@ def test_a_capture_runs_as_a_job_and_its_recording_can_be_downloaded(
     _, client, _ = served
     job = ended(client, start(client, "short", "first"))
     assert job["state"] == "succeeded", job["message"]
-    (session,) = (item for item in client.get("/api/v1/recordings").json() if item["name"] == "first")
+    (session,) = (item for item in client.get("/api/v1/recordings").json()["items"] if item["name"] == "first")
     assert (session["trials"], session["dropped"]) == (1, 0)
     href = next(item["href"] for item in session["recordings"] if item["file"].endswith(".mcap"))
     file = tmp_path / "downloaded.mcap"

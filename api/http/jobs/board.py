@@ -1,8 +1,6 @@
 """All jobs of a service: at most one that uses the bench, computations one after another, and what has ended."""
 
-import base64
 import contextlib
-import json
 import threading
 import time
 import traceback
@@ -13,6 +11,7 @@ from pathlib import Path
 
 from pydantic import JsonValue
 
+from api.catalogue.pages import Page, cut
 from api.http.jobs.job import Job, JobRequest, stamp
 from api.http.jobs.kinds import Kind
 from api.http.jobs.places import Places
@@ -26,7 +25,6 @@ from rig.errors import RigError
 
 # Nobody waits for more computations than a night's.
 MOST_WAITING = 50
-MOST_LISTED = 200
 NOTE, WARNING = 10, 20
 
 
@@ -236,16 +234,15 @@ class JobBoard:
             raise _ended(identifier, known.state, done)
         return None
 
-    def listed(self, wanted: Filter, limit: int, cursor: str) -> JobList:
-        """A page of them, newest first."""
+    def listed(self, wanted: Filter, page: Page) -> JobList:
+        """A page of them, newest first; raises UsageError for a wrong cursor."""
         with self._lock:
             everything: Mapping[str, JobSummary] = {
                 **self._known(), **{job.id: summary(job) for job in self._live.values()},
             }  # fmt: skip
-        found = sorted(filter(wanted.fits, everything.values()), key=_place, reverse=True)
-        after = [job for job in found if not cursor or _place(job) < _placed(cursor)]
-        following = _cursor(after[limit - 1]) if len(after) > limit else None
-        return JobList(items=after[:limit], next=following)
+        found = filter(wanted.fits, everything.values())
+        items, following = cut(page, "jobs", found, lambda job: (job.created, job.id), newest_first=True)
+        return JobList(items=items, next=following)
 
     def close(self) -> None:
         """The service ends: whatever computes is ended with it, what waits first, so that none of it begins."""
@@ -253,23 +250,6 @@ class JobBoard:
             if not job.asked.moves:
                 with contextlib.suppress(RigError):
                     self.cancel(job.id)
-
-
-def _place(job: JobSummary) -> tuple[str, str]:
-    return job.created, job.id
-
-
-def _cursor(job: JobSummary) -> str:
-    return base64.urlsafe_b64encode(json.dumps(_place(job)).encode()).decode().rstrip("=")
-
-
-def _placed(cursor: str) -> tuple[str, str]:
-    try:
-        created, identifier = json.loads(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)))
-        return str(created), str(identifier)
-    except (ValueError, TypeError) as error:
-        text = f"cursor {cursor[:40]}: is none that was given; leave it out to begin anew"
-        raise RequestRefused(422, "refused", text) from error
 
 
 def _unknown(identifier: str) -> RequestRefused:

@@ -46,7 +46,7 @@ class JobView(JobSummary):
 class JobList(BaseModel):
     """Jobs, newest first; ``next`` is the cursor of what follows, null at the end."""
 
-    items: list[JobSummary]
+    items: tuple[JobSummary, ...]
     next: str | None = None
 
 

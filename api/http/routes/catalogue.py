@@ -2,41 +2,40 @@
 
 import contextlib
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Depends, Request, Response
 from fastapi.responses import FileResponse
 from pydantic import Field
 from starlette.background import BackgroundTask
 
 from api.catalogue.catalogue import Catalogue, NoSuchSubject
 from api.catalogue.database import CatalogueDamaged, CatalogueUnavailable
-from api.catalogue.queries import Asked, Page
-from api.catalogue.settings import MOST, USUAL
+from api.catalogue.pages import Page
+from api.catalogue.queries import Asked
 from api.catalogue.subjects import erase_subject, export_subject
 from api.http.access.rights import ADMIN, CALLER, OPERATE, READ
 from api.http.access.scopes import Scope
 from api.http.models import RequestBody
 from api.http.problems import RequestRefused, responses
+from api.http.routes.common import PageQuery, Word
 from api.http.service import Service
+from rig.results.base import SavedResult
 from rig.results.catalogue import (
     CatalogueResult,
     CauseList,
     DiagnosisList,
     ErasureResult,
     ModelList,
+    SessionList,
     SiteList,
     SubjectHistory,
     SubjectList,
     TrialList,
     WorkList,
 )
-
-# Codes and words that are asked for; PostgreSQL and SQLite are asked with no longer ones.
-LONGEST = 500
-Word = Annotated[str, Query(max_length=LONGEST)]
 
 
 class NameRequest(RequestBody):
@@ -61,15 +60,7 @@ def asked_in(
     return Asked(subject, site, session, kind, quality, law, verdict, cause, since=since, until=until)
 
 
-def page_in(
-    limit: Annotated[int, Query(ge=1, le=MOST)] = USUAL, cursor: Annotated[str, Query(max_length=4 * LONGEST)] = ""
-) -> Page:
-    """Which page: the ``next`` of the one before is its cursor."""
-    return Page(limit, cursor)
-
-
 AskedQuery = Annotated[Asked, Depends(asked_in)]
-PageQuery = Annotated[Page, Depends(page_in)]
 
 
 @contextlib.contextmanager
@@ -97,44 +88,31 @@ def _lists(router: APIRouter, lists: Catalogue) -> None:
     @router.get(
         "/subjects", summary="Subjects by code; names only for whoever may operate", dependencies=[READ], responses=told
     )
-    def subjects(request: Request, site: Word = "") -> SubjectList:
+    def subjects(request: Request, asked: AskedQuery, page: PageQuery) -> SubjectList:
         with answering():
-            return lists.subjects(site, sees_names(request))
+            return lists.subjects(asked, page, sees_names(request))
 
-    @router.get("/sites", summary="Sites of subjects, with their sessions", dependencies=[READ], responses=told)
-    def sites(asked: AskedQuery) -> SiteList:
-        with answering():
-            return lists.sites(asked)
+    for name, (summary, result, find) in {
+        "sessions": ("Sessions by query, newest first", SessionList, lists.sessions),
+        "sites": ("Sites of subjects, with their sessions", SiteList, lists.sites),
+        "trials": ("Trials with their quality, newest first", TrialList, lists.trials),
+        "models": ("Fitted models, newest first", ModelList, lists.models),
+        "diagnoses": ("Diagnoses, newest first", DiagnosisList, lists.diagnoses),
+        "causes": ("Causes that diagnoses named, newest first", CauseList, lists.causes),
+        "operations": ("Operations that left a result in a session, newest first", WorkList, lists.operations),
+    }.items():
+        add_route = router.get(
+            f"/{name}", name=name, summary=summary, response_model=result, dependencies=[READ], responses=told
+        )
+        add_route(_lister(find))
 
-    @router.get("/trials", summary="Trials with their quality, newest first", dependencies=[READ], responses=told)
-    def trials(asked: AskedQuery, page: PageQuery) -> TrialList:
-        with answering():
-            return lists.trials(asked, page)
 
-    @router.get("/models", summary="Fitted models, newest first", dependencies=[READ], responses=told)
-    def models(asked: AskedQuery, page: PageQuery) -> ModelList:
+def _lister(find: Callable[[Asked, Page], SavedResult]) -> Callable[[Asked, Page], SavedResult]:
+    def page_of(asked: AskedQuery, page: PageQuery) -> SavedResult:
         with answering():
-            return lists.models(asked, page)
+            return find(asked, page)
 
-    @router.get("/diagnoses", summary="Diagnoses, newest first", dependencies=[READ], responses=told)
-    def diagnoses(asked: AskedQuery, page: PageQuery) -> DiagnosisList:
-        with answering():
-            return lists.diagnoses(asked, page)
-
-    @router.get("/causes", summary="Causes that diagnoses named, newest first", dependencies=[READ], responses=told)
-    def causes(asked: AskedQuery, page: PageQuery) -> CauseList:
-        with answering():
-            return lists.causes(asked, page)
-
-    @router.get(
-        "/operations",
-        summary="Operations that left a result in a session, newest first",
-        dependencies=[READ],
-        responses=told,
-    )
-    def operations(asked: AskedQuery, page: PageQuery) -> WorkList:
-        with answering():
-            return lists.operations(asked, page)
+    return page_of
 
 
 def sees_names(request: Request) -> bool:

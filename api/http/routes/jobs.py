@@ -7,7 +7,7 @@ from fastapi.responses import FileResponse
 
 from api.http.access.rights import OPERATE, READ, STOP
 from api.http.downloads import FileAsOfNow
-from api.http.jobs.board import MOST_LISTED, Filter
+from api.http.jobs.board import Filter
 from api.http.jobs.examples import EXAMPLES
 from api.http.jobs.kinds import KINDS, AnyJob
 from api.http.jobs.places import regular_file
@@ -15,7 +15,7 @@ from api.http.jobs.start import start
 from api.http.jobs.states import JobState
 from api.http.jobs.views import FILE_TYPES, JobList, JobView, media_type
 from api.http.problems import RequestRefused, responses
-from api.http.routes.common import PREFIX, KeyHeader, LeaseHeader, WhoAsks, refuse_without_key
+from api.http.routes.common import PREFIX, KeyHeader, LeaseHeader, PageQuery, WhoAsks, refuse_without_key
 from api.http.service import Service
 
 Word = Annotated[str, Query(max_length=1000)]
@@ -56,14 +56,13 @@ def add(router: APIRouter, service: Service) -> None:
 def _lists(router: APIRouter, service: Service) -> None:
     @router.get("/jobs", dependencies=[READ], summary="Jobs, newest first", responses=responses("422 refused"))
     def jobs(
+        page: PageQuery,
         kind: Word = "",
         state: JobState | None = None,
         session: Word = "",
         moves: bool | None = None,
-        limit: Annotated[int, Query(ge=1, le=MOST_LISTED)] = 50,
-        cursor: Word = "",
     ) -> JobList:
-        return service.jobs.listed(Filter(kind, state or "", session, moves), limit, cursor)
+        return service.jobs.listed(Filter(kind, state or "", session, moves), page)
 
     @router.get(
         "/jobs/{identifier}",

@@ -3,13 +3,16 @@
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
+from api.catalogue.catalogue import Catalogue
 from api.http import views
 from api.http.access.rights import READ
 from api.http.downloads import FileAsOfNow
 from api.http.jobs.places import regular_file
 from api.http.jobs.views import FILE_TYPES, media_type
-from api.http.models import SessionView
+from api.http.models import RecordingList
 from api.http.problems import RequestRefused, responses
+from api.http.routes.catalogue import AskedQuery, answering
+from api.http.routes.common import PageQuery
 from api.http.service import Service
 
 # A report is a page that carries its own style and pictures. Whatever else lies there as one, it runs no script, and is
@@ -20,9 +23,17 @@ SANDBOX = "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:
 def add(router: APIRouter, service: Service) -> None:
     """Its routes."""
 
-    @router.get("/recordings", dependencies=[READ], summary="Sessions with their recordings, newest first")
-    def recordings() -> list[SessionView]:
-        return views.sessions(service)
+    lists = Catalogue(service.sessions)
+
+    @router.get(
+        "/recordings",
+        dependencies=[READ],
+        summary="Sessions by query with their recordings, newest first",
+        responses=responses("422 refused", "503 catalogue"),
+    )
+    def recordings(asked: AskedQuery, page: PageQuery) -> RecordingList:
+        with answering():
+            return views.recordings(service.sessions, lists.sessions(asked, page))
 
     @router.get(
         "/recordings/{session}/{file:path}",

@@ -1,17 +1,16 @@
-"""Sessions: listed by query, looked at, taken away in every format, and erased in two steps."""
+"""Sessions: looked at, taken away in every format, and erased in two steps."""
 
 import asyncio
 import hashlib
 import shutil
 from collections.abc import Coroutine
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Response
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 
-from api.catalogue.catalogue import Catalogue
 from api.catalogue.erasing import put_aside
 from api.http import views
 from api.http.access.rights import ADMIN, OPERATE, READ
@@ -23,13 +22,11 @@ from api.http.jobs.start import start
 from api.http.jobs.views import FILE_TYPES, FileView, listed_files, media_type
 from api.http.models import SessionView
 from api.http.problems import RequestRefused, responses
-from api.http.routes.catalogue import AskedQuery, PageQuery, answering
+from api.http.routes.common import Word
 from api.http.service import Service
 from rig.results.base import SavedResult
-from rig.results.catalogue import SessionList
 
 Format = Literal["csv", "parquet", "hdf5", "mat", "mcap"]
-Word = Annotated[str, Query(max_length=100)]
 NAMES = {"csv": "csv", "parquet": "parquet", "hdf5": "session.h5", "mat": "session.mat"}
 FOLDERS = ("csv", "parquet")
 LOOK_S = 0.1
@@ -63,23 +60,12 @@ class ExportUnderWay(BaseModel):
 
 def add(router: APIRouter, service: Service) -> None:
     """Its routes."""
-    lists = Catalogue(service.sessions)
-    _looks(router, service, lists)
+    _looks(router, service)
     _exports(router, service)
     _erasure(router, service)
 
 
-def _looks(router: APIRouter, service: Service, lists: Catalogue) -> None:
-    @router.get(
-        "/sessions",
-        dependencies=[READ],
-        summary="Sessions by query, newest first",
-        responses=responses("422 refused", "503 catalogue"),
-    )
-    def sessions(asked: AskedQuery, page: PageQuery) -> SessionList:
-        with answering():
-            return lists.sessions(asked, page)
-
+def _looks(router: APIRouter, service: Service) -> None:
     @router.get(
         "/sessions/{session}",
         dependencies=[READ],

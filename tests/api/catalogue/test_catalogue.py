@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from api.catalogue.catalogue import Catalogue
-from api.catalogue.queries import Asked, Page
+from api.catalogue.pages import Page
+from api.catalogue.queries import Asked
 from rig.errors import UsageError
 from tests.api.catalogue.made import diagnosed, fitted, make_session, trial, with_threshold
 
@@ -114,7 +115,7 @@ def test_a_subject_s_history_has_sessions_thresholds_models_and_diagnoses(lab: C
     assert [(each.session, each.force_N) for each in history.thresholds] == [("b", 7.4)]
     assert [len(history.models), len(history.diagnoses)] == [1, 1]
     assert [each.subject for each in lab.subjects().items] == ["S01", "S02"]
-    assert [each.subject for each in lab.subjects(site="calf").items] == ["S02"]
+    assert [each.subject for each in lab.subjects(Asked(site="calf")).items] == ["S02"]
     with pytest.raises(UsageError, match="subject 'S03': has no session"):
         lab.history("S03")
 

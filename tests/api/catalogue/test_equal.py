@@ -8,7 +8,8 @@ import pytest
 from sqlalchemy import select
 
 from api.catalogue.catalogue import Catalogue
-from api.catalogue.queries import Asked, Page, listed
+from api.catalogue.pages import Page
+from api.catalogue.queries import Asked, listed
 from api.catalogue.schema import PERSON, STAMP, TABLES
 from rig.results.catalogue import SessionEntry, TrialEntry
 from tests.api.catalogue.made import diagnosed, fitted, make_session, trial, with_threshold

@@ -4,6 +4,9 @@ import { t } from "./texts";
 
 export type Schema = components["schemas"];
 
+/** Entries of one page of a list, as the service gives at most. */
+const LARGEST_PAGE = 500;
+
 type Method = "get" | "post" | "put" | "delete" | "patch";
 type Routes<M extends Method> = { [P in keyof paths]: paths[P][M] extends object ? P : never }[keyof paths];
 type Operation<P extends keyof paths, M extends Method> = paths[P][M];
@@ -90,6 +93,20 @@ export const ifThere = <T>(path: string, sent: Sent<undefined> = {}): Promise<T 
   });
 
 export const get = <P extends Routes<"get">>(path: P, sent: Sent<undefined> = {}) => ask("get", path, sent) as Promise<Answer<P, "get">>;
+type Items<A> = A extends { items: readonly (infer I)[] } ? I : never;
+
+/** All of a list that comes page by page. */
+export async function every<P extends Routes<"get">>(path: P): Promise<Items<Answer<P, "get">>[]> {
+  const found: Items<Answer<P, "get">>[] = [];
+  let cursor: string | null | undefined = "";
+  do {
+    const page = (await ask("get", path, { query: { limit: LARGEST_PAGE, cursor } })) as { items: typeof found; next?: string | null };
+    found.push(...page.items);
+    cursor = page.next;
+  } while (cursor);
+  return found;
+}
+
 export const post = <P extends Routes<"post">>(path: P, sent: Sent<Body<P, "post">> = {}) => ask("post", path, sent) as Promise<Answer<P, "post">>;
 export const put = <P extends Routes<"put">>(path: P, sent: Sent<Body<P, "put">> = {}) => ask("put", path, sent) as Promise<Answer<P, "put">>;
 export const remove = <P extends Routes<"delete">>(path: P, sent: Sent<undefined> = {}) => ask("delete", path, sent) as Promise<Answer<P, "delete">>;

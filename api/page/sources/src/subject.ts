@@ -1,5 +1,5 @@
 // Who lies on the bench: read with the mark that a change has to name, so that two pages do not overwrite each other.
-import { ask, get, marked, requestKey } from "./api";
+import { ask, every, marked, requestKey } from "./api";
 import { held, inControl } from "./lease";
 import { useLoaded } from "./loaded";
 
@@ -22,4 +22,4 @@ export const keepSubject = (before: OnBench, changed: Partial<Subject>) =>
   inControl(() => ask("put", PATH, { body: { ...before.value, ...changed }, headers: { ...held(), ...requestKey(), "If-Match": before.mark } }));
 
 /** Codes and sites that were used before, to choose from. */
-export const useKnownSubjects = () => useLoaded(async () => (await get("/api/v1/subjects")).items);
+export const useKnownSubjects = () => useLoaded(() => every("/api/v1/subjects"));

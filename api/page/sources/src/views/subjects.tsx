@@ -1,6 +1,6 @@
 // Who was measured, what came of it over time, and a person's data as a whole: taken along or erased.
 import { useState } from "preact/hooks";
-import { get, type Schema } from "../api";
+import { every, type Schema } from "../api";
 import { date } from "../clock";
 import { useLoaded } from "../loaded";
 import { Card, Rows, Show } from "../parts/basics";
@@ -32,7 +32,7 @@ function Table({ subjects }: { subjects: readonly Subject[] }) {
 }
 
 function List() {
-  const found = useLoaded(async () => (await get("/api/v1/subjects")).items);
+  const found = useLoaded(() => every("/api/v1/subjects"));
   const [asked, ask] = useState("");
   const [site, choose] = useState("");
   const sites = [...new Set((found.value ?? []).flatMap((one) => one.sites))].sort();
