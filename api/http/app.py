@@ -53,7 +53,7 @@ def build(service: Service, meanwhile: bool = False, names: tuple[str, ...] = ()
     problems.install(app)
     app.add_middleware(Guard, headers=_headers(service), access=service.access, rights=RightsTable(app), names=names)
     # As routes of the application's own: those of an included router are looked through twice for each request.
-    for router in (routes.build(service), stream_routes.build(Streams(service.wiring, feed, service.id))):
+    for router in (routes.build(service), stream_routes.build(Streams(service.wiring, feed, service.id, service.lost))):
         app.router.routes.extend(router.routes)
     app.get("/api/v1/openapi.json", include_in_schema=False, dependencies=[READ])(lambda: JSONResponse(app.openapi()))
     app.get("/", include_in_schema=False, dependencies=[PUBLIC])(lambda: _page(service))

@@ -49,7 +49,7 @@ EXPLAINED: Mapping[str, tuple[str, str]] = {
     "no-such-recording": ("The session has no such file.", "GET /api/v1/sessions/{session} lists its files."),
     "no-such-route": ("There is nothing at this address.", "GET /api/v1/openapi.json lists all."),
     "no-such-session": ("There is no session of that name.", "GET /api/v1/sessions lists them."),
-    "no-such-stream": ("There is no stream of that name.", "The service's hello lists them."),
+    "no-such-stream": ("There is no stream of that name.", "GET /api/v1/streams lists them."),
     "no-such-subject": ("Nothing is known of that code.", "GET /api/v1/subjects lists codes."),
     "no-such-upload": ("There is no upload of that id.", "Uploads are kept for a week; send the files again."),
     "not-confirmed": ("The loop did not confirm the stop in time.", "Use the hardware emergency stop."),

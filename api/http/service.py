@@ -5,7 +5,7 @@ import contextlib
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from controller.loop.messages import DeviceView
 from controller.recovery.situation import Consent
 from controller.stop.word import NOT_CONFIRMED, StopOutcome, StopReason
 from controller.supervisor import Supervisor
+from rig.channels import BY_NAME
 from rig.config.protocol import Indentation
 from rig.config.subject import Subject
 from rig.config.table import load
@@ -183,6 +184,13 @@ class Service:
         if bench is None or not bench.alive:
             return None
         return reports_of(self.devices(bench), bench.status.get("rates_Hz", {}))
+
+    def lost(self) -> Mapping[str, str]:
+        """Why each stream is lost that is, by its topic: all of them where no loop runs."""
+        bench = self.bench
+        if bench is None or not bench.alive:
+            return dict.fromkeys(BY_NAME, self.reason or "the loop's process is gone; connect again")
+        return bench.status.get("lost", {})
 
     def devices(self, bench: Supervisor) -> dict[str, DeviceView]:
         """Who each device is, and how it is."""

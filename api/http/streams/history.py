@@ -21,6 +21,7 @@ class LiveHistory:
     """Rows by their place, counted from the first ever; at least the last 60 s of them."""
 
     def __init__(self, fields: Sequence[str], rate_Hz: float, kept_s: float = KEPT_S) -> None:
+        self.period_ns = round(1e9 / rate_Hz) if rate_Hz else 0
         self._room = max(round(kept_s * rate_Hz * SPARE), 1)
         # Written once, so that the memory is taken now and not over the first minute.
         self._rows = np.full(self._room, 0, row_type(fields))

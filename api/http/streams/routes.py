@@ -6,8 +6,10 @@ from fastapi import APIRouter, Header, Query, WebSocket
 from fastapi.responses import StreamingResponse
 
 from api.http.access.rights import READ
+from api.http.problems import responses
 from api.http.routes.common import PREFIX
 from api.http.streams import sse
+from api.http.streams.latest import MOST_LATEST, LatestView
 from api.http.streams.messages import StreamView
 from api.http.streams.session import Streams
 from api.http.streams.socket import serve
@@ -22,7 +24,7 @@ Since = Annotated[int | None, Query(ge=0, le=2**53, description="number of the l
 
 
 def build(streams: Streams) -> APIRouter:
-    """`/stream`, `/streams` and `/events`."""
+    """`/stream`, `/streams`, the newest of one of them, and `/events`."""
     router = APIRouter(prefix=PREFIX)
 
     @router.websocket("/stream", dependencies=[READ])
@@ -34,6 +36,15 @@ def build(streams: Streams) -> APIRouter:
     )
     async def listed() -> list[StreamView]:
         return streams.listed()
+
+    @router.get(
+        "/streams/{stream}/latest",
+        dependencies=[READ],
+        summary="The newest samples of a stream; one that is not live says why, and gives none as if it were",
+        responses=responses("404 no-such-stream"),
+    )
+    async def newest(stream: str, limit: Annotated[int, Query(ge=1, le=MOST_LATEST)] = 1) -> LatestView:
+        return streams.latest(stream, limit)
 
     @router.get(
         "/events",

@@ -1,6 +1,7 @@
 """One client of `rig.v1`, without its socket: what it asks for, and what is due to it."""
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator, Mapping
 from itertools import chain
 
 from pydantic import ValidationError
@@ -10,6 +11,7 @@ from api.http.problems import RequestRefused
 from api.http.streams.batch import Decimation
 from api.http.streams.events import EventsLost, LiveEvent
 from api.http.streams.feed import Feed
+from api.http.streams.latest import LatestView, latest
 from api.http.streams.messages import (
     CLIENT_MESSAGE,
     MOST_STREAMS,
@@ -43,14 +45,28 @@ class TooSlow(Exception):
 class Streams:
     """What all clients share: the feed, the signals of this bench, and the views of them."""
 
-    def __init__(self, wiring: Wiring, feed: Feed, session_id: str) -> None:
-        self.feed, self.session_id = feed, session_id
+    def __init__(
+        self, wiring: Wiring, feed: Feed, session_id: str, lost: Callable[[], Mapping[str, str]] = dict
+    ) -> None:
+        """``lost`` says by topic why a device is lost now."""
+        self.feed, self.session_id, self._lost = feed, session_id, lost
         self.signals = signals(wiring)
         self.views = Views()
 
     def listed(self) -> list[StreamView]:
         """All that can be subscribed."""
         return [StreamView.model_validate(vars(one) | {"fields": list(one.fields)}) for one in self.signals.values()]
+
+    def signal(self, name: str) -> LiveSignal:
+        """The signal of that name; raises RequestRefused with all there are."""
+        if name not in self.signals:
+            text = f"no stream {name[:80]!r}; there are {', '.join(self.signals)}"
+            raise RequestRefused(404, "no-such-stream", text)
+        return self.signals[name]
+
+    def latest(self, name: str, count: int) -> LatestView:
+        """The newest samples of one of them; in the thread of the event loop, as the feed."""
+        return latest(self.signal(name), self.feed.run, count, time.monotonic_ns(), self._lost())
 
 
 class LiveClient:
@@ -106,7 +122,7 @@ class LiveClient:
         self._end(self._subscriptions.channels)
 
     def _subscribe(self, asked: Subscribe) -> Subscribed:
-        wanted = [self._signal(name) for name in dict.fromkeys(asked.streams)]
+        wanted = [self._streams.signal(name) for name in dict.fromkeys(asked.streams)]
         if len(self._subscriptions.channels) + len(wanted) > MOST_STREAMS:
             raise RequestRefused(
                 409, "too-many-channels", f"one connection takes {MOST_STREAMS} channels; end some first"
@@ -156,13 +172,6 @@ class LiveClient:
         for event in found:
             yield event
             self._event = event.seq
-
-    def _signal(self, name: str) -> LiveSignal:
-        found = self._streams.signals.get(name)
-        if found is None:
-            known = ", ".join(signal for signal in self._streams.signals if "." not in signal)
-            raise RequestRefused(404, "no-such-stream", f"no stream {name[:80]}; there are {known}, and more in hello")
-        return found
 
     def _end(self, channels: list[int]) -> list[int]:
         ended = [(channel, self._subscriptions.remove(channel)) for channel in channels]

@@ -53,6 +53,8 @@ class PlayedBench:
         self.start_ns = time.monotonic_ns()
         self.cycles = self.force_seq = self.marker_seq = self.events = 0
         self.peaks: dict[int, float] = {}
+        self.silent = False
+        """Whether the sensor says nothing while the loop goes on with what it said last."""
 
     def play(self, count: int, zero_N: float = ZERO_N) -> None:
         """So many cycles of 1 ms each, at once."""
@@ -90,13 +92,14 @@ class PlayedBench:
         shown_N = self.peaks.get(number, force_N(number))
         raw_N = shown_N + zero_N
         force = ForceSample(self.force_seq, now_ns, now_ns, 0, 0, 0, -raw_N, 0, 0, 0, 25.0, 0, 1)
-        self._ring.put(FORCE.id, FORCE.pack(force))
+        if not self.silent:
+            self._ring.put(FORCE.id, FORCE.pack(force))
+            self.force_seq += 1
         axis = AxisSample(number, now_ns, now_ns, number * 0.001, 1.0, 0.1, 0, 1)
         self._ring.put(AXIS.id, AXIS.pack(axis))
         loop = LoopSample(number, now_ns, now_ns, number, 0, now_ns, 0, 0, 0, 0, 0, 0, 1, 0, raw_N - zero_N, 3.0,
                           number * 0.001, number * 0.001, math.nan, math.nan, math.nan)  # fmt: skip
         self._ring.put(LOOP.id, LOOP.pack(loop))
-        self.force_seq += 1
         self.cycles += 1
 
 
