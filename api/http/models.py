@@ -90,8 +90,36 @@ class JobSummary(BaseModel):
     problem: JobProblem | None = Field(default=None, description="why it did not succeed")
 
 
+class ServiceLimits(BaseModel):
+    """How much the service takes at a time."""
+
+    body_bytes: int = Field(description="of a request, but for uploads")
+    upload_bytes: int
+    page_entries: int = Field(description="of one page of a list")
+    waiting_jobs: int = Field(description="computations that may wait for their turn")
+    requests_per_s: float = Field(description="of one caller, in the long run")
+    channels: int = Field(description="of one WebSocket")
+    lowest_rate_hz: float = Field(description="of a channel with max_rate_hz")
+    highest_rate_hz: float
+    latest_samples: int = Field(description="of one answer of /streams/{stream}/latest")
+    kept_s: float = Field(description="how long samples are kept for who comes back")
+
+
+class Capabilities(BaseModel):
+    """What this service can do; what is a laboratory's own, as its protocols, has lists that ask for a right."""
+
+    products: dict[str, list[str]] = Field(description="by role: devices that can stand here, those of plug-ins too")
+    extras: list[str] = Field(description="optional parts of the program that are installed")
+    jobs: list[str] = Field(description="kinds of jobs")
+    export_formats: list[str] = Field(description="of /sessions/{session}/export/{form}")
+    streams: dict[str, str] = Field(description="live streams with their unit")
+    protocols: list[str] = Field(description="spoken here: the interface's version, the WebSocket's subprotocol")
+    transports: dict[str, str] = Field(description="the address of each")
+    limits: ServiceLimits
+
+
 class Info(BaseModel):
-    """Who this service is."""
+    """Who this service is, and what it can do."""
 
     software: str
     service_id: str = Field(description="changes with every start of the service")
@@ -99,6 +127,7 @@ class Info(BaseModel):
     sessions_folder: str
     stop_port: int = Field(description="of the stop process on 127.0.0.1, which takes POST /estop, /pain and /stop")
     away_stops: str = Field(description="where a page of other computers finds the same beside the service; else empty")
+    capabilities: Capabilities
 
 
 class RigView(BaseModel):

@@ -8,6 +8,7 @@ from fastapi.responses import StreamingResponse
 import rig
 from api.http import views
 from api.http.access.rights import OPERATE, PUBLIC, READ
+from api.http.capabilities import capabilities_of
 from api.http.live import Broadcast
 from api.http.models import Info, RigView
 from api.http.problems import RequestRefused, responses
@@ -19,16 +20,20 @@ def add(router: APIRouter, service: Service) -> None:
     """Its routes."""
     broadcast = Broadcast(lambda: views.rig(service).model_dump_json())
 
-    @router.get("/info", dependencies=[PUBLIC], summary="Who this service is")
-    async def info(request: Request) -> Info:
-        return Info(
+    capabilities = capabilities_of(service.wiring)
+
+    @router.get("/info", dependencies=[PUBLIC], response_model=Info, summary="Who this service is, and what it can do")
+    async def info(request: Request) -> Response:
+        found = Info(
             software=f"tissue-rig {rig.__version__}",
             service_id=service.id,
             monotonic_ns=time.monotonic_ns(),
             sessions_folder=str(service.sessions),
             stop_port=service.stop_port,
             away_stops=service.away.address(request.url.hostname or "") if service.away else "",
+            capabilities=capabilities,
         )
+        return Response(found.model_dump_json(), media_type="application/json")
 
     # Asked for most often: in the event loop, which it takes less of than a thread would, and written once.
     @router.get("/rig", dependencies=[READ], response_model=RigView, summary="The bench as of now")
