@@ -68,13 +68,16 @@ def stamp(folder: Path) -> str:
     """A text that changes with every file of ``folder`` that is read here; raises OSError where the folder is gone.
 
     Sizes, dates and file numbers are compared for equality, never for order: a clock may go back. No file is opened:
-    every question asks this of every folder.
+    every question asks this of every folder. Beside a list a recording is its name: one that grows, while all look on,
+    is read when the list says more of it.
     """
     with os.scandir(folder) as found:
         names = {item.name for item in found}
-    own = [name for name in names if name.endswith((RECORDING, ".json")) or name in READ]
+    recordings = {name for name in names if name.endswith(RECORDING)}
+    own = [name for name in names - recordings if name.endswith(".json") or name in READ]
+    named, looked = (recordings, own) if SESSION_FILE in names else ((), [*recordings, *own])
     inner = [name for name in READ if name.partition("/")[0] in names and "/" in name]
-    looks = repr([_looks(folder, name) for name in sorted((*own, *inner))])
+    looks = repr([*sorted(named), *(_looks(folder, name) for name in sorted((*looked, *inner)))])
     return hashlib.sha256(looks.encode("utf-8", "surrogateescape")).hexdigest()
 
 

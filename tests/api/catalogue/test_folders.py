@@ -278,6 +278,33 @@ def test_the_stamp_is_of_what_is_read_and_of_nothing_else(lab: Catalogue) -> Non
         stamp(lab.root / "none")
 
 
+def grown_beside(folder: Path) -> bool:
+    """Whether a recording that grows in ``folder`` is a change."""
+    before = refresh.stamp(folder)
+    with (folder / "trial_001.mcap").open("ab") as recording:
+        recording.write(b"more of the same trial")
+    return refresh.stamp(folder) != before
+
+
+def test_a_recording_that_grows_is_a_change_only_where_no_list_tells_of_it(
+    lab: Catalogue, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = make_session(lab.root, "a", trials=(trial(1),))
+    assert not grown_beside(folder)
+    before = stamp(folder)
+    (folder / "trial_002.mcap").write_bytes(b"begins")
+    assert stamp(folder) != before
+    before = stamp(folder)
+    (folder / "trial_002.mcap").unlink()
+    assert stamp(folder) != before
+    # Planted: whatever has another size is read anew, at every question, while it is recorded.
+    with monkeypatch.context() as planted:
+        planted.setattr(refresh, "stamp", lambda place: str([path.stat().st_size for path in place.glob("*.mcap")]))
+        assert grown_beside(folder)
+    (folder / "session.json").unlink()
+    assert grown_beside(folder)
+
+
 def opened(root: Path) -> list[str]:
     """What any part of this process opens below ``root`` from now on; the list grows."""
     found = list[str]()
@@ -299,7 +326,7 @@ def test_a_question_opens_only_what_changed_and_never_a_recording(lab: Catalogue
     seen.clear()
     assert len(lab.sessions().items) == len(lab.models().items) == 3
     assert seen == []
-    (lab.root / "b" / "trial_001.mcap").write_bytes(b"longer than before")
+    (lab.root / "b" / "new.mcap").write_bytes(b"not in the list yet")
     seen.clear()
     lab.sessions()
     assert {Path(name).relative_to(lab.root).parts[0] for name in seen} == {"b"}
