@@ -86,6 +86,16 @@ def test_live_samples_are_those_of_the_recording(rig: ServedRig) -> None:
     assert coarse.streams["force"].highest == highest_N > 1.0
     assert all(found.accounts_for_all() for found in (*client.streams.values(), *coarse.streams.values()))
     events_can_be_asked_for_afterwards(rig)
+    the_newest_is_fresh(rig)
+
+
+def the_newest_is_fresh(rig: ServedRig) -> None:
+    for stream in ("force", "position", "depth", "marker"):
+        found = rig.ask("GET", f"/streams/{stream}/latest?limit=5")
+        assert (found["state"], found["reason"], len(found["samples"])) == ("live", "", 5), stream
+        assert 0 <= found["age_s"] < 0.25, stream
+        numbers = [one["seq"] for one in found["samples"]]
+        assert {after - before for before, after in pairwise(numbers)} == {found["step"]}, stream
 
 
 def until_ended(rig: ServedRig, job: str, *clients: ForeignClient) -> None:

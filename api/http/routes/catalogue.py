@@ -2,7 +2,7 @@
 
 import contextlib
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -36,6 +36,8 @@ from rig.results.catalogue import (
     TrialList,
     WorkList,
 )
+
+Find = Callable[[Asked, Page], SavedResult]
 
 
 class NameRequest(RequestBody):
@@ -92,7 +94,7 @@ def _lists(router: APIRouter, lists: Catalogue) -> None:
         with answering():
             return lists.subjects(asked, page, sees_names(request))
 
-    for name, (summary, result, find) in {
+    known: Mapping[str, tuple[str, type[SavedResult], Find]] = {
         "sessions": ("Sessions by query, newest first", SessionList, lists.sessions),
         "sites": ("Sites of subjects, with their sessions", SiteList, lists.sites),
         "trials": ("Trials with their quality, newest first", TrialList, lists.trials),
@@ -100,14 +102,15 @@ def _lists(router: APIRouter, lists: Catalogue) -> None:
         "diagnoses": ("Diagnoses, newest first", DiagnosisList, lists.diagnoses),
         "causes": ("Causes that diagnoses named, newest first", CauseList, lists.causes),
         "operations": ("Operations that left a result in a session, newest first", WorkList, lists.operations),
-    }.items():
-        add_route = router.get(
+    }
+    for name, (summary, result, find) in known.items():
+        listed_at = router.get(
             f"/{name}", name=name, summary=summary, response_model=result, dependencies=[READ], responses=told
         )
-        add_route(_lister(find))
+        listed_at(_lister(find))
 
 
-def _lister(find: Callable[[Asked, Page], SavedResult]) -> Callable[[Asked, Page], SavedResult]:
+def _lister(find: Find) -> Find:
     def page_of(asked: AskedQuery, page: PageQuery) -> SavedResult:
         with answering():
             return find(asked, page)
