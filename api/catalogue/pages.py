@@ -38,7 +38,7 @@ class Page:
         except (ValueError, TypeError, RecursionError):
             pass
         shown = storable(self.cursor[:40])
-        raise UsageError(f"cursor {shown}: is none that was given by {of}; leave it out to begin anew")
+        raise UsageError(f"cursor {shown}: is none that was given by this list; leave it out to begin anew")
 
     def first(
         self, of: str, found: Sequence[Item], place: Callable[[Item], Place]
