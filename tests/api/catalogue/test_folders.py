@@ -280,10 +280,10 @@ def test_the_stamp_is_of_what_is_read_and_of_nothing_else(lab: Catalogue) -> Non
 
 def grown_beside(folder: Path) -> bool:
     """Whether a recording that grows in ``folder`` is a change."""
-    before = refresh.stamp(folder)
+    before = reading.stamp(folder)
     with (folder / "trial_001.mcap").open("ab") as recording:
         recording.write(b"more of the same trial")
-    return refresh.stamp(folder) != before
+    return reading.stamp(folder) != before
 
 
 def test_a_recording_that_grows_is_a_change_only_where_no_list_tells_of_it(
@@ -299,7 +299,7 @@ def test_a_recording_that_grows_is_a_change_only_where_no_list_tells_of_it(
     assert stamp(folder) != before
     # Planted: whatever has another size is read anew, at every question, while it is recorded.
     with monkeypatch.context() as planted:
-        planted.setattr(refresh, "stamp", lambda place: str([path.stat().st_size for path in place.glob("*.mcap")]))
+        planted.setattr(reading, "stamp", lambda place: str([path.stat().st_size for path in place.glob("*.mcap")]))
         assert grown_beside(folder)
     (folder / "session.json").unlink()
     assert grown_beside(folder)
