@@ -21,6 +21,11 @@ class Person:
             raise UsageError(f"{question}: no terminal to answer at; give {option}")
         return str(typer.prompt(question))
 
+    def refuse_unless_clear(self, way: str) -> None:
+        """Raises UsageError, before anything moves, where nobody says that ``way`` is free."""
+        if self.answer(f"is the tip's way free from {way}, and the limb out (yes or no)", "--clear") != "yes":
+            raise UsageError("the tip's way is not free: nothing was moved")
+
     def do(self, request: str) -> None:
         """Asks for something to be done and returns when it is; raises UsageError where nobody can say so."""
         if self._pause_s is not None:

@@ -1,23 +1,22 @@
 """`rig calibrate`: force sensor against known weights, axis against tracker or gauge block."""
 
 import os
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from api.cli.asking import Person
-from api.cli.calibrate_axis import AxisAsked, calibrate_axis
+from api.cli.calibrate_axis import calibrate_axis
 from api.cli.calibrate_dynamics import calibrate_dynamics
 from api.cli.calibrate_force import ForceAsked, Load, calibrate_force
 from api.cli.calibrate_glove import GloveAsked, calibrate_glove, keep_and_say
 from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_file, wiring_from
 from api.cli.output import show, write_json
-from api.operations.calibrations import keep, refuse_out, refuse_unfit
+from api.operations.calibrate import AxisAsked
+from api.operations.calibrations import kept, refuse_out
 from rig.config.calibration import AnyCalibration, What, what_of
 from rig.errors import UsageError
-from rig.results.bench import CalibrateResult
 
 OF_FORCE = ("weights", "load", "tolerance_percent", "gravity")
 OF_AXIS = ("from_mm", "to_mm", "clear", "toward_limb", "gauge_block_mm", "near_mm", "dynamics")
@@ -91,11 +90,9 @@ def calibrate(
     else:
         way = AxisAsked(from_mm, to_mm, clear, toward_limb, gauge_block_mm, near_mm)
         found = calibrate_axis(wiring, way, Person(pause))
-    refuse_unfit(wiring.calibration, found, datetime.now(UTC))
-    kind = what_of(found)
-    path = keep(kind, found, out)
-    say_use(kind, path, (wiring_file(config) or Path()).parent)
-    write_json(json_file, CalibrateResult(file=str(path), calibration=found))
+    result = kept(wiring.calibration, found, out)
+    say_use(what_of(found), Path(result.file), (wiring_file(config) or Path()).parent)
+    write_json(json_file, result)
 
 
 def say_use(what: What, path: Path, wiring_folder: Path) -> None:

@@ -2,21 +2,13 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import NamedTuple
 
 from api.cli.asking import Person
 from api.cli.computing import here
 from api.cli.mock_bench import bench_for
+from api.cli.mock_calibration import NEAR_MM, block_laid
 from api.cli.output import show
-from api.operations.calibrate import (
-    AxisTravel,
-    GaugeBlock,
-    axis_by_block,
-    axis_by_tracker,
-    refuse_block,
-    refuse_outside,
-    refuse_travel,
-)
+from api.operations.calibrate import AxisAsked, AxisTravel, GaugeBlock, axis_by_block, axis_by_tracker, refuse_axis
 from controller.operation import Operation
 from mock_devices.control import BenchControl
 from rig.config.calibration import AxisCalibration
@@ -26,27 +18,14 @@ from rig.config.wiring import Wiring
 from rig.errors import UsageError
 from rig.results.tables import TextTable
 
-# Half a millimetre in front of what is touched.
-NEAR_MM = 0.5
-
-
-class AxisAsked(NamedTuple):
-    """What `rig calibrate axis` was asked for; None where it is to be asked or not wanted."""
-
-    from_mm: float
-    to_mm: float
-    clear: bool
-    toward_limb: bool | None
-    gauge_block_mm: float | None
-    near_mm: float | None
-
 
 def calibrate_axis(wiring: Wiring, asked: AxisAsked, person: Person) -> AxisCalibration:
     """The calibration, and what it says on the terminal; raises CheckFailed with what is wrong."""
-    _check(wiring, asked)
+    refuse_axis(asked, wiring)
     mock = wiring.axis.port == MOCK_PORT
     if not mock:
         asked = _confirmed(asked, person)
+        refuse_axis(asked, wiring)
         show("the axis homes and moves now")
     operation = Operation("calibrate axis")
     with bench_for(wiring, approaches=False) as (live, endpoints):
@@ -59,22 +38,10 @@ def calibrate_axis(wiring: Wiring, asked: AxisAsked, person: Person) -> AxisCali
     return found
 
 
-def _check(wiring: Wiring, asked: AxisAsked) -> None:
-    """Raises UsageError, before anything is opened, for what cannot be done."""
-    if asked.gauge_block_mm is None:
-        refuse_travel(AxisTravel(asked.from_mm, asked.to_mm), wiring)
-    elif asked.near_mm is not None:
-        refuse_block(GaugeBlock(asked.gauge_block_mm, asked.near_mm), wiring)
-    else:
-        refuse_outside((asked.from_mm, asked.to_mm), wiring)
-
-
 def _confirmed(asked: AxisAsked, person: Person) -> AxisAsked:
     """Nothing moves before somebody has said that the way is free."""
     if not asked.clear:
-        way = "home to the block" if asked.gauge_block_mm else f"home to {asked.to_mm:g} mm"
-        if person.answer(f"is the tip's way free from {way}, and the limb out (yes or no)", "--clear") != "yes":
-            raise UsageError("the tip's way is not free: nothing was moved")
+        person.refuse_unless_clear(asked.way)
     if asked.gauge_block_mm and asked.near_mm is None:
         said = person.answer(f"axis position {NEAR_MM:g} mm or a little more before the table, in mm", "--near-mm")
         return asked._replace(near_mm=_number(said))
@@ -99,23 +66,20 @@ def _toward(asked: AxisAsked, person: Person) -> bool:
 def _by_block(
     operation: Operation, wiring: Wiring, asked: AxisAsked, person: Person, endpoints: Endpoints | None
 ) -> AxisCalibration:
-    gauge_mm = asked.gauge_block_mm or 0.0
-    with _block(person, endpoints, gauge_mm) as (known_mm, put):
-        block = GaugeBlock(gauge_mm, known_mm if asked.near_mm is None else asked.near_mm)
+    with _block(asked, person, endpoints) as (block, put):
         return here(operation, lambda: axis_by_block(operation, wiring, asked.from_mm, block, put))
 
 
 @contextmanager
 def _block(
-    person: Person, endpoints: Endpoints | None, gauge_mm: float
-) -> Iterator[tuple[float, Callable[[], object]]]:
-    """Where the search begins, as far as it is known, and who puts the block there: a mock limb is its own."""
-    if not endpoints:
-        yield 0.0, lambda: person.do(f"put the gauge block of {gauge_mm:g} mm under the tip")
-        return
-    with BenchControl(endpoints.control) as control:
-        table_mm = control.number("surface.position_mm")
-        yield table_mm - NEAR_MM, lambda: control.set({"surface.position_mm": table_mm - gauge_mm})
+    asked: AxisAsked, person: Person, endpoints: Endpoints | None
+) -> Iterator[tuple[GaugeBlock, Callable[[], object]]]:
+    """Where the search begins, and who puts the block there: a mock limb is its own."""
+    if endpoints:
+        with BenchControl(endpoints.control) as control, block_laid(control, asked) as found:
+            yield found
+    else:
+        yield GaugeBlock(asked.gauge_block_mm or 0.0, asked.near_mm or 0.0), lambda: person.do(asked.block_request)
 
 
 def _say(found: AxisCalibration) -> None:

@@ -5,14 +5,12 @@ from api.cli.computing import here
 from api.cli.mock_bench import bench_for
 from api.cli.mock_calibration import in_the_air
 from api.cli.output import show
-from api.operations.calibrate_dynamics import axis_dynamics, sweep_asked
-from controller.commissioning.sweep_moves import CLEAR_MM
+from api.operations.calibrate_dynamics import axis_dynamics, sweep_asked, sweep_way
 from controller.operation import Operation
 from mock_devices.control import BenchControl
 from rig.config.axis_dynamics import AxisDynamics
 from rig.config.products.roles import MOCK_PORT
 from rig.config.wiring import Wiring
-from rig.errors import UsageError
 from rig.results.tables import TextTable
 
 
@@ -20,10 +18,8 @@ def calibrate_dynamics(wiring: Wiring, from_mm: float, clear: bool, person: Pers
     """The dynamics, and what they say on the terminal; raises CheckFailed with what is wrong."""
     sweep = sweep_asked(wiring, from_mm)
     if wiring.axis.port != MOCK_PORT:
-        to_mm = from_mm + sweep.way_mm + CLEAR_MM
-        question = f"is the tip's way free from home to {to_mm:.1f} mm, and the limb out (yes or no)"
-        if not clear and person.answer(question, "--clear") != "yes":
-            raise UsageError("the tip's way is not free: nothing was moved")
+        if not clear:
+            person.refuse_unless_clear(sweep_way(sweep, from_mm))
         show("the axis homes and moves now")
     found = _identified(wiring, from_mm)
     _say(found)

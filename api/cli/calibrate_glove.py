@@ -12,19 +12,18 @@ from api.cli.mock_calibration import BY_ITSELF
 from api.cli.options import wiring_file
 from api.cli.output import show, write_json
 from api.operations.calibrations import keep_glove
+from api.operations.glove import HEAVIEST_N, calibration_operation, finger_request
 from api.operations.glove import calibrate_glove as measure
-from api.operations.glove import calibration_operation
 from controller.commissioning.weights import Weights, parse_weights
 from controller.experiments.glove import glove_of
 from mock_devices.control import BenchControl
 from rig.config.glove import GloveCalibration
+from rig.config.products.firmata_glove import FirmataGlove
 from rig.config.products.roles import MOCK_PORT
 from rig.config.wiring import Wiring
 from rig.results.glove import GloveCalibrated
 from rig.results.tables import TextTable
 
-# Beyond what fingers press with before it hurts; a sensor is calibrated no farther than its weights.
-HEAVIEST_N = 50.0
 MOCK_WEIGHTS = Weights((1.0, 2.0, 4.0, 7.0, 10.0), uncertainty=0.0)
 # Ten samples of a glove at 50 Hz.
 MOCK_REST = BY_ITSELF._replace(read_s=0.2)
@@ -48,10 +47,14 @@ def calibrate_glove(wiring: Wiring, asked: GloveAsked, person: Person) -> tuple[
         with bench_for(wiring, approaches=False) as (live, endpoints):
             assert endpoints
             with BenchControl(endpoints.control) as control:
-                put_on = _on_mock(control, tuple(glove.fingers))
+                put_on = weights_on_glove(control, glove)
                 found = here(operation, lambda: measure(operation, live, name, weights, put_on, MOCK_REST))
     else:
-        found = here(operation, lambda: measure(operation, wiring, name, weights, lambda *load: person.do(_ask(*load))))
+
+        def ask(finger: str, load_N: float) -> None:
+            person.do(finger_request(finger, load_N))
+
+        found = here(operation, lambda: measure(operation, wiring, name, weights, ask))
     _say(found)
     return name, found
 
@@ -61,17 +64,13 @@ def _weights(asked: GloveAsked, person: Person) -> Weights:
     return parse_weights(text, False, asked.tolerance, HEAVIEST_N, asked.gravity_m_s2)
 
 
-def _on_mock(control: BenchControl, fingers: tuple[str, ...]) -> Callable[[str, float], None]:
+def weights_on_glove(control: BenchControl, glove: FirmataGlove) -> Callable[[str, float], None]:
+    """What puts weights on the fingers of the mock bench's glove."""
+
     def put_on(finger: str, load_N: float) -> None:
-        control.fault("glove", "weight", f"{fingers.index(finger)}={load_N!r}")
+        control.fault("glove", "weight", f"{tuple(glove.fingers).index(finger)}={load_N!r}")
 
     return put_on
-
-
-def _ask(finger: str, load_N: float) -> str:
-    if not load_N:
-        return f"take every weight off {finger}"
-    return f"put {load_N:.4g} N on the sensor of {finger}, alone"
 
 
 def _say(found: GloveCalibration) -> None:

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import typer
 
-from api.operations.calibrate import ReadingTime, force_calibration_operation, measured_force
+from api.operations.calibrate import AxisAsked, GaugeBlock, ReadingTime, force_calibration_operation, measured_force
 from controller.claims import state_folder
 from controller.commissioning.axis import against_tracker, ahead_mm, known_direction
 from controller.commissioning.axis_moves import Pace, RestingAxis, drive_to_positions
@@ -29,6 +29,8 @@ from rig.config.wiring import Wiring
 from rig.errors import DeviceError, RigError, UsageError
 from rig.recording.files import make_folder, write_text
 
+# Half a millimetre in front of what is touched.
+NEAR_MM = 0.5
 # Shares of limits.force_N; weights of the mock bench are exact.
 SHARES = (0.1, 0.25, 0.5)
 # Ten samples of the slower sensor; its filter and the tip's own take a few milliseconds.
@@ -130,6 +132,17 @@ def weights_on(control: BenchControl) -> Iterator[Callable[[float], None]]:
         yield put_on
     finally:
         put_on(0.0)
+
+
+@contextlib.contextmanager
+def block_laid(control: BenchControl, asked: AxisAsked) -> Iterator[tuple[GaugeBlock, Callable[[], object]]]:
+    """The block, and what lays it under the tip: the mock limb is its own table, and stands as before at the end."""
+    table_mm, gauge_mm = control.number("surface.position_mm"), asked.gauge_block_mm or 0.0
+    near_mm = table_mm - NEAR_MM if asked.near_mm is None else asked.near_mm
+    try:
+        yield GaugeBlock(gauge_mm, near_mm), lambda: control.set({"surface.position_mm": table_mm - gauge_mm})
+    finally:
+        control.set({"surface.position_mm": table_mm})
 
 
 @contextlib.contextmanager

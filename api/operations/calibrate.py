@@ -1,9 +1,11 @@
 """The force sensor against known weights, and the axis against tracker or gauge block; nobody else has the bench."""
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
 from datetime import UTC, datetime
 from itertools import count
+from pathlib import Path
 from typing import NamedTuple
 
 from api.operations.claimed import claimed
@@ -18,7 +20,7 @@ from controller.commissioning.axis_moves import (
 )
 from controller.commissioning.force import calibrate
 from controller.commissioning.readings import read
-from controller.commissioning.stoppable import stoppable
+from controller.commissioning.stoppable import awaited, stoppable
 from controller.commissioning.weights import Weights
 from controller.devices.drivers import Devices, open_force, start_devices
 from controller.loop.realtime import promptly
@@ -28,6 +30,7 @@ from rig.config.products.roles import ForceProduct
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed, UsageError
 
+LOOK_S = 0.05
 # A camera of 0.1 mm then knows the slope to a fifth of the 1 % that is allowed.
 LEAST_TRAVEL_MM = 8.0
 STEPS = 4
@@ -106,6 +109,50 @@ def measured_force(
         )
 
 
+class AxisAsked(NamedTuple):
+    """What a calibration of the axis is asked for; None where a person is to be asked, or it is not wanted."""
+
+    from_mm: float
+    to_mm: float
+    clear: bool
+    toward_limb: bool | None
+    gauge_block_mm: float | None
+    near_mm: float | None
+
+    @property
+    def way(self) -> str:
+        """What has to be free."""
+        return "home to the block" if self.gauge_block_mm else f"home to {self.to_mm:g} mm"
+
+    @property
+    def block_request(self) -> str:
+        """What a person is asked to do between the searches for table and block."""
+        return f"put the gauge block of {self.gauge_block_mm:g} mm under the tip"
+
+
+class AxisStart(NamedTuple):
+    """Before the axis moves: ``clear`` returns once its way is free, and raises where it is not.
+
+    ``word`` is the stop word where whoever asks has a stop process already.
+    """
+
+    clear: Callable[[], object] = lambda: None
+    word: Path | None = None
+
+
+AT_ONCE = AxisStart()
+
+
+def refuse_axis(asked: AxisAsked, wiring: Wiring) -> None:
+    """Raises UsageError, before anything is opened, for what cannot be done."""
+    if asked.gauge_block_mm is None:
+        refuse_travel(AxisTravel(asked.from_mm, asked.to_mm), wiring)
+    elif asked.near_mm is not None:
+        refuse_block(GaugeBlock(asked.gauge_block_mm, asked.near_mm), wiring)
+    else:
+        refuse_outside((asked.from_mm, asked.to_mm), wiring)
+
+
 def refuse_travel(travel: AxisTravel, wiring: Wiring) -> None:
     """Raises UsageError, before anything is opened, for what the tracker cannot judge."""
     if wiring.tracker is None:
@@ -144,13 +191,20 @@ class Resting(NamedTuple):
 
 
 @contextmanager
-def resting_axis(operation: Operation, wiring: Wiring) -> Iterator[Resting]:
+def resting_axis(operation: Operation, wiring: Wiring, start: AxisStart = AT_ONCE) -> Iterator[Resting]:
     """Devices started and the axis homed; a stop brakes it, and whatever happens the devices are closed.
 
     At the loop's priority, as the drive brakes where its heartbeat comes late.
     """
-    with claimed(wiring, moves=True), stoppable(wiring) as (guard, port), promptly(wiring.loop.priority):
-        operation.say(f"stop: Ctrl-C, the foot switch, or POST http://127.0.0.1:{port}/estop")
+    with claimed(wiring, moves=True), stoppable(wiring, start.word) as (guard, port), promptly(wiring.loop.priority):
+        if port:
+            operation.say(f"stop: Ctrl-C, the foot switch, or POST http://127.0.0.1:{port}/estop")
+
+        def look() -> None:
+            guard.refuse()
+            time.sleep(LOOK_S)
+
+        awaited(start.clear, look)
 
         @contextmanager
         def moving() -> Iterator[None]:
@@ -161,17 +215,22 @@ def resting_axis(operation: Operation, wiring: Wiring) -> Iterator[Resting]:
         with closing(start_devices(wiring, guard.interrupted)) as devices:
             with moving():
                 devices.axis.home()
-            yield Resting(RestingAxis(devices, moving), devices, moving, guard.interrupted)
+            axis = RestingAxis(devices, moving, refuse_stopped=guard.refuse)
+            yield Resting(axis, devices, moving, guard.interrupted)
 
 
 def axis_by_tracker(
-    operation: Operation, wiring: Wiring, travel: AxisTravel, toward_limb: Callable[[], bool]
+    operation: Operation,
+    wiring: Wiring,
+    travel: AxisTravel,
+    toward_limb: Callable[[], bool],
+    start: AxisStart = AT_ONCE,
 ) -> AxisCalibration:
     """The axis against the tracker; where no marker on the limb tells it, ``toward_limb`` says where the tip went."""
     refuse_travel(travel, wiring)
-    with resting_axis(operation, wiring) as resting:
+    with resting_axis(operation, wiring, start) as resting:
         places = drive_to_positions(resting.axis, _told(operation, steps_mm(travel.from_mm, travel.to_mm, STEPS)))
-    known_by = known_direction(ahead_mm(places)) or _said(toward_limb)
+        known_by = known_direction(ahead_mm(places)) or _said(lambda: resting.axis.wait_for(toward_limb))
     return against_tracker(resting.devices.axis.identity, wiring.axis, places, known_by, datetime.now(UTC))
 
 
@@ -188,10 +247,15 @@ def _said(toward_limb: Callable[[], bool]) -> KnownBy:
 
 
 def axis_by_block(
-    operation: Operation, wiring: Wiring, from_mm: float, block: GaugeBlock, put: Callable[[], object]
+    operation: Operation,
+    wiring: Wiring,
+    from_mm: float,
+    block: GaugeBlock,
+    put: Callable[[], object],
+    start: AxisStart = AT_ONCE,
 ) -> AxisCalibration:
     """The axis against a gauge block, which ``put`` lays on the table while the axis waits."""
-    with resting_axis(operation, wiring) as resting:
+    with resting_axis(operation, wiring, start) as resting:
         axis, drive = resting.axis, resting.devices.axis.identity
         axis.go(from_mm)
         axis.place()

@@ -3,10 +3,10 @@
 from contextlib import AbstractContextManager
 from datetime import UTC, datetime
 
-from api.operations.calibrate import resting_axis
+from api.operations.calibrate import AT_ONCE, AxisStart, resting_axis
 from controller.commissioning.axis_dynamics import identify
 from controller.commissioning.sweep import AirSweep, sweep_for
-from controller.commissioning.sweep_moves import SweepRun, refuse_outside, refuse_touching
+from controller.commissioning.sweep_moves import CLEAR_MM, SweepRun, refuse_outside, refuse_touching
 from controller.operation import Operation
 from rig.computer import computer_id
 from rig.config.axis_dynamics import AxisDynamics
@@ -24,10 +24,15 @@ def sweep_asked(wiring: Wiring, from_mm: float) -> AirSweep:
     return sweep
 
 
-def axis_dynamics(operation: Operation, wiring: Wiring, from_mm: float) -> AxisDynamics:
+def sweep_way(sweep: AirSweep, from_mm: float) -> str:
+    """What has to be free for it."""
+    return f"home to {from_mm + sweep.way_mm + CLEAR_MM:.1f} mm"
+
+
+def axis_dynamics(operation: Operation, wiring: Wiring, from_mm: float, start: AxisStart = AT_ONCE) -> AxisDynamics:
     """The dynamics, swept from ``from_mm`` on; raises CheckFailed with number and bound, SafetyStop for a touch."""
     sweep = sweep_asked(wiring, from_mm)
-    with resting_axis(operation, wiring) as resting:
+    with resting_axis(operation, wiring, start) as resting:
         operation.advance(0.0, "looking for anything in the way")
         refuse_touching(resting.axis, from_mm, sweep)
         operation.advance(0.3, f"{sweep.repeats} sweeps of {sweep.lowest_Hz:g} to {sweep.highest_Hz:g} Hz")

@@ -1,13 +1,14 @@
 """Where a new calibration is kept, and what keeps it from being."""
 
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 
-from rig.config.calibration import AnyCalibration, Calibration, What
+from rig.config.calibration import AnyCalibration, Calibration, What, what_of
 from rig.config.calibration_files import text_of
 from rig.config.glove import GloveCalibration
 from rig.errors import CheckFailed, UsageError
 from rig.recording.files import make_folder, refuse_unwritable, whole_file
+from rig.results.bench import CalibrateResult
 
 FOLDER = Path("calibration")
 
@@ -23,6 +24,12 @@ def refuse_unfit(stated: Calibration, found: AnyCalibration, now: datetime) -> N
     """Raises CheckFailed where the new calibration is not as good as the wiring states: it would be refused at use."""
     if reasons := stated.alone(found).unfit(now):
         raise CheckFailed("; ".join(reasons))
+
+
+def kept(stated: Calibration, found: AnyCalibration, out: Path | None) -> CalibrateResult:
+    """``found`` in a file, as ``keep``; raises as ``refuse_unfit``, and then nothing is written."""
+    refuse_unfit(stated, found, datetime.now(UTC))
+    return CalibrateResult(file=str(keep(what_of(found), found, out)), calibration=found)
 
 
 def keep(what: What, found: AnyCalibration, out: Path | None) -> Path:

@@ -22,6 +22,9 @@ from rig.config.products.firmata_glove import FirmataGlove
 from rig.config.wiring import Wiring
 from rig.results.glove import GloveThreshold
 
+# Beyond what fingers press with before it hurts; a sensor is calibrated no farther than its weights.
+HEAVIEST_N = 50.0
+
 
 def threshold_operation() -> Operation:
     """The operation that a threshold by glove is to report to."""
@@ -65,6 +68,13 @@ def _noted(rows: Iterable[Row], seen: list[Row]) -> Iterator[Row]:
     for row in rows:
         seen.append(row)
         yield row
+
+
+def finger_request(finger: str, load_N: float) -> str:
+    """What a person is asked to do for it."""
+    if not load_N:
+        return f"take every weight off {finger}"
+    return f"put {load_N:.4g} N on the sensor of {finger}, alone"
 
 
 def calibration_operation(glove: FirmataGlove, weights: Weights) -> Operation:

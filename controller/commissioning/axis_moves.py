@@ -3,15 +3,15 @@
 No loop runs meanwhile: between two moves everything is read, and what presses on the tip ends it.
 """
 
-import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from controller.commissioning.axis import Array, Place, ahead_mm, known_direction, refuse_first_step
+from controller.commissioning.stoppable import awaited
 from controller.devices.drivers import Devices
 from rig.channels import MarkerSample
 from rig.errors import CheckFailed, DeviceError, SafetyStop
@@ -28,6 +28,7 @@ DRAIN_S, TOUCH_READ_S = 0.04, 0.08
 # Thirty frames at each end know it to 2 %, and 20 % are asked.
 FIRST_STEP_MM = 1.0
 TIP, ARM = 0, 1
+T = TypeVar("T")
 
 
 class Pace(NamedTuple):
@@ -53,10 +54,12 @@ class RestingAxis:
         devices: Devices,
         moving: Callable[[], AbstractContextManager[None]] = nullcontext,
         pace: Pace = PACE,
+        refuse_stopped: Callable[[], object] = lambda: None,
         now: Callable[[], int] = time.monotonic_ns,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._devices, self._moving, self._pace, self._now, self._sleep = devices, moving, pace, now, sleep
+        self._refuse_stopped = refuse_stopped
         self._reference_N: Array | None = None
 
     def go(self, position_mm: float) -> None:
@@ -84,23 +87,14 @@ class RestingAxis:
         assert self._reference_N is not None
         return axis_mm, float(np.linalg.norm(force_N - self._reference_N))
 
-    def wait_for(self, act: Callable[[], object]) -> None:
-        """Returns once ``act`` has, which may take a person minutes: the drive hears from us meanwhile."""
-        errors: list[BaseException] = []
+    def wait_for(self, act: Callable[[], T]) -> T:
+        """What ``act`` returns, which may take a person minutes: the drive hears from us meanwhile; a stop ends it."""
 
-        def work() -> None:
-            try:
-                act()
-            except BaseException as error:
-                errors.append(error)
-
-        # A daemon: at Ctrl-C nobody waits for a question that is still open.
-        waiting = threading.Thread(target=work, daemon=True)
-        waiting.start()
-        while waiting.is_alive():
+        def look() -> None:
+            self._refuse_stopped()
             self._read(DRAIN_S)
-        if errors:
-            raise errors[0]
+
+        return awaited(act, look)
 
     def _read(self, seconds: float) -> tuple[float, list[MarkerSample], Array]:
         """Mean position, frames and mean force of a while; the reading keeps the drive's heartbeat going.

@@ -15,6 +15,8 @@ from rig.errors import SafetyStop
 
 LOOK_S = 0.002
 SENTENCE = "stopped by a person: nothing moves; start again when that is safe"
+# As the loop names such a stop, so that programs know it for none of the bench's own.
+BY_A_PERSON = "operator_stop"
 
 
 class StartGuard:
@@ -46,24 +48,25 @@ class StartGuard:
     def moving(self) -> Iterator[None]:
         """Around what moves the axis; raises SafetyStop where a stop was asked for before or meanwhile."""
         with self._lock:
-            self._refuse()
+            self.refuse()
             self._moving = True
         deed = Deed.AXIS_LOST
         try:
             yield
             deed = Deed.START_ENDED
-            self._refuse()
-        except SafetyStop:
+            self.refuse()
+        except SafetyStop as stop:
             deed = Deed.START_BRAKED if deed is Deed.AXIS_LOST else deed
-            raise
+            raise SafetyStop(str(stop), BY_A_PERSON if self._stopped else stop.code) from stop
         finally:
             with self._lock:
                 self._moving = False
                 self._responder.answer(deed, self._now())
 
-    def _refuse(self) -> None:
+    def refuse(self) -> None:
+        """Raises SafetyStop where a stop has been asked for."""
         if self._stopped:
-            raise SafetyStop(SENTENCE)
+            raise SafetyStop(SENTENCE, BY_A_PERSON)
 
     def look(self) -> None:
         """Takes what is asked, and answers it where nothing moves."""

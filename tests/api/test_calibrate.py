@@ -13,10 +13,11 @@ from api.cli import mock_calibration
 from api.cli.app import build
 from api.cli.asking import Person
 from api.cli.calibrate import say_use
-from api.cli.calibrate_axis import AxisAsked, calibrate_axis
+from api.cli.calibrate_axis import calibrate_axis
 from api.cli.mock_bench import bench_for, plug_into
 from api.cli.mock_calibration import force_file
 from api.cli.options import built_in, calibrated, wiring_from
+from api.operations.calibrate import AxisAsked
 from api.operations.calibrations import keep, refuse_out, refuse_unfit
 from rig.config.calibration import Calibration, Uncertainty
 from rig.config.calibration_files import read_force, text_of

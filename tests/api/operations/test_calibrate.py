@@ -1,20 +1,20 @@
 """A calibration that is cancelled: no further load is asked for, no further move is made, and the bench is free."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from types import SimpleNamespace
 
 import pytest
 
 from api.operations import calibrate
-from api.operations.calibrate import AxisTravel, GaugeBlock, force_calibration_operation
+from api.operations.calibrate import AxisStart, AxisTravel, GaugeBlock, force_calibration_operation
 from controller.commissioning.axis_moves import RestingAxis
 from controller.commissioning.readings import Reading
 from controller.commissioning.weights import Weights
 from controller.operation import Cancelled, Operation
 from drivers.roles import Identity
 from rig.config.wiring import Wiring
-from rig.errors import UsageError
+from rig.errors import CheckFailed, UsageError
 
 WEIGHTS = Weights((1.0, 2.0), uncertainty=0.0)
 
@@ -85,8 +85,8 @@ class FakeAxis:
 
 
 @contextmanager
-def braked(_: object) -> Iterator[tuple[object, int]]:
-    yield SimpleNamespace(moving=nullcontext, interrupted=lambda: False), 4711
+def braked(_: object, __: object) -> Iterator[tuple[object, int]]:
+    yield SimpleNamespace(moving=nullcontext, interrupted=lambda: False, refuse=lambda: None), 4711
 
 
 @pytest.fixture
@@ -135,6 +135,35 @@ def test_the_block_is_laid_between_the_searches_for_table_and_block(
     ]  # fmt: skip
     assert found.scale == pytest.approx(1.0) and found.direction_known_by == "contact"
     assert operation.progress.done == 0.5
+
+
+def test_nothing_moves_before_the_way_is_said_to_be_free(axis: FakeAxis) -> None:
+    def refused() -> None:
+        axis.moves.append("asked")
+        raise Cancelled("cancelled before: see that the way is free")
+
+    with pytest.raises(Cancelled, match="see that the way is free"):
+        calibrate.axis_by_tracker(
+            Operation("calibrate axis"), Wiring(), AxisTravel(2.0, 14.0), lambda: True, AxisStart(refused)
+        )
+    assert axis.moves == ["asked"]
+
+
+def test_without_a_marker_on_the_limb_a_person_says_where_the_tip_went_while_the_drive_is_kept_alive(
+    axis: FakeAxis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(calibrate, "drive_to_positions", lambda *_: [])
+    monkeypatch.setattr(calibrate, "ahead_mm", lambda _: None)
+    monkeypatch.setattr(calibrate, "known_direction", lambda _: None)
+
+    def waited(_: RestingAxis, act: Callable[[], bool]) -> bool:
+        axis.moves.append("alive")
+        return act()
+
+    monkeypatch.setattr(RestingAxis, "wait_for", waited)
+    with pytest.raises(CheckFailed, match=r"away from the limb .* turn axis.direction"):
+        calibrate.axis_by_tracker(Operation("calibrate axis"), Wiring(), AxisTravel(2.0, 14.0), lambda: False)
+    assert axis.moves == ["home", "alive", "closed"]
 
 
 @pytest.mark.parametrize(("block", "end"), [(GaugeBlock(10.0, 8.0), "-3 mm"), (GaugeBlock(1.0, 57.0), "62 mm")])

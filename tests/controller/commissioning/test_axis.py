@@ -1,5 +1,6 @@
 """Scale and sense of the axis from places that a tracker or a gauge block gives, and what is refused."""
 
+import threading
 import time
 from datetime import UTC, datetime
 
@@ -293,3 +294,18 @@ def test_while_a_person_is_waited_for_the_axis_is_kept_alive() -> None:
 
     with pytest.raises(CheckFailed, match="nobody there"):
         axis.wait_for(fails)
+    assert axis.wait_for(lambda: 4.0) == 4.0
+
+
+def test_a_stop_ends_a_question_that_nobody_answers() -> None:
+    bench, never = AxisOf(), threading.Event()
+
+    def stopped() -> None:
+        if bench.polls > 50:
+            raise SafetyStop("stopped by a person")
+
+    devices = Devices(ForceOf(bench), bench, TrackerOf(bench))  # type: ignore[arg-type]
+    axis = RestingAxis(devices, refuse_stopped=stopped, now=bench.clock, sleep=bench.sleep)
+    with pytest.raises(SafetyStop, match="stopped by a person"):
+        axis.wait_for(never.wait)
+    never.set()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from controller.safety.table import BY_PERSON
 from controller.stop.start import SENTENCE, StartGuard
 from controller.stop.word import Deed, Lane, Requester, Responder, StopReason, StopWord
 from rig.errors import DeviceError, SafetyStop
@@ -54,13 +55,14 @@ def test_a_stop_from_before_the_start_counts(page: StopWord) -> None:
 def test_a_stop_while_the_axis_homes_is_answered_once_it_is_braked(page: StopWord) -> None:
     asking = Requester(page, Lane.SUPERVISOR)
     with StartGuard(Responder(page)) as guard:
-        with pytest.raises(SafetyStop, match="braked"), guard.moving():
+        with pytest.raises(SafetyStop, match="braked") as stop, guard.moving():
             request = asking.request(StopReason.STOP)
             assert asking.confirmed(request, 0.05) is None
             homing(guard)
         answer = asking.answer(request)
     assert answer is not None
     assert answer.deed is Deed.START_BRAKED
+    assert stop.value.code in BY_PERSON, "a job that ends so was cancelled, and has not failed"
 
 
 def test_a_stop_that_a_lost_axis_cannot_follow_is_not_confirmed(page: StopWord) -> None:
