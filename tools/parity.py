@@ -39,12 +39,9 @@ ROUTES: Mapping[str, tuple[str, ...]] = {
     "token link": ("POST /auth/links",),
     "account list": ("GET /accounts",),
 }  # fmt: skip
-AT_THE_BENCH = "moves the tip or asks at each finger while no loop runs: a person stands beside it, at the terminal"
 BY_THE_ACCOUNT = "only the account that owns the files: whoever may do this over HTTP could make any other right"
 # What has no route, and why.
 WITHOUT: Mapping[str, str] = {
-    "calibrate axis": AT_THE_BENCH,
-    "calibrate glove": AT_THE_BENCH,
     "track --table": "compares gains on simulated subjects of its own, never on the bench that is served",
     "replay": "tests the program that is installed against a recording, and writes a test beside its sources",
     "find": "writes to ports of the computer that may be anybody's: a person beside them allows each",
@@ -58,6 +55,7 @@ WITHOUT: Mapping[str, str] = {
 }
 # What has a route and no view, and why; what has no route needs no second reason.
 UNSEEN: Mapping[str, str] = {
+    "calibrate glove": "once a year, weights on each finger in turn: command line and REST ask for them",
     "catalogue causes": "asked across all subjects by programs; a diagnosis is read with its session",
     "catalogue operations": "each session shows what was made of it",
     "catalogue rebuild": "asked for by a message that names it, of a catalogue that nobody can read",
@@ -67,7 +65,7 @@ UNSEEN: Mapping[str, str] = {
     "simulate": "the runs' own forecast stands beside each start; a simulation is of a bench that is not there",
 }
 # Options that make another command of one.
-ALSO = ("track --table",)
+ALSO = ("track --table", "calibrate axis --dynamics")
 
 
 class Row(NamedTuple):
@@ -112,9 +110,8 @@ def rows() -> list[Row]:
 
 
 def _routes(command: str) -> tuple[str, ...]:
-    jobs = tuple(
-        f"POST /jobs, kind {kind.name}" for kind in KINDS.values() if kind.command == command.split(maxsplit=1)[0]
-    )
+    own = (command, command.split(maxsplit=1)[0])
+    jobs = tuple(f"POST /jobs, kind {kind.name}" for kind in KINDS.values() if kind.command in own)
     return () if command in WITHOUT else (*ROUTES.get(command, ()), *jobs)
 
 

@@ -15,6 +15,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from api.cli.mock_bench import bench_for
+from api.cli.mock_work import done_by_mock
 from api.cli.options import ConfigOption, SetOption, wiring_from
 from api.cli.output import show
 from api.http.access.access import owner_name
@@ -27,7 +28,6 @@ from api.http.stops.process import AwayStops
 from api.http.streams.bridge import bridged
 from api.operations.remote import folder_name, socket_path
 from controller.stop.http import LOCAL
-from rig.config.products.roles import MOCK_PORT
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
 
@@ -125,8 +125,8 @@ def run_service(
         bench_for(settings, refuses=False) as (wiring, endpoints),
     ):
         service = Service(wiring, sessions, protocols, place.here)
-        if endpoints and settings.force.port == MOCK_PORT:
-            service.hands, service.works["calibrate-force"] = endpoints.control, "api.cli.mock_work:calibrate_force"
+        if endpoints:
+            service.hands, service.works = endpoints.control, done_by_mock(settings)
         service.access.address = place.address
         if away:
             service.away = away

@@ -94,11 +94,8 @@ class Service:
         bench = Supervisor(self.wiring, waiting=waiting, address=self.address)
         bench.attended = self.attended
         try:
-            bench.prepare()
-            if self.away:
-                self.away.follow(bench.stop_path)
             self.reason = "the bench is starting: devices are opened and the axis is homed"
-            self._coming = bench
+            self._hear(bench)
             bench.start()
         except RigError as error:
             self.reason = str(error)
@@ -107,6 +104,13 @@ class Service:
         finally:
             self._coming = None
             self.settled.set()
+
+    def _hear(self, bench: Supervisor) -> None:
+        """From now on stops are for ``bench``."""
+        bench.prepare()
+        if self.away:
+            self.away.follow(bench.stop_path)
+        self._coming = bench
 
     def recover(self, consent: Consent, lease: str = "") -> ResetResult:
         """The way back after a crash, a fault or a stop, as far as ``consent`` goes; a dead loop is replaced."""
@@ -128,15 +132,25 @@ class Service:
         self.bench = None
 
     @contextlib.contextmanager
-    def released(self) -> Iterator[None]:
+    def released(self, why: str) -> Iterator[None]:
         """Another process has the devices meanwhile; a person connects again, as that homes."""
         with self.starting:
             self.disconnect()
-            self.reason = "another process has the devices, and nothing moves; connect when it has ended"
+            self.reason = why
         try:
             yield
         finally:
             self.reason = "the devices are free again: see that nothing is in the tip's way, then connect"
+
+    @contextlib.contextmanager
+    def stopping(self, bench: Supervisor) -> Iterator[None]:
+        """Stops go through ``bench`` to another process; nothing of it but the stop process is started."""
+        self._hear(bench)
+        try:
+            yield
+        finally:
+            self._coming = None
+            bench.close()
 
     @property
     def running(self) -> Job | None:
@@ -213,14 +227,18 @@ class Service:
 
     async def stop(self, kind: StopReason) -> StopOutcome:
         """Asks the loop itself to stop and returns what it did; raises 504 where it has not confirmed that in time."""
-        bench = self.stoppable()
-        request = bench.stops.request(kind)
         job = self.running
-        if job:
-            job.stopped()
-        deadline = time.monotonic() + CONFIRM_S
-        while (answer := bench.stops.answer(request)) is None and time.monotonic() < deadline:
-            await asyncio.sleep(LOOK_S)
+        try:
+            bench = self.stoppable()
+            request = bench.stops.request(kind)
+            if job:
+                job.stopped()
+            deadline = time.monotonic() + CONFIRM_S
+            while (answer := bench.stops.answer(request)) is None and time.monotonic() < deadline:
+                await asyncio.sleep(LOOK_S)
+        finally:
+            if job:
+                job.give_up()
         if answer is None or not answer.confirmed:
             why = answer.text if answer else "the loop does not answer"
             raise RequestRefused(504, "not-confirmed", f"{NOT_CONFIRMED} ({why})")

@@ -53,6 +53,8 @@ def test_a_command_without_either_is_found(monkeypatch: pytest.MonkeyPatch) -> N
         "tools.parity.KINDS", {name: kind for name, kind in KINDS.items() if not name.startswith("fit")}
     )
     assert set(lacking(parity.rows())) == {"planted", "fit"}
+    monkeypatch.setattr("tools.parity.KINDS", {name: KINDS[name] for name in KINDS if name != "calibrate-glove"})
+    assert lacking(parity.rows()) == ["calibrate glove", "planted"], "no other calibration's route stands in for it"
 
 
 def test_every_route_that_is_named_is_there() -> None:
@@ -72,6 +74,8 @@ def test_every_view_that_is_named_is_there() -> None:
 def test_the_table_stands_in_the_reference() -> None:
     text = fill("<!-- generated: parity -->")
     assert "| `rig fit` | `POST /jobs, kind fit`, `POST /jobs, kind fit-cohort` | session |" in text
+    assert "| `rig calibrate axis` | `POST /jobs, kind calibrate-axis` | devices |" in text
+    assert "| `rig calibrate glove` | `POST /jobs, kind calibrate-glove` | none: " in text
     assert "| `rig serve` | none: is the service itself | none |" in text
     assert "| `rig catalogue sites` | `GET /sites` | none: each subject shows its own |" in text
     assert text.count("\n| `rig ") == len(list(parity.commands()))

@@ -12,7 +12,7 @@ from pathlib import Path
 from pydantic import JsonValue
 
 from api.catalogue.pages import Page, cut
-from api.http.jobs.job import Job, JobRequest, stamp
+from api.http.jobs.job import Job, JobRequest, ended_already, stamp
 from api.http.jobs.kinds import Kind
 from api.http.jobs.places import Places
 from api.http.jobs.store import JobStore
@@ -219,7 +219,7 @@ class JobBoard:
         """A job under way; raises RequestRefused with its state where it has ended."""
         job = self._alive(identifier, "changed")
         if job is None:
-            raise _ended(identifier, "cancelled", "changed")
+            raise ended_already(identifier, "cancelled", "changed")
         return job
 
     def _alive(self, identifier: str, done: str) -> Job | None:
@@ -231,7 +231,7 @@ class JobBoard:
         if known is None:
             raise _unknown(identifier)
         if known.state != "cancelled":
-            raise _ended(identifier, known.state, done)
+            raise ended_already(identifier, known.state, done)
         return None
 
     def listed(self, wanted: Filter, page: Page) -> JobList:
@@ -254,9 +254,3 @@ class JobBoard:
 
 def _unknown(identifier: str) -> RequestRefused:
     return RequestRefused(404, "no-such-job", f"no job {identifier[:80]!r}; /jobs lists those there are")
-
-
-def _ended(identifier: str, state: str, done: str) -> RequestRefused:
-    refused = RequestRefused(409, "job-state", f"job {identifier} has {state} and cannot be {done} any more")
-    refused.members = {"state": state}
-    return refused

@@ -24,6 +24,9 @@ PARAMS: dict[str, dict[str, object]] = {
     "diagnose-cohort": {"sessions": ["first", "second"], "simulation": "index"},
     "report-cohort": {"sessions": ["first", "second"]},
     "calibrate-force": {"weights": "100 g,200 g,500 g", "load": "pressed"},
+    "calibrate-glove": {"weights": "100 g,200 g,500 g,1 kg"},
+    "calibrate-axis": {"from_mm": 2.0, "to_mm": 14.0},
+    "calibrate-dynamics": {"from_mm": 2.0},
     "import": {"upload": UPLOAD, "session": "measured", "usual": True},
 }
 EXAMPLES: Any = {name: {"summary": name, "value": {"kind": name, "params": params}} for name, params in PARAMS.items()}

@@ -68,6 +68,8 @@ class Job:
     lease: str = ""
     interrupt: Callable[[], None] = lambda: None
     """Ends what is under way: stops the bench, or the process that computes."""
+    give_up: Callable[[], None] = lambda: None
+    """Ends a process that waits for a person and hears of no stop."""
     go_on: Callable[[], None] = lambda: None
     """What a person was asked for has been done."""
     state: JobState = "queued"
@@ -162,11 +164,11 @@ class Job:
             text = (
                 f"{self.asked.kind} is {self.state} and cannot be {verb}d; it can: {', '.join(self.can) or 'nothing'}"
             )
-            raise refused_by_state(self.state, text)
+            raise _refused(self.state, text)
 
     def _refuse_ended(self, done: str) -> None:
         if self.ended:
-            raise refused_by_state(self.state, f"job {self.id} has {self.state} and cannot be {done} any more")
+            raise ended_already(self.id, self.state, done)
 
     def ask(self, request: str) -> None:
         """A person is to do something; the job waits."""
@@ -192,8 +194,12 @@ class Job:
         self.become(end_of(error, self.operation.cancelled))
 
 
-def refused_by_state(state: str, text: str) -> RequestRefused:
-    """409 with the state that is why."""
+def ended_already(identifier: str, state: str, done: str) -> RequestRefused:
+    """Nothing can be ``done`` with it any more."""
+    return _refused(state, f"job {identifier} has {state} and cannot be {done} any more")
+
+
+def _refused(state: str, text: str) -> RequestRefused:
     refused = RequestRefused(409, "job-state", text)
     refused.members = {"state": state}
     return refused

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, get_args, get_type_hints
 from pydantic import Field
 
 from api.http.cohorts.params import DiagnoseCohortJob, FitCohortJob, ReportCohortJob
-from api.http.commissioning.params import CalibrateForceJob
+from api.http.commissioning.params import CALIBRATIONS, AnyCalibrated, AnyCalibrationJob
 from api.http.jobs.params import (
     CaptureParams,
     DataPlace,
@@ -29,7 +29,7 @@ from api.http.jobs.params import (
 from api.http.jobs.proposal import ProposalResult
 from api.http.models import RequestBody
 from rig.results.base import SavedResult
-from rig.results.bench import CalibrateResult, DoctorResult, RetractResult
+from rig.results.bench import DoctorResult, RetractResult
 from rig.results.cohort import CohortResult
 from rig.results.diagnosis import DiagnosisResult, ProtocolCheckResult
 from rig.results.fit import FitResult
@@ -40,7 +40,7 @@ from rig.results.tracking import SimulateResult, Threshold, TrackResult
 AnyResult = (
     CaptureResult | TrackResult | RetractResult | GloveThreshold | Threshold | DoctorResult | FitResult
     | DiagnosisResult | ProtocolCheckResult | SimulateResult | ReportResult | ExportResult | VerifyResult | RepairResult
-    | ProposalResult | ImportResult | CohortResult | CalibrateResult
+    | ProposalResult | ImportResult | CohortResult | AnyCalibrated
 )  # fmt: skip
 
 
@@ -159,7 +159,7 @@ class ImportJob(JobBody):
 AnyJob = Annotated[
     CaptureJob | TrackJob | RetractJob | ThresholdJob | GloveThresholdJob | DoctorJob | FitJob | DiagnoseJob
     | ProtocolCheckJob | SimulateJob | ReportJob | ExportJob | VerifyJob | RepairJob | ProposeJob | ImportJob
-    | FitCohortJob | DiagnoseCohortJob | ReportCohortJob | CalibrateForceJob,
+    | FitCohortJob | DiagnoseCohortJob | ReportCohortJob | AnyCalibrationJob,
     Field(discriminator="kind"),
 ]  # fmt: skip
 
@@ -192,7 +192,7 @@ class Kind:
         return found
 
 
-RECORDINGS, SCIENCE, BENCH = (f"api.http.jobs.work_{part}" for part in ("recordings", "science", "bench"))
+RECORDINGS, SCIENCE = (f"api.http.jobs.work_{part}" for part in ("recordings", "science"))
 COHORT, COMMISSIONING = "api.http.cohorts.work", "api.http.commissioning.work"
 KINDS: Mapping[str, Kind] = {
     kind.name: kind
@@ -202,7 +202,7 @@ KINDS: Mapping[str, Kind] = {
         Kind(RetractJob, RetractResult, "reset", moves=True),
         Kind(ThresholdJob, Threshold, "threshold", moves=True),
         Kind(GloveThresholdJob, GloveThreshold, "threshold", moves=True),
-        Kind(DoctorJob, DoctorResult, "doctor", f"{BENCH}:doctor"),
+        Kind(DoctorJob, DoctorResult, "doctor", f"{COMMISSIONING}:doctor"),
         Kind(FitJob, FitResult, "fit", f"{SCIENCE}:fit"),
         Kind(DiagnoseJob, DiagnosisResult, "diagnose", f"{SCIENCE}:diagnose"),
         Kind(ProtocolCheckJob, ProtocolCheckResult, "protocol", f"{SCIENCE}:protocol_check"),
@@ -216,6 +216,7 @@ KINDS: Mapping[str, Kind] = {
         Kind(FitCohortJob, CohortResult, "fit", f"{COHORT}:fit_cohort"),
         Kind(DiagnoseCohortJob, CohortResult, "diagnose", f"{COHORT}:diagnose_cohort"),
         Kind(ReportCohortJob, CohortResult, "report", f"{COHORT}:report_cohort"),
-        Kind(CalibrateForceJob, CalibrateResult, "calibrate", f"{COMMISSIONING}:calibrate_force", moves=True),
+        *(Kind(body, result, command, f"{COMMISSIONING}:{does}", moves=True)
+          for body, result, command, does in CALIBRATIONS),
     )
 }  # fmt: skip

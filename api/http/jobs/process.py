@@ -11,13 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import rig.errors
-from api.http.jobs.wire import Order, Told, Word
+from api.http.jobs.wire import CANCEL_S, Order, Told, Word
 from controller.operation import Cancelled, Operation
 from rig.errors import RigError, SafetyStop
 
 MODULE = "api.http.jobs.worker"
-# A computation looks a few times a second whether it is to end; one that does not is ended.
-CANCEL_S = 5.0
 # What a traceback ends with is one line.
 LONGEST_LINE = 300
 

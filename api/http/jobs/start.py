@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 
-from api.http.commissioning.params import CalibrateForceParams
+from api.http.commissioning.alone import Alone, refuse_undoable
+from api.http.commissioning.params import MovingParams
 from api.http.jobs.job import Job
 from api.http.jobs.kinds import KINDS, AnyJob, Kind
 from api.http.jobs.motion import planned
@@ -37,20 +38,10 @@ def _moving(service: Service, body: AnyJob, kind: Kind, by: str, lease: str) -> 
 
 def _alone(service: Service, body: AnyJob, kind: Kind, by: str, lease: str) -> Job:
     """In a process that has the devices to itself: the loop ends for it, which leaves the tip out."""
-    if isinstance(body.params, CalibrateForceParams):
-        body.params.up_to(service.wiring.limits.force_N)
+    refuse_undoable(body.params, service.wiring, kind.name in service.works)
     job = service.jobs.new(kind, body.params, by, None, Operation(kind.name))
-    job.lease, work = lease, _work(service, job, kind)
-
-    def with_the_ports() -> SavedResult:
-        with service.released():
-            return work()
-
-    with service.starting:
-        service.jobs.refuse_busy()
-        if service.seen_devices() is not None:
-            service.refuse_stopped()
-        return service.jobs.start_moving(job, with_the_ports)
+    job.lease, alone = lease, Alone(service, job, isinstance(body.params, MovingParams))
+    return alone.begun(_work(service, job, kind, alone.word))
 
 
 def _computing(service: Service, body: AnyJob, kind: Kind, by: str) -> Job:
@@ -62,19 +53,16 @@ def _computing(service: Service, body: AnyJob, kind: Kind, by: str) -> Job:
     return service.jobs.start_computing(job, _work(service, job, kind))
 
 
-def _work(service: Service, job: Job, kind: Kind) -> Callable[[], SavedResult]:
+def _work(service: Service, job: Job, kind: Kind, stop_word: str = "") -> Callable[[], SavedResult]:
     """Of a process of its own."""
     order = Order(
         kind=kind.name, work=service.works.get(kind.name, kind.work), params=job.asked.params,
-        wiring=service.wiring.model_dump_json(), hands=service.hands, **service.jobs.places(job.id)._asdict(),
+        wiring=service.wiring.model_dump_json(), hands=service.hands, stop_word=stop_word,
+        **service.jobs.places(job.id)._asdict(),
     )  # fmt: skip
     computation = Computation(order, job.ask)
     job.interrupt, job.go_on = computation.cancel, computation.done
-    return lambda: _result(kind, computation.run(job.operation))
-
-
-def _result(kind: Kind, text: str) -> SavedResult:
-    return kind.result.model_validate_json(text)
+    return lambda: kind.result.model_validate_json(computation.run(job.operation))
 
 
 def _session(asked: RequestBody) -> str | None:

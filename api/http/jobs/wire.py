@@ -7,6 +7,9 @@ from pydantic import BaseModel, JsonValue
 
 from api.http.jobs.places import Places
 
+# A computation looks a few times a second whether it is to end; one that does not is ended.
+CANCEL_S = 5.0
+
 
 class Order(BaseModel):
     """What is to be done: ``work`` names a function of an Operation, the kind's parameters and a ``Desk``."""
@@ -22,6 +25,8 @@ class Order(BaseModel):
     """As JSON."""
     hands: str = ""
     """Where the mock bench takes orders; empty on a real bench."""
+    stop_word: str = ""
+    """Where stops are asked for; empty where nothing moves."""
 
     @property
     def places(self) -> Places:

@@ -9,14 +9,17 @@ import queue
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from typing import NamedTuple, TextIO
 
 from api.http.jobs.kinds import KINDS
 from api.http.jobs.places import Places
-from api.http.jobs.wire import Order, Told, Word
+from api.http.jobs.wire import CANCEL_S, Order, Told, Word
 from api.http.models import RequestBody
+from controller.commissioning.stoppable import stop_for_lost
 from controller.operation import Cancelled, Operation, Progress
 from rig.config.wiring import Wiring
 from rig.errors import RigError, SafetyStop
@@ -36,6 +39,7 @@ class Desk(NamedTuple):
     ask: Callable[[str], None]
     """Asks a person to do something, and returns when it is done; raises Cancelled where it was cancelled."""
     hands: str = ""
+    stop_word: str = ""
 
 
 class Pipes:
@@ -45,6 +49,7 @@ class Pipes:
         self._incoming, self._outgoing = incoming, outgoing
         self._lock, self._done = threading.Lock(), queue.SimpleQueue[bool]()
         self.operation: Operation | None = None
+        self.stop_word = ""
 
     def tell(self, message: Told) -> None:
         """In one piece."""
@@ -59,6 +64,10 @@ class Pipes:
             if word.type == "cancel" and self.operation:
                 self.operation.cancel()
             self._done.put(word.type == "done")
+        self._done.put(False)
+        if self.stop_word:  # what moves is braked, and its devices are closed in order
+            stop_for_lost(Path(self.stop_word))
+            time.sleep(CANCEL_S)
         os._exit(ENDED)
 
     def ask(self, request: str) -> None:
@@ -71,9 +80,10 @@ class Pipes:
 def compute(order: Order, pipes: Pipes) -> None:
     """The work of ``order``, told from beginning to end."""
     kind = KINDS[order.kind]
-    operation = pipes.operation = Operation(order.kind)
+    operation, pipes.stop_word = Operation(order.kind), order.stop_word
+    pipes.operation = operation
     operation.watch = _watch(pipes.tell)
-    desk = Desk(order.places, Wiring.model_validate_json(order.wiring), pipes.ask, order.hands)
+    desk = Desk(order.places, Wiring.model_validate_json(order.wiring), pipes.ask, order.hands, order.stop_word)
     try:
         asked = kind.params.model_validate(order.params)
         found = function_at(order.work)(operation, asked, desk)
@@ -108,12 +118,13 @@ def _watch(tell: Callable[[Told], None]) -> Callable[[Progress], None]:
 
 def main() -> None:
     """Reads the order, does it, ends."""
-    os.nice(NICENESS)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     outgoing = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     pipes = Pipes(sys.stdin, outgoing)
     order = Order.model_validate_json(sys.stdin.readline())
+    if not order.stop_word:  # a drive waits for nobody
+        os.nice(NICENESS)
     threading.Thread(target=pipes.listen, name="service", daemon=True).start()
     compute(order, pipes)
 

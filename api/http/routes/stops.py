@@ -45,7 +45,7 @@ def _stops(router: APIRouter, service: Service) -> None:
         "/estop",
         dependencies=[STOP],
         summary="Software emergency stop: the drive's own quick stop",
-        responses=responses("503 disconnected", "504 not-confirmed"),
+        responses=responses("503 disconnected", "503 device", "504 not-confirmed"),
     )
     async def emergency_stop() -> Done:
         return _stopped(service, await service.stop(StopReason.EMERGENCY))
@@ -54,7 +54,7 @@ def _stops(router: APIRouter, service: Service) -> None:
         "/pain",
         dependencies=[STOP],
         summary="The subject's stop: retracts at safe speed",
-        responses=responses("503 disconnected", "504 not-confirmed"),
+        responses=responses("503 disconnected", "503 device", "504 not-confirmed"),
     )
     async def pain() -> Done:
         return _stopped(service, await service.stop(StopReason.PAIN))

@@ -5,11 +5,13 @@ import shutil
 import signal
 import sys
 import time
+from pathlib import Path
 
 from api.http.jobs.params import VerifyParams
 from api.http.jobs.worker import Desk
+from controller.commissioning.stoppable import stoppable
 from controller.operation import Operation
-from rig.errors import DataError
+from rig.errors import DataError, SafetyStop
 from rig.results.recorded import VerifyResult
 
 WHOLE = VerifyResult(ok=True, remarks=(), recordings={})
@@ -69,4 +71,21 @@ def asking(operation: Operation, _asked: VerifyParams, desk: Desk) -> VerifyResu
     for load in ("1 N", "2 N"):
         desk.ask(f"put {load} on the tip")
         operation.say(f"{load} is on")
+    return WHOLE
+
+
+def moving(operation: Operation, _asked: VerifyParams, desk: Desk) -> VerifyResult:
+    """Moves as a driver does, which brakes where it is told to."""
+    with stoppable(desk.wiring, Path(desk.stop_word)) as (guard, _), guard.moving():
+        operation.advance(0.1, "moves")
+        while not guard.interrupted():
+            time.sleep(0.001)
+        raise SafetyStop("stopped on request while it was moved")
+
+
+def moving_deaf(operation: Operation, _asked: VerifyParams, desk: Desk) -> VerifyResult:
+    """A computer that is held up in the middle of a move."""
+    with stoppable(desk.wiring, Path(desk.stop_word)) as (guard, _), guard.moving():
+        operation.advance(0.1, "moves")
+        time.sleep(60)
     return WHOLE
