@@ -24,11 +24,14 @@ from rig.config.axis_dynamics import AxisDynamics
 from rig.config.calibration import AxisCalibration, ForceCalibration
 from rig.config.calibration_files import read_axis, read_force, text_of
 from rig.config.endpoints import Endpoints
-from rig.config.products.roles import Product
+from rig.config.products.firmata_glove import FirmataGlove
+from rig.config.products.roles import MOCK_PORT, Product
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, RigError, UsageError
 from rig.recording.files import make_folder, write_text
 
+# Not loaded with the service: its process does it, and it brings along all that computes.
+WORK = "api.cli.mock_work"
 # Half a millimetre in front of what is touched.
 NEAR_MM = 0.5
 # Shares of limits.force_N; weights of the mock bench are exact.
@@ -167,6 +170,18 @@ def nothing_hidden(control: BenchControl) -> Iterator[None]:
     finally:
         if hidden:
             control.hide(hidden)
+
+
+def done_by_mock(wiring: Wiring) -> dict[str, str]:
+    """By kind of job what calibrates a device whose port is `mock` in ``wiring``; nobody is asked for anything."""
+    gloves = [product for product in wiring.input.values() if isinstance(product, FirmataGlove)]
+    mock = {
+        "force": wiring.force.port == MOCK_PORT,
+        "axis": wiring.axis.port == MOCK_PORT,
+        "dynamics": wiring.axis.port == MOCK_PORT,
+        "glove": bool(gloves) and all(glove.port == MOCK_PORT for glove in gloves),
+    }
+    return {f"calibrate-{what}": f"{WORK}:calibrate_{what}" for what, is_mock in mock.items() if is_mock}
 
 
 def say(sentence: str) -> None:

@@ -16,25 +16,8 @@ from api.operations.calibrate import AxisAsked
 from controller.experiments.glove import glove_of
 from controller.operation import Operation
 from mock_devices.control import BenchControl
-from rig.config.products.firmata_glove import FirmataGlove
-from rig.config.products.roles import MOCK_PORT
-from rig.config.wiring import Wiring
 from rig.results.bench import CalibrateResult
 from rig.results.glove import GloveCalibrated
-
-MODULE = "api.cli.mock_work"
-
-
-def done_by_mock(wiring: Wiring) -> dict[str, str]:
-    """By kind of job what calibrates a device whose port is `mock` in ``wiring``; nobody is asked for anything."""
-    gloves = [product for product in wiring.input.values() if isinstance(product, FirmataGlove)]
-    mock = {
-        "force": wiring.force.port == MOCK_PORT,
-        "axis": wiring.axis.port == MOCK_PORT,
-        "dynamics": wiring.axis.port == MOCK_PORT,
-        "glove": bool(gloves) and all(glove.port == MOCK_PORT for glove in gloves),
-    }
-    return {f"calibrate-{what}": f"{MODULE}:calibrate_{what}" for what, is_mock in mock.items() if is_mock}
 
 
 def calibrate_force(operation: Operation, asked: CalibrateForceParams, desk: Desk) -> CalibrateResult:

@@ -15,7 +15,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from api.cli.mock_bench import bench_for
-from api.cli.mock_work import done_by_mock
+from api.cli.mock_calibration import done_by_mock
 from api.cli.options import ConfigOption, SetOption, wiring_from
 from api.cli.output import show
 from api.http.access.access import owner_name

@@ -15,8 +15,9 @@ from api.cli.asking import Person
 from api.cli.calibrate import say_use
 from api.cli.calibrate_axis import calibrate_axis
 from api.cli.mock_bench import bench_for, plug_into
-from api.cli.mock_calibration import force_file
+from api.cli.mock_calibration import done_by_mock, force_file
 from api.cli.options import built_in, calibrated, wiring_from
+from api.http.jobs.worker import function_at
 from api.operations.calibrate import AxisAsked
 from api.operations.calibrations import keep, refuse_out, refuse_unfit
 from rig.config.calibration import Calibration, Uncertainty
@@ -318,3 +319,22 @@ def test_a_real_sensor_without_calibration_is_refused_before_a_bench_starts(monk
         bench_for(built_in(["force.port=/dev/ttyUSB0"])),
     ):
         pass
+
+
+@pytest.mark.parametrize(
+    ("settings", "kinds"),
+    [
+        ((), {"axis", "dynamics", "force"}),
+        (("axis.port=/dev/ttyACM0",), {"force"}),
+        (("force.port=/dev/ttyUSB0", "axis.port=/dev/ttyACM0"), set[str]()),
+        (("input.a.product=firmata-glove",), {"axis", "dynamics", "force", "glove"}),
+        (("input.a.product=firmata-glove", "input.b.product=firmata-glove", "input.b.port=/dev/ttyUSB1"),
+         {"axis", "dynamics", "force"}),
+    ],
+)  # fmt: skip
+def test_a_service_asks_nobody_for_what_the_mock_bench_does_with_its_own_devices(
+    settings: tuple[str, ...], kinds: set[str]
+) -> None:
+    found = done_by_mock(built_in(list(settings)))
+    assert set(found) == {f"calibrate-{kind}" for kind in kinds}
+    assert all(callable(function_at(name)) for name in found.values())

@@ -58,17 +58,26 @@ def test_a_state_that_does_not_come_is_told_with_the_reason_of_the_one_there_is(
     assert '"reason": "the drive reports: 8130 heartbeat"' in said and '"mode": "idle"' in said
 
 
-def test_a_calibration_shows_what_it_asks_for_and_goes_on_once_a_person_says_so(show: Any, service: Pretended) -> None:
-    asks = {"message": "put 1 N on the tip, alone", "can": ["cancel", "resume"], "session": None}
-    under_way = told.job("calibrate-force", "paused", **asks)
+@pytest.mark.parametrize(
+    ("kind", "request_"),
+    [
+        ("calibrate-force", "put 1 N on the tip, alone"),
+        ("calibrate-axis", "see that the tip's way is free from home to 14 mm, and the limb out"),
+    ],
+)
+def test_a_calibration_shows_what_it_asks_for_and_goes_on_once_a_person_says_so(
+    show: Any, service: Pretended, kind: str, request_: str
+) -> None:
+    asks = {"message": request_, "can": ["cancel", "resume"], "session": None}
+    under_way = told.job(kind, "paused", **asks)
     lease = {"lease_id": "l", "epoch": 1, "expires": told.AT}
     service.answers |= listed(under_way) | {"POST control/lease": lease, "PUT control/lease": lease}
-    service.answers |= {"POST jobs/job-calibrate-force/resume": under_way}
+    service.answers |= {f"POST jobs/job-{kind}/resume": under_way}
     page = show("devices")
-    expect(page.locator("#calibrate-force-asks")).to_have_text("put 1 N on the tip, alone")
-    holds_up(page, "state-calibrating-devices", (390,))
-    with page.expect_request("**/jobs/job-calibrate-force/resume") as asked:
-        page.click("#calibrate-force-resume")
+    expect(page.locator(f"#{kind}-asks")).to_have_text(request_)
+    holds_up(page, f"state-{kind}-devices", (390,))
+    with page.expect_request(f"**/jobs/job-{kind}/resume") as asked:
+        page.click(f"#{kind}-resume")
     assert asked.value.headers["x-control-lease"] == "l"
 
 

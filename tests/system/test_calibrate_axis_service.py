@@ -90,7 +90,7 @@ def test_a_stop_at_the_question_ends_it_before_anything_has_moved(served: Served
     job = begun(served, lease)
     asks = becomes(served, lease, job, "paused")
     assert asks["message"].startswith("see that the tip's way is free from home to 14 mm, and the limb out: then the")
-    assert served.rig["state"] == "disconnected" and "every stop reaches it" in served.rig["reason"]
+    assert served.rig["state"] == "disconnected" and "which every stop brakes" in served.rig["reason"]
     assert served.ask("POST", "/estop")["detail"] == "nothing was moving: the bench does not start"
     assert becomes(served, lease, job, "cancelled")["result"] is None
     assert stands(served.bench)

@@ -26,7 +26,7 @@ OPTION = re.compile(r"--([a-z][a-z-]*)")
 # A tenth of a second after control is lost the axis brakes: two millimetres at the 20 mm/s of its homing.
 LOOK_S = 0.1
 RESTS = "a calibration has the devices, and nothing moves; connect when it has ended"
-MOVES = "a calibration has the devices and moves the axis; every stop reaches it, and connect when it has ended"
+MOVES = "a calibration has the devices and moves the axis, which every stop brakes; connect when it has ended"
 
 
 def refuse_undoable(asked: object, wiring: Wiring, by_itself: bool) -> None:

@@ -23,11 +23,6 @@ PLANTED = "tests.api.jobs.planted"
 BLOCK = {"gauge_block_mm": 10.0}
 
 
-@pytest.fixture(autouse=True)
-def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-
-
 @pytest.mark.parametrize(
     ("kind", "params", "said"),
     [

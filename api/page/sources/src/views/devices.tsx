@@ -4,7 +4,7 @@ import { startRecovery } from "../parts/attention";
 import { fresh, rig } from "../live";
 import { may } from "../session";
 import { t } from "../texts";
-import { CalibrateForce } from "./devices/calibrate_force";
+import { CalibrateAxis, CalibrateDynamics, CalibrateForce } from "./devices/calibrate";
 import { Calibrations } from "./devices/calibrations";
 import { Doctor } from "./devices/doctor";
 
@@ -66,6 +66,10 @@ export function Devices() {
       <Doctor />
       <Calibrations />
       <CalibrateForce />
+      <div class="grid">
+        <CalibrateAxis />
+        <CalibrateDynamics />
+      </div>
       <div class="grid">
         <Card title={t.devices.recovery}>
           <p>{t.devices.recoveryText}</p>

@@ -1,4 +1,5 @@
-// The force sensor against known weights: the job asks for each, and goes on once a person says that it rests there.
+// Force sensor and axis calibrated: the job asks for each step, and goes on once a person says that it is done.
+import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
 import type { Schema } from "../../api";
 import { attempt } from "../../attempt";
@@ -10,32 +11,40 @@ import { t } from "../../texts";
 
 type Found = Schema["CalibrateResult"];
 
-export function CalibrateForce() {
-  const [weights, name] = useState("");
-  const [load, choose] = useState("pressed");
-  const [job, follow] = useWork<Found>("calibrate-force");
+function Calibrate({ kind, text, params, children }: { kind: string; text: string; params: Record<string, unknown>; children?: ComponentChildren }) {
+  const [job, follow] = useWork<Found>(kind);
   const begin = (event: Event) => {
     event.preventDefault();
-    void attempt(async () => follow((await startInControl<Found>("calibrate-force", { weights, load })).id));
+    void attempt(async () => follow((await startInControl<Found>(kind, params)).id));
   };
   return (
-    <Card title={t.kinds["calibrate-force"]!}>
-      <p>{t.devices.weightsText}</p>
-      {(!job || ended(job)) && (
-        <form onSubmit={begin}>
-          <label>{t.devices.weights}
-            <input id="weights" required maxLength={200} value={weights} onInput={(event) => name(event.currentTarget.value)} />
-          </label>
-          <label>{t.devices.load}
-            <select id="load" value={load} onChange={(event) => choose(event.currentTarget.value)}>
-              {Object.entries(t.devices.loads).map(([kind, text]) => <option key={kind} value={kind}>{text}</option>)}
-            </select>
-          </label>
-          <Start id="calibrate-force" why={whyNotMove()}>{t.devices.calibrateStart}</Start>
-        </form>
-      )}
+    <Card title={t.kinds[kind]!}>
+      <p>{text}</p>
+      {(!job || ended(job)) && <form onSubmit={begin}>{children}<Start id={kind} why={whyNotMove()}>{t.devices.calibrateStart}</Start></form>}
       <JobState job={job} />
-      {job?.result && <p id="calibrated" class="notice">{t.devices.calibrated(job.result.file)}</p>}
+      {job?.result && <p id={`${kind}-done`} class="notice">{t.devices.calibrated(job.result.file)}</p>}
     </Card>
   );
 }
+
+export function CalibrateForce() {
+  const [weights, name] = useState("");
+  const [load, choose] = useState("pressed");
+  return (
+    <Calibrate kind="calibrate-force" text={t.devices.weightsText} params={{ weights, load }}>
+      <label>{t.devices.weights}
+        <input id="weights" required maxLength={200} value={weights} onInput={(event) => name(event.currentTarget.value)} />
+      </label>
+      <label>{t.devices.load}
+        <select id="load" value={load} onChange={(event) => choose(event.currentTarget.value)}>
+          {Object.entries(t.devices.loads).map(([one, text]) => <option key={one} value={one}>{text}</option>)}
+        </select>
+      </label>
+    </Calibrate>
+  );
+}
+
+/** Against the tracker; a gauge block asks for numbers that only who stands at the bench knows. */
+export const CalibrateAxis = () => <Calibrate kind="calibrate-axis" text={t.devices.axisText} params={{}} />;
+
+export const CalibrateDynamics = () => <Calibrate kind="calibrate-dynamics" text={t.devices.dynamicsText} params={{}} />;
