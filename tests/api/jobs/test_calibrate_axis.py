@@ -9,7 +9,6 @@ from fastapi.testclient import TestClient
 
 from api.http.commissioning.alone import Alone
 from api.http.service import Service
-from api.http.stops.known import Known
 from controller.stop.word import Lane, Requester, StopReason, StopWord
 from mock_devices.testing.commands import until
 from rig.config.products.firmata_glove import FirmataGlove
@@ -110,9 +109,9 @@ def test_a_service_that_does_not_know_where_stops_go_is_found(
 
 def test_stops_from_other_computers_reach_it(client: TestClient, service: Service, bench: WiredBench) -> None:
     followed = list[Path]()
-    service.away = type("Away", (), {"follow": lambda _, page: followed.append(page)})()  # type: ignore[assignment]
+    service.away = type("Away", (), {"follow": lambda _, page: followed.append(page)})()
     job = moving(client, service)
-    page = StopWord.open(Path(Known(page=str(followed[-1])).page))
+    page = StopWord.open(followed[-1])
     asking = Requester(page, Lane.AWAY)
     answer = asking.confirmed(asking.request(StopReason.EMERGENCY), 2.0)
     page.close()
