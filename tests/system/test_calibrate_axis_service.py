@@ -68,8 +68,9 @@ def stands(bench: ServedBench) -> bool:
 
 
 def moving(served: ServedRig, lease: str) -> str:
-    """A job that moves the axis now, by steps of three seconds, with its way known to be free."""
+    """A job that moves the axis now, and for three seconds to come, with its way known to be free."""
     job = begun(served, lease, clear=True, to_mm=58.0)
+    until(lambda: served.ask("GET", f"/jobs/{job}")["message"] == "16 mm", PATIENCE_S, "its first long step")
     until(lambda: under_way(served.bench), PATIENCE_S, "the axis under way")
     return job
 
