@@ -12,7 +12,6 @@ from api.http.commissioning.params import (
 )
 from api.http.commissioning.work import axis_calibrated, calibrated, dynamics_found, glove_calibrated, start
 from api.http.jobs.worker import Desk
-from api.operations.calibrate import AxisAsked
 from controller.experiments.glove import glove_of
 from controller.operation import Operation
 from mock_devices.control import BenchControl
@@ -35,7 +34,7 @@ def calibrate_glove(operation: Operation, asked: CalibrateGloveParams, desk: Des
 
 def calibrate_axis(operation: Operation, params: CalibrateAxisParams, desk: Desk) -> CalibrateResult:
     """The mock limb is table and block; nothing is in the way."""
-    asked, begin = AxisAsked(**params.model_dump()), start(desk, clear=True)
+    asked, begin = params.asked, start(desk, clear=True)
     with ExitStack() as held:
         control = held.enter_context(BenchControl(desk.hands))
         if asked.gauge_block_mm:

@@ -13,7 +13,7 @@ from api.http.commissioning.params import (
 )
 from api.http.jobs.job import Job
 from api.http.service import Service
-from api.operations.calibrate import AxisAsked, refuse_axis
+from api.operations.calibrate import refuse_axis
 from api.operations.calibrate_dynamics import sweep_asked
 from api.operations.glove import HEAVIEST_N
 from controller.experiments.glove import glove_of
@@ -47,7 +47,7 @@ def _refuse(asked: object, wiring: Wiring, by_itself: bool) -> None:
         case CalibrateAxisParams():
             if asked.gauge_block_mm and asked.near_mm is None and not by_itself:
                 raise UsageError("near_mm: where is the table? give the axis position just before it, in mm")
-            refuse_axis(AxisAsked(**asked.model_dump()), wiring)
+            refuse_axis(asked.asked, wiring)
         case CalibrateDynamicsParams():
             sweep_asked(wiring, asked.from_mm)
 

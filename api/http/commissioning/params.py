@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from api.http.jobs.params import JobBody
 from api.http.models import RequestBody
+from api.operations.calibrate import AxisAsked
 from controller.commissioning.weights import Weights, parse_weights
 from rig.results.base import SavedResult
 from rig.results.bench import CalibrateResult
@@ -60,6 +61,11 @@ class CalibrateAxisParams(MovingParams):
         if self.near_mm is not None and self.gauge_block_mm is None:
             raise ValueError("near_mm says where the table for a gauge block is; give gauge_block_mm, or leave it out")
         return self
+
+    @property
+    def asked(self) -> AxisAsked:
+        """As the command asks for it."""
+        return AxisAsked(**self.model_dump())
 
 
 class CalibrateDynamicsParams(MovingParams):

@@ -87,7 +87,7 @@ def glove_calibrated(
 
 def calibrate_axis(operation: Operation, params: CalibrateAxisParams, desk: Desk) -> CalibrateResult:
     """Asks whether the way is free, then for the block, or where the tip went; the job is resumed once that is so."""
-    asked = AxisAsked(**params.model_dump())
+    asked = params.asked
     block = GaugeBlock(asked.gauge_block_mm, asked.near_mm or 0.0) if asked.gauge_block_mm else None
     return axis_calibrated(
         operation, asked, desk, block, lambda: desk.ask(asked.block_request), start(desk, asked.clear, asked.way)

@@ -80,8 +80,8 @@ class Pipes:
 def compute(order: Order, pipes: Pipes) -> None:
     """The work of ``order``, told from beginning to end."""
     kind = KINDS[order.kind]
-    operation, pipes.stop_word = Operation(order.kind), order.stop_word
-    pipes.operation = operation
+    pipes.stop_word = order.stop_word
+    operation = pipes.operation = Operation(order.kind)
     operation.watch = _watch(pipes.tell)
     desk = Desk(order.places, Wiring.model_validate_json(order.wiring), pipes.ask, order.hands, order.stop_word)
     try:

@@ -5,9 +5,9 @@ import hashlib
 import shutil
 from collections.abc import Coroutine
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 
@@ -22,7 +22,6 @@ from api.http.jobs.start import start
 from api.http.jobs.views import FILE_TYPES, FileView, listed_files, media_type
 from api.http.models import SessionView
 from api.http.problems import RequestRefused, responses
-from api.http.routes.common import Word
 from api.http.service import Service
 from rig.results.base import SavedResult
 
@@ -157,7 +156,7 @@ def _erasure(router: APIRouter, service: Service) -> None:
         summary="First says what would be erased, with 202; with what that says as `confirm` it is erased",
         responses={202: {"model": SessionErasure}, **responses("404 no-such-session", "409 busy", "409 stale")},
     )
-    def erase(session: str, response: Response, confirm: Word = "") -> SessionErasure:
+    def erase(session: str, response: Response, confirm: Annotated[str, Query(max_length=100)] = "") -> SessionErasure:
         folder = service.session(session)
         if any(job.asked.session == session for job in service.jobs.active):
             raise RequestRefused(409, "busy", f"a job works on session {session}; cancel it or wait")
