@@ -11,7 +11,6 @@ import pytest
 from controller.stop.keyboard import Keyboard
 from controller.stop.keypad import Keys, open_device
 from controller.stop.word import Deed, Keypad, Lane, Requester, Responder, StopReason, StopWord
-from tests.controller.descriptors import open_files
 
 KEYS = Keys({48: StopReason.PAIN}, StopReason.EMERGENCY)
 
@@ -29,7 +28,8 @@ class KeypadServed:
         self.loop = Responder(self.page)
         self.selector = selectors.DefaultSelector()
         self.plug_in()
-        self.keyboard = Keyboard(self.page, str(self.path), open_device(str(self.path)), KEYS, required)
+        self.descriptor = open_device(str(self.path))
+        self.keyboard = Keyboard(self.page, str(self.path), self.descriptor, KEYS, required)
 
     def plug_in(self) -> None:
         os.mkfifo(self.path)
@@ -77,15 +77,15 @@ def test_presses_are_counted_and_asked_for_in_the_stop_process_own_lane(folder: 
 def test_a_keypad_that_goes_is_told_let_go_and_looked_for_every_second(
     folder: Path, capsys: pytest.CaptureFixture[str], required: bool, stops: list[StopReason]
 ) -> None:
-    served, before = KeypadServed(folder, required), open_files()
+    served = KeypadServed(folder, required)
     served.turn(0.0)
     served.pull_out()
     served.turn(0.1)
     assert served.shown == "LOST"
     assert served.taken() == stops
     assert capsys.readouterr().err == f"{served.path}: the keypad is gone; plug it in again\n"
-    # The keypad's own descriptor and the writer's are closed.
-    assert len(before - open_files()) >= 2
+    with pytest.raises(OSError, match="Bad file descriptor"):
+        os.fstat(served.descriptor)
     served.turn(5.0)
     assert served.taken() == stops, "again and again: it cannot be acknowledged away"
     served.plug_in()
