@@ -55,7 +55,6 @@ WITHOUT: Mapping[str, str] = {
 }
 # What has a route and no view, and why; what has no route needs no second reason.
 UNSEEN: Mapping[str, str] = {
-    "calibrate glove": "once a year, weights on each finger in turn: command line and REST ask for them",
     "catalogue causes": "asked across all subjects by programs; a diagnosis is read with its session",
     "catalogue operations": "each session shows what was made of it",
     "catalogue rebuild": "asked for by a message that names it, of a catalogue that nobody can read",

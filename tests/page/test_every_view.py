@@ -35,7 +35,7 @@ AT_ONCE = ("bench", "data")
 STARTS = (
     "capture-start", "ramp-start", "track-start", "subject-keep", "threshold-keep", "fit-start", "diagnose-start",
     "report-start", "verify-start", "doctor", "read", "erase", "retract",
-    "calibrate-force", "calibrate-axis", "calibrate-dynamics",
+    "calibrate-force", "calibrate-glove", "calibrate-axis", "calibrate-dynamics",
 )  # fmt: skip
 WALKS = 3
 Show = Callable[[str], Page]

@@ -62,6 +62,7 @@ def test_a_state_that_does_not_come_is_told_with_the_reason_of_the_one_there_is(
     ("kind", "request_"),
     [
         ("calibrate-force", "put 1 N on the tip, alone"),
+        ("calibrate-glove", "put 1 N on finger 2, alone"),
         ("calibrate-axis", "see that the tip's way is free from home to 14 mm, and the limb out"),
     ],
 )
@@ -79,6 +80,27 @@ def test_a_calibration_shows_what_it_asks_for_and_goes_on_once_a_person_says_so(
     with page.expect_request(f"**/jobs/job-{kind}/resume") as asked:
         page.click(f"#{kind}-resume")
     assert asked.value.headers["x-control-lease"] == "l"
+
+
+def test_a_gauge_block_is_asked_for_with_its_height_and_place(show: Any, service: Pretended) -> None:
+    begun = told.job("calibrate-axis", "running", session=None)
+    lease = {"lease_id": "l", "epoch": 1, "expires": told.AT}
+    service.answers |= {"POST control/lease": lease, "PUT control/lease": lease, "POST jobs": begun}
+    service.answers |= {f"jobs/{begun['id']}": begun}
+    service.says(rig=IDLE)
+    page = show("devices")
+    page.select_option("#against", "block")
+    page.fill("#block-height", "10.003")
+    page.click("#calibrate-axis")
+    expect(page.locator("#block-near:invalid")).to_be_visible()
+    page.fill("#block-near", "31.5")
+    holds_up(page, "state-calibrate-axis-block", (390,))
+    with page.expect_request(lambda sent: sent.method == "POST" and sent.url.endswith("/jobs")) as asked:
+        page.click("#calibrate-axis")
+    assert asked.value.post_data_json == {
+        "kind": "calibrate-axis",
+        "params": {"gauge_block_mm": 10.003, "near_mm": 31.5},
+    }
 
 
 @pytest.mark.parametrize(

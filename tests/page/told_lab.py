@@ -57,10 +57,11 @@ CALIBRATIONS = [
 TOKENS = [TokenView(id="a1", name="notebook", scope="read", created=AT)]
 ACCOUNTS = [AccountView(name="ann", scope="operate"), AccountView(name="ben", scope="admin")]
 AUDIT = AuditView(
-    lines=[
+    items=[
         AuditLine(seq=2, time=AT, who="eve", credential="login", what="POST /api/v1/tokens", outcome="403", before=""),
         AuditLine(seq=1, time=AT, who="ann", credential="login", what="POST /api/v1/jobs", outcome="202", before=""),
     ],
+    next=None,
     broken=[],
 )
 
@@ -88,5 +89,5 @@ def bare() -> dict[str, Any]:
     nobody: list[Any] = []
     return {
         f"subjects/{SUBJECT}": left, "calibrations": nobody, "accounts": nobody, "tokens": nobody,
-        "audit": AuditView(lines=[], broken=[]),
+        "audit": AuditView(items=[], next=None, broken=[]),
     }  # fmt: skip

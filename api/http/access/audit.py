@@ -4,6 +4,7 @@ A line that was changed or removed shows: each carries the SHA-256 of the line b
 order is that of ``seq``, whatever the clock was set to.
 """
 
+import contextlib
 import fcntl
 import hashlib
 import json
@@ -16,6 +17,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
+from api.catalogue.pages import Page, cut
 from api.http.access.scopes import Caller
 
 TAIL_BYTES = 65_536  # many times the longest line
@@ -76,15 +78,19 @@ class AuditLog:
         """All lines, oldest first."""
         return self.path.read_bytes().splitlines() if self.path.exists() else []
 
-    def newest(self, count: int) -> list[AuditLine]:
-        """The last ``count`` lines, newest first; what cannot be read is left out, and `broken` tells of it."""
+    def newest(self, page: Page) -> tuple[list[AuditLine], str | None]:
+        """One page, newest first, and the cursor of the next; `broken` tells of lines left out, which cannot be read.
+
+        Raises UsageError for a cursor of another list.
+        """
+        numbered, after = cut(
+            page, "audit", enumerate(self.lines()), lambda one: (f"{one[0]:012}", ""), newest_first=True
+        )
         found = []
-        for line in reversed(list(self.lines())[-count:]):
-            try:
+        for _, line in numbered:
+            with contextlib.suppress(ValueError):
                 found.append(AuditLine.model_validate_json(line))
-            except ValueError:
-                continue
-        return found
+        return found, after
 
     def broken(self) -> list[int]:
         """Numbers of the lines, from 1, that do not follow the line before: something was changed there, or taken."""

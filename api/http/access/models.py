@@ -88,7 +88,8 @@ class AccountView(BaseModel):
 
 
 class AuditView(BaseModel):
-    """What was done, newest first."""
+    """What was done, newest first; ``next`` is the cursor of what came before, null at the beginning."""
 
-    lines: list[AuditLine]
+    items: list[AuditLine]
+    next: str | None
     broken: list[int] = Field(description="numbers of lines that do not follow the one before")

@@ -23,12 +23,11 @@ from api.http.access.models import (
 from api.http.access.rights import ADMIN, PUBLIC, READ
 from api.http.access.scopes import WORDS, Caller
 from api.http.problems import RequestRefused, responses
-from api.http.routes.common import WhoAsks
+from api.http.routes.common import PageQuery, WhoAsks
 from api.http.service import Service
 
 # As long as the passwords of those before take.
 BUSY_S = 3.0
-NEWEST = 200
 
 
 def add(router: APIRouter, service: Service) -> None:
@@ -41,9 +40,11 @@ def add(router: APIRouter, service: Service) -> None:
         return [AccountView(name=one.name, scope=one.scope) for one in service.access.accounts.accounts()]
 
     @router.get("/audit", dependencies=[ADMIN], summary="Who did what, newest first")
-    def audit() -> AuditView:
-        service.access.audit.settle()
-        return AuditView(lines=service.access.audit.newest(NEWEST), broken=service.access.audit.broken())
+    def audit(page: PageQuery) -> AuditView:
+        log = service.access.audit
+        log.settle()
+        items, after = log.newest(page)
+        return AuditView(items=items, next=after, broken=log.broken())
 
 
 def _logins(router: APIRouter, service: Service) -> None:

@@ -10,6 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
+from api.catalogue.pages import Page
 from api.http.access import limits
 from api.http.access.audit import AuditLog
 from api.http.access.limits import Rate, RateLimits
@@ -38,13 +39,13 @@ def service(tmp_path: Path) -> Service:
 
 def said(service: Service) -> list[tuple[str, str, str]]:
     service.access.audit.settle()
-    lines = reversed(service.access.audit.newest(100))
-    return [(line.who.partition("-")[0], line.what, line.outcome) for line in lines]
+    lines, _ = service.access.audit.newest(Page(100))
+    return [(line.who.partition("-")[0], line.what, line.outcome) for line in reversed(lines)]
 
 
 def test_a_line_says_who_what_when_and_how_it_ended(log: AuditLog) -> None:
     log.add(ANN, "POST /api/v1/jobs", "202").result()
-    (line,) = log.newest(10)
+    (line,), _ = log.newest(Page())
     assert (line.seq, line.who, line.credential, line.what, line.outcome) == (
         1, "Ann", "token 12ab", "POST /api/v1/jobs", "202"
     )  # fmt: skip
@@ -55,7 +56,7 @@ def test_a_line_says_who_what_when_and_how_it_ended(log: AuditLog) -> None:
 def test_lines_follow_each_other_also_of_two_services_and_after_a_restart(log: AuditLog) -> None:
     for who in (log, AuditLog(log.path), log):
         who.add(ANN, "x" * 1000, "200").result()
-    assert [line.seq for line in log.newest(10)] == [3, 2, 1]
+    assert [line.seq for line in log.newest(Page())[0]] == [3, 2, 1]
     assert log.broken() == []
 
 
@@ -81,7 +82,7 @@ def test_after_a_line_that_a_power_failure_cut_it_goes_on(log: AuditLog) -> None
     with log.path.open("a") as file:
         file.write('{"seq": 2, "ti\n')
     log.add(ANN, "b", "200").result()
-    assert [line.what for line in log.newest(10)] == ["b", "a"]
+    assert [line.what for line in log.newest(Page())[0]] == ["b", "a"]
     assert log.broken() == [2]
 
 
@@ -133,10 +134,31 @@ def test_an_admin_reads_the_log(service: Service) -> None:
     client = client_of(service)
     client.post("/api/v1/estop")
     shown = client.get("/api/v1/audit").json()
-    assert [line["what"] for line in shown["lines"]] == ["POST /api/v1/estop"]
+    assert [line["what"] for line in shown["items"]] == ["POST /api/v1/estop"]
     assert shown["broken"] == []
     line = json.loads(service.access.audit.path.read_text())
     assert set(line) == {"seq", "time", "who", "credential", "what", "outcome", "before"}
+
+
+def test_the_whole_log_is_read_page_by_page_also_where_a_line_is_broken(service: Service) -> None:
+    client = client_of(service)
+    for _ in range(5):
+        client.post("/api/v1/estop")
+    service.access.audit.settle()
+    path = service.access.audit.path
+    path.write_text(path.read_text().replace('"seq":3', '"seq":"3'))
+    pages, cursor = list[list[int]](), ""
+    while cursor is not None:
+        page = client.get("/api/v1/audit", params={"limit": 2, "cursor": cursor}).json()
+        pages.append([line["seq"] for line in page["items"]])
+        cursor = page["next"]
+    assert pages == [[5, 4], [2], [1]]
+
+
+def test_a_cursor_of_another_list_is_refused(service: Service) -> None:
+    foreign = Page(1).first("jobs", ["a", "b"], lambda one: (one, ""))[1]
+    refused = client_of(service).get("/api/v1/audit", params={"cursor": foreign})
+    assert (refused.status_code, "is none that was given by this list" in refused.text) == (422, True)
 
 
 def test_a_bucket_fills_steadily_up_to_its_rim() -> None:

@@ -95,17 +95,21 @@ export const ifThere = <T>(path: string, sent: Sent<undefined> = {}): Promise<T 
 export const get = <P extends Routes<"get">>(path: P, sent: Sent<undefined> = {}) => ask("get", path, sent) as Promise<Answer<P, "get">>;
 type Items<A> = A extends { items: readonly (infer I)[] } ? I : never;
 
-/** All of a list that comes page by page. */
-export async function every<P extends Routes<"get">>(path: P): Promise<Items<Answer<P, "get">>[]> {
-  const found: Items<Answer<P, "get">>[] = [];
-  let cursor: string | null | undefined = "";
-  do {
-    const page = (await ask("get", path, { query: { limit: LARGEST_PAGE, cursor } })) as { items: typeof found; next?: string | null };
-    found.push(...page.items);
-    cursor = page.next;
-  } while (cursor);
-  return found;
+/** The first ``many`` of a list that comes page by page, with all else that its last page says. */
+export async function upTo<P extends Routes<"get">>(path: P, many: number): Promise<Answer<P, "get">> {
+  const items: Items<Answer<P, "get">>[] = [];
+  let page: { items: typeof items; next?: string | null } = { items, next: "" };
+  while (page.next != null && items.length < many) {
+    const query = { limit: Math.min(many - items.length, LARGEST_PAGE), cursor: page.next };
+    page = (await ask("get", path, { query })) as typeof page;
+    items.push(...page.items);
+  }
+  return { ...page, items } as Answer<P, "get">;
 }
+
+/** All of such a list. */
+export const every = async <P extends Routes<"get">>(path: P): Promise<Items<Answer<P, "get">>[]> =>
+  ((await upTo(path, Infinity)) as { items: Items<Answer<P, "get">>[] }).items;
 
 export const post = <P extends Routes<"post">>(path: P, sent: Sent<Body<P, "post">> = {}) => ask("post", path, sent) as Promise<Answer<P, "post">>;
 export const put = <P extends Routes<"put">>(path: P, sent: Sent<Body<P, "put">> = {}) => ask("put", path, sent) as Promise<Answer<P, "put">>;

@@ -4,7 +4,7 @@ import { startRecovery } from "../parts/attention";
 import { fresh, rig } from "../live";
 import { may } from "../session";
 import { t } from "../texts";
-import { CalibrateAxis, CalibrateDynamics, CalibrateForce } from "./devices/calibrate";
+import { CalibrateAxis, CalibrateDynamics, CalibrateForce, CalibrateGlove } from "./devices/calibrate";
 import { Calibrations } from "./devices/calibrations";
 import { Doctor } from "./devices/doctor";
 
@@ -65,7 +65,10 @@ export function Devices() {
       <Card title={t.devices.each}><Streams /></Card>
       <Doctor />
       <Calibrations />
-      <CalibrateForce />
+      <div class="grid">
+        <CalibrateForce />
+        <CalibrateGlove />
+      </div>
       <div class="grid">
         <CalibrateAxis />
         <CalibrateDynamics />

@@ -1,6 +1,6 @@
 // All sessions, newest first; each opens as a view of its own.
 import { useState } from "preact/hooks";
-import { get } from "../api";
+import { upTo } from "../api";
 import { date } from "../clock";
 import { rig } from "../live";
 import { useLoaded } from "../loaded";
@@ -15,7 +15,7 @@ const HEADS = [t.sessions.session, t.sessions.subject, t.sessions.recorded, t.re
 export function Sessions() {
   const [many, more] = useState(AT_ONCE);
   const sessions = useLoaded(async () => {
-    const found = await get("/api/v1/sessions", { query: { limit: many } });
+    const found = await upTo("/api/v1/sessions", many);
     return Object.assign([...found.items], { next: found.next, remarks: found.remarks ?? [] });
   }, [rig.value?.job?.id, many]);
   return (

@@ -1,4 +1,4 @@
-// Force sensor and axis calibrated: the job asks for each step, and goes on once a person says that it is done.
+// Force sensor, gloves and axis calibrated: the job asks for each step, and goes on once a person says that it is done.
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
 import type { Schema } from "../../api";
@@ -27,14 +27,20 @@ function Calibrate({ kind, text, params, children }: { kind: string; text: strin
   );
 }
 
+function Weights({ id, weights, name }: { id: string; weights: string; name: (weights: string) => void }) {
+  return (
+    <label>{t.devices.weights}
+      <input id={id} required maxLength={200} value={weights} onInput={(event) => name(event.currentTarget.value)} />
+    </label>
+  );
+}
+
 export function CalibrateForce() {
   const [weights, name] = useState("");
   const [load, choose] = useState("pressed");
   return (
     <Calibrate kind="calibrate-force" text={t.devices.weightsText} params={{ weights, load }}>
-      <label>{t.devices.weights}
-        <input id="weights" required maxLength={200} value={weights} onInput={(event) => name(event.currentTarget.value)} />
-      </label>
+      <Weights id="weights" weights={weights} name={name} />
       <label>{t.devices.load}
         <select id="load" value={load} onChange={(event) => choose(event.currentTarget.value)}>
           {Object.entries(t.devices.loads).map(([one, text]) => <option key={one} value={one}>{text}</option>)}
@@ -44,7 +50,40 @@ export function CalibrateForce() {
   );
 }
 
-/** Against the tracker; a gauge block asks for numbers that only who stands at the bench knows. */
-export const CalibrateAxis = () => <Calibrate kind="calibrate-axis" text={t.devices.axisText} params={{}} />;
+export function CalibrateGlove() {
+  const [weights, name] = useState("");
+  return (
+    <Calibrate kind="calibrate-glove" text={t.devices.gloveText} params={{ weights }}>
+      <Weights id="glove-weights" weights={weights} name={name} />
+    </Calibrate>
+  );
+}
+
+function Millimetres({ id, label, value, set, min, max }: { id: string; label: string; value: string; set: (value: string) => void; min: number; max: number }) {
+  return (
+    <label>{label}
+      <input id={id} type="number" required min={min} max={max} step="any" value={value} onInput={(event) => set(event.currentTarget.value)} />
+    </label>
+  );
+}
+
+/** Against the tracker, or a gauge block, of which only who stands at the bench knows height and place. */
+export function CalibrateAxis() {
+  const [against, choose] = useState("tracker");
+  const [height_mm, setHeight] = useState("");
+  const [near_mm, setNear] = useState("");
+  const block = against === "block";
+  return (
+    <Calibrate kind="calibrate-axis" text={t.devices.axisText} params={block ? { gauge_block_mm: Number(height_mm), near_mm: Number(near_mm) } : {}}>
+      <label>{t.devices.against}
+        <select id="against" value={against} onChange={(event) => choose(event.currentTarget.value)}>
+          {Object.entries(t.devices.againsts).map(([one, text]) => <option key={one} value={one}>{text}</option>)}
+        </select>
+      </label>
+      {block && <Millimetres id="block-height" label={t.devices.blockHeight} value={height_mm} set={setHeight} min={1} max={100} />}
+      {block && <Millimetres id="block-near" label={t.devices.blockNear} value={near_mm} set={setNear} min={-1000} max={1000} />}
+    </Calibrate>
+  );
+}
 
 export const CalibrateDynamics = () => <Calibrate kind="calibrate-dynamics" text={t.devices.dynamicsText} params={{}} />;
