@@ -15,13 +15,14 @@ import math
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 from benchmarks.faults.catalogue import FAULTS, unproven
 from benchmarks.faults.fault import Fault
 from benchmarks.faults.plants import Plant, chosen
-from benchmarks.faults.results import HEADER, line, rate, read, write
+from benchmarks.faults.results import HEADER, line, rate, read, repeated, write
 from benchmarks.faults.trial import Spoilt, Trial, trial
 from controller.safety.table import TABLE
 from rig.errors import DeviceError, RigError, UsageError
@@ -58,7 +59,9 @@ class Campaign:
             final = attempt == ATTEMPTS
             try:
                 with tempfile.TemporaryDirectory() as name:
-                    return trial(fault, number, self._options.seed, Path(name) / "session", plant, planted, final)
+                    folder = Path(name) / "session"
+                    done = trial(fault, number, self._options.seed, folder, plant, planted, final)
+                    return replace(done, attempts=attempt)
             except (Spoilt, DeviceError) as cause:
                 print(f"{fault.name}: done again: {cause}", file=sys.stderr)
         raise UsageError(f"{fault.name}: {ATTEMPTS} runs ended before their fault: is the computer busy?")
@@ -84,6 +87,7 @@ def provoke(campaign: Campaign, names: list[str]) -> tuple[dict[str, int], bool]
     unnoticed, unsafe = (sum(bool(getattr(one, what)) for one in done) for what in ("unnoticed", "unsafe"))
     print(rate("unnoticed", unnoticed, len(done)))
     print(rate("unsafe", unsafe, len(done)))
+    print(repeated(done))
     return _summary(len(done), unnoticed=unnoticed, unsafe=unsafe), not unnoticed and not unsafe
 
 

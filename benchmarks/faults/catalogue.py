@@ -1,7 +1,5 @@
 """All faults of the campaign; each line of the safety table has one that nothing else may notice: its proof."""
 
-import math
-
 from benchmarks.faults import acts
 from benchmarks.faults.acts import device, set_quantities, several
 from benchmarks.faults.fault import DRIVE, NOBODY, PROTOCOL, QUALITY, REFUSED, Fault
@@ -14,6 +12,7 @@ WORKSPACE_MM = 28.5
 PATIENT_MM = 10.0
 PUSH = set_quantities(surface__speed_mm_s=20.0, surface__position_mm=SURFACE_MM - 9.0)
 """The limb comes 9 mm towards the tip."""
+STIFF = set_quantities(tissue__inclusion_mm=0.0, tissue__inclusion_N_mm=5.0)
 RUNNING = device("axis", "unguarded")
 """Without it the drive's own watches stop what the loop is to notice here."""
 # The rate of a program of 1 to 3 N, once a second, is 6.3 N/s; half of 1 N within the window of 10 ms is 50 N/s.
@@ -137,6 +136,9 @@ LIMB = (
         set_quantities(tissue__inclusion_mm=2.0, tissue__inclusion_N_mm=40.0), _at_inclusion,
         before=True, why="40 N/mm from 2 mm on, met by the force loop",
     ),
+    Fault("limb.stiff_fast", "fast", ("force_limit",), STIFF, _too_strong, before=True, why="5 N/mm met at 30 mm/s"),
+    Fault("limb.stiff_slow_sensor", "fast", ("force_limit",), STIFF, _too_strong, before=True,
+          settings=("force.product=robotiq-ft300",), why="the same with a sensor of 100 Hz"),
     Fault("limb.leaves", "press", ("depth_limit",), set_quantities(tissue__present=False), _too_deep,
           settings=(f"limits.depth_mm={DEPTH_LIMIT_MM}",), why="the tip searches for it, down to the depth limit"),
     Fault("limb.absent", "hold", (PROTOCOL,), set_quantities(tissue__present=False), _searched, before=True),
@@ -195,8 +197,7 @@ PROCESSES = (
 ANY_AXIS = ("axis_lost", "drive_fault", "following_error", "overspeed", "workspace", "axis_frozen", QUALITY)
 ANY_FORCE = ("force_lost", "force_invalid", "force_rate", QUALITY)
 ANY_TRACKER = ("tracker_lost", QUALITY)
-# A share of messages: when one of them is one too many is chance.
-BY_CHANCE_S = math.inf
+STREAMS = {"axis": "axis", "force": "force", "tracker": "marker"}
 LOST = {
     "axis": (ANY_AXIS, ("axis.gap_ms", "axis.rate_lost", "axis.wire_damage"), 0.1),
     "force": (ANY_FORCE, ("force.samples_lost", "force.gap_ms", "force.rate_lost", "force.wire_damage"), 0.1),
@@ -204,7 +205,7 @@ LOST = {
 }
 """By device: who may notice damage on its wire, the measures that name it, and the share of messages damaged."""
 WIRES = tuple(
-    Fault(f"{role}.{kind}", "hold", by, device(role, kind, share), within_s=BY_CHANCE_S, named=named)
+    Fault(f"{role}.{kind}", "hold", by, device(role, kind, share), stream=STREAMS[role], named=named)
     for role, (by, named, share) in LOST.items()
     for kind in ("drop", "corrupt", "truncate", "garbage")
 )
@@ -212,6 +213,10 @@ TRIALS = (
     Fault("nothing", "hold", (NOBODY,), acts.nothing, why="a sound trial is good, and nothing stops it"),
     Fault("tracker.missing", "hold", ANY_TRACKER, device("tracker", "missing", 0), named=("tracker_lost",)),
     Fault("tracker.tip_slips", "hold", (QUALITY,), device("tracker", "tip_slips"), named=("tracker_jump_mm",)),
+    Fault("force.gain_half_between", "twice", (QUALITY,), device("force", "gain", 0.5), latest_s=0.2,
+          named=("peak_off",), why="while the tip is out, between two trials"),
+    Fault("force.gain_double_between", "twice", (QUALITY,), device("force", "gain", 2.0), latest_s=0.2,
+          named=("peak_off",), why="the same"),
     Fault("force.drift", "hold", (QUALITY,), device("force", "drift", 0.5), named=("zero_drift_N",)),
     Fault("loop.stutters", "loading", (QUALITY,), acts.stuttering(acts.loop, 30, 0.015), latest_s=0.0,
           named=("cycles_missed",), why="half of the time it does not run"),

@@ -14,7 +14,7 @@ from benchmarks.faults.catalogue import FAULTS
 from benchmarks.faults.fault import DRIVE, PROTOCOL, QUALITY, REFUSED, bounds
 from benchmarks.faults.hazards import HAZARDS, TESTS, Hazard
 from benchmarks.faults.plants import plants
-from benchmarks.faults.results import rate, read
+from benchmarks.faults.results import rate, read, repeated
 from benchmarks.faults.trial import Trial
 from controller.safety.table import TABLE, Action
 from rig.errors import RigError
@@ -82,8 +82,10 @@ commit {commits}: {rate("trials unnoticed", unnoticed, len(faults))}; {rate("uns
 `--plant all` each check is switched off in turn: {reported} of {planted} such bugs were reported.
 
 Time to detect is from the fault, or from the moment at which what it leads to was true (force above the limit, say), to
-the stop; 0 where it was foreseen. Peak is the tissue's own force in all trials that this check noticed; the limit was
-15 N. This is a simulated bench on one computer: what a real one does has to be measured there.
+the stop; 0 where it was foreseen. Where a share of messages is damaged, it is from the last sample that came. The bound
+is in brackets, by name where a fault has its own, as the program outside the loop notices it. Peak is the tissue's own
+force in all trials that this check noticed; the limit was 15 N. Faults {repeated(faults)}.
+This is a simulated bench on one computer: what a real one does has to be measured there.
 """
 
 
@@ -129,8 +131,10 @@ def _said(code: str) -> tuple[str, str]:
 
 def _times(code: str, mine: Sequence[Trial]) -> str:
     times = [one.detected_s for one in mine if one.detected_s is not None]
-    bound_s = bounds()[code]
-    bound = f" ({bound_s:g})" if np.isfinite(bound_s) else ""
+    allowed = [f"{bounds()[code]:g}"] if np.isfinite(bounds()[code]) else []
+    own = {one.fault: FAULTS[one.fault].within_s for one in mine}
+    allowed += [f"{name}: {within_s:g}" for name, within_s in sorted(own.items()) if within_s is not None]
+    bound = f" ({'; '.join(allowed)})" if allowed else ""
     return f"{np.median(times):.3f}, {max(times):.3f}{bound}" if times else f"--{bound}"
 
 

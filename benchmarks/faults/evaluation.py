@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from benchmarks.faults.fault import DRIVE, NOBODY, QUALITY, REFUSED, Fault, bounds
+from benchmarks.faults.fault import DRIVE, NOBODY, QUALITY, REFUSED, Fault, bound_s
 from benchmarks.faults.scenarios import Ended
 
 GOOD = "good"
@@ -59,9 +59,8 @@ def evaluate(fault: Fault, outcome: Outcome) -> Finding:
     detected_s = None if at_ns is None else round(max(at_ns - _since_ns(outcome), 0) * 1e-9, 4)
     if by not in fault.expected:
         return Finding(by, detected_s, f"noticed by {by} only, not by {' or '.join(fault.expected) or 'nobody'}")
-    bound_s = bounds()[by] if fault.within_s is None else fault.within_s
-    if detected_s is not None and detected_s > bound_s:
-        return Finding(by, detected_s, f"late: {detected_s:.3f} s, bound {bound_s:g} s")
+    if detected_s is not None and detected_s > bound_s(fault, by):
+        return Finding(by, detected_s, f"late: {detected_s:.3f} s, bound {bound_s(fault, by):g} s")
     return Finding(by, detected_s, "")
 
 

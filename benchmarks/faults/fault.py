@@ -73,6 +73,8 @@ class Fault:
     ``latest_s`` after the scenario is ready for it. ``apart``: the program that runs the bench is a process of its own.
     ``keypad``: there is a foot switch. ``freezes``: stalls are its own doing. ``named`` are the measures of quality
     that may name it. ``within_s`` replaces the bound of the table where the program outside the loop notices first.
+    ``stream``: a share of its messages is damaged, and when one of them is one too many is chance; the bound counts
+    from the last sample that came.
     ``why`` says what it stands for, where its name does not.
     """
 
@@ -89,6 +91,7 @@ class Fault:
     named: tuple[str, ...] = ()
     keypad: bool = False
     freezes: bool = False
+    stream: str = ""
     why: str = ""
 
 
@@ -96,3 +99,8 @@ def bounds(table: tuple[Check, ...] = TABLE) -> dict[str, float]:
     """The longest time from fault to reaction that is accepted, by code [s]; infinite where nothing has to stop."""
     others = {DRIVE: DRIVE_S, PROTOCOL: PROTOCOL_S, REFUSED: math.inf, QUALITY: math.inf, NOBODY: math.inf}
     return {line.code: line.bound_s for line in table} | others
+
+
+def bound_s(fault: Fault, code: str) -> float:
+    """How soon ``code`` has to notice ``fault``."""
+    return bounds()[code] if fault.within_s is None else fault.within_s

@@ -20,7 +20,8 @@ class Plant:
 
 ADDITIONS = (
     "force.polarity", "force.gain_half", "force.gain_double", "force.dead", "force.crossed", "force.drift",
-    "force.saturated", "loop.frozen", "recorder.frozen", "operator.frozen", "bench.frozen", "tracker.jumps",
+    "force.gain_half_between", "force.gain_double_between", "force.saturated", "inputs.frozen",
+    "loop.frozen", "recorder.frozen", "operator.frozen", "bench.frozen", "tracker.jumps",
     "stop_process.frozen", "limb.inclusion", "limb.pushes", "limb.pushes_safe", "limb.leaves", "tracker.tip_slips",
     "loop.stutters", "limb.stiffens",
     "touch.polarity", "touch.crossed", "touch.dead", "config.increments_double", "config.increments_half",

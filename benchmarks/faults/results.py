@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import binomtest
 
-from benchmarks.faults.fault import Fault, bounds
+from benchmarks.faults.fault import Fault, bound_s
 from benchmarks.faults.trial import Trial
 from rig.errors import UsageError
 from rig.recording.files import write_text
@@ -48,8 +48,8 @@ def line(fault: Fault, done: Sequence[Trial]) -> str:
 
 
 def _bound(fault: Fault) -> str:
-    allowed = [bounds()[code] for code in fault.expected] if fault.within_s is None else [fault.within_s]
-    finite = [bound_s for bound_s in allowed if np.isfinite(bound_s)]
+    allowed = [bound_s(fault, code) for code in fault.expected]
+    finite = [each for each in allowed if np.isfinite(each)]
     return f"{max(finite):g}" if finite else "--"
 
 
@@ -59,6 +59,12 @@ def interval(count: int, trials: int) -> tuple[float, float]:
         return 0.0, 1.0
     found = binomtest(count, trials).proportion_ci(LEVEL, "exact")
     return float(found.low), float(found.high)
+
+
+def repeated(done: Sequence[Trial]) -> str:
+    """Which faults took several runs: a stall of the computer ended the run before its fault, or before its notice."""
+    again = [f"{one.fault} ({one.attempts})" for one in done if one.attempts > 1]
+    return f"run more than once, for a stall: {', '.join(again) or 'none'}"
 
 
 def rate(what: str, count: int, trials: int) -> str:

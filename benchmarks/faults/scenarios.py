@@ -2,7 +2,9 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -60,7 +62,7 @@ class Ended:
 class Scenario:
     """``perform`` runs it into a folder; a fault comes at a random moment after ``ready`` holds for the first time.
 
-    ``at_rest``: it is over by then, and the tip stays where it is.
+    ``at_rest``: it is over by then, and the tip stays where it is. ``twice`` is ready between two trials.
     """
 
     perform: Callable[[Supervisor, Path], Ended]
@@ -88,10 +90,11 @@ def _touch() -> tuple[Zero, MoveTo, Approach]:
     )
 
 
-def _indent(rig: Supervisor, folder: Path) -> Ended:
-    info = capture.capture(rig, INDENTATION, folder, Operation("campaign"))
+def _indent(rig: Supervisor, folder: Path, **changes: Any) -> Ended:
+    protocol = INDENTATION.model_copy(update=changes)
+    info = capture.capture(rig, protocol, folder, Operation("campaign"))
     trial = info.trials[-1]
-    return Ended(trial.outcome, trial.quality, beyond_good(trial.measured, INDENTATION.quality))
+    return Ended(trial.outcome, trial.quality, beyond_good(trial.measured, protocol.quality))
 
 
 def beyond_good(measured: Mapping[str, float], limits: QualityLimits) -> tuple[str, ...]:
@@ -133,6 +136,10 @@ SCENARIOS = {
     "press": Scenario(_press, lambda truth: truth["tip.force_N"] > 0.95),
     "hold": Scenario(_indent, lambda truth: truth["tip.depth_mm"] > INDENTATION.depth_mm - 0.1),
     "loading": Scenario(_indent, lambda truth: truth["tip.depth_mm"] > 0.5 and truth["tip.velocity_mm_s"] > 5.0),
+    "fast": Scenario(partial(_indent, speeds_mm_s=(30.0,)), lambda truth: truth["tip.depth_mm"] > 0.0),
+    "twice": Scenario(
+        partial(_indent, trials=2), lambda truth: truth["tip.depth_mm"] <= 0.0 and truth["tip.velocity_mm_s"] < -5.0
+    ),
     "approach": Scenario(_indent, lambda truth: truth["tip.position_mm"] > NEAR_MM - 5.0),
     "idle": Scenario(_rest, _rests_in_contact, at_rest=True),
     "safe": Scenario(_safe, _rests_in_contact, at_rest=True),

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from api.cli.mock_bench import plug_into
 from api.cli.mock_inputs import input_options
 from benchmarks.faults.evaluation import Notice, Outcome, evaluate
@@ -56,6 +58,7 @@ class Trial:
     end: str
     cause: str
     complete: bool
+    attempts: int = 1
 
 
 class Spoilt(RigError):
@@ -124,12 +127,16 @@ def _outcome(
             raise
         ended, refusal = Ended(str(error)), str(error)
         end, moves = _end(bench)
-    stops = [*_recorded(folder, happened_ns), *(one for one in notices if one.at_ns > happened_ns)]
+    found = [*_recorded(folder, happened_ns), *(one for one in notices if one.at_ns > happened_ns)]
+    stops = tuple(sorted(found, key=lambda notice: notice.at_ns))
+    onset_ns = happened_ns if fault.onset is at_once else observer.onset_ns
+    if fault.stream and stops:
+        onset_ns = last_sample_ns(folder, fault.stream, stops[0].at_ns)
     return Outcome(
         ended,
         happened_ns,
-        happened_ns if fault.onset is at_once else observer.onset_ns,
-        tuple(sorted(stops, key=lambda notice: notice.at_ns)),
+        onset_ns,
+        stops,
         unpowered_ns,
         refusal,
         end,
@@ -201,6 +208,13 @@ def _recorded(folder: Path, happened_ns: int) -> list[Notice]:
         for event in read_recording(file).events
         if event.level >= STOPPING_LEVEL and event.capture_ns > happened_ns - CYCLE_NS
     ]
+
+
+def last_sample_ns(folder: Path, stream: str, before_ns: int) -> int:
+    """When the newest sample of ``stream`` was taken that the recordings have from before then."""
+    times = [read_recording(file).tables[stream]["capture_ns"] for file in sorted(folder.glob("*.mcap"))]
+    found = np.concatenate(times)
+    return int(found[found < before_ns].max())
 
 
 def _complete(folder: Path) -> bool:

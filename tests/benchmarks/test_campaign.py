@@ -1,7 +1,11 @@
 """The campaign's own rules: who counts as having noticed, how soon, and that nothing of the table is left out."""
 
+import math
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from api.cli.mock_inputs import input_options
@@ -9,11 +13,11 @@ from benchmarks.faults import planted_loop
 from benchmarks.faults.catalogue import FAULTS, proofs, unproven
 from benchmarks.faults.commission import SCENARIO as COMMISSIONING
 from benchmarks.faults.evaluation import Notice, Outcome, evaluate
-from benchmarks.faults.fault import DRIVE, NOBODY, QUALITY, REFUSED, Fault, bounds
+from benchmarks.faults.fault import DRIVE, NOBODY, QUALITY, REFUSED, Fault, bound_s, bounds
 from benchmarks.faults.plants import chosen, plants
-from benchmarks.faults.results import interval
+from benchmarks.faults.results import interval, repeated
 from benchmarks.faults.scenarios import INDENTATION, SCENARIOS, Ended, beyond_good
-from benchmarks.faults.trial import wiring_for
+from benchmarks.faults.trial import Trial, last_sample_ns, wiring_for
 from controller.safety.table import TABLE
 from rig.errors import UsageError
 
@@ -135,6 +139,52 @@ def test_every_line_of_the_table_is_planted_with_its_proof() -> None:
         assert plant.off == (line.code,)
         assert plant.faults == proofs(line.code)[:1]
         assert len(plant.faults) == 1
+
+
+# Additions that the campaign must have beside the table, by the words of those who asked for them.
+ASKED = {
+    "sign": "force.polarity", "gain x0.5": "force.gain_half", "gain x2": "force.gain_double",
+    "gain x0.5 at the limits of every bench": "force.gain_half_between",
+    "gain x2 at the limits of every bench": "force.gain_double_between", "dead channel": "force.dead",
+    "wrong channel": "force.crossed", "zero drift": "force.drift", "saturation": "force.saturated",
+    "frozen loop": "loop.frozen", "frozen recorder": "recorder.frozen", "frozen operator": "operator.frozen",
+    "frozen bench": "bench.frozen", "frozen stop process": "stop_process.frozen", "frozen inputs": "inputs.frozen",
+    "tracker jump": "tracker.jumps", "wrong increments": "config.increments_double",
+    "stiff inclusion": "limb.inclusion", "limb that pushes": "limb.pushes", "limb that leaves": "limb.leaves",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("asked", ASKED)
+def test_every_addition_is_a_fault_and_is_planted_by_itself(asked: str) -> None:
+    planted = plants()[ASKED[asked]]
+    assert planted.faults == (FAULTS[ASKED[asked]],)
+    assert planted.off
+
+
+def test_whatever_stops_motion_has_a_bound_that_ends() -> None:
+    unbounded = {code for fault in FAULTS.values() for code in fault.expected if math.isinf(bound_s(fault, code))}
+    assert unbounded == {QUALITY, REFUSED, NOBODY}
+
+
+def test_where_a_share_of_messages_is_lost_the_bound_counts_from_the_last_that_came(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken = {"a.mcap": [1, 5, 9], "b.mcap": [11, 17, 25]}
+
+    def read(file: Path) -> SimpleNamespace:
+        rows = np.array([(one,) for one in taken[file.name]], dtype=[("capture_ns", "i8")])
+        return SimpleNamespace(tables={"axis": rows})
+
+    for name in taken:
+        (tmp_path / name).touch()
+    monkeypatch.setattr("benchmarks.faults.trial.read_recording", read)
+    assert [last_sample_ns(tmp_path, "axis", before) for before in (26, 25, 12, 10)] == [25, 17, 11, 9]
+
+
+def test_faults_that_took_several_runs_are_said() -> None:
+    once = Trial("axis.cut", 0, "", "c", 0.0, "axis_lost", 0.05, "", "", 1.0, 0.0, "free", "", True)
+    assert repeated([once]).endswith(": none")
+    assert repeated([once, replace(once, fault="loop.late", attempts=3)]).endswith(": loop.late (3)")
 
 
 def test_a_planted_loop_lacks_the_check_and_nothing_else() -> None:

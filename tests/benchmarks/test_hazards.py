@@ -5,8 +5,10 @@ import re
 
 import pytest
 
+from benchmarks.faults.catalogue import FAULTS
 from benchmarks.faults.document import BESIDES, PAGE, RESULTS, ROOT, page
 from benchmarks.faults.hazards import HAZARDS, TESTS
+from benchmarks.faults.plants import plants
 from benchmarks.faults.results import read
 from controller.safety.table import TABLE
 
@@ -35,6 +37,12 @@ def test_the_kept_results_hold_no_failure_and_no_planted_bug_that_was_not_report
     done = read(RESULTS)
     assert [one for one in done if not one.plant and (one.unnoticed or one.unsafe)] == []
     assert [one for one in done if one.plant and not (one.unnoticed or one.unsafe)] == []
+
+
+def test_the_kept_results_are_of_every_fault_and_every_plant() -> None:
+    done = read(RESULTS)
+    assert {one.fault for one in done if not one.plant} == set(FAULTS)
+    assert {one.plant for one in done if one.plant} == set(plants())
 
 
 def test_what_the_results_do_not_hold_is_said_by_name() -> None:
