@@ -13,6 +13,7 @@ from api.http.models import ControlView, RigView
 
 ADDRESS = "http://bench.invalid/"
 KIND = re.compile(r"kind=([a-z-]+)")
+CURSOR = re.compile(r"cursor=([^&]+)")
 KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 API = "api/v1/"
 # A stream that greets, sends half a minute of pressing with a force that follows a set-point, and goes on with it ten
@@ -81,7 +82,10 @@ Answer = BaseModel | dict[str, Any] | list[Any] | str | None
 
 @dataclass
 class Pretended:
-    """What is answered by path below /api/v1/; None never answers, an int refuses with that status."""
+    """What is answered by path below /api/v1/; None never answers, an int refuses with that status.
+
+    A page of a list that begins at a cursor is named by it: ``audit@c1``.
+    """
 
     built: Path
     answers: dict[str, Answer | int] = field(default_factory=dict)
@@ -102,6 +106,7 @@ class Pretended:
             self.asked.append((request.method, path.removeprefix(API), request.post_data_json))
         # A list of jobs is asked for by kind: what is said of one is not said of the others.
         path = f"{path}/{kind[1]}" if path.endswith("/jobs") and (kind := KIND.search(query)) else path
+        path = f"{path}@{cursor[1]}" if (cursor := CURSOR.search(query)) else path
         return self._said(route, f"{request.method} {path.removeprefix(API)}")
 
     def _said(self, route: Route, asked: str) -> None:

@@ -10,14 +10,17 @@ from typing import Any, cast
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from api.http.access.models import AuditView
 from hatch_build import SOURCES, built_folder
 from mock_devices.testing.commands import ServedBench
-from tests.page import told
+from tests.page import told, told_lab
 from tests.page.looks import holds_up, violations
-from tests.page.pretend import IDLE, INFO, OPERATOR, STOPPED, Pretended, opened
+from tests.page.pretend import ADMINISTRATOR, IDLE, INFO, OPERATOR, STOPPED, Pretended, opened
 from tests.page.steps import out_or_named, state
+from tests.page.told_lab import AUDIT
 
-VIEWS = {"run": "run", "session": f"session/{told.NAME}", "track": "track", "bench": "bench", "devices": "devices"}
+VIEWS = {"run": "run", "session": f"session/{told.NAME}", "track": "track", "bench": "bench", "devices": "devices",
+         "admin": "admin"}  # fmt: skip
 TOO_MUCH = "40 N is more than the 6 N that bench, subject and model allow."
 
 
@@ -80,6 +83,20 @@ def test_a_calibration_shows_what_it_asks_for_and_goes_on_once_a_person_says_so(
     with page.expect_request(f"**/jobs/job-{kind}/resume") as asked:
         page.click(f"#{kind}-resume")
     assert asked.value.headers["x-control-lease"] == "l"
+
+
+def test_more_of_a_list_is_shown_once_it_is_asked_for(show: Any, service: Pretended) -> None:
+    line = AUDIT.items[0]
+    newest = [line.model_copy(update={"seq": seq}) for seq in range(205, 5, -1)]
+    older = [line.model_copy(update={"seq": seq}) for seq in range(5, 0, -1)]
+    service.answers |= told_lab.around() | {"auth/me": ADMINISTRATOR}
+    service.answers |= {"audit": AuditView(items=newest, next="c1", broken=[])}
+    service.answers |= {"audit@c1": AuditView(items=older, next=None, broken=[])}
+    page = show("admin")
+    expect(page.locator("#audit tr")).to_have_count(200)
+    page.click("text=Show more")
+    expect(page.locator("#audit tr")).to_have_count(205)
+    expect(page.get_by_text("Show more")).to_have_count(0)
 
 
 def test_a_gauge_block_is_asked_for_with_its_height_and_place(show: Any, service: Pretended) -> None:

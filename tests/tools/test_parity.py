@@ -75,7 +75,7 @@ def test_the_table_stands_in_the_reference() -> None:
     text = fill("<!-- generated: parity -->")
     assert "| `rig fit` | `POST /jobs, kind fit`, `POST /jobs, kind fit-cohort` | session |" in text
     assert "| `rig calibrate axis` | `POST /jobs, kind calibrate-axis` | devices |" in text
-    assert "| `rig calibrate glove` | `POST /jobs, kind calibrate-glove` | none: " in text
+    assert "| `rig calibrate glove` | `POST /jobs, kind calibrate-glove` | devices |" in text
     assert "| `rig serve` | none: is the service itself | none |" in text
     assert "| `rig catalogue sites` | `GET /sites` | none: each subject shows its own |" in text
     assert text.count("\n| `rig ") == len(list(parity.commands()))

@@ -31,7 +31,7 @@ WHOLE = {
 }
 PAGED = {
     "/recordings", "/subjects", "/sites", "/sessions", "/trials", "/models", "/diagnoses", "/causes", "/operations",
-    "/jobs",
+    "/jobs", "/audit",
 }  # fmt: skip
 
 

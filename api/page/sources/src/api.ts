@@ -96,11 +96,11 @@ export const get = <P extends Routes<"get">>(path: P, sent: Sent<undefined> = {}
 type Items<A> = A extends { items: readonly (infer I)[] } ? I : never;
 
 /** The first ``many`` of a list that comes page by page, with all else that its last page says. */
-export async function upTo<P extends Routes<"get">>(path: P, many: number): Promise<Answer<P, "get">> {
+export async function upTo<P extends Routes<"get">>(path: P, many: number, only: Record<string, string> = {}): Promise<Answer<P, "get">> {
   const items: Items<Answer<P, "get">>[] = [];
   let page: { items: typeof items; next?: string | null } = { items, next: "" };
   while (page.next != null && items.length < many) {
-    const query = { limit: Math.min(many - items.length, LARGEST_PAGE), cursor: page.next };
+    const query = { ...only, limit: Math.min(many - items.length, LARGEST_PAGE), cursor: page.next };
     page = (await ask("get", path, { query })) as typeof page;
     items.push(...page.items);
   }
@@ -108,8 +108,8 @@ export async function upTo<P extends Routes<"get">>(path: P, many: number): Prom
 }
 
 /** All of such a list. */
-export const every = async <P extends Routes<"get">>(path: P): Promise<Items<Answer<P, "get">>[]> =>
-  ((await upTo(path, Infinity)) as { items: Items<Answer<P, "get">>[] }).items;
+export const every = async <P extends Routes<"get">>(path: P, only: Record<string, string> = {}): Promise<Items<Answer<P, "get">>[]> =>
+  ((await upTo(path, Infinity, only)) as { items: Items<Answer<P, "get">>[] }).items;
 
 export const post = <P extends Routes<"post">>(path: P, sent: Sent<Body<P, "post">> = {}) => ask("post", path, sent) as Promise<Answer<P, "post">>;
 export const put = <P extends Routes<"put">>(path: P, sent: Sent<Body<P, "put">> = {}) => ask("put", path, sent) as Promise<Answer<P, "put">>;

@@ -1,5 +1,5 @@
 // Fitted models to choose from, and where one comes from.
-import { get, type Schema } from "../api";
+import { every, type Schema } from "../api";
 import { date } from "../clock";
 import { useLoaded, type Loaded } from "../loaded";
 import { t } from "../texts";
@@ -22,7 +22,7 @@ export const ownModel = (models: readonly ModelEntry[], subject: string) => mode
 /** All models, those of ``subject`` first. */
 export function useModels(subject: string): Loaded<ModelEntry[]> {
   return useLoaded(async () => {
-    const { items } = await get("/api/v1/models", { query: { limit: 200 } });
+    const items = await every("/api/v1/models");
     return [...items.filter((one) => one.subject === subject), ...items.filter((one) => one.subject !== subject)];
   }, [subject]);
 }

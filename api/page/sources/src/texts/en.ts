@@ -249,7 +249,7 @@ export const en = {
     revoke: "Revoke…", revokeName: (name: string) => `Revoke the token ${name}…`, revokeNow: (name: string) => `Revoke ${name} now`,
     revoked: (name: string) => `The token ${name} is revoked: programs with it are refused from now on.`,
     audit: "Who did what", refresh: "Look again", search: "Name, request or outcome", noLine: "Nothing like that is among the newest lines.",
-    auditText: "The newest 200 lines: what acted or was refused, and who looked at subjects.",
+    auditText: "What acted or was refused, and who looked at subjects, newest first.",
     when: "when", who: "who", what: "request", outcome: "outcome", stranger: "nobody signed in",
     whole: "The log is whole: every line follows the one before.",
     broken: (lines: readonly number[]) => `The log was changed: ${lines.length === 1 ? "line" : "lines"} ${lines.slice(0, 10).join(", ")} ${lines.length === 1 ? "does" : "do"} not follow the one before.`,

@@ -1,6 +1,6 @@
 // One session: its curves, what they say of the tissue, what the simulation gets wrong, and everything to take away.
 import { useState } from "preact/hooks";
-import { get, type Schema } from "../api";
+import { every, get, type Schema } from "../api";
 import { date } from "../clock";
 import { ended, useWork, type Job } from "../jobs";
 import { useLoaded } from "../loaded";
@@ -42,7 +42,7 @@ function One({ of }: { of: string }) {
   const [more, again] = useState(0);
   const on = `${endings(fit, diagnosis)} ${more}`;
   const session = useLoaded(() => get("/api/v1/sessions/{session}", { path: { session: of } }), [of, on]);
-  const trials = useLoaded(async () => (await get("/api/v1/trials", { query: { session: of, limit: 200 } })).items, [of, on]);
+  const trials = useLoaded(() => every("/api/v1/trials", { session: of }), [of, on]);
   return (
     <>
       <Head session={session.value} trials={trials.value ?? []} of={of} />
