@@ -44,6 +44,17 @@ def several(*acts: Act) -> Act:
     return act
 
 
+def once_out(act: Act) -> Act:
+    """``act`` as soon as the tip has left the tissue."""
+
+    def later(live: Live) -> None:
+        while live.bench.control.number("tip.depth_mm") > -1.0:
+            time.sleep(0.005)
+        act(live)
+
+    return later
+
+
 def set_quantities(**values: Value) -> Act:
     """Sets quantities of the bench; ``tissue__present`` stands for ``tissue.present``."""
     wanted = {name.replace("__", "."): value for name, value in values.items()}

@@ -62,7 +62,7 @@ class Ended:
 class Scenario:
     """``perform`` runs it into a folder; a fault comes at a random moment after ``ready`` holds for the first time.
 
-    ``at_rest``: it is over by then, and the tip stays where it is. ``twice`` is ready between two trials.
+    ``at_rest``: it is over by then, and the tip stays where it is.
     """
 
     perform: Callable[[Supervisor, Path], Ended]
@@ -132,14 +132,16 @@ def _rests_in_contact(truth: Truth) -> bool:
     return truth["tip.depth_mm"] > REST_DEPTH_MM - 0.1 and abs(truth["tip.velocity_mm_s"]) < 0.5
 
 
+def _holds(truth: Truth) -> bool:
+    return truth["tip.depth_mm"] > INDENTATION.depth_mm - 0.1
+
+
 SCENARIOS = {
     "press": Scenario(_press, lambda truth: truth["tip.force_N"] > 0.95),
-    "hold": Scenario(_indent, lambda truth: truth["tip.depth_mm"] > INDENTATION.depth_mm - 0.1),
+    "hold": Scenario(_indent, _holds),
     "loading": Scenario(_indent, lambda truth: truth["tip.depth_mm"] > 0.5 and truth["tip.velocity_mm_s"] > 5.0),
     "fast": Scenario(partial(_indent, speeds_mm_s=(30.0,)), lambda truth: truth["tip.depth_mm"] > 0.0),
-    "twice": Scenario(
-        partial(_indent, trials=2), lambda truth: truth["tip.depth_mm"] <= 0.0 and truth["tip.velocity_mm_s"] < -5.0
-    ),
+    "twice": Scenario(partial(_indent, trials=2), _holds),
     "approach": Scenario(_indent, lambda truth: truth["tip.position_mm"] > NEAR_MM - 5.0),
     "idle": Scenario(_rest, _rests_in_contact, at_rest=True),
     "safe": Scenario(_safe, _rests_in_contact, at_rest=True),

@@ -211,10 +211,9 @@ def _recorded(folder: Path, happened_ns: int) -> list[Notice]:
 
 
 def last_sample_ns(folder: Path, stream: str, before_ns: int) -> int:
-    """When the newest sample of ``stream`` was taken that the recordings have from before then."""
-    times = [read_recording(file).tables[stream]["capture_ns"] for file in sorted(folder.glob("*.mcap"))]
-    found = np.concatenate(times)
-    return int(found[found < before_ns].max())
+    """When the newest sample of ``stream`` was taken that had come by then, of all recordings."""
+    found = np.concatenate([read_recording(file).tables[stream] for file in sorted(folder.glob("*.mcap"))])
+    return int(found["capture_ns"][found["arrival_ns"] < before_ns].max())
 
 
 def _complete(folder: Path) -> bool:

@@ -169,16 +169,18 @@ def test_whatever_stops_motion_has_a_bound_that_ends() -> None:
 def test_where_a_share_of_messages_is_lost_the_bound_counts_from_the_last_that_came(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    taken = {"a.mcap": [1, 5, 9], "b.mcap": [11, 17, 25]}
+    """Of three that were taken in time the last came too late for anybody to know of it."""
+    taken = {"a.mcap": [(1, 2), (5, 6), (9, 10)], "b.mcap": [(11, 12), (17, 40)]}
 
     def read(file: Path) -> SimpleNamespace:
-        rows = np.array([(one,) for one in taken[file.name]], dtype=[("capture_ns", "i8")])
-        return SimpleNamespace(tables={"axis": rows})
+        return SimpleNamespace(
+            tables={"axis": np.array(taken[file.name], [("capture_ns", "i8"), ("arrival_ns", "i8")])}
+        )
 
     for name in taken:
         (tmp_path / name).touch()
     monkeypatch.setattr("benchmarks.faults.trial.read_recording", read)
-    assert [last_sample_ns(tmp_path, "axis", before) for before in (26, 25, 12, 10)] == [25, 17, 11, 9]
+    assert [last_sample_ns(tmp_path, "axis", before) for before in (41, 40, 12, 11)] == [17, 11, 9, 9]
 
 
 def test_faults_that_took_several_runs_are_said() -> None:
