@@ -8,20 +8,19 @@ from typing import Any, cast
 
 import pytest
 
-from controller.law.inverse_model import GainRow
 from controller.loop import bench_loop
 from controller.loop.modes import Mode
 from controller.loop.paired_samples import Touch
 from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
-from controller.loop.steps import Hold, Retract, TrackForce
+from controller.loop.steps import Hold, Retract
 from controller.safety.inputs import SafetyInputs
 from controller.safety.load import UNKNOWN, LoadMonitor
 from controller.safety.oscillation import OscillationMonitor
 from controller.safety.table import Action, Incident
 from rig.channels import AxisSample, ForceSample
 from rig.errors import DeviceError
-from tests.controller.fake_bench import APPROACH, LEAVE, ZERO, FakeBench, pressing, wired
+from tests.controller.fake_bench import ZERO, FakeBench, wired
 from tests.controller.fake_devices import ARM
 
 MS = 1_000_000
@@ -398,23 +397,18 @@ class Swinging(OscillationMonitor):
         return f"swings in {state.force_N:.0f} N"
 
 
-def test_outside_of_force_control_nothing_oscillates() -> None:
-    bench = pressing()
-    bench.loop._oscillation = Swinging()
-    bench.cycle()
-    assert (bench.mode, inputs(bench).oscillation) == (Mode.COMPRESS, "")
-
-
-def test_in_force_control_an_oscillation_is_heard() -> None:
+@pytest.mark.parametrize("mode", Mode)
+def test_an_oscillation_is_heard_in_force_control_alone(mode: Mode) -> None:
     bench = FakeBench()
     bench.loop._oscillation = Swinging()
-    gains = tuple(
-        GainRow(force_N=force_N, depth_mm=force_N, tangent_N_mm=1.0, damping_N_s_mm=0.01) for force_N in (0.0, 9.0)
-    )
-    track = TrackForce(times_s=(0.0, 9.0), forces_N=(0.0, 0.0), gains=gains, crossover_rad_s=1.0)
-    bench.begin(ZERO, APPROACH, track, LEAVE)
-    bench.until(lambda: bench.mode is Mode.CONTACT)
-    assert (inputs(bench).oscillation, bench.latched) == ("", ""), "the step has only begun"
+    bench.loop.machine.mode = mode
     bench.cycle()
-    assert inputs(bench).oscillation == f"swings in {bench.loop.state.force_N:.0f} N"
-    assert bench.latched == "oscillation"
+    heard = f"swings in {bench.loop.state.force_N:.0f} N"
+    assert inputs(bench).oscillation == (heard if mode is Mode.CONTACT else "")
+    assert (bench.latched == "oscillation") is (mode is Mode.CONTACT)
+
+
+def test_a_loop_that_nobody_holds_back_may_start_at_once() -> None:
+    bench = FakeBench()
+    parts: Any = (bench.wiring, bench.devices, bench.ring, bench.link, bench.loop._commands, bench.clock)
+    assert bench_loop.BenchLoop(*parts).machine.latched is None

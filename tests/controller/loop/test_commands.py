@@ -172,6 +172,15 @@ def test_what_is_refused_is_a_warning_with_the_sentence_that_answers_it() -> Non
     assert bench.link.of("answer")[-1]["refused"] == sentence
 
 
+def test_a_program_whose_device_is_missing_is_refused_by_the_devices_own_sentence(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bench = FakeBench()
+    monkeypatch.setattr("controller.loop.commands.missing_device", lambda *_: "the pedal is gone; plug it in")
+    bench.begin(HOLD)
+    assert (bench.link.of("answer")[-1]["refused"], bench.loop.machine.busy) == ("the pedal is gone; plug it in", False)
+
+
 def test_messages_that_are_none_are_counted_from_the_first() -> None:
     bench = FakeBench()
     for refused in (1, 1, 3):

@@ -209,6 +209,11 @@ def test_the_studys_references_are_followed_on_tissue_half_to_twice_as_stiff(
     assert heard(found.sensed_N, asked_N, noise_N=plant.sensing.noise_N) == []
 
 
+@pytest.mark.parametrize(("noise_N", "amplitude_N"), [(0.01, 0.2), (0.1, 0.6)])
+def test_a_half_wave_passes_six_standard_deviations_and_a_fifth_of_a_newton(noise_N: float, amplitude_N: float) -> None:
+    assert OscillationMonitor().amplitude_N(LoopState(noise_N=noise_N)) == pytest.approx(amplitude_N)
+
+
 def test_nothing_is_heard_where_no_force_is_asked_for() -> None:
     silent = np.full_like(SECONDS, math.nan)
     assert heard(2.0 + swing(1.0, 40.0), silent) == []

@@ -36,10 +36,11 @@ def test_a_stop_before_anything_moves_is_answered_and_nothing_moves(page: StopWo
     with StartGuard(Responder(page)) as guard:
         # Who presses at the stop process is told after half a second that nothing is confirmed.
         answer = asking.confirmed(asking.request(StopReason.PAIN), 0.5)
-        with pytest.raises(SafetyStop, match=SENTENCE), guard.moving():
+        with pytest.raises(SafetyStop, match=SENTENCE) as stop, guard.moving():
             moved.append(True)
     assert answer is not None
     assert (answer.deed, moved) == (Deed.START_ENDED, [])
+    assert stop.value.code in BY_PERSON
 
 
 def test_a_stop_from_before_the_start_counts(page: StopWord) -> None:
@@ -63,6 +64,12 @@ def test_a_stop_while_the_axis_homes_is_answered_once_it_is_braked(page: StopWor
     assert answer is not None
     assert answer.deed is Deed.START_BRAKED
     assert stop.value.code in BY_PERSON, "a job that ends so was cancelled, and has not failed"
+
+
+def test_a_stop_of_the_axis_own_is_nobodys(page: StopWord) -> None:
+    with StartGuard(Responder(page)) as guard, pytest.raises(SafetyStop) as stop, guard.moving():
+        raise SafetyStop("the end switch was met", "workspace")
+    assert (stop.value.code, str(stop.value)) == ("workspace", "the end switch was met")
 
 
 def test_a_stop_that_a_lost_axis_cannot_follow_is_not_confirmed(page: StopWord) -> None:
