@@ -39,7 +39,9 @@ def add(router: APIRouter, service: Service) -> None:
     def accounts() -> list[AccountView]:
         return [AccountView(name=one.name, scope=one.scope) for one in service.access.accounts.accounts()]
 
-    @router.get("/audit", dependencies=[ADMIN], summary="Who did what, newest first")
+    @router.get(
+        "/audit", dependencies=[ADMIN], summary="Who did what, newest first", responses=responses("422 refused")
+    )
     def audit(page: PageQuery) -> AuditView:
         log = service.access.audit
         log.settle()
