@@ -147,7 +147,8 @@ def test_the_whole_log_is_read_page_by_page_also_where_a_line_is_broken(service:
     service.access.audit.settle()
     path = service.access.audit.path
     path.write_text(path.read_text().replace('"seq":3', '"seq":"3'))
-    pages, cursor = list[list[int]](), ""
+    pages = list[list[int]]()
+    cursor: str | None = ""
     while cursor is not None:
         page = client.get("/api/v1/audit", params={"limit": 2, "cursor": cursor}).json()
         pages.append([line["seq"] for line in page["items"]])
