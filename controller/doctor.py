@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from controller.devices.drivers import open_axis, open_force, open_tracker
+from controller.devices.guard import RATE_TOLERANCE
 from controller.inputs.examination import look_at
 from controller.loop.realtime import promptly
 from drivers.roles import Device, Identity, ServoAxis
@@ -23,7 +24,6 @@ from rig.results.bench import DeviceReport
 LOOKS = 3
 LISTEN_S = 2.0  # 120 frames of a tracker, whose noise is then known to 7 %
 PERIOD_S = 0.001
-RATE_TOLERANCE = 0.1  # half of what lies between neighbouring rates of a sensor
 
 AnySample = ForceSample | AxisSample | MarkerSample
 Samples = Sequence[AnySample]

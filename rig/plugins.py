@@ -12,7 +12,11 @@ from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from typing import Generic, TypeVar
 
+from rig.deadline import within
+
 Item = TypeVar("Item")
+# Half of what a process of the bench has for its start, as each of them imports what is declared.
+IMPORT_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -98,7 +102,8 @@ def _loaded(admission: Admission[Item], point: EntryPoint) -> tuple[Plugin, Item
     whose, version = (point.dist.name, point.dist.version) if point.dist else ("a distribution", "")
     plugin = Plugin(point.group, point.name, whose, version)
     try:
-        item = point.load()
+        with within(IMPORT_S):
+            item = point.load()
         error = admission.refusal(item)
         return (
             (replace(plugin, error=error), None) if error else (replace(plugin, declares=admission.name_of(item)), item)

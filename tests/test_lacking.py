@@ -1,9 +1,11 @@
-"""A test that finds no browser or database skips for a person and fails in CI."""
+"""A test that finds no browser, database or recording skips for a person and fails in CI."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
+from tests import data
 from tests.api.catalogue import server
 from tests.lacking import ALL
 from tests.system import browser
@@ -20,7 +22,18 @@ def without_database(patch: pytest.MonkeyPatch) -> None:
         pass
 
 
-@pytest.mark.parametrize("act", [without_browser, without_database])
+def without_one_recording(patch: pytest.MonkeyPatch) -> None:
+    patch.delenv("TISSUE_RIG_DATA", raising=False)
+    patch.setattr(data, "folder", lambda: Path(__file__).parent)
+    data.recording("no-such-recording")
+
+
+def without_promised_recordings(patch: pytest.MonkeyPatch) -> None:
+    patch.setenv("TISSUE_RIG_DATA", "/no/such/folder")
+    data.recording("emps")
+
+
+@pytest.mark.parametrize("act", [without_browser, without_database, without_one_recording, without_promised_recordings])
 def test_what_lacks_is_skipped_or_fails_where_all_have_to_run(
     monkeypatch: pytest.MonkeyPatch, act: Callable[[pytest.MonkeyPatch], None]
 ) -> None:
@@ -28,5 +41,15 @@ def test_what_lacks_is_skipped_or_fails_where_all_have_to_run(
     with pytest.raises(pytest.skip.Exception):
         act(monkeypatch)
     monkeypatch.setenv(ALL, "1")
-    with pytest.raises(pytest.fail.Exception, match="no test may skip"):
+    with pytest.raises((pytest.fail.Exception, pytest.skip.Exception), match="no test may skip"):
         act(monkeypatch)
+
+
+def test_where_nobody_promised_recordings_their_tests_skip_even_where_all_have_to_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv(ALL, "1")
+    monkeypatch.delenv("TISSUE_RIG_DATA", raising=False)
+    monkeypatch.setattr(data, "ROOT", tmp_path / "project")
+    with pytest.raises(pytest.skip.Exception, match="no recording emps"):
+        data.recording("emps")

@@ -12,16 +12,20 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
+from drivers.input_role import Input
 from drivers.roles import Device, ForceSensor, Identity, LinkCounters, MarkerTracker, ServoAxis
 from rig import plugins
 from rig.channels import AxisSample, ForceSample, MarkerSample
+from rig.config.products.input_role import InputProduct
 from rig.config.products.roles import AxisProduct, ForceProduct, Product, TrackerProduct
+from rig.deadline import within
 from rig.errors import DeviceError, RigError
+from rig.input_streams import InputSample
 from rig.plugins import Plugin
 
 Made = TypeVar("Made", bound=Device)
 Answer = TypeVar("Answer")
-Sample = TypeVar("Sample", ForceSample, AxisSample, MarkerSample)
+Sample = TypeVar("Sample", ForceSample, AxisSample, MarkerSample, InputSample)
 # Twenty cycles of the loop; waiting for another thread of this interpreter takes 5 ms at most.
 BLOCKED_NS = 20_000_000
 # One may be a page that was put aside; three in a tenth of a second are a driver that waits.
@@ -30,6 +34,8 @@ BLOCKED_POLLS, AMONG_POLLS = 3, 100
 BEYOND_RANGE = 2.0
 # The largest volume of a camera, and far beyond any axis.
 FARTHEST_MM = 10_000.0
+START_S = 30.0  # half of what the loop has for its start, homing included
+RATE_TOLERANCE = 0.1  # half of what lies between neighbouring rates of a sensor
 
 
 def force_sensor(config: ForceProduct, make: Callable[[], ForceSensor]) -> ForceSensor:
@@ -48,6 +54,12 @@ def marker_tracker(config: TrackerProduct, make: Callable[[], MarkerTracker]) ->
     """What ``make`` gives, guarded where a plug-in declares it."""
     plugin = plugins.declaring("tissue_rig.tracker", config.product)
     return GuardedTracker(plugin, config, make) if plugin else make()
+
+
+def input_device(config: InputProduct, make: Callable[[], Input]) -> Input:
+    """What ``make`` gives, guarded where a plug-in declares it."""
+    plugin = plugins.declaring("tissue_rig.input", config.product)
+    return GuardedInput(plugin, config, make) if plugin else make()
 
 
 class Guarded(ABC, Generic[Made, Sample]):
@@ -93,7 +105,16 @@ class Guarded(ABC, Generic[Made, Sample]):
         return self._asked(lambda: self._device.period_ns)
 
     def start(self) -> None:
-        self._asked(self._device.start)
+        with within(START_S):
+            self._asked(self._device.start)
+        self._refuse_rate()
+
+    def _refuse_rate(self) -> None:
+        """Later its samples are held against its own period alone."""
+        promised_Hz, own_ns = self._asked(lambda: self._config.promised_Hz), self.period_ns
+        own_Hz = 1e9 / own_ns if own_ns else 0.0
+        if promised_Hz is not None and abs(own_Hz - promised_Hz) > RATE_TOLERANCE * promised_Hz:
+            raise self._error(f"its driver has a rate of {own_Hz:.1f} Hz, its declaration one of {promised_Hz:.1f} Hz")
 
     def fileno(self) -> int:
         return self._asked(self._device.fileno)
@@ -109,6 +130,9 @@ class Guarded(ABC, Generic[Made, Sample]):
         begun_ns, waits = self._now(), self._waits()
         samples = self._asked(lambda: poll(now_ns))
         self._note_wait(self._now() - begun_ns, self._waits() - waits)
+        return self._checked(samples)
+
+    def _checked(self, samples: Sequence[Sample]) -> Sequence[Sample]:
         for sample in samples:
             wrong = self._wrong(sample)
             if wrong:
@@ -189,6 +213,22 @@ class GuardedTracker(Guarded[MarkerTracker, MarkerSample]):
     def _impossible(self, sample: MarkerSample) -> str:
         far_mm = math.hypot(sample.x_mm, sample.y_mm, sample.z_mm)
         return "" if far_mm <= FARTHEST_MM else f"a marker {far_mm:g} mm away: wrong unit?"
+
+
+class GuardedInput(Guarded[Input, InputSample]):
+    """An input, which may wait, as it has a thread of its own."""
+
+    KIND = InputSample
+
+    def poll(self, now_ns: int) -> Sequence[InputSample]:
+        """Samples since the last call, each looked at."""
+        return self._checked(self._asked(lambda: self._device.poll(now_ns)))
+
+    def concern(self) -> str:
+        return self._asked(self._device.concern)
+
+    def _impossible(self, sample: InputSample) -> str:  # noqa: ARG002 - nothing is known of what it measures
+        return ""
 
 
 class GuardedAxis(Guarded[ServoAxis, AxisSample]):

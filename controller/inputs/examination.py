@@ -5,6 +5,7 @@ from contextlib import closing
 
 import numpy as np
 
+from controller.devices.guard import RATE_TOLERANCE
 from controller.inputs.runner import open_input
 from drivers.input_role import Input
 from rig.config.products.input_role import InputProduct
@@ -13,8 +14,6 @@ from rig.input_streams import InputSample
 from rig.results.bench import DeviceReport
 
 PERIOD_S = 0.002
-# Half of what lies between the intervals that boards and senders are asked for.
-RATE_TOLERANCE = 0.1
 
 
 def look_at(name: str, config: InputProduct, seconds: float) -> DeviceReport:

@@ -30,7 +30,9 @@ SLOTS = 2048
 class Runner(Protocol):
     """One input, as far as this process asks."""
 
-    status: DeviceStatus
+    @property
+    def status(self) -> DeviceStatus:
+        """As it is now."""
 
 
 class Publisher:

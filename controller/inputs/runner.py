@@ -8,10 +8,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from pkgutil import resolve_name
 
-from controller.devices import states
+from controller.devices import guard, states
 from controller.devices.connections import of_stream
 from controller.devices.health import StreamHealth
-from controller.devices.states import DeviceState, Observation
+from controller.devices.states import DeviceState, DeviceStatus, Observation
 from drivers.input_role import Input
 from rig.channels import Stream
 from rig.config.products.input_role import InputProduct
@@ -22,13 +22,17 @@ FIRST_WAIT_S, LONGEST_WAIT_S = 1.0, 4.0
 # How long a quiet input is waited for; nothing depends on it but how soon a lost one is noticed.
 LISTEN_S = 0.05
 LEAVE_S = 4.0  # longer than any driver waits in `close`
+# Twenty turns; with two words of this process a needed input that hangs is then lost within the 1.3 s that it has.
+TURN_NS = 1_000_000_000
+# Half as long again as the longest start of ours, a stream that is looked for, opened and its clock waited for.
+OPEN_NS = 15_000_000_000
+HANGS = "its driver does not come back; look at the device, then start again"
 Put = Callable[[int, bytes], None]
 
 
 def open_input(config: InputProduct) -> Input:
     """The input, not yet started; raises DeviceError where its port cannot be opened."""
-    device: Input = resolve_name(config.driver)(config)
-    return device
+    return guard.input_device(config, lambda: resolve_name(config.driver)(config))
 
 
 class InputRunner:
@@ -43,10 +47,17 @@ class InputRunner:
         now: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._config, self._stream, self._put, self._opens, self._now = config, stream, put, opens, now
-        self.status = states.connecting(now())
+        self._status, self._due_ns = states.connecting(now()), now() + OPEN_NS
         self._next_seq = 0
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name=stream.name, daemon=True)
+
+    @property
+    def status(self) -> DeviceStatus:
+        """As it is now: one whose driver has not come back in time is lost, whatever it was before."""
+        was, now_ns = self._status, self._now()
+        hangs = now_ns > self._due_ns and was.state is not DeviceState.LOST
+        return states.following(was, Observation(None, lost=HANGS), now_ns) if hangs else was
 
     def begin(self) -> None:
         """Starts its thread."""
@@ -60,6 +71,7 @@ class InputRunner:
     def _run(self) -> None:
         wait_s = FIRST_WAIT_S
         while not self._ending.is_set():
+            self._due_ns = self._now() + OPEN_NS
             try:
                 with contextlib.closing(self._opens(self._config)) as device:
                     device.next_seq = self._next_seq
@@ -68,7 +80,7 @@ class InputRunner:
                     self._listen(device)
             except RigError as error:
                 self._note(Observation(None, lost=str(error)))
-            except Exception as error:  # a plug-in of somebody else: named, and tried again like one that is unplugged
+            except BaseException as error:  # a plug-in may even exit: named, and tried again like one unplugged
                 self._note(Observation(None, lost=f"its driver failed: {type(error).__name__}: {error}"))
             self._ending.wait(wait_s)
             wait_s = min(2 * wait_s, LONGEST_WAIT_S)
@@ -77,6 +89,7 @@ class InputRunner:
         health = StreamHealth(device.period_ns or 1, states.SILENT_NS)
         begun_ns = self._now()
         while not self._ending.is_set():
+            self._due_ns = self._now() + TURN_NS
             select.select([device.fileno()], [], [], LISTEN_S)
             for sample in device.poll(self._now()):
                 self._put(self._stream.id, self._stream.pack(sample.row))
@@ -99,5 +112,5 @@ class InputRunner:
 
     def _note(self, seen: Observation) -> None:
         """A lost one stays so, with what it was lost by, until a sample comes."""
-        if seen.lost or seen.age_ns is not None or self.status.state is not DeviceState.LOST:
-            self.status = states.following(self.status, seen, self._now())
+        if seen.lost or seen.age_ns is not None or self._status.state is not DeviceState.LOST:
+            self._status = states.following(self._status, seen, self._now())

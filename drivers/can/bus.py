@@ -7,6 +7,7 @@ import array
 import contextlib
 import fcntl
 import os
+import re
 import select
 import termios
 import time
@@ -16,13 +17,17 @@ from typing import Protocol, cast
 import can
 from can.interfaces.slcan import slcanBus
 
-from drivers.can.health import BusHealth, Counted
-from drivers.can.slcan import BITRATE_COMMANDS, CanFrame, SlcanDecoder, encode_frame
+from drivers.can.health import LOAD_NS, BusHealth, Counted
+from drivers.can.slcan import BITRATE_COMMANDS, FLAGS_LINE, CanFrame, SlcanDecoder, decode_flags, encode_frame
 from drivers.ports import PortClosed, read_waiting
 from rig.errors import DeviceError, UsageError
 
 ADAPTER_TIMEOUT_S = 0.5  # thirty deliveries of a USB adapter (16 ms)
 TEXT = frozenset(b"\a\r\n" + bytes(range(0x20, 0x7F)))
+# As often as load and errors are renewed, and nothing to a line that carries thousands of frames a second.
+FLAGS_NS = LOAD_NS
+NEVER_NS = 1 << 62
+LINE_END, FLAGS_OR_REFUSAL = re.compile(rb"[\r\a]"), re.compile(rb"(?:^|[\r\n])(%b)\r|\a" % FLAGS_LINE.pattern)
 
 
 class CanLink(Protocol):
@@ -60,7 +65,7 @@ class SlcanLink:
         self.path = path
         self.decoder = SlcanDecoder()
         self.health = BusHealth(bitrate)
-        self._now = now
+        self._now, self._flags_due_ns = now, NEVER_NS
         self._waiting = array.array("i", [0])
         self._poller = select.poll()
         self._lock = _locked(path)
@@ -84,10 +89,20 @@ class SlcanLink:
     def read(self) -> list[CanFrame]:
         """Frames that have arrived, possibly none; raises PortClosed."""
         data = self._read_raw()
-        frames = self.decoder.feed(data) if data else []
+        frames, now_ns = self.decoder.feed(data) if data else [], self._now()
         self.health.refused = self.decoder.refused
-        self.health.passed(frames, self._now())
+        self.health.passed(frames, now_ns)
+        self._look_at_flags(now_ns)
         return frames
+
+    def _look_at_flags(self, now_ns: int) -> None:
+        while self.decoder.replies:
+            flags = decode_flags(self.decoder.replies.popleft())
+            if flags is not None:
+                self.health.flagged(flags)
+        if now_ns >= self._flags_due_ns:
+            self._flags_due_ns = now_ns + FLAGS_NS
+            self._write(b"F\r")
 
     def wait(self, timeout_s: float) -> None:
         """Sleeps until something arrives or the time is over; for set-up only."""
@@ -127,12 +142,7 @@ class SlcanLink:
     def _await_answer(self, now: Callable[[], int]) -> None:
         """Adapters differ in what they say to V, and old ones refuse it with BEL; all of them answer a line of text."""
         termios.tcflush(self._fd, termios.TCIFLUSH)
-        self._write(b"V\r")
-        deadline_ns = now() + int(ADAPTER_TIMEOUT_S * 1e9)
-        answer = b""
-        while not (b"\r" in answer or b"\a" in answer) and now() < deadline_ns:
-            self.wait((deadline_ns - now()) / 1e9)
-            answer += self._read_raw()
+        answer = self._answered(b"V\r", LINE_END, now)
         if any(byte not in TEXT for byte in answer):
             raise DeviceError(
                 f"{self.path}: this is not a CAN adapter: asked for its version (V) and got {answer[:12].hex(' ')}; "
@@ -143,6 +153,20 @@ class SlcanLink:
                 f"{self.path}: no CAN adapter answers: asked for its version (V) and got nothing within "
                 f"{ADAPTER_TIMEOUT_S:g} s; check axis.port and the adapter's power"
             )
+        # Many adapters know no F. What it says first is of the time before.
+        said = FLAGS_OR_REFUSAL.search(self._answered(b"F\r", FLAGS_OR_REFUSAL, now))
+        if said and said[1]:
+            self._flags_due_ns = now() + FLAGS_NS
+
+    def _answered(self, command: bytes, whole: re.Pattern[bytes], now: Callable[[], int]) -> bytes:
+        """What comes until it is ``whole``, or the time is over."""
+        self._write(command)
+        deadline_ns = now() + int(ADAPTER_TIMEOUT_S * 1e9)
+        answer = b""
+        while not whole.search(answer) and now() < deadline_ns:
+            self.wait((deadline_ns - now()) / 1e9)
+            answer += self._read_raw()
+        return answer
 
 
 def _locked(path: str) -> int:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
 
-from drivers.can.slcan import CanFrame
+from drivers.can.slcan import CanFrame, Flags
 
 # Bits of a frame with 11-bit identifier beside its data (ISO 11898-1): start, arbitration, control, CRC, acknowledge,
 # end, space between frames; an extended identifier has 20 more.
@@ -61,6 +61,17 @@ class BusHealth:
             self.load = self._bits / self.bitrate / seconds if self._since_ns else 0.0
             self.errors_per_s = (self.error_frames - self._errors_before) / seconds
             self._bits, self._errors_before, self._since_ns = 0, self.error_frames, now_ns
+
+    def flagged(self, flags: Flags) -> None:
+        """What an SLCAN adapter says has been since it was last asked: that there were errors, not how many."""
+        self.error_frames += bool(flags & Flags.BUS_ERROR)
+        self.dropped += bool(flags & (Flags.RECEIVE_FULL | Flags.OVERRUN))
+        if flags & Flags.PASSIVE:
+            self.state = BusState.PASSIVE
+        elif flags & Flags.WARNING:
+            self.state = BusState.WARNING
+        elif not flags & Flags.BUS_ERROR:  # a controller tells changes of its state alone, and errors as they come
+            self.state = BusState.ACTIVE
 
     @property
     def trouble(self) -> str:

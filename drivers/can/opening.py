@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from drivers.can.bus import CanLink, SlcanLink
-from drivers.can.generic import ECHOING, PythonCanLink, open_bus
+from drivers.can.generic import PythonCanLink, open_bus
 from drivers.can.socketcan import SocketCanLink, open_socket
 from rig.config.products.can_axis import CanAxisProduct
 
@@ -19,7 +19,7 @@ def opener(config: CanAxisProduct) -> OpenLink:
 
     def by_library(port: str, bitrate: int, now: Callable[[], int]) -> CanLink:
         bus = open_bus(interface, port, bitrate, config.adapter)
-        return PythonCanLink(bus, f"{interface} {port}", bitrate, interface in ECHOING, now)
+        return PythonCanLink(bus, f"{interface} {port}", bitrate, interface, now)
 
     fast: dict[str, OpenLink] = {"slcan": SlcanLink, "socketcan": by_socket}
     return fast.get(interface, by_library)

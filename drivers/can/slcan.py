@@ -6,8 +6,10 @@ with CR, ``z`` CR or ``Z`` CR, or refuses it with BEL. Lines carry no checksum: 
 passes, which is why what matters is read back through SDO.
 """
 
+import re
 from binascii import hexlify, unhexlify
 from collections import deque
+from enum import IntFlag
 from typing import NamedTuple
 
 # Lawicel's longest line: letter, extended identifier, length, eight bytes in hexadecimal, time stamp.
@@ -25,6 +27,7 @@ BITRATE_COMMANDS = {
 """Bit rates every adapter and python-can agree on; S7 means 800 kbit/s to the one and 750 to the other."""
 
 
+FLAGS_LINE = re.compile(rb"F[0-9A-Fa-f]{2}")
 _PLAIN, _EXTENDED = 0x800, 0x2000_0000  # identifiers have 11 or 29 bits (ISO 11898-1)
 _KINDS = {b"t": (False, False), b"T": (True, False), b"r": (False, True), b"R": (True, True)}
 
@@ -66,6 +69,23 @@ def decode_line(line: bytes) -> CanFrame | None:
     if size > 8 or len(data) != size or len(line) - body not in (0, 4) or can_id >= (_EXTENDED if extended else _PLAIN):
         return None
     return CanFrame(can_id, data, extended, remote)
+
+
+class Flags(IntFlag):
+    """What an adapter says of its controller when it is asked by F: what has been since it was last asked."""
+
+    RECEIVE_FULL = 0x01
+    TRANSMIT_FULL = 0x02
+    WARNING = 0x04
+    OVERRUN = 0x08
+    PASSIVE = 0x20
+    ARBITRATION_LOST = 0x40
+    BUS_ERROR = 0x80
+
+
+def decode_flags(line: bytes) -> Flags | None:
+    """The flags in a line without its CR; None where it holds none."""
+    return Flags(int(line[1:], 16)) if FLAGS_LINE.fullmatch(line) else None
 
 
 class SlcanDecoder:

@@ -7,7 +7,7 @@ is passed over, as terminal programs send one. After Z1 each frame carries the m
 
 from binascii import hexlify
 
-from drivers.can.slcan import LONGEST, CanFrame, decode_line
+from drivers.can.slcan import LONGEST, CanFrame, Flags, decode_line
 from mock_devices.wire import Wire
 
 OK, BEL = b"\r", b"\a"
@@ -16,12 +16,15 @@ FRAME_SENT = {b"t": b"z\r", b"r": b"z\r", b"T": b"Z\r", b"R": b"Z\r"}
 
 
 class SlcanAdapter:
-    """The adapter; ``rate`` is the code of the bus' bit rate, 8 for 1 Mbit/s. Output leaves with ``flush``."""
+    """The adapter; ``rate`` is the code of the bus' bit rate, 8 for 1 Mbit/s. Output leaves with ``flush``.
+
+    ``flags`` is what has been on the bus since it was last asked (F).
+    """
 
     def __init__(self, wire: Wire, rate: bytes = b"8") -> None:
         self.wire = wire
         self.open = False
-        self.refused = 0
+        self.refused, self.flags = 0, Flags(0)
         self._stamped = False
         self._rate = rate
         self._chosen = b""
@@ -71,7 +74,8 @@ class SlcanAdapter:
             case b"N":
                 return b"NA123\r"
             case b"F" if self.open:
-                return b"F00\r"
+                said, self.flags = self.flags, Flags(0)
+                return b"F%02X\r" % said
             case b"C" if self.open:
                 self.open = False
                 return OK

@@ -5,15 +5,16 @@ import contextlib
 import functools
 import os
 import secrets
-from typing import Any
-
-from fastapi.testclient import TestClient
+from typing import TYPE_CHECKING, Any
 
 from api.http.access.scopes import Scope
 from api.http.access.tokens import TokenStore, access_folder
 from api.http.app import build
 from api.http.service import Service
 from rig.errors import UsageError
+
+if TYPE_CHECKING:
+    from fastapi.testclient import TestClient
 
 ADDRESS = "http://127.0.0.1:8000"
 
@@ -42,15 +43,17 @@ def bearer(scope: Scope = Scope.ADMIN) -> dict[str, str]:
     return {"Authorization": f"Bearer {token(scope)}"}
 
 
-def client_of(service: Service, scope: Scope | None = Scope.ADMIN, base: str = ADDRESS) -> TestClient:
+def client_of(service: Service, scope: Scope | None = Scope.ADMIN, base: str = ADDRESS) -> "TestClient":
     """A client on this computer with a token; ``scope`` None: without one."""
+    from fastapi.testclient import TestClient  # noqa: PLC0415 - needs a library of developers, `service` does not
+
     headers = {} if scope is None else bearer(scope)
     found = TestClient(build(service), base_url=base, headers=headers, client=("127.0.0.1", 50_000))
     found.event_hooks["request"].append(_keyed)
     return found
 
 
-def in_control(client: TestClient, holder: str = "test") -> TestClient:
+def in_control(client: "TestClient", holder: str = "test") -> "TestClient":
     """The same client, which has taken control for half a minute."""
     taken = client.post("/api/v1/control/lease", json={"holder": holder, "ttl_s": 30.0})
     client.headers["X-Control-Lease"] = taken.json()["lease_id"]

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 
 import pytest
 
+from tests.data import absent
 from tests.rig.fixed_sessions import FILE, SESSIONS, in_one_arithmetic
 
 pytestmark = pytest.mark.timeout(300)
@@ -34,7 +35,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
 @pytest.mark.parametrize("name", SESSIONS)
 def test_a_fixed_session_gets_the_answer_it_got(name: str, found: dict[str, object]) -> None:
     if name not in found:
-        pytest.skip("the recordings are not on this machine")
+        absent("the recordings are not on this machine")
     now, kept = dict(leaves(found[name])), dict(leaves(KEPT[name]))
     close = 1e-9 if found["arithmetic"] == KEPT["arithmetic"] else OTHER_ARITHMETIC
     assert now.keys() == kept.keys()

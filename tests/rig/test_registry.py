@@ -86,3 +86,18 @@ def test_of_two_plug_ins_with_one_name_neither_is_used(install: Install) -> None
 def test_a_name_is_registered_once() -> None:
     with pytest.raises(ValueError, match="there is a word 'own' already"):
         words("own", "own")
+
+
+@pytest.mark.parametrize(
+    "source",
+    ["import time\ntime.sleep(60)\n", "import time\ntry:\n    time.sleep(60)\nexcept Exception:\n    time.sleep(60)\n"],
+)
+def test_one_whose_import_does_not_end_is_given_up_and_harms_no_other(
+    install: Install, monkeypatch: pytest.MonkeyPatch, source: str
+) -> None:
+    """Also one that swallows what is raised in it."""
+    monkeypatch.setattr(plugins, "IMPORT_S", 0.1)
+    install("bad", source, x="bad_plug:WORD")
+    install("good", "WORD = 'plugged'\n", x="good_plug:WORD")
+    assert list(words("own")) == ["own", "plugged"]
+    assert errors() == {"bad": "TimeoutError: not done within 0.1 s"}

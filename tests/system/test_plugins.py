@@ -41,7 +41,7 @@ def passes_its_own_tests(project: Path, environment: Mapping[str, str]) -> None:
     assert " passed" in found.stdout and "skipped" not in found.stdout
 
 
-@pytest.mark.by_hand
+@pytest.mark.extra
 def test_the_net_ft_is_a_distribution_of_its_own(tmp_path: Path) -> None:
     project = tmp_path / "plugin"
     shutil.copytree(ROOT / "examples" / "plugin-netft", project)
@@ -65,13 +65,23 @@ def test_the_template_makes_a_plug_in_that_works(tmp_path: Path) -> None:
     passes_its_own_tests(project, installed(project, tmp_path / "target"))
 
 
+def without_what_developers_install(folder: Path) -> dict[str, str]:
+    """An environment in which no HTTP client can be imported, as `pip install tissue-rig pytest` brings none."""
+    (folder / "hidden").mkdir()
+    (folder / "hidden" / "sitecustomize.py").write_text("import sys; sys.modules.update(httpx=None, httpx2=None)\n")
+    paths = os.pathsep.join(map(str, (folder / "hidden", ROOT)))
+    return os.environ | {"PYTHONPATH": paths, "XDG_STATE_HOME": str(folder / "state")}
+
+
 @pytest.mark.extra
 def test_a_laboratorys_own_checks_run_as_the_workflow_says(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples" / "ci", tmp_path / "ci")
     workflow = (tmp_path / "ci" / "laboratory.yml").read_text()
     steps = [line.partition("run: ")[2] for line in workflow.splitlines() if "run: " in line]
     assert steps == ["pip install tissue-rig pytest", "rig devices", "pytest test_laboratory.py"]
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "XDG_STATE_HOME": str(tmp_path / "state")}
+    environment = without_what_developers_install(tmp_path)
+    hidden = run(sys.executable, "-c", "import httpx2", folder=tmp_path, environment=environment)
+    assert "ModuleNotFoundError" in hidden.stderr
     for step in steps[1:]:
         program, *arguments = step.split()
         done = run(Path(sys.executable).with_name(program), *arguments, folder=tmp_path / "ci", environment=environment)

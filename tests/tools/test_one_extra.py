@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.lacking import lacking
 from tools import one_extra
 from tools.one_extra import SMOKES, NoRegistry, Smoke, extras, trouble_of
 
@@ -17,7 +18,7 @@ def tried(extra: str, folder: Path) -> str:
     try:
         return trouble_of(extra, folder / "venv")
     except NoRegistry as error:
-        pytest.skip(f"no package registry answers here: {error}")
+        lacking(f"no package registry answers here: {error}")
 
 
 @pytest.mark.extra
@@ -41,7 +42,7 @@ def test_without_it_one_sentence_names_it(tmp_path: Path) -> None:
     try:
         python = one_extra.installed(tmp_path / "venv", "")
     except NoRegistry as error:
-        pytest.skip(f"no package registry answers here: {error}")
+        lacking(f"no package registry answers here: {error}")
     said = one_extra.run(python, "from drivers.lsl.library import load; load('machine')")
     assert "pip install 'tissue-rig[lsl]'" in said
 

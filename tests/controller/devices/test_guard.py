@@ -8,15 +8,26 @@ from collections.abc import Callable, Iterator, Sequence
 import pytest
 
 from controller.devices import drivers, guard
-from controller.devices.guard import AMONG_POLLS, BLOCKED_NS, BLOCKED_POLLS, GuardedAxis, GuardedForce, GuardedTracker
+from controller.devices.guard import (
+    AMONG_POLLS,
+    BLOCKED_NS,
+    BLOCKED_POLLS,
+    GuardedAxis,
+    GuardedForce,
+    GuardedInput,
+    GuardedTracker,
+)
+from controller.inputs.runner import open_input
 from drivers.roles import Device
 from mock_devices.testing.clock import Clock
 from rig import plugins
 from rig.channels import AxisSample, ForceSample, MarkerSample
 from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.evdev_switch import EvdevSwitch
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
 from rig.errors import DeviceError
+from rig.input_streams import InputSample
 from rig.plugins import Plugin
 from tests.controller.fake_bench import FakeBench, wired
 from tests.controller.fake_devices import FakeAxis, FakeDevice
@@ -79,6 +90,39 @@ def test_wrong_units_of_tracker_and_axis() -> None:
     axis = GuardedAxis(PLUGIN, Epos4Wiring(), lambda: Given([AXIS._replace(position_mm=2e4)]))  # type: ignore[arg-type,return-value]
     with pytest.raises(DeviceError, match="position 20000 mm: wrong unit"):
         axis.poll(1000)
+
+
+INPUT = InputSample(0, 900, 1000, 0, 0, -1, (1.0, 48.0), 0, 1)
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ([INPUT, INPUT._replace(seq=1, capture_ns=899)], "its times run back by 0.000 ms at sample 1"),
+        ([INPUT._replace(capture_ns=3_000_000)], "sample 0 was taken 2.999 ms after it came"),
+        (lambda: sys.exit("dongle"), "SystemExit: dongle"),
+        ([FORCE], "it gives ForceSample.*, where a InputSample is expected"),
+    ],
+)
+@pytest.mark.usefixtures("declared")
+def test_an_input_of_a_plug_in_is_guarded_too(
+    monkeypatch: pytest.MonkeyPatch, given: Sequence[object], sentence: str
+) -> None:
+    monkeypatch.setattr(EvdevSwitch, "driver", f"{__name__}:made_input")
+    monkeypatch.setattr(f"{__name__}.GIVEN", given)
+    device = open_input(EvdevSwitch())
+    with pytest.raises(DeviceError, match=f"evdev-switch, a plug-in of acme-rig 2.1: {sentence}"):
+        device.poll(1000)
+
+
+def test_an_input_may_wait_as_it_has_a_thread_of_its_own() -> None:
+    def asleep() -> Sequence[object]:
+        time.sleep(BLOCKED_NS * 1.1e-9)
+        return [INPUT]
+
+    guarded = GuardedInput(PLUGIN, EvdevSwitch(), lambda: Given(asleep))  # type: ignore[arg-type,return-value]
+    for _ in range(2 * BLOCKED_POLLS):
+        assert guarded.poll(1000) == [INPUT]
 
 
 def test_tools_of_a_tracker_have_times_of_their_own() -> None:
@@ -144,10 +188,10 @@ def test_it_closes_whatever_the_plug_in_does() -> None:
 @pytest.fixture
 def declared(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The three usual products as if plug-ins declared them."""
-    names = {"force": BotaWiring().product, "axis": Epos4Wiring().product, "tracker": PolarisWiring().product}
+    products = {"input": EvdevSwitch(), "force": BotaWiring(), "axis": Epos4Wiring(), "tracker": PolarisWiring()}
     groups = {
-        f"tissue_rig.{role}": (Plugin(f"tissue_rig.{role}", "x", "acme-rig", "2.1", name),)
-        for role, name in names.items()
+        f"tissue_rig.{role}": (Plugin(f"tissue_rig.{role}", "x", "acme-rig", "2.1", one.product),)
+        for role, one in products.items()
     }
     monkeypatch.setattr(plugins, "_met", groups)
     yield
@@ -163,6 +207,13 @@ def test_a_driver_that_cannot_even_be_imported_is_named(monkeypatch: pytest.Monk
 def test_ours_are_not_wrapped(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(BotaWiring, "driver", f"{__name__}:made_device")
     assert isinstance(drivers.open_force(BotaWiring()), FakeDevice)
+
+
+GIVEN: object = ()
+
+
+def made_input(_: object) -> Device:
+    return Given(GIVEN)  # type: ignore[arg-type]
 
 
 def made_device(*_: object, **__: object) -> Device:
@@ -209,3 +260,29 @@ def test_an_axis_behind_the_guard_is_the_axis_itself() -> None:
     axis.reset_fault()
     assert axis.history() == inner.history()
     assert {"home", "enable", "command", "quick_stop", "power_off", "reset_fault"} <= set(inner.calls)
+
+
+@pytest.mark.parametrize(("period_ns", "said_Hz"), [(10_000_000, "100.0"), (900_000, "1111.1"), (0, "0.0")])
+def test_a_rate_that_is_not_the_declared_one_is_refused_at_the_start(period_ns: int, said_Hz: str) -> None:
+    """A driver that gives 100 Hz, says so, and is declared as 1000 Hz would be on its own rate for ever after."""
+    slow = Given([])
+    slow.period_ns = period_ns
+    guarded = GuardedForce(PLUGIN, BotaWiring(), lambda: slow)
+    with pytest.raises(DeviceError, match=f"its driver has a rate of {said_Hz} Hz, its declaration one of 1000.0 Hz"):
+        guarded.start()
+
+
+def test_a_sensor_is_sold_by_a_round_number_and_an_axis_and_a_switch_answer_what_is_asked() -> None:
+    sold = Given([])
+    sold.period_ns = 996_094  # 51 samples of its converter's 51.2 kHz, sold as 1000 Hz
+    GuardedForce(PLUGIN, BotaWiring(), lambda: sold).start()
+    GuardedAxis(PLUGIN, Epos4Wiring(), lambda: FakeAxis(Clock(), 7)).start()
+    GuardedInput(PLUGIN, EvdevSwitch(), lambda: Given([])).start()  # type: ignore[arg-type,return-value]
+
+
+def test_a_start_that_does_not_end_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guard, "START_S", 0.1)
+    stuck = Given([])
+    monkeypatch.setattr(stuck, "start", lambda: time.sleep(60))
+    with pytest.raises(DeviceError, match=r"a plug-in of acme-rig 2.1: TimeoutError: not done within 0.1 s"):
+        GuardedForce(PLUGIN, BotaWiring(), lambda: stuck).start()

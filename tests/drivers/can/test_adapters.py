@@ -10,6 +10,7 @@ import pytest
 from drivers.can.generic import PythonCanLink, open_bus
 from drivers.can.health import BusState
 from drivers.can.slcan import CanFrame
+from drivers.can.socketcan import FULL_LARGEST
 from drivers.ports import PortClosed
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.table import parse
@@ -72,7 +73,7 @@ class BadBus(can.BusABC):
     def __init__(self) -> None:
         super().__init__(0)
         self.fails: Exception | None = None
-        self.now = can.BusState.ACTIVE
+        self.now, self.full = can.BusState.ACTIVE, True
 
     @property
     def state(self) -> can.BusState:
@@ -89,7 +90,8 @@ class BadBus(can.BusABC):
         return None, True
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        raise can.CanOperationError("transmit queue full")
+        if self.full:
+            raise can.CanOperationError("transmit queue full")
 
 
 @pytest.fixture
@@ -126,10 +128,20 @@ def test_what_the_adapters_library_raises_in_the_thread_is_told_where_the_bus_is
     assert "device detached" in gone(link)
 
 
-def test_a_transmit_queue_that_is_full_is_counted(bad: tuple[BadBus, PythonCanLink]) -> None:
-    _, link = bad
-    link.send(CanFrame(0x80), CanFrame(0x80))
-    assert link.decoder.refused == 2
+def test_a_transmit_queue_that_is_full_is_counted_and_ends_the_link_when_it_stays_so(
+    bad: tuple[BadBus, PythonCanLink],
+) -> None:
+    bus, link = bad
+    for _ in range(FULL_LARGEST - 1):
+        link.send(CanFrame(0x80))
+    bus.full = False
+    link.send(CanFrame(0x80))
+    bus.full = True
+    for _ in range(FULL_LARGEST - 1):
+        link.send(CanFrame(0x80))
+    assert link.decoder.refused == 2 * (FULL_LARGEST - 1)
+    with pytest.raises(PortClosed, match=r"^pcan PCAN_USBBUS1: .* takes no more frames: transmit queue full.; check"):
+        link.send(CanFrame(0x80))
 
 
 @pytest.mark.parametrize(

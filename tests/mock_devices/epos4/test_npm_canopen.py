@@ -13,6 +13,7 @@ import pytest
 
 from hatch_build import NodeFailed, node, npm
 from mock_devices.testing.epos4 import remote_drive
+from tests.lacking import lacking
 
 pytestmark = [pytest.mark.extra, pytest.mark.bench, pytest.mark.xdist_group("commands")]
 PATIENCE_S = 60.0
@@ -74,7 +75,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     try:
         npm(["install", "--ignore-scripts", "--no-audit", "--no-fund"], folder, PATIENCE_S)
     except NodeFailed as error:
-        pytest.skip(f"canopen of npm cannot be installed here: {str(error).splitlines()[-1:]}")
+        lacking(f"canopen of npm cannot be installed here: {str(error).splitlines()[-1:]}")
     return folder
 
 
