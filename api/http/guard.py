@@ -228,6 +228,11 @@ def _refuse_caller(right: Right, caller: Caller | None, arrived: Arrived) -> Res
     return problems.answer(403, "scope", text)
 
 
+def lacking(right: Right, scope: Scope) -> Response | None:
+    """The refusal where whoever asks has no such ``right``: for a route that asks some for more than its own."""
+    return _refuse_caller(right, scope.get(CALLER), _arrived(scope))
+
+
 def _refuse_forged(caller: Caller, arrived: Arrived) -> Response | None:
     """A cookie comes by itself, so what it lets pass must say that this service's own page has sent it."""
     acts = arrived.method not in SAFE_METHODS

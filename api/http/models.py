@@ -124,7 +124,7 @@ class Info(BaseModel):
     software: str
     service_id: str = Field(description="changes with every start of the service")
     monotonic_ns: int = Field(description="the clock of all samples, now")
-    sessions_folder: str
+    sessions_folder: str = Field(description="empty for whoever sends no credential")
     stop_port: int = Field(description="of the stop process on 127.0.0.1, which takes POST /estop, /pain and /stop")
     away_stops: str = Field(description="where a page of other computers finds the same beside the service; else empty")
     capabilities: Capabilities

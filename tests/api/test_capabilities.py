@@ -89,9 +89,11 @@ def test_the_limits_are_those_that_are_held(client: TestClient) -> None:
     assert client.post(f"{API}/uploads", headers=stated).status_code == 413
 
 
-def test_a_stranger_is_told_of_nothing_that_is_the_laboratory_s_own(client: TestClient) -> None:
+def test_a_stranger_is_told_of_nothing_that_is_the_laboratory_s_own(client: TestClient, tmp_path: Path) -> None:
     assert "unmistakable" in str(asked(client, "/protocols"))
     assert "unmistakable" not in client.get(f"{API}/info").text
+    assert client.get(f"{API}/info").json()["sessions_folder"] == ""
+    assert asked(client, "/info")["sessions_folder"] == str(tmp_path)
 
 
 def test_an_extra_is_there_where_all_that_it_needs_is() -> None:

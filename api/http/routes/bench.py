@@ -7,7 +7,7 @@ from fastapi.responses import StreamingResponse
 
 import rig
 from api.http import views
-from api.http.access.rights import OPERATE, PUBLIC, READ
+from api.http.access.rights import CALLER, OPERATE, PUBLIC, READ
 from api.http.capabilities import capabilities_of
 from api.http.live import Broadcast
 from api.http.models import Info, RigView
@@ -28,7 +28,7 @@ def add(router: APIRouter, service: Service) -> None:
             software=f"tissue-rig {rig.__version__}",
             service_id=service.id,
             monotonic_ns=time.monotonic_ns(),
-            sessions_folder=str(service.sessions),
+            sessions_folder=str(service.sessions) if request.scope[CALLER] else "",
             stop_port=service.stop_port,
             away_stops=service.away.address(request.url.hostname or "") if service.away else "",
             capabilities=capabilities,

@@ -2,11 +2,13 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Query, Response
+from fastapi import APIRouter, Body, Query, Request, Response
 from fastapi.responses import FileResponse
 
-from api.http.access.rights import OPERATE, READ, STOP
+from api.http.access.rights import CALLER, OPERATE, READ, STOP, Right
+from api.http.access.scopes import Scope
 from api.http.downloads import FileAsOfNow
+from api.http.guard import lacking
 from api.http.jobs.board import Filter
 from api.http.jobs.examples import EXAMPLES
 from api.http.jobs.kinds import KINDS, AnyJob
@@ -101,12 +103,16 @@ def _verbs(router: APIRouter, service: Service) -> None:
         "/jobs/{identifier}/cancel",
         dependencies=[STOP],
         response_model=JobView,
-        summary="Ends this job and no other; what moves is stopped and retracts",
-        responses=said,
+        summary="Ends this job and no other; what moves is stopped and retracts, all else asks for the scope operate",
+        responses={204: {"description": "the same, of which whoever has no credential is told nothing"}, **said},
     )
-    def cancel(identifier: str) -> Response:
+    def cancel(identifier: str, request: Request) -> Response:
+        job = service.jobs.find(identifier)
+        refused = None if job is None or job.asked.moves else lacking(Right(Scope.OPERATE), request.scope)
+        if refused:
+            return refused
         service.jobs.cancel(identifier)
-        return shown(identifier)
+        return shown(identifier) if request.scope[CALLER] else Response(status_code=204)
 
     @router.post(
         "/jobs/{identifier}/pause",

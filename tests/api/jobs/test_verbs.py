@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
+from api.http.access.scopes import Scope
 from api.http.service import Service
 from api.operations import motion
 from controller.operation import Operation
@@ -16,6 +17,7 @@ from rig.config.wiring import Wiring
 from rig.errors import SafetyStop
 from rig.results.recorded import CaptureResult
 from tests.api.jobs.asked import becomes, begun, ended, shown
+from tests.api.jobs.test_board import made
 from tests.api.test_http_recover import ScriptedBench
 
 DONE = CaptureResult(session="s", recordings=2, samples=0, dropped=0, trials=())
@@ -147,6 +149,31 @@ def test_a_cancel_while_a_trial_runs_stops_the_bench_and_no_trial_follows(
     for verb in ("pause", "resume"):
         refused = client.post(f"/api/v1/jobs/{job}/{verb}")
         assert (refused.status_code, refused.json()["state"]) == (409, "cancelled")
+
+
+def test_a_job_that_moves_is_ended_by_anybody_here_and_a_stranger_is_told_nothing_of_it(
+    client: TestClient, service: Service, trials: Trials, bench: WiredBench
+) -> None:
+    job = capture(client)
+    until(lambda: trials.made == [1], 10.0, "the first trial")
+    stopped = client_of(service, scope=None).post(f"/api/v1/jobs/{job}/cancel")
+    assert (stopped.status_code, stopped.content, bench.stopped) == (204, b"", 1)
+    looking = client_of(service, Scope.READ).post(f"/api/v1/jobs/{job}/cancel")
+    assert (looking.status_code, looking.json()["state"]) == (200, "cancelling")
+    trials.may.release()
+    assert (ended(client, job)["state"], trials.made) == ("cancelled", [1])
+
+
+@pytest.mark.parametrize(("scope", "status", "code"), [(None, 401, "no-credential"), (Scope.READ, 403, "scope")])
+def test_what_only_computes_is_ended_by_nobody_without_the_right_to_operate(
+    service: Service, scope: Scope | None, status: int, code: str
+) -> None:
+    job = made(service.jobs, wait=True)
+    refused = client_of(service, scope).post(f"/api/v1/jobs/{job}/cancel")
+    assert (refused.status_code, refused.json()["code"]) == (status, code)
+    assert service.jobs.alive(job).state == "queued"
+    done = client_of(service, Scope.OPERATE).post(f"/api/v1/jobs/{job}/cancel")
+    assert (done.status_code, done.json()["state"]) == (200, "cancelling")
 
 
 def test_what_has_succeeded_cannot_be_cancelled(client: TestClient, trials: Trials) -> None:
