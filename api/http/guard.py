@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from starlette.responses import Response
@@ -17,7 +18,7 @@ from api.http import problems
 from api.http.access.access import Access, cookie_name
 from api.http.access.arrived import Arrived
 from api.http.access.limits import KNOWN, UNKNOWN, Rate
-from api.http.access.rights import CALLER, PASSED, WEBSOCKET, Right, RightsTable
+from api.http.access.rights import CALLER, ENTITLED, PASSED, WEBSOCKET, Right, RightsTable
 from api.http.access.scopes import Caller
 from rig.errors import RigError
 
@@ -142,7 +143,7 @@ class Guard:
             return refused
         rule = self._rights.find(arrived.method, arrived.path)
         try:
-            caller = self._access.caller(arrived.headers, cookie_name(arrived.port), arrived.owner)
+            caller = self._caller(arrived)
         except (RigError, OSError) as error:
             if not (rule and rule.right and rule.right.stop and arrived.local):  # which asks for no credential
                 return problems.answer(503, "access", str(error))
@@ -152,11 +153,22 @@ class Guard:
         if rule.right is None:
             return problems.answer(403, "no-right", f"{rule.path} declares no right, so it serves nobody; report this")
         scope[PASSED], scope[CALLER] = rule.right, caller
+        scope[ENTITLED] = partial(self._entitled, rule.right, arrived)
         if not rule.right.stop:
             limited = self._refuse_rate(caller, arrived)
             if limited:
                 return limited
         return _refuse_caller(rule.right, caller, arrived) or _refuse_stated_size(arrived.headers, rule.right)
+
+    def _caller(self, arrived: Arrived) -> Caller | None:
+        return self._access.caller(arrived.headers, cookie_name(arrived.port), arrived.owner)
+
+    def _entitled(self, right: Right, arrived: Arrived) -> bool:
+        """Whether what was let in would be let in now."""
+        try:
+            return _refuse_caller(right, self._caller(arrived), arrived) is None
+        except (RigError, OSError):
+            return False
 
     def _refuse_rate(self, caller: Caller | None, arrived: Arrived) -> Response | None:
         who = f"{caller.by} {caller.name} {caller.id}" if caller else arrived.client

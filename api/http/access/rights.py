@@ -39,7 +39,10 @@ class Right:
             raise RequestRefused(403, "no-right", "this request did not pass the check of rights")
 
 
-PASSED, CALLER = "rig.right", "rig.caller"
+# What is known of a request: its right, who asks, and a function that says whether they still may.
+PASSED, CALLER, ENTITLED = "rig.right", "rig.caller", "rig.entitled"
+# How often that is asked of what stays open: who revokes a token waits for it, and a look costs what a request does.
+RECHECK_S = 1.0
 
 
 def _passes(right: Right, caller: Caller | None) -> bool:

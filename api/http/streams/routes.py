@@ -2,10 +2,10 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Query, WebSocket
+from fastapi import APIRouter, Header, Query, Request, WebSocket
 from fastapi.responses import StreamingResponse
 
-from api.http.access.rights import READ
+from api.http.access.rights import ENTITLED, READ
 from api.http.problems import responses
 from api.http.routes.common import PREFIX
 from api.http.streams import sse
@@ -53,10 +53,10 @@ def build(streams: Streams) -> APIRouter:
         response_class=StreamingResponse,
         responses={200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
     )
-    async def events(last_event_id: EventId = "", since: Since = None) -> StreamingResponse:
+    async def events(request: Request, last_event_id: EventId = "", since: Since = None) -> StreamingResponse:
         newest = streams.feed.events.last
         last = sse.after(streams.session_id, last_event_id) if last_event_id else newest if since is None else since
-        told = sse.told(streams.feed, streams.session_id, min(last, newest))
+        told = sse.told(streams.feed, streams.session_id, min(last, newest), request.scope[ENTITLED])
         return StreamingResponse(told, media_type="text/event-stream")
 
     return router

@@ -7,11 +7,18 @@ from collections.abc import Awaitable, Callable
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from api.http import problems
+from api.http.access.rights import ENTITLED, RECHECK_S
+from api.http.guard import POLICY
 from api.http.streams.messages import PROTOCOL
 from api.http.streams.session import LiveClient, Spoken, Streams, TooSlow
 
 # The client is to come back and resume: of the codes that are an application's own.
 OVERFLOW = 4008
+RIGHT_ENDED = "the right to look on has ended; log in, or take another token"
+
+
+class RightEnded(Exception):
+    """Whoever looks on may not any more."""
 
 
 async def serve(socket: WebSocket, streams: Streams) -> None:
@@ -24,7 +31,12 @@ async def serve(socket: WebSocket, streams: Streams) -> None:
     await socket.accept(subprotocol=PROTOCOL)
     with contextlib.suppress(WebSocketDisconnect), contextlib.closing(client):
         await _said(socket, client.hello())
-        await _first(_send(socket, client, turn := asyncio.Lock(), streams.feed.turn), _take(socket, client, turn))
+        turn = asyncio.Lock()
+        sending = _send(socket, client, turn, streams.feed.turn)
+        try:
+            await _first(sending, _take(socket, client, turn), _entitled(socket.scope[ENTITLED]))
+        except RightEnded:
+            await socket.close(POLICY, RIGHT_ENDED)
 
 
 async def _first(*parts: Awaitable[None]) -> None:
@@ -63,6 +75,13 @@ async def _take(socket: WebSocket, client: LiveClient, turn: asyncio.Lock) -> No
             return
         async with turn:  # nothing comes on a channel before the client has been told what it is
             await _said(socket, client.answer(message.get("text")))
+
+
+async def _entitled(entitled: Callable[[], bool]) -> None:
+    """For as long as they are."""
+    while entitled():
+        await asyncio.sleep(RECHECK_S)
+    raise RightEnded
 
 
 async def _said(socket: WebSocket, said: Spoken | bytes) -> None:

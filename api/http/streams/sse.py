@@ -1,7 +1,8 @@
 """Events as server-sent events, for scripts and curl: a reader that comes back says which was its last."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 
+from api.http.access.rights import RECHECK_S
 from api.http.streams.events import EventsLost
 from api.http.streams.feed import PERIOD_S, Feed
 from api.http.streams.messages import Gap
@@ -17,16 +18,17 @@ def after(session_id: str, last_event_id: str) -> int:
     return int(number) if session == session_id else 0
 
 
-async def told(feed: Feed, session_id: str, last: int) -> AsyncIterator[str]:
-    """Every event after number ``last``, for as long as the reader stays; one that falls too far behind is ended."""
+async def told(feed: Feed, session_id: str, last: int, entitled: Callable[[], bool]) -> AsyncIterator[str]:
+    """Every event after number ``last``, for as long as the reader stays and may; one too far behind is ended."""
     yield f"retry: {RETRY_MS}\n\n"
     try:
         feed.events.after(last)
     except EventsLost as lost:
         yield _gap(last + 1, lost.oldest - 1)
         last = lost.oldest - 1
-    silent_s = 0.0
-    while True:
+    silent_s = checked_s = 0.0
+    while checked_s < RECHECK_S or entitled():
+        checked_s = PERIOD_S if checked_s >= RECHECK_S else checked_s + PERIOD_S
         try:
             events = feed.events.after(last)
         except EventsLost:

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import uvicorn
 from fastapi import FastAPI
+from starlette.requests import HTTPConnection
 
 from api.http import problems
-from api.http.access.rights import READ
+from api.http.access.rights import ENTITLED, READ
 from api.http.connection import server_settings
 from api.http.streams.events import EventLog
 from api.http.streams.feed import Feed
@@ -110,6 +111,8 @@ class PlayedService:
         self.bench: PlayedBench | None = None
         self.events = events or EventLog()
         self.port = free_port()
+        self.entitled = True
+        """Whether whoever looks on still may."""
         self._server: uvicorn.Server | None = None
 
     @contextlib.contextmanager
@@ -149,5 +152,9 @@ class PlayedService:
         self.feed = Feed(wiring, lambda: self.bench, self.events)
         app.include_router(build(Streams(wiring, self.feed, SESSION)))
         assert READ.dependency
-        app.dependency_overrides[READ.dependency] = lambda: None  # who may is tested in tests/api/access
+        app.dependency_overrides[READ.dependency] = self._let_in
         return app
+
+    def _let_in(self, connection: HTTPConnection) -> None:
+        """Everybody: who may is tested in tests/api/access."""
+        connection.scope[ENTITLED] = lambda: self.entitled

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from websockets.exceptions import ConnectionClosed
 
-from api.http.streams import batch
+from api.http.streams import batch, socket
 from tests.api.streams.foreign_client import ForeignClient
 from tests.api.streams.played import PlayedBench, PlayedService, force_N
 
@@ -187,3 +188,14 @@ def test_what_is_not_understood_is_said_and_the_rest_goes_on(
         assert word in answer["detail"]
         bench.play(100)
         client.until(lambda: client.streams["depth"].covered == 100)
+
+
+def test_whoever_may_not_look_on_any_more_is_told_so(service: PlayedService, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(socket, "RECHECK_S", 0.05)
+    with ForeignClient(service.port) as client:
+        client.subscribe("force")
+        service.entitled = False
+        with pytest.raises(ConnectionClosed) as closed:
+            client.until(lambda: False)
+        assert closed.value.rcvd
+        assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1008, socket.RIGHT_ENDED)
