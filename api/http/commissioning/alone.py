@@ -1,8 +1,10 @@
 """The service's side of a calibration, which has the devices to itself; what moves the axis is stopped as a run is."""
 
 import contextlib
+import os
 import re
 import threading
+import time
 from collections.abc import Callable, Iterator
 
 from api.http.commissioning.params import (
@@ -15,15 +17,18 @@ from api.http.jobs.job import Job
 from api.http.service import Service
 from api.operations.calibrate import refuse_axis
 from api.operations.calibrate_dynamics import sweep_asked
+from api.operations.calibrations import refuse_out
 from api.operations.glove import HEAVIEST_N
 from controller.experiments.glove import glove_of
+from controller.stop.word import Deed, Responder, StopWord
 from controller.supervisor import NOT_IN_CONTROL, Supervisor
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, SafetyStop, UsageError
 from rig.results.base import SavedResult
 
 OPTION = re.compile(r"--([a-z][a-z-]*)")
-# A tenth of a second after control is lost the axis brakes: two millimetres at the 20 mm/s of its homing.
+# A tenth of a second after control is lost the axis brakes: two millimetres at the 20 mm/s of its homing. Stops are
+# waited for five times as long.
 LOOK_S = 0.1
 RESTS = "a calibration has the devices, and nothing moves; connect when it has ended"
 MOVES = "a calibration has the devices and moves the axis, which every stop brakes; connect when it has ended"
@@ -38,6 +43,7 @@ def refuse_undoable(asked: object, wiring: Wiring, by_itself: bool) -> None:
 
 
 def _refuse(asked: object, wiring: Wiring, by_itself: bool) -> None:
+    refuse_out(None)
     match asked:
         case CalibrateForceParams():
             asked.up_to(wiring.limits.force_N, asked.load == "hung")
@@ -53,7 +59,7 @@ def _refuse(asked: object, wiring: Wiring, by_itself: bool) -> None:
 
 
 class Alone:
-    """A calibration while no loop runs; where the axis moves, service, other computers and foot switch reach it."""
+    """A calibration while no loop runs; stops of service, other computers and foot switch reach it all the same."""
 
     def __init__(self, service: Service, job: Job, moves_axis: bool) -> None:
         self._service, self._job, self._moves_axis = service, job, moves_axis
@@ -91,10 +97,8 @@ class Alone:
 
     @contextlib.contextmanager
     def _stoppable(self) -> Iterator[None]:
-        if not self._moves_axis:
-            yield
-            return
-        watching = threading.Thread(target=self._attend, name=f"attended-{self._job.id}", daemon=True)
+        looks_on = self._attend if self._moves_axis else self._hold
+        watching = threading.Thread(target=looks_on, name=f"attended-{self._job.id}", daemon=True)
         with self._service.stopping(self._stops):
             watching.start()
             try:
@@ -114,3 +118,14 @@ class Alone:
                 self._left = True
                 self._stop()
                 return
+
+    def _hold(self) -> None:
+        """Until it is over: answers each stop that nothing moves, and ends the job by it."""
+        with contextlib.closing(StopWord.open(self._stops.stop_path)) as page:
+            responder = Responder(page)
+            responder.attach(os.getpid())
+            while not self._over.wait(LOOK_S):
+                if responder.take(time.monotonic_ns()):
+                    responder.answer(Deed.HELD, time.monotonic_ns())
+                    self._job.stopped()
+                    self._job.give_up()

@@ -27,7 +27,7 @@ from api.operations.calibrate import (
 )
 from api.operations.calibrate import calibrate_force as measure
 from api.operations.calibrate_dynamics import axis_dynamics, sweep_asked, sweep_way
-from api.operations.calibrations import keep_glove, kept, refuse_out
+from api.operations.calibrations import keep_glove, kept
 from api.operations.glove import HEAVIEST_N, calibration_operation, finger_request
 from api.operations.glove import calibrate_glove as measure_glove
 from controller.experiments.glove import glove_of
@@ -59,7 +59,6 @@ def calibrated(
     rest: ReadingTime = BY_HAND,
 ) -> CalibrateResult:
     """The calibration under loads by ``put_on``, kept beside those of the command; CheckFailed says what is wrong."""
-    refuse_out(None)
     weights = asked.up_to(desk.wiring.limits.force_N, asked.load == "hung")
     found = measure(relayed(force_calibration_operation(weights), operation), desk.wiring, weights, put_on, rest)
     return kept(desk.wiring.calibration, found, None)
@@ -78,7 +77,6 @@ def glove_calibrated(
     rest: ReadingTime = BY_HAND,
 ) -> GloveCalibrated:
     """Likewise that of a glove."""
-    refuse_out(None)
     weights, (name, glove) = asked.up_to(HEAVIEST_N), glove_of(desk.wiring, asked.input)
     inner = relayed(calibration_operation(glove, weights), operation)
     found = measure_glove(inner, desk.wiring, name, weights, put_on, rest)
@@ -103,7 +101,6 @@ def axis_calibrated(
     begin: AxisStart,
 ) -> CalibrateResult:
     """The calibration against ``block``, which ``put`` lays there, or without one against the tracker; kept."""
-    refuse_out(None)
     if block:
         found = axis_by_block(operation, desk.wiring, asked.from_mm, block, put, begin)
     else:
@@ -128,7 +125,6 @@ def dynamics_found(
     operation: Operation, asked: CalibrateDynamicsParams, desk: Desk, begin: AxisStart
 ) -> CalibrateResult:
     """The dynamics, kept beside those of the command."""
-    refuse_out(None)
     return kept(desk.wiring.calibration, axis_dynamics(operation, desk.wiring, asked.from_mm, begin), None)
 
 

@@ -1,5 +1,10 @@
 """The force sensor calibrated by a job: refused before the loop ends, then the ports are its own, and nothing homes."""
 
+import http.client
+import json
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -7,6 +12,7 @@ from fastapi.testclient import TestClient
 
 from api.http.service import Service
 from mock_devices.testing.commands import until
+from rig.config.products.firmata_glove import FirmataGlove
 from tests.api.jobs import test_verbs
 from tests.api.jobs.asked import becomes, begun, ended
 from tests.api.jobs.test_verbs import WiredBench
@@ -61,6 +67,49 @@ def test_the_loop_ends_for_it_and_a_person_connects_again(
     assert ended(client, job)["state"] == "cancelled"
     until(lambda: "then connect" in client.get("/api/v1/rig").json()["reason"], 10.0, "the devices free again")
     assert service.bench is None, "nothing homes by itself beside a hand that took weights away"
+
+
+@pytest.mark.parametrize("kind", ["calibrate-force", "calibrate-glove", "calibrate-axis", "calibrate-dynamics"])
+def test_where_the_result_could_not_be_written_is_said_while_the_bench_goes_on(
+    client: TestClient, bench: WiredBench, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "calibration").write_text("")
+    params = {"calibrate-force": ASKED, "calibrate-glove": {"weights": "1 N,2 N"}}.get(kind, {})
+    refused = client.post("/api/v1/jobs", json={"kind": kind, "params": params})
+    assert refused.status_code == 422 and "is a file, not a folder" in refused.json()["detail"], refused.text
+    assert bench.alive
+
+
+def by_the_service(client: TestClient) -> str:
+    answer = client.post("/api/v1/estop")
+    assert answer.status_code == 200, answer.text
+    return str(answer.json()["detail"])
+
+
+def by_the_stop_process(client: TestClient) -> str:
+    port = client.get("/api/v1/info").json()["stop_port"]
+    with closing(http.client.HTTPConnection("127.0.0.1", port, timeout=10)) as asked:
+        asked.request("POST", "/pain")
+        answer = asked.getresponse()
+        assert answer.status == 200
+        return str(json.load(answer)["done"])
+
+
+@pytest.mark.parametrize("stopped", [by_the_service, by_the_stop_process])
+@pytest.mark.parametrize(("kind", "asked"), [("calibrate-force", ASKED), ("calibrate-glove", {"weights": "1 N,2 N"})])
+def test_a_stop_while_nothing_moves_says_so_and_ends_the_job(
+    client: TestClient, service: Service, bench: WiredBench, kind: str, asked: dict[str, Any],
+    stopped: Callable[[TestClient], str],
+) -> None:  # fmt: skip
+    service.wiring = service.wiring.model_copy(update={"input": {"hand": FirmataGlove()}})
+    service.works[kind] = PLANTED
+    job = begun(client, kind, **asked)
+    becomes(client, job, "paused")
+    assert stopped(client) == "nothing was moving: the axis stays where it is"
+    assert ended(client, job)["state"] == "cancelled"
+    until(lambda: client.get("/api/v1/info").json()["stop_port"] == 0, 10.0, "the end of the stop process")
+    assert client.post("/api/v1/estop").status_code == 503
 
 
 def test_a_sensor_that_is_not_there_is_named(client: TestClient, bench: WiredBench) -> None:
