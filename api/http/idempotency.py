@@ -7,7 +7,6 @@ again under the same key. Kept on disk: a service that ended in the middle does 
 import base64
 import hashlib
 import threading
-import time
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError
 
 from api.http.access.rights import CALLER, STOP
-from api.http.access.secrets import awake_s
+from api.http.access.secrets import steady_s
 from api.http.problems import RequestRefused
 from rig.recording.files import make_folder, write_text
 
@@ -29,12 +28,6 @@ LONGEST_KEY = 100
 REFUSED = 400
 SENT_AGAIN = ("location", "etag", "content-type")
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
-
-
-def steady_s() -> Callable[[], float]:
-    """The time of day, carried on by a clock that nobody sets: who sets the date makes no key be forgotten [s]."""
-    ahead_s = time.time() - awake_s()
-    return lambda: ahead_s + awake_s()
 
 
 class KeptAnswer(BaseModel):

@@ -75,6 +75,7 @@ class JobSummary(BaseModel):
     kind: str
     name: str
     state: JobState
+    seq: int = Field(default=0, description="grows with every job, whatever the clock was set to")
     moves: bool = Field(description="it uses the bench")
     by: str = Field(description="who started it")
     session: str | None = Field(default=None, description="the session it works on or records")

@@ -2,10 +2,10 @@
 
 import asyncio
 import contextlib
+import os
 import shutil
-import time
 import uuid
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -14,6 +14,7 @@ from pydantic import BaseModel, Field
 from python_multipart.exceptions import MultipartParseError
 from python_multipart.multipart import MultipartParser, parse_options_header
 
+from api.http.access.secrets import steady_s
 from api.http.jobs.places import UPLOAD
 from api.http.problems import RequestRefused
 from rig.recording.files import make_folder
@@ -29,6 +30,8 @@ MOST_FILES = 5000
 # Long enough for what studies call their files, short enough for every file system below our folder.
 LONGEST_NAME, DEEPEST = 200, 8
 KEPT_S = 7 * 24 * 3600.0
+# What a person is at work with stays, should a clock that was wrong at the start make it old: one or two at a time.
+NEWEST_KEPT = 3
 # A sender that is silent for longer has been left.
 SILENT_S = 30.0
 # Written in one go: a thread's turn for each of the server's pieces would take longer than the disk.
@@ -53,10 +56,11 @@ class UploadView(BaseModel):
 
 
 class UploadShelf:
-    """Uploads below ``root``, each a folder; those older than a week go with the next one."""
+    """Uploads below ``root``, each a folder; those older than a week and not ``in_use`` go with the next one."""
 
-    def __init__(self, root: Path) -> None:
-        self._root = root
+    def __init__(self, root: Path, in_use: Callable[[str], bool] = lambda _: False) -> None:
+        self._root, self._in_use, self._now_s = root, in_use, steady_s()
+        self._coming: set[str] = set()
 
     async def receive(self, content_type: str, stated: int, pieces: AsyncIterator[bytes]) -> UploadView:
         """Everything of one body of multipart/form-data; raises RequestRefused, and then nothing is left of it."""
@@ -71,12 +75,15 @@ class UploadShelf:
         identifier = uuid.uuid4().hex[:12]
         scratch = self._root / f".{identifier}.part"
         scratch.mkdir()
+        self._coming.add(scratch.name)
         try:
             left_out = await _written(boundary, pieces, scratch)
             if not any(scratch.rglob("*")):
                 raise RequestRefused(422, "no-files", "no file came: send each as a part with a filename")
+            os.utime(scratch, (self._now_s(),) * 2)
             scratch.rename(self._root / identifier)
         finally:
+            self._coming.remove(scratch.name)
             shutil.rmtree(scratch, ignore_errors=True)
         return self.view(identifier).model_copy(update={"left_out": left_out})
 
@@ -99,17 +106,17 @@ class UploadShelf:
         shown = (self.view(name) for name in names if UPLOAD.fullmatch(name))
         return sorted(shown, key=lambda one: one.at, reverse=True)
 
-    def remove(self, identifier: str) -> UploadView:
-        """Removes one."""
-        gone = self.view(identifier)
+    def remove(self, identifier: str) -> None:
+        """Removes one that was looked at."""
         shutil.rmtree(self._root / identifier)
-        return gone
 
     def _prune(self) -> None:
-        for folder in self._root.iterdir():
-            with contextlib.suppress(OSError):
-                if time.time() - folder.stat().st_mtime > KEPT_S:
-                    shutil.rmtree(folder)
+        with contextlib.suppress(OSError):  # where another removes one meanwhile, the next upload goes on
+            folders = sorted((folder.stat().st_mtime, folder) for folder in self._root.iterdir())
+            for at_s, folder in folders[:-NEWEST_KEPT]:
+                held = folder.name in self._coming or self._in_use(folder.name)
+                if self._now_s() - at_s > KEPT_S and not held:
+                    shutil.rmtree(folder, ignore_errors=True)
 
 
 async def _written(boundary: bytes, pieces: AsyncIterator[bytes], folder: Path) -> list[str]:

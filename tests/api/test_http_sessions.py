@@ -9,8 +9,13 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api.http.access.scopes import Scope
+from api.http.cohorts.params import FitCohortParams
+from api.http.jobs.kinds import KINDS
+from api.http.jobs.params import FitParams, ModelRef, SimulateParams
+from api.http.models import RequestBody
 from api.http.routes import sessions
 from api.http.service import Service
+from controller.operation import Operation
 from mock_devices.testing.access import bearer
 from rig.recording.reader import read_recording
 from tests.api.catalogue.made import fitted, make_session
@@ -115,6 +120,24 @@ def test_a_session_that_is_worked_on_is_not_erased(client: TestClient, service: 
     refused = client.delete(f"{API}/first")
     assert (refused.status_code, refused.json()["code"]) == (409, "busy") and first.is_dir()
     client.post(f"/api/v1/jobs/{job}/cancel")
+
+
+@pytest.mark.parametrize(
+    ("kind", "asked"),
+    [
+        ("fit", FitParams(sessions=["other", "first"])),
+        ("fit-cohort", FitCohortParams(sessions=["other", "first"])),
+        ("simulate", SimulateParams(model=ModelRef(session="first"), reference="press:3")),
+    ],
+)
+def test_a_session_that_one_of_several_or_a_model_is_of_is_not_erased(
+    client: TestClient, service: Service, first: Path, kind: str, asked: RequestBody
+) -> None:
+    make_session(service.sessions, "free")
+    service.jobs._enter(service.jobs.new(KINDS[kind], asked, "Ann", None, Operation(kind)))
+    refused = client.delete(f"{API}/first")
+    assert (refused.status_code, refused.json()["code"]) == (409, "busy") and first.is_dir()
+    assert client.delete(f"{API}/free").status_code == 202
 
 
 def test_one_protocol_that_cannot_be_read_is_listed_with_its_error_and_the_others_stay(

@@ -1,6 +1,7 @@
 """Files are sent in parts, written whole or not at all, and imported from there."""
 
 import asyncio
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,12 @@ from fastapi.testclient import TestClient
 
 from api.http import uploads
 from api.http.access.scopes import Scope
+from api.http.jobs.kinds import KINDS
+from api.http.jobs.params import ProposeParams
 from api.http.problems import RequestRefused
 from api.http.service import Service
 from api.http.uploads import UploadShelf
+from controller.operation import Operation
 from mock_devices.testing.access import bearer, client_of
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.wiring import Wiring
@@ -54,8 +58,28 @@ def test_files_are_kept_as_they_were_sent_with_their_folders(client: TestClient,
     assert (found["bytes"], found["left_out"]) == (len(binary) + 4, [".DS_Store"])
     assert (service.jobs.uploads / found["id"] / "force" / "b ü.bin").read_bytes() == binary
     assert client.get(ROUTE).json() == [{**found, "left_out": []}]
-    assert client.delete(f"{ROUTE}/{found['id']}").status_code == 200
-    assert client.get(f"{ROUTE}/{found['id']}").status_code == 404 and left(service) == []
+
+
+def test_an_upload_is_removed_in_two_steps(client: TestClient, service: Service) -> None:
+    place = f"{ROUTE}/{sent(client, {'a.csv': b'1,2'}).json()['id']}"
+    asked = client.delete(place)
+    assert (asked.status_code, asked.json()["done"], asked.json()["bytes"]) == (202, False, 3)
+    wrong = client.delete(f"{place}?confirm=nonsense")
+    assert (wrong.status_code, wrong.json()["code"]) == (409, "stale")
+    (next(service.jobs.uploads.iterdir()) / "more.csv").write_text("something came meanwhile")
+    late = client.delete(f"{place}?confirm={asked.json()['confirm']}")
+    assert late.status_code == 409 and client.get(place).status_code == 200
+    done = client.delete(f"{place}?confirm={client.delete(place).json()['confirm']}")
+    assert (done.status_code, done.json()["done"], done.json()["confirm"]) == (200, True, "")
+    assert client.delete(place).status_code == client.get(place).status_code == 404 and left(service) == []
+
+
+def test_an_upload_that_is_worked_on_is_not_removed(client: TestClient, service: Service) -> None:
+    upload = sent(client, {"a.csv": b"1,2"}).json()["id"]
+    job = service.jobs.new(KINDS["propose"], ProposeParams(upload=upload), "Ann", None, Operation("propose"))
+    service.jobs._enter(job)
+    refused = client.delete(f"{ROUTE}/{upload}")
+    assert (refused.status_code, refused.json()["code"], left(service)) == (409, "busy", [upload])
 
 
 @pytest.mark.parametrize(
@@ -136,7 +160,66 @@ def test_what_is_older_than_a_week_goes(client: TestClient, monkeypatch: pytest.
     assert client.get(f"{ROUTE}/{first}").status_code == 200
     monkeypatch.setattr(uploads, "KEPT_S", -1.0)
     sent(client, {"a": b"1"})
+    assert client.get(f"{ROUTE}/{first}").status_code == 200, "one of those that came last"
+    monkeypatch.setattr(uploads, "NEWEST_KEPT", 1)
+    sent(client, {"a": b"1"})
     assert client.get(f"{ROUTE}/{first}").status_code == 404
+
+
+BODY = b'--x\r\nContent-Disposition: form-data; name="file"; filename="a"\r\n\r\nab\r\n--x--\r\n'
+YEAR_S = 365 * 24 * 3600.0
+
+
+async def whole() -> AsyncIterator[bytes]:
+    yield BODY
+
+
+async def put(shelf: UploadShelf, pieces: AsyncIterator[bytes] | None = None) -> str:
+    return (await shelf.receive("multipart/form-data; boundary=x", 0, pieces or whole())).id
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Age alone decides of all but the newest."""
+    monkeypatch.setattr(uploads, "NEWEST_KEPT", 1)
+
+
+@pytest.mark.usefixtures("few")
+def test_a_clock_that_was_set_forward_takes_no_upload(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shelf, real = UploadShelf(tmp_path / "u"), time.time
+    first = asyncio.run(put(shelf))
+    monkeypatch.setattr(time, "time", lambda: real() + YEAR_S)
+    others = [asyncio.run(put(shelf)) for _ in range(2)]
+    assert {one.id for one in shelf.listed()} == {first, *others}
+
+
+@pytest.mark.usefixtures("few")
+def test_a_clock_that_was_set_back_makes_no_new_upload_old(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shelf = UploadShelf(tmp_path / "u")
+    # The system stamps what is made now as a year old.
+    monkeypatch.setattr(shelf, "_now_s", lambda: time.time() + YEAR_S)
+    made = [asyncio.run(put(shelf)) for _ in range(3)]
+    assert {one.id for one in shelf.listed()} == set(made)
+
+
+@pytest.mark.usefixtures("few")
+def test_what_is_worked_on_or_just_comes_stays_however_old_it_seems(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(uploads, "KEPT_S", -1.0)
+    used = list[str]()
+    shelf = UploadShelf(tmp_path / "u", lambda identifier: identifier in used)
+    used.append(asyncio.run(put(shelf)))
+
+    async def slow() -> AsyncIterator[bytes]:
+        head, end = BODY.split(b"ab")
+        yield head + b"a" * uploads.WRITTEN_BYTES  # so much that it is written at once
+        for _ in range(3):
+            await put(shelf)
+        yield end
+
+    late = asyncio.run(put(shelf, slow()))
+    assert {used[0], late} <= {one.id for one in shelf.listed()}
 
 
 def test_an_upload_becomes_a_session(client: TestClient, tmp_path: Path) -> None:

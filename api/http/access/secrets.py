@@ -7,7 +7,7 @@ import hashlib
 import hmac
 import secrets
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 BYTES = 32
 TOKEN_MARK = "rig_"  # so that a scanner for leaked secrets can tell what it found
@@ -35,3 +35,9 @@ def position(secret: str, digests: Iterable[str]) -> int | None:
 def awake_s() -> float:
     """A clock for how long something lasts [s]: nobody sets it, and it goes on while the computer sleeps."""
     return time.clock_gettime(time.CLOCK_BOOTTIME)
+
+
+def steady_s() -> Callable[[], float]:
+    """The time of day, carried on by a clock that nobody sets: who sets the date makes nothing be forgotten [s]."""
+    ahead_s = time.time() - awake_s()
+    return lambda: ahead_s + awake_s()

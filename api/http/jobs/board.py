@@ -15,7 +15,7 @@ from api.catalogue.pages import Page, cut
 from api.http.jobs.job import Job, JobRequest, ended_already, stamp
 from api.http.jobs.kinds import Kind
 from api.http.jobs.places import Places
-from api.http.jobs.store import JobStore
+from api.http.jobs.store import JobStore, place
 from api.http.jobs.views import JobList, JobView, files_of, summary, view
 from api.http.models import JobSummary, RequestBody
 from api.http.problems import RequestRefused
@@ -112,7 +112,8 @@ class JobBoard:
         return job
 
     def _enter(self, job: Job) -> None:
-        self._known()
+        known = [one.seq for one in self._known().values()] + [one.seq for one in self._live.values()]
+        job.seq = 1 + max(known, default=0)
         self._store.hold(job.id)
         self._live[job.id] = job
         self._changed(job)
@@ -241,7 +242,7 @@ class JobBoard:
                 **self._known(), **{job.id: summary(job) for job in self._live.values()},
             }  # fmt: skip
         found = filter(wanted.fits, everything.values())
-        items, following = cut(page, "jobs", found, lambda job: (job.created, job.id), newest_first=True)
+        items, following = cut(page, "jobs", found, place, newest_first=True)
         return JobList(items=items, next=following)
 
     def close(self) -> None:

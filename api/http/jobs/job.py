@@ -66,6 +66,8 @@ class Job:
     operation: Operation
     changed: Callable[["Job"], None]
     lease: str = ""
+    seq: int = 0
+    """Grows with every job."""
     interrupt: Callable[[], None] = lambda: None
     """Ends what is under way: stops the bench, or the process that computes."""
     give_up: Callable[[], None] = lambda: None
@@ -88,6 +90,13 @@ class Job:
     def progress(self) -> Progress:
         """How it stands."""
         return self.operation.progress
+
+    def works_on(self, session: str) -> bool:
+        """Whether it needs that session: as its own, as one of several, or for a model."""
+        asked = self.asked.params
+        models = [value.get("session") for value in asked.values() if isinstance(value, dict)]
+        several = asked.get("sessions")
+        return session in (self.asked.session, *models, *(several if isinstance(several, list) else ()))
 
     @property
     def ended(self) -> bool:

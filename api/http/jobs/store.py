@@ -5,9 +5,10 @@ import fcntl
 import json
 import os
 import shutil
-import time
 from pathlib import Path
 
+from api.catalogue.pages import Place
+from api.http.access.secrets import steady_s
 from api.http.jobs.job import stamp
 from api.http.jobs.views import FILES, JobView
 from api.http.models import JobProblem, JobSummary
@@ -28,6 +29,9 @@ class JobStore:
     def __init__(self, root: Path) -> None:
         self.root = root
         self._locks: dict[str, int] = {}
+        self._now_s = steady_s()
+        self._ended_s: dict[str, float] = {}
+        """When those ended that this service has seen."""
 
     def folder(self, identifier: str) -> Path:
         """That of one job."""
@@ -51,6 +55,7 @@ class JobStore:
 
     def let_go(self, identifier: str) -> None:
         """The job has ended."""
+        self._ended_s[identifier] = self._now_s()
         fd = self._locks.pop(identifier, None)
         if fd is not None:
             os.close(fd)
@@ -86,15 +91,20 @@ class JobStore:
 
     def prune(self, jobs: dict[str, JobSummary]) -> None:
         """Forgets the oldest beyond what is kept, and their files sooner."""
-        newest = sorted(jobs.values(), key=lambda job: (job.created, job.id), reverse=True)
+        newest = sorted(jobs.values(), key=place, reverse=True)
         for job in newest[MOST_JOBS:]:
             del jobs[job.id]
             shutil.rmtree(self.folder(job.id), ignore_errors=True)
         for job in newest[:MOST_JOBS]:
             folder = self.files(job.id)
             with contextlib.suppress(OSError):
-                if time.time() - folder.stat().st_mtime > FILES_KEPT_S:
+                if self._now_s() - self._ended_s.get(job.id, folder.stat().st_mtime) > FILES_KEPT_S:
                     shutil.rmtree(folder, ignore_errors=True)
+
+
+def place(job: JobSummary) -> Place:
+    """In the order in which they were asked for, whatever the clock said."""
+    return f"{job.seq:012} {job.created}", job.id
 
 
 def _abandoned(lock: Path) -> bool:

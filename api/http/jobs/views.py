@@ -60,9 +60,9 @@ def _facts(job: Job) -> dict[str, object]:
     done = now.total if job.state == "succeeded" else now.done
     said = job.request or (wrong.detail if wrong else now.message)
     return {
-        "id": job.id, "kind": asked.kind, "name": now.name, "state": job.state, "moves": asked.moves, "by": asked.by,
-        "session": asked.session, "created": times.created, "started": times.started, "ended": times.ended,
-        "done": done, "total": now.total, "unit": now.unit, "message": said, "can": list(job.can),
+        "id": job.id, "kind": asked.kind, "name": now.name, "state": job.state, "seq": job.seq, "moves": asked.moves,
+        "by": asked.by, "session": asked.session, "created": times.created, "started": times.started,
+        "ended": times.ended, "done": done, "total": now.total, "unit": now.unit, "message": said, "can": list(job.can),
         "time_left_s": None if job.ended else now.time_left_s,
         "problem": JobProblem(code=wrong.code, detail=wrong.detail) if wrong else None,
     }  # fmt: skip

@@ -1,13 +1,12 @@
 """Sessions: looked at, taken away in every format, and erased in two steps."""
 
 import asyncio
-import hashlib
 import shutil
 from collections.abc import Coroutine
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Response
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 
@@ -15,15 +14,14 @@ from api.catalogue.erasing import put_aside
 from api.http import views
 from api.http.access.rights import ADMIN, OPERATE, READ
 from api.http.downloads import FileAsOfNow
+from api.http.erasing import Confirm, SessionErasure, state_of, to_confirm
 from api.http.jobs.kinds import ExportJob
 from api.http.jobs.params import ExportParams
-from api.http.jobs.places import PlaceRefused
 from api.http.jobs.start import start
 from api.http.jobs.views import FILE_TYPES, FileView, listed_files, media_type
 from api.http.models import SessionView
 from api.http.problems import RequestRefused, responses
 from api.http.service import Service
-from rig.results.base import SavedResult
 
 Format = Literal["csv", "parquet", "hdf5", "mat", "mcap"]
 NAMES = {"csv": "csv", "parquet": "parquet", "hdf5": "session.h5", "mat": "session.mat"}
@@ -37,16 +35,6 @@ class SessionFiles(SessionView):
     """A session with everything in its folder, also what was found in it."""
 
     files: list[FileView]
-
-
-class SessionErasure(SavedResult):
-    """What an erasure takes, or has taken once it is ``done``; ``confirm`` is what the second step asks for."""
-
-    session: str
-    done: bool
-    files: int
-    bytes: int
-    confirm: str = Field(default="", description="good as long as nothing in the session changes")
 
 
 class ExportUnderWay(BaseModel):
@@ -92,9 +80,9 @@ def _exports(router: APIRouter, service: Service) -> None:
     )
     async def export(session: str, form: Format) -> Response:
         folder = service.session(session)
-        file = service.jobs.folder / "exports" / f"{_state(folder)}.{form}.zip"
+        file = service.jobs.folder / "exports" / f"{state_of(folder)}.{form}.zip"
         if form not in FOLDERS and form != "mcap":
-            file = file.with_name(f"{_state(folder)}.{NAMES[form]}")
+            file = file.with_name(f"{state_of(folder)}.{NAMES[form]}")
         if not file.is_file():
             making = _made(service, session, form, file)
             if not await _awaited(under_way, file, making):
@@ -140,15 +128,6 @@ def _zipped(folder: Path, file: Path) -> None:
     Path(scratch).replace(file)
 
 
-def _state(folder: Path) -> str:
-    """Another content, another name."""
-    found = sorted(
-        (path.relative_to(folder).as_posix(), *(path.lstat()[at] for at in (6, 8)), path.lstat().st_mtime_ns)
-        for path in folder.rglob("*")
-    )
-    return hashlib.sha256(repr((str(folder), found)).encode()).hexdigest()[:24]
-
-
 def _erasure(router: APIRouter, service: Service) -> None:
     @router.delete(
         "/sessions/{session}",
@@ -156,19 +135,15 @@ def _erasure(router: APIRouter, service: Service) -> None:
         summary="First says what would be erased, with 202; with what that says as `confirm` it is erased",
         responses={202: {"model": SessionErasure}, **responses("404 no-such-session", "409 busy", "409 stale")},
     )
-    def erase(session: str, response: Response, confirm: Annotated[str, Query(max_length=100)] = "") -> SessionErasure:
+    def erase(session: str, response: Response, confirm: Confirm = "") -> SessionErasure:
         folder = service.session(session)
-        if any(job.asked.session == session for job in service.jobs.active):
+        if any(job.works_on(session) for job in service.jobs.active):
             raise RequestRefused(409, "busy", f"a job works on session {session}; cancel it or wait")
-        token, files = _state(folder), [path for path in folder.rglob("*") if path.is_file()]
+        token = to_confirm(f"session {session}", folder, confirm, response)
+        files = [path for path in folder.rglob("*") if path.is_file()]
         size = sum(path.lstat().st_size for path in files)
-        found = SessionErasure(session=session, done=False, files=len(files), bytes=size, confirm=token)
-        if not confirm:
-            response.status_code = 202
-            return found
-        if confirm != token:
-            text = f"session {session} has changed since, or that is not what the first step said; ask again without it"
-            raise PlaceRefused(409, "stale", text)
-        with put_aside(service.sessions, [session]):
-            pass
-        return found.model_copy(update={"done": True, "confirm": ""})
+        found = SessionErasure(session=session, done=not token, files=len(files), bytes=size, confirm=token)
+        if not token:
+            with put_aside(service.sessions, [session]):
+                pass
+        return found

@@ -1,9 +1,10 @@
 """Files that are sent to be imported."""
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Request, Response
 
 from api.http.access.rights import OPERATE, READ, upload
 from api.http.access.scopes import Scope
+from api.http.erasing import Confirm, UploadErasure, to_confirm
 from api.http.problems import RequestRefused, responses
 from api.http.service import Service
 from api.http.uploads import LARGEST_UPLOAD_BYTES, UploadShelf, UploadView
@@ -14,7 +15,11 @@ BODY = {"type": "object", "properties": {"file": FILES}, "required": ["file"]}
 
 def add(router: APIRouter, service: Service) -> None:
     """Its routes."""
-    shelf = UploadShelf(service.jobs.uploads)
+
+    def in_use(identifier: str) -> bool:
+        return any(job.asked.params.get("upload") == identifier for job in service.jobs.active)
+
+    shelf = UploadShelf(service.jobs.uploads, in_use)
 
     @router.post(
         "/uploads",
@@ -41,10 +46,14 @@ def add(router: APIRouter, service: Service) -> None:
     @router.delete(
         "/uploads/{identifier}",
         dependencies=[OPERATE],
-        summary="Removes an upload",
-        responses=responses("404 no-such-upload", "409 busy"),
+        summary="First says what would be removed, with 202; with what that says as `confirm` it is removed",
+        responses={202: {"model": UploadErasure}, **responses("404 no-such-upload", "409 busy", "409 stale")},
     )
-    def remove(identifier: str) -> UploadView:
-        if any(job.asked.params.get("upload") == identifier for job in service.jobs.active):
+    def remove(identifier: str, response: Response, confirm: Confirm = "") -> UploadErasure:
+        if in_use(identifier):
             raise RequestRefused(409, "busy", "a job works on it; cancel that first")
-        return shelf.remove(identifier)
+        found = shelf.view(identifier)
+        token = to_confirm(f"upload {identifier}", service.jobs.uploads / identifier, confirm, response)
+        if not token:
+            shelf.remove(identifier)
+        return UploadErasure(**vars(found), done=not token, confirm=token)

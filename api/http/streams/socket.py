@@ -17,10 +17,6 @@ OVERFLOW = 4008
 RIGHT_ENDED = "the right to look on has ended; log in, or take another token"
 
 
-class RightEnded(Exception):
-    """Whoever looks on may not any more."""
-
-
 async def serve(socket: WebSocket, streams: Streams) -> None:
     """One connection, from its first to its last message."""
     if PROTOCOL not in socket.scope["subprotocols"]:
@@ -35,7 +31,7 @@ async def serve(socket: WebSocket, streams: Streams) -> None:
         sending = _send(socket, client, turn, streams.feed.turn)
         try:
             await _first(sending, _take(socket, client, turn), _entitled(socket.scope[ENTITLED]))
-        except RightEnded:
+        except PermissionError:
             await socket.close(POLICY, RIGHT_ENDED)
 
 
@@ -78,10 +74,10 @@ async def _take(socket: WebSocket, client: LiveClient, turn: asyncio.Lock) -> No
 
 
 async def _entitled(entitled: Callable[[], bool]) -> None:
-    """For as long as they are."""
+    """For as long as they are; then raises PermissionError."""
     while entitled():
         await asyncio.sleep(RECHECK_S)
-    raise RightEnded
+    raise PermissionError(RIGHT_ENDED)
 
 
 async def _said(socket: WebSocket, said: Spoken | bytes) -> None:

@@ -1,15 +1,19 @@
 """Jobs are listed page by page, outlast the service, and none is left as if it still ran."""
 
 import json
+import os
 import threading
+import time
 from functools import partial
 from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
 
+from api.catalogue.pages import Page
 from api.http.jobs import board, store
-from api.http.jobs.board import JobBoard
+from api.http.jobs import job as job_module
+from api.http.jobs.board import Filter, JobBoard
 from api.http.jobs.kinds import KINDS
 from api.http.jobs.params import VerifyParams
 from api.http.service import Service
@@ -99,6 +103,33 @@ def test_the_oldest_are_forgotten_with_their_files(jobs: JobBoard, monkeypatch: 
     names = [made(jobs) for _ in range(5)]
     assert set(jobs._known()) == set(names[2:])
     assert {path.name for path in jobs.folder.iterdir()} == set(names[2:])
+
+
+def test_a_clock_that_was_set_back_makes_no_new_job_the_oldest(jobs: JobBoard, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "MOST_JOBS", 3)
+    before = [made(jobs) for _ in range(3)]
+    monkeypatch.setattr(job_module, "stamp", lambda: "1970-01-01T00:00:00.000000Z")
+    board, now = jobs, [before[2]]
+    for _ in range(2):
+        board = again(board)  # and so across a start of the service
+        now.append(made(board))
+    assert set(board._known()) == set(now)
+    assert [job.id for job in board.listed(Filter(), Page()).items] == now[::-1]
+
+
+def test_a_clock_that_was_set_forward_takes_no_files(jobs: JobBoard, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = made(jobs)
+    jobs.files(first).mkdir()
+    real = time.time
+    monkeypatch.setattr(time, "time", lambda: real() + 2 * store.FILES_KEPT_S)
+    made(jobs)
+    assert jobs.files(first).is_dir()
+    last, seen = made(jobs), jobs._store._now_s()
+    jobs.files(last).mkdir()
+    os.utime(jobs.files(last), (0, 0))  # as the system says where its clock was set back
+    monkeypatch.setattr(jobs._store, "_now_s", lambda: seen)
+    made(jobs)
+    assert jobs.files(last).is_dir()
 
 
 def test_files_go_before_their_job_does(jobs: JobBoard, monkeypatch: pytest.MonkeyPatch) -> None:
