@@ -65,6 +65,25 @@ def test_what_units_start_is_what_the_command_takes() -> None:
         get_command(build("serve")).commands["serve"].make_context("serve", words)  # type: ignore[attr-defined]
 
 
+def not_absolute(text: str) -> list[str]:
+    """Of what the bench's account runs: places that depend on where the person stands who types it."""
+    found = list[str]()
+    for line in re.findall(r"^sudo -u rig \S+/rig (.+)$", text, re.MULTILINE):
+        name, *words = line.split()
+        command = get_command(build(name)).commands[name]  # type: ignore[attr-defined]
+        given = command.make_context(name, words).params
+        places = [place for place in given.values() if isinstance(place, Path)]
+        found += [f"{name}: {place}" for place in places if not place.is_absolute()]
+    return found
+
+
+def test_what_the_account_of_the_bench_runs_is_right_wherever_it_is_typed() -> None:
+    text = PAGE.read_text()
+    assert text.count("\nsudo -u rig ") >= 2 and not_absolute(text) == []
+    planted = "sudo -u rig /opt/tissue-rig/bin/rig catalogue backup names.json\n"
+    assert not_absolute(planted) == ["catalogue: names.json", "catalogue: sessions"]
+
+
 def test_the_unit_grants_what_the_loop_asks_for_and_homes_nothing_by_itself() -> None:
     (granted,) = re.findall(r"^LimitRTPRIO=(\d+)$", UNIT, re.MULTILINE)
     assert int(granted) > Wiring().loop.priority
