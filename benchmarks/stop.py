@@ -8,11 +8,11 @@ granted: what counts is the stop, not how long a busy computer keeps a benchmark
 """
 
 import argparse
+import asyncio
 import contextlib
 import http.client
 import json
 import os
-import selectors
 import signal
 import socket
 import subprocess
@@ -25,11 +25,12 @@ from pathlib import Path
 
 import numpy as np
 
-from mock_devices.testing.access import bearer
+from benchmarks.service.clients import watching
+from mock_devices.testing.access import bearer, token
 from mock_devices.testing.commands import RIG, ROOT, ServedBench, free_port, served_bench
 from rig.recording.files import write_text
 
-STREAMS, REQUESTS_HZ, LISTING_EVERY = 50, 200, 10
+REQUESTS_HZ, LISTING_EVERY = 200, 10
 BODY_BYTES, CHUNK = 1_000_000_000, 65_536
 SETTLING_S = 2.0
 GOAL_P99_MS = 20.0
@@ -160,7 +161,7 @@ def put_under_load(port: int) -> int:
     threading.Thread(target=_send_bodies, args=(port,), daemon=True).start()
     for _ in range(4):
         threading.Thread(target=_ask, args=(port, REQUESTS_HZ / 4), daemon=True).start()
-    _drain_streams(port)
+    asyncio.run(watching(port, token()))
     return 0
 
 
@@ -190,20 +191,6 @@ def _ask(port: int, rate_Hz: float) -> None:
             client.request("GET", path, headers=bearer())
             client.getresponse().read()
             client.close()
-
-
-def _drain_streams(port: int) -> None:
-    with selectors.DefaultSelector() as selector:
-        for _ in range(STREAMS):
-            client = socket.create_connection(("127.0.0.1", port), 10)
-            client.sendall(_head("GET /api/v1/live", port))
-            client.setblocking(False)
-            selector.register(client, selectors.EVENT_READ)
-        while True:
-            for key, _ in selector.select(1.0):
-                with contextlib.suppress(OSError):
-                    if isinstance(key.fileobj, socket.socket) and not key.fileobj.recv(CHUNK):
-                        selector.unregister(key.fileobj)
 
 
 if __name__ == "__main__":

@@ -69,6 +69,12 @@ async def _loaded(port: int, token: str) -> Load:
     return load
 
 
+async def watching(port: int, token: str) -> None:
+    """The WebSockets alone, for ever."""
+    load = Load()
+    await asyncio.gather(*(_again(load, _watch(load, port, token, number)) for number in range(LIVE)))
+
+
 async def _again(load: Load, part: Callable[[], Awaitable[None]]) -> None:
     """A client that is thrown out comes back, and is counted."""
     while True:

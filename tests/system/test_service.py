@@ -187,12 +187,3 @@ def test_a_user_who_does_not_renew_the_lease_is_retracted_from(
     taken = client.post("/api/v1/control/lease", json={"holder": "the next one", "ttl_s": 30.0})
     client.headers["X-Control-Lease"] = taken.json()["lease_id"]
     reset(client)
-
-
-def test_live_values_come_as_server_sent_events(served: tuple[ServedBench, TestClient, Path]) -> None:
-    _, client, _ = served
-    app = client.app
-    assert app is not None
-    schema = client.get("/api/v1/openapi.json").json()
-    assert "text/event-stream" in schema["paths"]["/api/v1/live"]["get"]["responses"]["200"]["content"]
-    assert client.get("/api/v1/rig").json()["mode"] == "idle"

@@ -3,13 +3,11 @@
 import time
 
 from fastapi import APIRouter, Request, Response
-from fastapi.responses import StreamingResponse
 
 import rig
 from api.http import views
 from api.http.access.rights import CALLER, OPERATE, PUBLIC, READ
 from api.http.capabilities import capabilities_of
-from api.http.live import Broadcast
 from api.http.models import Info, RigView
 from api.http.problems import RequestRefused, responses
 from api.http.routes.common import KeyHeader, LeaseHeader, refuse_without_key
@@ -18,8 +16,6 @@ from api.http.service import Service
 
 def add(router: APIRouter, service: Service) -> None:
     """Its routes."""
-    broadcast = Broadcast(lambda: views.rig(service).model_dump_json())
-
     capabilities = capabilities_of(service.wiring)
 
     @router.get("/info", dependencies=[PUBLIC], response_model=Info, summary="Who this service is, and what it can do")
@@ -53,13 +49,3 @@ def add(router: APIRouter, service: Service) -> None:
             raise RequestRefused(409, "busy", "a job is under way")
         service.connect(lease)
         return views.rig(service)
-
-    @router.get(
-        "/live",
-        dependencies=[READ],
-        summary="The bench twenty times a second as server-sent events; a slow reader gets the newest",
-        response_class=StreamingResponse,
-        responses={200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
-    )
-    async def live() -> StreamingResponse:
-        return StreamingResponse(broadcast.stream(), media_type="text/event-stream")

@@ -21,7 +21,7 @@ OPEN = {
     "/", "/page", "/api/v1/info", "/api/v1/auth/login", "/api/v1/auth/ticket", "/api/v1/problems/{code}",
 }  # fmt: skip
 STOPS = {"/api/v1/estop", "/api/v1/pain", "/api/v1/jobs/{identifier}/cancel"}
-ENDLESS = {"/api/v1/live", "/api/v1/events"}
+ENDLESS = {"/api/v1/events"}
 REFUSED = {"no-credential", "scope", "no-right", "origin", "host"}
 
 
