@@ -10,6 +10,7 @@ from fastapi.testclient import TestClient
 
 from api.http.access.scopes import Scope
 from api.http.cohorts.params import FitCohortParams
+from api.http.jobs import views as job_views
 from api.http.jobs.kinds import KINDS
 from api.http.jobs.params import FitParams, ModelRef, SimulateParams
 from api.http.models import RequestBody
@@ -46,6 +47,17 @@ def test_a_session_is_shown_with_what_was_found_in_it(client: TestClient, servic
     assert answer.content == (service.sessions / "first" / "fit" / "model.json").read_bytes()
     for wrong in ("none", "..", "%2e%2e", "..%2Ffirst"):
         assert client.get(f"{API}/{wrong}").status_code == 404
+
+
+def test_how_many_files_are_not_listed_is_said(
+    client: TestClient, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_session(service.sessions, "first")
+    whole = client.get(f"{API}/first").json()
+    assert len(whole["files"]) > 1 and whole["files_left_out"] == 0
+    monkeypatch.setattr(job_views, "MOST_FILES", 1)
+    part = client.get(f"{API}/first").json()
+    assert (len(part["files"]), part["files_left_out"]) == (1, len(whole["files"]) - 1)
 
 
 def test_a_page_in_a_session_is_shown_without_any_right_and_everything_else_is_only_saved(

@@ -86,9 +86,10 @@ def files_of(job: Job, session: Path | None, own: Path) -> list[FileView]:
     return found[:MOST_FILES]
 
 
-def listed_files(session: Path, name: str) -> list[FileView]:
-    """All files of a session."""
-    return _listed(session, f"/api/v1/recordings/{quote(name, safe='')}/", "", 0)[:MOST_FILES]
+def listed_files(session: Path, name: str) -> tuple[list[FileView], int]:
+    """The files of a session, and how many more there are than are listed."""
+    found = _listed(session, f"/api/v1/recordings/{quote(name, safe='')}/", "", 0)
+    return found[:MOST_FILES], max(len(found) - MOST_FILES, 0)
 
 
 def _listed(folder: Path, href: str, prefix: str, since_ns: int) -> list[FileView]:

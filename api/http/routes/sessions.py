@@ -35,6 +35,7 @@ class SessionFiles(SessionView):
     """A session with everything in its folder, also what was found in it."""
 
     files: list[FileView]
+    files_left_out: int = Field(default=0, description="how many more the folder has")
 
 
 class ExportUnderWay(BaseModel):
@@ -61,7 +62,8 @@ def _looks(router: APIRouter, service: Service) -> None:
     )
     def one(session: str) -> SessionFiles:
         folder = service.session(session)
-        return SessionFiles(**vars(views.session(folder)), files=listed_files(folder, session))
+        files, more = listed_files(folder, session)
+        return SessionFiles(**vars(views.session(folder)), files=files, files_left_out=more)
 
 
 def _exports(router: APIRouter, service: Service) -> None:
