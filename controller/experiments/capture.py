@@ -71,6 +71,8 @@ def capture(bench: Supervisor, protocol: Indentation, folder: Path, operation: O
         for attempt in attempts(trial, protocol.quality.repeats):
             operation.advance(trial.index - 1, f"{attempt.name}, {trial.speed_mm_s:g} mm/s")
             result, cause = _run(bench, attempt, protocol, folder, info)
+            if cause is not None and not folder.is_dir():
+                raise cause  # there is nothing left to note it in
             info = replace(info, trials=(*info.trials, result))
             write_session(folder, info)
             operation.say(*sentences(result))

@@ -6,6 +6,7 @@ a prefix has them, and carry a checksum of their own, since MCAP checks only chu
 says that the recording was finished.
 """
 
+import contextlib
 import io
 import json
 import os
@@ -113,6 +114,7 @@ class RecordingWriter:
         """Closes the chunk in progress and hands it to the system; with ``sync`` waits until the disk has it."""
         self._end_chunk()
         self._write_batch()
+        self._refuse_gone()
         if sync:
             self._sync()
 
@@ -122,6 +124,7 @@ class RecordingWriter:
         self._add_metadata(SUMMARY, summary)
         self._layout.finish()
         self._write_batch()
+        self._refuse_gone()
         self._sync()
         self.close()
 
@@ -147,6 +150,18 @@ class RecordingWriter:
             os.fdatasync(self._fd)
         except OSError as error:
             self._fail(self._batch.tell(), error)
+
+    def _refuse_gone(self) -> None:
+        """The system takes all that is written to a file that nobody can find again."""
+        with contextlib.suppress(OSError):
+            if os.path.samestat(self.path.stat(), os.fstat(self._fd)):
+                return
+        self._failure = (
+            f"{self.path}: was removed or moved while it was recorded, and nothing more of it is; record into a new"
+            " session, and leave its folder alone until that has ended"
+        )
+        self.close()
+        raise RecordingFailed(self._failure)
 
     def _fail(self, good: int, error: OSError) -> None:
         """Cuts the file back to its last whole batch."""

@@ -1,5 +1,6 @@
 """The service over a real mock bench: what a lab's UI does, in the order in which it does it."""
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -186,4 +187,19 @@ def test_a_user_who_does_not_renew_the_lease_is_retracted_from(
     assert "operator_silent" in {event.code for event in events}
     taken = client.post("/api/v1/control/lease", json={"holder": "the next one", "ttl_s": 30.0})
     client.headers["X-Control-Lease"] = taken.json()["lease_id"]
+    reset(client)
+
+
+def test_a_session_whose_folder_is_removed_meanwhile_is_a_stop_with_one_sentence(
+    served: tuple[ServedBench, TestClient, Path],
+) -> None:
+    bench, client, folder = served
+    job = start(client, "slow", "eighth")
+    pressed(bench)
+    shutil.rmtree(folder / "sessions" / "eighth")
+    freed(bench)
+    done = ended(client, job)
+    assert (done["state"], done["problem"]["code"]) == ("failed", "failed")
+    assert "trial_001.mcap: was removed or moved while it was recorded" in done["message"]
+    assert not (folder / "sessions" / "eighth").exists()
     reset(client)

@@ -1,5 +1,6 @@
 """A bad trial is made again, under a name of its own; one that stays bad ends the command with a code of its own."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import cast
@@ -18,6 +19,7 @@ from rig.config.protocol import Indentation
 from rig.config.quality import QualityLimits
 from rig.config.wiring import Wiring
 from rig.errors import BadTrial, SafetyStop
+from rig.recording.mcap_file import RecordingFailed
 from rig.recording.sessions import SessionInfo, TrialInfo, open_session
 from rig.results.tracking import Followed, LoopCount, TrackResult
 from tests.rig.tissue.synthetic import Bench, metadata, tables, write_recording
@@ -66,6 +68,19 @@ def captured(folder: Path, recorder: FakeRecorder, monkeypatch: pytest.MonkeyPat
     protocol = Indentation(speeds_mm_s=(10.0,), trials=2, quality=QualityLimits(repeats=repeats))
     bench = cast(Supervisor, WiredOnly())
     return experiment.capture(bench, protocol, folder, Operation("capture", total=2, unit="trials"))
+
+
+def test_where_the_folder_is_gone_the_recorder_s_own_sentence_is_the_last(
+    session: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Removed(FakeRecorder):
+        def __call__(self, *_: object) -> Recorded:
+            shutil.rmtree(session)
+            raise RecordingFailed("was removed while it was recorded")
+
+    with pytest.raises(RecordingFailed, match="was removed while it was recorded"):
+        captured(session, Removed(), monkeypatch)
+    assert not session.exists()
 
 
 def test_a_bad_trial_is_made_again_and_kept_and_marked(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:

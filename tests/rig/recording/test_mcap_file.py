@@ -2,7 +2,8 @@
 
 import io
 import resource
-from collections.abc import Iterator
+import shutil
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -115,6 +116,24 @@ def test_after_a_full_disk_every_call_repeats_the_cause(tmp_path: Path) -> None:
     with pytest.raises(RecordingFailed, match="File too large"):
         writer.finish({})
     writer.close()
+
+
+@pytest.mark.parametrize("taken", [shutil.rmtree, lambda folder: folder.rename(folder.with_name("elsewhere"))])
+def test_a_recording_whose_folder_is_taken_away_ends_with_one_sentence(
+    tmp_path: Path, taken: Callable[[Path], object]
+) -> None:
+    for finish in (False, True):
+        (tmp_path / "session").mkdir()
+        writer = RecordingWriter(tmp_path / "session" / "a.mcap", {})
+        writer.add(FORCE.id, FORCE.pack(force(0)))
+        writer.flush()
+        taken(tmp_path / "session")
+        with pytest.raises(RecordingFailed, match="was removed or moved while it was recorded"):
+            writer.finish({}) if finish else writer.flush()
+        with pytest.raises(RecordingFailed, match="was removed or moved while it was recorded"):
+            writer.flush()
+        writer.close()
+        shutil.rmtree(tmp_path / "elsewhere", ignore_errors=True)
 
 
 def test_the_stock_reader_finds_every_row_by_the_index(write_recording: WriteRecording) -> None:
