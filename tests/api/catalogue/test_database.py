@@ -207,11 +207,21 @@ def _write(root: Path, given: str, number: int, together: Barrier) -> None:
         lab.refreshed()
 
 
+def _rebuild(root: Path, given: str, together: Barrier) -> None:
+    """Another program, which makes the tables anew over and over beside them."""
+    lab = Catalogue(root, given)
+    together.wait()
+    for _ in range(EACH):
+        assert "S01" in {each.subject for each in lab.subjects().items}
+        assert lab.rebuild().names >= 1
+
+
 @pytest.mark.timeout(300)
 def test_what_several_programs_write_at_once_is_all_there(lab: Catalogue, root: Path, database: str) -> None:
     context = multiprocessing.get_context("spawn")
-    together = context.Barrier(WRITERS)
+    together = context.Barrier(WRITERS + 1)
     writers = [context.Process(target=_write, args=(root, database, each, together)) for each in range(WRITERS)]
+    writers.append(context.Process(target=_rebuild, args=(root, database, together)))
     for writer in writers:
         writer.start()
     for writer in writers:
