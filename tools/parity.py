@@ -1,6 +1,7 @@
-"""The table of parity: for each command its route and its view of the page, or the reasons why there is none.
+"""The tables of parity: for each command its route and its view of the page, for each route its command, or why not.
 
-Commands come from the command line itself, kinds of jobs from the service, views from `api/page/sources/parity.json`.
+Commands come from the command line itself, kinds of jobs and routes from the service, views from
+`api/page/sources/parity.json`.
 """
 
 import inspect
@@ -13,11 +14,16 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hint
 from typer.models import ArgumentInfo
 
 from api.cli.app import COMMANDS
+from api.http import app
 from api.http.jobs.kinds import KINDS
+from api.http.routes.common import PREFIX
+from api.http.service import Service
+from rig.config.wiring import Wiring
 
 ROOT = Path(__file__).parents[1]
 VIEWS = ROOT / "api" / "page" / "sources" / "parity.json"
 HEADER = "| command | REST, below `/api/v1` | page |\n|---|---|---|"
+BY_ROUTE = "| REST, below `/api/v1` | command |\n|---|---|"
 # What is no job: the routes of a command.
 ROUTES: Mapping[str, tuple[str, ...]] = {
     **{f"catalogue {what}": (f"GET /{what}",) for what in (
@@ -62,6 +68,34 @@ UNSEEN: Mapping[str, str] = {
     "devices": "what could be installed; the page shows what stands on the bench",
     "repair": "makes another recording beside the one that is not whole, which a person compares first",
     "simulate": "the runs' own forecast stands beside each start; a simulation is of a bench that is not there",
+}
+OF_A_JOB = (
+    "a command is itself what a job is: it says how far it is, asks a person, ends by Ctrl-C and writes its files"
+)
+OF_A_BROWSER = "of a browser; a command is its account's own"
+OF_CONTROL = "a command has the bench to itself, or takes the lease of the service that has it"
+OF_FILES = "on the computer itself these are files in a folder"
+LOOKED_AT = "for whoever looks on; a command says its own values while it runs"
+AT_THE_START = "a command brings the bench up for itself, as its configuration says"
+# Routes that are of no command, and why.
+ALONE: Mapping[str, str] = {
+    **dict.fromkeys(("GET /auth/me", "POST /auth/login", "POST /auth/logout", "POST /auth/ticket"), OF_A_BROWSER),
+    **dict.fromkeys(("GET /jobs", "GET /jobs/{identifier}", "GET /jobs/{identifier}/files/{path}"), OF_A_JOB),
+    **dict.fromkeys((f"POST /jobs/{{identifier}}/{verb}" for verb in ("cancel", "pause", "resume")), OF_A_JOB),
+    **dict.fromkeys((f"{verb} /control/lease" for verb in ("GET", "POST", "PUT", "DELETE")), OF_CONTROL),
+    "POST /control/take": OF_CONTROL,
+    **dict.fromkeys(("GET /events", "GET /streams", "GET /streams/{stream}/latest"), LOOKED_AT),
+    **dict.fromkeys(("GET /rig", "POST /rig/connect", "GET /subject", "PUT /subject"), AT_THE_START),
+    **dict.fromkeys(("GET /recordings", "GET /recordings/{session}/{file}", "GET /protocols"), OF_FILES),
+    **dict.fromkeys(("GET /sessions/{session}", "DELETE /sessions/{session}", "GET /calibrations"), OF_FILES),
+    **dict.fromkeys(("GET /uploads", "GET /uploads/{identifier}", "DELETE /uploads/{identifier}"), OF_FILES),
+    "GET /audit": OF_FILES,
+    "GET /sessions/{session}/curves": "points of a picture, which `rig report` draws",
+    "GET /protocols/{name}/foresight": "a forecast beside each start; `rig protocol check` says what a protocol shows",
+    "POST /estop": "keys, foot switch and Ctrl-C stop a command, and so does the stop process beside it",
+    "POST /pain": "likewise",
+    "GET /info": "says who the service is",
+    "GET /problems/{code}": "explains a refusal of the service; a command says the next step at once",
 }
 # Options that make another command of one.
 ALSO = ("track --table", "calibrate axis --dynamics")
@@ -123,3 +157,26 @@ def _line(row: Row) -> str:
     rest = ", ".join(f"`{route}`" for route in row.routes) or f"none: {row.reason}"
     page = row.view or (f"none: {row.unseen}" if row.unseen else "none")
     return f"| `rig {row.command}` | {rest} | {page} |"
+
+
+def operations() -> set[str]:
+    """Method and path, below the prefix, of all that the service describes; nothing is connected to say it."""
+    paths = app.build(Service(Wiring(), Path("sessions"), Path("examples"))).openapi()["paths"]
+    return {f"{method.upper()} {path.removeprefix(PREFIX)}" for path, methods in paths.items() for method in methods}
+
+
+def by_route() -> Mapping[str, tuple[str, ...]]:
+    """The commands of each operation."""
+    known = [(route.partition(", kind")[0], row.command) for row in sorted(rows()) for route in row.routes]
+    return {
+        one: tuple(dict.fromkeys(command for route, command in known if route == one)) for one in sorted(operations())
+    }
+
+
+def parity_of_routes() -> str:
+    """Markdown of the table of routes."""
+    found = {
+        route: ", ".join(f"`rig {command}`" for command in commands) or f"none: {ALONE.get(route, '')}"
+        for route, commands in by_route().items()
+    }
+    return "\n".join([BY_ROUTE, *(f"| `{route}` | {said} |" for route, said in found.items())])

@@ -29,7 +29,7 @@ from tools.http_routes import routes
 from tools.interface import interface
 from tools.keys import tables
 from tools.laws import laws as laws_of
-from tools.parity import parity
+from tools.parity import parity, parity_of_routes
 from tools.schemas import WRITTEN
 
 MARK = re.compile(r"^<!-- generated: ([a-z-]+) -->$", re.MULTILINE)
@@ -117,6 +117,7 @@ GENERATORS: dict[str, Callable[[], str]] = {
     "devices": devices,
     "http": http,
     "parity": parity,
+    "parity-of-routes": parity_of_routes,
     "laws": laws,
     "python": python,
     "causes": causes,

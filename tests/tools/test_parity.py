@@ -6,19 +6,12 @@ from pathlib import Path
 import pytest
 
 from api.cli.app import COMMANDS
-from api.http import app
 from api.http.jobs.kinds import KINDS
-from api.http.service import Service
-from rig.config.wiring import Wiring
 from tools import parity
 from tools.reference import fill
 
-VIEWS = Path(__file__).parents[2] / "api" / "page" / "sources" / "src" / "views" / "index.ts"
-
-
-def described() -> set[str]:
-    paths = app.build(Service(Wiring(), Path("sessions"), Path("examples"))).openapi()["paths"]
-    return {f"{method.upper()} {path.removeprefix('/api/v1')}" for path, methods in paths.items() for method in methods}
+ROOT = Path(__file__).parents[2]
+VIEWS = ROOT / "api" / "page" / "sources" / "src" / "views" / "index.ts"
 
 
 def lacking(rows: list[parity.Row]) -> list[str]:
@@ -59,7 +52,7 @@ def test_a_command_without_either_is_found(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_every_route_that_is_named_is_there() -> None:
     named = {route.partition(", kind")[0] for row in parity.rows() for route in row.routes}
-    assert named - described() == set()
+    assert named - parity.operations() == set()
     assert set(parity.ROUTES) | set(parity.WITHOUT) <= set(parity.commands())
 
 
@@ -79,3 +72,27 @@ def test_the_table_stands_in_the_reference() -> None:
     assert "| `rig serve` | none: is the service itself | none |" in text
     assert "| `rig catalogue sites` | `GET /sites` | none: each subject shows its own |" in text
     assert text.count("\n| `rig ") == len(list(parity.commands()))
+
+
+def unexplained() -> list[str]:
+    """Routes with neither a command nor a reason for none, or with both."""
+    return [route for route, commands in parity.by_route().items() if bool(commands) == (route in parity.ALONE)]
+
+
+def test_every_route_has_a_command_or_a_reason_for_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert unexplained() == []
+    assert set(parity.ALONE) <= parity.operations() and all(parity.ALONE.values())
+    there = parity.operations()
+    monkeypatch.setattr(parity, "operations", lambda: {*there, "GET /planted"})
+    monkeypatch.delitem(parity.ALONE, "GET /rig")
+    monkeypatch.setitem(parity.ALONE, "GET /devices", "planted")
+    assert unexplained() == ["GET /devices", "GET /planted", "GET /rig"]
+
+
+def test_the_table_of_routes_stands_in_the_reference() -> None:
+    text = fill("<!-- generated: parity-of-routes -->")
+    assert "| `POST /recover` | `rig reset` |" in text
+    assert "| `GET /info` | none: says who the service is |" in text
+    assert "`rig fit`" in next(line for line in text.splitlines() if line.startswith("| `POST /jobs` |"))
+    assert text.count("\n| `") == len(parity.operations())
+    assert "<!-- generated: parity-of-routes -->" in (ROOT / "docs" / "reference" / "parity.md").read_text()
