@@ -121,7 +121,7 @@ GENERATORS: dict[str, Callable[[], str]] = {
     "laws": laws,
     "python": python,
     "causes": causes,
-    "axis causes": axis_causes,
+    "axis-causes": axis_causes,
 }  # fmt: skip
 
 

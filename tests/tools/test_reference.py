@@ -1,6 +1,8 @@
 """The reference names every key with its bounds and every command; a page cannot name a part that does not exist."""
 
+import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Literal, get_args
 
 import pytest
@@ -18,8 +20,9 @@ from rig.config.wiring import Limits, Loop, MockBenchSettings, Wiring
 from rig.diagnosis.effects.registry import CAUSES
 from rig.tissue.registry import LAWS
 from tools.keys import tables
-from tools.reference import fill
+from tools.reference import GENERATORS, MARK, fill
 
+PAGES = Path(__file__).parents[2] / "docs"
 PRODUCTS = [product for products in ROLES.values() for product in products.values()]
 
 
@@ -173,3 +176,15 @@ def test_what_import_rig_offers_stands_in_the_reference() -> None:
 def test_a_mark_without_a_generator_is_an_error() -> None:
     with pytest.raises(KeyError):
         fill("<!-- generated: nothing -->")
+
+
+def marks(text: str) -> set[str]:
+    """All that look like one, also where nothing would fill them."""
+    return set(re.findall(r"<!-- generated: (.+?) -->", text))
+
+
+def test_every_mark_of_a_page_is_filled() -> None:
+    found = set[str]().union(*(marks(page.read_text()) for page in PAGES.rglob("*.md")))
+    assert found == GENERATORS.keys()
+    assert all(MARK.fullmatch(f"<!-- generated: {name} -->") for name in found)
+    assert not MARK.search("<!-- generated: axis causes -->") and marks("<!-- generated: axis causes -->")
