@@ -21,7 +21,7 @@ from rig.config.endpoints import Endpoints
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
-RIG = [sys.executable, "-c", "from api.cli.app import main; main()"]
+RIG = [sys.executable, "-c", "from api.cli.__main__ import main; main()"]
 # A computer that others use too stops any process for a while, which no bench in a lab would be allowed to. What is
 # tested here is what stops motion and that it does; how old a sample may be is tested in tests/controller, on a clock
 # in the test's hand.
