@@ -63,7 +63,11 @@ class SignalledBench:
         self.done.append("prepared")
 
     def start(self) -> None:
-        self._meet(self.starting)
+        try:
+            self._meet(self.starting)
+        except BaseException:
+            self.close()
+            raise
         self.done.append("started")
 
     def refuse_held(self) -> None:
@@ -97,7 +101,7 @@ def test_a_start_is_ended_in_order_and_the_end_itself_is_let_end(
     bench = SignalledBench(starting=[number], ending=[number, *live.ENDINGS])
     with pytest.raises(KeyboardInterrupt):
         connected(bench, monkeypatch)
-    assert bench.done == ["prepared", "closed"]
+    assert bench.done == ["prepared", "closed", "closed"]
     assert left
 
 
