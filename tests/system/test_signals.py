@@ -23,8 +23,8 @@ HOMES_SLOWLY = ("axis.homing_speed_mm_s=2", "stop.port=0")
 
 def capture(bench: ServedBench, tmp_path: Path, *more: str, terminal: int | None = None) -> Running:
     (tmp_path / "slow.toml").write_text(SLOW)
-    arguments = ["capture", tmp_path / "slow.toml", "--out", tmp_path / "session", *bench.settings(*more)]
-    return Running(arguments, tmp_path, terminal=terminal)
+    words: tuple[str | Path, ...] = ("capture", tmp_path / "slow.toml", "--out", tmp_path / "session")
+    return Running([*words, *bench.settings(*more)], tmp_path, terminal=terminal)
 
 
 def stopped_and_whole(tmp_path: Path, outcome: str) -> None:
