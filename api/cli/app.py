@@ -52,7 +52,7 @@ def build(wanted: str | None = None, for_help: bool = False) -> typer.Typer:
     """The application with the command ``wanted``; where it is no command, with the name and summary of each."""
     app = typer.Typer(
         help="Software for a soft-tissue bench: capture, fit, track, report. Exit codes: 0 ok, 1 check failed,"
-        " 2 wrong use, 3 safety stop, 4 a bad trial remained.",
+        " 2 wrong use, 3 safety stop, 4 a bad trial remained, 130 interrupted.",
         no_args_is_help=True,
         invoke_without_command=True,
         pretty_exceptions_enable=False,
@@ -101,7 +101,7 @@ def _load(target: str) -> Callable[..., None]:
 
 
 def main() -> None:
-    """Entry point of the `rig` command."""
+    """Runs the command line of this process."""
     # Its matrices are small: threads of linear algebra mostly wait for one another, and take a core from the loop.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:

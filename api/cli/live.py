@@ -27,14 +27,19 @@ LOOK_S = 0.1
 CONFIRM_S = 0.5
 NAMES = {StopReason.PAIN: "pain stop", StopReason.EMERGENCY: "emergency stop", StopReason.STOP: "stop"}
 KEYS = "keys: p pain stop, space emergency stop, s or Ctrl-C stop and retract"
+ENDINGS = (signal.SIGTERM, signal.SIGHUP)  # a computer that shuts down, a terminal that is closed
 
 T = TypeVar("T")
+Handler = Callable[[int, FrameType | None], None]
 
 
 @contextlib.contextmanager
 def connected(wiring: Wiring) -> Iterator[Supervisor]:
-    """The bench, running; the terminal's keys stop it from before it starts, and while the axis homes."""
-    with stop_keys() as attach:
+    """The bench, running; the terminal's keys stop it from before it starts, and while the axis homes.
+
+    A computer that shuts down and a terminal that is closed end the bench first, as Ctrl-C does.
+    """
+    with stop_keys() as attach, _on_signals(_end, *ENDINGS):
         bench = Supervisor(wiring)
         try:
             bench.prepare()
@@ -43,7 +48,8 @@ def connected(wiring: Wiring) -> Iterator[Supervisor]:
             bench.refuse_held()
             yield bench
         finally:
-            bench.close()
+            with _on_signals(_let_end, *ENDINGS):
+                bench.close()
 
 
 @contextlib.contextmanager
@@ -125,19 +131,38 @@ def live_text(bench: Supervisor) -> str:
 
 @contextlib.contextmanager
 def _interrupt_stops(bench: Supervisor, operation: Operation) -> Iterator[None]:
-    def interrupted(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature of a handler
-        if number == signal.SIGHUP:
-            _leave_terminal()
+    def interrupted(number: int, frame: FrameType | None) -> None:
+        _let_end(number, frame)
         operation.cancel()
         with contextlib.suppress(DeviceError):
             bench.stop()
 
-    before = {number: signal.signal(number, interrupted) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    with _on_signals(interrupted, signal.SIGINT, *ENDINGS):
+        yield
+
+
+@contextlib.contextmanager
+def _on_signals(handler: Handler, *numbers: signal.Signals) -> Iterator[None]:
+    before = {number: signal.signal(number, handler) for number in numbers}
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    """As Ctrl-C does, once: a shell and the kernel both say that a terminal was closed."""
+    for ending in ENDINGS:
+        signal.signal(ending, _let_end)
+    _let_end(number, frame)
+    raise KeyboardInterrupt
+
+
+def _let_end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature of a handler
+    """What ends already is not hurried."""
+    if number == signal.SIGHUP:
+        _leave_terminal()
 
 
 def _leave_terminal() -> None:

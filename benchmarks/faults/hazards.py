@@ -32,7 +32,10 @@ HAZARDS = (
         " converter at its end, a frozen or silent sensor",
         ("first_touch", "force_lost", "force_invalid", "force_rate", PROTOCOL, REFUSED, QUALITY),
         "A gain that changed in the air before the first trial of a session is found by the next calibration only: hang"
-        " a known weight on the tip before each session.",
+        " a known weight on the tip before each session. The first touch is judged in newtons, not in millimetres: a"
+        " force channel that is dead and pressed exactly along its axis shows no moment either, and before"
+        " `search_to_mm` nothing stops the approach but the following error, once the drive's current limit holds the"
+        " axis back, and a tracker that sees the limb pushed away. Set it a few millimetres beyond the surface.",
     ),
     Hazard(
         "The tip is not where the axis says, or does not go where it is told",

@@ -10,7 +10,9 @@ import os
 import signal
 import socket
 import sys
+import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from controller.devices.absent import start_what_answers
@@ -63,22 +65,29 @@ def _serve(
     try:
         warm_up()
         granted = realtime.acquire(wiring.loop.priority)
-        interruption = Interruption()
+        interruption, ending = Interruption(), threading.Event()
+        _when_ended(ending.set)
         start = start_what_answers if held else start_devices
         with contextlib.ExitStack() as started:
             with StartGuard(stops) as guard:
-                interruption.source = guard.interrupted
+                interruption.source = lambda: ending.is_set() or guard.interrupted()
                 devices = start(wiring, interruption)
                 started.callback(devices.close)
                 with guard.moving():
                     held = _prepare(devices.axis, held)
             inbox = Inbox(channel, stops, interruption)
-            # A computer that shuts down, or a terminal that is closed, leaves the tip outside.
-            for number in (signal.SIGTERM, signal.SIGHUP):
-                signal.signal(number, lambda *_: inbox.end())
+            _when_ended(inbox.end)
+            if ending.is_set():
+                inbox.end()
             _run(wiring, devices, ring, channel, inbox, granted, table, held)
     finally:
         ring.close()
+
+
+def _when_ended(do: Callable[[], object]) -> None:
+    """A computer that shuts down, or a terminal that is closed, leaves the axis braked and the tip outside."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: do())
 
 
 def _prepare(axis: ServoAxis, held: str) -> str:

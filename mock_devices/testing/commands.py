@@ -21,7 +21,7 @@ from rig.config.endpoints import Endpoints
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
-RIG = [sys.executable, "-c", "from api.cli.app import main; main()"]
+RIG = [sys.executable, "-c", "from api.cli.__main__ import main; main()"]
 # A computer that others use too stops any process for a while, which no bench in a lab would be allowed to. What is
 # tested here is what stops motion and that it does; how old a sample may be is tested in tests/controller, on a clock
 # in the test's hand.
@@ -110,16 +110,24 @@ class Running:
 
     started: ClassVar[list["Running"]] = []
 
-    def __init__(self, arguments: Sequence[str | Path], folder: Path, stdin: int = subprocess.DEVNULL) -> None:
+    def __init__(
+        self,
+        arguments: Sequence[str | Path],
+        folder: Path,
+        stdin: int = subprocess.DEVNULL,
+        terminal: int | None = None,
+    ) -> None:
+        """``terminal``: reads and writes there and nowhere else, and is told when it is closed."""
         path = os.pathsep.join([str(ROOT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]).strip(os.pathsep)
         environment = os.environ | {"COLUMNS": "200", "PYTHONPATH": path}
+        own = [] if terminal is None else ["setsid", "--ctty"]
         self.process = subprocess.Popen(
-            [*RIG, *map(str, arguments)],
+            [*own, *RIG, *map(str, arguments)],
             cwd=folder,
             env=environment,
-            stdin=stdin,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            stdin=stdin if terminal is None else terminal,
+            stdout=subprocess.PIPE if terminal is None else terminal,
+            stderr=subprocess.PIPE if terminal is None else terminal,
             text=True,
         )
         self.started.append(self)
@@ -142,7 +150,7 @@ class Running:
             self.process.kill()
             out, err = self.process.communicate()
             raise AssertionError(f"still running after {timeout_s} s\n{out}\n{err}") from None
-        return Said(self.process.returncode, out, err)
+        return Said(self.process.returncode, out or "", err or "")
 
 
 def pressed(bench: ServedBench, force_N: float = 1.0) -> None:
@@ -154,6 +162,13 @@ def pressed(bench: ServedBench, force_N: float = 1.0) -> None:
         return bench.control.number("tip.force_N") > force_N
 
     until(there, PATIENCE_S, f"the tip pressing with {force_N} N")
+
+
+def homing(bench: ServedBench) -> None:
+    """Waits until the axis is under way to its reference."""
+    until(lambda: bench.control.get("axis.powered")["axis.powered"], PATIENCE_S, "the axis powered")
+    at_rest_mm = bench.control.number("axis.position_mm")
+    until(lambda: abs(bench.control.number("axis.position_mm") - at_rest_mm) > 0.1, PATIENCE_S, "the axis homing")
 
 
 def freed(bench: ServedBench) -> None:

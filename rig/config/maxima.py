@@ -16,6 +16,7 @@ class Maximum(NamedTuple):
 # 180 N/cm2 on 0.28 cm2 are 51 N.
 _PRESSURE = "ISO/TS 15066:2016, Table A.2, allows the forearm 180 N/cm2 at rest, which a tip of 6 mm reaches at 51 N"
 _WAY = "a second without news of the axis is 30 mm at the 30 mm/s of a fast trial"
+_OPEN = "0.75 N of 15 N, half of what a peak may have above them"
 
 MAXIMA: tuple[Maximum, ...] = (
     Maximum("limits.force_N", 50.0, "N", _PRESSURE),
@@ -37,6 +38,8 @@ MAXIMA: tuple[Maximum, ...] = (
     Maximum("loop.overrun_ms", 1000.0, "ms", _WAY),
     Maximum("loop.missed_periods", 10.0, "periods", "0.1 s at 100 Hz, in which a fast trial goes 3 mm"),
     Maximum("loop.lease_s", 10.0, "s", "longer is somebody who has left, not a program that is slow"),
+    Maximum("calibration.max_age_days", 730.0, "days", "makers of force sensors ask for a calibration each year"),
+    Maximum("calibration.max_uncertainty", 0.05, "of the value", _OPEN),
 )
 
 

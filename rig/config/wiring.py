@@ -114,8 +114,8 @@ class Wiring(Table):
 
     @model_validator(mode="after")
     def _within_maxima(self) -> Self:
-        tables = {"limits": self.limits, "subject": self.subject, "axis": self.axis, "loop": self.loop}
-        reasons = beyond(tables, (*self.force.maxima, *self.axis.maxima)) + input_troubles(self.input, self.stop.keypad)
+        largest = (*self.force.maxima, *self.axis.maxima)
+        reasons = beyond(dict(self), largest) + input_troubles(self.input, self.stop.keypad)
         if reasons:
             raise ValueError("; ".join(reasons))
         return self

@@ -32,7 +32,7 @@ def test_the_codes_a_command_ends_with_stand_in_the_help() -> None:
     text = " ".join(runner.invoke(build(), ["--help"], terminal_width=200).output.split())
     for error in (CheckFailed, UsageError, SafetyStop, BadTrial):
         assert re.search(rf"\b{error.exit_code} \w+", text.partition("Exit codes: 0 ok")[2]), error
-    assert "4 a bad trial remained" in text
+    assert "4 a bad trial remained, 130 interrupted" in text
 
 
 def test_the_version_is_that_of_the_package() -> None:

@@ -36,7 +36,7 @@ def test_calibrations_in_use_come_first_and_each_says_why_it_would_be_refused(
     for name, one in made.items():
         (folder / name).write_text(text_of(one))
     (folder / "force-1.json").write_text("no JSON")
-    known = Calibration(axis=Path("calibration/axis-7.json"), of_axis=made["axis-7.json"], max_age_days=2000)
+    known = Calibration(axis=Path("calibration/axis-7.json"), of_axis=made["axis-7.json"], max_age_days=730)
     service = Service(Wiring(force=BotaWiring(port="/dev/none"), calibration=known), tmp_path, tmp_path)
     found = client_of(service).get("/api/v1/calibrations").json()
     assert [(one["serial"], one["used"]) for one in found] == [("7", True), ("5", False), ("6", False), ("", False)]

@@ -16,7 +16,7 @@ from rig.errors import UsageError
 
 def given(key: str, value: float) -> Wiring:
     """The default wiring with one key changed."""
-    return parse(Wiring, merged({}, [f"{key}={value:.0f}"]), "rig.toml")
+    return parse(Wiring, merged({}, [f"{key}={value:.15g}"]), "rig.toml")
 
 
 @pytest.mark.parametrize("maximum", [*MAXIMA, *maxon_epos4.MAXIMA], ids=lambda maximum: str(maximum.key))
@@ -43,6 +43,12 @@ def test_every_limit_of_the_wiring_has_a_maximum() -> None:
         given("limits.retract_speed_mm_s", 1e9)
     with pytest.raises(UsageError, match="greater than or equal to -500"):
         given("limits.position_min_mm", -1e9)
+
+
+@pytest.mark.parametrize(("key", "most"), [("max_age_days", "730 days"), ("max_uncertainty", "0.05 of the value")])
+def test_no_word_makes_a_calibration_last_for_ever_or_good_enough_however_bad(key: str, most: str) -> None:
+    with pytest.raises(UsageError, match=rf"calibration.{key} 1e\+09 .* is above its maximum, {most}"):
+        given(f"calibration.{key}", 1e9)
 
 
 def test_all_that_is_wrong_is_said_at_once() -> None:

@@ -3,26 +3,49 @@
 import os
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from mock_devices.testing.commands import Running, ServedBench, children, pressed, rig
+from mock_devices.testing.commands import Running, ServedBench, children, freed, pressed, rig, served_bench
 from mock_devices.testing.models import index_model
 from rig.recording.ring import new_path
 
 pytestmark = [pytest.mark.extra, pytest.mark.xdist_group("recovery")]
 
-MODULES = {"loop": "controller.loop.process", "recorder": "rig.recording.recorder", "stop": "controller.stop.server"}
+MODULES = {
+    "loop": "controller.loop.process",
+    "recorder": "rig.recording.recorder",
+    "stop": "controller.stop.server",
+    "inputs": "controller.inputs.process",
+}
+ALL = ("command", *MODULES)
+# What a command says that goes on to its end after one of its processes was killed.
+SAID = {
+    "loop": (1, "killed by signal 9"),
+    "recorder": (1, "the recorder process ended"),
+    "stop": (3, "the stop process is silent"),
+    "inputs": (3, "input pedal is lost: the process of the inputs says nothing"),
+}
+
+
+@pytest.fixture
+def bench() -> Iterator[ServedBench]:
+    """With a foot switch."""
+    with served_bench("--seed", "1", "--input", "evdev-switch") as served:
+        yield served
 
 
 def tracking(bench: ServedBench, tmp_path: Path) -> Running:
-    """A force held in contact."""
+    """A force held in contact, and a foot switch that it needs."""
     model = tmp_path / "model.json"
     index_model(0.12, 0.22, 0.01, force_N=11.0).save(model)
     out = tmp_path / f"session-{time.monotonic_ns()}"
+    port = bench.endpoints.devices["switch"]["events"]
+    pedal = ("input.pedal.product=evdev-switch", f"input.pedal.port={port}", "input.pedal.stops=pain")
     running = Running(
-        ["track", "--model", model, "--force", "2", "--seconds", "60", "--out", out, *bench.settings()], tmp_path
+        ["track", "--model", model, "--force", "2", "--seconds", "60", "--out", out, *bench.settings(*pedal)], tmp_path
     )
     pressed(bench, 1.5)
     return running
@@ -31,24 +54,26 @@ def tracking(bench: ServedBench, tmp_path: Path) -> Running:
 def killed(running: Running, *whom: str) -> None:
     """Kills those processes of the command at once, and the command itself where ``whom`` names it."""
     command = running.process.pid
-    pids = {name: children(command, module) for name, module in MODULES.items()} | {"command": [command]}
+    pids = {name: children(command, module) for name, module in MODULES.items()}
+    assert {name: len(found) for name, found in pids.items()} == dict.fromkeys(MODULES, 1)
+    assert sorted(children(command, "")) == sorted(pid for found in pids.values() for pid in found), "one is not tried"
     for name in whom:
-        for pid in pids[name]:
+        for pid in (pids | {"command": [command]})[name]:
             os.kill(pid, signal.SIGKILL)
     if "command" in whom:
         running.end()
 
 
-@pytest.mark.parametrize(
-    "whom", [("loop",), ("recorder",), ("command",), ("stop",), ("command", "loop", "recorder", "stop")]
-)
+@pytest.mark.parametrize("whom", [("loop",), ("recorder",), ("command",), ("stop",), ("inputs",), ALL])
 def test_one_command_brings_the_tip_out_after_a_kill(bench: ServedBench, tmp_path: Path, whom: tuple[str, ...]) -> None:
     running = tracking(bench, tmp_path)
     killed(running, *whom)
-    if whom == ("stop",):
-        running.interrupt()
     if "command" not in whom:
-        assert running.end().code in (1, 3)
+        code, words = SAID[whom[0]]
+        if code == 3:
+            freed(bench)
+        said = running.end()
+        assert said.code == code and words in said.sentence, said.err
     said = rig("reset", "--yes", *bench.settings(), folder=tmp_path)
     assert said.code == 0, said.err
     assert bench.control.number("tip.force_N") == 0.0

@@ -25,6 +25,7 @@ from mock_devices.testing.commands import (
     ServedBench,
     children,
     freed,
+    homing,
     pressed,
     stands_still,
     until,
@@ -124,9 +125,7 @@ def test_a_stop_while_the_axis_homes_brakes_it_and_ends_the_start(bench: ServedB
 
     starting = threading.Thread(target=start)
     starting.start()
-    until(lambda: bench.control.get("axis.powered")["axis.powered"], PATIENCE_S, "the axis under way")
-    at_rest_mm = bench.control.number("axis.position_mm")
-    until(lambda: abs(bench.control.number("axis.position_mm") - at_rest_mm) > 0.1, PATIENCE_S, "the axis homing")
+    homing(bench)
     status, said = asked(supervisor.stop_port, "/estop")
     starting.join(30)
     assert (status, said["done"]) == (200, "braked while the drive moved by itself: nothing starts")

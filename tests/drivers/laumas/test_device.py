@@ -37,6 +37,7 @@ class Session:
     def __init__(self, **settings: object) -> None:
         self.cell, self.clock, self.wire = Cell(), Clock(), MemoryWire()
         self.mock = LaumasMock(self.wire, self.cell)
+        self.answers, self.spoilt = 0, (0, 0)
         self.port = ScriptedPort(self._answer)
         config = LaumasWiring.model_validate({"port": "/dev/ttyUSB0", "error_bits": ERROR_BIT} | settings)
         self.sensor = LaumasTransmitter(lambda: self.port, config, self.clock)
@@ -44,7 +45,12 @@ class Session:
     def _answer(self, data: bytes) -> bytes:
         self.wire.said += data
         self.mock.receive(self.clock())
-        return self.wire.take()
+        answer = bytearray(self.wire.take())
+        self.answers += 1
+        number, place = self.spoilt
+        if self.answers == number:
+            answer[place] ^= 4
+        return bytes(answer)
 
     def run(self, milliseconds: int) -> list[ForceSample]:
         samples: list[ForceSample] = []
@@ -64,6 +70,18 @@ def test_it_says_who_it_is() -> None:
     identity = started().sensor.identity
     assert (identity.product, identity.serial, identity.firmware) == ("laumas-tlb", "4711", "105")
     assert identity.settings["channels"] == "fz"
+
+
+@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.parametrize("place", [0, 1, 2, 3, -1])
+def test_any_one_damaged_answer_at_set_up_is_asked_for_again(
+    number: int, place: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("drivers.laumas.device.ANSWER_S", 0.01)
+    session = Session()
+    session.spoilt = (number, place)
+    session.sensor.start()
+    assert (session.sensor.identity.serial, session.answers) == ("4711", 3)
 
 
 def test_it_is_asked_a_hundred_times_a_second_and_gives_newtons() -> None:

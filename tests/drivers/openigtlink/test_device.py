@@ -48,6 +48,15 @@ def test_what_came_while_it_started_is_not_lost() -> None:
     assert session.tracker.identity.settings == {"stream": "TRANSFORM", "clock": "sender's"}
 
 
+@pytest.mark.parametrize("place", range(50, len(transform("tip", 0)), 3))
+def test_a_first_message_with_a_damaged_checksum_or_body_is_passed_over(place: int) -> None:
+    first = bytearray(transform("tip", 0))
+    first[place] ^= 4
+    session = Session(bytes(first) + transform("tip", 1) + transform("arm", 1))
+    session.tracker.start()
+    assert session.frame() == [(1, 0, 1), (1, 1, 1)]
+
+
 def test_tools_with_one_time_are_one_frame() -> None:
     session = started()
     assert session.frame(transform("tip", 1)) == []

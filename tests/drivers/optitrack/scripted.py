@@ -7,10 +7,11 @@ from drivers.optitrack import packets
 
 
 class ScriptedLink:
-    """``answers`` by message number; ``push`` makes a datagram arrive unasked."""
+    """``answers`` by message number, of the first the bytes that ``spoilt`` says; ``push`` makes one arrive unasked."""
 
     def __init__(self) -> None:
         self.answers: dict[int, bytes] = {}
+        self.spoilt: dict[int, int] = {}
         self.sent: list[int] = []
         self.closed = False
         self._waiting: list[bytes] = []
@@ -33,7 +34,7 @@ class ScriptedLink:
         message, _ = packets.split(datagram)
         self.sent.append(message)
         if message in self.answers:
-            self.push(self.answers[message])
+            self.push(self.answers[message][: self.spoilt.pop(message, None)])
 
     def close(self) -> None:
         self.closed = True

@@ -1,5 +1,7 @@
 """The session with Motive by scripted datagrams: who, which bodies, frames, and what may go wrong."""
 
+import time
+
 import pytest
 
 from drivers.optitrack import packets
@@ -58,6 +60,17 @@ def test_it_says_who_streams() -> None:
         "optitrack-natnet", "motive:1510", "Motive 3.1.0.1",
     )  # fmt: skip
     assert identity.settings == {"natnet": "4.1", "clock": "10000000 Hz"}
+
+
+@pytest.mark.parametrize("question", [packets.CONNECT, packets.REQUEST_MODELS, packets.KEEP_ALIVE])
+@pytest.mark.parametrize("kept", [0, 3, 20, -1])
+def test_any_one_damaged_answer_at_set_up_is_asked_for_again(question: int, kept: int) -> None:
+    session = Session()
+    session.link.spoilt[question] = kept
+    session.tracker._now = time.monotonic_ns  # a question that is repeated waits
+    session.tracker.start()
+    assert session.tracker.identity.serial == "motive:1510"
+    assert session.link.sent.count(question) == 2 and len(session.link.sent) == 4
 
 
 def test_bodies_and_markers_are_tools() -> None:
