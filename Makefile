@@ -62,6 +62,9 @@ campaigns: $(READY) page
 	$(BIN)/python -m benchmarks.mutation
 	for campaign in forms hidden planted nothing calibration; do $(BIN)/python -m benchmarks.criticism --campaign $$campaign || exit; done
 	$(BIN)/python -m benchmarks.control
+	$(BIN)/python -m benchmarks.clock
+	$(BIN)/python -m benchmarks.contact
+	$(BIN)/python -m benchmarks.stop
 	$(BIN)/python -m benchmarks.service --minutes 10
 	$(BIN)/python -m benchmarks.all
 

@@ -31,7 +31,7 @@ from rig.config.wiring import Wiring
 from rig.diagnosis.design import check
 from rig.errors import SafetyStop, UsageError
 from rig.intake.questions import inline
-from rig.recording.files import make_folder, write_text
+from rig.recording.files import make_folder, refuse_unwritable, write_text
 from rig.recording.sessions import derive
 from rig.results.demo import DemoSummary, HiddenTruth
 from rig.results.diagnosis import FOLDER, TRUTH
@@ -87,6 +87,7 @@ def demo(
         from api.cli.serve import refuse_taken  # noqa: PLC0415 - loads the service
 
         refuse_taken(port)
+    refuse_unwritable(out / SUMMARY)
     session, wiring = out / SESSION, built_in()
     plan = PLAN if protocol is None else load(Indentation, protocol)
     plan = plan.model_copy(update={"trials": trials or plan.trials})

@@ -20,7 +20,7 @@ from rig.intake.proposal import OPEN, Proposal, propose
 from rig.intake.questions import Question
 from rig.intake.rows import FIELDS
 from rig.recording.export import FORMATS, Format
-from rig.recording.files import write_text
+from rig.recording.files import refuse_unwritable, write_text
 from rig.recording.remote import address_of
 from rig.recording.sessions import TrialInfo
 from rig.results.came_in import NAME
@@ -131,6 +131,7 @@ def _proposed(folder: Path, file: Path, yes: bool) -> Path:
     if before:
         show(f"{file} was proposed for it before and is used; remove it for a new proposal")
         return file
+    refuse_unwritable(file)
     found = propose(folder)
     file.parent.mkdir(parents=True, exist_ok=True)
     write_text(file, head + found.text)

@@ -10,24 +10,19 @@ pressed at the stop process after the hold, while the load goes on. Last line: o
 import argparse
 import contextlib
 import json
-import os
-import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from api.http.access.scopes import Scope
 from benchmarks.service.clients import REQUESTS_HZ
-from benchmarks.stop import CLIENT_PRIORITY, pressed, summary
-from mock_devices.testing.access import token
-from mock_devices.testing.commands import ROOT, served_bench
+from benchmarks.service.load import Clients
+from benchmarks.stop import pressed, summary
+from mock_devices.testing.commands import served_bench
 from mock_devices.testing.service import ServedRig
 from rig.recording.files import write_text
 from rig.recording.reader import Recording, read_recording
@@ -41,7 +36,6 @@ PROTOCOL = (
 SETTLING_NS = 15_000_000_000
 MEMORY_EVERY_S = 2.0
 FIRST_S = 60.0
-ENDING_S = 300.0  # a client of low priority on a busy computer
 ENDED = ("succeeded", "failed", "stopped", "cancelled", "interrupted")
 GOALS = {"lost_samples": 0, "stop_p99_ms": 20.0, "rss_growth_MB": 20.0}
 MISSED_MORE_PERCENT = 0.1
@@ -106,22 +100,6 @@ def private_MB(pid: int) -> float:
     return 0.0
 
 
-@contextlib.contextmanager
-def clients(rig: ServedRig) -> Iterator[dict[str, Any]]:
-    """The load while the block lasts; then what it counted."""
-    counted: dict[str, Any] = {}
-    process = subprocess.Popen(
-        [sys.executable, "-m", "benchmarks.service.clients", str(rig.port)],
-        cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-        env=os.environ | {"TISSUE_RIG_TOKEN": token(Scope.READ)},
-    )  # fmt: skip
-    try:
-        yield counted
-    finally:
-        out, _ = process.communicate(timeout=ENDING_S)
-        counted.update(json.loads(out))
-
-
 def held(rig: ServedRig, name: str, seconds: float) -> Phase:
     """One press that holds for so long, into session ``name``."""
     lease = rig.lease()
@@ -161,34 +139,24 @@ def measured(minutes: float, presses: int) -> dict[str, float]:
         try:
             idle = held(rig, "idle", 60 * minutes)
             say("nobody looks", idle)
-            with clients(rig) as load:
+            with Clients(rig.port) as clients:
                 loaded = held(rig, "loaded", 60 * minutes)
-                stops = summary(stopped(rig, presses))
+                stops = summary(pressed(rig.stop_port, "/estop", presses))
+                load = clients.counted()
         finally:
             rig.running.process.terminate()
             rig.running.process.wait(60)
     say("50 live clients", loaded)
     print(f"clients: {json.dumps(load)}")
-    print(f"stops:   {json.dumps(stops)}")
+    print(f"stops:   {json.dumps(asdict(stops))}")
     return {
         "served_per_s": round(load["served"] / load["seconds"], 1),
         "lost_samples": idle.lost + loaded.lost + load["lost_live"],
         "missed_percent": round(loaded.missed_percent, 3),
         "missed_percent_idle": round(idle.missed_percent, 3),
-        "stop_p99_ms": stops["p99_ms"],
+        "stop_p99_ms": stops.p99_ms,
         "rss_growth_MB": round(loaded.growth_MB, 1),
     }
-
-
-def stopped(rig: ServedRig, presses: int) -> list[float]:
-    """Times of stops [ms], pressed by a process that does not itself wait for the computer."""
-    with contextlib.suppress(OSError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(CLIENT_PRIORITY))
-    try:
-        return pressed(rig.stop_port, "/estop", presses)
-    finally:
-        with contextlib.suppress(OSError):
-            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def say(name: str, phase: Phase) -> None:

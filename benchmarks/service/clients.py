@@ -1,4 +1,4 @@
-"""The load: `python -m benchmarks.service.clients PORT` until its standard input ends; then one JSON object.
+"""The load: `python -m benchmarks.service.clients PORT` until its input ends; a JSON object for each line that it gets.
 
 50 WebSockets of `rig.v1`, most of them as a page subscribes, every tenth with every sample of two streams, and 200
 requests a second over sixteen connections. All of it at low priority, in one process that is no part of the
@@ -44,29 +44,38 @@ class Load:
     samples: int = 0
     lost_live: int = 0
     lost_connections: int = 0
+    heard: set[int] = field(default_factory=set)
+    ended: set[int] = field(default_factory=set)
+    """Live clients that got something, and that were thrown out, since this was told last."""
+
+    def told(self) -> dict[str, object]:
+        """With times of answers by their percentiles, and live clients by their number."""
+        times_ms = self.answer_ms or [float("nan")]
+        shown = asdict(self) | {"answer_ms": {f"p{q}": round(float(np.percentile(times_ms, q)), 2) for q in (50, 99)}}
+        shown |= {"heard": len(self.heard - self.ended), "ended": len(self.ended)}
+        self.heard.clear()
+        self.ended.clear()
+        return shown
 
 
 def main() -> None:
     """Until whoever started this closes our standard input."""
     os.nice(LOW_PRIORITY)
-    load = asyncio.run(_loaded(int(sys.argv[1]), os.environ.get("TISSUE_RIG_TOKEN", "")))
-    times_ms = load.answer_ms or [float("nan")]
-    shown = asdict(load) | {"answer_ms": {f"p{q}": round(float(np.percentile(times_ms, q)), 2) for q in (50, 99)}}
-    print(json.dumps(shown), flush=True)
+    asyncio.run(_loaded(int(sys.argv[1]), os.environ.get("TISSUE_RIG_TOKEN", "")))
 
 
-async def _loaded(port: int, token: str) -> Load:
+async def _loaded(port: int, token: str) -> None:
     load = Load()
     clients = [_watch(load, port, token, number) for number in range(LIVE)]
     requests = [_ask(load, port, token, number) for number in range(CONNECTIONS)]
     began = time.monotonic()
     tasks = [asyncio.ensure_future(_again(load, part)) for part in (*clients, *requests)]
-    await asyncio.to_thread(sys.stdin.read)
-    load.seconds = time.monotonic() - began
+    while await asyncio.to_thread(sys.stdin.readline):
+        load.seconds = time.monotonic() - began
+        print(json.dumps(load.told()), flush=True)
     for task in tasks:
         task.cancel()
     await asyncio.gather(*tasks, return_exceptions=True)
-    return load
 
 
 async def watching(port: int, token: str) -> None:
@@ -90,16 +99,20 @@ def _watch(load: Load, port: int, token: str, number: int) -> Callable[[], Await
 
     async def watched() -> None:
         address = f"ws://127.0.0.1:{port}/api/v1/stream"
-        async with connect(address, subprotocols=offered, compression=None) as socket:
-            await socket.send(wanted)
-            await _count(load, socket)
+        try:
+            async with connect(address, subprotocols=offered, compression=None) as socket:
+                await socket.send(wanted)
+                await _count(load, socket, number)
+        finally:
+            load.ended.add(number)
 
     return watched
 
 
-async def _count(load: Load, socket: ClientConnection) -> None:
+async def _count(load: Load, socket: ClientConnection, number: int) -> None:
     async for message in socket:
         load.messages += 1
+        load.heard.add(number)
         if isinstance(message, bytes):
             load.samples += sum(_covered(message))
         elif '"gap"' in message and (gap := json.loads(message))["channel"]:

@@ -1,6 +1,7 @@
 """`rig verify`, `rig repair`, `rig import`, `rig export` as typed by a person."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ from api.cli import records
 from rig.errors import CheckFailed, DataError, UsageError
 from rig.recording.files import WriteFailed
 from rig.recording.sessions import open_session, write_session
+from tests.rig.recording import tampered
 from tests.rig.recording.measured import measured, write
 
 app = typer.Typer(rich_markup_mode=None)
@@ -171,6 +173,28 @@ def test_a_missing_recording_fails_the_check(session: Path) -> None:
     error = rig("verify", session).exception
     assert isinstance(error, CheckFailed)
     assert "trial trial_02: its recording trial_02.mcap is missing" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("plant", "sentence"),
+    [
+        (tampered.swap, "trial_01.mcap: was recorded as trial_02 of session"),
+        (tampered.copy, "trial_02.mcap: was recorded as trial_01 of session"),
+        (tampered.rewrite, "trial_01.mcap: was changed after it was closed"),
+        (tampered.edit_list, "session.json: was changed after the program wrote it"),
+    ],
+)
+def test_a_swapped_copied_or_edited_file_fails_the_check_though_each_is_whole(
+    session: Path, tmp_path: Path, plant: Callable[[Path], None], sentence: str
+) -> None:
+    plant(session)
+    result = rig("verify", session, "--json", tmp_path / "result.json")
+    assert isinstance(result.exception, CheckFailed) and result.exception.exit_code == 1
+    assert sentence in str(result.exception) and sentence in result.output
+    values = json.loads((tmp_path / "result.json").read_text())
+    assert values["ok"] is False
+    assert [recording["ok"] for recording in values["recordings"].values()] == [True, True]
+    assert any(remark.startswith(sentence) for remark in values["remarks"])
 
 
 def test_the_quality_of_a_trial_is_said_and_is_no_matter_of_completeness(session: Path, tmp_path: Path) -> None:

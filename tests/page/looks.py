@@ -9,11 +9,14 @@ from playwright.sync_api import Page, expect
 
 from hatch_build import LIMIT_S, SOURCES, fetch
 from mock_devices.testing.commands import ROOT
+from tests.page.pretend import API, Pretended
 
 AXE = SOURCES / "node_modules" / "axe-core" / "axe.min.js"
 # Pictures of what was seen, to be looked at after a run; out of what is committed.
 PICTURES = Path(os.environ.get("TISSUE_RIG_PICTURES", ROOT / ".venv" / "page"))
 WIDTHS = (1280, 768, 390)
+# The banner of an earlier press stays: only what was asked tells one from the next.
+STOP = ("POST", "estop", None)
 # Of all rules this one alone depends on the scheme.
 CONTRAST = ("color-contrast",)
 # Numbers what the Tab key has to come to. Of radio buttons with one name it comes to the one that is chosen.
@@ -63,9 +66,12 @@ def holds_up(page: Page, name: str, widths: Sequence[int] = WIDTHS) -> None:
     page.screenshot(path=PICTURES / f"{name}-dark.png", full_page=True)
 
 
-def stops(page: Page) -> None:
-    """Presses STOP by the keyboard alone, as whoever cannot use a mouse does."""
-    page.keyboard.press("Escape")
+def stops(page: Page, service: Pretended) -> None:
+    """Presses STOP by the keyboard alone, as whoever cannot use a mouse does; the service has to be asked once more."""
+    before = service.asked.count(STOP)
+    with page.expect_response(f"**/{API}estop"):
+        page.keyboard.press("Escape")
+    assert service.asked.count(STOP) == before + 1
     expect(page.locator("#stop-banner")).to_be_visible()
     expect(page.locator("#stop-banner")).to_be_in_viewport()
 

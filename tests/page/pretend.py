@@ -54,7 +54,10 @@ window.WebSocket = class {
     });
     setInterval(() => window.hung || (this.say({ type: "ping" }), this.sample(this.at, this.at + 0.1), (this.at += 0.1)), 100);
   }
-  say(message) { this.onmessage({ data: JSON.stringify(message) }); }
+  say(message) {
+    window.said_ms = performance.now();
+    this.onmessage({ data: JSON.stringify(message) });
+  }
   sample(from_s, to_s) {
     if (!window.still) for (const name of STREAMS) this.onmessage({ data: batch(name, from_s, to_s, Math.round(from_s * 100)) });
   }

@@ -4,19 +4,25 @@ import select
 import time
 from collections.abc import Iterator
 from itertools import product
+from pathlib import Path
 
 import pytest
 
 from api.cli.mock_bench import _arguments, bench_for, bench_process
 from controller.devices.drivers import Devices, start_devices
+from mock_devices.testing.commands import ServedBench, rig
 from rig.config.endpoints import Endpoints
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
 from rig.config.products.registry import FORCE_SENSORS
 from rig.config.wiring import Wiring
+from rig.recording.reader import read_recording
+from rig.recording.sessions import open_session
+from rig.recording.verify import verdict_of
 
 WAIT_S = 10.0
+SURFACE_MM = 20.0
 MIXTURES = [mixture for mixture in product((False, True), repeat=3) if any(mixture) and not all(mixture)]
 
 
@@ -86,3 +92,42 @@ def test_so_does_the_other_force_sensor(real: Endpoints, force: bool) -> None:
             assert heard(devices) == {"force", "axis", "tracker"}
         finally:
             devices.close()
+
+
+PRESS_ONCE = "speeds_mm_s = [20]\ntrials = 1\ndepth_mm = 6\n[quality]\nrepeats = 0\n"
+
+
+@pytest.mark.extra
+@pytest.mark.xdist_group("commands")
+def test_a_capture_with_a_real_bench_and_a_mock_pedal_and_glove_is_whole(bench: ServedBench, tmp_path: Path) -> None:
+    inputs = (
+        "input.pedal.product=evdev-switch", "input.pedal.port=mock", "input.pedal.stops=pain",
+        "input.glove.product=firmata-glove", "input.glove.port=mock",
+    )  # fmt: skip
+    (tmp_path / "one.toml").write_text(PRESS_ONCE)
+    session = tmp_path / "session"
+    said = rig("capture", tmp_path / "one.toml", "--out", session, *bench.settings(*inputs), folder=tmp_path)
+    # A busy computer leaves gaps, which are its own: the trial then is bad (4), and is there.
+    assert said.code in (0, 4), said.err
+    (trial,) = open_session(session).trials
+    assert trial.surface_mm == pytest.approx(SURFACE_MM, abs=0.2)
+    recording = read_recording(session / "trial_001.mcap")
+    assert recording.tables["axis"]["position_mm"].max() == pytest.approx(SURFACE_MM + 6.0, abs=0.5)
+    assert len(recording.tables["glove"]) > 50 and not verdict_of(recording).streams["glove"].faults
+
+
+@pytest.mark.extra
+@pytest.mark.xdist_group("commands")
+def test_a_mock_tracker_beside_a_real_axis_sees_another_tip_and_the_capture_is_stopped(
+    bench: ServedBench, tmp_path: Path
+) -> None:
+    (tmp_path / "one.toml").write_text(PRESS_ONCE)
+    session = tmp_path / "session"
+    settings = bench.settings("tracker.port=mock")
+    said = rig("capture", tmp_path / "one.toml", "--out", session, *settings, folder=tmp_path)
+    assert said.code == 3 and "the tracker sees" in said.sentence and "for each mm of the axis" in said.sentence
+    recording = read_recording(session / "trial_001.mcap")
+    axis, marker = recording.tables["axis"], recording.tables["marker"]
+    assert axis["position_mm"].max() - axis["position_mm"].min() > 2.0
+    assert len(marker) > 20 and (marker["valid"] == 1).mean() > 0.95
+    assert bench.control.number("tip.force_N") == 0.0

@@ -9,7 +9,7 @@ from mock_devices.testing.commands import Running, ServedBench
 from rig.recording.reader import read_recording
 from rig.recording.sessions import open_session
 
-pytestmark = [pytest.mark.by_hand, pytest.mark.xdist_group("commands")]
+pytestmark = [pytest.mark.extra, pytest.mark.xdist_group("commands")]
 SURFACE_MM = 20.0
 
 

@@ -1,5 +1,6 @@
 """Operations on recordings: what they return and say, and what is left where they are cancelled."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -7,7 +8,8 @@ import pytest
 from api.operations import records
 from controller.operation import Cancelled, Operation, Progress
 from rig.results.recorded import VerifyResult
-from tests.rig.recording.measured import NOW, measured
+from tests.rig.recording import tampered
+from tests.rig.recording.measured import NOW, measured, run
 from tests.rig.tissue.synthetic import Bench, write_made_session
 
 
@@ -36,6 +38,25 @@ def test_what_is_no_recording_is_damaged_and_hides_no_other(session: Path, tmp_p
     found = records.verify(Operation("verify"), copied)
     assert not found.ok
     assert [one.state for one in found.recordings.values()] == ["damaged", alone.recordings["trial_500"].state]
+
+
+@pytest.mark.parametrize(
+    ("plant", "sentence"),
+    [
+        (tampered.swap, "trial_02.mcap: was recorded as trial_01"),
+        (tampered.copy, "trial_02.mcap: has the content of trial_01"),
+        (tampered.rewrite, "trial_01.mcap: was changed after it was closed"),
+    ],
+)
+def test_a_session_whose_files_are_not_those_it_was_closed_with_is_not_whole(
+    tmp_path: Path, plant: Callable[[Path], None], sentence: str
+) -> None:
+    folder = run(measured(tmp_path / "measured")).folder
+    assert records.verify(Operation("verify"), folder).ok
+    plant(folder)
+    found = records.verify(Operation("verify"), folder)
+    assert not found.ok and all(one.ok for one in found.recordings.values())
+    assert any(remark.startswith(sentence) for remark in found.remarks), found.remarks
 
 
 def cancelled_once(message: str, name: str) -> Operation:

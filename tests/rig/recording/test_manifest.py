@@ -1,13 +1,12 @@
 """Swapped, copied and edited files of a session, each planted."""
 
-import json
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from rig.recording.sessions import SESSION_FILE, SessionInfo, TrialInfo, open_session, write_session
+from rig.recording.sessions import SessionInfo, TrialInfo, open_session, write_session
+from tests.rig.recording import tampered
 from tests.rig.recording.conftest import WriteRecording
 
 NAMES = ("one", "two")
@@ -24,39 +23,6 @@ def folder(tmp_path: Path, write_recording: WriteRecording) -> Path:
     return tmp_path
 
 
-def _swap(folder: Path) -> None:
-    one, two = (folder / f"{name}.mcap" for name in NAMES)
-    one.rename(folder / "kept")
-    two.rename(one)
-    (folder / "kept").rename(two)
-
-
-def _copy(folder: Path) -> None:
-    shutil.copy(folder / "one.mcap", folder / "two.mcap")
-
-
-def _edit_recording(folder: Path) -> None:
-    path = folder / "one.mcap"
-    data = bytearray(path.read_bytes())
-    place = data.index(b"tissue-rig")  # the library's name in the header, which no checksum of MCAP covers
-    data[place : place + 6] = b"TISSUE"
-    path.write_bytes(data)
-
-
-def _edit_list(folder: Path) -> None:
-    path = folder / SESSION_FILE
-    table = json.loads(path.read_text())
-    table["trials"][0]["speed_mm_s"] = 30.0
-    path.write_text(json.dumps(table))
-
-
-def _strip_seal(folder: Path) -> None:
-    path = folder / SESSION_FILE
-    table = json.loads(path.read_text())
-    del table["sha256"]
-    path.write_text(json.dumps(table))
-
-
 def test_an_untouched_session_has_nothing_to_say(folder: Path) -> None:
     assert open_session(folder).mismatches == ()
 
@@ -64,11 +30,14 @@ def test_an_untouched_session_has_nothing_to_say(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("plant", "sentences"),
     [
-        (_swap, ["one.mcap: was recorded as two of session bench", "two.mcap: was recorded as one of session bench"]),
-        (_copy, ["two.mcap: was recorded as one", "two.mcap: has the content of one"]),
-        (_edit_recording, ["one.mcap: was changed after it was closed"]),
-        (_edit_list, ["session.json: was changed after the program wrote it"]),
-        (_strip_seal, ["session.json: carries no hash of its own"]),
+        (
+            tampered.swap,
+            ["one.mcap: was recorded as two of session bench", "two.mcap: was recorded as one of session bench"],
+        ),
+        (tampered.copy, ["two.mcap: was recorded as one", "two.mcap: has the content of one"]),
+        (tampered.edit_recording, ["one.mcap: was changed after it was closed"]),
+        (tampered.edit_list, ["session.json: was changed after the program wrote it"]),
+        (tampered.strip_seal, ["session.json: carries no hash of its own"]),
     ],
 )
 def test_a_touched_session_is_told(folder: Path, plant: Callable[[Path], None], sentences: list[str]) -> None:
