@@ -1,18 +1,16 @@
 """An operation on the terminal: progress and live values, keys for pain stop and stop, Ctrl-C retracts."""
 
 import contextlib
-import os
-import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from types import FrameType
 from typing import TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from api.cli.computing import printed
+from api.cli.endings import ended_first, interrupt_stops, unhurried
 from api.cli.keys import stop_keys
 from api.cli.mock_bench import bench_for
 from controller.operation import Operation
@@ -23,14 +21,11 @@ from rig.config.wiring import Wiring
 from rig.errors import DeviceError
 
 LOOK_S = 0.1
-# As long as the stop process waits for the loop.
-CONFIRM_S = 0.5
+CONFIRM_S = 0.5  # as long as the stop process waits for the loop
 NAMES = {StopReason.PAIN: "pain stop", StopReason.EMERGENCY: "emergency stop", StopReason.STOP: "stop"}
 KEYS = "keys: p pain stop, space emergency stop, s or Ctrl-C stop and retract"
-ENDINGS = (signal.SIGTERM, signal.SIGHUP)  # a computer that shuts down, a terminal that is closed
 
 T = TypeVar("T")
-Handler = Callable[[int, FrameType | None], None]
 
 
 @contextlib.contextmanager
@@ -39,7 +34,7 @@ def connected(wiring: Wiring) -> Iterator[Supervisor]:
 
     A computer that shuts down and a terminal that is closed end the bench first, as Ctrl-C does.
     """
-    with stop_keys() as attach, _on_signals(_end, *ENDINGS):
+    with stop_keys() as attach, ended_first():
         bench = Supervisor(wiring)
         try:
             bench.prepare()
@@ -48,7 +43,7 @@ def connected(wiring: Wiring) -> Iterator[Supervisor]:
             bench.refuse_held()
             yield bench
         finally:
-            with _on_signals(_let_end, *ENDINGS):
+            with unhurried():
                 bench.close()
 
 
@@ -85,7 +80,7 @@ def run(bench: Supervisor, operation: Operation, work: Callable[[], T]) -> T:
             errors.append(error)
 
     thread = threading.Thread(target=worker, name=operation.progress.name)
-    with _interrupt_stops(bench, operation):
+    with interrupt_stops(bench, operation):
         thread.start()
         _show(bench, operation, thread)
     thread.join()
@@ -108,8 +103,7 @@ def _show(bench: Supervisor, operation: Operation, thread: threading.Thread) -> 
 
 
 def _live(bench: Supervisor, now: Snapshot) -> str:
-    left = "" if now.time_left_s is None else f"  {now.time_left_s:.0f} s left"
-    return live_text(bench) + left
+    return live_text(bench) + ("" if now.time_left_s is None else f"  {now.time_left_s:.0f} s left")
 
 
 def live_text(bench: Supervisor) -> str:
@@ -127,47 +121,3 @@ def live_text(bench: Supervisor) -> str:
             f"{rates.get('force', 0):5.0f} Hz",
         ]
     )
-
-
-@contextlib.contextmanager
-def _interrupt_stops(bench: Supervisor, operation: Operation) -> Iterator[None]:
-    def interrupted(number: int, frame: FrameType | None) -> None:
-        _let_end(number, frame)
-        operation.cancel()
-        with contextlib.suppress(DeviceError):
-            bench.stop()
-
-    with _on_signals(interrupted, signal.SIGINT, *ENDINGS):
-        yield
-
-
-@contextlib.contextmanager
-def _on_signals(handler: Handler, *numbers: signal.Signals) -> Iterator[None]:
-    before = {number: signal.signal(number, handler) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, earlier in before.items():
-            signal.signal(number, earlier)
-
-
-def _end(number: int, frame: FrameType | None) -> None:
-    """As Ctrl-C does, once: a shell and the kernel both say that a terminal was closed."""
-    for ending in ENDINGS:
-        signal.signal(ending, _let_end)
-    _let_end(number, frame)
-    raise KeyboardInterrupt
-
-
-def _let_end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature of a handler
-    """What ends already is not hurried."""
-    if number == signal.SIGHUP:
-        _leave_terminal()
-
-
-def _leave_terminal() -> None:
-    """A terminal that was closed answers every write with an error, which must not end the retraction."""
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    for stream in (sys.stdin, sys.stdout, sys.stderr):
-        os.dup2(nowhere, stream.fileno())
-    os.close(nowhere)

@@ -9,7 +9,7 @@ from typing import cast
 
 import pytest
 
-from api.cli import live
+from api.cli import endings, live
 from api.cli.computing import compute
 from controller.loop.messages import Status
 from controller.operation import Operation
@@ -31,7 +31,7 @@ class StoppableBench:
 def left(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """When the terminal was left; the tests go on writing to theirs."""
     found: list[str] = []
-    monkeypatch.setattr(live, "_leave_terminal", lambda: found.append("left"))
+    monkeypatch.setattr(endings, "_leave_terminal", lambda: found.append("left"))
     return found
 
 
@@ -84,21 +84,21 @@ class SignalledBench:
 
 def connected(bench: SignalledBench, monkeypatch: pytest.MonkeyPatch) -> None:
     """Starts the bench and ends it; signals are as before then."""
-    before = [signal.getsignal(number) for number in live.ENDINGS]
+    before = [signal.getsignal(number) for number in endings.ENDINGS]
     monkeypatch.setattr(live, "Supervisor", lambda _: bench)
     try:
         with live.connected(Wiring()):
             pass
     finally:
-        assert [signal.getsignal(number) for number in live.ENDINGS] == before
+        assert [signal.getsignal(number) for number in endings.ENDINGS] == before
 
 
-@pytest.mark.parametrize("number", live.ENDINGS)
+@pytest.mark.parametrize("number", endings.ENDINGS)
 def test_a_start_is_ended_in_order_and_the_end_itself_is_let_end(
     number: signal.Signals, left: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # A shell and the kernel both say that a terminal was closed.
-    bench = SignalledBench(starting=[number], ending=[number, *live.ENDINGS])
+    bench = SignalledBench(starting=[number], ending=[number, *endings.ENDINGS])
     with pytest.raises(KeyboardInterrupt):
         connected(bench, monkeypatch)
     assert bench.done == ["prepared", "closed", "closed"]
@@ -106,7 +106,7 @@ def test_a_start_is_ended_in_order_and_the_end_itself_is_let_end(
 
 
 def test_an_end_that_is_met_by_a_signal_is_no_failure(left: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = SignalledBench(starting=[], ending=[*live.ENDINGS])
+    bench = SignalledBench(starting=[], ending=[*endings.ENDINGS])
     connected(bench, monkeypatch)
     assert (bench.done, left) == (["prepared", "started", "used", "closed"], ["left"])
 
@@ -119,7 +119,7 @@ def test_a_terminal_that_was_closed_is_written_to_no_more(monkeypatch: pytest.Mo
         os.close(keyboard)
         with pytest.raises(OSError, match="Input/output error"):
             stream.write("nobody reads\n")
-        live._leave_terminal()
+        endings._leave_terminal()
         stream.write("nobody reads\n")
 
 
