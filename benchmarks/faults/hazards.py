@@ -76,7 +76,8 @@ HAZARDS = (
         "Spoilt data pass as good",
         "samples that are lost or corrupt, cycles that are missed, a zero that moved, a marker that slipped",
         (QUALITY, "recorder_stalled"),
-        "The verdict knows what can be seen in one trial. Whether the right site was pressed it does not know.",
+        "The verdict knows what can be seen in one trial and beside those before. Whether the right site was pressed it"
+        " does not know, nor that the sensor's gain changed between the first touch and the first loading.",
     ),
 )
 
