@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import NamedTuple
 
 from drivers.bota import codec as bota
-from drivers.can.slcan import SlcanDecoder, decode_line
+from drivers.can.slcan import SlcanDecoder, decode_flags, decode_line
 from drivers.can.socketcan import decode as decode_can
 from drivers.canopen.nmt import decode_emergency, decode_heartbeat
 from drivers.canopen.sdo import Download, Upload
@@ -257,6 +257,7 @@ def _of_can() -> dict[str, Codec]:
     return {
         "slcan stream": Codec(SlcanDecoder().feed, (), frames),
         "slcan line": Codec(decode_line, (), frames),
+        "slcan flags": Codec(decode_flags, (), (b"F00", b"F84", *frames)),
         "socketcan": Codec(lambda data: [decode_can(data[at : at + 16]) for at in range(0, len(data), 16)], (), frames),
         "canopen": Codec(_canopen, (), OF_CAN),
         "drives": Codec(_drives(), (), OF_CAN),
