@@ -94,22 +94,24 @@ export const ifThere = <T>(path: string, sent: Sent<undefined> = {}): Promise<T 
 
 export const get = <P extends Routes<"get">>(path: P, sent: Sent<undefined> = {}) => ask("get", path, sent) as Promise<Answer<P, "get">>;
 type Items<A> = A extends { items: readonly (infer I)[] } ? I : never;
+type Page<P extends Routes<"get">> = { items: Items<Answer<P, "get">>[]; next?: string | null };
 
-/** The first ``many`` of a list that comes page by page, with all else that its last page says. */
-export async function upTo<P extends Routes<"get">>(path: P, many: number, only: Record<string, string> = {}): Promise<Answer<P, "get">> {
-  const items: Items<Answer<P, "get">>[] = [];
-  let page: { items: typeof items; next?: string | null } = { items, next: "" };
+async function pages<P extends Routes<"get">>(path: P, many: number, only: Record<string, string>): Promise<Page<P>> {
+  let page: Page<P> = { items: [], next: "" };
+  const { items } = page;
   while (page.next != null && items.length < many) {
     const query = { ...only, limit: Math.min(many - items.length, LARGEST_PAGE), cursor: page.next };
-    page = (await ask("get", path, { query })) as typeof page;
+    page = (await ask("get", path, { query })) as Page<P>;
     items.push(...page.items);
   }
-  return { ...page, items } as Answer<P, "get">;
+  return { ...page, items };
 }
 
-/** All of such a list. */
-export const every = async <P extends Routes<"get">>(path: P, only: Record<string, string> = {}): Promise<Items<Answer<P, "get">>[]> =>
-  ((await upTo(path, Infinity, only)) as { items: Items<Answer<P, "get">>[] }).items;
+/** The first ``many`` of a list that comes page by page, with all else that its last page says. */
+export const upTo = <P extends Routes<"get">>(path: P, many: number) => pages(path, many, {}) as unknown as Promise<Answer<P, "get">>;
+
+/** All of such a list, or ``only`` what a query of it leaves. */
+export const every = async <P extends Routes<"get">>(path: P, only: Record<string, string> = {}) => (await pages(path, Infinity, only)).items;
 
 export const post = <P extends Routes<"post">>(path: P, sent: Sent<Body<P, "post">> = {}) => ask("post", path, sent) as Promise<Answer<P, "post">>;
 export const put = <P extends Routes<"put">>(path: P, sent: Sent<Body<P, "put">> = {}) => ask("put", path, sent) as Promise<Answer<P, "put">>;
