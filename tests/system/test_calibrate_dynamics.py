@@ -13,8 +13,14 @@ from tests.controller.commissioning.test_axis_dynamics import MockMechanics, sin
 pytestmark = [pytest.mark.bench, pytest.mark.extra, pytest.mark.xdist_group("commands")]
 
 
+TRIES = 3  # what a computer that was busy has spoilt is refused by its coherence, and is to be done again
+
+
 def test_the_mock_axis_is_found_as_its_physics_answer_a_sine(tmp_path: Path) -> None:
-    said = rig("calibrate", "axis", "--dynamics", "--json", "result.json", folder=tmp_path)
+    for _ in range(TRIES):
+        said = rig("calibrate", "axis", "--dynamics", "--json", "result.json", folder=tmp_path)
+        if "coherent to" not in said.err:
+            break
     assert said.code == 0, said.err
     found = read_dynamics(tmp_path / json.loads((tmp_path / "result.json").read_text())["file"])
     axis = Axis()
