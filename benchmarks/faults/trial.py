@@ -5,7 +5,7 @@ import os
 import random
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from mock_devices.testing.commands import ServedBench, served_bench
 from rig.config.table import merged, parse
 from rig.config.wiring import Wiring
 from rig.errors import RigError
-from rig.recording.reader import read_recording
+from rig.recording.reader import Recording, read_recording
 
 # Every limit of a real bench is stated, so that none is as patient as a mock device gets it; only missed samples are
 # counted by age, because the bench is a process of the same computer.
@@ -127,11 +127,12 @@ def _outcome(
             raise
         ended, refusal = Ended(str(error)), str(error)
         end, moves = _end(bench)
-    found = [*_recorded(folder, happened_ns), *(one for one in notices if one.at_ns > happened_ns)]
+    recordings = [read_recording(file) for file in sorted(folder.glob("*.mcap"))]
+    found = [*_recorded(recordings, happened_ns), *(one for one in notices if one.at_ns > happened_ns)]
     stops = tuple(sorted(found, key=lambda notice: notice.at_ns))
     onset_ns = happened_ns if fault.onset is at_once else observer.onset_ns
     if fault.stream and stops:
-        onset_ns = last_sample_ns(folder, fault.stream, stops[0].at_ns)
+        onset_ns = last_sample_ns(recordings, fault.stream, stops[0].at_ns)
     return Outcome(
         ended,
         happened_ns,
@@ -141,7 +142,7 @@ def _outcome(
         refusal,
         end,
         moves,
-        _complete(folder),
+        all(recording.complete and not recording.damage for recording in recordings),
     )
 
 
@@ -200,25 +201,20 @@ def _wait(condition: Callable[[], bool]) -> None:
         time.sleep(0.003)
 
 
-def _recorded(folder: Path, happened_ns: int) -> list[Notice]:
+def _recorded(recordings: Sequence[Recording], happened_ns: int) -> list[Notice]:
     """What stopped motion, from the events of the recordings."""
     return [
         Notice(event.code, event.capture_ns, event.text)
-        for file in sorted(folder.glob("*.mcap"))
-        for event in read_recording(file).events
+        for recording in recordings
+        for event in recording.events
         if event.level >= STOPPING_LEVEL and event.capture_ns > happened_ns - CYCLE_NS
     ]
 
 
-def last_sample_ns(folder: Path, stream: str, before_ns: int) -> int:
+def last_sample_ns(recordings: Sequence[Recording], stream: str, before_ns: int) -> int:
     """When the newest sample of ``stream`` was taken that had come by then, of all recordings."""
-    found = np.concatenate([read_recording(file).tables[stream] for file in sorted(folder.glob("*.mcap"))])
+    found = np.concatenate([recording.tables[stream] for recording in recordings])
     return int(found["capture_ns"][found["arrival_ns"] < before_ns].max())
-
-
-def _complete(folder: Path) -> bool:
-    recordings = [read_recording(file) for file in sorted(folder.glob("*.mcap"))]
-    return all(recording.complete and not recording.damage for recording in recordings)
 
 
 def _end(bench: ServedBench) -> tuple[str, str]:

@@ -2,8 +2,8 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -20,6 +20,7 @@ from benchmarks.faults.scenarios import INDENTATION, SCENARIOS, Ended, beyond_go
 from benchmarks.faults.trial import Trial, last_sample_ns, wiring_for
 from controller.safety.table import TABLE
 from rig.errors import UsageError
+from rig.recording.reader import Recording
 
 MS = 1_000_000
 BOUND_MS = 100
@@ -166,21 +167,12 @@ def test_whatever_stops_motion_has_a_bound_that_ends() -> None:
     assert unbounded == {QUALITY, REFUSED, NOBODY}
 
 
-def test_where_a_share_of_messages_is_lost_the_bound_counts_from_the_last_that_came(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_where_a_share_of_messages_is_lost_the_bound_counts_from_the_last_that_came() -> None:
     """Of three that were taken in time the last came too late for anybody to know of it."""
-    taken = {"a.mcap": [(1, 2), (5, 6), (9, 10)], "b.mcap": [(11, 12), (17, 40)]}
-
-    def read(file: Path) -> SimpleNamespace:
-        return SimpleNamespace(
-            tables={"axis": np.array(taken[file.name], [("capture_ns", "i8"), ("arrival_ns", "i8")])}
-        )
-
-    for name in taken:
-        (tmp_path / name).touch()
-    monkeypatch.setattr("benchmarks.faults.trial.read_recording", read)
-    assert [last_sample_ns(tmp_path, "axis", before) for before in (41, 40, 12, 11)] == [17, 11, 9, 9]
+    taken = [(1, 2), (5, 6), (9, 10)], [(11, 12), (17, 40)]
+    rows = [np.array(of, [("capture_ns", "i8"), ("arrival_ns", "i8")]) for of in taken]
+    recordings = cast(list[Recording], [SimpleNamespace(tables={"axis": each}) for each in rows])
+    assert [last_sample_ns(recordings, "axis", before) for before in (41, 40, 12, 11)] == [17, 11, 9, 9]
 
 
 def test_faults_that_took_several_runs_are_said() -> None:
