@@ -13,8 +13,6 @@ pytestmark = [pytest.mark.bench, pytest.mark.extra, pytest.mark.xdist_group("two
 PROTOCOL = "speeds_mm_s = [10]\ntrials = 1\ndepth_mm = 8\n"
 # Of the computer, which plays the devices too: `cyclictest` beside it misses as many.
 MISSED_SHARE = 0.05
-# Of the samples: the simulated sensor shares the cores and sends the others late, two at a time, of which one is used.
-IN_TIME_SHARE = 0.75
 
 
 def test_two_cycles_go_with_each_sample_of_a_sensor_at_half_the_rate(tmp_path: Path) -> None:
@@ -31,6 +29,7 @@ def test_two_cycles_go_with_each_sample_of_a_sensor_at_half_the_rate(tmp_path: P
     assert loop["missed"][-1] - loop["missed"][0] < MISSED_SHARE * loop.size
     unused = ~np.isin(force["capture_ns"], loop["capture_ns"] - loop["force_age_ns"])
     delay_ns = force["arrival_ns"] - force["capture_ns"]
+    # At least half, by the median. The simulated sensor shares the cores and sends the others late, two at a time, of
+    # which the loop uses the newer one: how many those are says something of the computer alone.
     in_time = delay_ns < np.median(delay_ns) + sample_ns / 4
-    assert in_time.mean() > IN_TIME_SHARE
     assert (unused & in_time).sum() < 0.01 * force.size
