@@ -371,6 +371,17 @@ def test_a_loop_that_goes_says_how_it_went(around: Surroundings, code: int, text
         assert not bench.alive
 
 
+def test_who_waits_for_an_answer_hears_how_the_loop_went(around: Surroundings) -> None:
+    def ends(loop: PlayedLoop, _: Received) -> None:
+        loop.ended.set()
+
+    around.exit_code = 3
+    with Supervisor(Wiring()) as bench:
+        around.reply = ends
+        with pytest.raises(DeviceError, match=r"ended unasked \(exit code 3\)"):
+            bench.reset()
+
+
 def test_how_a_loop_went_that_never_came_is_not_known() -> None:
     assert Supervisor(Wiring())._exit_text() == "exit code None"
 

@@ -13,7 +13,7 @@ from controller.loop.modes import Mode
 from controller.loop.paired_samples import Touch
 from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
-from controller.loop.steps import Hold, Retract
+from controller.loop.steps import Hold, Program, Retract
 from controller.safety.inputs import SafetyInputs
 from controller.safety.load import UNKNOWN, LoadMonitor
 from controller.safety.oscillation import OscillationMonitor
@@ -159,6 +159,13 @@ def test_a_sensor_of_which_one_channel_still_moves_is_not_frozen(channel: int) -
     for number in range(3):
         bench.loop._take_force(sample._replace(temperature_C=30.0 + number))
     assert bench.loop.health["force"].frozen, "whatever else of the sample changes"
+
+
+def test_where_the_limb_should_stay_is_found_anew_for_each_program() -> None:
+    bench = FakeBench()
+    registration = asked(bench, "_registration")
+    bench.loop.start(Program(name="test", steps=(ZERO,)), 1)
+    assert len(registration.of("begin")) == 1
 
 
 @pytest.mark.parametrize(
