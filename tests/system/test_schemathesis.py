@@ -6,9 +6,11 @@ tested where it belongs.
 
 import contextlib
 import os
+import re
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -45,6 +47,14 @@ def judged(address: str, seconds: int, folder: Path, *more: str) -> subprocess.C
     )  # fmt: skip
 
 
+def refuse_untried(said: str) -> None:
+    """Fails where an operation that is not left out was not tried before the time was over."""
+    counted = re.search(r"Selected: (\d+)/(\d+)\n  Tested: (\d+)\n", said)
+    assert counted, said[-3000:]
+    selected, described, tried = map(int, counted.groups())
+    assert 0 < selected == tried <= described, f"{tried} of {selected} operations were tried"
+
+
 @pytest.mark.timeout(400)
 def test_every_answer_is_as_described_while_the_tip_presses(bench: ServedBench, tmp_path: Path) -> None:
     (tmp_path / "protocols").mkdir()
@@ -70,6 +80,7 @@ def test_every_answer_is_as_described_while_the_tip_presses(bench: ServedBench, 
         over.set()
         keeper.join()
     assert done.returncode == 0, done.stdout[-6000:]
+    refuse_untried(done.stdout)
     shown = rig.ask("GET", f"/jobs/{job}")
     assert renewing.is_set() and shown["state"] == "running", shown["message"]
     assert bench.control.number("tip.force_N") > 1.0
@@ -100,3 +111,19 @@ def test_the_judge_says_no_where_an_answer_is_not_as_described(
     with served(app) as address:
         done = judged(address, 5, tmp_path)
     assert done.returncode == found, done.stdout[-3000:]
+    refuse_untried(done.stdout)
+
+
+def test_an_operation_that_no_time_was_left_for_is_told(tmp_path: Path) -> None:
+    app = FastAPI()
+    for number in range(20):
+
+        @app.get(f"/slow/{number}")
+        def slow() -> dict[str, str]:  # planted: one answer takes as long as there is for all
+            time.sleep(2.0)
+            return {}
+
+    with served(app) as address:
+        done = judged(address, 2, tmp_path)
+    with pytest.raises(AssertionError, match=r"\d of 20 operations were tried"):
+        refuse_untried(done.stdout)
