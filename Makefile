@@ -47,9 +47,11 @@ test-documents: $(READY) page
 test-campaigns: $(READY)
 	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m campaign --ignore tests/page --durations 10
 
-# The demonstration, stops and crashes in contact, every answer of the service while the tip presses, further products.
+# The demonstration, stops and crashes in contact, every answer of the service while the tip presses, further products; by itself
+# what asks how punctual the loop is, which the processes of a second bench would decide.
 test-extras: $(READY) page
-	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m extra --ignore tests/page --durations 10
+	$(BIN)/pytest -m alone --ignore tests/page
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "extra and not alone" --ignore tests/page --durations 10
 	$(MAKE) --no-print-directory test-one-extra
 
 # By hand, for hours, on a quiet computer, dated in docs/validation: what takes long and rarely breaks, a hundred new examples of

@@ -44,7 +44,7 @@ settings.load_profile("shared machine")
 
 
 # Markers of a few files: whoever asks for one of them need not load all the others, which takes ten seconds a worker.
-RARE = {"bench", "campaign", "extra", "by_hand"}
+RARE = {"alone", "bench", "campaign", "extra", "by_hand"}
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
