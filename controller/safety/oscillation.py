@@ -64,11 +64,9 @@ class OscillationMonitor:
 
     def _count(self, swing_N: float, amplitude_N: float, dt_s: float) -> None:
         self._since_s += dt_s
-        if self._since_s > 0.5 / LOWEST_HZ:
-            self._half_waves = 0
         side = 0 if abs(swing_N) <= amplitude_N else 1 if swing_N > 0 else -1
         if side in (0, self._side):
             return
-        in_band = self._side != 0 and self._since_s >= 0.5 / HIGHEST_HZ
+        in_band = self._side != 0 and 0.5 / HIGHEST_HZ <= self._since_s <= 0.5 / LOWEST_HZ
         self._half_waves = self._half_waves + 1 if in_band else 0
         self._side, self._since_s = side, 0.0
