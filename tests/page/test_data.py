@@ -104,3 +104,21 @@ def test_files_that_hold_no_force_are_refused_in_a_sentence_and_a_mapping_can_be
     expect(page.locator("#columns")).to_contain_text("way [mm]", timeout=WORK_MS)
     page.click("text=Mapping: what each column is")
     expect(page.locator("#mapping")).to_have_value(re.compile(r"way \[mm\]"))
+
+
+@pytest.mark.timeout(600)
+def test_what_is_left_out_is_named_when_it_is_read_and_when_it_comes_in(page: Page, tmp_path: Path) -> None:
+    mine = tmp_path / "mine"
+    stroke(mine / "one.csv", "time_s,position_mm,force_N")
+    (mine / "about.txt").write_text("the gel was warm\n")
+    (mine / ".DS_Store").write_bytes(b"\0\0\0\1Bud1")
+    view(page, "Data")
+    page.set_input_files("#files", [mine / name for name in ("one.csv", "about.txt", ".DS_Store")])
+    page.click("#read")
+    expect(page.locator("#left-out")).to_contain_text("hidden files: .DS_Store.")
+    expect(page.locator("#doubts")).to_contain_text("about.txt", timeout=WORK_MS)
+    page.fill("#import-session", "left")
+    page.click("#bring")
+    expect(page.locator("#came-in")).to_contain_text("were left out: about.txt", timeout=WORK_MS)
+    page.set_input_files("#files", mine / "one.csv")
+    expect(page.locator("#left-out")).to_have_count(0)

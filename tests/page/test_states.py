@@ -199,6 +199,14 @@ def test_curves_span_what_was_recorded_though_depth_is_not_known_at_first_and_ha
     expect(page.locator("#curves")).to_have_attribute("aria-label", re.compile("against time"))
 
 
+def test_files_of_a_session_that_are_too_many_to_list_are_counted(show: Any, service: Pretended) -> None:
+    service.answers[f"sessions/{told.NAME}"] = told.SESSION.model_copy(update={"files_left_out": 7})
+    page = show("session")
+    page.click("text=12 files")
+    expect(page.locator("#files li")).to_have_count(5)
+    expect(page.locator("#not-listed")).to_have_text("7 more files are not listed; they are in the session's folder.")
+
+
 def test_what_axe_is_for_is_found(show: Any) -> None:
     page = show("track")
     expect(page.locator("#track-form")).to_be_visible()

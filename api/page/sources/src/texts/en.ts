@@ -189,6 +189,7 @@ export const en = {
     title: "Bring your own data", files: "Files", choose: "Files of one or more recordings", chooseFolder: "Or a whole folder", read: "Read them",
     text: "Text, Excel, MAT, HDF5, Parquet or MCAP. They are copied to this bench's computer and nowhere else; what is in them is proposed below for you to correct.",
     chosen: (count: number, megabytes: string) => `${count === 1 ? "1 file" : `${count} files`}, ${megabytes} MB:`, more: (count: number) => `and ${count} more`,
+    leftOut: (names: readonly string[], more: number) => `Left out, since no measurement is in hidden files: ${names.join(", ")}${more > 0 ? ` and ${more} more` : ""}.`,
     noFile: "Choose files first, or drop them here.", copying: "Copying…",
     understood: "What was understood", nothing: "No column was understood: write a mapping below, or choose other files.",
     columns: ["quantity", "column in the files", "unit", "positive means", "files"], asked: "asked below",
@@ -372,5 +373,6 @@ export const en = {
     title: "Sessions", all: "All sessions", session: "session", subject: "subject", recorded: "recorded", more: "Show more",
     none: "No session yet. Run a protocol, or bring data of your own.",
     filesOf: (count: number) => (count === 1 ? "1 file" : `${count} files`),
+    notListed: (count: number) => (count === 1 ? "1 more file is not listed; it is in the session's folder." : `${count} more files are not listed; they are in the session's folder.`),
   },
 };

@@ -29,11 +29,16 @@ function Chosen({ files }: { files: readonly File[] }) {
 export function Files({ begin }: { begin: (upload: string, job: string) => void }) {
   const [files, choose] = useState<File[]>([]);
   const [copying, copy] = useState(false);
+  const [leftOut, leave] = useState<readonly string[]>([]);
   const form = useRef<HTMLFormElement>(null);
-  const chosen = (event: Event) => choose([...((event.currentTarget as HTMLInputElement).files ?? [])]);
+  const take = (taken: File[]) => {
+    choose(taken);
+    leave([]);
+  };
+  const chosen = (event: Event) => take([...((event.currentTarget as HTMLInputElement).files ?? [])]);
   const dropped = (event: DragEvent) => {
     event.preventDefault();
-    if (event.dataTransfer?.files.length) choose([...event.dataTransfer.files]);
+    if (event.dataTransfer?.files.length) take([...event.dataTransfer.files]);
   };
   const read = async (event: Event) => {
     event.preventDefault();
@@ -41,7 +46,8 @@ export function Files({ begin }: { begin: (upload: string, job: string) => void 
     await attempt(async () => {
       const body = new FormData();
       for (const file of files) body.append("file", file, nameOf(file));
-      const { id } = await post("/api/v1/uploads", { body: body as never });
+      const { id, left_out } = await post("/api/v1/uploads", { body: body as never });
+      leave(left_out);
       begin(id, (await start("propose", { upload: id })).id);
     });
     copy(false);
@@ -52,6 +58,7 @@ export function Files({ begin }: { begin: (upload: string, job: string) => void 
       <label>{t.data.chooseFolder}<input id="folder" type="file" multiple {...{ webkitdirectory: true }} onChange={chosen} /></label>
       <Start id="read" why={whyNotWork() || (files.length ? "" : t.data.noFile) || (copying ? t.data.copying : "")}>{t.data.read}</Start>
       <Chosen files={files} />
+      {leftOut.length > 0 && <p id="left-out" class="notice warn" role="status">{t.data.leftOut(leftOut.slice(0, SHOWN), leftOut.length - SHOWN)}</p>}
     </form>
   );
 }

@@ -53,8 +53,9 @@ export function FilesCard({ of, session, changed }: { of: string; session: Sessi
       <h3>{t.session.verifyTitle}</h3>
       <Whole of={of} />
       <details>
-        <summary>{t.sessions.filesOf(session.files.length)}</summary>
+        <summary>{t.sessions.filesOf(session.files.length + session.files_left_out)}</summary>
         <ul id="files">{session.files.map((file) => <li key={file.name}><a href={file.href} download>{file.name}</a> <span class="quiet">{(file.bytes / 1e6).toFixed(2)} MB</span></li>)}</ul>
+        {session.files_left_out > 0 && <p id="not-listed" class="quiet">{t.sessions.notListed(session.files_left_out)}</p>}
       </details>
     </Card>
   );
