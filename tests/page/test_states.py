@@ -11,6 +11,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from api.http.access.models import AuditView
+from api.http.models import RigView
 from hatch_build import SOURCES, built_folder
 from mock_devices.testing.commands import ServedBench
 from tests.page import told, told_lab
@@ -99,11 +100,23 @@ def test_more_of_a_list_is_shown_once_it_is_asked_for(show: Any, service: Preten
     expect(page.get_by_text("Show more")).to_have_count(0)
 
 
-def test_a_gauge_block_is_asked_for_with_its_height_and_place(show: Any, service: Pretended) -> None:
-    begun = told.job("calibrate-axis", "running", session=None)
+def starts(service: Pretended, kind: str) -> None:
+    """What is asked to start does."""
     lease = {"lease_id": "l", "epoch": 1, "expires": told.AT}
+    begun = told.job(kind, "running", session=None)
     service.answers |= {"POST control/lease": lease, "PUT control/lease": lease, "POST jobs": begun}
     service.answers |= {f"jobs/{begun['id']}": begun}
+
+
+def asked_by(page: Page, button: str) -> Any:
+    """The job that pressing ``button`` asks for."""
+    with page.expect_request(lambda sent: sent.method == "POST" and sent.url.endswith("/jobs")) as asked:
+        page.click(button)
+    return asked.value.post_data_json
+
+
+def test_a_gauge_block_is_asked_for_with_its_height_and_place(show: Any, service: Pretended) -> None:
+    starts(service, "calibrate-axis")
     service.says(rig=IDLE)
     page = show("devices")
     page.select_option("#against", "block")
@@ -112,12 +125,71 @@ def test_a_gauge_block_is_asked_for_with_its_height_and_place(show: Any, service
     expect(page.locator("#block-near:invalid")).to_be_visible()
     page.fill("#block-near", "31.5")
     holds_up(page, "state-calibrate-axis-block", (390,))
-    with page.expect_request(lambda sent: sent.method == "POST" and sent.url.endswith("/jobs")) as asked:
-        page.click("#calibrate-axis")
-    assert asked.value.post_data_json == {
+    assert asked_by(page, "#calibrate-axis") == {
         "kind": "calibrate-axis",
         "params": {"gauge_block_mm": 10.003, "near_mm": 31.5},
     }
+
+
+def with_gloves(*names: str) -> RigView:
+    """A bench that has them."""
+    worn = {name: IDLE.devices["force"] | {"product": "firmata-glove"} for name in names}
+    pedal = {"pedal": IDLE.devices["force"] | {"product": "evdev-switch"}}
+    return IDLE.model_copy(update={"devices": IDLE.devices | worn | pedal})
+
+
+GLOVE_WORK = {"threshold-glove": ("run", "#glove-start"), "calibrate-glove": ("devices", "#calibrate-glove")}
+CHOICE = {"threshold-glove": "#glove-input", "calibrate-glove": "#calibrate-glove-input"}
+
+
+def ready_for(page: Page, kind: str) -> None:
+    """Fills in what else that work asks for."""
+    if kind == "calibrate-glove":
+        page.fill("#glove-weights", "1 N, 2 N")
+    else:
+        page.click("#glove summary")
+
+
+@pytest.mark.parametrize("kind", GLOVE_WORK)
+def test_of_several_gloves_a_person_chooses_one_and_none_is_taken_unasked(
+    show: Any, service: Pretended, kind: str
+) -> None:
+    view, button = GLOVE_WORK[kind]
+    choice = CHOICE[kind]
+    starts(service, kind)
+    service.says(rig=with_gloves("left", "right"))
+    page = show(view)
+    ready_for(page, kind)
+    expect(page.locator(button)).to_be_disabled()
+    expect(page.locator(f"{button}-why")).to_have_text("The bench has several gloves: choose one.")
+    expect(page.locator(f"{choice} option")).to_have_text(["choose a glove", "left", "right"])
+    page.select_option(choice, "right")
+    holds_up(page, f"state-gloves-{view}", (390,))
+    asked = asked_by(page, button)
+    assert (asked["kind"], asked["params"]["input"]) == (kind, "right")
+
+
+@pytest.mark.parametrize("kind", GLOVE_WORK)
+def test_the_only_glove_is_not_asked_for(show: Any, service: Pretended, kind: str) -> None:
+    view, button = GLOVE_WORK[kind]
+    starts(service, kind)
+    service.says(rig=with_gloves("left"))
+    page = show(view)
+    ready_for(page, kind)
+    expect(page.locator(button)).to_be_enabled()
+    expect(page.locator(CHOICE[kind])).to_have_count(0)
+    assert "input" not in asked_by(page, button)["params"]
+
+
+def test_a_glove_that_is_gone_since_it_was_chosen_is_not_asked_for(show: Any, service: Pretended) -> None:
+    service.says(rig=with_gloves("left", "middle", "right"))
+    page = show("run")
+    page.click("#glove summary")
+    page.select_option("#glove-input", "right")
+    expect(page.locator("#glove-start")).to_be_enabled()
+    service.says(rig=with_gloves("left", "middle"))
+    expect(page.locator("#glove-start")).to_be_disabled()
+    expect(page.locator("#glove-input")).to_have_value("")
 
 
 @pytest.mark.parametrize(

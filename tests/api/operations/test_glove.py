@@ -39,7 +39,6 @@ CALIBRATION = GloveCalibration(
 GLOVE = {"product": "firmata-glove", "port": "/dev/glove", "fingers": {"thumb": 0}}
 SUBJECT = {"id": "S07", "site": "calf"}
 WIRING = Wiring.model_validate({"input": {"glove": GLOVE | {"of_fingers": CALIBRATION}}, "subject": SUBJECT})
-STREAM = input_streams(brought_by(WIRING.input))[0]
 PERIOD_NS = 20_000_000
 
 
@@ -52,8 +51,9 @@ class RingBench:
 
 
 @contextmanager
-def pressing(folder: Path, *peaks_N: float) -> Iterator[Supervisor]:
-    """A ring into which somebody's presses come, faster than anybody presses but with times as if not."""
+def pressing(folder: Path, *peaks_N: float, wiring: Wiring = WIRING) -> Iterator[Supervisor]:
+    """A ring into which somebody's presses come, by the last glove, faster than anybody presses."""
+    stream = input_streams(brought_by(wiring.input))[-1]
     ring, ending = RingWriter.create(folder / "loop.ring", 4096), threading.Event()
     rising = [[peak_N * number / 40 for number in range(41)] + [0.0] * 10 for peak_N in peaks_N]
     forces_N = [force_N for press in rising for force_N in press]
@@ -63,12 +63,12 @@ def pressing(folder: Path, *peaks_N: float) -> Iterator[Supervisor]:
         for seq, force_N in enumerate(forces_N):
             at_ns = PERIOD_NS * seq
             sample = InputSample(seq, at_ns, at_ns + 1, 0, 0, 16_000_000, (force_N, 20 * force_N), 0, 1)
-            ring.put(STREAM.id, STREAM.pack(sample.row))
+            ring.put(stream.id, stream.pack(sample.row))
         ending.wait(10.0)
 
     thread = threading.Thread(target=write)
     thread.start()
-    yield cast(Supervisor, RingBench(ring.path))
+    yield cast(Supervisor, RingBench(ring.path, wiring))
     ending.set()
     thread.join()
     ring.close()
@@ -152,3 +152,14 @@ def test_the_job_of_the_service_is_checked_and_does_it(tmp_path: Path) -> None:
     assert isinstance(found, GloveThreshold) and isinstance(plan.operation, Operation)
     assert math.isclose(found.force_N or 0.0, 8.2)
     assert (tmp_path / "sessions" / "found" / "glove_001.threshold.json").exists()
+
+
+def test_of_two_gloves_the_one_that_was_chosen_is_listened_to(tmp_path: Path) -> None:
+    both = {name: GLOVE | {"port": f"/dev/{name}", "of_fingers": CALIBRATION} for name in ("left", "right")}
+    wiring = Wiring.model_validate({"input": both, "subject": SUBJECT})
+    places = Places(*(tmp_path / name for name in ("sessions", "protocols", "uploads", "files")))
+    body = GloveThresholdJob(kind="threshold-glove", params=GloveThresholdParams(session="found", input="right"))
+    with pressing(tmp_path, 8.0, 8.4, 8.2, wiring=wiring) as bench:
+        found = planned(body, bench, places).work()
+    assert isinstance(found, GloveThreshold) and found.input == "right"
+    assert math.isclose(found.force_N or 0.0, 8.2)

@@ -132,6 +132,7 @@ export const en = {
     confusability: "Which causes can be told apart",
   } as Record<string, string>,
   noPicture: "No picture was made of this.",
+  gloves: { which: "Glove", choose: "choose a glove", noChoice: "The bench has several gloves: choose one." },
   models: {
     other: (subject: string, on: string) => `This tissue is ${subject ? `that of ${subject}` : "of nobody known"}, not of ${on || "whoever is on the bench"}: force may overshoot or lag.`,
     line: (session: string, subject: string, site: string, extended: boolean) => [session, subject, site].filter(Boolean).join(", ") + (extended ? " (with the causes named)" : ""),

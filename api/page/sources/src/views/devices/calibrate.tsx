@@ -5,13 +5,14 @@ import type { Schema } from "../../api";
 import { attempt } from "../../attempt";
 import { ended, startInControl, useWork } from "../../jobs";
 import { Card } from "../../parts/basics";
+import { useGlove } from "../../parts/gloves";
 import { JobState } from "../../parts/job";
 import { Start, whyNotMove } from "../../parts/may";
 import { t } from "../../texts";
 
 type Found = Schema["CalibrateResult"];
 
-function Calibrate({ kind, text, params, children }: { kind: string; text: string; params: Record<string, unknown>; children?: ComponentChildren }) {
+function Calibrate({ kind, text, params, why = "", children }: { kind: string; text: string; params: Record<string, unknown>; why?: string; children?: ComponentChildren }) {
   const [job, follow] = useWork<Found>(kind);
   const begin = (event: Event) => {
     event.preventDefault();
@@ -20,7 +21,7 @@ function Calibrate({ kind, text, params, children }: { kind: string; text: strin
   return (
     <Card title={t.kinds[kind]!}>
       <p>{text}</p>
-      {(!job || ended(job)) && <form onSubmit={begin}>{children}<Start id={kind} why={whyNotMove()}>{t.devices.calibrateStart}</Start></form>}
+      {(!job || ended(job)) && <form onSubmit={begin}>{children}<Start id={kind} why={whyNotMove() || why}>{t.devices.calibrateStart}</Start></form>}
       <JobState job={job} />
       {job?.result && <p id={`${kind}-done`} class="notice">{t.devices.calibrated(job.result.file)}</p>}
     </Card>
@@ -52,8 +53,10 @@ export function CalibrateForce() {
 
 export function CalibrateGlove() {
   const [weights, name] = useState("");
+  const glove = useGlove("calibrate-glove-input");
   return (
-    <Calibrate kind="calibrate-glove" text={t.devices.gloveText} params={{ weights }}>
+    <Calibrate kind="calibrate-glove" text={t.devices.gloveText} params={{ weights, ...glove.asked }} why={glove.why}>
+      {glove.choice}
       <Weights id="glove-weights" weights={weights} name={name} />
     </Calibrate>
   );

@@ -4,6 +4,7 @@ import type { Schema } from "../../api";
 import { attempt } from "../../attempt";
 import { ended, startInControl, useWork } from "../../jobs";
 import { shown } from "../../parts/basics";
+import { useGlove } from "../../parts/gloves";
 import { JobState } from "../../parts/job";
 import { Start, whyNotMove } from "../../parts/may";
 import { keepSubject, type OnBench } from "../../subject";
@@ -14,9 +15,10 @@ type Found = Schema["GloveThreshold"];
 export function Glove({ on, reload }: { on: OnBench; reload: () => void }) {
   const [session, name] = useState(`thresholds-${on.value.id}`);
   const [job, follow] = useWork<Found>("threshold-glove");
+  const glove = useGlove("glove-input");
   const begin = (event: Event) => {
     event.preventDefault();
-    void attempt(async () => follow((await startInControl<Found>("threshold-glove", { session })).id));
+    void attempt(async () => follow((await startInControl<Found>("threshold-glove", { session, ...glove.asked })).id));
   };
   return (
     <>
@@ -26,7 +28,8 @@ export function Glove({ on, reload }: { on: OnBench; reload: () => void }) {
           <label>{t.run.gloveSession}
             <input id="glove-session" required maxLength={80} value={session} onInput={(event) => name(event.currentTarget.value)} />
           </label>
-          <Start id="glove-start" why={whyNotMove() || (session ? "" : t.run.gloveNoSession)}>{t.run.gloveStart}</Start>
+          {glove.choice}
+          <Start id="glove-start" why={whyNotMove() || (session ? glove.why : t.run.gloveNoSession)}>{t.run.gloveStart}</Start>
         </form>
       )}
       <JobState job={job} />
