@@ -14,6 +14,20 @@ from mock_devices.testing.commands import PATIENCE_S, Running, ServedBench, chil
 ANSWER_S = 30.0  # connecting a device is waited for, and a busy computer
 
 
+def ask(address: str, method: str, path: str, body: object = None, lease: str = "") -> Any:
+    """One request of a program with every right to the service at ``address``; ``path`` is what follows /api/v1."""
+    data = None if body is None else json.dumps(body).encode()
+    headers = {
+        "Content-Type": "application/json",
+        "X-Control-Lease": lease,
+        **bearer(),
+        "Idempotency-Key": uuid4().hex,
+    }
+    request = Request(f"{address}/api/v1{path}", data, headers, method=method)
+    with urlopen(request, timeout=ANSWER_S) as answer:
+        return json.load(answer)
+
+
 class ServedRig:
     """A bench, the service on it, and requests to it; it is idle once this is made.
 
@@ -33,16 +47,7 @@ class ServedRig:
 
     def ask(self, method: str, path: str, body: object = None, lease: str = "") -> Any:
         """One request; ``path`` is what follows /api/v1."""
-        data = None if body is None else json.dumps(body).encode()
-        headers = {
-            "Content-Type": "application/json",
-            "X-Control-Lease": lease,
-            **bearer(),
-            "Idempotency-Key": uuid4().hex,
-        }
-        request = Request(f"{self.address}/api/v1{path}", data, headers, method=method)
-        with urlopen(request, timeout=ANSWER_S) as answer:
-            return json.load(answer)
+        return ask(self.address, method, path, body, lease)
 
     def lease(self) -> str:
         """The right to move, for 30 s."""

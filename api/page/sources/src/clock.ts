@@ -24,3 +24,6 @@ export function duration(seconds: number): string {
   const whole = Math.max(0, Math.round(seconds));
   return whole < 60 ? `${whole} s` : `${Math.floor(whole / 60)} min ${two(whole % 60)} s`;
 }
+
+/** The time of day to the second, of milliseconds since 1970. */
+export const timeOf = (ms: number) => new Date(ms).toLocaleTimeString();

@@ -32,6 +32,8 @@ export const contact = signal<Contact>("connecting");
 export const fresh = computed(() => contact.value === "live");
 export const numbers = signal<Partial<Record<Quantity, number | null>>>({});
 export const events = signal<RigEvent[]>([]);
+/** When the bench's clock was zero, in milliseconds since 1970; 0 where that is not known yet. */
+export const started_ms = signal(0);
 /** Samples that this page did not get in time, of all streams. */
 export const missed = signal(0);
 export const traces = Object.fromEntries(QUANTITIES.map((name) => [name, new Trace(CAPACITY)])) as Record<Quantity, Trace>;
@@ -87,6 +89,10 @@ function showNumbers(): void {
   else numbers.value = Object.fromEntries(QUANTITIES.map((name) => [name, known(traces[name].value(newest_s))]));
 }
 
+async function learnClock(): Promise<void> {
+  started_ms.value = Date.now() - (await get("/api/v1/info")).monotonic_ns * 1e-6;
+}
+
 async function look(): Promise<void> {
   try {
     rig.value = await get("/api/v1/rig", { signal: AbortSignal.timeout(2 * SILENT_MS) });
@@ -113,7 +119,10 @@ export function listen(): void {
     ],
     {
       message: () => void (heard_ms = performance.now()),
-      open: () => learnStopPort().catch(() => {}),
+      open: () => {
+        learnStopPort().catch(() => {});
+        learnClock().catch(() => {});
+      },
       run: forget,
       batch: keep,
       event: (event) => {

@@ -72,7 +72,8 @@ export class Stream {
     else if (said.type === "subscribed") for (const one of (said as unknown as { channels: Channel[] }).channels) this.channels.set(one.channel, one);
     else if (said.type === "run") this.begin((said as unknown as { run: string }).run);
     else if (said.type === "gap") this.heard.gap(said.stream as string, said.dropped as number);
-    else if (said.type === "event") {
+    // Each subscription is told what came meanwhile.
+    else if (said.type === "event" && (said.seq as number) > (this.event ?? 0)) {
       this.event = said.seq as number;
       this.heard.event(said as unknown as RigEvent);
     }
@@ -86,7 +87,8 @@ export class Stream {
 
   private greet(hello: { session_id: string; run: string; event_seq: number; streams: { name: string }[] }): void {
     if (hello.run !== this.run) this.begin(hello.run);
-    if (hello.session_id !== this.session) this.event = hello.event_seq;
+    // A service that was begun anew tells all of its own; what was before this page was opened is not asked for.
+    if (hello.session_id !== this.session) this.event = this.session ? 0 : hello.event_seq;
     this.session = hello.session_id;
     this.channels.clear();
     const known = new Set(hello.streams.map((one) => one.name));

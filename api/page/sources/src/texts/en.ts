@@ -296,6 +296,8 @@ export const en = {
     loop: (cycles: number, missed: number) => `control loop: ${cycles} cycles, ${missed} missed`,
     noDevices: "No device is connected.",
     against: "Force against depth",
+    happened: "What happened",
+    nothingHappened: "Nothing since this page was opened.",
   },
   devices: {
     title: "Devices",

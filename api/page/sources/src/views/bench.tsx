@@ -2,6 +2,7 @@
 import { signal } from "@preact/signals";
 import { Card, Dot, shown } from "../parts/basics";
 import { retract } from "../parts/attention";
+import { Happened } from "../parts/happened";
 import { fresh, now_s, numbers, rig, traces } from "../live";
 import { TimePlot, TimeWindow, XYPlot } from "../plot";
 import { t } from "../texts";
@@ -115,6 +116,7 @@ export function Bench() {
           <XYPlot id="loop-plot" label={t.bench.loopPlot} xUnit="mm" unit="N" curves={loop} height={250} every_ms={200} />
         </Card>
         <Health />
+        <Happened />
       </div>
     </>
   );
