@@ -17,7 +17,7 @@ from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from mock_devices.testing.commands import ROOT, free_port, rig
 from rig.recording.sessions import open_session
@@ -30,6 +30,7 @@ pytestmark = [pytest.mark.extra, pytest.mark.timeout(600), pytest.mark.xdist_gro
 LARGEST_STEADY_ERROR_PERCENT = 5.0
 # Relaxation: slow enough that a busy computer's time stamps, a few ms off, leave it as it is.
 HIDES_RELAXATION = "12"
+SEEN_MS = 60_000.0  # as PATIENCE_S: a page that is drawn beside other tests
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +65,33 @@ def browser() -> Iterator[Browser]:
         chromium.close()
 
 
-def test_a_demonstration_that_is_served_ends_with_an_address_where_its_session_is_and_with_ctrl_c(made: Path) -> None:
+def explored(page: Page, address: str) -> None:
+    """What somebody sees who opens the printed address and then the session."""
+    page.goto(address)
+    page.get_by_role("navigation").get_by_role("link", name="Sessions", exact=True).click()
+    assert "ticket" not in page.url
+    page.locator("#recordings").get_by_role("link", name="session", exact=True).click()
+    for part in ("#curves canvas", "#parameters", "#diagnosis-result .said"):
+        expect(page.locator(part)).to_be_visible(timeout=SEEN_MS)
+    expect(page.locator("#parameters")).to_contain_text("stiffness at contact", timeout=SEEN_MS)
+    expect(page.locator("#diagnosis-result .said")).not_to_be_empty(timeout=SEEN_MS)
+    expect(page.locator("#trials tbody tr").nth(5)).to_be_visible(timeout=SEEN_MS)
+
+
+def let_in_twice(browser: Browser, address: str) -> bool:
+    """Whether a ticket that was used lets another browser in."""
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto(address)
+    expect(page.locator("nav").or_(page.locator("#login-form"))).to_be_visible(timeout=SEEN_MS)
+    found = page.locator("nav").count() > 0 or not page.locator("#refusal").count()
+    context.close()
+    return found
+
+
+def test_a_demonstration_that_is_served_ends_with_an_address_where_its_session_is_and_with_ctrl_c(
+    made: Path, browser: Browser
+) -> None:
     port = free_port()
     code = f"from pathlib import Path; from api.cli.demo import PLAN, served; served(Path('demo'), PLAN, {port})"
     process = subprocess.Popen(
@@ -73,20 +100,21 @@ def test_a_demonstration_that_is_served_ends_with_an_address_where_its_session_i
     )  # fmt: skip
     try:
         assert process.stdout
-        address, _, ticket = process.stdout.readline().strip().partition("/#ticket=")
-        assert address == f"http://127.0.0.1:{port}"
+        printed = process.stdout.readline().strip()
+        address, _, ticket = printed.partition("/#ticket=")
+        assert address == f"http://127.0.0.1:{port}" and ticket
+        page = browser.new_page()
+        explored(page, printed)
+        assert not let_in_twice(browser, printed)
         login = Request(
             f"{address}/api/v1/auth/ticket", json.dumps({"ticket": ticket}).encode(),
             {"Content-Type": "application/json", "Origin": address},
         )  # fmt: skip
-        with urlopen(login, timeout=30) as answer:
-            cookie = answer.headers["set-cookie"].partition(";")[0]
         with pytest.raises(HTTPError, match="401"):
             urlopen(login, timeout=30)
 
         def shown(path: str) -> Any:
-            with urlopen(Request(f"{address}/api/v1{path}", headers={"Cookie": cookie}), timeout=30) as found:
-                return json.load(found)
+            return page.request.get(f"{address}/api/v1{path}").json()
 
         assert [each["session"] for each in shown("/sessions")["items"]] == ["session"]
         assert shown("/diagnoses")["items"] and shown("/models")["items"]
