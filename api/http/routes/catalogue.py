@@ -181,9 +181,9 @@ def _changes(router: APIRouter, service: Service, lists: Catalogue) -> None:
         },
     )
     def erase(subject: str, response: Response, confirm: Word = "") -> ErasureResult:
-        if service.running:
+        if service.jobs.active:
             raise RequestRefused(
-                409, "busy", "a job is under way, which may write to a session; erase when it has ended"
+                409, "busy", "a job is under way, which may use a session; erase when it has ended, or cancel it"
             )
         with answering():
             found = erase_subject(lists, subject, confirm)

@@ -2,6 +2,7 @@
 
 import io
 import shutil
+import threading
 import zipfile
 from pathlib import Path
 
@@ -11,8 +12,12 @@ from fastapi.testclient import TestClient
 from api.catalogue import subjects
 from api.catalogue.catalogue import Catalogue, default_file
 from api.http.access.scopes import Scope
+from api.http.jobs.kinds import KINDS
+from api.http.jobs.params import VerifyParams
 from api.http.service import Service
+from controller.operation import Operation
 from mock_devices.testing.access import bearer, client_of
+from mock_devices.testing.commands import until
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.wiring import Wiring
@@ -32,10 +37,15 @@ def lab(root: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def client(lab: Path) -> TestClient:
-    """Of a service that is not started: no bench is looked for."""
+def service(lab: Path) -> Service:
+    """One that is not started: no bench is looked for."""
     wiring = Wiring(force=BotaWiring(port="/dev/no-sensor"), axis=Epos4Wiring(port="/dev/no-adapter"), tracker=None)
-    return client_of(Service(wiring, lab, lab))
+    return Service(wiring, lab, lab)
+
+
+@pytest.fixture
+def client(service: Service) -> TestClient:
+    return client_of(service)
 
 
 def as_(scope: Scope) -> dict[str, str]:
@@ -129,6 +139,24 @@ def test_a_subject_is_erased_in_two_steps(client: TestClient, lab: Path) -> None
     assert (done.status_code, done.json()["done"]) == (200, True)
     assert not (lab / "first").exists() and (lab / "second").exists()
     assert client.get(f"{API}/subjects/S01").status_code == 404
+
+
+@pytest.mark.parametrize("address", ["subjects/S01", "sessions/first"])
+def test_what_is_being_computed_with_is_not_erased(
+    client: TestClient, service: Service, lab: Path, address: str
+) -> None:
+    ending = threading.Event()
+
+    def work() -> None:
+        ending.wait(30.0)
+
+    job = service.jobs.new(KINDS["verify"], VerifyParams(session="first"), "Ann", "first", Operation("verify"))
+    service.jobs.start_computing(job, work)
+    refused = client.delete(f"{API}/{address}")
+    assert (refused.status_code, refused.json()["code"]) == (409, "busy") and (lab / "first").exists()
+    ending.set()
+    until(lambda: not service.jobs.active, 30.0, "an end of the work")
+    assert client.delete(f"{API}/{address}").status_code == 202
 
 
 def test_an_erasure_in_one_step_would_be_seen(client: TestClient, lab: Path, monkeypatch: pytest.MonkeyPatch) -> None:

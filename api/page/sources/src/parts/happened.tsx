@@ -12,7 +12,7 @@ export function Happened() {
   return (
     <Card title={t.bench.happened} id="happened-card" wide>
       {!events.value.length && <p class="quiet">{t.bench.nothingHappened}</p>}
-      <div class="scroll tall" tabIndex={0} role="region" aria-label={t.bench.happened}>
+      <div class="scroll tall" tabIndex={0} role="region" aria-label={t.bench.events}>
         <ul class="plain" id="happened">
           {events.value.map((one, i) => (
             <li key={events.value.length - i}>

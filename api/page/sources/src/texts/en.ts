@@ -297,6 +297,7 @@ export const en = {
     noDevices: "No device is connected.",
     against: "Force against depth",
     happened: "What happened",
+    events: "Events, newest first",
     nothingHappened: "Nothing since this page was opened.",
   },
   devices: {
