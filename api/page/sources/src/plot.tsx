@@ -137,7 +137,7 @@ export function TimePlot({ id, label, unit, lines, window: shown, height, cursor
           cursor: { y: false, drag: { x: true, y: false, setScale: false }, sync: { key: "time" } },
           scales: { x: { time: false }, y: { range: ranged(unit) } },
           axes: axes(unit, t.plot.seconds),
-          series: [{}, ...lines.map((line) => ({ label: line.label, stroke: colour(line.colour), width: 1.5, dash: line.dash, spanGaps: true, points: { show: false } }))],
+          series: [{}, ...lines.map((line) => ({ label: line.label, stroke: colour(line.colour), width: 1, dash: line.dash, spanGaps: true, points: { show: false } }))],
           hooks: {
             setSelect: [(u) => {
               if (u.select.width < 4) return;
@@ -238,7 +238,7 @@ export function XYPlot({ id, label, xUnit, unit, curves, height, every_ms = 0, o
           mode: 2, width: box.clientWidth, height, legend: { show: false }, padding: [8, 12, 0, 0], cursor: { drag: { x: true, y: true } },
           scales: { x: { time: false, range: (u, low, high) => (u.data[0] === null && Number.isFinite(low) && low !== high ? [low, high] : bounds()) }, y: { range: ranged(unit) } },
           axes: axes(unit, xUnit),
-          series: [{}, ...now.map((curve) => ({ label: curve.label, stroke: colour(curve.colour), dash: curve.dash, width: 1.5, paths: drawn(curve), facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }] }))] as uPlot.Series[],
+          series: [{}, ...now.map((curve) => ({ label: curve.label, stroke: colour(curve.colour), dash: curve.dash, width: 1, paths: drawn(curve), facets: [{ scale: "x", auto: true }, { scale: "y", auto: true }] }))] as uPlot.Series[],
         },
         data,
         box,
@@ -276,7 +276,7 @@ function drawn(curve: Curve) {
     u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
     u.ctx.clip();
     u.ctx.strokeStyle = colour(curve.colour);
-    u.ctx.lineWidth = (curve.dash ? 2 : 1.5) * devicePixelRatio;
+    u.ctx.lineWidth = (curve.dash ? 2 : 1) * devicePixelRatio;
     u.ctx.globalAlpha = curve.faint ? 0.55 : 1;
     u.ctx.setLineDash((curve.dash ?? []).map((one) => one * devicePixelRatio));
     u.ctx.stroke(path);
