@@ -45,6 +45,17 @@ def test_what_lacks_is_skipped_or_fails_where_all_have_to_run(
         act(monkeypatch)
 
 
+def skips_unseen(source: str) -> bool:
+    """Whether a test file leaves tests out where a library is absent, in CI too."""
+    return "importorskip" in source
+
+
+def test_a_library_that_is_absent_is_a_failure() -> None:
+    here = Path(__file__)
+    assert [file for file in here.parent.rglob("*.py") if file != here and skips_unseen(file.read_text())] == []
+    assert skips_unseen('pylsl = pytest.importorskip("pylsl")')
+
+
 def test_where_nobody_promised_recordings_their_tests_skip_even_where_all_have_to_run(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -37,6 +37,7 @@ CLIENTS = (
     Client("maxon EPOS4", "canopen", "epos4/test_being.py", "python_canopen_reads_every_object"),
     Client("maxon EPOS4", "canopen (npm)", "epos4/test_npm_canopen.py", "npm_canopen", "6.2.1"),
     Client("maxon EPOS4", "being", "epos4/test_being.py", "its_own_classes", "1.0.2"),
+    Client("CiA 402 drive", "canopen", "cia402/test_clients.py", "test_canopen_"),
     Client("NDI Polaris, Vega", "ndicapi", "ndi/test_clients.py", "test_ndicapi_"),
     Client("NDI Polaris, Vega", "scikit-surgerynditracker", "ndi/test_clients.py", "test_scikit_surgery_"),
     Client("Bota SensONE", "pyserial", "bota/test_opening.py", "client"),

@@ -101,7 +101,7 @@ class Dictionary:
         old = self.values[entry.index, entry.sub]
         if entry.sub == 1 and not (value | old) & DISABLED and value != old:
             raise SdoAbort(OUT_OF_RANGE)
-        if entry.sub == 2 and value not in TYPES:
+        if entry.sub == 2 and value not in TYPES and value != entry.default:
             raise SdoAbort(OUT_OF_RANGE)
         if entry.sub == 3 and self._enabled(entry.index):
             raise SdoAbort(WRONG_STATE)

@@ -171,9 +171,7 @@ class Drive:
         if self.state is PdsState.FAULT:
             return
         reaction = FAULTS.get(code, UNKNOWN).reaction
-        option = {"off": 0, "abort connection": self._values[0x6007, 0], "fault reaction": self._values[0x605E, 0]}[
-            reaction
-        ]
+        option = self._values[{"abort connection": 0x6007, "fault reaction": 0x605E}.get(reaction, 0), 0]
         self._homing = None
         ramps = {"abort connection": {3: 0x6085}, "fault reaction": {1: 0x6084, 2: 0x6085}}.get(reaction, {})
         if self.powered and option in ramps:
@@ -233,6 +231,8 @@ class Drive:
             self._cut(self._leaving)
         elif self.state is PdsState.FAULT_REACTION:
             self._cut(PdsState.FAULT)
+        elif self._values[0x605A, 0] < 5:  # 1 to 4 end without torque, 5 to 8 stay there (CiA 402)
+            self._cut(PdsState.SWITCH_ON_DISABLED)
         else:
             self._bits |= Statusword.TARGET_REACHED
 

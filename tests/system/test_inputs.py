@@ -10,7 +10,6 @@ from mock_devices.testing.commands import Running, ServedBench, pressed, rig, se
 from rig.recording.reader import Recording, read_recording
 from rig.recording.verify import verdict_of
 
-pytest.importorskip("pylsl")
 INPUTS = ("evdev-switch", "firmata-glove", "lsl-stream")
 SURFACE_MM = 20.0
 

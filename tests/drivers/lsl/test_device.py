@@ -19,7 +19,6 @@ from rig.config.products.lsl_stream import LslStream
 from rig.errors import DeviceError, UsageError
 from rig.input_streams import InputSample
 
-pytest.importorskip("pylsl")
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("lsl")]
 NAMES = (f"belt-{os.getpid()}-{number}" for number in itertools.count())
 MS = 1_000_000

@@ -6,13 +6,13 @@ import time
 from collections.abc import Iterator
 from select import select
 
+import pyfirmata2
 import pytest
 
 from mock_devices.firmata.glove import GloveFigures, GlovePlant
 from mock_devices.firmata.mock import FirmataMock
 from mock_devices.wire import PtyWire
 
-pyfirmata2 = pytest.importorskip("pyfirmata2")
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("bench")]
 QUIET = GloveFigures(noise_counts=0.0)
 

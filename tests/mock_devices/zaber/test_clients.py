@@ -5,6 +5,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
+from zaber_motion import Units
+from zaber_motion.ascii import Axis, Connection
+from zaber_motion.exceptions import BadCommandException, BadDataException, MovementFailedException
 
 from drivers.zaber.device import open_axis
 from mock_devices.bench import Bench
@@ -14,11 +17,6 @@ from mock_devices.wire import TcpWire, Wire
 from mock_devices.zaber.mock import ZaberMock
 from rig.config.products.zaber_ascii import ZaberWiring
 from rig.config.wiring import Limits
-
-pytest.importorskip("zaber_motion", reason="the extra `zaber` is not installed")
-from zaber_motion import Units
-from zaber_motion.ascii import Axis, Connection
-from zaber_motion.exceptions import BadCommandException, BadDataException, MovementFailedException
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
 NATIVE = Units.NATIVE
