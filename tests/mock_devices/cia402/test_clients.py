@@ -168,7 +168,7 @@ def has_the_modes_that_it_advertises(session: Session) -> None:
         eventually(partial(in_mode, node, mode))
         taken.add(mode)
     assert taken == {mode for mode in OperationMode.SUPPORTED if mode != "NO MODE" and node.is_op_mode_supported(mode)}
-    assert taken == {"PROFILED POSITION", "HOMING", "CYCLIC SYNCHRONOUS POSITION"}
+    assert taken == {"PROFILED POSITION", "PROFILED VELOCITY", "HOMING", "CYCLIC SYNCHRONOUS POSITION"}
 
 
 def goes_to(session: Session, target_um: int) -> None:
@@ -176,9 +176,8 @@ def goes_to(session: Session, target_um: int) -> None:
     node.op_mode = "PROFILED POSITION"
     node.sdo[0x6081].raw = 30_000
     node.sdo[0x607A].raw = target_um
+    node.controlword = 0x0F  # a start of homing left the bit set that now has to rise
     node.controlword = 0x1F
-    eventually(lambda: node.statusword & ACKNOWLEDGE)
-    node.controlword = 0x0F
 
 
 def homes_and_counts_in_micrometres(session: Session) -> None:
@@ -189,6 +188,8 @@ def homes_and_counts_in_micrometres(session: Session) -> None:
     assert node.is_homed()
     assert session.bench.axis.position_mm == pytest.approx(0.0, abs=0.1)
     goes_to(session, 12_000)
+    eventually(lambda: node.statusword & ACKNOWLEDGE)
+    node.controlword = 0x0F
     eventually(lambda: node.statusword & TARGET_REACHED)
     assert node.sdo[0x6064].raw == pytest.approx(12_000, abs=50)
     assert session.bench.axis.position_mm == pytest.approx(12.0, abs=0.15)
