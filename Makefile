@@ -37,7 +37,7 @@ contracts: $(READY)
 PAGE ?= tests/page
 test-page: $(READY) page browser
 	@nice -n 15 $(BIN)/pytest $(PAGE) -m "not bench" & alone=$$!; \
-	  $(BIN)/pytest $(PAGE) -m bench --durations 10; beside=$$?; wait $$alone && exit $$beside
+	  $(BIN)/pytest $(PAGE) -m "bench and not by_hand" --durations 10; beside=$$?; wait $$alone && exit $$beside
 
 # Every command, cell and example of README and docs, as somebody would run it.
 test-documents: $(READY) page
@@ -58,6 +58,7 @@ test-extras: $(READY) page
 # each property, and the benchmarks that judge. The first that fails ends it.
 campaigns: $(READY) page
 	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m by_hand --ignore tests/page --durations 10
+	$(BIN)/pytest -m by_hand tests/page
 	$(BIN)/pytest -n 2 --dist loadfile -m "hypothesis and $(MAIN)" --ignore tests/page --hypothesis-profile default
 	$(BIN)/python -m benchmarks.faults --trials 1
 	$(BIN)/python -m benchmarks.faults --plant all --trials 1

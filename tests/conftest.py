@@ -8,6 +8,7 @@ import contextlib
 import gc
 import os
 import secrets
+import signal
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
 # One thread for each worker, and for all that it starts: more wait for one another, and take three times the time.
 # It is read when numpy is loaded, which is later than this.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# A shell that starts the tests in the background has Ctrl-C ignored by all that they start, also where it is to end it.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Drawn before any worker starts, and inherited by all: sessions that nobody has seen are hidden in each run.
 NEW_SEED = os.environ.setdefault("TISSUE_RIG_SEED", str(10_000 + secrets.randbelow(10**8)))

@@ -112,6 +112,7 @@ def test_who_is_in_control_and_is_cut_off_from_everything_is_sent_to_the_hardwar
     state(page, "ready")
 
 
+@pytest.mark.by_hand
 @pytest.mark.timeout(240)
 def test_a_service_that_hung_tells_once_it_goes_on_why_the_capture_ended(
     page: Page, service: Served, own_address: str, bench: ServedBench
@@ -130,6 +131,7 @@ def test_a_service_that_hung_tells_once_it_goes_on_why_the_capture_ended(
     expect(page.locator("#job-text")).to_have_count(0)
 
 
+@pytest.mark.by_hand
 @pytest.mark.timeout(240)
 def test_a_service_that_was_killed_and_begun_anew_asks_who_it_is_and_says_what_became_of_the_capture(
     page: Page, service: Served, own_address: str, bench: ServedBench
