@@ -10,7 +10,6 @@ above 20, 10,000 points in each trace.
 import argparse
 import json
 import math
-import struct
 import sys
 import tempfile
 import time
@@ -23,10 +22,10 @@ from typing import Any
 import numpy as np
 from playwright.sync_api import Page, sync_playwright
 
+from benchmarks.service.clients import batches
 from mock_devices.testing.commands import pressed, served_bench
-from mock_devices.testing.models import index_model
+from mock_devices.testing.models import known_session
 from mock_devices.testing.service import ServedRig
-from rig.recording.sessions import SessionInfo, write_session
 from tests.system.browser import installed, launch
 
 TRACES = ("force", "setpoint", "error")
@@ -35,8 +34,6 @@ MODEL = "known"
 FILLED_S = 30.0
 RENEWED_S = 5.0  # a lease lasts 30 s
 MEDIAN_HZ, P5_HZ, POINTS = 30.0, 20.0, 10_000
-# Of a batch, as docs/api/streams.md says.
-HEADER = struct.Struct("<HHIqII")
 COUNTED = """
 window.frames_ms = [];
 const clear = CanvasRenderingContext2D.prototype.clearRect;
@@ -54,14 +51,10 @@ def rates_Hz(frames_ms: list[float]) -> "np.ndarray[tuple[int], np.dtype[np.floa
 
 def points(frame: bytes) -> Iterator[tuple[int, int]]:
     """Of each batch in a message its channel, and the points it draws: least and greatest, which may be the same."""
-    at = 0
-    while at < len(frame):
-        channel, columns, _, _, count, _ = HEADER.unpack_from(frame, at)
-        at += HEADER.size + 4 * count
-        least, *greatest = np.frombuffer(frame, "<f4", columns * count, at).reshape(columns, count)
-        at += 4 * columns * count
-        seen = np.isfinite(least)
-        yield channel, int(seen.sum() + sum((seen & (least != other)).sum() for other in greatest[:1]))
+    for batch in batches(frame):
+        values = np.frombuffer(frame, "<f4", batch.columns * batch.rows, batch.at).reshape(batch.columns, batch.rows)
+        seen = np.isfinite(values[0])
+        yield batch.channel, int(seen.sum() + (seen & (values[0] != values[-1])).sum())
 
 
 class Received:
@@ -125,21 +118,13 @@ def tracking(seconds: float) -> object:
     return {"kind": "track", "params": {"model": {"session": MODEL}, "reference": reference}}
 
 
-def known_model(session: Path) -> None:
-    """A session that is a model alone."""
-    (session / "fit").mkdir(parents=True)
-    index_model(0.12, 0.22, 0.01, force_N=11.0).save(session / "fit" / "model.json")
-    write_session(session, SessionInfo(session.name, "track", "2026-01-01T00:00:00Z", "benchmark"))
-
-
 def missed(found: Mapping[str, Any]) -> list[str]:
     """What was not reached, a sentence each."""
     median_Hz, p5_Hz = found["frames_median_Hz"], found["frames_p5_Hz"]
-    few = {name: count for name, count in found["points"].items() if count < POINTS}
     return [
         *([f"{median_Hz:g} frames a second, not {MEDIAN_HZ:g}"] if median_Hz < MEDIAN_HZ else []),
         *([f"one frame in twenty at {p5_Hz:g} a second, not above {P5_HZ:g}"] if p5_Hz <= P5_HZ else []),
-        *(f"{count} points of {name}, not {POINTS}" for name, count in few.items()),
+        *(f"{count} points of {name}, not {POINTS}" for name, count in found["points"].items() if count < POINTS),
     ]
 
 
@@ -150,7 +135,7 @@ def main() -> None:
     seconds = parser.parse_args().seconds
     with tempfile.TemporaryDirectory() as name, served_bench("--seed", "1") as bench:
         folder = Path(name)
-        known_model(folder / "sessions" / MODEL)
+        known_session(folder / "sessions" / MODEL)
         served = ServedRig(bench, folder, bench.settings())
         found = measured(served, seconds)
         served.running.interrupt()

@@ -12,8 +12,9 @@ import os
 import struct
 import sys
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import asdict, dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
@@ -114,18 +115,29 @@ async def _count(load: Load, socket: ClientConnection, number: int) -> None:
         load.messages += 1
         load.heard.add(number)
         if isinstance(message, bytes):
-            load.samples += sum(_covered(message))
+            load.samples += sum(batch.covered for batch in batches(message))
         elif '"gap"' in message and (gap := json.loads(message))["channel"]:
             load.lost_live += gap["dropped"]
 
 
-def _covered(message: bytes) -> list[int]:
-    found, at = list[int](), 0
+class Batch(NamedTuple):
+    """What the head of a batch says, as docs/api/streams.md has it, and where in the message its columns begin."""
+
+    channel: int
+    columns: int
+    rows: int
+    covered: int
+    at: int
+
+
+def batches(message: bytes) -> Iterator[Batch]:
+    """Those of one message, which follow each other."""
+    at = 0
     while at < len(message):
-        _, columns, _, _, n, covered = BATCH.unpack_from(message, at)
-        found.append(covered)
-        at += BATCH.size + 4 * n * (1 + columns)
-    return found
+        channel, columns, _, _, rows, covered = BATCH.unpack_from(message, at)
+        at += BATCH.size + 4 * rows
+        yield Batch(channel, columns, rows, covered, at)
+        at += 4 * rows * columns
 
 
 def _ask(load: Load, port: int, token: str, number: int) -> Callable[[], Awaitable[None]]:

@@ -171,7 +171,7 @@ class Drive:
         if self.state is PdsState.FAULT:
             return
         reaction = FAULTS.get(code, UNKNOWN).reaction
-        option = self._values[{"abort connection": 0x6007, "fault reaction": 0x605E}.get(reaction, 0), 0]
+        option = {"abort connection": self._values[0x6007, 0], "fault reaction": self._values[0x605E, 0]}.get(reaction)
         self._homing = None
         ramps = {"abort connection": {3: 0x6085}, "fault reaction": {1: 0x6084, 2: 0x6085}}.get(reaction, {})
         if self.powered and option in ramps:

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -47,6 +47,16 @@ def watched(page: Page, bench: ServedBench) -> None:
     pressed(bench)
     expect(page.locator("#job-text")).to_contain_text("trial_001")
     expect(page.locator("#force")).to_have_text(NUMBER)
+
+
+def lost_in_contact(page: Page, bench: ServedBench, address: str, lose: Callable[[], None]) -> None:
+    """Somebody watches while the service is lost by ``lose``; the tip comes out meanwhile."""
+    state(page, "ready")
+    captures(address)
+    watched(page, bench)
+    lose()
+    lost(page)
+    freed(bench)
 
 
 def lost(page: Page) -> None:
@@ -117,12 +127,7 @@ def test_who_is_in_control_and_is_cut_off_from_everything_is_sent_to_the_hardwar
 def test_a_service_that_hung_tells_once_it_goes_on_why_the_capture_ended(
     page: Page, service: Served, own_address: str, bench: ServedBench
 ) -> None:
-    state(page, "ready")
-    captures(own_address)
-    watched(page, bench)
-    service.suspend()
-    lost(page)
-    freed(bench)
+    lost_in_contact(page, bench, own_address, service.suspend)
     service.resume()
     back(page, "stopped")
     reason = page.locator("#reason").text_content()
@@ -136,12 +141,7 @@ def test_a_service_that_hung_tells_once_it_goes_on_why_the_capture_ended(
 def test_a_service_that_was_killed_and_begun_anew_asks_who_it_is_and_says_what_became_of_the_capture(
     page: Page, service: Served, own_address: str, bench: ServedBench
 ) -> None:
-    state(page, "ready")
-    captures(own_address)
-    watched(page, bench)
-    service.process.kill()
-    lost(page)
-    freed(bench)
+    lost_in_contact(page, bench, own_address, service.process.kill)
     anew = serve(bench, service.folder, int(own_address.rpartition(":")[2]))
     try:
         state(page, "not signed in")

@@ -19,7 +19,7 @@ from urllib.request import Request, urlopen
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
-from mock_devices.testing.commands import ROOT, free_port, rig
+from mock_devices.testing.commands import PATIENCE_S, ROOT, free_port, rig
 from rig.recording.sessions import open_session
 from rig.tissue.model import load_model
 from tests.conftest import STALLS
@@ -30,7 +30,7 @@ pytestmark = [pytest.mark.extra, pytest.mark.timeout(600), pytest.mark.xdist_gro
 LARGEST_STEADY_ERROR_PERCENT = 5.0
 # Relaxation: slow enough that a busy computer's time stamps, a few ms off, leave it as it is.
 HIDES_RELAXATION = "12"
-SEEN_MS = 60_000.0  # as PATIENCE_S: a page that is drawn beside other tests
+SEEN_MS = 1000 * PATIENCE_S  # a page that is drawn beside other tests
 
 
 @pytest.fixture(scope="module")

@@ -16,9 +16,8 @@ from mock_devices.testing.commands import (
     served_bench,
     until,
 )
-from mock_devices.testing.models import index_model
+from mock_devices.testing.models import known_session
 from mock_devices.testing.service import ServedRig
-from rig.recording.sessions import SessionInfo, write_session
 
 pytestmark = [pytest.mark.extra, pytest.mark.xdist_group("recovery")]
 
@@ -30,9 +29,7 @@ MODULES = ("controller.loop.process", "rig.recording.recorder", "controller.stop
 def served(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[ServedRig]:
     """With the options in the test's parameter, where it has one."""
     (tmp_path / "links").mkdir()
-    (tmp_path / "sessions" / "known" / "fit").mkdir(parents=True)
-    index_model(0.12, 0.22, 0.01, force_N=11.0).save(tmp_path / "sessions" / "known" / "fit" / "model.json")
-    write_session(tmp_path / "sessions" / "known", SessionInfo("known", "track", "2026-01-01T00:00:00Z", "test"))
+    known_session(tmp_path / "sessions" / "known")
     with served_bench("--seed", "1", "--links", str(tmp_path / "links")) as bench:
         found = ServedRig(bench, tmp_path, [*getattr(request, "param", ()), *bench.settings()])
         yield found

@@ -26,6 +26,7 @@ from mock_devices.epos4 import drive as inside
 from mock_devices.epos4.dictionary import Dictionary
 from mock_devices.epos4.mock import Epos4Mock
 from mock_devices.parameters import Parameters
+from mock_devices.testing.commands import until
 from mock_devices.testing.played import played
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
@@ -51,10 +52,7 @@ class Session(NamedTuple):
 
 
 def eventually(condition: Callable[[], object]) -> None:
-    deadline_s = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < deadline_s, "waited in vain"
-        time.sleep(0.005)
+    until(condition, PATIENCE_S, "what this session waits for")
 
 
 @contextmanager

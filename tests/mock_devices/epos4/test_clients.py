@@ -13,6 +13,7 @@ from canopen.objectdictionary import ODRecord, ODVariable, datatypes
 
 from drivers.epos4.objects import TEXT, Entry
 from mock_devices.epos4.table import EPOS4
+from mock_devices.testing.commands import until
 from mock_devices.testing.epos4 import remote_drive
 from mock_devices.testing.remote import RemoteMock
 
@@ -55,10 +56,7 @@ def dictionary() -> canopen.ObjectDictionary:
 
 
 def eventually(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.005)
+    until(condition, PATIENCE_S, "what this session waits for")
 
 
 @pytest.fixture

@@ -89,8 +89,8 @@ function showNumbers(): void {
   else numbers.value = Object.fromEntries(QUANTITIES.map((name) => [name, known(traces[name].value(newest_s))]));
 }
 
-async function learnClock(): Promise<void> {
-  started_ms.value = Date.now() - (await get("/api/v1/info")).monotonic_ns * 1e-6;
+async function learn(): Promise<void> {
+  started_ms.value = Date.now() - (await learnStopPort()).monotonic_ns * 1e-6;
 }
 
 async function look(): Promise<void> {
@@ -119,15 +119,12 @@ export function listen(): void {
     ],
     {
       message: () => void (heard_ms = performance.now()),
-      open: () => {
-        learnStopPort().catch(() => {});
-        learnClock().catch(() => {});
-      },
+      open: () => learn().catch(() => {}),
       run: forget,
       batch: keep,
       event: (event) => {
         events.value = [event, ...events.value].slice(0, EVENTS);
-        if (event.code.startsWith("away-stops")) learnStopPort().catch(() => {});
+        if (event.code.startsWith("away-stops")) learn().catch(() => {});
       },
       gap: (_, dropped) => void (missed.value += dropped),
     },

@@ -2,6 +2,7 @@
 // The service is asked as well; whichever answers first for the loop confirms. A page that came encrypted asks the one
 // for other computers, also on the bench's own: not every browser lets it ask 127.0.0.1 without encryption.
 import { signal } from "@preact/signals";
+import type { Schema } from "./api";
 import { t } from "./texts";
 
 export type StopKind = "estop" | "pain";
@@ -19,11 +20,13 @@ export const alone = signal(false);
 let stopPort = 0;
 let away = "";
 
-export async function learnStopPort(): Promise<void> {
-  const info = await (await fetch("/api/v1/info")).json();
+/** Also what else the service says of itself. */
+export async function learnStopPort(): Promise<Schema["Info"]> {
+  const info: Schema["Info"] = await (await fetch("/api/v1/info")).json();
   stopPort = info.stop_port || stopPort;
   away = info.away_stops || away;
   alone.value = ENCRYPTED && !info.away_stops;
+  return info;
 }
 
 function besides(kind: StopKind, signal: AbortSignal): Promise<string>[] {
