@@ -23,6 +23,8 @@ from api.operations.records import refuse_incomplete, verify
 from api.operations.report import report
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
+from controller.law.gain_table import DampingUnknown
+from controller.loop.steps import Program
 from controller.operation import Operation
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
@@ -95,7 +97,7 @@ def demo(
     seed = secrets.randbelow(LARGEST_SEED) if seed is None else seed
     secret = draw(np.random.default_rng(seed), check(plan).detectable)
     show(f"a cause is hidden in the bench; --seed {seed} hides the same again")
-    fitted, result = _measured(wiring, secret.hide, plan, out)
+    fitted, result = measured(wiring, secret.hide, plan, out)
     show(*track_parts(result))
     console.rule("diagnose: what the simulation gets wrong")
     diagnosis = diagnosed(session, out=session / FOLDER)
@@ -105,12 +107,9 @@ def demo(
     write_text(session / FOLDER / TRUTH, secret.sentence(diagnosis) + "\n")
     page = report(Operation("report"), session, out / REPORT)
     hidden = HiddenTruth(
-        effect=secret.effect,
-        parameters=secret.knobs,
-        seed=seed,
-        named=secret.found_in(diagnosis) is not None,
-        inside=secret.inside(diagnosis),
-    )
+        effect=secret.effect, parameters=secret.knobs, seed=seed,
+        named=secret.found_in(diagnosis) is not None, inside=secret.inside(diagnosis),
+    )  # fmt: skip
     found = DemoSummary(**dict(page), fit=fitted, tracking=result, diagnosis=diagnosis, hidden=hidden)
     found.write(out / SUMMARY)
     show(f"{page.recordings} recordings, {page.samples} samples, {page.dropped} dropped")
@@ -122,9 +121,10 @@ def demo(
         served(out, plan, port)
 
 
-def _measured(
+def measured(
     wiring: Wiring, hide: tuple[str, ...], plan: Indentation, out: Path, again: int = AGAIN
 ) -> tuple[FitResult, TrackResult]:
+    """What the fit and the tracking showed; begun again where this computer was late or the trials were too few."""
     _clear(out)
     session = out / SESSION
     try:
@@ -134,12 +134,17 @@ def _measured(
             console.rule("fit: constant stiffness against the index law")
             fitted = fit_session([session])
             console.rule("track: gains from the tangent stiffness of the model")
-            return fitted, _track(bench, session)
+            return fitted, followed(bench, TrackPlan(_forces(bench, session), str(MODEL)), session)
+    except DampingUnknown as unknown:
+        if not again:
+            raise
+        show(f"{unknown}; the demonstration begins again, with one trial more at each speed")
+        plan = plan.model_copy(update={"trials": plan.trials + 1})
     except SafetyStop as stop:
         if not again or stop.code not in LATE:
             raise
         show(f"{stop}; this computer, which simulates the bench, was late, so the demonstration begins again")
-    return _measured(wiring, hide, plan, out, again - 1)
+    return measured(wiring, hide, plan, out, again - 1)
 
 
 def served(out: Path, plan: Indentation, port: int) -> None:
@@ -169,12 +174,11 @@ def _clear(out: Path) -> None:
     out.mkdir(parents=True)
 
 
-def _track(bench: Supervisor, session: Path) -> TrackResult:
+def _forces(bench: Supervisor, session: Path) -> Program:
     model = load_model(session / MODEL)
     # A limb that softens was pressed harder at first than its model reaches.
     largest_N = min(model.valid.force_N, model.force_N(model.valid.depth_mm))
-    program = tracked.plan(forces_within(largest_N), SECONDS, model, bench.wiring)
-    return followed(bench, TrackPlan(program, str(MODEL)), session)
+    return tracked.plan(forces_within(largest_N), SECONDS, model, bench.wiring)
 
 
 def forces_within(largest_N: float) -> tuple[float, ...]:

@@ -34,7 +34,7 @@ def _gain_of_softening(share: float) -> float:
 
 THICKNESS_MM = 10.0  # of the mock bench's substrate
 REFERENCE_MM_S = 10.0  # speed at which its rate law has its level
-# The first number is the size. Small enough that fit and tracking stay what they are without it.
+# The first number is the size. Small enough that the fit knows the damping, and so has a law to track with.
 CAUSES: Mapping[str, tuple[HiddenNumber, ...]] = {
     "friction": (
         HiddenNumber("level_N", "friction_N", 0.05, 0.15),
@@ -47,7 +47,7 @@ CAUSES: Mapping[str, tuple[HiddenNumber, ...]] = {
         HiddenNumber("period_mm", "ripple_pitch_mm", 1.0, 2.5),
     ),
     "surface_motion": (
-        HiddenNumber("amplitude_mm", "surface_motion_mm", 0.05, 0.15),
+        HiddenNumber("amplitude_mm", "surface_motion_mm", 0.05, 0.1),
         HiddenNumber("frequency_Hz", "surface_motion_Hz", 0.2, 0.4),
     ),
     "relaxation": (
@@ -55,7 +55,7 @@ CAUSES: Mapping[str, tuple[HiddenNumber, ...]] = {
         HiddenNumber("time_constant_s", "tau_s", 0.2, 0.8),
     ),
     "rate_law": (
-        HiddenNumber("exponent", "rate_exponent", 0.4, 0.7, null=1.0),
+        HiddenNumber("exponent", "rate_exponent", 0.5, 0.7, null=1.0),
         HiddenNumber("level_N", "damping_N_s_mm", 0.08, 0.12, lambda level_N: level_N / REFERENCE_MM_S),
     ),
     "elastic_law": (HiddenNumber("exponent", "exponent", 1.7, 2.1, null=1.0),),
@@ -70,15 +70,15 @@ CAUSES: Mapping[str, tuple[HiddenNumber, ...]] = {
         HiddenNumber("level_N", "adhesion_N", 0.05, 0.15),
         HiddenNumber("length_mm", "adhesion_length_mm", 0.5, 1.5),
     ),
-    "hunt_crossley": (HiddenNumber("damping_s_mm", "hunt_crossley_s_mm", 0.005, 0.015),),
-    "mullins": (HiddenNumber("softening", "mullins_share", 0.1, 0.25),),
+    "hunt_crossley": (HiddenNumber("damping_s_mm", "hunt_crossley_s_mm", 0.01, 0.015),),
+    "mullins": (HiddenNumber("softening", "mullins_share", 0.1, 0.2),),
     "sensor_hysteresis": (
         HiddenNumber("level_N", "hysteresis_N", 0.05, 0.15),
         HiddenNumber("width_N", "hysteresis_width_N", 0.3, 0.8),
     ),
     "clock_drift": (HiddenNumber("gain_ppm", "clock_drift_ppm", 40.0, 80.0),),
     "tip_inertia": (HiddenNumber("mass_kg", "tip_inertia_kg", 0.02, 0.06),),
-    "filter_lag": (HiddenNumber("time_constant_s", "filter_lag_s", 0.003, 0.008),),
+    "filter_lag": (HiddenNumber("time_constant_s", "filter_lag_s", 0.003, 0.006),),
     "time_offset": (HiddenNumber("delay_s", "time_offset_s", 0.003, 0.008),),
     "zero_drift": (HiddenNumber("rate_N_h", "zero_drift_N_h", 8.0, 15.0),),
     "tracker_latency": (HiddenNumber("delay_s", "tracker_latency_s", 0.015, 0.04),),

@@ -21,6 +21,10 @@ SPAN_ROWS = 6
 STEP = 1e-6  # of a parameter, for slopes: the root of what a double resolves is 1.5e-8
 
 
+class DampingUnknown(UsageError):
+    """The trials of a model leave open whether the tissue damps at all."""
+
+
 class TissueBounds(NamedTuple):
     """Tangent [N/mm] and damping [N s/mm] at some depths, the least and the largest of their intervals, shape (n,)."""
 
@@ -45,7 +49,7 @@ def gain_rows(model: Model, depths_mm: Sequence[float]) -> tuple[GainRow, ...]:
 def span_of(model: Model, rows: Sequence[GainRow], rates: Rates) -> Span:
     """The tissue to be held: half to twice the model, or its own interval where that is wider.
 
-    Raises UsageError for a model whose damping is not known, or whose tissue may be stiffer than the limit.
+    Raises DampingUnknown, and UsageError for a model whose tissue may be stiffer than the limit.
     """
     shown = [rows[round(at)] for at in np.linspace(0, len(rows) - 1, SPAN_ROWS)]
     tangent, damping = known_at(model, np.array([row.depth_mm for row in shown]))
@@ -99,10 +103,10 @@ def _refuse_flat(depths_mm: Sequence[float], forces: Sequence[float], tangents: 
 
 
 def _refuse_undamped(damping: TissueBounds) -> None:
-    """Raises UsageError where B may be 0: the law divides by it at the frequencies that count."""
+    """Raises DampingUnknown where B may be 0: the law divides by it at the frequencies that count."""
     at = int(np.argmin(damping.low))
     if not damping.low[at] > 0:
-        raise UsageError(
+        raise DampingUnknown(
             f"the model's damping is {damping.middle[at]:.3g} N s/mm, {damping.low[at]:.3g} to {damping.high[at]:.3g};"
             " the force law needs it above 0 with its whole interval: fit trials of several speeds"
             " (rig fit --model index)"

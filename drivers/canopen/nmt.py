@@ -61,11 +61,6 @@ def decode_heartbeat(data: bytes) -> NmtState | None:
         return None
 
 
-def encode_emergency(node: int, emergency: Emergency) -> CanFrame:
-    """The emergency message of ``node``."""
-    return CanFrame(EMERGENCY_ID + node, struct.pack("<HB5s", *emergency))
-
-
 def decode_emergency(data: bytes) -> Emergency | None:
     """The emergency in the 8 bytes; None where there are not 8."""
     return Emergency(*struct.unpack("<HB5s", data)) if len(data) == 8 else None

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 from api.cli import demo
 from api.cli.app import build
 from api.cli.demo import forces_within
+from controller.law.gain_table import DampingUnknown
 from mock_devices.testing.models import index_model
 from rig.config.wiring import Wiring
 from rig.errors import SafetyStop, UsageError
@@ -136,12 +137,34 @@ def test_a_demonstration_begins_again_where_the_computer_was_late_and_for_no_oth
     monkeypatch.setattr("api.cli.live.running", lambda *_: contextlib.nullcontext())
     monkeypatch.setattr(demo, "captured", captured)
     monkeypatch.setattr(demo, "fit_session", lambda _: "fitted")
-    monkeypatch.setattr(demo, "_track", lambda *_: "tracked")
+    monkeypatch.setattr(demo, "_forces", lambda *_: "forces")
+    monkeypatch.setattr(demo, "followed", lambda *_: "tracked")
     refused = pytest.raises(SafetyStop) if begun <= len(stops) else contextlib.nullcontext()
     with refused:
-        found: object = demo._measured(Wiring(), (), demo.PLAN, tmp_path / "demo")
+        found: object = demo.measured(Wiring(), (), demo.PLAN, tmp_path / "demo")
         assert found == ("fitted", "tracked")
     assert len(begins) == begun
+
+
+@pytest.mark.parametrize(("refusals", "trials"), [(0, [2]), (1, [2, 3]), (2, [2, 3, 4]), (3, [2, 3, 4])])
+def test_a_demonstration_whose_trials_leave_damping_open_begins_again_with_more_and_not_for_ever(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refusals: int, trials: list[int]
+) -> None:
+    captures, left = list[int](), [DampingUnknown("0 to 0.004 N s/mm")] * refusals
+
+    def forces(*_: object) -> None:
+        if left:
+            raise left.pop()
+
+    monkeypatch.setattr("api.cli.live.running", lambda *_: contextlib.nullcontext())
+    monkeypatch.setattr(demo, "captured", lambda _, plan, __: captures.append(plan.trials))
+    monkeypatch.setattr(demo, "fit_session", lambda _: "fitted")
+    monkeypatch.setattr(demo, "_forces", forces)
+    monkeypatch.setattr(demo, "followed", lambda *_: "tracked")
+    refused = pytest.raises(DampingUnknown) if refusals > demo.AGAIN else contextlib.nullcontext()
+    with refused:
+        demo.measured(Wiring(), (), demo.PLAN, tmp_path / "demo")
+    assert captures == trials
 
 
 @pytest.mark.parametrize(("largest_N", "forces_N"), [(5.2, (1, 2, 3, 4, 5)), (2.0, (0.34, 0.68, 1.02, 1.36, 1.7))])

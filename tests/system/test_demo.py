@@ -19,6 +19,8 @@ from urllib.request import Request, urlopen
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
+from api.cli.demo import PLAN, measured
+from api.cli.options import built_in
 from mock_devices.testing.commands import PATIENCE_S, ROOT, free_port, rig
 from rig.recording.sessions import open_session
 from rig.tissue.model import load_model
@@ -124,6 +126,16 @@ def test_a_demonstration_that_is_served_ends_with_an_address_where_its_session_i
         assert (process.returncode, out, "Traceback" in said) == (0, "", False), said
     finally:
         process.kill()
+
+
+@pytest.mark.by_hand
+def test_trials_that_leave_damping_open_are_recorded_again_with_one_more(tmp_path: Path) -> None:
+    plan = PLAN.model_copy(update={"trials": 1})
+    # Its damping begins at nothing and its force is a fifth of an average limb's: five trials do not show a B above 0.
+    _, tracking = measured(built_in(), ("hunt_crossley.damping_s_mm=0.005",), plan, tmp_path / "demo")
+    indentations = [trial for trial in open_session(tmp_path / "demo" / "session").trials if trial.speed_mm_s]
+    assert len(indentations) > len(plan.speeds_mm_s)
+    assert tracking.levels
 
 
 def test_a_port_that_is_taken_is_told_before_the_demonstration(tmp_path: Path) -> None:

@@ -7,7 +7,6 @@ taken is asked to wait. A name that is not there takes as long as one that is.
 import asyncio
 import os
 import threading
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -24,8 +23,6 @@ LONGEST_PASSWORD = 200
 # 64 MB each; whoever comes beyond them waits outside.
 WORKERS, WAITING = 1, 8
 NICE = 10  # below the force loop and the service itself
-
-Hasher = Callable[[], PasswordHasher]
 
 
 class Account(BaseModel):

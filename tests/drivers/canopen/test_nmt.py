@@ -12,7 +12,6 @@ from drivers.canopen.nmt import (
     NmtState,
     decode_emergency,
     decode_heartbeat,
-    encode_emergency,
     encode_heartbeat,
     encode_nmt,
 )
@@ -63,7 +62,6 @@ def test_an_emergency_carries_code_register_and_five_bytes() -> None:
     data = bytes.fromhex("11 86 80 01 02 03 04 05")
     emergency = Emergency(0x8611, 0x80, bytes((1, 2, 3, 4, 5)))
     assert decode_emergency(data) == emergency
-    assert encode_emergency(1, emergency) == CanFrame(0x081, data)
 
 
 @given(data=st.binary(max_size=8))
