@@ -119,7 +119,7 @@ def run_service(
     """Serves until Ctrl-C, and ends in order."""
     with (
         contextlib.ExitStack() as beside,
-        _listening(place.host, place.port) as listening,
+        listening_at(place.host, place.port) as listening,
         _away(place) as away,
         own_socket(socket_path(place.here)) as own,
         bench_for(settings, refuses=False) as (wiring, endpoints),
@@ -144,13 +144,13 @@ def _away(place: ServedAt) -> contextlib.AbstractContextManager[AwayStops | None
         return contextlib.nullcontext()
     beside = place.tls and place.host not in (*LOCAL, "0.0.0.0")
     hosts = (place.host, LOCAL[0]) if beside else (place.host,)
-    listeners = [_listening(host, place.stop_port, "--stop-port") for host in hosts]
+    listeners = [listening_at(host, place.stop_port, "--stop-port") for host in hosts]
     return contextlib.closing(AwayStops(place, listeners))
 
 
 def refuse_taken(port: int) -> None:
     """Raises UsageError, before anything else is done, where something listens there on this computer."""
-    _listening(LOCAL[0], port).close()
+    listening_at(LOCAL[0], port).close()
 
 
 def serve_here(settings: Wiring, sessions: Path, protocols: Path, port: int) -> None:
@@ -166,10 +166,13 @@ def configured(application: FastAPI, place: ServedAt) -> uvicorn.Config:
     )  # fmt: skip
 
 
-def _listening(host: str, port: int, option: str = "--port") -> socket.socket:
-    """Taken before the bench starts, which homes the axis."""
+def listening_at(host: str, port: int, option: str = "--port") -> socket.socket:
+    """A port that is taken before the bench starts, which homes the axis; raises UsageError where it cannot be."""
     try:
-        return socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+        listening = socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+        # Head and body of an answer leave by themselves: else the body waits 40 ms for the client's acknowledgement.
+        listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return listening
     except OSError as error:
         # Below zero are those of looking up a name (EAI_NONAME, netdb.h).
         if (error.errno or 0) < 0 or error.errno == errno.EADDRNOTAVAIL:

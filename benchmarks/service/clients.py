@@ -21,7 +21,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-# An answer beside all this takes 45 ms: eight connections could carry 180 requests a second, whatever the service can.
+# Sixteen connections carry 200 requests a second where an answer takes up to 80 ms.
 LIVE, REQUESTS_HZ, CONNECTIONS = 50, 200, 16
 EVERY_SAMPLE_EACH = 10
 PAGE = {"type": "subscribe", "streams": ["force", "setpoint", "error", "depth", "marker"], "max_rate_hz": 30.0}

@@ -46,7 +46,7 @@ class NameRequest(RequestBody):
     name: str = Field(max_length=200, description="empty: the name is forgotten")
 
 
-def asked_in(
+async def asked_in(
     subject: Word = "",
     site: Word = "",
     session: Word = "",

@@ -37,7 +37,8 @@ def refuse_without_key(key: str) -> None:
         raise RequestRefused(400, "idempotency-key", text)
 
 
-def _caller(connection: HTTPConnection) -> Caller:
+# What only looks at the request is asked in the event loop: handing it to a thread costs more than the answer.
+async def _caller(connection: HTTPConnection) -> Caller:
     caller = connection.scope[CALLER]
     assert isinstance(caller, Caller)
     return caller
@@ -47,7 +48,7 @@ def _caller(connection: HTTPConnection) -> Caller:
 WhoAsks = Annotated[Caller, Depends(_caller)]
 
 
-def _page(
+async def _page(
     limit: Annotated[int, Query(ge=1, le=MOST)] = USUAL, cursor: Annotated[str, Query(max_length=4 * LONGEST)] = ""
 ) -> Page:
     return Page(limit, cursor)
