@@ -73,7 +73,9 @@ def find(
     yes: Annotated[bool, typer.Option("--yes", help="Writes to every port that it lists, without asking you.")] = False,
     json_file: JsonOption = None,
 ) -> None:
-    """Lists ports, switches and streams; with your consent asks at each port who is there. Says the lines for rig.toml.
+    """Lists ports, CAN buses, switches and streams; with your consent asks at each port who is there.
+
+    Says the lines for rig.toml.
 
     Without --ask or --yes nothing is written to any port: it may be somebody else's device.
 
@@ -81,7 +83,8 @@ def find(
     """
     if ask and yes:
         raise UsageError("--ask and --yes: give one of them")
-    seen = [*finding.ports(), *finding.switches(), *finding.streams(), *map(finding.named, addresses or [])]
+    alone = [*finding.buses(), *finding.switches(), *finding.streams()]
+    seen = [*finding.ports(), *alone, *map(finding.named, addresses or [])]
     result = compute("find", lambda operation: _found(operation, seen, ask, yes))
     show(TextTable("Ports", ("port", "USB", "adapter", "who answers"), [_row(port) for port in result.ports], words=4))
     show(*(port.lines for port in result.ports if port.lines))

@@ -44,6 +44,10 @@ ADAPTERS = {
     (0x2341, 0x0043): "Arduino Uno",
     (0xAD50, 0x60C4): "CANable, CAN by SLCAN",
 }
+# Those without a serial line, which python-can drives itself: its interface, and how it calls the first of them.
+DRIVEN = {(0x0C72, 0x000C): ("pcan", "PCAN_USBBUS{}", 1), (0x1D50, 0x606F): ("gs_usb", "{}", 0)}
+ARPHRD_CAN = "280"  # linux/if_arp.h
+SYSTEM = Path("/sys")
 BY_ID = Path("/dev/serial/by-id")
 ASKED_Hz = 100.0
 Consent = Callable[[PortFound], bool]
@@ -79,6 +83,28 @@ def ports() -> list[PortFound]:
 def switches(names: Path = NAMES) -> list[PortFound]:
     """Input devices of Linux by their names; nothing is opened, and which of them is a foot switch a person knows."""
     return [_listed(EvdevSwitch, f"{BY_NAME}{name}", "keys, as of a foot switch") for name in key_devices(names)]
+
+
+def buses(system: Path = SYSTEM) -> list[PortFound]:
+    """CAN buses of Linux, and adapters that Linux leaves to python-can; nothing is opened."""
+    kinds = sorted(system.glob("class/net/*/type"))
+    found = [_bus("socketcan", kind.parent.name) for kind in kinds if kind.read_text().strip() == ARPHRD_CAN]
+    adapters = sorted(path.parent for path in system.glob("bus/usb/devices/*/idVendor"))
+    for numbers, (interface, name, first) in DRIVEN.items():
+        free = [path for path in adapters if _numbers(path) == numbers and not any(path.glob("*/net/*"))]
+        found += [_bus(interface, name.format(first + place), numbers) for place in range(len(free))]
+    return found
+
+
+def _bus(interface: str, port: str, numbers: tuple[int, int] | None = None) -> PortFound:
+    usb, kind = ("{:04x}:{:04x}".format(*numbers), ADAPTERS[numbers]) if numbers else ("", "CAN bus of Linux")
+    lines = f'[axis]\ninterface = "{interface}"\nport = {toml(port)}\n'
+    return PortFound(address=port, usb=usb, kind=kind, asked=False, role="axis", lines=lines)
+
+
+def _numbers(adapter: Path) -> tuple[int, int]:
+    vendor, product = (int((adapter / name).read_text(), 16) for name in ("idVendor", "idProduct"))
+    return vendor, product
 
 
 def streams() -> list[PortFound]:
@@ -117,9 +143,9 @@ def _lasting(device: str) -> str:
 
 
 def find(seen: Iterable[PortFound], consent: Consent) -> Iterator[PortFound]:
-    """Each port, asked who is there where ``consent`` says so; what says by itself what it is need not be asked."""
+    """Each port, asked who is there where ``consent`` says so; what is no line, or says what it is, is not."""
     for port in seen:
-        yield ask(port) if not port.product and consent(port) else port
+        yield ask(port) if not port.lines and consent(port) else port
 
 
 def ask(port: PortFound) -> PortFound:

@@ -1,4 +1,4 @@
-"""Two ways to put a force mock to work in tests: on a wire in memory, and in another process on a pseudo-terminal."""
+"""A force mock at work in another process, on a pseudo-terminal."""
 
 import multiprocessing
 import select
@@ -6,21 +6,18 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
-from typing import Generic, Literal, TypeVar
+from typing import Literal
 
 from drivers.roles import ForceSensor
 from mock_devices.bota.mock import BotaMock
-from mock_devices.interfaces import NEVER_NS, ProtocolMock
+from mock_devices.interfaces import NEVER_NS
 from mock_devices.robotiq.mock import RobotiqMock
-from mock_devices.testing.wire import MemoryWire
 from mock_devices.wire import PtyWire
 from rig.channels import ForceSample
 
 Product = Literal["bota", "robotiq"]
 Knobs = dict[str, bool | int | str]
-AnyMock = TypeVar("AnyMock", bound=ProtocolMock)
 WAIT_S = 20.0
-QUIET_S = 0.2
 WRENCH = (1.25, -2.5, -7.75, 0.125, -0.25, 0.5)
 
 
@@ -37,27 +34,6 @@ class StillPlant:
 
     def overrange(self) -> bool:
         return self.over
-
-
-class SensorBench(Generic[AnyMock]):
-    """A mock on a wire in memory, with the clock in the test's hand."""
-
-    def __init__(self, mock: AnyMock, wire: MemoryWire, now_ns: int) -> None:
-        self.mock, self.wire, self.now_ns = mock, wire, now_ns
-
-    def say(self, data: bytes) -> bytes:
-        """What the mock answers at once."""
-        self.wire.said += data
-        self.mock.receive(self.now_ns)
-        return self.wire.take()
-
-    def wait(self, duration_ns: int) -> bytes:
-        """What the mock sends in the next while."""
-        end_ns = self.now_ns + duration_ns
-        while self.mock.due_ns <= end_ns:
-            self.mock.tick(self.mock.due_ns)
-        self.now_ns = end_ns
-        return self.wire.take()
 
 
 class ServedMock:
@@ -107,14 +83,6 @@ def collect(sensor: ForceSensor, enough: Callable[[list[ForceSample]], bool]) ->
         select.select([sensor.fileno()], [], [], 0.1)
         samples += sensor.poll(time.monotonic_ns())
     return samples
-
-
-def await_silence(sensor: ForceSensor) -> None:
-    """Waits until what was under way has come and nothing follows; a driver that raises at silence fails here."""
-    deadline = time.monotonic() + WAIT_S
-    while sensor.poll(time.monotonic_ns()) or select.select([sensor.fileno()], [], [], QUIET_S)[0]:
-        assert time.monotonic() < deadline, "the sensor does not fall silent"
-    assert list(sensor.poll(time.monotonic_ns())) == []
 
 
 @contextmanager

@@ -5,6 +5,7 @@ import os
 import pty
 import select
 import subprocess
+import tomllib
 import tty
 from collections.abc import Iterator
 from pathlib import Path
@@ -194,6 +195,36 @@ def test_foot_switches_are_found_by_their_names_and_never_opened(tmp_path: Path)
     )  # fmt: skip
     assert found.lines == '[input.switch]\nproduct = "evdev-switch"\nport = "name:PCsensor FootSwitch"\n'
     assert list(finding.find([found], lambda _: pytest.fail("what names itself is not asked"))) == [found]
+
+
+def written(folder: Path, **files: str) -> None:
+    folder.mkdir(parents=True)
+    for name, text in files.items():
+        (folder / name).write_text(f"{text}\n")
+
+
+def test_can_buses_are_found_as_linux_or_python_can_drives_them(tmp_path: Path) -> None:
+    """As /sys of a computer with one bus of the kernel, whose adapter counts once, and three adapters without."""
+    for name, kind in (("lo", "772"), ("eth0", "1"), ("can0", "280")):
+        written(tmp_path / "class" / "net" / name, type=kind)
+    plugged = (("1-1", "0c72", "000c"), ("1-2", "0c72", "000c"), ("1-3", "1d50", "606f"), ("1-4", "0403", "6001"))
+    for place, vendor, product in (*plugged, ("2-1", "0c72", "000c")):
+        written(tmp_path / "bus" / "usb" / "devices" / place, idVendor=vendor, idProduct=product)
+    (tmp_path / "bus" / "usb" / "devices" / "1-1" / "1-1:1.0" / "net" / "can0").mkdir(parents=True)
+    assert [(bus.address, bus.usb) for bus in finding.buses(tmp_path)] == [
+        ("can0", ""), ("PCAN_USBBUS1", "0c72:000c"), ("PCAN_USBBUS2", "0c72:000c"), ("0", "1d50:606f"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("address", ["can0", "PCAN_USBBUS1", "0"])
+def test_the_lines_of_a_bus_are_those_of_an_axis_and_nobody_writes_to_it(address: str, tmp_path: Path) -> None:
+    written(tmp_path / "class" / "net" / "can0", type="280")
+    for place, vendor, product in (("1-2", "0c72", "000c"), ("1-3", "1d50", "606f")):
+        written(tmp_path / "bus" / "usb" / "devices" / place, idVendor=vendor, idProduct=product)
+    (bus,) = [one for one in finding.buses(tmp_path) if one.address == address]
+    assert list(finding.find([bus], lambda _: pytest.fail("asked"))) == [bus]
+    table = {"product": "maxon-epos4", **tomllib.loads(bus.lines)["axis"]}
+    assert Wiring.model_validate({"axis": table}).axis.port == address
 
 
 @pytest.mark.parametrize("installed", [True, False])

@@ -14,10 +14,11 @@ from drivers.bota.device import BotaSensOne
 from drivers.ports import PortClosed, open_port
 from drivers.roles import Identity
 from mock_devices.testing.clock import long_ago
-from mock_devices.testing.force import WRENCH, ServedMock, await_silence, collect
+from mock_devices.testing.force import WRENCH, ServedMock, collect
 from rig.config.products.bota_sensone import BotaWiring
 from rig.errors import DeviceError, UsageError
 from tests.drivers.scripted_port import ScriptedPort
+from tests.drivers.silence import await_silence
 
 BOOT = b"c,0,1,0,4\r\nApp Init\r\nname: BFT-SENS-SER-M8\r\nS/N: 000271\r\nFW version: 1.0.6\r\n"
 PERIOD_US = 996

@@ -13,10 +13,11 @@ from drivers.robotiq.codec import FRAME_NS, STOP_BURST, encode_frame, with_crc
 from drivers.robotiq.device import RobotiqFt300
 from drivers.roles import Identity
 from mock_devices.testing.clock import long_ago
-from mock_devices.testing.force import WAIT_S, WRENCH, ServedMock, await_silence, collect
+from mock_devices.testing.force import WAIT_S, WRENCH, ServedMock, collect
 from rig.config.products.robotiq_ft300 import Ft300Wiring
 from rig.errors import DeviceError
 from tests.drivers.scripted_port import ScriptedPort
+from tests.drivers.silence import await_silence
 
 FRAME = encode_frame([125, -250, -775, 125, -250, 500])
 PERIOD_NS = 10_000_000

@@ -9,8 +9,9 @@ from drivers.bota.codec import ForceFrame, make_decoder
 from drivers.roles import LinkCounters
 from mock_devices.bota.mock import BOOT_NS, BotaMock, Command, CommandParser
 from mock_devices.interfaces import NEVER_NS, ProtocolMock
-from mock_devices.testing.force import WRENCH, SensorBench, ServedMock, StillPlant
+from mock_devices.testing.force import WRENCH, ServedMock, StillPlant
 from mock_devices.testing.wire import MemoryWire
+from tests.mock_devices.sensor_bench import SensorBench
 
 START_NS = 5_000_000_000
 SECOND_NS = 1_000_000_000

@@ -25,8 +25,9 @@ from drivers.robotiq.codec import (
 from drivers.roles import LinkCounters
 from mock_devices.interfaces import NEVER_NS, ProtocolMock
 from mock_devices.robotiq.mock import REQUEST_BYTES_MAX, RequestFinder, RobotiqMock
-from mock_devices.testing.force import WRENCH, SensorBench, ServedMock, StillPlant
+from mock_devices.testing.force import WRENCH, ServedMock, StillPlant
 from mock_devices.testing.wire import MemoryWire
+from tests.mock_devices.sensor_bench import SensorBench
 
 START_NS = 7_000_000_000
 PERIOD_NS = 10_000_000
