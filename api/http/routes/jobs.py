@@ -57,7 +57,7 @@ def add(router: APIRouter, service: Service) -> None:
 
 def _lists(router: APIRouter, service: Service) -> None:
     @router.get("/jobs", dependencies=[READ], summary="Jobs, newest first", responses=responses("422 refused"))
-    async def jobs(
+    def jobs(
         page: PageQuery,
         kind: Word = "",
         state: JobState | None = None,

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 from collections.abc import Awaitable, Callable
 
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketDisconnected
 
 from api.http import problems
 from api.http.access.rights import ENTITLED, RECHECK_S
@@ -25,7 +25,8 @@ async def serve(socket: WebSocket, streams: Streams) -> None:
         return
     client = LiveClient(streams)
     await socket.accept(subprotocol=PROTOCOL)
-    with contextlib.suppress(WebSocketDisconnect), contextlib.closing(client):
+    # The second where the service itself has closed it meanwhile, because it ends.
+    with contextlib.suppress(WebSocketDisconnect, WebSocketDisconnected), contextlib.closing(client):
         await _said(socket, client.hello())
         turn = asyncio.Lock()
         sending = _send(socket, client, turn, streams.feed.turn)
