@@ -24,9 +24,11 @@ def answering(listening: socket.socket) -> Iterator[int]:
     server = uvicorn.Server(uvicorn.Config(FastAPI(), log_level="error"))
     thread = threading.Thread(target=server.run, args=([listening],))
     thread.start()
-    yield listening.getsockname()[1]
-    server.should_exit = True
-    thread.join()
+    try:
+        yield listening.getsockname()[1]
+    finally:
+        server.should_exit = True
+        thread.join()
 
 
 def median_ms(port: int) -> float:
