@@ -11,6 +11,7 @@ ALIVE, VALID, ON_RATE = 1, 2, 4
 IDENTICAL_LIMIT = 100  # with noise of half a step every other sample is alike, but never a hundred in a row
 # 10 ms at 1 kHz, in which a trial of 30 mm/s goes the 0.3 mm of `axis.standstill_mm`: neither waits for the other.
 STANDING_REPORTS = 10
+SET_OUT_MM = 0.01  # what was said before that says nothing: a pause in the answers makes no axis frozen
 # Neighbouring rates of a sensor lie 20 % apart; jitter of 40 % of a period moves a mean of fifty by 4 %.
 RATE_TOLERANCE = 0.2
 
@@ -31,8 +32,7 @@ class StreamHealth:
     def update(self, capture_ns: int, valid: bool, value: object = None) -> None:
         """Takes note of one sample; ``value`` is what must not stay the same for ever, None where anything may."""
         if self._last_capture_ns > -NEVER_NS:
-            step_ns = capture_ns - self._last_capture_ns
-            self._mean_period_ns += 0.02 * (step_ns - self._mean_period_ns)
+            self._mean_period_ns += 0.02 * (capture_ns - self._last_capture_ns - self._mean_period_ns)
         else:
             self._mean_period_ns = self.period_ns
         self._last_capture_ns, self.valid = capture_ns, valid
@@ -72,11 +72,12 @@ class Standstill:
     _reports: int = 0
 
     def update(self, position_mm: float, setpoint_mm: float) -> float:
-        """Way of the set-point since the place last changed [mm]; 0 until ten reports in a row name the same."""
+        """Way of the set-point since the place last changed [mm]; 0 until ten reports since then name the same."""
         if position_mm != self._position_mm:
-            self._position_mm, self._setpoint_mm, self._reports = position_mm, setpoint_mm, 0
-        self._reports += 1
-        return abs(setpoint_mm - self._setpoint_mm) if self._reports > STANDING_REPORTS else 0.0
+            self._position_mm, self._setpoint_mm = position_mm, setpoint_mm
+        gone_mm = abs(setpoint_mm - self._setpoint_mm)
+        self._reports = self._reports + 1 if gone_mm > SET_OUT_MM else 1
+        return gone_mm if self._reports > STANDING_REPORTS else 0.0
 
     def begin(self) -> None:
         """What came before counts no more: a new program sets out from where the axis is."""

@@ -42,6 +42,11 @@ class Served:
     address: str
     folder: Path
 
+    @property
+    def origin(self) -> str:
+        """The address without the page's own part."""
+        return self.address.partition("/#")[0]
+
     def suspend(self) -> None:
         """Lets the service hang."""
         self.process.send_signal(signal.SIGSTOP)

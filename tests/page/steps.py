@@ -6,7 +6,8 @@ from typing import Any
 
 from playwright.sync_api import Page, expect
 
-from mock_devices.testing.commands import PATIENCE_S, ServedBench, until
+from mock_devices.testing.commands import PATIENCE_S, ServedBench, freed, until
+from mock_devices.testing.service import ask
 
 # As the service shows it, asked for as the page does; what does not answer within 5 s says that instead.
 RIG = """async () => {
@@ -18,8 +19,21 @@ ASKED = ("state", "reason", "mode", "force_N", "position_mm", "missed", "lost", 
 
 def standing(page: Page) -> dict[str, Any]:
     """What keeps the bench from going on, as the service says it."""
-    now = page.evaluate(RIG)
+    return asked_for(page.evaluate(RIG))
+
+
+def asked_for(now: dict[str, Any]) -> dict[str, Any]:
+    """What tells why the bench does not go on, of all that the service says."""
     return {name: now[name] for name in ASKED if name in now}
+
+
+def out(bench: ServedBench, address: str) -> None:
+    """Waits until the tip is out of the tissue; fails with what the service at ``address`` says of the bench."""
+    try:
+        freed(bench)
+    except AssertionError as error:
+        error.add_note(json.dumps(asked_for(ask(address, "GET", "/rig")), indent=1))
+        raise
 
 
 def state(page: Page, name: str, within_ms: float | None = None) -> None:

@@ -4,11 +4,11 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from api.http.access.scopes import Scope
-from mock_devices.testing.commands import ServedBench, freed, pressed
+from mock_devices.testing.commands import ServedBench, pressed
 from tests.page.conftest import Served
 from tests.page.looks import holds_up
 from tests.page.people import somebody
-from tests.page.steps import out_or_named, start, state, view
+from tests.page.steps import out, out_or_named, start, state, view
 
 
 @pytest.mark.timeout(240)
@@ -27,7 +27,7 @@ def test_the_second_person_is_told_who_and_what_for_and_takes_over_with_a_reason
         expect(other.locator("#takeover")).to_be_hidden()
 
         page.click("#job-stop")
-        freed(bench)
+        out(bench, service.origin)
         page.click("#reset")
         state(page, "ready")
         view(other, "Devices")

@@ -5,9 +5,10 @@ import re
 import pytest
 from playwright.sync_api import Page, expect
 
-from mock_devices.testing.commands import ServedBench, freed
+from mock_devices.testing.commands import ServedBench
+from tests.page.conftest import Served
 from tests.page.looks import holds_up
-from tests.page.steps import state, view
+from tests.page.steps import out, state, view
 
 # Three speeds, each thrice: the least that a diagnosis can leave out recordings of.
 PROTOCOL = (
@@ -25,15 +26,17 @@ def protocols() -> dict[str, str]:
 
 
 @pytest.mark.timeout(800)
-def test_a_new_user_goes_from_subject_to_tracking_without_reading_anything(page: Page, bench: ServedBench) -> None:
+def test_a_new_user_goes_from_subject_to_tracking_without_reading_anything(
+    page: Page, service: Served, bench: ServedBench
+) -> None:
     state(page, "ready")
     view(page, "Run")
     set_up(page)
     capture(page)
-    freed(bench)
+    out(bench, service.origin)
     understand(page)
     track(page)
-    freed(bench)
+    out(bench, service.origin)
     find_threshold(page)
 
 

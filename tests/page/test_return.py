@@ -12,7 +12,7 @@ from mock_devices.testing.commands import ServedBench, freed, pressed
 from mock_devices.testing.service import ask
 from tests.page.conftest import Served, serve
 from tests.page.line import Line
-from tests.page.steps import start, state, view
+from tests.page.steps import out, start, state, view
 
 SILENT = "no answer from the service"
 STALE = re.compile("stale")
@@ -22,7 +22,7 @@ NUMBER = re.compile(r"^[\d.]+$")
 @pytest.fixture
 def own_address(service: Served) -> str:
     """Where the service itself is, whatever line leads to it."""
-    return service.address.partition("/#")[0]
+    return service.origin
 
 
 @pytest.fixture
@@ -102,7 +102,7 @@ def test_a_capture_goes_on_over_a_cut_line_and_is_there_again_with_what_happened
 
 @pytest.mark.timeout(240)
 def test_who_is_in_control_and_is_cut_off_from_everything_is_sent_to_the_hardware_stop_and_the_tip_is_retracted(
-    page: Page, bench: ServedBench
+    page: Page, bench: ServedBench, own_address: str
 ) -> None:
     state(page, "ready")
     start(page, "slow")
@@ -112,7 +112,7 @@ def test_who_is_in_control_and_is_cut_off_from_everything_is_sent_to_the_hardwar
     lost(page)
     page.keyboard.press("Escape")
     expect(page.locator("#stop-banner")).to_contain_text("NOT CONFIRMED: use the hardware stop")
-    freed(bench)
+    out(bench, own_address)
     page.context.set_offline(False)
     back(page, "stopped")
     expect(page.locator("#reason")).to_contain_text("not in control any more")

@@ -1,6 +1,7 @@
 """What each view says in states of its own; the states that all share are in `test_every_view`."""
 
 import contextlib
+import json
 import math
 import re
 from collections.abc import Iterator
@@ -13,8 +14,9 @@ from playwright.sync_api import Browser, Page, expect
 from api.http.access.models import AuditView
 from api.http.models import RigView
 from hatch_build import SOURCES, built_folder
+from mock_devices.testing import commands
 from mock_devices.testing.commands import ServedBench
-from tests.page import told, told_lab
+from tests.page import steps, told, told_lab
 from tests.page.looks import holds_up, violations
 from tests.page.pretend import ADMINISTRATOR, IDLE, INFO, OPERATOR, STOPPED, Pretended, opened
 from tests.page.steps import out_or_named, state
@@ -208,6 +210,16 @@ def test_a_tip_that_a_takeover_leaves_in_the_tissue_needs_a_reason_that_left_it_
     page = show("bench")
     with contextlib.nullcontext() if named else pytest.raises(AssertionError):
         out_or_named(page, pressing)
+
+
+def test_a_tip_that_stays_in_is_told_with_what_the_service_says_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    pressing = cast(ServedBench, SimpleNamespace(control=SimpleNamespace(number=lambda _: 1.0)))
+    says = {"state": "stopped", "reason": "the axis goes on reporting 25.983 mm", "since": "now"}
+    monkeypatch.setattr(steps, "ask", lambda *asked: says if asked == ("http://here", "GET", "/rig") else {})
+    monkeypatch.setattr(commands, "PATIENCE_S", 0.05)
+    with pytest.raises(AssertionError, match="the tip out of contact") as failed:
+        steps.out(pressing, "http://here")
+    assert [json.loads(note) for note in failed.value.__notes__] == [{k: says[k] for k in ("state", "reason")}]
 
 
 def listed(job: dict[str, Any]) -> dict[str, Any]:

@@ -6,13 +6,15 @@ import signal
 import pytest
 from playwright.sync_api import Page, expect
 
-from mock_devices.testing.commands import ServedBench, children, freed, pressed
+from mock_devices.testing.commands import ServedBench, children, pressed
 from tests.page.conftest import Served
-from tests.page.steps import start, state, view
+from tests.page.steps import out, start, state, view
 
 
 @pytest.mark.timeout(200)
-def test_a_person_runs_a_protocol_stops_it_and_finds_the_recordings(page: Page, bench: ServedBench) -> None:
+def test_a_person_runs_a_protocol_stops_it_and_finds_the_recordings(
+    page: Page, service: Served, bench: ServedBench
+) -> None:
     state(page, "ready")
     view(page, "Devices")
     expect(page.locator("#devices tr")).to_have_count(3)
@@ -40,7 +42,7 @@ def test_a_person_runs_a_protocol_stops_it_and_finds_the_recordings(page: Page, 
     page.click("text=Acknowledge stop")
     state(page, "ready")
     page.click("#retract")
-    freed(bench)
+    out(bench, service.origin)
 
 
 @pytest.mark.timeout(200)
@@ -92,5 +94,5 @@ def test_a_killed_loop_is_recovered_from_the_page_with_a_consent_for_each_act(
         assert bench.control.number("tip.force_N") > 0.5
         page.click("text=Yes, do it")
     expect(page.locator("#message")).to_contain_text("recovered: ")
-    freed(bench)
+    out(bench, service.origin)
     state(page, "ready")

@@ -114,6 +114,14 @@ def test_a_set_point_that_goes_back_counts_as_way_too() -> None:
     assert [standstill.update(5.0, -float(cycle)) for cycle in range(11)][-1] == 10.0
 
 
+def test_what_an_axis_said_at_rest_does_not_make_a_pause_in_its_answers_a_standstill() -> None:
+    standstill = Standstill()
+    at_rest = [standstill.update(5.0, 5.0 + 0.01 * (cycle % 2)) for cycle in range(100)]
+    late = [standstill.update(5.0, 5.4 + 0.02 * cycle) for cycle in range(9)]
+    assert at_rest + late == [0.0] * 109, "sent off, and nine reports of before come at once"
+    assert standstill.update(5.0, 5.6) == pytest.approx(0.6), "a tenth is one too many"
+
+
 def test_a_first_report_of_nothing_and_a_new_beginning_count_from_the_next() -> None:
     standstill = Standstill()
     assert standstill.update(math.nan, 0.0) == 0.0

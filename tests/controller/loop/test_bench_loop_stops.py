@@ -148,6 +148,22 @@ def test_an_axis_that_names_one_place_is_told_after_ten_reports(sensor_Hz: float
 
 
 @RATES_HZ
+def test_an_axis_that_pauses_as_it_is_sent_out_and_then_names_where_it_was_is_not_frozen(sensor_Hz: float) -> None:
+    bench = pressing(sensor_Hz)
+    bench.wait(0.1)
+    deep_mm = bench.axis.position_mm
+    bench.say("stop")
+    bench.axis.reads_mm, bench.axis.silent = deep_mm, True
+    bench.wait(0.022)
+    bench.axis.silent = False
+    bench.wait(0.003)
+    bench.axis.reads_mm = None
+    bench.until(lambda: bench.mode is Mode.SAFE)
+    assert (bench.latched, bench.axis.quick_stops) == ("operator_stop", [])
+    assert bench.axis.position_mm < deep_mm - 5.0, "the tip is out"
+
+
+@RATES_HZ
 def test_an_axis_that_stands_while_its_set_point_stands_is_not_frozen(sensor_Hz: float) -> None:
     bench = pressing(sensor_Hz)
     bench.axis.reads_mm = bench.loop.state.position_mm
