@@ -41,17 +41,17 @@ test-page: $(READY) page browser
 
 # Every command, cell and example of README and docs, as somebody would run it.
 test-documents: $(READY) page
-	$(BIN)/pytest -n 2 --dist worksteal -m documents tests/test_docs.py tests/system/test_api_docs.py --durations 5
+	$(BIN)/pytest -n 2 --dist worksteal -m "documents and not by_hand" tests/test_docs.py tests/system/test_api_docs.py --durations 5
 
 # Diagnoses of many sessions, made and measured, and safety checks that are switched off one by one.
 test-campaigns: $(READY)
-	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m campaign --ignore tests/page --durations 10
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "campaign and not by_hand" --ignore tests/page --durations 10
 
 # The demonstration, stops and crashes in contact, every answer of the service while the tip presses, further products; by itself
 # what asks how punctual the loop is, which the processes of a second bench would decide.
 test-extras: $(READY) page
-	$(BIN)/pytest -m alone --ignore tests/page
-	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "extra and not alone" --ignore tests/page --durations 10
+	$(BIN)/pytest -m "alone and not by_hand" --ignore tests/page
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "extra and not alone and not by_hand" --ignore tests/page --durations 10
 	$(MAKE) --no-print-directory test-one-extra
 
 # By hand, for hours, on a quiet computer, dated in docs/validation: what takes long and rarely breaks, a hundred new examples of

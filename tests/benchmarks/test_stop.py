@@ -66,8 +66,8 @@ def test_the_service_is_judged_by_what_the_page_waits() -> None:
 )
 def test_the_load_is_waited_for(monkeypatch: pytest.MonkeyPatch, counts: list[tuple[int, int]], looks: int) -> None:
     clock = [0.0]
-    monkeypatch.setattr(stop.time, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(stop.time, "sleep", lambda seconds: clock.__setitem__(0, clock[0] + seconds))
+    time = SimpleNamespace(monotonic=lambda: clock[0], sleep=lambda seconds: clock.__setitem__(0, clock[0] + seconds))
+    monkeypatch.setattr(stop, "time", time)
     monkeypatch.setattr(stop, "SETTLING_S", 10.0)
     told = iter(counts)
 
