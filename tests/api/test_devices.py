@@ -250,6 +250,7 @@ def bench() -> Iterator[ServedBench]:
 @pytest.mark.bench
 @pytest.mark.extra
 @pytest.mark.xdist_group("commands")
+@pytest.mark.by_hand
 def test_glove_and_stream_of_the_mock_bench_are_found(bench: ServedBench) -> None:
     ports = bench.endpoints.devices
     glove = finding.ask(finding.named(ports["glove"]["serial"]))

@@ -128,6 +128,7 @@ def test_the_axis_is_calibrated_against_the_tracker(served: ServedRig, lease: st
     assert listed[done["result"]["file"]] == "axis"
 
 
+@pytest.mark.by_hand
 def test_a_person_lays_the_block_that_the_job_asks_for(served: ServedRig, lease: str) -> None:
     control, table_mm = served.bench.control, served.bench.control.number("surface.position_mm")
     job = begun(served, lease, clear=True, gauge_block_mm=5.0, near_mm=round(table_mm, 1) - 0.3)
@@ -152,6 +153,7 @@ def test_a_service_that_is_killed_leaves_an_axis_that_stands_and_ports_that_are_
         served.running.end()
 
 
+@pytest.mark.by_hand
 def test_the_simulated_bench_calibrates_axis_and_glove_by_itself(tmp_path: Path) -> None:
     with served_bench("--seed", "1") as bench:  # only for its control; the service has a bench of its own
         served = ServedRig(bench, tmp_path, ["--set", "input.glove.product=firmata-glove"])

@@ -16,6 +16,7 @@ pytestmark = [pytest.mark.bench, pytest.mark.extra, pytest.mark.xdist_group("com
 TRIES = 3  # what a computer that was busy has spoilt is refused by its coherence, and is to be done again
 
 
+@pytest.mark.by_hand
 def test_the_mock_axis_is_found_as_its_physics_answer_a_sine(tmp_path: Path) -> None:
     for _ in range(TRIES):
         said = rig("calibrate", "axis", "--dynamics", "--json", "result.json", folder=tmp_path)

@@ -77,6 +77,7 @@ def test_a_pedal_that_is_pulled_out_retracts_and_is_named(bench: ServedBench, tm
 
 
 @pytest.mark.extra
+@pytest.mark.by_hand
 def test_a_glove_is_calibrated_and_finds_a_threshold(tmp_path: Path) -> None:
     said = rig("calibrate", "glove", "--set", "input.glove.product=firmata-glove", "--out", "g.json", folder=tmp_path)
     assert said.code == 0, said.err

@@ -32,6 +32,7 @@ def test_the_doctor_finds_each_at_its_rate(products: tuple[str, ...], tmp_path: 
 
 
 @each_mixture
+@pytest.mark.by_hand
 def test_a_trial_and_a_tracking_are_complete(products: tuple[str, ...], tmp_path: Path) -> None:
     trial_once = "speeds_mm_s = [10]\ntrials = 1\ndepth_mm = 8\n[quality]\nrepeats = 0\n"
     (tmp_path / "one.toml").write_text(trial_once)

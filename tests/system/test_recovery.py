@@ -64,7 +64,14 @@ def killed(running: Running, *whom: str) -> None:
         running.end()
 
 
-@pytest.mark.parametrize("whom", [("loop",), ("recorder",), ("command",), ("stop",), ("inputs",), ALL])
+@pytest.mark.parametrize(
+    "whom",
+    [
+        ("loop",),
+        *(pytest.param((name,), marks=pytest.mark.by_hand) for name in ("recorder", "command", "stop", "inputs")),
+        ALL,
+    ],
+)
 def test_one_command_brings_the_tip_out_after_a_kill(bench: ServedBench, tmp_path: Path, whom: tuple[str, ...]) -> None:
     running = tracking(bench, tmp_path)
     killed(running, *whom)

@@ -89,6 +89,7 @@ def tracking(served: ServedRig) -> None:
     pressed(served.bench, 1.5)
 
 
+@pytest.mark.by_hand
 def test_a_killed_service_leaves_a_bench_that_one_command_recovers(served: ServedRig) -> None:
     tracking(served)
     served.running.kill()

@@ -15,7 +15,10 @@ SURFACE_MM = 20.0
 
 @pytest.mark.parametrize(
     ("product", "role", "model", "cycles_a_sample"),
-    [("bota-sensone", "force", "BFT-SENS", 1.0), ("robotiq-ft300", "force_modbus", "FT", 10.0)],
+    [
+        pytest.param("bota-sensone", "force", "BFT-SENS", 1.0, marks=pytest.mark.by_hand),
+        ("robotiq-ft300", "force_modbus", "FT", 10.0),
+    ],
 )
 def test_8_mm_are_8_mm_with_either_sensor(
     bench: ServedBench, tmp_path: Path, product: str, role: str, model: str, cycles_a_sample: float
