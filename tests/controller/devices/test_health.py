@@ -116,10 +116,16 @@ def test_a_set_point_that_goes_back_counts_as_way_too() -> None:
 
 def test_what_an_axis_said_at_rest_does_not_make_a_pause_in_its_answers_a_standstill() -> None:
     standstill = Standstill()
-    at_rest = [standstill.update(5.0, 5.0 + 0.01 * (cycle % 2)) for cycle in range(100)]
-    late = [standstill.update(5.0, 5.4 + 0.02 * cycle) for cycle in range(9)]
+    at_rest = [standstill.update(0.0, 0.01 * (cycle % 2)) for cycle in range(100)]
+    late = [standstill.update(0.0, 0.4 + 0.02 * cycle) for cycle in range(9)]
     assert at_rest + late == [0.0] * 109, "sent off, and nine reports of before come at once"
-    assert standstill.update(5.0, 5.6) == pytest.approx(0.6), "a tenth is one too many"
+    assert standstill.update(0.0, 0.6) == 0.6, "a tenth is one too many"
+
+
+def test_a_set_point_that_is_a_little_more_than_a_hundredth_away_has_set_out() -> None:
+    standstill = Standstill()
+    standstill.update(0.0, 0.0)
+    assert [standstill.update(0.0, 0.0101) for _ in range(10)] == [0.0] * 9 + [0.0101]
 
 
 def test_a_first_report_of_nothing_and_a_new_beginning_count_from_the_next() -> None:
