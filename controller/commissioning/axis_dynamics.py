@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.stats import t as student
+from scipy.special import stdtrit as student_t
 
 from controller.commissioning.sweep import RUN_IN_S, TURN_MM_S, AirSweep, steady_mm
 from drivers.roles import Identity
@@ -191,7 +191,7 @@ def _within(response: FrequencyResponse, best: ResponseFit) -> Column:
     """
     rows = np.array([[*one, one.delay_s + one.sum_s] for one in (fit(response, each) for each in response.left_out)])
     count = len(rows)
-    scatter = student.ppf(0.975, count - 1) * np.sqrt((count - 1) * rows.var(axis=0))
+    scatter = student_t(count - 1, 0.975) * np.sqrt((count - 1) * rows.var(axis=0))
     together = np.vstack([np.eye(4), [0, 1, 1, 0]])
     shape = COVERAGE * np.sqrt(np.diag(together @ _covariance(response, best) @ together.T))
     return np.asarray(np.hypot(scatter, shape))
@@ -222,7 +222,7 @@ def reversal_of(sweep: AirSweep, followed: SweepRecord, lag_s: float) -> Reversa
     begin_s = sweep.turns_begin_s + 0.25 * sweep.turn_s
     turns = [_turn(sweep, followed, begin_s + at * sweep.turn_s) for at in range(sweep.turns)]
     lost_mm, friction_A = (np.array(side) for side in zip(*turns, strict=True))
-    spread = student.ppf(0.975, len(turns) - 1) / math.sqrt(len(turns))
+    spread = student_t(len(turns) - 1, 0.975) / math.sqrt(len(turns))
     told = bool(np.isfinite(friction_A).all())  # not every drive tells its current
     return Reversal(
         lost_mm=float(lost_mm.mean()) - TURN_MM_S * lag_s,

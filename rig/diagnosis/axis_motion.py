@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # its parts load when they are used: scipy.signal takes half a second
 from numpy.typing import NDArray
-from scipy.signal import butter, filtfilt, periodogram
 
 from rig.errors import DataError
 from rig.intake.axis import AxisRecording, AxisUnits
@@ -180,7 +180,7 @@ def _far(grid_s: Array, samples_s: Array, period_s: float) -> Mask:
 
 def cut_of(one: _Even) -> float:
     """Frequency of the filter [Hz], by how fast the axis moves; raises DataError where the samples are too slow."""
-    frequency, power = periodogram(np.gradient(one.position, one.period_s), 1 / one.period_s, window="hann")
+    frequency, power = scipy.signal.periodogram(np.gradient(one.position, one.period_s), 1 / one.period_s, "hann")
     share = np.cumsum(power) / power.sum()
     fastest_Hz = float(frequency[np.searchsorted(share, SLOW_SHARE)])
     highest_Hz = CUT_OF_THINNED / one.period_s
@@ -194,22 +194,22 @@ def cut_of(one: _Even) -> float:
 
 def _thinned(one: _Even, cut_Hz: float) -> _Rows:
     rate_Hz = 1 / one.period_s
-    numerator, denominator = butter(4, cut_Hz / (rate_Hz / 2))
+    numerator, denominator = scipy.signal.butter(4, cut_Hz / (rate_Hz / 2))
     edge, step = math.ceil(EDGE_PERIODS * rate_Hz / cut_Hz), max(1, round(CUT_OF_THINNED * rate_Hz / cut_Hz))
     take = slice(edge, len(one.position) - edge, step)
     if len(one.position) <= 2 * edge + step * BLOCKS:
         raise DataError(f"a recording of {len(one.position) / rate_Hz:.3g} s is too short; record longer")
-    derivatives = [filtfilt(numerator, denominator, one.position)]
+    derivatives = [scipy.signal.filtfilt(numerator, denominator, one.position)]
     for _ in range(4):
         derivatives.append(np.gradient(derivatives[-1], one.period_s))
     # Lost motion is a step at each reversal, which the filter would make ring: slip is only thinned.
-    effort, slip = filtfilt(numerator, denominator, one.effort), one.slip
+    effort, slip = scipy.signal.filtfilt(numerator, denominator, one.effort), one.slip
     reach = np.ones(2 * math.ceil(rate_Hz / cut_Hz) + 1)
     unknown = np.convolve(one.unknown, reach, "same") > 0
     time_s = np.arange(len(effort)) * one.period_s
     q, v, a, _, s = derivatives
     sign_speed = max(SIGN_SHARE * float(np.percentile(np.abs(v), FASTEST)), SIGN_NOISES * noise_of(v[take]))
-    direction = filtfilt(numerator, denominator, np.tanh(v / sign_speed))
+    direction = scipy.signal.filtfilt(numerator, denominator, np.tanh(v / sign_speed))
     blind = unknown | (np.abs(v) < SIGNS * sign_speed)
     return _Rows(*(np.ascontiguousarray(x[take]) for x in (q, v, a, s, effort, slip, time_s, blind, direction)))
 

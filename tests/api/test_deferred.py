@@ -65,6 +65,17 @@ def test_help_of_all_commands_loads_nothing_heavy_and_says_the_same_as_the_comma
     assert all("Usage: rig" in text for text in quick.values())
 
 
+# Half a second each, on a bench that somebody waits for.
+SLOW = {"scipy.signal", "scipy.stats", "matplotlib", "numba", "pandas"}
+
+
+@pytest.mark.parametrize("module", ["api.http.app", "controller.loop.process"])
+def test_service_and_loop_start_without_what_a_diagnosis_loads(module: str) -> None:
+    command = [sys.executable, "-c", f"import sys, {module}; print(*sys.modules)"]
+    loaded = set(subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
+    assert module in loaded and loaded & SLOW == set()
+
+
 MODULE = """
 import json
 import no_such_module
