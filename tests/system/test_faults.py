@@ -129,8 +129,8 @@ def test_a_second_user_is_told_that_the_bench_is_taken(bench: ServedBench, proto
     ("device", "kind", "words"),
     [
         ("force", "cut", ("force",)),
-        ("force", "freeze", ("force", "old")),
-        ("force", "frozen", ("frozen",)),
+        pytest.param("force", "freeze", ("force", "old"), marks=pytest.mark.by_hand),
+        pytest.param("force", "frozen", ("frozen",), marks=pytest.mark.by_hand),
         pytest.param("force", "invalid", ("invalid",), marks=pytest.mark.by_hand),
         ("tracker", "cut", ("tracker",)),
     ],
