@@ -186,12 +186,13 @@ def test_reading_takes_the_memory_of_the_tables_and_little_more(tmp_path: Path) 
 
 def test_reading_is_an_order_faster_than_the_stock_reader_a_row(tmp_path: Path) -> None:
     """Measured: 1.5 % (`python -m benchmarks.recording`); on a busy computer in the same minute still below a tenth."""
-    written(tmp_path / "a.mcap", chunks=20, rows=600)
+    written(tmp_path / "a.mcap", chunks=10, rows=3000)
 
     def spent_s(read: object) -> float:
         began = time.process_time()
         read(tmp_path / "a.mcap")  # type: ignore[operator]
         return time.process_time() - began
 
-    ours, theirs = (min(spent_s(read) for _ in range(3)) for read in (read_recording, stock))
-    assert ours < 0.1 * theirs
+    # In turn, so that a processor that is slower for a while is so for both.
+    shares = [spent_s(read_recording) / spent_s(stock) for _ in range(3)]
+    assert min(shares) < 0.1
