@@ -1,4 +1,4 @@
-"""How long a stop takes: `python -m benchmarks.stop [--presses 300] [--json FILE]`, in one to two minutes.
+"""How long a stop takes: `python -m benchmarks.stop [--presses 1000] [--json FILE]`, in two to three minutes.
 
 A real service over the mock bench; each press is a POST /estop on a connection of its own to the stop process, timed
 from before the connection to the loop's confirmation. Phases in one run: nothing else going on; 50 streams, 200
@@ -97,7 +97,7 @@ class Phase:
 def main() -> int:
     """Prints head, table and one JSON object; 1 where a goal is missed or the load was not there."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.stop", description=__doc__)
-    parser.add_argument("--presses", type=int, default=300, help="of each phase")
+    parser.add_argument("--presses", type=int, default=1000, help="of each phase")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     with promptly(CLIENT_PRIORITY):
