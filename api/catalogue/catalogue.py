@@ -17,7 +17,7 @@ from api.catalogue.folder import short, utc
 from api.catalogue.pages import FIRST, Page, cut
 from api.catalogue.people import NamedPerson
 from api.catalogue.queries import EVERYTHING, Asked, every, listed, sites
-from api.catalogue.refresh import refill, refresh
+from api.catalogue.refresh import current, refill
 from api.catalogue.schema import TABLES, Kind
 from api.catalogue.settings import ENVIRONMENT
 from api.catalogue.stiffness import compared
@@ -75,9 +75,8 @@ class Catalogue:
     def _fresh(self) -> Iterator[tuple[Connection, tuple[str, ...]]]:
         """One state of all tables, as the folders are now; and sentences on what is not listed."""
         self._prepare()
-        remarks = refresh(self.database)
-        with self.database.reading() as connection:
-            yield connection, remarks
+        with current(self.database) as found:
+            yield found
 
     def _prepare(self) -> None:
         file = self.database.file

@@ -2,7 +2,7 @@
 
 import contextlib
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,18 +61,22 @@ def _printable(name: str) -> str:
     return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
-def refresh(database: Database) -> tuple[str, ...]:
-    """Brings the tables to what the folders hold; sentences on what is not listed."""
+@contextlib.contextmanager
+def current(database: Database) -> Iterator[tuple[Connection, tuple[str, ...]]]:
+    """One state of all tables, brought to what the folders hold; and sentences on what is not listed."""
     found = scan(database.root)
     with database.reading() as connection:
         known = stamps(connection)
-    changed = [name for name, now in found.stamps.items() if known.get(name) != now]
-    gone = [name for name in known if name not in found.stamps]
-    if changed or gone:
-        entries = _read(database.root, changed)
-        with database.writing() as connection:
-            replace(connection, [*changed, *gone], entries, found.stamps)
-    return found.remarks
+        changed = [name for name, now in found.stamps.items() if known.get(name) != now]
+        gone = [name for name in known if name not in found.stamps]
+        if not changed and not gone:
+            yield connection, found.remarks
+            return
+    entries = _read(database.root, changed)
+    with database.writing() as connection:
+        replace(connection, [*changed, *gone], entries, found.stamps)
+    with database.reading() as connection:
+        yield connection, found.remarks
 
 
 def stamps(connection: Connection) -> dict[str, str]:

@@ -1,6 +1,6 @@
 """The recordings of the sessions, to be looked through and downloaded."""
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Response
 from fastapi.responses import FileResponse
 
 from api.catalogue.catalogue import Catalogue
@@ -28,12 +28,14 @@ def add(router: APIRouter, service: Service) -> None:
     @router.get(
         "/recordings",
         dependencies=[READ],
+        response_model=RecordingList,
         summary="Sessions by query with their recordings, newest first",
         responses=responses("422 refused", "503 catalogue"),
     )
-    def recordings(asked: AskedQuery, page: PageQuery) -> RecordingList:
+    def recordings(asked: AskedQuery, page: PageQuery) -> Response:
         with answering():
-            return views.recordings(service.sessions, lists.sessions(asked, page))
+            found = views.recordings(service.sessions, lists.sessions(asked, page))
+        return Response(found.model_dump_json(), media_type="application/json")
 
     @router.get(
         "/recordings/{session}/{file:path}",

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from sqlalchemy import event
 
 from api.catalogue import folder as reading
 from api.catalogue import refresh
@@ -196,6 +197,18 @@ def test_a_time_that_no_calendar_has_is_empty(seconds: float) -> None:
 def test_times_are_brought_to_one_form() -> None:
     assert utc_of("2026-11-23T12:00:00+02:00") == utc_of("2026-11-23T10:00") == "2026-11-23T10:00:00.000000Z"
     assert utc_of("2026-11-23") == "2026-11-23T00:00:00.000000Z"
+
+
+def test_where_nothing_has_changed_a_list_opens_the_database_once(lab: Catalogue) -> None:
+    make_session(lab.root, "a")
+    lab.sessions()
+    opened: list[object] = []
+    event.listen(lab.database.engine, "connect", lambda connection, _: opened.append(connection))
+    lab.sessions()
+    assert len(opened) == 1
+    make_session(lab.root, "b")
+    assert len(lab.sessions().items) == 2
+    assert len(opened) == 4, "looked at, brought up to date, and read"
 
 
 def test_a_session_removed_while_it_is_read_is_not_listed(lab: Catalogue, monkeypatch: pytest.MonkeyPatch) -> None:
