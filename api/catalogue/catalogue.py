@@ -3,7 +3,7 @@
 import contextlib
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -71,12 +71,10 @@ class Catalogue:
         self.database = Database(address(given, default_file(root)), root, moves=not given)
         self._prepared = False
 
-    @contextlib.contextmanager
-    def _fresh(self) -> Iterator[tuple[Connection, tuple[str, ...]]]:
+    def _fresh(self) -> contextlib.AbstractContextManager[tuple[Connection, tuple[str, ...]]]:
         """One state of all tables, as the folders are now; and sentences on what is not listed."""
         self._prepare()
-        with current(self.database) as found:
-            yield found
+        return current(self.database)
 
     def _prepare(self) -> None:
         file = self.database.file

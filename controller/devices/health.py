@@ -11,7 +11,7 @@ ALIVE, VALID, ON_RATE = 1, 2, 4
 IDENTICAL_LIMIT = 100  # with noise of half a step every other sample is alike, but never a hundred in a row
 # 10 ms at 1 kHz, in which a trial of 30 mm/s goes the 0.3 mm of `axis.standstill_mm`: neither waits for the other.
 STANDING_REPORTS = 10
-SET_OUT_MM = 0.01  # what was said before that says nothing: a pause in the answers makes no axis frozen
+SET_OUT_MM = 0.01  # before that no report counts: an axis at rest names one place, and may do so late
 # Neighbouring rates of a sensor lie 20 % apart; jitter of 40 % of a period moves a mean of fifty by 4 %.
 RATE_TOLERANCE = 0.2
 
@@ -72,7 +72,7 @@ class Standstill:
     _reports: int = 0
 
     def update(self, position_mm: float, setpoint_mm: float) -> float:
-        """Way of the set-point since the place last changed [mm]; 0 until ten reports since then name the same."""
+        """Way of the set-point since the place last changed [mm]; 0 until the tenth report after it set out."""
         if position_mm != self._position_mm:
             self._position_mm, self._setpoint_mm = position_mm, setpoint_mm
         gone_mm = abs(setpoint_mm - self._setpoint_mm)

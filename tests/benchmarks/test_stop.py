@@ -43,7 +43,7 @@ def test_good_figures_are_let_pass() -> None:
 
 @pytest.mark.parametrize("name", PHASES)
 def test_a_stop_that_is_late_is_told_of_every_phase(name: str) -> None:
-    goal_ms = 1500 if name.startswith("service") else 20
+    goal_ms = 1500 if name == "service, under load" else 20
     late = {"p99_ms": float(goal_ms)}
     assert missed(planted(name, late, {})) == [
         f"{name}: 99 of 100 presses within {goal_ms} ms, not within {goal_ms} ms"
@@ -51,9 +51,10 @@ def test_a_stop_that_is_late_is_told_of_every_phase(name: str) -> None:
     assert missed(planted(name, {"p99_ms": goal_ms - 0.1}, {})) == []
 
 
-def test_the_service_is_judged_by_what_the_page_waits() -> None:
+def test_the_service_under_load_is_judged_by_what_the_page_waits() -> None:
     (waits_ms,) = re.findall(r"CONFIRM_MS = (\d+);", (SOURCES / "src" / "stop.ts").read_text(encoding="utf-8"))
-    assert int(waits_ms) == stop.GOAL_SERVICE_P99_MS
+    assert {"service, under load": int(waits_ms)} == stop.GOALS_P99_MS
+    assert stop.GOALS_P99_MS.keys() <= PHASES.keys()
 
 
 @pytest.mark.parametrize(

@@ -19,10 +19,10 @@ ASKED = ("state", "reason", "mode", "force_N", "position_mm", "missed", "lost", 
 
 def standing(page: Page) -> dict[str, Any]:
     """What keeps the bench from going on, as the service says it."""
-    return asked_for(page.evaluate(RIG))
+    return reasons(page.evaluate(RIG))
 
 
-def asked_for(now: dict[str, Any]) -> dict[str, Any]:
+def reasons(now: dict[str, Any]) -> dict[str, Any]:
     """What tells why the bench does not go on, of all that the service says."""
     return {name: now[name] for name in ASKED if name in now}
 
@@ -32,7 +32,7 @@ def out(bench: ServedBench, address: str) -> None:
     try:
         freed(bench)
     except AssertionError as error:
-        error.add_note(json.dumps(asked_for(ask(address, "GET", "/rig")), indent=1))
+        error.add_note(json.dumps(reasons(ask(address, "GET", "/rig")), indent=1))
         raise
 
 

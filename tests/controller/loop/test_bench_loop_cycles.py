@@ -344,6 +344,7 @@ def test_at_rest_a_limb_that_pushes_is_given_way_to_and_what_stood_still_is_forg
     assert (bench.mode, len(ways)) == (Mode.RETRACT, 1)
     bench.cycles(STANDING_REPORTS)
     # From 12 mm outwards for a dozen cycles, not from the 10 mm of the set-point before.
+    assert bench.loop.state.standstill_mm < 0.1
     assert "axis_frozen" not in {code for code, _, _ in events(bench)}
 
 
