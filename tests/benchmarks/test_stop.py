@@ -5,7 +5,6 @@ import contextlib
 import http.server
 import itertools
 import json
-import re
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
@@ -18,7 +17,6 @@ from benchmarks import stop
 from benchmarks.service import clients
 from benchmarks.service.load import Clients
 from benchmarks.stop import GIVEN_UP_MS, PHASES, Load, Phase, Stops, came, missed, pressed, summary
-from hatch_build import SOURCES
 from mock_devices.testing.commands import free_port
 
 QUICK, SERVED = Stops(300, 3.1, 6.2, 9.0, 0), Load(199.6, 50, 0, 40)
@@ -39,22 +37,6 @@ def planted(name: str, stops: dict[str, Any], load: dict[str, Any]) -> list[Phas
 
 def test_good_figures_are_let_pass() -> None:
     assert missed(GOOD) == []
-
-
-@pytest.mark.parametrize("name", PHASES)
-def test_a_stop_that_is_late_is_told_of_every_phase(name: str) -> None:
-    goal_ms = 1500 if name == "service, under load" else 20
-    late = {"p99_ms": float(goal_ms)}
-    assert missed(planted(name, late, {})) == [
-        f"{name}: 99 of 100 presses within {goal_ms} ms, not within {goal_ms} ms"
-    ]
-    assert missed(planted(name, {"p99_ms": goal_ms - 0.1}, {})) == []
-
-
-def test_the_service_under_load_is_judged_by_what_the_page_waits() -> None:
-    (waits_ms,) = re.findall(r"CONFIRM_MS = (\d+);", (SOURCES / "src" / "stop.ts").read_text(encoding="utf-8"))
-    assert {"service, under load": int(waits_ms)} == stop.GOALS_P99_MS
-    assert stop.GOALS_P99_MS.keys() <= PHASES.keys()
 
 
 @pytest.mark.parametrize(
@@ -84,12 +66,13 @@ def test_the_load_is_waited_for(monkeypatch: pytest.MonkeyPatch, counts: list[tu
 @pytest.mark.parametrize(
     ("bad", "sentence"),
     [
+        ({"p99_ms": 20.0}, "99 of 100 presses within 20 ms, not within 20 ms"),
         ({"p99_ms": float("nan")}, "99 of 100 presses within nan ms"),
         ({"not_confirmed": 1}, "1 of 300 presses were not confirmed"),
         ({"presses": 99}, "99 presses, at least 100 are needed"),
     ],
 )
-def test_a_stop_that_is_lost_or_unknown_is_told_of_every_phase(name: str, bad: dict[str, Any], sentence: str) -> None:
+def test_a_stop_that_is_late_or_lost_is_told_of_every_phase(name: str, bad: dict[str, Any], sentence: str) -> None:
     (said,) = missed(planted(name, bad, {}))
     assert said.startswith(f"{name}: {sentence}")
 
