@@ -29,7 +29,7 @@ from api.http.streams.messages import (
     Unsubscribed,
 )
 from api.http.streams.signals import LiveSignal, signals
-from api.http.streams.subscriptions import Begin, Subscriptions
+from api.http.streams.subscriptions import Begin, SharedTurn, Subscriptions
 from api.http.streams.views import View, Views
 from rig.config.wiring import Wiring
 
@@ -51,7 +51,7 @@ class Streams:
         """``lost`` says by topic why a device is lost now."""
         self.feed, self.session_id, self._lost = feed, session_id, lost
         self.signals = signals(wiring)
-        self.views = Views()
+        self.views, self.turn = Views(), SharedTurn()
 
     def listed(self) -> list[StreamView]:
         """All that can be subscribed."""
@@ -74,7 +74,7 @@ class LiveClient:
 
     def __init__(self, streams: Streams) -> None:
         self._streams, self._feed = streams, streams.feed
-        self._subscriptions = Subscriptions(streams.feed.run)
+        self._subscriptions = Subscriptions(streams.feed.run, streams.turn)
         self._event: int | None = None
         self._resuming = False
         self._spoke_ns = streams.feed.now_ns

@@ -27,7 +27,7 @@ class Cut(NamedTuple):
     following: int
 
 
-@dataclass
+@dataclass(eq=False)
 class View:
     """``signal`` at most ``rate_hz`` times a second (0: every sample), on ``channel``."""
 

@@ -58,10 +58,10 @@ def test_the_judge_says_no_where_a_gap_is_miscounted(
     service: PlayedService, bench: PlayedBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Planted: what was left out is begun one sample too late, and not told.
-    genuine = Subscription._gap
+    genuine = Subscription.gap
     monkeypatch.setattr(
         Subscription,
-        "_gap",
+        "gap",
         lambda self, cut: (gap.model_copy(update={"first": gap.first + 1}) for gap in genuine(self, cut)),
     )
     bench.lose_force(5)
