@@ -22,8 +22,7 @@ from rig.errors import CheckFailed, DeviceError, RigError, UsageError
 # Four sweeps know delay and lags together to a tenth of a millisecond, and last three seconds.
 SWEEP_S, REPEATS, TURNS = 0.5, 4, 2
 FROM_MM, SPEED_MM_S = 2.0, 20.0
-# Where others use the computer two sweeps in five miss the bounds, or it stands still for longer than a sample may be
-# old.
+# Beside another bench one sweep in four misses the bounds; a computer may stand still for longer than a sample lasts.
 TRIES = 8
 
 

@@ -2,8 +2,8 @@
 
 import json
 import math
-from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from bisect import bisect_left
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -82,12 +82,12 @@ def test_live_samples_are_those_of_the_recording(rig: ServedRig) -> None:
     inside = sorted(late)[len(late) // 2]
     assert not same({seq: value for seq, value in whole.items() if seq != inside}, late)
     assert not same(whole | {inside: (whole[inside][0] + 1e-4,)}, late)
-    came = live(client, "force")
-    shown_N = [came[seq][0] for seq in force]
-    assert forces_are_the_loops(shown_N, list(force.values()), list(loop.values()))
-    # Planted: another zero, and every reading one place late.
-    assert not forces_are_the_loops([one + 1e-5 for one in shown_N], list(force.values()), list(loop.values()))
-    assert not forces_are_the_loops(shown_N[-1:] + shown_N[:-1], list(force.values()), list(loop.values()))
+    shown_N = {seq: value for seq, (value,) in live(client, "force").items()}
+    assert forces_are_the_loops(shown_N, force, loop)
+    middle = sorted(force)[len(force) // 2]
+    # Planted: one reading with another zero, and every reading one place late.
+    assert not forces_are_the_loops(shown_N | {middle: shown_N[middle] + 1e-5}, force, loop)
+    assert not forces_are_the_loops({seq + 1: value for seq, value in shown_N.items()} | {min(force): 0.0}, force, loop)
     highest_N = max(value for (value,) in live(client, "force").values() if not math.isnan(value))
     assert coarse.streams["force"].highest == highest_N > 1.0
     assert all(found.accounts_for_all() for found in (*client.streams.values(), *coarse.streams.values()))
@@ -117,20 +117,20 @@ def until_ended(rig: ServedRig, job: str, *clients: ForeignClient) -> None:
         client.until(lambda client=client: client.streams["force"].times_ns[-1:] > [now_ns])
 
 
-def forces_are_the_loops(shown_N: Sequence[float], force: Sequence[Any], loop: Sequence[Any]) -> bool:
-    """Whether the newest reading of each cycle is what the loop had as its force: its zero was taken off, and no other.
+def forces_are_the_loops(shown_N: Mapping[int, float], force: Mapping[int, Any], loop: Mapping[int, Any]) -> bool:
+    """Whether the reading of each cycle is what the loop had as its force: its zero was taken off, and no other.
 
-    Of one reading in a hundred, which came just as the loop looked, it may be the one beside it.
+    One that came in the look with which a cycle began is its own; of a cycle that was held up nothing is known.
     """
-    arrived_ns = [row.arrival_ns for row in force]
-    exact, beside = [], []
-    for before, row in pairwise(loop):
-        newest = bisect_right(arrived_ns, row.capture_ns + LOOK_NS) - 1
-        # A cycle begins with the look that brought its reading, which keeps the zero of that cycle.
-        if newest > 0 and arrived_ns[newest] > before.capture_ns + LOOK_NS and not math.isnan(row.force_n):
-            exact.append(abs(shown_N[newest] - row.force_n) < SAME_N)
-            beside.append(any(abs(one - row.force_n) < SAME_N for one in shown_N[newest - 1 : newest + 2]))
-    return len(exact) > 500 and all(beside) and sum(exact) > 0.99 * len(exact)
+    numbers, arrived_ns = list(force), [row.arrival_ns for row in force.values()]
+    compared = 0
+    for row in loop.values():
+        first, after = (bisect_left(arrived_ns, row.capture_ns + later_ns) for later_ns in (0, LOOK_NS))
+        if after == first + 1 and not math.isnan(row.force_n):
+            if not abs(shown_N[numbers[first]] - row.force_n) < SAME_N:
+                return False
+            compared += 1
+    return compared > 500
 
 
 def events_can_be_asked_for_afterwards(rig: ServedRig) -> None:
