@@ -5,6 +5,7 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 from uuid import uuid4
 
@@ -15,7 +16,10 @@ ANSWER_S = 30.0  # connecting a device is waited for, and a busy computer
 
 
 def ask(address: str, method: str, path: str, body: object = None, lease: str = "") -> Any:
-    """One request of a program with every right to the service at ``address``; ``path`` is what follows /api/v1."""
+    """One request of a program with every right to the service at ``address``; ``path`` is what follows /api/v1.
+
+    A refusal is raised as HTTPError; what the service said of it stands in its notes.
+    """
     data = None if body is None else json.dumps(body).encode()
     headers = {
         "Content-Type": "application/json",
@@ -24,8 +28,12 @@ def ask(address: str, method: str, path: str, body: object = None, lease: str = 
         "Idempotency-Key": uuid4().hex,
     }
     request = Request(f"{address}/api/v1{path}", data, headers, method=method)
-    with urlopen(request, timeout=ANSWER_S) as answer:
-        return json.load(answer)
+    try:
+        with urlopen(request, timeout=ANSWER_S) as answer:
+            return json.load(answer)
+    except HTTPError as error:
+        error.add_note(error.read().decode())
+        raise
 
 
 class ServedRig:
