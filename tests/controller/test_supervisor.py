@@ -42,9 +42,10 @@ from tests.controller.played_loop import (
 
 
 def ends_soon(around: Surroundings) -> None:
-    """The loop's process ends after it has failed."""
+    """The loop's process ends after it has begun, and failed."""
 
     def end() -> None:
+        until(lambda: bool(around.processes))
         around.loop.ended.set()
 
     threading.Timer(0.05, end).start()

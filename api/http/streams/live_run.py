@@ -33,10 +33,11 @@ class LiveRun:
         zeros_N = self._zeros_N(slots, np.asarray(compression_N), loop["force_N"])
         self._keep("force", force, compression_N=compression_N, force_N=compression_N - zeros_N)
         self._keep("axis", rows_of(slots, AXIS))
-        self._keep("loop", loop, error_N=loop["reference_N"] - loop["force_N"])
         markers = rows_of(slots, MARKER)
         for number, tool in enumerate(self._tools):
             self._keep(marker_source(tool), markers[markers["tool"] == number])
+        # Whoever looks from another thread finds no cycle whose readings are still to come.
+        self._keep("loop", loop, error_N=loop["reference_N"] - loop["force_N"])
 
     def _zeros_N(
         self, slots: Slots, compression_N: NDArray[np.float64], shown_N: NDArray[np.float64]

@@ -2,16 +2,20 @@
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import httpx2 as httpx
 import pytest
 
 from api.http.streams import latest
+from api.http.streams.history import Rows
 from api.http.streams.latest import LatestView
+from api.http.streams.live_run import LiveRun
 from api.http.streams.signals import signals
 from mock_devices.testing.commands import until
 from rig.config.wiring import Wiring
+from rig.recording.tap import RingTap
 from tests.api.streams.played import PlayedBench, PlayedService, force_N
 
 MS = 1_000_000
@@ -156,3 +160,20 @@ def test_a_judge_says_no_where_age_loss_or_doubt_is_not_looked_at(
     monkeypatch.setattr(latest, name, planted)
     with pytest.raises(AssertionError):
         judge(service, bench)
+
+
+def test_no_cycle_is_there_before_the_readings_it_speaks_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench, run = PlayedBench(tmp_path), LiveRun(Wiring())
+    tap, loop = RingTap.open(bench.ring_path), run.histories["loop"]
+    bench.play(33)
+    before, add = list[tuple[int, ...]](), loop.add
+
+    def look(rows: Rows) -> None:
+        before.append(tuple(run.histories[name].end for name in ("loop", "force", "axis", "marker.tip")))
+        add(rows)
+
+    monkeypatch.setattr(loop, "add", look)
+    run.add(tap.take(1 << 12))
+    assert before == [(0, 33, 33, 3)]
+    tap.close()
+    bench.close()
