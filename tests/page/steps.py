@@ -1,7 +1,6 @@
 """What a person does on the page, a step a function."""
 
 import json
-import re
 from typing import Any
 
 from playwright.sync_api import Page, expect
@@ -39,7 +38,7 @@ def out(bench: ServedBench, address: str) -> None:
 def state(page: Page, name: str, within_ms: float | None = None) -> None:
     """Waits until the page says that the bench is in state ``name``; fails with why it is in another."""
     try:
-        expect(page.locator("#state")).to_have_text(re.compile(name, re.IGNORECASE), timeout=within_ms)
+        expect(page.locator("#state")).to_have_text(name, timeout=within_ms)
     except AssertionError as error:
         error.add_note(json.dumps(standing(page), indent=1))
         raise

@@ -64,6 +64,14 @@ def test_a_state_that_does_not_come_is_told_with_the_reason_of_the_one_there_is(
     assert '"reason": "the drive reports: 8130 heartbeat"' in said and '"mode": "idle"' in said
 
 
+def test_a_bench_that_is_not_ready_is_not_taken_for_one_that_is(show: Any, service: Pretended) -> None:
+    service.says(rig=IDLE.model_copy(update={"state": "not ready", "reason": "force is connecting: it starts"}))
+    page = show("bench")
+    state(page, "not ready")
+    with pytest.raises(AssertionError, match="Actual value: not ready"):
+        state(page, "ready", 300.0)
+
+
 @pytest.mark.parametrize(
     ("kind", "request_"),
     [
