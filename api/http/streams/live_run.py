@@ -27,7 +27,7 @@ class LiveRun:
         self._zero_N = np.nan
 
     def add(self, slots: Slots) -> None:
-        """Sorts in whole cycles of the loop: rows of its devices and then its own, which says what the zero was."""
+        """Sorts in whole cycles: rows of the devices, and last the loop's own, which nobody finds before those."""
         force, loop = rows_of(slots, FORCE), rows_of(slots, LOOP)
         compression_N = self._force_map.compression_N(force["fx_N"], force["fy_N"], force["fz_N"])
         zeros_N = self._zeros_N(slots, np.asarray(compression_N), loop["force_N"])
@@ -36,7 +36,6 @@ class LiveRun:
         markers = rows_of(slots, MARKER)
         for number, tool in enumerate(self._tools):
             self._keep(marker_source(tool), markers[markers["tool"] == number])
-        # Whoever looks from another thread finds no cycle whose readings are still to come.
         self._keep("loop", loop, error_N=loop["reference_N"] - loop["force_N"])
 
     def _zeros_N(
