@@ -3,7 +3,7 @@
 import json
 import math
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -83,11 +83,12 @@ def test_live_samples_are_those_of_the_recording(rig: ServedRig) -> None:
     assert not same({seq: value for seq, value in whole.items() if seq != inside}, late)
     assert not same(whole | {inside: (whole[inside][0] + 1e-4,)}, late)
     shown_N = {seq: value for seq, (value,) in live(client, "force").items()}
-    assert forces_are_the_loops(shown_N, force, loop)
-    middle = sorted(force)[len(force) // 2]
+    own = own_readings(force, loop)
+    assert forces_are_the_loops(shown_N, own)
+    middle, _ = own[len(own) // 2]
     # Planted: one reading with another zero, and every reading one place late.
-    assert not forces_are_the_loops(shown_N | {middle: shown_N[middle] + 1e-5}, force, loop)
-    assert not forces_are_the_loops({seq + 1: value for seq, value in shown_N.items()} | {min(force): 0.0}, force, loop)
+    assert not forces_are_the_loops(shown_N | {middle: shown_N[middle] + 1e-5}, own)
+    assert not forces_are_the_loops({seq + 1: value for seq, value in shown_N.items()} | {min(force): 0.0}, own)
     highest_N = max(value for (value,) in live(client, "force").values() if not math.isnan(value))
     assert coarse.streams["force"].highest == highest_N > 1.0
     assert all(found.accounts_for_all() for found in (*client.streams.values(), *coarse.streams.values()))
@@ -117,20 +118,23 @@ def until_ended(rig: ServedRig, job: str, *clients: ForeignClient) -> None:
         client.until(lambda client=client: client.streams["force"].times_ns[-1:] > [now_ns])
 
 
-def forces_are_the_loops(shown_N: Mapping[int, float], force: Mapping[int, Any], loop: Mapping[int, Any]) -> bool:
-    """Whether the reading of each cycle is what the loop had as its force: its zero was taken off, and no other.
+def own_readings(force: Mapping[int, Any], loop: Mapping[int, Any]) -> list[tuple[int, float]]:
+    """The number of each cycle's own reading, and what the loop had as its force then.
 
     One that came in the look with which a cycle began is its own; of a cycle that was held up nothing is known.
     """
     numbers, arrived_ns = list(force), [row.arrival_ns for row in force.values()]
-    compared = 0
+    found = list[tuple[int, float]]()
     for row in loop.values():
         first, after = (bisect_left(arrived_ns, row.capture_ns + later_ns) for later_ns in (0, LOOK_NS))
         if after == first + 1 and not math.isnan(row.force_n):
-            if not abs(shown_N[numbers[first]] - row.force_n) < SAME_N:
-                return False
-            compared += 1
-    return compared > 500
+            found.append((numbers[first], row.force_n))
+    return found
+
+
+def forces_are_the_loops(shown_N: Mapping[int, float], own: Sequence[tuple[int, float]]) -> bool:
+    """Whether each cycle's own reading is what the loop had as its force: its zero was taken off, and no other."""
+    return len(own) > 500 and all(abs(shown_N[seq] - force_N) < SAME_N for seq, force_N in own)
 
 
 def events_can_be_asked_for_afterwards(rig: ServedRig) -> None:
