@@ -32,6 +32,7 @@ class FrameReader:
         self._counters = counters
         self._clock = ClockMap(latency_ns=round(config.latency_ms * 1e6))
         self._unwrap = Unwrapper(32)
+        self._quickest_ns = _LONG_NS
         self._newest = _NO_FRAME
         self._last = [_NO_FRAME] * len(handles)
         self._last_ns = [-_LONG_NS] * len(handles)
@@ -39,8 +40,11 @@ class FrameReader:
     def samples(self, reply: TrackingReply, asked_ns: int, arrival_ns: int) -> list[MarkerSample]:
         """One sample for each tool whose frame is new; none where the reply repeats a frame.
 
-        The tracker answers with the newest frame it has when asked, so the question, not the answer, dates it.
+        The tracker answers with the newest frame it has when asked, so the question, not the answer, dates it: at the
+        latest when it was sent and all that this exchange took longer than the quickest, which may have held it up.
         """
+        self._quickest_ns = min(self._quickest_ns, arrival_ns - asked_ns)
+        heard_ns = arrival_ns - self._quickest_ns
         readings = {tool.handle: tool for tool in reply.tools}
         tools = [readings.get(handle) for handle in self._handles]
         frames = [self._unwrap(tool.frame) if tool and tool.frame is not None else _NO_FRAME for tool in tools]
@@ -49,8 +53,8 @@ class FrameReader:
             return []
         self._count(newest)
         taken_ns = newest * 1_000_000_000 // COUNTER_HZ
-        self._clock.observe(taken_ns, asked_ns)
-        (newest_ns,) = self._clock.captures([taken_ns], asked_ns)
+        self._clock.observe(taken_ns, heard_ns)
+        (newest_ns,) = self._clock.captures([taken_ns], heard_ns)
         samples = []
         for index, tool in enumerate(tools):
             # A disabled tool has no frame number of its own; active tools have theirs a frame or two apart.

@@ -7,7 +7,10 @@ from collections.abc import Iterator
 import pytest
 
 from drivers.ndi.device import LOST_AFTER_NS, REPLY_TIMEOUT_NS, NdiTracker
+from drivers.ndi.frames import FrameReader
+from drivers.ndi.replies import ToolReading, TrackingReply
 from drivers.ports import PortClosed
+from drivers.roles import LinkCounters
 from mock_devices.testing.ndi import ARM, MS, TIP, TrackerBench, run, started
 from rig.config.products.ndi_polaris import PolarisWiring
 from rig.errors import DeviceError
@@ -224,3 +227,20 @@ def test_a_reply_that_is_no_tracking_data_is_counted_and_asked_for_again(bench: 
     bench.wire.sent.append(b"OKAYA896\r")
     assert run(bench, device, 200, 300)
     assert device.counters.discarded_bytes == discarded + 4
+
+
+def test_a_question_that_is_held_up_on_its_way_dates_no_later_frame_too_early() -> None:
+    """The tracker answers it with the newest frame, which was taken long after the question had been sent."""
+    reader = FrameReader([1], PolarisWiring(), LinkCounters())
+
+    def captured_ns(frame: int, way_ns: int) -> int:
+        """Of a frame that is heard 2 ms after it was taken, where the question was ``way_ns`` on its way."""
+        heard_ns = frame * 1_000_000_000 // 60 + 2 * MS
+        tool = ToolReading(1, "MISSING", 0, frame)
+        (sample,) = reader.samples(TrackingReply((tool,), 0), heard_ns - way_ns, heard_ns + 3 * MS)
+        return sample.capture_ns - heard_ns
+
+    before = [captured_ns(frame, MS) for frame in range(1, 120)]
+    held_up = captured_ns(120, 80 * MS)
+    after = [captured_ns(frame, MS) for frame in range(121, 240)]
+    assert [*before[60:], held_up, *after] == pytest.approx([-MS] * 179, abs=0.1 * MS)
