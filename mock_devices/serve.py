@@ -12,7 +12,7 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -94,13 +94,12 @@ class MockServer:
                 return
             self.turn(ready)
 
-    def turn(self, ready: Sequence[int]) -> None:
+    def turn(self, ready: Collection[int]) -> None:
         """Brings time up to now and hears what came on the descriptors ``ready``."""
         axes = (device for device in self._axes if not set(device.wire.filenos()).isdisjoint(ready))
         self._axis = next(axes, self._axis)
-        # Read before the clock: what comes while this process is held up after that belongs to the next turn.
-        told = b"" if set(self._axis.wire.filenos()).isdisjoint(ready) else self._axis.wire.read()
-        now_ns = self._clock_ns()
+        told, now_ns = self._told()
+        ready = {*ready, *self._axis.wire.filenos()} if told else set(ready)
         late = bool(ready) and now_ns - self._due_ns() > LATE_NS
         if late:
             self._live_through(ready, told, now_ns)
@@ -116,6 +115,20 @@ class MockServer:
             mock.close()
         self.control.close()
 
+    def _told(self) -> tuple[bytes, int]:
+        """All that the axis was told until a time, and that time.
+
+        This process may be held up at any line of it, and a terminal hands out 4095 bytes at once: it reads until
+        nothing is left and that took no time. What comes after belongs to the next turn.
+        """
+        told, since_ns = b"", self._due_ns()
+        while True:
+            came, now_ns = self._axis.wire.read(), self._clock_ns()
+            told += came
+            if not came and now_ns - since_ns <= LATE_NS:
+                return told, now_ns
+            since_ns = now_ns
+
     def _due_ns(self) -> int:
         return min(item.due_ns for item in self._timed)
 
@@ -128,7 +141,7 @@ class MockServer:
             left_s -= LEAD_S
         return select.select(descriptors, [], [], min(max(left_s, 0.0), NAP_S))[0]
 
-    def _live_through(self, ready: Sequence[int], told: bytes, now_ns: int) -> None:
+    def _live_through(self, ready: Collection[int], told: bytes, now_ns: int) -> None:
         """Hears what came during a stall, what the axis was ``told`` line by line, evenly from its beginning on."""
         axis = self._axis.wire.filenos()
         self._hear([fileno for fileno in ready if fileno not in axis], now_ns)
@@ -141,7 +154,7 @@ class MockServer:
             self._axis.wire.put_back(line)
             self._axis.mock.receive(told_ns)
 
-    def _hear(self, ready: Sequence[int], now_ns: int) -> None:
+    def _hear(self, ready: Collection[int], now_ns: int) -> None:
         heard = set(ready)
         for mock in self._mocks:
             if not heard.isdisjoint(mock.filenos()):

@@ -12,6 +12,7 @@ import termios
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,7 @@ from rig.config.wiring import Limits
 
 COMMAND = [sys.executable, "-m", "mock_devices.serve", "--tracker-tcp-port", "0"]
 FRAME = 37
+TERMINAL_BYTES = 4095  # what Linux hands out of one at most, however much lies there
 
 
 @contextmanager
@@ -304,61 +306,107 @@ def test_bytes_that_came_during_a_stall_are_heard_before_time_is_caught_up(serve
     assert served.say(b"C") == b"r,0,C,0\r\n"
 
 
-def test_what_the_axis_was_told_during_a_stall_is_heard_evenly_over_it(
-    served: ServerBench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    mock, line, told_ns = served.axis.mock, served.axis.wire, list[int]()
-    hear = mock.receive
+@dataclass
+class ToldAxis:
+    """A client of the axis whose channel is open, and when each of its lines was heard."""
 
-    def heard(now_ns: int) -> None:
-        told_ns.append(now_ns)
-        hear(now_ns)
+    served: ServerBench
+    port: Port
+    heard_ns: list[int] = field(default_factory=list)
 
-    monkeypatch.setattr(mock, "receive", heard)
-    with opened(line.endpoint) as port:
+    @property
+    def filenos(self) -> list[int]:
+        """Of the axis' line."""
+        return self.served.axis.wire.filenos()
+
+    def turn(self) -> None:
+        """With something on the line."""
+        assert select.select(self.filenos, [], [], 5.0)[0]
+        self.served.server.turn(self.filenos)
+
+    def tell(self, lines: int, stall_ms: int) -> None:
+        """Puts ``lines`` SYNCs on the line while ``stall_ms`` pass."""
+        self.port.write(b"t0800\r" * lines)
+        await_bytes(self.filenos[0], min(lines * 6, TERMINAL_BYTES))
+        self.served.clock.now_ns += stall_ms * 1_000_000
+
+
+@pytest.fixture
+def told(served: ServerBench, monkeypatch: pytest.MonkeyPatch) -> Iterator[ToldAxis]:
+    """A node that is operational."""
+    hear = served.axis.mock.receive
+    with opened(served.axis.wire.endpoint) as port:
+        told = ToldAxis(served, port)
         port.write(b"C\rS8\rO\rt00020101\r")
-        assert select.select(line.filenos(), [], [], 5.0)[0]
-        served.server.turn(line.filenos())
-        told_ns.clear()
-        before_ns = served.clock.now_ns
-        served.clock.now_ns += 100_000_000
-        port.write(b"t0800\r" * 50)
-        await_bytes(line.filenos()[0], 300)
-        served.server.turn(line.filenos())
-    steps_ns = np.diff([before_ns, *told_ns])
-    assert len(told_ns) == 50
+        told.turn()
+
+        def heard(now_ns: int) -> None:
+            told.heard_ns.append(now_ns)
+            hear(now_ns)
+
+        monkeypatch.setattr(served.axis.mock, "receive", heard)
+        yield told
+
+
+def test_what_the_axis_was_told_during_a_stall_is_heard_evenly_over_it(told: ToldAxis) -> None:
+    clock = told.served.clock
+    before_ns = clock.now_ns
+    told.tell(lines=50, stall_ms=100)
+    told.turn()
+    steps_ns = np.diff([before_ns, *told.heard_ns])
+    assert len(told.heard_ns) == 50
     assert steps_ns == pytest.approx([0, *[2_000_000] * 49], abs=300_000)
-    assert served.bench.now_ns == pytest.approx(served.clock.now_ns, abs=5_000_000)
+    assert told.served.bench.now_ns == pytest.approx(clock.now_ns, abs=5_000_000)
+
+
+def test_more_than_a_terminal_hands_out_at_once_is_heard_evenly_too(told: ToldAxis) -> None:
+    told.tell(lines=900, stall_ms=900)
+    told.turn()
+    assert np.diff(told.heard_ns) == pytest.approx([1_000_000] * 899, abs=300_000)
 
 
 def test_what_the_axis_was_told_while_a_turn_was_held_up_is_not_heard_all_at_once(
-    served: ServerBench, monkeypatch: pytest.MonkeyPatch
+    told: ToldAxis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The process loses its core just after it has looked at the clock, and fifty lines come before it goes on."""
-    line, told_ns = served.axis.wire, list[int]()
-    with opened(line.endpoint) as port:
-        port.write(b"C\rS8\rO\rt00020101\r")
-        assert select.select(line.filenos(), [], [], 5.0)[0]
-        served.server.turn(line.filenos())
-        hear = served.axis.mock.receive
+    server, clock = told.served.server, told.served.clock
+    looks = 0
 
-        def heard(now_ns: int) -> None:
-            told_ns.append(now_ns)
-            hear(now_ns)
+    def held_up() -> int:
+        nonlocal looks
+        looks, looked_ns = looks + 1, clock.now_ns
+        if looks == 2:  # the first is followed by a look whether more came
+            told.tell(lines=50, stall_ms=100)
+        return looked_ns
 
-        def held_up() -> int:
-            looked_ns = served.clock.now_ns
-            port.write(b"t0800\r" * 50)
-            await_bytes(line.filenos()[0], 300)
-            served.clock.now_ns += 100_000_000
-            monkeypatch.setattr(served.server, "_clock_ns", served.clock)
-            return looked_ns
+    told.port.write(b"t0800\r")
+    monkeypatch.setattr(server, "_clock_ns", held_up)
+    told.turn()
+    told.turn()
+    assert len(told.heard_ns) == 51
+    assert np.diff(told.heard_ns[1:]) == pytest.approx(2_000_000, abs=300_000)
 
-        port.write(b"t0800\r")
-        assert select.select(line.filenos(), [], [], 5.0)[0]
-        monkeypatch.setattr(served.axis.mock, "receive", heard)
-        monkeypatch.setattr(served.server, "_clock_ns", held_up)
-        served.server.turn(line.filenos())
-        served.server.turn(line.filenos())
-    assert len(told_ns) == 51
-    assert np.diff(told_ns[1:]) == pytest.approx(2_000_000, abs=300_000)
+
+@pytest.mark.parametrize("after", ["waiting", "reading"])
+def test_a_turn_that_is_held_up_before_it_looks_at_the_clock_hears_all_that_came(
+    told: ToldAxis, monkeypatch: pytest.MonkeyPatch, after: str
+) -> None:
+    """It woke for something else, or had just found nothing on the line, as it lost its core."""
+    wire = told.served.axis.wire
+    read, reads = wire.read, 0
+
+    def held_up() -> bytes:
+        nonlocal reads
+        reads += 1
+        came = b"" if after == "reading" and reads == 1 else read()
+        if after == "reading" and reads == 1:
+            told.tell(lines=50, stall_ms=100)
+        return came
+
+    if after == "waiting":
+        told.tell(lines=50, stall_ms=100)
+    monkeypatch.setattr(wire, "read", held_up)
+    told.served.server.turn([])
+    monkeypatch.setattr(wire, "read", read)
+    assert len(told.heard_ns) == 50
+    assert np.diff(told.heard_ns) == pytest.approx(2_000_000, abs=300_000)
