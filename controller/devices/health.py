@@ -4,7 +4,8 @@ A position may stay the same for ever, and be right; what tells a frozen one is 
 """
 
 import math
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, field
 
 NEVER_NS = 1 << 62  # 146 years: older than any sample, and ages from it still have 64 bits
 ALIVE, VALID, ON_RATE = 1, 2, 4
@@ -12,6 +13,7 @@ IDENTICAL_LIMIT = 100  # with noise of half a step every other sample is alike, 
 # 10 ms at 1 kHz, in which a trial of 30 mm/s goes the 0.3 mm of `axis.standstill_mm`: neither waits for the other.
 STANDING_REPORTS = 10
 SET_OUT_MM = 0.01  # before that no report counts: an axis at rest names one place, and may do so late
+SENT_KEPT = 2048  # 1 s at 2 kHz, the longest that an axis may be told to be silent for (`loop.stale_axis_ms`)
 # Neighbouring rates of a sensor lie 20 % apart; jitter of 40 % of a period moves a mean of fifty by 4 %.
 RATE_TOLERANCE = 0.2
 
@@ -65,14 +67,27 @@ class StreamHealth:
 
 @dataclass(slots=True)
 class Standstill:
-    """How far a set-point went while the axis named one and the same place; ``update`` is called once a report."""
+    """How far a set-point went while the axis named one and the same place; ``update`` is called once a report.
 
+    A report is held against the set-point in force when it was asked for: one that comes late says where the axis was.
+    """
+
+    _sent: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=SENT_KEPT))
     _position_mm: float = math.nan
     _setpoint_mm: float = math.nan
     _reports: int = 0
 
-    def update(self, position_mm: float, setpoint_mm: float) -> float:
+    def sent(self, now_ns: int, setpoint_mm: float) -> None:
+        """A set-point goes out, and a report is asked for."""
+        self._sent.append((now_ns, setpoint_mm))
+
+    def update(self, capture_ns: int, position_mm: float) -> float:
         """Way of the set-point since the place last changed [mm]; 0 until the tenth report after it set out."""
+        if not self._sent:
+            return 0.0
+        while len(self._sent) > 1 and self._sent[1][0] <= capture_ns:
+            self._sent.popleft()
+        setpoint_mm = self._sent[0][1]
         if position_mm != self._position_mm:
             self._position_mm, self._setpoint_mm = position_mm, setpoint_mm
         gone_mm = abs(setpoint_mm - self._setpoint_mm)

@@ -94,7 +94,7 @@ class BenchLoop:
         )
         self.machine = MotionStateMachine(wiring, self.state, self._finished, table)
         self.inputs = SafetyInputs()
-        self._registration = Registration()
+        self._registration = Registration(devices.axis.period_ns)
         self._standstill, self._wire_damage = Standstill(), WireDamage()
         self.health = {
             stream: takeover.unheard(self.wiring, self.devices, stream) for stream in ("force", "axis", "marker")
@@ -187,7 +187,7 @@ class BenchLoop:
         state.position_mm, state.velocity_mm_s = sample.position_mm, sample.velocity_mm_s
         if sample.valid:
             state.paired.axis(sample.capture_ns, sample.position_mm)
-        state.standstill_mm = self._standstill.update(sample.position_mm, state.setpoint.position_mm)
+        state.standstill_mm = self._standstill.update(sample.capture_ns, sample.position_mm)
         self._load_monitor.axis(sample.capture_ns, sample.position_mm)
         if self.devices.tracker:
             self._registration.axis(sample.capture_ns, sample.position_mm)
@@ -240,6 +240,7 @@ class BenchLoop:
             return
         try:
             if self.devices.axis.enabled and not self.braked and math.isfinite(self.state.position_mm):
+                self._standstill.sent(now_ns, self.state.setpoint.position_mm)
                 self.devices.axis.command(self.state.setpoint.position_mm, now_ns)
             else:
                 self.devices.axis.request(now_ns)
@@ -323,28 +324,12 @@ class BenchLoop:
         state, health, machine = self.state, self.health, self.machine
         bits = health["force"].bits(now_ns) | health["axis"].bits(now_ns) << 3 | health["marker"].bits(now_ns) << 6
         row = LoopSample(
-            self._cycles,
-            now_ns,
-            now_ns,
-            cycle.number,
-            cycle.missed,
-            cycle.scheduled_ns,
-            cycle.wake_ns - cycle.scheduled_ns,
-            self.now() - cycle.began_ns + cycle.prepared_ns,
-            health["force"].age_ns(now_ns),
-            health["axis"].age_ns(now_ns),
-            health["marker"].age_ns(now_ns),
-            bits,
-            machine.mode,
-            machine.step_index,
-            state.force_N,
-            state.reference_N,
-            state.position_mm,
-            state.setpoint.position_mm,
-            state.surface_mm,
-            state.depth_mm,
-            state.tangent_N_mm,
-        )
+            self._cycles, now_ns, now_ns, cycle.number, cycle.missed, cycle.scheduled_ns,
+            cycle.wake_ns - cycle.scheduled_ns, self.now() - cycle.began_ns + cycle.prepared_ns,
+            health["force"].age_ns(now_ns), health["axis"].age_ns(now_ns), health["marker"].age_ns(now_ns), bits,
+            machine.mode, machine.step_index, state.force_N, state.reference_N, state.position_mm,
+            state.setpoint.position_mm, state.surface_mm, state.depth_mm, state.tangent_N_mm,
+        )  # fmt: skip
         self._ring.put(LOOP.id, LOOP.pack(row))
         if self._cycles % self._status_every == 0:
             takeover.attend(self, now_ns)

@@ -19,6 +19,8 @@ CONFIDENCE = 3.29
 SMOOTH_FRAMES = 6  # 0.1 s at 60 Hz, in which noise of 0.06 mm falls to 0.025
 # From one frame of 60 Hz to the next at 0.5 mm/s.
 LEAST_STEP_MM = 0.008
+# What comes by USB is up to 16 ms late; in 20 an axis of 30 mm/s goes 0.6 mm, which hardly bends a line of 20 frames.
+FRESH_NS, FRESH_PERIODS = 20_000_000, 2
 HISTORY = 1000  # a second at 1 kHz: a frame that counts is 0.2 s old at most (`loop.stale_marker_ms`)
 # How much later than stated a frame may have been taken, and how much earlier: trackers are late by one to four frames
 # of 60 Hz. A step of 10 ms leaves 0.15 mm where an axis of 30 mm/s turns: over 4 mm of way less than tolerated.
@@ -75,8 +77,9 @@ class MarkerLine:
 class Registration:
     """Fed with axis samples and tracker frames; ``moved_mm`` is NaN until the axis has travelled far enough."""
 
-    def __init__(self) -> None:
+    def __init__(self, axis_period_ns: int) -> None:
         self._axis: deque[tuple[int, float]] = deque(maxlen=HISTORY)
+        self._fresh_ns = FRESH_NS + FRESH_PERIODS * axis_period_ns
         self.begin()
 
     def begin(self) -> None:
@@ -93,9 +96,9 @@ class Registration:
         self._axis.append((capture_ns, position_mm))
 
     def tip(self, frame: int, capture_ns: int, at: Point) -> None:
-        """The tip's marker in one frame."""
+        """The tip's marker in one frame; it counts for nothing where the axis has not said where it was by then."""
         position_mm = self._position(capture_ns)
-        if position_mm is None:
+        if position_mm is None or capture_ns - self._axis[-1][0] > self._fresh_ns:
             return
         before, self._tip = self._tip, (frame, at, position_mm)
         if self.registered:  # what comes after may be a camera that was pushed

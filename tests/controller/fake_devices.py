@@ -21,6 +21,7 @@ Triple: TypeAlias = tuple[float, float, float]
 ZERO_N = 0.8
 SURFACE_MM = 20.0
 STIFFNESS_N_MM = 1.0
+AT_ONCE = 15  # reports of an axis in one poll
 DITHER_N = (0.0, 0.001, -0.001)
 """Noise of the converter, the same every three samples: without any, three samples are a frozen sensor."""
 
@@ -65,7 +66,10 @@ class FakeDevice:
 
 @dataclass
 class FakeAxis(FakeDevice):
-    """A servo axis with a lag of ``lag_s``; 0 is an axis that is where it is told to be."""
+    """A servo axis with a lag of ``lag_s``; 0 is an axis that is where it is told to be.
+
+    What is ``held_up`` on its way comes when that is over, a few at a time; ``silent``, it never comes.
+    """
 
     position_mm: float = 10.0
     lag_s: float = 0.0047
@@ -74,6 +78,7 @@ class FakeAxis(FakeDevice):
     fault_text: str = ""
     blocked: bool = False
     reads_mm: float | None = None
+    held_up: bool = False
     scale: float = 1.0
     velocity_mm_s: float | None = None
     valid: bool = True
@@ -110,9 +115,10 @@ class FakeAxis(FakeDevice):
     def poll(self, now_ns: int) -> Sequence[AxisSample]:
         """What was asked for since the last call."""
         self.called("poll")
-        due = [] if self.silent else list(self._due)
-        self._due.clear()
-        return [self._sample(captured_ns, now_ns, mm, mm_s) for captured_ns, mm, mm_s in due]
+        if self.held_up:
+            return []
+        due = [self._due.popleft() for _ in range(min(len(self._due), AT_ONCE))]
+        return [] if self.silent else [self._sample(captured_ns, now_ns, mm, mm_s) for captured_ns, mm, mm_s in due]
 
     def _sample(self, captured_ns: int, now_ns: int, mm: float, mm_s: float) -> AxisSample:
         self.next_seq += 1

@@ -75,20 +75,9 @@ def _weighted(s: float, t: float, u: float, v: float, a: Vectors) -> Vector:
 
 @row_kernel(CELL)
 def cell_force(
-    x: Matrix,
-    _u: Matrix,
-    p: int,
-    low: int,
-    high: int,
-    stride: int,
-    n: int,
-    kv_low: float,
-    kv_high: float,
-    volume: float,
-    t: Floats,
-    masks: Floats,
-    m: int,
-) -> None:
+    x: Matrix, _u: Matrix, p: int, low: int, high: int, stride: int, n: int,
+    kv_low: float, kv_high: float, volume: float, t: Floats, masks: Floats, m: int,
+) -> None:  # fmt: skip
     """Forces in N. The determinant of an octant with an odd number of edges that go down is -J."""
     inverse = 1.0 / volume
     weak, strong = 0.125 * kv_low * inverse, 0.125 * kv_high * inverse
@@ -154,20 +143,9 @@ def _along(s: float, a: Vector, t: float, b: Vector, c: Vector) -> Vector:
 
 @row_kernel(CELL)
 def cell_product(
-    x: Matrix,
-    u: Matrix,
-    p: int,
-    low: int,
-    high: int,
-    stride: int,
-    n: int,
-    kv_low: float,
-    kv_high: float,
-    volume: float,
-    t: Floats,
-    masks: Floats,
-    m: int,
-) -> None:
+    x: Matrix, u: Matrix, p: int, low: int, high: int, stride: int, n: int,
+    kv_low: float, kv_high: float, volume: float, t: Floats, masks: Floats, m: int,
+) -> None:  # fmt: skip
     """Change of the forces for a small displacement u."""
     _clear(t, n)
     for octant in range(8):
@@ -201,20 +179,9 @@ def _sizes(a: Vector, b: Vector, c: Vector) -> Vector:
 
 @row_kernel(CELL)
 def cell_diagonal(
-    x: Matrix,
-    _u: Matrix,
-    p: int,
-    low: int,
-    high: int,
-    stride: int,
-    n: int,
-    kv_low: float,
-    kv_high: float,
-    volume: float,
-    t: Floats,
-    masks: Floats,
-    m: int,
-) -> None:
+    x: Matrix, _u: Matrix, p: int, low: int, high: int, stride: int, n: int,
+    kv_low: float, kv_high: float, volume: float, t: Floats, masks: Floats, m: int,
+) -> None:  # fmt: skip
     """A positive bound of the Hessian's diagonal."""
     _clear(t, n)
     for octant in range(8):

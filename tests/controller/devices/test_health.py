@@ -104,34 +104,87 @@ def test_a_stream_starts_well_at_any_time_of_the_clock() -> None:
     assert health.rate_Hz == pytest.approx(1000.0)
 
 
+class Reports:
+    """An axis that is told where to be and reports once a millisecond."""
+
+    def __init__(self) -> None:
+        self.standstill = Standstill()
+        self.now_ns = 0
+
+    def update(self, position_mm: float, setpoint_mm: float) -> float:
+        """The report of the moment at which the set-point went out."""
+        return self.standstill.update(self.sent(setpoint_mm), position_mm)
+
+    def sent(self, setpoint_mm: float) -> int:
+        """When the report is of that comes later."""
+        self.now_ns += MS
+        self.standstill.sent(self.now_ns, setpoint_mm)
+        return self.now_ns
+
+
 def test_ten_reports_of_one_place_are_no_standstill_and_eleven_are() -> None:
-    standstill = Standstill()
-    assert [standstill.update(5.0, float(cycle)) for cycle in range(12)] == [0.0] * 10 + [10.0, 11.0]
+    axis = Reports()
+    assert [axis.update(5.0, float(cycle)) for cycle in range(12)] == [0.0] * 10 + [10.0, 11.0]
 
 
 def test_a_set_point_that_goes_back_counts_as_way_too() -> None:
-    standstill = Standstill()
-    assert [standstill.update(5.0, -float(cycle)) for cycle in range(11)][-1] == 10.0
+    axis = Reports()
+    assert [axis.update(5.0, -float(cycle)) for cycle in range(11)][-1] == 10.0
 
 
-def test_what_an_axis_said_at_rest_does_not_make_a_pause_in_its_answers_a_standstill() -> None:
-    standstill = Standstill()
-    at_rest = [standstill.update(0.0, 0.01 * (cycle % 2)) for cycle in range(100)]
-    late = [standstill.update(0.0, 0.4 + 0.02 * cycle) for cycle in range(9)]
-    assert at_rest + late == [0.0] * 109, "sent off, and nine reports of before come at once"
-    assert standstill.update(0.0, 0.6) == 0.6, "a tenth is one too many"
+def test_an_axis_at_rest_has_not_said_too_often_where_it_is_as_it_is_sent_off() -> None:
+    axis = Reports()
+    at_rest = [axis.update(0.0, 0.01 * (cycle % 2)) for cycle in range(100)]
+    away = [axis.update(0.0, 0.4 + 0.02 * cycle) for cycle in range(9)]
+    assert at_rest + away == [0.0] * 109
+    assert axis.update(0.0, 0.6) == 0.6, "a tenth is one too many"
+
+
+def test_late_reports_are_held_against_the_set_points_of_their_own_time() -> None:
+    axis = Reports()
+    axis.update(0.0, 0.0)
+    at_rest = [axis.sent(0.0) for _ in range(20)]
+    away = [axis.sent(0.03 * step) for step in range(200)]
+    late = [axis.standstill.update(captured_ns, 0.0) for captured_ns in at_rest + away[:10]]
+    assert late == [0.0] * 30, "the set-point is 6 mm away by now"
+    frozen = [axis.standstill.update(captured_ns, 0.0) for captured_ns in away[10:]]
+    assert frozen == pytest.approx([0.03 * step for step in range(10, 200)]), "and late ones tell a frozen axis as well"
+
+
+def test_a_report_of_between_two_set_points_is_held_against_the_earlier() -> None:
+    axis = Reports()
+    for _ in range(12):
+        axis.update(0.0, 0.0)
+    sent_ns = [axis.sent(0.1 * step) for step in range(1, 20)]
+    between = [axis.standstill.update(captured_ns - 1, 0.0) for captured_ns in sent_ns]
+    assert between == pytest.approx([0.0] * 10 + [0.1 * step for step in range(10, 19)])
+
+
+def test_set_points_of_the_last_second_at_2_kHz_are_kept_and_no_more() -> None:
+    axis = Reports()
+    sent_ns = [axis.sent(float(step)) for step in range(5000)]
+    axis.standstill.update(sent_ns[0], 0.0)
+    ways_mm = [axis.standstill.update(sent_ns[-1], 0.0) for _ in range(10)]
+    assert ways_mm[-1] == 2047.0, "from the oldest of 2048 to the newest"
 
 
 def test_a_set_point_that_is_a_little_more_than_a_hundredth_away_has_set_out() -> None:
-    standstill = Standstill()
-    standstill.update(0.0, 0.0)
-    assert [standstill.update(0.0, 0.0101) for _ in range(10)] == [0.0] * 9 + [0.0101]
+    axis = Reports()
+    axis.update(0.0, 0.0)
+    assert [axis.update(0.0, 0.0101) for _ in range(10)] == [0.0] * 9 + [0.0101]
+
+
+def test_what_was_reported_before_anything_was_sent_is_no_standstill_and_hides_none() -> None:
+    axis = Reports()
+    assert [axis.standstill.update(number * MS, 5.0) for number in range(20)] == [0.0] * 20
+    axis.now_ns = 20 * MS
+    assert [axis.update(5.0, float(cycle)) for cycle in range(11)] == [0.0] * 10 + [10.0]
 
 
 def test_a_first_report_of_nothing_and_a_new_beginning_count_from_the_next() -> None:
-    standstill = Standstill()
-    assert standstill.update(math.nan, 0.0) == 0.0
+    axis = Reports()
+    assert axis.update(math.nan, 0.0) == 0.0
     for cycle in range(20):
-        standstill.update(5.0, float(cycle))
-    standstill.begin()
-    assert [standstill.update(5.0, 100.0 + cycle) for cycle in range(11)] == [0.0] * 10 + [10.0]
+        axis.update(5.0, float(cycle))
+    axis.standstill.begin()
+    assert [axis.update(5.0, 100.0 + cycle) for cycle in range(11)] == [0.0] * 10 + [10.0]

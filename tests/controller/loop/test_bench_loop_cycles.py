@@ -295,8 +295,13 @@ def test_forgetting_one_stream_forgets_nothing_of_the_others(stream: str) -> Non
     bench.cycles(20)
     loop, now_ns = bench.loop, bench.clock.now_ns
     registration, monitor = asked(bench, "_registration"), loop._load_monitor
+
+    def stood_mm(setpoint_mm: float) -> float:
+        loop._standstill.sent(now_ns, setpoint_mm)
+        return loop._standstill.update(now_ns, 12.0)
+
     for _ in range(STANDING_REPORTS):
-        loop._standstill.update(12.0, 30.0)
+        stood_mm(30.0)
     loop.forget(stream)
     ages_ns = {name: health.age_ns(now_ns) for name, health in loop.health.items()}
     assert [name for name, age_ns in ages_ns.items() if age_ns > 1 << 61] == [stream]
@@ -307,8 +312,7 @@ def test_forgetting_one_stream_forgets_nothing_of_the_others(stream: str) -> Non
     forgotten = loop._load_monitor.load(now_ns, zero, 0.0, Setpoint(12.0, 0.0), 2000.0) is UNKNOWN
     assert (forgotten, loop._load_monitor is monitor) == (stream == "force", stream != "force")
     # The axis has named one place for ten reports of a set-point elsewhere; from anew that takes ten more.
-    stood_mm = loop._standstill.update(12.0, 40.0)
-    assert stood_mm == (0.0 if stream == "axis" else 30.0)
+    assert stood_mm(40.0) == (0.0 if stream == "axis" else 30.0)
     assert isinstance(loop._load_monitor, LoadMonitor)
 
 

@@ -40,9 +40,9 @@ def held_up(bench: FakeBench) -> None:
     bench.cycle()
 
 
-def go_on(bench: FakeBench) -> None:
-    """The set-point goes on, 20 mm/s into the tissue, in the place of the hold."""
-    bench.loop.machine._run = MoveTo(position_mm=bench.loop.state.position_mm + 8.0, speed_mm_s=20.0)
+def go_on(bench: FakeBench, by_mm: float = 8.0) -> None:
+    """The set-point goes on at 20 mm/s, into the tissue or out of it, in the place of the hold."""
+    bench.loop.machine._run = MoveTo(position_mm=bench.loop.state.position_mm + by_mm, speed_mm_s=20.0)
 
 
 @dataclass
@@ -161,6 +161,26 @@ def test_an_axis_that_pauses_as_it_is_sent_out_and_then_names_where_it_was_is_no
     bench.until(lambda: bench.mode is Mode.SAFE)
     assert (bench.latched, bench.axis.quick_stops) == ("operator_stop", [])
     assert bench.axis.position_mm < deep_mm - 5.0, "the tip is out"
+
+
+@RATES_HZ
+@pytest.mark.parametrize("frozen", [False, True])
+def test_reports_that_were_held_up_tell_a_frozen_axis_from_one_that_was_asked_before_it_set_out(
+    sensor_Hz: float, frozen: bool
+) -> None:
+    patient = {"loop": {"missed_periods": 0, "stale_axis_ms": 400.0}, "axis": {"following_error_mm": 12.0}}
+    bench = pressing(sensor_Hz, patient)
+    bench.axis.lag_s = 0.0
+    bench.wait(0.1)
+    bench.axis.held_up = True
+    bench.wait(0.02)
+    go_on(bench, by_mm=-8.0)
+    if frozen:
+        bench.axis.reads_mm = bench.loop.state.position_mm
+    bench.wait(0.15)
+    bench.axis.held_up = False
+    bench.wait(0.01)
+    assert bench.latched == ("axis_frozen" if frozen else "")
 
 
 @RATES_HZ

@@ -4,12 +4,13 @@ import math
 
 import pytest
 
-from controller.devices.health import Standstill, StreamHealth
+from controller.devices.health import StreamHealth
 from controller.loop.modes import Mode
 from controller.loop.steps import Hold, MoveTo
 from controller.safety.table import TABLE, Action
 from mock_devices.testing.spring_bench import APPROACH, PRESS, SURFACE_MM, ZERO, ZERO_N, SpringBench
 from rig.config.wiring import Wiring
+from tests.controller.devices.test_health import Reports
 
 
 @pytest.mark.parametrize(
@@ -117,18 +118,18 @@ def test_a_converter_that_repeats_itself_for_more_than_two_periods_is_frozen() -
 
 
 def test_an_axis_that_names_one_place_while_its_set_point_goes_on_stands() -> None:
-    standstill = Standstill()
-    gone_mm = [standstill.update(7.0, 7.0 + 0.1 * cycle) for cycle in range(12)]
+    axis = Reports()
+    gone_mm = [axis.update(7.0, 7.0 + 0.1 * cycle) for cycle in range(12)]
     assert gone_mm == pytest.approx([0.0] * 10 + [1.0, 1.1])
-    assert standstill.update(7.0005, 8.2) == 0.0, "it moves again"
+    assert axis.update(7.0005, 8.2) == 0.0, "it moves again"
 
 
 def test_what_an_axis_named_before_a_program_is_not_held_against_it() -> None:
-    standstill = Standstill()
+    axis = Reports()
     for _ in range(1000):
-        standstill.update(7.0, 9.0)
-    standstill.begin()
-    assert [standstill.update(7.0, 7.0) for _ in range(20)] == [0.0] * 20
+        axis.update(7.0, 9.0)
+    axis.standstill.begin()
+    assert [axis.update(7.0, 7.0) for _ in range(20)] == [0.0] * 20
 
 
 def test_a_frozen_axis_is_stopped_at_once() -> None:
