@@ -68,6 +68,7 @@ campaigns: $(READY) page
 	$(BIN)/python -m benchmarks.clock
 	$(BIN)/python -m benchmarks.contact
 	$(BIN)/python -m benchmarks.stop
+	$(BIN)/python -m benchmarks.stalls
 	$(BIN)/python -m benchmarks.service --minutes 10
 	$(BIN)/python -m benchmarks.page
 	$(BIN)/python -m benchmarks.all

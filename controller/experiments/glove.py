@@ -2,18 +2,16 @@
 
 import json
 import math
-import time
 from collections.abc import Iterable, Sequence
 from contextlib import closing
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
-import rig
 from controller.experiments.capture import new_session
 from controller.experiments.presses import MOST, PRESSES, RULE, GlovePress, gathered, threshold_N
+from controller.experiments.recorded import stated
 from controller.inputs.watch import Row
 from controller.operation import Operation
 from rig.channels import Stream
@@ -21,7 +19,7 @@ from rig.config.products.firmata_glove import FirmataGlove
 from rig.config.products.input_role import brought_by
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed, SafetyStop, UsageError
-from rig.input_streams import METADATA, input_streams, layouts
+from rig.input_streams import input_streams
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.reader import TRACKING
 from rig.recording.sessions import SESSION_FILE, TrialInfo, open_session, write_session
@@ -69,28 +67,13 @@ def record(rows: Sequence[Row], wiring: Wiring, name: str, folder: Path, outcome
         new_session(folder, "track", {"name": "glove", "kind": TRACKING}, wiring)
     file, stream = folder / f"{_free_name(folder)}.mcap", stream_of(wiring, name)
     info, samples = open_session(folder).info, {stream.name: len(rows)}
-    with closing(RecordingWriter(file, _metadata(wiring, info.id, file.stem))) as writer:
+    about = stated(wiring, info.id, file.stem) | {"trial": {"kind": TRACKING, "name": "threshold by glove"}}
+    with closing(RecordingWriter(file, about)) as writer:
         writer.add_rows(stream, np.array(rows, stream.dtype))
         writer.finish({"outcome": outcome, "samples": json.dumps(samples), "dropped": "{}"})
     entry = TrialInfo(file.stem, file.name, speed_mm_s=math.nan, depth_mm=math.nan, outcome=outcome, samples=samples)
     write_session(folder, replace(info, trials=(*info.trials, entry.sealed(folder))))
     return file
-
-
-def _metadata(wiring: Wiring, session: str, trial: str) -> dict[str, dict[str, str]]:
-    return {
-        "recording": {
-            "session": session,
-            "trial": trial,
-            "software": f"tissue-rig {rig.__version__}",
-            "wall_start_iso": datetime.now(UTC).isoformat(),
-            "monotonic_start_ns": str(time.monotonic_ns()),
-        },
-        METADATA: layouts(brought_by(wiring.input)),
-        "wiring": {name: json.dumps(table) for name, table in wiring.model_dump(mode="json").items()},
-        "subject": {name: str(value) for name, value in wiring.subject.model_dump().items()},
-        "trial": {"kind": TRACKING, "name": "threshold by glove"},
-    }
 
 
 def _free_name(folder: Path) -> str:

@@ -41,7 +41,17 @@ class Recorded:
 
 def metadata(bench: Supervisor, session: str, trial: str, about: Mapping[str, object]) -> dict[str, dict[str, str]]:
     """The metadata of one recording; nested values are JSON text."""
-    wiring = bench.wiring
+    return {
+        **stated(bench.wiring, session, trial),
+        "devices": {role: json.dumps(identity) for role, identity in bench.ready.devices.items()},
+        "realtime": dict(bench.ready.realtime),
+        "calibration": _calibration(bench.wiring),
+        **{name: _texts(value) for name, value in about.items()},
+    }
+
+
+def stated(wiring: Wiring, session: str, trial: str) -> dict[str, dict[str, str]]:
+    """The part of it that needs no bench: whose it is, when it began, and the wiring."""
     return {
         "recording": {
             "session": session,
@@ -52,12 +62,8 @@ def metadata(bench: Supervisor, session: str, trial: str, about: Mapping[str, ob
             "monotonic_start_ns": str(time.monotonic_ns()),
         },
         **({METADATA: layouts(brought_by(wiring.input))} if wiring.input else {}),
-        "devices": {role: json.dumps(identity) for role, identity in bench.ready.devices.items()},
-        "realtime": dict(bench.ready.realtime),
         "wiring": {name: json.dumps(table) for name, table in wiring.model_dump(mode="json").items()},
-        "calibration": _calibration(wiring),
         "subject": {name: str(value) for name, value in wiring.subject.model_dump().items()},
-        **{name: _texts(value) for name, value in about.items()},
     }
 
 

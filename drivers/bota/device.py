@@ -15,8 +15,8 @@ from typing import ClassVar, TypeVar
 
 from drivers.bota import codec
 from drivers.ports import Port, open_port, read_until
-from drivers.roles import Identity, LinkCounters
-from rig.channels import ForceSample
+from drivers.roles import Identity
+from drivers.streamed_force import StreamedForce
 from rig.config.products.bota_sensone import BotaWiring
 from rig.errors import DeviceError, UsageError
 from rig.timing import ClockMap, Unwrapper
@@ -38,12 +38,8 @@ FIRST_FRAMES_S = 1.0
 LISTEN_S = 0.25
 
 
-# A frame and the sensor's unwrapped clock [us].
-Timed = tuple[int, codec.ForceFrame]
-
-
-class BotaSensOne:
-    """Owns ``port`` until ``close``. ``now`` is the monotonic clock in ns.
+class BotaSensOne(StreamedForce[codec.ForceFrame]):
+    """``now`` is the monotonic clock in ns.
 
     Raises UsageError, with the port closed, where the configured rate or baud cannot be had.
     """
@@ -51,35 +47,20 @@ class BotaSensOne:
     DEFAULT_BAUD: ClassVar = codec.DEFAULT_BAUD
 
     def __init__(self, port: Port, config: BotaWiring, now: Callable[[], int] = time.monotonic_ns) -> None:
-        self.counters = LinkCounters()
-        self._port = port
-        self._now = now
+        self._clock = ClockMap(round(config.latency_ms * 1e6))
+        super().__init__(PRODUCT, port, self._clock, now)
         try:
             self._baud, self._sinc = _line_settings(config)
         except UsageError:
             port.close()
             raise
         self._period_ns = round(self._sinc * 1e9 / codec.CONVERTER_HZ)
-        self._identity = Identity(PRODUCT, "", "")
-        self._latency_ns = round(config.latency_ms * 1e6)
-        self.next_seq = 0
-        self._clock = ClockMap(self._latency_ns)
-        self._taken: list[tuple[list[Timed], int]] = []
         self._forget_clock()
-
-    @property
-    def identity(self) -> Identity:
-        """Known after ``start``."""
-        return self._identity
 
     @property
     def period_ns(self) -> int:
         """Nominal time between samples at the filter length chosen."""
         return self._period_ns
-
-    def fileno(self) -> int:
-        """Descriptor that turns readable when a sample may have come."""
-        return self._port.fileno()
 
     def start(self) -> None:
         """Resets, identifies, configures and runs the sensor; raises DeviceError with one sentence."""
@@ -91,15 +72,6 @@ class BotaSensOne:
         self._await_frames(_repeated(partial(self._command, codec.RUN_MODE)))
         settings = {"rate": f"{codec.rate_Hz(self._sinc):.1f} Hz", "sinc": str(self._sinc), "baud": str(self._baud)}
         self._identity = Identity(boot.name, boot.serial, boot.firmware, settings)
-
-    def poll(self, now_ns: int) -> Sequence[ForceSample]:
-        """Samples since the last call."""
-        data = self._port.read()
-        if data:
-            # A host that is interrupted between its look at the clock and the read finds what came later.
-            self._take(data, max(now_ns, self._now()))
-        taken, self._taken = self._taken, []
-        return [sample for frames, arrival_ns in taken for sample in self._samples(frames, arrival_ns)]
 
     def close(self) -> None:
         """Takes the sensor out of run mode and gives the port back."""
@@ -176,24 +148,14 @@ class BotaSensOne:
         return f"no valid reading within {timeout_s:.1f} s of run mode, status {status!r}; unload it and check power"
 
     def _take(self, data: bytes, arrival_ns: int) -> None:
-        """Keeps the frames in ``data``, and dates none of them before all are known: the first may be the latest."""
-        timed = [(self._unwrap(frame.time_us), frame) for frame in self._decoder.feed(data)]
-        timed = [(device_us, frame) for device_us, frame in timed if self._is_new(device_us)]
-        for device_us, _ in timed:
-            self._clock.observe(device_us * 1000, arrival_ns)
+        counted = [(self._unwrap(frame.time_us), frame) for frame in self._decoder.feed(data)]
+        timed = [(device_us * 1000, frame) for device_us, frame in counted if self._is_new(device_us)]
+        for device_ns, _ in timed:
+            self._clock.observe(device_ns, arrival_ns)
         self._taken.append((timed, arrival_ns))
 
-    def _samples(self, timed: Sequence[Timed], arrival_ns: int) -> list[ForceSample]:
-        captures_ns = self._clock.captures([device_us * 1000 for device_us, _ in timed], arrival_ns)
-        pairs = zip(timed, captures_ns, strict=True)
-        return [self._sample(device_us, frame, capture_ns, arrival_ns) for (device_us, frame), capture_ns in pairs]
-
-    def _sample(self, device_us: int, frame: codec.ForceFrame, capture_ns: int, arrival_ns: int) -> ForceSample:
-        self.next_seq += 1
-        valid = int(_is_valid(frame))
-        return ForceSample(
-            self.next_seq - 1, capture_ns, arrival_ns, device_us, *frame[1:7], frame.temperature_C, frame.status, valid
-        )
+    def _read(self, frame: codec.ForceFrame) -> tuple[float, ...]:
+        return (*frame[1:7], frame.temperature_C, frame.status, int(_is_valid(frame)))
 
     def _is_new(self, device_us: int) -> bool:
         """Counts what is missing before this reading; False where the line brings one reading twice."""
@@ -206,12 +168,6 @@ class BotaSensOne:
         self.counters.repeated += not step_us
         self.counters.device_lost += max(round(step_us * 1000 / self._period_ns) - 1, 0)
         return bool(step_us)
-
-    def _error(self, what: str) -> DeviceError:
-        return DeviceError(self._about(what))
-
-    def _about(self, what: str) -> str:
-        return f"{PRODUCT} at {self._port.address}: {what}"
 
 
 def open_sensor(config: BotaWiring) -> BotaSensOne:

@@ -6,6 +6,7 @@ frames and counts the lost ones is their place in it, see ``frame_clock``.
 """
 
 import logging
+import math
 import select
 import time
 from collections.abc import Callable, Sequence
@@ -20,7 +21,7 @@ from drivers.ports import Port, open_port, read_until
 from drivers.robotiq import codec
 from drivers.robotiq.frame_clock import LISTEN_NS, PERIOD_NS, FrameClock
 from drivers.roles import Identity, LinkCounters
-from rig.channels import ForceSample
+from drivers.streamed_force import StreamedForce
 from rig.config.products.robotiq_ft300 import Ft300Wiring
 from rig.errors import DeviceError
 
@@ -43,12 +44,8 @@ FIRST_FRAME_S = 1.0 + 20 / codec.STREAM_HZ
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
-# A frame and its place in the stream [ns].
-Timed = tuple[int, codec.Wrench]
-
-
-class RobotiqFt300:
-    """Owns the line from construction to ``close``; ``open_port`` opens it at a given baud.
+class RobotiqFt300(StreamedForce[codec.Wrench]):
+    """Owns the line from construction on; ``open_port`` opens it at a given baud.
 
     The rate is fixed: ``config.rate_Hz`` is the most that is wanted, and ``period_ns`` tells what there is. Raises
     DeviceError where the port cannot be opened.
@@ -59,29 +56,15 @@ class RobotiqFt300:
     def __init__(
         self, open_port: Callable[[int], Port], config: Ft300Wiring, now: Callable[[], int] = time.monotonic_ns
     ) -> None:
-        self.counters = LinkCounters()
         self._open_port = open_port
-        self._now = now
-        self._port = open_port(codec.DEFAULT_BAUD)
         self._clock = FrameClock(round(config.latency_ms * 1e6))
+        super().__init__(PRODUCT, open_port(codec.DEFAULT_BAUD), self._clock, now)
         self._decoder = codec.make_decoder(self.counters)
-        self._identity = Identity(PRODUCT, "", "")
-        self.next_seq = 0
-        self._taken: list[tuple[list[Timed], int]] = []
-
-    @property
-    def identity(self) -> Identity:
-        """Known after ``start``."""
-        return self._identity
 
     @property
     def period_ns(self) -> int:
         """Nominal time between samples."""
         return PERIOD_NS
-
-    def fileno(self) -> int:
-        """Descriptor that turns readable when a sample may have come; ``start`` changes it."""
-        return self._port.fileno()
 
     def start(self) -> None:
         """Stops a running stream, identifies the sensor by its registers and starts the stream."""
@@ -91,15 +74,6 @@ class RobotiqFt300:
         self._port = self._open_port(codec.DEFAULT_BAUD)
         self._start_stream()
         self._listen()
-
-    def poll(self, now_ns: int) -> Sequence[ForceSample]:
-        """Samples since the last call."""
-        data = self._port.read()
-        if data:
-            # A host that is interrupted between its look at the clock and the read finds what came later.
-            self._take(data, max(now_ns, self._now()))
-        taken, self._taken = self._taken, []
-        return [sample for frames, arrival_ns in taken for sample in self._samples(frames, arrival_ns)]
 
     def close(self) -> None:
         """Stops the stream and gives the port back."""
@@ -196,19 +170,8 @@ class RobotiqFt300:
         self.counters.device_lost = self._clock.lost
         self._taken.append((list(zip(devices_ns, wrenches, strict=True)), arrival_ns))
 
-    def _samples(self, frames: Sequence[Timed], arrival_ns: int) -> list[ForceSample]:
-        captures_ns = self._clock.captures([device_ns for device_ns, _ in frames], arrival_ns)
-        pairs = zip(frames, captures_ns, strict=True)
-        return [self._sample(device_ns, wrench, capture_ns, arrival_ns) for (device_ns, wrench), capture_ns in pairs]
-
-    def _sample(self, device_ns: int, wrench: codec.Wrench, capture_ns: int, arrival_ns: int) -> ForceSample:
-        self.next_seq += 1
-        return ForceSample(
-            self.next_seq - 1, capture_ns, arrival_ns, device_ns // 1000, *wrench, float("nan"), 0, int(wrench.in_range)
-        )
-
-    def _error(self, what: str) -> DeviceError:
-        return DeviceError(f"{PRODUCT} at {self._port.address}: {what}")
+    def _read(self, frame: codec.Wrench) -> tuple[float, ...]:
+        return (*frame, math.nan, 0, int(frame.in_range))
 
 
 def open_sensor(config: Ft300Wiring) -> RobotiqFt300:

@@ -1,7 +1,7 @@
 """From a study of tissue laws to its result."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from rig.results.fit import DisplacementErrors, FitResult, HeldOut, LawResult, ParameterResult
 from rig.tissue.control_table import control_rows
@@ -11,6 +11,9 @@ from rig.tissue.laws import FloatArray
 from rig.tissue.study import Known, Study, rows
 from rig.trials.findings import merge
 
+# Displacement by half: tissue twice as stiff as the model, the most that the loop's gains are chosen for
+# (controller.law.synthesis).
+HELD_PERCENT = 50.0
 FRICTION = "friction shows at reversals: curves of loading say nothing for or against it"
 
 
@@ -30,9 +33,21 @@ def fit_result(study: Study, model: str, model_law: str, known: Known, recording
         "model_law": model_law,
         "known": known,
         "recordings": recordings,
-        "remarks": [FRICTION] if any(judged.law.friction[0] for judged in study.judged.values()) else [],
+        "remarks": [*_remarks(laws[model_law], model_law, any(each.law.friction[0] for each in study.judged.values()))],
         "data_quality": merge([finding for curve in study.curves for finding in curve.findings]),
     })  # fmt: skip
+
+
+def _remarks(law: LawResult, name: str, friction: bool) -> Iterator[str]:
+    """What the curves cannot tell, and where the law is none to track with."""
+    if friction:
+        yield FRICTION
+    worst_percent = (law.held_out.trials or law).max_error_percent
+    if worst_percent is not None and worst_percent > HELD_PERCENT:
+        yield (
+            f"the {name} law errs by up to {worst_percent:.0f} % of a displacement, and a force loop holds tissue half "
+            "to twice as stiff as its model: this is no model to track with; `rig diagnose` says what it gets wrong"
+        )
 
 
 def law_result(judged: Judged, force_N: FloatArray) -> LawResult:

@@ -169,9 +169,9 @@ def control_table(control: Sequence[ControlRow], law: str) -> TextTable:
     """K and B at each force, as a force loop needs them."""
     rows = [
         (
-            f"{r.force_N:.2f}", f"{r.depth_mm:.2f}", f"{r.secant_N_mm:.3f}", f"{r.tangent_N_mm:.3f}",
-            f"{r.tangent_low_N_mm:.3f}-{r.tangent_high_N_mm:.3f}", f"{r.damping_N_s_mm:.4f}",
-            f"{r.damping_low_N_s_mm:.4f}-{r.damping_high_N_s_mm:.4f}",
+            f"{r.force_N:.2f}", f"{r.depth_mm:.2f}", f"{r.secant_N_mm:.4g}", f"{r.tangent_N_mm:.4g}",
+            f"{r.tangent_low_N_mm:.4g} to {r.tangent_high_N_mm:.4g}", f"{r.damping_N_s_mm:.4g}",
+            f"{r.damping_low_N_s_mm:.4g} to {r.damping_high_N_s_mm:.4g}",
         )
         for r in control
     ]  # fmt: skip

@@ -118,6 +118,21 @@ def test_the_index_law_is_closest_on_tissue_that_follows_it(study: Study) -> Non
     assert [speed.trials for speed in study.speeds] == [2, 2, 2]
 
 
+def test_a_law_that_errs_by_more_than_half_of_a_displacement_is_said_to_be_none_to_track_with(
+    study: Study, tmp_path: Path
+) -> None:
+    assert result_of(study).remarks == ()
+    soft, stiff = Bench(force=index_force(a_N_mm=0.1)), Bench(force=index_force(a_N_mm=0.6))
+    both = [soft.cycle(10.0, 1), soft.cycle(20.0, 2), stiff.cycle(10.0, 3), stiff.cycle(20.0, 4)]
+    poor = result_of(study_session(open_session(write_made_session(tmp_path / "both", both))))
+    left_out = poor.laws["index"].held_out.trials
+    assert left_out and left_out.max_error_percent and left_out.max_error_percent > 50.0
+    assert [remark.partition(",")[0] for remark in poor.remarks] == [
+        f"the index law errs by up to {left_out.max_error_percent:.0f} % of a displacement"
+    ]
+    assert "no model to track with" in poor.remarks[0]
+
+
 def test_all_laws_are_judged_on_the_same_measured_displacements(study: Study) -> None:
     constant, index = study.judged["constant"].fitted, study.judged["index"].fitted
     assert constant.measured_mm == pytest.approx(index.measured_mm)
