@@ -11,8 +11,6 @@ from rig.errors import RigError
 from rig.results.base import Failure, SavedResult
 from rig.results.tables import Part, TextTable
 
-LONGEST_WHOLE = 16  # letters of what is never broken: an interval of four digits, not a path
-
 console = Console(markup=False, highlight=False)
 
 
@@ -27,9 +25,8 @@ def show(*parts: Part) -> None:
 
 def _table(part: TextTable) -> Table:
     found = Table(title=part.title, title_justify="left", show_edge=False)
-    for name, *cells in zip(part.header, *part.rows, strict=True):
-        longest = max(map(len, (name, *cells)))
-        found.add_column(name, overflow="fold", no_wrap=len(name) * (" " in name) < longest <= LONGEST_WHOLE)
+    for name in part.header:
+        found.add_column(name, overflow="fold")
     for row in part.rows:
         found.add_row(*row)
     return found

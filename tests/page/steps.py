@@ -44,6 +44,17 @@ def state(page: Page, name: str, within_ms: float | None = None) -> None:
         raise
 
 
+def press(page: Page, selector: str) -> None:
+    """Clicks what can be clicked; fails with why it cannot, as the page and the service say it."""
+    try:
+        expect(page.locator(selector)).to_be_enabled()
+    except AssertionError as error:
+        why = page.locator(f"{selector}-why").all_text_contents()
+        error.add_note(json.dumps({"the page says": why} | standing(page), indent=1))
+        raise
+    page.click(selector)
+
+
 def out_or_named(page: Page, bench: ServedBench) -> None:
     """Waits until the tip is out of the tissue, or left where an immediate stop had to leave it, for a stated reason.
 

@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 from mock_devices.testing.commands import ServedBench
 from tests.page.conftest import Served
 from tests.page.looks import holds_up
-from tests.page.steps import out, state, view
+from tests.page.steps import out, press, state, view
 
 # Three speeds, each thrice: the least that a diagnosis can leave out recordings of.
 PROTOCOL = (
@@ -60,7 +60,7 @@ def set_up(page: Page) -> None:
 def capture(page: Page) -> None:
     """From the start to the card that says what came of it."""
     page.fill("#session", "first")
-    page.click("#capture-start")
+    press(page, "#capture-start")
     expect(page.locator("#capture-under-way")).to_contain_text("of 9 trials")
     expect(page.locator("#result")).to_contain_text("Session first")
     expect(page.locator("#peak")).to_have_text(re.compile(r"^[1-8]\.\d\d$"))
@@ -87,9 +87,10 @@ def track(page: Page) -> None:
     expect(page.locator("#origin")).to_contain_text("fitted to session first")
     page.fill("#forces", "1, 2")
     page.fill("#seconds", "2")
-    page.click("#track-start")
+    press(page, "#track-start")
     state(page, "running")
     expect(page.locator("#rms")).to_have_text(re.compile(r"^0\.\d\d\d$"))
+    expect(page.locator("#seconds")).to_have_value("2")
     holds_up(page, "real-track", (1280, 390))
 
 
@@ -99,7 +100,7 @@ def find_threshold(page: Page) -> None:
     expect(page.locator("#verdict")).to_contain_text("It will go as planned")
     page.click("#ramp summary")
     page.fill("#ramp-up-to", "2.5")
-    page.click("#ramp-start")
+    press(page, "#ramp-start")
     bench_force = page.locator("#now-force").first
     expect(bench_force).to_have_text(re.compile(r"^[12]\.\d\d$"))
     page.click("#ramp-pain")

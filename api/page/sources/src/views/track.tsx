@@ -71,7 +71,8 @@ function Run({ models, of, subject }: { models: ModelEntry[]; of: string; subjec
       <Card id="track-what" title={t.track.what}>
         <ModelChoice id="track-model" label={t.track.model} models={models} chosen={keyOf(refOf(model))} choose={choose} />
         <Origin model={model} subject={subject} />
-        {!running && <Wanted most_N={most_N} begin={begin} why={whyNotMove()} />}
+        {/* Hidden, not gone: what was written stands for the next run. */}
+        <div hidden={Boolean(running)}><Wanted most_N={most_N} begin={begin} why={whyNotMove()} /></div>
         <JobState job={job} />
       </Card>
       <Card id="track-live" title={t.track.live}>
