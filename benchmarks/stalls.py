@@ -11,9 +11,7 @@ was stopped by mistake.
 
 import argparse
 import json
-import os
 import random
-import signal
 import subprocess
 import tempfile
 import time
@@ -22,6 +20,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from benchmarks.about import head
+from benchmarks.faults.acts import suspend
 from controller.safety.table import TABLE
 from mock_devices.testing.commands import RIG, served_bench
 from rig.recording.files import write_text
@@ -98,9 +97,7 @@ def stalled(process: "subprocess.Popen[str]", pid: int, draw: random.Random) -> 
     count = 0
     while process.poll() is None:
         time.sleep(draw.uniform(*EVERY_S))
-        os.kill(pid, signal.SIGSTOP)
-        time.sleep(draw.uniform(*STALL_S))
-        os.kill(pid, signal.SIGCONT)
+        suspend(pid, draw.uniform(*STALL_S))
         count += 1
     return count
 

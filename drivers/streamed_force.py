@@ -9,8 +9,6 @@ from drivers.roles import Identity, LinkCounters
 from rig.channels import ForceSample
 from rig.errors import DeviceError
 
-Frame = TypeVar("Frame")
-
 
 class Dating(Protocol):
     """From the sensor's time to the host's."""
@@ -19,12 +17,16 @@ class Dating(Protocol):
         """Of frames that came together, oldest first."""
 
 
-class StreamedForce(ABC, Generic[Frame]):
+Clock = TypeVar("Clock", bound=Dating)
+Frame = TypeVar("Frame")
+
+
+class StreamedForce(ABC, Generic[Clock, Frame]):
     """Owns ``port`` until ``close``; ``_taken`` are frames with the sensor's time [ns], and when they arrived."""
 
-    def __init__(self, product: str, port: Port, clock: Dating, now: Callable[[], int]) -> None:
+    def __init__(self, product: str, port: Port, clock: Clock, now: Callable[[], int]) -> None:
         self.counters, self.next_seq = LinkCounters(), 0
-        self._port, self._dating, self._now = port, clock, now
+        self._port, self._clock, self._now = port, clock, now
         self._identity = Identity(product, "", "")
         self._taken: list[tuple[list[tuple[int, Frame]], int]] = []
 
@@ -47,7 +49,7 @@ class StreamedForce(ABC, Generic[Frame]):
         return [sample for frames, arrival_ns in taken for sample in self._samples(frames, arrival_ns)]
 
     def _samples(self, frames: Sequence[tuple[int, Frame]], arrival_ns: int) -> list[ForceSample]:
-        captures_ns = self._dating.captures([device_ns for device_ns, _ in frames], arrival_ns)
+        captures_ns = self._clock.captures([device_ns for device_ns, _ in frames], arrival_ns)
         self.next_seq += len(frames)
         numbers = range(self.next_seq - len(frames), self.next_seq)
         return [

@@ -12,7 +12,7 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -94,20 +94,21 @@ class MockServer:
                 return
             self.turn(ready)
 
-    def turn(self, ready: Collection[int]) -> None:
+    def turn(self, ready: Sequence[int]) -> None:
         """Brings time up to now and hears what came on the descriptors ``ready``."""
         axes = (device for device in self._axes if not set(device.wire.filenos()).isdisjoint(ready))
         self._axis = next(axes, self._axis)
-        told, now_ns = self._told()
-        ready = {*ready, *self._axis.wire.filenos()} if told else set(ready)
-        late = bool(ready) and now_ns - self._due_ns() > LATE_NS
+        due_ns = self._due_ns()
+        told, now_ns = self._told(due_ns)
+        heard = {*ready, *(self._axis.wire.filenos() if told else ())}
+        late = bool(heard) and now_ns - due_ns > LATE_NS
         if late:
-            self._live_through(ready, told, now_ns)
+            self._live_through(heard, told, now_ns)
         self._catch_up(now_ns)
         if not late:
             self._axis.wire.put_back(told)
             self._bench.advance(now_ns)
-            self._hear(ready, now_ns)
+            self._hear(heard, now_ns)
 
     def close(self) -> None:
         """Cuts all wires."""
@@ -115,13 +116,13 @@ class MockServer:
             mock.close()
         self.control.close()
 
-    def _told(self) -> tuple[bytes, int]:
-        """All that the axis was told until a time, and that time.
+    def _told(self, since_ns: int) -> tuple[bytes, int]:
+        """All that the axis was told until a time, and that time; ``since_ns`` is when this turn was due.
 
         This process may be held up at any line of it, and a terminal hands out 4095 bytes at once: it reads until
         nothing is left and that took no time. What comes after belongs to the next turn.
         """
-        told, since_ns = b"", self._due_ns()
+        told = b""
         while True:
             came, now_ns = self._axis.wire.read(), self._clock_ns()
             told += came
@@ -141,10 +142,9 @@ class MockServer:
             left_s -= LEAD_S
         return select.select(descriptors, [], [], min(max(left_s, 0.0), NAP_S))[0]
 
-    def _live_through(self, ready: Collection[int], told: bytes, now_ns: int) -> None:
+    def _live_through(self, heard: set[int], told: bytes, now_ns: int) -> None:
         """Hears what came during a stall, what the axis was ``told`` line by line, evenly from its beginning on."""
-        axis = self._axis.wire.filenos()
-        self._hear([fileno for fileno in ready if fileno not in axis], now_ns)
+        self._hear(heard.difference(self._axis.wire.filenos()), now_ns)
         start_ns, lines = self._bench.now_ns, told.splitlines(keepends=True)
         stall_ns = now_ns - start_ns if now_ns - start_ns < GIVE_UP_NS else 0
         for number, line in enumerate(lines):
@@ -154,8 +154,7 @@ class MockServer:
             self._axis.wire.put_back(line)
             self._axis.mock.receive(told_ns)
 
-    def _hear(self, ready: Collection[int], now_ns: int) -> None:
-        heard = set(ready)
+    def _hear(self, heard: set[int], now_ns: int) -> None:
         for mock in self._mocks:
             if not heard.isdisjoint(mock.filenos()):
                 mock.receive(now_ns)

@@ -92,12 +92,17 @@ def stuttering(pid_of: Callable[[Live], int], times: int, seconds: float) -> Act
     def act(live: Live) -> None:
         pid = pid_of(live)
         for _ in range(times):
-            os.kill(pid, signal.SIGSTOP)
-            time.sleep(seconds)
-            os.kill(pid, signal.SIGCONT)
+            suspend(pid, seconds)
             time.sleep(seconds)
 
     return act
+
+
+def suspend(pid: int, seconds: float) -> None:
+    """Stopped for ``seconds``."""
+    os.kill(pid, signal.SIGSTOP)
+    time.sleep(seconds)
+    _continue(pid)
 
 
 def _continue(pid: int) -> None:

@@ -38,7 +38,7 @@ FIRST_FRAMES_S = 1.0
 LISTEN_S = 0.25
 
 
-class BotaSensOne(StreamedForce[codec.ForceFrame]):
+class BotaSensOne(StreamedForce[ClockMap, codec.ForceFrame]):
     """``now`` is the monotonic clock in ns.
 
     Raises UsageError, with the port closed, where the configured rate or baud cannot be had.
@@ -47,8 +47,7 @@ class BotaSensOne(StreamedForce[codec.ForceFrame]):
     DEFAULT_BAUD: ClassVar = codec.DEFAULT_BAUD
 
     def __init__(self, port: Port, config: BotaWiring, now: Callable[[], int] = time.monotonic_ns) -> None:
-        self._clock = ClockMap(round(config.latency_ms * 1e6))
-        super().__init__(PRODUCT, port, self._clock, now)
+        super().__init__(PRODUCT, port, ClockMap(round(config.latency_ms * 1e6)), now)
         try:
             self._baud, self._sinc = _line_settings(config)
         except UsageError:

@@ -44,7 +44,7 @@ FIRST_FRAME_S = 1.0 + 20 / codec.STREAM_HZ
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
-class RobotiqFt300(StreamedForce[codec.Wrench]):
+class RobotiqFt300(StreamedForce[FrameClock, codec.Wrench]):
     """Owns the line from construction on; ``open_port`` opens it at a given baud.
 
     The rate is fixed: ``config.rate_Hz`` is the most that is wanted, and ``period_ns`` tells what there is. Raises
@@ -57,8 +57,8 @@ class RobotiqFt300(StreamedForce[codec.Wrench]):
         self, open_port: Callable[[int], Port], config: Ft300Wiring, now: Callable[[], int] = time.monotonic_ns
     ) -> None:
         self._open_port = open_port
-        self._clock = FrameClock(round(config.latency_ms * 1e6))
-        super().__init__(PRODUCT, open_port(codec.DEFAULT_BAUD), self._clock, now)
+        clock = FrameClock(round(config.latency_ms * 1e6))
+        super().__init__(PRODUCT, open_port(codec.DEFAULT_BAUD), clock, now)
         self._decoder = codec.make_decoder(self.counters)
 
     @property

@@ -82,4 +82,4 @@ def start(page: Page, protocol: str, session: str = "") -> None:
     page.select_option("#protocol", protocol)
     if session:
         page.fill("#session", session)
-    page.click("#capture-start")
+    press(page, "#capture-start")
