@@ -229,6 +229,7 @@ SCALE = {
     "api/cli/cohort.py": "many sessions at once, on cores and computers",
     "api/http/cohorts/": "many sessions at once, on cores and computers",
     "api/operations/at_hand.py": "recordings in an object store",
+    "rig/trials/chosen.py": "each specimen of a place by itself",
     "rig/results/cohort.py": "many sessions at once, on cores and computers",
     "rig/results/cohort_tables.py": "many sessions at once, on cores and computers",
     "rig/tissue/mixed_effects.py": "what subjects share",

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from api.operations.cohort.wanted import Wanted
+from api.operations.cohort.wanted import By, Wanted
 from rig.errors import UsageError
 
 SchedulerOption = Annotated[
@@ -20,6 +20,7 @@ SchedulerOption = Annotated[
 CohortOption = Annotated[
     bool, typer.Option("--cohort", help="Each session by itself, in parallel, then a summary over subjects.")
 ]
+ByOption = Annotated[By | None, typer.Option("--by", help="Each specimen, site, operator or recording by itself.")]
 
 
 def work_on_cohort(
@@ -29,24 +30,29 @@ def work_on_cohort(
     scheduler: str,
     mapping: Path | None,
     json_file: Path | None,
+    yes: bool,
 ) -> None:
     """Works on all, shows and writes what was found; raises CheckFailed where some have no result."""
     # What a cohort needs takes a second to load, and the options above are told by every command's help.
     from api.cli.computing import compute  # noqa: PLC0415
     from api.cli.output import show, write_json  # noqa: PLC0415
+    from api.cli.records import mapping_for  # noqa: PLC0415
     from api.operations.cohort import cohort as work  # noqa: PLC0415
     from api.operations.cohort.runners import on_cluster, on_cores  # noqa: PLC0415
     from rig.results.cohort import FILE  # noqa: PLC0415
     from rig.results.cohort_tables import cohort_parts  # noqa: PLC0415
 
     if out is None:
-        raise UsageError(f"{len(places)} sessions have no one place for results: give a folder with --out")
+        several = f"parts by {wanted.by}" if wanted.by else f"{len(places)} sessions"
+        raise UsageError(f"{several} have no one place for results: give a folder with --out")
+    if len(places) == 1:
+        mapping = mapping_for(places[0], mapping, out, yes)
     runner = on_cluster(scheduler) if scheduler else on_cores
     result = compute(
         work.cohort_operation(wanted, places),
         lambda operation: work.cohort(operation, places, out, wanted, runner, mapping),
     )
-    show(*cohort_parts(result), f"{out / FILE} is written; each session's results are in its folder beside it")
+    show(*cohort_parts(result), f"{out / FILE} is written; the results of each are in its folder beside it")
     write_json(json_file, result)
     work.refuse_failed(result)
 
@@ -58,11 +64,12 @@ def taken_as_cohort(
     scheduler: str,
     mapping: Path | None,
     json_file: Path | None,
+    yes: bool,
 ) -> bool:
-    """Whether there are several, or a cluster is named: they have then been worked on."""
-    if len(places) == 1 and not scheduler:
+    """Whether there are several, of one place too, or a cluster is named: they have then been worked on."""
+    if len(places) == 1 and not scheduler and not wanted.by:
         return False
-    work_on_cohort(places, out, wanted, scheduler, mapping, json_file)
+    work_on_cohort(places, out, wanted, scheduler, mapping, json_file, yes)
     return True
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from api.cli.cohort import SchedulerOption, refuse_with_cohort, taken_as_cohort
+from api.cli.cohort import ByOption, SchedulerOption, refuse_with_cohort, taken_as_cohort
 from api.cli.computing import compute
 from api.cli.options import JsonOption, MappingOption, OnlyOption, PlacesArgument, YesOption
 from api.cli.output import show, write_json
@@ -38,18 +38,20 @@ def diagnose(
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures and the extended model; else SESSION/diagnosis.")
     ] = None,
+    by: ByOption = None,
     scheduler: SchedulerOption = "",
     json_file: JsonOption = None,
 ) -> None:
     """Says what the simulation gets wrong on a session, names the cause, extends the model and measures the gain.
 
-    Ends with 1 where nothing could be judged. Of several sessions each is diagnosed by itself, in parallel.
+    Ends with 1 where nothing could be judged. Of several sessions each is diagnosed by itself, and with --by
+    each specimen or site, in parallel.
 
     Example: rig diagnose sessions/first --json diagnosis.json
     """
-    wanted = Wanted("diagnose", simulation=simulation, detectability=detectability, only=only)
-    refuse_with_cohort({"--reference": reference} if len(places) > 1 else {})
-    if taken_as_cohort(places, out, wanted, scheduler, mapping, json_file):
+    wanted = Wanted("diagnose", simulation=simulation, detectability=detectability, only=only, by=by)
+    refuse_with_cohort({"--reference": reference} if by or len(places) > 1 else {})
+    if taken_as_cohort(places, out, wanted, scheduler, mapping, json_file, yes):
         return
     (place,) = places
     folder = place / FOLDER if out is None and is_session(place) else out

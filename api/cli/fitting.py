@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from api.cli.cohort import CohortOption, SchedulerOption, refuse_with_cohort, work_on_cohort
+from api.cli.cohort import ByOption, CohortOption, SchedulerOption, refuse_with_cohort, work_on_cohort
 from api.cli.computing import compute
 from api.cli.options import PLACE, JsonOption, MappingOption, OnlyOption, YesOption
 from api.cli.output import show, write_json
@@ -49,6 +49,7 @@ def fit(
         bool, typer.Option("--per-spring", help="The lattice, and stiffness a exp(b |strain|) in each of its springs.")
     ] = False,
     cohort: CohortOption = False,
+    by: ByOption = None,
     scheduler: SchedulerOption = "",
     mapping: MappingOption = None,
     only: OnlyOption = "",
@@ -58,8 +59,8 @@ def fit(
     """Fits constant stiffness, the index model and other tissue laws to sessions, and says how wrong each is.
 
     Writes fit.json, pictures, table.csv and model.json. Errors are taken on the trials fitted and on
-    trials, speeds and, with several sessions, subjects left out. With --cohort each session is fitted by itself, in
-    parallel, and random effects say what subjects share.
+    trials, speeds and, with several sessions, subjects left out. With --cohort each session is fitted by itself, and
+    with --by each specimen or site of it, in parallel; random effects say what they share.
 
     Example: rig fit sessions/first --laws fung,qlv --json fit.json
 
@@ -68,11 +69,11 @@ def fit(
     Example: rig fit sessions/second --with sessions/first/diagnosis/model.json
     """
     compared = laws_from(laws, known or [], model, extended)
-    if cohort or scheduler:
+    if cohort or scheduler or by:
         refuse_with_cohort({"--with": extended, "--lattice": lattice, "--per-spring": per_spring})
         named, given = tuple(law.name for law in compared.compared), tuple(compared.known.items())
-        wanted = Wanted("fit", named, given, compared.saved, only=only)
-        work_on_cohort(places, out, wanted, scheduler, mapping, json_file)
+        wanted = Wanted("fit", named, given, compared.saved, only=only, by=by)
+        work_on_cohort(places, out, wanted, scheduler, mapping, json_file, yes)
         return
     simulated = _lattice(block, springs, per_spring) if lattice or per_spring else None
     target = work.target_of(places, out)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from api.cli.cohort import SchedulerOption, taken_as_cohort
+from api.cli.cohort import ByOption, SchedulerOption, taken_as_cohort
 from api.cli.computing import compute
 from api.cli.options import JsonOption, MappingOption, OnlyOption, PlacesArgument, YesOption
 from api.cli.output import write_json
@@ -20,19 +20,20 @@ def report(
     out: Annotated[
         Path | None, typer.Option("--out", help="File to write, else SESSION/report.html; of several a folder.")
     ] = None,
+    by: ByOption = None,
     scheduler: SchedulerOption = "",
     mapping: MappingOption = None,
     only: OnlyOption = "",
     yes: YesOption = False,
     json_file: JsonOption = None,
 ) -> None:
-    """Writes one self-contained HTML page about a session, or about each of several; it needs no network.
+    """Writes one self-contained HTML page about a session, or about each of several or of its parts.
 
-    Of files of others it shows the results in fit/ and diagnosis/ beside the page.
+    A page needs no network. Of files of others it shows the results in fit/ and diagnosis/ beside the page.
 
     Example: rig report sessions/first --out first.html
     """
-    if taken_as_cohort(places, out, Wanted("report", only=only), scheduler, mapping, json_file):
+    if taken_as_cohort(places, out, Wanted("report", only=only, by=by), scheduler, mapping, json_file, yes):
         return
     (place,) = places
     opening = Opening(mapping_for(place, mapping, out or Path(place.stem), yes), only)

@@ -11,15 +11,20 @@ FILE = "cohort.json"
 
 
 class CohortSession(Result):
-    """One session. ``kept``: its result was there already; ``failed``: ``reason`` says why it has none."""
+    """One session, or one part of one. ``kept``: its result was there already; ``failed``: ``reason`` says why it has
+    none.
+    """
 
     session: str
-    subject: str
+    subject: str = Field(description="or the specimen, site, operator or recording that the part is of")
     state: Literal["done", "kept", "failed"]
     seconds: float = Field(description="of one core, where it was worked on")
     folder: str = Field(default="", description="where its results are, below the cohort's own")
     reason: str = ""
     parameters: Mapping[str, float] = Field(default={}, description="of a fit: those of its model")
+    worst_percent: float | None = Field(
+        default=None, description="of a fit: the largest error of a displacement, if possible of trials left out"
+    )
     verdict: str = Field(default="", description="of a diagnosis")
     causes: tuple[str, ...] = Field(default=(), description="of a diagnosis: what it named")
 
@@ -41,6 +46,9 @@ class CohortResult(SavedResult):
     """Every session by itself, then all together."""
 
     work: Literal["fit", "diagnose", "report"]
+    by: Literal["specimen", "site", "operator", "recording"] | None = Field(
+        default=None, description="what tells the parts apart that were worked on; null: sessions as they are"
+    )
     sessions: tuple[CohortSession, ...]
     model_law: str = Field(default="", description="of a fit: the law whose parameters these are")
     parameters: Mapping[str, PopulationParameter] = Field(

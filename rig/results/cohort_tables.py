@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from rig.results.cohort import CohortResult, CohortSession
+from rig.results.cohort import CohortResult, CohortSession, PopulationParameter
 from rig.results.tables import UNKNOWN, Caution, Part, TextTable
 
 
@@ -17,45 +17,46 @@ def cohort_parts(found: CohortResult) -> Iterator[Part]:
         yield "named: " + ", ".join(f"{cause} in {count}" for cause, count in ranked)
     yield from found.remarks
     done, kept, failed = (sum(each.state == state for each in found.sessions) for state in ("done", "kept", "failed"))
-    yield f"{len(found.sessions)} sessions: {done} done, {kept} kept from before, {failed} failed"
+    yield f"{len(found.sessions)} {found.by or 'session'}s: {done} done, {kept} kept from before, {failed} failed"
 
 
 def _sessions(found: CohortResult) -> TextTable:
     names = list(dict.fromkeys(name for each in found.sessions for name in each.parameters))
+    more = {"fit": [*names, "off by, %"], "diagnose": ["verdict", "causes"], "report": []}[found.work]
+    who = [] if found.by else ["subject"]
     rows = [
-        [each.folder or each.session, each.subject or UNKNOWN, each.state, f"{each.seconds:.1f}", *_said(each, names)]
-        for each in found.sessions
+        [*_which(each, found.by), each.state, f"{each.seconds:.1f}", *_said(each, names)] for each in found.sessions
     ]
-    more = {"fit": names, "diagnose": ["verdict", "causes"], "report": []}[found.work]
-    return TextTable("", ["session", "subject", "state", "seconds", *more], rows, words=3)
+    return TextTable("", [found.by or "session", *who, "state", "seconds", *more], rows, words=3)
+
+
+def _which(each: CohortSession, by: str | None) -> list[str]:
+    called = each.folder or each.session
+    return [called] if by else [called, each.subject or UNKNOWN]
 
 
 def _said(each: CohortSession, names: list[str]) -> list[str]:
     if names:
-        return [f"{each.parameters[name]:.4g}" if name in each.parameters else UNKNOWN for name in names]
+        values = [f"{each.parameters[name]:.4g}" if name in each.parameters else UNKNOWN for name in names]
+        return [*values, UNKNOWN if each.worst_percent is None else f"{each.worst_percent:.0f}"]
     return [each.verdict, ", ".join(each.causes)] if each.verdict else []
 
 
 def _population(found: CohortResult) -> TextTable:
+    who = found.by or "subject"
+    again = any(each.within is not None for each in found.parameters.values())
     rows = [
-        [
-            f"{name} ({each.unit})", f"{each.mean:.4g}", _between(each.mean_interval), f"{each.between:.4g}",
-            _between(each.between_interval), UNKNOWN if each.within is None else f"{each.within:.4g}",
-            f"{each.subjects}", f"{each.sessions}",
-        ]
+        [f"{name} ({each.unit})", *_spread(each), *([UNKNOWN if each.within is None else f"{each.within:.4g}"] * again)]
         for name, each in found.parameters.items()
-    ]  # fmt: skip
-    header = [
-        "parameter",
-        "mean",
-        "95 %",
-        "sd of subjects",
-        "95 %",
-        "sd of a subject's sessions",
-        "subjects",
-        "sessions",
     ]
-    return TextTable(f"Over subjects, {found.model_law} (random effects, REML)", header, rows)
+    header = ["parameter", "mean", "95 %", f"sd of {who}s", "95 %", *([f"sd within a {who}"] * again)]
+    about = max(found.parameters.values(), key=lambda each: each.sessions)
+    counts = f"{about.subjects} {who}s" + (f", {about.sessions} sessions" if again else "")
+    return TextTable(f"Over {counts}, {found.model_law} (random effects, REML)", header, rows)
+
+
+def _spread(over: PopulationParameter) -> list[str]:
+    return [f"{over.mean:.4g}", _between(over.mean_interval), f"{over.between:.4g}", _between(over.between_interval)]
 
 
 def _between(interval: tuple[float, float]) -> str:

@@ -51,6 +51,11 @@ class LawResult(DisplacementErrors):
     held_out: HeldOut
     control: tuple[ControlRow, ...] = Field(description="what the law means to a force loop, at each given force")
 
+    @property
+    def worst_percent(self) -> float | None:
+        """Its largest error of a displacement, of trials left out where there are several."""
+        return (self.held_out.trials or self).max_error_percent
+
 
 class LatticeSweep(Result):
     """Reaction over spring stiffness, phi(d) = R/k, of the block at each depth; ``intact``: no cell collapsed."""

@@ -42,11 +42,10 @@ def _remarks(law: LawResult, name: str, friction: bool) -> Iterator[str]:
     """What the curves cannot tell, and where the law is none to track with."""
     if friction:
         yield FRICTION
-    worst_percent = (law.held_out.trials or law).max_error_percent
-    if worst_percent is not None and worst_percent > HELD_PERCENT:
+    if law.worst_percent is not None and law.worst_percent > HELD_PERCENT:
         yield (
-            f"the {name} law errs by up to {worst_percent:.0f} % of a displacement, and a force loop holds tissue half "
-            "to twice as stiff as its model: this is no model to track with; `rig diagnose` says what it gets wrong"
+            f"the {name} law errs by up to {law.worst_percent:.0f} % of a displacement, and a force loop holds tissue "
+            "half to twice as stiff as its model: this is none to track with; `rig diagnose` says what it gets wrong"
         )
 
 

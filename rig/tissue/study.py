@@ -21,7 +21,7 @@ from rig.tissue.summary import RateTest, Row, Skipped, SpeedSummary
 from rig.trials.curves import Curve, loading_curve
 from rig.trials.cycles import cut, cycle_of
 from rig.trials.findings import SAMPLES_LEFT_OUT, STATED, TRIAL_LEFT_OUT, Finding
-from rig.trials.reading import trials_of
+from rig.trials.reading import SEVERAL, trials_of
 from rig.trials.trial import TrialSet, inspected
 from rig.version import SOFTWARE
 
@@ -132,15 +132,9 @@ def curves_in(found: TrialSet, subject: str = "") -> tuple[list[Curve], list[Ski
 
 
 def _said_if_several(found: TrialSet, curves: list[Curve]) -> list[Curve]:
-    """The first of ``curves`` says so where they are of several specimens or sites."""
-    fitted = {curve.trial for curve in curves}
-    labels = [trial.labels for trial in found.trials if trial.name in fitted]
-    counts = {name: len({of[name] for of in labels if name in of}) for name in ("specimen", "site")}
-    several = " and ".join(f"{count} {name}s" for name, count in counts.items() if count > 1)
-    if not several:
-        return curves
-    text = f"{several} are fitted as one tissue: what differs between them is in the errors; --only NAME fits some"
-    return [replace(curves[0], findings=(*curves[0].findings, Finding("", "session", "several", text))), *curves[1:]]
+    """The first of ``curves`` says so where they are of several specimens, sites or operators."""
+    said = tuple(finding for finding in found.findings if finding.kind in SEVERAL)
+    return [*(replace(curve, findings=(*curve.findings, *said)) for curve in curves[:1]), *curves[1:]]
 
 
 def study_curves(

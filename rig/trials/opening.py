@@ -4,7 +4,6 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 from rig.config.table import load, parse
@@ -16,6 +15,7 @@ from rig.progress import Progress, silent
 from rig.recording.files import whole_folder
 from rig.recording.reader import LONGEST_ROWS, Recording, read_recording
 from rig.recording.sessions import SESSION_FILE, Session, TrialInfo, open_session, write_session
+from rig.trials.chosen import chosen
 from rig.trials.findings import Finding, merge
 from rig.trials.quality import TrialQuality, quality_of
 
@@ -26,10 +26,11 @@ MAGIC, WRITER, HEAD_BYTES = b"\x89MCAP0\r\n", b"tissue-rig", 64
 
 @dataclass(frozen=True)
 class Opening:
-    """How a place is read: by which mapping, and which of its recordings, by a pattern over their names."""
+    """How a place is read: by which mapping, and which of its recordings (see `rig.trials.chosen`)."""
 
     mapping: Path | None = None
     only: str = ""
+    part: str = ""
 
 
 AS_IT_IS = Opening()
@@ -59,7 +60,7 @@ def open_place(place: Path, opening: Opening, scratch: Path, now: datetime, tell
     Raises DataError or UsageError with what is wrong and the next step.
     """
     if opening.mapping is None and is_recorded(place):
-        return _chosen(open_session(place) if place.is_dir() else _alone(place), opening.only)
+        return chosen(open_session(place) if place.is_dir() else _alone(place), opening.only, opening.part)
     if not place.exists():
         raise DataError(f"{place}: no such file or folder; give a session, a recording, or files with their mapping")
     if (place / SESSION_FILE).is_file():
@@ -67,7 +68,7 @@ def open_place(place: Path, opening: Opening, scratch: Path, now: datetime, tell
     name = place.resolve().name.partition(".")[0] if place.is_file() else place.resolve().name
     mapping, doubts = _mapping_of(place, opening.mapping)
     made = import_files(place, mapping, scratch / name, now, tell)
-    found = _chosen(replace(made, origin=place), opening.only)
+    found = chosen(replace(made, origin=place), opening.only, opening.part)
     return replace(found, remarks=(*doubts, *found.remarks))
 
 
@@ -96,18 +97,6 @@ def _mapping_of(place: Path, file: Path | None) -> tuple[DataMapping, tuple[str,
         raise UsageError(f"{place}: give a mapping that says what the files do not: {lines}")
     complete = found.answered(())
     return parse(DataMapping, complete.tree, f"the mapping proposed for {place}"), complete.doubts
-
-
-def _chosen(session: Session, only: str) -> Session:
-    if not only:
-        return session
-    trials = tuple(trial for trial in session.trials if fnmatchcase(trial.name, only))
-    if not trials:
-        names = ", ".join(trial.name for trial in session.trials[:3])
-        raise UsageError(f"{session.place}: no recording matches --only {only!r}; they are called like {names}")
-    about = (remark for remark in session.remarks if any(trial.name in remark for trial in trials))
-    said = f"{len(trials)} of {len(session.trials)} recordings are taken, those matching {only!r}"
-    return replace(session, info=replace(session.info, trials=trials), remarks=(said, *about))
 
 
 def import_files(

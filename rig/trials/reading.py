@@ -16,6 +16,7 @@ from rig.trials.recorded import NS, late, shifted, start_ns, trial_of
 from rig.trials.stated import stated_findings
 from rig.trials.trial import Trial, TrialSet
 
+SEVERAL = ("specimen", "site", "operator")
 GAP_NS = 1_000_000_000  # nobody states the time between them: a hundred times what is a gap within one
 
 
@@ -121,11 +122,11 @@ def _common_surface(trials: Sequence[Trial]) -> tuple[float | None, list[Finding
 
 def _mixed(trials: Sequence[Trial]) -> Iterator[Finding]:
     """Labels of which there are several: a model of all is a model of none of them."""
-    for label in ("specimen", "site", "operator"):
+    for label in SEVERAL:
         names = list(dict.fromkeys(trial.labels.get(label, "") for trial in trials))
         if len(names) > 1:
             shown = ", ".join(name or "none" for name in names[:4]) + (", ..." if len(names) > 4 else "")
-            text = f"{len(names)} {label}s ({shown}) are taken as one tissue under one hand: choose one with --only"
+            text = f"{len(names)} {label}s ({shown}) are taken as one tissue under one hand: --by {label} takes each"
             yield Finding("", "session", label, text)
 
 

@@ -11,13 +11,13 @@ from rig.recording.converter import Array
 from rig.recording.reader import Recording
 from rig.recording.slope import TIP_TOOL
 from rig.recording.tables import compression_N
+from rig.trials.chosen import labels_of
 from rig.trials.findings import Finding
 from rig.trials.trial import Trial
 
 NS = 1e-9
 # A drive that is asked half a millisecond late has gone 15 um at 30 mm/s, a tenth of what contact is known to.
 LATE_NS = 500_000
-LABELS = ("specimen", "site", "cycle", "operator")
 MOST_LATE = 0.01  # one left out in a hundred leaves a hole of one period, which interpolation bridges
 
 
@@ -29,8 +29,8 @@ def trial_of(name: str, recording: Recording) -> Trial:
     force, axis, marker = (recording.tables[stream] for stream in ("force", "axis", "marker"))
     sound, moving = force["valid"] != 0, (axis["valid"] != 0) & in_time(axis["capture_ns"], axis["arrival_ns"])
     seen = (marker["tool"] == TIP_TOOL) & (marker["valid"] != 0)
-    facts, labels = recording.metadata.get("trial", {}), recording.metadata.get("labels", {})
-    notes, start = recording.metadata.get("notes", {}), start_ns(recording)
+    facts, notes = recording.metadata.get("trial", {}), recording.metadata.get("notes", {})
+    start = start_ns(recording)
     stated_C = _number(name, "temperature_C", facts if "temperature_C" in facts else notes)
     return Trial(
         name,
@@ -44,7 +44,7 @@ def trial_of(name: str, recording: Recording) -> Trial:
         _number(name, "speed_mm_s", facts),
         _number(name, "depth_mm", facts),
         _number(name, "surface_mm", recording.metadata.get("calibration", {})),
-        {key: text for key, text in {**notes, **labels}.items() if key in LABELS},
+        labels_of(recording.metadata),
     )
 
 

@@ -6,16 +6,18 @@ from pydantic import Field, model_validator
 
 from api.http.jobs.params import Existing, JobBody, Only
 from api.http.models import RequestBody
+from api.operations.cohort.wanted import By
 
 # Names of 1,000 sessions fit into a request's 64 kB; a larger cohort is one for the command line and its cluster.
 MOST_IN_COHORT = 1000
 
 
 class CohortParams(RequestBody):
-    """Sessions, each worked on by itself."""
+    """Sessions, or the parts of each, each worked on by itself."""
 
     sessions: list[Existing] = Field(min_length=1, max_length=MOST_IN_COHORT)
     only: Only = ""
+    by: By | None = Field(default=None, description="works on each part of a session that this label tells apart")
 
     @model_validator(mode="after")
     def _each_once(self) -> Self:

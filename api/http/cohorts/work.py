@@ -15,18 +15,19 @@ def fit_cohort(operation: Operation, asked: FitCohortParams, desk: Desk) -> Coho
     """Into the job's own folder, with a folder for each session."""
     check_known(asked.known, laws_of(asked.laws, asked.model).compared)
     known = tuple(asked.known.items())
-    return _worked(operation, Wanted("fit", tuple(asked.laws), known, asked.model, only=asked.only), asked, desk)
+    wanted = Wanted("fit", tuple(asked.laws), known, asked.model, only=asked.only, by=asked.by)
+    return _worked(operation, wanted, asked, desk)
 
 
 def diagnose_cohort(operation: Operation, asked: DiagnoseCohortParams, desk: Desk) -> CohortResult:
     """The same of diagnoses."""
-    wanted = Wanted("diagnose", simulation=asked.simulation, detectability=asked.detectability, only=asked.only)
+    wanted = Wanted("diagnose", (), (), "index", asked.simulation, asked.detectability, asked.only, asked.by)
     return _worked(operation, wanted, asked, desk)
 
 
 def report_cohort(operation: Operation, asked: CohortParams, desk: Desk) -> CohortResult:
     """The same of pages."""
-    return _worked(operation, Wanted("report", only=asked.only), asked, desk)
+    return _worked(operation, Wanted("report", only=asked.only, by=asked.by), asked, desk)
 
 
 def _worked(operation: Operation, wanted: Wanted, asked: CohortParams, desk: Desk) -> CohortResult:

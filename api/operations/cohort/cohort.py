@@ -2,12 +2,13 @@
 
 from collections import Counter
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
 from api.operations.cohort import kept
+from api.operations.cohort.parts import Parts
 from api.operations.cohort.runners import Runner, on_cores
 from api.operations.cohort.task import Files, Task, TaskOutcome
 from api.operations.cohort.wanted import Wanted
@@ -48,15 +49,19 @@ def cohort(
     runner: Runner = on_cores,
     mapping: Path | None = None,
 ) -> CohortResult:
-    """Works on every place and writes its results to ``out``/NAME, what all have in common to ``out``/cohort.json.
+    """Works on every place, or each of its parts, and writes results to ``out``/NAME, what all have in common to
+    ``out``/cohort.json.
 
     A session that fails is named in the result and costs the others nothing. What was finished once is kept: the same
     call goes on where another was ended. Raises UsageError where places cannot be told apart.
     """
     refuse_unwritable(out / FILE)
-    tasks = [Task.of(name, place, wanted, mapping) for name, place in named(places).items()]
-    found = {each.outcome.task.name: each for each in _written(operation, tasks, out, runner)}
-    result = _result(wanted, [found[task.name] for task in tasks], out)
+    with ExitStack() as stack:
+        parts = Parts(wanted, mapping, stack, lambda stage, _: operation.step(stage, 0))
+        tasks = parts.tasks(named(places))
+        found = {each.outcome.task.name: each for each in _written(operation, tasks, len(places), out, runner)}
+    result = _result(wanted, [found[task.name] for task in tasks], parts.remarks, out)
+    make_folder(out)
     result.write(out / FILE)
     return result
 
@@ -68,7 +73,7 @@ def refuse_failed(found: CohortResult) -> None:
     names = ", ".join(each.session for each in found.failed[:MOST_NAMED])
     more = len(found.failed) - MOST_NAMED
     raise CheckFailed(
-        f"{len(found.failed)} of {len(found.sessions)} sessions have no result: {names}"
+        f"{len(found.failed)} of {len(found.sessions)} {found.by or 'session'}s have no result: {names}"
         f"{f' and {more} more' if more > 0 else ''}; first: {found.failed[0].reason}"
     )
 
@@ -91,13 +96,13 @@ def _parts(place: Path) -> tuple[str, ...]:
     return whole.parts
 
 
-def _written(operation: Operation, tasks: Sequence[Task], out: Path, runner: Runner) -> Iterator[_Found]:
+def _written(operation: Operation, tasks: Sequence[Task], places: int, out: Path, runner: Runner) -> Iterator[_Found]:
     """Each session as soon as its results stand in its folder."""
     with closing(_outcomes(operation, tasks, runner)) as outcomes:
         for done, each in enumerate(outcomes, start=1):
             if each.outcome.files:
                 _write(each.outcome.files, out / each.outcome.task.name)
-            operation.step(f"{done} of {len(tasks)} sessions", done)
+            operation.step(f"{done} of {len(tasks)} {_counted(each.outcome.task.wanted)}", done * places / len(tasks))
             yield each
     kept.forget_oldest()
 
@@ -122,6 +127,8 @@ def _outcomes(operation: Operation, tasks: Sequence[Task], runner: Runner) -> Ge
 
 def _looked_up(task: Task, keys: dict[str, str]) -> _Found | None:
     """What is kept, or why there cannot be anything; else its key is noted and it is to be worked on."""
+    if task.refused:
+        return _Found(TaskOutcome(task, {}, 0.0, task.refused), "failed")
     try:
         key = kept.key_of(task)
     except RigError as error:
@@ -135,6 +142,10 @@ def _looked_up(task: Task, keys: dict[str, str]) -> _Found | None:
     return _Found(TaskOutcome(task, files), "kept")
 
 
+def _counted(wanted: Wanted) -> str:
+    return f"{wanted.by}s" if wanted.by else "sessions"
+
+
 def _write(files: Files, folder: Path) -> None:
     make_folder(folder)
     for name, content in files.items():
@@ -142,7 +153,7 @@ def _write(files: Files, folder: Path) -> None:
             scratch.write_bytes(content)
 
 
-def _result(wanted: Wanted, found: Sequence[_Found], out: Path) -> CohortResult:
+def _result(wanted: Wanted, found: Sequence[_Found], said: Sequence[str], out: Path) -> CohortResult:
     sessions = tuple(_session(wanted, each, out) for each in found)
     fits = [
         FitResult.read(out / each.folder / TOLD_BY[wanted.work]) for each in sessions if each.folder and each.parameters
@@ -150,30 +161,32 @@ def _result(wanted: Wanted, found: Sequence[_Found], out: Path) -> CohortResult:
     parameters, remarks = _shared(wanted.model, sessions, fits)
     return CohortResult(
         work=wanted.work,
+        by=wanted.by,
         sessions=sessions,
         model_law=wanted.model if wanted.work == "fit" else "",
         parameters=parameters,
         interval_level=LEVEL,
         causes=Counter(cause for each in sessions for cause in each.causes),
-        remarks=remarks,
+        remarks=(*said, *remarks),
     )
 
 
 def _session(wanted: Wanted, found: _Found, out: Path) -> CohortSession:
     """What one session's own files say."""
     outcome, name = found.outcome, found.outcome.task.name
-    facts = {"session": outcome.task.place, "state": found.state, "seconds": outcome.seconds, "reason": outcome.reason}
+    facts = {"session": outcome.task.called, "state": found.state, "seconds": outcome.seconds, "reason": outcome.reason}
     if found.state == "failed":
         return CohortSession.model_validate({"subject": "", **facts})
     read = {"fit": _fitted, "diagnose": _diagnosed}.get(wanted.work, _nothing_more)
-    return CohortSession.model_validate({"subject": "", "folder": name, **facts, **read(wanted, out / name)})
+    whose = {"subject": outcome.task.value} if wanted.by else {}
+    return CohortSession.model_validate({"subject": "", "folder": name, **facts, **read(wanted, out / name), **whose})
 
 
 def _fitted(wanted: Wanted, folder: Path) -> Mapping[str, object]:
     law = FitResult.read(folder / TOLD_BY[wanted.work]).laws[wanted.model]
     subject = load_model(folder / MODEL).data.subject or folder.name
     values = {name: each.value for name, each in law.parameters.items() if not each.known}
-    return {"subject": subject, "parameters": values}
+    return {"subject": subject, "parameters": values, "worst_percent": law.worst_percent}
 
 
 def _diagnosed(wanted: Wanted, folder: Path) -> Mapping[str, object]:

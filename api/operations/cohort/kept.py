@@ -36,7 +36,7 @@ def kept_folder() -> Path:
 
 def key_of(task: Task) -> str:
     """Of what there is now; raises DataError where the place cannot be read."""
-    digest = hashlib.sha256(f"{SOFTWARE} {program_digest()} {sorted(asdict(task.wanted).items())}".encode())
+    digest = hashlib.sha256(f"{SOFTWARE} {program_digest()} {sorted(asdict(task.wanted).items())} {task.part}".encode())
     address = address_of(Path(task.place))
     for line in _remote(address) if address else _local(Path(task.place), task):
         digest.update(line.encode() + b"\n")

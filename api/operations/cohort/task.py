@@ -20,12 +20,21 @@ Files = Mapping[str, bytes]
 
 @dataclass(frozen=True)
 class Task:
-    """One session: where it lies, the mapping of files of others, and the name its results go by."""
+    """One session: where it lies, the mapping of files of others, and the name its results go by.
+
+    ``part`` are those of its recordings that are meant, as ``site=B5``, and ``value`` what they are of. ``near`` is a
+    session made of the place for as long as this computer works on the cohort; another computer makes its own.
+    ``refused`` says why nothing can be worked on.
+    """
 
     name: str
     place: str
     wanted: Wanted
     mapping: str = ""
+    part: str = ""
+    value: str = ""
+    near: str = ""
+    refused: str = ""
 
     @classmethod
     def of(cls, name: str, place: Path, wanted: Wanted, mapping: Path | None) -> "Task":
@@ -34,9 +43,16 @@ class Task:
         return cls(name, where, wanted, str(mapping.resolve()) if mapping else "")
 
     @property
-    def opening(self) -> Opening:
-        """How the place is read."""
-        return Opening(Path(self.mapping) if self.mapping else None, self.wanted.only)
+    def at_hand(self) -> tuple[Path, Opening]:
+        """What is read, and how."""
+        near = Path(self.near) if self.near and Path(self.near).is_dir() else None
+        mapping = Path(self.mapping) if self.mapping and not near else None
+        return near or Path(self.place), Opening(mapping, self.wanted.only, self.part)
+
+    @property
+    def called(self) -> str:
+        """What to call it by: its place, and the part of it."""
+        return f"{self.place} {self.part.partition('=')[0]}={self.value}" if self.part else self.place
 
 
 @dataclass(frozen=True)
@@ -58,32 +74,39 @@ def run(task: Task) -> TaskOutcome:
             files = {file.name: file.read_bytes() for file in sorted(Path(folder).iterdir())}
         return TaskOutcome(task, files, time.monotonic() - began)
     except RigError as error:
-        return TaskOutcome(task, {}, time.monotonic() - began, str(error))
+        return TaskOutcome(task, {}, time.monotonic() - began, _reason(task, error))
     except Exception as error:
-        reason = f"{task.place}: the work met an error of its own: {type(error).__name__}: {error}"
+        reason = f"{task.called}: the work met an error of its own: {type(error).__name__}: {_reason(task, error)}"
         return TaskOutcome(task, {}, time.monotonic() - began, reason)
+
+
+def _reason(task: Task, error: Exception) -> str:
+    """What was met, of the place that somebody named."""
+    return str(error).replace(task.near, task.place) if task.near else str(error)
 
 
 def _fit(task: Task, folder: Path) -> None:
     from api.operations import fit as work  # noqa: PLC0415 - each work loads what it needs
 
     laws = replace(work.laws_of(task.wanted.laws, task.wanted.model), known=dict(task.wanted.known))
-    found = work.fit(Operation("fit"), [Path(task.place)], folder, laws, opening=task.opening, drawn=False)
+    place, opening = task.at_hand
+    found = work.fit(Operation("fit"), [place], folder, laws, opening=opening, drawn=False)
     found.model_copy(update={"model": fit.MODEL}).write(folder / fit.FILE)
 
 
 def _diagnose(task: Task, folder: Path) -> None:
     from api.operations.diagnose import diagnose  # noqa: PLC0415
 
-    wanted = task.wanted
-    ask = partial(diagnose, Operation("diagnose"), Path(task.place), wanted.simulation, folder, task.opening)
+    (place, opening), wanted = task.at_hand, task.wanted
+    ask = partial(diagnose, Operation("diagnose"), place, wanted.simulation, folder, opening)
     ask(detectability=wanted.detectability)
 
 
 def _report(task: Task, folder: Path) -> None:
     from api.operations.report import report  # noqa: PLC0415
 
-    report(Operation("report"), Path(task.place), folder / PAGE, task.opening)
+    place, opening = task.at_hand
+    report(Operation("report"), place, folder / PAGE, opening)
 
 
 _WORKS = {"fit": _fit, "diagnose": _diagnose, "report": _report}

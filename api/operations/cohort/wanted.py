@@ -5,11 +5,14 @@ from typing import Literal
 
 Work = Literal["fit", "diagnose", "report"]
 Simulation = Literal["index", "constant"]
+By = Literal["specimen", "site", "operator", "recording"]
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is done with each session: the options that ``work`` has for one."""
+    """What is done with each session, or with each of its parts where ``by`` says what tells them apart: the options
+    that ``work`` has for one.
+    """
 
     work: Work
     laws: tuple[str, ...] = ()
@@ -18,3 +21,4 @@ class Wanted:
     simulation: Simulation = "index"
     detectability: bool = False
     only: str = ""
+    by: By | None = None

@@ -34,6 +34,7 @@ from rig.tissue.study import (
 )
 from rig.tissue.summary import Skipped
 from rig.trials.cycles import IndentationCycle
+from rig.trials.findings import Finding
 from rig.trials.reading import trials_of
 from rig.trials.trial import inspected
 from tests.rig.recording.measured import turned_tables
@@ -71,14 +72,12 @@ def test_every_trial_with_a_curve_counts_and_the_others_say_why_not(study: Study
     assert "no contact" in study.skipped[0].reason
 
 
-@pytest.mark.parametrize(("specimens", "said"), [("ab", ["2 specimens are fitted as one tissue"]), ("aa", [])])
-def test_several_specimens_in_one_fit_are_said_once(folder: Path, specimens: str, said: list[str]) -> None:
+@pytest.mark.parametrize("kind", ["specimen", "site", "operator"])
+def test_several_specimens_in_one_fit_are_said_once(folder: Path, kind: str) -> None:
     found = inspected(trials_of(open_session(folder)))
-    labels = [{"specimen": specimens[number % 2], "site": "thigh"} for number in range(len(found.trials))]
-    trials = tuple(replace(trial, labels=one) for trial, one in zip(found.trials, labels, strict=True))
-    curves, _ = curves_in(replace(found, trials=trials))
-    texts = [one.text for curve in curves for one in curve.findings if one.kind == "several"]
-    assert [text.partition(":")[0] for text in texts] == said
+    said = Finding("", "session", kind, "several are taken as one")
+    curves, _ = curves_in(replace(found, findings=(*found.findings, said)))
+    assert [one for curve in curves for one in curve.findings if one.kind == kind] == [said]
 
 
 def test_samples_that_were_left_out_are_said_with_the_fit(tmp_path: Path) -> None:
@@ -130,7 +129,7 @@ def test_a_law_that_errs_by_more_than_half_of_a_displacement_is_said_to_be_none_
     assert [remark.partition(",")[0] for remark in poor.remarks] == [
         f"the index law errs by up to {left_out.max_error_percent:.0f} % of a displacement"
     ]
-    assert "no model to track with" in poor.remarks[0]
+    assert "none to track with" in poor.remarks[0]
 
 
 def test_all_laws_are_judged_on_the_same_measured_displacements(study: Study) -> None:
