@@ -138,12 +138,8 @@ def _object_name(name: str, value: Any) -> str:
 
 def _split(name: str, value: NDArray[np.generic]) -> Vectors:
     """A vector as it is, a table by its columns ``name:1`` and so on; the longer side are the rows."""
-    if value.ndim == 1:
-        return {name: value}
-    rows = value if value.shape[0] >= value.shape[1] else value.T
-    if rows.shape[1] == 1:
-        return {name: rows[:, 0]}
-    return {f"{name}:{number + 1}": rows[:, number] for number in range(rows.shape[1])}
+    lines = value.reshape(1, -1) if value.ndim == 1 else value if value.shape[0] < value.shape[1] else value.T
+    return {f"{name}:{number}" if len(lines) > 1 else name: line for number, line in enumerate(lines, start=1)}
 
 
 def _of_vectors(
@@ -180,7 +176,8 @@ def open_hdf5(path: Path) -> list[Sheet]:
         with h5py.File(path) as file:
             groups: dict[str, Any] = {}
             file.visititems(groups.__setitem__)
-            found = {"": file, **{name: group for name, group in groups.items() if name[:1] != "#"}}
+            # MATLAB's own cells, and the indexes that PyTables makes.
+            found = {"": file} | {name: group for name, group in groups.items() if not re.match("#|(.*/)?_i_", name)}
             known = [(path, name, group) for name, group in found.items() if isinstance(group, h5py.Group)]
             return [sheet for group in known for sheet in (_of_group(*group), *_members(*group))]
     except DAMAGE as error:

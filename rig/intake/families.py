@@ -29,7 +29,8 @@ DIRECTIONS = frozenset("xyz")
 class ColumnGroup:
     """Columns of a sheet that belong together, by their numbers.
 
-    ``index`` tells it from others beside it, ``called`` is the quantity that its sheet or file says it holds.
+    ``index`` tells it from others beside it, ``called`` is the quantity that its sheet or file says it holds. ``force``
+    is that of the table it goes together with, at its own rows.
     """
 
     path: Path
@@ -38,6 +39,7 @@ class ColumnGroup:
     names: tuple[str, ...]
     index: str = ""
     called: str = ""
+    force: Looks | None = None
 
     @property
     def units(self) -> tuple[str, ...]:

@@ -37,6 +37,7 @@ HEAD_BYTES = 65_536
 HEAD_ROWS = 400
 # Of the encodings that laboratories' machines write; one that is no Unicode is told by the words of the header only.
 ENCODINGS = ("gb18030", "cp949", "shift_jis", "big5", "cp1252", "cp1251")
+STRAY_ZEROS = 1  # WinTest ends its first line with one; more of them are numbers or what a power failure left
 _BETWEEN = re.compile(r"[\s,;|\"()\[\]/]+")
 DELIMITERS = ("\t", ";", ",", "|", " ")
 
@@ -257,13 +258,15 @@ def encoding_of(head: bytes) -> tuple[str, tuple[str, ...]]:
     if max(zeros) > len(head[:HEAD_ROWS]) // 4:  # of two bytes of a digit one is none
         return ("utf-16-be" if zeros[0] > zeros[1] else "utf-16-le"), ()
     if _decodes(head, "utf-8"):
-        return ("" if b"\0" in head else "utf-8"), ()
+        return ("" if head.count(0) > STRAY_ZEROS else "utf-8"), ()
     header = b"\n".join(head.splitlines()[:HEAD_ROWS])
     words = {name: _BETWEEN.split(header.decode(name)) for name in ENCODINGS if _decodes(head, name)}
     known = {name: sum(knows(w) or bool(unit_in(w)) for w in own if not w.isascii()) for name, own in words.items()}
-    if not known or b"\0" in header:
+    if not known or header.count(0) > STRAY_ZEROS:
         return "", ()
-    best = max(known, key=lambda name: known[name])
+    # A byte beyond ASCII that stands alone between its letters is a letter of the West; others come in pairs and words.
+    western = not re.search(rb"[\x80-\xff]{2}", header)
+    best = max(known, key=lambda name: (known[name], western and name == "cp1252"))
     others = [name for name in known if known[name] == known[best] and name != best]
     said = {name: next((line for line in header.decode(name).splitlines() if not line.isascii()), "") for name in known}
     texts = "; ".join(f"{name}: {said[name]!r}" for name in (best, *others))

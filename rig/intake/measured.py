@@ -151,19 +151,29 @@ def value_of(table: ColumnGroup, quantity: str, column: int, known: Mapping[str,
 
 def _sense(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, int]) -> str:
     """The sense in which the largest force is compression and lies deeper than the start; ours where none is seen."""
-    force = column if quantity == "force" else known.get("force")
-    risen = np.zeros(1) if force is None else _risen(table.looks[force])
+    force = table.looks[known["force"]] if "force" in known else table.force
+    risen = _risen(table.looks[column] if quantity == "force" else force or Looks(np.zeros(1)))
     most = int(np.argmax(np.abs(risen)))
     if quantity == "force":
         return "tension" if risen[most] < 0 else "compression"
-    way = np.nan_to_num(signed(table.looks[column]))
-    return "out" if way[min(most, way.size - 1)] < way[0] else "into"
+    way = signed(table.looks[column])
+    there = np.flatnonzero(np.isfinite(way))
+    return "out" if way[there[np.argmin(np.abs(there - most))]] < way[there[0]] else "into"
+
+
+def beside(way: ColumnGroup, force: ColumnGroup) -> ColumnGroup:
+    """``way`` with the force of the table that goes together with it, which begins and ends as it does."""
+    measured = signed(force.looks[chosen(force)["force"]])
+    known, rows = np.flatnonzero(np.isfinite(measured)), max(looks.values.size for looks in way.looks.values())
+    at = np.linspace(0, measured.size - 1, rows)
+    return replace(way, force=Looks(np.interp(at, known, measured[known])))
 
 
 def _risen(looks: Looks) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Above its first tenth, where the machine stands in air or at its preload."""
-    force = np.nan_to_num(signed(looks))
-    return np.asarray(force - np.median(force[: max(1, force.size // 10)]))
+    force = signed(looks)
+    known = force[np.isfinite(force)]
+    return np.nan_to_num(force - np.median(known[: max(1, known.size // 10)]))
 
 
 def signed(looks: Looks) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

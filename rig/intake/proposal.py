@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +13,12 @@ from rig.intake.families import INTERRUPTED, ColumnGroup, all_tables, groups_of
 from rig.intake.folder import below, files_in
 from rig.intake.labelling import Labels, labels_in
 from rig.intake.mapping import FileForm
-from rig.intake.measured import chosen, measured_in, ranks_of, spoilt
+from rig.intake.measured import beside, chosen, measured_in, ranks_of, spoilt
 from rig.intake.naming import channels_of, names_of
 from rig.intake.questions import JointQuestion, OpenQuestion, Question, inline
 from rig.intake.readers import kind_of
 from rig.intake.survey import texts_of
+from rig.intake.text import open_texts
 from rig.intake.timebase import clock_of, span_s
 from rig.intake.units import ROTARY
 
@@ -28,6 +29,8 @@ LEVER_MM = 1000.0
 CLOCKS_APART = 0.02
 # A table of fewer rows in which no word is known is a list of settings or results.
 FEWEST_ROWS = 10
+# A sample may be lost where a program begins to write another table, but nobody starts a recording within two.
+GOES_ON_STEPS = 2.0
 # Where more of the rows would be left out, time starts anew for another recording, or the column is no time.
 LATE_SHARE = 0.1
 # Of three questions people give up; what can be asked as one is.
@@ -68,14 +71,16 @@ class Proposal:
 def propose(folder: Path) -> Proposal:
     """What the folder seems to hold; raises DataError where nothing in it may be a force and a position."""
     doubts, files = list[str](), files_in(folder)
-    groups = groups_of(list(all_tables(files, doubts)))
+    groups = [_in_one(group) for group in groups_of(list(all_tables(files, doubts)))]
     picked, recording = _picked(folder, groups)
     if not picked:
         raise nothing_found(folder, files, groups, doubts)
     tables, questions, names = list[TomlTable](), list[OpenQuestion](), dict[str, str]()
     for pattern, tables_alike, quantities in picked:
         group, empty = _with_numbers(tables_alike)
-        doubts += [f"left aside, no numbers in its columns: {table.layout.sheet.where}" for table in empty]
+        doubts += [f"{_without_numbers(table)}: {table.layout.sheet.where}" for table in empty]
+        if recording and "force" not in quantities:
+            group = [beside(group[0], picked[0][1][0]), *group[1:]]
         table, templates, said, asked = _proposed(folder, group, quantities, pattern)
         tables.append(table)
         names |= templates
@@ -95,6 +100,43 @@ def _with_numbers(group: Group) -> tuple[Group, Group]:
     found = [len(chosen(table)) for table in group]
     whole = [table for table, count in zip(group, found, strict=True) if count == max(found)]
     return whole, [table for table, count in zip(group, found, strict=True) if count < max(found)]
+
+
+def _in_one(group: Group) -> Group:
+    """The tables as they are; those below each other in a text as one where time goes on from each to the next."""
+    if not group[0].layout.form.get("repeats"):
+        return group
+    places = dict.fromkeys(table.layout.source for table in group)
+    parts = [[table for table in group if table.layout.source == place] for place in places]
+    if not all(_goes_on(*pair) for tables in parts for pair in pairwise(tables)):
+        return group
+    return [_whole(tables[0], len(tables)) for tables in parts]
+
+
+def _whole(first: ColumnGroup, count: int) -> ColumnGroup:
+    source, form = first.layout.source, {key: own for key, own in first.layout.form.items() if key != "repeats"}
+    (sheet,) = open_texts(source, FileForm.model_construct(**form))
+    said = (
+        f"{first.path.name}: its row of names comes {count} times while time goes on, so it is taken as one recording"
+    )
+    return replace(
+        first, layout=first.layout._replace(sheet=sheet, form=form, broken=f"{said}; else say repeats = true")
+    )
+
+
+def _goes_on(table: ColumnGroup, following: ColumnGroup) -> bool:
+    """Whether the next begins within two steps of time behind the last row of a table."""
+    here, there = (span_s(part, clock_of(part)[0]) for part in (table, following))
+    if here is None or there is None:
+        return False
+    rows = max(looks.values.size for looks in table.looks.values())
+    return 0 < there[0] - here[1] <= GOES_ON_STEPS * (here[1] - here[0]) / max(1, rows - 1)
+
+
+def _without_numbers(table: ColumnGroup) -> str:
+    # Tables below each other in a text are counted, so that none of them can be left out.
+    is_part = kind_of(table.path) == "text"
+    return "nothing moves in a column of it, so it tells little" if is_part else "left aside, no numbers in its columns"
 
 
 def _picked(folder: Path, groups: Sequence[Group]) -> tuple[Picked, TomlTable]:

@@ -10,7 +10,7 @@ from rig.intake.units import LINEAR, ROTARY, SIGNALS
 WORDS: dict[str, tuple[str, ...]] = {
     "time": (
         "time", "timestamp", "zeit", "temps", "tiempo", "tempo", "时间", "時間", "시간", "время", "czas", "čas", "tijd",
-        "zeitstempel", "elapsed", "stamp", "seconds", "sec", "secs", "ms", "msec", "t",
+        "zeitstempel", "elapsed", "stamp", "seconds", "sec", "secs", "ms", "msec", "millis", "micros", "t",
     ),
     "force": (
         "force", "kraft", "standardkraft", "fuerza", "forza", "力", "负荷", "荷重", "载荷", "하중", "힘", "load",

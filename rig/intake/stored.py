@@ -1,6 +1,8 @@
 """Columns of an HDF5 file that stay in it until they are sliced, so that a long one is never held whole."""
 
-from dataclasses import dataclass
+import math
+import pickletools
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,15 +38,31 @@ class StoredVector:
 
     def _of(self, data: Any, rows: slice) -> Any:
         if self.field:
-            return data.fields(self.field)[rows]
+            found = data.fields(self.field)[rows]
+            return found if self.line is None else found[:, self.line]
         if self.line is None:
             return data[rows]
         return data[self.line, rows] if self.across else data[rows, self.line]
 
 
 def fields_of(path: Path, item: Any) -> dict[str, StoredVector]:
-    """The columns of a dataset whose rows have named fields."""
-    return {name: StoredVector(path, item.name, len(item), field=name) for name in item.dtype.names}
+    """The columns of a dataset whose rows have named fields; in a field of several, by a pickle that is only read."""
+    found: dict[str, StoredVector] = {}
+    for field in item.dtype.names:
+        whole, size = StoredVector(path, item.name, len(item), field=field), math.prod(item.dtype[field].shape)
+        said = _pickled(item.attrs.get(f"{field}_kind"))
+        names = said if len(said) == size else [f"{field}:{number}" for number in range(1, size + 1)]
+        several = {name: replace(whole, line=line) for line, name in enumerate(names)}
+        found |= several if item.dtype[field].shape else {field: whole}
+    return found
+
+
+def _pickled(content: object) -> list[str]:
+    try:
+        found = pickletools.genops(content if isinstance(content, bytes) else b"")
+        return [text for _, text, _ in found if isinstance(text, str)]
+    except ValueError:
+        return []
 
 
 def lines_of(path: Path, name: str, item: Any) -> dict[str, StoredVector]:

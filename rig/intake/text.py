@@ -233,15 +233,16 @@ def _rows(file: IO[bytes], source: Source, form: FileForm, part: FilePart, head:
 
 
 def _until(file: Iterable[bytes], source: Source, part: FilePart, head: Head, form: FileForm) -> Iterator[bytes]:
-    """The lines of the part; where others are left out, those above one that begins another table."""
-    is_left_out = form.other_lines == "drop" and not form.affixes
+    """The lines of the part; where others are left out, none from one that begins another table to the names again."""
+    is_left_out, another = form.other_lines == "drop" and not form.affixes, False
     for number, line in enumerate(islice(file, None if part.end is None else part.end - head.start), head.start + 1):
         if is_left_out and line[:1] not in NUMBER_BEGINS:
             text = line.decode(errors="replace")
-            refuse_units(source.line(number), cells_of(text, form.delimiter), head.names, head.units)
-            if begins_another(text, form.delimiter, head.names):
-                return
-        yield line
+            cells = cells_of(text, form.delimiter)
+            refuse_units(source.line(number), cells, head.names, head.units)
+            another &= list(filter(None, cells)) != list(filter(None, head.names))
+            another |= begins_another(text, form.delimiter, head.names)
+        yield b"\n" if another else line
 
 
 def refuse_units(place: str, cells: Sequence[str], names: Sequence[str], units: Sequence[str]) -> None:

@@ -30,8 +30,8 @@ RAW = (*SIGNALS, "%", "Pa", "kPa", "MPa", "1")
 # Other spellings, in small letters: plurals, whole words, other scripts, and units that mean nothing else in capitals.
 SPELLINGS = {
     **dict.fromkeys(("sec", "secs", "second", "seconds", "sekunden", "秒", "초", "с", "сек"), "s"),
-    **dict.fromkeys(("msec", "millisecond", "milliseconds", "毫秒", "ミリ秒", "мс"), "ms"),
-    **dict.fromkeys(("usec", "usecs", "microsec", "microsecond", "microseconds", "微秒"), "us"),
+    **dict.fromkeys(("msec", "millis", "millisecond", "milliseconds", "毫秒", "ミリ秒", "мс"), "ms"),
+    **dict.fromkeys(("usec", "usecs", "micros", "microsec", "microsecond", "microseconds", "微秒"), "us"),
     **dict.fromkeys(("nsec", "nsecs", "nanosec", "nanosecs", "nanosecond", "nanoseconds", "纳秒"), "ns"),
     **dict.fromkeys(("minute", "minutes", "分"), "min"),
     **dict.fromkeys(("newton", "newtons", "牛", "牛顿", "ニュートン", "н"), "N"),

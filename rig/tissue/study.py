@@ -128,13 +128,9 @@ def curves_in(found: TrialSet, subject: str = "") -> tuple[list[Curve], list[Ski
                 skipped.append(Skipped(part.name, str(error).removeprefix(f"{part.name}: ")))
             else:
                 curves.append(replace(curve, subject=subject, recording=recording, findings=(*curve.findings, *kept)))
-    return _said_if_several(found, curves), skipped
-
-
-def _said_if_several(found: TrialSet, curves: list[Curve]) -> list[Curve]:
-    """The first of ``curves`` says so where they are of several specimens, sites or operators."""
-    said = tuple(finding for finding in found.findings if finding.kind in SEVERAL)
-    return [*(replace(curve, findings=(*curve.findings, *said)) for curve in curves[:1]), *curves[1:]]
+    several = tuple(finding for finding in found.findings if finding.kind in SEVERAL)
+    curves[:1] = [replace(curve, findings=(*curve.findings, *several)) for curve in curves[:1]]
+    return curves, skipped
 
 
 def study_curves(

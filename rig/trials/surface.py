@@ -256,9 +256,11 @@ def _no_contact(cycle: IndentationCycle, height_N: float, spread_N: float, fall_
             f"{cycle.name}: force falls by {fall_N:.2g} N where the tip goes in: the sign of compression is wrong; "
             "correct force.compression in rig.toml, or `positive` of the force in the mapping"
         )
+    least_N = max(10 * spread_N, LEAST_FORCE_N)
+    why = "to tell it from noise" if least_N > LEAST_FORCE_N else "of tissue under a tip of millimetres"
     return (
         f"{cycle.name}: no contact: force rises by {max(height_N, 0):.2g} N at most "
-        f"(at least {max(10 * spread_N, LEAST_FORCE_N):.2g} N is needed to tell it from noise); go deeper"
+        f"(at least {least_N:.2g} N is needed {why}); go deeper"
     )
 
 

@@ -4,6 +4,7 @@ Each is written by another library, or letter by letter, and has to come out as 
 """
 
 import decimal
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 
@@ -42,6 +43,20 @@ def pandas_fixed(folder: Path) -> None:
         group["block0_values"] = np.column_stack([TIME_S, WAY_MM, FORCE_N])
         group["block1_items"] = np.array([b"note"])
         group["block1_values"] = np.ones((COUNT, 1), np.int8)
+
+
+def pandas_table(folder: Path) -> None:
+    """The same with its table format: PyTables' rows of blocks, an index beside them, and names in pickles."""
+    blocks = [("index", np.int64), ("values_block_0", np.float64, (2,)), ("values_block_1", np.int64, (1,))]
+    rows = np.zeros(COUNT, blocks)
+    rows["index"] = np.arange(COUNT)
+    rows["values_block_0"], rows["values_block_1"] = np.column_stack([WAY_MM, FORCE_N]), 1e3 * TIME_S[:, None]
+    with h5py.File(folder / "a.h5", "w") as file:
+        table = file.create_dataset("run/table", data=rows)
+        table.attrs["index_kind"] = np.bytes_(b"integer")
+        for number, names in enumerate((["position_mm", "force_N"], ["millis"])):
+            table.attrs[f"values_block_{number}_kind"] = np.bytes_(pickle.dumps(names, protocol=0))
+        file["run/_i_table/index/sortedLR"], file["run/_i_table/index/indicesLR"] = np.arange(9), np.arange(7)
 
 
 def channels_with_units(folder: Path) -> None:
@@ -83,6 +98,10 @@ def with_gaps(folder: Path) -> None:
 
 FORMS: dict[str, Callable[[Path], None]] = {
     "pandas' fixed format": pandas_fixed,
+    "pandas' table format": pandas_table,
+    "an Arduino's clock, last": text(
+        "position_mm,force_N,millis\n", lines("{:.5f},{:.5f},{:.0f}", WAY_MM, FORCE_N, 1e3 * TIME_S)
+    ),
     "a struct a channel with its unit": channels_with_units,
     "time above a struct of channels": time_above_channels,
     "decimals in Parquet": decimals,

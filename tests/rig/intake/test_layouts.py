@@ -108,16 +108,20 @@ def test_a_table_begins_wherever_its_names_come_again(folder: Path, words: Seque
     assert forces[1] - forces[0] == pytest.approx(1e-5, abs=1e-7)
 
 
-def test_one_table_with_its_names_on_every_page_is_one_recording_where_the_mapping_says_so(folder: Path) -> None:
+def test_one_table_with_its_names_on_every_page_is_one_recording_unless_the_mapping_says_otherwise(
+    folder: Path,
+) -> None:
     head, rows = (
         "Time (s),Position (mm),Force (N)\n",
         lines("{:.3f},{:.5f},{:.6f}", TIME_S, WAY_MM, FORCE_N).splitlines(),
     )
     (folder / "a.csv").write_text("".join(head + "\n".join(rows[at : at + 20]) + "\n" for at in range(0, COUNT, 20)))
     proposal = propose(folder)
-    assert any("its row of names comes 3 times" in doubt and "take repeats out" in doubt for doubt in proposal.doubts)
-    tree = tomllib.loads(proposal.text.replace("repeats = true\n", ""))
-    check(import_folder(folder, parse(DataMapping, tree, "edited"), folder.parent / "out", NOW))
+    assert any("its row of names comes 3 times while time goes on" in doubt for doubt in proposal.doubts)
+    check(came_in(folder))
+    tree = tomllib.loads(proposal.text.replace('other_lines = "drop"\n', 'other_lines = "drop"\nrepeats = true\n'))
+    apart = import_folder(folder, parse(DataMapping, tree, "edited"), folder.parent / "apart", NOW)
+    assert [trial.samples["force"] for trial in apart.trials] == [20, 20, 20]
 
 
 @pytest.mark.parametrize(
