@@ -129,9 +129,9 @@ def explained_share(base: Array, extended: Array, floor: Array) -> Estimate | No
 
 
 def _share(squares: Array) -> Array:
-    """Share explained of what could be, from mean squares of base, extended and floor along the first axis."""
+    """Share explained of what could be, or of the least that is worth it, from mean squares along the first axis."""
     base, extended, floor = squares
-    return np.asarray((base - extended) / np.maximum(base - floor, 1e-300))
+    return np.asarray((base - extended) / np.maximum(base - floor, base - base / WORTH_EXPLAINING**2))
 
 
 def noise_N(own: Fit) -> float | None:

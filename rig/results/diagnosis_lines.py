@@ -8,6 +8,7 @@ from rig.results.diagnosis import DiagnosisResult
 
 LINES, WIDTH = ("asked", "explained", "cause", "cost", "next"), len("explained: ")
 LONGEST_MIN = 60.0  # nobody holds still for longer
+THICKEST_MM = 200.0  # no limb is thicker: the stiffness says nothing there
 
 
 def five_lines(result: DiagnosisResult) -> list[str]:
@@ -122,7 +123,7 @@ def cost(result: DiagnosisResult) -> str:
 
 
 def _force_and_depth(error_N: float, result: DiagnosisResult) -> str:
-    if not result.stiffness_N_mm:
+    if not result.stiffness_N_mm or error_N > THICKEST_MM * result.stiffness_N_mm:
         return f"{error_N:.2g} N rms"
     return f"{error_N:.2g} N rms, as much as {error_N / result.stiffness_N_mm:.2g} mm of depth"
 

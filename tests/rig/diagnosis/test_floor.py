@@ -168,3 +168,14 @@ def test_the_share_explained_is_of_power_and_left_out_where_nothing_could_be_gai
     assert found is not None
     assert (found.value, found.low, found.high) == pytest.approx((9 / 16,) * 3)
     assert explained_share(base, base, np.full(4, 0.046**2)) is None
+
+
+def test_draws_in_which_nothing_could_be_gained_leave_the_interval_of_the_share_finite() -> None:
+    # One recording of six has all that can be taken off; four draws in ten are without it.
+    base, extended, floor = (np.array([own, 1.0, 1.0, 1.0, 1.0, 1.0]) for own in (50.0, 1.0, 1.0))
+    extended[1:] = 1.1
+    found = explained_share(base, extended, floor)
+    assert found is not None
+    # Without it 0.1 is lost of the least worth explaining, 1 - 1 / 1.1^2 of the error.
+    assert found.low == pytest.approx(-0.1 / (1 - 1 / 1.1**2))
+    assert found.value == pytest.approx((55.0 - 6.5) / (55.0 - 6.0))

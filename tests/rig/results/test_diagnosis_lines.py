@@ -71,6 +71,8 @@ def test_nothing_named_is_told_with_the_error_as_force_and_depth() -> None:
     assert said["explained"].startswith("no model tried does better than the simulation as it is: the error is 0.03 N")
     assert said["cost"] == "the force is predicted within 0.03 N rms, as much as 0.06 mm of depth"
     assert said["next"].startswith("nothing to mend")
+    flat = lines(result("adequate", explained_share=None, stiffness_N_mm=1e-5))
+    assert flat["cost"] == "the force is predicted within 0.03 N rms", "3 m of depth are nobody's"
 
 
 def test_an_axis_is_told_in_its_own_unit() -> None:
