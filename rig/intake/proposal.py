@@ -78,7 +78,9 @@ def propose(folder: Path) -> Proposal:
     tables, questions, names = list[TomlTable](), list[OpenQuestion](), dict[str, str]()
     for pattern, tables_alike, quantities in picked:
         group, empty = _with_numbers(tables_alike)
-        doubts += [f"{_without_numbers(table)}: {table.layout.sheet.where}" for table in empty]
+        # Tables below each other in a text are counted, so that none of them can be left out.
+        aside = [table.layout.sheet.where for table in empty if kind_of(table.path) != "text"]
+        doubts += [f"left aside, no numbers in its columns: {where}" for where in aside]
         if recording and "force" not in quantities:
             group = [beside(group[0], picked[0][1][0]), *group[1:]]
         table, templates, said, asked = _proposed(folder, group, quantities, pattern)
@@ -131,12 +133,6 @@ def _goes_on(table: ColumnGroup, following: ColumnGroup) -> bool:
         return False
     rows = max(looks.values.size for looks in table.looks.values())
     return 0 < there[0] - here[1] <= GOES_ON_STEPS * (here[1] - here[0]) / max(1, rows - 1)
-
-
-def _without_numbers(table: ColumnGroup) -> str:
-    # Tables below each other in a text are counted, so that none of them can be left out.
-    is_part = kind_of(table.path) == "text"
-    return "nothing moves in a column of it, so it tells little" if is_part else "left aside, no numbers in its columns"
 
 
 def _picked(folder: Path, groups: Sequence[Group]) -> tuple[Picked, TomlTable]:

@@ -41,7 +41,7 @@ class Sheet:
     ``read`` takes the numbers (from 0) of columns, whether each is text, and gives them piece by piece, in the order
     asked for, alike in length. ``first_row`` is where the first of them stands in the file, counted from 1 in
     ``counted``s. ``facts`` are what stands above the table; ``unread`` says what in the file was not understood,
-    ``rows`` about how many rows there are, 0 where nobody knows.
+    ``rows`` about how many rows there are, 0 where nobody knows, ``line_of`` where one stands that is not at its place.
     """
 
     path: Path
@@ -54,6 +54,7 @@ class Sheet:
     counted: str = "row"
     unread: str = ""
     rows: int = 0
+    line_of: Callable[[int], int] | None = None
 
     @property
     def where(self) -> str:
@@ -62,7 +63,7 @@ class Sheet:
 
     def place(self, row: int) -> str:
         """Where row ``row`` (from 0) of the data stands."""
-        return f"{self.where} {self.counted} {self.first_row + row}"
+        return f"{self.where} {self.counted} {self.line_of(row) if self.line_of else self.first_row + row}"
 
     def number(self, place: Place) -> int:
         """The number of a column from 0; raises DataError where it is not there, or there twice."""
