@@ -327,10 +327,6 @@ def open_json_lines(path: Path) -> list[Sheet]:
     return [_of_vectors(path, "", _of_rows(rows), {}, {})] if rows else []
 
 
-def _of_json(_: Any, bodies: list[bytes]) -> Vectors:
-    return _of_rows([dict(_flat("", json.loads(body))) for body in bodies])
-
-
 def _of_rows(rows: Sequence[Mapping[str, object]]) -> Vectors:
     """The numbers and texts that any of the rows has; nothing where one has none."""
     names = dict.fromkeys(name for row in rows for name, value in row.items() if isinstance(value, int | float | str))
@@ -365,4 +361,6 @@ def _of_cdr(schema: Any, bodies: list[bytes]) -> Vectors:
         return {}
 
 
-_DECODERS: dict[str, Callable[[Any, list[bytes]], Vectors]] = {"json": _of_json, "cdr": _of_cdr}
+_DECODERS: dict[str, Callable[[Any, list[bytes]], Vectors]] = {
+    "json": lambda _, bodies: _of_rows([dict(_flat("", json.loads(body))) for body in bodies]), "cdr": _of_cdr,
+}  # fmt: skip

@@ -29,8 +29,7 @@ DIRECTIONS = frozenset("xyz")
 class ColumnGroup:
     """Columns of a sheet that belong together, by their numbers.
 
-    ``index`` tells it from others beside it, ``called`` is the quantity that its sheet or file says it holds. ``force``
-    is that of the table it goes together with, at its own rows.
+    ``index`` tells it from others beside it, ``called`` is what its place says it is, ``force`` another table's.
     """
 
     path: Path
@@ -137,7 +136,7 @@ def _own_parts(whole: ColumnGroup, quantity: str) -> dict[int, str]:
 def parts_of(name: str) -> list[str]:
     """The words and numbers of a name in small letters, without the unit that it ends in."""
     parts = _PARTS.findall(_BRACKETED.sub(" ", name))
-    unit = len(parts) > 1 and not _BRACKETED.search(name) and unit_in(parts[-1])
+    unit = len(parts) > 1 and not _BRACKETED.search(name) and unit_in(parts[-1]) not in ("", "1")
     return [part.lower() for part in (parts[:-1] if unit else parts)]
 
 

@@ -78,9 +78,8 @@ def _is_letter_of_another(quantity: str, name: str, word: str) -> bool:
     """Whether a letter in the name is a direction (``force.x``), or part of a counter's (``F/T Sequence``)."""
     if len(word) > 1 or quantity in ("counter", "label"):
         return False
-    if not _COUNTERS.isdisjoint(words_of(name)):
-        return True
-    return quantity == "position" and any(_place(other, name) is not None for other in ("force", "velocity"))
+    of_another = quantity == "position" and any(_place(other, name) is not None for other in ("force", "velocity"))
+    return of_another or not _COUNTERS.isdisjoint(words_of(name))
 
 
 def candidates(quantity: str, header: Sequence[str], units: Sequence[str]) -> list[Candidate]:

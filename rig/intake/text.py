@@ -105,9 +105,7 @@ def _open(source: Source, form: FileForm, part: FilePart) -> Sheet:
     def read(columns: Mapping[int, bool]) -> Iterator[Batch]:
         return _batches(source, form, part, head, columns)
 
-    def line_of(row: int) -> int:
-        return next(islice(_lines(source, form, part, head), row, None))[0]
-
+    lines = partial(_lines, source, form, part, head)
     last, kind = (form.header_row or form.rows_above + 1) - 1, "row" if source.sheet else "line"
     facts = [row for row in head.above[:last] if not part.start or is_other(row, head.first)]
     name = "-".join(filter(None, (source.sheet, part.name)))
@@ -116,7 +114,8 @@ def _open(source: Source, form: FileForm, part: FilePart) -> Sheet:
         stated |= {"sampling rate (Hz)": "".join(head.above[0])}
     return Sheet(
         source.path, name, head.names, head.units, read, stated, head.start + 1,
-        "column" if form.across else kind, rows=head.rows, line_of=line_of if form.other_lines == "drop" else None,
+        "column" if form.across else kind, rows=head.rows,
+        line_of=(lambda row: next(islice(lines(), row, None))[0]) if form.other_lines == "drop" else None,
     )  # fmt: skip
 
 

@@ -8,12 +8,13 @@ import numpy as np
 
 from rig.config.table import TomlTable
 from rig.intake.families import ColumnGroup
+from rig.intake.mapping import TimeColumn
 from rig.intake.notation import is_stamp, pattern_of
 from rig.intake.questions import Choice, OpenQuestion
 from rig.intake.readers import kind_of
 from rig.intake.roles import words_of
 from rig.intake.survey import Looks, wraps_at
-from rig.intake.times import is_iso
+from rig.intake.times import is_iso, times_ns
 from rig.intake.units import TIME_NS, unit_in, unit_of
 
 # Numbers so large are time since 1970 (2001 to 2286), whatever the column is called.
@@ -95,14 +96,17 @@ def _rows_a_stamp(table: ColumnGroup) -> int:
 
 
 def span_s(table: ColumnGroup, time: TomlTable) -> tuple[float, float] | None:
-    """First and last time of a table in s, None where they are texts or days, or their unit is open."""
+    """First and last time of a table in s, None where they are days, or their unit is open."""
     rate_Hz, rows = time.get("rate_Hz"), max((looks.values.size for looks in table.looks.values()), default=0)
     if rate_Hz and rows:
         return 0.0, (rows - 1) / rate_Hz
-    if time.get("unit") not in TIME_NS:
+    number = table.layout.sheet.number(time.get("column", 1))
+    texts = [text for text in table.texts.get(number, []) if text] if "form" in time else []
+    if not texts and time.get("unit") not in TIME_NS:
         return None
-    known = table.looks[table.layout.sheet.number(time["column"])].known * TIME_NS[time["unit"]] * 1e-9
-    return float(known[0]), float(known[-1])
+    known = texts or table.looks[number].known
+    ends = times_ns([known[:: max(1, len(known) - 1)], None], 0, 2, TimeColumn.model_validate(time), table.layout.sheet)
+    return float(ends[0] * 1e-9), float(ends[-1] * 1e-9)
 
 
 def _fitting(table: ColumnGroup) -> list[int]:

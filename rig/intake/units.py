@@ -84,8 +84,8 @@ def unit_of(name: str) -> str:
 
     Empty if it names none. One letter alone is a name and no unit, and a 1 in brackets counts columns.
     """
-    plain = _plain(name).strip()
-    ending = re.search(r"(?<=[\s_/,])([^\s_,()\[\]{}]+)$", plain)
+    plain = re.sub(r"\.\.(.+)\.$", r" (\1)", _plain(name).strip())  # as R makes names
+    ending = re.search(r"(?<=[\s_/,.])([^\s_,.()\[\]{}]+)$", plain)
     bracketed = re.findall(r"[(\[{]([^)\]}]*)[)\]}]", plain)[::-1]
     found = [*bracketed, ending[1] if ending else "", plain if plain[1:] else ""]
     return next((unit for unit in map(unit_in, found) if unit not in ("", "1")), "")

@@ -404,6 +404,22 @@ def test_what_a_device_said_before_it_was_lost_counts_no_more() -> None:
         assert bench.loop.health[stream].period_ns == getattr(bench, role).period_ns
 
 
+def test_the_loop_knows_the_number_of_the_last_sample_of_each_device() -> None:
+    bench = pressing()
+    bench.cycles(200)
+    force, axis, marker = (rows[-1].seq for rows in (bench.ring.force, bench.ring.axis, bench.ring.marker))
+    assert bench.loop.published == {"force": force, "axis": axis, "tracker": marker}
+
+
+def test_a_loop_that_is_left_alone_says_so_to_its_checks() -> None:
+    bench = FakeBench()
+    bench.cycle()
+    assert bench.loop.inputs.supervisor_lost is False
+    bench.link.lost = True
+    bench.cycle()
+    assert bench.loop.inputs.supervisor_lost is True
+
+
 def test_the_loop_leaves_its_devices_closed() -> None:
     bench = FakeBench()
     bench.loop.close()

@@ -109,3 +109,38 @@ def test_a_lone_letter_beyond_ascii_is_of_the_west(folder: Path) -> None:
     proposal = propose(folder)
     assert 'encoding = "cp1252"' in proposal.text
     assert any(doubt.startswith("the encoding may be cp1252: ") for doubt in proposal.doubts), "a tie is a doubt"
+
+
+def test_specimens_beside_each_other_have_times_of_their_own_without_units_in_the_names(folder: Path) -> None:
+    columns = [np.full((3, COUNT), np.nan) for _ in range(2)]
+    for number, (rate, own) in enumerate(((1, slice(None)), (2, slice(0, COUNT, 2)))):
+        columns[number][:, : len(TIME_S[own])] = TIME_S[own] * rate, FORCE_N[own], WAY_MM[own]
+    rows = (",".join("" if np.isnan(cell) else f"{cell:.5f}" for cell in row) for row in np.concatenate(columns).T)
+    text("t_1,F_1,x_1,t_2,F_2,x_2\n", "\n".join(rows) + "\n")(folder)
+    session = came_in(folder, "N", "mm")
+    assert [trial.name for trial in session.trials] == ["a-1", "a-2"]
+    steps_s = [np.diff(session.recording(trial.name).tables["force"]["capture_ns"]) * 1e-9 for trial in session.trials]
+    assert [set(np.round(one, 6)) for one in steps_s] == [{0.02}, {0.08}]
+
+
+@pytest.mark.parametrize(("names", "units"), [("t.s,F.mN,x.mm", 1e3), ("Time..s.,Force..mN.,Displacement..mm.", 1e3)])
+def test_units_stand_in_names_as_r_writes_them(folder: Path, names: str, units: float) -> None:
+    text(f"{names}\n", lines("{:.3f},{:.3f},{:.5f}", TIME_S, FORCE_N * units, WAY_MM))(folder)
+    check(came_in(folder))
+
+
+def test_two_loggers_whose_stamps_do_not_begin_together_have_clocks_of_their_own(folder: Path) -> None:
+    for name, head, values, late_s in (("force", "Force (N)", FORCE_N, 0.0), ("pose", "Position (mm)", WAY_MM, 0.7)):
+        stamps = np.datetime64("2026-05-04T10:00:00") + np.round((TIME_S + late_s) * 1e3).astype("timedelta64[ms]")
+        text(f"Time,{head}\n", lines("{}Z,{:.5f}", stamps, values), f"a_{name}.csv")(folder)
+    proposal = propose(folder)
+    assert any("their times do not begin and end together" in doubt for doubt in proposal.doubts)
+    assert 'clock = "own"' in proposal.text
+
+
+def test_a_summary_of_a_few_rows_is_no_recording(folder: Path) -> None:
+    text(HEAD, "".join(ROWS))(folder)
+    text("Date,Max force (N),Max displacement (mm)\n", "2026-05-04,3.1,6.0\n2026-05-05,3.2,6.0\n", "summary.csv")(
+        folder
+    )
+    assert [trial.name for trial in came_in(folder).trials] == ["a"]
