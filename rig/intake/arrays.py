@@ -138,7 +138,8 @@ def _object_name(name: str, value: Any) -> str:
 
 def _split(name: str, value: NDArray[np.generic]) -> Vectors:
     """A vector as it is, a table by its columns ``name:1`` and so on; the longer side are the rows."""
-    lines = value.reshape(1, -1) if value.ndim == 1 else value if value.shape[0] < value.shape[1] else value.T
+    lines = np.atleast_2d(value)
+    lines = lines if lines.shape[0] < lines.shape[1] else lines.T
     return {f"{name}:{number}" if len(lines) > 1 else name: line for number, line in enumerate(lines, start=1)}
 
 
@@ -327,6 +328,10 @@ def open_json_lines(path: Path) -> list[Sheet]:
     return [_of_vectors(path, "", _of_rows(rows), {}, {})] if rows else []
 
 
+def _of_json(_: Any, bodies: list[bytes]) -> Vectors:
+    return _of_rows([dict(_flat("", json.loads(body))) for body in bodies])
+
+
 def _of_rows(rows: Sequence[Mapping[str, object]]) -> Vectors:
     """The numbers and texts that any of the rows has; nothing where one has none."""
     names = dict.fromkeys(name for row in rows for name, value in row.items() if isinstance(value, int | float | str))
@@ -361,6 +366,4 @@ def _of_cdr(schema: Any, bodies: list[bytes]) -> Vectors:
         return {}
 
 
-_DECODERS: dict[str, Callable[[Any, list[bytes]], Vectors]] = {
-    "json": lambda _, bodies: _of_rows([dict(_flat("", json.loads(body))) for body in bodies]), "cdr": _of_cdr,
-}  # fmt: skip
+_DECODERS: dict[str, Callable[[Any, list[bytes]], Vectors]] = {"json": _of_json, "cdr": _of_cdr}

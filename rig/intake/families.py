@@ -58,6 +58,11 @@ class ColumnGroup:
         others = [number for number in self.columns if number not in self.looks]
         return texts_of(self.layout.sheet, others) if others else {}
 
+    @property
+    def rows(self) -> int:
+        """How many it has, of those that were looked at."""
+        return max((looks.values.size for looks in self.looks.values()), default=0)
+
     def fitting(self, quantity: str) -> list[int]:
         """Columns that may be the quantity by word and unit, the likeliest first."""
         return [self.columns[item.column] for item in candidates(quantity, self.names, self.units)]

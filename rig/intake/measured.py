@@ -164,8 +164,7 @@ def _sense(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, i
 def beside(way: ColumnGroup, force: ColumnGroup) -> ColumnGroup:
     """``way`` with the force of the table that goes together with it, which begins and ends as it does."""
     measured = signed(force.looks[chosen(force)["force"]])
-    known, rows = np.flatnonzero(np.isfinite(measured)), max(looks.values.size for looks in way.looks.values())
-    at = np.linspace(0, measured.size - 1, rows)
+    known, at = np.flatnonzero(np.isfinite(measured)), np.linspace(0, measured.size - 1, way.rows)
     return replace(way, force=Looks(np.interp(at, known, measured[known])))
 
 

@@ -118,25 +118,22 @@ def _in_one(group: Group) -> Group:
 def _whole(first: ColumnGroup, count: int) -> ColumnGroup:
     source, form = first.layout.source, {key: own for key, own in first.layout.form.items() if key != "repeats"}
     (sheet,) = open_texts(source, FileForm.model_construct(**form))
-    said = (
-        f"{first.path.name}: its row of names comes {count} times while time goes on, so it is taken as one recording"
-    )
-    return replace(
-        first, layout=first.layout._replace(sheet=sheet, form=form, broken=f"{said}; else say repeats = true")
-    )
+    said = f"its row of names comes {count} times while time goes on, so it is taken as one recording"
+    broken = f"{first.path.name}: {said}; else say repeats = true"
+    return replace(first, layout=first.layout._replace(sheet=sheet, form=form, broken=broken))
 
 
 def _goes_on(table: ColumnGroup, following: ColumnGroup) -> bool:
     """Whether the next begins within two steps of time behind the last row of a table."""
     here, there = (span_s(part, clock_of(part)[0]) for part in (table, following))
-    return bool(here and there and 0 < there[0] - here[1] <= GOES_ON_STEPS * (here[1] - here[0]) / _rows_in(table))
+    return bool(here and there and 0 < there[0] - here[1] <= GOES_ON_STEPS * (here[1] - here[0]) / table.rows)
 
 
 def _picked(folder: Path, groups: Sequence[Group]) -> tuple[Picked, TomlTable]:
     """The groups that are taken, each with its own keys and quantities; what recordings of several files are called."""
     known = [(group, chosen(group[0])) for group in groups]
     both = [(group, found) for group, found in known if "force" in found and not found.keys().isdisjoint(WAYS)]
-    both = [(group, found) for group, found in both if _rows_in(group[0]) >= FEWEST_ROWS] or both
+    both = [(group, found) for group, found in both if group[0].rows >= FEWEST_ROWS] or both
     best = min((ranks_of(group[0], "force")[found["force"]] for group, found in both), default=None)
     pair = _pair(folder, known, best)
     if pair:
@@ -199,11 +196,7 @@ def _may_be(table: ColumnGroup, found: Mapping[str, int]) -> bool:
     """Whether numbers move in enough columns besides time to be force and position, in rows enough to see it."""
     time = _number(table, clock_of(table)[0])
     moving = [number for number, looks in table.looks.items() if looks.moves and number != time]
-    return (len(moving) >= 2 and _rows_in(table) >= FEWEST_ROWS) or (len(moving) >= 1 and bool(found))
-
-
-def _rows_in(table: ColumnGroup) -> int:
-    return max((looks.values.size for looks in table.looks.values()), default=0)
+    return (len(moving) >= 2 and table.rows >= FEWEST_ROWS) or (len(moving) >= 1 and bool(found))
 
 
 def _proposed(

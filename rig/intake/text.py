@@ -242,8 +242,8 @@ def _until(file: Iterable[bytes], source: Source, part: FilePart, head: Head, fo
             text = line.decode(errors="replace")
             cells = cells_of(text, form.delimiter)
             refuse_units(source.line(number), cells, head.names, head.units)
-            another &= list(filter(None, cells)) != list(filter(None, head.names))
-            another |= begins_another(text, form.delimiter, head.names)
+            again = list(filter(None, cells)) == list(filter(None, head.names))
+            another = begins_another(text, form.delimiter, head.names) or (another and not again)
         yield b"\n" if another else line
 
 

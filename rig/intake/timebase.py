@@ -97,9 +97,8 @@ def _rows_a_stamp(table: ColumnGroup) -> int:
 
 def span_s(table: ColumnGroup, time: TomlTable) -> tuple[float, float] | None:
     """First and last time of a table in s, None where they are days, or their unit is open."""
-    rate_Hz, rows = time.get("rate_Hz"), max((looks.values.size for looks in table.looks.values()), default=0)
-    if rate_Hz and rows:
-        return 0.0, (rows - 1) / rate_Hz
+    if time.get("rate_Hz") and table.rows:
+        return 0.0, (table.rows - 1) / time["rate_Hz"]
     number = table.layout.sheet.number(time.get("column", 1))
     texts = [text for text in table.texts.get(number, []) if text] if "form" in time else []
     if not texts and time.get("unit") not in TIME_NS:

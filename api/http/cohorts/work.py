@@ -21,7 +21,9 @@ def fit_cohort(operation: Operation, asked: FitCohortParams, desk: Desk) -> Coho
 
 def diagnose_cohort(operation: Operation, asked: DiagnoseCohortParams, desk: Desk) -> CohortResult:
     """The same of diagnoses."""
-    wanted = Wanted("diagnose", (), (), "index", asked.simulation, asked.detectability, asked.only, asked.by)
+    wanted = Wanted(
+        "diagnose", simulation=asked.simulation, detectability=asked.detectability, only=asked.only, by=asked.by
+    )
     return _worked(operation, wanted, asked, desk)
 
 

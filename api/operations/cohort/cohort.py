@@ -102,7 +102,8 @@ def _written(operation: Operation, tasks: Sequence[Task], places: int, out: Path
         for done, each in enumerate(outcomes, start=1):
             if each.outcome.files:
                 _write(each.outcome.files, out / each.outcome.task.name)
-            operation.step(f"{done} of {len(tasks)} {_counted(each.outcome.task.wanted)}", done * places / len(tasks))
+            what = each.outcome.task.wanted.by or "session"
+            operation.step(f"{done} of {len(tasks)} {what}s", done * places / len(tasks))
             yield each
     kept.forget_oldest()
 
@@ -142,10 +143,6 @@ def _looked_up(task: Task, keys: dict[str, str]) -> _Found | None:
     return _Found(TaskOutcome(task, files), "kept")
 
 
-def _counted(wanted: Wanted) -> str:
-    return f"{wanted.by}s" if wanted.by else "sessions"
-
-
 def _write(files: Files, folder: Path) -> None:
     make_folder(folder)
     for name, content in files.items():
@@ -178,7 +175,7 @@ def _session(wanted: Wanted, found: _Found, out: Path) -> CohortSession:
     if found.state == "failed":
         return CohortSession.model_validate({"subject": "", **facts})
     read = {"fit": _fitted, "diagnose": _diagnosed}.get(wanted.work, _nothing_more)
-    whose = {"subject": outcome.task.value} if wanted.by else {}
+    whose = {} if outcome.task.value is None else {"subject": outcome.task.value}
     return CohortSession.model_validate({"subject": "", "folder": name, **facts, **read(wanted, out / name), **whose})
 
 

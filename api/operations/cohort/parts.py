@@ -1,6 +1,5 @@
 """The tasks of a cohort: a session each, or each part of one that a label of its recordings tells apart."""
 
-import glob
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -53,7 +52,7 @@ class Parts:
         for value in parts_of(session, label):
             own = file_name(value or f"no {label}")
             name = own if alone else f"{whole.name}-{own}"
-            yield replace(whole, name=name, part=f"{label}={glob.escape(value)}", value=value, near=near)
+            yield replace(whole, name=name, value=value, near=near)
 
 
 def _each_once(tasks: Iterable[Task]) -> Iterator[Task]:

@@ -1,5 +1,6 @@
 """One session of a cohort, as whichever process has a core for it works on it: a place in, files out."""
 
+import glob
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -22,17 +23,16 @@ Files = Mapping[str, bytes]
 class Task:
     """One session: where it lies, the mapping of files of others, and the name its results go by.
 
-    ``part`` are those of its recordings that are meant, as ``site=B5``, and ``value`` what they are of. ``near`` is a
-    session made of the place for as long as this computer works on the cohort; another computer makes its own.
-    ``refused`` says why nothing can be worked on.
+    ``value`` is what those of its recordings are of that are meant, None for all of them. ``near`` is a session made of
+    the place for as long as this computer works on the cohort; another computer makes its own. ``refused`` says why
+    nothing can be worked on.
     """
 
     name: str
     place: str
     wanted: Wanted
     mapping: str = ""
-    part: str = ""
-    value: str = ""
+    value: str | None = None
     near: str = ""
     refused: str = ""
 
@@ -41,6 +41,11 @@ class Task:
         """With paths that another process, which may stand elsewhere, finds too."""
         where = address_of(place) or str(place.resolve())
         return cls(name, where, wanted, str(mapping.resolve()) if mapping else "")
+
+    @property
+    def part(self) -> str:
+        """The recordings that are meant, as a pattern over a label, ``site=B5``; empty for all."""
+        return "" if self.value is None else f"{self.wanted.by}={glob.escape(self.value)}"
 
     @property
     def at_hand(self) -> tuple[Path, Opening]:
@@ -52,7 +57,7 @@ class Task:
     @property
     def called(self) -> str:
         """What to call it by: its place, and the part of it."""
-        return f"{self.place} {self.part.partition('=')[0]}={self.value}" if self.part else self.place
+        return self.place if self.value is None else f"{self.place} {self.wanted.by}={self.value}"
 
 
 @dataclass(frozen=True)
