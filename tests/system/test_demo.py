@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError
@@ -80,6 +81,15 @@ def explored(page: Page, address: str) -> None:
     expect(page.locator("#trials tbody tr").nth(5)).to_be_visible(timeout=SEEN_MS)
 
 
+@contextmanager
+def ended(process: subprocess.Popen[str]) -> Iterator[None]:
+    """Whatever happens meanwhile, the process ends: its pipes left open would be found in a test after this one."""
+    try:
+        yield
+    finally:
+        process.kill()
+
+
 def let_in_twice(browser: Browser, address: str) -> bool:
     """Whether a ticket that was used lets another browser in."""
     context = browser.new_context()
@@ -96,16 +106,16 @@ def test_a_demonstration_that_is_served_ends_with_an_address_where_its_session_i
 ) -> None:
     port = free_port()
     code = f"from pathlib import Path; from api.cli.demo import PLAN, served; served(Path('demo'), PLAN, {port})"
-    process = subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "-c", code], cwd=made.parent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
-    try:
+    ) as process, ended(process):  # fmt: skip
         assert process.stdout
         printed = process.stdout.readline().strip()
         address, _, ticket = printed.partition("/#ticket=")
         assert address == f"http://127.0.0.1:{port}" and ticket
         page = browser.new_page()
+        page.set_default_timeout(SEEN_MS)
         explored(page, printed)
         assert not let_in_twice(browser, printed)
         login = Request(
@@ -124,8 +134,6 @@ def test_a_demonstration_that_is_served_ends_with_an_address_where_its_session_i
         process.send_signal(signal.SIGINT)
         out, said = process.communicate(timeout=60)
         assert (process.returncode, out, "Traceback" in said) == (0, "", False), said
-    finally:
-        process.kill()
 
 
 @pytest.mark.by_hand
