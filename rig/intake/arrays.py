@@ -56,7 +56,14 @@ def open_mat(path: Path) -> list[Sheet]:
     _join_beside(groups)
     _join(groups)
     titles = list(_titles(groups))
-    return [_of_values(path, name, values, titles) for name, values in groups.items()]
+    return [_of_values(path, name, {**_facts_above(name, groups), **values}, titles) for name, values in groups.items()]
+
+
+def _facts_above(name: str, groups: Mapping[str, Mapping[str, object]]) -> dict[str, object]:
+    """What the structs that hold this one say of it: texts and single numbers."""
+    above = [name[: match.start()] for match in re.finditer("[.]", name)]
+    found = [groups.get(up, {}).items() for up in above]
+    return {key: value for items in found for key, value in items if isinstance(value, str | int | float)}
 
 
 def _titles(groups: Mapping[str, Mapping[str, object]]) -> Iterator[list[str]]:
@@ -198,7 +205,16 @@ def _members(path: Path, name: str, group: Any) -> Iterator[Sheet]:
             if isinstance(item, h5py.Dataset) and item.size > 1 and item.dtype.kind in "biuf" and _is_numeric(item)
             for key, column in _split(key, item[()]).items()
         }
-        yield _of_vectors(path, f"{name}({number + 1})", vectors, {}, {})
+        facts = {key: _fact(item) for key, item in items.items() if isinstance(item, h5py.Dataset)}
+        said = {key: fact for key, fact in facts.items() if fact}
+        yield _of_vectors(path, f"{name}({number + 1})", vectors, {}, said)
+
+
+def _fact(item: Any) -> str:
+    """A text, or a single number, of a file of MATLAB; empty of anything else."""
+    if item.dtype.kind in "biuf" and not _is_numeric(item):
+        return "".join(map(chr, np.ravel(item[()])))
+    return _text(np.ravel(item[()])[0]) if item.size == 1 else ""
 
 
 def _of_group(path: Path, name: str, group: Any) -> Sheet:

@@ -60,7 +60,15 @@ def tables_in(folder: Path, mapping: DataMapping) -> Iterator[FoundTable]:
         for path, labels in named:
             own = {"file": path.name.removesuffix(".gz").rpartition(".")[0], "folder": path.parent.name}
             for more, sheet in open_sheets(path, form):
-                yield FoundTable(sheet, form, {**own, "sheet": sheet.name, **form.labels, **labels, **more})
+                facts = {name: _fact(sheet, fact) for name, fact in form.facts.items()}
+                yield FoundTable(sheet, form, {**own, "sheet": sheet.name, **form.labels, **facts, **labels, **more})
+
+
+def _fact(sheet: Sheet, name: str) -> str:
+    if name not in sheet.facts:
+        there = listed(list(sheet.facts)) or "nothing at all"
+        raise DataError(f"{sheet.where}: nothing states its {name!r}, as `facts` of the mapping says; there is {there}")
+    return sheet.facts[name]
 
 
 def unnamed_in(folder: Path, mapping: DataMapping) -> list[str]:

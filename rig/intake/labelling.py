@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rig.config.table import TomlTable
 from rig.intake.families import ColumnGroup
-from rig.intake.naming import templates_of
+from rig.intake.naming import KINDS, templates_of
 from rig.intake.notation import is_stamp
 from rig.intake.roles import WORDS, words_of
 from rig.intake.survey import Numbers
@@ -18,6 +18,13 @@ FEWEST_ROWS = 5
 # Of the words for labels those that are a whole recording's; a cycle, an operator and a condition may change within.
 RECORDINGS = WORDS["label"][: WORDS["label"].index("cycle")]
 UNKNOWN = len(WORDS["label"])
+# What is stated above a table of whom or what it is of; a cycle's number is not, and a sample may have a rate as well.
+FACTS = {
+    "specimen": KINDS["specimen"],
+    "site": KINDS["site"],
+    "operator": ("operator", "examiner", "bediener", "prüfer"),
+}
+IDENTIFIERS = frozenset(("name", "id", "identifier", "label", "code", "no", "nr", "number", "nummer", "bezeichnung"))
 
 
 class Labels(NamedTuple):
@@ -43,6 +50,26 @@ def labels_in(table: ColumnGroup, taken: Sequence[int], time: int | None) -> Lab
     recording = "-".join(f"{{{called[number]}}}" for number in telling)
     templates = {**({"recording": recording} if telling else {}), **templates_of(list(called.values()))}
     return Labels({called[number]: table.place(number) for number in kept}, templates, doubts)
+
+
+def facts_in(tables: Sequence[ColumnGroup], known: TomlTable) -> tuple[TomlTable, TomlTable]:
+    """The `facts` of a mapping, and templates over them: what stands above each table of whom or what it is of.
+
+    Only what differs between the tables, and of which the templates ``known`` say nothing.
+    """
+    stated = [table.layout.sheet.facts for table in tables]
+    told = [name for name in stated[0] if len({facts.get(name) for facts in stated}) > 1]
+    told = [name for name in told if all(name in facts for facts in stated)]
+    found: TomlTable = {}
+    for kind, words in FACTS.items():
+        named = [name for name in told if _is_called(name, words)]
+        found |= {kind: named[0]} if named and kind not in known else {}
+    return found, templates_of(list(found))
+
+
+def _is_called(name: str, words: Sequence[str]) -> bool:
+    said = [word for word in words_of(name) if word not in IDENTIFIERS]
+    return len(said) == 1 and said[0] in words
 
 
 def _labelled(table: ColumnGroup, taken: Sequence[int], anew: Sequence[int]) -> Iterator[tuple[int, list[str]]]:

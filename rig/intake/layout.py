@@ -1,6 +1,7 @@
 """How the rows of a file nobody described are written: encoding, delimiter, decimal sign, header and unit rows."""
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import islice, zip_longest
 from pathlib import Path
@@ -41,6 +42,9 @@ STRAY_ZEROS = 1  # WinTest ends its first line with one; more of them are number
 _BETWEEN = re.compile(r"[\s,;|\"()\[\]/]+")
 DELIMITERS = ("\t", ";", ",", "|", " ")
 
+LEAST_ROWS = 2  # the least that has a rate
+# By chance two numbers stand at the same places in a few lines of words.
+LABELLED_ROWS = 8
 # A table of so few rows may lie across; a quantity each is fewer.
 ACROSS_ROWS = 100
 # Force and a way at least: words for fewer may be there by chance.
@@ -290,7 +294,10 @@ def _of_rows(
     """
     kinds = [_kind(row, delimiter) for row in rows]
     longest, end = _longest(kinds)
-    if end - longest < 2:  # two rows are the least that has a rate
+    if end - longest < LEAST_ROWS:
+        kinds = _labelled(rows)
+        longest, end = _longest(kinds)
+    if end - longest < LEAST_ROWS:
         return None
     start = _begins(rows, kinds, longest)
     data = [row for row, kind in zip(rows[start:end], kinds[start:end], strict=True) if kind == kinds[longest]]
@@ -344,6 +351,15 @@ def _kind(row: Sequence[str], delimiter: str) -> int:
     least = 1 if delimiter == "" else min(2, len(row))
     numbers = sum(map(is_value, filled))
     return len(row) if numbers >= least and 2 * numbers >= len(filled) else 0
+
+
+def _labelled(rows: Sequence[Sequence[str]]) -> list[int]:
+    """As ``_kind`` for rows that say in words what they are of, with numbers in the places where most have them."""
+    places = [tuple(at for at, cell in enumerate(row) if is_value(cell)) for row in rows]
+    often = Counter((len(row), own) for row, own in zip(rows, places, strict=True) if len(own) > 1)
+    (kind, times), *_ = often.most_common(1) or [((0, ()), 0)]
+    alike = [(len(row), own) == kind for row, own in zip(rows, places, strict=True)]
+    return [kind[0] if same and times >= LABELLED_ROWS else 0 for same in alike]
 
 
 def _longest(kinds: Sequence[int]) -> tuple[int, int]:

@@ -117,7 +117,7 @@ class FileForm(Table):
     ``header_row`` and ``unit_row`` count from 1; 0 where there is none; the data begin in
     ``first_row``, or below both. ``across`` turns rows into columns before they are counted.
     ``label`` is a column whose text tells recordings apart, or several by what they are called in templates; ``labels``
-    adds names to those of the patterns.
+    adds names to those of the patterns, ``facts`` what stands above a table or beside its vectors under these names.
     ``missing`` are texts, and numbers, that stand for none.
     ``disorder = "drop"`` leaves out rows whose time is not after all before it, ``other_lines = "drop"`` lines of a
     text that are no rows, between them and below. With ``repeats`` a table begins wherever the row of names comes
@@ -144,6 +144,7 @@ class FileForm(Table):
     missing: tuple[str, ...] = ("", "nan", "NaN", "NAN", "MISSING")
     label: Place | dict[str, Place] | None = None
     labels: dict[str, str] = Field(default_factory=dict)
+    facts: dict[str, str] = Field(default_factory=dict)
     disorder: Literal["refuse", "drop"] = "refuse"
     other_lines: Literal["refuse", "drop"] = "refuse"
     repeats: bool = False

@@ -1,6 +1,5 @@
 """Which columns of a table that nobody described are its force and its position."""
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -10,7 +9,7 @@ import numpy as np
 from rig.config.table import TomlTable
 from rig.intake.families import COMPONENTS, DIRECTIONS, ColumnGroup, parts_of
 from rig.intake.questions import Choice, OpenQuestion
-from rig.intake.roles import candidates, words_of
+from rig.intake.roles import WORDS, candidates, words_of
 from rig.intake.survey import Looks, sign_of
 from rig.intake.units import LINEAR, ROTARY, SIGNALS, ros_unit, unit_in, unit_of, unknown_unit
 from rig.recording.converter import at_the_end_of_range, run_lengths
@@ -25,8 +24,8 @@ ROBOT_WORDS = frozenset(("tcp", "pose", "ee", "eef", "flange"))
 REACH_M = 3.0
 # A way this short in millimetres is pressed by nanoindenters, which write smaller units; robots write it in metres.
 LEAST_MM = 0.05
-# As OptiTrack's Motive states them above its columns.
-_LENGTHS = re.compile(r"length units?\W+(\w+)", re.IGNORECASE)
+# Of a line above the columns that states a unit: `Length Units,Meters` in OptiTrack's Motive, `Unit:,lbF` of gauges.
+UNIT_WORDS = frozenset(("unit", "units", "einheit", "einheiten", "单位", "単位"))
 # What a force cell reads across its axis, and another's noise, is a few percent of the force.
 RIVAL_SHARE = 0.1
 # The same force in another unit differs by rounding only, which is a few thousandths of it at most.
@@ -133,12 +132,21 @@ def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
         return unit
     if not ROTARY_WORDS.isdisjoint(words):
         return {"force": "N m", "velocity": "rad/s"}.get(quantity, "rad" if np.abs(known).max() <= TURN_RAD else "deg")
-    if quantity == "position" and (
-        stated := _LENGTHS.search(" ".join(map(" ".join, table.layout.sheet.facts.items())))
-    ):
-        return unit_in(stated[1])
+    if stated := _stated_unit(quantity, table.layout.sheet.facts):
+        return stated
     robot = not ROBOT_WORDS.isdisjoint(words) and np.abs(known).max() < REACH_M
     return "m" if quantity == "position" and (robot or np.ptp(known) < LEAST_MM) else USUAL[quantity]
+
+
+def _stated_unit(quantity: str, facts: Mapping[str, str]) -> str:
+    """The unit in a line above the table that states one of this quantity, or of whatever has it; empty without one."""
+    own = {*WORDS[quantity], *(("length",) if quantity == "position" else ())}
+    for name, value in facts.items():
+        words, unit = set(words_of(name)), unit_in(value)
+        others = words - UNIT_WORDS
+        if others < words and (not others or others & own) and unit in LINEAR[quantity]:
+            return unit
+    return ""
 
 
 def value_of(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, int]) -> TomlTable:

@@ -11,7 +11,7 @@ from rig.config.table import TomlTable
 from rig.intake.aside import WAYS, Group, left_aside, nothing_found, untimed
 from rig.intake.families import INTERRUPTED, ColumnGroup, all_tables, groups_of
 from rig.intake.folder import below, files_in
-from rig.intake.labelling import Labels, labels_in
+from rig.intake.labelling import Labels, facts_in, labels_in
 from rig.intake.mapping import FileForm
 from rig.intake.measured import beside, chosen, measured_in, ranks_of, spoilt
 from rig.intake.naming import channels_of, names_of
@@ -208,6 +208,7 @@ def _proposed(
     at = None if {"wraps_at", "finer"} & time.keys() else _number(first, time)
     measured = measured_in(first, _number(first, time), quantities)
     files, templates = (pattern["files"], {}) if "files" in pattern else _files(folder, group)
+    facts, stated = facts_in(group, templates)
     forms = [own.layout.form for own in group]
     table: TomlTable = {
         "files": files, **_sheets(group), **pattern, **first.layout.form,
@@ -217,6 +218,7 @@ def _proposed(
     labels = labels_in(first, taken, at)
     table |= {"label": labels.label} if labels.label is not None else {}
     table |= {"labels": {"part": first.index}} if first.index else {}
+    table |= {"facts": facts} if facts else {}
     late = _late(first, at, labels.label)
     table |= {"disorder": "drop"} if late else {}
     table |= {"time": time, "columns": measured.columns}
@@ -225,7 +227,8 @@ def _proposed(
         *first.layout.doubts, *_broken(group), *doubts, *spoils, *measured.doubts, *labels.doubts, *late,
         *_senses(first, measured.columns),
     ]  # fmt: skip
-    return table, {**templates, **labels.templates, **_apart(group, labels)}, said, [*asked, *measured.questions]
+    templates |= {**stated, **labels.templates, **_apart(group, labels)}
+    return table, templates, said, [*asked, *measured.questions]
 
 
 def _apart(group: Group, labels: Labels) -> TomlTable:

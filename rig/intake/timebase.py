@@ -25,12 +25,17 @@ DAYS = (36_526.0, 60_000.0)
 # motion are, or the whole recording were shorter than anybody records.
 RATES_HZ = (0.2, 20_000.0)
 SHORTEST_S = 0.2
+# What time may be counted from within a recording: the whole recording's is surer.
+PARTS = frozenset(("step", "segment", "interval", "cycle", "stage", "phase", "block", "abschnitt", "schritt"))
 # Where more of the rows have the stamp of the row before, it is coarser than they are: whole seconds of many rows each.
 SAME_STAMPS = 0.1
 _RATE = re.compile(r"rate|freq|abtast|采样|サンプリング|\bfs\b", re.IGNORECASE)
 _SAMPLED = re.compile(
     r"sampl|scan|acqui|frame|data|collect|log|abtast|采样|サンプリング|update|hz|\bfs\b", re.IGNORECASE
 )
+# What is in Hz may be a filter's or a test's; with one of these words it is how often the rows come.
+_SAMPLES = re.compile(r"sampl|scan|acqui|采样|サンプリング|abtast", re.IGNORECASE)
+_HERTZ = re.compile(r"\bk?hz\b|\bk?s/s\b|\bsps\b|samples?/s", re.IGNORECASE)
 _STEP = re.compile(r"interval|period|delta_x|time step|sample time|\bdt\b|increment|schrittweite", re.IGNORECASE)
 _SECOND = re.compile(r":\d\d:\d\d$")
 _FIRST = re.compile(r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?")
@@ -111,6 +116,7 @@ def span_s(table: ColumnGroup, time: TomlTable) -> tuple[float, float] | None:
 def _fitting(table: ColumnGroup) -> list[int]:
     """Columns that may be time: by their words, then those of stamps, then the first if it runs like a clock."""
     named = table.fitting("time")
+    named.sort(key=lambda number: not PARTS.isdisjoint(words_of(table.layout.sheet.header[number])))
     first = [number for number in table.columns[:1] if number in table.looks]
     clocks = [number for number in first if table.looks[number].even and not table.looks[number].counts]
     stamps = [number for number in table.columns if any(map(is_stamp, table.texts.get(number, [])[:1]))]
@@ -196,6 +202,8 @@ def _stated_rate_Hz(facts: Mapping[str, str]) -> float | None:
         unit = unit_of(name) or unit_of(value)
         if amount > 0 and _STEP.search(name):
             return 1e9 / (amount * TIME_NS.get(unit, TIME_NS["s"]))
-        if amount > 0 and _RATE.search(name) and _SAMPLED.search(f"{name} {value}"):
-            return amount * (1e3 if "khz" in (name + value).lower() else 1.0)
+        said = f"{name} {value}"
+        rate = _RATE.search(name) and _SAMPLED.search(said)
+        if amount > 0 and (rate or (_SAMPLES.search(name) and _HERTZ.search(said))):
+            return amount * (1e3 if re.search("khz|ks/s", said, re.IGNORECASE) else 1.0)
     return None
