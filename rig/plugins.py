@@ -1,7 +1,8 @@
 """What other distributions declare by entry points: each is admitted, or named with what is wrong and harms nothing.
 
 The groups are `tissue_rig.force`, `.axis`, `.tracker`, `.input`, `.cause`, `.axis_cause` and `.law`. Two distributions
-that declare one name are both refused: which of two drivers moves a tip is not left to the order of folders.
+that declare one name are both refused: which of two drivers moves a tip is not left to the order of folders. Our own
+products are declared in the same groups, by the distribution `tissue-rig` itself.
 """
 
 import inspect
@@ -10,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from rig.deadline import within
 
@@ -61,6 +62,8 @@ def _expected(item: object, what: str) -> str:
     return f"is {item!r}, where {what} is expected"
 
 
+# The distribution that this package is of.
+OURS = "tissue-rig"
 _met: dict[str, tuple[Plugin, ...]] = {}
 
 # Looking through all distributions takes 10 ms.
@@ -88,12 +91,21 @@ def hint() -> str:
     return f"; plug-ins that cannot be used: {failed}" if failed else ""
 
 
+def our_own(group: str) -> list[Any]:
+    """What this package's own distribution declares in ``group``; none where it lies about without being installed."""
+    return [point.load() for point in _advertised().select(group=group) if _is_ours(point)]
+
+
+def _is_ours(point: EntryPoint) -> bool:
+    return point.dist is not None and point.dist.name == OURS
+
+
 def admit(group: str, admission: Admission[Item]) -> None:
     """Registers every usable entry point of ``group``; the others are kept with their error."""
     if not group:
         return
     loaded = partial(_loaded, admission)
-    found = [loaded(point) for point in _advertised().select(group=group)]
+    found = [loaded(point) for point in _advertised().select(group=group) if not _is_ours(point)]
     names = Counter(plugin.declares for plugin, _ in found if not plugin.error)
     _met[group] = tuple(_admitted(plugin, item, names, admission) for plugin, item in found)
 

@@ -3,14 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-from rig.config.products.evdev_switch import EvdevSwitch
 from rig.config.products.firmata_glove import FirmataGlove
 from rig.config.products.input_role import InputProduct
-from rig.config.products.lsl_stream import LslStream
 from rig.config.products.registry import ROLES, products_of
 from rig.registry import Registry
 
-INPUTS: Registry[type[InputProduct]] = products_of(
-    "input", "input", InputProduct, (FirmataGlove, EvdevSwitch, LslStream)
-)
+INPUTS: Registry[type[InputProduct]] = products_of("input", "input", InputProduct, FirmataGlove)
 EVERY_ROLE: Mapping[str, Registry[Any]] = {**ROLES, "input": INPUTS}

@@ -3,7 +3,7 @@
 What is registered before `rig.config.wiring` is imported is a choice there like any other.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import reduce
 from operator import or_
 from typing import Annotated, Any, TypeVar
@@ -11,16 +11,11 @@ from typing import Annotated, Any, TypeVar
 from pydantic import Discriminator, Tag, TypeAdapter
 
 from rig.config.products.bota_sensone import BotaWiring
-from rig.config.products.cia402 import Cia402Wiring
-from rig.config.products.laumas_tlb import LaumasWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
-from rig.config.products.openigtlink import OpenIgtLinkWiring
-from rig.config.products.optitrack_natnet import NatNetWiring
-from rig.config.products.robotiq_ft300 import Ft300Wiring
 from rig.config.products.roles import AxisProduct, ForceProduct, Product, TrackerProduct
 from rig.config.products.usable import refusal_of
-from rig.config.products.zaber_ascii import ZaberWiring
+from rig.plugins import our_own
 from rig.registry import Registry
 
 AnyProduct = TypeVar("AnyProduct", bound=Product)
@@ -31,20 +26,16 @@ def name_of(product: type[Product]) -> str:
     return str(product.model_fields["product"].default)
 
 
-def products_of(role: str, what: str, kind: type[AnyProduct], own: Iterable[type[AnyProduct]]) -> Any:
-    """The registry of ``role``: our own products, then those of plug-ins; ``what`` is what messages call one."""
-    return Registry[type[AnyProduct]](what, name_of, own, f"tissue_rig.{role}", refusal_of(kind))
+def products_of(role: str, what: str, kind: type[AnyProduct], usual: type[AnyProduct]) -> Any:
+    """The registry of ``role``: ``usual``, our other products, then plug-ins'; ``what`` is what messages call one."""
+    group = f"tissue_rig.{role}"
+    own = dict.fromkeys([usual, *our_own(group)])
+    return Registry[type[AnyProduct]](what, name_of, own, group, refusal_of(kind))
 
 
-FORCE_SENSORS: Registry[type[ForceProduct]] = products_of(
-    "force", "force sensor", ForceProduct, (BotaWiring, Ft300Wiring, LaumasWiring)
-)
-AXES: Registry[type[AxisProduct]] = products_of(
-    "axis", "servo axis", AxisProduct, (Epos4Wiring, Cia402Wiring, ZaberWiring)
-)
-TRACKERS: Registry[type[TrackerProduct]] = products_of(
-    "tracker", "marker tracker", TrackerProduct, (PolarisWiring, NatNetWiring, OpenIgtLinkWiring)
-)
+FORCE_SENSORS: Registry[type[ForceProduct]] = products_of("force", "force sensor", ForceProduct, BotaWiring)
+AXES: Registry[type[AxisProduct]] = products_of("axis", "servo axis", AxisProduct, Epos4Wiring)
+TRACKERS: Registry[type[TrackerProduct]] = products_of("tracker", "marker tracker", TrackerProduct, PolarisWiring)
 ROLES: Mapping[str, Registry[Any]] = {"force": FORCE_SENSORS, "axis": AXES, "tracker": TRACKERS}
 
 
