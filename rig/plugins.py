@@ -86,9 +86,11 @@ def failures() -> Iterator[Plugin]:
 
 
 def hint() -> str:
-    """Behind a name nobody knows: which plug-ins failed, as far as that may be why; empty where none did."""
+    """Behind a name nobody knows: what failed or is not installed, as far as that may be why; empty where nothing."""
     failed = "; ".join(plugin.sentence for plugin in failures())
-    return f"; plug-ins that cannot be used: {failed}" if failed else ""
+    said = f"; plug-ins that cannot be used: {failed}" if failed else ""
+    commands = _advertised().select(group="console_scripts")
+    return said if any(map(_is_ours, commands)) else f"{said}; {OURS} is not installed, and declares nothing"
 
 
 def our_own(group: str) -> list[Any]:

@@ -32,6 +32,7 @@ SMOKES: Mapping[str, Smoke] = {
     "cluster": Smoke("distributed", "from distributed import LocalCluster"),
     "foxglove": Smoke("foxglove", "from api.http.streams.bridge import bridged"),
     "glove": Smoke("pyfirmata2", "from drivers.firmata.device import open_glove"),
+    "gs_usb": Smoke("gs_usb", "from can.interfaces.gs_usb import GsUsbBus"),
     "igtl": Smoke("pyigtl", "import pyigtl, crcmod; crcmod.mkCrcFun(0x142F0E1EBA9EA3693)(b'1')"),
     "lsl": Smoke("pylsl", "from drivers.lsl.library import load; load('machine').local_clock()"),
     "multicast": Smoke("msgpack", "from can.interfaces.udp_multicast import UdpMulticastBus"),

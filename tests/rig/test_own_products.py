@@ -14,6 +14,7 @@ from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.inputs import EVERY_ROLE
 from rig.config.products.registry import name_of, products_of
 from rig.config.products.roles import ForceProduct, Product
+from rig.errors import UsageError
 
 ROOT = Path(__file__).parents[2]
 
@@ -50,9 +51,13 @@ def test_our_own_are_no_plug_ins() -> None:
     assert plugins.declaring("tissue_rig.force", "bota-sensone") is None
 
 
-def test_a_product_that_is_not_declared_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_is_not_installed_says_so_where_a_product_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(UsageError, match=r"all: bota-sensone, .*[^d]$") as told:
+        EVERY_ROLE["force"].named("acme")
+    assert "not installed" not in str(told.value)
     monkeypatch.setattr(plugins, "OURS", "another")
-    assert plugins.our_own("tissue_rig.force") == []
     monkeypatch.setattr(plugins, "_met", {})
-    monkeypatch.setattr(plugins, "OURS", "tissue-rig")
-    assert next(iter(products_of("force", "force sensor", ForceProduct, BotaWiring))) == "bota-sensone"
+    alone = products_of("force", "force sensor", ForceProduct, BotaWiring)
+    assert next(iter(alone)) == "bota-sensone"
+    with pytest.raises(UsageError, match=r"; another is not installed, and declares nothing$"):
+        alone.named("acme")
