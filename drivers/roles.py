@@ -7,7 +7,7 @@ is lost. ``close`` leaves the device safe, may be called twice and never raises.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from rig.channels import AxisSample, ForceSample, MarkerSample
 
@@ -57,6 +57,14 @@ class Device(Protocol):
 
     def close(self) -> None:
         """Leaves the device safe and the port free."""
+
+
+@runtime_checkable
+class Asked(Protocol):
+    """A device whose ``start`` sets something offers this beside it, for whoever only looks what is there."""
+
+    def identify(self) -> Identity:
+        """Opens the port, asks who is there, changes nothing and closes it; raises DeviceError."""
 
 
 class ForceSensor(Device, Protocol):

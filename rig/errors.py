@@ -24,6 +24,10 @@ class DeviceError(RigError):
     """A device is absent, silent, wrong or in fault: check wiring and power, then `rig doctor`."""
 
 
+class PluginError(RigError):
+    """What another distribution declares failed in its own code: see its maker, or uninstall it."""
+
+
 class CheckFailed(RigError):
     """A check ran and its answer is no (`rig verify`, `rig doctor`)."""
 

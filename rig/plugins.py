@@ -6,6 +6,8 @@ products are declared in the same groups, by the distribution `tissue-rig` itsel
 """
 
 import inspect
+import sys
+import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -14,6 +16,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
 from rig.deadline import within
+from rig.errors import PluginError
 
 Item = TypeVar("Item")
 # Half of what a process of the bench has for its start, as each of them imports what is declared.
@@ -30,6 +33,7 @@ class Plugin:
     version: str
     declares: str = ""
     error: str = ""
+    module: str = ""
 
     @property
     def sentence(self) -> str:
@@ -80,6 +84,24 @@ def declaring(group: str, name: str) -> Plugin | None:
     return next((one for one in _met.get(group, ()) if one.declares == name and not one.error), None)
 
 
+def blamed(error: Exception) -> PluginError | None:
+    """``error`` as that of the plug-in in whose code it arose, also in another process; None where it is in none's."""
+    told = "".join(traceback.format_exception(error))
+    used = [plugin for plugins in _met.values() for plugin in plugins if not plugin.error]
+    places = {plugin: told.rfind(_place(plugin)) for plugin in used}
+    last = max(places, key=lambda plugin: places[plugin], default=None)
+    if last is None or places[last] < 0:
+        return None
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    return PluginError(f"{replace(last, error=what).sentence}; see its maker, or uninstall it")
+
+
+def _place(plugin: Plugin) -> str:
+    """As lines of a traceback have it: the plug-in's file, or the folder of its package."""
+    file = str(getattr(sys.modules.get(plugin.module), "__file__", None) or plugin.module)
+    return f'File "{file.removesuffix("__init__.py")}'
+
+
 def failures() -> Iterator[Plugin]:
     """Those that cannot be used."""
     return (plugin for plugins in _met.values() for plugin in plugins if plugin.error)
@@ -114,7 +136,7 @@ def admit(group: str, admission: Admission[Item]) -> None:
 
 def _loaded(admission: Admission[Item], point: EntryPoint) -> tuple[Plugin, Item | None]:
     whose, version = (point.dist.name, point.dist.version) if point.dist else ("a distribution", "")
-    plugin = Plugin(point.group, point.name, whose, version)
+    plugin = Plugin(point.group, point.name, whose, version, module=point.module.partition(".")[0])
     try:
         with within(IMPORT_S):
             item = point.load()

@@ -11,7 +11,7 @@ from contextlib import nullcontext
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -110,7 +110,18 @@ def main() -> None:
         with deferred() if for_help else nullcontext():
             build(next((word for word in words if word != "--"), None), for_help)()
     except RigError as error:
-        from rich.console import Console  # noqa: PLC0415 - help needs none
+        _end(error)
+    except Exception as error:
+        from rig.plugins import blamed  # noqa: PLC0415 - help needs none
 
-        Console(stderr=True, highlight=False, soft_wrap=True, emoji=False).print(f"rig: {error}", markup=False)
-        sys.exit(error.exit_code)
+        theirs = blamed(error)
+        if theirs is None:
+            raise
+        _end(theirs)
+
+
+def _end(error: RigError) -> NoReturn:
+    from rich.console import Console  # noqa: PLC0415 - help needs none
+
+    Console(stderr=True, highlight=False, soft_wrap=True, emoji=False).print(f"rig: {error}", markup=False)
+    sys.exit(error.exit_code)

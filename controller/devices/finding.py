@@ -1,7 +1,7 @@
 """Which ports the computer has and who answers there. USB is read from the system; nothing is written without consent.
 
 An unknown port may be somebody else's pump or printer: what is sent to it is for a person to allow. The drivers
-themselves ask who is there; starting one moves nothing.
+themselves ask who is there, and change nothing; one that has no question of its own is started, which moves nothing.
 """
 
 import contextlib
@@ -17,7 +17,7 @@ from controller.inputs.runner import open_input
 from drivers.evdev.device import BY_NAME
 from drivers.evdev.port import NAMES, key_devices
 from drivers.lsl.library import streams_there
-from drivers.roles import Device, Identity
+from drivers.roles import Asked, Device, Identity
 from rig.config.products.evdev_switch import EvdevSwitch
 from rig.config.products.inputs import INPUTS
 from rig.config.products.lsl_stream import LslStream
@@ -167,6 +167,8 @@ def ask(port: PortFound) -> PortFound:
 
 def _identity(role: str, product: type[Product], address: str) -> Identity:
     device = _opened(role, product.model_validate({"port": address}))
+    if isinstance(device, Asked):
+        return device.identify()
     with contextlib.closing(device):
         device.start()
         return device.identity

@@ -34,6 +34,8 @@ BLOCKED_POLLS, AMONG_POLLS = 3, 100
 BEYOND_RANGE = 2.0
 # The largest volume of a camera, and far beyond any axis.
 FARTHEST_MM = 10_000.0
+# The loop is given up by its operators after a second without a cycle; who is at fault has to be named before that.
+CYCLIC_S = 0.5
 START_S = 30.0  # half of what the loop has for its start, homing included
 RATE_TOLERANCE = 0.1  # half of what lies between neighbouring rates of a sensor
 
@@ -128,7 +130,7 @@ class Guarded(ABC, Generic[Made, Sample]):
 
     def _poll(self, poll: Callable[[int], Sequence[Sample]], now_ns: int) -> Sequence[Sample]:
         begun_ns, waits = self._now(), self._waits()
-        samples = self._asked(lambda: poll(now_ns))
+        samples = self._soon(lambda: poll(now_ns))
         self._note_wait(self._now() - begun_ns, self._waits() - waits)
         return self._checked(samples)
 
@@ -165,6 +167,15 @@ class Guarded(ABC, Generic[Made, Sample]):
     @abstractmethod
     def _impossible(self, sample: Sample) -> str:
         """What of a valid sample cannot be; "" where all can."""
+
+    def _soon(self, ask: Callable[[], Answer]) -> Answer:
+        """As ``_asked`` for what the loop calls in each cycle: what never comes back is named, and not waited for."""
+
+        def asked() -> Answer:
+            with within(CYCLIC_S):
+                return ask()
+
+        return self._asked(asked)
 
     def _asked(self, ask: Callable[[], Answer]) -> Answer:
         try:
@@ -262,16 +273,16 @@ class GuardedAxis(Guarded[ServoAxis, AxisSample]):
         return self._poll(self._device.poll, now_ns)
 
     def command(self, position_mm: float, now_ns: int) -> None:
-        self._asked(lambda: self._device.command(position_mm, now_ns))
+        self._soon(lambda: self._device.command(position_mm, now_ns))
 
     def request(self, now_ns: int) -> None:
-        self._asked(lambda: self._device.request(now_ns))
+        self._soon(lambda: self._device.request(now_ns))
 
     def quick_stop(self) -> None:
-        self._asked(self._device.quick_stop)
+        self._soon(self._device.quick_stop)
 
     def power_off(self) -> None:
-        self._asked(self._device.power_off)
+        self._soon(self._device.power_off)
 
     def history(self) -> tuple[str, ...]:
         return self._asked(self._device.history)

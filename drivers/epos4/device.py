@@ -105,8 +105,8 @@ class Epos4Axis(SampledDevice):
         self.close()
         self._homed = False
         config = self._config
-        self._link = self._open_link(config.port, config.bitrate, self._now)
-        node = Node(self._link, config.node, setup.host_node(config), config.heartbeat_ms, self._name, self._now)
+        self._link = self._opened()
+        node = self._node(self._link)
         self._samples = SampleBuilder(self._kind, self._samples.next_seq)
         node.handlers[TPDO_IDS[0] + config.node] = self._samples.take_state
         node.handlers[TPDO_IDS[1] + config.node] = self._samples.take_motion
@@ -125,6 +125,18 @@ class Epos4Axis(SampledDevice):
             raise
         node.restarted = False
         self._refused_before = self._link.decoder.refused
+
+    def identify(self) -> Identity:
+        """Who is there; no object is written, and the node stays in its state."""
+        with contextlib.closing(self._opened()) as link:
+            return self._kind.identify(self._node(link))
+
+    def _opened(self) -> CanLink:
+        return self._open_link(self._config.port, self._config.bitrate, self._now)
+
+    def _node(self, link: CanLink) -> Node:
+        config = self._config
+        return Node(link, config.node, setup.host_node(config), config.heartbeat_ms, self._name, self._now)
 
     def home(self) -> None:
         """Finds the reference by the configured method; raises DeviceError where it does not within the travel."""

@@ -84,6 +84,13 @@ class NdiTracker(SampledTracker):
             self.close()
             raise
 
+    def identify(self) -> Identity:
+        """Who is there, whatever tools it has; none is loaded, and none let go."""
+        with contextlib.closing(self._open_port(startup.POWER_UP_BAUD)) as port:
+            dialogue = startup.Dialogue(port, codec.ReplyDecoder(), self._now)
+            startup.initialise(dialogue)
+            return startup.identify(dialogue)
+
     def _converse(self, dialogue: startup.Dialogue, roms: Sequence[bytes]) -> None:
         startup.initialise(dialogue)
         identity = startup.identify(dialogue)

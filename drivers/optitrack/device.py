@@ -78,14 +78,10 @@ class OptiTrackTracker(SampledTracker):
 
     def start(self) -> None:
         """Asks who streams and which bodies there are, waits for a frame; raises DeviceError in one sentence."""
-        self.close()
-        self._link = self._open_link()
         self._samples.restart()
         self._bodies, self._newest = {}, None
-        self._server = self._server._replace(name="")
         try:
-            self._ask(packets.encode_connect(), lambda: bool(self._server.name), "who it is", "its address, that it")
-            self._refuse_layout()
+            self._connect()
             wanted = packets.encode_packet(packets.REQUEST_MODELS)
             self._ask(wanted, lambda: bool(self._bodies), "its rigid bodies", "that a rigid body is defined and it")
             self._refuse_tools()
@@ -94,6 +90,21 @@ class OptiTrackTracker(SampledTracker):
             self.close()
             raise
         self._heard_ns = self._told_ns = self._now()
+
+    def identify(self) -> Identity:
+        """Who streams, whatever its bodies are called."""
+        try:
+            self._connect()
+        finally:
+            self.close()
+        return self.identity
+
+    def _connect(self) -> None:
+        self.close()
+        self._link = self._open_link()
+        self._server = self._server._replace(name="")
+        self._ask(packets.encode_connect(), lambda: bool(self._server.name), "who it is", "its address, that it")
+        self._refuse_layout()
 
     def poll(self, now_ns: int) -> list[MarkerSample]:
         """Samples of the frames that came since the last call; raises DeviceError after a second without any."""

@@ -89,15 +89,11 @@ class ZaberAxis(SampledDevice):
     def start(self) -> None:
         """Identifies the axis, stops it, and writes the limits that it keeps by itself."""
         self.close()
-        config, port = self._config, self._open_port()
-        dialogue = AsciiDialogue(
-            port, config.device, config.axis_number, self._name, self.counters, self._now, self._sleep
-        )
-        self._dialogue = dialogue
+        self._dialogue = dialogue = self._talk(self._open_port())
         try:
-            self._identity = setup.identify(dialogue, config)
+            self._identity = setup.identify(dialogue, self._config)
             self._halt(dialogue)
-            setup.configure(dialogue, config, self._limits)
+            setup.configure(dialogue, self._config, self._limits)
             self._look(dialogue)
         except BaseException:
             self.close()
@@ -105,6 +101,15 @@ class ZaberAxis(SampledDevice):
         self._samples = PositionSamples(self._scale, self._samples.next_seq)
         self._following = self._stopping = False
         self._refused, self._due_ns, self._heard_ns = "", 0, self._now()
+
+    def identify(self) -> Identity:
+        """Who is there; no setting is written, since they outlive the power."""
+        with contextlib.closing(self._open_port()) as port:
+            return setup.identify(self._talk(port), self._config)
+
+    def _talk(self, port: Port) -> AsciiDialogue:
+        device, axis = self._config.device, self._config.axis_number
+        return AsciiDialogue(port, device, axis, self._name, self.counters, self._now, self._sleep)
 
     def home(self) -> None:
         """Finds the reference by the device's own search; raises DeviceError where it does not within the travel."""

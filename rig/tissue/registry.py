@@ -10,11 +10,22 @@ from rig.tissue.laws_elastic import Fung, Layer, Power, Quadratic
 from rig.tissue.laws_extended import Extended
 from rig.tissue.laws_viscous import HuntCrossley, Prony, QuasiLinear, StandardLinear
 
+
+def refusal(item: object) -> str:
+    """Why an object is no tissue law; "" where it is one."""
+    wrong = subclass_of(Law)(item)
+    if wrong or not isinstance(item, type):
+        return wrong
+    lacking = sorted(getattr(item, "__abstractmethods__", ()))
+    lacking += [name for name in ("name", "formula", "bounds") if not getattr(item, name, None)]
+    return f"{item.__name__} has no {', '.join(lacking)}" if lacking else ""
+
+
 COMPARED: tuple[type[Law], ...] = (Constant, Index)
 THREE_PARAMETER: tuple[type[Law], ...] = (Quadratic, Power, Fung)
 OTHERS: tuple[type[Law], ...] = (Layer, HuntCrossley, StandardLinear, Prony, QuasiLinear, Extended)
 LAWS = Registry[type[Law]](
-    "tissue law", lambda law: law.name, (*COMPARED, *THREE_PARAMETER, *OTHERS), "tissue_rig.law", subclass_of(Law)
+    "tissue law", lambda law: law.name, (*COMPARED, *THREE_PARAMETER, *OTHERS), "tissue_rig.law", refusal
 )
 ALSO = {"kelvin_voigt": Constant.name}
 

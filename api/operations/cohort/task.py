@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 from api.operations.cohort.wanted import Wanted
 from controller.operation import Operation
 from rig.errors import RigError
+from rig.plugins import blamed
 from rig.recording.remote import address_of
 from rig.results import fit
 from rig.trials.opening import Opening
@@ -81,6 +82,9 @@ def run(task: Task) -> TaskOutcome:
     except RigError as error:
         return TaskOutcome(task, {}, time.monotonic() - began, _reason(task, error))
     except Exception as error:
+        theirs = blamed(error)
+        if theirs is not None:
+            return TaskOutcome(task, {}, time.monotonic() - began, str(theirs))
         reason = f"{task.called}: the work met an error of its own: {type(error).__name__}: {_reason(task, error)}"
         return TaskOutcome(task, {}, time.monotonic() - began, reason)
 

@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 from rig.diagnosis.axis_motion import Motion
 from rig.diagnosis.effects.scan import PEAKS, peaks
 from rig.diagnosis.problem import Array, Effect, InverseProblem, Par, Values
+from rig.plugins import instance_of
 from rig.registry import Registry
 from rig.simulation.scans import play
 from rig.tissue.index_law import Fields
@@ -197,4 +198,6 @@ AXIS_EFFECTS = (
     COULOMB, VISCOUS, ASYMMETRIC, STRIBECK, POSITION_LOAD, GRAVITY, POSITION_RIPPLE, DEAD_TIME, FLEXIBLE_MODE, BACKLASH,
     COMPLIANCE,
 )  # fmt: skip
-AXIS_CAUSES = Registry[AxisEffect]("cause of an axis", lambda cause: cause.name, AXIS_EFFECTS, "tissue_rig.axis_cause")
+AXIS_CAUSES = Registry[AxisEffect](
+    "cause of an axis", lambda cause: cause.name, AXIS_EFFECTS, "tissue_rig.axis_cause", instance_of(AxisEffect)
+)

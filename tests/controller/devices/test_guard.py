@@ -286,3 +286,25 @@ def test_a_start_that_does_not_end_is_given_up(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(stuck, "start", lambda: time.sleep(60))
     with pytest.raises(DeviceError, match=r"a plug-in of acme-rig 2.1: TimeoutError: not done within 0.1 s"):
         GuardedForce(PLUGIN, BotaWiring(), lambda: stuck).start()
+
+
+def test_a_poll_that_never_comes_back_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guard, "CYCLIC_S", 0.1)
+
+    def stuck() -> Sequence[ForceSample]:
+        time.sleep(60)
+        return []
+
+    with pytest.raises(DeviceError, match=r"a plug-in of acme-rig 2.1: TimeoutError: not done within 0.1 s"):
+        force(stuck).poll(0)
+
+
+@pytest.mark.parametrize("what", ["command", "request", "quick_stop", "power_off"])
+def test_an_axis_that_never_comes_back_is_named_too(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guard, "CYCLIC_S", 0.1)
+    stuck = FakeAxis(Clock(), 7)
+    monkeypatch.setattr(stuck, what, lambda *_: time.sleep(60))
+    axis = GuardedAxis(PLUGIN, Epos4Wiring(), lambda: stuck)
+    asked = {"command": (1.0, 0), "request": (0,)}.get(what, ())
+    with pytest.raises(DeviceError, match=r"not done within 0\.1 s"):
+        getattr(axis, what)(*asked)

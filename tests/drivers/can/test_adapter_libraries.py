@@ -132,6 +132,8 @@ def gs_usb(monkeypatch: pytest.MonkeyPatch) -> Iterator[deque[GsUsbFrame]]:
         "gs_usb.gs_usb": {"GsUsb": GsUsb},
         "gs_usb.gs_usb_frame": frames,
     }
+    # As python-can's class may have met the real package, which is there in tests.
+    monkeypatch.delitem(sys.modules, "can.interfaces.gs_usb", raising=False)
     for name, held in modules.items():
         module = ModuleType(name)
         vars(module).update(held)

@@ -381,3 +381,12 @@ def test_numbers_go_on_where_the_driver_before_left_off(bench: DriveBench, homed
         again.request(bench.now())
         samples = list(again.poll(bench.now()))
     assert samples[0].seq == last + 1
+
+
+def test_who_only_asks_who_is_there_writes_no_object_and_leaves_the_node_in_its_state(bench: DriveBench) -> None:
+    state = bench.mock.nmt
+    assert axis_on(bench).identify().product == "maxon EPOS4 61500000"
+    uploads = {frame.data[0] & 0xE0 for frame in bench.sent}
+    assert uploads <= {0x40, 0x60}  # CiA 301: initiate an upload, and a segment of it
+    assert {frame.can_id for frame in bench.sent} == {0x601}
+    assert (bench.mock.nmt, bench.closed) == (state, True)

@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 from drivers.ndi import codec
+from drivers.ndi.device import NdiTracker
 from mock_devices.testing.ndi import TrackerBench, run, started
+from rig.config.products.ndi_polaris import PolarisWiring
 
 ROM = b"NDI\0".ljust(1024, b"\x07")
 
@@ -114,3 +116,12 @@ def test_after_our_sessions_another_client_finds_its_markers(bench: TrackerBench
         tracked = said(bench, "TX:0001")[0]
         assert "MISSING" not in tracked
         said(bench, "TSTOP:")
+
+
+def test_who_only_asks_who_is_there_loads_nothing_and_lets_nothing_go(bench: TrackerBench) -> None:
+    other_client(bench)
+    bench.commands.clear()
+    found = NdiTracker(bench.open, PolarisWiring(tools=("another",)), lambda: 0).identify()
+    assert found.product == "Polaris Vega Control Firmware"
+    assert {command.split(b":")[0] for command in bench.commands} == {b"INIT", b"VER", b"GETINFO"}
+    assert bench.closed

@@ -179,3 +179,10 @@ def test_a_tool_is_a_body_or_one_of_its_markers() -> None:
 def test_it_is_not_asked_before_its_start() -> None:
     with pytest.raises(DeviceError, match="not started"):
         Session().tracker.poll(0)
+
+
+def test_who_only_asks_who_streams_needs_no_name_of_a_body() -> None:
+    session = Session(tools=("another", "third"))
+    assert session.tracker.identify().firmware == "Motive 3.1.0.1"
+    assert session.link.sent == [packets.CONNECT]
+    assert session.link.closed

@@ -319,3 +319,11 @@ def test_a_rate_that_the_line_cannot_carry_is_refused_in_the_configuration() -> 
 
 def test_home_leads_outward_only_where_positions_grow_into_the_tissue() -> None:
     assert ZaberWiring().homes_outward and not ZaberWiring(direction=-1).homes_outward
+
+
+def test_who_only_asks_who_is_there_writes_no_setting_and_stops_nothing() -> None:
+    """Settings outlive the power, and whoever looks for a device does not know its scale."""
+    bench = ZaberBench()
+    asked = bench.axis(Limits(position_min_mm=1.0, position_max_mm=40.0)).identify()
+    assert (asked.product, asked.serial, asked.firmware) == ("zaber-ascii", "68123", "7.40")
+    assert bench.commands and all(b" get " in line or line.split()[1:2] == [b"get"] for line in bench.commands)
