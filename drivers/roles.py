@@ -60,7 +60,7 @@ class Device(Protocol):
 
 
 @runtime_checkable
-class Asked(Protocol):
+class Identifying(Protocol):
     """A device whose ``start`` sets something offers this beside it, for whoever only looks what is there."""
 
     def identify(self) -> Identity:

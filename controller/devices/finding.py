@@ -17,7 +17,7 @@ from controller.inputs.runner import open_input
 from drivers.evdev.device import BY_NAME
 from drivers.evdev.port import NAMES, key_devices
 from drivers.lsl.library import streams_there
-from drivers.roles import Asked, Device, Identity
+from drivers.roles import Device, Identifying, Identity
 from rig.config.products.evdev_switch import EvdevSwitch
 from rig.config.products.inputs import INPUTS
 from rig.config.products.lsl_stream import LslStream
@@ -167,7 +167,7 @@ def ask(port: PortFound) -> PortFound:
 
 def _identity(role: str, product: type[Product], address: str) -> Identity:
     device = _opened(role, product.model_validate({"port": address}))
-    if isinstance(device, Asked):
+    if isinstance(device, Identifying):
         return device.identify()
     with contextlib.closing(device):
         device.start()
