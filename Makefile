@@ -67,6 +67,9 @@ campaigns: $(READY) page
 	$(BIN)/python -m benchmarks.control
 	$(BIN)/python -m benchmarks.clock
 	$(BIN)/python -m benchmarks.contact
+	$(BIN)/python -m benchmarks.preload
+	$(BIN)/python -m benchmarks.imported
+	for kind in csv parquet h5; do $(BIN)/python -m benchmarks.large_import --kind $$kind || exit; done
 	$(BIN)/python -m benchmarks.stop
 	$(BIN)/python -m benchmarks.stalls
 	$(BIN)/python -m benchmarks.service --minutes 10

@@ -21,6 +21,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 RATE_HZ = 1000.0
+MOST_GB = 1.5
 PIECE_ROWS = 500_000
 CHANNELS = ("t", "F", "x", "Fx", "Fy", "T1", "T2", "U")
 MAPPING = """[[tables]]
@@ -33,8 +34,8 @@ position = {{ column = "x", unit = "mm" }}
 """
 
 
-def main() -> None:
-    """Makes the file, imports it, and prints what that took."""
+def main() -> int:
+    """Makes the file, imports it, and prints what that took; 1 where it took more memory than is allowed."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--gigabytes", type=float, default=2.0)
     parser.add_argument("--kind", choices=("csv", "parquet", "h5"), default="csv")
@@ -58,6 +59,7 @@ def main() -> None:
             "largest_memory_GB": round(used.ru_maxrss * 1024 / 1e9, 3),
             "processor_s": round(used.ru_utime + used.ru_stime, 1), "seconds": round(took_s, 1),
         }))  # fmt: skip
+        return int(used.ru_maxrss * 1024 / 1e9 >= MOST_GB)
 
 
 def _write(path: Path, size_B: float) -> int:
@@ -95,4 +97,4 @@ def _columns(first: int) -> list[NDArray[np.float64]]:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

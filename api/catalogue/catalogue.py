@@ -171,6 +171,13 @@ class Catalogue:
             stiffness=compared(sessions, models),
         )
 
+    def site_thresholds_N(self, subject: str, highest_N: float) -> dict[str, float]:
+        """What was found last at each site of the subject, to a tenth and never above it; empty where nothing is."""
+        with self._fresh() as (connection, _):
+            found = every(connection, ThresholdEntry, Asked(subject=subject))
+        newest_last = [(one.site, int(10 * (one.force_N or 0.0)) / 10) for one in found[::-1]]
+        return {site: min(force_N, highest_N) for site, force_N in newest_last if site and force_N > 0}
+
     def refreshed(self) -> tuple[str, ...]:
         """Brings the tables to what the folders hold now; sentences on what is not listed."""
         with self._fresh() as (_, remarks):

@@ -250,6 +250,7 @@ class _Reader:
     def _threshold(self, name: str) -> Iterator[CatalogueEntry]:
         found = Threshold.read(self._folder / name)
         about = self._about(name)
+        about["site"] = found.site or about["site"]
         yield ThresholdEntry(**about, recording=found.recording, force_N=found.force_N, up_to_N=found.up_to_N)
         yield self._work("threshold", name)
 

@@ -8,6 +8,9 @@ from pydantic import Field
 from rig.config.products.roles import Positive
 from rig.config.table import Table
 
+# At most what subject.pain_threshold_N may be, for the reason that stands there (rig.config.maxima).
+HIGHEST_SITE_N = 50.0
+
 
 class Subject(Table):
     """Who lies under the tip."""
@@ -15,8 +18,7 @@ class Subject(Table):
     id: str = Field(default="phantom", description="a code, no person's name; kept with each recording")
     site: str = Field(default="forearm", description="where the tip presses, kept with each recording")
     pain_threshold_N: Positive = Field(default=15.0, description="the lower of it and limits.force_N holds")
-    # At most what subject.pain_threshold_N may be, for the reason that stands there (rig.config.maxima).
-    site_thresholds_N: Mapping[str, Annotated[float, Field(gt=0, le=50)]] = Field(
+    site_thresholds_N: Mapping[str, Annotated[float, Field(gt=0, le=HIGHEST_SITE_N)]] = Field(
         default={}, description="found at single sites, by their names; at its site each holds beside the others"
     )
 

@@ -23,6 +23,7 @@ def nothing_found(folder: Path, files: Sequence[Path], groups: Sequence[Group], 
     held = {table.path for group in groups for table in group}
     texts = [below(folder, path) for path in files if kind_of(path) and path not in held]
     others = [below(folder, path) for path in files if not kind_of(path)]
+    doubts = [*doubts, *dict.fromkeys(doubt for table in tables for doubt in table.layout.doubts)]
     why = [
         *doubts[:MOST_NAMED],
         *seen[:MOST_NAMED],

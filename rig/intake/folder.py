@@ -12,6 +12,9 @@ from rig.intake.pattern import filled, matched
 from rig.intake.readers import kind_of, open_sheets
 from rig.intake.sheet import Sheet, unreadable
 
+# Hidden files, and those by which Excel keeps others from a workbook that is open.
+OF_PROGRAMS = (".", "~$")
+
 
 class FoundTable(NamedTuple):
     """One table of the folder: its sheet, how it is read, and what tells it apart."""
@@ -28,7 +31,7 @@ def files_in(folder: Path) -> list[Path]:
             return [folder]
         if not folder.is_dir():
             raise DataError(f"{folder}: no such file or folder; give the one that holds the data")
-        found = [path for path in _below_all(folder) if path.is_file() and not path.name.startswith(".")]
+        found = [path for path in _below_all(folder) if path.is_file() and not path.name.startswith(OF_PROGRAMS)]
     except PermissionError as error:
         raise unreadable(Path(error.filename), "a folder", error) from error
     return sorted(found, key=lambda path: natural(path.relative_to(folder).as_posix()))

@@ -131,8 +131,15 @@ def _layouts(path: Path) -> list[Layout]:
         return seen or [layout for layouts in found.values() for layout in layouts]
     if kind != "arrays" or path.suffix.lower() not in ARRAYS:
         return []
-    sheets = [sheet for _, sheet in open_sheets(path, FileForm.model_construct(sheets="**/*")) if sheet.header]
-    return [Layout(sheet, Source(path, sheet.name), {}, sheet.header) for sheet in sheets]
+    opened = [sheet for _, sheet in open_sheets(path, FileForm.model_construct(sheets="**/*"))]
+    sheets = [sheet for sheet in opened if sheet.header]
+    if not sheets and any(sheet.unread for sheet in opened):
+        raise DataError("; ".join(said for sheet in opened for said in _unread(sheet)))
+    return [Layout(sheet, Source(path, sheet.name), {}, sheet.header, _unread(sheet)) for sheet in sheets]
+
+
+def _unread(sheet: Sheet) -> tuple[str, ...]:
+    return (f"{sheet.path.name}{sheet.unread}".replace(";", ":", 1),) if sheet.unread else ()
 
 
 def _sections(path: Path) -> list[str]:

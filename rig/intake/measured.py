@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.config.table import TomlTable
+from rig.errors import DataError
 from rig.intake.families import COMPONENTS, DIRECTIONS, ColumnGroup, parts_of
 from rig.intake.questions import Choice, OpenQuestion
 from rig.intake.roles import WORDS, candidates, words_of
@@ -151,10 +152,22 @@ def _stated_unit(quantity: str, facts: Mapping[str, str]) -> str:
 
 def value_of(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, int]) -> TomlTable:
     """What the mapping says of a column: its place, its unit, where its sign stands, and its sense."""
-    unit = table.layout.sheet.units[column]
+    unit = table.layout.sheet.units[column] or _unit_beside(table, column)
     fitting = unit in LINEAR[quantity] or unit in ROTARY.get(quantity, {})
     value: TomlTable = {"column": table.place(column), **({"unit": unit} if fitting else {})}
     return {**value, **sign_of(table.looks[column].values), "positive": _sense(table, quantity, column, known)}
+
+
+def _unit_beside(table: ColumnGroup, column: int) -> str:
+    """The unit in the column behind it, where that holds units; raises DataError where it holds several."""
+    texts, header = table.texts.get(column + 1, []), table.layout.sheet.header
+    if not texts or UNIT_WORDS.isdisjoint(words_of(header[column + 1])) or not all(map(unit_in, texts)):
+        return ""
+    other = next((row for row, text in enumerate(texts) if unit_in(text) != unit_in(texts[0])), None)
+    if other is None:
+        return unit_in(texts[0])
+    why = f"{header[column]!r} is in {texts[other]} from here on and in {texts[0]} above"
+    raise DataError(f"{table.layout.sheet.place(other)}: {why}; save the rows of each unit as a file of its own")
 
 
 def _sense(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, int]) -> str:

@@ -196,7 +196,10 @@ def _may_be(table: ColumnGroup, found: Mapping[str, int]) -> bool:
     """Whether numbers move in enough columns besides time to be force and position, in rows enough to see it."""
     time = _number(table, clock_of(table)[0])
     moving = [number for number, looks in table.looks.items() if looks.moves and number != time]
-    return (len(moving) >= 2 and table.rows >= FEWEST_ROWS) or (len(moving) >= 1 and bool(found))
+    lacking = ("force" not in found) + found.keys().isdisjoint(WAYS)
+    left = table.looks.keys() - {time, *found.values()}
+    enough = (len(moving) >= 2 and table.rows >= FEWEST_ROWS) or (len(moving) >= 1 and bool(found))
+    return enough and len(left) >= lacking
 
 
 def _proposed(

@@ -25,6 +25,8 @@ FIELDS = {
 # A number of a tool, and a signal that only tells how two clocks lie.
 UNITLESS = ("tool", "sync")
 EXAMPLES = {"force": "N", "velocity": "mm/s", "current": "A", "temperature": "C", "arrival": "ns"}
+# A lost or swapped row is a step back; what falls back to the first tenth of the way begins anew.
+ANEW_SHARE = 0.1
 # Before the name of a label, among the columns that are read.
 LABEL = "label "
 
@@ -122,9 +124,12 @@ def _in_order(
 
 
 def _refuse_order(at_ns: Times, latest: Times, row: int, place: str) -> None:
+    said = f"{place}: time {at_ns[row] * 1e-9:.9g} s follows {latest[row] * 1e-9:.9g} s"
+    if at_ns[row] - at_ns[0] <= ANEW_SHARE * (latest[row] - at_ns[0]):
+        anew = "another recording or specimen begins here under the same name: name what parts them in `label`"
+        raise DataError(f"{said}; {anew}, or save it as a file of its own")
     raise DataError(
-        f"{place}: time {at_ns[row] * 1e-9:.9g} s follows {latest[row] * 1e-9:.9g} s; time must increase from row to "
-        "row. Mend the file, or leave such rows out: disorder = 'drop'"
+        f"{said}; time must increase from row to row. Mend the file, or leave such rows out: disorder = 'drop'"
     )
 
 

@@ -101,10 +101,13 @@ def _written_ns(texts: Sequence[str], first: int, form: str, sheet: Sheet) -> Ti
     for row, text in enumerate(texts):
         try:
             since = _since_day_0(text) if form == "spreadsheet" else datetime.strptime(text, form)
+            gone = since - (NO_DATE if "%" in form and "%d" not in form else UNIX)
+            at_ns[row] = gone.days * DAY_NS + gone.seconds * NS + gone.microseconds * 1000
+        except OverflowError as error:
+            said = f"{text!r} as {form} is beyond {LIMIT_NS / NS:g} s; correct the form of time"
+            raise DataError(f"{sheet.place(first + row)}: {said}") from error
         except ValueError as error:
             raise DataError(f"{sheet.place(first + row)}: {text!r} is not written as {form}") from error
-        gone = since - (NO_DATE if "%" in form and "%d" not in form else UNIX)
-        at_ns[row] = gone.days * DAY_NS + gone.seconds * NS + gone.microseconds * 1000
     return at_ns
 
 

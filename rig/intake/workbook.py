@@ -2,7 +2,10 @@
 
 import csv
 import datetime
+import faulthandler
 import io
+import os
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
@@ -16,6 +19,11 @@ from rig.intake.sheet import DAMAGE, unreadable
 # Day 0 of spreadsheets, in the calendar of 1900 with its leap day that never was (ECMA-376 part 1, 18.17.4.1).
 EPOCH = datetime.datetime(1899, 12, 30)
 DAY_S = 86_400.0
+
+
+# Of a compound file, as which the old form is stored ([MS-CFB] 2.2).
+COMPOUND = bytes.fromhex("d0cf11e0a1b11ae1")
+ENDS_IT = "what is damaged in it ends the program that reads it"
 
 
 def sheet_names(path: Path) -> list[str]:
@@ -58,11 +66,36 @@ def _written(cell: object, decimal: str) -> str:
 @contextmanager
 def _readable(path: Path) -> Iterator[None]:
     try:
-        with path.open("rb"):  # says why it cannot, which the library does not
-            yield
+        with path.open("rb") as file:  # says why it cannot, which the library does not
+            old = file.read(len(COMPOUND)) == COMPOUND
+        if old and not _survived(str(path), path.stat().st_mtime_ns):
+            raise ValueError(ENDS_IT)
+        yield
     except FileNotFoundError as error:
         raise DataError(f"{path}: no such file") from error
     except calamine.PasswordError as error:
         raise DataError(f"{path}: encrypted; save it without a password") from error
     except (calamine.CalamineError, *DAMAGE) as error:
         raise unreadable(path, "a workbook", error, "open it and save it as xlsx, or copy it again") from error
+
+
+@lru_cache(maxsize=1024)
+def _survived(path: str, _changed_ns: int) -> bool:
+    """Whether another process lives that reads the whole workbook: the library aborts on some that are damaged."""
+    with warnings.catch_warnings():  # other threads hold nothing that the child needs
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child:
+        return os.waitpid(child, 0)[1] == 0
+    ended = 1
+    try:
+        faulthandler.disable()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+        book = calamine.CalamineWorkbook.from_path(path)
+        for name in book.sheet_names:
+            book.get_sheet_by_name(name).to_python(skip_empty_area=False)
+        ended = 0
+    except Exception:
+        ended = 0  # a panic is none, and what is one is said by whoever reads it next
+    finally:
+        os._exit(ended)

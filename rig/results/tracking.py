@@ -184,3 +184,4 @@ class Threshold(SavedResult):
     force_N: float | None
     up_to_N: float
     recording: str
+    site: str = Field(default="", description="where, if it is not the session's")

@@ -209,7 +209,8 @@ def everything() -> dict[str, Any]:
     """All answers of a bench at rest with one session."""
     base = f"recordings/{NAME}"
     return {
-        "subject": {"id": SUBJECT, "site": SITE, "pain_threshold_N": 12.0}, "subjects": SUBJECTS, "models": MODELS,
+        "subject": {"id": SUBJECT, "site": SITE, "pain_threshold_N": 12.0, "site_thresholds_N": {}},
+        "subjects": SUBJECTS, "models": MODELS,
         "protocols": [one.model_dump() for one in PROTOCOLS], "protocols/quick/foresight": FORESIGHT,
         "sessions": SESSIONS, f"sessions/{NAME}": SESSION, f"sessions/{NAME}/curves": CURVES, "trials": TRIALS,
         f"{base}/fit/fit.json": FIT, f"{base}/diagnosis/diagnosis.json": DIAGNOSIS, f"{base}/track.json": TRACKED,
@@ -221,6 +222,6 @@ def nothing() -> dict[str, Any]:
     """All answers of a bench that was never used."""
     empty: dict[str, Any] = {"items": [], "next": None}
     return {
-        "subject": {"id": "", "site": "", "pain_threshold_N": 15.0}, "subjects": empty, "models": empty,
-        "protocols": [], "sessions": empty, "trials": empty, **NO_JOBS,
+        "subject": {"id": "", "site": "", "pain_threshold_N": 15.0, "site_thresholds_N": {}}, "subjects": empty,
+        "models": empty, "protocols": [], "sessions": empty, "trials": empty, **NO_JOBS,
     }  # fmt: skip

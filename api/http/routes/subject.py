@@ -6,25 +6,37 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Response
 from pydantic import Field
 
+from api.catalogue.catalogue import Catalogue
 from api.http.access.rights import OPERATE, READ
 from api.http.models import RequestBody
 from api.http.problems import RequestRefused, responses
 from api.http.routes.common import LeaseHeader
 from api.http.service import Service
+from rig.config.subject import HIGHEST_SITE_N
 
 MatchHeader = Annotated[str, Header(alias="If-Match", max_length=80, description="the ETag of what is to be changed")]
 
 
+SiteThresholds = Annotated[dict[str, Annotated[float, Field(gt=0, le=HIGHEST_SITE_N)]], Field(max_length=200)]
+
+
 class SubjectSettings(RequestBody):
-    """Subject, site and the force that none may pass, beside limits.force_N."""
+    """Subject, site and the force that none may pass, beside limits.force_N; at its site the lower of two holds."""
 
     id: str = Field(min_length=1, max_length=80, description="a code, no person's name", examples=["S01"])
     site: str = Field(min_length=1, max_length=80, examples=["left forearm"])
     pain_threshold_N: float = Field(gt=0, le=1000, examples=[8.5])
+    site_thresholds_N: SiteThresholds | None = Field(
+        default=None,
+        description="at single sites; left out: as they are, or, for another subject, as its sessions found them last",
+        examples=[{"left forearm": 7.9}],
+    )
 
 
 def add(router: APIRouter, service: Service) -> None:
     """Its routes."""
+
+    lists = Catalogue(service.sessions)
 
     def shown(response: Response) -> SubjectSettings:
         found = SubjectSettings(**service.wiring.subject.model_dump(include=set(SubjectSettings.model_fields)))
@@ -46,7 +58,10 @@ def add(router: APIRouter, service: Service) -> None:
     ) -> SubjectSettings:
         service.control.check(lease)
         _refuse_stale(match, etag_of(shown(response)))
-        service.use_subject(service.wiring.subject.model_copy(update=wanted.model_dump()), lease)
+        given = wanted.model_dump(exclude_none=True)
+        if wanted.id != service.wiring.subject.id:
+            given.setdefault("site_thresholds_N", lists.site_thresholds_N(wanted.id, HIGHEST_SITE_N))
+        service.use_subject(service.wiring.subject.model_copy(update=given), lease)
         return shown(response)
 
 

@@ -58,7 +58,9 @@ def test_recordings_that_each_begin_at_zero_stay_apart_and_are_not_joined_in_sil
     assert numbers(session) == [COUNT, COUNT]
     mapping = propose(folder).answered(()).text.replace("repeats = true\n", "")
     (folder / "mapping.toml").write_text(mapping)
-    with pytest.raises(DataError, match=r"a\.csv line 73: time 0 s follows 1\.18 s; time must increase"):
+    with pytest.raises(
+        DataError, match=r"a\.csv line 73: time 0 s follows 1\.18 s; another recording or specimen begins"
+    ):
         run(folder, "joined")
 
 

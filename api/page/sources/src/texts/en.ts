@@ -358,6 +358,7 @@ export const en = {
     gloveText: "Nothing of the bench moves. Press slowly with the glove until the subject says stop, and let go at once: three times.",
     gloveSession: "Session that keeps it", gloveStart: "Begin to press", gloveNoSession: "Name a session.",
     glovePress: (number: number, force: string, refused: string) => `Press ${number}: ${force} N${refused ? `, refused: ${refused}` : ""}`,
+    gloveKeep: (force: string, site: string) => `Set ${force} N as threshold at ${site}`, gloveKept: (force: string, site: string) => `the pain threshold at ${site} is ${force} N`,
     gloveFound: (force: string, site: string, rule: string) => `${force} N at ${site}: ${rule}.`,
     protocol: "Protocol", tissue: "Tissue to expect", noModel: "not known",
     refused: "refused", refusedHere: "This bench refuses the protocol, see above.",

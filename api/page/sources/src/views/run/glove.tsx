@@ -42,12 +42,13 @@ function Answer({ found, on, reload }: { found: Found; on: OnBench; reload: () =
   const force_N = found.force_N ?? 0;
   // Never above what was found.
   const limit_N = Math.floor(force_N * 10) / 10;
-  const keep = () => attempt(async () => (await keepSubject(on, { pain_threshold_N: limit_N }), t.run.thresholdKept(shown(limit_N, 1)))).then(reload);
+  const known = on.value.site_thresholds_N;
+  const keep = () => attempt(async () => (await keepSubject(on, { site_thresholds_N: { ...known, [found.site]: limit_N } }), t.run.gloveKept(shown(limit_N, 1), found.site))).then(reload);
   return (
     <div class="notice" id="glove-result">
       <ol>{found.presses.map((one, number) => <li key={number}>{t.run.glovePress(number + 1, shown(one.peak_N, 1), one.refused ?? "")}</li>)}</ol>
       <p>{t.run.gloveFound(shown(force_N, 2), found.site, found.rule)}</p>
-      {limit_N !== on.value.pain_threshold_N && <Start id="glove-keep" why={whyNotMove()} onClick={() => void keep()}>{t.run.rampKeep(shown(limit_N, 1))}</Start>}
+      {limit_N > 0 && limit_N !== known[found.site] && <Start id="glove-keep" why={whyNotMove()} onClick={() => void keep()}>{t.run.gloveKeep(shown(limit_N, 1), found.site)}</Start>}
     </div>
   );
 }

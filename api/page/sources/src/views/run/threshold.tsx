@@ -14,7 +14,7 @@ import { Now } from "../../parts/now";
 import { Glove } from "./glove";
 import { pressStop } from "../../stop";
 import { link } from "../../route";
-import { keepSubject, type OnBench } from "../../subject";
+import { keepSubject, thresholdAt, type OnBench } from "../../subject";
 import { t } from "../../texts";
 
 type Found = Schema["Threshold"];
@@ -30,7 +30,7 @@ function Known({ on, reload }: { on: OnBench; reload: () => void }) {
   return (
     <>
       <dl class="facts large">
-        <div><dt>{t.run.threshold}</dt><dd><output id="threshold">{shown(on.value.pain_threshold_N, 1)}</output> <small>N</small></dd></div>
+        <div><dt>{t.run.threshold}</dt><dd><output id="threshold">{shown(thresholdAt(on.value), 1)}</output> <small>N</small></dd></div>
         <div><dt>{t.run.forceLimit}</dt><dd><output id="force-limit">{shown(rig.value?.limits.force_N, 1)}</output> <small>N</small></dd></div>
       </dl>
       <form onSubmit={keep}>
