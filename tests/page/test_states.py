@@ -363,3 +363,51 @@ def test_the_arrow_keys_read_values_of_one_time_and_a_pause_keeps_what_is_shown(
     assert len(read) == 4
     page.click("#plot-pause")
     expect(page.locator("#plot-pause")).to_have_text("Pause")
+
+
+HELD = {"lease_id": "l", "epoch": 1, "expires": told.AT}
+ELSEWHERE = {"thigh": 6.0}
+FOUND = {
+    "force_N": 7.96, "up_to_N": 20.0, "recording": "glove_001.mcap", "subject": told.SUBJECT, "site": told.SITE,
+    "input": "glove", "presses": [{"peak_N": 7.96, "seconds": 2.0, "refused": ""}], "rule": "the median of three",
+}  # fmt: skip
+
+
+def body_of(page: Page, button: str) -> Any:
+    """What is put as the subject by a click."""
+    with page.expect_request(lambda request: request.method == "PUT" and request.url.endswith("/subject")) as asked:
+        page.click(button)
+    return asked.value.post_data_json
+
+
+def test_a_glove_s_threshold_is_its_site_s(show: Any, service: Pretended) -> None:
+    subject = service.answers["subject"]
+    assert isinstance(subject, dict)
+    service.answers |= listed(told.job("threshold-glove", result=FOUND))
+    service.answers |= {"POST control/lease": HELD, "PUT control/lease": HELD, "PUT subject": subject}
+    service.says(rig=with_gloves("left"), subject=subject | {"site_thresholds_N": ELSEWHERE})
+    page = show("run")
+    page.click("#glove summary")
+    expect(page.locator("#glove-keep")).to_have_text(f"Set 7.9 N as threshold at {told.SITE}")
+    expect(page.locator("#threshold")).to_have_text("12.0")
+    assert body_of(page, "#glove-keep") == {
+        "id": told.SUBJECT, "site": told.SITE, "pain_threshold_N": 12.0,
+        "site_thresholds_N": ELSEWHERE | {told.SITE: 7.9},
+    }  # fmt: skip
+
+
+def test_the_threshold_in_force_is_the_lower_at_its_site(show: Any, service: Pretended) -> None:
+    subject = service.answers["subject"]
+    assert isinstance(subject, dict)
+    service.says(subject=subject | {"site_thresholds_N": {told.SITE: 7.9}})
+    expect(show("run").locator("#threshold")).to_have_text("7.9")
+
+
+def test_another_subject_does_not_get_the_sites_of_the_one_before(show: Any, service: Pretended) -> None:
+    subject = service.answers["subject"]
+    assert isinstance(subject, dict)
+    service.answers |= {"POST control/lease": HELD, "PUT control/lease": HELD, "PUT subject": subject}
+    service.says(subject=subject | {"site_thresholds_N": ELSEWHERE})
+    page = show("run")
+    page.fill("#subject-id", "S99")
+    assert body_of(page, "#subject-keep") == {"id": "S99", "site": told.SITE, "pain_threshold_N": 12.0}
