@@ -12,7 +12,7 @@ from controller.devices.drivers import open_axis, open_force, open_tracker
 from controller.devices.guard import RATE_TOLERANCE
 from controller.inputs.examination import look_at
 from controller.loop.realtime import promptly
-from drivers.roles import Device, Identity, ServoAxis
+from drivers.roles import Device, Identity, OnBus, ServoAxis
 from rig.channels import AxisSample, ForceSample, MarkerSample
 from rig.config.force_map import CHANNELS
 from rig.config.products.roles import Product
@@ -73,7 +73,8 @@ def _heard(role: str, device: AnyDevice, listen: Listen[AnyDevice], channel: int
         found = _finding(role, device.identity, 1e9 / device.period_ns, listen(device), channel)
         if not found.problem:
             break
-    return found.model_copy(update={"problem": found.problem or device.counters.trouble})
+    bus = device.bus if isinstance(device, OnBus) else ""
+    return found.model_copy(update={"problem": found.problem or device.counters.trouble, "bus": bus})
 
 
 def _listen(poll: Callable[[int], Samples], seconds: float) -> Samples:

@@ -67,6 +67,15 @@ class Identifying(Protocol):
         """Opens the port, asks who is there, changes nothing and closes it; raises DeviceError."""
 
 
+@runtime_checkable
+class OnBus(Protocol):
+    """A device on a bus that others may load, or disturb."""
+
+    @property
+    def bus(self) -> str:
+        """Load and errors of the bus, in words; known after ``start``."""
+
+
 class ForceSensor(Device, Protocol):
     """A sensor in front of the tip."""
 

@@ -96,6 +96,11 @@ class Epos4Axis(SampledDevice):
         """Whether positions count from home, as the drive last said."""
         return self._walker is not None and self._is_referenced(self._walker.status)
 
+    @property
+    def bus(self) -> str:
+        """Load and errors of the CAN bus, in words; raises DeviceError before ``start``."""
+        return self._started().node.link.health.summary
+
     def fileno(self) -> int:
         """Descriptor of the CAN link; raises DeviceError before ``start``."""
         return self._started().node.link.fileno()

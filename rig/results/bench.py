@@ -21,6 +21,7 @@ class DeviceReport(Result):
     noise: str = ""
     latency_ms: float = 0.0
     range: str = ""
+    bus: str = Field(default="", description="load and errors of the bus that it is on, where it is on one")
     problem: str = ""
     advice: str = ""
 

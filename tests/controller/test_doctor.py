@@ -70,6 +70,18 @@ def test_trouble_of_the_link_is_a_problem_though_the_rate_is_right() -> None:
     assert said.problem == device.counters.trouble
 
 
+class OnOne(Slow):
+    """A device on a bus."""
+
+    bus = "CAN 1000 kbit/s, load 31%"
+
+
+def test_the_bus_of_a_device_is_told_though_nothing_is_wrong_with_it() -> None:
+    for device, told in ((OnOne(0), OnOne.bus), (Slow(0), "")):
+        said = doctor._look("axis", BotaWiring(), lambda device=device: cast(Device, device), device.listen)  # type: ignore[misc]
+        assert (said.bus, said.problem) == (told, "")
+
+
 def test_a_device_that_is_not_there_comes_with_where_to_look() -> None:
     wiring = Wiring(force=BotaWiring(port="/dev/no-sensor"), axis=Epos4Wiring(port="/dev/no-adapter"), tracker=None)
     force, axis = doctor.examine(wiring, 0.0)

@@ -1,6 +1,7 @@
 """A drive that is known by its data sheet alone does the job of a bench: three lines of configuration change."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,8 @@ def test_doctor_names_the_drive_and_a_capture_indents_with_it(settings: list[str
         device for device in json.loads((tmp_path / "seen.json").read_text())["devices"] if device["role"] == "axis"
     ]
     assert (axis["product"], axis["serial"]) == ("Neutral drive 00000402", "00C1A402")
+    # SYNC and its two answers each millisecond are some 300 of its 1000 bits, as far as the doctor keeps that up.
+    assert re.fullmatch(r"CAN 1000 kbit/s, load [1-9]\d?%, 0 error frames, .*, error active", axis["bus"])
     (tmp_path / "one.toml").write_text("speeds_mm_s = [10]\ntrials = 1\ndepth_mm = 6\n")
     captured = rig("capture", "one.toml", "--out", "session", *settings, folder=tmp_path)
     assert captured.code in (0, 4), captured.sentence

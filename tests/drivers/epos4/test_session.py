@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from drivers.can.slcan import CanFrame, encode_frame
 from drivers.epos4.device import Epos4Axis
+from drivers.roles import OnBus
 from mock_devices.canopen.sdo_server import SdoAbort
 from mock_devices.interfaces import NEVER_NS
 from mock_devices.testing.epos4 import DriveBench, HostDied
@@ -390,3 +391,13 @@ def test_who_only_asks_who_is_there_writes_no_object_and_leaves_the_node_in_its_
     assert uploads <= {0x40, 0x60}  # CiA 301: initiate an upload, and a segment of it
     assert {frame.can_id for frame in bench.sent} == {0x601}
     assert (bench.mock.nmt, bench.closed) == (state, True)
+
+
+def test_the_load_of_the_bus_is_told(bench: DriveBench) -> None:
+    axis = axis_on(bench)
+    with pytest.raises(DeviceError, match="not started"):
+        _ = axis.bus
+    axis.start()
+    bench.health.load, bench.health.error_frames = 0.31, 2
+    assert isinstance(axis, OnBus)
+    assert axis.bus == "CAN 1000 kbit/s, load 31%, 2 error frames, 0 refused, 0 dropped, error active"
