@@ -71,6 +71,7 @@ campaigns: $(READY) page
 	$(BIN)/python -m benchmarks.imported
 	for kind in csv parquet h5; do $(BIN)/python -m benchmarks.large_import --kind $$kind || exit; done
 	$(BIN)/python -m benchmarks.stop
+	$(BIN)/python -m benchmarks.fuzz --each 1000000
 	$(BIN)/python -m benchmarks.stalls
 	$(BIN)/python -m benchmarks.service --minutes 10
 	$(BIN)/python -m benchmarks.page

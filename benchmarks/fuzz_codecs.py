@@ -4,8 +4,10 @@
 """
 
 import importlib.util
+import math
 import struct
 from collections.abc import Callable
+from functools import cache
 from itertools import chain
 from pathlib import Path
 from types import ModuleType
@@ -49,7 +51,7 @@ from mock_devices.optitrack.packets import frame, models, server_information
 from mock_devices.robotiq.mock import RequestFinder
 from mock_devices.zaber.commands import CommandLines
 from rig.config.products.cia402 import Cia402Wiring
-from rig.errors import UsageError
+from rig.errors import DeviceError, UsageError
 
 NUMBERS = {entry.kind: entry for entry in OBJECTS.values() if entry.size}
 PLUGIN = Path(__file__).parents[1] / "examples/plugin-netft/src/rig_netft/netft.py"
@@ -120,6 +122,10 @@ OF_OPTITRACK = tuple(
 )
 # Of ATI's manual: the request for a stream, and a record of six counts.
 OF_NETFT = (bytes.fromhex("1234000200000000"), struct.pack(">IIIiiiiii", 5, 35_007, 0, 10**6, -2, 3, 4, -5, 6))
+OF_NETFT_PAGE = (
+    b"<netft><cfgcalsn>FT27462</cfgcalsn><scfgfu>N</scfgfu><scfgtu>Nm</scfgtu><cfgcpf>1000</cfgcpf><cfgcpt>2</cfgcpt>",
+    b"<scfgfu>lbf</scfgfu>", b"<cfgcpf>0</cfgcpf>", b"<cfgcpt>nan</cfgcpt>", b"<cfgcpf>1e999</cfgcpf>",
+)  # fmt: skip
 EXAMPLES = tuple(
     chain(OF_BOTA, OF_ROBOTIQ, OF_SLCAN, OF_CAN, SHEETS, OF_NDI, OF_ZABER, OF_LAUMAS, OF_FIRMATA, OF_EVDEV,
           OF_IGTLINK, OF_OPTITRACK, OF_NETFT)
@@ -224,6 +230,13 @@ def _switch() -> Callable[[bytes], object]:
     return lambda data: (changes.changes(data), presses.feed(data))
 
 
+def _netft_page(data: bytes) -> None:
+    """A scale that is no number above zero is as bad as a crash: force would be nothing, or of the wrong sign."""
+    scale = _netft().scale_of(data.decode("latin-1"), "ati-netft")
+    assert 0 < scale.N < math.inf and 0 < scale.N_m < math.inf
+
+
+@cache
 def _netft() -> ModuleType:
     """The example plug-in, which is a distribution of its own and need not be installed."""
     spec = importlib.util.spec_from_file_location("fuzzed_netft", PLUGIN)
@@ -249,6 +262,7 @@ def _of_lines() -> dict[str, Codec]:
         "firmata": Codec(_firmata(), (), OF_FIRMATA),
         "input events": Codec(_switch(), (), OF_EVDEV),
         "netft records": Codec(_netft().parse, (), OF_NETFT),
+        "netft page": Codec(_netft_page, (DeviceError,), OF_NETFT_PAGE),
     }
 
 

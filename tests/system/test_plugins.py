@@ -42,7 +42,6 @@ def passes_its_own_tests(project: Path, environment: Mapping[str, str]) -> None:
 
 
 @pytest.mark.extra
-@pytest.mark.by_hand
 def test_the_net_ft_is_a_distribution_of_its_own(tmp_path: Path) -> None:
     project = tmp_path / "plugin"
     shutil.copytree(ROOT / "examples" / "plugin-netft", project)
@@ -75,7 +74,6 @@ def without_what_developers_install(folder: Path) -> dict[str, str]:
 
 
 @pytest.mark.extra
-@pytest.mark.by_hand
 def test_a_laboratorys_own_checks_run_as_the_workflow_says(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples" / "ci", tmp_path / "ci")
     workflow = (tmp_path / "ci" / "laboratory.yml").read_text()

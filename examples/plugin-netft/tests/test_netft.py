@@ -55,7 +55,13 @@ def test_counts_become_newton_by_what_the_page_says(
 
 
 @pytest.mark.parametrize(
-    "page", [PAGE.format("stone", "Nm", 1, 1), PAGE.format("N", "Nm", 0, 1), PAGE.format("N", "Nm", "x", 1), "<html>"]
+    "page",
+    [
+        PAGE.format("stone", "Nm", 1, 1),
+        *(PAGE.format("N", "Nm", counts, 1) for counts in (0, "x", "nan", -1, "1e999")),
+        PAGE.format("N", "Nm", 1, "nan"),
+        "<html>",
+    ],
 )
 def test_a_page_without_a_scale_is_refused(page: str) -> None:
     with pytest.raises(DeviceError, match=r"ati-netft: netftapi2.xml says no .* set its units to N and Nm"):

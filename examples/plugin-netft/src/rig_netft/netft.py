@@ -104,6 +104,8 @@ def scale_of(page: str, product: str) -> Scale:
     try:
         per_N = float(said["cfgcpf"]) / NEWTON[said["scfgfu"]]
         per_N_m = float(said["cfgcpt"]) / NEWTON_METRE[said["scfgtu"]]
+        if not (0 < per_N < math.inf and 0 < per_N_m < math.inf):
+            raise ValueError(f"{per_N:g} counts for 1 N and {per_N_m:g} for 1 N m")
         return Scale(
             1 / per_N,
             1 / per_N_m,
