@@ -21,7 +21,7 @@ from scipy.io.matlab import MatlabFunction, MatlabOpaque, MatReadError, MatReadW
 from zstandard import ZstdError
 
 from rig.errors import DataError
-from rig.intake.sheet import DAMAGE, Batch, Column, Sheet, unreadable
+from rig.intake.sheet import DAMAGE, Batch, Column, Sheet, refuse_large, unreadable
 from rig.intake.stored import StoredVector, fields_of, lines_of
 from rig.intake.text import bytes_of
 from rig.intake.units import ros_unit, unit_in, unit_of
@@ -29,6 +29,9 @@ from rig.intake.units import ros_unit, unit_in, unit_of
 Vectors = dict[str, NDArray[np.generic] | StoredVector]
 BATCH_ROWS = 1 << 18  # two megabytes a column
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
+# What memory of 1.5 GB holds: vectors as they are, messages with what Python needs for each, and texts as numbers.
+LARGEST_MAT_B, LARGEST_MCAP_B, LARGEST_LINES_B = 1e9, 0.4e9, 0.25e9
+PIECES = "save it as Parquet, HDF5 or CSV, which are read piece by piece, or in parts"
 # Time, force and position.
 FEWEST_CHANNELS = 3
 # Longer lists in a message are images and clouds of points.
@@ -46,6 +49,7 @@ def open_mat(path: Path) -> list[Sheet]:
             head = file.read(520)
         if HDF5_MAGIC in head:
             return open_hdf5(path)
+        refuse_large(path, LARGEST_MAT_B, "save it with -v7.3, which is read piece by piece")
         with warnings.catch_warnings():  # of two objects in one file, which are named when they are asked for
             warnings.simplefilter("ignore", MatReadWarning)
             found = scipy.io.loadmat(str(path), squeeze_me=True, struct_as_record=False, appendmat=False)
@@ -306,6 +310,7 @@ def _array(column: Any) -> NDArray[np.generic]:
 def open_mcap(path: Path) -> list[Sheet]:
     """A sheet of each topic whose messages are JSON or numbers in CDR, with ``log_time`` and ``publish_time`` [ns]."""
     bodies: dict[str, tuple[Any, Any, list[bytes], list[tuple[int, int]]]] = {}
+    refuse_large(path, LARGEST_MCAP_B, PIECES)
     try:
         with path.open("rb") as file:
             for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages(log_time_order=False):
@@ -332,6 +337,7 @@ def _of_topic(
 def open_json_lines(path: Path) -> list[Sheet]:
     """The one table of a file with a JSON object a line."""
     rows = list[dict[str, object]]()
+    refuse_large(path, LARGEST_LINES_B, PIECES)
     try:
         with bytes_of(path) as file:
             for number, line in enumerate(file, 1):

@@ -89,6 +89,14 @@ def unreadable(path: Path, kind: str, error: Exception, advice: str = "copy it a
     return DataError(f"{path}: not readable as {kind} ({said}); {advice}")
 
 
+def refuse_large(path: Path, most_B: float, instead: str) -> None:
+    """Raises DataError where a file of a kind that is held in memory whole is larger than memory is taken for."""
+    size_B = path.stat().st_size
+    if size_B > most_B:
+        why = f"its kind is held in memory whole, up to {most_B / 1e9:g} GB of it, and it has {size_B / 1e9:.2f} GB"
+        raise DataError(f"{path}: {why}; {instead}")
+
+
 def facts_in(rows: Sequence[Sequence[str]]) -> dict[str, str]:
     """Of the rows above a table those that are a name and a value, in two cells or one with a colon or = in it."""
     found = [[cell for cell in map(str.strip, row) if cell] for row in rows]

@@ -14,13 +14,15 @@ from pathlib import Path
 import python_calamine as calamine
 
 from rig.errors import DataError
-from rig.intake.sheet import DAMAGE, unreadable
+from rig.intake.sheet import DAMAGE, refuse_large, unreadable
 
 # Day 0 of spreadsheets, in the calendar of 1900 with its leap day that never was (ECMA-376 part 1, 18.17.4.1).
 EPOCH = datetime.datetime(1899, 12, 30)
 DAY_S = 86_400.0
 
 
+# Cells of a sheet are held in memory, ten times as large as they are packed.
+LARGEST_B = 0.15e9
 # Of a compound file, as which the old form is stored ([MS-CFB] 2.2).
 COMPOUND = bytes.fromhex("d0cf11e0a1b11ae1")
 ENDS_IT = "what is damaged in it ends the program that reads it"
@@ -68,6 +70,7 @@ def _readable(path: Path) -> Iterator[None]:
     try:
         with path.open("rb") as file:  # says why it cannot, which the library does not
             old = file.read(len(COMPOUND)) == COMPOUND
+        refuse_large(path, LARGEST_B, "save its sheets as CSV, which is read piece by piece")
         if old and not _survived(str(path), path.stat().st_mtime_ns):
             raise ValueError(ENDS_IT)
         yield

@@ -137,3 +137,21 @@ def test_a_workbook_that_is_open_in_excel_is_no_damaged_one(folder: Path) -> Non
     (folder / "a.csv").write_text(HEAD + PRESS)
     (folder / "~$a.xlsx").write_bytes(b"\x06Anna" + bytes(150))
     assert propose(folder).doubts == propose(folder / "a.csv").doubts
+
+
+@pytest.mark.parametrize(
+    ("name", "most", "instead"),
+    [
+        ("a.mat", "1", "save it with -v7.3"), ("a.mcap", "0.4", "save it as Parquet"),
+        ("a.jsonl", "0.25", "save it as Parquet"), ("a.xlsx", "0.15", "save its sheets as CSV"),
+    ],
+)  # fmt: skip
+def test_a_file_that_memory_does_not_hold_is_refused_before_it_is_read(
+    folder: Path, name: str, most: str, instead: str
+) -> None:
+    with (folder / name).open("wb") as file:
+        file.truncate(2_000_000_000)  # of holes, which take no room
+    with pytest.raises(DataError, match=rf"{name}: its kind .* up to {most} GB of it, and it has 2.00 GB; {instead}"):
+        imported(folder)
+    with pytest.raises(DataError, match=f"no table with force and position was found in it .*{instead}"):
+        propose(folder)
