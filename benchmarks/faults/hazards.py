@@ -31,7 +31,12 @@ HAZARDS = (
         "a wrong word of configuration, another sensor, exchanged wires, a broken channel, a zero that drifts, a"
         " converter at its end, a frozen or silent sensor",
         ("first_touch", "force_lost", "force_invalid", "force_rate", PROTOCOL, REFUSED, QUALITY),
-        "A gain that changed in the air before the first trial of a session is found by the next calibration only: hang"
+        "A channel that dies, or a gain that halves, while the tip presses with a few newtons is noticed by"
+        " `force_rate` only where `limits.force_rate_N_s` is near what the work needs: the campaign's faults have 40"
+        " N/s. At the 1000 N/s that holds where nothing is stated, tracking searches on inwards to `limits.depth_mm`"
+        " (49 N were reached on the mock's limb in 1.8 s with the check switched off), and a halved gain doubles the"
+        " force unseen. State the rate. A gain that changed in the air before the first trial of a session is found by"
+        " the next calibration only: hang"
         " a known weight on the tip before each session. The first touch is judged in newtons, not in millimetres: a"
         " force channel that is dead and pressed exactly along its axis shows no moment either, and before"
         " `search_to_mm` nothing stops the approach but the following error, once the drive's current limit holds the"
@@ -69,7 +74,9 @@ HAZARDS = (
         "The tip stays in a limb that cannot get away",
         "a stop in contact, a crash, a limb that pushes against an axis at rest",
         ("pushed", "force_limit", DRIVE),
-        "After a crash nothing moves by itself: `rig reset` brings the tip out once somebody agrees. Without a computer"
+        "While the force sensor is lost or invalid nobody sees that the limb pushes against an axis at rest; its state"
+        " says so. After a crash nothing moves by itself: `rig reset` brings the tip out once somebody agrees. Without a"
+        " computer"
         " only an axis that can be pushed back by hand frees the limb.",
     ),
     Hazard(
