@@ -15,7 +15,7 @@ from fastapi import Request, Response
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError
 
-from api.http.access.rights import CALLER, STOP
+from api.http.access.rights import CALLER, PASSED, STOP
 from api.http.access.secrets import steady_s
 from api.http.problems import RequestRefused
 from rig.recording.files import make_folder, write_text
@@ -160,8 +160,16 @@ def idempotent(store: AnswerStore) -> type[APIRoute]:
     return IdempotentRoute
 
 
+async def _told(request: Request) -> bytes:
+    """What tells a request from another with its key: the body, or, of one that is read piece by piece, its length."""
+    right = request.scope.get(PASSED)
+    if right is not None and right.streamed:
+        return request.headers.get("content-length", "").encode()
+    return await request.body()
+
+
 async def _once(store: AnswerStore, place: str, request: Request, handler: Handler) -> Response:
-    before = store.begin(place, await request.body())
+    before = store.begin(place, await _told(request))
     if before:
         return before.response()
     response: Response | None = None

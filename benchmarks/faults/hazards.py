@@ -75,9 +75,8 @@ HAZARDS = (
         "a stop in contact, a crash, a limb that pushes against an axis at rest",
         ("pushed", "force_limit", DRIVE),
         "While the force sensor is lost or invalid nobody sees that the limb pushes against an axis at rest; its state"
-        " says so. After a crash nothing moves by itself: `rig reset` brings the tip out once somebody agrees. Without a"
-        " computer"
-        " only an axis that can be pushed back by hand frees the limb.",
+        " says so. After a crash nothing moves by itself: `rig reset` brings the tip out once somebody agrees. Without"
+        " a computer only an axis that can be pushed back by hand frees the limb.",
     ),
     Hazard(
         "Spoilt data pass as good",

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fastapi import Request
 from fastapi.testclient import TestClient
 
 from api.http import uploads
@@ -230,3 +231,22 @@ def test_an_upload_becomes_a_session(client: TestClient, tmp_path: Path) -> None
     assert done["state"] == "succeeded", done["message"]
     assert (done["session"], done["result"]["session"]) == ("new", str(tmp_path / "sessions" / "new"))
     assert any(file["name"].endswith(".mcap") for file in done["files"])
+
+
+def keyed(client: TestClient, content: bytes, key: str = "k") -> Any:
+    return client.post(ROUTE, files=[("file", ("a.csv", content))], headers={"Idempotency-Key": key})
+
+
+def test_an_upload_with_a_key_is_read_piece_by_piece_too(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A key let the whole body into memory, past every limit of an upload."""
+
+    async def whole(_: Request) -> bytes:
+        raise AssertionError("the body was read whole")
+
+    monkeypatch.setattr(Request, "body", whole)
+    first = keyed(client, b"1,2\n" * 1000)
+    assert first.status_code == 201, first.text
+    assert keyed(client, b"1,2\n" * 1000).json() == first.json()
+    other = keyed(client, b"1,2\n" * 1001)
+    assert (other.status_code, other.json()["code"]) == (422, "idempotency-key-reused")
+    assert len(client.get(ROUTE).json()) == 1
