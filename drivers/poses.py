@@ -52,15 +52,17 @@ class PoseFrames:
         self._clock.restart()
         self._last = None
 
-    def samples(self, frame: int, device_ns: int, poses: Mapping[str, ToolPose], arrival_ns: int) -> list[MarkerSample]:
-        """One sample a tool; none where the frame is not newer than the last one."""
+    def samples(
+        self, frame: int, device_ns: int, poses: Mapping[str, ToolPose], arrival_ns: int, more: int = 0
+    ) -> list[MarkerSample]:
+        """One sample a tool; none where the frame is not newer than the last one. ``more`` frames came with it."""
         if not self._is_newer(frame, device_ns):
             self._counters.repeated += 1
             return []
         self._last = frame, device_ns
         self._counters.frames += 1
         self._clock.observe(device_ns, arrival_ns)
-        (capture_ns,) = self._clock.captures([device_ns], arrival_ns)
+        (capture_ns,) = self._clock.captures([device_ns], arrival_ns, more)
         return [
             self._sample(frame, index, poses.get(tool, NO_POSE), capture_ns, arrival_ns)
             for index, tool in enumerate(self._tools)

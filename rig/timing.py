@@ -90,12 +90,12 @@ class ClockMap:
             self._minima[-1] = point
         self._edge = device_ns, min(point[1], _bound_ns(self._edge, device_ns, self._rate))
 
-    def captures(self, devices_ns: Sequence[int], arrival_ns: int) -> list[int]:
-        """Host times of capture of samples that were observed and came together, oldest first.
+    def captures(self, devices_ns: Sequence[int], arrival_ns: int, more: int = 0) -> list[int]:
+        """Host times of capture of samples that were observed and came together, with so many ``more``, oldest first.
 
         Each is later than the one before it, and none is after arrival as long as arrivals go upwards.
         """
-        left = len(devices_ns)
+        left = len(devices_ns) + more
         return [self._capture(device_ns, arrival_ns, left - index) for index, device_ns in enumerate(devices_ns)]
 
     def _capture(self, device_ns: int, arrival_ns: int, left: int) -> int:

@@ -109,9 +109,10 @@ class OptiTrackTracker(SampledTracker):
     def poll(self, now_ns: int) -> list[MarkerSample]:
         """Samples of the frames that came since the last call; raises DeviceError after a second without any."""
         samples: list[MarkerSample] = []
-        for frame in self._received():
+        frames = list(self._received())
+        for more, frame in zip(reversed(range(len(frames))), frames, strict=True):
             self._heard_ns = now_ns
-            samples += self._samples.samples(frame.number, self._taken_ns(frame), self._poses(frame), now_ns)
+            samples += self._samples.samples(frame.number, self._taken_ns(frame), self._poses(frame), now_ns, more)
         if now_ns - self._heard_ns > LOST_AFTER_NS:
             raise DeviceError(
                 f"{self._config.port}: no frame for {LOST_AFTER_NS / 1e9:g} s; check Motive's streaming and the network"

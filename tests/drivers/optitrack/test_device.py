@@ -186,3 +186,11 @@ def test_who_only_asks_who_streams_needs_no_name_of_a_body() -> None:
     assert session.tracker.identify().firmware == "Motive 3.1.0.1"
     assert session.link.sent == [packets.CONNECT]
     assert session.link.closed
+
+
+def test_frames_that_come_together_are_none_taken_after_they_came() -> None:
+    session = started()
+    samples = session.poll(*(frame_of(101 + number) for number in range(4)))
+    taken_ns = [sample.capture_ns for sample in samples if sample.tool == 0]
+    assert len(taken_ns) == 4 and taken_ns == sorted(set(taken_ns))
+    assert all(sample.capture_ns <= sample.arrival_ns for sample in samples)
