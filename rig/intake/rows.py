@@ -26,7 +26,7 @@ FIELDS = {
 UNITLESS = ("tool", "sync")
 EXAMPLES = {"force": "N", "velocity": "mm/s", "current": "A", "temperature": "C", "arrival": "ns"}
 # A lost or swapped row is a step back; what falls back to the first tenth of the way begins anew.
-ANEW_SHARE = 0.1
+ANEW_SHARE, ANEW_ROWS = 0.1, 10
 # Before the name of a label, among the columns that are read.
 LABEL = "label "
 
@@ -125,7 +125,7 @@ def _in_order(
 
 def _refuse_order(at_ns: Times, latest: Times, row: int, place: str) -> None:
     said = f"{place}: time {at_ns[row] * 1e-9:.9g} s follows {latest[row] * 1e-9:.9g} s"
-    if at_ns[row] - at_ns[0] <= ANEW_SHARE * (latest[row] - at_ns[0]):
+    if row >= ANEW_ROWS and at_ns[row] - at_ns[0] <= ANEW_SHARE * (latest[row] - at_ns[0]):
         anew = "another recording or specimen begins here under the same name: name what parts them in `label`"
         raise DataError(f"{said}; {anew}, or save it as a file of its own")
     raise DataError(

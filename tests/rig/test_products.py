@@ -67,7 +67,7 @@ def test_an_unknown_product_is_answered_with_the_nearest_and_all() -> None:
         wiring("force.product=robotik-ft300")
     assert str(refusal.value) == (
         "rig.toml: force.product: unknown product 'robotik-ft300'; nearest: robotiq-ft300;"
-        " all: bota-sensone, robotiq-ft300, laumas-tlb"
+        " all: bota-sensone, laumas-tlb, robotiq-ft300"
     )
 
 
