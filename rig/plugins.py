@@ -5,6 +5,7 @@ that declare one name are both refused: which of two drivers moves a tip is not 
 products are declared in the same groups, by the distribution `tissue-rig` itself.
 """
 
+import contextlib
 import inspect
 import sys
 import traceback
@@ -16,7 +17,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
 from rig.deadline import within
-from rig.errors import PluginError
+from rig.errors import PluginError, RigError
 
 Item = TypeVar("Item")
 # Half of what a process of the bench has for its start, as each of them imports what is declared.
@@ -94,6 +95,20 @@ def blamed(error: Exception) -> PluginError | None:
         return None
     what = " ".join(f"{type(error).__name__}: {error}".split())
     return PluginError(f"{replace(last, error=what).sentence}; see its maker, or uninstall it")
+
+
+@contextlib.contextmanager
+def blaming() -> Iterator[None]:
+    """What arises in a plug-in's code is raised as its PluginError; everything else as it is."""
+    try:
+        yield
+    except RigError:
+        raise
+    except Exception as error:
+        theirs = blamed(error)
+        if theirs is None:
+            raise
+        raise theirs from error
 
 
 def _place(plugin: Plugin) -> str:

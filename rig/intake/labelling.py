@@ -52,7 +52,7 @@ def labels_in(table: ColumnGroup, taken: Sequence[int], time: int | None) -> Lab
     return Labels({called[number]: table.place(number) for number in kept}, templates, doubts)
 
 
-def facts_in(tables: Sequence[ColumnGroup], known: TomlTable) -> tuple[TomlTable, TomlTable]:
+def stated_in(tables: Sequence[ColumnGroup], known: TomlTable) -> tuple[TomlTable, TomlTable]:
     """The `facts` of a mapping, and templates over them: what stands above each table of whom or what it is of.
 
     Only what differs between the tables, and of which the templates ``known`` say nothing.

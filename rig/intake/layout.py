@@ -30,7 +30,7 @@ from rig.intake.text import (
     section_in,
     section_name,
 )
-from rig.intake.units import unit_in, unit_of
+from rig.intake.units import UNIT_WORDS, unit_in, unit_of
 from rig.intake.workbook import hidden_sheets, sheet_names
 
 # Read of a text to see how it is written: preambles are shorter, and a table shows itself in a few rows.
@@ -54,7 +54,6 @@ SURE_SHARE = 0.75
 # A row for each value has its time, channel, value and unit, and what the whole is called.
 WIDEST_LONG = 12
 VALUES = frozenset(("value", "wert", "reading", "messwert", "data", "val", "valeur"))
-UNITS = frozenset(("unit", "units", "einheit", "unité"))
 # Where more of the lines are none of the table, it is another table than was thought.
 OTHER_SHARE = 0.1
 
@@ -99,7 +98,7 @@ def _by_channel(layout: Layout) -> list[Layout]:
 def _long_form(sheet: Sheet) -> LongForm | None:
     """The form of a sheet in which one column says of what a row is, a force or a way among others."""
     texts = {number: list(dict.fromkeys(own)) for number, own in texts_of(sheet, range(len(sheet.header))).items()}
-    units = _called(sheet, UNITS)
+    units = _called(sheet, UNIT_WORDS)
     told = [number for number, names in texts.items() if number not in units and _are_channels(names)]
     values = [number for number in _called(sheet, VALUES) if number not in told]
     units = [number for number in units if all(map(unit_in, texts[number]))]

@@ -12,7 +12,7 @@ from rig.intake.families import COMPONENTS, DIRECTIONS, ColumnGroup, parts_of
 from rig.intake.questions import Choice, OpenQuestion
 from rig.intake.roles import WORDS, candidates, words_of
 from rig.intake.survey import Looks, sign_of
-from rig.intake.units import LINEAR, ROTARY, SIGNALS, ros_unit, unit_in, unit_of, unknown_unit
+from rig.intake.units import LINEAR, ROTARY, SIGNALS, UNIT_WORDS, ros_unit, unit_in, unit_of, unknown_unit
 from rig.recording.converter import at_the_end_of_range, run_lengths
 
 # Whole numbers beyond this are a converter's counts: it has ten bits at least, and no one weighs and measures so.
@@ -25,8 +25,6 @@ ROBOT_WORDS = frozenset(("tcp", "pose", "ee", "eef", "flange"))
 REACH_M = 3.0
 # A way this short in millimetres is pressed by nanoindenters, which write smaller units; robots write it in metres.
 LEAST_MM = 0.05
-# Of a line above the columns that states a unit: `Length Units,Meters` in OptiTrack's Motive, `Unit:,lbF` of gauges.
-UNIT_WORDS = frozenset(("unit", "units", "einheit", "einheiten", "单位", "単位"))
 # What a force cell reads across its axis, and another's noise, is a few percent of the force.
 RIVAL_SHARE = 0.1
 # The same force in another unit differs by rounding only, which is a few thousandths of it at most.
@@ -140,7 +138,10 @@ def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
 
 
 def _stated_unit(quantity: str, facts: Mapping[str, str]) -> str:
-    """The unit in a line above the table that states one of this quantity, or of whatever has it; empty without one."""
+    """The unit in a line above the table that states one of this quantity, or of whatever has it; empty without one.
+
+    As `Length Units,Meters` in OptiTrack's Motive, `Unit:,lbF` of gauges.
+    """
     own = {*WORDS[quantity], *(("length",) if quantity == "position" else ())}
     for name, value in facts.items():
         words, unit = set(words_of(name)), unit_in(value)

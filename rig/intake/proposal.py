@@ -11,7 +11,7 @@ from rig.config.table import TomlTable
 from rig.intake.aside import WAYS, Group, left_aside, nothing_found, untimed
 from rig.intake.families import INTERRUPTED, ColumnGroup, all_tables, groups_of
 from rig.intake.folder import below, files_in
-from rig.intake.labelling import Labels, facts_in, labels_in
+from rig.intake.labelling import Labels, labels_in, stated_in
 from rig.intake.mapping import FileForm
 from rig.intake.measured import beside, chosen, measured_in, ranks_of, spoilt
 from rig.intake.naming import channels_of, names_of
@@ -211,7 +211,7 @@ def _proposed(
     at = None if {"wraps_at", "finer"} & time.keys() else _number(first, time)
     measured = measured_in(first, _number(first, time), quantities)
     files, templates = (pattern["files"], {}) if "files" in pattern else _files(folder, group)
-    facts, stated = facts_in(group, templates)
+    facts, stated = stated_in(group, templates)
     forms = [own.layout.form for own in group]
     table: TomlTable = {
         "files": files, **_sheets(group), **pattern, **first.layout.form,

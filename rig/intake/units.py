@@ -57,6 +57,9 @@ ROTARY = {
 }  # fmt: skip
 UNITS = frozenset(RAW).union(*LINEAR.values(), *ROTARY.values())
 
+# What a column of units is called, and a line above a table that states one.
+UNIT_WORDS = frozenset(("unit", "units", "einheit", "einheiten", "unité", "单位", "単位"))
+
 # Of ROS messages the vectors with units (REP 103: standard units and coordinate conventions).
 ROS_UNITS = {"force": "N", "torque": "N m", "position": "m", "translation": "m"}
 

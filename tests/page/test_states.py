@@ -24,6 +24,8 @@ from tests.page.told_lab import AUDIT
 
 VIEWS = {"run": "run", "session": f"session/{told.NAME}", "track": "track", "bench": "bench", "devices": "devices",
          "admin": "admin"}  # fmt: skip
+LEASE = {"lease_id": "l", "epoch": 1, "expires": told.AT}
+IN_CONTROL = {"POST control/lease": LEASE, "PUT control/lease": LEASE}
 TOO_MUCH = "40 N is more than the 6 N that bench, subject and model allow."
 
 
@@ -85,8 +87,7 @@ def test_a_calibration_shows_what_it_asks_for_and_goes_on_once_a_person_says_so(
 ) -> None:
     asks = {"message": request_, "can": ["cancel", "resume"], "session": None}
     under_way = told.job(kind, "paused", **asks)
-    lease = {"lease_id": "l", "epoch": 1, "expires": told.AT}
-    service.answers |= listed(under_way) | {"POST control/lease": lease, "PUT control/lease": lease}
+    service.answers |= listed(under_way) | IN_CONTROL
     service.answers |= {f"POST jobs/job-{kind}/resume": under_way}
     page = show("devices")
     expect(page.locator(f"#{kind}-asks")).to_have_text(request_)
@@ -112,9 +113,8 @@ def test_more_of_a_list_is_shown_once_it_is_asked_for(show: Any, service: Preten
 
 def starts(service: Pretended, kind: str) -> None:
     """What is asked to start does."""
-    lease = {"lease_id": "l", "epoch": 1, "expires": told.AT}
     begun = told.job(kind, "running", session=None)
-    service.answers |= {"POST control/lease": lease, "PUT control/lease": lease, "POST jobs": begun}
+    service.answers |= IN_CONTROL | {"POST jobs": begun}
     service.answers |= {f"jobs/{begun['id']}": begun}
 
 
@@ -365,7 +365,6 @@ def test_the_arrow_keys_read_values_of_one_time_and_a_pause_keeps_what_is_shown(
     expect(page.locator("#plot-pause")).to_have_text("Pause")
 
 
-HELD = {"lease_id": "l", "epoch": 1, "expires": told.AT}
 ELSEWHERE = {"thigh": 6.0}
 FOUND = {
     "force_N": 7.96, "up_to_N": 20.0, "recording": "glove_001.mcap", "subject": told.SUBJECT, "site": told.SITE,
@@ -384,7 +383,7 @@ def test_a_glove_s_threshold_is_its_site_s(show: Any, service: Pretended) -> Non
     subject = service.answers["subject"]
     assert isinstance(subject, dict)
     service.answers |= listed(told.job("threshold-glove", result=FOUND))
-    service.answers |= {"POST control/lease": HELD, "PUT control/lease": HELD, "PUT subject": subject}
+    service.answers |= IN_CONTROL | {"PUT subject": subject}
     service.says(rig=with_gloves("left"), subject=subject | {"site_thresholds_N": ELSEWHERE})
     page = show("run")
     page.click("#glove summary")
@@ -406,7 +405,7 @@ def test_the_threshold_in_force_is_the_lower_at_its_site(show: Any, service: Pre
 def test_another_subject_does_not_get_the_sites_of_the_one_before(show: Any, service: Pretended) -> None:
     subject = service.answers["subject"]
     assert isinstance(subject, dict)
-    service.answers |= {"POST control/lease": HELD, "PUT control/lease": HELD, "PUT subject": subject}
+    service.answers |= IN_CONTROL | {"PUT subject": subject}
     service.says(subject=subject | {"site_thresholds_N": ELSEWHERE})
     page = show("run")
     page.fill("#subject-id", "S99")

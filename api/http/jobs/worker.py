@@ -23,7 +23,7 @@ from controller.commissioning.stoppable import stop_for_lost
 from controller.operation import Cancelled, Operation, Progress
 from rig.config.wiring import Wiring
 from rig.errors import RigError, SafetyStop
-from rig.plugins import blamed
+from rig.plugins import blaming
 from rig.results.base import SavedResult
 
 # A third of a normal program's share of a busy computer: a fit may wait for a page, and never the other way.
@@ -87,17 +87,13 @@ def compute(order: Order, pipes: Pipes) -> None:
     desk = Desk(order.places, Wiring.model_validate_json(order.wiring), pipes.ask, order.hands, order.stop_word)
     try:
         asked = kind.params.model_validate(order.params)
-        found = function_at(order.work)(operation, asked, desk)
+        with blaming():
+            found = function_at(order.work)(operation, asked, desk)
     except RigError as error:
         code = error.code if isinstance(error, SafetyStop) else ""
         pipes.tell(Told(type="error", name=type(error).__name__, text=str(error), code=code))
     except OSError as error:  # most often a session that was removed meanwhile
         pipes.tell(Told(type="error", name="DataError", text=f"{error.filename}: {error.strerror or error}"))
-    except Exception as error:
-        theirs = blamed(error)
-        if theirs is None:
-            raise
-        pipes.tell(Told(type="error", name=type(theirs).__name__, text=str(theirs)))
     else:
         pipes.tell(Told(type="result", text=found.model_dump_json()))
 

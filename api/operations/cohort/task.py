@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from api.operations.cohort.wanted import Wanted
 from controller.operation import Operation
 from rig.errors import RigError
-from rig.plugins import blamed
+from rig.plugins import blaming
 from rig.recording.remote import address_of
 from rig.results import fit
 from rig.trials.opening import Opening
@@ -75,16 +75,13 @@ def run(task: Task) -> TaskOutcome:
     """Works on one session; whatever it meets ends with it and not with the others."""
     began = time.monotonic()
     try:
-        with TemporaryDirectory(prefix="rig-") as folder:
+        with TemporaryDirectory(prefix="rig-") as folder, blaming():
             _WORKS[task.wanted.work](task, Path(folder))
             files = {file.name: file.read_bytes() for file in sorted(Path(folder).iterdir())}
         return TaskOutcome(task, files, time.monotonic() - began)
     except RigError as error:
         return TaskOutcome(task, {}, time.monotonic() - began, _reason(task, error))
     except Exception as error:
-        theirs = blamed(error)
-        if theirs is not None:
-            return TaskOutcome(task, {}, time.monotonic() - began, str(theirs))
         reason = f"{task.called}: the work met an error of its own: {type(error).__name__}: {_reason(task, error)}"
         return TaskOutcome(task, {}, time.monotonic() - began, reason)
 

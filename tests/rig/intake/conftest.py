@@ -1,4 +1,4 @@
-"""A good folder of CSV files to import."""
+"""Folders to import: a good one of CSV files, and an empty one."""
 
 from pathlib import Path
 
@@ -10,3 +10,9 @@ from tests.rig.recording.measured import measured
 @pytest.fixture
 def source(tmp_path: Path) -> Path:
     return measured(tmp_path / "measured")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "in").mkdir()
+    return tmp_path / "in"

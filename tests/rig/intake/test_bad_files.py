@@ -83,12 +83,6 @@ def forces_N(session: Session) -> list[float]:
     return forces
 
 
-@pytest.fixture(name="folder")
-def _folder(tmp_path: Path) -> Path:
-    (tmp_path / "in").mkdir()
-    return tmp_path / "in"
-
-
 @pytest.mark.parametrize("name", MAKERS)
 def test_a_file_that_was_cut_is_refused(folder: Path, name: str) -> None:
     MAKERS[name](folder / name)

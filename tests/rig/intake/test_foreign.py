@@ -57,12 +57,6 @@ def lines(form: str, *columns: NDArray[np.generic]) -> str:
     return "".join(form.format(*row) + "\n" for row in zip(*columns, strict=True))
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "in").mkdir()
-    return tmp_path / "in"
-
-
 def test_instron_bluehill(folder: Path) -> None:
     head = (
         '"Results Table 1"\n,"Maximum Load","Modulus"\n,"(N)","(MPa)"\n1,"7.512","0.84"\n\n'

@@ -23,12 +23,6 @@ HEAD = "Time (s),Position (mm),Force (N)\n"
 ENDS = r"a\.xls: not readable as a workbook \(what is damaged in it ends the program that reads it\); open it"
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "in").mkdir()
-    return tmp_path / "in"
-
-
 def imported(folder: Path, **table: object) -> None:
     columns = {"force": {"column": "Force (N)"}, "position": {"column": "Position (mm)"}}
     form = {"files": "*", "time": {"column": "Time (s)"}, "columns": columns, **table}

@@ -27,12 +27,6 @@ CYRILLIC = "Время, с;Перемещение, мм;Сила, Н\n"
 ROW = lines("{:.3f};{:.5f};{:.5f}", TIME_S, WAY_MM, FORCE_N)
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "in").mkdir()
-    return tmp_path / "in"
-
-
 def pandas_fixed(folder: Path) -> None:
     """`DataFrame.to_hdf` with its fixed format: the names of a block's columns stand beside its values."""
     with h5py.File(folder / "a.h5", "w") as file:

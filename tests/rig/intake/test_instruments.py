@@ -13,12 +13,6 @@ from tests.rig.intake.test_foreign import FORCE_N, TIME_S, WAY_MM, came_in, chec
 ALL = FORMS | LOGGED
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "in").mkdir()
-    return tmp_path / "in"
-
-
 @pytest.mark.parametrize("form", ALL)
 def test_what_an_instrument_wrote_comes_in(folder: Path, form: str) -> None:
     write, recordings, answers = ALL[form]

@@ -25,12 +25,6 @@ from tests.rig.intake.test_foreign import COUNT, FORCE_N, ROWS, TIME_S, WAY_MM, 
 from tests.rig.recording.measured import NOW
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "in").mkdir()
-    return tmp_path / "in"
-
-
 def names(session: Session) -> list[str]:
     return [trial.name for trial in session.trials]
 

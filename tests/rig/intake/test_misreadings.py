@@ -21,12 +21,6 @@ TIMED = {"column": "Zeit [s]"}
 COLUMNS = {"force": {"column": "Kraft [mN]"}, "position": {"column": "Weg [um]"}}
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "in").mkdir()
-    return tmp_path / "in"
-
-
 def mapped(folder: Path, **more: object) -> None:
     """Imports by a mapping of a table with semicolons."""
     table = {"files": "*.csv", "delimiter": ";", "time": TIMED, "columns": COLUMNS, **more}

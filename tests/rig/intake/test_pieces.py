@@ -20,12 +20,6 @@ OTHER = "\nSpecimen\tPeak force (N)\tDisplacement (mm)\nA\tlow\tnone\n"
 ROWS = PRESS.replace(",", "\t").splitlines(keepends=True)
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "in").mkdir()
-    return tmp_path / "in"
-
-
 def in_blocks(folder: Path, step_s: float = 0.02) -> None:
     """Two files of three segments each, between which ``step_s`` pass."""
     lost = round(step_s / 0.02) - 1

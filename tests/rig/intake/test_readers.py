@@ -42,12 +42,6 @@ def check(session: Session, name: str) -> None:
     assert tables["axis"]["position_mm"].tolist() == WAY_MM.tolist()
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "in").mkdir()
-    return tmp_path / "in"
-
-
 def test_vectors_and_structs_of_matlab(folder: Path) -> None:
     vectors = {"t": TIME_S.reshape(-1, 1), "F": FORCE_N.reshape(1, -1), "x": WAY_MM, "gain": 3.0}
     scipy.io.savemat(folder / "flat.mat", vectors)

@@ -24,12 +24,6 @@ HEAD = "Time (s),Position (mm),Force (N)\n"
 PEOPLE = {"measurement_7": "P01", "measurement_9": "P02", "measurement_12": "P02"}
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "in").mkdir()
-    return tmp_path / "in"
-
-
 def press(number: int) -> str:
     """Rows of a specimen that is stiffer than the one before, since copies of a recording are left out."""
     return lines("{:.3f},{:.5f},{:.5f}", TIME_S, WAY_MM, stiffer_N(number))
@@ -142,19 +136,18 @@ def test_other_frequencies_are_not_the_rate_of_the_rows(folder: Path, line: str)
     assert "at what rate are the rows" in question.text
 
 
-@pytest.mark.parametrize("line", ["Unit:,lbF", "Load unit,lbf", "Force Units = LBF"])
-def test_the_unit_above_is_the_answer_that_is_offered(folder: Path, line: str) -> None:
-    text(f"{line}\nTime (s),Position (mm),Load\n", PRESS)(folder)
-    (question,) = propose(folder).questions
-    assert question.usual == "lbf"
-    assert 'unit = "lbf"' in question.line
+OF_FORCE = ("Unit:,lbF", "Load unit,lbf", "Force Units = LBF")
+OF_OTHERS = ("Temperature unit,g", "Unit,°C", "Length Units,Meters")
 
 
-@pytest.mark.parametrize("line", ["Temperature unit,g", "Unit,°C", "Length Units,Meters"])
-def test_the_unit_of_something_else_is_not_that_of_force(folder: Path, line: str) -> None:
+@pytest.mark.parametrize(
+    ("line", "unit"), [*((line, "lbf") for line in OF_FORCE), *((line, "N") for line in OF_OTHERS)]
+)
+def test_the_unit_of_force_above_is_the_answer_that_is_offered(folder: Path, line: str, unit: str) -> None:
     text(f"{line}\nTime (s),Position (mm),Load\n", PRESS)(folder)
     (question,) = propose(folder).questions
-    assert question.usual == "N"
+    assert question.usual == unit
+    assert f'unit = "{unit}"' in question.line
 
 
 def test_a_table_with_more_words_than_numbers_is_one(folder: Path) -> None:
