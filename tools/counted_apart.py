@@ -9,6 +9,7 @@ SAFETY = {
     "controller/safety/first_touch.py": "force must rise as the calibration says",
     "controller/safety/giving_way.py": "a limb that pushes is given way to",
     "controller/safety/load.py": "the force limit holds for what is still to come",
+    "controller/safety/lost_contact.py": "the force must go on being felt",
     "controller/devices/absent.py": "recovery begins where a sensor is absent",
     "controller/devices/connections.py": "whether each device may be relied on",
     "controller/devices/guard.py": "a driver of another distribution that does anything wrong stops motion",

@@ -12,16 +12,20 @@ WORKSPACE_MM = 28.5
 PATIENT_MM = 10.0
 PUSH = set_quantities(surface__speed_mm_s=20.0, surface__position_mm=SURFACE_MM - 9.0)
 """The limb comes 9 mm towards the tip."""
+DROP = set_quantities(surface__speed_mm_s=60.0, surface__position_mm=SURFACE_MM + 15.0)
+RECEDE = set_quantities(surface__speed_mm_s=2.0, surface__position_mm=SURFACE_MM + 9.0)
 STIFF = set_quantities(tissue__inclusion_mm=0.0, tissue__inclusion_N_mm=5.0)
 RUNNING = device("axis", "unguarded")
 """Without it the drive's own watches stop what the loop is to notice here."""
-# The rate of a program of 1 to 3 N, once a second, is 6.3 N/s; half of 1 N within the window of 10 ms is 50 N/s.
+# The rate of a program of 1 to 3 N, once a second, is 6.3 N/s; 1 N more within the window of 10 ms is 100 N/s.
 GENTLE = ("limits.force_rate_N_s=40",)
 # Patient enough for a cycle that comes 70 ms late to be the only thing that is wrong.
 LATE = ("loop.overrun_ms=40", "loop.stale_axis_ms=300", "loop.stale_force_ms=300", "axis.heartbeat_ms=300")
 LATE_S = 0.07
 # A hundred equal samples of 1 kHz where missed samples count by age alone, and one cycle.
 FROZEN_S = 0.2
+# What vanishes in one sample, and one turn.
+AT_ONCE_S = 0.1
 # The program looks after its recorder ten times a second; a recorder writes what it has at least every 0.4 s.
 RECORDER_GONE_S = 0.3
 DISK_FULL_S = 0.7
@@ -31,7 +35,11 @@ GLOVE = ("input.glove.product=firmata-glove", "input.glove.port=mock", "input.gl
 
 
 def _too_deep(truth: Truth) -> bool:
-    return truth["tip.depth_mm"] > DEPTH_LIMIT_MM
+    return truth["tip.position_mm"] > SURFACE_MM + DEPTH_LIMIT_MM
+
+
+def _unfelt(truth: Truth) -> bool:
+    return truth["tip.depth_mm"] < 0.0
 
 
 def _at_inclusion(truth: Truth) -> bool:
@@ -103,11 +111,11 @@ FORCE = (
     Fault("touch.polarity", "hold", ("first_touch",), device("force", "polarity"), _touches, before=True),
     Fault("touch.crossed", "hold", ("first_touch",), device("force", "crossed"), _touches, before=True),
     Fault("touch.dead", "hold", ("first_touch",), device("force", "dead"), _touches, before=True),
-    Fault("force.polarity", "press", ("force_rate",), device("force", "polarity"), settings=GENTLE),
-    Fault("force.gain_half", "press", ("force_rate",), device("force", "gain", 0.5), settings=GENTLE),
+    Fault("force.polarity", "press", ("contact_lost",), device("force", "polarity"), within_s=AT_ONCE_S),
+    Fault("force.gain_half", "press", ("contact_lost",), device("force", "gain", 0.5), within_s=AT_ONCE_S),
     Fault("force.gain_double", "press", ("force_rate",), device("force", "gain", 2.0), settings=GENTLE),
-    Fault("force.dead", "press", ("force_rate",), device("force", "dead"), settings=GENTLE),
-    Fault("force.crossed", "press", ("force_rate",), device("force", "crossed"), settings=GENTLE),
+    Fault("force.dead", "press", ("contact_lost",), device("force", "dead"), within_s=AT_ONCE_S),
+    Fault("force.crossed", "press", ("contact_lost",), device("force", "crossed"), within_s=AT_ONCE_S),
 )
 
 TRACKER = (
@@ -139,8 +147,12 @@ LIMB = (
     Fault("limb.stiff_fast", "fast", ("force_limit",), STIFF, _too_strong, before=True, why="5 N/mm met at 30 mm/s"),
     Fault("limb.stiff_slow_sensor", "fast", ("force_limit",), STIFF, _too_strong, before=True,
           settings=("force.product=robotiq-ft300",), why="the same with a sensor of 100 Hz"),
-    Fault("limb.leaves", "press", ("depth_limit",), set_quantities(tissue__present=False), _too_deep,
-          settings=(f"limits.depth_mm={DEPTH_LIMIT_MM}",), why="the tip searches for it, down to the depth limit"),
+    Fault("limb.leaves", "press", ("contact_lost",), set_quantities(tissue__present=False),
+          within_s=AT_ONCE_S),
+    Fault("limb.drops", "press", ("contact_lost",), DROP, _unfelt, settings=("limits.patient_mm=20",),
+          why="15 mm at 60 mm/s, and the tip searches for it"),
+    Fault("limb.recedes", "press", ("depth_limit",), RECEDE, _too_deep,
+          settings=(f"limits.depth_mm={DEPTH_LIMIT_MM}",), why="slowly, and the tip follows, down to the depth limit"),
     Fault("limb.absent", "hold", (PROTOCOL,), set_quantities(tissue__present=False), _searched, before=True),
     Fault("limb.pushes_idle", "idle", ("pushed",), PUSH, _pushed),
     Fault("limb.pushes_safe", "safe", ("pushed",), PUSH, _pushed, why="after an emergency stop in contact"),

@@ -30,13 +30,11 @@ HAZARDS = (
         "The force that is shown is not the force on the limb",
         "a wrong word of configuration, another sensor, exchanged wires, a broken channel, a zero that drifts, a"
         " converter at its end, a frozen or silent sensor",
-        ("first_touch", "force_lost", "force_invalid", "force_rate", PROTOCOL, REFUSED, QUALITY),
-        "A channel that dies, or a gain that halves, while the tip presses with a few newtons is noticed by"
-        " `force_rate` only where `limits.force_rate_N_s` is near what the work needs: the campaign's faults have 40"
-        " N/s. At the 1000 N/s that holds where nothing is stated, tracking searches on inwards to `limits.depth_mm`"
-        " (49 N were reached on the mock's limb in 1.8 s with the check switched off), and a halved gain doubles the"
-        " force unseen. State the rate. A gain that changed in the air before the first trial of a session is found by"
-        " the next calibration only: hang"
+        ("first_touch", "force_lost", "force_invalid", "force_rate", "contact_lost", PROTOCOL, REFUSED, QUALITY),
+        "A gain that halves is not noticed where the tip presses with less than 0.8 N, nor in a press of 10 to 30 mm/s"
+        " with a sensor of 100 Hz before three of its samples are in the loading: the tip then presses with up to twice"
+        " the limit. A channel that dies below 0.8 N is noticed 3 mm further in. A gain that changed in the air before"
+        " the first trial of a session is found by the next calibration only: hang"
         " a known weight on the tip before each session. The first touch is judged in newtons, not in millimetres: a"
         " force channel that is dead and pressed exactly along its axis shows no moment either, and before"
         " `search_to_mm` nothing stops the approach but the following error, once the drive's current limit holds the"
@@ -53,8 +51,9 @@ HAZARDS = (
     Hazard(
         "The limb moves, or is not where it is believed to be",
         "the person moves, breathing, a strap that slips, a marker that is hidden or knocked off, a tracker that fails",
-        ("patient_moved", "tracker_lost", "depth_limit", PROTOCOL),
-        "Without a tracker only force and depth are known of the limb.",
+        ("patient_moved", "tracker_lost", "contact_lost", "depth_limit", PROTOCOL),
+        "Without a tracker only force and depth are known of the limb. One that is drawn back slowly, under a guide"
+        " whose friction is more than 0.05 N, is searched for down to `limits.depth_mm`.",
     ),
     Hazard(
         "A person wants to stop the motion and nothing happens",
@@ -105,6 +104,8 @@ TESTS: dict[str, str] = {
     "force_rate": "tests/controller/safety/test_force_limit.py::test_a_rate_above_its_limit_stops_with_either_sensor",
     "first_touch": "tests/controller/safety/test_first_touch.py"
     "::test_a_sign_that_turned_since_the_calibration_is_found_before_2_N_and_named",
+    "contact_lost": "tests/controller/safety/test_lost_contact.py"
+    "::test_a_channel_that_fails_while_a_force_is_tracked_is_noticed_before_anything_is_felt",
     "oscillation": "tests/controller/safety/test_oscillation.py"
     "::test_tissue_stiffer_than_the_loop_tolerates_is_left_and_named",
     "axis_scale": "tests/controller/safety/test_axis_scale.py"

@@ -14,7 +14,7 @@ from controller.devices.states import DeviceStatus
 from controller.devices.wire_damage import WireDamage
 from controller.loop.executive import Cycle
 from controller.loop.messages import Finished, Outcome, Status, StatusSaid, Stopped
-from controller.loop.modes import AT_REST, Mode
+from controller.loop.modes import AT_REST, PRESSING, Mode
 from controller.loop.paired_samples import Touch
 from controller.loop.phase_lock import PhaseLock
 from controller.loop.registration import Point, Registration
@@ -26,6 +26,7 @@ from controller.safety.first_touch import FirstTouch
 from controller.safety.giving_way import give_way
 from controller.safety.inputs import SafetyInputs
 from controller.safety.load import LoadMonitor, calibrated_zero
+from controller.safety.lost_contact import LostContact
 from controller.safety.oscillation import OscillationMonitor
 from controller.safety.table import TABLE, Action, Check, Incident
 from rig.channel import Channel
@@ -106,6 +107,7 @@ class BenchLoop:
         self._cycles = self._events = self._program = 0
         self._load_monitor = LoadMonitor(devices.force.period_ns)
         self._first_touch, self._oscillation = FirstTouch(wiring), OscillationMonitor()
+        self._lost_contact = LostContact()
         self._calibrated_zero = calibrated_zero(wiring)
         self._force_map = wiring.force_map
         self.braked = False
@@ -218,6 +220,7 @@ class BenchLoop:
         state.force_late = health["force"].age_ns(now_ns) > LATE_PERIODS * health["force"].period_ns
         state.following_mm = state.setpoint.position_mm - state.position_mm if self.machine.busy else 0.0
         inputs.touch_wrong = self._first_touch.update(state) if self.machine.mode in TOUCHING else ""
+        inputs.contact_lost = self._lost_contact.update(state) if self.machine.mode in PRESSING else ""
         inputs.oscillation = self._oscillation.update(state) if self.machine.mode is Mode.CONTACT else ""
         inputs.force_valid, inputs.force_frozen = health["force"].valid, health["force"].frozen
         inputs.force_age_ms = health["force"].age_ns(now_ns) * 1e-6
@@ -275,6 +278,7 @@ class BenchLoop:
         self._registration.begin()
         self._standstill.begin()
         self._first_touch.begin()
+        self._lost_contact.begin()
         self.state.standstill_mm, self.state.axis_scale = 0.0, None
         self.machine.start(program)
 

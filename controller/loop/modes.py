@@ -17,3 +17,6 @@ class Mode(IntEnum):
 
 AT_REST = (Mode.IDLE, Mode.SAFE)
 """Modes in which nothing is asked to move."""
+
+PRESSING = (Mode.COMPRESS, Mode.CONTACT)
+"""Modes in which the tip is meant to be in contact, and goes deeper by what it feels."""

@@ -6,7 +6,7 @@ Every one takes (state, inputs, wiring). Force is counted from the reference zer
 
 import math
 
-from controller.loop.modes import AT_REST
+from controller.loop.modes import AT_REST, PRESSING
 from controller.loop.state import LoopState
 from controller.safety.inputs import SafetyInputs
 from rig.config.wiring import Wiring
@@ -142,6 +142,17 @@ def force_rate(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
 def first_touch(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
     """The sensor does not answer a touch as it was calibrated."""
     return inputs.touch_wrong
+
+
+def contact_lost(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
+    """What the tip presses on is not felt any more, though the tip did not leave."""
+    vanished_N = state.load.vanished_N
+    if not vanished_N > 0.0 or inputs.mode not in PRESSING:
+        return inputs.contact_lost
+    return (
+        f"{vanished_N:.2f} N vanished at once though the tip did not leave: the limb is gone, or a force channel died"
+        " or lost its gain; check sensor and cable, then `rig calibrate force`"
+    )
 
 
 def oscillation(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:

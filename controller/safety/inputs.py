@@ -18,6 +18,7 @@ class SafetyInputs:
     force_valid: bool = True
     force_frozen: bool = False
     touch_wrong: str = ""
+    contact_lost: str = ""
     oscillation: str = ""
     force_age_ms: float = 0.0
     axis_age_ms: float = 0.0

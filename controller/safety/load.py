@@ -8,10 +8,15 @@ reached if the axis were stopped now:
 
 k is the stiffest of the secants from earlier samples to the newest, each less what noise alone may give, and raised by
 what tissue stiffens on the way. Where a limb pushes while the axis stands, load + rate x age of the sample counts.
+
+A channel that dies, loses gain or turns round while the tip presses takes the load away in one sample. Tissue gives it
+back by no more than its stiffness times the way out, and on the way in it takes more by its tangent stiffness: what
+is missing beyond that has no cause in it.
 """
 
 import math
 from collections import deque
+from collections.abc import Iterator
 from typing import NamedTuple, TypeAlias
 
 from controller.loop.setpoint import Setpoint
@@ -32,6 +37,8 @@ STIFFNESS_WINDOW_NS = 60_000_000
 LEAST_TRAVEL_MM = 0.05
 # Beyond this a secant says what the tissue was, not what it is.
 LONGEST_TRAVEL_MM = 0.7
+# Over this the noise of the noisier product takes no more than 1 N/mm; a shorter secant may lie across a turn.
+TELLING_TRAVEL_MM = 0.2
 # Samples between the ends of the secants, spread evenly on a logarithmic scale: all sixty would cost the loop 30 us.
 LAGS = (1, 2, 3, 5, 8, 13, 21, 34, 55)
 # Three standard deviations of a difference of two samples.
@@ -40,18 +47,33 @@ NOISE_GUARD = 3.0 * math.sqrt(2.0)
 LARGEST_NOISE_N = 0.15
 # Growth of tangent stiffness [1/mm]: the index law exponent of forearms is 0.1 to 0.25; linear tissue is stopped early.
 STIFFENING_PER_MM = 0.25
+# A filter of a sensor of 1 kHz spreads a jump over two or three samples; the damping of tissue behind a tip that brakes
+# from 30 mm/s with 2000 mm/s2 takes 15 ms to go.
+VANISHING_NS = 3_000_000
+# Half a gain is lost from 0.8 N on: 0.32 N there, which is four standard deviations of a difference of two samples of
+# the noisier product, twice.
+LEAST_LOADED_N, LEAST_VANISHED_N, LEAST_SHARE = 0.8, 0.3, 0.4
+# Stiffer than any limb that is left or met at a speed that matters (5 N/mm are asked for); a bone under a tip that
+# leaves it may stop once too often.
+STIFFEST_N_MM = 10.0
+# Tissue gives a load back more steeply than it took it, by its memory.
+UNLOADING = 2.0
 # An axis sample this old is not extrapolated from any further.
 LONGEST_AHEAD_NS = 10_000_000
 
 
 class TipLoad(NamedTuple):
-    """What the tip bears: norms from the reference zero [N], [N m], rate [N/s], stiffness [N/mm], peak foreseen [N]."""
+    """What the tip bears: norms from the reference zero [N], [N m], rate [N/s], stiffness [N/mm], peak foreseen [N].
+
+    ``vanished_N`` is the load that went at once and for no reason, 0 where that is little.
+    """
 
     force_N: float
     torque_N_m: float
     rate_N_s: float
     stiffness_N_mm: float
     predicted_N: float
+    vanished_N: float = 0.0
 
 
 UNKNOWN = TipLoad(math.nan, math.nan, 0.0, 0.0, math.nan)
@@ -70,6 +92,7 @@ class LoadMonitor:
         self._filter_ns = period_ns // 2  # what is sampled at a rate was filtered for it, about half a period long
         self._rate_ns = max(RATE_WINDOW_NS, round(RATE_PERIODS * period_ns))
         self._kept_ns = max(STIFFNESS_WINDOW_NS, self._rate_ns)
+        self._vanishing = max(1, round(VANISHING_NS / period_ns)) if period_ns else 1
         self._axis: deque[tuple[int, float]] = deque(maxlen=64)
         self._samples: deque[_Sample] = deque()
 
@@ -96,7 +119,8 @@ class LoadMonitor:
         stiffness_N_mm = self._stiffness(zero, noise_N, max(ahead_mm, 0.0))
         rise_N = stiffness_N_mm * max(ahead_mm, 0.0)
         pushed_N = rate_N_s * (now_ns - newest.capture_ns) * 1e-9
-        return TipLoad(load_N, _torque(newest.wrench, zero), rate_N_s, stiffness_N_mm, load_N + max(rise_N, pushed_N))
+        peak_N, torque_N_m = load_N + max(rise_N, pushed_N), _torque(newest.wrench, zero)
+        return TipLoad(load_N, torque_N_m, rate_N_s, stiffness_N_mm, peak_N, self._vanished_N(zero, noise_N))
 
     def _rate(self) -> float:
         """Change of the force vector over the window [N/s], as a norm: direction and sign do not matter."""
@@ -105,24 +129,62 @@ class LoadMonitor:
         span_ns = newest.capture_ns - first.capture_ns
         return _force(newest.wrench, first.wrench) / span_ns * 1e9 if span_ns > self._rate_ns // 2 else 0.0
 
+    def _vanished_N(self, zero: Wrench, noise_N: float) -> float:
+        """What two samples lack of what the two before a jump let expect, along their direction."""
+        samples, newest = self._samples, self._samples[-1]
+        if len(samples) < self._vanishing + 3:
+            return 0.0
+        then = samples[-2 - self._vanishing]
+        load_N, inward_mm = _force(then.wrench, zero), newest.position_mm - then.position_mm
+        if load_N < LEAST_VANISHED_N:
+            return 0.0
+        left_N = max(_along(sample.wrench, then.wrench, zero) for sample in (newest, samples[-2])) / load_N
+        if left_N >= (1.0 - LEAST_SHARE) * (load_N + STIFFEST_N_MM * max(inward_mm, 0.0)):
+            return 0.0  # whatever the tissue, and the secants would cost the loop 10 us
+        expected_N = self._expected_N(zero, noise_N)
+        least_N = max(LEAST_VANISHED_N, LEAST_SHARE * expected_N)
+        return expected_N - left_N if expected_N >= LEAST_LOADED_N and expected_N - left_N > least_N else 0.0
+
+    def _expected_N(self, zero: Wrench, noise_N: float) -> float:
+        """The least that a sound sensor would show now, going on from either of the two samples before a jump."""
+        then, newest = self._samples[-2 - self._vanishing], self._samples[-1]
+        per_mm = min(self._tangent_before(zero, noise_N), STIFFEST_N_MM)
+        if newest.position_mm < then.position_mm:
+            per_mm = min(UNLOADING * per_mm, STIFFEST_N_MM) or STIFFEST_N_MM
+        before = (then, self._samples[-3 - self._vanishing])
+        return min(_force(one.wrench, zero) + per_mm * (newest.position_mm - one.position_mm) for one in before)
+
+    def _tangent_before(self, zero: Wrench, noise_N: float) -> float:
+        """The steepest that tells, up to where a jump may be [N/mm]; 0 where none does."""
+        secants = self._secants(2 + self._vanishing, zero, noise_N)
+        return max((per_mm for per_mm, travel_mm in secants if travel_mm >= TELLING_TRAVEL_MM), default=0.0)
+
     def _stiffness(self, zero: Wrench, noise_N: float, ahead_mm: float) -> float:
         """Tangent stiffness on the way of ``ahead_mm`` before the tip [N/mm], never negative."""
-        samples, newest = self._samples, self._samples[-1]
-        load_N, guard_N = _force(newest.wrench, zero), NOISE_GUARD * min(noise_N, LARGEST_NOISE_N)
-        stiffest_N_mm = 0.0
+        return max(
+            (
+                per_mm * (1.0 + STIFFENING_PER_MM * 0.5 * (ahead_mm + travel_mm))
+                for per_mm, travel_mm in self._secants(1, zero, noise_N)
+            ),
+            default=0.0,
+        )
+
+    def _secants(self, last: int, zero: Wrench, noise_N: float) -> Iterator[tuple[float, float]]:
+        """Force over travel, less what noise may give [N/mm], and travel [mm], up to the ``last`` sample of all."""
+        samples, end, guard_N = self._samples, self._samples[-last], NOISE_GUARD * min(noise_N, LARGEST_NOISE_N)
+        load_N, found = _force(end.wrench, zero), False
         for lag in LAGS:
-            if lag >= len(samples):
-                break
-            then = samples[-1 - lag]
-            travel_mm, rise_N = newest.position_mm - then.position_mm, load_N - _force(then.wrench, zero)
+            if lag + last > len(samples):
+                return
+            then = samples[-last - lag]
+            travel_mm, rise_N = end.position_mm - then.position_mm, load_N - _force(then.wrench, zero)
             if travel_mm < 0.0:
                 travel_mm, rise_N = -travel_mm, -rise_N
-            if travel_mm > LONGEST_TRAVEL_MM and stiffest_N_mm > 0.0:
-                break
-            if travel_mm >= LEAST_TRAVEL_MM:
-                stiffening = 1.0 + STIFFENING_PER_MM * 0.5 * (ahead_mm + travel_mm)
-                stiffest_N_mm = max(stiffest_N_mm, (rise_N - guard_N) / travel_mm * stiffening)
-        return stiffest_N_mm
+            if travel_mm > LONGEST_TRAVEL_MM and found:
+                return
+            if travel_mm >= LEAST_TRAVEL_MM and rise_N > guard_N:
+                found = True
+                yield (rise_N - guard_N) / travel_mm, travel_mm
 
     def _position(self, capture_ns: int) -> float:
         """The axis at ``capture_ns``: between its samples, or ahead of the newest as it last moved [mm]."""
@@ -151,6 +213,12 @@ def _between(before: tuple[int, float], after: tuple[int, float], at_ns: int) ->
 
 def _force(wrench: Wrench, zero: Wrench) -> float:
     return math.dist(wrench[:3], zero[:3])
+
+
+def _along(wrench: Wrench, then: Wrench, zero: Wrench) -> float:
+    """Scalar product of two forces [N2]: the first along the second, times the second."""
+    (fx_N, fy_N, fz_N, *_), (tx_N, ty_N, tz_N, *_), (zx_N, zy_N, zz_N, *_) = wrench, then, zero
+    return (fx_N - zx_N) * (tx_N - zx_N) + (fy_N - zy_N) * (ty_N - zy_N) + (fz_N - zz_N) * (tz_N - zz_N)
 
 
 def _torque(wrench: Wrench, zero: Wrench) -> float:

@@ -59,6 +59,8 @@ PATIENT_S = 0.3
 RECORDER_S = checks.RECORDER_SILENT_S + TURN_S
 # From the first load: 1 N of the softest tissue (0.1 N/mm) at the 5 mm/s of an approach.
 TOUCH_S = 2.0
+# Three millimetres of a search at 5 mm/s, and one turn; what vanishes at once is told at once.
+CONTACT_S = 0.6 + TURN_S
 # From the depth at which tissue is too stiff: half of a press that is made once a second, until it is pressed upon with
 # force enough to swing; then six turns of 12 Hz, and one turn of the loop.
 OSCILLATION_S = 0.5 + 0.5 + TURN_S
@@ -87,6 +89,7 @@ TABLE: tuple[Check, ...] = (
     Check("force_lost", Action.SOFT, checks.force_lost, STALE_S),
     Check("force_invalid", Action.SOFT, checks.force_invalid, TURN_S),
     Check("force_rate", Action.SOFT, checks.force_rate, TURN_S, at_rest=True),
+    Check("contact_lost", Action.SOFT, checks.contact_lost, CONTACT_S),
     Check("oscillation", Action.SOFT, checks.oscillation, OSCILLATION_S),
     Check("first_touch", Action.SOFT, checks.first_touch, TOUCH_S),
     Check("axis_scale", Action.SOFT, checks.axis_scale, SCALE_S),

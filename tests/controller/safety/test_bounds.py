@@ -34,6 +34,7 @@ LINES = [
     ("force_lost", SOFT, 0.6, False),
     ("force_invalid", SOFT, 0.1, False),
     ("force_rate", SOFT, 0.1, True),
+    ("contact_lost", SOFT, 0.7, False),
     ("oscillation", SOFT, 1.1, False),
     ("first_touch", SOFT, 2.0, False),
     ("axis_scale", SOFT, 2.1, False),
@@ -141,6 +142,11 @@ CASES = [
          "the force sensor marks its samples as invalid or out of range"),
     Case("force_invalid", {}, {"force_frozen": True}, "the force sensor repeats the same value: it is frozen"),
     Case("force_rate", load(rate_N_s=1000.0), load(rate_N_s=1001.0), "force changes by 1001 N/s (limit 1000 N/s)"),
+    Case("contact_lost", load(vanished_N=0.0), load(vanished_N=0.34),
+         "0.34 N vanished at once though the tip did not leave: the limb is gone, or a force channel died or lost its"
+         " gain; check sensor and cable, then `rig calibrate force`"),
+    Case("contact_lost", {**load(vanished_N=3.0), "mode": Mode.RETRACT}, {"contact_lost": "nothing is felt"},
+         "nothing is felt"),
     Case("depth_limit", {"position_mm": 35.0, "surface_mm": 20.0}, {"position_mm": 35.01, "surface_mm": 20.0},
          "depth 15.01 mm is above 15 mm"),
     Case("tracker_lost", {"marker_age_ms": 200.0}, {"marker_age_ms": 201.0},
@@ -238,6 +244,12 @@ def test_while_the_tip_moves_what_is_not_known_is_a_stop_too(code: str) -> None:
     assert found(line_of(code), CASES[0], nothing)
 
 
+@pytest.mark.parametrize("mode", list(Mode))
+def test_a_load_that_vanishes_counts_where_the_tip_is_to_press(mode: Mode) -> None:
+    gone = {**load(vanished_N=3.0), "mode": mode}
+    assert bool(found(line_of("contact_lost"), CASES[0], gone)) is (mode in (Mode.COMPRESS, Mode.CONTACT))
+
+
 def test_without_a_tracker_no_tracker_can_be_lost() -> None:
     state, inputs = LoopState(), SafetyInputs(marker_lost="cable", marker_age_ms=1e9, limb_age_ms=1e9)
     assert safety_checks.tracker_lost(state, inputs, Wiring(tracker=None)) == ""
@@ -286,7 +298,7 @@ def test_what_the_table_looks_at_is_well_until_the_loop_says_otherwise() -> None
     inputs = SafetyInputs()
     assert inputs == SafetyInputs(
         mode=Mode.IDLE, force_lost="", axis_lost="", marker_lost="", drive_fault="", force_valid=True,
-        force_frozen=False, touch_wrong="", oscillation="", force_age_ms=0.0,
+        force_frozen=False, touch_wrong="", contact_lost="", oscillation="", force_age_ms=0.0,
         axis_age_ms=0.0, marker_age_ms=0.0, limb_age_ms=0.0, late_ms=0.0,
         recorder_fill=0.0, recorder_silent_s=0.0, stop_silent_s=0.0,
         supervisor_lost=False, operator_silent_s=0.0, requests=frozenset(),

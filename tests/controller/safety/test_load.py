@@ -228,3 +228,75 @@ def test_stiffness_is_the_steepest_secant_of_the_ways_that_count(
 ) -> None:
     stiffness_N_mm = sampled(*rows)._stiffness(NO_WRENCH, 0.0, 0.0)
     assert stiffness_N_mm == pytest.approx(slope_N_mm * (1.0 + 0.25 * 0.5 * travel_mm))
+
+
+def jumped(
+    before_N: float,
+    after_N: float,
+    mm_a_sample: float = 0.0,
+    per_mm: float = 0.0,
+    period_ms: int = 1,
+    noise_N: float = 0.0,
+) -> list[float]:
+    """What has vanished at each of ten samples from a jump on: the force goes to ``after_N`` and rises no more."""
+    monitor, told = LoadMonitor(period_ms * MS), []
+    for number in range(-30, 10):
+        at_ms, place_mm = (number + 30) * period_ms, 20.0 + mm_a_sample * number
+        monitor.axis(round((at_ms - 0.5 * period_ms) * MS), place_mm)
+        monitor.force(at_ms * MS, along(after_N if number >= 0 else before_N + per_mm * mm_a_sample * number))
+        told.append(asked(monitor, at_ms, noise_N=noise_N).vanished_N)
+    assert told[:31] == [0.0] * 31, "one sample is a disturbance"
+    return told[31:]
+
+
+@pytest.mark.parametrize(("period_ms", "seen"), [(1, 3), (3, 1), (10, 1)])
+def test_a_load_that_goes_at_once_is_told_from_its_second_sample_for_three_milliseconds(
+    period_ms: int, seen: int
+) -> None:
+    assert jumped(2.0, 0.0, period_ms=period_ms) == pytest.approx([2.0] * seen + [0.0] * (9 - seen))
+    assert jumped(2.0, -2.0, period_ms=period_ms)[0] == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(
+    ("before_N", "after_N", "told"),
+    [(0.81, 0.48, True), (0.79, 0.40, False), (0.81, 0.49, False), (3.0, 1.79, True), (3.0, 1.81, False),
+     (0.9, 0.0, True), (0.3, 0.0, False)],
+)  # fmt: skip
+def test_it_counts_from_eight_tenths_of_a_newton_and_where_four_tenths_are_gone(
+    before_N: float, after_N: float, told: bool
+) -> None:
+    assert (jumped(before_N, after_N)[0] > 0.0) is told
+
+
+def test_the_force_that_is_left_is_what_points_the_same_way() -> None:
+    monitor = LoadMonitor(MS)
+    for number in range(20):
+        monitor.axis(number * MS, 20.0)
+        monitor.force(number * MS, (0.0, 0.0, -5.0, 0.0, 0.0, 0.0) if number < 18 else (5.0, 3.0, -2.0, 0.0, 0.0, 0.0))
+    assert asked(monitor, 19.0, zero=(0.0, 0.0, -1.0, 0.0, 0.0, 0.0)).vanished_N == pytest.approx(4.0 - 1.0)
+
+
+# Where the second sample after the jump is the newest, the two before it are four and five samples back, three and four
+# before the jump's place.
+def test_on_the_way_out_twice_the_tangent_before_may_go() -> None:
+    [told, *_] = jumped(4.0, 0.5, mm_a_sample=-0.05, per_mm=2.0)
+    assert told == pytest.approx(min(4.3 - 4.0 * 0.2, 4.4 - 4.0 * 0.25) - 0.5)
+    [stiff, *_] = jumped(4.0, 0.0, mm_a_sample=-0.05, per_mm=6.0)
+    assert stiff == pytest.approx(min(4.9 - 10.0 * 0.2, 5.2 - 10.0 * 0.25)), "no more than 10 N/mm"
+
+
+def test_on_the_way_out_ten_newtons_a_millimetre_may_go_where_no_tangent_is_known() -> None:
+    assert jumped(4.0, 0.5, mm_a_sample=-0.05)[0] == pytest.approx(4.0 - 10.0 * 0.25 - 0.5)
+
+
+def test_on_the_way_in_it_is_to_rise_by_the_tangent_before() -> None:
+    assert jumped(4.0, 1.0, mm_a_sample=0.05, per_mm=3.0)[0] == pytest.approx(3.55 + 3.0 * 0.2 - 1.0)
+    assert jumped(19.0, 9.0, mm_a_sample=0.05, per_mm=12.0)[0] == pytest.approx(16.6 + 10.0 * 0.25 - 9.0)
+
+
+def test_noise_makes_no_tangent_and_short_ways_tell_none() -> None:
+    tangent_N_mm = 3.0 - 3.0 * math.sqrt(2.0) * 0.05 / 0.65  # over 13 samples, the longest way that counts
+    [told, *_] = jumped(4.0, 1.0, mm_a_sample=0.05, per_mm=3.0, noise_N=0.05)
+    assert told == pytest.approx(3.4 + tangent_N_mm * 0.25 - 1.0)
+    # Of thirty samples twenty-one lie before: 0.19 mm of the 0.2 that it takes.
+    assert jumped(4.0, 1.0, mm_a_sample=0.009, per_mm=3.0)[0] == pytest.approx(4.0 - 3.0 * 0.009 * 4 - 1.0)
