@@ -104,7 +104,7 @@ TESTS: dict[str, str] = {
     "force_rate": "tests/controller/safety/test_force_limit.py::test_a_rate_above_its_limit_stops_with_either_sensor",
     "first_touch": "tests/controller/safety/test_first_touch.py"
     "::test_a_sign_that_turned_since_the_calibration_is_found_before_2_N_and_named",
-    "contact_lost": "tests/controller/safety/test_lost_contact.py"
+    "contact_lost": "tests/controller/safety/test_failing_channel.py"
     "::test_a_channel_that_fails_while_a_force_is_tracked_is_noticed_before_anything_is_felt",
     "oscillation": "tests/controller/safety/test_oscillation.py"
     "::test_tissue_stiffer_than_the_loop_tolerates_is_left_and_named",

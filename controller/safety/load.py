@@ -17,6 +17,7 @@ is missing beyond that has no cause in it.
 import math
 from collections import deque
 from collections.abc import Iterator
+from itertools import islice
 from typing import NamedTuple, TypeAlias
 
 from controller.loop.setpoint import Setpoint
@@ -53,11 +54,14 @@ VANISHING_NS = 3_000_000
 # Half a gain is lost from 0.8 N on: 0.32 N there, which is four standard deviations of a difference of two samples of
 # the noisier product, twice.
 LEAST_LOADED_N, LEAST_VANISHED_N, LEAST_SHARE = 0.8, 0.3, 0.4
-# Stiffer than any limb that is left or met at a speed that matters (5 N/mm are asked for); a bone under a tip that
-# leaves it may stop once too often.
-STIFFEST_N_MM = 10.0
-# Tissue gives a load back more steeply than it took it, by its memory.
-UNLOADING = 2.0
+# Stiffer than any limb that is met at a speed that matters (5 N/mm are asked for).
+STIFFEST_IN_N_MM = 10.0
+# Tissue gives a load back more steeply than it took it, by its memory; a loop that swings on a bone is no lost contact.
+UNLOADING, STIFFEST_OUT_N_MM = 2.0, 50.0
+# Where no tangent is known the axis went less than LEAST_TRAVEL_MM in STIFFNESS_WINDOW_NS: 0.1 N of a sensor of 1 kHz.
+UNKNOWN_OUT_N_MM = 20.0
+# A swing of 80 Hz and 0.05 mm passes no place by more between two samples; the softest tissue gives 0.002 N over it.
+SAME_PLACE_MM = 0.02
 # An axis sample this old is not extrapolated from any further.
 LONGEST_AHEAD_NS = 10_000_000
 
@@ -139,25 +143,38 @@ class LoadMonitor:
         if load_N < LEAST_VANISHED_N:
             return 0.0
         left_N = max(_along(sample.wrench, then.wrench, zero) for sample in (newest, samples[-2])) / load_N
-        if left_N >= (1.0 - LEAST_SHARE) * (load_N + STIFFEST_N_MM * max(inward_mm, 0.0)):
+        if left_N >= (1.0 - LEAST_SHARE) * (load_N + STIFFEST_IN_N_MM * max(inward_mm, 0.0)):
             return 0.0  # whatever the tissue, and the secants would cost the loop 10 us
         expected_N = self._expected_N(zero, noise_N)
         least_N = max(LEAST_VANISHED_N, LEAST_SHARE * expected_N)
-        return expected_N - left_N if expected_N >= LEAST_LOADED_N and expected_N - left_N > least_N else 0.0
+        vanished_N = expected_N - left_N
+        if expected_N < LEAST_LOADED_N or not vanished_N > least_N or self._felt_here(zero, left_N + least_N):
+            return 0.0
+        return vanished_N
+
+    def _felt_here(self, zero: Wrench, most_N: float) -> bool:
+        """Whether no more than that was felt at this place a moment ago: a loop that swings on something stiff."""
+        place_mm, before = self._samples[-1].position_mm, len(self._samples) - 3 - self._vanishing
+        return any(
+            abs(sample.position_mm - place_mm) <= SAME_PLACE_MM and _force(sample.wrench, zero) <= most_N
+            for sample in islice(self._samples, before)
+        )
 
     def _expected_N(self, zero: Wrench, noise_N: float) -> float:
         """The least that a sound sensor would show now, going on from either of the two samples before a jump."""
         then, newest = self._samples[-2 - self._vanishing], self._samples[-1]
-        per_mm = min(self._tangent_before(zero, noise_N), STIFFEST_N_MM)
         if newest.position_mm < then.position_mm:
-            per_mm = min(UNLOADING * per_mm, STIFFEST_N_MM) or STIFFEST_N_MM
+            known_N_mm = UNLOADING * self._tangent_before(zero, noise_N, LEAST_TRAVEL_MM)
+            per_mm = min(known_N_mm, STIFFEST_OUT_N_MM) or UNKNOWN_OUT_N_MM
+        else:
+            per_mm = min(self._tangent_before(zero, noise_N, TELLING_TRAVEL_MM), STIFFEST_IN_N_MM)
         before = (then, self._samples[-3 - self._vanishing])
         return min(_force(one.wrench, zero) + per_mm * (newest.position_mm - one.position_mm) for one in before)
 
-    def _tangent_before(self, zero: Wrench, noise_N: float) -> float:
-        """The steepest that tells, up to where a jump may be [N/mm]; 0 where none does."""
+    def _tangent_before(self, zero: Wrench, noise_N: float, least_mm: float) -> float:
+        """The steepest secant over ``least_mm`` or more, up to where a jump may be [N/mm]; 0 where there is none."""
         secants = self._secants(2 + self._vanishing, zero, noise_N)
-        return max((per_mm for per_mm, travel_mm in secants if travel_mm >= TELLING_TRAVEL_MM), default=0.0)
+        return max((per_mm for per_mm, travel_mm in secants if travel_mm >= least_mm), default=0.0)
 
     def _stiffness(self, zero: Wrench, noise_N: float, ahead_mm: float) -> float:
         """Tangent stiffness on the way of ``ahead_mm`` before the tip [N/mm], never negative."""

@@ -12,7 +12,7 @@ import pytest
 from controller.loop.modes import Mode
 from controller.loop.steps import Compress, MoveTo
 from controller.safety.table import TABLE, Action
-from tests.controller.fake_bench import APPROACH, HOLD, ZERO, FakeBench, pressing, wired
+from tests.controller.fake_bench import APPROACH, HOLD, LEAVE, PRESS, ZERO, FakeBench, pressing, wired
 from tests.controller.fake_devices import SURFACE_MM
 
 RATES_HZ = pytest.mark.parametrize("sensor_Hz", [1000.0, 100.0])
@@ -76,6 +76,8 @@ FAULTS = [
     Fault("force_invalid", knob("force", valid=False), (0, 3), (0, 13), "invalid or out of range"),
     # Three samples the same are two too many: the third repetition of the last good one is the third after the fault.
     Fault("force_invalid", knob("force", frozen=True), (2, 5), (20, 42), "frozen"),
+    Fault("contact_lost", knob("force", gain=0.0), (1, 4), (10, 33), "N vanished at once though the tip did not leave"),
+    Fault("contact_lost", knob("force", gain=0.5), (1, 4), (10, 33), "1.5"),
     Fault("tracker_lost", cut("tracker"), (0, 2), (0, 2), "tracker lost: cable"),
     Fault("tracker_lost", knob("tracker", silent=True), (183, 203), (183, 203), "tracker: newest sample is 20"),
     Fault("tracker_lost", knob("tracker", hidden=frozenset({1})), (183, 203), (183, 203), "limb's marker"),
@@ -197,6 +199,22 @@ def test_force_that_jumps_faster_than_its_limit_is_told(sensor_Hz: float) -> Non
     bench.force.surface_mm -= 2.0  # 2 N more at once
     bench.until(lambda: bench.latched != "", within_s=0.02)
     assert bench.latched == "force_rate"
+
+
+@RATES_HZ
+def test_a_channel_that_is_dead_from_the_touch_on_is_told_three_millimetres_below_each_surface(
+    sensor_Hz: float,
+) -> None:
+    bench = FakeBench(wired(sensor_Hz))
+    bench.run(ZERO, APPROACH, PRESS)
+    bench.run(LEAVE)
+    bench.begin(ZERO, APPROACH, Compress(depth_mm=9.0, speed_mm_s=10.0, force_limit_N=15.0))
+    bench.until(lambda: bench.loop.machine.step_index == 2)
+    bench.force.gain = 0.0
+    bench.until(lambda: bench.latched != "")
+    assert bench.latched == "contact_lost"
+    assert "nothing is felt 3.0 mm beyond where the limb was felt last" in bench.link.of("incident")[0]["text"]
+    assert 3.0 < bench.loop.state.depth_mm < 3.4
 
 
 @RATES_HZ

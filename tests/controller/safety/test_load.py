@@ -281,12 +281,17 @@ def test_the_force_that_is_left_is_what_points_the_same_way() -> None:
 def test_on_the_way_out_twice_the_tangent_before_may_go() -> None:
     [told, *_] = jumped(4.0, 0.5, mm_a_sample=-0.05, per_mm=2.0)
     assert told == pytest.approx(min(4.3 - 4.0 * 0.2, 4.4 - 4.0 * 0.25) - 0.5)
-    [stiff, *_] = jumped(4.0, 0.0, mm_a_sample=-0.05, per_mm=6.0)
-    assert stiff == pytest.approx(min(4.9 - 10.0 * 0.2, 5.2 - 10.0 * 0.25)), "no more than 10 N/mm"
+    [short, *_] = jumped(4.0, 0.5, mm_a_sample=-0.0024, per_mm=2.0)  # 0.05 mm lie 21 samples back
+    assert short == pytest.approx(min(4.0144 - 4.0 * 0.0096, 4.0192 - 4.0 * 0.012) - 0.5)
+    [stiff, *_] = jumped(40.0, 0.0, mm_a_sample=-0.05, per_mm=60.0)
+    assert stiff == pytest.approx(min(49.0 - 50.0 * 0.2, 52.0 - 50.0 * 0.25)), "no more than 50 N/mm"
 
 
-def test_on_the_way_out_ten_newtons_a_millimetre_may_go_where_no_tangent_is_known() -> None:
-    assert jumped(4.0, 0.5, mm_a_sample=-0.05)[0] == pytest.approx(4.0 - 10.0 * 0.25 - 0.5)
+def test_on_the_way_out_twenty_newtons_a_millimetre_may_go_where_no_tangent_is_known() -> None:
+    assert jumped(4.0, 0.5, mm_a_sample=-0.05)[0] == 0.0
+    assert jumped(4.0, 0.5, mm_a_sample=-0.02)[0] == pytest.approx(4.0 - 20.0 * 0.1 - 0.5)
+    [short, *_] = jumped(4.0, 0.5, mm_a_sample=-0.0023, per_mm=2.0)
+    assert short == pytest.approx(min(4.0138 - 20.0 * 0.0092, 4.0184 - 20.0 * 0.0115) - 0.5)
 
 
 def test_on_the_way_in_it_is_to_rise_by_the_tangent_before() -> None:
@@ -300,3 +305,16 @@ def test_noise_makes_no_tangent_and_short_ways_tell_none() -> None:
     assert told == pytest.approx(3.4 + tangent_N_mm * 0.25 - 1.0)
     # Of thirty samples twenty-one lie before: 0.19 mm of the 0.2 that it takes.
     assert jumped(4.0, 1.0, mm_a_sample=0.009, per_mm=3.0)[0] == pytest.approx(4.0 - 3.0 * 0.009 * 4 - 1.0)
+
+
+@pytest.mark.parametrize(
+    ("place_mm", "felt_N", "told"), [(0.019, 2.09, False), (0.021, 2.09, True), (0.019, 2.11, True)]
+)
+def test_what_was_hardly_more_at_the_same_place_a_moment_ago_has_not_vanished(
+    place_mm: float, felt_N: float, told: bool
+) -> None:
+    monitor = LoadMonitor(MS)
+    for number in range(30):
+        monitor.axis(number * MS, 20.0 - place_mm * (number < 10))
+        monitor.force(number * MS, along(felt_N if number < 10 else 4.0 if number < 28 else 0.5))
+    assert (asked(monitor, 29.0).vanished_N > 0.0) is told
