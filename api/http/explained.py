@@ -58,6 +58,7 @@ EXPLAINED: Mapping[str, tuple[str, str]] = {
     "outcome-unknown": ("The service ended while it answered.", "Look whether it took effect, then use a new key."),
     "password": ("Name or password is wrong.", "Accounts are made on the bench's computer: `rig account set NAME`."),
     "queue-full": ("Too many computations wait.", "Cancel one, or wait."),
+    "range": ("The file has no such part.", "Content-Range says its bytes; write Range as bytes=FIRST-LAST."),
     "rate": ("The rate is outside what can be sent.", "Ask for a rate within the bounds that are named."),
     "refused": ("A check refuses it.", "The message names what was asked, the limit and the next step."),
     "safety-stop": ("Motion was stopped.", "Look why, acknowledge it, then start again."),

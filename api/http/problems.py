@@ -53,6 +53,7 @@ TITLES = {
     412: "changed meanwhile",
     413: "too large",
     415: "not in this form",
+    416: "no such part",
     422: "the request is wrong",
     423: "somebody else is in control, or nobody",
     428: "say what is to be changed",

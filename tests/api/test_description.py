@@ -53,6 +53,43 @@ def test_the_problems_of_a_route_are_among_them(schema: dict[str, Any], name: st
     assert told in described.problems(dict(described.operations(schema))[name])
 
 
+def headers_of(operation: dict[str, Any]) -> set[str]:
+    return {one["name"] for one in operation.get("parameters", ()) if one["in"] == "header"}
+
+
+@pytest.mark.parametrize(
+    ("name", "headers"),
+    [
+        ("POST /api/v1/jobs", {"X-Control-Lease", "Idempotency-Key"}),
+        ("POST /api/v1/control/lease", {"Idempotency-Key"}),
+        ("POST /api/v1/uploads", {"Idempotency-Key"}),
+        ("PUT /api/v1/subject", {"X-Control-Lease", "If-Match"}),
+        ("GET /api/v1/recordings/{session}/{file}", {"Range", "If-Range"}),
+        ("GET /api/v1/jobs/{identifier}/files/{path}", {"Range", "If-Range"}),
+        ("GET /api/v1/sessions/{session}/export/{form}", {"Range", "If-Range"}),
+        ("GET /api/v1/events", {"Last-Event-ID"}),
+        ("POST /api/v1/estop", set()),
+        ("POST /api/v1/tokens", set()),
+    ],
+)
+def test_the_headers_that_a_route_reads_are_declared(schema: dict[str, Any], name: str, headers: set[str]) -> None:
+    assert headers_of(dict(described.operations(schema))[name]) == headers
+
+
+def test_every_credential_is_a_scheme_and_each_route_names_the_scope_it_asks_for(schema: dict[str, Any]) -> None:
+    schemes = schema["components"]["securitySchemes"]
+    assert (schemes["token"]["type"], schemes["token"]["scheme"]) == ("http", "bearer")
+    assert (schemes["login"]["type"], schemes["login"]["in"], schemes["login"]["name"]) == (
+        "apiKey", "cookie", "rig_login_8123"
+    )  # fmt: skip
+    asked = {name: operation["security"] for name, operation in described.operations(schema)}
+    assert asked["GET /api/v1/rig"] == [{"token": ["read"]}, {"login": ["read"]}]
+    assert asked["POST /api/v1/tokens"] == [{"token": ["admin"]}, {"login": ["admin"]}]
+    assert asked["GET /api/v1/info"] == []
+    stops = {name for name, either in asked.items() if {} in either}
+    assert stops == {f"POST {STOP}", "POST /api/v1/pain", "POST /api/v1/jobs/{identifier}/cancel"}
+
+
 def test_a_stop_and_what_answers_with_a_secret_heed_no_key(schema: dict[str, Any]) -> None:
     found = dict(described.operations(schema))
     keyed = {name for name in found if "409 in-progress" in described.problems(found[name])}

@@ -7,17 +7,18 @@ from fastapi.responses import FileResponse
 
 from api.http.access.rights import CALLER, OPERATE, READ, STOP, Right
 from api.http.access.scopes import Scope
-from api.http.downloads import FileAsOfNow
+from api.http.downloads import FILE_ANSWERS, RANGED, FileAsOfNow
 from api.http.guard import lacking
+from api.http.idempotency import KeyHeader, refuse_without_key
 from api.http.jobs.board import Filter
 from api.http.jobs.examples import EXAMPLES
 from api.http.jobs.kinds import KINDS, AnyJob
 from api.http.jobs.places import regular_file
 from api.http.jobs.start import start
 from api.http.jobs.states import JobState
-from api.http.jobs.views import FILE_TYPES, JobList, JobView, media_type
+from api.http.jobs.views import JobList, JobView, media_type
 from api.http.problems import RequestRefused, responses
-from api.http.routes.common import PREFIX, KeyHeader, LeaseHeader, PageQuery, WhoAsks, refuse_without_key
+from api.http.routes.common import PREFIX, LeaseHeader, PageQuery, WhoAsks
 from api.http.service import Service
 
 Word = Annotated[str, Query(max_length=1000)]
@@ -78,11 +79,11 @@ def _lists(router: APIRouter, service: Service) -> None:
 
     @router.get(
         "/jobs/{identifier}/files/{path:path}",
-        dependencies=[READ],
+        dependencies=[READ, RANGED],
         summary="A file of a job's own; ranges are served",
         response_class=FileResponse,
         responses={
-            200: {"content": {kind: {} for kind in FILE_TYPES}},
+            **FILE_ANSWERS,
             **responses("404 no-such-job", "404 no-such-file"),
         },
     )

@@ -6,9 +6,9 @@ from fastapi.responses import FileResponse
 from api.catalogue.catalogue import Catalogue
 from api.http import views
 from api.http.access.rights import READ
-from api.http.downloads import FileAsOfNow
+from api.http.downloads import FILE_ANSWERS, RANGED, FileAsOfNow
 from api.http.jobs.places import regular_file
-from api.http.jobs.views import FILE_TYPES, media_type
+from api.http.jobs.views import media_type
 from api.http.models import RecordingList
 from api.http.problems import RequestRefused, responses
 from api.http.routes.catalogue import AskedQuery, answering
@@ -39,11 +39,11 @@ def add(router: APIRouter, service: Service) -> None:
 
     @router.get(
         "/recordings/{session}/{file:path}",
-        dependencies=[READ],
+        dependencies=[READ, RANGED],
         summary="One file of a session, also of its results; ranges are served, and a report is shown by a browser",
         response_class=FileResponse,
         responses={
-            200: {"content": {kind: {} for kind in FILE_TYPES}},
+            **FILE_ANSWERS,
             **responses("404 no-such-session", "404 no-such-recording"),
         },
     )

@@ -13,12 +13,12 @@ from pydantic import BaseModel, Field
 from api.catalogue.erasing import put_aside
 from api.http import views
 from api.http.access.rights import ADMIN, OPERATE, READ
-from api.http.downloads import FileAsOfNow
+from api.http.downloads import FILE_ANSWERS, RANGED, FileAsOfNow
 from api.http.erasing import Confirm, SessionErasure, state_of, to_confirm
 from api.http.jobs.kinds import ExportJob
 from api.http.jobs.params import ExportParams
 from api.http.jobs.start import start
-from api.http.jobs.views import FILE_TYPES, FileView, listed_files, media_type
+from api.http.jobs.views import FileView, listed_files, media_type
 from api.http.models import SessionView
 from api.http.problems import RequestRefused, responses
 from api.http.service import Service
@@ -71,11 +71,11 @@ def _exports(router: APIRouter, service: Service) -> None:
 
     @router.get(
         "/sessions/{session}/export/{form}",
-        dependencies=[OPERATE],
+        dependencies=[OPERATE, RANGED],
         summary="A session in another format as one file, made when it is first asked for; ranges are served",
         response_class=FileResponse,
         responses={
-            200: {"content": {kind: {} for kind in FILE_TYPES}},
+            **FILE_ANSWERS,
             202: {"model": ExportUnderWay},
             **responses("404 no-such-session", "409 link", "409 failed", "429 queue-full"),
         },

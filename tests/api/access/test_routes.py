@@ -101,6 +101,9 @@ def test_every_operation_of_the_description_is_one_whose_right_is_checked(client
         assert rule and rule.path.replace(":path", "") == path and rule.right, (method, path)
         told = paths[path][method.lower()]["responses"]
         assert {"401", "403"} <= told.keys(), (method, path)
+        asked = [sorted(one) for one in paths[path][method.lower()]["security"]]
+        either = [["token"], ["login"]]
+        assert asked == ([] if rule.path in OPEN else [[], *either] if rule.path in STOPS else either), (method, path)
 
 
 def test_without_a_credential_only_what_is_open_answers(client: TestClient) -> None:
