@@ -9,6 +9,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
+from api.catalogue.erasing import NotErased
 from api.http.explained import EXPLAINED
 from api.http.jobs.places import PlaceRefused
 from rig.errors import DeviceError, RigError, SafetyStop, UsageError
@@ -143,6 +144,8 @@ def _ours(error: RigError) -> JSONResponse:
             return answer(409, "safety-stop", str(error))
         case UsageError():
             return answer(422, "refused", str(error))
+        case NotErased():
+            return answer(503, "storage", str(error))
         case DeviceError():
             return answer(503, "device", str(error))
         case _:

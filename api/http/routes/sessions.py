@@ -15,6 +15,7 @@ from api.http import views
 from api.http.access.rights import ADMIN, OPERATE, READ
 from api.http.downloads import FILE_ANSWERS, RANGED, FileAsOfNow
 from api.http.erasing import Confirm, SessionErasure, state_of, to_confirm
+from api.http.jobs.kept import EXPORTS
 from api.http.jobs.kinds import ExportJob
 from api.http.jobs.params import ExportParams
 from api.http.jobs.start import start
@@ -82,7 +83,7 @@ def _exports(router: APIRouter, service: Service) -> None:
     )
     async def export(session: str, form: Format) -> Response:
         folder = service.session(session)
-        file = service.jobs.folder / "exports" / f"{state_of(folder)}.{form}.zip"
+        file = service.jobs.folder / EXPORTS / f"{state_of(folder)}.{form}.zip"
         if form not in FOLDERS and form != "mcap":
             file = file.with_name(f"{state_of(folder)}.{NAMES[form]}")
         if not file.is_file():
@@ -147,5 +148,5 @@ def _erasure(router: APIRouter, service: Service) -> None:
         found = SessionErasure(session=session, done=not token, files=len(files), bytes=size, confirm=token)
         if not token:
             with put_aside(service.sessions, [session]):
-                pass
+                service.jobs.erase([session])
         return found
