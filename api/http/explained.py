@@ -73,6 +73,7 @@ EXPLAINED: Mapping[str, tuple[str, str]] = {
     "too-large": ("The body is larger than this address reads.", "Send less, or in parts."),
     "too-many": ("Too many requests, or tries to log in.", "Wait as long as Retry-After says."),
     "too-many-channels": ("One client has too many channels.", "Unsubscribe from some."),
+    "too-many-open": ("As many connections look on as may.", "Close one, or come back later."),
     "too-many-views": ("Clients ask for too many different rates at once.", "Ask for a rate that others use."),
 }  # fmt: skip
 

@@ -100,6 +100,10 @@ class ServiceLimits(BaseModel):
     waiting_jobs: int = Field(description="computations that may wait for their turn")
     requests_per_s: float = Field(description="of one caller, in the long run")
     channels: int = Field(description="of one WebSocket")
+    open_connections: int = Field(description="that look on at a time: WebSockets, and readers of events")
+    open_connections_each: int = Field(description="of one token or login")
+    message_bytes: int = Field(description="of what a client says over a WebSocket")
+    messages_per_s: float = Field(description="of one WebSocket, in the long run")
     lowest_rate_hz: float = Field(description="of a channel with max_rate_hz")
     highest_rate_hz: float
     latest_samples: int = Field(description="of one answer of /streams/{stream}/latest")
