@@ -86,7 +86,7 @@ class JobSummary(BaseModel):
     total: float
     unit: str
     message: str = Field(description="what it does now; of a paused calibration what a person is to do")
-    time_left_s: float | None = Field(description="at the pace so far; null before the first part is done")
+    time_left_s: float | None = Field(description="by its plan, else at the pace so far; null where neither is known")
     can: list[Verb] = Field(description="what it may be asked for now")
     problem: JobProblem | None = Field(default=None, description="why it did not succeed")
 
