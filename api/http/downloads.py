@@ -1,9 +1,11 @@
 """Files sent as they were when they were asked for, though a recorder may be writing them."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
-from fastapi import Depends, Header
+from fastapi import APIRouter, Depends, Header
+from fastapi.params import Depends as Declared
 from fastapi.responses import FileResponse, Response
 from starlette.types import Message, Receive, Scope, Send
 
@@ -26,6 +28,25 @@ FILE_ANSWERS: dict[int | str, dict[str, Any]] = {
     206: {"description": "the part", "content": {kind: {} for kind in (*FILE_TYPES, "multipart/byteranges")}},
     **responses("416 range"),
 }
+
+
+Answering = TypeVar("Answering", bound=Callable[..., object])
+
+
+def files_at(
+    router: APIRouter, path: str, right: Declared, refused: Mapping[int | str, dict[str, Any]], summary: str
+) -> Callable[[Answering], Answering]:
+    """For what answers with a file: by GET, whole or in parts, and by HEAD, which says how large it is."""
+    stated: dict[str, Any] = {
+        "dependencies": [right, RANGED], "summary": summary, "response_class": FileResponse,
+        "responses": {**FILE_ANSWERS, **refused},
+    }  # fmt: skip
+
+    def added(answering: Answering) -> Answering:
+        router.head(path, include_in_schema=False, **stated)(answering)
+        return router.get(path, **stated)(answering)
+
+    return added
 
 
 class FileAsOfNow(FileResponse):

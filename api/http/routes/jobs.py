@@ -3,11 +3,10 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Body, Query, Request, Response
-from fastapi.responses import FileResponse
 
 from api.http.access.rights import CALLER, OPERATE, READ, STOP, Right
 from api.http.access.scopes import Scope
-from api.http.downloads import FILE_ANSWERS, RANGED, FileAsOfNow
+from api.http.downloads import FileAsOfNow, files_at
 from api.http.guard import lacking
 from api.http.idempotency import KeyHeader, refuse_without_key
 from api.http.jobs.board import Filter
@@ -77,15 +76,12 @@ def _lists(router: APIRouter, service: Service) -> None:
     def job(identifier: str) -> Response:
         return Response(service.jobs.shown(identifier), media_type=JSON)
 
-    @router.get(
+    @files_at(
+        router,
         "/jobs/{identifier}/files/{path:path}",
-        dependencies=[READ, RANGED],
-        summary="A file of a job's own; ranges are served",
-        response_class=FileResponse,
-        responses={
-            **FILE_ANSWERS,
-            **responses("404 no-such-job", "404 no-such-file"),
-        },
+        READ,
+        responses("404 no-such-job", "404 no-such-file"),
+        "A file of a job's own; HEAD and ranges are served",
     )
     def download(identifier: str, path: str) -> FileAsOfNow:
         found = regular_file(service.jobs.files(identifier), path)

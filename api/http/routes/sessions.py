@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Literal
 
 from fastapi import APIRouter, Response
-from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 
 from api.catalogue.erasing import put_aside
 from api.http import views
 from api.http.access.rights import ADMIN, OPERATE, READ
-from api.http.downloads import FILE_ANSWERS, RANGED, FileAsOfNow
+from api.http.downloads import FileAsOfNow, files_at
 from api.http.erasing import Confirm, SessionErasure, state_of, to_confirm
 from api.http.jobs.kept import EXPORTS
 from api.http.jobs.kinds import ExportJob
@@ -70,16 +69,15 @@ def _looks(router: APIRouter, service: Service) -> None:
 def _exports(router: APIRouter, service: Service) -> None:
     under_way: dict[Path, asyncio.Task[None]] = {}
 
-    @router.get(
+    @files_at(
+        router,
         "/sessions/{session}/export/{form}",
-        dependencies=[OPERATE, RANGED],
-        summary="A session in another format as one file, made when it is first asked for; ranges are served",
-        response_class=FileResponse,
-        responses={
-            **FILE_ANSWERS,
+        OPERATE,
+        {
             202: {"model": ExportUnderWay},
             **responses("404 no-such-session", "409 link", "409 failed", "429 queue-full"),
         },
+        "A session in another format as one file, made when it is first asked for; HEAD and ranges are served",
     )
     async def export(session: str, form: Format) -> Response:
         folder = service.session(session)
