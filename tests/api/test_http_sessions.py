@@ -1,5 +1,6 @@
 """Sessions over HTTP: pages, every format with ranges, erasure in two steps."""
 
+import errno
 import io
 import zipfile
 from collections.abc import Callable
@@ -9,6 +10,7 @@ import h5py
 import pytest
 from fastapi.testclient import TestClient
 
+from api.http import room
 from api.http.access.scopes import Scope
 from api.http.cohorts.params import FitCohortParams
 from api.http.jobs import views as job_views
@@ -83,6 +85,34 @@ def test_the_head_of_a_file_says_how_large_it_is_and_sends_none_of_it(
     part = client.get(address, headers={"Range": "bytes=1-3", "If-Range": told["etag"]})
     assert (part.status_code, part.content) == (206, content[1:4])
     assert client.head(f"{address}x").status_code in (404, 422)
+
+
+@pytest.mark.parametrize("form", ["csv", "hdf5", "mcap"])
+def test_an_export_that_would_fill_the_disk_does_not_begin(
+    client: TestClient, service: Service, monkeypatch: pytest.MonkeyPatch, form: str
+) -> None:
+    make_session(service.sessions, "first")
+    monkeypatch.setattr(room, "LEFT_FREE_BYTES", 10**18)
+    asked = {"kind": "export", "params": {"session": "first"}}
+    for refused in (client.get(f"{API}/first/export/{form}"), client.post("/api/v1/jobs", json=asked)):
+        assert (refused.status_code, refused.json()["code"]) == (507, "disk-full")
+    assert client.get("/api/v1/jobs").json()["items"] == []
+    assert not list((service.jobs.folder / "exports").rglob("*"))
+
+
+def test_an_export_that_a_full_disk_ends_leaves_nothing(
+    client: TestClient, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_session(service.sessions, "first")
+
+    def full(name: str, _form: str, _folder: Path) -> str:
+        Path(f"{name}.zip").write_bytes(bytes(1000))
+        raise OSError(errno.ENOSPC, "No space left on device", f"{name}.zip")
+
+    monkeypatch.setattr("shutil.make_archive", full)
+    refused = client.get(f"{API}/first/export/mcap")
+    assert (refused.status_code, refused.json()["code"]) == (503, "storage")
+    assert not list((service.jobs.folder / "exports").rglob("*"))
 
 
 def test_how_many_files_are_not_listed_is_said(

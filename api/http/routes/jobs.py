@@ -25,7 +25,7 @@ JSON = "application/json"
 REFUSED = responses(
     "400 idempotency-key", "404 no-such-session", "404 no-such-model", "404 no-such-upload", "404 no-such-protocol",
     "404 no-such-recording", "409 busy", "409 stopped", "409 session-exists", "409 link", "422 refused",
-    "429 queue-full", "503 disconnected",
+    "429 queue-full", "503 disconnected", "507 disk-full",
 )  # fmt: skip
 
 

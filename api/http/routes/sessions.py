@@ -2,6 +2,7 @@
 
 import asyncio
 import shutil
+import tempfile
 from collections.abc import Coroutine
 from pathlib import Path
 from typing import Literal
@@ -21,7 +22,9 @@ from api.http.jobs.start import start
 from api.http.jobs.views import FileView, listed_files, media_type
 from api.http.models import SessionView
 from api.http.problems import RequestRefused, responses
+from api.http.room import refuse_full, size_of
 from api.http.service import Service
+from rig.recording.files import whole_file
 
 Format = Literal["csv", "parquet", "hdf5", "mat", "mcap"]
 NAMES = {"csv": "csv", "parquet": "parquet", "hdf5": "session.h5", "mat": "session.mat"}
@@ -75,7 +78,7 @@ def _exports(router: APIRouter, service: Service) -> None:
         OPERATE,
         {
             202: {"model": ExportUnderWay},
-            **responses("404 no-such-session", "409 link", "409 failed", "429 queue-full"),
+            **responses("404 no-such-session", "409 link", "409 failed", "429 queue-full", "507 disk-full"),
         },
         "A session in another format as one file, made when it is first asked for; HEAD and ranges are served",
     )
@@ -121,12 +124,19 @@ async def _made(service: Service, session: str, form: Format, file: Path) -> Non
     if job.wrong:
         raise RequestRefused(409, job.wrong.code, job.wrong.detail)
     made = service.jobs.files(job.id) / NAMES[form]
-    await asyncio.to_thread(_zipped if form in FOLDERS else shutil.copyfile, made, file)
+    await asyncio.to_thread(_zipped if form in FOLDERS else _copied, made, file)
 
 
 def _zipped(folder: Path, file: Path) -> None:
-    scratch = shutil.make_archive(str(file.with_name(f".{file.stem}")), "zip", folder)
-    Path(scratch).replace(file)
+    refuse_full(file.parent, size_of(folder))
+    with tempfile.TemporaryDirectory(prefix=".", dir=file.parent) as scratch:
+        Path(shutil.make_archive(f"{scratch}/whole", "zip", folder)).replace(file)
+
+
+def _copied(made: Path, file: Path) -> None:
+    refuse_full(file.parent, made.stat().st_size)
+    with whole_file(file) as scratch:
+        shutil.copyfile(made, scratch)
 
 
 def _erasure(router: APIRouter, service: Service) -> None:
