@@ -1,6 +1,8 @@
 """The description shows each request and answer by an example that is valid, and names every problem of a route."""
 
 import copy
+import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,6 +11,7 @@ from api.http.explained import EXPLAINED
 from tests.api import described
 
 STOP = "/api/v1/estop"
+HTTP_PAGE = Path(__file__).parents[2] / "docs" / "reference" / "http.md"
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +91,26 @@ def test_every_credential_is_a_scheme_and_each_route_names_the_scope_it_asks_for
     assert asked["GET /api/v1/info"] == []
     stops = {name for name, either in asked.items() if {} in either}
     assert stops == {f"POST {STOP}", "POST /api/v1/pain", "POST /api/v1/jobs/{identifier}/cancel"}
+
+
+def differences() -> list[tuple[str, str]]:
+    """Words of the design and those of the service, as the reference has them."""
+    lines = HTTP_PAGE.read_text(encoding="utf-8").split("## Where it differs")[1].split("## Routes")[0].splitlines()
+    rows = [line.split(" | ") for line in lines if line.startswith("| ")][1:]
+    return [(row[0], row[1]) for row in rows]
+
+
+def test_the_reference_names_what_the_service_has_in_the_place_of_words_of_its_design(schema: dict[str, Any]) -> None:
+    names = {name.replace(" /api/v1", " ") for name, _ in described.operations(schema)}
+    here = {address for _, words in differences() for address in re.findall(r"`([A-Z]+ /[^`]*)`", words)}
+    assert len(here) > 5 and here <= names
+    fields = set(schema["components"]["schemas"]["Info"]["properties"])
+    fields |= set(schema["components"]["schemas"]["LeaseView"]["properties"])
+    assert {"service_id", "left_s", "lease_id", "epoch"} <= fields
+    assert not {"session_id", "expires"} & fields
+    assert set(schema["components"]["schemas"]["RigView"]["properties"]["state"]["enum"]) == {
+        "disconnected", "not ready", "idle", "running", "stopped"
+    }  # fmt: skip
 
 
 def test_a_stop_and_what_answers_with_a_secret_heed_no_key(schema: dict[str, Any]) -> None:
