@@ -18,7 +18,7 @@ class Cancelled(RigError):
 
 @dataclass(frozen=True)
 class Progress:
-    """A snapshot. ``time_left_s`` is what the rest takes at the pace so far; None before the first part is done.
+    """A snapshot. ``time_left_s`` is what the rest takes by plan, else at the pace so far; None where neither is known.
 
     ``log`` is what it said, a sentence each; ``result`` is what it returned, once it has succeeded.
     """
@@ -48,6 +48,7 @@ class Operation:
         self._cancel = threading.Event()
         self._now_s = now_s
         self._began_s = self._advanced_s = now_s()
+        self._ends_s: float | None = None
         self.watch: Callable[[Progress], object] = lambda _: None
 
     @property
@@ -58,10 +59,16 @@ class Operation:
 
     def _time_left_s(self) -> float | None:
         now = self._progress
+        if now.state == "running" and self._ends_s is not None:
+            return max(0.0, self._ends_s - self._now_s())
         if now.state != "running" or not now.done:
             return None
         took_s = self._advanced_s - self._began_s
         return max(0.0, took_s * (now.total - now.done) / now.done - (self._now_s() - self._advanced_s))
+
+    def expect(self, rest_s: float) -> None:
+        """Says how long the rest takes from now on, where that is planned."""
+        self._ends_s = self._now_s() + rest_s
 
     def advance(self, done: float, message: str) -> None:
         """Says how far it is, and what comes now."""

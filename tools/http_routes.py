@@ -21,11 +21,18 @@ def routes(described: Schema) -> str:
 
 def _route(name: str, operation: Schema, described: Schema) -> str:
     schemas = described["components"]["schemas"]
-    lines = [f"## {name}", "", f"{operation['summary']}.", ""]
+    lines = [f"## {name}", "", f"{operation['summary']}.", "", f"- asks for: {_right(operation['security'])}"]
     lines += [f"- `{one['name']}` ({one['in']}): {value_words(one['schema'], schemas)}" for one in _given(operation)]
     lines += [f"- body: {_content(operation['requestBody'], schemas)}"] if "requestBody" in operation else []
     lines += [f"- {code}: {_answer(answer, schemas)}" for code, answer in sorted(operation["responses"].items())]
     return "\n".join([*lines, ""])
+
+
+def _right(security: list[dict[str, list[str]]]) -> str:
+    """In words, where every scheme takes the same scope."""
+    scopes = {scope for either in security for each in either.values() for scope in each}
+    words = "".join(f"the scope `{scope}`" for scope in scopes) or "nothing"
+    return f"{words}; on the bench's own computer nothing" if {} in security else words
 
 
 def _given(operation: Schema) -> list[dict[str, Any]]:

@@ -6,7 +6,7 @@ import os
 import stat
 import time
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -104,8 +104,16 @@ def _sum_line(sha256: str, name: str) -> str:
     return f"{mark}{sha256}  {escaped}\n"
 
 
-def erase_subject(catalogue: Catalogue, subject: str, confirm: str = "", now_s: float | None = None) -> ErasureResult:
+def erase_subject(
+    catalogue: Catalogue,
+    subject: str,
+    confirm: str = "",
+    now_s: float | None = None,
+    also: Callable[[Sequence[str]], None] = lambda _: None,
+) -> ErasureResult:
     """First, without ``confirm``, what would go; then, with what that returned, it goes.
+
+    ``also`` erases what is kept of these sessions elsewhere.
 
     Raises UsageError where something else would go by now than what was confirmed, or a session is being recorded.
     """
@@ -119,6 +127,7 @@ def erase_subject(catalogue: Catalogue, subject: str, confirm: str = "", now_s: 
     with catalogue.database.writing() as connection, put_aside(catalogue.root, planned.sessions):
         forget(connection, planned.sessions)
         people.forget_name(connection, planned.subject)
+        also(planned.sessions)
     catalogue.database.compact()
     return planned.model_copy(update={"done": True, "confirm": ""})
 
@@ -182,6 +191,7 @@ def _statement(catalogue: Catalogue, sessions: int, named: bool) -> str:
     whose = f" Nobody can say whose these are: {', '.join(unknown)}." if unknown else ""
     return (
         f"{sessions} sessions are removed whole, with recordings and all results in them, and nothing brings them back;"
-        f" {kept}. Not reached: exports, reports and copies elsewhere, results of several sessions written with --out,"
+        f" {kept}. What jobs of the service made of them goes too, and uploads they were imported from."
+        f" Not reached: exports, reports and copies elsewhere, results of several sessions written with --out,"
         f" and backups of names (make a new one and delete those).{whose}"
     )

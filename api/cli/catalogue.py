@@ -1,6 +1,7 @@
 """`rig catalogue` and `rig subject`: what the folder of sessions holds, by query, and whose it is."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -13,6 +14,7 @@ from api.catalogue.settings import ENVIRONMENT, USUAL
 from api.catalogue.subjects import erase_subject, export_subject
 from api.cli.options import JsonOption
 from api.cli.output import show, write_json
+from api.http.jobs.kept import erase_kept
 from rig.errors import UsageError
 from rig.results.base import Result, SavedResult
 from rig.results.catalogue import ErasureResult, SubjectHistory
@@ -197,7 +199,7 @@ def subject(
         case "export":
             _export(lists, code, out, json_file)
         case "erase":
-            _erased(erase_subject(lists, code, confirm), json_file)
+            _erased(erase_subject(lists, code, confirm, also=partial(erase_kept, lists.root)), json_file)
 
 
 def _history(found: SubjectHistory, json_file: Path | None) -> None:

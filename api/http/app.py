@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from urllib.parse import urlsplit
 
 from fastapi import FastAPI
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, Response
@@ -10,6 +11,7 @@ from fastapi.staticfiles import StaticFiles
 
 import rig
 from api.http import description, problems, routes
+from api.http.access.access import cookie_name
 from api.http.access.rights import PUBLIC, READ, Right, RightsTable
 from api.http.guard import Guard
 from api.http.service import Service
@@ -58,7 +60,7 @@ def build(service: Service, meanwhile: bool = False, names: tuple[str, ...] = ()
     app.get("/api/v1/openapi.json", include_in_schema=False, dependencies=[READ])(lambda: JSONResponse(app.openapi()))
     app.get("/", include_in_schema=False, dependencies=[PUBLIC])(lambda: _page(service))
     app.mount("/page", PageFiles(directory=BUILT, check_dir=False))
-    description.install(app)
+    description.install(app, cookie_name(urlsplit(service.address).port or 0))
     return app
 
 

@@ -13,9 +13,10 @@ from api.http.jobs.kinds import KINDS
 from api.http.models import Capabilities, ServiceLimits
 from api.http.routes.common import PREFIX
 from api.http.routes.sessions import Format
+from api.http.streams.connections import MESSAGES, MOST_OPEN, MOST_OPEN_EACH
 from api.http.streams.history import KEPT_S
 from api.http.streams.latest import MOST_LATEST
-from api.http.streams.messages import HIGHEST_HZ, LOWEST_HZ, MOST_STREAMS, PROTOCOL
+from api.http.streams.messages import HIGHEST_HZ, LARGEST_MESSAGE_BYTES, LOWEST_HZ, MOST_STREAMS, PROTOCOL
 from api.http.streams.signals import signals
 from api.http.uploads import LARGEST_UPLOAD_BYTES
 from rig.config.products.inputs import EVERY_ROLE
@@ -44,6 +45,10 @@ def capabilities_of(wiring: Wiring) -> Capabilities:
             waiting_jobs=MOST_WAITING,
             requests_per_s=KNOWN.per_s,
             channels=MOST_STREAMS,
+            open_connections=MOST_OPEN,
+            open_connections_each=MOST_OPEN_EACH,
+            message_bytes=LARGEST_MESSAGE_BYTES,
+            messages_per_s=MESSAGES.per_s,
             lowest_rate_hz=LOWEST_HZ,
             highest_rate_hz=HIGHEST_HZ,
             latest_samples=MOST_LATEST,

@@ -10,6 +10,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.exceptions import InvalidState
 
+from api.http.streams.messages import LARGEST_MESSAGE_BYTES
+
 NO_LINGER = struct.pack("ii", 1, 0)
 # A second of all streams: what the system keeps for a client that reads slowly is old before it comes.
 SOCKET_BYTES = 65_536
@@ -105,7 +107,8 @@ def server_settings() -> ServerSettings:
     """What `uvicorn.Config` needs so that no client can hold the service up."""
     return {
         "http": ImpatientProtocol, "timeout_keep_alive": 5, "backlog": 128, "log_level": "warning",
-        # A subscription to all streams has 2 kB; a client that reads nothing for a minute has been left; and numbers
-        # from a sensor do not get shorter by compression, which takes the time of 50 clients.
-        "ws": LeavingProtocol, "ws_max_size": 64_000, "ws_ping_timeout": 60.0, "ws_per_message_deflate": False,
+        # A client that reads nothing for a minute has been left; and numbers from a sensor do not get shorter by
+        # compression, which takes the time of 50 clients.
+        "ws": LeavingProtocol, "ws_max_size": LARGEST_MESSAGE_BYTES, "ws_ping_timeout": 60.0,
+        "ws_per_message_deflate": False,
     }  # fmt: skip

@@ -8,8 +8,7 @@ from typing import Any
 
 from fastapi import FastAPI
 
-from api.http.access.rights import RightsTable
-from api.http.idempotency import holds_secret
+from api.http.access.rights import Right, RightsTable
 from api.http.problems import MEDIA_TYPE, Problem, responses
 from api.http.routes.common import PREFIX
 
@@ -33,16 +32,32 @@ def examples() -> Mapping[str, Described]:
     return found
 
 
-def install(app: FastAPI) -> None:
-    """``app`` describes what its routes state, with examples and the problems of each."""
+def install(app: FastAPI, cookie: str) -> None:
+    """``app`` describes what its routes state, with examples, problems and right of each; ``cookie``: of a login."""
     original = app.openapi
 
     def described() -> Described:
         if app.openapi_schema is None:
             _complete(original(), RightsTable(app))
+            original()["components"]["securitySchemes"] = credentials(cookie)
         return original()
 
     app.openapi = described  # type: ignore[method-assign]
+
+
+def credentials(cookie: str) -> Described:
+    """By what a request says who asks."""
+    token = {"type": "http", "scheme": "bearer", "description": "a token of `rig token create NAME --scope SCOPE`"}
+    login = {"type": "apiKey", "in": "cookie", "name": cookie, "description": "of a browser that is logged in"}
+    return {"token": token, "login": login}
+
+
+def asked_of(right: Right) -> list[dict[str, list[str]]]:
+    """Either credential, of the scope that is named; a stop on the bench's own computer asks for none."""
+    if right.scope is None:
+        return []
+    either: list[dict[str, list[str]]] = [{name: [right.scope.word]} for name in ("token", "login")]
+    return [{}, *either] if right.stop else either
 
 
 def _complete(schema: Described, rights: RightsTable) -> None:
@@ -54,8 +69,9 @@ def _complete(schema: Described, rights: RightsTable) -> None:
         for method, operation in operations.items():
             name = f"{method.upper()} {path.removeprefix(PREFIX)}"
             rule = rights.find(method.upper(), path)
-            keyed = method == "post" and not holds_secret(path) and not (rule and rule.right and rule.right.stop)
-            words = (*ANYWHERE, *(KEYED if keyed else ()), *_stated(operation))
+            if rule and rule.right:
+                operation["security"] = asked_of(rule.right)
+            words = (*ANYWHERE, *_stated(operation))
             problems = {str(status): problem for status, problem in responses(*words).items()}
             operation["responses"] = {**operation["responses"], **problems}
             _exemplify(operation, examples()["routes"].get(name, {}))
@@ -67,8 +83,9 @@ def _stated(operation: Described) -> Iterator[str]:
         yield from (f"{status} {code}" for code in response.get("content", {}).get(MEDIA_TYPE, {}).get("examples", ()))
     if "422" in operation["responses"]:
         yield "422 invalid-request"
-    if any(one["name"] == "X-Control-Lease" for one in operation.get("parameters", ())):
-        yield "423 no-lease"
+    named = {one["name"] for one in operation.get("parameters", ())}
+    yield from KEYED if "Idempotency-Key" in named else ()
+    yield from ("423 no-lease",) if "X-Control-Lease" in named else ()
 
 
 def _exemplify(operation: Described, given: Mapping[str, object]) -> None:

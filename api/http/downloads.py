@@ -1,9 +1,52 @@
 """Files sent as they were when they were asked for, though a recorder may be writing them."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Annotated, Any, TypeVar
 
-from fastapi.responses import FileResponse
+from fastapi import APIRouter, Depends, Header
+from fastapi.params import Depends as Declared
+from fastapi.responses import FileResponse, Response
 from starlette.types import Message, Receive, Scope, Send
+
+from api.http.jobs.views import FILE_TYPES
+from api.http.problems import answer, responses
+
+RANGE_REFUSED = 400, 416
+RangeHeader = Annotated[str, Header(alias="Range", description="bytes=FIRST-LAST: a part of the file, with 206")]
+SameHeader = Annotated[str, Header(alias="If-Range", description="the ETag that the part is of; of another all comes")]
+
+
+async def _part(part: RangeHeader = "", same: SameHeader = "") -> None:
+    """What the answer itself reads."""
+
+
+# For each route that answers with a file, which serves parts of it.
+RANGED = Depends(_part)
+FILE_ANSWERS: dict[int | str, dict[str, Any]] = {
+    200: {"content": {kind: {} for kind in FILE_TYPES}},
+    206: {"description": "the part", "content": {kind: {} for kind in (*FILE_TYPES, "multipart/byteranges")}},
+    **responses("416 range"),
+}
+
+
+Answering = TypeVar("Answering", bound=Callable[..., object])
+
+
+def files_at(
+    router: APIRouter, path: str, right: Declared, refused: Mapping[int | str, dict[str, Any]], summary: str
+) -> Callable[[Answering], Answering]:
+    """For what answers with a file: by GET, whole or in parts, and by HEAD, which says how large it is."""
+    stated: dict[str, Any] = {
+        "dependencies": [right, RANGED], "summary": summary, "response_class": FileResponse,
+        "responses": {**FILE_ANSWERS, **refused},
+    }  # fmt: skip
+
+    def added(answering: Answering) -> Answering:
+        router.head(path, include_in_schema=False, **stated)(answering)
+        return router.get(path, **stated)(answering)
+
+    return added
 
 
 class FileAsOfNow(FileResponse):
@@ -13,18 +56,27 @@ class FileAsOfNow(FileResponse):
         """Ranges as in ``FileResponse`` (RFC 9110, section 14); raises FileNotFoundError where it was removed."""
         self.stat_result = Path(self.path).stat()
         self.set_stat_headers(self.stat_result)
-        left = 0
+        left, refused = 0, False
 
         async def no_more_than_promised(message: Message) -> None:
-            nonlocal left
+            nonlocal left, refused
             if message["type"] == "http.response.start":
-                left = _promised(message)
+                left, refused = _promised(message), message["status"] in RANGE_REFUSED
             elif message["type"] == "http.response.body":
                 message = {**message, "body": message.get("body", b"")[:left]}
                 left -= len(message["body"])
-            await send(message)
+            if not refused:
+                await send(message)
 
         await super().__call__(scope, receive, no_more_than_promised)
+        if refused:
+            await self._no_such_part(self.stat_result.st_size)(scope, receive, send)
+
+    def _no_such_part(self, size: int) -> Response:
+        text = f"{Path(self.path).name} has {size} bytes and not that part of them; write Range as bytes=0-99"
+        response = answer(416, "range", text)
+        response.headers["Content-Range"] = f"bytes */{size}"
+        return response
 
 
 def _promised(start: Message) -> int:

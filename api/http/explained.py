@@ -58,6 +58,7 @@ EXPLAINED: Mapping[str, tuple[str, str]] = {
     "outcome-unknown": ("The service ended while it answered.", "Look whether it took effect, then use a new key."),
     "password": ("Name or password is wrong.", "Accounts are made on the bench's computer: `rig account set NAME`."),
     "queue-full": ("Too many computations wait.", "Cancel one, or wait."),
+    "range": ("The file has no such part.", "Content-Range says its bytes; write Range as bytes=FIRST-LAST."),
     "rate": ("The rate is outside what can be sent.", "Ask for a rate within the bounds that are named."),
     "refused": ("A check refuses it.", "The message names what was asked, the limit and the next step."),
     "safety-stop": ("Motion was stopped.", "Look why, acknowledge it, then start again."),
@@ -72,6 +73,7 @@ EXPLAINED: Mapping[str, tuple[str, str]] = {
     "too-large": ("The body is larger than this address reads.", "Send less, or in parts."),
     "too-many": ("Too many requests, or tries to log in.", "Wait as long as Retry-After says."),
     "too-many-channels": ("One client has too many channels.", "Unsubscribe from some."),
+    "too-many-open": ("As many connections look on as may.", "Close one, or come back later."),
     "too-many-views": ("Clients ask for too many different rates at once.", "Ask for a rate that others use."),
 }  # fmt: skip
 

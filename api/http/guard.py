@@ -171,7 +171,7 @@ class Guard:
             return False
 
     def _refuse_rate(self, caller: Caller | None, arrived: Arrived) -> Response | None:
-        who = f"{caller.by} {caller.name} {caller.id}" if caller else arrived.client
+        who = caller.key if caller else arrived.client
         wait_s = self._access.limits.wait_s(who, KNOWN if caller else UNKNOWN)
         return limited(wait_s) if wait_s else None
 

@@ -9,9 +9,9 @@ import hashlib
 import threading
 from collections.abc import Callable, Coroutine
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import Request, Response
+from fastapi import Depends, Header, Request, Response
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError
 
@@ -23,11 +23,33 @@ from rig.recording.files import make_folder, write_text
 KEPT_S = 24 * 3600.0
 # A busy day's jobs; the oldest go first.
 MOST_KEPT = 2000
-# As `KeyHeader` takes them; a longer one is refused by the route.
-LONGEST_KEY = 100
 REFUSED = 400
 SENT_AGAIN = ("location", "etag", "content-type")
+KEY = r"^[!-~]{1,100}$"
+KeyHeader = Annotated[
+    str,
+    Header(
+        alias="Idempotency-Key",
+        pattern=f"^$|{KEY}",
+        description="asked for by what moves: the same key with the same body gets the first answer again, for a day",
+    ),
+]
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
+
+
+def refuse_without_key(key: str) -> None:
+    """Raises RequestRefused: what moves must not move twice because an answer was lost."""
+    if not key:
+        text = "this moves the bench: send a header Idempotency-Key, new for each thing that is to happen once"
+        raise RequestRefused(400, "idempotency-key", text)
+
+
+async def _named(key: KeyHeader = "") -> str:
+    return key
+
+
+# For each route that heeds a key: so the description has it, and one that cannot be kept is refused.
+NAMED = Depends(_named)
 
 
 class KeptAnswer(BaseModel):
@@ -143,14 +165,18 @@ def idempotent(store: AnswerStore) -> type[APIRoute]:
     class IdempotentRoute(APIRoute):
         """A stop that is asked for twice stops twice; what answers with a secret keeps none."""
 
+        def __init__(self, path: str, endpoint: Callable[..., Any], **stated: Any) -> None:
+            rights = stated.get("dependencies") or ()
+            self._keeps = "POST" in (stated.get("methods") or ()) and not holds_secret(path) and STOP not in rights
+            super().__init__(path, endpoint, **stated | {"dependencies": [*rights, *[NAMED] * self._keeps]})
+
         def get_route_handler(self) -> Handler:
             handler = super().get_route_handler()
-            keeps = "POST" in (self.methods or ()) and not holds_secret(self.path) and STOP not in self.dependencies
 
             async def answered(request: Request) -> Response:
                 key = request.headers.get("idempotency-key", "")
                 caller = request.scope.get(CALLER)
-                if not (keeps and key and caller) or len(key) > LONGEST_KEY:
+                if not (self._keeps and key and caller):
                     return await handler(request)
                 place = f"{caller.name} {request.url.path} {key}"
                 return await _once(store, place, request, handler)

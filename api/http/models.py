@@ -86,7 +86,7 @@ class JobSummary(BaseModel):
     total: float
     unit: str
     message: str = Field(description="what it does now; of a paused calibration what a person is to do")
-    time_left_s: float | None = Field(description="at the pace so far; null before the first part is done")
+    time_left_s: float | None = Field(description="by its plan, else at the pace so far; null where neither is known")
     can: list[Verb] = Field(description="what it may be asked for now")
     problem: JobProblem | None = Field(default=None, description="why it did not succeed")
 
@@ -100,6 +100,10 @@ class ServiceLimits(BaseModel):
     waiting_jobs: int = Field(description="computations that may wait for their turn")
     requests_per_s: float = Field(description="of one caller, in the long run")
     channels: int = Field(description="of one WebSocket")
+    open_connections: int = Field(description="that look on at a time: WebSockets, and readers of events")
+    open_connections_each: int = Field(description="of one token or login")
+    message_bytes: int = Field(description="of what a client says over a WebSocket")
+    messages_per_s: float = Field(description="of one WebSocket, in the long run")
     lowest_rate_hz: float = Field(description="of a channel with max_rate_hz")
     highest_rate_hz: float
     latest_samples: int = Field(description="of one answer of /streams/{stream}/latest")

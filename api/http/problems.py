@@ -9,6 +9,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
+from api.catalogue.erasing import NotErased
 from api.http.explained import EXPLAINED
 from api.http.jobs.places import PlaceRefused
 from rig.errors import DeviceError, RigError, SafetyStop, UsageError
@@ -53,6 +54,7 @@ TITLES = {
     412: "changed meanwhile",
     413: "too large",
     415: "not in this form",
+    416: "no such part",
     422: "the request is wrong",
     423: "somebody else is in control, or nobody",
     428: "say what is to be changed",
@@ -142,6 +144,8 @@ def _ours(error: RigError) -> JSONResponse:
             return answer(409, "safety-stop", str(error))
         case UsageError():
             return answer(422, "refused", str(error))
+        case NotErased():
+            return answer(503, "storage", str(error))
         case DeviceError():
             return answer(503, "device", str(error))
         case _:

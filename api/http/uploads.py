@@ -17,6 +17,7 @@ from python_multipart.multipart import MultipartParser, parse_options_header
 from api.http.access.secrets import steady_s
 from api.http.jobs.places import UPLOAD
 from api.http.problems import RequestRefused
+from api.http.room import refuse_full
 from rig.recording.files import make_folder
 
 if TYPE_CHECKING:
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 
 # Ten hours of a 1 kHz sensor as text; more is sent in parts, or imported on the bench's computer.
 LARGEST_UPLOAD_BYTES = 2_000_000_000
-# The recorder of an hour's session needs less than half of it.
-LEFT_FREE_BYTES = 1_000_000_000
 MOST_FILES = 5000
 # Long enough for what studies call their files, short enough for every file system below our folder.
 LONGEST_NAME, DEEPEST = 200, 8
@@ -69,9 +68,7 @@ class UploadShelf:
             raise RequestRefused(415, "multipart", "send the files as multipart/form-data, each as a part named file")
         make_folder(self._root)
         self._prune()
-        if shutil.disk_usage(self._root).free < stated + LEFT_FREE_BYTES:
-            text = f"the disk of {self._root} has no room for {stated / 1e6:.0f} MB beside what recordings need"
-            raise RequestRefused(507, "disk-full", text)
+        refuse_full(self._root, stated)
         identifier = uuid.uuid4().hex[:12]
         scratch = self._root / f".{identifier}.part"
         scratch.mkdir()
@@ -124,6 +121,7 @@ async def _written(boundary: bytes, pieces: AsyncIterator[bytes], folder: Path) 
     parser = MultipartParser(boundary, parts.callbacks())
     try:
         async for piece in _gathered(pieces):
+            await asyncio.to_thread(refuse_full, folder, len(piece))
             await asyncio.to_thread(parser.write, piece)
         parser.finalize()
     except MultipartParseError as error:

@@ -63,15 +63,19 @@ def track(
     operation: Operation, bench: Supervisor, wanted: TrackPlan, folder: Path, against: TrackPlan | None = None
 ) -> TrackResult:
     """Tracks force into the session ``folder``, first ``against`` another model; SafetyStop at a stop."""
-    before = _track(operation, bench, against, folder) if against else None
+    own_s = tracked.duration_s(wanted.program)
+    before = _track(operation, bench, against, folder, own_s) if against else None
     if operation.cancelled:
         raise SafetyStop("stopped by the operator before the second run")
     found = _track(operation, bench, wanted, folder)
     return compare_runs(before, found) if before else found
 
 
-def _track(operation: Operation, bench: Supervisor, wanted: TrackPlan, folder: Path) -> TrackResult:
+def _track(
+    operation: Operation, bench: Supervisor, wanted: TrackPlan, folder: Path, then_s: float = 0.0
+) -> TrackResult:
     done = operation.progress.done
+    operation.expect(tracked.duration_s(wanted.program) + then_s)
     operation.advance(done, wanted.program.name)
     found = tracked.run(bench, wanted.program, folder, wanted.model)
     operation.advance(done + 1, "done")
@@ -80,6 +84,7 @@ def _track(operation: Operation, bench: Supervisor, wanted: TrackPlan, folder: P
 
 def threshold(operation: Operation, bench: Supervisor, wanted: TrackPlan, up_to_N: float, folder: Path) -> Threshold:
     """Raises force until the subject stops it, into the session ``folder``; SafetyStop at any other stop."""
+    operation.expect(tracked.duration_s(wanted.program))
     operation.advance(0, wanted.program.name)
     return ramp.run(bench, wanted.program, up_to_N, folder, wanted.model)
 
@@ -89,6 +94,7 @@ def retract(operation: Operation, bench: Supervisor) -> RetractResult:
     limits = bench.wiring.limits
     speed_mm_s = min(RETRACT_MM_S, limits.retract_speed_mm_s)
     leave = Retract(clearance_mm=RETRACT_MM, speed_mm_s=speed_mm_s, floor_mm=limits.position_min_mm)
+    operation.expect(RETRACT_MM / speed_mm_s)
     operation.advance(0, "retract")
     outcome = bench.run(Program(name="retract", steps=(leave,)), RETRACT_TIMEOUT_S)
     if outcome.stopped:

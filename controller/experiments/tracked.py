@@ -84,7 +84,8 @@ def recorded_run(bench: Supervisor, program: Program, folder: Path, model: str) 
         "model": {"file": model},
         "protocol": {"kind": TRACKING, "quality": QualityLimits().model_dump(mode="json")},
     }
-    done = record(bench, program, folder / f"{name}.mcap", metadata(bench, session, name, about), _longest_s(program))
+    longest_s = MARGIN_S + duration_s(program)
+    done = record(bench, program, folder / f"{name}.mcap", metadata(bench, session, name, about), longest_s)
     _enter(folder, name, done)
     return done
 
@@ -107,8 +108,9 @@ def _enter(folder: Path, name: str, done: Recorded) -> None:
     write_session(folder, replace(info, trials=(*kept, entry)))
 
 
-def _longest_s(program: Program) -> float:
-    return MARGIN_S + sum(step.times_s[-1] * step.repeats for step in program.steps if isinstance(step, TrackForce))
+def duration_s(program: Program) -> float:
+    """How long it holds forces; the way there and back depends on where the surface is."""
+    return sum(step.given.duration_s for step in program.steps if isinstance(step, TrackForce))
 
 
 def _free_name(folder: Path) -> str:

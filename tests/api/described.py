@@ -31,7 +31,7 @@ class Shown(NamedTuple):
 
 def description() -> dict[str, Any]:
     """Of the routes as they are."""
-    return build(Service(Wiring(), Path("sessions"), Path("protocols"))).openapi()
+    return build(Service(Wiring(), Path("sessions"), Path("protocols"), "http://127.0.0.1:8123")).openapi()
 
 
 def operations(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:

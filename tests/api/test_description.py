@@ -1,6 +1,8 @@
 """The description shows each request and answer by an example that is valid, and names every problem of a route."""
 
 import copy
+import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,6 +11,7 @@ from api.http.explained import EXPLAINED
 from tests.api import described
 
 STOP = "/api/v1/estop"
+HTTP_PAGE = Path(__file__).parents[2] / "docs" / "reference" / "http.md"
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +54,63 @@ def test_every_route_has_a_summary_and_names_each_problem_by_a_type_that_has_a_p
 )
 def test_the_problems_of_a_route_are_among_them(schema: dict[str, Any], name: str, told: str) -> None:
     assert told in described.problems(dict(described.operations(schema))[name])
+
+
+def headers_of(operation: dict[str, Any]) -> set[str]:
+    return {one["name"] for one in operation.get("parameters", ()) if one["in"] == "header"}
+
+
+@pytest.mark.parametrize(
+    ("name", "headers"),
+    [
+        ("POST /api/v1/jobs", {"X-Control-Lease", "Idempotency-Key"}),
+        ("POST /api/v1/control/lease", {"Idempotency-Key"}),
+        ("POST /api/v1/uploads", {"Idempotency-Key"}),
+        ("PUT /api/v1/subject", {"X-Control-Lease", "If-Match"}),
+        ("GET /api/v1/recordings/{session}/{file}", {"Range", "If-Range"}),
+        ("GET /api/v1/jobs/{identifier}/files/{path}", {"Range", "If-Range"}),
+        ("GET /api/v1/sessions/{session}/export/{form}", {"Range", "If-Range"}),
+        ("GET /api/v1/events", {"Last-Event-ID"}),
+        ("POST /api/v1/estop", set()),
+        ("POST /api/v1/tokens", set()),
+    ],
+)
+def test_the_headers_that_a_route_reads_are_declared(schema: dict[str, Any], name: str, headers: set[str]) -> None:
+    assert headers_of(dict(described.operations(schema))[name]) == headers
+
+
+def test_every_credential_is_a_scheme_and_each_route_names_the_scope_it_asks_for(schema: dict[str, Any]) -> None:
+    schemes = schema["components"]["securitySchemes"]
+    assert (schemes["token"]["type"], schemes["token"]["scheme"]) == ("http", "bearer")
+    assert (schemes["login"]["type"], schemes["login"]["in"], schemes["login"]["name"]) == (
+        "apiKey", "cookie", "rig_login_8123"
+    )  # fmt: skip
+    asked = {name: operation["security"] for name, operation in described.operations(schema)}
+    assert asked["GET /api/v1/rig"] == [{"token": ["read"]}, {"login": ["read"]}]
+    assert asked["POST /api/v1/tokens"] == [{"token": ["admin"]}, {"login": ["admin"]}]
+    assert asked["GET /api/v1/info"] == []
+    stops = {name for name, either in asked.items() if {} in either}
+    assert stops == {f"POST {STOP}", "POST /api/v1/pain", "POST /api/v1/jobs/{identifier}/cancel"}
+
+
+def differences() -> list[tuple[str, str]]:
+    """Words of the design and those of the service, as the reference has them."""
+    lines = HTTP_PAGE.read_text(encoding="utf-8").split("## Where it differs")[1].split("## Routes")[0].splitlines()
+    rows = [line.split(" | ") for line in lines if line.startswith("| ")][1:]
+    return [(row[0], row[1]) for row in rows]
+
+
+def test_the_reference_names_what_the_service_has_in_the_place_of_words_of_its_design(schema: dict[str, Any]) -> None:
+    names = {name.replace(" /api/v1", " ") for name, _ in described.operations(schema)}
+    here = {address for _, words in differences() for address in re.findall(r"`([A-Z]+ /[^`]*)`", words)}
+    assert len(here) > 5 and here <= names
+    fields = set(schema["components"]["schemas"]["Info"]["properties"])
+    fields |= set(schema["components"]["schemas"]["LeaseView"]["properties"])
+    assert {"service_id", "left_s", "lease_id", "epoch"} <= fields
+    assert not {"session_id", "expires"} & fields
+    assert set(schema["components"]["schemas"]["RigView"]["properties"]["state"]["enum"]) == {
+        "disconnected", "not ready", "idle", "running", "stopped"
+    }  # fmt: skip
 
 
 def test_a_stop_and_what_answers_with_a_secret_heed_no_key(schema: dict[str, Any]) -> None:

@@ -1,6 +1,7 @@
 """A file that grows while it is sent has the length that was promised."""
 
 import asyncio
+import json
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,8 @@ from api.http.downloads import FileAsOfNow
 CHUNK = FileAsOfNow.chunk_size
 
 
-def sent(response: FileAsOfNow, *headers: tuple[bytes, bytes]) -> tuple[int, bytes]:
-    """Content-Length and body of ``response``."""
+def answered(response: FileAsOfNow, *headers: tuple[bytes, bytes]) -> list[Message]:
+    """All that ``response`` sends."""
     messages: list[Message] = []
 
     async def send(message: Message) -> None:
@@ -23,7 +24,12 @@ def sent(response: FileAsOfNow, *headers: tuple[bytes, bytes]) -> tuple[int, byt
 
     scope: Scope = {"type": "http", "asgi": {"spec_version": "2.4"}, "method": "GET", "headers": list(headers)}
     asyncio.run(response(scope, receive, send))
-    start, *bodies = messages
+    return messages
+
+
+def sent(response: FileAsOfNow, *headers: tuple[bytes, bytes]) -> tuple[int, bytes]:
+    """Content-Length and body of ``response``."""
+    start, *bodies = answered(response, *headers)
     assert not bodies[-1]["more_body"]
     return int(dict(start["headers"])[b"content-length"]), b"".join(body["body"] for body in bodies)
 
@@ -46,3 +52,14 @@ def test_a_range_of_a_growing_file_is_that_range(tmp_path: Path) -> None:
         10,
         bytes(range(10, 20)),
     )
+
+
+@pytest.mark.parametrize("asked", [b"bytes=100-", b"bytes=7-3", b"bytes=x-y", b"lines=1-2"])
+def test_a_part_that_is_none_is_a_problem_that_says_how_many_bytes_there_are(tmp_path: Path, asked: bytes) -> None:
+    whole = tmp_path / "trial_001.mcap"
+    whole.write_bytes(bytes(100))
+    start, body = answered(FileAsOfNow(whole), (b"range", asked))
+    told = dict(start["headers"])
+    assert (start["status"], told[b"content-type"]) == (416, b"application/problem+json")
+    assert told[b"content-range"] == b"bytes */100"
+    assert "trial_001.mcap has 100 bytes" in json.loads(body["body"])["detail"]

@@ -1,23 +1,27 @@
 """Sessions over HTTP: pages, every format with ranges, erasure in two steps."""
 
+import errno
 import io
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
 import pytest
 from fastapi.testclient import TestClient
 
+from api.http import room
 from api.http.access.scopes import Scope
 from api.http.cohorts.params import FitCohortParams
 from api.http.jobs import views as job_views
 from api.http.jobs.kinds import KINDS
-from api.http.jobs.params import FitParams, ModelRef, SimulateParams
+from api.http.jobs.params import ExportParams, FitParams, ModelRef, SimulateParams
 from api.http.models import RequestBody
 from api.http.routes import sessions
 from api.http.service import Service
 from controller.operation import Operation
-from mock_devices.testing.access import bearer
+from mock_devices.testing.access import bearer, client_of
+from mock_devices.testing.commands import until
 from rig.recording.reader import read_recording
 from tests.api.catalogue.made import fitted, make_session
 from tests.api.jobs import conftest
@@ -47,6 +51,68 @@ def test_a_session_is_shown_with_what_was_found_in_it(client: TestClient, servic
     assert answer.content == (service.sessions / "first" / "fit" / "model.json").read_bytes()
     for wrong in ("none", "..", "%2e%2e", "..%2Ffirst"):
         assert client.get(f"{API}/{wrong}").status_code == 404
+
+
+def file_of_a_session(service: Service) -> tuple[str, bytes]:
+    return "/api/v1/recordings/first/trial_001.mcap", (service.sessions / "first" / "trial_001.mcap").read_bytes()
+
+
+def file_of_a_job(service: Service) -> tuple[str, bytes]:
+    job = service.jobs.new(KINDS["export"], ExportParams(session="first"), "Ann", "first", Operation("export"))
+    service.jobs.start_computing(job, lambda: None)
+    until(lambda: service.jobs.find(job.id) is None, 30.0, "the job's end")
+    service.jobs.files(job.id).mkdir(parents=True)
+    (service.jobs.files(job.id) / "session.h5").write_bytes(bytes(1000))
+    return f"/api/v1/jobs/{job.id}/files/session.h5", bytes(1000)
+
+
+def export_of_a_session(service: Service) -> tuple[str, bytes]:
+    answer = client_of(service).get(f"{API}/first/export/mcap")
+    return f"{API}/first/export/mcap", answer.content
+
+
+@pytest.mark.parametrize("made", [file_of_a_session, file_of_a_job, export_of_a_session])
+def test_the_head_of_a_file_says_how_large_it_is_and_sends_none_of_it(
+    client: TestClient, service: Service, made: Callable[[Service], tuple[str, bytes]]
+) -> None:
+    make_session(service.sessions, "first")
+    address, content = made(service)
+    head, whole = client.head(address), client.get(address)
+    assert (head.status_code, head.content, whole.content) == (200, b"", content)
+    told = {name: head.headers[name] for name in ("content-length", "etag", "accept-ranges", "last-modified")}
+    assert told == {name: whole.headers[name] for name in told}
+    assert (told["content-length"], told["accept-ranges"]) == (str(len(content)), "bytes")
+    part = client.get(address, headers={"Range": "bytes=1-3", "If-Range": told["etag"]})
+    assert (part.status_code, part.content) == (206, content[1:4])
+    assert client.head(f"{address}x").status_code in (404, 422)
+
+
+@pytest.mark.parametrize("form", ["csv", "hdf5", "mcap"])
+def test_an_export_that_would_fill_the_disk_does_not_begin(
+    client: TestClient, service: Service, monkeypatch: pytest.MonkeyPatch, form: str
+) -> None:
+    make_session(service.sessions, "first")
+    monkeypatch.setattr(room, "LEFT_FREE_BYTES", 10**18)
+    asked = {"kind": "export", "params": {"session": "first"}}
+    for refused in (client.get(f"{API}/first/export/{form}"), client.post("/api/v1/jobs", json=asked)):
+        assert (refused.status_code, refused.json()["code"]) == (507, "disk-full")
+    assert client.get("/api/v1/jobs").json()["items"] == []
+    assert not list((service.jobs.folder / "exports").rglob("*"))
+
+
+def test_an_export_that_a_full_disk_ends_leaves_nothing(
+    client: TestClient, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_session(service.sessions, "first")
+
+    def full(name: str, _form: str, _folder: Path) -> str:
+        Path(f"{name}.zip").write_bytes(bytes(1000))
+        raise OSError(errno.ENOSPC, "No space left on device", f"{name}.zip")
+
+    monkeypatch.setattr("shutil.make_archive", full)
+    refused = client.get(f"{API}/first/export/mcap")
+    assert (refused.status_code, refused.json()["code"]) == (503, "storage")
+    assert not list((service.jobs.folder / "exports").rglob("*"))
 
 
 def test_how_many_files_are_not_listed_is_said(

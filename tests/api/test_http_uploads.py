@@ -4,13 +4,14 @@ import asyncio
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from fastapi import Request
 from fastapi.testclient import TestClient
 
-from api.http import uploads
+from api.http import room, uploads
 from api.http.access.scopes import Scope
 from api.http.jobs.kinds import KINDS
 from api.http.jobs.params import ProposeParams
@@ -133,10 +134,45 @@ def test_more_than_is_allowed_is_refused_also_where_its_size_is_not_stated(
 def test_the_room_that_recordings_need_is_left(
     client: TestClient, service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(uploads, "LEFT_FREE_BYTES", 10**18)
+    monkeypatch.setattr(room, "LEFT_FREE_BYTES", 10**18)
     refused = sent(client, {"a": b"1"})
     assert (refused.status_code, refused.json()["code"]) == (507, "disk-full")
     assert left(service) == []
+
+
+def test_an_upload_ends_before_the_disk_is_full_and_nothing_of_it_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Somebody else fills the disk while it comes, or its size was not stated."""
+    root, seen = tmp_path / "uploads", list[int]()
+
+    def filling(_: Path) -> SimpleNamespace:
+        seen.append(sum(path.stat().st_size for path in root.rglob("*") if path.is_file()))
+        return SimpleNamespace(free=room.LEFT_FREE_BYTES + 5 * uploads.WRITTEN_BYTES - 2 * seen[-1] - 1)
+
+    monkeypatch.setattr("shutil.disk_usage", filling)
+
+    async def pieces() -> AsyncIterator[bytes]:
+        yield b'--x\r\nContent-Disposition: form-data; name="file"; filename="a.bin"\r\n\r\n'
+        for _ in range(4):
+            yield bytes(uploads.WRITTEN_BYTES)
+        yield b"\r\n--x--\r\n"
+
+    with pytest.raises(RequestRefused, match="remove what is not needed") as refused:
+        asyncio.run(UploadShelf(root).receive("multipart/form-data; boundary=x", 0, pieces()))
+    assert (refused.value.status, refused.value.code) == (507, "disk-full")
+    assert max(seen) == 2 * uploads.WRITTEN_BYTES and list(root.iterdir()) == []
+
+
+def test_an_import_that_would_fill_the_disk_does_not_begin(
+    client: TestClient, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    upload = sent(client, {"a.csv": bytes(1000)}).json()["id"]
+    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=room.LEFT_FREE_BYTES + 3999))
+    asked = {"kind": "import", "params": {"upload": upload, "session": "measured", "usual": True}}
+    refused = client.post("/api/v1/jobs", json=asked)
+    assert (refused.status_code, refused.json()["code"]) == (507, "disk-full")
+    assert client.get("/api/v1/jobs").json()["items"] == [] and not (service.sessions / "measured").exists()
 
 
 def test_a_sender_that_falls_silent_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

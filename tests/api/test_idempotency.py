@@ -52,6 +52,14 @@ def test_the_same_key_with_another_body_is_refused(service: Service) -> None:
     assert started(client) == 1
 
 
+@pytest.mark.parametrize("path", ["/api/v1/jobs", "/api/v1/uploads", "/api/v1/control/lease"])
+@pytest.mark.parametrize("key", ["a" * 101, "two words"])
+def test_a_key_that_cannot_be_kept_is_refused_wherever_one_is_heeded(service: Service, path: str, key: str) -> None:
+    refused = client_of(service).post(path, json={"holder": "Ann"}, headers={"Idempotency-Key": key})
+    assert (refused.status_code, refused.json()["code"]) == (422, "invalid-request")
+    assert "Idempotency-Key" in refused.json()["detail"]
+
+
 def test_a_key_is_its_senders_own(service: Service) -> None:
     one, two = client_of(service), client_of(service)
     token = two.post("/api/v1/tokens", json={"name": "other", "scope": "operate"}).json()["token"]

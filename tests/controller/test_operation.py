@@ -31,6 +31,20 @@ def test_the_time_left_is_what_the_rest_takes_at_the_pace_so_far() -> None:
     assert operation.progress.time_left_s is None
 
 
+def test_the_time_left_of_what_is_planned_is_that_of_its_plan() -> None:
+    clock = Clock()
+    operation = Operation("track", total=2, unit="runs", now_s=clock)
+    operation.expect(30.0)
+    assert operation.progress.time_left_s == pytest.approx(30.0)
+    clock.now_s += 20.0
+    operation.advance(1, "second")
+    assert operation.progress.time_left_s == pytest.approx(10.0)
+    clock.now_s += 20.0
+    assert operation.progress.time_left_s == pytest.approx(0.0, abs=0.0)
+    operation.run(lambda: None)
+    assert operation.progress.time_left_s is None
+
+
 def test_the_log_is_watched_as_it_grows() -> None:
     operation, seen = Operation("capture"), list[Progress]()
     operation.watch = seen.append

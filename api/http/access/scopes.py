@@ -34,6 +34,11 @@ class Caller:
     id: str
     by: Literal["token", "login", "link", "socket"]
 
+    @property
+    def key(self) -> str:
+        """One credential of one person or program."""
+        return f"{self.by} {self.name} {self.id}"
+
     def may(self, scope: Scope) -> bool:
         """Whether ``scope`` is within this caller's."""
         return self.scope >= scope

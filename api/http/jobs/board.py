@@ -5,7 +5,7 @@ import threading
 import time
 import traceback
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from pydantic import JsonValue
 
 from api.catalogue.pages import Page, cut
 from api.http.jobs.job import Job, JobRequest, ended_already, stamp
+from api.http.jobs.kept import beside, erase_kept
 from api.http.jobs.kinds import Kind
 from api.http.jobs.places import Places
 from api.http.jobs.store import JobStore, place
@@ -50,11 +51,10 @@ class JobBoard:
     """Starts, lists and ends jobs. Safe from any thread."""
 
     def __init__(self, sessions: Path, protocols: Path, events: EventLog) -> None:
-        beside = sessions.absolute()
         self._sessions, self._protocols, self._events = sessions, protocols, events
-        self.folder = beside.with_name(f"{beside.name}.jobs")
+        self.folder = beside(sessions, "jobs")
         self._store = JobStore(self.folder)
-        self.uploads = beside.with_name(f"{beside.name}.uploads")
+        self.uploads = beside(sessions, "uploads")
         self._lock = threading.RLock()
         self._live: dict[str, Job] = {}
         self._ended: dict[str, JobSummary] | None = None
@@ -203,6 +203,12 @@ class JobBoard:
             if identifier not in self._live and identifier not in self._known():
                 raise _unknown(identifier)
         return self._store.files(identifier)
+
+    def erase(self, sessions: Sequence[str]) -> None:
+        """Whatever has ended and was made of these sessions, with its files and all exports."""
+        with self._lock:
+            erase_kept(self._sessions, sessions)
+            self._ended = None
 
     def cancel(self, identifier: str) -> None:
         """Ends this job and no other; one that waits ends at once."""

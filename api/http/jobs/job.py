@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 
 from pydantic import JsonValue
 
+from api.http.jobs.kept import works_on
 from api.http.jobs.process import Crashed
 from api.http.jobs.states import ENDS, JobEnd, JobState, Verb
 from api.http.problems import RequestRefused
@@ -93,10 +94,7 @@ class Job:
 
     def works_on(self, session: str) -> bool:
         """Whether it needs that session: as its own, as one of several, or for a model."""
-        asked = self.asked.params
-        models = [value.get("session") for value in asked.values() if isinstance(value, dict)]
-        several = asked.get("sessions")
-        return session in (self.asked.session, *models, *(several if isinstance(several, list) else ()))
+        return works_on(vars(self.asked), (session,))
 
     @property
     def ended(self) -> bool:

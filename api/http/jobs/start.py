@@ -7,15 +7,19 @@ from api.http.commissioning.params import MovingParams
 from api.http.jobs.job import Job
 from api.http.jobs.kinds import KINDS, AnyJob, Kind
 from api.http.jobs.motion import planned
-from api.http.jobs.params import ImportParams, ModelRef, RepairParams, VerifyParams
+from api.http.jobs.params import ExportParams, ImportParams, ModelRef, RepairParams, VerifyParams
 from api.http.jobs.places import Places
 from api.http.jobs.process import Computation
 from api.http.jobs.wire import Order
 from api.http.models import RequestBody
+from api.http.room import refuse_full, size_of
 from api.http.service import Service
 from controller.operation import Operation
 from rig.results.base import SavedResult
 from rig.results.bench import DoctorResult
+
+# A synthetic session takes 3 times its recordings in all formats together, and 3.5 times what it has as MAT.
+MOST_GROWTH = 4
 
 
 def start(service: Service, body: AnyJob, by: str, lease: str = "") -> Job:
@@ -45,7 +49,9 @@ def _alone(service: Service, body: AnyJob, kind: Kind, by: str, lease: str) -> J
 
 
 def _computing(service: Service, body: AnyJob, kind: Kind, by: str) -> Job:
-    _check(service.jobs.places(""), body.params)
+    places = service.jobs.places("")
+    _check(places, body.params)
+    _refuse_full(places, body.params)
     job = service.jobs.new(kind, body.params, by, _session(body.params), Operation(kind.name))
     seen = service.seen_devices() if kind.name == "doctor" else None
     if seen is not None:
@@ -70,6 +76,17 @@ def _session(asked: RequestBody) -> str | None:
     several: list[str] = getattr(asked, "sessions", [])
     found: str | None = getattr(asked, "session", None)
     return several[0] if len(several) == 1 else found
+
+
+def _refuse_full(places: Places, asked: RequestBody) -> None:
+    match asked:
+        case ExportParams():
+            source = places.place(asked.session, asked.upload)
+        case ImportParams():
+            source = places.upload(asked.upload)
+        case _:
+            return
+    refuse_full(places.sessions, MOST_GROWTH * size_of(source))
 
 
 def _check(places: Places, asked: RequestBody) -> None:

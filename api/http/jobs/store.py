@@ -10,12 +10,13 @@ from pathlib import Path
 from api.catalogue.pages import Place
 from api.http.access.secrets import steady_s
 from api.http.jobs.job import stamp
+from api.http.jobs.kept import RECORD
 from api.http.jobs.views import FILES, JobView
 from api.http.models import JobProblem, JobSummary
 from rig.errors import RigError
 from rig.recording.files import make_folder, write_text
 
-RECORD, LOCK = "job.json", "lock"
+LOCK = "lock"
 # A busy month of a lab; each has a record of some kilobytes.
 MOST_JOBS = 500
 # Files of jobs are exports and pictures, made again when they are wanted.

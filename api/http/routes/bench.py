@@ -8,9 +8,10 @@ import rig
 from api.http import views
 from api.http.access.rights import CALLER, OPERATE, PUBLIC, READ
 from api.http.capabilities import capabilities_of
+from api.http.idempotency import KeyHeader, refuse_without_key
 from api.http.models import Info, RigView
 from api.http.problems import RequestRefused, responses
-from api.http.routes.common import KeyHeader, LeaseHeader, refuse_without_key
+from api.http.routes.common import LeaseHeader
 from api.http.service import Service
 
 

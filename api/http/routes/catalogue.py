@@ -186,7 +186,7 @@ def _changes(router: APIRouter, service: Service, lists: Catalogue) -> None:
                 409, "busy", "a job is under way, which may use a session; erase when it has ended, or cancel it"
             )
         with answering():
-            found = erase_subject(lists, subject, confirm)
+            found = erase_subject(lists, subject, confirm, also=service.jobs.erase)
         response.status_code = 200 if found.done else 202
         return found
 

@@ -9,7 +9,6 @@ from api.catalogue.pages import Page
 from api.catalogue.settings import MOST, USUAL
 from api.http.access.rights import CALLER
 from api.http.access.scopes import Caller
-from api.http.problems import RequestRefused
 
 PREFIX = "/api/v1"
 
@@ -18,23 +17,6 @@ LeaseHeader = Annotated[str, Header(alias="X-Control-Lease", description="lease_
 # Codes and words that are asked for; PostgreSQL and SQLite are asked with no longer ones.
 LONGEST = 500
 Word = Annotated[str, Query(max_length=LONGEST)]
-
-KEY = r"^[!-~]{1,100}$"
-KeyHeader = Annotated[
-    str,
-    Header(
-        alias="Idempotency-Key",
-        pattern=f"^$|{KEY}",
-        description="asked for by what moves: the same key with the same body gets the first answer again, for a day",
-    ),
-]
-
-
-def refuse_without_key(key: str) -> None:
-    """Raises RequestRefused: what moves must not move twice because an answer was lost."""
-    if not key:
-        text = "this moves the bench: send a header Idempotency-Key, new for each thing that is to happen once"
-        raise RequestRefused(400, "idempotency-key", text)
 
 
 # What only looks at the request is asked in the event loop: handing it to a thread costs more than the answer.

@@ -3,21 +3,21 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Body, Query, Request, Response
-from fastapi.responses import FileResponse
 
 from api.http.access.rights import CALLER, OPERATE, READ, STOP, Right
 from api.http.access.scopes import Scope
-from api.http.downloads import FileAsOfNow
+from api.http.downloads import FileAsOfNow, files_at
 from api.http.guard import lacking
+from api.http.idempotency import KeyHeader, refuse_without_key
 from api.http.jobs.board import Filter
 from api.http.jobs.examples import EXAMPLES
 from api.http.jobs.kinds import KINDS, AnyJob
 from api.http.jobs.places import regular_file
 from api.http.jobs.start import start
 from api.http.jobs.states import JobState
-from api.http.jobs.views import FILE_TYPES, JobList, JobView, media_type
+from api.http.jobs.views import JobList, JobView, media_type
 from api.http.problems import RequestRefused, responses
-from api.http.routes.common import PREFIX, KeyHeader, LeaseHeader, PageQuery, WhoAsks, refuse_without_key
+from api.http.routes.common import PREFIX, LeaseHeader, PageQuery, WhoAsks
 from api.http.service import Service
 
 Word = Annotated[str, Query(max_length=1000)]
@@ -25,7 +25,7 @@ JSON = "application/json"
 REFUSED = responses(
     "400 idempotency-key", "404 no-such-session", "404 no-such-model", "404 no-such-upload", "404 no-such-protocol",
     "404 no-such-recording", "409 busy", "409 stopped", "409 session-exists", "409 link", "422 refused",
-    "429 queue-full", "503 disconnected",
+    "429 queue-full", "503 disconnected", "507 disk-full",
 )  # fmt: skip
 
 
@@ -76,15 +76,12 @@ def _lists(router: APIRouter, service: Service) -> None:
     def job(identifier: str) -> Response:
         return Response(service.jobs.shown(identifier), media_type=JSON)
 
-    @router.get(
+    @files_at(
+        router,
         "/jobs/{identifier}/files/{path:path}",
-        dependencies=[READ],
-        summary="A file of a job's own; ranges are served",
-        response_class=FileResponse,
-        responses={
-            200: {"content": {kind: {} for kind in FILE_TYPES}},
-            **responses("404 no-such-job", "404 no-such-file"),
-        },
+        READ,
+        responses("404 no-such-job", "404 no-such-file"),
+        "A file of a job's own; HEAD and ranges are served",
     )
     def download(identifier: str, path: str) -> FileAsOfNow:
         found = regular_file(service.jobs.files(identifier), path)

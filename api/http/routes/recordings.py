@@ -1,14 +1,13 @@
 """The recordings of the sessions, to be looked through and downloaded."""
 
 from fastapi import APIRouter, Response
-from fastapi.responses import FileResponse
 
 from api.catalogue.catalogue import Catalogue
 from api.http import views
 from api.http.access.rights import READ
-from api.http.downloads import FileAsOfNow
+from api.http.downloads import FileAsOfNow, files_at
 from api.http.jobs.places import regular_file
-from api.http.jobs.views import FILE_TYPES, media_type
+from api.http.jobs.views import media_type
 from api.http.models import RecordingList
 from api.http.problems import RequestRefused, responses
 from api.http.routes.catalogue import AskedQuery, answering
@@ -37,15 +36,12 @@ def add(router: APIRouter, service: Service) -> None:
             found = views.recordings(service.sessions, lists.sessions(asked, page))
         return Response(found.model_dump_json(), media_type="application/json")
 
-    @router.get(
+    @files_at(
+        router,
         "/recordings/{session}/{file:path}",
-        dependencies=[READ],
-        summary="One file of a session, also of its results; ranges are served, and a report is shown by a browser",
-        response_class=FileResponse,
-        responses={
-            200: {"content": {kind: {} for kind in FILE_TYPES}},
-            **responses("404 no-such-session", "404 no-such-recording"),
-        },
+        READ,
+        responses("404 no-such-session", "404 no-such-recording"),
+        "One file of a session, also of its results; HEAD and ranges are served, and a report is shown by a browser",
     )
     def download(session: str, file: str) -> FileAsOfNow:
         found = regular_file(service.session(session), file)

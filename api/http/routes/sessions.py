@@ -2,26 +2,29 @@
 
 import asyncio
 import shutil
+import tempfile
 from collections.abc import Coroutine
 from pathlib import Path
 from typing import Literal
 
 from fastapi import APIRouter, Response
-from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 
 from api.catalogue.erasing import put_aside
 from api.http import views
 from api.http.access.rights import ADMIN, OPERATE, READ
-from api.http.downloads import FileAsOfNow
+from api.http.downloads import FileAsOfNow, files_at
 from api.http.erasing import Confirm, SessionErasure, state_of, to_confirm
+from api.http.jobs.kept import EXPORTS
 from api.http.jobs.kinds import ExportJob
 from api.http.jobs.params import ExportParams
 from api.http.jobs.start import start
-from api.http.jobs.views import FILE_TYPES, FileView, listed_files, media_type
+from api.http.jobs.views import FileView, listed_files, media_type
 from api.http.models import SessionView
 from api.http.problems import RequestRefused, responses
+from api.http.room import refuse_full, size_of
 from api.http.service import Service
+from rig.recording.files import whole_file
 
 Format = Literal["csv", "parquet", "hdf5", "mat", "mcap"]
 NAMES = {"csv": "csv", "parquet": "parquet", "hdf5": "session.h5", "mat": "session.mat"}
@@ -69,20 +72,19 @@ def _looks(router: APIRouter, service: Service) -> None:
 def _exports(router: APIRouter, service: Service) -> None:
     under_way: dict[Path, asyncio.Task[None]] = {}
 
-    @router.get(
+    @files_at(
+        router,
         "/sessions/{session}/export/{form}",
-        dependencies=[OPERATE],
-        summary="A session in another format as one file, made when it is first asked for; ranges are served",
-        response_class=FileResponse,
-        responses={
-            200: {"content": {kind: {} for kind in FILE_TYPES}},
+        OPERATE,
+        {
             202: {"model": ExportUnderWay},
-            **responses("404 no-such-session", "409 link", "409 failed", "429 queue-full"),
+            **responses("404 no-such-session", "409 link", "409 failed", "429 queue-full", "507 disk-full"),
         },
+        "A session in another format as one file, made when it is first asked for; HEAD and ranges are served",
     )
     async def export(session: str, form: Format) -> Response:
         folder = service.session(session)
-        file = service.jobs.folder / "exports" / f"{state_of(folder)}.{form}.zip"
+        file = service.jobs.folder / EXPORTS / f"{state_of(folder)}.{form}.zip"
         if form not in FOLDERS and form != "mcap":
             file = file.with_name(f"{state_of(folder)}.{NAMES[form]}")
         if not file.is_file():
@@ -122,12 +124,19 @@ async def _made(service: Service, session: str, form: Format, file: Path) -> Non
     if job.wrong:
         raise RequestRefused(409, job.wrong.code, job.wrong.detail)
     made = service.jobs.files(job.id) / NAMES[form]
-    await asyncio.to_thread(_zipped if form in FOLDERS else shutil.copyfile, made, file)
+    await asyncio.to_thread(_zipped if form in FOLDERS else _copied, made, file)
 
 
 def _zipped(folder: Path, file: Path) -> None:
-    scratch = shutil.make_archive(str(file.with_name(f".{file.stem}")), "zip", folder)
-    Path(scratch).replace(file)
+    refuse_full(file.parent, size_of(folder))
+    with tempfile.TemporaryDirectory(prefix=".", dir=file.parent) as scratch:
+        Path(shutil.make_archive(f"{scratch}/whole", "zip", folder)).replace(file)
+
+
+def _copied(made: Path, file: Path) -> None:
+    refuse_full(file.parent, made.stat().st_size)
+    with whole_file(file) as scratch:
+        shutil.copyfile(made, scratch)
 
 
 def _erasure(router: APIRouter, service: Service) -> None:
@@ -147,5 +156,5 @@ def _erasure(router: APIRouter, service: Service) -> None:
         found = SessionErasure(session=session, done=not token, files=len(files), bytes=size, confirm=token)
         if not token:
             with put_aside(service.sessions, [session]):
-                pass
+                service.jobs.erase([session])
         return found

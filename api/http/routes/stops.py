@@ -4,9 +4,10 @@ from fastapi import APIRouter
 
 from api.http import views
 from api.http.access.rights import OPERATE, STOP
+from api.http.idempotency import KeyHeader, refuse_without_key
 from api.http.models import Done, RecoverRequest
 from api.http.problems import responses
-from api.http.routes.common import KeyHeader, LeaseHeader, refuse_without_key
+from api.http.routes.common import LeaseHeader
 from api.http.service import Service
 from controller.recovery.situation import Consent
 from controller.stop.word import StopOutcome, StopReason

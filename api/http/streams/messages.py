@@ -13,6 +13,8 @@ PROTOCOL = "rig.v1"
 LOWEST_HZ, HIGHEST_HZ = 1.0, 10_000.0
 # More than there are signals.
 MOST_STREAMS = 64
+# A subscription to all streams has 2 kB.
+LARGEST_MESSAGE_BYTES = 64_000
 Number = Annotated[int, Field(ge=0, le=2**53)]
 
 

@@ -12,7 +12,8 @@ from api.http.streams import sse
 from api.http.streams.latest import MOST_LATEST, LatestView
 from api.http.streams.messages import StreamView
 from api.http.streams.session import Streams
-from api.http.streams.socket import serve
+from api.http.streams.socket import serve, who
+from api.http.streams.sse import EventAnswer
 
 EventId = Annotated[
     str,
@@ -51,12 +52,15 @@ def build(streams: Streams) -> APIRouter:
         dependencies=[READ],
         summary="What happens, as server-sent events; with Last-Event-ID what was missed comes first",
         response_class=StreamingResponse,
-        responses={200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
+        responses={
+            200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}},
+            **responses("429 too-many-open"),
+        },
     )
-    async def events(request: Request, last_event_id: EventId = "", since: Since = None) -> StreamingResponse:
+    async def events(request: Request, last_event_id: EventId = "", since: Since = None) -> EventAnswer:
         newest = streams.feed.events.last
         last = sse.after(streams.session_id, last_event_id) if last_event_id else newest if since is None else since
         told = sse.told(streams.feed, streams.session_id, min(last, newest), request.scope[ENTITLED])
-        return StreamingResponse(told, media_type="text/event-stream")
+        return EventAnswer(told, streams.connections, who(request))
 
     return router

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 import rig
 from api.http.problems import RequestRefused
 from api.http.streams.batch import Decimation
+from api.http.streams.connections import OpenConnections
 from api.http.streams.events import EventsLost, LiveEvent
 from api.http.streams.feed import Feed
 from api.http.streams.latest import LatestView, latest
@@ -51,7 +52,7 @@ class Streams:
         """``lost`` says by topic why a device is lost now."""
         self.feed, self.session_id, self._lost = feed, session_id, lost
         self.signals = signals(wiring)
-        self.views, self.turn = Views(), SharedTurn()
+        self.views, self.turn, self.connections = Views(), SharedTurn(), OpenConnections()
 
     def listed(self) -> list[StreamView]:
         """All that can be subscribed."""

@@ -4,16 +4,24 @@ import asyncio
 import contextlib
 from collections.abc import Awaitable, Callable
 
+from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketDisconnected
 
 from api.http import problems
-from api.http.access.rights import ENTITLED, RECHECK_S
+from api.http.access.limits import RateLimits
+from api.http.access.rights import CALLER, ENTITLED, RECHECK_S
+from api.http.access.scopes import Caller
 from api.http.guard import POLICY
+from api.http.problems import RequestRefused
+from api.http.streams.connections import MESSAGES
 from api.http.streams.messages import PROTOCOL
 from api.http.streams.session import LiveClient, Spoken, Streams, TooSlow
 
 # The client is to come back and resume: of the codes that are an application's own.
 OVERFLOW = 4008
+# Of the registered ones (RFC 6455, IANA): try again later.
+LATER = 1013
+TOO_OFTEN = f"more than {MESSAGES.per_s:g} messages a second came for a while; send fewer, and come back"
 RIGHT_ENDED = "the right to look on has ended; log in, or take another token"
 
 
@@ -23,8 +31,22 @@ async def serve(socket: WebSocket, streams: Streams) -> None:
         text = f"this address speaks the WebSocket subprotocol {PROTOCOL}: ask for it when connecting"
         await socket.send_denial_response(problems.answer(400, "subprotocol", text))
         return
-    client = LiveClient(streams)
     await socket.accept(subprotocol=PROTOCOL)
+    try:
+        with streams.connections.joined(who(socket)):
+            await _served(socket, streams)
+    except RequestRefused as refused:
+        await socket.close(LATER, str(refused))
+
+
+def who(connection: HTTPConnection) -> str:
+    """Whose connections are counted together."""
+    caller: Caller | None = connection.scope.get(CALLER)
+    return caller.key if caller else ""
+
+
+async def _served(socket: WebSocket, streams: Streams) -> None:
+    client = LiveClient(streams)
     # The second where the service itself has closed it meanwhile, because it ends.
     with contextlib.suppress(WebSocketDisconnect, WebSocketDisconnected), contextlib.closing(client):
         await _said(socket, client.hello())
@@ -32,8 +54,8 @@ async def serve(socket: WebSocket, streams: Streams) -> None:
         sending = _send(socket, client, turn, streams.feed.turn)
         try:
             await _first(sending, _take(socket, client, turn), _entitled(socket.scope[ENTITLED]))
-        except PermissionError:
-            await socket.close(POLICY, RIGHT_ENDED)
+        except PermissionError as ended:
+            await socket.close(POLICY, str(ended))
 
 
 async def _first(*parts: Awaitable[None]) -> None:
@@ -66,10 +88,13 @@ async def _send(socket: WebSocket, client: LiveClient, turn: asyncio.Lock, news:
 
 
 async def _take(socket: WebSocket, client: LiveClient, turn: asyncio.Lock) -> None:
+    limits = RateLimits()
     while True:
         message = await socket.receive()
         if message["type"] == "websocket.disconnect":
             return
+        if limits.wait_s("", MESSAGES):
+            raise PermissionError(TOO_OFTEN)
         async with turn:  # nothing comes on a channel before the client has been told what it is
             await _said(socket, client.answer(message.get("text")))
 

@@ -2,7 +2,11 @@
 
 from collections.abc import AsyncIterator, Callable
 
+from starlette.responses import StreamingResponse
+from starlette.types import Receive, Scope, Send
+
 from api.http.access.rights import RECHECK_S
+from api.http.streams.connections import OpenConnections
 from api.http.streams.events import EventsLost
 from api.http.streams.feed import PERIOD_S, Feed
 from api.http.streams.messages import Gap
@@ -10,6 +14,19 @@ from api.http.streams.messages import Gap
 # A comment after this much silence, so that proxies and readers know that the line is there.
 SILENCE_S = 5.0
 RETRY_MS = 1000
+
+
+class EventAnswer(StreamingResponse):
+    """Events for as long as the reader stays; raises RequestRefused where as many look on as may."""
+
+    def __init__(self, told: AsyncIterator[str], connections: OpenConnections, who: str) -> None:
+        super().__init__(told, media_type="text/event-stream")
+        self._connections, self._who = connections, who
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Counted from the first byte to the last, however it ends."""
+        with self._connections.joined(self._who):
+            await super().__call__(scope, receive, send)
 
 
 def after(session_id: str, last_event_id: str) -> int:

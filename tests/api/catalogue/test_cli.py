@@ -16,6 +16,7 @@ from tests.api.catalogue.made import diagnosed, fitted, make_session, trial, wit
 def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("RIG_CATALOGUE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     root = tmp_path / "sessions"
     with_threshold(diagnosed(fitted(make_session(root, "first")), "friction"), 7.25)
     make_session(root, "second", {"id": "S02", "site": "calf"}, trials=(trial(1, "bad"),))

@@ -30,6 +30,7 @@ NAME = "Ann Unmistakable-Example"
 @pytest.fixture
 def lab(root: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.delenv("RIG_CATALOGUE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(root.parent / "cache"))
     with_threshold(diagnosed(fitted(make_session(root, "first")), "friction"), 7.25)
     make_session(root, "second", {"id": "../S 02/ä", "site": "calf"}, trials=(trial(1, "bad"),))
     Catalogue(root).rename("S01", NAME)
@@ -164,7 +165,7 @@ def test_an_erasure_in_one_step_would_be_seen(client: TestClient, lab: Path, mon
     real = subjects.erase_subject
     monkeypatch.setattr(
         "api.http.routes.catalogue.erase_subject",
-        lambda lists, subject, _: real(lists, subject, real(lists, subject).confirm),
+        lambda lists, subject, _, **__: real(lists, subject, real(lists, subject).confirm),
     )
     with pytest.raises(AssertionError):
         test_a_subject_is_erased_in_two_steps(client, lab)

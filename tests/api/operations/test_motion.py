@@ -8,9 +8,11 @@ import pytest
 from api.operations import motion
 from api.operations.motion import TrackPlan
 from controller.experiments import capture as experiment
+from controller.experiments import threshold as ramp
 from controller.experiments import tracked
+from controller.law.inverse_model import GainRow
 from controller.loop.messages import Outcome
-from controller.loop.steps import Program, Retract
+from controller.loop.steps import Program, Retract, TrackForce
 from controller.operation import Operation
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
@@ -106,6 +108,31 @@ def test_what_a_model_gains_over_another_is_part_of_the_result(tmp_path: Path, m
     assert operation.progress.done == 2
     alone = motion.track(Operation("track"), bench(), new, tmp_path)
     assert alone.gain is None and alone.against is None
+
+
+def held(seconds: float) -> TrackPlan:
+    gains = [GainRow(force_N=force_N, depth_mm=force_N, tangent_N_mm=1.0, damping_N_s_mm=0.1) for force_N in (0.0, 9.0)]
+    step = TrackForce(times_s=(0.0, seconds), forces_N=(1.0, 1.0), gains=tuple(gains), crossover_rad_s=10.0)
+    return TrackPlan(Program(name="hold", steps=(step,)), "model.json")
+
+
+def test_the_time_left_of_what_moves_is_known_from_its_beginning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = list[float | None]()
+
+    def follow(*_: object) -> TrackResult:
+        told.append(operation.progress.time_left_s)
+        return followed(0.1)
+
+    monkeypatch.setattr(tracked, "run", follow)
+    monkeypatch.setattr(ramp, "run", follow)
+    monkeypatch.setattr(PlayedBench, "run", lambda *_: follow() and Outcome("complete", "", 0.0, None, None))
+    operation = Operation("track", total=2, now_s=lambda: 100.0)
+    motion.track(operation, bench(), held(20.0), tmp_path, held(30.0))
+    motion.threshold(operation, bench(), held(12.0), 6.0, tmp_path)
+    motion.retract(operation, bench())
+    assert told == [50.0, 20.0, 12.0, motion.RETRACT_MM / motion.RETRACT_MM_S]
 
 
 def test_a_comparison_that_is_cancelled_starts_no_second_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
