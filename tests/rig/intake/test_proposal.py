@@ -10,7 +10,7 @@ import pytest
 
 from rig.config.table import load, parse
 from rig.errors import DataError, UsageError
-from rig.intake.layout import encoding_of
+from rig.intake.encodings import encoding_of
 from rig.intake.mapping import DataMapping
 from rig.intake.naming import names_of
 from rig.intake.proposal import Proposal, propose
