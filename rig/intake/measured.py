@@ -125,30 +125,32 @@ def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
     known, words = table.looks[column].known, words_of(table.layout.sheet.header[column])
     counts = bool((known % 1 == 0).all()) and float(np.abs(known).max()) >= COUNTS
     header = table.layout.sheet.header[column]
-    if table.layout.sheet.units[column] or counts or unknown_unit(table.layout.heads[column]) or unit_of(header):
+    if table.layout.sheet.units[column] or unknown_unit(table.layout.heads[column]) or unit_of(header):
         return ""
+    stated = _stated_unit(quantity, table.layout.sheet.facts)
+    if counts or stated is not None:
+        return stated or ""
     if unit := ros_unit(table.layout.sheet.header[column]):
         return unit
     if not ROTARY_WORDS.isdisjoint(words):
         return {"force": "N m", "velocity": "rad/s"}.get(quantity, "rad" if np.abs(known).max() <= TURN_RAD else "deg")
-    if stated := _stated_unit(quantity, table.layout.sheet.facts):
-        return stated
     robot = not ROBOT_WORDS.isdisjoint(words) and np.abs(known).max() < REACH_M
     return "m" if quantity == "position" and (robot or np.ptp(known) < LEAST_MM) else USUAL[quantity]
 
 
-def _stated_unit(quantity: str, facts: Mapping[str, str]) -> str:
-    """The unit in a line above the table that states one of this quantity, or of whatever has it; empty without one.
+def _stated_unit(quantity: str, facts: Mapping[str, str]) -> str | None:
+    """The unit in a line above the table that states one of this quantity, or of whatever has it; None without a line.
 
+    Empty where the line is of this quantity by name and its unit is none that is known, or another's.
     As `Length Units,Meters` in OptiTrack's Motive, `Unit:,lbF` of gauges.
     """
     own = {*WORDS[quantity], *(("length",) if quantity == "position" else ())}
     for name, value in facts.items():
         words, unit = set(words_of(name)), unit_in(value)
         others = words - UNIT_WORDS
-        if others < words and (not others or others & own) and unit in LINEAR[quantity]:
-            return unit
-    return ""
+        if others < words and (others & own or (not others and unit in LINEAR[quantity])):
+            return unit if unit in LINEAR[quantity] else ""
+    return None
 
 
 def value_of(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, int]) -> TomlTable:
