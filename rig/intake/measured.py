@@ -72,7 +72,7 @@ def _forces(table: ColumnGroup, mine: int) -> list[int]:
 
 def _which(table: ColumnGroup, forces: Sequence[int], known: Mapping[str, int]) -> OpenQuestion:
     """Which of several forces under one motion it is."""
-    asked = _question(table, "force", forces, known, 0)
+    asked = _question(table, "force", forces, known)
     first, unit = asked.choices[0], _usual(table, "force", forces[0])
     shown = "; ".join(f"{choice.name} ({choice.why})" for choice in asked.choices)
     text = f"{table.path.name}: {len(forces)} forces under one motion: {shown}; name the one to read"
@@ -97,7 +97,7 @@ def measured_in(table: ColumnGroup, time: int | None, quantities: Sequence[str])
         elif quantity in known:
             _take(found, table, quantity, known)
         else:
-            found.questions.append(_question(table, quantity, left, known, len(found.questions)))
+            found.questions.append(_question(table, quantity, left, known))
     return found
 
 
@@ -117,7 +117,7 @@ def _take(found: MeasuredColumns, table: ColumnGroup, quantity: str, known: Mapp
         what = f"{table.path.name}: {quantity} ({value['column']!r}, {table.looks[column].span}) {how}"
         text = f"{what} (how many {USUAL[quantity]} one of it is)"
         choice = Choice(str(value["column"]), value)
-        found.questions.append(OpenQuestion(text, (), quantity, (choice,), _usual(table, quantity, column), "0.01"))
+        found.questions.append(OpenQuestion(text, (), quantity, (choice,), _usual(table, quantity, column)))
 
 
 def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
@@ -243,10 +243,8 @@ def _full_rows(table: ColumnGroup, column: int) -> tuple[int, int]:
     return row, int(lengths[row])
 
 
-def _question(
-    table: ColumnGroup, quantity: str, left: Sequence[int], known: Mapping[str, int], asked: int
-) -> OpenQuestion:
-    """Which column it is, of those that move and are nothing else; its example is none of those ``asked``."""
+def _question(table: ColumnGroup, quantity: str, left: Sequence[int], known: Mapping[str, int]) -> OpenQuestion:
+    """Which column it is, of those that move and are nothing else."""
     units = table.layout.sheet.units
     choices = tuple(
         Choice(
@@ -260,5 +258,4 @@ def _question(
     usual = clear[0].name if len(clear) == 1 and clear[0].whole else ""
     shown = "; ".join(f"{choice.name} ({choice.why})" for choice in choices) or "none whose cells are mostly numbers"
     text = f"{table.path.name}: no name tells which column is the {quantity}; it may be {shown}; say it with its unit"
-    example = f"{choices[min(asked, len(choices) - 1)].name} {USUAL[quantity]}" if choices else ""
-    return OpenQuestion(text, (), quantity, choices, usual, example)
+    return OpenQuestion(text, (), quantity, choices, usual)

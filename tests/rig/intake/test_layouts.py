@@ -168,8 +168,8 @@ def test_two_columns_without_names_and_time_ask_twice(folder: Path) -> None:
 def test_answers_of_a_joint_question_are_as_many_as_it_has_parts(folder: Path) -> None:
     np.savetxt(folder / "a.txt", np.stack([FORCE_N, WAY_MM], axis=1), "%.6f")
     (_, joint) = propose(folder).questions
-    assert joint.text.endswith("answer them together, with a semicolon between, as '1 N; 2 mm'")
-    with pytest.raises(UsageError, match="'1 N' is not 2 answers with a semicolon between, as '1 N; 2 mm'"):
+    assert joint.text.endswith("answer them together, with a semicolon between, as 'COLUMN UNIT; COLUMN UNIT'")
+    with pytest.raises(UsageError, match="'1 N' is not 2 answers with a semicolon between, as 'COLUMN UNIT; "):
         joint.value("1 N")
 
 

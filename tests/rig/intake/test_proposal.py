@@ -157,7 +157,7 @@ def test_a_column_nobody_named_is_asked_for_with_what_it_may_be(tmp_path: Path) 
     (question,) = proposal.questions
     assert "it may be signal (V) (V, 0 to 120, moves); say it" in question.text
     assert (question.usual, question.line) == (
-        "", 'columns.force = { column = "signal (V)", positive = "compression", unit = "N" }'
+        "", 'columns.force = { column = "signal (V)", positive = "compression", scale = "?" }'
     )  # fmt: skip
     tables = session_of(proposal.answered(["signal (V) 0.5"]), tmp_path / "in", tmp_path / "out").recording("a").tables
     assert tables["force"]["fz_N"].max() == 60.0
