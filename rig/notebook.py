@@ -28,12 +28,12 @@ from rig.tissue.model import Model
 from rig.tissue.registry import COMPARED, check_known, law_named
 from rig.tissue.study import Study, model_of, study_session
 from rig.trials.curves import loading_curve
-from rig.trials.cycles import cycle_of
+from rig.trials.cycles import cycle_of, pushed
 from rig.trials.opening import Opening, open_place
 from rig.trials.reading import trials_of
 from rig.trials.recorded import trial_of
 from rig.trials.segments import segments_of
-from rig.trials.surface import find_surface, pushed
+from rig.trials.surface import find_surface
 
 if TYPE_CHECKING:
     import pandas as pd

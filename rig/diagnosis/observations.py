@@ -8,7 +8,7 @@ both sides alike and cannot be mistaken for a lag of one of them.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import repeat
 
 import numpy as np
@@ -18,9 +18,9 @@ from scipy.interpolate import CubicSpline
 from rig.errors import DataError
 from rig.recording.converter import at_the_end_of_range
 from rig.simulation.drive import Array, MeasuredMotion
-from rig.trials.cycles import cycle_of
+from rig.trials.cycles import as_pushed, cycle_of
 from rig.trials.findings import Finding, merge
-from rig.trials.surface import find_surface, pushed
+from rig.trials.surface import find_surface
 from rig.trials.trial import FEWEST_SAMPLES, Trial, TrialSet, drop_disordered, drop_unusable, inspect
 
 WORKING_RATE_HZ = 250.0
@@ -181,12 +181,8 @@ def _without_copies(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]
 
 def _pushed(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:
     """What was pulled as if it had been pushed, as for a fit."""
-    said = [pushed(cycle_of(trial))[1] for trial in usable]
-    trials = [
-        replace(trial, force_N=-trial.force_N, axis_mm=-trial.axis_mm) if found else trial
-        for trial, found in zip(usable, said, strict=True)
-    ]
-    return trials, [finding for found in said for finding in found]
+    turned = [as_pushed(trial) for trial in usable]
+    return [trial for trial, _ in turned], [finding for _, found in turned for finding in found]
 
 
 def _turned(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:

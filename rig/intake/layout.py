@@ -1,6 +1,5 @@
 """How the rows of a file nobody described are written: encoding, delimiter, decimal sign, header and unit rows."""
 
-import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import islice, zip_longest
@@ -11,6 +10,7 @@ from rig.config.table import TomlTable
 from rig.errors import DataError
 from rig.intake.cells import NO_VALUE, Affixed, above_columns, affixed, cells_of, is_value
 from rig.intake.edited import joined, loosened
+from rig.intake.encodings import HEAD_ROWS, encoding_of
 from rig.intake.headings import Headings, headings_of
 from rig.intake.interruptions import MOST_LINES, interruptions_of
 from rig.intake.long import by_channel
@@ -33,13 +33,8 @@ from rig.intake.text import (
 from rig.intake.units import UNIT_WORDS, unit_in, unit_of
 from rig.intake.workbook import hidden_sheets, sheet_names
 
-# Read of a text to see how it is written: preambles are shorter, and a table shows itself in a few rows.
+# Read of a text to see how it is written: preambles are shorter.
 HEAD_BYTES = 65_536
-HEAD_ROWS = 400
-# Of the encodings that laboratories' machines write; one that is no Unicode is told by the words of the header only.
-ENCODINGS = ("gb18030", "cp949", "shift_jis", "big5", "cp1252", "cp1251")
-STRAY_ZEROS = 1  # WinTest ends its first line with one; more of them are numbers or what a power failure left
-_BETWEEN = re.compile(r"[\s,;|\"()\[\]/]+")
 DELIMITERS = ("\t", ";", ",", "|", " ")
 
 LEAST_ROWS = 2  # the least that has a rate
@@ -258,37 +253,6 @@ def _understood(found: Found) -> tuple[int, int]:
     """How many quantities are found in it, and how many columns."""
     heads, units = found.headings.heads, found.headings.units
     return sum(bool(candidates(quantity, heads, units)) for quantity in WORDS), len(heads)
-
-
-def encoding_of(head: bytes) -> tuple[str, tuple[str, ...]]:
-    """The encoding whose header has most words that are known, empty of no text; a doubt where others have as many."""
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return "utf-16", ()
-    zeros = [head[start:HEAD_ROWS:2].count(0) for start in (0, 1)]
-    if max(zeros) > len(head[:HEAD_ROWS]) // 4:  # of two bytes of a digit one is none
-        return ("utf-16-be" if zeros[0] > zeros[1] else "utf-16-le"), ()
-    if _decodes(head, "utf-8"):
-        return ("" if head.count(0) > STRAY_ZEROS else "utf-8"), ()
-    header = b"\n".join(head.splitlines()[:HEAD_ROWS])
-    words = {name: _BETWEEN.split(header.decode(name)) for name in ENCODINGS if _decodes(head, name)}
-    known = {name: sum(knows(w) or bool(unit_in(w)) for w in own if not w.isascii()) for name, own in words.items()}
-    if not known or header.count(0) > STRAY_ZEROS:
-        return "", ()
-    # A byte beyond ASCII that stands alone between its letters is a letter of the West; others come in pairs and words.
-    western = not re.search(rb"[\x80-\xff]{2}", header)
-    best = max(known, key=lambda name: (known[name], western and name == "cp1252"))
-    others = [name for name in known if known[name] == known[best] and name != best]
-    said = {name: next((line for line in header.decode(name).splitlines() if not line.isascii()), "") for name in known}
-    texts = "; ".join(f"{name}: {said[name]!r}" for name in (best, *others))
-    return best, (f"the encoding may be {texts}",) if others else ()
-
-
-def _decodes(head: bytes, name: str) -> bool:
-    try:
-        head[: head.rfind(b"\n") + 1 or len(head)].decode(name)
-    except UnicodeDecodeError:
-        return False
-    return True
 
 
 def _of_rows(

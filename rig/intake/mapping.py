@@ -9,7 +9,18 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, mod
 
 from rig.config.table import Table, TomlTable
 
-Place = Annotated[str, Field(min_length=1)] | Annotated[int, Field(ge=1)]
+# Stands in a line of a mapping for what nobody has said yet: no number, so that it cannot be taken for an answer.
+UNSAID = "?"
+
+
+def _said(value: object) -> object:
+    if value == UNSAID:
+        raise ValueError(f"this is still open: write what is true in place of {UNSAID!r}")
+    return value
+
+
+Said = BeforeValidator(_said)
+Place = Annotated[Annotated[str, Field(min_length=1)] | Annotated[int, Field(ge=1)], Said]
 """A column by its name in the header, or by its number counted from 1."""
 Positive = Annotated[float, Field(gt=0)]
 Facts = TomlTable | str
@@ -74,7 +85,7 @@ class TimeColumn(Table):
     wraps_at: Positive | None = None
     form: Literal["number", "iso", "spreadsheet", "counter"] | Annotated[str, Field(pattern="%")] = "number"
     unit: str = ""
-    rate_Hz: Positive | None = None
+    rate_Hz: Annotated[Positive | None, Said] = None
 
     @model_validator(mode="after")
     def _counted(self) -> "TimeColumn":
@@ -92,8 +103,8 @@ class ValueColumn(Table):
     """
 
     column: Place
-    unit: str = ""
-    scale: float | None = None
+    unit: Annotated[str, Said] = ""
+    scale: Annotated[float | None, Said] = None
     offset: float = 0.0
     positive: Sense = 1
     sign_bit: int | None = Field(default=None, ge=1, le=52)

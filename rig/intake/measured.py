@@ -72,7 +72,7 @@ def _forces(table: ColumnGroup, mine: int) -> list[int]:
 
 def _which(table: ColumnGroup, forces: Sequence[int], known: Mapping[str, int]) -> OpenQuestion:
     """Which of several forces under one motion it is."""
-    asked = _question(table, "force", forces, known, 0)
+    asked = _question(table, "force", forces, known)
     first, unit = asked.choices[0], _usual(table, "force", forces[0])
     shown = "; ".join(f"{choice.name} ({choice.why})" for choice in asked.choices)
     text = f"{table.path.name}: {len(forces)} forces under one motion: {shown}; name the one to read"
@@ -97,7 +97,7 @@ def measured_in(table: ColumnGroup, time: int | None, quantities: Sequence[str])
         elif quantity in known:
             _take(found, table, quantity, known)
         else:
-            found.questions.append(_question(table, quantity, left, known, len(found.questions)))
+            found.questions.append(_question(table, quantity, left, known))
     return found
 
 
@@ -117,7 +117,7 @@ def _take(found: MeasuredColumns, table: ColumnGroup, quantity: str, known: Mapp
         what = f"{table.path.name}: {quantity} ({value['column']!r}, {table.looks[column].span}) {how}"
         text = f"{what} (how many {USUAL[quantity]} one of it is)"
         choice = Choice(str(value["column"]), value)
-        found.questions.append(OpenQuestion(text, (), quantity, (choice,), _usual(table, quantity, column), "0.01"))
+        found.questions.append(OpenQuestion(text, (), quantity, (choice,), _usual(table, quantity, column)))
 
 
 def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
@@ -125,30 +125,32 @@ def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
     known, words = table.looks[column].known, words_of(table.layout.sheet.header[column])
     counts = bool((known % 1 == 0).all()) and float(np.abs(known).max()) >= COUNTS
     header = table.layout.sheet.header[column]
-    if table.layout.sheet.units[column] or counts or unknown_unit(table.layout.heads[column]) or unit_of(header):
+    if table.layout.sheet.units[column] or unknown_unit(table.layout.heads[column]) or unit_of(header):
         return ""
+    stated = _stated_unit(quantity, table.layout.sheet.facts)
+    if counts or stated is not None:
+        return stated or ""
     if unit := ros_unit(table.layout.sheet.header[column]):
         return unit
     if not ROTARY_WORDS.isdisjoint(words):
         return {"force": "N m", "velocity": "rad/s"}.get(quantity, "rad" if np.abs(known).max() <= TURN_RAD else "deg")
-    if stated := _stated_unit(quantity, table.layout.sheet.facts):
-        return stated
     robot = not ROBOT_WORDS.isdisjoint(words) and np.abs(known).max() < REACH_M
     return "m" if quantity == "position" and (robot or np.ptp(known) < LEAST_MM) else USUAL[quantity]
 
 
-def _stated_unit(quantity: str, facts: Mapping[str, str]) -> str:
-    """The unit in a line above the table that states one of this quantity, or of whatever has it; empty without one.
+def _stated_unit(quantity: str, facts: Mapping[str, str]) -> str | None:
+    """The unit in a line above the table that states one of this quantity, or of whatever has it; None without a line.
 
+    Empty where the line is of this quantity by name and its unit is none that is known, or another's.
     As `Length Units,Meters` in OptiTrack's Motive, `Unit:,lbF` of gauges.
     """
     own = {*WORDS[quantity], *(("length",) if quantity == "position" else ())}
     for name, value in facts.items():
         words, unit = set(words_of(name)), unit_in(value)
         others = words - UNIT_WORDS
-        if others < words and (not others or others & own) and unit in LINEAR[quantity]:
-            return unit
-    return ""
+        if others < words and (others & own or (not others and unit in LINEAR[quantity])):
+            return unit if unit in LINEAR[quantity] else ""
+    return None
 
 
 def value_of(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, int]) -> TomlTable:
@@ -241,10 +243,8 @@ def _full_rows(table: ColumnGroup, column: int) -> tuple[int, int]:
     return row, int(lengths[row])
 
 
-def _question(
-    table: ColumnGroup, quantity: str, left: Sequence[int], known: Mapping[str, int], asked: int
-) -> OpenQuestion:
-    """Which column it is, of those that move and are nothing else; its example is none of those ``asked``."""
+def _question(table: ColumnGroup, quantity: str, left: Sequence[int], known: Mapping[str, int]) -> OpenQuestion:
+    """Which column it is, of those that move and are nothing else."""
     units = table.layout.sheet.units
     choices = tuple(
         Choice(
@@ -258,5 +258,4 @@ def _question(
     usual = clear[0].name if len(clear) == 1 and clear[0].whole else ""
     shown = "; ".join(f"{choice.name} ({choice.why})" for choice in choices) or "none whose cells are mostly numbers"
     text = f"{table.path.name}: no name tells which column is the {quantity}; it may be {shown}; say it with its unit"
-    example = f"{choices[min(asked, len(choices) - 1)].name} {USUAL[quantity]}" if choices else ""
-    return OpenQuestion(text, (), quantity, choices, usual, example)
+    return OpenQuestion(text, (), quantity, choices, usual)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from rig.config.table import TomlTable
 from rig.errors import UsageError
+from rig.intake.mapping import UNSAID
 from rig.intake.units import LINEAR, ROTARY, unit_in
 
 
@@ -28,7 +29,7 @@ class OpenQuestion:
     """What the data cannot say of a ``quantity`` in the tables of these numbers.
 
     Without ``choices`` it is the rate of the rows [Hz]. ``usual`` is what `--yes` answers, empty where nothing is
-    clearly the best answer; ``example`` is one that is valid.
+    clearly the best answer; ``example`` is one that the data suggest, empty without one.
     """
 
     text: str
@@ -40,9 +41,22 @@ class OpenQuestion:
 
     @property
     def line(self) -> str:
-        """The line of the mapping that answers it."""
+        """The line of the mapping that answers it; what the data cannot say is open in it, and refused until said."""
         place = "time" if self.quantity == "time" else f"columns.{self.quantity}"
-        return f"{place} = {inline(self.value(self.usual or self.example))}"
+        suggested = self.usual or self.example
+        return f"{place} = {inline(self.value(suggested) if suggested else self._unsaid())}"
+
+    @property
+    def form(self) -> str:
+        """An answer, or what one looks like."""
+        return self.usual or self.example or ("COLUMN UNIT" if len(self.choices) > 1 else "NUMBER")
+
+    def _unsaid(self) -> TomlTable:
+        if not self.choices:
+            return {"rate_Hz": UNSAID}
+        return (
+            {"column": UNSAID, "unit": UNSAID} if len(self.choices) > 1 else {**self.choices[0].known, "scale": UNSAID}
+        )
 
     def answer(self, tree: TomlTable, said: str) -> None:
         """Puts the answer into every table where it is open; raises UsageError where it is none."""
@@ -89,7 +103,7 @@ class JointQuestion:
     def text(self) -> str:
         """All of them, and how they are answered."""
         said = "; and ".join(part.text for part in self.parts)
-        return f"{said}; answer them together, with a semicolon between, as {self.example!r}"
+        return f"{said}; answer them together, with a semicolon between, as {self.form!r}"
 
     @property
     def usual(self) -> str:
@@ -97,9 +111,9 @@ class JointQuestion:
         return "; ".join(part.usual for part in self.parts) if all(part.usual for part in self.parts) else ""
 
     @property
-    def example(self) -> str:
-        """An answer that is valid."""
-        return "; ".join(part.usual or part.example for part in self.parts)
+    def form(self) -> str:
+        """An answer, or what one looks like."""
+        return "; ".join(part.form for part in self.parts)
 
     @property
     def line(self) -> str:
@@ -118,7 +132,7 @@ class JointQuestion:
     def _parted(self, said: str) -> list[str]:
         found = [own.strip() for own in said.split(";")]
         if len(found) != len(self.parts):
-            raise UsageError(f"{said!r} is not {len(self.parts)} answers with a semicolon between, as {self.example!r}")
+            raise UsageError(f"{said!r} is not {len(self.parts)} answers with a semicolon between, as {self.form!r}")
         return found
 
 

@@ -64,7 +64,7 @@ def clock_of(table: ColumnGroup) -> SaidTime:
         named = [repr(table.place(number)) for number in table.fitting("time") if number in table.looks]
         still = f" that grows from row to row ({named[0]} does not)" if named and not about else ""
         text = f"{table.path.name}: no column of time{coarse or still}; at what rate are the rows, in Hz?"
-        return {}, [], [OpenQuestion(text, (), "time", example=str(about or 1000))]
+        return {}, [], [OpenQuestion(text, (), "time", example=str(about or ""))]
     said = [f"{table.path.name}: rows are counted at {rate_Hz:g} Hz, as stands above the table"]
     if counter is None:
         return {"rate_Hz": rate_Hz}, said, []

@@ -9,11 +9,13 @@ from rig.errors import DataError
 TIME_NS = {"ns": 1.0, "us": 1e3, "ms": 1e6, "s": 1e9, "min": 60e9, "h": 3600e9}
 FORCE_N = {
     "N": 1.0, "kN": 1e3, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "pN": 1e-12, "cN": 1e-2, "daN": 10.0, "MN": 1e6,
-    "dyn": 1e-5, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605,
+    "dyn": 1e-5, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605, "ozf": 4.4482216152605 / 16,
+    "kip": 4448.2216152605,
 }  # fmt: skip
 # Of a force, a mass is the weight of it: so texture analysers and balances write.
-FORCE_N |= {"g": FORCE_N["gf"], "kg": FORCE_N["kgf"], "lb": FORCE_N["lbf"]}
+FORCE_N |= {"g": FORCE_N["gf"], "kg": FORCE_N["kgf"], "lb": FORCE_N["lbf"], "oz": FORCE_N["ozf"]}
 LENGTH_MM = {"mm": 1.0, "m": 1e3, "cm": 10.0, "um": 1e-3, "nm": 1e-6, "inch": 25.4, "in": 25.4, "mil": 0.0254}
+LENGTH_MM |= {"ft": 304.8, "Å": 1e-7}
 SPEED_MM_S = {
     "mm/s": 1.0, "m/s": 1e3, "um/s": 1e-3, "cm/s": 10.0, "mm/min": 1 / 60, "in/s": 25.4, "in/min": 25.4 / 60,
 }  # fmt: skip
@@ -27,6 +29,9 @@ TEMPERATURE_C = {"C": 1.0, "°C": 1.0, "degC": 1.0}
 SIGNALS = ("V", "mV", "uV", "count", "counts")
 # Known, but no measure of a quantity of ours.
 RAW = (*SIGNALS, "%", "Pa", "kPa", "MPa", "1")
+_PREFIXES = {"": "", "kilo": "k", "centi": "c", "milli": "m", "micro": "u", "nano": "n"}
+_WORDS = {"newton": "N", "meter": "m", "metre": "m"}
+_MASSES = {"gram": "gf", "kilogram": "kgf", "pound": "lbf", "ounce": "ozf"}
 # Other spellings, in small letters: plurals, whole words, other scripts, and units that mean nothing else in capitals.
 SPELLINGS = {
     **dict.fromkeys(("sec", "secs", "second", "seconds", "sekunden", "秒", "초", "с", "сек"), "s"),
@@ -34,13 +39,14 @@ SPELLINGS = {
     **dict.fromkeys(("usec", "usecs", "micros", "microsec", "microsecond", "microseconds", "微秒"), "us"),
     **dict.fromkeys(("nsec", "nsecs", "nanosec", "nanosecs", "nanosecond", "nanoseconds", "纳秒"), "ns"),
     **dict.fromkeys(("minute", "minutes", "分"), "min"),
-    **dict.fromkeys(("newton", "newtons", "牛", "牛顿", "ニュートン", "н"), "N"),
-    **dict.fromkeys(("kilonewton", "kilonewtons", "千牛", "кн"), "kN"),
-    **dict.fromkeys(("gram", "grams", "克"), "g"),
-    **dict.fromkeys(("millimeter", "millimeters", "millimetre", "millimetres", "毫米", "ミリ", "мм"), "mm"),
-    **dict.fromkeys(("meter", "meters", "metre", "metres", "米"), "m"),
-    **dict.fromkeys(("micrometer", "micrometers", "micron", "microns", "微米", "мкм"), "um"),
-    **{unit.lower(): unit for unit in ("s", "ms", "min", "kN", "gf", "kgf", "lbf", "kg", "lb")},
+    **{f"{prefix}{word}{plural}": f"{letter}{unit}" for prefix, letter in _PREFIXES.items()
+       for word, unit in _WORDS.items() for plural in ("", "s")},
+    **{f"{word}{plural}{force}": unit for word, unit in _MASSES.items() for plural in ("", "s")
+       for force in ("", "-force", " force")},
+    **dict.fromkeys(("牛", "牛顿", "ニュートン", "н"), "N"), **dict.fromkeys(("千牛", "кн"), "kN"), "克": "g",
+    **dict.fromkeys(("毫米", "ミリ", "мм"), "mm"), "米": "m", **dict.fromkeys(("mils", "thou", "thous"), "mil"),
+    **dict.fromkeys(("micron", "microns", "微米", "мкм"), "um"), **dict.fromkeys(("foot", "feet"), "ft"),
+    **{unit.lower(): unit for unit in ("s", "ms", "min", "kN", "gf", "kgf", "lbf", "ozf", "kg", "lb", "oz")},
     **{unit: unit for unit in ("mm", "cm", "um", "in", "inch")},
     **dict.fromkeys(("inches", '"'), "inch"), "kgs": "kg", "lbs": "lb", "volt": "V", "volts": "V",
     **dict.fromkeys(("degree", "degrees"), "deg"), **dict.fromkeys(("radian", "radians"), "rad"),
@@ -78,7 +84,7 @@ def _plain(text: str) -> str:
 
 def unknown_unit(name: str) -> str:
     """What stands in brackets behind a name like a unit and is none that is known, empty without one."""
-    found = re.findall(r"[(\[{]\s*([^\W\d_]{2,4})\s*[)\]}]", _plain(name))
+    found = re.findall(r"[(\[{]\s*(u|[^\W\d_]{2,9}(?:-[^\W\d_]+)?)\s*[)\]}]", _plain(name))
     return next((text for text in found if not unit_in(text)), "")
 
 
@@ -88,7 +94,7 @@ def unit_of(name: str) -> str:
     Empty if it names none. One letter alone is a name and no unit, and a 1 in brackets counts columns.
     """
     plain = re.sub(r"\.\.(.+)\.$", r" (\1)", _plain(name).strip())  # as R makes names
-    ending = re.search(r"(?<=[\s_/,.])([^\s_,.()\[\]{}]+)$", plain)
+    ending = re.search(r"(?<=[\s_/,.])([^\s_,.()\[\]{}]+)\.?$", plain)
     bracketed = re.findall(r"[(\[{]([^)\]}]*)[)\]}]", plain)[::-1]
     found = [*bracketed, ending[1] if ending else "", plain if plain[1:] else ""]
     return next((unit for unit in map(unit_in, found) if unit not in ("", "1")), "")

@@ -7,20 +7,11 @@ from numpy.typing import NDArray
 
 from rig.errors import DataError
 from rig.trials.contact import Contact, FloatArray
-from rig.trials.cycles import IndentationCycle
+from rig.trials.cycles import LEAST_TRAVEL_MM, IndentationCycle, pushed
 from rig.trials.findings import Finding
 from rig.trials.stated import SPEED_SHARE, middle_speed
-from rig.trials.streams import in_order
-from rig.trials.surface import (
-    LEAST_SAMPLES,
-    LEAST_TRAVEL_MM,
-    WIDEST_SHARE,
-    Rise,
-    descent,
-    despiked,
-    find_surface,
-    pushed,
-)
+from rig.trials.streams import LEAST_SAMPLES, despiked, in_order
+from rig.trials.surface import WIDEST_SHARE, Rise, descent, find_surface
 
 # So that a fit may move contact by its interval and still see the air above it.
 AIR_KEPT_MM = 0.5

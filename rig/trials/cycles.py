@@ -5,14 +5,18 @@ from itertools import pairwise
 
 import numpy as np
 
+from rig.errors import DataError
 from rig.recording.converter import Array
 from rig.trials.findings import Finding
+from rig.trials.streams import despiked
 from rig.trials.trial import Trial, TrialSet, drop_disordered, drop_unusable
 
 # Shares of a travel, of 5 mm of air and 8 mm of depth for example: a lift leaves the surface, which is at 0.38; a stop
 # at half depth, at 0.69, is none; what is within 0.26 mm of the highest place is the rest there.
 UP, DEEP = 0.25, 0.6
 AT_REST = 0.02
+# Half of what contact is known to in a good trial: a shorter way has no depth that can be told.
+LEAST_TRAVEL_MM = 0.1
 AIR_SHARE = 0.05  # of the force's range: guide friction of 0.2 N, in a trial of 4 N
 
 
@@ -36,6 +40,25 @@ def cycle_of(trial: Trial) -> IndentationCycle:
     force_s, axis_s = (_from(sound.force_s[0], at_s) for at_s in (sound.force_s, sound.axis_s))
     position_mm = np.interp(force_s, axis_s, sound.axis_mm)
     return IndentationCycle(trial.name, trial.speed_mm_s, force_s, sound.force_N, position_mm)
+
+
+def pushed(cycle: IndentationCycle) -> tuple[IndentationCycle, tuple[Finding, ...]]:
+    """The cycle as compression: with both signs turned, and that said, where force grows in tension on the way out."""
+    force_N = despiked(cycle.force_N)
+    lowest = int(np.argmin(force_N))
+    way_mm = cycle.position_mm[: lowest + 1] - cycle.position_mm[0]
+    # A tip that leaves the tissue goes out as well, but its force ends at zero.
+    if -force_N[lowest] <= force_N.max() or -way_mm[-1] <= max(float(way_mm.max()), LEAST_TRAVEL_MM):
+        return cycle, ()
+    text = "force grows in tension as the tip goes out: depth and force count in that sense"
+    turned = replace(cycle, force_N=-cycle.force_N, position_mm=-cycle.position_mm)
+    return turned, (Finding(cycle.name, "force", "tension", text),)
+
+
+def as_pushed(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
+    """The trial likewise; raises DataError where too little is left of it."""
+    _, pulled = pushed(cycle_of(trial))
+    return replace(trial, force_N=-trial.force_N, axis_mm=-trial.axis_mm) if pulled else trial, pulled
 
 
 def way_back(position_mm: Array, turn_mm: float) -> Array:
@@ -62,10 +85,11 @@ def in_cycles(session: TrialSet) -> TrialSet:
 
 def cut(trial: Trial) -> list[Trial]:
     """The cycles of a recording, each from the middle of the rest before it to that after it."""
-    time_s, place_mm = drop_disordered(trial.axis_s, trial.axis_mm)
-    if not len(time_s) or not np.isfinite(trial.force_N).any():
+    try:
+        turned, _ = as_pushed(trial)
+    except DataError:  # too little is left to have cycles, as whoever reads the trial says
         return [trial]
-    cuts = [at for at in lifts(time_s, place_mm) if in_the_air(trial, at)]
+    cuts = [at for at in lifts(*drop_disordered(turned.axis_s, turned.axis_mm)) if in_the_air(turned, at)]
     edges = [-np.inf, *cuts, np.inf]
     return [between(trial, number, start, stop) for number, (start, stop) in enumerate(pairwise(edges), start=1)]
 

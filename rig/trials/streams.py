@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from rig.recording.converter import Array, run_lengths
 
+# Two samples always lie on a line; the third can contradict it.
+LEAST_SAMPLES = 3
 # A stream that lost three samples in a row still goes on; four are a hole.
 GAP_PERIODS = 5.0
 # The highest bit of a word, and those that servos give their loads in.
@@ -76,3 +78,12 @@ def sign_bit(value: Array, step: float) -> int | None:
 def longest_repeat(value: Array) -> int:
     """How many samples in a row have one value, at most; 0 of none."""
     return int(run_lengths(np.diff(value) == 0).max(initial=0)) + 1 if value.size else 0
+
+
+def despiked(values: Array) -> Array:
+    """Median of three: one wrong sample is no contact and no peak."""
+    if len(values) < LEAST_SAMPLES:
+        return values
+    before, after = values[:-2], values[2:]
+    low, high = np.minimum(before, after), np.maximum(before, after)
+    return np.concatenate([values[:1], np.maximum(low, np.minimum(high, values[1:-1])), values[-1:]])

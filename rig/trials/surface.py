@@ -14,10 +14,8 @@ from rig.trials.contact import Contact, FloatArray, Misfits, find_contact
 from rig.trials.cycles import IndentationCycle, way_back
 from rig.trials.findings import Finding
 from rig.trials.preload import contact_before
-from rig.trials.streams import sample_noise
+from rig.trials.streams import LEAST_SAMPLES, despiked, sample_noise
 
-# Two samples always lie on a line; the third can contradict it.
-LEAST_SAMPLES = 3
 # The fewest that have a median and a spread about it.
 LEAST_AIR_SAMPLES = 3
 # Contact is known to 0.2 mm in a good trial (`contact_within_mm`); air begins half as much again above it.
@@ -33,8 +31,6 @@ SHALLOW_SHARE = 0.15  # deeper force says more of the tissue than of its surface
 SEARCH_SHARE = 1.0  # a soft onset may stay below the noise for as long a way as the rest takes
 # Five times what contact is known to in a good trial.
 LEAST_SEARCH_MM = 1.0
-# Half of what contact is known to in a good trial: a shorter way has no depth that can be told.
-LEAST_TRAVEL_MM = 0.1
 # What contact is known to in a good trial: a smaller way back is no turn, but dither and noise of the axis.
 TURN_MM = 0.2
 # A median over twenty samples is known to three tenths of their standard deviation.
@@ -80,19 +76,6 @@ def find_surface(cycle: IndentationCycle) -> FoundSurface:
         return _zeroed(run_in, rise)
     except _NoAirError:
         return _from_contact(cycle)
-
-
-def pushed(cycle: IndentationCycle) -> tuple[IndentationCycle, tuple[Finding, ...]]:
-    """The cycle as compression: with both signs turned, and that said, where force grows in tension on the way out."""
-    force_N = despiked(cycle.force_N)
-    lowest = int(np.argmin(force_N))
-    way_mm = cycle.position_mm[: lowest + 1] - cycle.position_mm[0]
-    # A tip that leaves the tissue goes out as well, but its force ends at zero.
-    if -force_N[lowest] <= force_N.max() or -way_mm[-1] <= max(float(way_mm.max()), LEAST_TRAVEL_MM):
-        return cycle, ()
-    text = "force grows in tension as the tip goes out: depth and force count in that sense"
-    turned = replace(cycle, force_N=-cycle.force_N, position_mm=-cycle.position_mm)
-    return turned, (Finding(cycle.name, "force", "tension", text),)
 
 
 def _rise(cycle: IndentationCycle) -> Rise:
@@ -237,15 +220,6 @@ def _run_in(cycle: IndentationCycle, rise: Rise) -> tuple[IndentationCycle, Rise
     arrays = {name: getattr(cycle, name)[first:] for name in ("time_s", "force_N", "position_mm")}
     shorter = replace(cycle, **arrays)
     return shorter, _rise(shorter)
-
-
-def despiked(values: FloatArray) -> FloatArray:
-    """Median of three: one wrong sample is no contact and no peak."""
-    if len(values) < LEAST_SAMPLES:
-        return values
-    before, after = values[:-2], values[2:]
-    low, high = np.minimum(before, after), np.maximum(before, after)
-    return np.concatenate([values[:1], np.maximum(low, np.minimum(high, values[1:-1])), values[-1:]])
 
 
 def _no_contact(cycle: IndentationCycle, height_N: float, spread_N: float, fall_N: float) -> str:

@@ -108,7 +108,7 @@ NAMELESS = "time_s,a,depth_mm,b\n" + "".join(f"0.{k},{k / 3},{2 * k},{-k / 7}\n"
 
 def test_a_column_no_name_tells_is_asked_for_and_never_guessed(tmp_path: Path) -> None:
     source = write(tmp_path / "in", {"a.csv": NAMELESS})
-    line = 'give the line columns.force = { column = "a", positive = "compression", unit = "N" } in'
+    line = 'give the line columns.force = { column = "?", unit = "?" } in'
     for options, why in (
         ([], "no terminal to answer at"),
         (["--yes"], "no answer is clearly the best, so --yes takes"),
@@ -120,8 +120,11 @@ def test_a_column_no_name_tells_is_asked_for_and_never_guessed(tmp_path: Path) -
         assert not (tmp_path / "out").exists()
         text = (tmp_path / "out.toml").read_text()
         (tmp_path / "out.toml").unlink()
-    (tmp_path / "mine.toml").write_text(text + line.removeprefix("give the line ").removesuffix(" in"))
-    mended = rig("import", source, "--out", tmp_path / "out", "--mapping", tmp_path / "mine.toml")
+    given, mine = line.removeprefix("give the line ").removesuffix(" in"), tmp_path / "mine.toml"
+    mine.write_text(text + given)
+    assert "this is still open" in str(rig("import", source, "--out", tmp_path / "out", "--mapping", mine).exception)
+    mine.write_text(text + given.replace('column = "?"', 'column = "a"').replace('unit = "?"', 'unit = "N"'))
+    mended = rig("import", source, "--out", tmp_path / "out", "--mapping", mine)
     assert mended.exit_code == 0, mended.exception
     assert open_session(tmp_path / "out").trials[0].peak_force_N == pytest.approx(3.0)
 

@@ -67,6 +67,15 @@ def test_strokes_that_never_leave_the_tissue_are_not_cut(clean: TrialSet) -> Non
     assert len(cut(inside)) == 1
 
 
+def test_what_is_pulled_is_cut_where_it_was_let_go(clean: TrialSet) -> None:
+    pressed = joined(clean.trials)
+    pulled = replace(pressed, force_N=-pressed.force_N, axis_mm=-pressed.axis_mm)
+    assert [part.force_s.tolist() for part in cut(pulled)] == [part.force_s.tolist() for part in cut(pressed)]
+    # A strip that was pulled once: where it is longest, it is not let go.
+    (whole,) = cut(replace(clean.trials[0], force_N=-clean.trials[0].force_N, axis_mm=-clean.trials[0].axis_mm))
+    assert whole.name == clean.trials[0].name
+
+
 def joined(trials: tuple[Trial, ...]) -> Trial:
     fields = ("force_s", "force_N", "axis_s", "axis_mm", "marker_s", "marker_mm", "temperature_C")
     columns: dict[str, Any] = {name: np.concatenate([getattr(trial, name) for trial in trials]) for name in fields}

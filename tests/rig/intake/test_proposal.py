@@ -10,7 +10,7 @@ import pytest
 
 from rig.config.table import load, parse
 from rig.errors import DataError, UsageError
-from rig.intake.layout import encoding_of
+from rig.intake.encodings import encoding_of
 from rig.intake.mapping import DataMapping
 from rig.intake.naming import names_of
 from rig.intake.proposal import Proposal, propose
@@ -157,7 +157,7 @@ def test_a_column_nobody_named_is_asked_for_with_what_it_may_be(tmp_path: Path) 
     (question,) = proposal.questions
     assert "it may be signal (V) (V, 0 to 120, moves); say it" in question.text
     assert (question.usual, question.line) == (
-        "", 'columns.force = { column = "signal (V)", positive = "compression", unit = "N" }'
+        "", 'columns.force = { column = "signal (V)", positive = "compression", scale = "?" }'
     )  # fmt: skip
     tables = session_of(proposal.answered(["signal (V) 0.5"]), tmp_path / "in", tmp_path / "out").recording("a").tables
     assert tables["force"]["fz_N"].max() == 60.0
