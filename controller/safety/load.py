@@ -77,10 +77,10 @@ class TipLoad(NamedTuple):
     rate_N_s: float
     stiffness_N_mm: float
     predicted_N: float
-    vanished_N: float = 0.0
+    vanished_N: float
 
 
-UNKNOWN = TipLoad(math.nan, math.nan, 0.0, 0.0, math.nan)
+UNKNOWN = TipLoad(math.nan, math.nan, 0.0, 0.0, math.nan, 0.0)
 
 
 class _Sample(NamedTuple):
@@ -145,7 +145,7 @@ class LoadMonitor:
         left_N = max(_along(sample.wrench, then.wrench, zero) for sample in (newest, samples[-2])) / load_N
         if left_N >= (1.0 - LEAST_SHARE) * (load_N + STIFFEST_IN_N_MM * max(inward_mm, 0.0)):
             return 0.0  # whatever the tissue, and the secants would cost the loop 10 us
-        expected_N = self._expected_N(zero, noise_N)
+        expected_N = self._expected_N(then, zero, noise_N)
         least_N = max(LEAST_VANISHED_N, LEAST_SHARE * expected_N)
         vanished_N = expected_N - left_N
         if expected_N < LEAST_LOADED_N or not vanished_N > least_N or self._felt_here(zero, left_N + least_N):
@@ -160,9 +160,9 @@ class LoadMonitor:
             for sample in islice(self._samples, before)
         )
 
-    def _expected_N(self, zero: Wrench, noise_N: float) -> float:
+    def _expected_N(self, then: _Sample, zero: Wrench, noise_N: float) -> float:
         """The least that a sound sensor would show now, going on from either of the two samples before a jump."""
-        then, newest = self._samples[-2 - self._vanishing], self._samples[-1]
+        newest = self._samples[-1]
         if newest.position_mm < then.position_mm:
             known_N_mm = UNLOADING * self._tangent_before(zero, noise_N, LEAST_TRAVEL_MM)
             per_mm = min(known_N_mm, STIFFEST_OUT_N_MM) or UNKNOWN_OUT_N_MM

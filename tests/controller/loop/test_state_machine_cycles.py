@@ -15,7 +15,7 @@ from controller.safety.load import TipLoad
 from controller.safety.table import Action, Check, Incident
 from rig.config.wiring import Limits, Wiring
 
-QUIET = TipLoad(force_N=0.0, torque_N_m=0.0, rate_N_s=0.0, stiffness_N_mm=0.0, predicted_N=0.0)
+QUIET = TipLoad(force_N=0.0, torque_N_m=0.0, rate_N_s=0.0, stiffness_N_mm=0.0, predicted_N=0.0, vanished_N=0.0)
 STEPS = (Hold(duration_s=0.010), MoveTo(position_mm=30.0, speed_mm_s=20.0))
 
 

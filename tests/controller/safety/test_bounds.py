@@ -48,7 +48,7 @@ LINES = [
     ("supervisor_lost", SOFT, 0.1, False),
     ("operator_silent", SOFT, 3.1, False),
 ]
-QUIET = TipLoad(force_N=0.0, torque_N_m=0.0, rate_N_s=0.0, stiffness_N_mm=0.0, predicted_N=0.0)
+QUIET = TipLoad(force_N=0.0, torque_N_m=0.0, rate_N_s=0.0, stiffness_N_mm=0.0, predicted_N=0.0, vanished_N=0.0)
 WRENCH = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
 
 

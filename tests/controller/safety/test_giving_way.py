@@ -189,7 +189,7 @@ def test_the_drive_is_enabled_only_where_it_is_not() -> None:
 
 @pytest.mark.parametrize("mode", [Mode.IDLE, Mode.SAFE])
 def test_a_sensor_without_zero_or_calibration_may_show_anything_at_rest_but_a_push_is_felt(mode: Mode) -> None:
-    shown = TipLoad(force_N=25.0, torque_N_m=2.0, rate_N_s=0.0, stiffness_N_mm=0.0, predicted_N=25.0)
+    shown = TipLoad(force_N=25.0, torque_N_m=2.0, rate_N_s=0.0, stiffness_N_mm=0.0, predicted_N=25.0, vanished_N=0.0)
     state = LoopState(load=shown, rest_N=25.0)
     assert evaluate(state, SafetyInputs(mode=mode), Wiring(), at_rest=True) is None
     state.rest_N = 19.9

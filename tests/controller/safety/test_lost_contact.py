@@ -23,6 +23,18 @@ def test_the_search_ends_three_millimetres_beyond_the_last_place_that_was_felt()
     assert contact.update(resting(8.02, 0.0)) != ""
 
 
+def test_in_the_tissue_the_last_place_that_was_felt_counts_however_far_out_the_tip_went() -> None:
+    contact = LostContact()
+    assert [
+        contact.update(resting(depth_mm, force_N)) for depth_mm, force_N in ((6.0, 1.0), (0.5, 0.0), (8.9, 0.0))
+    ] == (3 * [""])
+    assert contact.update(resting(9.01, 0.0)) != ""
+
+
+def test_before_anything_was_felt_the_surface_counts() -> None:
+    assert LostContact().update(resting(3.01, 0.0)) != ""
+
+
 def test_out_of_the_tissue_the_surface_counts_again_and_before_any_nothing_does() -> None:
     contact = LostContact()
     assert contact.update(resting(6.0, 1.0)) == ""
