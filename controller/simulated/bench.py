@@ -130,7 +130,7 @@ class _Playback:
         state.force_samples = self._cycle // sensing.every_cycles
         state.wrench = (0.0, 0.0, held_N, 0.0, 0.0, 0.0)
         load_N = abs(held_N - self._zeros().first_N)
-        state.load = TipLoad(load_N, 0.0, 0.0, 0.0, load_N)
+        state.load = TipLoad(load_N, 0.0, 0.0, 0.0, load_N, 0.0)
         state.force_N, state.position_mm = state.raw_N - state.zero_N, plant.position_mm
         state.following_mm = state.setpoint.position_mm - state.position_mm
         self._pair(self._cycle, state.raw_N, state.position_mm)

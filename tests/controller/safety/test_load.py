@@ -42,7 +42,7 @@ def test_before_the_first_sample_nothing_is_known() -> None:
     load = asked(LoadMonitor(MS), 0.0)
     assert load is UNKNOWN
     assert math.isnan(load.force_N) and math.isnan(load.torque_N_m) and math.isnan(load.predicted_N)
-    assert (load.rate_N_s, load.stiffness_N_mm) == (0.0, 0.0)
+    assert (load.rate_N_s, load.stiffness_N_mm, load.vanished_N) == (0.0, 0.0, 0.0)
 
 
 def test_force_and_torque_are_norms_from_the_zero() -> None:
@@ -301,6 +301,8 @@ def test_on_the_way_out_twenty_newtons_a_millimetre_may_go_where_no_tangent_is_k
 
 def test_on_the_way_in_it_is_to_rise_by_the_tangent_before() -> None:
     assert jumped(4.0, 1.0, mm_a_sample=0.05, per_mm=3.0)[0] == pytest.approx(3.55 + 3.0 * 0.2 - 1.0)
+    # At full speed half of a gain may leave nearly as much as there was before.
+    assert jumped(35.0, 20.0, mm_a_sample=0.2, per_mm=5.0)[0] == pytest.approx(32.0 + 5.0 * 0.8 - 20.0)
     assert jumped(19.0, 9.0, mm_a_sample=0.05, per_mm=12.0)[0] == pytest.approx(16.6 + 10.0 * 0.25 - 9.0)
 
 
