@@ -187,7 +187,7 @@ class LoadMonitor:
         )
 
     def _secants(self, last: int, zero: Wrench, noise_N: float) -> Iterator[tuple[float, float]]:
-        """Force over travel, less what noise may give [N/mm], and travel [mm], up to the ``last`` sample of all."""
+        """Force over travel, less what noise may give [N/mm], and travel [mm], up to ``last`` from the end."""
         samples, end, guard_N = self._samples, self._samples[-last], NOISE_GUARD * min(noise_N, LARGEST_NOISE_N)
         load_N, found = _force(end.wrench, zero), False
         for lag in LAGS:

@@ -27,11 +27,11 @@ class LostContact:
 
     def update(self, state: LoopState) -> str:
         """A sentence where nothing is felt beyond the last place where something was, or the surface; else ""."""
-        felt = state.force_N >= max(LEAST_N, NOISES * state.noise_N)
-        if not state.depth_mm > 0.0:
+        inside = state.depth_mm > 0.0
+        if not inside or math.isnan(self._felt_mm):
             self._felt_mm = state.surface_mm
-        elif felt or math.isnan(self._felt_mm):
-            self._felt_mm = state.position_mm if felt else state.surface_mm
+        if inside and state.force_N >= max(LEAST_N, NOISES * state.noise_N):
+            self._felt_mm = state.position_mm
         beyond_mm = state.position_mm - self._felt_mm
         if not beyond_mm > FARTHEST_MM:
             return ""

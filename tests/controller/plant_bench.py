@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, cast
 
 import numpy as np
+import pytest
 
 from controller.devices.drivers import Devices
 from controller.loop.bench_loop import BenchLoop
@@ -44,6 +45,8 @@ class Product(NamedTuple):
 
 BOTA = Product(1000.0, 0.0005, 1_500_000, 0.005, 0.001, 0.0002)
 FT300 = Product(100.0, 0.003, 10_000_000, 0.05, 0.01, 0.002)
+PRODUCTS = pytest.mark.parametrize("product", [BOTA, FT300], ids=["1 kHz", "100 Hz"])
+TOUCH = (ZERO, Approach(speed_mm_s=5.0, contact_force_N=0.05, search_to_mm=40.0))
 
 
 def curve(force_N: Callable[[float], float]) -> ModelledLimb:

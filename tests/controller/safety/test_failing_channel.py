@@ -7,15 +7,12 @@ import pytest
 
 from controller.loop.modes import Mode
 from controller.loop.setpoint import Setpoint
-from controller.loop.steps import Approach, Compress, Hold, Retract, Step
+from controller.loop.steps import Compress, Hold, Retract, Step
 from controller.safety.load import NO_WRENCH, LoadMonitor
 from controller.safety.table import TABLE
-from tests.controller.fake_bench import ZERO
-from tests.controller.plant_bench import BOTA, FT300, PlantBench, Product, curve, linear, rammed
+from tests.controller.plant_bench import BOTA, FT300, PRODUCTS, TOUCH, PlantBench, Product, curve, linear, rammed
 from tests.controller.safety.test_force_limit import BOUND_N, LIMIT_N, TRACKED, tracking
 
-PRODUCTS = pytest.mark.parametrize("product", [BOTA, FT300], ids=["1 kHz", "100 Hz"])
-TOUCH = (ZERO, Approach(speed_mm_s=5.0, contact_force_N=0.05, search_to_mm=40.0))
 PRESSES_N = (0.1, 3.0, 1.0, 3.0, 1.0, 3.0, 1.0)
 STILL = Setpoint(20.0, 0.0)
 WITHOUT = tuple(line for line in TABLE if line.code != "contact_lost")

@@ -6,15 +6,13 @@ import pytest
 
 from controller.loop.modes import Mode
 from controller.loop.state import LoopState
-from controller.loop.steps import Approach, Compress, Retract
+from controller.loop.steps import Compress, Retract
 from controller.safety.first_touch import FirstTouch
 from controller.safety.load import Wrench
 from controller.safety.table import TABLE
-from tests.controller.fake_bench import ZERO, wired
-from tests.controller.plant_bench import BOTA, FT300, PlantBench, Product, linear
+from tests.controller.fake_bench import wired
+from tests.controller.plant_bench import BOTA, FT300, PRODUCTS, TOUCH, PlantBench, Product, linear
 
-PRODUCTS = pytest.mark.parametrize("product", [BOTA, FT300], ids=["1 kHz", "100 Hz"])
-TOUCH = (ZERO, Approach(speed_mm_s=5.0, contact_force_N=0.05, search_to_mm=40.0))
 TRIAL = (
     *TOUCH,
     Compress(depth_mm=3.0, speed_mm_s=20.0, force_limit_N=12.0),

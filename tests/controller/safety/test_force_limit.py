@@ -20,10 +20,9 @@ from mock_devices.testing.spring_bench import WIRING
 from rig.config.axis_response import AxisResponse
 from rig.simulation.axis_plant import ModelledLimb
 from tests.controller.fake_bench import ZERO, wired
-from tests.controller.plant_bench import BOTA, FT300, PlantBench, Product, curve, exponential, linear, rammed
+from tests.controller.plant_bench import BOTA, FT300, PRODUCTS, PlantBench, Product, curve, exponential, linear, rammed
 
 LIMIT_N, BOUND_N = 15.0, 16.5
-PRODUCTS = pytest.mark.parametrize("product", [BOTA, FT300], ids=["1 kHz", "100 Hz"])
 
 
 def stopped(bench: PlantBench, *steps: Step) -> PlantBench:

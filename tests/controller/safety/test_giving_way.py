@@ -14,9 +14,8 @@ from rig.config.wiring import Limits, Wiring
 from rig.errors import DeviceError
 from tests.controller.fake_bench import ZERO, FakeBench, wired
 from tests.controller.fake_devices import FakeAxis
-from tests.controller.plant_bench import BOTA, FT300, PlantBench, Product, linear
+from tests.controller.plant_bench import BOTA, PRODUCTS, PlantBench, Product, linear
 
-PRODUCTS = pytest.mark.parametrize("product", [BOTA, FT300], ids=["1 kHz", "100 Hz"])
 INTO_CONTACT = (
     ZERO,
     Approach(speed_mm_s=5.0, contact_force_N=0.05, search_to_mm=40.0),

@@ -17,14 +17,13 @@ from controller.safety.oscillation import OscillationMonitor
 from controller.safety.table import TABLE
 from mock_devices.testing.models import index_model
 from tests.controller.fake_bench import ZERO
-from tests.controller.plant_bench import BOTA, FT300, PlantBench, Product, curve
+from tests.controller.plant_bench import BOTA, FT300, PRODUCTS, PlantBench, Product, curve
 from tests.controller.simulated.subjects import RESPONSE, SLOW_RESPONSE
 
 MODEL = index_model(0.12, 0.22, 0.01, force_N=11.0)
 STIFF_MM = 4.0
 # Tissue of the model has 0.55 N/mm there; this bench has no damping besides.
 TOO_STIFF_N_MM = {BOTA: 20.0, FT300: 6.0}
-RATES = pytest.mark.parametrize("product", [BOTA, FT300], ids=["1 kHz", "100 Hz"])
 SECONDS = np.arange(0.0, 6.0, 0.001)
 Column = NDArray[np.float64]
 
@@ -52,7 +51,7 @@ def pressed(product: Product, stiff_N_mm: float, without: str = "") -> PlantBenc
     return bench
 
 
-@RATES
+@PRODUCTS
 def test_tissue_stiffer_than_the_loop_tolerates_is_left_and_named(product: Product) -> None:
     bench = pressed(product, TOO_STIFF_N_MM[product])
     assert bench.latched == "oscillation"
@@ -63,13 +62,13 @@ def test_tissue_stiffer_than_the_loop_tolerates_is_left_and_named(product: Produ
     assert bench.loop.state.peak_force_N < 12.0
 
 
-@RATES
+@PRODUCTS
 def test_without_the_check_it_goes_on_swinging(product: Product) -> None:
     """The planted bug: of the whole table only the force limit may notice, where it grows so far."""
     assert pressed(product, TOO_STIFF_N_MM[product], without="oscillation").latched in ("", "force_limit")
 
 
-@RATES
+@PRODUCTS
 def test_tissue_that_the_loop_tolerates_is_pressed_on(product: Product) -> None:
     assert pressed(product, 1.0).latched == ""
 
@@ -185,7 +184,7 @@ def test_the_same_jumps_that_do_not_cease_are_heard() -> None:
 
 
 @pytest.mark.extra
-@RATES
+@PRODUCTS
 @pytest.mark.parametrize("reference", ["vibrate:0.5", "knead:2", "sine:0.5,mean_N=2,frequency_Hz=10"])
 @pytest.mark.parametrize("stiffness", [0.5, 1.0, 2.0])
 def test_the_studys_references_are_followed_on_tissue_half_to_twice_as_stiff(
