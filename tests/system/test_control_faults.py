@@ -108,4 +108,5 @@ def test_a_limb_that_is_pulled_away_ends_the_run(bench: ServedBench, tracking: R
     bench.control.set({"surface.position_mm": 34.0})
     said = tracking.end()
     assert said.code == 3
-    assert "against the robot (limit 10 mm)" in said.sentence
+    assert "the limb is gone, or a force channel died" in said.sentence
+    assert "contact_lost" in causes(tmp_path)
