@@ -37,8 +37,9 @@ HAZARDS = (
         " the first trial of a session is found by the next calibration only: hang"
         " a known weight on the tip before each session. The first touch is judged in newtons, not in millimetres: a"
         " force channel that is dead and pressed exactly along its axis shows no moment either, and before"
-        " `search_to_mm` nothing stops the approach but the following error, once the drive's current limit holds the"
-        " axis back, and a tracker that sees the limb pushed away. Set it a few millimetres beyond the surface.",
+        " `search_to_mm` (of the protocol; under force that of `limits`) nothing stops the approach but the following"
+        " error, once the drive's current limit holds the axis back, and a tracker that sees the limb pushed away. Set"
+        " it a few millimetres beyond the surface.",
     ),
     Hazard(
         "The tip is not where the axis says, or does not go where it is told",

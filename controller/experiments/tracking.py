@@ -72,7 +72,7 @@ def following(reference: Reference, model: Model, wiring: Wiring) -> Program:
             Approach(
                 speed_mm_s=min(APPROACH_MM_S, wiring.limits.speed_mm_s),
                 contact_force_N=CONTACT_N,
-                search_to_mm=wiring.limits.position_max_mm,
+                search_to_mm=min(wiring.limits.search_to_mm, wiring.limits.position_max_mm),
             ),
             *tracks,
             Retract(clearance_mm=5.0, speed_mm_s=min(10.0, wiring.limits.retract_speed_mm_s)),

@@ -65,6 +65,9 @@ class Limits(Table):
     depth_mm: Positive = Field(default=15.0, description="from the surface")
     position_min_mm: float = Field(default=0.0, ge=-500, description="end of the workspace away from the limb")
     position_max_mm: float = Field(default=60.0, description="end of the workspace towards the limb")
+    search_to_mm: float = Field(
+        default=40.0, description="axis position at which a run under force gives up the search for the limb"
+    )
     patient_mm: Positive = Field(default=10.0, description="how far the limb may move against the robot in a program")
     speed_mm_s: Positive = Field(default=60.0, description="of the axis, in either direction")
     retract_speed_mm_s: Positive = Field(default=20.0, description="at which a stop brings the tip out")

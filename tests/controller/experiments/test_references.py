@@ -6,7 +6,7 @@ import pytest
 
 from controller.experiments import tracking
 from controller.experiments.references import parse_reference
-from controller.loop.steps import TrackForce
+from controller.loop.steps import Approach, TrackForce
 from controller.safety.program_limits import refuse_beyond_limits
 from mock_devices.testing.models import index_model
 from rig.config.products.maxon_epos4 import Epos4Wiring
@@ -129,6 +129,20 @@ def test_a_force_deeper_than_the_limit_is_refused_before_it_is_tried() -> None:
 def test_a_reference_without_end_is_refused() -> None:
     with pytest.raises(UsageError, match=r"duration of the reference 1e\+09 s is above an hour, 3600 s"):
         refuse_beyond_limits(tracking.following(parse_reference("step:5,duration_s=1e9"), MODEL, Wiring()), Wiring())
+
+
+@pytest.mark.parametrize(
+    ("limits", "to_mm"), [({}, 40.0), ({"search_to_mm": 28.0}, 28.0), ({"position_max_mm": 35.0}, 35.0)]
+)
+def test_the_limb_is_searched_for_within_a_stated_distance(limits: dict[str, float], to_mm: float) -> None:
+    program = tracking.following(parse_reference("step:5"), MODEL, Wiring.model_validate({"limits": limits}))
+    assert [step.search_to_mm for step in program.steps if isinstance(step, Approach)] == [to_mm]
+
+
+def test_a_search_that_ends_outside_the_workspace_is_refused() -> None:
+    wiring = Wiring.model_validate({"limits": {"search_to_mm": -1.0}})
+    with pytest.raises(UsageError, match="search_to_mm -1 mm is outside 0 to 60 mm"):
+        refuse_beyond_limits(tracking.following(parse_reference("step:5"), MODEL, wiring), wiring)
 
 
 def test_a_delay_that_no_law_can_hold_is_refused() -> None:
