@@ -10,7 +10,7 @@ import pytest
 
 from controller.devices.health import STANDING_REPORTS
 from controller.loop import bench_loop
-from controller.loop.modes import Mode
+from controller.loop.modes import PRESSING, Mode
 from controller.loop.paired_samples import Touch
 from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
@@ -270,6 +270,23 @@ def test_a_first_touch_is_looked_for_only_where_there_may_be_one() -> None:
     bench.loop.machine.mode = Mode.COMPRESS
     bench.cycle()
     assert len(touch.of("update")) == 1
+
+
+def test_a_lost_contact_is_looked_for_only_while_the_tip_presses() -> None:
+    bench = FakeBench(table=())
+    lost = asked(bench, "_lost_contact")
+    bench.begin(AWAY)
+    bench.cycles(3)
+    assert lost.of("begin") == [()]
+    assert lost.of("update") == []
+    assert inputs(bench).contact_lost == ""
+    bench.loop.state.surface_mm = bench.loop.state.position_mm - 3.5
+    for mode in PRESSING:
+        bench.loop.machine.mode = mode
+        bench.cycle()
+        assert inputs(bench).contact_lost == lost.update(bench.loop.state)
+        assert inputs(bench).contact_lost.startswith("nothing is felt 3.5 mm beyond where the limb was felt last")
+    assert len(lost.of("update")) == 4
 
 
 def test_each_surface_that_is_found_is_told_once() -> None:
