@@ -34,6 +34,8 @@ from rig.results.bench import DeviceReport, ResetResult
 # As long as the stop process itself waits for the loop.
 CONFIRM_S = 0.5
 LOOK_S = 0.001
+# Most stops are confirmed within two cycles of the loop; to wait for them here is shorter than a turn of the service.
+PROMPT_S = 0.003
 
 
 class Service:
@@ -234,7 +236,8 @@ class Service:
             if job:
                 job.stopped()
             deadline = time.monotonic() + CONFIRM_S
-            while (answer := bench.stops.answer(request)) is None and time.monotonic() < deadline:
+            answer = bench.stops.confirmed(request, PROMPT_S)
+            while (answer := answer or bench.stops.answer(request)) is None and time.monotonic() < deadline:
                 await asyncio.sleep(LOOK_S)
         finally:
             if job:

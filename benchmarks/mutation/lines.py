@@ -127,11 +127,18 @@ def file_of(test: str) -> str:
 
 
 class Observer:
-    """A pytest plugin that notes which probes each test passes, its fixtures included."""
+    """A pytest plugin that notes which probes each test passes, its fixtures included, of one worker's files."""
 
-    def __init__(self, ran: Mapping[str, dict[int, int]]) -> None:
+    def __init__(self, ran: Mapping[str, dict[int, int]], worker: int, workers: int) -> None:
         self.tests = Coverage()
         self._ran = ran
+        self._worker, self._workers = worker, workers
+
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """A file's tests stay together: they share what they set up."""
+        files = list(dict.fromkeys(file_of(item.nodeid) for item in items))
+        mine = set(files[self._worker :: self._workers])
+        items[:] = [item for item in items if file_of(item.nodeid) in mine]
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, Any, Any]:

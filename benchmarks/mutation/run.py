@@ -159,34 +159,47 @@ def _module(path: str) -> str:
 
 
 def _looked_at(subject: Subject) -> Coverage:
-    """Runs the tests once with probes, in a process of its own; imports here what they needed of code not mutated."""
+    """Runs the tests once with probes, in processes of their own; imports here what they needed of code not mutated."""
+    workers = os.cpu_count() or 1
+    looks = [_begin_look(subject, worker, workers) for worker in range(workers)]
+    tests, modules = Coverage(), dict[str, None]()
+    for pid, told in looks:
+        with os.fdopen(told) as pipe:
+            lines, seconds, failed, imported = json.loads(pipe.read())
+        os.waitpid(pid, 0)
+        tests.lines.update({test: {(path, line) for path, line in places} for test, places in lines.items()})
+        tests.seconds.update(seconds)
+        tests.failed.extend(failed)
+        modules.update(dict.fromkeys(imported))
+    if tests.failed or not tests.lines:
+        failed = ", ".join(tests.failed) or "none was found"
+        raise CheckFailed(f"without any mutant tests fail: {failed}; mend them first")
+    trials.warm(modules)
+    return tests
+
+
+def _begin_look(subject: Subject, worker: int, workers: int) -> tuple[int, int]:
+    """A process that runs its share of the tests; its number, and where it tells what it saw."""
     told, tell = os.pipe()
     pid = os.fork()
     if pid == 0:
         os.close(told)
         _silence()
-        tests = _observed(subject)
+        tests = _observed(subject, worker, workers)
         with os.fdopen(tell, "w") as pipe:
             json.dump([{test: sorted(lines) for test, lines in tests.lines.items()}, tests.seconds, tests.failed,
                        trials.imported()], pipe)  # fmt: skip
         os._exit(0)
     os.close(tell)
-    with os.fdopen(told) as pipe:
-        text = pipe.read()
-    os.waitpid(pid, 0)
-    lines, seconds, failed, modules = json.loads(text)
-    if failed or not lines:
-        raise CheckFailed(f"without any mutant tests fail: {', '.join(failed) or 'none was found'}; mend them first")
-    trials.warm(modules)
-    return Coverage({test: {(path, line) for path, line in places} for test, places in lines.items()}, seconds, [])
+    return pid, told
 
 
-def _observed(subject: Subject) -> Coverage:
+def _observed(subject: Subject, worker: int, workers: int) -> Coverage:
     ran: dict[str, dict[int, int]] = {path: {} for path in subject.paths}
     trees = {path: with_probes(ast.parse((subject.root / path).read_text())) for path in subject.paths}
     codes = {_module(path): compile(tree, str(subject.root / path), "exec") for path, tree in trees.items()}
     sys.meta_path.insert(0, trials.Instead(codes, {_module(path): {RAN: ran[path]} for path in subject.paths}))
-    observer = Observer(ran)
+    observer = Observer(ran, worker, workers)
     pytest.main([*trials.OPTIONS, *subject.tests], plugins=[observer])
     return observer.tests
 
