@@ -5,9 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rig.intake.text
+from rig.config.table import parse
+from rig.errors import DataError
+from rig.intake.mapping import DataMapping
 from rig.intake.proposal import propose
+from rig.intake.session import import_folder
 from tests.rig.intake.makers import MAKERS, A, B, C, Press, dynamometer, rows
 from tests.rig.intake.test_foreign import came_in
+from tests.rig.recording.measured import NOW
 
 
 @pytest.mark.parametrize("maker", MAKERS)
@@ -35,14 +41,26 @@ def test_units_stand_over_the_columns_of_a_report_as_they_are_placed(folder: Pat
 
 
 @pytest.mark.parametrize(
-    "head", ["TIME (S),TRAVEL (MM),FORCE (MN)", "TimeMs,PositionUm,ForceMN", "Time,Way,F\nS,MM,MN"]
+    "head", ["TIME (S),TRAVEL (MM),FORCE (MN)", "TimeMs,PositionUm,ForceMN", "TIME,TRAVEL,FORCE\nS,MM,MN"]
 )
 def test_whether_capitals_are_a_thousandth_or_a_million_newtons_is_asked(folder: Path, head: str) -> None:
-    (folder / "a.csv").write_text(head.replace("Way", "Position") + "\n" + rows("{:.3f},{:.5f},{:.5f}", *A))
+    (folder / "a.csv").write_text(head + "\n" + rows("{:.3f},{:.5f},{:.5f}", *A))
     (question,) = propose(folder).questions
     assert "may be in mN or MN" in question.text
     assert question.usual == ""
     came_in(folder, "mN")
+
+
+def test_time_that_begins_anew_between_pieces_of_a_text_begins_a_recording(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = MAKERS["time_begins_anew"](folder)
+    mapping = parse(DataMapping, propose(folder).tree, "proposed")
+    monkeypatch.setattr(rig.intake.text, "BLOCK_BYTES", 1000)
+    session = import_folder(folder, mapping, folder.parent / "whole", NOW)
+    assert [trial.samples["force"] for trial in session.trials] == [own.time_s.size for own in written]
+    with pytest.raises(DataError, match="or say disorder = 'restart'"):  # which the first piece does not show
+        came_in(folder)
 
 
 def mixed(folder: Path, sign: float) -> None:
