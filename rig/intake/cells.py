@@ -16,6 +16,7 @@ NO_VALUE = frozenset((
     "ol", "ovld", "out of range", "inf", "-inf", "∞", "-∞", "bad", "invalid",
 ))  # fmt: skip
 COMMENT = ("#", "%", "//")
+REMARK = "#"  # behind the last cell of a row
 # Names of a last column that is written in the rows where there is something to say, and left out in all others.
 REMARKS = frozenset(("comment", "comments", "remark", "remarks", "note", "notes", "kommentar", "bemerkung", "备注"))
 _AFFIXED = re.compile(

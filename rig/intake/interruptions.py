@@ -4,7 +4,7 @@ from collections.abc import Callable
 from itertools import islice
 from typing import NamedTuple
 
-from rig.intake.cells import COMMENT, bare, begins_another, cells_of, is_other, is_value
+from rig.intake.cells import COMMENT, REMARK, bare, begins_another, cells_of, is_other, is_value
 from rig.intake.edited import loosened
 from rig.intake.headings import ROWS
 from rig.intake.mapping import FileForm
@@ -53,6 +53,8 @@ def interruptions_of(source: Source, form: FileForm) -> Interruptions:
                     another = (number, text)
                 cells = cells_of(loosened(text, form.delimiter) if form.affixes else text, form.delimiter)
                 cells = bare(cells, head.marks) if form.affixes else cells
+                if remark := "".join(cells[len(head.names) : len(head.names) + 1]):
+                    others += [(number, remark)] if remark.startswith(REMARK) else []
                 others += [(number, text)] if text.startswith(COMMENT) or is_other(cells, head.first) else []
     first = another if another[1] else others[0] if others else (0, "")
     return Interruptions(number - form.rows_above, len(others), *first, headers, bool(another[1]), gap)

@@ -44,6 +44,7 @@ def _pressed(table: ColumnGroup, quantity: str, column: int, known: Mapping[str,
     if quantity == "force":
         return "tension" if risen[most] < 0 else "compression"
     way = signed(table.looks[column])
+    way = np.cumsum(np.nan_to_num(way)) if quantity == "velocity" else way
     there = np.flatnonzero(np.isfinite(way))
     return "out" if way[there[np.argmin(np.abs(there - most))]] < way[there[0]] else "into"
 

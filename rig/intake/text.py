@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from rig.errors import DataError
 from rig.intake.cells import (
     COMMENT,
+    REMARK,
     Affixed,
     above_columns,
     affixed,
@@ -285,7 +286,8 @@ def _edit(form: FileForm, head: Head) -> Callable[[bytes], bytes] | None:
 
 def _edited(line: bytes, form: FileForm, head: Head) -> bytes:
     """Empty where a line is none of the table and such are left out, so that the others keep their numbers."""
-    text = line.decode(errors="replace")
+    text, remark, _ = line.decode(errors="replace").partition(form.delimiter + REMARK)
+    line = f"{text}\n".encode() if remark else line
     cells = cells_of(text, form.delimiter)
     if form.affixes:
         cells = bare(cells_of(loosened(text, form.delimiter), form.delimiter), head.marks)

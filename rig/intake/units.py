@@ -104,9 +104,15 @@ def unknown_unit(name: str) -> str:
 def unit_of(name: str) -> str:
     """The unit a column's name ends in, or has in brackets (``force_kN``, ``Force [kN]``, ``x (mm) left``), or is.
 
-    Empty if it names none. One letter alone is a name and no unit, and a 1 in brackets counts columns.
+    Empty if it names none. One letter alone is a name and no unit, and a 1 in brackets counts columns. Of two units one
+    is by the other (``speed_mm_s``), and one that is not known so is none: ``stiffness_N_mm`` is no way.
     """
     plain = re.sub(r"\.\.(.+)\.$", r" (\1)", _plain(name).strip())  # as R makes names
+    two = re.search(r"(?<=[\s_])([^\W_]+)[\s_](?:per[\s_])?([^\W_]+)$", plain)
+    parts = [unit_in(part) for part in two.groups()] if two else [""]
+    rate = "/".join(parts) if all(parts) else ""
+    if rate in UNITS or (rate and parts[0] != "in"):  # Weg in mm
+        return rate if rate in UNITS else ""
     ending = re.search(r"(?<=[\s_/,.])([^\s_,.()\[\]{}]+)\.?$", plain)
     bracketed = re.findall(r"[(\[{]([^)\]}]*)[)\]}]", plain)[::-1]
     found = [*bracketed, ending[1] if ending else "", plain if plain[1:] else ""]

@@ -2,7 +2,8 @@
 
 Laid out letter by letter by the manuals and published examples: Bluehill (Instron), TestSuite (MTS), testXpert
 (ZwickRoell), TRAPEZIUM X (Shimadzu), WinTest (TA Instruments), Mach-1 (Biomomentum), MicroSquisher (CellScale), Piuma
-(Optics11), RheoCompass (Anton Paar), DMA Q800 (TA Instruments), Capstone (PASCO), LabVIEW (NI), data processing of JPK.
+(Optics11), LabChart (ADInstruments), RheoCompass (Anton Paar), DMA Q800 (TA Instruments), Capstone (PASCO), LabVIEW
+(NI), data processing of JPK.
 """
 
 from collections.abc import Callable, Iterator
@@ -212,6 +213,14 @@ def lab_view_of_several_x(folder: Path) -> list[Press]:
     return [A]
 
 
+def chart_with_remarks(folder: Path) -> list[Press]:
+    text = "Interval=\t0.02 s\nChannelTitle=\tPosition\tForce\nRange=\t10.000 mm\t10.000 N\n"
+    data = rows("{:.3f}\t{:.5f}\t{:.5f}", *A).splitlines()
+    data[30] += "\t#* touched"
+    (folder / "a.txt").write_text(text + "\n".join(data))
+    return [A]
+
+
 def signals_listed_above(folder: Path) -> list[Press]:
     head = "Instrument\tDMA Q800\nSize\t10.0\t5.0\t2.0\tmm\nTime\t10:11:12\nNsig\t4\nSig1\tTime (min)\n"
     head += "Sig2\tTemperature (°C)\nSig3\tDisplacement (µm)\nSig4\tStatic Force (N)\nStartOfData\n"
@@ -292,9 +301,9 @@ MAKERS: dict[str, Callable[[Path], list[Press]]] = {
     for write in (
         bluehill_below_each_other, bluehill_side_by_side, test_suite_cycles, test_suite_pulls_are_positive,
         test_xpert_with_statistics, test_xpert_text, trapezium, win_test_scans, mach_1, micro_squisher, piuma,
-        rheo_compass, rheo_compass_intervals, lab_view_comments, lab_view_of_several_x, signals_listed_above,
-        channels_listed_above, capstone, jpk_segments, time_begins_anew, time_begins_anew_behind_words, capitals,
-        glued_units, a_channel_a_file,
+        rheo_compass, rheo_compass_intervals, lab_view_comments, lab_view_of_several_x, chart_with_remarks,
+        signals_listed_above, channels_listed_above, capstone, jpk_segments, time_begins_anew,
+        time_begins_anew_behind_words, capitals, glued_units, a_channel_a_file,
     )
 }  # fmt: skip
 MAKERS |= {

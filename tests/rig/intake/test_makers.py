@@ -63,6 +63,16 @@ def test_time_that_begins_anew_between_pieces_of_a_text_begins_a_recording(
         came_in(folder)
 
 
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_a_velocity_is_counted_into_the_tissue_as_the_way_it_makes(folder: Path, sense: float) -> None:
+    speed = np.gradient(A.way_mm, A.time_s)
+    data = rows("{:.3f},{:.6f},{:.5f}", A.time_s, sense * speed, A.force_N)
+    (folder / "a.csv").write_text("time_s,velocity_mm_s,force_N\n" + data)
+    found = came_in(folder).recording("a").tables["axis"]
+    assert found["velocity_mm_s"] == pytest.approx(speed, abs=1e-5)
+    assert found["position_mm"] == pytest.approx(A.way_mm, abs=0.02)
+
+
 def mixed(folder: Path, sign: float) -> None:
     """Rows that say by a word whether the force presses or pulls."""
     said = ["Compression" if force >= 0 else "Tension" for force in A.force_N - 0.5]
