@@ -51,9 +51,11 @@ def pieces(sheet: Sheet, form: FileForm) -> Iterator[Piece]:
         found = dict(zip(wanted, batch, strict=True))
         at_ns = times_ns([found.get(name) for name in ("time", "finer")], first, count, form.time, sheet)
         at_ns = unwrapped(at_ns, last_ns, period_ns(form.time, sheet))
-        restarts = restart + np.cumsum(np.diff(at_ns, prepend=at_ns[0] if last_ns is None else last_ns) < 0)
-        last_ns, restart = int(at_ns[-1]), int(restarts[-1])
-        told = {name: found[LABEL + name] for name in form.label_columns} | {RESTART: restarts}
+        told = {name: found[LABEL + name] for name in form.label_columns}
+        if form.disorder == RESTART:
+            told[RESTART] = restart + np.cumsum(np.diff(at_ns, prepend=at_ns[0] if last_ns is None else last_ns) < 0)
+            restart = int(told[RESTART][-1])
+        last_ns = int(at_ns[-1])
         values, saturated = _values(found, sheet, form)
         for labels, rows in _runs([told[name] for name in form.row_labels], count):
             part = {name: column[rows] for name, column in values.items()}
