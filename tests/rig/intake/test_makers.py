@@ -63,6 +63,13 @@ def test_time_that_begins_anew_between_pieces_of_a_text_begins_a_recording(
         came_in(folder)
 
 
+def test_tests_of_one_specimen_whose_name_stands_in_each_row_are_told_by_their_number(folder: Path) -> None:
+    data = "".join(rows("gel,{:.3f},{:.5f},{:.5f}", *own) for own in (A, C))
+    (folder / "a.csv").write_text("specimen,Time (s),Position (mm),Force (N)\n" + data)
+    session = came_in(folder)
+    assert [(trial.name, trial.samples["force"]) for trial in session.trials] == [("gel-1", 250), ("gel-2", 200)]
+
+
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_a_velocity_is_counted_into_the_tissue_as_the_way_it_makes(folder: Path, sense: float) -> None:
     speed = np.gradient(A.way_mm, A.time_s)
