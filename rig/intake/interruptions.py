@@ -9,7 +9,7 @@ from rig.intake.edited import loosened
 from rig.intake.headings import ROWS
 from rig.intake.mapping import FileForm
 from rig.intake.sheet import Source
-from rig.intake.text import BLANK_CELLS, NUMBER_BEGINS, FilePart, Head, head_of, lines_in, open_utf8
+from rig.intake.text import BLANK_CELLS, NUMBER_BEGINS, FilePart, Head, head_of, lines_in, names_again, open_utf8
 
 # Of more lines than these only the first are looked at, in about a second.
 MOST_LINES = 4_000_000
@@ -42,7 +42,7 @@ def interruptions_of(source: Source, form: FileForm) -> Interruptions:
             is_usual = is_usual or _usual(line, form, head)
             gap = gap or number * (empty and is_usual(line))
             empty = not line.strip(BLANK_CELLS)
-            if names and line.strip() == names:
+            if names and names_again(line, names):
                 headers, another = headers + 1, (0, "")
             elif another[1]:
                 if number > another[0] + ROWS:

@@ -47,6 +47,7 @@ Kinds = Mapping[int, bool]  # of the columns that are read, whether they are tex
 BLANK_CELLS = b" \t\r\n,;"
 # A line that begins with one of these is a row, where it has as many cells as the first and that begins with a number.
 NUMBER_BEGINS = b"0123456789+-.,"
+_DIGITS = re.compile(rb"\d+")
 _SECTION = re.compile(r'"?\[?([^\W\d_][\w .-]*)\]?"?[\s,;]*')
 _UTF8 = ("utf-8", "utf8", "utf-8-sig", "ascii")
 
@@ -84,10 +85,17 @@ def _parts(source: Source, form: FileForm) -> list[FilePart]:
     with lines_in(source, form) as file:
         for number, line in enumerate(file):
             header = line.strip() if number == form.header_row - 1 else header
-            at += [number] if header and line.strip() == header else []
+            at += [number] if header and names_again(line, header) else []
     below = form.rows_above - form.header_row + 1
     spans = [(here - form.header_row + 1, after) for here, after in pairwise([*at, number + 1]) if after - here > below]
     return [FilePart(str(index), *span) for index, span in enumerate(spans, 1)] if len(spans) > 1 else [FilePart()]
+
+
+def names_again(line: bytes, header: bytes) -> bool:
+    """Whether the line is the ``header`` row, but for numbers (``Specimen 2 Force (N)``)."""
+    line = line.strip()
+    alike = line[:2] == header[:2] and not line[:1].isdigit()  # as rows begin
+    return line == header or (alike and _DIGITS.sub(b"0", line) == _DIGITS.sub(b"0", header))
 
 
 def section_in(source: Source, form: FileForm) -> FilePart:
@@ -113,6 +121,8 @@ def section_name(line: str) -> str:
 
 def _open(source: Source, form: FileForm, part: FilePart) -> Sheet:
     head = head_of(source, form, part)
+    if form.repeats and part.start:  # whose names may have its own number in them
+        head = head._replace(names=head_of(source, form, FilePart()).names)
 
     def read(columns: Mapping[int, bool]) -> Iterator[Batch]:
         return _batches(source, form, part, head, columns)

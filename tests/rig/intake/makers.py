@@ -221,6 +221,15 @@ def chart_with_remarks(folder: Path) -> list[Press]:
     return [A]
 
 
+def names_with_the_number_of_the_specimen(folder: Path) -> list[Press]:
+    text = ""
+    for number, own in enumerate((A, C), 9):
+        text += ",".join(f"Specimen {number} {name}" for name in ("Time (s)", "Position (mm)", "Force (N)")) + "\n"
+        text += rows("{:.3f},{:.5f},{:.5f}", *own) + "\n"
+    (folder / "a.csv").write_text(text)
+    return [A, C]
+
+
 def signals_listed_above(folder: Path) -> list[Press]:
     head = "Instrument\tDMA Q800\nSize\t10.0\t5.0\t2.0\tmm\nTime\t10:11:12\nNsig\t4\nSig1\tTime (min)\n"
     head += "Sig2\tTemperature (°C)\nSig3\tDisplacement (µm)\nSig4\tStatic Force (N)\nStartOfData\n"
@@ -302,6 +311,7 @@ MAKERS: dict[str, Callable[[Path], list[Press]]] = {
         bluehill_below_each_other, bluehill_side_by_side, test_suite_cycles, test_suite_pulls_are_positive,
         test_xpert_with_statistics, test_xpert_text, trapezium, win_test_scans, mach_1, micro_squisher, piuma,
         rheo_compass, rheo_compass_intervals, lab_view_comments, lab_view_of_several_x, chart_with_remarks,
+        names_with_the_number_of_the_specimen,
         signals_listed_above, channels_listed_above, capstone, jpk_segments, time_begins_anew,
         time_begins_anew_behind_words, capitals, glued_units, a_channel_a_file,
     )
