@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from rig.intake.notation import hyphened, is_number, is_stamp
-from rig.intake.roles import knows
+from rig.intake.roles import knows, words_of
 from rig.intake.units import unit_in
 
 # Written for a number that is not there, besides an empty cell, by loggers, spreadsheets and statistics programs.
@@ -16,6 +16,9 @@ NO_VALUE = frozenset((
     "ol", "ovld", "out of range", "inf", "-inf", "∞", "-∞", "bad", "invalid",
 ))  # fmt: skip
 COMMENT = ("#", "%", "//")
+REMARK = "#"  # behind the last cell of a row
+# Names of a last column that is written in the rows where there is something to say, and left out in all others.
+REMARKS = frozenset(("comment", "comments", "remark", "remarks", "note", "notes", "kommentar", "bemerkung", "备注"))
 _AFFIXED = re.compile(
     r"(?:(?P<name>[^\W\d][^:=]*?)\s*[:=]\s*)?(?P<number>[+-]?[\d.,]*\d[\d.,]*(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,+-]\S*)?"
 )
@@ -56,10 +59,25 @@ def above_columns(line: str, delimiter: str, below: str) -> list[str]:
         and not below.rstrip().endswith('"')
     ):
         return ["", *cells]
+    if delimiter == " " and len(cells) < len(first) and line[:1].isspace():
+        return _standing_above(line, below) or cells
     if delimiter == " " and len(cells) > len(first):
         apart = re.split(r"\s{2,}|\t", line.strip())
         return apart if len(apart) == len(first) else []
     return cells
+
+
+def _standing_above(line: str, below: str) -> list[str]:
+    """Each cell of a line parted by blanks over the number that stands nearest to it; none where two have the same."""
+    numbers = [match.span() for match in re.finditer(r"\S+", below)]
+    found = [""] * len(numbers)
+    for match in re.finditer(r"\S+(?: \S+)*", line):
+        apart = [max(start - match.end(), match.start() - end) for start, end in numbers]
+        at = apart.index(min(apart))
+        if found[at]:
+            return []
+        found[at] = match[0]
+    return found
 
 
 def affixed(cell: str) -> Affixed:
@@ -78,6 +96,17 @@ def bare(cells: Sequence[str], like: Sequence[Affixed]) -> list[str]:
         part.number if (part.name, part.unit) in known[at : at + 1] else cell
         for at, (part, cell) in enumerate(zip(found, cells, strict=True))
     ]
+
+
+def ends_in_comment(names: Sequence[str]) -> bool:
+    """Whether the last of the names is one of comments, which rows may lack."""
+    return len(names) > 2 and not REMARKS.isdisjoint(words_of(names[-1]))
+
+
+def with_comments(rows: Sequence[Sequence[str]]) -> list[Sequence[str]]:
+    """The rows, those that lack only the cell of a comment with an empty one, where their names end in it."""
+    cells = next((len(row) for row in rows if ends_in_comment(row)), 0)
+    return [[*row, ""] if len(row) == cells - 1 else row for row in rows]
 
 
 def is_value(cell: str) -> bool:

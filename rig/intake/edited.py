@@ -44,6 +44,12 @@ def plain_numbers(line: bytes, edit: Callable[[bytes], bytes] | None) -> bytes:
     return with_hyphens(_DOUBLE.sub(rb"\1E\2", edit(line) if edit else line))
 
 
+def filled_up(line: bytes, edit: Callable[[bytes], bytes] | None, delimiter: bytes, cells: int) -> bytes:
+    """With an empty last cell where the line lacks that one, after another change."""
+    line = edit(line) if edit else line
+    return line.rstrip(b"\r\n") + delimiter + b"\n" if line.count(delimiter) == cells - 2 else line
+
+
 def with_hyphens(line: bytes) -> bytes:
     """With a hyphen where a number has another sign for minus."""
     return _MINUS.sub(b"-", line)

@@ -3,17 +3,18 @@
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 from rig.errors import DataError
 from rig.intake.layout import Layout, layouts_of
 from rig.intake.mapping import FileForm
+from rig.intake.pulling import PULLS, said_of_test
 from rig.intake.readers import kind_of
 from rig.intake.roles import candidates
 from rig.intake.survey import Looks, looks_of, texts_of
-from rig.intake.units import unit_in
+from rig.intake.units import Meant, meant, unit_in, unit_of
 
 _BRACKETED = re.compile(r"[(\[{][^)\]}]*[^\W\d_][^)\]}]*[)\]}]")
 _PARTS = re.compile(r"\d+|[^\W\d_]+")
@@ -29,7 +30,8 @@ DIRECTIONS = frozenset("xyz")
 class ColumnGroup:
     """Columns of a sheet that belong together, by their numbers.
 
-    ``index`` tells it from others beside it, ``called`` is what its place says it is, ``force`` another table's.
+    ``index`` tells it from others beside it, ``called`` is what its place says it is, ``force`` another table's,
+    ``said`` what that says of the test.
     """
 
     path: Path
@@ -39,11 +41,12 @@ class ColumnGroup:
     index: str = ""
     called: str = ""
     force: Looks | None = None
+    said: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def units(self) -> tuple[str, ...]:
         """The unit of each of its columns, empty where none is stated."""
-        return tuple(self.layout.sheet.units[number] for number in self.columns)
+        return tuple(map(self.unit, self.columns))
 
     @cached_property
     def looks(self) -> Mapping[int, Looks]:
@@ -59,6 +62,12 @@ class ColumnGroup:
         return texts_of(self.layout.sheet, others) if others else {}
 
     @property
+    def said_of_test(self) -> dict[str, str]:
+        """By what is done in the test, compression or tension, the text that says so, but names of columns."""
+        sheet = self.layout.sheet
+        return {**said_of_test((self.path.name, sheet.name), sheet.facts), **self.said}
+
+    @property
     def rows(self) -> int:
         """How many it has, of those that were looked at."""
         return max((looks.values.size for looks in self.looks.values()), default=0)
@@ -66,6 +75,21 @@ class ColumnGroup:
     def fitting(self, quantity: str) -> list[int]:
         """Columns that may be the quantity by word and unit, the likeliest first."""
         return [self.columns[item.column] for item in candidates(quantity, self.names, self.units)]
+
+    def unit(self, column: int) -> str:
+        """The unit of a column, by its own words or by those of its place; empty where none is stated."""
+        sheet = self.layout.sheet  # whose units are empty where a name and the row of units differ
+        return sheet.units[column] or ("" if unit_of(sheet.header[column]) else unit_of(self.name(column)))
+
+    def meant(self, quantity: str, column: int, unit: str = "") -> Meant:
+        """The units that may be meant by all that is written of a column; none where name and row of units differ."""
+        unit = self.unit(column) or unit
+        differ = not unit and unit_of(self.layout.sheet.header[column])
+        return Meant([], False) if differ else meant(quantity, self.name(column), unit)
+
+    def name(self, column: int) -> str:
+        """All the words of a column, those of its place as well."""
+        return self.names[self.columns.index(column)] if column in self.columns else self.layout.heads[column]
 
     def place(self, column: int) -> str | int:
         """The column's name where it stands there once, else its number from 1."""
@@ -183,7 +207,7 @@ def _alike(one: ColumnGroup, other: ColumnGroup) -> bool:
 def _form(table: ColumnGroup) -> str:
     """How it is written, and what tells it from others of the same columns."""
     form = {key: value for key, value in table.layout.form.items() if key not in INTERRUPTED}
-    return json.dumps([kind_of(table.path), form, table.index, table.called])
+    return json.dumps([kind_of(table.path), form, table.index, table.called, table.said_of_test.keys() == {PULLS}])
 
 
 def _columns(table: ColumnGroup) -> set[tuple[str, str]]:

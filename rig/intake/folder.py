@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rig.errors import DataError
-from rig.intake.mapping import DataMapping, FileForm
+from rig.intake.mapping import RESTART, DataMapping, FileForm
 from rig.intake.pattern import filled, matched
 from rig.intake.readers import kind_of, open_sheets
 from rig.intake.sheet import Sheet, unreadable
@@ -95,6 +95,7 @@ def labels_of(table: FoundTable, labels: Mapping[str, str], mapping: DataMapping
     known, where = {**table.labels, **labels}, table.sheet.where
     sheets = "-{sheet}" if table.sheet.name else ""
     name = mapping.recording or ("{label}" if "label" in labels else "{file}" + sheets)
+    name += "-{restart}" if RESTART in labels and "{restart}" not in name else ""
     found = {**known, "recording": filled(name, known, where)}
     for key in ("specimen", "site", "cycle"):
         template = getattr(mapping, key)

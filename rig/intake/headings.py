@@ -1,5 +1,6 @@
 """What stands above a table: the row of names, the row of units, and all the words above each column."""
 
+import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -13,6 +14,11 @@ ROWS = 12
 MORE_ROWS = 2
 # Of letters: a longer word that is known among units makes names of them (`secs`, `nsecs`, `force`).
 LONGEST_UNIT = 4
+
+# A number behind a word, or before a sign, and a name.
+_NUMBERED = re.compile(
+    r"(?:(?P<word>[^\W\d_]+) ?(?P<number>\d+)\s*[:=.)]?\s+|(?P<alone>\d+)\s*[:=.)]\s*)(?P<name>[^\d\s].*)"
+)
 
 Row = Sequence[str]
 
@@ -33,6 +39,8 @@ class Headings(NamedTuple):
 
 def headings_of(above: Sequence[Row], width: int, used: int) -> Headings:
     """The names and units of ``width`` columns, of which ``used`` are filled, in the rows above them."""
+    if listed := _listed(above, width):
+        return Headings(0, 0, listed, tuple(map(unit_of, listed)))
     filled = [number for number, row in enumerate(above) if any(row)][-ROWS:]
     unit_at = next((number for number in filled[::-1] if _are_units(above[number], number == len(above) - 1)), None)
     header_at = _names_at(above, [number for number in filled if number != unit_at], used)
@@ -54,6 +62,22 @@ def headings_of(above: Sequence[Row], width: int, used: int) -> Headings:
         tuple(head or str(number + 1) for number, head in enumerate(heads)),
         units,
     )
+
+
+def _listed(above: Sequence[Row], width: int) -> tuple[str, ...]:
+    """The names of all columns where each has a line with its number (``Sig2 Force (N)``, ``# 2: Force (N)``)."""
+    found = [match for row in above if (match := _NUMBERED.fullmatch(" ".join(filter(None, row))))]
+    runs = [found[at : at + width] for at, match in enumerate(found) if _place(match) == 1]
+    for run in runs:
+        counted = list(map(_place, run)) == list(range(1, width + 1))
+        alike = len({match["word"] for match in run}) == 1
+        if width > 1 and counted and alike and any(knows(match["name"]) for match in run):
+            return tuple(match["name"] for match in run)
+    return ()
+
+
+def _place(match: re.Match[str]) -> int:
+    return int(match["number"] or match["alone"])
 
 
 def stated_unit(name: str, below: str) -> str | None:

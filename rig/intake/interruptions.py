@@ -4,12 +4,12 @@ from collections.abc import Callable
 from itertools import islice
 from typing import NamedTuple
 
-from rig.intake.cells import COMMENT, bare, begins_another, cells_of, is_other, is_value
+from rig.intake.cells import COMMENT, REMARK, bare, begins_another, cells_of, is_other, is_value
 from rig.intake.edited import loosened
 from rig.intake.headings import ROWS
 from rig.intake.mapping import FileForm
 from rig.intake.sheet import Source
-from rig.intake.text import BLANK_CELLS, NUMBER_BEGINS, FilePart, Head, head_of, lines_in, open_utf8
+from rig.intake.text import BLANK_CELLS, NUMBER_BEGINS, FilePart, Head, head_of, lines_in, names_again, open_utf8
 
 # Of more lines than these only the first are looked at, in about a second.
 MOST_LINES = 4_000_000
@@ -42,7 +42,7 @@ def interruptions_of(source: Source, form: FileForm) -> Interruptions:
             is_usual = is_usual or _usual(line, form, head)
             gap = gap or number * (empty and is_usual(line))
             empty = not line.strip(BLANK_CELLS)
-            if names and line.strip() == names:
+            if names and names_again(line, names):
                 headers, another = headers + 1, (0, "")
             elif another[1]:
                 if number > another[0] + ROWS:
@@ -53,6 +53,8 @@ def interruptions_of(source: Source, form: FileForm) -> Interruptions:
                     another = (number, text)
                 cells = cells_of(loosened(text, form.delimiter) if form.affixes else text, form.delimiter)
                 cells = bare(cells, head.marks) if form.affixes else cells
+                if remark := "".join(cells[len(head.names) : len(head.names) + 1]):
+                    others += [(number, remark)] if remark.startswith(REMARK) else []
                 others += [(number, text)] if text.startswith(COMMENT) or is_other(cells, head.first) else []
     first = another if another[1] else others[0] if others else (0, "")
     return Interruptions(number - form.rows_above, len(others), *first, headers, bool(another[1]), gap)

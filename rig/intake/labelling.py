@@ -28,11 +28,12 @@ IDENTIFIERS = frozenset(("name", "id", "identifier", "label", "code", "no", "nr"
 
 
 class Labels(NamedTuple):
-    """The `label` of a mapping, the templates over it, and what is doubtful."""
+    """The `label` of a mapping, the templates over it, what is doubtful, and whether labels tell recordings apart."""
 
     label: TomlTable | str | int | None
     templates: TomlTable
     doubts: list[str]
+    telling: bool = False
 
 
 def labels_in(table: ColumnGroup, taken: Sequence[int], time: int | None) -> Labels:
@@ -43,13 +44,14 @@ def labels_in(table: ColumnGroup, taken: Sequence[int], time: int | None) -> Lab
     kept = [number for number in texts if number in telling or _rank(table, number) < UNKNOWN]
     if not kept:
         return Labels(None, {}, [])
+    parting = any(len(set(texts[number])) > 1 for number in telling)
     doubts = list(_doubts(table, texts, telling, anew)) if telling else []
     if kept == telling and len(telling) == 1:
-        return Labels(table.place(telling[0]), {}, doubts)
+        return Labels(table.place(telling[0]), {}, doubts, parting)
     called = {number: _called(table, number) for number in kept}
     recording = "-".join(f"{{{called[number]}}}" for number in telling)
     templates = {**({"recording": recording} if telling else {}), **templates_of(list(called.values()))}
-    return Labels({called[number]: table.place(number) for number in kept}, templates, doubts)
+    return Labels({called[number]: table.place(number) for number in kept}, templates, doubts, parting)
 
 
 def stated_in(tables: Sequence[ColumnGroup], known: TomlTable) -> tuple[TomlTable, TomlTable]:

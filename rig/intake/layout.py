@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from rig.config.table import TomlTable
 from rig.errors import DataError
-from rig.intake.cells import NO_VALUE, Affixed, above_columns, affixed, cells_of, is_value
+from rig.intake.cells import NO_VALUE, Affixed, above_columns, affixed, cells_of, is_value, with_comments
 from rig.intake.edited import joined, loosened
 from rig.intake.encodings import HEAD_ROWS, encoding_of
 from rig.intake.headings import Headings, headings_of
@@ -262,6 +262,7 @@ def _of_rows(
 
     ``lines`` are the rows of a text as they stand, ``affixed_rows`` their cells with names and units.
     """
+    rows = with_comments(rows)
     kinds = [_kind(row, delimiter) for row in rows]
     longest, end = _longest(kinds)
     if end - longest < LEAST_ROWS:

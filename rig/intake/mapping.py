@@ -24,6 +24,7 @@ Place = Annotated[Annotated[str, Field(min_length=1)] | Annotated[int, Field(ge=
 """A column by its name in the header, or by its number counted from 1."""
 Positive = Annotated[float, Field(gt=0)]
 Facts = TomlTable | str
+RESTART = "restart"
 MAPPING_FILE = "mapping.toml"
 Quantity = Literal[
     "force", "position", "velocity", "current", "temperature", "x", "y", "z", "tool", "arrival", "sync",
@@ -130,7 +131,8 @@ class FileForm(Table):
     ``label`` is a column whose text tells recordings apart, or several by what they are called in templates; ``labels``
     adds names to those of the patterns, ``facts`` what stands above a table or beside its vectors under these names.
     ``missing`` are texts, and numbers, that stand for none.
-    ``disorder = "drop"`` leaves out rows whose time is not after all before it, ``other_lines = "drop"`` lines of a
+    ``disorder = "drop"`` leaves out rows whose time is not after all before it, with ``"restart"`` another recording
+    begins there, whose number ``{restart}`` ends its name; ``other_lines = "drop"`` lines of a
     text that are no rows, between them and below. With ``repeats`` a table begins wherever the row of names comes
     again, called by its number in ``{sheet}``; with ``affixes`` cells have a name before or a unit behind their number
     (``F:1.2 N``), rows brackets around them or an arrow in them. With ``section`` the table stands below the line that
@@ -156,7 +158,7 @@ class FileForm(Table):
     label: Place | dict[str, Place] | None = None
     labels: dict[str, str] = Field(default_factory=dict)
     facts: dict[str, str] = Field(default_factory=dict)
-    disorder: Literal["refuse", "drop"] = "refuse"
+    disorder: Literal["refuse", "drop", "restart"] = "refuse"
     other_lines: Literal["refuse", "drop"] = "refuse"
     repeats: bool = False
     affixes: bool = False
@@ -179,6 +181,11 @@ class FileForm(Table):
         if isinstance(self.label, dict):
             return self.label
         return {} if self.label is None else {"label": self.label}
+
+    @property
+    def row_labels(self) -> tuple[str, ...]:
+        """What tells rows of a table apart: columns of labels, and where time begins anew."""
+        return (*self.label_columns, *((RESTART,) if self.disorder == RESTART else ()))
 
     @property
     def missing_numbers(self) -> list[float]:

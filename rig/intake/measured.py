@@ -9,10 +9,12 @@ import numpy as np
 from rig.config.table import TomlTable
 from rig.errors import DataError
 from rig.intake.families import COMPONENTS, DIRECTIONS, ColumnGroup, parts_of
+from rig.intake.pulling import PULLS
 from rig.intake.questions import Choice, OpenQuestion
-from rig.intake.roles import WORDS, candidates, words_of
+from rig.intake.roles import UNIT_ALONE, WORDS, candidates, words_of
+from rig.intake.senses import pulls, sense_of, signed
 from rig.intake.survey import Looks, sign_of
-from rig.intake.units import LINEAR, ROTARY, SIGNALS, UNIT_WORDS, ros_unit, unit_in, unit_of, unknown_unit
+from rig.intake.units import LINEAR, ROTARY, SIGNALS, UNIT_WORDS, Meant, ros_unit, unit_in, unit_of, unknown_unit
 from rig.recording.converter import at_the_end_of_range, run_lengths
 
 # Whole numbers beyond this are a converter's counts: it has ten bits at least, and no one weighs and measures so.
@@ -63,7 +65,7 @@ def _forces(table: ColumnGroup, mine: int) -> list[int]:
     apart = set[str]().union(*(name ^ names[0] for name in names))
     if apart <= DIRECTIONS or apart in COMPONENTS:
         return [mine]
-    in_N = {number: looks[number].values * LINEAR["force"].get(sheet.units[number], 1.0) for number in alike}
+    in_N = {number: looks[number].values * LINEAR["force"].get(table.unit(number), 1.0) for number in alike}
     range_N = {number: float(np.nanmax(own) - np.nanmin(own)) for number, own in in_N.items()}
     moving = [number for number in alike if range_N[number] > RIVAL_SHARE * range_N[mine]]
     away_N = {number: float(np.nan_to_num(np.abs(in_N[number] - in_N[mine])).max()) for number in moving}
@@ -106,14 +108,16 @@ def _take(found: MeasuredColumns, table: ColumnGroup, quantity: str, known: Mapp
     value = value_of(table, quantity, column, known)
     found.columns[quantity] = value
     found.doubts.extend(_doubts(table, quantity, column))
+    may_be = _meant(table, quantity, column).units
     if "unit" not in value:
         units = ", ".join((*LINEAR[quantity], *ROTARY.get(quantity, {})))
-        said = table.layout.sheet.units[column]
+        said = "" if may_be else table.unit(column)
         other = unknown_unit(table.layout.heads[column])
         own = unit_of(str(value["column"]))
         twice = f"is in {own} by its name and in another by the row of units" if own and not said else "has no unit"
         unsaid = f"is in {other}, which is none of" if other else f"{twice}; it is one of"
         how = f"is in {said}, which needs a scale" if said else f"{unsaid} {units}, or needs a scale"
+        how = f"may be in {' or '.join(may_be)}, which capitals hide, else it needs a scale" if may_be else how
         what = f"{table.path.name}: {quantity} ({value['column']!r}, {table.looks[column].span}) {how}"
         text = f"{what} (how many {USUAL[quantity]} one of it is)"
         choice = Choice(str(value["column"]), value)
@@ -125,7 +129,9 @@ def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
     known, words = table.looks[column].known, words_of(table.layout.sheet.header[column])
     counts = bool((known % 1 == 0).all()) and float(np.abs(known).max()) >= COUNTS
     header = table.layout.sheet.header[column]
-    if table.layout.sheet.units[column] or unknown_unit(table.layout.heads[column]) or unit_of(header):
+    if table.unit(column) or unknown_unit(table.layout.heads[column]) or unit_of(header):
+        return ""
+    if _meant(table, quantity, column).units:
         return ""
     stated = _stated_unit(quantity, table.layout.sheet.facts)
     if counts or stated is not None:
@@ -155,10 +161,13 @@ def _stated_unit(quantity: str, facts: Mapping[str, str]) -> str | None:
 
 def value_of(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, int]) -> TomlTable:
     """What the mapping says of a column: its place, its unit, where its sign stands, and its sense."""
-    unit = table.layout.sheet.units[column] or _unit_beside(table, column)
-    fitting = unit in LINEAR[quantity] or unit in ROTARY.get(quantity, {})
-    value: TomlTable = {"column": table.place(column), **({"unit": unit} if fitting else {})}
-    return {**value, **sign_of(table.looks[column].values), "positive": _sense(table, quantity, column, known)}
+    found = _meant(table, quantity, column)
+    value: TomlTable = {"column": table.place(column), **({"unit": found.units[0]} if found.sure else {})}
+    return {**value, **sign_of(table.looks[column].values), "positive": sense_of(table, quantity, column, known)}
+
+
+def _meant(table: ColumnGroup, quantity: str, column: int) -> Meant:
+    return table.meant(quantity, column, _unit_beside(table, column))
 
 
 def _unit_beside(table: ColumnGroup, column: int) -> str:
@@ -173,49 +182,28 @@ def _unit_beside(table: ColumnGroup, column: int) -> str:
     raise DataError(f"{table.layout.sheet.place(other)}: {why}; save the rows of each unit as a file of its own")
 
 
-def _sense(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, int]) -> str:
-    """The sense in which the largest force is compression and lies deeper than the start; ours where none is seen."""
-    force = table.looks[known["force"]] if "force" in known else table.force
-    risen = _risen(table.looks[column] if quantity == "force" else force or Looks(np.zeros(1)))
-    most = int(np.argmax(np.abs(risen)))
-    if quantity == "force":
-        return "tension" if risen[most] < 0 else "compression"
-    way = signed(table.looks[column])
-    there = np.flatnonzero(np.isfinite(way))
-    return "out" if way[there[np.argmin(np.abs(there - most))]] < way[there[0]] else "into"
-
-
 def beside(way: ColumnGroup, force: ColumnGroup) -> ColumnGroup:
     """``way`` with the force of the table that goes together with it, which begins and ends as it does."""
-    measured = signed(force.looks[chosen(force)["force"]])
+    own = chosen(force)
+    measured, said = signed(force.looks[own["force"]]), {PULLS: force.path.name} if pulls(force, own) else {}
     known, at = np.flatnonzero(np.isfinite(measured)), np.linspace(0, measured.size - 1, way.rows)
-    return replace(way, force=Looks(np.interp(at, known, measured[known])))
-
-
-def _risen(looks: Looks) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Above its first tenth, where the machine stands in air or at its preload."""
-    force = signed(looks)
-    known = force[np.isfinite(force)]
-    return np.nan_to_num(force - np.median(known[: max(1, known.size // 10)]))
-
-
-def signed(looks: Looks) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """The numbers with the sign where it stands in a bit."""
-    sign, values = sign_of(looks.values), looks.values
-    if "bits" in sign:
-        return np.where(values >= 2.0 ** (sign["bits"] - 1), values - 2.0 ** sign["bits"], values)
-    weight = 2.0 ** sign["sign_bit"] if sign else np.inf
-    return np.where(values >= weight, weight - values, values)
+    return replace(way, force=Looks(np.interp(at, known, measured[known])), said=said)
 
 
 def _doubts(table: ColumnGroup, quantity: str, column: int) -> Iterator[str]:
     name, looks = table.path.name, table.looks[column]
     header = table.layout.sheet.header
     ranks = ranks_of(table, quantity)
-    others = [number for number, rank in ranks.items() if rank[:2] == ranks[column][:2] and number != column]
+    own, moving = ranks[column], [number for number in ranks if number in table.looks and table.looks[number].moves]
+    others = [
+        number for number in moving
+        if number != column and ranks[number][0] == own[0] and ranks[number][1] in (own[1], UNIT_ALONE)
+    ]  # fmt: skip
     if others:
         shown = ", ".join(repr(header[number]) for number in others)
         yield f"{name}: {quantity} is taken to be {header[column]!r}; it may be {shown}"
+    if (found := _meant(table, quantity, column)).sure and not (table.unit(column) or _unit_beside(table, column)):
+        yield f"{name}: {header[column]!r} is taken to be in {found.units[0]}, by the end of its name"
     for key, value in sign_of(looks.values).items():
         yield f"{name}: {header[column]!r} has its sign in high numbers, read with {key} = {value}; if not, take it out"
 
@@ -245,7 +233,7 @@ def _full_rows(table: ColumnGroup, column: int) -> tuple[int, int]:
 
 def _question(table: ColumnGroup, quantity: str, left: Sequence[int], known: Mapping[str, int]) -> OpenQuestion:
     """Which column it is, of those that move and are nothing else."""
-    units = table.layout.sheet.units
+    units = {column: table.unit(column) for column in left}
     choices = tuple(
         Choice(
             str(table.place(column)), value_of(table, quantity, column, known),

@@ -5,8 +5,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from pathlib import Path
 
-import numpy as np
-
 from rig.config.table import TomlTable
 from rig.intake.aside import WAYS, Group, left_aside, nothing_found, untimed
 from rig.intake.families import INTERRUPTED, ColumnGroup, all_tables, groups_of
@@ -17,9 +15,10 @@ from rig.intake.measured import beside, chosen, measured_in, ranks_of, spoilt
 from rig.intake.naming import channels_of, names_of
 from rig.intake.questions import JointQuestion, OpenQuestion, Question, inline
 from rig.intake.readers import kind_of
+from rig.intake.senses import doubts_of_senses
 from rig.intake.survey import texts_of
 from rig.intake.text import open_texts
-from rig.intake.timebase import clock_of, span_s
+from rig.intake.timebase import clock_of, disorder_of, span_s
 from rig.intake.units import ROTARY
 
 Picked = list[tuple[TomlTable, Group, tuple[str, ...]]]
@@ -31,8 +30,6 @@ CLOCKS_APART = 0.02
 FEWEST_ROWS = 10
 # A sample may be lost where a program begins to write another table, but nobody starts a recording within two.
 GOES_ON_STEPS = 2.0
-# Where more of the rows would be left out, time starts anew for another recording, or the column is no time.
-LATE_SHARE = 0.1
 # Of three questions people give up; what can be asked as one is.
 MOST_QUESTIONS = 2
 OPEN = "# open: "
@@ -222,13 +219,14 @@ def _proposed(
     table |= {"label": labels.label} if labels.label is not None else {}
     table |= {"labels": {"part": first.index}} if first.index else {}
     table |= {"facts": facts} if facts else {}
-    late = _late(first, at, labels.label)
-    table |= {"disorder": "drop"} if late else {}
+    orders = [disorder_of(own, at, labels) for own in group] if at is not None else []
+    disorder, late = max(orders, default=("", []))  # where one has it, a restart before rows that are dropped
+    table |= {"disorder": disorder} if late else {}
     table |= {"time": time, "columns": measured.columns}
     spoils = [said for table in group for item in chosen(table).items() for said in spoilt(table, *item)]
     said = [
         *first.layout.doubts, *_broken(group), *doubts, *spoils, *measured.doubts, *labels.doubts, *late,
-        *_senses(first, measured.columns),
+        *doubts_of_senses(first, chosen(first), measured.columns),
     ]  # fmt: skip
     templates |= {**stated, **labels.templates, **_apart(group, labels)}
     return table, templates, said, [*asked, *measured.questions]
@@ -264,25 +262,6 @@ def _missing(group: Group) -> TomlTable:
     found = dict.fromkeys(word for table in group for looks in table.looks.values() for word in looks.missing)
     usual = FileForm.model_fields["missing"].default
     return {"missing": [*usual, *(word for word in found if word not in usual)]} if set(found) - set(usual) else {}
-
-
-def _late(table: ColumnGroup, at: int | None, label: object) -> list[str]:
-    """That rows are left out whose time does not grow, where there are some and no label starts it anew."""
-    if at is None or at not in table.looks or label is not None:
-        return []
-    values = table.looks[at].values
-    late = np.flatnonzero(values[1:] <= np.fmax.accumulate(values)[:-1])
-    if not 0 < late.size <= LATE_SHARE * values.size:
-        return []
-    place = table.layout.sheet.place(int(late[0]) + 1)
-    return [f"{place}: time does not grow, as in {late.size} rows in all; they are left out"]
-
-
-def _senses(table: ColumnGroup, columns: TomlTable) -> Iterator[str]:
-    said = ", ".join(f"positive {quantity} as {column['positive']}" for quantity, column in columns.items())
-    if said:
-        other = "as if pressed; pulled, write the other of compression and tension, into and out"
-        yield f"{table.path.name}: {said}, {other}"
 
 
 def _files(folder: Path, group: Group) -> tuple[str | list[str], TomlTable]:

@@ -44,6 +44,9 @@ _OTHER = frozenset((
 ))  # fmt: skip
 
 
+UNIT_ALONE = 2  # in the rank of a candidate
+
+
 class Candidate(NamedTuple):
     """By ``rank``, smaller is likelier: a word against it; word and unit, word, unit (0 to 2); the word's place."""
 
@@ -93,5 +96,5 @@ def candidates(quantity: str, header: Sequence[str], units: Sequence[str]) -> li
         if place is not None and (not unit or unit in fitting or unit in SIGNALS or quantity in ("label", "counter")):
             found.append(Candidate(number, (spoiled, 0 if unit in fitting else 1, place)))
         elif unit in fitting and quantity in ("time", "force", "position"):
-            found.append(Candidate(number, (spoiled, 2, 0)))
+            found.append(Candidate(number, (spoiled, UNIT_ALONE, 0)))
     return sorted(found, key=lambda item: (item.rank, item.column))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rig.channels import AXIS, BY_NAME, MARKER, Stream
 from rig.errors import DataError
-from rig.intake.mapping import FileForm, ValueColumn
+from rig.intake.mapping import RESTART, FileForm, ValueColumn
 from rig.intake.sheet import Batch, Column, Sheet
 from rig.intake.times import Times, agreed_unit, is_text, period_ns, times_ns, unwrapped
 from rig.intake.units import factor_of
@@ -45,19 +45,23 @@ def pieces(sheet: Sheet, form: FileForm) -> Iterator[Piece]:
     """The rows of a sheet in pieces of the same labels; raises DataError with the place of what is wrong."""
     wanted = _wanted(sheet, form)
     clocks = dict[tuple[tuple[str, ...], float], int]()
-    last_ns: int | None = None
+    last_ns, restart = None, 1
     for first, batch in _said(sheet.read(dict(wanted.values()))):
         count = len(batch[0])
         found = dict(zip(wanted, batch, strict=True))
         at_ns = times_ns([found.get(name) for name in ("time", "finer")], first, count, form.time, sheet)
         at_ns = unwrapped(at_ns, last_ns, period_ns(form.time, sheet))
+        told = {name: found[LABEL + name] for name in form.label_columns}
+        if form.disorder == RESTART:
+            told[RESTART] = restart + np.cumsum(np.diff(at_ns, prepend=at_ns[0] if last_ns is None else last_ns) < 0)
+            restart = int(told[RESTART][-1])
         last_ns = int(at_ns[-1])
         values, saturated = _values(found, sheet, form)
-        for labels, rows in _runs([found[LABEL + name] for name in form.label_columns], count):
+        for labels, rows in _runs([told[name] for name in form.row_labels], count):
             part = {name: column[rows] for name, column in values.items()}
             keep = _in_order(at_ns[rows], part.get("tool"), clocks, labels, form, sheet, first + rows.start)
             kept = {name: column[keep] for name, column in part.items()}
-            named = dict(zip(form.label_columns, labels, strict=True))
+            named = dict(zip(form.row_labels, labels, strict=True))
             yield Piece(named, at_ns[rows][keep], kept, int(saturated[rows].sum()), int((~keep).sum()))
 
 
@@ -127,7 +131,7 @@ def _refuse_order(at_ns: Times, latest: Times, row: int, place: str) -> None:
     said = f"{place}: time {at_ns[row] * 1e-9:.9g} s follows {latest[row] * 1e-9:.9g} s"
     if row >= ANEW_ROWS and at_ns[row] - at_ns[0] <= ANEW_SHARE * (latest[row] - at_ns[0]):
         anew = "another recording or specimen begins here under the same name: name what parts them in `label`"
-        raise DataError(f"{said}; {anew}, or save it as a file of its own")
+        raise DataError(f"{said}; {anew}, or say disorder = 'restart'")
     raise DataError(
         f"{said}; time must increase from row to row. Mend the file, or leave such rows out: disorder = 'drop'"
     )

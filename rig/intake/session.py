@@ -15,7 +15,7 @@ from pathlib import Path
 from rig.errors import DataError
 from rig.intake.clocks import Part, on_one_clock
 from rig.intake.folder import FoundTable, file_name, labels_of, listed, natural, tables_in, unnamed_in
-from rig.intake.mapping import DataMapping
+from rig.intake.mapping import RESTART, DataMapping
 from rig.intake.stating import StatedFacts, stated_of
 from rig.intake.writing import OpenRecording, Written
 from rig.progress import Progress, silent
@@ -90,7 +90,7 @@ def grouped(folder: Path, mapping: DataMapping) -> list[list[FoundTable]]:
     """Tables that are one recording, together; a table whose labels name recordings is one by itself."""
     groups: dict[object, list[FoundTable]] = {}
     for number, table in enumerate(tables_in(folder, mapping)):
-        labels = dict.fromkeys(table.form.label_columns, "")
+        labels = dict.fromkeys(table.form.row_labels, "")
         name = file_name(labels_of(table, labels, mapping)["recording"])
         groups.setdefault(number if _parted(table, mapping) else name, []).append(table)
     return list(groups.values())
@@ -99,7 +99,7 @@ def grouped(folder: Path, mapping: DataMapping) -> list[list[FoundTable]]:
 def _parted(table: FoundTable, mapping: DataMapping) -> bool:
     """Whether rows of the table are of several recordings, by its labels."""
     named = mapping.recording or "{label}"
-    return any(f"{{{label}}}" in named for label in table.form.label_columns)
+    return table.form.disorder == RESTART or any(f"{{{label}}}" in named for label in table.form.label_columns)
 
 
 def _check_new(name: str, names: set[str], table: FoundTable) -> None:

@@ -19,11 +19,23 @@ import pyarrow.csv as arrow_csv
 from numpy.typing import NDArray
 
 from rig.errors import DataError
-from rig.intake.cells import COMMENT, Affixed, above_columns, affixed, bare, begins_another, cells_of, is_other
-from rig.intake.edited import EditedLines, joined, loosened, plain_numbers, single_blanks
+from rig.intake.cells import (
+    COMMENT,
+    REMARK,
+    Affixed,
+    above_columns,
+    affixed,
+    bare,
+    begins_another,
+    cells_of,
+    ends_in_comment,
+    is_other,
+)
+from rig.intake.edited import EditedLines, filled_up, joined, loosened, plain_numbers, single_blanks
 from rig.intake.headings import stated_unit
 from rig.intake.mapping import FileForm
-from rig.intake.notation import GROUPS, hyphened, is_number, is_stamp
+from rig.intake.notation import GROUPS, is_number, is_stamp
+from rig.intake.numerals import check_number
 from rig.intake.roles import words_of
 from rig.intake.sheet import DAMAGE, Batch, Column, Sheet, Source, facts_in, unreadable
 from rig.intake.units import unit_in, unit_of
@@ -35,6 +47,7 @@ Kinds = Mapping[int, bool]  # of the columns that are read, whether they are tex
 BLANK_CELLS = b" \t\r\n,;"
 # A line that begins with one of these is a row, where it has as many cells as the first and that begins with a number.
 NUMBER_BEGINS = b"0123456789+-.,"
+_DIGITS = re.compile(rb"\d+")
 _SECTION = re.compile(r'"?\[?([^\W\d_][\w .-]*)\]?"?[\s,;]*')
 _UTF8 = ("utf-8", "utf8", "utf-8-sig", "ascii")
 
@@ -72,10 +85,17 @@ def _parts(source: Source, form: FileForm) -> list[FilePart]:
     with lines_in(source, form) as file:
         for number, line in enumerate(file):
             header = line.strip() if number == form.header_row - 1 else header
-            at += [number] if header and line.strip() == header else []
+            at += [number] if header and names_again(line, header) else []
     below = form.rows_above - form.header_row + 1
     spans = [(here - form.header_row + 1, after) for here, after in pairwise([*at, number + 1]) if after - here > below]
     return [FilePart(str(index), *span) for index, span in enumerate(spans, 1)] if len(spans) > 1 else [FilePart()]
+
+
+def names_again(line: bytes, header: bytes) -> bool:
+    """Whether the line is the ``header`` row, but for numbers (``Specimen 2 Force (N)``)."""
+    line = line.strip()
+    alike = line[:2] == header[:2] and not line[:1].isdigit()  # as rows begin
+    return line == header or (alike and _DIGITS.sub(b"0", line) == _DIGITS.sub(b"0", header))
 
 
 def section_in(source: Source, form: FileForm) -> FilePart:
@@ -101,6 +121,8 @@ def section_name(line: str) -> str:
 
 def _open(source: Source, form: FileForm, part: FilePart) -> Sheet:
     head = head_of(source, form, part)
+    if form.repeats and part.start:  # whose names may have its own number in them
+        head = head._replace(names=head_of(source, form, FilePart()).names)
 
     def read(columns: Mapping[int, bool]) -> Iterator[Batch]:
         return _batches(source, form, part, head, columns)
@@ -115,7 +137,7 @@ def _open(source: Source, form: FileForm, part: FilePart) -> Sheet:
     return Sheet(
         source.path, name, head.names, head.units, read, stated, head.start + 1,
         "column" if form.across else kind, rows=head.rows,
-        line_of=(lambda row: next(islice(lines(), row, None))[0]) if form.other_lines == "drop" else None,
+        line_of=None if form.across else lambda row: next(islice(lines(), row, None))[0],
     )  # fmt: skip
 
 
@@ -203,8 +225,10 @@ def _decoded(source: Source, number: int, line: bytes) -> str:
 
 
 def _width(above: list[list[str]], first: list[str], form: FileForm) -> int:
-    """Cells of the first row of data, but not those behind the header that hold something."""
+    """Cells of the first row of data, but not those behind the header that hold something; all of it with a comment."""
     named = above[form.header_row - 1] if form.header_row else []
+    if ends_in_comment(named):
+        return len(named)
     return len(named) if named and any(first[len(named) :]) else len(first) or len(named)
 
 
@@ -265,12 +289,15 @@ def _edit(form: FileForm, head: Head) -> Callable[[bytes], bytes] | None:
     edit = single_blanks if form.delimiter == " " else None
     if form.affixes or form.other_lines == "drop":
         edit = partial(_edited, form=form, head=head)
+    if ends_in_comment(head.names):
+        edit = partial(filled_up, edit=edit, delimiter=form.delimiter.encode(), cells=len(head.names))
     return partial(plain_numbers, edit=edit) if form.exponent == "D" or form.minus != "-" else edit
 
 
 def _edited(line: bytes, form: FileForm, head: Head) -> bytes:
     """Empty where a line is none of the table and such are left out, so that the others keep their numbers."""
-    text = line.decode(errors="replace")
+    text, remark, _ = line.decode(errors="replace").partition(form.delimiter + REMARK)
+    line = f"{text}\n".encode() if remark else line
     cells = cells_of(text, form.delimiter)
     if form.affixes:
         cells = bare(cells_of(loosened(text, form.delimiter), form.delimiter), head.marks)
@@ -334,7 +361,7 @@ def _explain(source: Source, form: FileForm, part: FilePart, head: Head, columns
             why = _TWICE if len(cells) == 2 * len(head.names) and form.delimiter == "," else "mend it or take it out"
             raise DataError(f"{place}: {len(cells)} cells where the header has {len(head.names)}; {why}")
         for number in (number for number, text in columns.items() if not text):
-            _check_number(f"{place}, column {head.names[number]}", cells[number].strip(), form)
+            check_number(f"{place}, column {head.names[number]}", cells[number].strip(), form)
 
 
 _TWICE = "the comma parts cells and decimals: save it with semicolons"
@@ -353,37 +380,3 @@ def _lines(source: Source, form: FileForm, part: FilePart, head: Head) -> Iterat
             yield from ((head.start + reader.line_num, cells) for cells in reader if cells)
         except (UnicodeDecodeError, csv.Error, *DAMAGE) as error:
             raise unreadable(source.path, "text", error, "state its encoding, or copy the file again") from error
-
-
-def _check_number(place: str, text: str, form: FileForm) -> None:
-    if text in form.missing:
-        return
-    if form.thousands and form.thousands in text and not re.fullmatch(GROUPS.format(re.escape(form.thousands)), text):
-        raise DataError(f"{place}: {text!r} is no number whose thousands {form.thousands!r} parts; correct the mapping")
-    try:
-        float(text.replace(form.thousands, "").replace(form.decimal, ".") if form.thousands else _pointed(text, form))
-    except ValueError as error:
-        raise DataError(f"{place}: {text!r} is not a number{_hint(text, form)}") from error
-
-
-def _pointed(text: str, form: FileForm) -> str:
-    if "_" in text or (form.decimal == "," and "." in text):
-        raise ValueError(text)
-    return text.replace(form.decimal, ".")
-
-
-def _hint(text: str, form: FileForm) -> str:
-    if hyphened(text) != text:
-        return "; if its sign is a minus, state it: minus = '\u2212'"
-    digits = text.lstrip("+-")
-    if digits.replace(",", "").replace(".", "").isdigit() and digits.count(",") + digits.count(".") > 1:
-        return "; if digits are parted in thousands, state it: thousands = ',' (or '.', with decimal = ',')"
-    if form.decimal == "." and digits.replace(",", "", 1).isdigit():
-        return "; if this is a decimal comma, state it: decimal = ','"
-    if form.decimal == "," and digits.replace(".", "", 1).isdigit():
-        return ", for others of this table have a decimal comma; write one of the two in all of them"
-    if affixed(text).number != text and form.affixes:
-        return " with the name and unit of the first row's; one column has one unit: mend it, or take the row out"
-    if affixed(text).number != text:
-        return "; if every cell of the column has this name or unit beside its number, state it: affixes = true"
-    return f"; if it says that there is no value, add it: missing = ['', {text!r}]"

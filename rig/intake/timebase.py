@@ -8,12 +8,14 @@ import numpy as np
 
 from rig.config.table import TomlTable
 from rig.intake.families import ColumnGroup
-from rig.intake.mapping import TimeColumn
+from rig.intake.labelling import Labels
+from rig.intake.mapping import RESTART, TimeColumn
 from rig.intake.notation import is_stamp, pattern_of
 from rig.intake.questions import Choice, OpenQuestion
 from rig.intake.readers import kind_of
 from rig.intake.roles import words_of
-from rig.intake.survey import Looks, wraps_at
+from rig.intake.rows import ANEW_ROWS, ANEW_SHARE
+from rig.intake.survey import Looks, Numbers, wraps_at
 from rig.intake.times import is_iso, times_ns
 from rig.intake.units import TIME_NS, unit_in, unit_of
 
@@ -29,6 +31,8 @@ SHORTEST_S = 0.2
 PARTS = frozenset(("step", "segment", "interval", "cycle", "stage", "phase", "block", "abschnitt", "schritt"))
 # Where more of the rows have the stamp of the row before, it is coarser than they are: whole seconds of many rows each.
 SAME_STAMPS = 0.1
+# Where more of the rows would be left out, time starts anew for another recording, or the column is no time.
+LATE_SHARE = 0.1
 _RATE = re.compile(r"rate|freq|abtast|采样|サンプリング|\bfs\b", re.IGNORECASE)
 _SAMPLED = re.compile(
     r"sampl|scan|acqui|frame|data|collect|log|abtast|采样|サンプリング|update|hz|\bfs\b", re.IGNORECASE
@@ -84,8 +88,8 @@ def _in_two(table: ColumnGroup) -> TomlTable:
 
 def _other_times(table: ColumnGroup, column: int) -> list[str]:
     """That another column may be the time as well, where it runs otherwise."""
-    looks, unit = table.looks, table.layout.sheet.units[column]
-    alike = [number for number in table.fitting("time") if table.layout.sheet.units[number] == unit and number in looks]
+    looks, unit = table.looks, table.unit(column)
+    alike = [number for number in table.fitting("time") if table.unit(number) == unit and number in looks]
     others = [number for number in alike if looks[number].rises and column in looks]
     own = looks[column].values if others else np.empty(0)
     shown = [repr(table.place(at)) for at in others if not np.array_equal(looks[at].values, own, equal_nan=True)]
@@ -113,6 +117,31 @@ def span_s(table: ColumnGroup, time: TomlTable) -> tuple[float, float] | None:
     return float(ends[0] * 1e-9), float(ends[-1] * 1e-9)
 
 
+def disorder_of(table: ColumnGroup, at: int, labels: Labels) -> tuple[str, list[str]]:
+    """What to do where time does not grow, and the doubt that says so; nothing where it does, or a label tells why."""
+    if at not in table.looks or labels.telling:
+        return "", []
+    values = table.looks[at].values
+    late = np.flatnonzero(values[1:] <= np.fmax.accumulate(values)[:-1])
+    place = table.layout.sheet.place(int(late[0]) + 1) if late.size else ""
+    if restarts := _restarts(values):
+        said = f"{place}: time begins anew, as it does {restarts} times; each time a recording begins"
+        return RESTART, [f"{said}; if they are one, write true times"]
+    if labels.label is not None or not 0 < late.size <= LATE_SHARE * values.size:
+        return "", []
+    return "drop", [f"{place}: time does not grow, as in {late.size} rows in all; they are left out"]
+
+
+def _restarts(values: Numbers) -> int:
+    """How often time begins anew, if all that it does besides growing is to fall to where it began, after some rows."""
+    known = values[np.isfinite(values)]
+    ends = np.flatnonzero(np.diff(known) <= 0)
+    begun, reached = known[ends + 1] - known[0], known[ends] - known[0]
+    lengths = np.diff([0, *(ends + 1), known.size])
+    anew = ends.size and lengths.min() >= ANEW_ROWS and bool((np.abs(begun) <= ANEW_SHARE * reached).all())
+    return int(ends.size) if anew else 0
+
+
 def _fitting(table: ColumnGroup) -> list[int]:
     """Columns that may be time: by their words, then those of stamps, then the first if it runs like a clock."""
     named = table.fitting("time")
@@ -125,7 +154,8 @@ def _fitting(table: ColumnGroup) -> list[int]:
 
 def _column(table: ColumnGroup, column: int) -> SaidTime | None:
     """The column as time, None where its cells are no times."""
-    place, unit = table.place(column), table.layout.sheet.units[column]
+    place, own = table.place(column), table.meant("time", column)
+    unit = own.units[0] if own.sure else table.unit(column)
     if column in table.texts:
         return _of_texts(table, place, [text for text in table.texts[column] if text])
     looks = table.looks.get(column)

@@ -77,7 +77,7 @@ def _factor(form: TimeColumn, sheet: Sheet, number: int) -> float:
 def agreed_unit(stated: str, sheet: Sheet, number: int, quantity: str, example: str) -> str:
     """The unit the mapping states, or else the file; raises where they differ, or neither says one."""
     there, name, stated = sheet.units[number], sheet.header[number], unit_in(stated) or stated
-    if stated and there and stated != there:
+    if stated and there and stated.lower() != there.lower():
         raise DataError(
             f"{sheet.where}: column {name!r} is in {there} by its header, the mapping says {stated}; correct it"
         )

@@ -2,6 +2,7 @@
 
 import re
 import unicodedata
+from typing import NamedTuple
 
 from rig.errors import DataError
 
@@ -21,10 +22,13 @@ SPEED_MM_S = {
 }  # fmt: skip
 # A rotary axis is mapped with the lever at which its torque is a force and its angle a way.
 TORQUE_N_MM = {"N m": 1e3, "Nm": 1e3, "N*m": 1e3, "N mm": 1.0, "Nmm": 1.0, "mN m": 1.0, "mNm": 1.0}
+TORQUE_N_MM |= {"lbf ft": 4.4482216152605 * 304.8, "lbf in": 4.4482216152605 * 25.4}
 ANGLE_RAD = {"rad": 1.0, "deg": 0.017453292519943295, "°": 0.017453292519943295, "turn": 6.283185307179586}
 RATE_RAD_S = {"rad/s": 1.0, "deg/s": 0.017453292519943295, "r/min": 0.10471975511965977, "rpm": 0.10471975511965977}
 CURRENT_A = {"A": 1.0, "mA": 1e-3}
 TEMPERATURE_C = {"C": 1.0, "°C": 1.0, "degC": 1.0}
+# Of forces that benches for tissue reach no meganewton: whoever writes MN may well mean millinewtons.
+AMBIGUOUS = "MN"
 # What a sensor gives before it is calibrated: a column in one of them needs its scale.
 SIGNALS = ("V", "mV", "uV", "count", "counts")
 # Known, but no measure of a quantity of ours.
@@ -49,7 +53,13 @@ SPELLINGS = {
     **{unit.lower(): unit for unit in ("s", "ms", "min", "kN", "gf", "kgf", "lbf", "ozf", "kg", "lb", "oz")},
     **{unit: unit for unit in ("mm", "cm", "um", "in", "inch")},
     **dict.fromkeys(("inches", '"'), "inch"), "kgs": "kg", "lbs": "lb", "volt": "V", "volts": "V",
-    **dict.fromkeys(("degree", "degrees"), "deg"), **dict.fromkeys(("radian", "radians"), "rad"),
+    **{f"{length}{sign}{mass}": f"lbf {length}" for length in ("ft", "in") for sign in ("-", " ", ".", "")
+       for mass in ("lb", "lbs", "lbf")},
+    **{f"{mass}{sign}{length}": f"lbf {length}" for length in ("ft", "in") for sign in ("-", " ", ".")
+       for mass in ("lb", "lbs", "lbf")},
+    **{f"n{sign}m": "N m" for sign in "-."}, **{f"n{sign}mm": "N mm" for sign in "-."},
+    **dict.fromkeys(("newton-meter", "newton-meters", "newton meter", "newton meters", "newton-metres"), "N m"),
+    **dict.fromkeys(("deg", "degree", "degrees"), "deg"), **dict.fromkeys(("radian", "radians"), "rad"),
 }  # fmt: skip
 
 LINEAR = {
@@ -74,6 +84,9 @@ def unit_in(text: str) -> str:
     """``text`` as a unit (``(mm)``, ``[N]``, ``µm``, ``sec``, ``（秒）``), empty where it is none that is known."""
     bare = _plain(text).strip().strip("()[]{}<>").strip()
     bare = bare[:-1] if bare[:-1].isalpha() and bare.endswith(".") else bare  # in. and sec.
+    if bare not in UNITS and bare.count("/") == 1:  # deg/sec, mm/second
+        rate = "/".join(map(unit_in, bare.split("/")))
+        return rate if rate in UNITS else ""
     return bare if bare in UNITS else SPELLINGS.get(bare.lower(), "")
 
 
@@ -91,13 +104,41 @@ def unknown_unit(name: str) -> str:
 def unit_of(name: str) -> str:
     """The unit a column's name ends in, or has in brackets (``force_kN``, ``Force [kN]``, ``x (mm) left``), or is.
 
-    Empty if it names none. One letter alone is a name and no unit, and a 1 in brackets counts columns.
+    Empty if it names none. One letter alone is a name and no unit, and a 1 in brackets counts columns. Of two units one
+    is by the other (``speed_mm_s``), and one that is not known so is none: ``stiffness_N_mm`` is no way.
     """
     plain = re.sub(r"\.\.(.+)\.$", r" (\1)", _plain(name).strip())  # as R makes names
+    two = re.search(r"(?<=[\s_])([^\W_]+)[\s_](?:per[\s_])?([^\W_]+)$", plain)
+    parts = [unit_in(part) for part in two.groups()] if two else [""]
+    rate = "/".join(parts) if all(parts) else ""
+    if rate in UNITS or (rate and parts[0] != "in"):  # Weg in mm
+        return rate if rate in UNITS else ""
     ending = re.search(r"(?<=[\s_/,.])([^\s_,.()\[\]{}]+)\.?$", plain)
     bracketed = re.findall(r"[(\[{]([^)\]}]*)[)\]}]", plain)[::-1]
     found = [*bracketed, ending[1] if ending else "", plain if plain[1:] else ""]
     return next((unit for unit in map(unit_in, found) if unit not in ("", "1")), "")
+
+
+class Meant(NamedTuple):
+    """Units that may be meant; ``sure`` where it is one, by its own letters or by those of the name."""
+
+    units: list[str]
+    sure: bool
+
+
+def meant(quantity: str, name: str, unit: str) -> Meant:
+    """The units of the quantity that ``unit``, or what ``name`` ends in where that is empty, may be in capitals.
+
+    Machines write names in capitals, and then MN is a millinewton or a meganewton, NM a nanometre or a newton metre.
+    """
+    plain, known = _plain(name).strip(), (*LINEAR[quantity], *ROTARY.get(quantity, {}))
+    if unit and unit != AMBIGUOUS:
+        return Meant([unit] if unit in known else [], unit in known)
+    ending = re.search(r"(?:(?<=[\s_/,.(\[{])|(?<=[a-z])(?=[A-Z]))([^\W\d_]{1,3})[)\]}]?$", plain)
+    text = unit or (unit_in(ending[1]) or ending[1] if ending else "")
+    found = [text] if text in known and text != AMBIGUOUS else [own for own in known if own.lower() == text.lower()]
+    is_told = found == [text] or plain.isupper() or (text.istitle() and len(text) > 1)  # as in PositionUm
+    return Meant(found, len(found) == 1 and is_told)
 
 
 def factor_of(quantity: str, unit: str, lever_mm: float | None = None) -> float:

@@ -12,6 +12,8 @@ from rig.trials.streams import in_order
 
 # Of force and of axis: fewer are no cycle, at 10 Hz as little as two seconds.
 FEWEST_SAMPLES = 20
+# What a mapping calls the column of each stream that a trial needs.
+MAPPED = {"force": "force", "axis": "position"}
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,8 @@ def drop_unusable(trial: Trial) -> Trial:
     axis = drop_disordered(trial.axis_s, trial.axis_mm)
     for name, raw, kept in (("force", trial.force_s, force[0]), ("axis", trial.axis_s, axis[0])):
         if not raw.size:
-            raise DataError(f"{trial.name}: no valid {name} samples; a trial needs force and axis")
+            said = f"no valid {name} samples; a trial needs force and axis"
+            raise DataError(f"{trial.name}: {said}: name the column of its {MAPPED[name]} in the mapping")
         if kept.size < FEWEST_SAMPLES:
             raise DataError(
                 f"{trial.name}: {kept.size} of {raw.size} samples of {name} are numbers at growing times "

@@ -134,7 +134,7 @@ LOGGED: dict[str, tuple[Write, int, tuple[str, ...]]] = {
              lines("{:.4f},{:.5f},{:.5f},", TIME_S, WAY_MM, FORCE_N)), 1, ()),
     "LabChart": (
         text("Interval=\t0.02 s\nExcelDateTime=\t4.429e+04\t4/3/2021 10:11:12.345\nTimeFormat=\tStartOfBlock\n"
-             "ChannelTitle=\tForce\tPosition\nRange=\t10 N\t10.000 mm\n", LVM, "a.txt"), 1, ("N", "mm")),
+             "ChannelTitle=\tForce\tPosition\nRange=\t10 N\t10.000 mm\n", LVM, "a.txt"), 1, ()),
     "TwinCAT Scope": (text(SCOPE, lines("{:d},{:.5f},{:d},{:.5f}", MS, FORCE_N, MS, WAY_MM)), 1, ()),
     "UTF-16 without a mark": (
         text("Time (s),Force (N),Position (mm)\n", lines("{:.3f},{:.5f},{:.5f}", TIME_S, FORCE_N, WAY_MM),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rig.intake.proposal import propose
+from rig.intake.units import unit_of
 from tests.rig.intake.instruments import text
 from tests.rig.intake.test_foreign import FORCE_N, TIME_S, WAY_MM, came_in, check, lines
 
@@ -73,6 +74,21 @@ def test_a_unit_that_stands_there_and_is_not_known_is_never_the_usual_one(folder
     (question,) = propose(folder).questions
     assert question.usual == ""
     assert unit in question.text
+
+
+@pytest.mark.parametrize(
+    ("head", "unit"), [("velocity_mm_s", "mm/s"), ("speed mm per min", "mm/min"), ("Weg in mm", "mm")]
+)
+def test_a_unit_by_another_is_one_unit(head: str, unit: str) -> None:
+    assert unit_of(head) == unit
+
+
+@pytest.mark.parametrize("other", ["stiffness_N_mm", "damping_N_s_mm", "speed_mm_s"])
+def test_what_ends_in_a_unit_by_another_is_neither_time_nor_way_nor_force(folder: Path, other: str) -> None:
+    text(f"{other},time_s,force_N,way_mm\n", lines("{:.5f},{:.3f},{:.5f},{:.5f}", TIME_S, TIME_S, FORCE_N, WAY_MM))(
+        folder
+    )
+    read(folder)
 
 
 def test_raw_counts_are_asked_unless_their_unit_stands_above(folder: Path) -> None:

@@ -1,0 +1,87 @@
+"""In which sense a table counts its force and its way: by what is said of the test, and by how the numbers run."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from rig.config.table import TomlTable
+from rig.intake.families import ColumnGroup
+from rig.intake.pulling import PRESSES, PULLS, kinds_in, mentions, rows_of_both
+from rig.intake.survey import Looks, Numbers, sign_of
+
+DONE = {PRESSES: "pressed", PULLS: "pulled"}
+OTHER = {"compression": "tension", "tension": "compression", "into": "out", "out": "into"}
+
+
+def sense_of(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, int]) -> str:
+    """The sense in which the largest force presses, or pulls where that is said; ours where none is seen."""
+    pressed = _pressed(table, quantity, column, known)
+    return OTHER[pressed] if pulls(table, known) else pressed
+
+
+def pulls(table: ColumnGroup, known: Mapping[str, int]) -> bool:
+    """Whether all that is said of the test, or of its columns, is that it pulls."""
+    return _said(table, known).keys() == {PULLS}
+
+
+def _said(table: ColumnGroup, known: Mapping[str, int]) -> dict[str, str]:
+    """By what is done the text that says so; a column of tension says it only where its numbers rise."""
+    found = dict(table.said_of_test)
+    for texts in table.texts.values():
+        found |= rows_of_both(texts)[0]
+    for quantity in ("force", "position"):
+        name = table.layout.sheet.header[known[quantity]] if quantity in known else ""
+        rising = _pressed(table, quantity, known[quantity], known) in ("compression", "into") if name else False
+        found |= {kind: name for kind in kinds_in(name) if kind == PRESSES or rising}
+    return found
+
+
+def _pressed(table: ColumnGroup, quantity: str, column: int, known: Mapping[str, int]) -> str:
+    """The sense in which the largest force is compression and lies deeper than the start; ours where none is seen."""
+    force = table.looks[known["force"]] if "force" in known else table.force
+    risen = _risen(table.looks[column] if quantity == "force" else force or Looks(np.zeros(1)))
+    most = int(np.argmax(np.abs(risen)))
+    if quantity == "force":
+        return "tension" if risen[most] < 0 else "compression"
+    way = signed(table.looks[column])
+    way = np.cumsum(np.nan_to_num(way)) if quantity == "velocity" else way
+    there = np.flatnonzero(np.isfinite(way))
+    return "out" if way[there[np.argmin(np.abs(there - most))]] < way[there[0]] else "into"
+
+
+def _risen(looks: Looks) -> Numbers:
+    """Above its first tenth, where the machine stands in air or at its preload."""
+    force = signed(looks)
+    known = force[np.isfinite(force)]
+    return np.nan_to_num(force - np.median(known[: max(1, known.size // 10)]))
+
+
+def signed(looks: Looks) -> Numbers:
+    """The numbers with the sign where it stands in a bit."""
+    sign, values = sign_of(looks.values), looks.values
+    if "bits" in sign:
+        return np.where(values >= 2.0 ** (sign["bits"] - 1), values - 2.0 ** sign["bits"], values)
+    weight = 2.0 ** sign["sign_bit"] if sign else np.inf
+    return np.where(values >= weight, weight - values, values)
+
+
+def doubts_of_senses(table: ColumnGroup, known: Mapping[str, int], columns: TomlTable) -> Iterator[str]:
+    """How the senses are read, by whose word, and what is said that they do not follow."""
+    name, found = table.path.name, _said(table, known)
+    said = ", ".join(f"positive {quantity} as {column['positive']}" for quantity, column in columns.items())
+    if said and len(found) == 1:
+        ((kind, who),) = found.items()
+        yield f"{name}: {said}, as {DONE[kind]}, which {who!r} says; else write the other of each pair"
+    elif said:
+        other = "as if pressed; pulled, write the other of compression and tension, into and out"
+        yield f"{name}: {said}, {other}"
+    if len(found) > 1:
+        yield f"{name}: {found[PULLS]!r} says tension and {found[PRESSES]!r} compression; it is read as if pressed"
+    if not found:
+        yield from (f"{name}: {fact!r} speaks of tension" for fact in list(mentions(table.layout.sheet.facts))[:1])
+    force = table.looks[known["force"]].known if "force" in known else np.zeros(1)
+    for number, texts in table.texts.items():
+        row = rows_of_both(texts)[1]
+        if row and force.min() >= 0:
+            said = f"{table.layout.sheet.header[number]!r} says {texts[row]} from here on and {texts[0]} above"
+            yield f"{table.layout.sheet.place(row)}: {said}; the force has no sign, so all of it is read alike"
