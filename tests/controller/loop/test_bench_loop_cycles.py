@@ -381,6 +381,18 @@ def test_a_retreat_from_a_program_and_a_stop_at_rest_ask_no_drive_to_give_way(wa
     assert (resting.mode, ways) == (Mode.SAFE, [])
 
 
+def test_the_warning_that_a_drive_cannot_give_way_has_the_time_of_its_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(axis: Any, limits: Any) -> bool:
+        raise DeviceError("the bus is off")
+
+    monkeypatch.setattr(bench_loop, "give_way", refuse)
+    bench = FakeBench()
+    bench.force.extra_N = lambda _: 20.0
+    bench.cycles(2)
+    told = {event.code: event.capture_ns for event in bench.ring.events}
+    assert told["no_way"] == told[bench.latched]
+
+
 def test_a_drive_that_cannot_give_way_is_left_braked_with_a_warning() -> None:
     bench = FakeBench(table=())
     bench.axis.on, bench.axis.cut = False, "the bus is off"
