@@ -20,7 +20,7 @@ page: $(READY)
 # The groups of those that take longest come first, whatever their number of tests. The others wait for a third of their
 # time, for processes that start and connections that end: a third worker uses it.
 MAIN := not campaign and not documents and not extra and not by_hand
-test: $(READY) page browser postgresql
+test: $(READY) page browser postgresql mbpoll
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(MAKE) --no-print-directory --jobs 2 types contracts
@@ -136,6 +136,13 @@ postgresql:
 	@ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || command -v initdb >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null \
 	  && $(APT) update -qq && $(APT) install -y -qq --no-install-recommends postgresql >/dev/null; } \
 	  || echo "no PostgreSQL here and no right to install it: its tests will skip"
+
+# A client of Modbus that nobody here wrote.
+.PHONY: mbpoll
+mbpoll:
+	@command -v mbpoll >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null \
+	  && $(APT) update -qq && $(APT) install -y -qq --no-install-recommends mbpoll >/dev/null; } \
+	  || echo "no mbpoll here and no right to install it: its tests will skip"
 
 # Debian's venv has no pip of its own, and a plain Debian no pip at all; uv then installs in seconds what pip takes a
 # minute for.

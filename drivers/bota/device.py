@@ -23,6 +23,8 @@ from rig.timing import ClockMap, Unwrapper
 
 PRODUCT = "bota-sensone"
 NAME_PREFIX = "BFT"
+# bota-driver 1.1.16 sets no filter shorter than 64 samples.
+REFUSED = "check its firmware, or set force.rate_Hz to 800 or less, as newer sensors may want it"
 UNUSABLE = int(codec.StatusBits.OVERRANGE | codec.StatusBits.INVALID | codec.StatusBits.RAW)
 # The maker's driver allows 2 s for the settings and 2 s for the rest of the text after a reset.
 BOOT_S = 4.0
@@ -117,7 +119,7 @@ class BotaSensOne(StreamedForce[ClockMap, codec.ForceFrame]):
                 self._about(f"no answer to {command!r} within {ACK_S:g} s, {_came(text)}; run `rig doctor`")
             )
         if ack.code:
-            raise _Misheard(self._about(f"refused {command!r} with code {ack.code}, expected 0; check its firmware"))
+            raise _Misheard(self._about(f"refused {command!r} with code {ack.code}, expected 0; {REFUSED}"))
         return text[ack.end :]
 
     def _await_frames(self, data: bytes) -> None:

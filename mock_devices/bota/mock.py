@@ -29,11 +29,12 @@ NAME = "BFT-SENS-SER-M8"
 FIRMWARE = "1.0.6"
 # The sensor itself takes about a second; long enough here to lose commands sent too early.
 BOOT_NS = 200_000_000
+LONGEST_SINC = 2048  # the maker's driver names it as the limit
 OK, REFUSED = 0, 1
 SINGLE = "CRI#slw"
-ARGUMENT = "0123456789,.- "
+ARGUMENT = "0123456789,.- ?"
 COMPLETE = re.compile(
-    r"c(,\d){4}|f,\d{2,4}(,\d){3}|b(, *-?\d+\.\d{3}){6}|m\d(, *-?\d+\.\d{6}){6}",
+    r"c(,\d){4}|f,\d{2,4}(,\d){3}|b((, *-?\d+\.\d{3}){6}|(, *-?\d+\.\d{6}){6})|m\d(, *-?\d+\.\d{6}){6}|p\?",
 )
 
 
@@ -72,7 +73,7 @@ class CommandParser:
                 yield self._spoilt()
             if char in SINGLE:
                 yield Command(char, ())
-            elif char in "cfbm":
+            elif char in "cfbmp":
                 self._text = char
 
     def _spoilt(self) -> Command:
@@ -167,6 +168,8 @@ class BotaMock(OnWire):
             self._boot(now_ns)
             return
         code = self._code(command)
+        if command.letter == "p" and code == OK:
+            self._send(self._product_text())
         self._send(f"r,0,{command.letter},{code}\r\n".encode())
         if code == OK:
             self._apply(command, now_ns)
@@ -181,7 +184,7 @@ class BotaMock(OnWire):
         if command.letter == "c":
             return arguments[2] == "0" and int(arguments[3]) in BAUD_CODES.values()
         if command.letter == "f":
-            return SINC_LENGTHS[0] <= int(arguments[0]) <= SINC_LENGTHS[-1]
+            return SINC_LENGTHS[0] <= int(arguments[0]) <= LONGEST_SINC
         return True
 
     def _apply(self, command: Command, now_ns: int) -> None:
@@ -211,6 +214,10 @@ class BotaMock(OnWire):
         return (
             f"{self._setup_text()}App Init\r\nname: {name}\r\nS/N: {self.serial_number}\r\nFW version: {FIRMWARE}\r\n"
         ).encode()
+
+    def _product_text(self) -> bytes:
+        """Serial number and name where the maker's driver looks for them; it passes over what else stands there."""
+        return f"p,0,{self.serial_number[-3:]},0,0,{NAME}\r\n".encode()
 
     def _setup_text(self) -> str:
         return f"c,{','.join(self._setup)}\r\n"

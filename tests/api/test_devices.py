@@ -17,12 +17,15 @@ from serial.tools.list_ports_common import ListPortInfo
 from typer.testing import CliRunner
 
 from api.cli.app import build
+from api.cli.mock_bench import at_endpoints
+from api.cli.options import built_in
 from api.http import app as service
 from api.http.service import Service
 from api.operations.devices import devices
 from controller.devices import finding
 from mock_devices.testing.access import client_of
 from mock_devices.testing.commands import RIG, ROOT, ServedBench, served_bench
+from rig.config.products.registry import name_of
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, UsageError
 from rig.results.devices import DevicesResult, FindResult, PortFound
@@ -258,15 +261,21 @@ def test_glove_and_stream_of_the_mock_bench_are_found(bench: ServedBench) -> Non
     assert ports["breathing"]["lsl"] in [stream.address for stream in finding.streams()]
 
 
+PLAYED = {name_of(product): role for role, product in finding.candidates() if product.mock and role != "input"}
+
+
 @pytest.mark.bench
 @pytest.mark.extra
 @pytest.mark.xdist_group("commands")
-def test_each_device_of_the_mock_bench_is_found_at_its_port(bench: ServedBench) -> None:
-    ports = bench.endpoints.devices
-    found = [
-        finding.ask(finding.named(address))
-        for address in (ports["force"]["serial"], ports["axis"]["slcan"], f"tcp://{ports['tracker']['tcp']}")
-    ]
-    assert [one.product for one in found] == ["bota-sensone", "maxon-epos4", "ndi-polaris"]
-    assert found[1].lines == f'[axis]\nproduct = "maxon-epos4"\nport = "{ports["axis"]["slcan"]}"\n'
-    assert found[0].serial == bench.endpoints.serials["force"]
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("name", PLAYED)
+def test_each_product_that_can_be_played_is_found_at_its_port_and_no_other_is(name: str, bench: ServedBench) -> None:
+    """Whatever was asked before it, and what that wrote to it, it is there and answers for itself."""
+    role = PLAYED[name]
+    wired = at_endpoints(built_in([f"{role}.product={name}"]), bench.endpoints)
+    device = getattr(wired, role)
+    address, mock = device.port, device.mock.role
+    found = finding.ask(finding.named(address))
+    assert (found.role, found.product, found.problem) == (role, name, "")
+    assert found.serial == bench.endpoints.serials.get(mock, found.serial)
+    assert found.lines == f'[{role}]\nproduct = "{name}"\nport = "{address}"\n'

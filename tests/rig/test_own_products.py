@@ -1,4 +1,4 @@
-"""Our own products are declared by entry points, in the groups that plug-ins have."""
+"""Our own products are declared by entry points, in the groups that plug-ins have; our laws keep what theirs must."""
 
 import importlib
 import pkgutil
@@ -15,6 +15,7 @@ from rig.config.products.inputs import EVERY_ROLE
 from rig.config.products.registry import name_of, products_of
 from rig.config.products.roles import ForceProduct, Product
 from rig.errors import UsageError
+from rig.tissue.registry import LAWS, refusal
 
 ROOT = Path(__file__).parents[2]
 
@@ -49,6 +50,11 @@ def test_what_is_installed_is_what_the_project_declares() -> None:
 def test_our_own_are_no_plug_ins() -> None:
     assert plugins.OURS not in {one.distribution for found in plugins.met().values() for one in found}
     assert plugins.declaring("tissue_rig.force", "bota-sensone") is None
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_our_own_laws_keep_what_is_asked_of_those_of_plug_ins(name: str) -> None:
+    assert refusal(LAWS[name]) == ""
 
 
 def test_a_folder_that_is_not_installed_says_so_where_a_product_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:

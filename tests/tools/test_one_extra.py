@@ -6,12 +6,24 @@ import pytest
 
 from tests.lacking import lacking
 from tools import one_extra
+from tools.exchanges import igtl
 from tools.one_extra import SMOKES, NoRegistry, Smoke, extras, trouble_of
 
 
 def test_each_extra_for_users_is_tried() -> None:
     assert list(SMOKES) == extras()
     assert {"lsl", "glove", "igtl", "zaber", "multicast", "cluster", "s3", "foxglove", "postgresql"} <= set(SMOKES)
+
+
+def test_each_is_tried_by_an_exchange_but_where_there_is_nothing_to_talk_to() -> None:
+    assert {extra for extra, smoke in SMOKES.items() if "exchange()" not in smoke.works} == {"gs_usb", "pandas"}
+
+
+@pytest.mark.extra
+def test_an_exchange_that_says_something_else_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(igtl, "TIP", (0.0,) * 8)
+    with pytest.raises(AssertionError):
+        igtl.exchange()
 
 
 def tried(extra: str, folder: Path) -> str:

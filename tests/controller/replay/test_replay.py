@@ -166,11 +166,11 @@ def test_a_check_that_is_gone_is_noticed(monkeypatch: pytest.MonkeyPatch) -> Non
     assert found.differences[0].replayed != found.differences[0].recorded
 
 
-def test_a_sample_that_was_edited_is_noticed(trial: Recording) -> None:
-    """The last of the trial, which decides nothing that comes after it."""
+def test_a_sample_with_one_bit_turned_is_noticed(trial: Recording) -> None:
+    """The lowest of the last of the trial, which decides nothing that comes after it."""
     recording = trial
     force = recording.tables["force"].copy()
-    force["fz_N"][-2] += 1e-9
+    force["fz_N"][-2] = np.nextafter(force["fz_N"][-2], np.inf)
     edited = dataclasses.replace(recording, tables={**recording.tables, "force": force})
     found = replay_recording(edited)
     assert (found.differing_rows, found.differences[0].field) == (1, "force_N")

@@ -66,8 +66,15 @@ def test_settings_are_acknowledged_in_configuration_mode() -> None:
     assert bench.say(b"f,51,0,0,1") == b"r,0,f,0\r\n"
     assert bench.say(b"b, 0.000,-1.500, 0.000,12.345, 0.000, 0.000") == b"r,0,b,0\r\n"
     assert bench.say(b"m5, 1.000000,-0.250000, 0.000000, 0.000000, 0.000000, 0.000000") == b"r,0,m,0\r\n"
+    assert bench.say(b"b,1.500000,0.000000,0.000000,0.000000,0.000000,-0.250000\n") == b"r,0,b,0\r\n"
     assert bench.say(b"sl") == b"r,0,s,0\r\nr,0,l,0\r\n"
     assert bench.say(b"w") == b"r,0,w,0\r\nc,0,1,0,4\r\nf,51,0,0,1\r\n"
+
+
+def test_it_says_which_product_it_is_before_the_acknowledgement() -> None:
+    bench = BotaBench()
+    bench.say(b"C")
+    assert bench.say(b"p?\n") == b"p,0,271,0,0,BFT-SENS-SER-M8\r\nr,0,p,0\r\n"
 
 
 def test_settings_are_refused_outside_configuration_mode() -> None:
@@ -77,7 +84,9 @@ def test_settings_are_refused_outside_configuration_mode() -> None:
     assert bench.say(b"c,0,1,0,4s") == b"r,0,c,1\r\nr,0,s,1\r\n"
 
 
-@pytest.mark.parametrize("wrong", [b"c,0,1,1,4", b"c,0,1,0,9", b"f,50,0,0,1", b"f,513,0,0,1", b"f,51R", b"c,,C", b"f;"])
+@pytest.mark.parametrize(
+    "wrong", [b"c,0,1,1,4", b"c,0,1,0,9", b"f,50,0,0,1", b"f,2049,0,0,1", b"p!", b"b,1.5,", b"f,51R", b"c,,C", b"f;"]
+)
 def test_settings_that_are_wrong_are_refused(wrong: bytes) -> None:
     bench = BotaBench()
     bench.say(b"C")
@@ -102,7 +111,9 @@ def test_the_parser_holds_at_most_a_command_whatever_comes(noise: bytes) -> None
     assert list(parser.feed(b"C"))[-1] == Command("C", ())
 
 
-@pytest.mark.parametrize(("sinc", "rate_Hz"), [(51, 1003), (64, 800), (128, 400), (205, 249), (256, 200), (512, 100)])
+@pytest.mark.parametrize(
+    ("sinc", "rate_Hz"), [(51, 1003), (64, 800), (128, 400), (205, 249), (256, 200), (512, 100), (1024, 50)]
+)
 def test_the_filter_sets_the_rate(sinc: int, rate_Hz: int) -> None:
     bench = BotaBench()
     bench.say(f"Cf,{sinc},0,0,1R".encode())

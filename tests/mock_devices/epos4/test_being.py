@@ -10,16 +10,20 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import canopen
 import pytest
 
 from drivers.cia402.eds import read_eds
-from drivers.epos4.objects import TEXT
+from drivers.cia402.kind import check_sheet
+from drivers.cia402.units import units_per_turn
+from drivers.epos4.node import Node
+from drivers.epos4.objects import TEXT, Entry
 from mock_devices.epos4.table import EPOS4, LATER
 from mock_devices.testing.epos4 import remote_drive
 from mock_devices.testing.remote import RemoteMock
+from rig.errors import UsageError
 from tests.lacking import lacking
 
 pytestmark = [pytest.mark.extra, pytest.mark.bench, pytest.mark.xdist_group("commands")]
@@ -149,14 +153,59 @@ def test_the_table_agrees_with_the_makers_sheet_entry_by_entry(sheet: Path) -> N
         assert entry.kind == TEXT or (variable.default or 0) == default, entry
 
 
-def test_our_reader_reads_the_makers_sheet_as_canopen_does(sheet: Path) -> None:
-    ours, theirs = read_eds(sheet), variables(sheet)
+# Of two makers: entries, vendor, product, name.
+SHEETS = {
+    "maxon_EPOS4_50-5.eds": (443, 0xFB, 0x61500000, "EPOS4 Module 50/5"),
+    "MCLM3002P-CO.eds": (275, 327, 3150, "MCLM300...CO"),
+}
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_our_reader_reads_the_makers_sheet_as_canopen_does(name: str, folder: Path) -> None:
+    path = folder / "being/can/eds_files" / name
+    ours, theirs = read_eds(path), variables(path)
     assert ours.objects.keys() == theirs.keys()
-    assert (ours.vendor, ours.product, ours.name) == (0xFB, 0x61500000, "EPOS4 Module 50/5")
+    assert (len(theirs), ours.vendor, ours.product, ours.name) == SHEETS[name]
     for key, variable in theirs.items():
         entry = ours.objects[key]
-        assert entry.kind == TEXT or variable.data_type == CIA_301[entry.kind]
-        assert entry.kind == TEXT or int(entry.default) + entry.by_node == (variable.default or 0)
+        assert (entry.kind == TEXT) is (variable.data_type not in CIA_301.values()), entry
+        assert entry.kind == TEXT or variable.data_type == CIA_301[entry.kind], entry
+        assert entry.kind == TEXT or int(entry.default) + entry.by_node == (variable.default or 0), entry
+        assert entry.access.removesuffix("+") == {"rww": "rw", "rwr": "rw"}.get(
+            variable.access_type, variable.access_type
+        )
+        assert (entry.access[-1] == "+") is variable.pdo_mappable, entry
+
+
+class AsDelivered:
+    """A drive that has what its sheet says."""
+
+    name = "MCLM"
+
+    def __init__(self, theirs: dict[tuple[int, int], Any]) -> None:
+        self._theirs = theirs
+
+    def read(self, entry: Entry) -> int:
+        return int(self._theirs[entry.index, entry.sub].default)
+
+    def has(self, entry: Entry) -> bool:
+        return (entry.index, entry.sub) in self._theirs
+
+    def ratio(self, index: int) -> float:
+        return float(self._theirs[index, 1].default / self._theirs[index, 2].default)
+
+
+def test_a_drives_factors_give_the_scale_that_its_makers_own_position_factor_gives(folder: Path) -> None:
+    """Object 6093, which we do not read, says increments for a unit; those for a turn are of encoder and gear."""
+    drive = AsDelivered(variables(folder / "being/can/eds_files/MCLM3002P-CO.eds"))
+    per_turn = drive.ratio(0x608F) * drive.ratio(0x6091) / drive.ratio(0x6093)
+    assert units_per_turn(cast(Node, drive), drive.has) == pytest.approx(per_turn) == 1000.0
+
+
+def test_a_servo_drive_without_what_a_bench_needs_is_refused_by_its_sheet(folder: Path) -> None:
+    sheet = read_eds(folder / "being/can/eds_files/MCLM3002P-CO.eds")
+    with pytest.raises(UsageError, match=r"MCLM: lacks object 6007:00 \(abort connection option code\), which an axis"):
+        check_sheet(sheet, "MCLM")
 
 
 def test_python_canopen_reads_every_object_of_the_sheet(sheet: Path, mock: RemoteMock) -> None:

@@ -1,4 +1,4 @@
-"""Modbus clients of others, unchanged, against the simulated transmitter: pymodbus and minimalmodbus."""
+"""Modbus clients of others, unchanged, against the simulated transmitter: pymodbus, minimalmodbus and mbpoll."""
 
 import minimalmodbus
 import pytest
@@ -8,6 +8,7 @@ from mock_devices.laumas.mock import LaumasMock
 from mock_devices.testing.played import played
 from mock_devices.wire import PtyWire
 from tests.drivers.laumas.test_device import Cell
+from tests.mock_devices.polled import mbpoll
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
 
@@ -39,3 +40,12 @@ def test_minimalmodbus_reads_the_same(mock: LaumasMock) -> None:
                 instrument.read_register(40)
         finally:
             instrument.serial.close()
+
+
+def test_mbpoll_reads_the_same_and_is_told_what_is_wrong(mock: LaumasMock) -> None:
+    with played(mock):
+        line = mock.endpoints()["serial"]
+        assert "[7]: \t-25000\n[9]: \t-25000\n" in mbpoll(line, 1, 115_200, "-t", "4:int", "-B", "-r", "7", "-c", "2")
+        assert "Illegal data address" in mbpoll(line, 1, 115_200, "-r", "40")
+        assert "Illegal function" in mbpoll(line, 1, 115_200, "-r", "5", write=7)
+        assert "Connection timed out" in mbpoll(line, 2, 115_200, "-r", "3")

@@ -27,6 +27,7 @@ from mock_devices.interfaces import NEVER_NS, ProtocolMock
 from mock_devices.robotiq.mock import REQUEST_BYTES_MAX, RequestFinder, RobotiqMock
 from mock_devices.testing.force import WRENCH, ServedMock, StillPlant
 from mock_devices.testing.wire import MemoryWire
+from tests.mock_devices.polled import mbpoll
 from tests.mock_devices.sensor_bench import SensorBench
 
 START_NS = 7_000_000_000
@@ -319,3 +320,9 @@ class TestThirdPartyClients:
         with closing(ModbusSerialClient(robotiq.endpoint, baudrate=19_200, timeout=5)) as client:
             assert client.connect()
             assert client.read_holding_registers(180, count=1, device_id=9).registers == [125]
+
+    def test_mbpoll_reads_registers_and_hears_nothing_from_another_slave(self, robotiq: ServedMock) -> None:
+        forces = mbpoll(robotiq.endpoint, 9, 19_200, "-t", "4:hex", "-r", "180", "-c", "3")
+        assert "[180]: \t0x007D\n[181]: \t0xFF06\n[182]: \t0xFCF9\n" in forces
+        assert "Illegal data address" in mbpoll(robotiq.endpoint, 9, 19_200, "-r", "186")
+        assert "Connection timed out" in mbpoll(robotiq.endpoint, 8, 19_200, "-r", "180")

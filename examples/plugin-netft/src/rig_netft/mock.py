@@ -15,6 +15,7 @@ from mock_devices.wire import OnWire, TcpWire, Wire
 from rig_netft.netft import HEADER, INTERNAL_HZ, RECORD, REQUEST, STOP, STREAM
 
 COUNTS = 1_000_000
+BIAS = 0x42
 # Bit 31 of the status: something is wrong with what the record holds.
 UNHEALTHY = 0x8000_0000
 SERIAL = 27_462
@@ -39,6 +40,7 @@ class NetFtMock(OnWire):
         self._due_tick: int | None = None
         self._left = self._rdt = 0
         self._counts: tuple[int, ...] = (0,) * 6
+        self._zero: tuple[int, ...] = (0,) * 6
 
     def endpoints(self) -> dict[str, str]:
         """Where records come from."""
@@ -67,12 +69,15 @@ class NetFtMock(OnWire):
     def _record(self, tick: int) -> bytes:
         self._rdt += 1
         if not self.frozen:
-            unit_N = 4.4482216152605 if self.pounds else 1.0
-            fx, fy, fz, *moments = self._plant.wrench()
-            values = [fx / unit_N, fy / unit_N, fz / unit_N, *moments]
-            self._counts = tuple(max(-LARGEST, min(round(value * COUNTS), LARGEST)) for value in values)
+            pairs = zip(self._measured(), self._zero, strict=True)
+            self._counts = tuple(max(-LARGEST, min(now - zero, LARGEST)) for now, zero in pairs)
         status = UNHEALTHY if self.invalid or self._plant.overrange() else 0
         return RECORD.pack(self._rdt & 0xFFFF_FFFF, tick & 0xFFFF_FFFF, status, *self._counts)
+
+    def _measured(self) -> tuple[int, ...]:
+        unit_N = 4.4482216152605 if self.pounds else 1.0
+        fx, fy, fz, *moments = self._plant.wrench()
+        return tuple(round(value * COUNTS) for value in (fx / unit_N, fy / unit_N, fz / unit_N, *moments))
 
     def receive(self, now_ns: int) -> None:
         """Hears requests, and answers whoever asks for a page."""
@@ -84,6 +89,8 @@ class NetFtMock(OnWire):
         if len(data) != REQUEST.size:
             return
         header, command, count = REQUEST.unpack(data)
+        if header == HEADER and command == BIAS:
+            self._zero = self._measured()
         if header != HEADER or command not in (STOP, STREAM):
             return
         self._left = count or -1
