@@ -3,6 +3,11 @@
 A message is one sentence group for a person: what failed, where, what came, the limit with its unit, the next step.
 """
 
+import errno
+
+# Of the disk, and of what this account may use of it.
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
+
 
 class RigError(Exception):
     """Root of every failure this project raises on purpose; ``exit_code`` is what the command line ends with."""
@@ -18,6 +23,19 @@ class UsageError(RigError):
 
 class DataError(UsageError):
     """Given data cannot be used (NaN, gap, wrong unit, wrong order): the message names file, place and bound."""
+
+
+class WriteFailed(RigError):
+    """The disk did not take a result; nothing half-written was left behind."""
+
+
+class DiskFull(WriteFailed):
+    """The disk had no room for it: remove what is not needed, then try again."""
+
+
+def write_failed(text: str, error: OSError) -> WriteFailed:
+    """What to raise for ``error``, with that ``text``."""
+    return (DiskFull if error.errno in NO_ROOM else WriteFailed)(text)
 
 
 class DeviceError(RigError):

@@ -15,9 +15,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("rig", "drivers", "controller", "api", "mock_devices")
-# The page is packed as it is built.
 UNPACKED = "api/page/sources/"
-BUILT = "api/page/built/index.html"
+EXAMPLES = ("diagnosis", "indentation", "quick")
+# What is packed beside the packages: the page as it is built, and protocols to begin with.
+BESIDE = ("api/page/built/index.html", *(f"api/protocols/{name}.toml" for name in EXAMPLES))
 BIN = Path(sys.executable).parent
 # The demonstration takes two minutes; CI has four for all of it.
 DEMONSTRATION_S = 200
@@ -27,7 +28,7 @@ def missing(wheel: Path, root: Path = ROOT) -> list[str]:
     """Files of the five packages that the wheel has not: modules, pages, templates, parameters."""
     with zipfile.ZipFile(wheel) as archive:
         packed = set(archive.namelist())
-    return sorted(name for name in {*_files(root), BUILT} if name not in packed)
+    return sorted(name for name in {*_files(root), *BESIDE} if name not in packed)
 
 
 def _files(root: Path) -> Iterator[str]:

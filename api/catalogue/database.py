@@ -75,16 +75,18 @@ class Database:
             yield connection
 
     def prepare(self) -> None:
-        """Makes the tables where there are none; raises as above where they are not of this program and folder."""
+        """Makes the tables where there are none, and those of an older program anew, but for the names in them.
+
+        Raises as above where they are not of this program and folder.
+        """
         if self.file is not None and not self.file.exists():
             _make_private(self.file)
         self.check()
         with self.reading() as connection:
-            found = self._has_ours(connection)
-            if found:
-                self._refuse_foreign(connection)
-        if not found:
+            version = self._own_version(connection) if self._has_ours(connection) else 0
+        if version < VERSION:
             with self.writing() as connection:
+                DERIVED.drop_all(connection)
                 self.create(connection)
 
     def compact(self) -> None:
@@ -124,7 +126,7 @@ class Database:
             raise UsageError(f"{self.place}: is a database, but no catalogue; give another file with --catalogue")
         return bool(ours)
 
-    def _refuse_foreign(self, connection: Connection) -> None:
+    def _own_version(self, connection: Connection) -> int:
         """Raises UsageError where the catalogue is of a newer program or of another folder."""
         row = connection.execute(select(CATALOGUE)).first()
         if row is None:
@@ -135,6 +137,7 @@ class Database:
                 f"{self.place}: is the catalogue of {row.root}, not of {self.root.resolve()}; give another with"
                 " --catalogue, or `rig catalogue rebuild`, which makes it that of this folder"
             )
+        return int(row.version)
 
     def _refuse_newer(self, version: int) -> None:
         if version > VERSION:

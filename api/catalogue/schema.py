@@ -22,6 +22,7 @@ from rig.results.catalogue import (
     WorkEntry,
 )
 
+# Grows with every change of these tables, and of what is read into them: then they are read anew.
 VERSION = 1
 Kind = TypeVar("Kind", bound=CatalogueEntry)
 BY_CODE_POINT = (

@@ -14,7 +14,7 @@ from rig.config.wiring import Wiring
 from rig.errors import UsageError
 from rig.recording.files import refuse_unwritable
 
-DEFAULT_FILE = Path("rig.toml")
+DEFAULT_FILE, EXAMPLES = Path("rig.toml"), Path("examples")
 ENVIRONMENT = "RIG_CONFIG"
 ConfigOption = Annotated[
     Path | None,
@@ -48,6 +48,12 @@ def _checked_json(path: Path | None) -> Path | None:
 JsonOption = Annotated[
     Path | None, typer.Option("--json", help="Writes the result to this file as JSON.", callback=_checked_json)
 ]
+
+
+def protocols_here() -> Path:
+    """./examples where that is there, else the protocols of the installed program, or of the checkout it runs from."""
+    installed, checkout = Path(__file__).parents[1] / "protocols", Path(__file__).parents[2] / EXAMPLES
+    return next((folder for folder in (EXAMPLES, installed) if folder.is_dir()), checkout)
 
 
 def wiring_from(config: Path | None, overrides: list[str] | None) -> Wiring:

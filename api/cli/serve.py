@@ -18,7 +18,7 @@ from fastapi import FastAPI
 
 from api.cli.mock_bench import bench_for
 from api.cli.mock_calibration import done_by_mock
-from api.cli.options import ConfigOption, SetOption, wiring_from
+from api.cli.options import ConfigOption, SetOption, protocols_here, wiring_from
 from api.cli.output import show
 from api.http.access.access import owner_name
 from api.http.access.arrived import LOOPBACK
@@ -57,6 +57,9 @@ StopPortOption = Annotated[
 ]
 # A thread that computes keeps the interpreter for so long while others wait; Python's own is 5 ms.
 SWITCH_S = 0.0005
+ProtocolsOption = Annotated[
+    Path | None, typer.Option(help="Folder of the protocols; else ./examples, else those that come with the program.")
+]
 HANDSHAKE_S = 5.0  # as long as a request's head has
 
 
@@ -109,7 +112,7 @@ def serve(
     port: Annotated[int, typer.Option(min=1, max=65535, help="TCP port to listen on.")] = 8000,
     host: Annotated[str, typer.Option(help="Address to listen on; others than this computer's need TLS.")] = LOCAL[0],
     sessions: Annotated[Path, typer.Option(help="Folder of the sessions.")] = Path("sessions"),
-    protocols: Annotated[Path, typer.Option(help="Folder of the protocols.")] = Path("examples"),
+    protocols: ProtocolsOption = None,
     foxglove: FoxgloveOption = None,
     name: NameOption = None,
     tls_cert: CertificateOption = None,
@@ -122,7 +125,7 @@ def serve(
     Example: rig serve --config rig.toml --port 8000
     """
     place = served_at(ServeOptions(host, port, tuple(name or ()), tls_cert, tls_key, behind_proxy, stop_port))
-    run_service(wiring_from(config, overrides), place, sessions, protocols, foxglove)
+    run_service(wiring_from(config, overrides), place, sessions, protocols or protocols_here(), foxglove)
 
 
 def run_service(

@@ -13,12 +13,11 @@ from typing import Annotated, Any
 
 from fastapi import Depends, Header, Request, Response
 from fastapi.routing import APIRoute
-from pydantic import BaseModel, ValidationError
 
 from api.http.access.rights import CALLER, PASSED, STOP
 from api.http.access.secrets import steady_s
+from api.http.answers import ERASED, KeptAnswer, read_answers, write_answers, writing
 from api.http.problems import RequestRefused
-from rig.recording.files import make_folder, write_text
 
 KEPT_S = 24 * 3600.0
 # A busy day's jobs; the oldest go first.
@@ -35,6 +34,7 @@ KeyHeader = Annotated[
     ),
 ]
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
+Look = tuple[int, int, int]
 
 
 def refuse_without_key(key: str) -> None:
@@ -52,36 +52,21 @@ async def _named(key: KeyHeader = "") -> str:
 NAMED = Depends(_named)
 
 
-class KeptAnswer(BaseModel):
-    """What was answered; status 0 while nobody knows. ``body`` in base64."""
-
-    place: str
-    """Who asked, where, under which key."""
-    asked: str
-    """SHA-256 of the body."""
-    at_s: float
-    status: int = 0
-    headers: dict[str, str] = {}
-    body: str = ""
-
-    def response(self) -> Response:
-        """The same again, marked."""
-        headers = {**self.headers, "Idempotent-Replayed": "true"}
-        return Response(base64.b64decode(self.body), self.status, headers)
-
-
 class AnswerStore:
     """Answers of a service, in ``file``. Safe from any thread; the event loop waits for one short line of it."""
 
     def __init__(self, file: Path, now_s: Callable[[], float] | None = None) -> None:
         self._file, self._now_s, self._lock = file, now_s or steady_s(), threading.Lock()
-        self._kept: dict[str, KeptAnswer] | None = None
+        self._kept: dict[str, KeptAnswer] = {}
+        self._seen: Look | None = None
         self._under_way: set[str] = set()
 
     def begin(self, place: str, body: bytes) -> KeptAnswer | None:
         """The answer given before; None where this is the first time, which is noted. Raises RequestRefused."""
         asked = hashlib.sha256(body).hexdigest()
         with self._lock:
+            if self._seen is None and self._file.is_file():
+                self._shorten()
             known = self._known().get(place)
             if known is None:
                 self._under_way.add(place)
@@ -90,6 +75,9 @@ class AnswerStore:
             if known.asked != asked:
                 text = "this Idempotency-Key was sent with another body; a new request takes a new key"
                 raise RequestRefused(422, "idempotency-key-reused", text)
+            if known.status == ERASED:
+                text = "this was answered before, and what it was about has been erased since; it is not done again"
+                raise RequestRefused(404, "gone", text)
             if known.status:
                 return known
             raise _undecided(place in self._under_way)
@@ -109,42 +97,40 @@ class AnswerStore:
             answer = {"status": response.status_code, "headers": headers, "body": body}
             self._write(begun.model_copy(update=answer))
 
+    def _shorten(self) -> None:
+        """Once a start: what is out of date leaves the file too."""
+        with writing(self._file):
+            write_answers(self._file, self._known().values())
+            self._seen = _look(self._file)
+
     def _known(self) -> dict[str, KeptAnswer]:
+        now = _look(self._file)
+        if now and now != self._seen:  # an earlier service wrote it, or another program has erased some
+            self._kept, self._seen = read_answers(self._file), now
         oldest_s = self._now_s() - KEPT_S
-        if self._kept is None:
-            self._kept = _read(self._file)
-            self._shorten()
         self._kept = {place: each for place, each in self._kept.items() if each.at_s > oldest_s}
         return self._kept
 
-    def _shorten(self) -> None:
-        """Once a start: what is out of date leaves the file too."""
-        if self._file.is_file():
-            write_text(self._file, "".join(f"{each.model_dump_json()}\n" for each in (self._kept or {}).values()))
-
     def _write(self, answer: KeptAnswer) -> None:
-        known = self._known()
-        known.pop(answer.place, None)
-        if answer.at_s:
-            known[answer.place] = answer
-        while len(known) > MOST_KEPT:
-            known.pop(next(iter(known)))
-        make_folder(self._file.parent)
-        with self._file.open("a", encoding="utf-8") as file:
-            file.write(answer.model_dump_json() + "\n")
+        with writing(self._file):
+            known = self._known()
+            known.pop(answer.place, None)
+            if answer.at_s:
+                known[answer.place] = answer
+            while len(known) > MOST_KEPT:
+                known.pop(next(iter(known)))
+            with self._file.open("a", encoding="utf-8") as file:
+                file.write(answer.model_dump_json() + "\n")
+            self._seen = _look(self._file)
 
 
-def _read(file: Path) -> dict[str, KeptAnswer]:
-    """The last line of each place counts; one that was not written whole is none."""
-    found: dict[str, KeptAnswer] = {}
-    lines = file.read_text(encoding="utf-8", errors="replace").splitlines() if file.is_file() else []
-    for line in lines:
-        try:
-            answer = KeptAnswer.model_validate_json(line)
-        except ValidationError:
-            continue
-        found[answer.place] = answer
-    return found
+def _look(file: Path) -> Look | None:
+    """Another after each change; None where there is no file."""
+    try:
+        found = file.stat()
+    except FileNotFoundError:
+        return None
+    return found.st_ino, found.st_size, found.st_mtime_ns
 
 
 def _undecided(under_way: bool) -> RequestRefused:
@@ -197,7 +183,8 @@ async def _told(request: Request) -> bytes:
 async def _once(store: AnswerStore, place: str, request: Request, handler: Handler) -> Response:
     before = store.begin(place, await _told(request))
     if before:
-        return before.response()
+        body = base64.b64decode(before.body)
+        return Response(body, before.status, {**before.headers, "Idempotent-Replayed": "true"})
     response: Response | None = None
     try:
         response = await handler(request)

@@ -12,9 +12,10 @@ from starlette.exceptions import HTTPException
 from api.catalogue.erasing import NotErased
 from api.http.explained import EXPLAINED
 from api.http.jobs.places import PlaceRefused
-from rig.errors import DeviceError, RigError, SafetyStop, UsageError
+from rig.errors import NO_ROOM, DeviceError, DiskFull, RigError, SafetyStop, UsageError, WriteFailed
 
 MEDIA_TYPE = "application/problem+json"
+DISK_FULL = "disk-full"
 
 
 class Problem(BaseModel):
@@ -115,6 +116,9 @@ def install(app: FastAPI) -> None:
 
     async def system(request: Request, error: Exception) -> JSONResponse:  # noqa: ARG001
         assert isinstance(error, OSError)
+        if error.errno in NO_ROOM:
+            where = f"{error.filename}: " if error.filename else ""
+            return answer(507, DISK_FULL, f"{where}{error.strerror}; remove what is not needed, then try again")
         if error.filename is None:
             raise error
         if isinstance(error, FileNotFoundError):
@@ -144,7 +148,9 @@ def _ours(error: RigError) -> JSONResponse:
             return answer(409, "safety-stop", str(error))
         case UsageError():
             return answer(422, "refused", str(error))
-        case NotErased():
+        case DiskFull():
+            return answer(507, DISK_FULL, str(error))
+        case NotErased() | WriteFailed():
             return answer(503, "storage", str(error))
         case DeviceError():
             return answer(503, "device", str(error))

@@ -6,11 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rig.errors import RigError, UsageError
-
-
-class WriteFailed(RigError):
-    """The disk did not take a result; nothing half-written was left behind."""
+from rig.errors import UsageError, write_failed
 
 
 @contextmanager
@@ -23,7 +19,9 @@ def whole_file(path: Path, overwrite: bool = False) -> Iterator[Path]:
         wait_for_disk(scratch)
         scratch.replace(path)
     except OSError as error:
-        raise WriteFailed(f"{path}: cannot be written: {error.strerror or error}; nothing was left behind") from error
+        raise write_failed(
+            f"{path}: cannot be written: {error.strerror or error}; nothing was left behind", error
+        ) from error
     finally:
         scratch.unlink(missing_ok=True)
 
@@ -39,7 +37,9 @@ def whole_folder(path: Path) -> Iterator[Path]:
         yield scratch
         scratch.replace(path)
     except OSError as error:
-        raise WriteFailed(f"{path}: cannot be written: {error.strerror or error}; nothing was left behind") from error
+        raise write_failed(
+            f"{path}: cannot be written: {error.strerror or error}; nothing was left behind", error
+        ) from error
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
 
@@ -49,7 +49,7 @@ def make_folder(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise WriteFailed(f"{path}: cannot be made: {error.strerror}; give another place") from error
+        raise write_failed(f"{path}: cannot be made: {error.strerror}; give another place", error) from error
 
 
 def refuse_unwritable(path: Path) -> None:

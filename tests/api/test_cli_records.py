@@ -11,8 +11,7 @@ import typer
 from typer.testing import CliRunner, Result
 
 from api.cli import records
-from rig.errors import CheckFailed, DataError, UsageError
-from rig.recording.files import WriteFailed
+from rig.errors import CheckFailed, DataError, UsageError, WriteFailed
 from rig.recording.sessions import open_session, write_session
 from tests.rig.recording import tampered
 from tests.rig.recording.measured import measured, write

@@ -70,6 +70,7 @@ def headers_of(operation: dict[str, Any]) -> set[str]:
         ("GET /api/v1/recordings/{session}/{file}", {"Range", "If-Range"}),
         ("GET /api/v1/jobs/{identifier}/files/{path}", {"Range", "If-Range"}),
         ("GET /api/v1/sessions/{session}/export/{form}", {"Range", "If-Range"}),
+        ("PUT /api/v1/subjects/{subject}/name", {"If-Match"}),
         ("GET /api/v1/events", {"Last-Event-ID"}),
         ("POST /api/v1/estop", set()),
         ("POST /api/v1/tokens", set()),

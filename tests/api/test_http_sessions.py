@@ -5,6 +5,7 @@ import io
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import get_args
 
 import h5py
 import pytest
@@ -111,8 +112,43 @@ def test_an_export_that_a_full_disk_ends_leaves_nothing(
 
     monkeypatch.setattr("shutil.make_archive", full)
     refused = client.get(f"{API}/first/export/mcap")
-    assert (refused.status_code, refused.json()["code"]) == (503, "storage")
+    assert (refused.status_code, refused.json()["code"]) == (507, "disk-full")
     assert not list((service.jobs.folder / "exports").rglob("*"))
+
+
+@pytest.mark.parametrize("planted", ["without_room", "without_room_unsaid"])
+def test_a_format_for_which_the_disk_had_no_room_is_507_and_so_is_its_job(
+    client: TestClient, service: Service, planted: str
+) -> None:
+    make_session(service.sessions, "first")
+    service.works["export"] = f"tests.api.jobs.planted:{planted}"
+    refused = client.get(f"{API}/first/export/hdf5")
+    assert (refused.status_code, refused.json()["code"]) == (507, "disk-full"), refused.text
+    (job,) = client.get("/api/v1/jobs?kind=export").json()["items"]
+    assert (job["state"], job["problem"]["code"]) == ("failed", "disk-full")
+    assert "space" in job["problem"]["detail"] or "quota" in job["problem"]["detail"]
+
+
+def test_who_only_looks_on_gets_every_format_in_parts_and_fills_no_queue(
+    client: TestClient, service: Service, first: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sessions, "PATIENCE_S", PATIENCE_S)
+    looks_on = bearer(Scope.READ)
+    for form in get_args(sessions.Format):
+        whole = client.get(f"{API}/first/export/{form}", headers=looks_on)
+        part = client.get(f"{API}/first/export/{form}", headers=looks_on | {"Range": "bytes=2-9"})
+        assert (whole.status_code, part.status_code, part.content) == (200, 206, whole.content[2:10])
+    monkeypatch.setattr(sessions, "MOST_UNDER_WAY", 1)
+    monkeypatch.setattr(sessions, "PATIENCE_S", 0.1)
+    make_session(service.sessions, "second")
+    service.works["export"] = "tests.api.jobs.planted:patient"
+    assert client.get(f"{API}/second/export/csv", headers=looks_on).status_code == 202
+    refused = client.get(f"{API}/second/export/mat", headers=looks_on)
+    assert (refused.status_code, refused.json()["code"]) == (429, "queue-full")
+    assert client.get(f"{API}/first/export/csv", headers=looks_on).status_code == 200
+    assert client.post("/api/v1/jobs", json={"kind": "verify", "params": {"session": "first"}}).status_code == 202
+    for job in client.get("/api/v1/jobs").json()["items"]:
+        client.post(f"/api/v1/jobs/{job['id']}/cancel")
 
 
 def test_how_many_files_are_not_listed_is_said(

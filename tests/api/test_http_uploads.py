@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from base64 import b64decode
 from collections.abc import AsyncIterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ from fastapi.testclient import TestClient
 
 from api.http import room, uploads
 from api.http.access.scopes import Scope
+from api.http.answers import ANSWERS, read_answers
 from api.http.jobs.kinds import KINDS
 from api.http.jobs.params import ProposeParams
 from api.http.problems import RequestRefused
@@ -63,7 +65,9 @@ def test_files_are_kept_as_they_were_sent_with_their_folders(client: TestClient,
 
 
 def test_an_upload_is_removed_in_two_steps(client: TestClient, service: Service) -> None:
-    place = f"{ROUTE}/{sent(client, {'a.csv': b'1,2'}).json()['id']}"
+    place = f"{ROUTE}/{sent(client, {'Ann Example.csv': b'1,2'}).json()['id']}"
+    answers = service.jobs.folder / ANSWERS
+    assert any(b"Ann Example" in b64decode(each.body) for each in read_answers(answers).values())
     asked = client.delete(place)
     assert (asked.status_code, asked.json()["done"], asked.json()["bytes"]) == (202, False, 3)
     wrong = client.delete(f"{place}?confirm=nonsense")
@@ -74,6 +78,7 @@ def test_an_upload_is_removed_in_two_steps(client: TestClient, service: Service)
     done = client.delete(f"{place}?confirm={client.delete(place).json()['confirm']}")
     assert (done.status_code, done.json()["done"], done.json()["confirm"]) == (200, True, "")
     assert client.delete(place).status_code == client.get(place).status_code == 404 and left(service) == []
+    assert not any(b"Ann Example" in b64decode(each.body) for each in read_answers(answers).values())
 
 
 def test_an_upload_that_is_worked_on_is_not_removed(client: TestClient, service: Service) -> None:

@@ -9,6 +9,7 @@ import pytest
 from fastapi import Response
 from fastapi.testclient import TestClient
 
+from api.http.answers import forget, read_answers
 from api.http.idempotency import KEPT_S, AnswerStore
 from api.http.problems import RequestRefused
 from api.http.service import Service
@@ -146,6 +147,42 @@ def test_whoever_sets_the_date_makes_no_key_be_forgotten(
     # A store that asks for the date each time forgets it when that is set forward.
     dated = AnswerStore(file, time.time)
     assert (dated.begin("p", b"x") is None) is (jump_s > 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "body", "told"),
+    [
+        ("first", '{"session":"first"}', True),
+        ("first", '{"session":"first-2","of":"the.first"}', False),
+        ('a "b" ä', '{"session":"a \\"b\\" ä"}', True),
+        ("a/b ä", '{"href":"/api/v1/sessions/a/b%20%C3%A4"}', True),
+        ("a.c", '{"session":"abc"}', False),
+    ],
+)
+def test_what_is_erased_is_taken_out_of_answers_that_name_it_however_they_write_it(
+    tmp_path: Path, store: AnswerStore, name: str, body: str, told: bool
+) -> None:
+    file = tmp_path / "answers.jsonl"
+    for place in ("p", "other"):
+        assert store.begin(place, b"x") is None
+    store.end("p", Response(body.encode(), 202, {"location": "/api/v1/jobs/1"}))
+    store.end("other", Response(b"{}", 202))
+    forget(file, [name])
+    assert [each.status for each in read_answers(file).values()] == [404 if told else 202, 202]
+    if told:
+        with pytest.raises(RequestRefused, match="has been erased since; it is not done again"):
+            store.begin("p", b"x")
+    else:
+        assert store.begin("p", b"x")
+    other = store.begin("other", b"x")
+    assert other and other.status == 202
+
+
+def test_answers_of_which_the_file_was_removed_are_known_until_the_end(tmp_path: Path, store: AnswerStore) -> None:
+    store.begin("p", b"x")
+    store.end("p", Response(b"{}", 202))
+    (tmp_path / "answers.jsonl").unlink()
+    assert store.begin("p", b"x")
 
 
 def test_a_line_that_was_cut_is_no_answer(tmp_path: Path, store: AnswerStore) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.packaged import PACKAGES, ROOT, missing
+from tools.packaged import BESIDE, PACKAGES, ROOT, missing
 
 
 def lay_out(root: Path) -> None:
@@ -24,13 +24,13 @@ def pack(root: Path, without: str = "") -> Path:
     with zipfile.ZipFile(wheel, "w") as archive:
         for package in PACKAGES:
             archive.writestr(f"{package}/__init__.py", "")
-        for name in ("rig/template.html", "api/page/built/index.html"):
+        for name in ("rig/template.html", *BESIDE):
             if name != without:
                 archive.writestr(name, "<html>")
     return wheel
 
 
-@pytest.mark.parametrize("name", ["rig/template.html", "api/page/built/index.html"])
+@pytest.mark.parametrize("name", ["rig/template.html", *BESIDE])
 def test_a_file_that_was_not_packed_is_named_and_so_is_a_page_that_was_not_built(name: str, tmp_path: Path) -> None:
     lay_out(tmp_path)
     assert missing(pack(tmp_path, without=name), tmp_path) == [name]

@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
@@ -74,28 +74,29 @@ class AuditLog:
         finally:
             os.close(fd)
 
-    def lines(self) -> Iterable[bytes]:
+    def lines(self) -> Sequence[bytes]:
         """All lines, oldest first."""
         return self.path.read_bytes().splitlines() if self.path.exists() else []
 
-    def newest(self, page: Page) -> tuple[list[AuditLine], str | None]:
-        """One page, newest first, and the cursor of the next; `broken` tells of lines left out, which cannot be read.
+    def newest(self, page: Page, lines: Sequence[bytes] | None = None) -> tuple[list[AuditLine], str | None]:
+        """One page of all ``lines``, newest first, and the cursor of the next.
 
-        Raises UsageError for a cursor of another list.
+        `broken` tells of lines left out, which cannot be read. Raises UsageError for a cursor of another list.
         """
         numbered, after = cut(
-            page, "audit", enumerate(self.lines()), lambda one: (f"{one[0]:012}", ""), newest_first=True
-        )
+            page, "audit", enumerate(self.lines() if lines is None else lines),
+            lambda one: (f"{one[0]:012}", ""), newest_first=True,
+        )  # fmt: skip
         found = []
         for _, line in numbered:
             with contextlib.suppress(ValueError):
                 found.append(AuditLine.model_validate_json(line))
         return found, after
 
-    def broken(self) -> list[int]:
+    def broken(self, lines: Sequence[bytes] | None = None) -> list[int]:
         """Numbers of the lines, from 1, that do not follow the line before: something was changed there, or taken."""
         found, seq, before = [], 0, FIRST
-        for number, line in enumerate(self.lines(), 1):
+        for number, line in enumerate(self.lines() if lines is None else lines, 1):
             try:
                 known = AuditLine.model_validate_json(line)
                 follows = (known.seq, known.before) == (seq + 1, before)

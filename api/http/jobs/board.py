@@ -177,8 +177,11 @@ class JobBoard:
         return view(job, files_of(job, session, self._store.files(job.id)) if job.ended else [])
 
     def _known(self) -> dict[str, JobSummary]:
+        changed = self._store.changed()
         if self._ended is None:
             self._ended = self._store.load()
+        elif changed:  # a subject was erased from the command line
+            self._ended = {name: job for name, job in self._ended.items() if self._store.folder(name).is_dir()}
         return self._ended
 
     def find(self, identifier: str) -> Job | None:

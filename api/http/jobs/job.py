@@ -10,15 +10,16 @@ from pydantic import JsonValue
 from api.http.jobs.kept import works_on
 from api.http.jobs.process import Crashed
 from api.http.jobs.states import ENDS, JobEnd, JobState, Verb
-from api.http.problems import RequestRefused
+from api.http.problems import DISK_FULL, RequestRefused
 from controller.operation import Cancelled, Operation, Progress
 from controller.safety.table import BY_PERSON
-from rig.errors import BadTrial, CheckFailed, DataError, DeviceError, RigError, SafetyStop, UsageError
+from rig.errors import BadTrial, CheckFailed, DataError, DeviceError, DiskFull, RigError, SafetyStop, UsageError
 
 # The first class that fits an error names it for programs.
 CODES: Mapping[type[BaseException], str] = {
-    Cancelled: "cancelled", Crashed: "crashed", DataError: "data", UsageError: "refused", DeviceError: "device",
-    CheckFailed: "check-failed", BadTrial: "bad-trial", RigError: "failed", BaseException: "error",
+    DiskFull: DISK_FULL, Cancelled: "cancelled", Crashed: "crashed", DataError: "data", UsageError: "refused",
+    DeviceError: "device", CheckFailed: "check-failed", BadTrial: "bad-trial", RigError: "failed",
+    BaseException: "error",
 }  # fmt: skip
 PAUSED_STOP = "stopped by the operator while it was paused"
 

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
+from api.http.answers import ANSWERS, forget
 from api.operations.cohort import kept
 
 RECORD, EXPORTS = "job.json", "exports"
@@ -19,11 +20,12 @@ def beside(sessions: Path, what: str) -> Path:
 
 
 def erase_kept(sessions: Path, names: Collection[str]) -> None:
-    """Removes jobs on sessions of these ``names``, uploads they were imported from, and all that is made again."""
+    """Removes jobs on these sessions, uploads they came from, answers about either, and all that is made again."""
     jobs = {record.parent: _facts(record) for record in beside(sessions, "jobs").glob(f"*/{RECORD}")}
     sent = {str(job["params"]["upload"]) for job in jobs.values() if _imported(job, names)}
     made = [folder for folder, job in jobs.items() if works_on(job, names) or job["params"].get("upload") in sent]
     uploads = [beside(sessions, "uploads") / name for name in sent]
+    forget(beside(sessions, "jobs") / ANSWERS, {*names, *sent, *(folder.name for folder in made)})
     for folder in (*made, *uploads, beside(sessions, "jobs") / EXPORTS):
         if folder.exists():
             shutil.rmtree(folder)

@@ -33,6 +33,7 @@ class JobStore:
         self._now_s = steady_s()
         self._ended_s: dict[str, float] = {}
         """When those ended that this service has seen."""
+        self._looked: tuple[int, int] | None = None
 
     def folder(self, identifier: str) -> Path:
         """That of one job."""
@@ -74,6 +75,15 @@ class JobStore:
             return {}
         found = (self._loaded(folder) for folder in self.root.iterdir() if (folder / RECORD).is_file())
         return {each.id: each for each in found if each is not None}
+
+    def changed(self) -> bool:
+        """Whether folders of jobs came or went since this was asked last, by whatever program."""
+        now = None
+        with contextlib.suppress(FileNotFoundError):
+            found = self.root.stat()
+            now = found.st_mtime_ns, found.st_nlink
+        before, self._looked = self._looked, now
+        return now != before
 
     def _loaded(self, folder: Path) -> JobSummary | None:
         lock = folder / LOCK

@@ -22,7 +22,7 @@ from api.http.models import RequestBody
 from controller.commissioning.stoppable import stop_for_lost
 from controller.operation import Cancelled, Operation, Progress
 from rig.config.wiring import Wiring
-from rig.errors import RigError, SafetyStop
+from rig.errors import NO_ROOM, RigError, SafetyStop
 from rig.plugins import blaming
 from rig.results.base import SavedResult
 
@@ -93,7 +93,8 @@ def compute(order: Order, pipes: Pipes) -> None:
         code = error.code if isinstance(error, SafetyStop) else ""
         pipes.tell(Told(type="error", name=type(error).__name__, text=str(error), code=code))
     except OSError as error:  # most often a session that was removed meanwhile
-        pipes.tell(Told(type="error", name="DataError", text=f"{error.filename}: {error.strerror or error}"))
+        name = "DiskFull" if error.errno in NO_ROOM else "DataError"
+        pipes.tell(Told(type="error", name=name, text=f"{error.filename}: {error.strerror or error}"))
     else:
         pipes.tell(Told(type="result", text=found.model_dump_json()))
 

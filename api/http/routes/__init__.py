@@ -2,6 +2,7 @@
 
 from fastapi import APIRouter
 
+from api.http.answers import ANSWERS
 from api.http.idempotency import AnswerStore, idempotent
 from api.http.routes import (
     access,
@@ -33,7 +34,7 @@ MODULES = (
 
 def build(service: Service) -> APIRouter:
     """All routes over ``service``."""
-    router = APIRouter(prefix=PREFIX, route_class=idempotent(AnswerStore(service.jobs.folder / "answers.jsonl")))
+    router = APIRouter(prefix=PREFIX, route_class=idempotent(AnswerStore(service.jobs.folder / ANSWERS)))
     for module in MODULES:
         module.add(router, service)
     return router

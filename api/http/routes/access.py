@@ -45,8 +45,9 @@ def add(router: APIRouter, service: Service) -> None:
     def audit(page: PageQuery) -> AuditView:
         log = service.access.audit
         log.settle()
-        items, after = log.newest(page)
-        return AuditView(items=items, next=after, broken=log.broken())
+        lines = log.lines()
+        items, after = log.newest(page, lines)
+        return AuditView(items=items, next=after, broken=log.broken(lines))
 
 
 def _logins(router: APIRouter, service: Service) -> None:

@@ -2,9 +2,11 @@
 
 import contextlib
 import tempfile
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated
+from urllib.parse import quote
 
 from fastapi import APIRouter, Depends, Request, Response
 from fastapi.responses import FileResponse
@@ -20,7 +22,7 @@ from api.http.access.rights import ADMIN, CALLER, OPERATE, READ
 from api.http.access.scopes import Scope
 from api.http.models import RequestBody
 from api.http.problems import RequestRefused, responses
-from api.http.routes.common import PageQuery, Word
+from api.http.routes.common import MatchHeader, PageQuery, Word, etag_of, refuse_stale
 from api.http.service import Service
 from rig.results.base import SavedResult
 from rig.results.catalogue import (
@@ -31,6 +33,7 @@ from rig.results.catalogue import (
     ModelList,
     SessionList,
     SiteList,
+    SubjectEntry,
     SubjectHistory,
     SubjectList,
     TrialList,
@@ -124,6 +127,14 @@ def sees_names(request: Request) -> bool:
     return caller is not None and caller.may(Scope.OPERATE)
 
 
+def entry_of(lists: Catalogue, subject: str) -> SubjectEntry | None:
+    """What is known of a code, with its name; None where nothing is."""
+    try:
+        return lists.history(subject).subject
+    except NoSuchSubject:
+        return None
+
+
 def _one_subject(router: APIRouter, lists: Catalogue) -> None:
     # A code may have any character; what follows it is looked for first.
     @router.get(
@@ -148,26 +159,33 @@ def _one_subject(router: APIRouter, lists: Catalogue) -> None:
         sent = BackgroundTask(scratch.cleanup)
         return FileResponse(archive, media_type="application/zip", filename="subject.zip", background=sent)
 
+    one_changes = threading.Lock()
+
     @router.put(
         "/subjects/{subject:path}/name",
         dependencies=[OPERATE],
-        summary="Keeps a person's name for a code",
-        responses=responses("404 no-such-subject", "422 refused", "503 catalogue"),
+        summary="Keeps a person's name for a code; where something is known of it, If-Match has to name its ETag",
+        responses=responses("404 no-such-subject", "412 stale", "422 refused", "428 if-match", "503 catalogue"),
     )
-    def rename(subject: str, request: NameRequest) -> SubjectList:
-        with answering():
+    def rename(subject: str, request: NameRequest, match: MatchHeader = "") -> SubjectList:
+        with answering(), one_changes:
+            known = entry_of(lists, subject)
+            if known:
+                refuse_stale(match, etag_of(known), f"/subjects/{quote(subject, safe='')}")
             lists.rename(subject, request.name)
             return lists.subjects()
 
     @router.get(
         "/subjects/{subject:path}",
         dependencies=[READ],
-        summary="A subject's sessions, thresholds, models and diagnoses; the name only for whoever may operate",
+        summary="A subject's sessions, models and diagnoses; name only for whoever may operate, ETag for its change",
         responses=responses("404 no-such-subject", "422 refused", "503 catalogue"),
     )
-    def history(subject: str, request: Request) -> SubjectHistory:
+    def history(subject: str, request: Request, response: Response) -> SubjectHistory:
         with answering():
-            return lists.history(subject, sees_names(request))
+            found = lists.history(subject, sees_names(request))
+        response.headers["ETag"] = etag_of(found.subject)
+        return found
 
 
 def _changes(router: APIRouter, service: Service, lists: Catalogue) -> None:

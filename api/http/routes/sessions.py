@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field
 
 from api.catalogue.erasing import put_aside
 from api.http import views
-from api.http.access.rights import ADMIN, OPERATE, READ
+from api.http.access.rights import ADMIN, READ
 from api.http.downloads import FileAsOfNow, files_at
 from api.http.erasing import Confirm, SessionErasure, state_of, to_confirm
 from api.http.jobs.kept import EXPORTS
@@ -21,7 +21,7 @@ from api.http.jobs.params import ExportParams
 from api.http.jobs.start import start
 from api.http.jobs.views import FileView, listed_files, media_type
 from api.http.models import SessionView
-from api.http.problems import RequestRefused, responses
+from api.http.problems import DISK_FULL, RequestRefused, responses
 from api.http.room import refuse_full, size_of
 from api.http.service import Service
 from rig.recording.files import whole_file
@@ -32,6 +32,8 @@ FOLDERS = ("csv", "parquet")
 LOOK_S = 0.1
 PATIENCE_S = 20.0  # programs and proxies give up after 30 s
 RETRY_S = 5
+# Whoever may only look leaves room in the queue of computations for those who measure.
+MOST_UNDER_WAY = 8
 
 
 class SessionFiles(SessionView):
@@ -75,7 +77,7 @@ def _exports(router: APIRouter, service: Service) -> None:
     @files_at(
         router,
         "/sessions/{session}/export/{form}",
-        OPERATE,
+        READ,
         {
             202: {"model": ExportUnderWay},
             **responses("404 no-such-session", "409 link", "409 failed", "429 queue-full", "507 disk-full"),
@@ -100,6 +102,9 @@ async def _awaited(under_way: dict[Path, asyncio.Task[None]], file: Path, making
     """Whether it is there; it is made once, however many ask and however soon they go."""
     if file in under_way:
         making.close()
+    elif len(under_way) >= MOST_UNDER_WAY:
+        making.close()
+        raise RequestRefused(429, "queue-full", f"{MOST_UNDER_WAY} exports are under way already; wait for one to end")
     else:
         under_way[file] = asyncio.create_task(making)
         under_way[file].add_done_callback(lambda _: under_way.pop(file))
@@ -122,7 +127,7 @@ async def _made(service: Service, session: str, form: Format, file: Path) -> Non
     while not job.ended:
         await asyncio.sleep(LOOK_S)
     if job.wrong:
-        raise RequestRefused(409, job.wrong.code, job.wrong.detail)
+        raise RequestRefused(507 if job.wrong.code == DISK_FULL else 409, job.wrong.code, job.wrong.detail)
     made = service.jobs.files(job.id) / NAMES[form]
     await asyncio.to_thread(_zipped if form in FOLDERS else _copied, made, file)
 

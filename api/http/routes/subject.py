@@ -1,21 +1,17 @@
 """Who lies under the tip: kept with each recording, and the force that none may pass. Until the service ends."""
 
-import hashlib
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Response
+from fastapi import APIRouter, Response
 from pydantic import Field
 
 from api.catalogue.catalogue import Catalogue
 from api.http.access.rights import OPERATE, READ
 from api.http.models import RequestBody
-from api.http.problems import RequestRefused, responses
-from api.http.routes.common import LeaseHeader
+from api.http.problems import responses
+from api.http.routes.common import LeaseHeader, MatchHeader, etag_of, refuse_stale
 from api.http.service import Service
 from rig.config.subject import HIGHEST_SITE_N
-
-MatchHeader = Annotated[str, Header(alias="If-Match", max_length=80, description="the ETag of what is to be changed")]
-
 
 SiteThresholds = Annotated[dict[str, Annotated[float, Field(gt=0, le=HIGHEST_SITE_N)]], Field(max_length=200)]
 
@@ -57,23 +53,9 @@ def add(router: APIRouter, service: Service) -> None:
         wanted: SubjectSettings, response: Response, lease: LeaseHeader = "", match: MatchHeader = ""
     ) -> SubjectSettings:
         service.control.check(lease)
-        _refuse_stale(match, etag_of(shown(response)))
+        refuse_stale(match, etag_of(shown(response)), "/subject")
         given = wanted.model_dump(exclude_none=True)
         if wanted.id != service.wiring.subject.id:
             given.setdefault("site_thresholds_N", lists.site_thresholds_N(wanted.id, HIGHEST_SITE_N))
         service.use_subject(service.wiring.subject.model_copy(update=given), lease)
         return shown(response)
-
-
-def etag_of(settings: SubjectSettings) -> str:
-    """Another content, another tag."""
-    return f'"{hashlib.sha256(settings.model_dump_json().encode()).hexdigest()[:16]}"'
-
-
-def _refuse_stale(match: str, now: str) -> None:
-    if not match:
-        text = "send If-Match with the ETag of GET /api/v1/subject, so that no change of somebody else is lost"
-        raise RequestRefused(428, "if-match", text)
-    if match not in (now, "*"):
-        text = "the subject was changed meanwhile: look at it (GET /api/v1/subject), then change it"
-        raise RequestRefused(412, "stale", text)

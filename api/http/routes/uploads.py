@@ -4,6 +4,7 @@ from fastapi import APIRouter, Request, Response
 
 from api.http.access.rights import OPERATE, READ, upload
 from api.http.access.scopes import Scope
+from api.http.answers import ANSWERS, forget
 from api.http.erasing import Confirm, UploadErasure, to_confirm
 from api.http.problems import RequestRefused, responses
 from api.http.service import Service
@@ -56,4 +57,5 @@ def add(router: APIRouter, service: Service) -> None:
         token = to_confirm(f"upload {identifier}", service.jobs.uploads / identifier, confirm, response)
         if not token:
             shelf.remove(identifier)
+            forget(service.jobs.folder / ANSWERS, [identifier])
         return UploadErasure(**vars(found), done=not token, confirm=token)

@@ -156,6 +156,20 @@ def test_the_whole_log_is_read_page_by_page_also_where_a_line_is_broken(service:
     assert pages == [[5, 4], [2], [1]]
 
 
+def test_the_log_is_read_once_for_a_page_and_for_what_is_broken(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = list[AuditLog]()
+
+    def lines(log: AuditLog) -> list[bytes]:
+        read.append(log)
+        return []
+
+    monkeypatch.setattr(AuditLog, "lines", lines)
+    assert client_of(service).get("/api/v1/audit").status_code == 200
+    assert len(read) == 1
+
+
 def test_a_cursor_of_another_list_is_refused(service: Service) -> None:
     foreign = Page(1).first("jobs", ["a", "b"], lambda one: (one, ""))[1]
     refused = client_of(service).get("/api/v1/audit", params={"cursor": foreign})

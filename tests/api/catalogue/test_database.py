@@ -50,6 +50,21 @@ def test_a_newer_catalogue_is_refused_and_not_rebuilt(lab: Catalogue, root: Path
         assert connection.scalar(select(CATALOGUE.c.version)) == VERSION + 1
 
 
+def test_a_catalogue_of_an_older_program_is_read_anew_and_keeps_its_names(
+    lab: Catalogue, root: Path, database: str
+) -> None:
+    with lab.database.writing() as connection:
+        connection.execute(CATALOGUE.update().values(version=VERSION - 1))
+        connection.exec_driver_sql("ALTER TABLE rig_session DROP COLUMN quality")
+        connection.exec_driver_sql("UPDATE rig_trial SET quality = 'as it was read before'")
+    again = Catalogue(root, database)
+    assert [each.quality for each in again.sessions().items] == ["good"]
+    assert [each.quality for each in again.trials().items] == ["good"]
+    assert again.subjects().items[0].name == "Ann Example"
+    with lab.database.reading() as connection:
+        assert connection.scalar(select(CATALOGUE.c.version)) == VERSION
+
+
 def test_a_catalogue_of_another_folder_is_refused_until_it_is_rebuilt(
     lab: Catalogue, tmp_path: Path, database: str
 ) -> None:

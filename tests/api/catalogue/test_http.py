@@ -109,12 +109,49 @@ def test_without_a_credential_nothing_is_said(client: TestClient, path: str) -> 
     assert answer.status_code == 401 and NAME not in answer.text
 
 
+def named(client: TestClient, name: str, match: str | None = None) -> tuple[int, str]:
+    """What comes of naming S01, under the mark of what is there where no other is given."""
+    tag = client.get(f"{API}/subjects/S01").headers["etag"] if match is None else match
+    answer = client.put(f"{API}/subjects/S01/name", json={"name": name}, headers={"If-Match": tag})
+    return answer.status_code, answer.json().get("code", "")
+
+
 def test_a_name_is_kept_and_forgotten(client: TestClient, lab: Path) -> None:
-    assert client.put(f"{API}/subjects/S01/name", json={"name": "Bo"}).status_code == 200
+    assert named(client, "Bo") == (200, "")
     assert Catalogue(lab).history("S01").subject.name == "Bo"
-    assert client.put(f"{API}/subjects/S01/name", json={"name": ""}).status_code == 200
-    again = client.put(f"{API}/subjects/S01/name", json={"name": ""})
-    assert (again.status_code, again.json()["code"]) == (404, "no-such-subject")
+    assert named(client, "") == (200, "")
+    assert named(client, "") == (404, "no-such-subject")
+
+
+def test_no_name_that_somebody_else_gave_meanwhile_is_lost(client: TestClient, lab: Path) -> None:
+    old = client.get(f"{API}/subjects/S01").headers["etag"]
+    assert named(client, "Bo", old) == (200, "")
+    assert named(client, "Cy", old) == (412, "stale")
+    assert named(client, "Cy", "") == (428, "if-match")
+    assert Catalogue(lab).history("S01").subject.name == "Bo"
+    assert named(client, "Di", "*") == (200, "")
+    # Of a code that nobody has there is nothing to name, and its first name needs no look.
+    assert client.put(f"{API}/subjects/S%2F9/name", json={"name": "Ed"}).status_code == 200
+    assert client.put(f"{API}/subjects/S%2F9/name", json={"name": "Flo"}).status_code == 428
+
+
+def test_the_mark_of_a_name_tells_a_reader_nothing_of_it(client: TestClient) -> None:
+    marks = set[str]()
+    for name in ("Bo", "Cy"):
+        assert named(client, name) == (200, "")
+        marks.add(client.get(f"{API}/subjects/S01", headers=as_(Scope.READ)).headers["etag"])
+    assert len(marks) == 1
+
+
+def test_of_two_who_name_at_once_one_is_told(client: TestClient) -> None:
+    tag = client.get(f"{API}/subjects/S01").headers["etag"]
+    found: list[int] = []
+    threads = [threading.Thread(target=lambda name=name: found.append(named(client, name, tag)[0])) for name in "abcd"]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(20.0)
+    assert sorted(found) == [200, 412, 412, 412]
 
 
 def test_an_archive_is_sent_whole_and_leaves_no_file(

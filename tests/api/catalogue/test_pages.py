@@ -96,7 +96,7 @@ def test_a_page_that_comes_again_or_is_left_out_would_be_seen(
 def test_an_entry_that_goes_meanwhile_takes_no_other_with_it(client: TestClient) -> None:
     first = client.get(f"{API}/subjects?limit=2").json()
     assert [one["subject"] for one in first["items"]] == ["S01", "S02"]
-    assert client.put(f"{API}/subjects/S05/name", json={"name": ""}).status_code == 200
+    assert client.put(f"{API}/subjects/S05/name", json={"name": ""}, headers={"If-Match": "*"}).status_code == 200
     rest = client.get(f"{API}/subjects?limit=2&cursor={first['next']}").json()
     client.put(f"{API}/subjects/S05/name", json={"name": "Named, and never measured"})
     assert [one["subject"] for one in rest["items"]] == ["S10", "ä"] and rest["next"] is None

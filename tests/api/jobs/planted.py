@@ -1,5 +1,6 @@
 """Work that a process of its own is given in the place of a command's: it waits, dies, asks, or talks too much."""
 
+import errno
 import os
 import shutil
 import signal
@@ -7,12 +8,13 @@ import sys
 import time
 from pathlib import Path
 
-from api.http.jobs.params import VerifyParams
+from api.http.jobs.params import ExportParams, VerifyParams
 from api.http.jobs.worker import Desk
 from controller.commissioning.stoppable import stoppable
 from controller.operation import Operation
 from rig.errors import DataError, SafetyStop
-from rig.results.recorded import VerifyResult
+from rig.recording.files import whole_file
+from rig.results.recorded import ExportResult, VerifyResult
 
 WHOLE = VerifyResult(ok=True, remarks=(), recordings={})
 
@@ -54,6 +56,18 @@ def removing(_operation: Operation, asked: VerifyParams, desk: Desk) -> VerifyRe
     shutil.rmtree(folder)
     (folder / "session.json").read_bytes()
     return WHOLE
+
+
+def without_room(_operation: Operation, asked: ExportParams, desk: Desk) -> ExportResult:
+    """The disk fills up while a file is written, as a system that is asked to write tells it."""
+    with whole_file(desk.places.session(asked.session or "") / "out.bin") as scratch:
+        scratch.write_bytes(b"half")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def without_room_unsaid(_operation: Operation, _asked: ExportParams, _desk: Desk) -> ExportResult:
+    """The same where nothing of ours stands between."""
+    raise OSError(errno.EDQUOT, os.strerror(errno.EDQUOT), "/data/session.h5")
 
 
 def talkative(operation: Operation, _asked: VerifyParams, _desk: Desk) -> VerifyResult:

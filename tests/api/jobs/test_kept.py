@@ -1,7 +1,9 @@
 """Whoever is erased is gone from what jobs keep of their sessions too: results, files, exports and uploads."""
 
-from collections.abc import Sequence
+import base64
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -10,6 +12,7 @@ from typer.testing import CliRunner
 from api.catalogue.catalogue import Catalogue
 from api.catalogue.subjects import erase_subject
 from api.cli.app import build
+from api.http.answers import ANSWERS, read_answers
 from api.http.jobs.kinds import KINDS
 from api.http.jobs.params import FitParams, ImportParams, SimulateParams, VerifyParams
 from api.http.models import RequestBody
@@ -97,6 +100,55 @@ def test_the_command_line_erases_the_same_and_the_next_service_knows_none_of_it(
     assert "S01: erased: 1 sessions" in CliRunner().invoke(build("subject"), arguments).output
     assert {path.name for path in service.jobs.folder.iterdir()} & {*mine, other} == {other}
     assert not holding(service.jobs.uploads, MINE)
+
+
+def by_command_line(service: Service) -> None:
+    confirm = erase_subject(Catalogue(service.sessions), "S01").confirm
+    arguments = ["subject", "erase", "S01", "--sessions", str(service.sessions), "--confirm", confirm]
+    assert CliRunner().invoke(build("subject"), arguments).exit_code == 0
+
+
+def by_service(service: Service) -> None:
+    erased(client_of(service), "subjects/S01")
+
+
+ERASERS = pytest.mark.parametrize("erase", [by_service, by_command_line])
+
+
+@ERASERS
+def test_no_answer_that_is_kept_tells_of_who_was_erased_and_none_of_it_is_done_again(
+    client: TestClient, service: Service, erase: Callable[[Service], None]
+) -> None:
+    service.works["verify"] = "tests.api.jobs.planted:wrong"
+
+    def verified(session: str) -> Any:
+        asked = {"kind": "verify", "params": {"session": session}}
+        key = {"Idempotency-Key": {"first": "one", "other": "two"}[session]}
+        return client.post(f"{API}/jobs", json=asked, headers=key)
+
+    def answers() -> bytes:
+        kept_there = read_answers(service.jobs.folder / ANSWERS).values()
+        return b"".join(base64.b64decode(each.body) + repr(each).encode() for each in kept_there)
+
+    mine, other = verified("first"), verified("other")
+    until(lambda: not service.jobs.active, 60.0, "the jobs' end")
+    assert mine.json()["id"].encode() in answers() and b'"first"' in answers()
+    erase(service)
+    assert mine.json()["id"].encode() not in answers() and b'"first"' not in answers()
+    again = verified("first")
+    assert (again.status_code, again.json()["code"]) == (404, "gone")
+    assert verified("other").json() == other.json()
+    assert [job["id"] for job in client.get(f"{API}/jobs").json()["items"]] == [other.json()["id"]]
+
+
+def test_what_the_command_line_erased_is_in_no_list_of_the_service_beside_it(
+    client: TestClient, service: Service
+) -> None:
+    mine, other = all_worked(service)
+    assert len(client.get(f"{API}/jobs").json()["items"]) == len(mine) + 1
+    by_command_line(service)
+    assert [job["id"] for job in client.get(f"{API}/jobs").json()["items"]] == [other]
+    assert {client.get(f"{API}/jobs/{job}").status_code for job in mine} == {404}
 
 
 def test_a_failure_to_remove_what_jobs_keep_brings_the_session_back(

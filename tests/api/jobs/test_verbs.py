@@ -224,6 +224,37 @@ def test_what_moves_asks_for_a_key_and_what_computes_does_not(client: TestClient
     assert computed.status_code == 404
 
 
+def test_a_start_that_comes_again_after_another_took_control_gets_the_first_answer_and_moves_nothing(
+    client: TestClient, service: Service, trials: Trials
+) -> None:
+    asked, key = {"kind": "capture", "params": {"protocol": "p", "session": "s"}}, {"Idempotency-Key": "once"}
+    first = client.post("/api/v1/jobs", json=asked, headers=key)
+    trials.may.release(2)
+    ended(client, first.json()["id"])
+    other = client_of(service)
+    assert other.post("/api/v1/control/take", json={"holder": "Bob", "reason": "my turn"}).status_code == 200
+    again = client.post("/api/v1/jobs", json=asked, headers=key)
+    assert (again.status_code, again.json()) == (first.status_code, first.json())
+    late = client.post("/api/v1/jobs", json=asked, headers={"Idempotency-Key": "late"})
+    assert (late.status_code, late.json()["code"]) == (423, "no-lease")
+    assert trials.made == [1, 2]
+
+
+def test_verbs_that_come_in_the_wrong_order_are_refused_by_state_and_change_nothing(
+    client: TestClient, trials: Trials
+) -> None:
+    job = capture(client)
+    until(lambda: trials.made == [1], 10.0, "the first trial")
+    assert client.post(f"/api/v1/jobs/{job}/resume").json()["state"] == "running"  # before the pause that it answers
+    assert client.post(f"/api/v1/jobs/{job}/pause").json()["state"] == "pausing"
+    assert client.post(f"/api/v1/jobs/{job}/cancel").json()["state"] == "cancelling"
+    for verb in ("resume", "pause"):
+        refused = client.post(f"/api/v1/jobs/{job}/{verb}")
+        assert (refused.status_code, refused.json()["state"]) == (409, "cancelling")
+    trials.may.release()
+    assert (ended(client, job)["state"], trials.made) == ("cancelled", [1])
+
+
 def test_nothing_is_started_on_a_stopped_bench(client: TestClient, trials: Trials, bench: WiredBench) -> None:
     bench.status = {"latched": {"code": "pain_stop", "text": "the subject's stop", "action": "SOFT"}}
     refused = client.post("/api/v1/jobs", json={"kind": "capture", "params": {"protocol": "p", "session": "s"}})

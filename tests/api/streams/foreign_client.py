@@ -64,6 +64,7 @@ class ForeignClient:
         self.streams: dict[str, Received] = {}
         self.events: list[dict[str, Any]] = []
         self.said: list[dict[str, Any]] = []
+        self.channels: list[dict[str, Any]] = []
         self._channels: dict[int, str] = {}
 
     def __enter__(self) -> Self:
@@ -110,6 +111,7 @@ class ForeignClient:
             case "ping":
                 pass
             case "subscribed":
+                self.channels += said["channels"]
                 for channel in said["channels"]:
                     self._channels[channel["channel"]] = channel["stream"]
                     fresh = Received(channel["columns"], channel["step"])

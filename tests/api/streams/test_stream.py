@@ -1,6 +1,7 @@
 """`rig.v1` as a foreign client sees it: no peak is lost, and no sample without being named."""
 
 import math
+from itertools import pairwise, permutations
 from pathlib import Path
 
 import numpy as np
@@ -124,6 +125,48 @@ def test_who_comes_back_gets_what_was_missed(service: PlayedService, bench: Play
         assert again.streams["force"].batches[0][0] == force.last_seq + 1
         assert again.streams["force"].accounts_for_all() and not again.streams["force"].gaps
         assert again.streams["marker"].batches[0][0] == marker.last_seq + 2
+
+
+RESUMED = {"streams": ["force"], "since_seq": {"force": 199}}
+MESSAGES: dict[str, dict[str, object]] = {
+    "all": {"type": "subscribe", "streams": ["force"]},
+    "from 200": {"type": "subscribe", **RESUMED},
+    "end": {"type": "unsubscribe", "channels": []},
+    "ask": {"type": "ping", "id": 7},
+}
+
+
+@pytest.mark.parametrize("order", list(permutations(MESSAGES)), ids=", ".join)
+def test_messages_in_any_order_are_answered_in_it_and_the_last_one_counts(
+    service: PlayedService, bench: PlayedBench, order: tuple[str, ...]
+) -> None:
+    bench.play(500)
+    service.caught_up()
+    with ForeignClient(service.port) as client:
+        for name in order:
+            named = MESSAGES[name] | ({"run": client.hello["run"]} if name == "from 200" else {})
+            ended = {"channels": [each["channel"] for each in client.channels]} if name == "end" else {}
+            before = len(client.streams["force"].batches) if "force" in client.streams else 0
+            answer = client.ask(named | ended)
+            assert (
+                answer["type"]
+                == {"subscribe": "subscribed", "unsubscribe": "unsubscribed", "ping": "pong"}[str(named["type"])]
+            )
+            if name in ("all", "from 200"):
+                last, since = name, before
+        bench.play(500)
+        if order.index("end") > max(order.index("all"), order.index("from 200")):
+            told = len(client.streams["force"].batches)
+            service.caught_up()
+            client.ask(MESSAGES["ask"])
+            assert len(client.streams["force"].batches) == told
+            return
+        force = client.streams["force"]
+        client.until(lambda: force.batches and force.last_seq == 999)
+        spans = force.batches[since:]
+        assert spans[0][0] == (200 if last == "from 200" else spans[0][0])
+        assert all(after[0] == before[0] + before[1] for before, after in pairwise(spans))
+        assert not force.gaps
 
 
 def test_what_is_older_than_a_minute_is_a_gap_with_its_size(service: PlayedService, bench: PlayedBench) -> None:

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from rig.errors import UsageError
+from rig.errors import UsageError, WriteFailed
 from rig.intake.mapping import MAPPING_FILE
-from rig.recording.files import WriteFailed
 from rig.recording.mcap_file import RecordingFailed
 from tests.rig.recording.measured import FORCE, MAPPING, MARKER_TABLE, TABLES, run, write
 from tests.rig.recording.test_mcap_file import disk_of

@@ -15,11 +15,10 @@ import scipy.io
 
 from rig.channels import FORCE, STREAMS
 from rig.config.table import load
-from rig.errors import DataError, UsageError
+from rig.errors import DataError, UsageError, WriteFailed
 from rig.intake.mapping import MAPPING_FILE, DataMapping
 from rig.intake.session import import_folder
 from rig.recording.export import FORMATS, Format, export
-from rig.recording.files import WriteFailed
 from rig.recording.sessions import JsonTable, Session, SessionInfo, TrialInfo, open_session, write_session
 from tests.rig.recording.conftest import WriteRecording, axis, event, force
 from tests.rig.recording.measured import NOW, run

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.errors import DataError, UsageError
-from rig.recording.files import WriteFailed
+from rig.errors import DataError, UsageError, WriteFailed
 from rig.tissue.laws import Index, Law
 from rig.tissue.model import Model, Provenance, Quality, ValidRange, load_model
 from tests.rig.tissue.examples import EXAMPLES

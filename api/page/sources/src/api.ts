@@ -80,8 +80,8 @@ export async function ask(method: Method, path: string, sent: Sent<unknown> = {}
 }
 
 /** What was read, with the mark that a change of it has to name. */
-export async function marked<T>(path: string): Promise<{ value: T; mark: string }> {
-  const response = await answered("get", path, {});
+export async function marked<T>(path: string, sent: Sent<undefined> = {}): Promise<{ value: T; mark: string }> {
+  const response = await answered("get", path, sent);
   return { value: await response.json(), mark: response.headers.get("ETag") ?? "" };
 }
 

@@ -1,6 +1,6 @@
 // One subject: sessions, how stiff each found the tissue, thresholds, diagnoses.
 import { useState } from "preact/hooks";
-import { get, put, type Answer, type Schema } from "../../api";
+import { marked, put, type Answer, type Schema } from "../../api";
 import { attempt } from "../../attempt";
 import { date } from "../../clock";
 import { useLoaded } from "../../loaded";
@@ -11,21 +11,21 @@ import { may } from "../../session";
 import { t } from "../../texts";
 import { Whole } from "./whole";
 
-type Known = Answer<"/api/v1/subjects/{subject}", "get">;
+const PATH = "/api/v1/subjects/{subject}";
+type Known = Answer<typeof PATH, "get">;
 type Stiffness = Schema["StiffnessEntry"];
 
 const COLOURS = ["--force", "--depth", "--error", "--setpoint"];
 const DAY_MS = 86_400_000;
 
-function Name({ code, now, renamed }: { code: string; now: string; renamed: () => void }) {
+function Name({ code, now, mark, again }: { code: string; now: string; mark: string; again: () => void }) {
   const [name, give] = useState(now);
   const keep = (event: Event) => {
     event.preventDefault();
     void attempt(async () => {
-      await put("/api/v1/subjects/{subject}/name", { path: { subject: code }, body: { name: name.trim() } });
-      renamed();
+      await put("/api/v1/subjects/{subject}/name", { path: { subject: code }, body: { name: name.trim() }, headers: { "If-Match": mark } });
       return name.trim() ? t.subjects.named : t.subjects.forgotten;
-    });
+    }).then(again);
   };
   return (
     <form onSubmit={keep}>
@@ -103,18 +103,18 @@ function Facts({ known }: { known: Known }) {
 }
 
 export function History({ code }: { code: string }) {
-  const found = useLoaded(() => get("/api/v1/subjects/{subject}", { path: { subject: code } }), [code]);
-  const name = found.value?.subject.name;
+  const found = useLoaded(() => marked<Known>(PATH, { path: { subject: code } }), [code]);
+  const name = found.value?.value.subject.name;
   return (
     <>
       <p><a href={link("subjects")}>{t.subjects.back}</a></p>
       <h1>{name ? t.subjects.both(name, code) : t.subjects.one(code)}</h1>
       <Show loaded={found}>
-        {(known) => (
+        {({ value: known, mark }) => (
           <>
             <Card title={t.subjects.about}>
               <Facts known={known} />
-              {may("operate") ? <Name code={code} now={known.subject.name ?? ""} renamed={found.reload} /> : <p class="quiet">{t.subjects.namesHidden}</p>}
+              {may("operate") ? <Name code={code} now={known.subject.name ?? ""} mark={mark} again={found.reload} /> : <p class="quiet">{t.subjects.namesHidden}</p>}
             </Card>
             <Card title={t.subjects.stiffness} aside={<span class="quiet">{t.subjects.stiffnessHelp}</span>}><Stiffnesses found={known.stiffness ?? []} /></Card>
             <Card title={t.subjects.sessions}><Sessions known={known} /></Card>

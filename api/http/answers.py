@@ -1,0 +1,77 @@
+"""Answers to requests with an Idempotency-Key: lines of a file beside the jobs, one program at a time writing it."""
+
+import base64
+import contextlib
+import fcntl
+import json
+import os
+import re
+from collections.abc import Collection, Iterable, Iterator
+from pathlib import Path
+from urllib.parse import quote
+
+from pydantic import BaseModel, ValidationError
+
+from rig.recording.files import make_folder, write_text
+
+ANSWERS = "answers.jsonl"
+# The status of an answer that was given, and told of what has been erased since.
+ERASED = 404
+
+
+class KeptAnswer(BaseModel):
+    """What was answered; status 0 while nobody knows. ``body`` in base64."""
+
+    place: str
+    """Who asked, where, under which key."""
+    asked: str
+    """SHA-256 of the body."""
+    at_s: float
+    status: int = 0
+    headers: dict[str, str] = {}
+    body: str = ""
+
+    def tells_of(self, names: re.Pattern[str]) -> bool:
+        """Whether a name stands in it."""
+        headers = " ".join(self.headers.values())
+        return names.search(f"{headers} {base64.b64decode(self.body).decode(errors='replace')}") is not None
+
+
+def read_answers(file: Path) -> dict[str, KeptAnswer]:
+    """The last line of each place counts; one that was not written whole is none."""
+    found: dict[str, KeptAnswer] = {}
+    lines = file.read_text(encoding="utf-8", errors="replace").splitlines() if file.is_file() else []
+    for line in lines:
+        with contextlib.suppress(ValidationError):
+            answer = KeptAnswer.model_validate_json(line)
+            found[answer.place] = answer
+    return found
+
+
+def write_answers(file: Path, answers: Iterable[KeptAnswer]) -> None:
+    """These and no others, in a new file."""
+    write_text(file, "".join(f"{each.model_dump_json()}\n" for each in answers))
+
+
+@contextlib.contextmanager
+def writing(file: Path) -> Iterator[None]:
+    """Around each change: no other program reads or writes meanwhile."""
+    make_folder(file.parent)
+    lock = os.open(file.with_suffix(".lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(lock)
+
+
+def forget(file: Path, names: Collection[str]) -> None:
+    """Takes out what was answered about ``names``; that there was an answer stays known: nothing is done again."""
+    if not (names and file.is_file()):
+        return
+    said = {form for name in names for form in (name, quote(name), json.dumps(name, ensure_ascii=False)[1:-1])}
+    pattern = re.compile(rf"(?<![\w.-])(?:{'|'.join(map(re.escape, said))})(?![\w-])")
+    empty = {"status": ERASED, "headers": {}, "body": ""}
+    with writing(file):
+        kept = read_answers(file).values()
+        write_answers(file, [each.model_copy(update=empty) if each.tells_of(pattern) else each for each in kept])
