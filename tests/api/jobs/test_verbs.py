@@ -48,7 +48,7 @@ class Confirming:
     def request(self, _kind: object) -> int:
         return 1
 
-    def answer(self, _request: int) -> object:
+    def confirmed(self, _request: int, _within_s: float) -> object:
         return type("Answer", (), {"confirmed": True, "text": "braked", "id": 1})()
 
 
