@@ -101,6 +101,7 @@ SERVICE: dict[str, str] = {
     "api/http/lease.py": "who may act",
     "api/http/jobs/": "all that the command line can do, as jobs",
     "api/http/idempotency.py": "all that the command line can do, as jobs",
+    "api/http/shared_file.py": "who may act",
     "api/http/uploads.py": "all that the command line can do, as jobs",
     "api/http/protocols.py": "routes, a module a concern",
     "api/http/explained.py": "routes, a module a concern",

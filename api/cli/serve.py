@@ -7,7 +7,6 @@ import gc
 import os
 import socket
 import ssl
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
@@ -29,6 +28,7 @@ from api.http.service import Service
 from api.http.stops.process import AwayStops
 from api.http.streams.bridge import bridged
 from api.operations.remote import folder_name, socket_path
+from controller.loop.realtime import switch_promptly
 from controller.stop.http import LOCAL
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
@@ -55,8 +55,6 @@ StopPortOption = Annotated[
     int | None,
     typer.Option(min=1, max=65535, help="TCP port for stops from other computers; two above --port if left out."),
 ]
-# A thread that computes keeps the interpreter for so long while others wait; Python's own is 5 ms.
-SWITCH_S = 0.0005
 ProtocolsOption = Annotated[
     Path | None, typer.Option(help="Folder of the protocols; else ./examples, else those that come with the program.")
 ]
@@ -103,7 +101,7 @@ def _answer_promptly() -> None:
     """No answer, and no stop among them, waits for a look through all that was loaded (0.3 s), or long for a thread."""
     gc.collect()
     gc.freeze()
-    sys.setswitchinterval(SWITCH_S)
+    switch_promptly()
 
 
 def serve(

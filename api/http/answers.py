@@ -2,9 +2,7 @@
 
 import base64
 import contextlib
-import fcntl
 import json
-import os
 import re
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
@@ -12,6 +10,7 @@ from urllib.parse import quote
 
 from pydantic import BaseModel, ValidationError
 
+from api.http.shared_file import alone
 from rig.recording.files import make_folder, write_text
 
 ANSWERS = "answers.jsonl"
@@ -57,12 +56,8 @@ def write_answers(file: Path, answers: Iterable[KeptAnswer]) -> None:
 def writing(file: Path) -> Iterator[None]:
     """Around each change: no other program reads or writes meanwhile."""
     make_folder(file.parent)
-    lock = os.open(file.with_suffix(".lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with alone(file):
         yield
-    finally:
-        os.close(lock)
 
 
 def forget(file: Path, names: Collection[str]) -> None:

@@ -18,6 +18,7 @@ from api.http.access.rights import CALLER, PASSED, STOP
 from api.http.access.secrets import steady_s
 from api.http.answers import ERASED, KeptAnswer, read_answers, write_answers, writing
 from api.http.problems import RequestRefused
+from api.http.shared_file import FileState, file_state
 
 KEPT_S = 24 * 3600.0
 # A busy day's jobs; the oldest go first.
@@ -34,7 +35,6 @@ KeyHeader = Annotated[
     ),
 ]
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
-Look = tuple[int, int, int]
 
 
 def refuse_without_key(key: str) -> None:
@@ -58,7 +58,7 @@ class AnswerStore:
     def __init__(self, file: Path, now_s: Callable[[], float] | None = None) -> None:
         self._file, self._now_s, self._lock = file, now_s or steady_s(), threading.Lock()
         self._kept: dict[str, KeptAnswer] = {}
-        self._seen: Look | None = None
+        self._seen: FileState | None = None
         self._under_way: set[str] = set()
 
     def begin(self, place: str, body: bytes) -> KeptAnswer | None:
@@ -101,10 +101,10 @@ class AnswerStore:
         """Once a start: what is out of date leaves the file too."""
         with writing(self._file):
             write_answers(self._file, self._known().values())
-            self._seen = _look(self._file)
+            self._seen = file_state(self._file)
 
     def _known(self) -> dict[str, KeptAnswer]:
-        now = _look(self._file)
+        now = file_state(self._file)
         if now and now != self._seen:  # an earlier service wrote it, or another program has erased some
             self._kept, self._seen = read_answers(self._file), now
         oldest_s = self._now_s() - KEPT_S
@@ -121,16 +121,7 @@ class AnswerStore:
                 known.pop(next(iter(known)))
             with self._file.open("a", encoding="utf-8") as file:
                 file.write(answer.model_dump_json() + "\n")
-            self._seen = _look(self._file)
-
-
-def _look(file: Path) -> Look | None:
-    """Another after each change; None where there is no file."""
-    try:
-        found = file.stat()
-    except FileNotFoundError:
-        return None
-    return found.st_ino, found.st_size, found.st_mtime_ns
+            self._seen = file_state(self._file)
 
 
 def _undecided(under_way: bool) -> RequestRefused:

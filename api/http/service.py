@@ -237,8 +237,9 @@ class Service:
                 job.stopped()
             deadline = time.monotonic() + CONFIRM_S
             answer = bench.stops.confirmed(request, PROMPT_S)
-            while (answer := answer or bench.stops.answer(request)) is None and time.monotonic() < deadline:
+            while answer is None and time.monotonic() < deadline:
                 await asyncio.sleep(LOOK_S)
+                answer = bench.stops.answer(request)
         finally:
             if job:
                 job.give_up()

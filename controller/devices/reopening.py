@@ -1,11 +1,11 @@
 """Opens a lost device again beside the loop: a new driver, started in a thread, for the loop to take over."""
 
-import sys
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from controller.loop.realtime import switch_promptly
 from drivers.roles import Device, Identity
 from rig.errors import RigError
 
@@ -15,8 +15,6 @@ FIRST_WAIT_NS = 1_000_000_000
 LONGEST_WAIT_NS = 4_000_000_000
 # Start-ups have deadlines of their own of a few seconds; the loop's process does not wait for one longer than this.
 LEAVING_S = 1.0
-# What a start-up computes may hold the interpreter for so long, half a cycle of the loop; Python's own is 5 ms.
-SWITCH_S = 0.0005
 
 Spawn = Callable[[Callable[[], None]], None]
 Open = Callable[[], Device]
@@ -24,7 +22,7 @@ Open = Callable[[], Device]
 
 def in_thread(work: Callable[[], None]) -> None:
     """Runs ``work`` beside the loop; it ends with the process."""
-    sys.setswitchinterval(SWITCH_S)
+    switch_promptly()
     threading.Thread(target=work, name="reopening", daemon=True).start()
 
 

@@ -1,7 +1,6 @@
 """One private file of a list: read anew where it changed, written whole or not at all, one writer at a time."""
 
 import contextlib
-import fcntl
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,10 +8,10 @@ from typing import Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from api.http.shared_file import FileState, alone, file_state
 from rig.errors import UsageError
 
 Content = TypeVar("Content", bound=BaseModel)
-Seen = tuple[int, int, int]
 
 
 class PrivateFile(Generic[Content]):
@@ -20,12 +19,12 @@ class PrivateFile(Generic[Content]):
 
     def __init__(self, path: Path, empty: Content) -> None:
         self.path, self._empty = path, empty
-        self._seen: Seen | None = None
+        self._seen: FileState | None = None
         self._content = empty
 
     def read(self) -> Content:
         """What is in it now; raises UsageError where others may read or write it, or it is not what was written."""
-        seen = _seen(self.path)
+        seen = file_state(self.path)
         if seen != self._seen:
             self._content = self._load() if seen else self._empty
             self._seen = seen
@@ -48,12 +47,8 @@ class PrivateFile(Generic[Content]):
     def alone(self) -> Iterator[None]:
         """Around reading and writing: no other process does either meanwhile."""
         self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        lock = os.open(self.path.with_suffix(".lock"), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+        with alone(self.path):
             yield
-        finally:
-            os.close(lock)
 
     def write(self, content: Content) -> None:
         """Puts ``content`` in its place; within ``alone``."""
@@ -65,12 +60,3 @@ class PrivateFile(Generic[Content]):
             file.flush()
             os.fsync(file.fileno())
         new.rename(self.path)
-
-
-def _seen(path: Path) -> Seen | None:
-    """Tells one state of the file from the next: each is a new file, put in the place of the one before."""
-    try:
-        status = path.stat()
-    except FileNotFoundError:
-        return None
-    return status.st_ino, status.st_mtime_ns, status.st_size
