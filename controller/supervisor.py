@@ -42,6 +42,8 @@ READY_TIMEOUT_S = 3.0
 # Renewals within one lease, so that two may be late.
 LEASE_SHARE = 4
 UNASKED_LEASE_S = 3.0
+# Two statuses of the loop: the one that is known may be from before what was just asked.
+TOLD_S = 0.1
 
 
 class Supervisor:
@@ -199,7 +201,7 @@ class Supervisor:
 
     def wait_at_rest(self, timeout_s: float = 30.0) -> None:
         """Waits until nothing moves any more."""
-        self._closing.wait(0.1)
+        self._closing.wait(TOLD_S)
         self._loop().wait_until(lambda status: not status.get("busy"), timeout_s)
 
     @property
@@ -245,6 +247,7 @@ class Supervisor:
         """Acknowledges a stop and waits until the loop's status shows it; raises where the cause is still there."""
         loop = self._loop()
         loop.ask(Reset(), "a reset")
+        self._closing.wait(TOLD_S)
         if not loop.wait_until(lambda status: not status.get("latched"), ANSWER_TIMEOUT_S):
             raise DeviceError(f"the loop did not leave its safe state within {ANSWER_TIMEOUT_S:g} s after the reset")
 

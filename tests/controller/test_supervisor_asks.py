@@ -8,7 +8,7 @@ import pytest
 
 from controller import supervisor as module
 from controller.loop.client import LoopClient
-from controller.loop.messages import Recover, Status
+from controller.loop.messages import Recover, Reset, Status
 from controller.recovery.situation import Consent
 from controller.supervisor import Supervisor
 from rig.channel import Message
@@ -62,6 +62,13 @@ def test_rest_is_looked_for_once_the_loop_has_had_time_to_say_that_it_moves(stat
     assert client.done == [(rests, 7.0)]
     bench.wait_at_rest()
     assert client.done[1] == (rests, 30.0)
+
+
+def test_a_reset_is_looked_for_once_a_status_from_before_it_is_none_any_more() -> None:
+    bench, client, closing = asking({"busy": True})
+    bench.reset()
+    assert closing.waited_s == [0.1]
+    assert client.done == [(Reset(), "a reset", 0.0), (True, 5.0)]
 
 
 def test_an_act_of_recovery_is_waited_for_until_nothing_moves() -> None:
