@@ -28,6 +28,7 @@ MAXIMA: tuple[Maximum, ...] = (
     Maximum("limits.speed_mm_s", 100.0, "mm/s", "a person needs 0.2 s to press a button, in which that is 20 mm"),
     Maximum("limits.patient_mm", 30.0, "mm", "half the width of a slender forearm: the tip is not above it any more"),
     Maximum("limits.position_max_mm", 500.0, "mm", "no axis of a bench for one limb is longer"),
+    Maximum("limits.search_to_mm", 500.0, "mm", "no axis of a bench for one limb is longer: its end ends a search"),
     Maximum("axis.following_error_mm", 30.0, "mm", _WAY),
     Maximum("axis.standstill_mm", 3.0, "mm", "ten reports of an axis asked 100 times a second, at 30 mm/s"),
     Maximum("axis.acceleration_mm_s2", 10_000.0, "mm/s2", "a third of what 5 A give a carriage of 8 kg, 26 m/s2"),
