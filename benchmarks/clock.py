@@ -1,9 +1,10 @@
 """How true the capture times are: `python -m benchmarks.clock [--seconds 20]`; the last line is one JSON object.
 
-The mock bench tells when each sample was really taken, on this computer's monotonic clock; both serial force sensors
-are read by their drivers once a millisecond, as the loop does and with its priority where that is granted, idle and
-with a busy process for each core. No second is left out for settling. For comparison: how late samples arrive, and
-arrival less the delay that is known, which is what there would be without a clock map.
+A mock bench with that sensor tells when each sample was really taken, on this computer's monotonic clock. Both serial
+force sensors are read by their drivers in the loop's own cyclic executive, a millisecond a cycle, in step with the
+sensor where its rate allows it and with the loop's priority where that is granted, idle and with a busy process for
+each core. No second is left out for settling. For comparison: how late samples arrive, and arrival less the delay that
+is known, which is what there would be without a clock map.
 """
 
 import argparse
@@ -26,7 +27,9 @@ from numpy.typing import NDArray
 from api.cli.mock_bench import bench_process
 from benchmarks.about import head
 from controller.devices.drivers import open_force
-from controller.loop.realtime import acquire
+from controller.loop.executive import AHEAD, Cycle, Executive, sleep_then_spin
+from controller.loop.phase_lock import PhaseLock
+from controller.loop.realtime import acquire, spin_ns
 from drivers.robotiq.codec import FRAME_NS, to_counts
 from drivers.roles import ForceSensor
 from mock_devices.control import BenchControl
@@ -34,8 +37,8 @@ from rig.channels import ForceSample
 from rig.config.products.registry import FORCE_SENSORS
 from rig.config.wiring import Loop, Wiring
 
-PERIOD_S = 0.001
-COLLECT_S = 0.5
+PERIOD_NS = round(1e9 / Loop().rate_Hz)
+COLLECT_NS = 500_000_000
 LIMIT_MS = 0.2
 KNOWN_NS = {"bota-sensone": 0, "robotiq-ft300": FRAME_NS}
 RUNS = tuple((product, load) for product in KNOWN_NS for load in ("idle", "loaded"))
@@ -68,22 +71,34 @@ def mark(product: str, sample: ForceSample) -> int:
     return int.from_bytes(struct.pack("<6h", *to_counts(sample[4:10])), "little")
 
 
-def listen(
-    sensor: ForceSensor, control: BenchControl, role: str, seconds: float
-) -> tuple[list[ForceSample], list[tuple[int, int]]]:
-    """Samples, and marks and times of all that were taken."""
-    samples, taken = list[ForceSample](), list[tuple[int, int]]()
-    end_s = time.monotonic() + seconds
-    collect_s = 0.0
-    while (now_s := time.monotonic()) < end_s:
-        samples += sensor.poll(time.monotonic_ns())
-        if now_s >= collect_s:
-            taken += control.sampled(role)
-            collect_s = now_s + COLLECT_S
-        time.sleep(PERIOD_S)
-    while more := control.sampled(role):
-        taken += more
-    return samples, taken
+class Listening:
+    """A loop's work that only reads: samples, and marks and times of all that were taken."""
+
+    def __init__(self, sensor: ForceSensor, control: BenchControl, role: str, seconds: float) -> None:
+        self.samples, self.taken = list[ForceSample](), list[tuple[int, int]]()
+        self.phase = PhaseLock(PERIOD_NS, sensor.period_ns)
+        self._sensor, self._control, self._role = sensor, control, role
+        self._collect_ns = time.monotonic_ns()
+        self._end_ns = self._collect_ns + round(seconds * 1e9)
+
+    def prepare(self, now_ns: int) -> None:
+        """Asks twice a second what was taken, which may cost a cycle."""
+        if now_ns >= self._collect_ns:
+            self.taken += self._control.sampled(self._role)
+            self._collect_ns = now_ns + COLLECT_NS
+
+    def take_force(self, now_ns: int) -> None:
+        """What the sensor said, for the phase too."""
+        for sample in self._sensor.poll(now_ns):
+            self.samples.append(sample)
+            self.phase.observe(sample.capture_ns, sample.arrival_ns)
+
+    def run_cycle(self, cycle: Cycle) -> bool:
+        """Until the time is over, and then all that was taken."""
+        going_on = cycle.wake_ns < self._end_ns
+        while not going_on and (more := self._control.sampled(self._role)):
+            self.taken += more
+        return going_on
 
 
 def truths_ns(product: str, samples: Sequence[ForceSample], taken: Sequence[tuple[int, int]]) -> list[int | None]:
@@ -120,14 +135,18 @@ def measured(product: str, load: str, seconds: float, priority: int) -> Row:
     assert kind.mock
     role = kind.mock.role
     with contextlib.ExitStack() as stack:
-        _, endpoints = stack.enter_context(bench_process(Wiring(), every_product=True))
+        _, endpoints = stack.enter_context(bench_process(Wiring.model_validate({"force": {"product": product}})))
         control = stack.enter_context(BenchControl(endpoints.control))
         config = kind(port=kind.mock.address(endpoints))
         sensor = stack.enter_context(contextlib.closing(open_force(config)))
-        acquire(priority)
+        granted = acquire(priority)
         sensor.start()
-        samples, taken = listen(sensor, control, role, seconds)
-    return row(product, load, round(seconds * config.sampled_Hz), samples, truths_ns(product, samples, taken))
+        listening = Listening(sensor, control, role, seconds)
+        Executive(sleep=sleep_then_spin(min(spin_ns(granted), round(AHEAD * PERIOD_NS)))).run(
+            listening, listening.phase
+        )
+    samples = listening.samples
+    return row(product, load, round(seconds * config.sampled_Hz), samples, truths_ns(product, samples, listening.taken))
 
 
 def spin() -> None:
