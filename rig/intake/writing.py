@@ -76,7 +76,9 @@ class OpenRecording:
         if sum(samples.values()) > LONGEST_ROWS:
             self._rows = {}
         peak_N = self.info.peak_force_N
-        peak_N = float(np.fmax.reduce(rows["fz_N"], initial=peak_N)) if stream == FORCE.name else peak_N
+        if stream == FORCE.name:  # the largest in size, with its sign: a strip that is pulled has only negative ones
+            ends_N = np.array([peak_N, np.fmax.reduce(rows["fz_N"]), np.fmin.reduce(rows["fz_N"])])
+            peak_N = float(ends_N[np.argmax(np.nan_to_num(np.abs(ends_N), nan=-1.0))])
         self.info = replace(self.info, samples=samples, peak_force_N=peak_N)
 
     def finish(self) -> Written:

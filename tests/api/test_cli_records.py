@@ -13,6 +13,7 @@ from typer.testing import CliRunner, Result
 from api.cli import records
 from rig.errors import CheckFailed, DataError, UsageError, WriteFailed
 from rig.recording.sessions import open_session, write_session
+from rig.report.page import write_report
 from tests.rig.recording import tampered
 from tests.rig.recording.measured import measured, write
 
@@ -68,6 +69,18 @@ def test_a_mapping_may_stand_anywhere(source: Path, tmp_path: Path) -> None:
     mapping = (source / "mapping.toml").rename(tmp_path / "mine.toml")
     assert rig("import", source, "--out", tmp_path / "out", "--mapping", mapping).exit_code == 0
     assert open_session(tmp_path / "out").trials[0].peak_force_N == 1.5
+
+
+def test_the_peak_of_a_pull_is_shown_with_its_sign_wherever_a_peak_is(tmp_path: Path) -> None:
+    rows = "".join(f"0.{k},{2 * k},{k}\n" for k in range(8))
+    source = write(tmp_path / "in", {"a.csv": "Test type,Tension\n\nTime (s),Travel (mm),Force (N)\n" + rows})
+    result = rig("import", source, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.exception
+    assert "-7.00" in result.output
+    session = open_session(tmp_path / "out")
+    assert session.trials[0].peak_force_N == -7.0
+    write_report(session, tmp_path / "report.html")
+    assert ">-7.00<" in (tmp_path / "report.html").read_text()
 
 
 def test_without_a_mapping_one_is_proposed_saved_and_used(tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ def test_force_positive_in_tension_is_turned_round(source: Path, word: str) -> N
     (source / MAPPING_FILE).write_text(text)
     session = run(source)
     assert session.recording("trial_01").tables["force"]["fz_N"].tolist() == [0.0, -0.5, -1.5]
-    assert session.trials[0].peak_force_N == 0.0
+    assert session.trials[0].peak_force_N == -1.5
 
 
 @pytest.mark.parametrize("word", ["out", "away", "up", "out_of_tissue", "out of the tissue"])
