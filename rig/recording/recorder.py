@@ -115,7 +115,7 @@ class Recorder:
         try:
             self._drain(BATCH)
             if self._writer and not self._failure and now_ns - self._flushed_ns >= FLUSH_PERIOD_NS:
-                self._flush(now_ns)
+                self._flush(self._writer, now_ns)
         except RecordingFailed as error:
             self._failure = str(error)
             self._ring.commit()
@@ -183,11 +183,9 @@ class Recorder:
         for stream, body in self._tally.accepted(slots):
             self._writer.add(stream.id, body)
 
-    def _flush(self, now_ns: int) -> None:
-        if self._writer is None:
-            return
+    def _flush(self, writer: RecordingWriter, now_ns: int) -> None:
         sync = now_ns - self._synced_ns >= SYNC_PERIOD_NS
-        self._writer.flush(sync)
+        writer.flush(sync)
         self._ring.commit()
         self._flushed_ns = now_ns
         self._synced_ns = now_ns if sync else self._synced_ns
@@ -200,7 +198,8 @@ def run(ring: RingReader, recorder: Recorder, channel: Channel, ending: threadin
             with contextlib.suppress(RecordingFailed):
                 recorder.end("recorder ended by a signal")
             return
-        select([channel], [], [], DRAIN_PERIOD_S)
+        behind = recorder.recording and ring.head - ring.position > BATCH
+        select([channel], [], [], 0.0 if behind else DRAIN_PERIOD_S)
         for received in channel.receive_all():
             channel.send(recorder.handle(received))
             if isinstance(received.message, Quit):
