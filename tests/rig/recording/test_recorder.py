@@ -104,6 +104,16 @@ def test_gaps_in_the_numbers_are_counted_as_missing(ring: RingWriter, recorder: 
     assert closed(recorder)["missing"] == {"force": 3}
 
 
+def test_gaps_between_two_turns_are_counted_and_what_came_before_the_first_is_none(
+    ring: RingWriter, recorder: Recorder, tmp_path: Path
+) -> None:
+    opened(recorder, tmp_path / "a.mcap")
+    for seqs in ((100, 101), (104,), (103, 106)):
+        put_force(ring, *seqs)
+        recorder.step(0)
+    assert closed(recorder)["missing"] == {"force": 2 + 2}
+
+
 def test_drops_during_a_recording_are_counted_per_stream(ring: RingWriter, recorder: Recorder, tmp_path: Path) -> None:
     put_force(ring, *range(300))
     opened(recorder, tmp_path / "a.mcap")
@@ -129,8 +139,20 @@ def test_slots_are_given_back_only_after_their_chunk_is_in_the_file(
     assert (reader.position, reader.tail, seqs_in(path)) == (3, 3, [0, 1, 2])
 
 
+def test_each_turn_of_the_process_hands_over_what_it_took(
+    ring: RingWriter, reader: RingReader, recorder: Recorder, tmp_path: Path
+) -> None:
+    """A turn that only takes rows costs as much as 400 of them; 8 mm at 30 mm/s are loaded in 0.27 s."""
+    opened(recorder, tmp_path / "a.mcap")
+    for turn in range(1, 5):
+        put_force(ring, turn)
+        recorder.step(turn * round(DRAIN_PERIOD_S * 1e9))
+        assert reader.tail == ring.head == turn
+    assert DRAIN_PERIOD_S < 8 / 30
+
+
 def test_a_recorder_that_is_behind_does_not_wait(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A wait for each batch would be 82,000 rows a second."""
+    """A wait for each batch would be 41,000 rows a second."""
     ring = RingWriter.create(tmp_path / "ring", slots=1 << 15)
     reader, waits, ending = RingReader.open(ring.path), list[float](), threading.Event()
     recorder = Recorder(reader)
