@@ -4,8 +4,8 @@ import os
 from pathlib import Path
 from typing import Self
 
-# A chunk of ours has 1 MB before it is packed; a window holds many, and reads of 4 MB cost the disk nothing extra.
-WINDOW = 1 << 22
+# Ten chunks of the recorder. Of a larger one the memory comes from the system each time, and leaves the cache.
+WINDOW = 1 << 19
 
 
 class FileWindow:

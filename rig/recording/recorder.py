@@ -34,7 +34,7 @@ from rig.recording.messages import TO_RECORDER, Close, Closed, Open, Opened, Qui
 from rig.recording.ring import RingReader
 from rig.recording.slots import Slots, bodies_of, rows_of
 
-DRAIN_PERIOD_S = 0.1  # half of a flush period, and commands wake it at once: waking up costs as much as all else
+DRAIN_PERIOD_S = 0.2  # a flush period, and commands wake it at once: a turn costs as much as 400 rows
 FLUSH_PERIOD_NS = 200_000_000  # what dies with the process: less than the loading of the fastest trial, 8 mm at 30 mm/s
 SYNC_PERIOD_NS = 1_000_000_000  # what a power failure takes; a sync was seen to last 0.13 s
 SILENCE_NS = 2_000_000_000  # twice the longest pause after which a loop still goes on (`loop.overrun_ms`)
@@ -67,15 +67,15 @@ class Tally:
                 yield stream, rows.tobytes()
 
     def _count(self, stream: Stream, seqs: NDArray[np.int64]) -> None:
-        steps = np.diff(seqs, prepend=self._last.get(stream.id, int(seqs[0])))
-        self.missing[stream.name] += int(np.maximum(steps - 1, 0).sum())
+        known = np.concatenate(([self._last.get(stream.id, seqs[0])], seqs))
+        self.missing[stream.name] += int(np.maximum(known[1:] - known[:-1] - 1, 0).sum())
         self.samples[stream.name] += seqs.size
         self.unreadable -= seqs.size
         self._last[stream.id] = int(seqs[-1])
 
 
 class Recorder:
-    """Ring to files. Time and commands are given; ``step`` is to be called every 100 ms or so."""
+    """Ring to files. Time and commands are given; ``step`` is to be called as often as a flush is due."""
 
     def __init__(self, ring: RingReader, resume: bool = False) -> None:
         """With ``resume`` what a predecessor left in the ring stays there for the first recording."""
@@ -115,7 +115,7 @@ class Recorder:
         try:
             self._drain(BATCH)
             if self._writer and not self._failure and now_ns - self._flushed_ns >= FLUSH_PERIOD_NS:
-                self._flush(now_ns)
+                self._flush(self._writer, now_ns)
         except RecordingFailed as error:
             self._failure = str(error)
             self._ring.commit()
@@ -183,11 +183,9 @@ class Recorder:
         for stream, body in self._tally.accepted(slots):
             self._writer.add(stream.id, body)
 
-    def _flush(self, now_ns: int) -> None:
-        if self._writer is None:
-            return
+    def _flush(self, writer: RecordingWriter, now_ns: int) -> None:
         sync = now_ns - self._synced_ns >= SYNC_PERIOD_NS
-        self._writer.flush(sync)
+        writer.flush(sync)
         self._ring.commit()
         self._flushed_ns = now_ns
         self._synced_ns = now_ns if sync else self._synced_ns
@@ -200,7 +198,8 @@ def run(ring: RingReader, recorder: Recorder, channel: Channel, ending: threadin
             with contextlib.suppress(RecordingFailed):
                 recorder.end("recorder ended by a signal")
             return
-        select([channel], [], [], DRAIN_PERIOD_S)
+        behind = recorder.recording and ring.head - ring.position > BATCH
+        select([channel], [], [], 0.0 if behind else DRAIN_PERIOD_S)
         for received in channel.receive_all():
             channel.send(recorder.handle(received))
             if isinstance(received.message, Quit):

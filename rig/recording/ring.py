@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.errors import DeviceError, UsageError
 from rig.recording.slots import BODY_LIMIT, SLOT, SLOT_TYPE, TRAILER, Slots
@@ -155,7 +156,7 @@ class RingReader:
         self._fd, self._mapping = fd, mapping
         self._bytes, self._words = mapping.bytes, mapping.words
         self._mask = slots - 1
-        self._slots: Slots = np.frombuffer(mapping.bytes, SLOT_TYPE, slots, PAGE)
+        self._slots: NDArray[np.void] = np.frombuffer(mapping.bytes, f"V{SLOT}", slots, PAGE)
         self._next = self._words[_TAIL]
         self.damaged = 0
 
@@ -186,13 +187,13 @@ class RingReader:
         A slot that does not carry its own number is left out and counted in ``damaged``.
         """
         numbers = np.arange(self._next, min(self._words[_HEAD], self._next + limit))
-        found = self._slots[numbers & self._mask]
+        found = self._slots[numbers & self._mask].view(SLOT_TYPE)  # field by field takes five times as long
         good = (found["number"] == numbers) & (found["size"] <= BODY_LIMIT)
         self._next += numbers.size
         self.damaged += int(numbers.size - np.count_nonzero(good))
         if commit:
             self.commit()
-        kept: Slots = found[good]
+        kept: Slots = found if good.all() else found[good]
         return kept
 
     def commit(self) -> None:

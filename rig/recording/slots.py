@@ -32,8 +32,9 @@ def holding(slots: Slots, stream: Stream) -> NDArray[np.bool_]:
 
 def rows_of(slots: Slots, stream: Stream) -> NDArray[np.void]:
     """The rows of ``stream`` among ``slots``, as its table; streams with text have none."""
-    bodies = slots["body"][holding(slots, stream), : stream.dtype.itemsize]
-    return np.ascontiguousarray(bodies).view(stream.dtype).reshape(-1)
+    # As so many bytes: one copy a row.
+    bodies = slots["body"][:, : stream.dtype.itemsize].view(f"V{stream.dtype.itemsize}")[:, 0]
+    return bodies[holding(slots, stream)].view(stream.dtype)
 
 
 def bodies_of(slots: Slots, stream: Stream) -> Iterator[tuple[bytes, tuple[Any, ...]]]:

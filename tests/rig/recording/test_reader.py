@@ -1,17 +1,25 @@
 """Reading back: finished files, every kind of prefix, zeroed and flipped blocks, files that are something else."""
 
 import random
+import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import Chunk
 from mcap.writer import Writer
 
 from rig.channels import BY_ID, BY_NAME, EVENT, LOOP, STREAMS, EventSample, LoopSample
 from rig.errors import DataError
+from rig.recording import chunk
+from rig.recording.chunk import RECORD
 from rig.recording.mcap_file import RecordingWriter
+from rig.recording.mcap_layout import MESSAGE_HEAD
 from rig.recording.reader import Recording, read_recording
 from rig.recording.ring import RingReader, RingWriter
 from rig.recording.scan import scan
@@ -280,3 +288,16 @@ def test_whatever_goes_into_the_ring_comes_out_of_the_file(
             assert recording.tables[stream.name].dtype == BY_ID[stream.id].dtype
     assert recording.complete
     assert np.all([not recording.damage, not recording.cut])
+
+
+@pytest.mark.parametrize("size", range(1, MESSAGE_HEAD.size - RECORD.size))
+def test_a_chunk_that_ends_within_the_head_of_a_message_is_named(size: int) -> None:
+    with pytest.raises(chunk.BadRecord):
+        chunk.take_apart(_chunk_of(RECORD.pack(Opcode.MESSAGE, size) + bytes(size)))
+
+
+def _chunk_of(data: bytes) -> bytes:
+    packed = zstandard.ZstdCompressor().compress(data)
+    builder = RecordBuilder()
+    Chunk("zstd", packed, 1, 1, zlib.crc32(data), len(data)).write(builder)
+    return bytes(builder.end())[RECORD.size :]

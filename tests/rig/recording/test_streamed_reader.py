@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 
 from rig.channels import AXIS, CDR_HEADER, EVENT, FORCE, LOOP, STREAMS, Stream
 from rig.errors import DataError
-from rig.recording import file_window, scan
+from rig.recording import file_window, growing_table, scan
 from rig.recording.file_window import FileWindow
 from rig.recording.growing_table import GrowingTable
 from rig.recording.mcap_file import RecordingWriter
@@ -151,7 +151,9 @@ def test_what_is_no_recording_is_one_sentence(tmp_path: Path, text: bytes) -> No
         assert read_recording(tmp_path / "a.mcap").cut
 
 
-def test_a_table_grows_and_keeps_each_row() -> None:
+def test_a_table_grows_and_keeps_each_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Past the size from which it is moved instead of copied."""
+    monkeypatch.setattr(growing_table, "LARGE_BYTES", 1 << 20)
     table = GrowingTable(AXIS.dtype.itemsize)
     parts = [random_rows(AXIS, 10 * number, number * 37, number) for number in range(1, 60)]
     for part in parts:
@@ -162,6 +164,26 @@ def test_a_table_grows_and_keeps_each_row() -> None:
     assert rows.tobytes() == np.concatenate(parts).tobytes()
     with pytest.raises(ValueError, match="read-only"):
         rows["seq"][0] = 1
+
+
+def advised(address: int) -> bool:
+    """Whether the memory there is to have huge pages: flag `hg` of proc_pid_smaps(5)."""
+    inside = False
+    for line in Path("/proc/self/smaps").read_text().splitlines():
+        first, _, rest = line.partition(" ")
+        if "-" in first:
+            begin, end = (int(part, 16) for part in first.split("-"))
+            inside = begin <= address < end
+        elif inside and first == "VmFlags:":
+            return "hg" in rest.split()
+    return False
+
+
+def test_a_large_table_has_huge_pages_where_the_system_has_them() -> None:
+    table = GrowingTable(AXIS.dtype.itemsize)
+    for _ in range(3):
+        table.add(np.ones((40_000, AXIS.dtype.itemsize), np.uint8))
+        assert advised(table.rows(AXIS.dtype).ctypes.data) == Path("/sys/kernel/mm/transparent_hugepage").exists()
 
 
 PEAK = """
