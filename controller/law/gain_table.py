@@ -121,5 +121,5 @@ def _refuse_stiff(tangent: TissueBounds, rates: Rates) -> None:
     if tangent.high[at] > limit:
         raise UsageError(
             f"at {tangent.depth_mm[at]:.3g} mm the tissue may have {tangent.high[at]:.3g} N/mm, above the"
-            f" {limit:g} N/mm up to which the force limit holds with this sensor: track lower forces"
+            f" {limit:g} N/mm up to which the force limit holds with this sensor: fit trials that press less deep"
         )

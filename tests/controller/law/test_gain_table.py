@@ -101,6 +101,13 @@ def test_an_interval_that_reaches_zero_on_one_side_is_refused_whatever_the_stand
         span_of(model, gain_rows(model, depths(model)), FAST)
 
 
+def test_of_tissue_too_stiff_where_it_is_deep_trials_that_press_less_deep_make_a_model_to_track_with() -> None:
+    deep, less_deep = index_model(0.5, 0.2, 0.03, force_N=80.0), index_model(0.5, 0.2, 0.03, force_N=30.0)
+    with pytest.raises(UsageError, match=r"above the 20 N/mm .*: fit trials that press less deep"):
+        span_of(deep, gain_rows(deep, depths(deep)), FAST)
+    span_of(less_deep, gain_rows(less_deep, depths(less_deep)), FAST)
+
+
 @pytest.mark.parametrize(("rates", "limit"), [(FAST, 20), (SLOW, 10)], ids=["1 kHz", "100 Hz"])
 def test_tissue_that_may_be_stiffer_than_the_limit_is_refused_with_force_and_bound(rates: Rates, limit: int) -> None:
     known = index_model(0.99 * limit, 0.0, 0.1)
