@@ -124,6 +124,20 @@ def test_a_subject_on_whom_only_one_law_was_measured_does_not_count() -> None:
     assert list(wire_report.gains(parts()[:1])) == []
 
 
+def test_what_was_not_played_on_every_subject_confirms_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    sentences = wire_report.show(parts())
+    assert "limb 2 Hz, 0.5 N: measured on 2 of 5 subjects" in sentences
+    assert "jumps: measured on 0 of 5 subjects" in sentences
+    assert "contact, 0 mm/s: measured on 0 of 5 subjects" in sentences
+    assert "NOT CONFIRMED: low jumps: measured on 0 of 5 subjects" in capsys.readouterr().out
+    whole = [
+        WiredPart(part=part, found=tuple(Wired(case=case, bench=1.0, simulated=1.0) for case in cases), missed=0)
+        for part in wire.parts(1)
+        for cases in ([*GAINS] if part.kind == "limb" else [f"{part.kind}, x{part.stiffness:g}"],)
+    ]
+    assert wire_report.lacking(whole) == []
+
+
 def test_a_measurement_goes_on_where_its_file_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file, asked = tmp_path / "wire.jsonl", []
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
