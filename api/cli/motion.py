@@ -11,6 +11,7 @@ from api.cli.options import ConfigOption, JsonOption, SetOption, calibrated, wir
 from api.cli.output import show, write_json
 from api.operations import motion
 from api.operations.motion import Captured, TrackPlan
+from controller.commissioning.dynamics_refusals import refuse_unidentified
 from controller.experiments import capture as experiment
 from controller.experiments import tracked
 from controller.experiments.references import parse_reference
@@ -97,7 +98,9 @@ def track(
 
 def _tracked(wiring: Wiring, folder: Path, asked: "TrackOptions", against: Path | None, json_file: Path | None) -> None:
     """One run, after one with the other model where there is one; all is checked before anything is opened."""
-    _plans(calibrated(wiring), asked, against)
+    known = calibrated(wiring)
+    _plans(known, asked, against)
+    refuse_unidentified(known)
     tracked.refuse_foreign(folder)
     with live.running(wiring) as bench:
         # By the axis that answered: a simulated one is identified when it is first asked for, else it is the same law.

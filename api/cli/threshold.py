@@ -7,10 +7,11 @@ import typer
 
 from api.cli import live
 from api.cli.glove import by_glove
-from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
+from api.cli.options import ConfigOption, JsonOption, SetOption, calibrated, wiring_from
 from api.cli.output import show, write_json
 from api.operations import motion
 from api.operations.motion import TrackPlan
+from controller.commissioning.dynamics_refusals import refuse_unidentified
 from controller.experiments import threshold as experiment
 from controller.experiments import tracked
 from controller.operation import Operation
@@ -45,6 +46,7 @@ def threshold(
         raise UsageError("rig threshold: give --model and --up-to for a ramp of the axis, or --glove")
     fitted = load_model(model)
     experiment.plan(up_to, rate, fitted, wiring)  # refused before anything is opened
+    refuse_unidentified(calibrated(wiring))
     tracked.refuse_foreign(out)
     with live.running(wiring) as bench:
         ramp = TrackPlan(experiment.plan(up_to, rate, fitted, bench.wiring), str(model))

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from benchmarks.control.goals import GOALS, JUMPS, LOW_JUMPS, PEAK
 from benchmarks.control.laws import LAW
+from benchmarks.control.plants import SUBJECTS
 from benchmarks.control.scores import Gain, Score, gain_of, mean_of
 from benchmarks.control.wire import BEST_AT_CONTACT, CONSTANT, WiredPart
 
@@ -74,6 +75,18 @@ def missed(confirmed: Sequence[Confirmed], peak: float | None) -> list[str]:
     return sentences
 
 
+def lacking(found: Sequence[WiredPart]) -> list[str]:
+    """Headlines that were not measured on every subject, one sentence each: what was not played confirms nothing."""
+    subjects = {one.what: one.subjects for one in gains(found)}
+    touched = {one.part.subject for one in found if (one.part.kind, one.part.law) == ("contact", LAW)}
+    subjects[CONTACT] = len(touched)
+    return [
+        f"{what}: measured on {subjects.get(what, 0)} of {len(SUBJECTS)} subjects"
+        for what in (*PROMISED, CONTACT)
+        if subjects.get(what, 0) < len(SUBJECTS)
+    ]
+
+
 def show(found: Sequence[WiredPart]) -> list[str]:
     """Prints both, case by case and as gains; returns what is not confirmed."""
     for bench, where in ((True, "bench"), (False, "simulated")):
@@ -91,7 +104,7 @@ def show(found: Sequence[WiredPart]) -> list[str]:
     peaks = {law: mean_of(touched, law, [CONTACT]).worst for law in (LAW, CONSTANT, BEST_AT_CONTACT)
              if any(score.law == law for score in touched)}  # fmt: skip
     print("contact, worst subject:", ", ".join(f"{law} {peak:.3f}" for law, peak in peaks.items()))
-    sentences = missed(confirmed, peaks.get(LAW))
+    sentences = [*missed(confirmed, peaks.get(LAW)), *lacking(found)]
     for sentence in sentences:
         print("NOT CONFIRMED:", sentence)
     return sentences

@@ -4,7 +4,9 @@ from controller.loop.steps import Program, TrackForce
 from drivers.roles import Identity
 from rig.computer import computer_id
 from rig.config.axis_dynamics import AxisDynamics
+from rig.config.products.roles import MOCK_PORT
 from rig.config.wiring import Wiring
+from rig.errors import UsageError
 
 
 def dynamics_reasons(program: Program, wiring: Wiring, axis: Identity) -> list[str]:
@@ -16,11 +18,18 @@ def dynamics_reasons(program: Program, wiring: Wiring, axis: Identity) -> list[s
         return []
     known = wiring.calibration.of_dynamics
     if known is None:
-        return [
-            f"no dynamics of {axis.product} {axis.serial}: run `rig calibrate axis --dynamics` and give its file as"
-            " calibration.dynamics"
-        ]
+        return [_missing(f"{axis.product} {axis.serial}")]
     return [*_foreign(known, axis), *dynamics_elsewhere(known, wiring)]
+
+
+def refuse_unidentified(wiring: Wiring) -> None:
+    """The same as far as it is known before the axis homes; raises UsageError. A mock axis is identified by itself."""
+    known = wiring.calibration.of_dynamics
+    if known is None and wiring.axis.port == MOCK_PORT:
+        return
+    reasons = dynamics_elsewhere(known, wiring) if known else [_missing(f"the axis at {wiring.axis.port}")]
+    if reasons:
+        raise UsageError("; ".join(reasons))
 
 
 def dynamics_elsewhere(known: AxisDynamics, wiring: Wiring) -> list[str]:
@@ -35,3 +44,7 @@ def _foreign(known: AxisDynamics, axis: Identity) -> list[str]:
         f"calibration.dynamics is of {known.product} {known.serial}, but {axis.product} {axis.serial} answered: give"
         " its own, or run `rig calibrate axis --dynamics`"
     ]
+
+
+def _missing(whose: str) -> str:
+    return f"no dynamics of {whose}: run `rig calibrate axis --dynamics` and give its file as calibration.dynamics"

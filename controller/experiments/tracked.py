@@ -46,9 +46,7 @@ def refuse_foreign(folder: Path) -> None:
 
 def plan(forces_N: Sequence[float], seconds: float, model: Model, wiring: Wiring) -> Program:
     """The program, checked against model and limits before anything is opened."""
-    program = tracking.program(forces_N, seconds, model, wiring)
-    refuse_beyond_limits(program, wiring)
-    return program
+    return plan_reference(tracking.levels(forces_N, seconds), model, wiring)
 
 
 def plan_reference(reference: Reference, model: Model, wiring: Wiring) -> Program:

@@ -41,15 +41,16 @@ CONTACT_N = 0.05  # ten times the sensor's noise
 Column = NDArray[np.float64]
 
 
-def program(forces_N: Sequence[float], seconds: float, model: Model, wiring: Wiring) -> Program:
-    """Jumps through ``forces_N``, ``seconds`` each; raises UsageError beyond the model."""
+def levels(forces_N: Sequence[float], seconds: float) -> Reference:
+    """Jumps through ``forces_N``, ``seconds`` each; raises UsageError where there would be nothing to judge."""
     if not forces_N or not min(forces_N) > CONTACT_N or not SETTLE_S < seconds < math.inf:
         raise UsageError(
             f"tracking needs forces above {CONTACT_N:g} N for more than {SETTLE_S:g} s each,"
             f" not {', '.join(f'{force:g}' for force in forces_N) or 'none'} N for {seconds:g} s"
         )
     name = ", ".join(f"{force:g}" for force in forces_N) + " N"
-    return following(Reference(name, *_levels(forces_N, seconds)), model, wiring)
+    times_s = tuple(at * seconds for level in range(len(forces_N)) for at in (level, level + 1))
+    return Reference(name, times_s, tuple(force_N for force_N in forces_N for _ in range(2)))
 
 
 def following(reference: Reference, model: Model, wiring: Wiring) -> Program:
@@ -156,11 +157,6 @@ def _speed(model: Model, from_N: float, to_N: float, duration_s: float) -> float
     """Largest speed [mm/s] along a straight line of force; soft tissue near contact needs the most."""
     depths = [model.depth_mm(float(force_N)) for force_N in np.linspace(from_N, to_N, LINE_PARTS + 1)]
     return max(abs(b - a) for a, b in pairwise(depths)) * LINE_PARTS / duration_s
-
-
-def _levels(forces_N: Sequence[float], seconds: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    times = tuple(at * seconds for level in range(len(forces_N)) for at in (level, level + 1))
-    return times, tuple(force_N for force_N in forces_N for _ in range(2))
 
 
 def plateaus(time_s: Column, reference_N: Column, force_N: Column, mode: NDArray[np.int64]) -> tuple[Plateau, ...]:

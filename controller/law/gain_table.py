@@ -67,7 +67,7 @@ def span_of(model: Model, rows: Sequence[GainRow], rates: Rates) -> Span:
 
 
 def known_at(model: Model, depth_mm: FloatArray) -> tuple[TissueBounds, TissueBounds]:
-    """Tangent and damping with their intervals: the parameters' covariance carried through (delta method)."""
+    """Tangent and damping with their intervals: those of the parameters carried through (delta method)."""
     law, here = model.law, _tangent_and_damping(model.law, depth_mm)
     slopes = []
     for index, parameter in enumerate(law.parameters):
@@ -76,9 +76,9 @@ def known_at(model: Model, depth_mm: FloatArray) -> tuple[TissueBounds, TissueBo
         values = law.values
         values[index] += step
         slopes.append((_tangent_and_damping(law.from_values(values), depth_mm) - here) / step)
-    variances = np.einsum("pkr,pq,qkr->kr", np.array(slopes), model.covariance, np.array(slopes))
-    reach = _reach(model) * np.sqrt(np.maximum(variances, 0.0))
-    low, high = np.maximum(here - reach, 0.0), here + reach
+    squares = np.einsum("pkr,pq,qkr->kr", np.array(slopes), _reaches(model), np.array(slopes))
+    reach = np.sqrt(np.maximum(squares, 0.0))
+    low, high = np.where(here - reach > STEP * here, here - reach, 0.0), here + reach  # slopes are as exact as STEP
     return TissueBounds(depth_mm, here[0], low[0], high[0]), TissueBounds(depth_mm, here[1], low[1], high[1])
 
 
@@ -86,11 +86,13 @@ def _tangent_and_damping(law: Law, depth_mm: FloatArray) -> FloatArray:
     return np.array([law.tangent_stiffness(depth_mm), law.damping(depth_mm)])
 
 
-def _reach(model: Model) -> float:
-    """How many standard errors the model's intervals reach from their middle."""
-    halves = {name: 0.5 * (high - low) for name, (low, high) in model.intervals.items()}
-    errors = {name: error for name, error in model.standard_errors.items() if error > 0 and name in halves}
-    return max((halves[name] / error for name, error in errors.items()), default=0.0)
+def _reaches(model: Model) -> FloatArray:
+    """The covariance, with how far each parameter's interval reaches to its farther side for its standard error."""
+    sides = [max(abs(bound - p.value) for bound in model.intervals[p.name]) for p in model.law.parameters]
+    errors = np.sqrt(np.diag(model.covariance))
+    products = np.outer(errors, errors)
+    correlation = np.divide(model.covariance, products, out=np.eye(len(errors)), where=products > 0)
+    return np.asarray(correlation * np.outer(sides, sides))
 
 
 def _refuse_flat(depths_mm: Sequence[float], forces: Sequence[float], tangents: Sequence[float]) -> None:
@@ -119,5 +121,5 @@ def _refuse_stiff(tangent: TissueBounds, rates: Rates) -> None:
     if tangent.high[at] > limit:
         raise UsageError(
             f"at {tangent.depth_mm[at]:.3g} mm the tissue may have {tangent.high[at]:.3g} N/mm, above the"
-            f" {limit:g} N/mm up to which the force limit holds with this sensor: track lower forces"
+            f" {limit:g} N/mm up to which the force limit holds with this sensor: fit trials that press less deep"
         )

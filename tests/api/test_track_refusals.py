@@ -11,8 +11,10 @@ from api.cli.app import build
 from api.cli.demo import forces_within
 from controller.law.gain_table import DampingUnknown
 from mock_devices.testing.models import index_model
+from rig.config.calibration_files import text_of
 from rig.config.wiring import Wiring
 from rig.errors import SafetyStop, UsageError
+from tests.calibrations import axis_dynamics
 
 runner = CliRunner()
 
@@ -82,6 +84,28 @@ def test_a_threshold_session_is_refused_before_any_device_is_opened(arguments: s
     answer = runner.invoke(build("threshold"), ["threshold", "--model", "model.json", *arguments.split()])
     assert isinstance(answer.exception, UsageError), answer.exception
     assert sentence in str(answer.exception)
+
+
+@pytest.mark.parametrize("command", ["track --force 1", "threshold --up-to 5"])
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        ("axis.port=/dev/ttyACM0", "no dynamics of the axis at /dev/ttyACM0: run `rig calibrate axis --dynamics`"),
+        ("calibration.dynamics=elsewhere.json", "of EPOS4 A1 were identified on lab-7-0badcafe, this is "),
+    ],
+)
+def test_an_axis_that_was_not_identified_here_is_refused_before_it_homes(
+    command: str, setting: str, sentence: str, tmp_path: Path
+) -> None:
+    elsewhere = axis_dynamics().model_copy(update={"computer": "lab-7-0badcafe"})
+    (tmp_path / "elsewhere.json").write_text(text_of(elsewhere))
+    name, *options = command.split()
+    asked = [name, "--model", "model.json", *options, "--out", "session", "--set", setting]
+    answer = runner.invoke(build(name), asked)
+    assert isinstance(answer.exception, UsageError), answer.exception
+    assert sentence in str(answer.exception)
+    assert answer.exception.exit_code == 2
+    assert not (tmp_path / "session").exists()
 
 
 def test_a_table_that_was_interrupted_while_learning_is_refused_with_the_folder_in_its_way(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.control import laws, rival_law, wire, wire_programs, wire_report
-from benchmarks.control.cases import Asked
+from benchmarks.control.cases import LIMB_MM, Asked
 from benchmarks.control.laws import LAW
 from benchmarks.control.plants import PLANT, limb_of, model_of, wiring_of
 from benchmarks.control.rival_process import ConstantLaw
@@ -124,6 +124,20 @@ def test_a_subject_on_whom_only_one_law_was_measured_does_not_count() -> None:
     assert list(wire_report.gains(parts()[:1])) == []
 
 
+def test_what_was_not_played_on_every_subject_confirms_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    sentences = wire_report.show(parts())
+    assert "limb 2 Hz, 0.5 N: measured on 2 of 5 subjects" in sentences
+    assert "jumps: measured on 0 of 5 subjects" in sentences
+    assert "contact, 0 mm/s: measured on 0 of 5 subjects" in sentences
+    assert "NOT CONFIRMED: low jumps: measured on 0 of 5 subjects" in capsys.readouterr().out
+    whole = [
+        WiredPart(part=part, found=tuple(Wired(case=case, bench=1.0, simulated=1.0) for case in cases), missed=0)
+        for part in wire.parts(1)
+        for cases in ([*GAINS] if part.kind == "limb" else [f"{part.kind}, x{part.stiffness:g}"],)
+    ]
+    assert wire_report.lacking(whole) == []
+
+
 def test_a_measurement_goes_on_where_its_file_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file, asked = tmp_path / "wire.jsonl", []
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
@@ -154,3 +168,15 @@ def test_the_tissue_on_the_bench_is_as_many_times_as_stiff(tmp_path: Path) -> No
     assert force_N == pytest.approx(float(stiff.force_N[300]), rel=1e-6)
     assert wiring.mock.hide == ()
     assert len(wire.wiring_of(LIMB, tmp_path).mock.hide) == 2
+
+
+def test_no_part_needs_more_depth_than_the_bench_allows(tmp_path: Path) -> None:
+    """A jump of 1 N may pass its level by a tenth of a newton; beyond the limit the bench would stop each time."""
+    for part in wire.parts(1):
+        allowed_mm = wire.wiring_of(part, tmp_path).limits.depth_mm
+        limb = limb_of(model_of(part.subject), part.stiffness)
+        line, _ = wire_programs.simulated_line(
+            part.kind, wire_programs.program(part.kind, model_of(part.subject), wiring_of(PLANT))
+        )
+        deepest_mm = float(np.interp(max(line.forces_N) + 0.1, limb.force_N, limb.depth_mm))
+        assert deepest_mm + 2 * LIMB_MM * (part.kind == "limb") < allowed_mm, part

@@ -5,21 +5,26 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from controller.commissioning.refusals import refuse_uncalibrated, refuse_uncommissioned
-from controller.loop.steps import Approach, Program, Retract, Zero
+from controller.law.inverse_model import GainRow
+from controller.loop.steps import Approach, Program, Retract, TrackForce, Zero
 from drivers.roles import Identity
+from rig.config.axis_dynamics import AxisDynamics
 from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration, Uncertainty
 from rig.config.force_map import ForceMap
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
-from tests.calibrations import axis_calibration, force_calibration
+from tests.calibrations import axis_calibration, axis_dynamics, force_calibration
 from tests.controller.fake_bench import FakeBench, wired
 
 NOW = datetime(2026, 3, 1, 9, 0, tzinfo=UTC)
 SENSOR, DRIVE = Identity("BFT-SENS-SER-M8", "000271", "1.0.6"), Identity("EPOS4", "A1", "0x0170")
 ZERO, APPROACH = Zero(duration_s=0.2), Approach(speed_mm_s=5.0, contact_force_N=0.05, search_to_mm=40.0)
 PRESSES = Program(name="press", steps=(ZERO, APPROACH))
+GAINS = tuple(GainRow(force_N=at, depth_mm=at, tangent_N_mm=1.0, damping_N_s_mm=0.01) for at in (0.0, 5.0))
+LAW = TrackForce(times_s=(0.0, 1.0), forces_N=(1.0, 1.0), gains=GAINS, crossover_rad_s=60.0)
+TRACKS = Program(name="track", steps=(ZERO, APPROACH, LAW))
 LEAVES = Program(name="leave", steps=(Retract(clearance_mm=5.0, speed_mm_s=10.0),))
 OF_FORCE = force_calibration(date=NOW)
 OF_AXIS = axis_calibration(date=NOW)
@@ -116,6 +121,29 @@ def test_a_wiring_that_contradicts_the_force_calibration_is_refused(force: dict[
 def test_a_wiring_that_contradicts_the_axis_calibration_is_refused(axis: Epos4Wiring) -> None:
     with pytest.raises(UsageError, match=r"the axis was calibrated with 2000 and 1"):
         refused(wiring(of_axis=OF_AXIS, axis=axis))
+
+
+@pytest.mark.parametrize(
+    ("dynamics", "sentence"),
+    [
+        (None, "track refused before moving: no dynamics of EPOS4 A1: run `rig calibrate axis --dynamics`"),
+        (axis_dynamics(date=NOW, serial="A2"), "calibration.dynamics is of EPOS4 A2, but EPOS4 A1 answered"),
+        (axis_dynamics(date=NOW).model_copy(update={"computer": "lab-7-0badcafe"}), "identified on lab-7-0badcafe"),
+    ],
+)
+def test_no_force_loop_runs_on_an_axis_that_was_not_identified_here(
+    dynamics: AxisDynamics | None, sentence: str
+) -> None:
+    known = wiring().calibration.model_copy(update={"of_dynamics": dynamics})
+    found = wiring().model_copy(update={"calibration": known})
+    with pytest.raises(UsageError, match=sentence):
+        refused(found, TRACKS)
+    refused(found)  # a capture closes no force loop
+
+
+def test_a_force_loop_runs_on_an_axis_that_was_identified_here() -> None:
+    known = wiring().calibration.model_copy(update={"of_dynamics": axis_dynamics(date=NOW)})
+    refused(wiring().model_copy(update={"calibration": known}), TRACKS)
 
 
 def test_the_loop_itself_refuses_and_stays_idle() -> None:

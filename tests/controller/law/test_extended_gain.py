@@ -57,6 +57,7 @@ def rms_error_N(model: Model, in_time: bool = True) -> float:
 def test_a_model_that_knows_the_friction_tracks_better_than_one_that_does_not() -> None:
     plain = replace(index_model(0.12, 0.22, 0.01, force_N=8.0), law=Index(**LIMB))
     law = Extended(**LIMB, friction_N=FRICTION["level_N"], friction_length_mm=FRICTION["slip_length_mm"])
-    knowing = replace(plain, law=law, covariance=np.zeros((len(law.values), len(law.values))))
+    known = {p.name: (p.value, p.value) for p in law.parameters}
+    knowing = replace(plain, law=law, covariance=np.zeros((len(law.values), len(law.values))), intervals=known)
     assert rms_error_N(knowing) < 0.8 * rms_error_N(plain)
     assert rms_error_N(knowing) < 0.4 * rms_error_N(knowing, in_time=False)

@@ -63,6 +63,15 @@ def test_a_model_that_knows_less_has_a_wider_span() -> None:
     assert span.damping == pytest.approx((0.6, 1.4), abs=1e-6)
 
 
+def test_each_parameter_reaches_as_far_as_its_own_interval() -> None:
+    """Stiffness by 2 standard errors of 0.6, damping by 3 of 0.002."""
+    model = uncertain(index_model(2.0, 0.0, 0.01), a_N_mm=0.6, damping_N_s_mm=0.002)
+    model = replace(model, intervals={**model.intervals, "damping_N_s_mm": (0.004, 0.016)})
+    span = span_of(model, gain_rows(model, depths(model)), FAST)
+    assert span.stiffness == pytest.approx((0.4, 2.0), abs=1e-6)
+    assert span.damping == pytest.approx((0.4, 1.6), abs=1e-6)
+
+
 def test_a_model_without_tangent_stiffness_is_refused_with_the_depth() -> None:
     flat = index_model(0.12, 0.22, 0.01)
     with pytest.raises(UsageError, match=r"tangent stiffness at -1 mm is 0 N/mm; gains need it above 0"):
@@ -79,6 +88,24 @@ def test_a_damping_whose_interval_reaches_zero_is_refused_with_the_interval() ->
     model = uncertain(index_model(0.12, 0.22, 0.01), damping_N_s_mm=0.006)
     with pytest.raises(UsageError, match=r"damping is 0\.01 N s/mm, 0 to 0\.022; .* its whole interval"):
         span_of(model, gain_rows(model, depths(model)), FAST)
+
+
+@pytest.mark.parametrize("standard_error", [0.002, 0.0])
+@pytest.mark.parametrize("interval", [(0.0, 0.012), (-0.001, 0.011)])
+def test_an_interval_that_reaches_zero_on_one_side_is_refused_whatever_the_standard_error(
+    standard_error: float, interval: tuple[float, float]
+) -> None:
+    model = uncertain(index_model(0.12, 0.22, 0.01), damping_N_s_mm=standard_error)
+    model = replace(model, intervals={**model.intervals, "damping_N_s_mm": interval})
+    with pytest.raises(UsageError, match=r"damping is 0\.01 N s/mm, 0 to 0\.02"):
+        span_of(model, gain_rows(model, depths(model)), FAST)
+
+
+def test_of_tissue_too_stiff_where_it_is_deep_trials_that_press_less_deep_make_a_model_to_track_with() -> None:
+    deep, less_deep = index_model(0.5, 0.2, 0.03, force_N=80.0), index_model(0.5, 0.2, 0.03, force_N=30.0)
+    with pytest.raises(UsageError, match=r"above the 20 N/mm .*: fit trials that press less deep"):
+        span_of(deep, gain_rows(deep, depths(deep)), FAST)
+    span_of(less_deep, gain_rows(less_deep, depths(less_deep)), FAST)
 
 
 @pytest.mark.parametrize(("rates", "limit"), [(FAST, 20), (SLOW, 10)], ids=["1 kHz", "100 Hz"])

@@ -22,7 +22,8 @@ MODEL = index_model(0.12, 0.22, 0.01)
 def test_the_law_follows_the_tangent_of_any_tissue_that_is_stiff_at_contact_and_damped(law: Law) -> None:
     valid = ValidRange(depth_mm=float(law.depth(10.0)), force_N=10.0, speeds_mm_s=(5.0,))
     size = len(law.values)
-    model = replace(MODEL, law=law, valid=valid, covariance=np.zeros((size, size)))
+    known = {p.name: (p.value, p.value) for p in law.parameters}
+    model = replace(MODEL, law=law, valid=valid, covariance=np.zeros((size, size)), intervals=known)
     if law.name in SOFT_AT_CONTACT:
         with pytest.raises(UsageError, match=r"tangent stiffness at 0 mm is 0 N/mm; .*--model index"):
             force_law(model, built_in())
