@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from api.cli.mock_bench import bench_process
 from benchmarks.about import head
 from controller.devices.drivers import open_force
-from controller.loop.executive import AHEAD, Cycle, Executive, sleep_then_spin
+from controller.loop.executive import Cycle, Executive, sleep_then_spin
 from controller.loop.phase_lock import PhaseLock
 from controller.loop.realtime import acquire, spin_ns
 from drivers.robotiq.codec import FRAME_NS, to_counts
@@ -142,9 +142,7 @@ def measured(product: str, load: str, seconds: float, priority: int) -> Row:
         granted = acquire(priority)
         sensor.start()
         listening = Listening(sensor, control, role, seconds)
-        Executive(sleep=sleep_then_spin(min(spin_ns(granted), round(AHEAD * PERIOD_NS)))).run(
-            listening, listening.phase
-        )
+        Executive(sleep=sleep_then_spin(spin_ns(granted))).run(listening, listening.phase)
     samples = listening.samples
     return row(product, load, round(seconds * config.sampled_Hz), samples, truths_ns(product, samples, listening.taken))
 
