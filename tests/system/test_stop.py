@@ -5,6 +5,8 @@ import json
 import os
 import signal
 import struct
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -15,6 +17,7 @@ import pytest
 
 from api.cli.mock_bench import plug_into
 from api.cli.options import built_in
+from api.cli.serve import NICE
 from controller.stop.start import SENTENCE
 from controller.stop.word import NOT_CONFIRMED, Deed, StopReason
 from controller.supervisor import Supervisor
@@ -77,6 +80,23 @@ def test_with_the_service_suspended_a_press_is_confirmed_and_the_tip_leaves(
     assert (status, again["id"], again["confirmed"]) == (200, said["id"] + 1, True)
     freed(bench)
     assert asked(served.stop_port, "/estop")[1]["done"] == "braked"
+
+
+def granted(nice: int) -> bool:
+    """Whether this account may go first: tried by a process of its own."""
+    trial = f"import os; os.setpriority(os.PRIO_PROCESS, 0, {nice})"
+    return not subprocess.run([sys.executable, "-c", trial], stderr=subprocess.DEVNULL, check=False).returncode
+
+
+def test_a_press_at_the_services_own_address_goes_before_its_clients(served: ServedRig) -> None:
+    expected = NICE if granted(NICE) else os.getpriority(os.PRIO_PROCESS, 0)
+    assert {os.getpriority(os.PRIO_PROCESS, pid) for pid in threads(served.running.process.pid)} == {expected}
+    status, said = asked(served.port, "/api/v1/estop")
+    assert (status, said["detail"]) == (200, "braked")
+
+
+def threads(pid: int) -> list[int]:
+    return [int(each.name) for each in Path(f"/proc/{pid}/task").iterdir()]
 
 
 def test_with_the_service_killed_a_press_is_confirmed_and_the_process_ends_with_the_loop(

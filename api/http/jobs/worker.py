@@ -127,7 +127,7 @@ def main() -> None:
     pipes = Pipes(sys.stdin, outgoing)
     order = Order.model_validate_json(sys.stdin.readline())
     if not order.stop_word:  # a drive waits for nobody
-        os.nice(NICENESS)
+        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)  # whatever the service's own is
     threading.Thread(target=pipes.listen, name="service", daemon=True).start()
     compute(order, pipes)
 

@@ -253,7 +253,7 @@ def main(arguments: list[str]) -> int:
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     settings = AwaySettings.model_validate_json(arguments[0])
-    os.nice(NICE)
+    os.setpriority(os.PRIO_PROCESS, 0, NICE)  # whatever the service's own is
     tls = tls_context(*settings.files) if settings.files else None
     listeners = [socket.socket(fileno=int(fd)) for fd in arguments[1:]]
     try:

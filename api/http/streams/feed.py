@@ -2,8 +2,9 @@
 
 import asyncio
 import contextlib
+import itertools
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -18,6 +19,8 @@ from rig.recording.slots import Slots, texts_of
 from rig.recording.tap import RingTap
 
 PERIOD_S = 0.04
+# Followers are woken one part after another over the period: no stop waits while fifty of them are served.
+PARTS = 10
 # Two seconds of the bench, which take a few milliseconds.
 MOST_SLOTS = 8192
 # A loop that has published nothing for this many turns, 0.2 s, is not within a cycle: it has ended.
@@ -47,7 +50,7 @@ class Feed:
         self._followed: RunningBench | None = None
         self._tap: RingTap | None = None
         self._fruitless = 0
-        self._turn = asyncio.Event()
+        self._turns, self._places = [asyncio.Event() for _ in range(PARTS)], itertools.cycle(range(PARTS))
         self.now_ns = time.monotonic_ns()
         """When the newest turn began: all clients see the same moment."""
         self.run = LiveRun(wiring)
@@ -56,16 +59,23 @@ class Feed:
         """Goes on until it is cancelled."""
         try:
             while True:
+                began_s = time.monotonic()
                 self._try_step()
-                turn, self._turn = self._turn, asyncio.Event()
-                turn.set()
-                await asyncio.sleep(PERIOD_S)
+                for place, turn in enumerate(self._turns):
+                    self._turns[place] = asyncio.Event()
+                    turn.set()
+                    await asyncio.sleep(began_s + (place + 1) * PERIOD_S / PARTS - time.monotonic())
         finally:
             self._let_go()
 
-    async def turn(self) -> None:
-        """Waits until there may be something new."""
-        await self._turn.wait()
+    def follower(self) -> Callable[[], Awaitable[None]]:
+        """Waits until there may be something new, once a period; each follower has its place within that."""
+        place = next(self._places)
+
+        async def turn() -> None:
+            await self._turns[place].wait()
+
+        return turn
 
     @property
     def missed(self) -> int:

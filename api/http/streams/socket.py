@@ -51,7 +51,7 @@ async def _served(socket: WebSocket, streams: Streams) -> None:
     with contextlib.suppress(WebSocketDisconnect, WebSocketDisconnected), contextlib.closing(client):
         await _said(socket, client.hello())
         turn = asyncio.Lock()
-        sending = _send(socket, client, turn, streams.feed.turn)
+        sending = _send(socket, client, turn, streams.feed.follower())
         try:
             await _first(sending, _take(socket, client, turn), _entitled(socket.scope[ENTITLED]))
         except PermissionError as ended:

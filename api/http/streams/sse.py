@@ -43,7 +43,7 @@ async def told(feed: Feed, session_id: str, last: int, entitled: Callable[[], bo
     except EventsLost as lost:
         yield _gap(last + 1, lost.oldest - 1)
         last = lost.oldest - 1
-    silent_s = checked_s = 0.0
+    silent_s, checked_s, turn = 0.0, 0.0, feed.follower()
     while checked_s < RECHECK_S or entitled():
         checked_s = PERIOD_S if checked_s >= RECHECK_S else checked_s + PERIOD_S
         try:
@@ -57,7 +57,7 @@ async def told(feed: Feed, session_id: str, last: int, entitled: Callable[[], bo
         if silent_s >= SILENCE_S:
             silent_s = 0.0
             yield ": nothing new\n\n"
-        await feed.turn()
+        await turn()
 
 
 def _gap(first: int, last: int) -> str:

@@ -80,6 +80,12 @@ def talkative(operation: Operation, _asked: VerifyParams, _desk: Desk) -> Verify
     return WHOLE
 
 
+def nice(operation: Operation, _asked: VerifyParams, _desk: Desk) -> VerifyResult:
+    """Says at what priority it computes."""
+    operation.say(f"nice {os.getpriority(os.PRIO_PROCESS, 0)}")
+    return WHOLE
+
+
 def asking(operation: Operation, _asked: VerifyParams, desk: Desk) -> VerifyResult:
     """Needs a person twice."""
     for load in ("1 N", "2 N"):

@@ -1,12 +1,14 @@
 """What only computes runs in a process of its own: it can be cancelled, it may die, and the service goes on."""
 
 import json
+import os
 import time
 from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
 
+from api.cli.serve import NICE, go_at
 from api.http.jobs import process
 from api.http.service import Service
 from mock_devices.testing.commands import until
@@ -55,6 +57,19 @@ def test_a_report_is_a_file_of_its_session(client: TestClient, first: Path) -> N
     (page,) = done["files"]
     assert (page["name"], page["href"]) == ("report.html", "/api/v1/recordings/first/report.html")
     assert client.get(page["href"]).content == (first / "report.html").read_bytes()
+
+
+def test_what_computes_stands_back_though_the_service_goes_first(
+    client: TestClient, service: Service, first: Path
+) -> None:
+    planted(service, "nice")
+    before = os.getpriority(os.PRIO_PROCESS, 0)
+    go_at(NICE)
+    try:
+        done = ended(client, begun(client, "verify", session=first.name))
+    finally:
+        go_at(before)
+    assert done["log"] == ["nice 5"]
 
 
 @pytest.mark.parametrize(("function", "longest_s"), [("patient", 20.0), ("deaf", 40.0)])
