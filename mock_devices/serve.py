@@ -253,6 +253,10 @@ def _be_prompt(priority: int) -> None:
         return
     # What the computer puts aside of a bench that rested is read again from a disk others write to: 0.45 s were seen.
     lock_memory()
+    cores = os.sched_getaffinity(0)
+    # A device has a processor of its own: on the core that the loop takes, the last, a sample waits for a gap of its.
+    if len(cores) > 1:
+        os.sched_setaffinity(0, cores - {max(cores)})
     if refused := ask_fifo(priority):
         sys.stderr.write(f"bench: runs without real-time priority {priority} ({refused})\n")
 

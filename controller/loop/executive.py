@@ -137,10 +137,11 @@ class Executive:
 
     def _look(self, work: Work, phase: PhaseLock, due_ns: int) -> int:
         """Looks at the force sensor until its sample is there or the time is over; when it last looked."""
-        looked_ns = self._now()
+        looked_ns, looks = self._now(), 1
         work.take_force(looked_ns)
         while looked_ns < (until_ns := phase.patience_ns(due_ns)):
             self._rest(until_ns)
-            looked_ns = self._now()
+            looked_ns, looks = self._now(), looks + 1
             work.take_force(looked_ns)
+        phase.looked(looks)
         return looked_ns
