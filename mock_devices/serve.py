@@ -255,8 +255,7 @@ def _be_prompt(priority: int) -> None:
     lock_memory()
     cores = os.sched_getaffinity(0)
     # A device has a processor of its own: on the core that the loop takes, the last, a sample waits for a gap of its.
-    if len(cores) > 1:
-        os.sched_setaffinity(0, cores - {max(cores)})
+    os.sched_setaffinity(0, cores - {max(cores)} or cores)
     if refused := ask_fifo(priority):
         sys.stderr.write(f"bench: runs without real-time priority {priority} ({refused})\n")
 

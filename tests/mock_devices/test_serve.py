@@ -410,3 +410,9 @@ def test_a_turn_that_is_held_up_before_it_looks_at_the_clock_hears_all_that_came
     monkeypatch.setattr(wire, "read", read)
     assert len(told.heard_ns) == 50
     assert np.diff(told.heard_ns) == pytest.approx(2_000_000, abs=300_000)
+
+
+def test_a_bench_keeps_off_the_core_that_the_loop_takes_first() -> None:
+    cores = os.sched_getaffinity(0)
+    with served_bench() as bench:
+        assert os.sched_getaffinity(bench.endpoints.pid) == (cores - {max(cores)} or cores)
