@@ -4,6 +4,7 @@ import threading
 from pathlib import Path
 
 from api.http.models import ProtocolView
+from api.http.shared_file import FileState, file_state
 from controller.experiments.capture import check
 from rig.config.protocol import Indentation
 from rig.config.table import load
@@ -11,7 +12,6 @@ from rig.config.wiring import Wiring
 from rig.errors import RigError
 
 MARK = 'kind = "indentation"'
-Stamp = tuple[int, int, int]
 
 
 class ProtocolShelf:
@@ -19,7 +19,7 @@ class ProtocolShelf:
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._lock = folder, threading.Lock()
-        self._known: dict[Path, tuple[Stamp, Wiring, ProtocolView | None]] = {}
+        self._known: dict[Path, tuple[FileState | None, Wiring, ProtocolView | None]] = {}
 
     def listed(self, wiring: Wiring) -> list[ProtocolView]:
         """Every protocol, also those that this bench refuses or that cannot be read."""
@@ -28,19 +28,14 @@ class ProtocolShelf:
             return [view for view in found if view]
 
     def _view(self, path: Path, wiring: Wiring) -> ProtocolView | None:
-        stamp = _stamp(path)
+        try:
+            state = file_state(path)
+        except OSError as error:
+            return _unreadable(path, error)
         known = self._known.get(path)
-        if known is None or known[:2] != (stamp, wiring):
-            known = self._known[path] = (stamp, wiring, _read(path, wiring))
+        if known is None or known[:2] != (state, wiring):
+            known = self._known[path] = (state, wiring, _read(path, wiring))
         return known[2]
-
-
-def _stamp(path: Path) -> Stamp:
-    try:
-        now = path.stat()
-    except OSError:
-        return 0, 0, 0
-    return now.st_mtime_ns, now.st_size, now.st_ino
 
 
 def _read(path: Path, wiring: Wiring) -> ProtocolView | None:
@@ -48,7 +43,7 @@ def _read(path: Path, wiring: Wiring) -> ProtocolView | None:
     try:
         marked = MARK in path.read_text(errors="replace")
     except OSError as error:
-        return _refused(path, f"{path}: cannot be read: {error.strerror}")
+        return _unreadable(path, error)
     try:
         plan = load(Indentation, path)
     except RigError as error:
@@ -59,6 +54,10 @@ def _read(path: Path, wiring: Wiring) -> ProtocolView | None:
     except RigError as error:
         return view.model_copy(update={"settings": {}, "refusal": str(error)})
     return view
+
+
+def _unreadable(path: Path, error: OSError) -> ProtocolView:
+    return _refused(path, f"{path}: cannot be read: {error.strerror}")
 
 
 def _refused(path: Path, why: str) -> ProtocolView:

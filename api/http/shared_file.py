@@ -6,16 +6,19 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-FileState = tuple[int, int, int]
+FileState = tuple[int, int, int, int]
 
 
 def file_state(path: Path) -> FileState | None:
-    """Tells one state of the file from the next, written on or put anew; None where there is no file."""
+    """Tells one state of the file from the next, written on or put anew; None where there is no file.
+
+    Of a folder, by its links, also where some of its folders come and others go within one tick of the file system.
+    """
     try:
         found = path.stat()
     except FileNotFoundError:
         return None
-    return found.st_ino, found.st_mtime_ns, found.st_size
+    return found.st_ino, found.st_mtime_ns, found.st_size, found.st_nlink
 
 
 @contextlib.contextmanager

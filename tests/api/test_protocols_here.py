@@ -35,3 +35,13 @@ def test_an_installed_program_has_those_that_were_packed_with_it(
     (packed / "quick.toml").write_bytes((ROOT / "examples" / "quick.toml").read_bytes())
     monkeypatch.setattr(options, "__file__", str(tmp_path / "site-packages" / "api" / "cli" / "options.py"))
     assert shown() == ["quick"]
+
+
+def test_links_that_lead_nowhere_or_to_themselves_are_listed_with_why_and_hide_no_other(tmp_path: Path) -> None:
+    (tmp_path / "good.toml").write_text('kind = "indentation"\ndepth_mm = 5\n')
+    for name, leads_to in (("gone", "nowhere.toml"), ("round", "round.toml")):
+        (tmp_path / f"{name}.toml").symlink_to(leads_to)
+    found = {view.name: view.refusal for view in ProtocolShelf(tmp_path).listed(Wiring())}
+    assert found.keys() == {"good", "gone", "round"} and found["good"] == ""
+    assert "cannot be read: No such file or directory" in found["gone"]
+    assert "cannot be read: Too many levels of symbolic links" in found["round"]

@@ -13,6 +13,7 @@ from api.http.jobs.job import stamp
 from api.http.jobs.kept import RECORD
 from api.http.jobs.views import FILES, JobView
 from api.http.models import JobProblem, JobSummary
+from api.http.shared_file import FileState, file_state
 from rig.errors import RigError
 from rig.recording.files import make_folder, write_text
 
@@ -33,7 +34,7 @@ class JobStore:
         self._now_s = steady_s()
         self._ended_s: dict[str, float] = {}
         """When those ended that this service has seen."""
-        self._looked: tuple[int, int] | None = None
+        self._looked: FileState | None = None
 
     def folder(self, identifier: str) -> Path:
         """That of one job."""
@@ -78,12 +79,8 @@ class JobStore:
 
     def changed(self) -> bool:
         """Whether folders of jobs came or went since this was asked last, by whatever program."""
-        now = None
-        with contextlib.suppress(FileNotFoundError):
-            found = self.root.stat()
-            now = found.st_mtime_ns, found.st_nlink
-        before, self._looked = self._looked, now
-        return now != before
+        before, self._looked = self._looked, file_state(self.root)
+        return self._looked != before
 
     def _loaded(self, folder: Path) -> JobSummary | None:
         lock = folder / LOCK
