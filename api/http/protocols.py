@@ -40,6 +40,8 @@ class ProtocolShelf:
 
 def _read(path: Path, wiring: Wiring) -> ProtocolView | None:
     """None of a file that is no protocol and does not say it is: a wiring, a mapping."""
+    if path.is_fifo() or path.is_char_device():  # whose end does not come
+        return _refused(path, f"{path}: is no file")
     try:
         marked = MARK in path.read_text(errors="replace")
     except OSError as error:
