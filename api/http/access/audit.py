@@ -64,13 +64,13 @@ class AuditLog:
         fd = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
             fcntl.flock(fd, fcntl.LOCK_EX)
-            seq, before = _last(fd)
+            seq, before, end = _last(fd)
             line = AuditLine(
                 seq=seq + 1, time=self._now().isoformat(timespec="milliseconds"), who=caller.name if caller else "",
                 credential=f"{caller.by} {caller.id}".strip() if caller else "", what=what[:300], outcome=outcome[:300],
                 before=before,
             )  # fmt: skip
-            os.write(fd, line.model_dump_json().encode() + b"\n")
+            os.write(fd, end + line.model_dump_json().encode() + b"\n")
         finally:
             os.close(fd)
 
@@ -108,13 +108,13 @@ class AuditLog:
         return found
 
 
-def _last(fd: int) -> tuple[int, str]:
-    """Number and SHA-256 of the last line."""
-    size = os.fstat(fd).st_size
-    lines = os.pread(fd, TAIL_BYTES, max(size - TAIL_BYTES, 0)).splitlines()
-    if not lines:
-        return 0, FIRST
-    try:
-        return int(json.loads(lines[-1])["seq"]), hashlib.sha256(lines[-1]).hexdigest()
-    except (ValueError, KeyError, TypeError):  # a line cut short by a power failure
-        return len(lines), hashlib.sha256(lines[-1]).hexdigest()
+def _last(fd: int) -> tuple[int, str, bytes]:
+    """Number and SHA-256 of the last line, and what ends it where a power failure or a full disk cut it."""
+    tail = os.pread(fd, TAIL_BYTES, max(os.fstat(fd).st_size - TAIL_BYTES, 0))
+    lines = tail.splitlines()
+    before = hashlib.sha256(lines[-1]).hexdigest() if lines else FIRST
+    end = b"" if tail.endswith(b"\n") or not tail else b"\n"
+    for behind, line in enumerate(reversed(lines)):
+        with contextlib.suppress(ValueError, KeyError, TypeError):
+            return int(json.loads(line)["seq"]) + behind, before, end
+    return len(lines), before, end

@@ -12,7 +12,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from api.catalogue.pages import Page
 from api.http.access import limits
-from api.http.access.audit import AuditLog
+from api.http.access.audit import TAIL_BYTES, AuditLog
 from api.http.access.limits import Rate, RateLimits
 from api.http.access.rights import OPERATE
 from api.http.access.scopes import Caller, Scope
@@ -77,13 +77,27 @@ def test_a_line_that_was_changed_taken_or_moved_shows(log: AuditLog, spoil: str,
     assert log.broken() == found
 
 
-def test_after_a_line_that_a_power_failure_cut_it_goes_on(log: AuditLog) -> None:
+@pytest.mark.parametrize("end", ["", "\n"])
+def test_after_a_line_that_a_power_failure_cut_it_goes_on(log: AuditLog, end: str) -> None:
     log.add(ANN, "a", "200").result()
     with log.path.open("a") as file:
-        file.write('{"seq": 2, "ti\n')
-    log.add(ANN, "b", "200").result()
-    assert [line.what for line in log.newest(Page())[0]] == ["b", "a"]
+        file.write(f'{{"seq": 2, "ti{end}')
+    for what in "bc":
+        log.add(ANN, what, "200").result()
+    assert [(line.seq, line.what) for line in log.newest(Page())[0]] == [(4, "c"), (3, "b"), (1, "a")]
     assert log.broken() == [2]
+
+
+def test_after_a_cut_line_a_log_longer_than_what_is_looked_at_counts_on(log: AuditLog) -> None:
+    for _ in range(250):
+        log.add(ANN, "x" * 300, "200")
+    log.settle()
+    assert log.path.stat().st_size > TAIL_BYTES
+    with log.path.open("a") as file:
+        file.write('{"seq": 251, "ti')
+    log.add(ANN, "b", "200").result()
+    assert log.newest(Page(1))[0][0].seq == 252
+    assert log.broken() == [251]
 
 
 def test_a_full_disk_is_told_and_keeps_nobody(
