@@ -39,8 +39,7 @@ class KeptAnswer(BaseModel):
 def read_answers(file: Path) -> dict[str, KeptAnswer]:
     """The last line of each place counts; one that was not written whole is none."""
     found: dict[str, KeptAnswer] = {}
-    lines = file.read_text(encoding="utf-8", errors="replace").splitlines() if file.is_file() else []
-    for line in lines:
+    for line in file.read_bytes().splitlines() if file.is_file() else []:  # names may hold what else ends lines of text
         with contextlib.suppress(ValidationError):
             answer = KeptAnswer.model_validate_json(line)
             found[answer.place] = answer

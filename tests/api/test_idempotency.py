@@ -185,6 +185,17 @@ def test_answers_of_which_the_file_was_removed_are_known_until_the_end(tmp_path:
     assert store.begin("p", b"x")
 
 
+@pytest.mark.parametrize("end_of_line", ["\x85", "\u2028", "\u2029", "\r\n"])
+def test_an_answer_to_a_name_with_an_end_of_a_line_in_it_outlasts_the_service(
+    tmp_path: Path, store: AnswerStore, end_of_line: str
+) -> None:
+    place = f"Ann{end_of_line}of the lab /api/v1/jobs key"
+    store.begin(place, b"x")
+    store.end(place, Response(b"{}", 202))
+    found = AnswerStore(tmp_path / "answers.jsonl", Clock().seconds).begin(place, b"x")
+    assert found and (found.place, found.status) == (place, 202)
+
+
 def test_a_line_that_was_cut_is_no_answer(tmp_path: Path, store: AnswerStore) -> None:
     store.begin("p", b"x")
     file = tmp_path / "answers.jsonl"
