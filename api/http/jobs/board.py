@@ -154,8 +154,7 @@ class JobBoard:
     def _changed(self, job: Job) -> None:
         """Keeps it, and tells everybody."""
         with self._lock:
-            with contextlib.suppress(RigError, OSError):  # a full disk stops no job
-                self._store.keep(self._view(job))
+            self._store.keep(self._view(job))
             self._publish(job)
             if job.ended:
                 self._live.pop(job.id, None)
@@ -174,7 +173,9 @@ class JobBoard:
 
     def _view(self, job: Job) -> JobView:
         session = None if job.asked.session is None else self._sessions / job.asked.session
-        return view(job, files_of(job, session, self._store.files(job.id)) if job.ended else [])
+        with contextlib.suppress(OSError):  # somebody removes a folder meanwhile
+            return view(job, files_of(job, session, self._store.files(job.id)) if job.ended else [])
+        return view(job, [])
 
     def _known(self) -> dict[str, JobSummary]:
         changed = self._store.changed()

@@ -229,8 +229,8 @@ def wrong_of(error: BaseException | None) -> Wrong | None:
     """For programs and for people."""
     if error is None:
         return None
-    if isinstance(error, SafetyStop):
-        return Wrong(error.code or "safety-stop", str(error))
-    code = next(code for kind, code in CODES.items() if isinstance(error, kind))
     text = str(error) if isinstance(error, RigError) else f"the job met an error of its own: {error!r}"
-    return Wrong(code, text)
+    detail = text.encode(errors="replace").decode()  # names on a disk need be no text
+    if isinstance(error, SafetyStop):
+        return Wrong(error.code or "safety-stop", detail)
+    return Wrong(next(code for kind, code in CODES.items() if isinstance(error, kind)), detail)

@@ -35,6 +35,8 @@ class JobStore:
         self._ended_s: dict[str, float] = {}
         """When those ended that this service has seen."""
         self._looked: FileState | None = None
+        self._unwritten: dict[str, bytes] = {}
+        """What the disk did not take."""
 
     def folder(self, identifier: str) -> Path:
         """That of one job."""
@@ -52,9 +54,13 @@ class JobStore:
         self._locks[identifier] = fd
 
     def keep(self, view: JobView) -> None:
-        """Writes it as it stands."""
-        make_folder(self.folder(view.id))
-        write_text(self.folder(view.id) / RECORD, view.model_dump_json())
+        """Writes it as it stands; a disk that takes nothing stops no job, and what it stands for is known meanwhile."""
+        text = view.model_dump_json()
+        self._unwritten[view.id] = text.encode()
+        with contextlib.suppress(RigError, OSError):
+            make_folder(self.folder(view.id))
+            write_text(self.folder(view.id) / RECORD, text)
+            del self._unwritten[view.id]
 
     def let_go(self, identifier: str) -> None:
         """The job has ended."""
@@ -62,10 +68,13 @@ class JobStore:
         fd = self._locks.pop(identifier, None)
         if fd is not None:
             os.close(fd)
-            (self.folder(identifier) / LOCK).unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # without its holder a lock that stays is none
+                (self.folder(identifier) / LOCK).unlink(missing_ok=True)
 
     def record(self, identifier: str) -> bytes | None:
         """The view of a job as JSON; None where there is none."""
+        if identifier in self._unwritten:
+            return self._unwritten[identifier]
         with contextlib.suppress(OSError):
             return (self.folder(identifier) / RECORD).read_bytes()
         return None
@@ -102,6 +111,7 @@ class JobStore:
         newest = sorted(jobs.values(), key=place, reverse=True)
         for job in newest[MOST_JOBS:]:
             del jobs[job.id]
+            self._unwritten.pop(job.id, None)
             shutil.rmtree(self.folder(job.id), ignore_errors=True)
         for job in newest[:MOST_JOBS]:
             folder = self.files(job.id)

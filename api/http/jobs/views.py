@@ -1,6 +1,9 @@
 """Jobs as what goes over the wire, and is kept of those that have ended."""
 
+import contextlib
 import mimetypes
+import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import cast
 from urllib.parse import quote
@@ -100,10 +103,16 @@ def _listed(folder: Path, href: str, prefix: str, since_ns: int) -> list[FileVie
             name=prefix + name, href=href + quote(name), bytes=found.st_size, media_type=media_type(name),
         )
         for path in paths
-        for found in (path.stat(),)
+        for found in _looks(path)
         for name in (path.relative_to(folder).as_posix(),)
         if found.st_mtime_ns >= since_ns and not path.name.startswith(".")
     ]  # fmt: skip
+
+
+def _looks(path: Path) -> Iterator[os.stat_result]:
+    """One, or none of what was removed meanwhile."""
+    with contextlib.suppress(FileNotFoundError):
+        yield path.stat()
 
 
 def media_type(name: str) -> str:

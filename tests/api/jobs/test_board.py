@@ -4,6 +4,7 @@ import json
 import os
 import threading
 import time
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from api.catalogue.pages import Page
-from api.http.jobs import board, store
+from api.http.jobs import board, store, views
 from api.http.jobs import job as job_module
 from api.http.jobs.board import Filter, JobBoard
 from api.http.jobs.kinds import KINDS
@@ -21,17 +22,20 @@ from api.http.streams.events import EventLog
 from controller.operation import Operation
 from mock_devices.testing.access import client_of
 from mock_devices.testing.commands import until
+from rig.errors import DataError, DiskFull
 from tests.api.jobs.asked import begun, ended
 
 
-def made(jobs: JobBoard, session: str = "first", wait: bool = False) -> str:
-    """A job of no work; one that is to ``wait`` is never begun."""
+def made(
+    jobs: JobBoard, session: str = "first", wait: bool = False, work: Callable[[Path], object] = lambda _: None
+) -> str:
+    """A job of no ``work``, or what that does with the folder of its files; one that is to ``wait`` is never begun."""
     kind, operation = KINDS["verify"], Operation("verify")
     job = jobs.new(kind, VerifyParams(session=session), "Ann", session, operation)
     if wait:
         jobs._enter(job)
     else:
-        jobs.start_computing(job, lambda: None)
+        jobs.start_computing(job, lambda: work(jobs.files(job.id)))
         until(lambda: jobs.find(job.id) is None, 10.0, "the job's end")
     return job.id
 
@@ -96,6 +100,47 @@ def test_a_record_that_was_cut_hides_no_other(jobs: JobBoard) -> None:
     file = jobs.folder / cut / "job.json"
     file.write_text(file.read_text()[:100])
     assert list(again(jobs)._known()) == [good]
+
+
+def test_a_job_that_ends_where_the_disk_takes_nothing_is_shown_as_it_ended(
+    jobs: JobBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise DiskFull("no room")
+
+    job = made(jobs, work=lambda _: monkeypatch.setattr(store, "write_text", full))
+    (listed,) = jobs.listed(Filter(), Page()).items
+    assert listed.state == json.loads(jobs.shown(job))["state"] == "succeeded"
+    monkeypatch.undo()
+    assert json.loads(again(jobs).shown(job))["state"] == "interrupted"  # as of the last that it took
+
+
+def test_a_file_that_goes_while_those_of_a_job_are_listed_hides_neither_its_end_nor_others(
+    jobs: JobBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def writes(folder: Path) -> None:
+        folder.mkdir(parents=True)
+        for name in ("gone", "kept"):
+            (folder / name).write_text("")
+
+        def listing(name: str) -> bool:
+            if name == "gone":
+                (folder / name).unlink()
+            return True
+
+        monkeypatch.setattr(views, "is_text", listing)
+
+    found = json.loads(jobs.shown(made(jobs, work=writes)))
+    assert (found["state"], [file["name"] for file in found["files"]]) == ("succeeded", ["files/kept"])
+
+
+def test_a_job_that_ends_in_words_that_are_no_text_keeps_no_other_waiting(jobs: JobBoard) -> None:
+    def fails(_: Path) -> None:
+        raise DataError("/srv/\udcff.mcap: is damaged")
+
+    found = json.loads(jobs.shown(made(jobs, work=fails)))
+    assert (found["state"], found["problem"]["detail"]) == ("failed", "/srv/?.mcap: is damaged")
+    assert json.loads(jobs.shown(made(jobs)))["state"] == "succeeded"
 
 
 def test_the_oldest_are_forgotten_with_their_files(jobs: JobBoard, monkeypatch: pytest.MonkeyPatch) -> None:
