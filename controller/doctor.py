@@ -73,8 +73,8 @@ def _heard(role: str, device: AnyDevice, listen: Listen[AnyDevice], channel: int
         found = _finding(role, device.identity, 1e9 / device.period_ns, listen(device), channel)
         if not found.problem:
             break
-    bus = device.bus if isinstance(device, OnBus) else ""
-    return found.model_copy(update={"problem": found.problem or device.counters.trouble, "bus": bus})
+    about = {"bus": device.bus if isinstance(device, OnBus) else "", "settings": device.identity.settings}
+    return found.model_copy(update={"problem": found.problem or device.counters.trouble, **about})
 
 
 def _listen(poll: Callable[[int], Samples], seconds: float) -> Samples:

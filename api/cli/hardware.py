@@ -58,8 +58,8 @@ def _lines(endpoints: Endpoints) -> str:
 def _row(finding: DeviceReport) -> tuple[str, ...]:
     if not finding.product:
         return finding.role, f"not heard; look at {finding.advice}" if finding.advice else "not heard"
-    bus = f"; {finding.bus}" if finding.bus else ""
-    device = f"{finding.product}, serial {finding.serial}, firmware {finding.firmware}{bus}"
+    more = "".join(f"; {words}" for words in (finding.settings.get("scale"), finding.bus) if words)
+    device = f"{finding.product}, serial {finding.serial}, firmware {finding.firmware}{more}"
     latency = f"{finding.latency_ms:.2f}" if finding.latency_ms else ""
     return finding.role, device, f"{finding.rate_Hz:.1f}", finding.noise, latency, finding.range
 

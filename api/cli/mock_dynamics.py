@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from api.cli.mock_calibration import in_the_air, kept, mock_file, nothing_hidden, say
+from controller.commissioning.axis import as_answered
 from controller.commissioning.axis_dynamics import identify
 from controller.commissioning.dynamics_refusals import dynamics_elsewhere
 from controller.commissioning.sweep import sweep_for
@@ -61,9 +62,10 @@ def _identified(wiring: Wiring, endpoints: Endpoints) -> AxisDynamics:
 
 
 def _swept(wiring: Wiring) -> AxisDynamics:
-    sweep = sweep_for(wiring, SWEEP_S, REPEATS, TURNS)
     devices = start_devices(wiring)
     try:
+        answered = as_answered(wiring.axis, devices.axis.identity)
+        sweep = sweep_for(wiring.model_copy(update={"axis": answered}), SWEEP_S, REPEATS, TURNS)
         devices.axis.home()
         devices.axis.move_to(wiring.limits.position_min_mm + FROM_MM, SPEED_MM_S)
         with promptly(wiring.loop.priority):

@@ -4,6 +4,7 @@ from contextlib import AbstractContextManager
 from datetime import UTC, datetime
 
 from api.operations.calibrate import AT_ONCE, AxisStart, resting_axis
+from controller.commissioning.axis import as_answered
 from controller.commissioning.axis_dynamics import identify
 from controller.commissioning.sweep import AirSweep, sweep_for
 from controller.commissioning.sweep_moves import CLEAR_MM, SweepRun, refuse_outside, refuse_touching
@@ -33,6 +34,8 @@ def axis_dynamics(operation: Operation, wiring: Wiring, from_mm: float, start: A
     """The dynamics, swept from ``from_mm`` on; raises CheckFailed with number and bound, SafetyStop for a touch."""
     sweep = sweep_asked(wiring, from_mm)
     with resting_axis(operation, wiring, start) as resting:
+        drive = resting.devices.axis.identity
+        sweep = sweep_asked(wiring.model_copy(update={"axis": as_answered(wiring.axis, drive)}), from_mm)
         operation.advance(0.0, "looking for anything in the way")
         refuse_touching(resting.axis, from_mm, sweep)
         operation.advance(0.3, f"{sweep.repeats} sweeps of {sweep.lowest_Hz:g} to {sweep.highest_Hz:g} Hz")
@@ -40,5 +43,4 @@ def axis_dynamics(operation: Operation, wiring: Wiring, from_mm: float, start: A
         with moving:
             resting.devices.axis.enable()
             followed = SweepRun(resting.devices, wiring, sweep, resting.interrupted).played()
-        drive = resting.devices.axis.identity
     return identify(drive, wiring, sweep, followed, datetime.now(UTC), computer_id())

@@ -41,6 +41,7 @@ def _seen(role: str, device: DeviceView, rates_Hz: Mapping[str, float]) -> Devic
         product=device.get("product", ""),
         serial=device.get("serial", ""),
         firmware=device.get("firmware", ""),
+        settings=device.get("settings", {}),
         rate_Hz=rates_Hz.get(STREAMS.get(role, role), 0.0),
         problem="" if state == "ok" else f"{state}: {device.get('detail', '')}",
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 from controller.operation import Operation
 from controller.replay.session import replay_session
 from rig.errors import UsageError
-from rig.recording.files import make_folder, refuse_unwritable, write_text
+from rig.recording.files import refuse_unwritable, whole_folder, write_text
 from rig.recording.sessions import SESSION_FILE, open_session
 from rig.results.replay import ReplayResult
 
@@ -42,18 +42,21 @@ def replay(operation: Operation, session: Path, overrides: Sequence[str], only: 
 def write_test(session: Path, result: ReplayResult, file: Path) -> str:
     """A test file, and a folder of its name with the recordings; says so. Raises UsageError where one is there."""
     folder = file.with_suffix("")
-    if not (file.name.startswith("test_") and file.suffix == ".py"):
-        raise UsageError(f"--as-test {file}: pytest finds files that are called test_....py; give such a name")
+    if not (file.name.startswith("test_") and file.suffix == ".py" and file.stem.isidentifier()):
+        raise UsageError(
+            f"--as-test {file}: pytest finds files that are called test_....py, of letters, digits and underscores;"
+            " give such a name"
+        )
     for place in (file, folder):
         if place.exists():
             raise UsageError(f"--as-test {file}: {place} exists already and is not overwritten; give another name")
     refuse_unwritable(file)
-    make_folder(folder)
-    shutil.copy(session / SESSION_FILE, folder)
-    for one in result.recordings:
-        shutil.copy(session / one.recording, folder)
-    stops = {one.recording: list(one.stops) for one in result.recordings}
-    write_text(file, TEST.format(name=session.name, file=file.name, stops=_literal(stops)))
+    with whole_folder(folder) as scratch:
+        listed = [SESSION_FILE] if (session / SESSION_FILE).is_file() else []  # a crash leaves recordings alone
+        for name in (*listed, *(one.recording for one in result.recordings)):
+            shutil.copyfile(session / name, scratch / name)
+    stops, name = {one.recording: list(one.stops) for one in result.recordings}, session.resolve().name
+    write_text(file, TEST.format(name=ascii(name)[1:-1].replace('"', "'"), file=file.name, stops=_literal(stops)))
     return f"{file}: a test of {len(result.recordings)} recordings, which it finds in {folder}"
 
 

@@ -37,6 +37,12 @@ class Place:
     arm_mm: Array
 
 
+def as_answered(config: AxisProduct, drive: Identity) -> AxisProduct:
+    """The axis with the scale that its drive said when it was opened, where the configuration states none."""
+    said = {"increments_per_mm": float(drive.settings.get("increments_per_mm", 0.0))}
+    return config if config.increments_per_mm else config.model_copy(update=said)
+
+
 def refuse_first_step(start: Place, now: Place) -> None:
     """Raises CheckFailed where the first step already went much too far or not far enough."""
     asked_mm = abs(now.axis_mm - start.axis_mm)
@@ -132,7 +138,7 @@ def _calibration(
         uncertainty=deviation,
         direction=config.direction,
         direction_known_by=known_by,
-        increments_per_mm=config.increments_per_mm,
+        increments_per_mm=as_answered(config, drive).increments_per_mm,
         reference=reference,
         steps=tuple(steps),
     )

@@ -5,6 +5,7 @@ A configuration that contradicts a calibration is refused; nothing is ever corre
 
 from datetime import datetime
 
+from controller.commissioning.axis import as_answered
 from controller.commissioning.dynamics_refusals import dynamics_reasons
 from controller.loop.steps import Approach, Program
 from drivers.roles import Identity
@@ -24,7 +25,8 @@ def refuse_uncommissioned(program: Program, wiring: Wiring, sensor: Identity, ax
     known = wiring.calibration
     if known.of_force is None:
         raise UsageError(f"{program.name} refused before moving: {_missing(f'{sensor.product} {sensor.serial}')}")
-    reasons = [*_foreign(known.of_force, sensor, "force"), *contradictions(wiring), *known.unfit(now)]
+    answered = wiring.model_copy(update={"axis": as_answered(wiring.axis, axis)})
+    reasons = [*_foreign(known.of_force, sensor, "force"), *contradictions(answered), *known.unfit(now)]
     if known.of_axis:
         reasons += _foreign(known.of_axis, axis, "axis")
     reasons += dynamics_reasons(program, wiring, axis)
@@ -60,8 +62,8 @@ def contradictions(wiring: Wiring) -> list[str]:
 
 
 def _same_scale(wiring: Wiring, known: AxisCalibration) -> bool:
-    off = abs(wiring.axis.increments_per_mm / known.increments_per_mm - 1)
-    return wiring.axis.direction == known.direction and off <= SAME_SCALE
+    counted = wiring.axis.increments_per_mm or known.increments_per_mm  # what only the drive says is known from it
+    return wiring.axis.direction == known.direction and abs(counted / known.increments_per_mm - 1) <= SAME_SCALE
 
 
 def _foreign(known: ForceCalibration | AxisCalibration, answered: Identity, role: str) -> list[str]:

@@ -79,8 +79,8 @@ class AirSweep(NamedTuple):
 def sweep_for(wiring: Wiring, sweep_s: float, repeats: int, turns: int) -> AirSweep:
     """What limits and product allow; raises UsageError with number and bound where it would show nothing."""
     limits, axis = wiring.limits, wiring.axis
-    counted_Hz = math.sqrt(ACCELERATION_SHARE * axis.acceleration_mm_s2 * axis.increments_per_mm / FEWEST_COUNTS)
-    counted_Hz /= 2 * math.pi
+    per_mm = axis.increments_per_mm or math.inf  # known once the drive has answered, and looked at then
+    counted_Hz = math.sqrt(ACCELERATION_SHARE * axis.acceleration_mm_s2 * per_mm / FEWEST_COUNTS) / (2 * math.pi)
     sweep = AirSweep(
         LOWEST_HZ,
         min(BAND * axis.bandwidth_Hz, RATE_SHARE * wiring.loop.rate_Hz, counted_Hz),

@@ -132,13 +132,12 @@ class Guarded(ABC, Generic[Made, Sample]):
         begun_ns, waits = self._now(), self._waits()
         samples = self._soon(lambda: poll(now_ns))
         self._note_wait(self._now() - begun_ns, self._waits() - waits)
-        return self._checked(samples)
+        return self._asked(lambda: self._checked(samples))
 
     def _checked(self, samples: Sequence[Sample]) -> Sequence[Sample]:
-        for sample in samples:
-            wrong = self._wrong(sample)
-            if wrong:
-                raise self._error(wrong)
+        wrong = next(filter(None, map(self._wrong, samples)), "")
+        if wrong:
+            raise self._error(wrong)
         return samples
 
     def _note_wait(self, took_ns: int, waits: int) -> None:
@@ -233,7 +232,7 @@ class GuardedInput(Guarded[Input, InputSample]):
 
     def poll(self, now_ns: int) -> Sequence[InputSample]:
         """Samples since the last call, each looked at."""
-        return self._checked(self._asked(lambda: self._device.poll(now_ns)))
+        return self._asked(lambda: self._checked(self._device.poll(now_ns)))
 
     def concern(self) -> str:
         return self._asked(self._device.concern)
@@ -246,18 +245,27 @@ class GuardedAxis(Guarded[ServoAxis, AxisSample]):
     """A servo axis."""
 
     KIND = AxisSample
+    _failure: DeviceError | None = None
+
+    def _said(self, ask: Callable[[], Answer], unsaid: Answer) -> Answer:
+        """What the loop looks at anywhere in its cycle: a failure is a fault, and then raised by ``poll``."""
+        try:
+            return unsaid if self._failure else self._soon(ask)
+        except DeviceError as error:
+            self._failure = error
+            return unsaid
 
     @property
     def fault(self) -> str:
-        return self._asked(lambda: self._device.fault)
+        return self._said(lambda: self._device.fault, "") or str(self._failure or "")
 
     @property
     def enabled(self) -> bool:
-        return self._asked(lambda: self._device.enabled)
+        return self._said(lambda: self._device.enabled, False)
 
     @property
     def referenced(self) -> bool:
-        return self._asked(lambda: self._device.referenced)
+        return self._said(lambda: self._device.referenced, False)
 
     def home(self) -> None:
         self._asked(self._device.home)
@@ -270,6 +278,8 @@ class GuardedAxis(Guarded[ServoAxis, AxisSample]):
 
     def poll(self, now_ns: int) -> Sequence[AxisSample]:
         """Samples since the last call, each looked at."""
+        if self._failure:
+            raise self._failure
         return self._poll(self._device.poll, now_ns)
 
     def command(self, position_mm: float, now_ns: int) -> None:

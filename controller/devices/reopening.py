@@ -104,8 +104,12 @@ class Reopening:
 
     def _strange(self, found: Identity) -> str:
         known = self.identity
-        if known is None or (found.product, found.serial) == (known.product, known.serial):
+        if known is None:
             return ""
+        if (found.product, found.serial) == (known.product, known.serial):
+            was, now = (who.settings.get("increments_per_mm") for who in (known, found))
+            changed = f"counts {now} increments a mm and counted {was}: end the bench and start it with this scale"
+            return "" if was == now else f"{found.product} serial {found.serial} {changed}"
         return (
             f"another device answers: {found.product} serial {found.serial} instead of {known.product} serial"
             f" {known.serial}; plug the right one in, or end the bench and start it with this one"

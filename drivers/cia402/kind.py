@@ -29,6 +29,7 @@ NEEDED = (
     objects.LIMIT_HIGH, objects.HEARTBEAT_PRODUCER, objects.HEARTBEAT_CONSUMER, objects.ABORT_OPTION, objects.VENDOR,
     objects.ERROR_REGISTER,
 )  # fmt: skip
+LONGEST_TURN_MM = 10.0  # lead of the screws of small axes, where nothing states it: homing may take so much longer
 STANDSTILL_MM_S = 0.1  # an encoder of 10 um that flickers between two lines at 10 Hz
 PDOS = range(1, 4)
 
@@ -51,16 +52,18 @@ def check_sheet(sheet: DataSheet, where: str) -> None:
 class SheetKind:
     """The drive of ``sheet``; ``scale`` is known after ``identify``."""
 
+    scale: Units
+
     def __init__(self, config: Cia402Wiring, sheet: DataSheet) -> None:
         self._config, self._sheet = config, sheet
-        self._speed_unit = 1.0
         self._rated_mA = 0
         self.referenced_bit = 1 << config.referenced_bit if config.referenced_bit >= 0 else 0
 
-    @cached_property
-    def scale(self) -> Units:
-        """Units of position and speed."""
-        return units.scale_of(self._config, self._speed_unit)
+    @property
+    def turn_mm(self) -> float:
+        """Travel of one turn, as far as it is stated."""
+        config = self._config
+        return config.lead_mm or config.increments_per_rev / self.scale.increments_per_mm or LONGEST_TURN_MM
 
     @property
     def standstill(self) -> int:
@@ -79,15 +82,21 @@ class SheetKind:
         lacking = [f"{mode} ({words})" for mode, words in MODES.items() if not modes >> (mode - 1) & 1]
         if lacking:
             raise DeviceError(f"{node.name}: lacks modes {', '.join(lacking)} (object 6502 is {modes:#x})")
-        units.check_scale(node, self._config, self.has)
-        self._speed_unit = units.speed_unit(node, self._config, self.has)
-        self.__dict__.pop("scale", None)
+        found = units.position_scale(node, self._config, self.has)
+        speed_unit = units.speed_unit(node, self._config, self.has, found.per_mm)
+        self.scale = Units(found.per_mm, 60 * speed_unit, self._config.direction)
         self._rated_mA = self._asked(node, RATED_CURRENT)
         return Identity(
             product=f"{self._name(node)} {product:08X}",
             serial=f"{self._asked(node, objects.SERIAL):08X}",
             firmware=f"{self._asked(node, objects.REVISION) >> 16:04X}",
-            settings={"node": str(node.number), "modes": f"{modes:#x}", "vendor": f"{vendor:#x}"},
+            settings={
+                "node": str(node.number),
+                "modes": f"{modes:#x}",
+                "vendor": f"{vendor:#x}",
+                "increments_per_mm": repr(found.per_mm),
+                "scale": str(found),
+            },
         )
 
     def _check_identity(self, node: Node, vendor: int, product: int) -> None:

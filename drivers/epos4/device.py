@@ -322,8 +322,7 @@ class Epos4Axis(SampledDevice):
     def _homing_time_s(self) -> float:
         """Twice the travel at homing speed, one turn of the screw at the slow speed, and the ramps between."""
         travel_mm = self._limits.position_max_mm - self._limits.position_min_mm
-        turn_mm = self._config.increments_per_rev / self._config.increments_per_mm
         speed_mm_s = self._config.homing_speed_mm_s
-        slow_s = turn_mm / (speed_mm_s * setup.SLOW_SEARCH)
+        slow_s = self._kind.turn_mm / (speed_mm_s * setup.SLOW_SEARCH)
         ramps_s = 4 * speed_mm_s / self._config.acceleration_mm_s2
         return 2 * travel_mm / speed_mm_s + slow_s + ramps_s + REACTION_S

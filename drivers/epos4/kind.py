@@ -27,6 +27,10 @@ class DriveKind(Protocol):
     def scale(self) -> Units:
         """Units of position and speed, known after ``identify``."""
 
+    @property
+    def turn_mm(self) -> float:
+        """Travel of one turn of the screw, known after ``identify``."""
+
     def identify(self, node: Node) -> Identity:
         """Who the node says it is; raises DeviceError where it is another or lacks what is needed."""
 
@@ -46,7 +50,8 @@ class Epos4Kind:
 
     def __init__(self, config: CanAxisProduct) -> None:
         self._config = config
-        self.scale = setup.units(config)
+        self.scale = Units(config.increments_per_mm, config.increments_per_rev, config.direction)
+        self.turn_mm = config.increments_per_rev / config.increments_per_mm
 
     def writes(self, limits: Limits) -> list[tuple[Entry, int]]:
         """Limits, stops, heartbeats and PDOs, in their order."""

@@ -35,11 +35,6 @@ def drive_heartbeat_limit_ns(config: CanAxisProduct) -> int:
     return limit_ms * 1_000_000
 
 
-def units(config: CanAxisProduct) -> Units:
-    """Scale of the configured axis."""
-    return Units(config.increments_per_mm, config.increments_per_rev, config.direction)
-
-
 def drive_limits(limits: Limits, scale: Units) -> tuple[int, int]:
     """Objects 607D:1 and :2 in increments, smaller first."""
     ends = (limits.position_min_mm - LIMIT_MARGIN_MM, limits.position_max_mm + LIMIT_MARGIN_MM)

@@ -22,6 +22,7 @@ class DeviceReport(Result):
     latency_ms: float = 0.0
     range: str = ""
     bus: str = Field(default="", description="load and errors of the bus that it is on, where it is on one")
+    settings: dict[str, str] = Field(default={}, description="what else it says of itself")
     problem: str = ""
     advice: str = ""
 

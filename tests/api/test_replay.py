@@ -1,6 +1,9 @@
 """`rig replay`: a recorded stop becomes a test in one command, and other limits say at which row they differ."""
 
 import runpy
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +58,7 @@ def test_other_limits_are_said_with_the_row_and_no_test_is_written(session: Path
     ("arguments", "sentence"),
     [
         (("--as-test", "frozen.py"), "pytest finds files that are called test_"),
+        (("--as-test", "test_frozen.1.py"), "of letters, digits and underscores; give such a name"),
         (("--only", "track*"), "no recording is called like 'track\\*'"),
         (("--set", "limits.force=2"), "unknown key limits.force; nearest valid key: force_N"),
     ],
@@ -64,6 +68,34 @@ def test_wrong_use_is_one_sentence(session: Path, arguments: tuple[str, ...], se
     assert isinstance(said.exception, UsageError)
     with pytest.raises(UsageError, match=sentence):
         raise said.exception
+
+
+def pytest_in(folder: Path) -> "subprocess.CompletedProcess[str]":
+    """In a folder that is no checkout, as whoever was given the test runs it."""
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-W", "error"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60, check=False)
+
+
+@pytest.mark.parametrize("listed", [True, False], ids=["whole", "after a crash"])
+@pytest.mark.parametrize("name", ["plain", 'it\'s "C:\\new" \'\'\'and\'\'\' """so"""'])
+def test_the_test_runs_in_a_folder_of_its_own(session: Path, listed: bool, name: str, tmp_path: Path) -> None:
+    place = shutil.copytree(session, tmp_path / name)
+    if not listed:
+        (place / "session.json").unlink()
+    (tmp_path / "away").mkdir()
+    said = rig(place, "--as-test", tmp_path / "away" / "test_it.py")
+    assert said.exit_code == 0, (said.output, said.exception)
+    shutil.rmtree(place)
+    ran = pytest_in(tmp_path / "away")
+    assert ran.returncode == 0 and "1 passed" in ran.stdout, ran.stdout + ran.stderr
+
+
+def test_a_check_that_was_broken_since_fails_it(session: Path, tmp_path: Path) -> None:
+    assert rig(session, "--as-test", tmp_path / "test_it.py").exit_code == 0
+    broken = "from controller.devices.health import StreamHealth\nStreamHealth.frozen = property(lambda _: False)\n"
+    (tmp_path / "conftest.py").write_text(broken)
+    ran = pytest_in(tmp_path)
+    assert ran.returncode == 1 and "1 failed" in ran.stdout and "force_invalid" in ran.stdout, ran.stdout + ran.stderr
 
 
 def test_what_is_there_is_not_overwritten(session: Path, tmp_path: Path) -> None:

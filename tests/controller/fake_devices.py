@@ -39,11 +39,12 @@ class FakeDevice:
     calls: list[str] = field(default_factory=list)
     next_seq: int = 0
     serial: str = "1"
+    settings: dict[str, str] = field(default_factory=dict)
 
     @property
     def identity(self) -> Identity:
         """Who it claims to be."""
-        return Identity(type(self).__name__, self.serial, "1")
+        return Identity(type(self).__name__, self.serial, "1", self.settings)
 
     def start(self) -> None:
         """Counts as a call; fails where the cable is cut."""

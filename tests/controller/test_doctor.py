@@ -2,11 +2,13 @@
 
 import contextlib
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 import pytest
 
+from api.cli.hardware import _row
 from controller import doctor
 from drivers.roles import Device, Identity, LinkCounters
 from rig.channels import ForceSample
@@ -80,6 +82,14 @@ def test_the_bus_of_a_device_is_told_though_nothing_is_wrong_with_it() -> None:
     for device, told in ((OnOne(0), OnOne.bus), (Slow(0), "")):
         said = doctor._look("axis", BotaWiring(), lambda device=device: cast(Device, device), device.listen)  # type: ignore[misc]
         assert (said.bus, said.problem) == (told, "")
+
+
+def test_the_scale_that_a_drive_says_of_itself_is_told() -> None:
+    device, scale = Slow(0), "1000 units a mm by its unit of position (object 60A8)"
+    device.identity = replace(WHO, settings={"scale": scale})
+    said = doctor._look("axis", BotaWiring(), lambda: cast(Device, device), device.listen)
+    assert said.settings == {"scale": scale}
+    assert _row(said)[1] == f"bota-sensone, serial 000271, firmware 1.0.6; {scale}"
 
 
 def test_a_device_that_is_not_there_comes_with_where_to_look() -> None:

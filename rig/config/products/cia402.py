@@ -16,7 +16,7 @@ OUTWARD = {1: (1, 11, 12, 13, 14, 17, 27, 28, 29, 30), -1: (2, 7, 8, 9, 10, 18, 
 class Cia402Wiring(CanAxisProduct):
     """A servo drive of the profile CiA 402 behind a CAN adapter.
 
-    ``lead_mm`` lets the driver hold `increments_per_mm` against the drive's own feed constant.
+    ``lead_mm`` lets the driver hold `increments_per_mm` against the drive's own factors, or take it from them.
     """
 
     driver: ClassVar[str] = "drivers.cia402.device:open_axis"
@@ -29,6 +29,12 @@ class Cia402Wiring(CanAxisProduct):
     }  # fmt: skip
 
     product: Literal["cia402"] = Field(default="cia402", description="what stands on the bench")
+    increments_per_mm: float = Field(
+        default=0.0, ge=0, description="position units of the drive; 0: as its own unit, or factors and lead_mm, say"
+    )
+    increments_per_rev: float = Field(
+        default=0.0, ge=0, description="position units a turn, where speeds are in rpm; 0: as the drive's factors say"
+    )
     eds: Path | None = Field(default=None, description="its electronic data sheet; absent: that of the simulated one")
     lead_mm: float = Field(default=0.0, ge=0, description="travel of one turn of the driving shaft; 0: not compared")
     speed_unit: Literal["auto", "units/s", "rpm"] = Field(

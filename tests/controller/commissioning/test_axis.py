@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -20,6 +21,7 @@ from controller.devices.drivers import Devices
 from drivers.roles import Identity
 from rig.channels import AxisSample, ForceSample, MarkerSample
 from rig.config.calibration import AxisCalibration
+from rig.config.products.cia402 import Cia402Wiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.errors import CheckFailed, DeviceError, SafetyStop
 
@@ -57,6 +59,12 @@ def test_the_scale_is_what_the_tracker_saw_of_a_millimetre(scale: float) -> None
     assert (found.serial, found.direction, found.increments_per_mm) == ("A1", 1, 2000.0)
     assert found.steps[4].axis_mm == 12.0
     assert found.steps[4].reference_mm == pytest.approx(12.0 * scale, abs=0.05)
+
+
+def test_a_scale_that_only_the_drive_says_is_what_was_calibrated_with() -> None:
+    drive = replace(DRIVE, settings={"increments_per_mm": "1024.5"})
+    for config, per_mm in ((Cia402Wiring(), 1024.5), (Cia402Wiring(increments_per_mm=1024.0), 1024.0)):
+        assert against_tracker(drive, config, places(1.0), "limb marker", NOW).increments_per_mm == per_mm
 
 
 @pytest.mark.parametrize("scale", [0.98, 1.02])

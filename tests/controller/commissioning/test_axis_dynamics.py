@@ -1,25 +1,33 @@
 """The axis identified on axes whose response is known: by a closed form, by the mock's physics, by the plant's."""
 
+import contextlib
 import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
 import pytest
 
+from api.cli import mock_dynamics
+from api.operations import calibrate_dynamics
+from api.operations.calibrate_dynamics import axis_dynamics
 from controller.commissioning.axis_dynamics import identify, response_of
 from controller.commissioning.sweep import AirSweep, amplitude_mm, offset_mm, sweep_for
 from controller.commissioning.sweep_moves import LOOK_NS, SweepRun, refuse_outside
 from controller.devices.drivers import Devices
+from controller.operation import Operation
 from drivers.roles import ForceSensor, Identity, LinkCounters, ServoAxis
 from mock_devices.parameters import Axis
 from mock_devices.physics import STEP_S
 from mock_devices.physics.drive_plant import DrivePlant
 from rig.channels import AxisSample, ForceSample
 from rig.config.axis_dynamics import AxisDynamics
+from rig.config.products.cia402 import Cia402Wiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.wiring import Limits, Loop, Wiring
 from rig.errors import CheckFailed, DeviceError, RigError, SafetyStop, UsageError
@@ -339,6 +347,20 @@ def test_a_sweep_ends_where_it_began() -> None:
 def test_a_sweep_that_would_show_nothing_is_refused(wiring: Wiring, sentence: str) -> None:
     with pytest.raises(UsageError, match=sentence):
         sweep_for(wiring, 0.5, 4, 2)
+
+
+def test_counts_that_only_the_drive_says_are_looked_at_once_it_has_answered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forty to the millimetre show it up to 21 Hz, as above."""
+    wiring = Wiring(axis=Cia402Wiring())
+    assert sweep_for(wiring, 0.5, 4, 2) == sweep_for(Wiring(), 0.5, 4, 2)
+    axis = SimpleNamespace(identity=Identity("drive", "1", "", {"increments_per_mm": "40.0"}))
+    devices = SimpleNamespace(axis=axis, close=lambda: None)
+    monkeypatch.setattr(mock_dynamics, "start_devices", lambda _: devices)
+    resting = SimpleNamespace(devices=devices)
+    monkeypatch.setattr(calibrate_dynamics, "resting_axis", lambda *_: contextlib.nullcontext(resting))
+    for sweep in (partial(mock_dynamics._swept, wiring), partial(axis_dynamics, Operation("sweep"), wiring, 2.0)):
+        with pytest.raises(UsageError, match=r"axis.increments_per_mm 40 show the axis up to 21.4 Hz"):
+            sweep()
 
 
 @pytest.mark.parametrize("at_mm", [0.2, 57.0])

@@ -1,5 +1,6 @@
 """Who may approach: only with a calibration of the sensor that answers, which the wiring does not contradict."""
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -12,6 +13,7 @@ from rig.config.axis_dynamics import AxisDynamics
 from rig.config.calibration import AxisCalibration, Calibration, ForceCalibration, Uncertainty
 from rig.config.force_map import ForceMap
 from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.cia402 import Cia402Wiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
@@ -144,6 +146,17 @@ def test_no_force_loop_runs_on_an_axis_that_was_not_identified_here(
 def test_a_force_loop_runs_on_an_axis_that_was_identified_here() -> None:
     known = wiring().calibration.model_copy(update={"of_dynamics": axis_dynamics(date=NOW)})
     refused(wiring().model_copy(update={"calibration": known}), TRACKS)
+
+
+def test_a_scale_that_the_drive_says_is_held_against_the_calibration_once_it_has_answered() -> None:
+    """The calibration is of an axis of 2000 to the millimetre."""
+    found = wiring(of_axis=OF_AXIS, axis=Cia402Wiring(port="/dev/ttyACM0"))
+    refuse_uncalibrated(found, NOW)
+    refused(found, axis=replace(DRIVE, settings={"increments_per_mm": "2000.0"}))
+    with pytest.raises(UsageError, match=r"axis.increments_per_mm 1000, .* the axis was calibrated with 2000 and 1"):
+        refused(found, axis=replace(DRIVE, settings={"increments_per_mm": "1000.0"}))
+    with pytest.raises(UsageError, match=r"axis.direction -1: the axis was calibrated with 2000 and 1"):
+        refuse_uncalibrated(wiring(of_axis=OF_AXIS, axis=Cia402Wiring(port="/dev/ttyACM0", direction=-1)), NOW)
 
 
 def test_the_loop_itself_refuses_and_stays_idle() -> None:

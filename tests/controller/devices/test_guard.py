@@ -4,6 +4,8 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import cast
 
 import pytest
 
@@ -18,6 +20,7 @@ from controller.devices.guard import (
     GuardedTracker,
 )
 from controller.inputs.runner import open_input
+from controller.loop.modes import Mode
 from drivers.roles import Device
 from mock_devices.testing.clock import Clock
 from rig import plugins
@@ -68,6 +71,8 @@ def test_what_is_right_passes_as_it_is() -> None:
         ([FORCE, FORCE._replace(seq=1, capture_ns=-5_000_000)], "its times run back by 5.001 ms at sample 1"),
         ([FORCE._replace(capture_ns=3_000_000)], "sample 0 was taken 2.999 ms after it came"),
         ([FORCE._replace(fz_N=-981.0)], "981 N from a sensor of 100 N: wrong unit"),
+        (lambda: None, "TypeError: 'NoneType' object is not iterable"),
+        ([FORCE._replace(fz_N=cast(float, "-1 N"))], "TypeError: must be real number, not str"),
     ],
 )
 def test_what_is_wrong_is_an_error_that_names_the_plug_in(given: Sequence[object], sentence: str) -> None:
@@ -102,6 +107,7 @@ INPUT = InputSample(0, 900, 1000, 0, 0, -1, (1.0, 48.0), 0, 1)
         ([INPUT._replace(capture_ns=3_000_000)], "sample 0 was taken 2.999 ms after it came"),
         (lambda: sys.exit("dongle"), "SystemExit: dongle"),
         ([FORCE], "it gives ForceSample.*, where a InputSample is expected"),
+        (lambda: None, "TypeError: 'NoneType' object is not iterable"),
     ],
 )
 @pytest.mark.usefixtures("declared")
@@ -240,6 +246,37 @@ def test_a_bench_of_plug_ins_works_and_one_that_raises_stops_it_by_name(monkeypa
     bench.until(lambda: bench.latched == "force_lost")
     said = bench.link.of("incident")[-1]["text"]
     assert "force sensor lost: bota-sensone, a plug-in of acme-rig 2.1: ZeroDivisionError: division by zero" in said
+
+
+@pytest.mark.parametrize("what", ["fault", "enabled", "referenced"])
+@pytest.mark.usefixtures("declared")
+def test_what_an_axis_raises_between_polls_stops_motion_and_not_the_loop(
+    what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = FakeBench(wired())
+    axis = guard.servo_axis(bench.wiring.axis, lambda: bench.axis)
+    bench.loop.devices = replace(bench.loop.devices, axis=axis)
+    bench.press(2.0)
+    broken = type("Broken", (FakeAxis,), {what: property(lambda _: dict[str, str]()["status"], lambda *_: None)})
+    monkeypatch.setattr(bench.axis, "__class__", broken)
+    bench.until(lambda: bench.latched in ("drive_fault", "axis_lost"), within_s=1.0)
+    assert "maxon-epos4, a plug-in of acme-rig 2.1: KeyError: 'status'" in bench.link.of("incident")[0]["text"]
+    bench.until(lambda: bench.mode is Mode.SAFE)
+    bench.until(lambda: bool(bench.loop.inputs.axis_lost), within_s=0.1)
+
+
+def test_an_axis_that_cannot_say_whether_it_is_at_fault_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bench that starts with a drive in fault homes nothing, and waits for recovery."""
+    monkeypatch.setattr(guard, "CYCLIC_S", 0.1)
+    stuck = FakeAxis(Clock(), 7)
+    axis = GuardedAxis(PLUGIN, Epos4Wiring(), lambda: stuck)
+    monkeypatch.setattr(FakeAxis, "fault", property(lambda _: time.sleep(60)))
+    assert "not done within 0.1 s" in axis.fault
+    began_s = time.monotonic()
+    assert "not done within 0.1 s" in axis.fault and not axis.enabled and not axis.referenced
+    assert time.monotonic() - began_s < 0.1
+    with pytest.raises(DeviceError, match=r"a plug-in of acme-rig 2.1: TimeoutError"):
+        axis.poll(0)
 
 
 @pytest.mark.usefixtures("declared")

@@ -168,6 +168,20 @@ def test_an_axis_that_restarted_is_in_fault_until_it_is_homed() -> None:
     assert not bench.axis.commands
 
 
+def test_an_axis_that_counts_otherwise_than_before_is_a_fault_and_is_not_used() -> None:
+    bench = settled()
+    spare = spare_axis(bench)
+    spare.settings = {"increments_per_mm": "2000.0"}
+    bench.axis.cut = "the line is gone"
+    bench.wait(0.2)
+    replaced_axis(bench, spare)
+    bench.until(lambda: states(bench)["axis"] == "fault", within_s=3.0)
+    detail = bench.link.statuses[-1]["devices"]["axis"]["detail"]
+    assert "FakeAxis serial 1 counts 2000.0 increments a mm and counted None: end the bench and start it" in detail
+    assert spare.closed
+    assert not spare.commands
+
+
 def test_leaving_the_tissue_takes_the_axis_alone() -> None:
     bench = settled()
     bench.force.cut = "the line is gone"

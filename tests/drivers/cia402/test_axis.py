@@ -1,5 +1,6 @@
 """The axis on a drive that is known by its data sheet: set-up, units, identity, homing, cyclic positions."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ KIND: dict[str, Any] = {
     "increments_per_mm": 1000.0, "increments_per_rev": 5000.0, "speed_unit": 1.0, "table": table(5.0),
     "number": 0x00C1_A402,
 }  # fmt: skip
+IN_INCREMENTS = 0x00B5_0000  # object 60A8 of a drive that counts its encoder's (CiA 303-2)
 
 
 def axis_on(bench: DriveBench, **config: Any) -> Epos4Axis:
@@ -112,7 +114,41 @@ def test_the_scale_is_held_against_the_drives_own_feed_constant(bench: DriveBenc
     with pytest.raises(DeviceError, match=r"5000 units are one turn, .*lead_mm 5 that is 1000 a mm, where .* 2000"):
         axis_on(bench, increments_per_mm=2000.0).start()
     axis_on(bench, increments_per_mm=2000.0, lead_mm=0.0).start()
+    bench.mock.dictionary.values[0x60A8, 0] = IN_INCREMENTS
     axis_on(bench, increments_per_mm=2000.0, lead_mm=2.5).start()
+
+
+@pytest.mark.parametrize(
+    ("unit", "lead_mm", "said"),
+    [
+        (0xFA01_0000, 0.0, r"1000 units a mm by its unit of position \(object 60A8\)"),
+        (IN_INCREMENTS, 5.0, r"1000 units a mm by its own factors .* 5000 units are one turn, and axis.lead_mm 5"),
+    ],
+)
+def test_a_scale_that_is_not_stated_is_taken_from_the_drive(
+    bench: DriveBench, unit: int, lead_mm: float, said: str
+) -> None:
+    bench.mock.dictionary.values[0x60A8, 0] = unit
+    axis = axis_on(bench, increments_per_mm=0.0, lead_mm=lead_mm)
+    axis.start()
+    assert re.match(said, axis.identity.settings["scale"])
+    assert float(axis.identity.settings["increments_per_mm"]) == 1000.0
+    assert (value(bench, 0x607D, 1), value(bench, 0x607D, 2)) == (-500, 60_500)
+    axis.home()
+    axis.move_to(12, 30)
+    assert bench.plant.position_mm == pytest.approx(12, abs=0.1)
+
+
+def test_a_drive_that_nobody_set_up_is_neither_told_nor_moved(bench: DriveBench) -> None:
+    bench.mock.dictionary.values[0x6092, 1] = 1
+    axis = axis_on(bench, increments_per_mm=0.0)
+    with pytest.raises(DeviceError, match=r"nothing says how many .*: give axis.increments_per_mm, or axis.lead_mm"):
+        axis.start()
+    for act in (axis.home, axis.enable, lambda: axis.move_to(1.0, 1.0), lambda: axis.command(1.0, bench.now())):
+        with pytest.raises(DeviceError, match="is not started"):
+            act()
+    assert value(bench, 0x607F) == 400_000
+    assert not bench.plant.powered
 
 
 def test_factors_that_cannot_be_divided_are_told(bench: DriveBench) -> None:

@@ -15,6 +15,7 @@ from drivers.epos4.codec import (
     pdo_maps,
 )
 from drivers.epos4.faults import FAULTS, describe
+from drivers.epos4.kind import Epos4Kind
 from drivers.epos4.setup import (
     agrees,
     drive_heartbeat_limit_ns,
@@ -24,7 +25,6 @@ from drivers.epos4.setup import (
     host_node,
     parameters,
     process_data,
-    units,
 )
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.wiring import Limits
@@ -99,7 +99,7 @@ def test_every_other_pdo_is_switched_off() -> None:
 def test_limits_are_written_before_anything_else_and_the_watch_on_the_host_last() -> None:
     axis = Epos4Wiring(heartbeat_ms=50, current_limit_A=4, following_error_mm=1.5, acceleration_mm_s2=2000)
     limits = Limits(position_min_mm=2, position_max_mm=40, speed_mm_s=60)
-    writes = [(entry.index, entry.sub, value) for entry, value in parameters(axis, limits, units(axis))]
+    writes = [(entry.index, entry.sub, value) for entry, value in parameters(axis, limits, Epos4Kind(axis).scale)]
     assert writes[:8] == [
         (0x607D, 1, 3000),
         (0x607D, 2, 81_000),
