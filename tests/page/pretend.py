@@ -17,7 +17,7 @@ CURSOR = re.compile(r"cursor=([^&]+)")
 KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 API = "api/v1/"
 # A stream that greets, sends half a minute of pressing with a force that follows a set-point, and goes on with it ten
-# times a second; `hung` silences it, `still` leaves out the samples.
+# times a second; `hung` silences it, `still` leaves out the samples; a `dead` one is silent for good and never closed.
 SOCKET = """
 window.hung = window.still = false;
 const STREAMS = ["force", "setpoint", "error", "depth", "position", "marker"];
@@ -46,13 +46,15 @@ function batch(name, from_s, to_s, seq) {
 window.WebSocket = class {
   constructor() {
     this.at = 40;
+    window.socket = this;
     const hello = { type: "hello", session_id: "s", run: "r", event_seq: 0, streams: STREAMS.map((name) => ({ name })) };
     setTimeout(() => {
+      if (window.hung) return;
       this.say(hello);
       this.say({ type: "subscribed", channels: STREAMS.map((stream, i) => ({ channel: i + 1, stream, columns: [], step: 1 })) });
       for (let t = 10; t < this.at; t++) this.sample(t, t + 1);
     });
-    setInterval(() => window.hung || (this.say({ type: "ping" }), this.sample(this.at, this.at + 0.1), (this.at += 0.1)), 100);
+    setInterval(() => window.hung || this.dead || (this.say({ type: "ping" }), this.sample(this.at, this.at + 0.1), (this.at += 0.1)), 100);
   }
   say(message) {
     window.said_ms = performance.now();

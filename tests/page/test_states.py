@@ -97,6 +97,18 @@ def test_a_calibration_shows_what_it_asks_for_and_goes_on_once_a_person_says_so(
     assert asked.value.headers["x-control-lease"] == "l"
 
 
+def test_a_double_click_answers_one_request(show: Any, service: Pretended) -> None:
+    asks = {"message": "put 1 N on the tip, alone", "can": ["cancel", "resume"], "session": None}
+    paused = told.job("calibrate-force", "paused", **asks)
+    service.answers |= listed(paused) | IN_CONTROL | {"POST jobs/job-calibrate-force/resume": paused}
+    page = show("devices")
+    with page.expect_response("**/jobs/job-calibrate-force/resume"):
+        page.dblclick("#calibrate-force-resume")
+    expect(page.locator("#calibrate-force-cancel")).to_be_enabled()
+    expect(page.locator("#calibrate-force-resume")).to_be_enabled()
+    assert [path for _, path, _ in service.asked if path.endswith("resume")] == ["jobs/job-calibrate-force/resume"]
+
+
 def test_more_of_a_list_is_shown_once_it_is_asked_for(show: Any, service: Pretended) -> None:
     line = AUDIT.items[0]
     newest = [line.model_copy(update={"seq": seq}) for seq in range(205, 5, -1)]

@@ -128,9 +128,10 @@ def _verbs(router: APIRouter, service: Service) -> None:
         dependencies=[OPERATE],
         response_model=JobView,
         summary="Lets a paused job go on; in a calibration it says that what was asked for is done",
-        responses=said,
+        responses={**said, **responses("400 idempotency-key")},
     )
-    def resume(identifier: str, lease: LeaseHeader = "") -> Response:
+    def resume(identifier: str, lease: LeaseHeader = "", key: KeyHeader = "") -> Response:
         service.control.check(lease)
+        refuse_without_key(key)
         service.jobs.alive(identifier).resume(lease)
         return shown(identifier)

@@ -131,6 +131,25 @@ def test_what_a_person_is_asked_for_pauses_the_job_until_it_is_done(
     assert ended(client, job)["state"] == "cancelled"
 
 
+def test_an_answer_to_a_request_that_is_sent_again_is_none_to_the_next(
+    client: TestClient, service: Service, first: Path
+) -> None:
+    planted(service, "asking")
+    job = begun(client, "verify", session=first.name)
+    becomes(client, job, "paused")
+    done = {"Idempotency-Key": "1-N-is-on"}
+    client.post(f"/api/v1/jobs/{job}/resume", headers=done)
+    until(lambda: shown(client, job)["message"] == "put 2 N on the tip", PATIENCE_S, "the second request")
+    again = client.post(f"/api/v1/jobs/{job}/resume", headers=done)
+    assert (again.status_code, again.headers["idempotent-replayed"]) == (200, "true")
+    unnamed = client.post(f"/api/v1/jobs/{job}/resume", headers={"Idempotency-Key": ""})
+    assert (unnamed.status_code, unnamed.json()["code"]) == (400, "idempotency-key")
+    asked = shown(client, job)
+    assert (asked["state"], asked["message"]) == ("paused", "put 2 N on the tip")
+    client.post(f"/api/v1/jobs/{job}/cancel")
+    assert ended(client, job)["log"] == ["1 N is on"]
+
+
 @pytest.mark.usefixtures("impatient")
 def test_one_computes_while_others_wait_in_their_order(client: TestClient, service: Service, first: Path) -> None:
     planted(service, "patient")

@@ -214,7 +214,7 @@ def test_whoever_resumes_takes_the_job_over(client: TestClient, service: Service
 
 def test_what_moves_asks_for_a_key_and_what_computes_does_not(client: TestClient, trials: Trials) -> None:
     body = {"kind": "capture", "params": {"protocol": "p", "session": "s"}}
-    for path, sent in (("/jobs", body), ("/recover", {}), ("/rig/connect", None)):
+    for path, sent in (("/jobs", body), ("/recover", {}), ("/rig/connect", None), ("/jobs/x/resume", None)):
         refused = client.post(f"/api/v1{path}", json=sent, headers={"Idempotency-Key": ""})
         assert (refused.status_code, refused.json()["code"]) == (400, "idempotency-key"), path
     assert trials.made == []

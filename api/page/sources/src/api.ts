@@ -36,6 +36,9 @@ export class Refused extends Error {
   }
 }
 
+/** Whether no answer came at all: what only looks can be asked for again. */
+export const unanswered = (error: unknown) => error instanceof Refused && error.status === 0;
+
 const listeners: Array<() => void> = [];
 /** Called whenever an answer says that nobody is logged in here. */
 export function onUnauthorised(listener: () => void): void {
@@ -62,27 +65,30 @@ export function requestKey(): Record<string, string> {
   return { "Idempotency-Key": Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("") };
 }
 
+/** Also of an answer that broke off within. */
+function lost(): never {
+  throw new Refused(0, "no-answer", t.noAnswer);
+}
+
 async function answered(method: Method, path: string, sent: Sent<unknown>): Promise<Response> {
   const form = sent.body instanceof FormData;
   const headers = { ...(sent.body !== undefined && !form && { "Content-Type": "application/json" }), ...sent.headers };
   const body = sent.body === undefined ? undefined : form ? (sent.body as FormData) : JSON.stringify(sent.body);
   const request = { method: method.toUpperCase(), headers, body, signal: sent.signal, credentials: "same-origin" as const };
-  const response = await fetch(address(path, sent), request).catch(() => {
-    throw new Refused(0, "no-answer", t.noAnswer);
-  });
+  const response = await fetch(address(path, sent), request).catch(lost);
   if (!response.ok) throw await refused(response);
   return response;
 }
 
 export async function ask(method: Method, path: string, sent: Sent<unknown> = {}): Promise<unknown> {
   const response = await answered(method, path, sent);
-  return response.status === 204 ? undefined : response.json();
+  return response.status === 204 ? undefined : response.json().catch(lost);
 }
 
 /** What was read, with the mark that a change of it has to name. */
 export async function marked<T>(path: string, sent: Sent<undefined> = {}): Promise<{ value: T; mark: string }> {
   const response = await answered("get", path, sent);
-  return { value: await response.json(), mark: response.headers.get("ETag") ?? "" };
+  return { value: await response.json().catch(lost), mark: response.headers.get("ETag") ?? "" };
 }
 
 /** What is there, or null where nothing has been made yet. */

@@ -1,6 +1,6 @@
 // Work that takes longer than an answer: it is started, goes on whoever looks, and leaves a result.
 import { useEffect, useState } from "preact/hooks";
-import { ask, requestKey } from "./api";
+import { ask, requestKey, unanswered } from "./api";
 import { held, inControl } from "./lease";
 
 export type JobState = "queued" | "running" | "pausing" | "paused" | "cancelling" | "succeeded" | "failed" | "cancelled" | "interrupted";
@@ -79,7 +79,12 @@ export function useWork<R = unknown>(kind: string, session?: string): [Job<R> | 
   const [id, follow] = useState("");
   useEffect(() => {
     let current = true;
-    newest(kind, session).then((found) => current && found && follow((now) => now || found), () => {});
+    const find = (): Promise<unknown> =>
+      newest(kind, session).then(
+        (found) => current && found && follow((now) => now || found),
+        (error) => current && unanswered(error) && setTimeout(find, LOOK_MS),
+      );
+    void find();
     return () => void (current = false);
   }, [kind, session]);
   return [useJob<R>(id), follow];

@@ -9,6 +9,8 @@ const PATH = "/api/v1/control/lease";
 const LASTS_S = 5;
 // A fifth of what a lease lasts.
 const RENEW_MS = 1000;
+// Somebody else, or nobody, is in control.
+const LOCKED = 423;
 
 export const lease = signal("");
 /** Who logged in here, as others are told. */
@@ -32,7 +34,7 @@ async function take(): Promise<void> {
   try {
     keep((await post(PATH, { body: wanted() })).lease_id);
   } catch (error) {
-    occupied.value = error instanceof Refused && error.status === 423;
+    occupied.value = error instanceof Refused && error.status === LOCKED;
     throw occupied.value ? new Error(t.control.refused(told((error as Refused).more))) : error;
   }
 }
@@ -63,9 +65,9 @@ async function renew(): Promise<void> {
   try {
     await ask("put", PATH, { headers: held() });
   } catch (error) {
-    // A service that does not answer may still hold it for us; one that refuses does not. Nor is a new lease lost
-    // by the answer to an old one.
-    if (!(error instanceof Refused) || error.status === 0 || lease.value !== mine) return;
+    // Only 423 says that it is not ours: a service that does not answer, or is too busy to, may still hold it for us.
+    // Nor is a new lease lost by the answer to an old one.
+    if (!(error instanceof Refused) || error.status !== LOCKED || lease.value !== mine) return;
     lease.value = "";
     lost.value = gone(error);
   }

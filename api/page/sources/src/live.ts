@@ -90,13 +90,17 @@ function showNumbers(): void {
 }
 
 async function learn(): Promise<void> {
-  started_ms.value = Date.now() - (await learnStopPort()).monotonic_ns * 1e-6;
+  const { monotonic_ns } = await learnStopPort();
+  started_ms.value = Date.now() - monotonic_ns * 1e-6;
 }
 
 async function look(): Promise<void> {
+  const before = rig.value?.state;
   try {
     rig.value = await get("/api/v1/rig", { signal: AbortSignal.timeout(2 * SILENT_MS) });
     viewed_ms = performance.now();
+    // Each start of the bench has a stop process of its own, also while it homes and is not connected yet.
+    if ([before, rig.value.state].includes("disconnected")) void learn();
   } catch {
     // Silence is shown by the clock, whatever the reason.
   }
@@ -119,12 +123,12 @@ export function listen(): void {
     ],
     {
       message: () => void (heard_ms = performance.now()),
-      open: () => learn().catch(() => {}),
-      run: forget,
+      open: () => void learn(),
+      run: () => (forget(), void learn()),
       batch: keep,
       event: (event) => {
         events.value = [event, ...events.value].slice(0, EVENTS);
-        if (event.code.startsWith("away-stops")) learn().catch(() => {});
+        if (event.code.startsWith("away-stops")) void learn();
       },
       gap: (_, dropped) => void (missed.value += dropped),
     },

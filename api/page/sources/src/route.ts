@@ -9,10 +9,19 @@ export interface Place {
   of: string;
 }
 
+/** What somebody typed may be no code of letters. */
+function decoded(text: string): string {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text;
+  }
+}
+
 function read(): Place {
   const [view, ...rest] = location.hash.replace(/^#\/?/, "").split("/");
   const known = VIEWS.find((one) => one === view);
-  return { view: known ?? "bench", of: known ? decodeURIComponent(rest.join("/")) : "" };
+  return { view: known ?? "bench", of: known ? decoded(rest.join("/")) : "" };
 }
 
 export const place = signal<Place>({ view: "bench", of: "" });

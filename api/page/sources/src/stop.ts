@@ -13,6 +13,7 @@ export interface Stop {
 }
 
 const CONFIRM_MS = 1500;
+const AGAIN_MS = 1000;
 const ENCRYPTED = location.protocol === "https:";
 export const stop = signal<Stop | null>(null);
 /** Whether there is, for now, no way to a stop but through the service. */
@@ -20,14 +21,28 @@ export const alone = signal(false);
 let stopPort = 0;
 let away = "";
 
-/** Also what else the service says of itself. */
-export async function learnStopPort(): Promise<Schema["Info"]> {
-  const info: Schema["Info"] = await (await fetch("/api/v1/info")).json();
-  stopPort = info.stop_port || stopPort;
-  away = info.away_stops || away;
-  alone.value = ENCRYPTED && !info.away_stops;
-  return info;
+async function info(): Promise<Schema["Info"]> {
+  const answer = await fetch("/api/v1/info", { signal: AbortSignal.timeout(5 * AGAIN_MS) });
+  if (!answer.ok) throw new Error(answer.statusText);
+  return answer.json();
 }
+
+async function learned(): Promise<Schema["Info"]> {
+  for (;;) {
+    const found = await info().catch(() => null);
+    if (found) {
+      stopPort = found.stop_port || stopPort;
+      away = found.away_stops || away;
+      alone.value = ENCRYPTED && !found.away_stops;
+      return found;
+    }
+    await new Promise((later) => setTimeout(later, AGAIN_MS));
+  }
+}
+
+let learning: ReturnType<typeof learned> | null = null;
+/** Also what else the service says of itself; asked until it answers: a way to a stop must not hang on one request. */
+export const learnStopPort = () => (learning ??= learned().finally(() => void (learning = null)));
 
 function besides(kind: StopKind, signal: AbortSignal): Promise<string>[] {
   if (ENCRYPTED) return away ? [askForStop(`${away}/${kind}`, signal, "include")] : [];
@@ -62,5 +77,5 @@ export function listenForEscape(): void {
     },
     { capture: true },
   );
-  learnStopPort().catch(() => {});
+  void learnStopPort();
 }

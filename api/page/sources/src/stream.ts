@@ -40,6 +40,9 @@ export interface Heard {
 const HEADER_BYTES = 24;
 // A service that restarts is back within seconds; more tries than two a second help nobody.
 const AGAIN_MS = 500;
+// A service says something every 0.2 s. Where another network or a sleeping computer cut the line, nobody closes it:
+// what has been silent for this long is given up. A browser holds an attempt back by 5 s after others that failed.
+const DEAD_MS = 10_000;
 
 export class Stream {
   private socket: WebSocket | null = null;
@@ -48,6 +51,7 @@ export class Stream {
   private run = "";
   private session = "";
   private event: number | null = null;
+  private patience = 0;
 
   constructor(
     private readonly asked: Asked[],
@@ -57,14 +61,30 @@ export class Stream {
   open(): void {
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const socket = new WebSocket(`${scheme}://${location.host}/api/v1/stream`, "rig.v1");
+    this.socket = socket;
+    this.wait();
     socket.binaryType = "arraybuffer";
     socket.onmessage = (message) => {
+      if (socket !== this.socket) return;
+      this.wait();
       this.heard.message();
       if (typeof message.data === "string") this.told(JSON.parse(message.data));
       else this.sampled(message.data as ArrayBuffer);
     };
-    socket.onclose = () => setTimeout(() => this.open(), AGAIN_MS);
-    this.socket = socket;
+    socket.onclose = () => socket === this.socket && this.again();
+  }
+
+  private wait(): void {
+    clearTimeout(this.patience);
+    this.patience = window.setTimeout(() => this.again(), DEAD_MS);
+  }
+
+  private again(): void {
+    clearTimeout(this.patience);
+    const before = this.socket;
+    this.socket = null;
+    before?.close();
+    setTimeout(() => this.open(), AGAIN_MS);
   }
 
   private told(said: Record<string, unknown>): void {

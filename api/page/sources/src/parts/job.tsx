@@ -1,10 +1,14 @@
 // One piece of work: how far it is, what it said, how it ended, and its end by hand.
+import { useState } from "preact/hooks";
 import { attempt } from "../attempt";
 import { duration } from "../clock";
 import { ended, tell, type Job, type Verb } from "../jobs";
 import { inControl } from "../lease";
 import { t } from "../texts";
 import { Dot } from "./basics";
+
+// What is asked for next is shown half a second later: the second click of a double one must not answer that too.
+const ANSWERED_MS = 1000;
 
 const named = (job: Job) => t.kinds[job.kind] ?? job.kind;
 
@@ -19,9 +23,16 @@ function Left({ job }: { job: Job }) {
 }
 
 function Verbs({ job }: { job: Job }) {
+  const [answered, answer] = useState(false);
   // Whoever ends something needs no control of it; whoever lets it go on does.
-  const does = (verb: Verb) => () => void attempt(() => (verb === "cancel" ? tell(job, verb) : inControl(() => tell(job, verb))));
-  return <div class="row">{job.can.map((verb) => <button key={verb} id={`${job.kind}-${verb}`} type="button" onClick={does(verb)}>{t.job[verb]}</button>)}</div>;
+  const does = (verb: Verb) => () => {
+    if (verb === "resume") {
+      answer(true);
+      setTimeout(() => answer(false), ANSWERED_MS);
+    }
+    void attempt(() => (verb === "cancel" ? tell(job, verb) : inControl(() => tell(job, verb))));
+  };
+  return <div class="row">{job.can.map((verb) => <button key={verb} id={`${job.kind}-${verb}`} type="button" disabled={answered && verb === "resume"} onClick={does(verb)}>{t.job[verb]}</button>)}</div>;
 }
 
 function Log({ job }: { job: Job }) {
