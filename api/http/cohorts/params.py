@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from api.http.jobs.params import Existing, JobBody, Only
+from api.http.jobs.params import Existing, JobOf, Only
 from api.http.models import RequestBody
 from api.operations.cohort.wanted import By
 
@@ -41,22 +41,13 @@ class DiagnoseCohortParams(CohortParams):
     detectability: bool = Field(default=False, description="plants causes not found, to see from what size")
 
 
-class FitCohortJob(JobBody):
+class FitCohortJob(JobOf[Literal["fit-cohort"], FitCohortParams]):
     """Fits each session of a cohort by itself, and says what subjects share."""
 
-    kind: Literal["fit-cohort"]
-    params: FitCohortParams
 
-
-class DiagnoseCohortJob(JobBody):
+class DiagnoseCohortJob(JobOf[Literal["diagnose-cohort"], DiagnoseCohortParams]):
     """Diagnoses each session of a cohort by itself."""
 
-    kind: Literal["diagnose-cohort"]
-    params: DiagnoseCohortParams
 
-
-class ReportCohortJob(JobBody):
+class ReportCohortJob(JobOf[Literal["report-cohort"], CohortParams]):
     """Writes a page about each session of a cohort."""
-
-    kind: Literal["report-cohort"]
-    params: CohortParams

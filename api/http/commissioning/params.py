@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from api.http.jobs.params import JobBody
+from api.http.jobs.params import JobBody, JobOf
 from api.http.models import RequestBody
 from api.operations.calibrate import AxisAsked
 from controller.commissioning.weights import Weights, parse_weights
@@ -72,31 +72,23 @@ class CalibrateDynamicsParams(MovingParams):
     """Small sweeps in the air."""
 
 
-class CalibrateForceJob(JobBody):
+class CalibrateForceJob(JobOf[Literal["calibrate-force"], CalibrateForceParams]):
     """Calibrates the force sensor against known weights; the loop ends for it, and nothing moves."""
 
-    kind: Literal["calibrate-force"]
-    params: CalibrateForceParams
 
-
-class CalibrateGloveJob(JobBody):
+class CalibrateGloveJob(JobOf[Literal["calibrate-glove"], CalibrateGloveParams]):
     """Calibrates a glove against known weights on each finger; the loop ends for it, and nothing moves."""
 
-    kind: Literal["calibrate-glove"]
-    params: CalibrateGloveParams
 
-
-class CalibrateAxisJob(JobBody):
+class CalibrateAxisJob(JobOf[Literal["calibrate-axis"], CalibrateAxisParams]):
     """Calibrates the axis against tracker or gauge block; the loop ends for it, then the axis homes and moves."""
 
-    kind: Literal["calibrate-axis"]
     params: CalibrateAxisParams = CalibrateAxisParams()
 
 
-class CalibrateDynamicsJob(JobBody):
+class CalibrateDynamicsJob(JobOf[Literal["calibrate-dynamics"], CalibrateDynamicsParams]):
     """Finds how the axis follows its set-point; the loop ends for it, then the axis homes and swings in the air."""
 
-    kind: Literal["calibrate-dynamics"]
     params: CalibrateDynamicsParams = CalibrateDynamicsParams()
 
 

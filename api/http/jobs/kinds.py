@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal, get_args, get_type_hints
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
@@ -17,6 +17,7 @@ from api.http.jobs.params import (
     GloveThresholdParams,
     ImportParams,
     JobBody,
+    JobOf,
     NothingAsked,
     ProposeParams,
     ProtocolCheckParams,
@@ -44,116 +45,72 @@ AnyResult = (
 )  # fmt: skip
 
 
-class CaptureJob(JobBody):
+class CaptureJob(JobOf[Literal["capture"], CaptureParams]):
     """Runs a protocol and records every trial."""
 
-    kind: Literal["capture"]
-    params: CaptureParams
 
-
-class TrackJob(JobBody):
+class TrackJob(JobOf[Literal["track"], TrackParams]):
     """Tracks a force with a law made from a model."""
 
-    kind: Literal["track"]
-    params: TrackParams
 
-
-class RetractJob(JobBody):
+class RetractJob(JobOf[Literal["retract"], NothingAsked]):
     """Moves the tip out, after a stop that was acknowledged."""
 
-    kind: Literal["retract"]
     params: NothingAsked = NothingAsked()
 
 
-class ThresholdJob(JobBody):
+class ThresholdJob(JobOf[Literal["threshold"], ThresholdParams]):
     """Raises force slowly until the subject stops it."""
 
-    kind: Literal["threshold"]
-    params: ThresholdParams
 
-
-class GloveThresholdJob(JobBody):
+class GloveThresholdJob(JobOf[Literal["threshold-glove"], GloveThresholdParams]):
     """Takes the subject's pain threshold at a site from presses with a glove."""
 
-    kind: Literal["threshold-glove"]
-    params: GloveThresholdParams
 
-
-class DoctorJob(JobBody):
+class DoctorJob(JobOf[Literal["doctor"], NothingAsked]):
     """Looks at each device without moving anything."""
 
-    kind: Literal["doctor"]
     params: NothingAsked = NothingAsked()
 
 
-class FitJob(JobBody):
+class FitJob(JobOf[Literal["fit"], FitParams]):
     """Fits tissue laws, and the lattice where asked for."""
 
-    kind: Literal["fit"]
-    params: FitParams
 
-
-class DiagnoseJob(JobBody):
+class DiagnoseJob(JobOf[Literal["diagnose"], DiagnoseParams]):
     """Says what the simulation gets wrong, names the cause and extends the model."""
 
-    kind: Literal["diagnose"]
-    params: DiagnoseParams
 
-
-class ProtocolCheckJob(JobBody):
+class ProtocolCheckJob(JobOf[Literal["protocol-check"], ProtocolCheckParams]):
     """Says before any recording which causes a protocol can show."""
 
-    kind: Literal["protocol-check"]
-    params: ProtocolCheckParams
 
-
-class SimulateJob(JobBody):
+class SimulateJob(JobOf[Literal["simulate"], SimulateParams]):
     """Plays a reference on a model before anything real moves."""
 
-    kind: Literal["simulate"]
-    params: SimulateParams
 
-
-class ReportJob(JobBody):
+class ReportJob(JobOf[Literal["report"], DataPlace]):
     """Writes one self-contained page."""
 
-    kind: Literal["report"]
-    params: DataPlace
 
-
-class ExportJob(JobBody):
+class ExportJob(JobOf[Literal["export"], ExportParams]):
     """Writes recordings as CSV, Parquet, HDF5 and MAT."""
 
-    kind: Literal["export"]
-    params: ExportParams
 
-
-class VerifyJob(JobBody):
+class VerifyJob(JobOf[Literal["verify"], VerifyParams]):
     """Reads every byte and says what is complete, missing or damaged."""
 
-    kind: Literal["verify"]
-    params: VerifyParams
 
-
-class RepairJob(JobBody):
+class RepairJob(JobOf[Literal["repair"], RepairParams]):
     """Saves every good sample of a recording as a new one."""
 
-    kind: Literal["repair"]
-    params: RepairParams
 
-
-class ProposeJob(JobBody):
+class ProposeJob(JobOf[Literal["propose"], ProposeParams]):
     """Proposes a mapping for an upload, with what is doubtful and what to ask."""
 
-    kind: Literal["propose"]
-    params: ProposeParams
 
-
-class ImportJob(JobBody):
+class ImportJob(JobOf[Literal["import"], ImportParams]):
     """Makes a session of an upload."""
-
-    kind: Literal["import"]
-    params: ImportParams
 
 
 AnyJob = Annotated[
@@ -182,13 +139,14 @@ class Kind:
     @property
     def name(self) -> str:
         """As requests and views say it."""
-        (name,) = get_args(get_type_hints(self.body)["kind"])
+        (name,) = get_args(self.body.model_fields["kind"].annotation)
         return str(name)
 
     @property
     def params(self) -> type[RequestBody]:
         """What it is asked for."""
-        found: type[RequestBody] = get_type_hints(self.body)["params"]
+        found = self.body.model_fields["params"].annotation
+        assert isinstance(found, type) and issubclass(found, RequestBody)
         return found
 
 

@@ -1,6 +1,6 @@
 """What each kind of job is asked for: strict, bounded, named as the command's options are, with units."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Generic, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -19,10 +19,19 @@ Point = Annotated[list[float], Field(min_length=2, max_length=2)]
 MOST_POINTS = 4000
 # A person compares a handful of sessions; twenty are a study's.
 MOST_SESSIONS = 20
+KindName = TypeVar("KindName", bound=str)
+Params = TypeVar("Params", bound=RequestBody)
 
 
 class JobBody(RequestBody):
     """Root of what starts a job."""
+
+
+class JobOf(JobBody, Generic[KindName, Params]):
+    """One kind of job, by its name, and what that is asked for."""
+
+    kind: KindName
+    params: Params
 
 
 class ModelRef(RequestBody):
