@@ -4,13 +4,14 @@
 """
 
 from collections.abc import Mapping
-from typing import Annotated, TypeVar
+from typing import Annotated, Generic, TypeVar
 
 from pydantic import BeforeValidator, Field
 
 from rig.results.base import Number, Result, SavedResult
 
 Value = TypeVar("Value")
+Entry = TypeVar("Entry", bound=Result)
 
 
 def storable(value: Value) -> Value | str:
@@ -139,61 +140,45 @@ class SiteEntry(Result):
     last: str
 
 
-class SessionList(SavedResult):
+class EntryList(Result, Generic[Entry]):
+    """One page of entries; ``next`` is the cursor of what follows, null at the end."""
+
+    items: tuple[Entry, ...]
+    next: str | None = None
+
+
+class SessionList(EntryList[SessionEntry], SavedResult):
     """Sessions, newest first; ``next`` is the cursor of what follows, null at the end."""
 
-    items: tuple[SessionEntry, ...]
-    next: str | None = None
     remarks: Texts = Field(default=(), description="folders that are not listed, and why")
 
 
-class TrialList(SavedResult):
+class TrialList(EntryList[TrialEntry], SavedResult):
     """Trials, newest first."""
 
-    items: tuple[TrialEntry, ...]
-    next: str | None = None
 
-
-class ModelList(SavedResult):
+class ModelList(EntryList[ModelEntry], SavedResult):
     """Models, newest first."""
 
-    items: tuple[ModelEntry, ...]
-    next: str | None = None
 
-
-class DiagnosisList(SavedResult):
+class DiagnosisList(EntryList[DiagnosisEntry], SavedResult):
     """Diagnoses, newest first."""
 
-    items: tuple[DiagnosisEntry, ...]
-    next: str | None = None
 
-
-class CauseList(SavedResult):
+class CauseList(EntryList[CauseEntry], SavedResult):
     """Causes named, newest first."""
 
-    items: tuple[CauseEntry, ...]
-    next: str | None = None
 
-
-class WorkList(SavedResult):
+class WorkList(EntryList[WorkEntry], SavedResult):
     """Operations, newest first."""
 
-    items: tuple[WorkEntry, ...]
-    next: str | None = None
 
-
-class SubjectList(SavedResult):
+class SubjectList(EntryList[SubjectEntry], SavedResult):
     """Subjects by code."""
 
-    items: tuple[SubjectEntry, ...]
-    next: str | None = None
 
-
-class SiteList(SavedResult):
+class SiteList(EntryList[SiteEntry], SavedResult):
     """Sites by subject."""
-
-    items: tuple[SiteEntry, ...]
-    next: str | None = None
 
 
 class SubjectHistory(SavedResult):
