@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pkgutil import resolve_name
 
-from controller.devices import guard
+from controller.devices.guard import GuardedAxis, GuardedForce, GuardedTracker
 from controller.devices.reopening import Open, Openers
 from drivers.epos4.walker import never
 from drivers.roles import Device, ForceSensor, MarkerTracker, ServoAxis
@@ -37,7 +37,7 @@ class Devices:
 
 def open_force(config: ForceProduct) -> ForceSensor:
     """The force sensor, not yet started; raises DeviceError where its port cannot be opened."""
-    return guard.force_sensor(config, lambda: resolve_name(config.driver)(config))
+    return GuardedForce.guard(config, lambda: resolve_name(config.driver)(config))
 
 
 def open_axis(config: AxisProduct, limits: Limits, rate_Hz: float, interrupted: Interrupted = never) -> ServoAxis:
@@ -46,12 +46,12 @@ def open_axis(config: AxisProduct, limits: Limits, rate_Hz: float, interrupted: 
     ``interrupted`` is asked while it moves by itself; a yes brakes it.
     """
     options = {"rate_Hz": rate_Hz, "interrupted": interrupted}
-    return guard.servo_axis(config, lambda: resolve_name(config.driver)(config, limits, **options))
+    return GuardedAxis.guard(config, lambda: resolve_name(config.driver)(config, limits, **options))
 
 
 def open_tracker(config: TrackerProduct) -> MarkerTracker:
     """The tracker, not yet started."""
-    return guard.marker_tracker(config, lambda: resolve_name(config.driver)(config))
+    return GuardedTracker.guard(config, lambda: resolve_name(config.driver)(config))
 
 
 class Interruption:
