@@ -201,9 +201,8 @@ def _code(body: bytes) -> str:
 
 def limited(wait_s: float) -> Response:
     """Somebody asks too often."""
-    response = problems.answer(429, "too-many", f"too many requests; try again in {wait_s:.1f} s")
-    response.headers["Retry-After"] = str(math.ceil(wait_s))
-    return response
+    text = f"too many requests; try again in {wait_s:.1f} s"
+    return problems.answer(429, "too-many", text, headers={"Retry-After": str(math.ceil(wait_s))})
 
 
 HOW = (
@@ -213,9 +212,8 @@ HOW = (
 
 
 def _unauthorised(word: str) -> Response:
-    response = problems.answer(401, "no-credential", f"nobody is logged in here: {HOW.format(scope=word)}")
-    response.headers["WWW-Authenticate"] = "Bearer"
-    return response
+    text = f"nobody is logged in here: {HOW.format(scope=word)}"
+    return problems.answer(401, "no-credential", text, headers={"WWW-Authenticate": "Bearer"})
 
 
 def _unknown(caller: Caller | None, methods: frozenset[str]) -> Response:
@@ -224,9 +222,8 @@ def _unknown(caller: Caller | None, methods: frozenset[str]) -> Response:
         return _unauthorised("read")
     if not methods:
         return problems.answer(404, "no-such-route", "there is nothing at this address; see /api/v1/openapi.json")
-    response = problems.answer(405, "method", f"this address takes {', '.join(sorted(methods))}")
-    response.headers["Allow"] = ", ".join(sorted(methods))
-    return response
+    taken = ", ".join(sorted(methods))
+    return problems.answer(405, "method", f"this address takes {taken}", headers={"Allow": taken})
 
 
 def _refuse_caller(right: Right, caller: Caller | None, arrived: Arrived) -> Response | None:

@@ -107,9 +107,9 @@ async def _checked(service: Service, sent: LoginRequest, request: Request) -> Ca
             return await service.access.accounts.enter(sent.name, sent.password)
     except Busy:
         wait_s = BUSY_S
-    refused = RequestRefused(429, "too-many", f"too many tries to log in; try again in {math.ceil(wait_s)} s")
-    refused.headers = {"Retry-After": str(math.ceil(wait_s))}
-    raise refused
+    again_s = str(math.ceil(wait_s))
+    text = f"too many tries to log in; try again in {again_s} s"
+    raise RequestRefused(429, "too-many", text, headers={"Retry-After": again_s})
 
 
 def _enter(service: Service, caller: Caller, request: Request, response: Response) -> Me:
