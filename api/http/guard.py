@@ -154,10 +154,8 @@ class Guard:
             return problems.answer(403, "no-right", f"{rule.path} declares no right, so it serves nobody; report this")
         scope[PASSED], scope[CALLER] = rule.right, caller
         scope[ENTITLED] = partial(self._entitled, rule.right, arrived)
-        if not rule.right.stop:
-            limited = self._refuse_rate(caller, arrived)
-            if limited:
-                return limited
+        if not rule.right.stop and (wait_s := self._wait_s(caller, arrived)):
+            return limited(wait_s)
         return _refuse_caller(rule.right, caller, arrived) or _refuse_stated_size(arrived.headers, rule.right)
 
     def _caller(self, arrived: Arrived) -> Caller | None:
@@ -170,10 +168,9 @@ class Guard:
         except (RigError, OSError):
             return False
 
-    def _refuse_rate(self, caller: Caller | None, arrived: Arrived) -> Response | None:
+    def _wait_s(self, caller: Caller | None, arrived: Arrived) -> float:
         who = caller.key if caller else arrived.client
-        wait_s = self._access.limits.wait_s(who, KNOWN if caller else UNKNOWN)
-        return limited(wait_s) if wait_s else None
+        return self._access.limits.wait_s(who, KNOWN if caller else UNKNOWN)
 
     def _refuse_place(self, arrived: Arrived) -> Response | None:
         """No other site's page may move this bench: the host must be this one, and so must the page that asks."""
