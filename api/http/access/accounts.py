@@ -12,10 +12,9 @@ from pathlib import Path
 
 from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
-from pydantic import BaseModel, ConfigDict
 
 from api.http.access.scopes import WORDS, Caller, Scope, ScopeWord
-from api.http.access.store import PrivateFile
+from api.http.access.store import KeptModel, PrivateFile
 from rig.errors import UsageError
 
 SHORTEST_PASSWORD = 12
@@ -25,10 +24,8 @@ WORKERS, WAITING = 1, 8
 NICE = 10  # below the force loop and the service itself
 
 
-class Account(BaseModel):
+class Account(KeptModel):
     """One person."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     scope: ScopeWord
@@ -40,10 +37,8 @@ class Account(BaseModel):
         return Caller(self.name, WORDS[self.scope], "", "login")
 
 
-class Accounts(BaseModel):
+class Accounts(KeptModel):
     """The file of accounts."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     version: int = 1
     accounts: tuple[Account, ...] = ()

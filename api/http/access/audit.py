@@ -15,19 +15,16 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict
-
 from api.catalogue.pages import Page, cut
 from api.http.access.scopes import Caller
+from api.http.access.store import KeptModel
 
 TAIL_BYTES = 65_536  # many times the longest line
 FIRST = "0" * 64
 
 
-class AuditLine(BaseModel):
+class AuditLine(KeptModel):
     """One thing that somebody did, or was kept from doing."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     seq: int
     time: str

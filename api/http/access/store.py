@@ -6,12 +6,18 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from api.http.shared_file import FileState, alone, file_state
 from rig.errors import UsageError
 
 Content = TypeVar("Content", bound=BaseModel)
+
+
+class KeptModel(BaseModel):
+    """Root of what is kept of who may act: nothing in it changes by itself, and nothing unknown is taken."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class PrivateFile(Generic[Content]):

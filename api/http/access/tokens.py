@@ -8,19 +8,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
-from pydantic import BaseModel, ConfigDict
-
 from api.http.access.scopes import WORDS, Caller, Scope, ScopeWord
 from api.http.access.secrets import TOKEN_MARK, digest, new_secret, position
-from api.http.access.store import PrivateFile
+from api.http.access.store import KeptModel, PrivateFile
 from controller.claims import state_folder
 from rig.errors import UsageError
 
 
-class Token(BaseModel):
+class Token(KeptModel):
     """One token as it is kept."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     id: str
     name: str
@@ -34,10 +30,8 @@ class Token(BaseModel):
         return Caller(self.name, WORDS[self.scope], self.id, "token")
 
 
-class Tokens(BaseModel):
+class Tokens(KeptModel):
     """The file of tokens."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     version: int = 1
     tokens: tuple[Token, ...] = ()

@@ -2,15 +2,12 @@
 
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict
-
 from api.http.access.logins import Pass
+from api.http.access.store import KeptModel
 
 
-class AwaySettings(BaseModel):
+class AwaySettings(KeptModel):
     """At its start. Without ``files``, certificate and key, a reverse proxy on this computer is before it."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     known: Path
     access: Path
@@ -23,10 +20,8 @@ class AwaySettings(BaseModel):
     """Of the address that people open."""
 
 
-class Known(BaseModel):
+class Known(KeptModel):
     """What changes: the bench's stop word, and whose browsers are logged in."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     page: str = ""
     logins: tuple[Pass, ...] = ()
