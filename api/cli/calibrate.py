@@ -26,40 +26,48 @@ OTHERS = {
     "axis": (*OF_FORCE, "input_name"),
     "glove": (*OF_AXIS, "load"),
 }
+WeightsOption = Annotated[
+    str, typer.Option("--weights", help="force: known weights, as '100 g,200 g,5 N'; a mock sensor has its own.")
+]
+ToleranceOption = Annotated[
+    float, typer.Option("--tolerance-percent", min=0, max=10, help="force: bound on the error of each weight.")
+]
+GravityOption = Annotated[
+    float | None, typer.Option("--gravity", min=9.7, max=9.9, help="force: m/s2 at this place, for g and kg.")
+]
+TowardOption = Annotated[
+    bool | None, typer.Option("--toward-limb/--away-from-limb", help="axis: where the tip went at first.")
+]
+BlockOption = Annotated[
+    float | None, typer.Option("--gauge-block-mm", min=1, max=100, help="axis: against a block, not the tracker.")
+]
+NearOption = Annotated[
+    float | None, typer.Option("--near-mm", help="axis: position just before the table, for the block.")
+]
+DynamicsOption = Annotated[
+    bool, typer.Option("--dynamics", help="axis: how it follows its set-point, by small sweeps in the air.")
+]
+PauseOption = Annotated[
+    float | None, typer.Option("--pause", min=0, max=600, help="Seconds to wait instead of Enter each time.")
+]
 
 
 def calibrate(
     context: typer.Context,
     what: Annotated[Literal["force", "axis", "glove"], typer.Argument(help="What to calibrate.")],
-    weights: Annotated[
-        str, typer.Option("--weights", help="force: known weights, as '100 g,200 g,5 N'; a mock sensor has its own.")
-    ] = "",
+    weights: WeightsOption = "",
     load: Annotated[Load | None, typer.Option("--load", help="force: pressed on the tip, or hung.")] = None,
-    tolerance_percent: Annotated[
-        float, typer.Option("--tolerance-percent", min=0, max=10, help="force: bound on the error of each weight.")
-    ] = 0.5,
-    gravity: Annotated[
-        float | None, typer.Option("--gravity", min=9.7, max=9.9, help="force: m/s2 at this place, for g and kg.")
-    ] = None,
+    tolerance_percent: ToleranceOption = 0.5,
+    gravity: GravityOption = None,
     from_mm: Annotated[float, typer.Option("--from-mm", help="axis: where it begins, in the air.")] = 2.0,
     to_mm: Annotated[float, typer.Option("--to-mm", help="axis: how far it goes, in the air.")] = 14.0,
     clear: Annotated[bool, typer.Option("--clear", help="axis: the tip's way is free, and the limb out.")] = False,
-    toward_limb: Annotated[
-        bool | None, typer.Option("--toward-limb/--away-from-limb", help="axis: where the tip went at first.")
-    ] = None,
-    gauge_block_mm: Annotated[
-        float | None, typer.Option("--gauge-block-mm", min=1, max=100, help="axis: against a block, not the tracker.")
-    ] = None,
-    near_mm: Annotated[
-        float | None, typer.Option("--near-mm", help="axis: position just before the table, for the block.")
-    ] = None,
+    toward_limb: TowardOption = None,
+    gauge_block_mm: BlockOption = None,
+    near_mm: NearOption = None,
     input_name: Annotated[str, typer.Option("--input", help="glove: its name, where there are several.")] = "",
-    dynamics: Annotated[
-        bool, typer.Option("--dynamics", help="axis: how it follows its set-point, by small sweeps in the air.")
-    ] = False,
-    pause: Annotated[
-        float | None, typer.Option("--pause", min=0, max=600, help="Seconds to wait instead of Enter each time.")
-    ] = None,
+    dynamics: DynamicsOption = False,
+    pause: PauseOption = None,
     out: Annotated[Path | None, typer.Option("--out", help="New file; else calibration/WHAT-SERIAL-TIME.json.")] = None,
     config: ConfigOption = None,
     overrides: SetOption = None,
@@ -74,22 +82,21 @@ def calibrate(
     Example: rig calibrate force --weights "100 g,200 g,500 g" --load pressed
     """
     _refuse_options(context, OTHERS[what], what)
-    wiring = wiring_from(config, overrides)
+    wiring, person = wiring_from(config, overrides), Person(pause)
     refuse_out(out)
     if what == "glove":
         of_glove = GloveAsked(weights, tolerance_percent / 100, gravity, input_name)
-        keep_and_say(*calibrate_glove(wiring, of_glove, Person(pause)), out, config, json_file)
+        keep_and_say(*calibrate_glove(wiring, of_glove, person), out, config, json_file)
         return
     found: AnyCalibration
     if dynamics:
         _refuse_options(context, OF_SCALE, "axis --dynamics")
-        found = calibrate_dynamics(wiring, from_mm, clear, Person(pause))
+        found = calibrate_dynamics(wiring, from_mm, clear, person)
     elif what == "force":
-        asked = ForceAsked(weights, load, tolerance_percent / 100, gravity)
-        found = calibrate_force(wiring, asked, Person(pause))
+        found = calibrate_force(wiring, ForceAsked(weights, load, tolerance_percent / 100, gravity), person)
     else:
         way = AxisAsked(from_mm, to_mm, clear, toward_limb, gauge_block_mm, near_mm)
-        found = calibrate_axis(wiring, way, Person(pause))
+        found = calibrate_axis(wiring, way, person)
     result = kept(wiring.calibration, found, out)
     say_use(what_of(found), Path(result.file), (wiring_file(config) or Path()).parent)
     write_json(json_file, result)

@@ -30,7 +30,8 @@ def calibrate_axis(wiring: Wiring, asked: AxisAsked, person: Person) -> AxisCali
     operation = Operation("calibrate axis")
     with bench_for(wiring, approaches=False) as (live, endpoints):
         if asked.gauge_block_mm:
-            found = _by_block(operation, live, asked, person, endpoints if mock else None)
+            with _block(asked, person, endpoints if mock else None) as (block, put):
+                found = here(operation, lambda: axis_by_block(operation, live, asked.from_mm, block, put))
         else:
             travel = AxisTravel(asked.from_mm, asked.to_mm)
             found = here(operation, lambda: axis_by_tracker(operation, live, travel, lambda: _toward(asked, person)))
@@ -61,13 +62,6 @@ def _toward(asked: AxisAsked, person: Person) -> bool:
         return asked.toward_limb
     question = "no marker on the limb tells it: did the tip first go towards the limb's place (yes or no)"
     return person.answer(question, "--toward-limb or --away-from-limb") == "yes"
-
-
-def _by_block(
-    operation: Operation, wiring: Wiring, asked: AxisAsked, person: Person, endpoints: Endpoints | None
-) -> AxisCalibration:
-    with _block(asked, person, endpoints) as (block, put):
-        return here(operation, lambda: axis_by_block(operation, wiring, asked.from_mm, block, put))
 
 
 @contextmanager

@@ -36,7 +36,7 @@ from rig.intake.questions import inline
 from rig.recording.files import make_folder, refuse_unwritable, write_text
 from rig.recording.sessions import derive
 from rig.results.demo import DemoSummary, HiddenTruth
-from rig.results.diagnosis import FOLDER, TRUTH
+from rig.results.diagnosis import FOLDER, TRUTH, DiagnosisResult
 from rig.results.fit import FitResult
 from rig.results.tables import track_parts
 from rig.results.tracking import TrackResult
@@ -104,21 +104,28 @@ def demo(
     console.rule("verify and report")
     refuse_incomplete(verify(Operation("verify"), session), session)
     derive(session)
-    write_text(session / FOLDER / TRUTH, secret.sentence(diagnosis) + "\n")
-    page = report(Operation("report"), session, out / REPORT)
     hidden = HiddenTruth(
         effect=secret.effect, parameters=secret.knobs, seed=seed,
         named=secret.found_in(diagnosis) is not None, inside=secret.inside(diagnosis),
     )  # fmt: skip
-    found = DemoSummary(**dict(page), fit=fitted, tracking=result, diagnosis=diagnosis, hidden=hidden)
+    _reported(out, secret.sentence(diagnosis), fitted, result, diagnosis, hidden)
+    if serve:
+        console.rule("served until Ctrl-C")
+        served(out, plan, port)
+
+
+def _reported(
+    out: Path, truth: str, fit: FitResult, tracking: TrackResult, diagnosis: DiagnosisResult, hidden: HiddenTruth
+) -> None:
+    """Writes page and summary, and says the truth."""
+    write_text(out / SESSION / FOLDER / TRUTH, truth + "\n")
+    page = report(Operation("report"), out / SESSION, out / REPORT)
+    found = DemoSummary(**dict(page), fit=fit, tracking=tracking, diagnosis=diagnosis, hidden=hidden)
     found.write(out / SUMMARY)
     show(f"{page.recordings} recordings, {page.samples} samples, {page.dropped} dropped")
     show(f"{page.file} shows it; {out / SUMMARY} has the figures")
     console.rule("the truth")
-    show(secret.sentence(diagnosis))
-    if serve:
-        console.rule("served until Ctrl-C")
-        served(out, plan, port)
+    show(truth)
 
 
 def measured(

@@ -58,11 +58,8 @@ def mock_file(device: Product, endpoints: Endpoints, suffix: str = "") -> Path:
 def mock_force_calibration(wiring: Wiring, endpoints: Endpoints) -> ForceCalibration:
     """The calibration of the mock sensor at ``wiring.force.port``, made now where there is none that may be used."""
     file = force_file(wiring, endpoints)
-    with contextlib.suppress(UsageError):
-        known = read_force(file)
-        if not wiring.calibration.alone(known).unfit(datetime.now(UTC)):
-            return known
-    return kept("the mock force sensor", _measured_force(wiring, endpoints), file)
+    known = usable(read_force, file, wiring)
+    return known or kept("the mock force sensor", _measured_force(wiring, endpoints), file)
 
 
 def mock_axis_calibration(wiring: Wiring, endpoints: Endpoints) -> AxisCalibration | None:
@@ -72,16 +69,22 @@ def mock_axis_calibration(wiring: Wiring, endpoints: Endpoints) -> AxisCalibrati
     where the computer was too busy for it: the approach does not need it.
     """
     file = mock_file(wiring.axis, endpoints)
-    with contextlib.suppress(UsageError):
-        known = read_axis(file)
-        if not wiring.calibration.alone(known).unfit(datetime.now(UTC)):
-            return known
+    if known := usable(read_axis, file, wiring):
+        return known
     try:
         made = _measured_axis(wiring, endpoints)
     except DeviceError as error:
         say(f"the mock axis was not calibrated, next time again: {error}")
         return None
     return made and kept("the mock axis", made, file)
+
+
+def usable(read: Callable[[Path], Made], file: Path, wiring: Wiring) -> Made | None:
+    """What is kept in ``file``; None where there is nothing, or it may not be used any more."""
+    with contextlib.suppress(UsageError):
+        known = read(file)
+        return None if wiring.calibration.alone(known).unfit(datetime.now(UTC)) else known
+    return None
 
 
 def mock_weights(wiring: Wiring, hung: bool = False) -> Weights:
@@ -92,11 +95,7 @@ def mock_weights(wiring: Wiring, hung: bool = False) -> Weights:
 
 def _measured_force(wiring: Wiring, endpoints: Endpoints) -> ForceCalibration:
     weights = mock_weights(wiring)
-    with (
-        BenchControl(endpoints.control) as control,
-        nothing_hidden(control),
-        weights_on(control) as put_on,
-    ):
+    with BenchControl(endpoints.control) as control, nothing_hidden(control), weights_on(control) as put_on:
         return measured_force(force_calibration_operation(weights), wiring.force, weights, put_on, BY_ITSELF)
 
 

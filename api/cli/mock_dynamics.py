@@ -4,7 +4,7 @@ import contextlib
 from datetime import UTC, datetime
 from pathlib import Path
 
-from api.cli.mock_calibration import in_the_air, kept, mock_file, nothing_hidden, say
+from api.cli.mock_calibration import in_the_air, kept, mock_file, nothing_hidden, say, usable
 from controller.commissioning.axis import as_answered
 from controller.commissioning.axis_dynamics import identify
 from controller.commissioning.dynamics_refusals import dynamics_elsewhere
@@ -34,10 +34,9 @@ def mock_axis_dynamics(wiring: Wiring, endpoints: Endpoints) -> AxisDynamics | N
     busy: the force loop is then refused.
     """
     file = dynamics_file(wiring, endpoints)
-    with contextlib.suppress(UsageError):
-        known = read_dynamics(file)
-        if not [*wiring.calibration.alone(known).unfit(datetime.now(UTC)), *dynamics_elsewhere(known, wiring)]:
-            return known
+    known = usable(read_dynamics, file, wiring)
+    if known and not dynamics_elsewhere(known, wiring):
+        return known
     if wiring.axis.reports_Hz < wiring.loop.rate_Hz:
         return None  # it holds what it is told from one report to the next, which no sweep of each cycle allows for
     try:

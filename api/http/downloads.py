@@ -74,9 +74,7 @@ class FileAsOfNow(FileResponse):
 
     def _no_such_part(self, size: int) -> Response:
         text = f"{Path(self.path).name} has {size} bytes and not that part of them; write Range as bytes=0-99"
-        response = answer(416, "range", text)
-        response.headers["Content-Range"] = f"bytes */{size}"
-        return response
+        return answer(416, "range", text, headers={"Content-Range": f"bytes */{size}"})
 
 
 def _promised(start: Message) -> int:

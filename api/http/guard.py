@@ -154,10 +154,8 @@ class Guard:
             return problems.answer(403, "no-right", f"{rule.path} declares no right, so it serves nobody; report this")
         scope[PASSED], scope[CALLER] = rule.right, caller
         scope[ENTITLED] = partial(self._entitled, rule.right, arrived)
-        if not rule.right.stop:
-            limited = self._refuse_rate(caller, arrived)
-            if limited:
-                return limited
+        if not rule.right.stop and (wait_s := self._wait_s(caller, arrived)):
+            return limited(wait_s)
         return _refuse_caller(rule.right, caller, arrived) or _refuse_stated_size(arrived.headers, rule.right)
 
     def _caller(self, arrived: Arrived) -> Caller | None:
@@ -170,10 +168,9 @@ class Guard:
         except (RigError, OSError):
             return False
 
-    def _refuse_rate(self, caller: Caller | None, arrived: Arrived) -> Response | None:
+    def _wait_s(self, caller: Caller | None, arrived: Arrived) -> float:
         who = caller.key if caller else arrived.client
-        wait_s = self._access.limits.wait_s(who, KNOWN if caller else UNKNOWN)
-        return limited(wait_s) if wait_s else None
+        return self._access.limits.wait_s(who, KNOWN if caller else UNKNOWN)
 
     def _refuse_place(self, arrived: Arrived) -> Response | None:
         """No other site's page may move this bench: the host must be this one, and so must the page that asks."""
@@ -201,9 +198,8 @@ def _code(body: bytes) -> str:
 
 def limited(wait_s: float) -> Response:
     """Somebody asks too often."""
-    response = problems.answer(429, "too-many", f"too many requests; try again in {wait_s:.1f} s")
-    response.headers["Retry-After"] = str(math.ceil(wait_s))
-    return response
+    text = f"too many requests; try again in {wait_s:.1f} s"
+    return problems.answer(429, "too-many", text, headers={"Retry-After": str(math.ceil(wait_s))})
 
 
 HOW = (
@@ -213,9 +209,8 @@ HOW = (
 
 
 def _unauthorised(word: str) -> Response:
-    response = problems.answer(401, "no-credential", f"nobody is logged in here: {HOW.format(scope=word)}")
-    response.headers["WWW-Authenticate"] = "Bearer"
-    return response
+    text = f"nobody is logged in here: {HOW.format(scope=word)}"
+    return problems.answer(401, "no-credential", text, headers={"WWW-Authenticate": "Bearer"})
 
 
 def _unknown(caller: Caller | None, methods: frozenset[str]) -> Response:
@@ -224,9 +219,8 @@ def _unknown(caller: Caller | None, methods: frozenset[str]) -> Response:
         return _unauthorised("read")
     if not methods:
         return problems.answer(404, "no-such-route", "there is nothing at this address; see /api/v1/openapi.json")
-    response = problems.answer(405, "method", f"this address takes {', '.join(sorted(methods))}")
-    response.headers["Allow"] = ", ".join(sorted(methods))
-    return response
+    taken = ", ".join(sorted(methods))
+    return problems.answer(405, "method", f"this address takes {taken}", headers={"Allow": taken})
 
 
 def _refuse_caller(right: Right, caller: Caller | None, arrived: Arrived) -> Response | None:

@@ -6,12 +6,12 @@ lasts is measured on a clock that nobody sets and that goes on while the compute
 
 import threading
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from api.http.access.secrets import awake_s
-from api.http.problems import RequestRefused
+from api.http.problems import NONE, RequestRefused
 
 LOCKED = 423
 Hearing = Callable[[str, str], object]
@@ -146,17 +146,12 @@ class LeaseRegistry:
         if taken:
             what = f"{taken.by} took control over at {taken.at}: {taken.reason}"
         text = f"{what}; {owner}: take the lease with POST /api/v1/control/lease first"
-        refused = _locked(held, "no-lease", text)
-        if taken:
-            refused.members = {**refused.members, "taken_by": taken.by, "reason": taken.reason}
-        raise refused
+        raise _locked(held, "no-lease", text, {"taken_by": taken.by, "reason": taken.reason} if taken else NONE)
 
 
-def _locked(held: ControlLease | None, code: str, text: str) -> RequestRefused:
-    refused = RequestRefused(LOCKED, code, text)
-    if held:
-        refused.members = {"holder": held.holder, "purpose": held.purpose, "since": held.since}
-    return refused
+def _locked(held: ControlLease | None, code: str, text: str, more: Mapping[str, str] = NONE) -> RequestRefused:
+    whose = {"holder": held.holder, "purpose": held.purpose, "since": held.since} if held else {}
+    return RequestRefused(LOCKED, code, text, {**whose, **more})
 
 
 def _now() -> str:

@@ -16,6 +16,7 @@ from rig.errors import NO_ROOM, DeviceError, DiskFull, RigError, SafetyStop, Usa
 
 MEDIA_TYPE = "application/problem+json"
 DISK_FULL = "disk-full"
+NONE: Mapping[str, str] = {}
 
 
 class Problem(BaseModel):
@@ -35,13 +36,13 @@ class Problem(BaseModel):
 
 
 class RequestRefused(RigError):
-    """A request that is right in itself but not in the present state; carries HTTP status and code."""
+    """A request that is right in itself but not in the present state; carries what `answer` takes."""
 
-    def __init__(self, status: int, code: str, detail: str) -> None:
+    def __init__(
+        self, status: int, code: str, detail: str, members: Mapping[str, str] = NONE, headers: Mapping[str, str] = NONE
+    ) -> None:
         super().__init__(detail)
-        self.status, self.code = status, code
-        self.members: Mapping[str, str] = {}
-        self.headers: Mapping[str, str] = {}
+        self.status, self.code, self.members, self.headers = status, code, members, headers
 
 
 TITLES = {
@@ -76,10 +77,12 @@ def problem(status: int, code: str, detail: str) -> Problem:
     return Problem(type=f"/api/v1/problems/{code}", title=title(status), status=status, detail=detail, code=code)
 
 
-def answer(status: int, code: str, detail: str, members: Mapping[str, str] | None = None) -> JSONResponse:
+def answer(
+    status: int, code: str, detail: str, members: Mapping[str, str] = NONE, headers: Mapping[str, str] = NONE
+) -> JSONResponse:
     """One problem as a response; ``members`` are more of its fields."""
-    shown = problem(status, code, detail).model_copy(update=dict(members or {}))
-    return JSONResponse(shown.model_dump(exclude_none=True), status, media_type=MEDIA_TYPE)
+    shown = problem(status, code, detail).model_copy(update=members)
+    return JSONResponse(shown.model_dump(exclude_none=True), status, headers, MEDIA_TYPE)
 
 
 def responses(*words: str) -> dict[int | str, dict[str, Any]]:
@@ -139,9 +142,7 @@ def install(app: FastAPI) -> None:
 def _ours(error: RigError) -> JSONResponse:
     match error:
         case RequestRefused():
-            response = answer(error.status, error.code, str(error), error.members)
-            response.headers.update(error.headers)
-            return response
+            return answer(error.status, error.code, str(error), error.members, error.headers)
         case PlaceRefused():
             return answer(error.status, error.code, str(error))
         case SafetyStop():

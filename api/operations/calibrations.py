@@ -34,19 +34,18 @@ def kept(stated: Calibration, found: AnyCalibration, out: Path | None) -> Calibr
 
 def keep(what: What, found: AnyCalibration, out: Path | None) -> Path:
     """Writes it, whole or not at all, to ``out`` or calibration/WHAT-SERIAL-TIME.json; returns the path."""
-    path = out or FOLDER / f"{what}-{_plain(found.serial)}-{_stamp(found.date)}.json"
-    make_folder(path.parent)
-    with whole_file(path) as scratch:
-        scratch.write_text(text_of(found), encoding="utf-8")
-    return path
+    return _written(out or FOLDER / f"{what}-{_plain(found.serial)}-{_stamp(found.date)}.json", found)
 
 
 def keep_glove(found: GloveCalibration, out: Path | None) -> Path:
     """Likewise that of a glove, which has no serial number."""
-    path = out or FOLDER / f"glove-{_stamp(found.date)}.json"
+    return _written(out or FOLDER / f"glove-{_stamp(found.date)}.json", found)
+
+
+def _written(path: Path, found: AnyCalibration | GloveCalibration) -> Path:
     make_folder(path.parent)
     with whole_file(path) as scratch:
-        scratch.write_text(found.model_dump_json(indent=2) + "\n", encoding="utf-8")
+        scratch.write_text(text_of(found), encoding="utf-8")
     return path
 
 

@@ -167,14 +167,18 @@ def fit(response: FrequencyResponse, measured: Spectrum) -> ResponseFit:
     def residuals(values: Column) -> Column:
         gain, delay_ms, sum_ms, share = values
         product = share * (0.5 * sum_ms) ** 2
-        fitted = model(response.frequency_Hz, gain, 1e-3 * delay_ms, 1e-3 * sum_ms, 1e-6 * product)
-        ratio = (fitted / measured - 1) / response.deviation
-        return np.concatenate([ratio.real, ratio.imag])
+        return _weighed(response, measured, gain, 1e-3 * delay_ms, 1e-3 * sum_ms, 1e-6 * product)
 
     bounds = ([LEAST_GAIN, 0.0, 0.0, 0.0], [1 / LEAST_GAIN, 100.0, 200.0, 1.0])
     found = least_squares(residuals, [1.0, 1.0, 5.0, 0.8], bounds=bounds, x_scale="jac").x
     gain, delay_ms, sum_ms, share = (float(value) for value in found)
     return ResponseFit(gain, 1e-3 * delay_ms, 1e-3 * sum_ms, 1e-6 * share * (0.5 * sum_ms) ** 2)
+
+
+def _weighed(response: FrequencyResponse, measured: Spectrum, *parameters: float) -> Column:
+    """What the model lies off ``measured``, relative and by what is known of each frequency; real and imaginary."""
+    ratio = (model(response.frequency_Hz, *parameters) / measured - 1) / response.deviation
+    return np.concatenate([ratio.real, ratio.imag])
 
 
 def _misfit(response: FrequencyResponse, best: ResponseFit) -> float:
@@ -200,13 +204,8 @@ def _within(response: FrequencyResponse, best: ResponseFit) -> Column:
 def _covariance(response: FrequencyResponse, best: ResponseFit) -> Column:
     """Of the four parameters, by the residuals' own size where that is larger than their deviations."""
     steps = np.diag([1e-4, 1e-6, 1e-6, 1e-9])
-
-    def weighed(values: Column) -> Column:
-        ratio = (model(response.frequency_Hz, *values) / response.mean - 1) / response.deviation
-        return np.concatenate([ratio.real, ratio.imag])
-
-    at = weighed(np.array(best))
-    jacobian = np.array([(weighed(best + step) - at) / step.sum() for step in steps]).T
+    at = _weighed(response, response.mean, *best)
+    jacobian = np.array([(_weighed(response, response.mean, *(best + step)) - at) / step.sum() for step in steps]).T
     size = max(1.0, float(at @ at) / (len(at) - len(steps)))
     return np.asarray(size * np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-20))
 

@@ -4,6 +4,7 @@ from controller.loop.steps import Program, TrackForce
 from drivers.roles import Identity
 from rig.computer import computer_id
 from rig.config.axis_dynamics import AxisDynamics
+from rig.config.calibration import AnyCalibration, what_of, what_to_calibrate
 from rig.config.products.roles import MOCK_PORT
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
@@ -19,7 +20,7 @@ def dynamics_reasons(program: Program, wiring: Wiring, axis: Identity) -> list[s
     known = wiring.calibration.of_dynamics
     if known is None:
         return [_missing(f"{axis.product} {axis.serial}")]
-    return [*_foreign(known, axis), *dynamics_elsewhere(known, wiring)]
+    return [*foreign(known, axis), *dynamics_elsewhere(known, wiring)]
 
 
 def refuse_unidentified(wiring: Wiring) -> None:
@@ -37,12 +38,13 @@ def dynamics_elsewhere(known: AxisDynamics, wiring: Wiring) -> list[str]:
     return known.elsewhere(computer_id(), wiring.loop.rate_Hz, wiring.force.product)
 
 
-def _foreign(known: AxisDynamics, axis: Identity) -> list[str]:
-    if (known.product, known.serial) == (axis.product, axis.serial):
+def foreign(known: AnyCalibration, answered: Identity) -> list[str]:
+    """Why a calibration of any kind does not hold for the device that ``answered``; empty if it does."""
+    if (known.product, known.serial) == (answered.product, answered.serial):
         return []
     return [
-        f"calibration.dynamics is of {known.product} {known.serial}, but {axis.product} {axis.serial} answered: give"
-        " its own, or run `rig calibrate axis --dynamics`"
+        f"calibration.{what_of(known)} is of {known.product} {known.serial}, but {answered.product} {answered.serial}"
+        f" answered: give its own, or run `rig calibrate {what_to_calibrate(known)}`"
     ]
 
 

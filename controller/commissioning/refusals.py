@@ -6,10 +6,10 @@ A configuration that contradicts a calibration is refused; nothing is ever corre
 from datetime import datetime
 
 from controller.commissioning.axis import as_answered
-from controller.commissioning.dynamics_refusals import dynamics_reasons
+from controller.commissioning.dynamics_refusals import dynamics_reasons, foreign
 from controller.loop.steps import Approach, Program
 from drivers.roles import Identity
-from rig.config.calibration import AxisCalibration, ForceCalibration
+from rig.config.calibration import AxisCalibration
 from rig.config.products.roles import MOCK_PORT
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
@@ -26,9 +26,9 @@ def refuse_uncommissioned(program: Program, wiring: Wiring, sensor: Identity, ax
     if known.of_force is None:
         raise UsageError(f"{program.name} refused before moving: {_missing(f'{sensor.product} {sensor.serial}')}")
     answered = wiring.model_copy(update={"axis": as_answered(wiring.axis, axis)})
-    reasons = [*_foreign(known.of_force, sensor, "force"), *contradictions(answered), *known.unfit(now)]
+    reasons = [*foreign(known.of_force, sensor), *contradictions(answered), *known.unfit(now)]
     if known.of_axis:
-        reasons += _foreign(known.of_axis, axis, "axis")
+        reasons += foreign(known.of_axis, axis)
     reasons += dynamics_reasons(program, wiring, axis)
     if reasons:
         raise UsageError(f"{program.name} refused before moving: " + "; ".join(reasons))
@@ -64,15 +64,6 @@ def contradictions(wiring: Wiring) -> list[str]:
 def _same_scale(wiring: Wiring, known: AxisCalibration) -> bool:
     counted = wiring.axis.increments_per_mm or known.increments_per_mm  # what only the drive says is known from it
     return wiring.axis.direction == known.direction and abs(counted / known.increments_per_mm - 1) <= SAME_SCALE
-
-
-def _foreign(known: ForceCalibration | AxisCalibration, answered: Identity, role: str) -> list[str]:
-    if (known.product, known.serial) == (answered.product, answered.serial):
-        return []
-    return [
-        f"calibration.{role} is of {known.product} {known.serial}, but {answered.product} {answered.serial} answered:"
-        f" give its own, or run `rig calibrate {role}`"
-    ]
 
 
 def _missing(whose: str) -> str:

@@ -1,15 +1,14 @@
 """Starting a bench for recovery: the axis must be there; a sensor that is not is lost from the beginning."""
 
 from collections.abc import Callable, Sequence
-from typing import Never, TypeVar
+from contextlib import ExitStack
+from typing import Never
 
-from controller.devices.drivers import Devices, Interrupted, open_axis, open_force, open_tracker
+from controller.devices.drivers import Devices, Interrupted, Started, open_axis, open_force, open_tracker, started
 from drivers.epos4.walker import never
-from drivers.roles import Device, Identity, LinkCounters
+from drivers.roles import Identity, LinkCounters
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError
-
-Started = TypeVar("Started", bound=Device)
 
 
 class Absent:
@@ -46,12 +45,9 @@ def start_what_answers(wiring: Wiring, interrupted: Interrupted = never) -> Devi
 
 
 def _started(opener: Callable[[], Started]) -> Started:
-    device = opener()
-    try:
-        device.start()
-    except BaseException:
-        device.close()
-        raise
+    with ExitStack() as opened:
+        device = started(opener(), opened)
+        opened.pop_all()
     return device
 
 

@@ -1,10 +1,12 @@
 """From one line of `rig.toml` to the driver that fills the role."""
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pkgutil import resolve_name
+from typing import TypeVar
 
-from controller.devices import guard
+from controller.devices.guard import GuardedAxis, GuardedForce, GuardedTracker
 from controller.devices.reopening import Open, Openers
 from drivers.epos4.walker import never
 from drivers.roles import Device, ForceSensor, MarkerTracker, ServoAxis
@@ -12,6 +14,7 @@ from rig.config.products.roles import AxisProduct, ForceProduct, TrackerProduct
 from rig.config.wiring import Limits, Wiring
 
 Interrupted = Callable[[], bool]
+Started = TypeVar("Started", bound=Device)
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class Devices:
 
 def open_force(config: ForceProduct) -> ForceSensor:
     """The force sensor, not yet started; raises DeviceError where its port cannot be opened."""
-    return guard.force_sensor(config, lambda: resolve_name(config.driver)(config))
+    return GuardedForce.guard(config, lambda: resolve_name(config.driver)(config))
 
 
 def open_axis(config: AxisProduct, limits: Limits, rate_Hz: float, interrupted: Interrupted = never) -> ServoAxis:
@@ -46,12 +49,12 @@ def open_axis(config: AxisProduct, limits: Limits, rate_Hz: float, interrupted: 
     ``interrupted`` is asked while it moves by itself; a yes brakes it.
     """
     options = {"rate_Hz": rate_Hz, "interrupted": interrupted}
-    return guard.servo_axis(config, lambda: resolve_name(config.driver)(config, limits, **options))
+    return GuardedAxis.guard(config, lambda: resolve_name(config.driver)(config, limits, **options))
 
 
 def open_tracker(config: TrackerProduct) -> MarkerTracker:
     """The tracker, not yet started."""
-    return guard.marker_tracker(config, lambda: resolve_name(config.driver)(config))
+    return GuardedTracker.guard(config, lambda: resolve_name(config.driver)(config))
 
 
 class Interruption:
@@ -77,20 +80,16 @@ def openers(wiring: Wiring, interrupted: Interrupted = never) -> Openers:
 
 def start_devices(wiring: Wiring, interrupted: Interrupted = never) -> Devices:
     """Opens and starts all devices; on any failure those already open are closed again, and DeviceError is raised."""
-    opened: list[Device] = []
-    try:
-        force = open_force(wiring.force)
-        opened.append(force)
-        force.start()
-        axis = open_axis(wiring.axis, wiring.limits, wiring.loop.rate_Hz, interrupted)
-        opened.append(axis)
-        axis.start()
-        tracker = open_tracker(wiring.tracker) if wiring.tracker else None
-        if tracker:
-            opened.append(tracker)
-            tracker.start()
-    except BaseException:
-        for device in reversed(opened):
-            device.close()
-        raise
+    with ExitStack() as opened:
+        force = started(open_force(wiring.force), opened)
+        axis = started(open_axis(wiring.axis, wiring.limits, wiring.loop.rate_Hz, interrupted), opened)
+        tracker = started(open_tracker(wiring.tracker), opened) if wiring.tracker else None
+        opened.pop_all()
     return Devices(force, axis, tracker)
+
+
+def started(device: Started, opened: ExitStack) -> Started:
+    """The device, which is closed with ``opened``, also where it does not start."""
+    opened.callback(device.close)
+    device.start()
+    return device

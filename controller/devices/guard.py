@@ -10,14 +10,13 @@ import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Generic, TypeVar
+from typing import Generic, Self, TypeVar
 
 from drivers.input_role import Input
 from drivers.roles import Device, ForceSensor, Identity, LinkCounters, MarkerTracker, ServoAxis
 from rig import plugins
 from rig.channels import AxisSample, ForceSample, MarkerSample
-from rig.config.products.input_role import InputProduct
-from rig.config.products.roles import AxisProduct, ForceProduct, Product, TrackerProduct
+from rig.config.products.roles import ForceProduct, Product
 from rig.deadline import within
 from rig.errors import DeviceError, RigError
 from rig.input_streams import InputSample
@@ -40,34 +39,18 @@ START_S = 30.0  # half of what the loop has for its start, homing included
 RATE_TOLERANCE = 0.1  # half of what lies between neighbouring rates of a sensor
 
 
-def force_sensor(config: ForceProduct, make: Callable[[], ForceSensor]) -> ForceSensor:
-    """What ``make`` gives, guarded where a plug-in declares it."""
-    plugin = plugins.declaring("tissue_rig.force", config.product)
-    return GuardedForce(plugin, config, make) if plugin else make()
-
-
-def servo_axis(config: AxisProduct, make: Callable[[], ServoAxis]) -> ServoAxis:
-    """What ``make`` gives, guarded where a plug-in declares it."""
-    plugin = plugins.declaring("tissue_rig.axis", config.product)
-    return GuardedAxis(plugin, config, make) if plugin else make()
-
-
-def marker_tracker(config: TrackerProduct, make: Callable[[], MarkerTracker]) -> MarkerTracker:
-    """What ``make`` gives, guarded where a plug-in declares it."""
-    plugin = plugins.declaring("tissue_rig.tracker", config.product)
-    return GuardedTracker(plugin, config, make) if plugin else make()
-
-
-def input_device(config: InputProduct, make: Callable[[], Input]) -> Input:
-    """What ``make`` gives, guarded where a plug-in declares it."""
-    plugin = plugins.declaring("tissue_rig.input", config.product)
-    return GuardedInput(plugin, config, make) if plugin else make()
-
-
 class Guarded(ABC, Generic[Made, Sample]):
     """What every role has. ``now`` is the monotonic clock, ``waits`` how often this thread has waited so far."""
 
+    GROUP: str
+    """Of entry points, in which plug-ins declare products of this role."""
     KIND: type[Sample]
+
+    @classmethod
+    def guard(cls, config: Product, make: Callable[[], Made]) -> Self | Made:
+        """What ``make`` gives, guarded where a plug-in declares it."""
+        plugin = plugins.declaring(cls.GROUP, config.product)
+        return cls(plugin, config, make) if plugin else make()
 
     def __init__(
         self,
@@ -194,7 +177,7 @@ class Guarded(ABC, Generic[Made, Sample]):
 class GuardedForce(Guarded[ForceSensor, ForceSample]):
     """A force sensor."""
 
-    KIND = ForceSample
+    GROUP, KIND = "tissue_rig.force", ForceSample
 
     def poll(self, now_ns: int) -> Sequence[ForceSample]:
         """Samples since the last call, each looked at."""
@@ -210,7 +193,7 @@ class GuardedForce(Guarded[ForceSensor, ForceSample]):
 class GuardedTracker(Guarded[MarkerTracker, MarkerSample]):
     """A marker tracker."""
 
-    KIND = MarkerSample
+    GROUP, KIND = "tissue_rig.tracker", MarkerSample
 
     @property
     def tools(self) -> tuple[str, ...]:
@@ -228,7 +211,7 @@ class GuardedTracker(Guarded[MarkerTracker, MarkerSample]):
 class GuardedInput(Guarded[Input, InputSample]):
     """An input, which may wait, as it has a thread of its own."""
 
-    KIND = InputSample
+    GROUP, KIND = "tissue_rig.input", InputSample
 
     def poll(self, now_ns: int) -> Sequence[InputSample]:
         """Samples since the last call, each looked at."""
@@ -244,7 +227,7 @@ class GuardedInput(Guarded[Input, InputSample]):
 class GuardedAxis(Guarded[ServoAxis, AxisSample]):
     """A servo axis."""
 
-    KIND = AxisSample
+    GROUP, KIND = "tissue_rig.axis", AxisSample
     _failure: DeviceError | None = None
 
     def _said(self, ask: Callable[[], Answer], unsaid: Answer) -> Answer:

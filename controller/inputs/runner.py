@@ -8,8 +8,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from pkgutil import resolve_name
 
-from controller.devices import guard, states
+from controller.devices import states
 from controller.devices.connections import of_stream
+from controller.devices.guard import GuardedInput
 from controller.devices.health import StreamHealth
 from controller.devices.states import DeviceState, DeviceStatus, Observation
 from drivers.input_role import Input
@@ -32,7 +33,7 @@ Put = Callable[[int, bytes], None]
 
 def open_input(config: InputProduct) -> Input:
     """The input, not yet started; raises DeviceError where its port cannot be opened."""
-    return guard.input_device(config, lambda: resolve_name(config.driver)(config))
+    return GuardedInput.guard(config, lambda: resolve_name(config.driver)(config))
 
 
 class InputRunner:

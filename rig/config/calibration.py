@@ -170,7 +170,7 @@ class Calibration(Table):
         if age > timedelta(days=self.max_age_days):
             return [
                 f"{_named(one)} is {age.days} days old, calibration.max_age_days is {self.max_age_days:g}:"
-                f" run `rig calibrate {_command(one)}`"
+                f" run `rig calibrate {what_to_calibrate(one)}`"
             ]
         return []
 
@@ -191,7 +191,8 @@ def what_of(one: AnyCalibration) -> What:
     return next(what for what, kind in KINDS.items() if isinstance(one, kind))
 
 
-def _command(one: AnyCalibration) -> str:
+def what_to_calibrate(one: AnyCalibration) -> str:
+    """The same in the words of the command."""
     return {"dynamics": "axis --dynamics"}.get(what_of(one), what_of(one))
 
 

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from rig.config.axis_dynamics import AxisDynamics
-from rig.config.calibration import VERSION, AnyCalibration, AxisCalibration, Calibration, ForceCalibration
+from rig.config.calibration import KINDS, VERSION, AnyCalibration, AxisCalibration, Calibration, ForceCalibration
 from rig.config.glove import GloveCalibration
 from rig.config.table import AnyTable, TomlTable, parse, read_toml, refuse_newer
 from rig.errors import UsageError
@@ -12,17 +12,12 @@ from rig.errors import UsageError
 
 def with_files(calibration: Calibration) -> Calibration:
     """``calibration`` with what its files hold; raises UsageError naming file and key where one is malformed."""
-    found: dict[str, AnyCalibration] = {}
-    if calibration.force:
-        found["of_force"] = _read(ForceCalibration, calibration.force, "calibration.force")
-    if calibration.axis:
-        found["of_axis"] = _read(AxisCalibration, calibration.axis, "calibration.axis")
-    if calibration.dynamics:
-        found["of_dynamics"] = _read(AxisDynamics, calibration.dynamics, "calibration.dynamics")
+    files = zip(KINDS.items(), (calibration.force, calibration.axis, calibration.dynamics), strict=True)
+    found = {f"of_{what}": _read(kind, file, f"calibration.{what}") for (what, kind), file in files if file}
     return calibration.model_copy(update=found)
 
 
-def text_of(calibration: AnyCalibration) -> str:
+def text_of(calibration: AnyCalibration | GloveCalibration) -> str:
     """What a calibration file holds."""
     return calibration.model_dump_json(indent=2) + "\n"
 

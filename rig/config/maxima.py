@@ -47,14 +47,10 @@ MAXIMA: tuple[Maximum, ...] = (
 def beyond(tables: Mapping[str, object], of_products: Iterable[Maximum]) -> list[str]:
     """What of ``tables`` (section to table) is above its maximum, the products' own included, one sentence each."""
     found = []
-    least = {maximum.key: maximum for maximum in sorted((*of_products, *MAXIMA), key=_largest_first)}
+    least = {maximum.key: maximum for maximum in sorted((*of_products, *MAXIMA), key=lambda one: -one.value)}
     for key, value, unit, reason in least.values():
         section, _, name = key.partition(".")
         given = getattr(tables[section], name)
         if not given <= value:
             found.append(f"{key} {given:g} {unit} is above its maximum, {value:g} {unit}: {reason}")
     return found
-
-
-def _largest_first(maximum: Maximum) -> float:
-    return -maximum.value

@@ -52,12 +52,8 @@ def above_columns(line: str, delimiter: str, below: str) -> list[str]:
     if len(cells) == 1 < len(first):
         others = (cells_of(line, sign) for sign in "\t;,|" if sign in line)
         return next((found for found in others if len(found) == len(first)), cells)
-    if (
-        len(cells) == len(first) - 1
-        and below.startswith('"')
-        and is_number(first[-1])
-        and not below.rstrip().endswith('"')
-    ):
+    is_named = below.startswith('"') and not below.rstrip().endswith('"')
+    if len(cells) == len(first) - 1 and is_named and is_number(first[-1]):
         return ["", *cells]
     if delimiter == " " and len(cells) < len(first) and line[:1].isspace():
         return _standing_above(line, below) or cells

@@ -197,21 +197,16 @@ def groups_of(tables: Sequence[ColumnGroup]) -> list[list[ColumnGroup]]:
 
 
 def _alike(one: ColumnGroup, other: ColumnGroup) -> bool:
-    ours, theirs = _columns(one), _columns(other)
-    forms = [_form(one), _form(other)]
-    shared = len(ours & theirs)
-    same = ours == theirs or (kind_of(one.path) == "arrays" and 2 * shared > max(len(ours), len(theirs)))
-    return forms[0] == forms[1] and same
+    ours, theirs = set(_keys(one)), set(_keys(other))
+    most_shared = 2 * len(ours & theirs) > max(len(ours), len(theirs))
+    same = ours == theirs or (kind_of(one.path) == "arrays" and most_shared)
+    return same and _form(one) == _form(other)
 
 
 def _form(table: ColumnGroup) -> str:
     """How it is written, and what tells it from others of the same columns."""
     form = {key: value for key, value in table.layout.form.items() if key not in INTERRUPTED}
     return json.dumps([kind_of(table.path), form, table.index, table.called, table.said_of_test.keys() == {PULLS}])
-
-
-def _columns(table: ColumnGroup) -> set[tuple[str, str]]:
-    return set(_keys(table))
 
 
 def _keys(table: ColumnGroup) -> list[tuple[str, str]]:
@@ -222,7 +217,7 @@ def _keys(table: ColumnGroup) -> list[tuple[str, str]]:
 
 def _common(group: Sequence[ColumnGroup]) -> Iterator[ColumnGroup]:
     """The tables with the columns that all of them have."""
-    shared = set.intersection(*(_columns(table) for table in group))
+    shared = set.intersection(*(set(_keys(table)) for table in group))
     for table in group:
         kept = [at for at, own in enumerate(_keys(table)) if own in shared]
         yield replace(table, columns=tuple(table.columns[k] for k in kept), names=tuple(table.names[k] for k in kept))

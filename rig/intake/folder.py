@@ -96,12 +96,8 @@ def labels_of(table: FoundTable, labels: Mapping[str, str], mapping: DataMapping
     sheets = "-{sheet}" if table.sheet.name else ""
     name = mapping.recording or ("{label}" if "label" in labels else "{file}" + sheets)
     name += "-{restart}" if RESTART in labels and "{restart}" not in name else ""
-    found = {**known, "recording": filled(name, known, where)}
-    for key in ("specimen", "site", "cycle"):
-        template = getattr(mapping, key)
-        if template:
-            found[key] = filled(template, known, where)
-    return found
+    templates = {"recording": name, "specimen": mapping.specimen, "site": mapping.site, "cycle": mapping.cycle}
+    return known | {key: filled(template, known, where) for key, template in templates.items() if template}
 
 
 def file_name(recording: str) -> str:

@@ -1,6 +1,7 @@
 """Columns of a table whose texts say which rows belong together: recordings below each other, who, what, how."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -78,13 +79,11 @@ def _labelled(table: ColumnGroup, taken: Sequence[int], anew: Sequence[int]) -> 
     """Columns called as labels are, of texts that are no numbers, or that change where time begins anew, as texts."""
     for number in table.columns:
         words = words_of(table.layout.sheet.header[number])
-        named = any(word in WORDS["label"] for word in words)
-        if number in taken:
+        named, texts = any(word in WORDS["label"] for word in words), table.texts.get(number, [])
+        if number in taken or any(map(is_stamp, texts[:1])):
             continue
-        if number in table.texts and any(map(is_stamp, table.texts[number][:1])):
-            continue
-        if number in table.texts and (named or len(set(table.texts[number])) > 1):
-            yield number, table.texts[number]
+        if number in table.texts and (named or len(set(texts)) > 1):
+            yield number, texts
         elif number in table.looks and not table.looks[number].counts:
             rows, steps = _steps(table.looks[number].values)
             if named or (anew and np.array_equal(rows[steps != 0], anew)):
@@ -92,10 +91,8 @@ def _labelled(table: ColumnGroup, taken: Sequence[int], anew: Sequence[int]) -> 
 
 
 def _holds(texts: Sequence[str]) -> bool:
-    names = np.asarray(texts)
-    return bool(
-        names.size >= FEWEST_ROWS and (np.sum(names[1:] != names[:-1]) + 1) * FEWEST_ROWS <= names.size
-    ) and bool(all(texts))
+    runs = 1 + sum(before != after for before, after in pairwise(texts))
+    return runs * FEWEST_ROWS <= len(texts) and all(texts)
 
 
 def _called(table: ColumnGroup, number: int) -> str:

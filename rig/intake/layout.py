@@ -36,7 +36,6 @@ from rig.intake.workbook import hidden_sheets, sheet_names
 # Read of a text to see how it is written: preambles are shorter.
 HEAD_BYTES = 65_536
 DELIMITERS = ("\t", ";", ",", "|", " ")
-
 LEAST_ROWS = 2  # the least that has a rate
 # By chance two numbers stand at the same places in a few lines of words.
 LABELLED_ROWS = 8

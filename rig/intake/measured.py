@@ -126,18 +126,18 @@ def _take(found: MeasuredColumns, table: ColumnGroup, quantity: str, known: Mapp
 
 def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
     """The unit it has nearly always; none where a sensor's signal or a count needs a scale."""
-    known, words = table.looks[column].known, words_of(table.layout.sheet.header[column])
+    known, name = table.looks[column].known, table.layout.sheet.header[column]
     counts = bool((known % 1 == 0).all()) and float(np.abs(known).max()) >= COUNTS
-    header = table.layout.sheet.header[column]
-    if table.unit(column) or unknown_unit(table.layout.heads[column]) or unit_of(header):
+    if table.unit(column) or unknown_unit(table.layout.heads[column]) or unit_of(name):
         return ""
     if _meant(table, quantity, column).units:
         return ""
     stated = _stated_unit(quantity, table.layout.sheet.facts)
     if counts or stated is not None:
         return stated or ""
-    if unit := ros_unit(table.layout.sheet.header[column]):
+    if unit := ros_unit(name):
         return unit
+    words = words_of(name)
     if not ROTARY_WORDS.isdisjoint(words):
         return {"force": "N m", "velocity": "rad/s"}.get(quantity, "rad" if np.abs(known).max() <= TURN_RAD else "deg")
     robot = not ROBOT_WORDS.isdisjoint(words) and np.abs(known).max() < REACH_M

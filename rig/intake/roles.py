@@ -42,8 +42,6 @@ _OTHER = frozenset((
     "limit", "max", "peak", "error", "err", "rate", "offset", "raw", "std", "mean", "strain", "stress", "area",
     "width", "thickness", "diameter", "length", "energy", "work", "acceleration", "accel", "acc", "gyro", "orientation",
 ))  # fmt: skip
-
-
 UNIT_ALONE = 2  # in the rank of a candidate
 
 

@@ -123,11 +123,7 @@ def _open(source: Source, form: FileForm, part: FilePart) -> Sheet:
     head = head_of(source, form, part)
     if form.repeats and part.start:  # whose names may have its own number in them
         head = head._replace(names=head_of(source, form, FilePart()).names)
-
-    def read(columns: Mapping[int, bool]) -> Iterator[Batch]:
-        return _batches(source, form, part, head, columns)
-
-    lines = partial(_lines, source, form, part, head)
+    read, lines = partial(_batches, source, form, part, head), partial(_lines, source, form, part, head)
     last, kind = (form.header_row or form.rows_above + 1) - 1, "row" if source.sheet else "line"
     facts = [row for row in head.above[:last] if not part.start or is_other(row, head.first)]
     name = "-".join(filter(None, (source.sheet, part.name)))
@@ -371,11 +367,9 @@ _LEFT_OUT = "other_lines = 'drop', and repeats = true where its row of names com
 def _lines(source: Source, form: FileForm, part: FilePart, head: Head) -> Iterator[tuple[int, list[str]]]:
     """Number and cells of each line of the table, empty ones left out; raises DataError."""
     with lines_in(source, form) as file:
-        for _ in islice(file, head.start):
-            pass
-        edit = _edit(form, head) or bytes
+        edit, below = _edit(form, head) or bytes, islice(file, head.start, None)
         try:
-            rows = (edit(line).decode() for line in _until(file, source, part, head, form))
+            rows = (edit(line).decode() for line in _until(below, source, part, head, form))
             reader = csv.reader(rows, delimiter=form.delimiter)
             yield from ((head.start + reader.line_num, cells) for cells in reader if cells)
         except (UnicodeDecodeError, csv.Error, *DAMAGE) as error:

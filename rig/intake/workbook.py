@@ -19,8 +19,6 @@ from rig.intake.sheet import DAMAGE, refuse_large, unreadable
 # Day 0 of spreadsheets, in the calendar of 1900 with its leap day that never was (ECMA-376 part 1, 18.17.4.1).
 EPOCH = datetime.datetime(1899, 12, 30)
 DAY_S = 86_400.0
-
-
 # Cells of a sheet are held in memory, ten times as large as they are packed.
 LARGEST_B = 0.15e9
 # Of a compound file, as which the old form is stored ([MS-CFB] 2.2).

@@ -2,8 +2,9 @@
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from rig.errors import UsageError, write_failed
@@ -13,17 +14,9 @@ from rig.errors import UsageError, write_failed
 def whole_file(path: Path, overwrite: bool = False) -> Iterator[Path]:
     """A scratch path that becomes ``path`` when the block ends well; raises UsageError where ``path`` may not."""
     _check(path, overwrite)
-    scratch = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
+    with _put_in_place(path, partial(Path.unlink, missing_ok=True)) as scratch:
         yield scratch
         wait_for_disk(scratch)
-        scratch.replace(path)
-    except OSError as error:
-        raise write_failed(
-            f"{path}: cannot be written: {error.strerror or error}; nothing was left behind", error
-        ) from error
-    finally:
-        scratch.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -31,17 +24,22 @@ def whole_folder(path: Path) -> Iterator[Path]:
     """A scratch folder that becomes ``path`` when the block ends well; an empty folder at ``path`` is replaced."""
     if not (path.is_dir() and not any(path.iterdir())):
         _check(path, overwrite=False)
+    with _put_in_place(path, partial(shutil.rmtree, ignore_errors=True)) as scratch:
+        scratch.mkdir(parents=True)
+        yield scratch
+
+
+@contextmanager
+def _put_in_place(path: Path, remove: Callable[[Path], object]) -> Iterator[Path]:
     scratch = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        scratch.mkdir(parents=True)
         yield scratch
         scratch.replace(path)
     except OSError as error:
-        raise write_failed(
-            f"{path}: cannot be written: {error.strerror or error}; nothing was left behind", error
-        ) from error
+        said = f"{path}: cannot be written: {error.strerror or error}; nothing was left behind"
+        raise write_failed(said, error) from error
     finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+        remove(scratch)
 
 
 def make_folder(path: Path) -> None:

@@ -58,8 +58,7 @@ def came_in_result(session: Session, tell: Progress = silent, looked: Looked | N
             f"{LONGEST_ROWS}); import them in several sessions, in shorter recordings"
         )
         return CameInResult(session=session.info.id, recordings=(), sha256={}, remarks=(remark,))
-
-    looked = looked or Looked()  # fmt: skip
+    looked = looked or Looked()
     trials = looked.of(session, portion(tell, 0.0, 0.6))
     found = inspected(trials)
     tell("the contact of every cycle", 0.6)

@@ -73,10 +73,7 @@ def evaluate_trial(recording: Recording, limits: QualityLimits, peaks_before_N: 
     curve = None if recording.tracks_force else _curve(recording)
     measured = (*_of_streams(recording), *_of_force(recording), *_of_tracker(recording), *_of_loading(recording, curve))
     found = [one for one in (*measured, *_against_before(recording, peaks_before_N)) if not math.isnan(one.value)]
-    unusable = [
-        *_unusable(recording),
-        *([f"no loading can be read from it: {curve}"] if isinstance(curve, str) else []),
-    ]
+    unusable = tuple(_unusable(recording, curve))
     beyond = [(measure, measure.bounds(limits)) for measure in found if measure.value > measure.bounds(limits).good]
     bad = unusable or any(bounds.bad is not None and measure.value > bounds.bad for measure, bounds in beyond)
     verdict: Verdict = "bad" if bad else "usable" if beyond else "good"
@@ -84,8 +81,8 @@ def evaluate_trial(recording: Recording, limits: QualityLimits, peaks_before_N: 
     return TrialQuality(verdict, reasons, {measure.name: measure.value for measure in found})
 
 
-def _unusable(recording: Recording) -> Iterator[str]:
-    """What makes a trial bad whatever else holds."""
+def _unusable(recording: Recording, curve: Curve | str | None) -> Iterator[str]:
+    """What makes a trial bad whatever else holds; ``curve`` is its loading, or why there is none."""
     summary = recording.metadata.get(SUMMARY, {})
     if not recording.complete:
         yield "the recording was not finished"
@@ -93,6 +90,8 @@ def _unusable(recording: Recording) -> Iterator[str]:
         yield f"it was stopped: {summary['cause']}"
     if recording.damage:
         yield f"the recording is damaged: {recording.damage[0]}"
+    if isinstance(curve, str):
+        yield f"no loading can be read from it: {curve}"
 
 
 def _answered(recording: Recording) -> bool:

@@ -98,9 +98,8 @@ def _slowest(time_s: Array, position_mm: Array, surface_mm: float) -> float:
 
 
 def _slow(time_s: Array, position_mm: Array, surface_mm: float) -> float:
-    first = (
-        len(position_mm) - int(np.argmax(position_mm[::-1] <= surface_mm)) - 1 if position_mm.min() <= surface_mm else 0
-    )
+    above = np.flatnonzero(position_mm <= surface_mm)
+    first = int(above[-1]) if len(above) else 0
     inside_s, inside_mm = time_s[first:], position_mm[first:]
     if len(inside_mm) < FEWEST_AT_REST or inside_mm[-1] <= inside_mm[0]:
         return np.inf
@@ -127,12 +126,10 @@ def _sense(even_mm: Array, half: int) -> NDArray[np.int64]:
 
 def _stepping(pieces: Sequence[Segment], time_s: Array) -> Iterator[Segment]:
     """With the short rests of a motion that steps as part of its way."""
-    start = 0
+    start, kinds = 0, [piece.kind for piece in pieces]
     while start < len(pieces):
-        kind, stop = pieces[start].kind, start + 1
-        while (
-            kind != "hold" and stop + 1 < len(pieces) and pieces[stop].kind == "hold" and pieces[stop + 1].kind == kind
-        ):
+        kind, stop = kinds[start], start + 1
+        while kind != "hold" and kinds[stop : stop + 2] == ["hold", kind]:
             stop += 2
         whole = Segment(kind, slice(pieces[start].rows.start, pieces[stop - 1].rows.stop))
         longest_s = REST_SHARE * whole.took_s(time_s)
@@ -153,10 +150,9 @@ def _in_the_air(piece: Segment, position_mm: Array, surface_mm: float) -> Iterat
         return
     count = int(np.count_nonzero(above))
     cut = start + count if kind == "loading" else stop - count
-    below: tuple[Kind, slice] = kind, slice(cut, stop) if kind == "loading" else slice(start, cut)
-    air: tuple[Kind, slice] = "air", slice(start, cut) if kind == "loading" else slice(cut, stop)
-    parts = (air, below) if kind == "loading" else (below, air)
-    yield from (Segment(*part) for part in parts if part[1].start < part[1].stop)
+    kinds: tuple[Kind, Kind] = ("air", kind) if kind == "loading" else (kind, "air")
+    parts = zip(kinds, ((start, cut), (cut, stop)), strict=True)
+    yield from (Segment(own, slice(first, end)) for own, (first, end) in parts if first < end)
 
 
 def _merged(parts: Iterator[Segment]) -> Iterator[Segment]:

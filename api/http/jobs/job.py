@@ -208,9 +208,7 @@ def ended_already(identifier: str, state: str, done: str) -> RequestRefused:
 
 
 def _refused(state: str, text: str) -> RequestRefused:
-    refused = RequestRefused(409, "job-state", text)
-    refused.members = {"state": state}
-    return refused
+    return RequestRefused(409, "job-state", text, {"state": state})
 
 
 def end_of(error: BaseException | None, cancelled: bool = False) -> JobEnd:

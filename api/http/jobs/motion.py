@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from api.http.jobs.kinds import AnyJob, CaptureJob, GloveThresholdJob, RetractJob, ThresholdJob, TrackJob
-from api.http.jobs.params import GloveThresholdParams, ModelRef, TrackParams
+from api.http.jobs.params import GloveThresholdParams, ModelRef, ThresholdParams, TrackParams
 from api.http.jobs.places import Places
 from api.http.jobs.references import reference_of
 from api.operations import glove, motion
@@ -13,7 +13,6 @@ from api.operations.motion import TrackPlan
 from controller.experiments import capture as experiment
 from controller.experiments import threshold as ramp
 from controller.experiments import tracked
-from controller.loop.steps import Program
 from controller.operation import Operation
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
@@ -58,32 +57,34 @@ def _capture(body: CaptureJob, bench: Supervisor, places: Places) -> Planned:
 def _track(asked: TrackParams, bench: Supervisor, places: Places) -> Planned:
     wanted = _plan(asked, asked.model, bench, places)
     against = _plan(asked, asked.against, bench, places) if asked.against else None
-    name = asked.session or asked.model.session
-    folder = places.recorded_into(name)
-    tracked.refuse_foreign(folder)
+    name, folder = _session(asked, places)
     operation = Operation("track", total=2 if against else 1, unit="runs")
     return Planned(operation, name, lambda: motion.track(operation, bench, wanted, folder, against))
 
 
 def _plan(asked: TrackParams, ref: ModelRef, bench: Supervisor, places: Places) -> TrackPlan:
     file = places.model(ref)
-    return TrackPlan(_program(asked, file, bench), str(file.relative_to(places.sessions)))
-
-
-def _program(asked: TrackParams, file: Path, bench: Supervisor) -> Program:
     model = load_model(file)
     if asked.forces_N:
-        return tracked.plan(asked.forces_N, asked.seconds, model, bench.wiring)
-    return tracked.plan_reference(reference_of(asked), model, bench.wiring)
+        program = tracked.plan(asked.forces_N, asked.seconds, model, bench.wiring)
+    else:
+        program = tracked.plan_reference(reference_of(asked), model, bench.wiring)
+    return TrackPlan(program, str(file.relative_to(places.sessions)))
+
+
+def _session(asked: TrackParams | ThresholdParams, places: Places) -> tuple[str, Path]:
+    """Name and folder of the session that is recorded into; raises UsageError where that holds something else."""
+    name = asked.session or asked.model.session
+    folder = places.recorded_into(name)
+    tracked.refuse_foreign(folder)
+    return name, folder
 
 
 def _threshold(body: ThresholdJob, bench: Supervisor, places: Places) -> Planned:
     asked, file = body.params, places.model(body.params.model)
     program = ramp.plan(asked.up_to_N, asked.rate_N_s, load_model(file), bench.wiring)
     plan = TrackPlan(program, str(file.relative_to(places.sessions)))
-    name = asked.session or asked.model.session
-    folder = places.recorded_into(name)
-    tracked.refuse_foreign(folder)
+    name, folder = _session(asked, places)
     operation = Operation("threshold", total=1, unit="ramps")
     return Planned(operation, name, lambda: motion.threshold(operation, bench, plan, asked.up_to_N, folder))
 

@@ -33,6 +33,7 @@ BUSY_S = 3.0
 def add(router: APIRouter, service: Service) -> None:
     """Its routes."""
     _logins(router, service)
+    _logged_in(router, service)
     _tokens(router, service)
 
     @router.get("/accounts", dependencies=[ADMIN], summary="People who log in with a password")
@@ -51,8 +52,6 @@ def add(router: APIRouter, service: Service) -> None:
 
 
 def _logins(router: APIRouter, service: Service) -> None:
-    logins = service.access.logins
-
     @router.post(
         "/auth/ticket",
         dependencies=[PUBLIC],
@@ -60,7 +59,7 @@ def _logins(router: APIRouter, service: Service) -> None:
         responses=responses("401 ticket"),
     )
     def ticket(sent: TicketRequest, request: Request, response: Response) -> Me:
-        caller = logins.tickets.take(sent.ticket)
+        caller = service.access.logins.tickets.take(sent.ticket)
         if caller is None:
             text = "this link is used up or older than five minutes; `rig token link` prints another"
             raise RequestRefused(401, "ticket", text)
@@ -78,6 +77,10 @@ def _logins(router: APIRouter, service: Service) -> None:
             text = "name or password is wrong; an account is made on the bench's computer by `rig account set NAME`"
             raise RequestRefused(401, "password", text)
         return _enter(service, caller, request, response)
+
+
+def _logged_in(router: APIRouter, service: Service) -> None:
+    logins = service.access.logins
 
     @router.post("/auth/logout", dependencies=[READ], summary="Logs this browser out")
     def logout(request: Request, response: Response) -> Me:
@@ -107,9 +110,9 @@ async def _checked(service: Service, sent: LoginRequest, request: Request) -> Ca
             return await service.access.accounts.enter(sent.name, sent.password)
     except Busy:
         wait_s = BUSY_S
-    refused = RequestRefused(429, "too-many", f"too many tries to log in; try again in {math.ceil(wait_s)} s")
-    refused.headers = {"Retry-After": str(math.ceil(wait_s))}
-    raise refused
+    again_s = str(math.ceil(wait_s))
+    text = f"too many tries to log in; try again in {again_s} s"
+    raise RequestRefused(429, "too-many", text, headers={"Retry-After": again_s})
 
 
 def _enter(service: Service, caller: Caller, request: Request, response: Response) -> Me:

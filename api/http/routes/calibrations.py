@@ -11,7 +11,7 @@ from api.http.access.rights import READ
 from api.http.service import Service
 from api.operations.calibrations import FOLDER
 from rig.config.axis_dynamics import AxisDynamics
-from rig.config.calibration import AnyCalibration, Calibration, ForceCalibration, What
+from rig.config.calibration import AnyCalibration, Calibration, ForceCalibration, What, what_of
 from rig.config.calibration_files import read_axis, read_dynamics, read_force
 from rig.errors import RigError
 
@@ -48,28 +48,26 @@ def add(router: APIRouter, service: Service) -> None:
 
 
 def _used(stated: Calibration, now: datetime) -> Iterator[CalibrationView]:
-    if stated.of_force:
-        yield _view("force", stated.force, stated.of_force, stated, now, used=True)
-    if stated.of_axis:
-        yield _view("axis", stated.axis, stated.of_axis, stated, now, used=True)
-    if stated.of_dynamics:
-        yield _view("dynamics", stated.dynamics, stated.of_dynamics, stated, now, used=True)
+    files, read = (stated.force, stated.axis, stated.dynamics), (stated.of_force, stated.of_axis, stated.of_dynamics)
+    for file, found in zip(files, read, strict=True):
+        if found:
+            yield _view(file, found, stated, now, used=True)
 
 
 def _lying(stated: Calibration, now: datetime) -> Iterator[CalibrationView]:
     for what, read in READERS.items():
         for path in FOLDER.glob(f"{what}-*.json"):
             try:
-                yield _view(what, path, read(path), stated, now)
+                yield _view(path, read(path), stated, now)
             except RigError as error:
                 yield CalibrationView(what=what, used=False, file=str(path), refused=str(error))
 
 
 def _view(
-    what: What, file: Path | None, found: AnyCalibration, stated: Calibration, now: datetime, used: bool = False
+    file: Path | None, found: AnyCalibration, stated: Calibration, now: datetime, used: bool = False
 ) -> CalibrationView:
     return CalibrationView(
-        what=what,
+        what=what_of(found),
         used=used,
         file=str(file or ""),
         product=found.product,

@@ -83,6 +83,7 @@ def add(router: APIRouter, service: Service) -> None:
     """Its routes."""
     lists = Catalogue(service.sessions)
     _lists(router, lists)
+    _export(router, lists)  # before them: a code may have any character, so what follows it is looked for first
     _one_subject(router, lists)
     _changes(router, service, lists)
 
@@ -135,8 +136,7 @@ def entry_of(lists: Catalogue, subject: str) -> SubjectEntry | None:
         return None
 
 
-def _one_subject(router: APIRouter, lists: Catalogue) -> None:
-    # A code may have any character; what follows it is looked for first.
+def _export(router: APIRouter, lists: Catalogue) -> None:
     @router.get(
         "/subjects/{subject:path}/export",
         dependencies=[OPERATE],
@@ -159,6 +159,8 @@ def _one_subject(router: APIRouter, lists: Catalogue) -> None:
         sent = BackgroundTask(scratch.cleanup)
         return FileResponse(archive, media_type="application/zip", filename="subject.zip", background=sent)
 
+
+def _one_subject(router: APIRouter, lists: Catalogue) -> None:
     one_changes = threading.Lock()
 
     @router.put(

@@ -19,6 +19,7 @@ from rig.results.base import Result
 from rig.tissue.model import Model, load_model
 
 ModelFolder = Literal["fit", "diagnosis"]
+Verdict = Literal["refused", "unknown", "cut short", "as planned"]
 
 
 class ExpectedForce(Result):
@@ -34,7 +35,7 @@ class Foresight(Result):
     """A protocol on this bench; ``expected`` is empty where no model is known."""
 
     protocol: str
-    verdict: Literal["refused", "unknown", "cut short", "as planned"]
+    verdict: Verdict
     sentence: str
     doubt: str = Field(default="", description="what the model cannot say; empty if nothing")
     trials: int
@@ -98,9 +99,6 @@ def _expected(plan: Indentation, model: Model) -> Iterator[ExpectedForce]:
         else:
             depth_mm = float(model.law.depth(limit_N, speed))
             yield ExpectedForce(speed_mm_s=speed, depth_mm=depth_mm, force_N=limit_N, ends="force limit")
-
-
-Verdict = Literal["refused", "unknown", "cut short", "as planned"]
 
 
 def _verdict(plan: Indentation, expected: Sequence[ExpectedForce], refused: str) -> tuple[Verdict, str]:

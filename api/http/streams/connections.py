@@ -37,6 +37,4 @@ class OpenConnections:
 
 
 def _full(text: str) -> RequestRefused:
-    refused = RequestRefused(429, "too-many-open", text)
-    refused.headers = {"Retry-After": str(RETRY_S)}
-    return refused
+    return RequestRefused(429, "too-many-open", text, headers={"Retry-After": str(RETRY_S)})

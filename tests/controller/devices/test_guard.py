@@ -232,9 +232,9 @@ def test_a_bench_of_plug_ins_works_and_one_that_raises_stops_it_by_name(monkeypa
     bench = FakeBench(wired())
     wiring, devices = bench.wiring, bench.loop.devices
     bench.loop.devices = drivers.Devices(
-        guard.force_sensor(wiring.force, lambda: devices.force),
-        guard.servo_axis(wiring.axis, lambda: devices.axis),
-        guard.marker_tracker(wiring.tracker, lambda: devices.tracker) if wiring.tracker and devices.tracker else None,  # type: ignore[arg-type,return-value]
+        GuardedForce.guard(wiring.force, lambda: devices.force),
+        GuardedAxis.guard(wiring.axis, lambda: devices.axis),
+        GuardedTracker.guard(wiring.tracker, lambda: devices.tracker) if wiring.tracker and devices.tracker else None,  # type: ignore[arg-type,return-value]
     )
     assert isinstance(bench.loop.devices.force, GuardedForce)
     bench.press(2.0)
@@ -254,7 +254,7 @@ def test_what_an_axis_raises_between_polls_stops_motion_and_not_the_loop(
     what: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bench = FakeBench(wired())
-    axis = guard.servo_axis(bench.wiring.axis, lambda: bench.axis)
+    axis = GuardedAxis.guard(bench.wiring.axis, lambda: bench.axis)
     bench.loop.devices = replace(bench.loop.devices, axis=axis)
     bench.press(2.0)
     broken = type("Broken", (FakeAxis,), {what: property(lambda _: dict[str, str]()["status"], lambda *_: None)})
@@ -283,7 +283,7 @@ def test_an_axis_that_cannot_say_whether_it_is_at_fault_is(monkeypatch: pytest.M
 def test_an_axis_behind_the_guard_is_the_axis_itself() -> None:
     clock = Clock()
     inner = FakeAxis(clock, 1_000_000, position_mm=3.0, target_mm=3.0)
-    axis = guard.servo_axis(Epos4Wiring(), lambda: inner)
+    axis = GuardedAxis.guard(Epos4Wiring(), lambda: inner)
     assert isinstance(axis, GuardedAxis)
     axis.next_seq = 7
     axis.start()
