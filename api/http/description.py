@@ -74,6 +74,9 @@ def _complete(schema: Described, rights: RightsTable) -> None:
             words = (*ANYWHERE, *_stated(operation))
             problems = {str(status): problem for status, problem in responses(*words).items()}
             operation["responses"] = {**operation["responses"], **problems}
+            if method == "head":  # has no body
+                for response in operation["responses"].values():
+                    response.pop("content", None)
             _exemplify(operation, examples()["routes"].get(name, {}))
 
 
