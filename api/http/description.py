@@ -89,6 +89,7 @@ def _stated(operation: Described) -> Iterator[str]:
     named = {one["name"] for one in operation.get("parameters", ())}
     yield from KEYED if "Idempotency-Key" in named else ()
     yield from ("423 no-lease",) if "X-Control-Lease" in named else ()
+    yield from ("422 refused",) if "cursor" in named else ()
 
 
 def _exemplify(operation: Described, given: Mapping[str, object]) -> None:

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from api.http.jobs.states import JobState, Verb
+from api.http.listing import Listing
 from controller.loop.messages import DeviceView
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
@@ -194,11 +195,9 @@ class SessionView(BaseModel):
     recordings: list[RecordingView]
 
 
-class RecordingList(BaseModel):
+class RecordingList(Listing[SessionView]):
     """Sessions with their recordings, newest first; ``next`` is the cursor of what follows, null at the end."""
 
-    items: list[SessionView]
-    next: str | None = None
     remarks: list[str] = Field(default=[], description="folders that are not listed, and why")
 
 

@@ -81,6 +81,14 @@ def test_head_is_described_where_it_is_served_and_answers_as_get_does_without_a_
     assert len(names) == len(set(names))
 
 
+def test_a_list_that_goes_by_cursor_tells_of_one_that_is_wrong(schema: dict[str, Any]) -> None:
+    by_cursor = [
+        one for _, one in described.operations(schema)
+        if "cursor" in {each["name"] for each in one.get("parameters", ())}
+    ]  # fmt: skip
+    assert len(by_cursor) == 17 and all("422 refused" in described.problems(one) for one in by_cursor)
+
+
 def headers_of(operation: dict[str, Any]) -> set[str]:
     return {one["name"] for one in operation.get("parameters", ()) if one["in"] == "header"}
 

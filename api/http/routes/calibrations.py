@@ -7,7 +7,10 @@ from pathlib import Path
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
+from api.catalogue.pages import Place
 from api.http.access.rights import READ
+from api.http.listing import Listing, listing
+from api.http.routes.common import PageQuery, Word
 from api.http.service import Service
 from api.operations.calibrations import FOLDER
 from rig.config.axis_dynamics import AxisDynamics
@@ -39,12 +42,19 @@ def add(router: APIRouter, service: Service) -> None:
     @router.get(
         "/calibrations", dependencies=[READ], summary="Calibrations in use, then those in their folder, newest first"
     )
-    def calibrations() -> list[CalibrationView]:
+    def calibrations(
+        page: PageQuery, what: What | None = None, used: bool | None = None, product: Word = "", serial: Word = ""
+    ) -> Listing[CalibrationView]:
         stated, now = service.wiring.calibration, datetime.now(UTC)
-        used = list(_used(stated, now))
-        taken = {Path(one.file).resolve() for one in used if one.file}
-        lying = [one for one in _lying(stated, now) if Path(one.file).resolve() not in taken]
-        return [*used, *sorted(lying, key=lambda one: one.date, reverse=True)]
+        using = list(_used(stated, now))
+        taken = {Path(one.file).resolve() for one in using if one.file}
+        lying = (one for one in _lying(stated, now) if Path(one.file).resolve() not in taken)
+        wanted: Mapping[str, str | bool | None] = {"what": what, "used": used, "product": product, "serial": serial}
+        return listing("calibrations", [*using, *lying], page, _place, newest_first=True, **wanted)
+
+
+def _place(one: CalibrationView) -> Place:
+    return f"{one.used:d} {one.date}", f"{one.what} {Path(one.file).name}"
 
 
 def _used(stated: Calibration, now: datetime) -> Iterator[CalibrationView]:
