@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import threading
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -79,7 +80,8 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
 
 
 def walked(client: TestClient, path: str, limit: int) -> list[Any]:
-    found, cursor = [], ""
+    found = list[Any]()
+    cursor: str | None = ""
     while cursor is not None:
         page = client.get(f"{API}{path}", params={"limit": limit, "cursor": cursor})
         assert page.status_code == 200, page.text
@@ -182,7 +184,7 @@ ENTRIES = [Entry(name="b", good=True), Entry(name="a"), Entry(name="c", tags=["x
     ],
 )  # fmt: skip
 def test_no_is_asked_for_and_nothing_is_not(wanted: dict[str, str | bool | None], found: str) -> None:
-    listed = listing("entries", ENTRIES, Page(), lambda one: (one.name, ""), **wanted)
+    listed = listing("entries", ENTRIES, Page(), lambda one: (one.name, ""), newest_first=False, **wanted)
     assert "".join(one.name for one in listed.items) == found
 
 
@@ -191,6 +193,40 @@ def test_a_cursor_of_another_list_is_refused() -> None:
     assert following
     with pytest.raises(UsageError, match="none that was given by this list"):
         listing("others", ENTRIES, Page(1, following), lambda one: (one.name, ""))
+
+
+def test_a_file_whose_name_is_no_text_hides_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("calibration").mkdir()
+    for name in (b"good.toml", b"\xff.toml", b"\xfe.toml"):
+        Path(os.fsdecode(name)).write_text('kind = "indentation"\n')
+    for name in (b"axis-1.json", b"axis-\xff.json"):
+        (Path("calibration") / os.fsdecode(name)).write_text(text_of(axis("1", 1)))
+    client = client_of(Service(Wiring(), tmp_path / "sessions", tmp_path))
+    listed = client.get(f"{API}/protocols")
+    assert (listed.status_code, [one["name"] for one in listed.json()["items"]]) == (200, ["?", "?", "good"])
+    assert [one["file"] for one in client.get(f"{API}/calibrations").json()["items"]] == [
+        "calibration/axis-?.json", "calibration/axis-1.json"
+    ]  # fmt: skip
+
+
+def test_a_pipe_among_calibrations_is_listed_as_none_and_holds_nobody_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("calibration").mkdir()
+    pipe = tmp_path / "calibration" / "axis-1.json"
+    os.mkfifo(pipe)
+    # Nothing comes out of it: a request that reads it is let go, and has read nothing.
+    let_go = threading.Timer(5.0, lambda: os.close(os.open(pipe, os.O_RDWR)))
+    let_go.start()
+    Path("calibration/force-1.json").symlink_to("/dev/null")
+    (tmp_path / "calibration" / "axis-2.json").write_text(text_of(axis("2", 1)))
+    listed = client_of(Service(Wiring(), tmp_path / "sessions", tmp_path)).get(f"{API}/calibrations").json()["items"]
+    let_go.cancel()
+    assert {one["file"]: one["refused"].endswith("is no file") for one in listed} == {
+        "calibration/axis-1.json": True, "calibration/force-1.json": True, "calibration/axis-2.json": False
+    }  # fmt: skip
 
 
 def test_an_upload_that_is_removed_while_they_are_listed_hides_no_other(

@@ -16,7 +16,8 @@ from api.operations.calibrations import FOLDER
 from rig.config.axis_dynamics import AxisDynamics
 from rig.config.calibration import AnyCalibration, Calibration, ForceCalibration, What
 from rig.config.calibration_files import read_axis, read_dynamics, read_force
-from rig.errors import RigError
+from rig.errors import RigError, UsageError
+from rig.results.catalogue import Text
 
 READERS: Mapping[What, Callable[[Path], AnyCalibration]] = {
     "force": read_force, "axis": read_axis, "dynamics": read_dynamics,
@@ -28,12 +29,12 @@ class CalibrationView(BaseModel):
 
     what: What
     used: bool = Field(description="the bench measures with it now")
-    file: str = Field(description="empty: the simulated bench's own")
+    file: Text = Field(description="empty: the simulated bench's own")
     product: str = ""
     serial: str = ""
     date: str = ""
     uncertainty_percent: float | None = Field(default=None, description="relative standard uncertainty")
-    refused: str = Field(description="why the bench would not use it; empty if it would")
+    refused: Text = Field(description="why the bench would not use it; empty if it would")
 
 
 def add(router: APIRouter, service: Service) -> None:
@@ -70,6 +71,8 @@ def _lying(stated: Calibration, now: datetime) -> Iterator[CalibrationView]:
     for what, read in READERS.items():
         for path in FOLDER.glob(f"{what}-*.json"):
             try:
+                if path.is_fifo() or path.is_char_device():  # whose end does not come
+                    raise UsageError(f"{path}: is no file")
                 yield _view(what, path, read(path), stated, now)
             except RigError as error:
                 yield CalibrationView(what=what, used=False, file=str(path), refused=str(error))
