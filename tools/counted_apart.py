@@ -104,6 +104,7 @@ SERVICE: dict[str, str] = {
     "api/http/shared_file.py": "who may act",
     "api/http/uploads.py": "all that the command line can do, as jobs",
     "api/http/protocols.py": "routes, a module a concern",
+    "api/http/listing.py": "routes, a module a concern",
     "api/http/explained.py": "routes, a module a concern",
     "api/http/description.py": "routes, a module a concern",
     "api/cli/serve.py": "who may act",

@@ -77,6 +77,7 @@ OF_CONTROL = "a command has the bench to itself, or takes the lease of the servi
 OF_FILES = "on the computer itself these are files in a folder"
 LOOKED_AT = "for whoever looks on; a command says its own values while it runs"
 AT_THE_START = "a command brings the bench up for itself, as its configuration says"
+FILES = ("/jobs/{identifier}/files/{path}", "/recordings/{session}/{file}", "/sessions/{session}/export/{form}")
 # Routes that are of no command, and why.
 ALONE: Mapping[str, str] = {
     **dict.fromkeys(("GET /auth/me", "POST /auth/login", "POST /auth/logout", "POST /auth/ticket"), OF_A_BROWSER),
@@ -90,6 +91,7 @@ ALONE: Mapping[str, str] = {
     **dict.fromkeys(("GET /sessions/{session}", "DELETE /sessions/{session}", "GET /calibrations"), OF_FILES),
     **dict.fromkeys(("GET /uploads", "GET /uploads/{identifier}", "DELETE /uploads/{identifier}"), OF_FILES),
     "GET /audit": OF_FILES,
+    **dict.fromkeys((f"HEAD {path}" for path in FILES), "how large a file is; on the computer itself `ls` says it"),
     "GET /sessions/{session}/curves": "points of a picture, which `rig report` draws",
     "GET /protocols/{name}/foresight": "a forecast beside each start; `rig protocol check` says what a protocol shows",
     "POST /estop": "keys, foot switch and Ctrl-C stop a command, and so does the stop process beside it",

@@ -74,6 +74,9 @@ def _complete(schema: Described, rights: RightsTable) -> None:
             words = (*ANYWHERE, *_stated(operation))
             problems = {str(status): problem for status, problem in responses(*words).items()}
             operation["responses"] = {**operation["responses"], **problems}
+            if method == "head":  # has no body
+                for response in operation["responses"].values():
+                    response.pop("content", None)
             _exemplify(operation, examples()["routes"].get(name, {}))
 
 
@@ -86,6 +89,7 @@ def _stated(operation: Described) -> Iterator[str]:
     named = {one["name"] for one in operation.get("parameters", ())}
     yield from KEYED if "Idempotency-Key" in named else ()
     yield from ("423 no-lease",) if "X-Control-Lease" in named else ()
+    yield from ("422 refused",) if "cursor" in named else ()
 
 
 def _exemplify(operation: Described, given: Mapping[str, object]) -> None:

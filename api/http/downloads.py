@@ -43,7 +43,7 @@ def files_at(
     }  # fmt: skip
 
     def added(answering: Answering) -> Answering:
-        router.head(path, include_in_schema=False, **stated)(answering)
+        router.head(path, **stated)(answering)
         return router.get(path, **stated)(answering)
 
     return added

@@ -5,7 +5,9 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from api.http.jobs.states import JobState, Verb
+from api.http.listing import Listing
 from controller.loop.messages import DeviceView
+from rig.results.catalogue import Text
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
 
@@ -164,10 +166,10 @@ class RigView(BaseModel):
 class ProtocolView(BaseModel):
     """A protocol file."""
 
-    name: str
-    file: str
+    name: Text
+    file: Text
     settings: dict[str, JsonValue]
-    refusal: str = Field(description="why it cannot be started on this bench; empty if it can")
+    refusal: Text = Field(description="why it cannot be started on this bench; empty if it can")
 
 
 class RecordingView(BaseModel):
@@ -194,11 +196,9 @@ class SessionView(BaseModel):
     recordings: list[RecordingView]
 
 
-class RecordingList(BaseModel):
+class RecordingList(Listing[SessionView]):
     """Sessions with their recordings, newest first; ``next`` is the cursor of what follows, null at the end."""
 
-    items: list[SessionView]
-    next: str | None = None
     remarks: list[str] = Field(default=[], description="folders that are not listed, and why")
 
 

@@ -5,7 +5,7 @@ import contextlib
 import os
 import shutil
 import uuid
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -97,11 +97,11 @@ class UploadShelf:
         at = datetime.fromtimestamp(folder.stat().st_mtime, UTC).isoformat(timespec="seconds")
         return UploadView(id=identifier, at=at, files=files, bytes=sum(file.bytes for file in files))
 
-    def listed(self) -> list[UploadView]:
-        """All there are, newest first."""
-        names = [path.name for path in self._root.glob("*") if path.is_dir()] if self._root.is_dir() else []
-        shown = (self.view(name) for name in names if UPLOAD.fullmatch(name))
-        return sorted(shown, key=lambda one: one.at, reverse=True)
+    def listed(self) -> Iterator[UploadView]:
+        """All there are."""
+        for name in filter(UPLOAD.fullmatch, (path.name for path in self._root.glob("*"))):
+            with contextlib.suppress(RequestRefused, FileNotFoundError):  # removed meanwhile
+                yield self.view(name)
 
     def remove(self, identifier: str) -> None:
         """Removes one that was looked at."""

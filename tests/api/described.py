@@ -1,12 +1,13 @@
 """The service's description of itself, as tests hold answers against it."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import jsonschema_rs
 
+from api.http.access.rights import RightsTable, Rule
 from api.http.app import build
 from api.http.service import Service
 from rig.config.wiring import Wiring
@@ -32,6 +33,11 @@ class Shown(NamedTuple):
 def description() -> dict[str, Any]:
     """Of the routes as they are."""
     return build(Service(Wiring(), Path("sessions"), Path("protocols"), "http://127.0.0.1:8123")).openapi()
+
+
+def rules() -> Sequence[Rule]:
+    """Of all routes as they are, described or not."""
+    return RightsTable(build(Service(Wiring(), Path("sessions"), Path("protocols")))).rules
 
 
 def operations(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -46,7 +46,7 @@ def untrue(client: TestClient, told: dict[str, Any]) -> list[str]:
     places = {getattr(route, "path", "") for route in client.app.routes}
     judged = {
         "products": {(role, name) for role, names in told["products"].items() for name in names} == products,
-        "streams": told["streams"] == {one["name"]: one["unit"] for one in asked(client, "/streams")},
+        "streams": told["streams"] == {one["name"]: one["unit"] for one in asked(client, "/streams")["items"]},
         "jobs": set(told["jobs"]) == kinds["discriminator"]["mapping"].keys(),
         "export_formats": told["export_formats"] == form["schema"]["enum"],
         "transports": {told["transports"]["websocket"], told["transports"]["server-sent events"]} <= places,

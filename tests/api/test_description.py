@@ -31,6 +31,8 @@ def test_every_example_is_valid(schema: dict[str, Any]) -> None:
 def test_every_route_has_a_summary_and_names_each_problem_by_a_type_that_has_a_page(schema: dict[str, Any]) -> None:
     for name, operation in described.operations(schema):
         assert operation["summary"], name
+        if name.startswith("HEAD "):  # told of by its GET
+            continue
         told = described.problems(operation)
         assert {word.partition(" ")[2] for word in told} <= EXPLAINED.keys(), name
         assert {"401 no-credential", "403 scope", "429 too-many"} <= told, name
@@ -54,6 +56,37 @@ def test_every_route_has_a_summary_and_names_each_problem_by_a_type_that_has_a_p
 )
 def test_the_problems_of_a_route_are_among_them(schema: dict[str, Any], name: str, told: str) -> None:
     assert told in described.problems(dict(described.operations(schema))[name])
+
+
+SENDING_FILES = {
+    "/api/v1/recordings/{session}/{file}", "/api/v1/jobs/{identifier}/files/{path}",
+    "/api/v1/sessions/{session}/export/{form}",
+}  # fmt: skip
+
+
+def test_head_is_described_where_it_is_served_and_answers_as_get_does_without_a_body(schema: dict[str, Any]) -> None:
+    served = {rule.path.replace(":path", "") for rule in described.rules() if "HEAD" in rule.methods}
+    found = {name.removeprefix("HEAD "): one for name, one in described.operations(schema) if name.startswith("HEAD ")}
+    assert found.keys() == SENDING_FILES == served & schema["paths"].keys()
+    for path, head in found.items():
+        get = schema["paths"][path]["get"]
+        assert {key: head[key] for key in ("summary", "parameters", "security")} == {
+            key: get[key] for key in ("summary", "parameters", "security")
+        }
+        assert {status: said["description"] for status, said in head["responses"].items()} == {
+            status: said["description"] for status, said in get["responses"].items()
+        }
+        assert not any("content" in said for said in head["responses"].values())
+    names = [one["operationId"] for _, one in described.operations(schema)]
+    assert len(names) == len(set(names))
+
+
+def test_a_list_that_goes_by_cursor_tells_of_one_that_is_wrong(schema: dict[str, Any]) -> None:
+    by_cursor = [
+        one for _, one in described.operations(schema)
+        if "cursor" in {each["name"] for each in one.get("parameters", ())}
+    ]  # fmt: skip
+    assert len(by_cursor) == 17 and all("422 refused" in described.problems(one) for one in by_cursor)
 
 
 def headers_of(operation: dict[str, Any]) -> set[str]:

@@ -38,7 +38,7 @@ def test_calibrations_in_use_come_first_and_each_says_why_it_would_be_refused(
     (folder / "force-1.json").write_text("no JSON")
     known = Calibration(axis=Path("calibration/axis-7.json"), of_axis=made["axis-7.json"], max_age_days=730)
     service = Service(Wiring(force=BotaWiring(port="/dev/none"), calibration=known), tmp_path, tmp_path)
-    found = client_of(service).get("/api/v1/calibrations").json()
+    found = client_of(service).get("/api/v1/calibrations").json()["items"]
     assert [(one["serial"], one["used"]) for one in found] == [("7", True), ("5", False), ("6", False), ("", False)]
     assert found[0]["refused"] == "" and found[0]["uncertainty_percent"] == pytest.approx(0.1)
     assert "uncertain by 5 %" in found[1]["refused"] and "days old" in found[2]["refused"]

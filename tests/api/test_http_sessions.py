@@ -262,13 +262,13 @@ def test_one_protocol_that_cannot_be_read_is_listed_with_its_error_and_the_other
     (folder / "wiring.toml").write_text('[force]\nproduct = "bota"\n')
     (folder / "folder.toml").mkdir()
     (folder / "gone.toml").symlink_to(folder / "nowhere")
-    listed = {each["name"]: each["refusal"] for each in client.get("/api/v1/protocols").json()}
+    listed = {each["name"]: each["refusal"] for each in client.get("/api/v1/protocols").json()["items"]}
     assert listed.keys() == {"plain", "folder", "gone"} and listed["plain"] == ""
     assert "Is a directory" in listed["folder"] and "No such file" in listed["gone"]
     monkeypatch.setattr("api.http.protocols.load", lambda _kind, path: pytest.fail(f"{path} was read again"))
-    assert len(client.get("/api/v1/protocols").json()) == 3
+    assert len(client.get("/api/v1/protocols").json()["items"]) == 3
     monkeypatch.undo()
     (folder / "plain.toml").write_text("depth_mm = 500\n")
     assert "500 mm deep" in next(
-        each["refusal"] for each in client.get("/api/v1/protocols").json() if each["name"] == "plain"
+        each["refusal"] for each in client.get("/api/v1/protocols").json()["items"] if each["name"] == "plain"
     )

@@ -61,7 +61,7 @@ def test_files_are_kept_as_they_were_sent_with_their_folders(client: TestClient,
     ]  # fmt: skip
     assert (found["bytes"], found["left_out"]) == (len(binary) + 4, [".DS_Store"])
     assert (service.jobs.uploads / found["id"] / "force" / "b ü.bin").read_bytes() == binary
-    assert client.get(ROUTE).json() == [{**found, "left_out": []}]
+    assert client.get(ROUTE).json() == {"items": [{**found, "left_out": []}], "next": None}
 
 
 def test_an_upload_is_removed_in_two_steps(client: TestClient, service: Service) -> None:
@@ -290,4 +290,4 @@ def test_an_upload_with_a_key_is_read_piece_by_piece_too(client: TestClient, mon
     assert keyed(client, b"1,2\n" * 1000).json() == first.json()
     other = keyed(client, b"1,2\n" * 1001)
     assert (other.status_code, other.json()["code"]) == (422, "idempotency-key-reused")
-    assert len(client.get(ROUTE).json()) == 1
+    assert len(client.get(ROUTE).json()["items"]) == 1

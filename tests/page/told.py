@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from api.http.jobs.views import FileView
+from api.http.listing import Listing
 from api.http.models import ProtocolView
 from api.http.routes.curves import CurvesView, CurveView
 from api.http.routes.foresight import ExpectedForce, Foresight
@@ -211,7 +212,7 @@ def everything() -> dict[str, Any]:
     return {
         "subject": {"id": SUBJECT, "site": SITE, "pain_threshold_N": 12.0, "site_thresholds_N": {}},
         "subjects": SUBJECTS, "models": MODELS,
-        "protocols": [one.model_dump() for one in PROTOCOLS], "protocols/quick/foresight": FORESIGHT,
+        "protocols": Listing[ProtocolView](items=PROTOCOLS), "protocols/quick/foresight": FORESIGHT,
         "sessions": SESSIONS, f"sessions/{NAME}": SESSION, f"sessions/{NAME}/curves": CURVES, "trials": TRIALS,
         f"{base}/fit/fit.json": FIT, f"{base}/diagnosis/diagnosis.json": DIAGNOSIS, f"{base}/track.json": TRACKED,
         **{f"{base}/{name}.svg": PICTURE for name in PICTURES}, **NO_JOBS,
@@ -223,5 +224,5 @@ def nothing() -> dict[str, Any]:
     empty: dict[str, Any] = {"items": [], "next": None}
     return {
         "subject": {"id": "", "site": "", "pain_threshold_N": 15.0, "site_thresholds_N": {}}, "subjects": empty,
-        "models": empty, "protocols": [], "sessions": empty, "trials": empty, **NO_JOBS,
+        "models": empty, "protocols": empty, "sessions": empty, "trials": empty, **NO_JOBS,
     }  # fmt: skip

@@ -4,6 +4,7 @@ from typing import Any
 
 from api.http.access.audit import AuditLine
 from api.http.access.models import AccountView, AuditView, TokenView
+from api.http.listing import Listing
 from api.http.routes.calibrations import CalibrationView
 from rig.results.catalogue import (
     DiagnosisEntry,
@@ -69,8 +70,8 @@ AUDIT = AuditView(
 def around() -> dict[str, Any]:
     """All answers on a laboratory with one subject, three devices and two people."""
     return {
-        f"subjects/{SUBJECT}": HISTORY, "calibrations": [one.model_dump() for one in CALIBRATIONS],
-        "accounts": [one.model_dump() for one in ACCOUNTS], "tokens": [one.model_dump() for one in TOKENS],
+        f"subjects/{SUBJECT}": HISTORY, "calibrations": Listing[CalibrationView](items=CALIBRATIONS),
+        "accounts": Listing[AccountView](items=ACCOUNTS), "tokens": Listing[TokenView](items=TOKENS),
         "audit": AUDIT,
     }  # fmt: skip
 
@@ -86,7 +87,7 @@ def bare() -> dict[str, Any]:
             "stiffness": (),
         }
     )
-    nobody: list[Any] = []
+    nobody: dict[str, Any] = {"items": [], "next": None}
     return {
         f"subjects/{SUBJECT}": left, "calibrations": nobody, "accounts": nobody, "tokens": nobody,
         "audit": AuditView(items=[], next=None, broken=[]),

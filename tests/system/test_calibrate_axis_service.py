@@ -124,7 +124,7 @@ def test_the_axis_is_calibrated_against_the_tracker(served: ServedRig, lease: st
     done = becomes(served, lease, job, "succeeded", within_s=SEARCHED_S)
     found = read_axis(served.folder / done["result"]["file"])
     assert found.scale == pytest.approx(1.0, abs=0.005) and found.direction_known_by == "limb marker"
-    listed = {one["file"]: one["what"] for one in served.ask("GET", "/calibrations")}
+    listed = {one["file"]: one["what"] for one in served.ask("GET", "/calibrations")["items"]}
     assert listed[done["result"]["file"]] == "axis"
 
 

@@ -49,7 +49,7 @@ def test_a_person_is_asked_for_each_weight_and_connects_again(tmp_path: Path) ->
         assert [found.matrix[at][at] for at in range(3)] == pytest.approx([1.0, 1.0, 1.0], abs=0.03)
         shown = served.rig
         assert shown["state"] == "disconnected" and "see that nothing is in the tip's way" in shown["reason"]
-        listed = [one["file"] for one in served.ask("GET", "/calibrations")]
+        listed = [one["file"] for one in served.ask("GET", "/calibrations")["items"]]
         assert done["result"]["file"] in listed
         served.ask("POST", "/rig/connect", {}, served.lease())
         served.becomes("idle")

@@ -130,7 +130,7 @@ def test_a_demonstration_that_is_served_ends_with_an_address_where_its_session_i
 
         assert [each["session"] for each in shown("/sessions")["items"]] == ["session"]
         assert shown("/diagnoses")["items"] and shown("/models")["items"]
-        assert [(each["name"], each["refusal"]) for each in shown("/protocols")] == [("demonstration", "")]
+        assert [(each["name"], each["refusal"]) for each in shown("/protocols")["items"]] == [("demonstration", "")]
         process.send_signal(signal.SIGINT)
         out, said = process.communicate(timeout=60)
         assert (process.returncode, out, "Traceback" in said) == (0, "", False), said

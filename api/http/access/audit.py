@@ -10,12 +10,11 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 
-from api.catalogue.pages import Page, cut
 from api.http.access.scopes import Caller
 from api.http.access.store import KeptModel
 
@@ -75,20 +74,11 @@ class AuditLog:
         """All lines, oldest first."""
         return self.path.read_bytes().splitlines() if self.path.exists() else []
 
-    def newest(self, page: Page, lines: Sequence[bytes] | None = None) -> tuple[list[AuditLine], str | None]:
-        """One page of all ``lines``, newest first, and the cursor of the next.
-
-        `broken` tells of lines left out, which cannot be read. Raises UsageError for a cursor of another list.
-        """
-        numbered, after = cut(
-            page, "audit", enumerate(self.lines() if lines is None else lines),
-            lambda one: (f"{one[0]:012}", ""), newest_first=True,
-        )  # fmt: skip
-        found = []
-        for _, line in numbered:
+    def entries(self, lines: Sequence[bytes] | None = None) -> Iterator[AuditLine]:
+        """Of all ``lines``, oldest first; `broken` tells of those left out, which cannot be read."""
+        for line in self.lines() if lines is None else lines:
             with contextlib.suppress(ValueError):
-                found.append(AuditLine.model_validate_json(line))
-        return found, after
+                yield AuditLine.model_validate_json(line)
 
     def broken(self, lines: Sequence[bytes] | None = None) -> list[int]:
         """Numbers of the lines, from 1, that do not follow the line before: something was changed there, or taken."""

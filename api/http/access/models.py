@@ -7,6 +7,7 @@ from pydantic import BaseModel, Field
 from api.http.access.audit import AuditLine
 from api.http.access.scopes import WORDS, Caller, ScopeWord
 from api.http.access.tokens import Token
+from api.http.listing import Listing
 from api.http.models import RequestBody
 
 Secret = Annotated[str, Field(min_length=1, max_length=200)]
@@ -87,9 +88,7 @@ class AccountView(BaseModel):
     scope: ScopeWord
 
 
-class AuditView(BaseModel):
+class AuditView(Listing[AuditLine]):
     """What was done, newest first; ``next`` is the cursor of what came before, null at the beginning."""
 
-    items: list[AuditLine]
-    next: str | None
     broken: list[int] = Field(description="numbers of lines that do not follow the one before")

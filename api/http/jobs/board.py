@@ -5,19 +5,17 @@ import threading
 import time
 import traceback
 import uuid
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from pydantic import JsonValue
 
-from api.catalogue.pages import Page, cut
 from api.http.jobs.job import Job, JobRequest, ended_already, stamp
 from api.http.jobs.kept import beside, erase_kept
 from api.http.jobs.kinds import Kind
 from api.http.jobs.places import Places
-from api.http.jobs.store import JobStore, place
-from api.http.jobs.views import JobList, JobView, files_of, summary, view
+from api.http.jobs.store import JobStore
+from api.http.jobs.views import JobView, files_of, summary, view
 from api.http.models import JobSummary, RequestBody
 from api.http.problems import RequestRefused
 from api.http.streams.events import EventLog
@@ -27,24 +25,6 @@ from rig.errors import RigError
 # Nobody waits for more computations than a night's.
 MOST_WAITING = 50
 NOTE, WARNING = 10, 20
-
-
-@dataclass(frozen=True)
-class Filter:
-    """What jobs are asked for; empty asks for nothing."""
-
-    kind: str = ""
-    state: str = ""
-    session: str = ""
-    moves: bool | None = None
-
-    def fits(self, job: JobSummary) -> bool:
-        """Whether it is one of them."""
-        wanted = {"kind": self.kind, "state": self.state, "session": self.session}
-        facts = vars(job)
-        return all(not value or facts[name] == value for name, value in wanted.items()) and (
-            self.moves is None or job.moves == self.moves
-        )
 
 
 class JobBoard:
@@ -245,15 +225,10 @@ class JobBoard:
             raise ended_already(identifier, known.state, done)
         return None
 
-    def listed(self, wanted: Filter, page: Page) -> JobList:
-        """A page of them, newest first; raises UsageError for a wrong cursor."""
+    def listed(self) -> list[JobSummary]:
+        """All there are."""
         with self._lock:
-            everything: Mapping[str, JobSummary] = {
-                **self._known(), **{job.id: summary(job) for job in self._live.values()},
-            }  # fmt: skip
-        found = filter(wanted.fits, everything.values())
-        items, following = cut(page, "jobs", found, place, newest_first=True)
-        return JobList(items=items, next=following)
+            return list({**self._known(), **{job.id: summary(job) for job in self._live.values()}}.values())
 
     def close(self) -> None:
         """The service ends: whatever computes is ended with it, what waits first, so that none of it begins."""

@@ -46,13 +46,6 @@ class JobView(JobSummary):
     files: list[FileView] = Field(default=[], description="what it has written")
 
 
-class JobList(BaseModel):
-    """Jobs, newest first; ``next`` is the cursor of what follows, null at the end."""
-
-    items: tuple[JobSummary, ...]
-    next: str | None = None
-
-
 def summary(job: Job) -> JobSummary:
     """For lists and for the bench."""
     return JobSummary.model_validate(_facts(job))

@@ -21,9 +21,10 @@ from api.http.access.models import (
     TokenView,
 )
 from api.http.access.rights import ADMIN, PUBLIC, READ
-from api.http.access.scopes import WORDS, Caller
+from api.http.access.scopes import WORDS, Caller, ScopeWord
+from api.http.listing import Listing, listing
 from api.http.problems import RequestRefused, responses
-from api.http.routes.common import PageQuery, WhoAsks
+from api.http.routes.common import PageQuery, WhoAsks, Word
 from api.http.service import Service
 
 # As long as the passwords of those before take.
@@ -36,19 +37,21 @@ def add(router: APIRouter, service: Service) -> None:
     _logged_in(router, service)
     _tokens(router, service)
 
-    @router.get("/accounts", dependencies=[ADMIN], summary="People who log in with a password")
-    def accounts() -> list[AccountView]:
-        return [AccountView(name=one.name, scope=one.scope) for one in service.access.accounts.accounts()]
+    @router.get("/accounts", dependencies=[ADMIN], summary="People who log in with a password, by name")
+    def accounts(page: PageQuery, name: Word = "", scope: ScopeWord | None = None) -> Listing[AccountView]:
+        found = (AccountView(name=one.name, scope=one.scope) for one in service.access.accounts.accounts())
+        return listing("accounts", found, page, lambda one: (one.name, ""), name=name, scope=scope)
 
-    @router.get(
-        "/audit", dependencies=[ADMIN], summary="Who did what, newest first", responses=responses("422 refused")
-    )
-    def audit(page: PageQuery) -> AuditView:
+    @router.get("/audit", dependencies=[ADMIN], summary="Who did what, newest first")
+    def audit(page: PageQuery, who: Word = "", what: Word = "", outcome: Word = "") -> AuditView:
         log = service.access.audit
         log.settle()
         lines = log.lines()
-        items, after = log.newest(page, lines)
-        return AuditView(items=items, next=after, broken=log.broken(lines))
+        found = listing(
+            "audit", log.entries(lines), page, lambda one: (f"{one.seq:012}", one.before), newest_first=True,
+            who=who, what=what, outcome=outcome,
+        )  # fmt: skip
+        return AuditView(**vars(found), broken=log.broken(lines))
 
 
 def _logins(router: APIRouter, service: Service) -> None:
@@ -131,9 +134,10 @@ def _cookie(request: Request) -> str:
 def _tokens(router: APIRouter, service: Service) -> None:
     tokens = service.access.tokens
 
-    @router.get("/tokens", dependencies=[ADMIN], summary="Tokens there are, without their secrets")
-    def listed() -> list[TokenView]:
-        return [TokenView.of(token) for token in tokens.tokens()]
+    @router.get("/tokens", dependencies=[ADMIN], summary="Tokens, oldest first, without their secrets")
+    def listed(page: PageQuery, name: Word = "", scope: ScopeWord | None = None) -> Listing[TokenView]:
+        found = map(TokenView.of, tokens.tokens())
+        return listing("tokens", found, page, lambda one: (one.created, one.id), name=name, scope=scope)
 
     @router.post(
         "/tokens", dependencies=[ADMIN], status_code=201, summary="Makes a token; its secret is shown once",

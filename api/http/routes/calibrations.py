@@ -7,13 +7,17 @@ from pathlib import Path
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
+from api.catalogue.pages import Place
 from api.http.access.rights import READ
+from api.http.listing import Listing, listing
+from api.http.routes.common import PageQuery, Word
 from api.http.service import Service
 from api.operations.calibrations import FOLDER
 from rig.config.axis_dynamics import AxisDynamics
 from rig.config.calibration import AnyCalibration, Calibration, ForceCalibration, What, what_of
 from rig.config.calibration_files import read_axis, read_dynamics, read_force
-from rig.errors import RigError
+from rig.errors import RigError, UsageError
+from rig.results.catalogue import Text
 
 READERS: Mapping[What, Callable[[Path], AnyCalibration]] = {
     "force": read_force, "axis": read_axis, "dynamics": read_dynamics,
@@ -25,12 +29,12 @@ class CalibrationView(BaseModel):
 
     what: What
     used: bool = Field(description="the bench measures with it now")
-    file: str = Field(description="empty: the simulated bench's own")
+    file: Text = Field(description="empty: the simulated bench's own")
     product: str = ""
     serial: str = ""
     date: str = ""
     uncertainty_percent: float | None = Field(default=None, description="relative standard uncertainty")
-    refused: str = Field(description="why the bench would not use it; empty if it would")
+    refused: Text = Field(description="why the bench would not use it; empty if it would")
 
 
 def add(router: APIRouter, service: Service) -> None:
@@ -39,12 +43,19 @@ def add(router: APIRouter, service: Service) -> None:
     @router.get(
         "/calibrations", dependencies=[READ], summary="Calibrations in use, then those in their folder, newest first"
     )
-    def calibrations() -> list[CalibrationView]:
+    def calibrations(
+        page: PageQuery, what: What | None = None, used: bool | None = None, product: Word = "", serial: Word = ""
+    ) -> Listing[CalibrationView]:
         stated, now = service.wiring.calibration, datetime.now(UTC)
-        used = list(_used(stated, now))
-        taken = {Path(one.file).resolve() for one in used if one.file}
-        lying = [one for one in _lying(stated, now) if Path(one.file).resolve() not in taken]
-        return [*used, *sorted(lying, key=lambda one: one.date, reverse=True)]
+        using = list(_used(stated, now))
+        taken = {Path(one.file).resolve() for one in using if one.file}
+        lying = (one for one in _lying(stated, now) if Path(one.file).resolve() not in taken)
+        wanted: Mapping[str, str | bool | None] = {"what": what, "used": used, "product": product, "serial": serial}
+        return listing("calibrations", [*using, *lying], page, _place, newest_first=True, **wanted)
+
+
+def _place(one: CalibrationView) -> Place:
+    return f"{one.used:d} {one.date}", f"{one.what} {Path(one.file).name}"
 
 
 def _used(stated: Calibration, now: datetime) -> Iterator[CalibrationView]:
@@ -58,6 +69,8 @@ def _lying(stated: Calibration, now: datetime) -> Iterator[CalibrationView]:
     for what, read in READERS.items():
         for path in FOLDER.glob(f"{what}-*.json"):
             try:
+                if path.is_fifo() or path.is_char_device():  # whose end does not come
+                    raise UsageError(f"{path}: is no file")
                 yield _view(path, read(path), stated, now)
             except RigError as error:
                 yield CalibrationView(what=what, used=False, file=str(path), refused=str(error))

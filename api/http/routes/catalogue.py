@@ -89,7 +89,7 @@ def add(router: APIRouter, service: Service) -> None:
 
 
 def _lists(router: APIRouter, lists: Catalogue) -> None:
-    told = responses("422 refused", "503 catalogue")
+    told = responses("503 catalogue")
 
     @router.get(
         "/subjects", summary="Subjects by code; names only for whoever may operate", dependencies=[READ], responses=told

@@ -1,26 +1,28 @@
 """Jobs: what takes longer than an answer, for everything that the command line can do."""
 
+from collections.abc import Mapping
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Query, Request, Response
+from fastapi import APIRouter, Body, Request, Response
 
 from api.http.access.rights import CALLER, OPERATE, READ, STOP, Right
 from api.http.access.scopes import Scope
 from api.http.downloads import FileAsOfNow, files_at
 from api.http.guard import lacking
 from api.http.idempotency import KeyHeader, refuse_without_key
-from api.http.jobs.board import Filter
 from api.http.jobs.examples import EXAMPLES
 from api.http.jobs.kinds import KINDS, AnyJob
 from api.http.jobs.places import regular_file
 from api.http.jobs.start import start
 from api.http.jobs.states import JobState
-from api.http.jobs.views import JobList, JobView, media_type
+from api.http.jobs.store import place
+from api.http.jobs.views import JobView, media_type
+from api.http.listing import Listing, listing
+from api.http.models import JobSummary
 from api.http.problems import RequestRefused, responses
-from api.http.routes.common import PREFIX, LeaseHeader, PageQuery, WhoAsks
+from api.http.routes.common import PREFIX, LeaseHeader, PageQuery, WhoAsks, Word
 from api.http.service import Service
 
-Word = Annotated[str, Query(max_length=1000)]
 JSON = "application/json"
 REFUSED = responses(
     "400 idempotency-key", "404 no-such-session", "404 no-such-model", "404 no-such-upload", "404 no-such-protocol",
@@ -56,15 +58,12 @@ def add(router: APIRouter, service: Service) -> None:
 
 
 def _lists(router: APIRouter, service: Service) -> None:
-    @router.get("/jobs", dependencies=[READ], summary="Jobs, newest first", responses=responses("422 refused"))
+    @router.get("/jobs", dependencies=[READ], summary="Jobs, newest first")
     def jobs(
-        page: PageQuery,
-        kind: Word = "",
-        state: JobState | None = None,
-        session: Word = "",
-        moves: bool | None = None,
-    ) -> JobList:
-        return service.jobs.listed(Filter(kind, state or "", session, moves), page)
+        page: PageQuery, kind: Word = "", state: JobState | None = None, session: Word = "", moves: bool | None = None
+    ) -> Listing[JobSummary]:
+        wanted: Mapping[str, str | bool | None] = {"kind": kind, "state": state, "session": session, "moves": moves}
+        return listing("jobs", service.jobs.listed(), page, place, newest_first=True, **wanted)
 
     @router.get(
         "/jobs/{identifier}",

@@ -29,7 +29,7 @@ def add(router: APIRouter, service: Service) -> None:
         dependencies=[READ],
         response_model=RecordingList,
         summary="Sessions by query with their recordings, newest first",
-        responses=responses("422 refused", "503 catalogue"),
+        responses=responses("503 catalogue"),
     )
     def recordings(asked: AskedQuery, page: PageQuery) -> Response:
         with answering():

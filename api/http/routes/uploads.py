@@ -6,7 +6,9 @@ from api.http.access.rights import OPERATE, READ, upload
 from api.http.access.scopes import Scope
 from api.http.answers import ANSWERS, forget
 from api.http.erasing import Confirm, UploadErasure, to_confirm
+from api.http.listing import Listing, listing
 from api.http.problems import RequestRefused, responses
+from api.http.routes.common import PageQuery, Word
 from api.http.service import Service
 from api.http.uploads import LARGEST_UPLOAD_BYTES, UploadShelf, UploadView
 
@@ -35,8 +37,9 @@ def add(router: APIRouter, service: Service) -> None:
         return await shelf.receive(request.headers.get("content-type", ""), stated, request.stream())
 
     @router.get("/uploads", dependencies=[READ], summary="Files that were sent, newest first")
-    def listed() -> list[UploadView]:
-        return shelf.listed()
+    def listed(page: PageQuery, file: Word = "") -> Listing[UploadView]:
+        found = (one for one in shelf.listed() if not file or file in {each.name for each in one.files})
+        return listing("uploads", found, page, lambda one: (one.at, one.id), newest_first=True)
 
     @router.get(
         "/uploads/{identifier}", dependencies=[READ], summary="One upload", responses=responses("404 no-such-upload")

@@ -6,8 +6,9 @@ from fastapi import APIRouter, Header, Query, Request, WebSocket
 from fastapi.responses import StreamingResponse
 
 from api.http.access.rights import ENTITLED, READ
+from api.http.listing import Listing, listing
 from api.http.problems import responses
-from api.http.routes.common import PREFIX
+from api.http.routes.common import PREFIX, PageQuery, Word
 from api.http.streams import sse
 from api.http.streams.latest import MOST_LATEST, LatestView
 from api.http.streams.messages import StreamView
@@ -35,8 +36,10 @@ def build(streams: Streams) -> APIRouter:
     @router.get(
         "/streams", dependencies=[READ], summary="Live streams that `WS /stream` (subprotocol rig.v1) can be asked for"
     )
-    async def listed() -> list[StreamView]:
-        return streams.listed()
+    async def listed(page: PageQuery, name: Word = "", topic: Word = "", unit: Word = "") -> Listing[StreamView]:
+        place = {name: (f"{at:03}", "") for at, name in enumerate(streams.signals)}
+        found = streams.listed()
+        return listing("streams", found, page, lambda one: place[one.name], name=name, topic=topic, unit=unit)
 
     @router.get(
         "/streams/{stream}/latest",

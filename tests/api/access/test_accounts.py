@@ -158,4 +158,4 @@ def test_accounts_are_listed_for_administrators_without_what_a_password_is_kept_
     secret = TokenStore(tmp_path / "access").create("program", Scope.ADMIN).secret
     client = client_of(service, scope=None)
     listed = client.get("/api/v1/accounts", headers={"Authorization": f"Bearer {secret}"})
-    assert listed.json() == [{"name": "ann", "scope": "operate"}]
+    assert listed.json() == {"items": [{"name": "ann", "scope": "operate"}], "next": None}

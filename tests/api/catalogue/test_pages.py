@@ -11,8 +11,11 @@ from fastapi.testclient import TestClient
 
 from api.catalogue.catalogue import Catalogue
 from api.catalogue.pages import Page, Place
+from api.http.access.models import AccountView
 from api.http.access.rights import READ
 from api.http.access.scopes import Scope
+from api.http.listing import Listing, listing
+from api.http.routes.common import PageQuery
 from api.http.service import Service
 from mock_devices.testing.access import bearer, client_of
 from rig.config.products.bota_sensone import BotaWiring
@@ -20,18 +23,9 @@ from rig.config.wiring import Wiring
 from tests.api.catalogue.made import make_session, trial
 
 API = "/api/v1"
-# Lists that come whole, each with what keeps it short; whoever adds one has to say so here, or gives it a cursor.
-WHOLE = {
-    "/accounts": "people who have a password here, a handful",
-    "/tokens": "programs of this bench, a handful",
-    "/protocols": "files that a person has put into one folder",
-    "/streams": "as many as the wiring has, a few dozen",
-    "/calibrations": "one a commissioning",
-    "/uploads": "go after a week",
-}
 PAGED = {
     "/recordings", "/subjects", "/sites", "/sessions", "/trials", "/models", "/diagnoses", "/causes", "/operations",
-    "/jobs", "/audit",
+    "/jobs", "/audit", "/accounts", "/tokens", "/protocols", "/streams", "/calibrations", "/uploads",
 }  # fmt: skip
 
 
@@ -188,7 +182,7 @@ def test_a_page_has_bounds(client: TestClient, path: str, limit: str) -> None:
 
 
 def lists(app: FastAPI) -> Iterator[tuple[str, bool]]:
-    """Path of each list below the prefix, and whether it goes by limit and cursor and says what is next."""
+    """Path of each list below the prefix, and whether it goes by limit, cursor and query and says what is next."""
     schema = app.openapi()
     for path, methods in schema["paths"].items():
         answer = (
@@ -198,24 +192,27 @@ def lists(app: FastAPI) -> Iterator[tuple[str, bool]]:
         fields = schema["components"]["schemas"].get(shape.get("$ref", "").rpartition("/")[2], {}).get("properties", {})
         if shape.get("type") == "array" or "items" in fields:
             named = {one["name"] for one in methods["get"].get("parameters", ())}
-            yield path.removeprefix(API), "next" in fields and {"limit", "cursor"} <= named
+            yield path.removeprefix(API), "next" in fields and {"limit", "cursor"} < named
 
 
-def test_every_list_has_a_cursor_or_a_reason_to_come_whole(client: TestClient) -> None:
+def test_every_list_has_a_cursor_and_a_query(client: TestClient) -> None:
     app = client.app
     assert isinstance(app, FastAPI)
-    found = dict(lists(app))
-    assert {path for path, paged in found.items() if paged} == PAGED
-    assert {path for path, paged in found.items() if not paged} == WHOLE.keys()
+    assert dict(lists(app)) == dict.fromkeys(PAGED, True)
 
 
-def test_a_list_without_a_cursor_is_found(client: TestClient) -> None:
+def test_a_list_without_a_cursor_or_a_query_is_found(client: TestClient) -> None:
     app = client.app
     assert isinstance(app, FastAPI)
 
-    def planted() -> list[str]:
+    def whole() -> list[str]:
         return []
 
-    app.get(f"{API}/planted", dependencies=[READ], summary="Planted")(planted)
+    def unasked(page: PageQuery) -> Listing[AccountView]:
+        return listing("planted", [], page, lambda one: (one.name, ""))
+
+    for name, planted in (("whole", whole), ("unasked", unasked)):
+        app.get(f"{API}/{name}", dependencies=[READ], summary="Planted")(planted)
     app.openapi_schema = None
-    assert dict(lists(app))["/planted"] is False
+    found = dict(lists(app))
+    assert (found["/whole"], found["/unasked"]) == (False, False)

@@ -11,10 +11,9 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from api.catalogue.pages import Page
 from api.http.jobs import board, store, views
 from api.http.jobs import job as job_module
-from api.http.jobs.board import Filter, JobBoard
+from api.http.jobs.board import JobBoard
 from api.http.jobs.kinds import KINDS
 from api.http.jobs.params import VerifyParams
 from api.http.service import Service
@@ -109,7 +108,7 @@ def test_a_job_that_ends_where_the_disk_takes_nothing_is_shown_as_it_ended(
         raise DiskFull("no room")
 
     job = made(jobs, work=lambda _: monkeypatch.setattr(store, "write_text", full))
-    (listed,) = jobs.listed(Filter(), Page()).items
+    (listed,) = jobs.listed()
     assert listed.state == json.loads(jobs.shown(job))["state"] == "succeeded"
     monkeypatch.undo()
     assert json.loads(again(jobs).shown(job))["state"] == "interrupted"  # as of the last that it took
@@ -159,7 +158,7 @@ def test_a_clock_that_was_set_back_makes_no_new_job_the_oldest(jobs: JobBoard, m
         board = again(board)  # and so across a start of the service
         now.append(made(board))
     assert set(board._known()) == set(now)
-    assert [job.id for job in board.listed(Filter(), Page()).items] == now[::-1]
+    assert [job.id for job in sorted(board.listed(), key=store.place)] == now
 
 
 def test_a_clock_that_was_set_forward_takes_no_files(jobs: JobBoard, monkeypatch: pytest.MonkeyPatch) -> None:

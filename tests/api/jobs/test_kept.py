@@ -86,7 +86,7 @@ def test_nothing_that_jobs_made_of_an_erased_session_is_served_or_left(
         assert client.get(f"{API}/jobs/{job}/files/left.bin").status_code == 404
     assert [job["id"] for job in client.get(f"{API}/jobs").json()["items"]] == [other]
     assert client.get(f"{API}/jobs/{other}/files/left.bin").content == MINE
-    assert client.get(f"{API}/uploads").json() == []
+    assert client.get(f"{API}/uploads").json()["items"] == []
     assert [path.parents[1].name for path in holding(tmp_path, MINE)] == [other]
     assert not list(service.jobs.folder.rglob("*.zip"))
 

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from api.catalogue.pages import Page
 from api.http.access.access import Access, cookie_name
 from api.http.access.logins import LOGIN_S
 from api.http.access.scopes import Caller, Scope
@@ -306,7 +305,7 @@ def who_stopped_is_in_the_audit_log(at: Away) -> None:
     deadline = time.monotonic() + 20
     while not list(at.access.audit.lines()) and time.monotonic() < deadline:
         time.sleep(0.01)
-    line = at.access.audit.newest(Page(1))[0][0]
+    line = list(at.access.audit.entries())[-1]
     assert (line.who, line.what) == ("watch", "POST /pain beside the service")
     assert line.outcome == f"200 {HELD}"
 

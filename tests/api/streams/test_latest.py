@@ -129,7 +129,7 @@ def test_an_unknown_stream_is_told_with_all_that_there_are(service: PlayedServic
     answer = asked(service, "presure")
     assert (answer.status_code, answer.json()["code"]) == (404, "no-such-stream")
     names = answer.json()["detail"].partition("there are ")[2].split(", ")
-    listed = httpx.get(f"http://127.0.0.1:{service.port}/api/v1/streams").json()
+    listed = httpx.get(f"http://127.0.0.1:{service.port}/api/v1/streams").json()["items"]
     assert names == [one["name"] for one in listed] and "marker.arm" in names
 
 

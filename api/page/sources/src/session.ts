@@ -12,15 +12,21 @@ export const refusal = signal("");
 
 export const may = (scope: Me["scopes"][number]) => Boolean(me.value?.scopes.includes(scope));
 
-async function enter(): Promise<Me> {
-  const ticket = new URLSearchParams(location.hash.slice(1)).get("ticket");
+// As soon as whoever just started the service sees it.
+const AGAIN_MS = 1000;
+// Slower answers come, but by then somebody wonders.
+const TOLD_MS = 3000;
+const TOO_MANY = 429;
+
+/** Whether another try may be answered otherwise: no answer came, or one of a service that is not ready. */
+const passing = (error: unknown) => error instanceof Refused && (error.status === 0 || error.status === TOO_MANY || error.status >= 500);
+
+async function enter(ticket: string | null): Promise<Me> {
   if (!ticket) return get("/api/v1/auth/me");
-  // What signs in is not left in the address bar, nor in the history.
-  history.replaceState(null, "", location.pathname);
   return post("/api/v1/auth/ticket", { body: { ticket } }).catch((used: Error) =>
     // An address that is opened again: this browser may be signed in from the first time.
-    get("/api/v1/auth/me").catch(() => {
-      throw used;
+    get("/api/v1/auth/me").catch((mine: Error) => {
+      throw passing(mine) ? mine : used;
     }),
   );
 }
@@ -37,14 +43,27 @@ export async function signIn(next: () => void): Promise<void> {
     if (me.value) refusal.value = t.login.ended;
     me.value = null;
   });
-  try {
-    accept(await enter());
-    next();
-  } catch (error) {
-    // Whoever has not been here before is told how to come in, not that they are not in.
-    if (!(error instanceof Refused && error.status === 401 && error.code !== "ticket")) refusal.value = (error as Error).message;
-  }
-  entering.value = false;
+  const ticket = new URLSearchParams(location.hash.slice(1)).get("ticket");
+  // What signs in is not left in the address bar, nor in the history.
+  if (ticket) history.replaceState(null, "", location.pathname);
+  const ask = async (): Promise<void> => {
+    // What was sent is waited for: a ticket that it takes is good for no second.
+    const hangs = setTimeout(() => {
+      refusal.value = t.noAnswer;
+      entering.value = false;
+    }, TOLD_MS);
+    try {
+      accept(await enter(ticket));
+      next();
+    } catch (error) {
+      // Whoever has not been here before is told how to come in, not that they are not in.
+      refusal.value = error instanceof Refused && error.status === 401 && error.code !== "ticket" ? "" : (error as Error).message;
+      if (passing(error)) setTimeout(ask, AGAIN_MS);
+    }
+    clearTimeout(hangs);
+    entering.value = false;
+  };
+  await ask();
 }
 
 /** Signs in by a password; the page begins anew, so that nothing asked for before answers into it. */

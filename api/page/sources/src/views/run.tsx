@@ -1,6 +1,6 @@
 // From a subject to what came of a run, in four steps that can be read without knowing the bench.
 import { useState } from "preact/hooks";
-import { get } from "../api";
+import { every } from "../api";
 import { rig } from "../live";
 import { useLoaded } from "../loaded";
 import { keyOf, ownModel, refOf, useModels } from "../parts/models";
@@ -14,7 +14,7 @@ import { ThresholdStep } from "./run/threshold";
 export function Run() {
   const subject = useSubject();
   const limit_N = rig.value?.limits.force_N;
-  const protocols = useLoaded(() => get("/api/v1/protocols"), [limit_N]);
+  const protocols = useLoaded(() => every("/api/v1/protocols"), [limit_N]);
   const id = subject.value?.value.id ?? "";
   const models = useModels(id).value ?? [];
   const own = ownModel(models, id);

@@ -1,6 +1,6 @@
 // Links that sign in once, accounts with a password, tokens for programs.
 import { useState } from "preact/hooks";
-import { get, post, remove, type Schema } from "../../api";
+import { every, post, remove, type Schema } from "../../api";
 import { attempt } from "../../attempt";
 import { date, duration } from "../../clock";
 import { useLoaded } from "../../loaded";
@@ -66,7 +66,7 @@ export function Links() {
 }
 
 export function Accounts() {
-  const accounts = useLoaded(() => get("/api/v1/accounts"));
+  const accounts = useLoaded(() => every("/api/v1/accounts"));
   return (
     <Card title={t.admin.accounts}>
       <p><Prose text={t.admin.accountsText} /></p>
@@ -98,7 +98,7 @@ function Revoke({ token, gone }: { token: Schema["TokenView"]; gone: () => void 
 }
 
 export function Tokens() {
-  const tokens = useLoaded(() => get("/api/v1/tokens"));
+  const tokens = useLoaded(() => every("/api/v1/tokens"));
   const [made, show] = useState("");
   const make = async (name: string, scope: Scope) => {
     show((await post("/api/v1/tokens", { body: { name, scope } })).token);

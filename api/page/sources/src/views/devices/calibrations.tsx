@@ -1,5 +1,5 @@
 // What force sensor and axis were calibrated by, and whether that may still be used.
-import { get, type Schema } from "../../api";
+import { every, type Schema } from "../../api";
 import { date } from "../../clock";
 import { useLoaded } from "../../loaded";
 import { Card, Dot, Prose, Rows, Show, significant } from "../../parts/basics";
@@ -20,7 +20,7 @@ function Row({ one }: { one: Calibration }) {
 }
 
 export function Calibrations() {
-  const found = useLoaded(() => get("/api/v1/calibrations"));
+  const found = useLoaded(() => every("/api/v1/calibrations"));
   return (
     <Card title={t.devices.calibrations}>
       <Show loaded={found} empty={<p>{t.devices.noCalibration}</p>}>
