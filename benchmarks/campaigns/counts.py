@@ -65,7 +65,19 @@ class Share:
         """Text, counts, interval, goal."""
         low, high = self.interval
         share = f"{self.hits / self.count:.3f} ({low:.3f} to {high:.3f})" if self.count else "not counted"
-        return f"{self.text:62s} {self.hits:4d}/{self.count:<4d} {share:24s} {_against(self.goal, self.met)}"
+        return f"{self.text:62s} {self.hits:4d}/{self.count:<4d} {share:24s} {self.against}"
+
+    @property
+    def missed(self) -> str:
+        """In words how the goal was missed; nothing where it was not."""
+        if self.met:
+            return ""
+        return "MISSED" if self.count else "no trial at all: MISSED"
+
+    @property
+    def against(self) -> str:
+        """The goal, and whether it was missed."""
+        return "" if self.goal is None else f"goal {self.goal}  {self.missed}".rstrip()
 
     @property
     def json(self) -> dict[str, Value]:
@@ -73,13 +85,9 @@ class Share:
         low, high = self.interval
         return {
             "hits": self.hits, "count": self.count, "low": round(low, 4), "high": round(high, 4),
-            "goal": None if self.goal is None else str(self.goal), "met": self.met,
+            "goal": None if self.goal is None else str(self.goal), "met": self.met, "missed": self.missed,
             "by_generator": {name: f"{hits}/{count}" for name, (hits, count) in self.by_generator.items()},
         }  # fmt: skip
-
-
-def _against(goal: Goal | None, met: bool) -> str:
-    return "" if goal is None else f"goal {goal}{'' if met else '  MISSED'}"
 
 
 def exact_interval(hits: int, count: int, level: float = LEVEL) -> tuple[float, float]:

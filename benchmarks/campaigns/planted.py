@@ -10,12 +10,14 @@ from benchmarks.campaigns import questions as ask
 from benchmarks.campaigns.campaign import Campaign, judged
 from benchmarks.campaigns.case import Answer, AnswerFunction, Case, Plant, Record, Truth
 from benchmarks.campaigns.counts import Goal, Question
-from benchmarks.campaigns.measured import SETS, MeasuredSet, session_of
+from benchmarks.campaigns.measured import PARTS, SETS, MeasuredSet, session_of
 from benchmarks.campaigns.operators import OPERATORS, plant
 from rig.trials.trial import TrialSet
 
 # Two in three above the size stated, by enough that one in five missed there by chance is none; one in three below.
 ABOVE, BELOW = (1.5, 4.0), (0.2, 0.7)
+# A set that the simulation misses has no size stated: its plants show names only, those of the parts sizes too.
+IN_TURN = tuple(one for k, whole in enumerate(SETS) for one in (whole, PARTS[k % len(PARTS)]))
 
 
 def case_of(chosen: MeasuredSet) -> Case:
@@ -56,7 +58,7 @@ def choose(rng: np.random.Generator, before: Answer) -> str:
 
 
 def record_in(sets: Sequence[MeasuredSet], seed: int, answer: AnswerFunction) -> Record:
-    """One plant in one of the sets."""
+    """One plant in one of the sets; as many seeds in a row as there are sets have all of them."""
     rng = np.random.default_rng([seed, 11])
     chosen = sets[seed % len(sets)]
     before = answer_as_measured(chosen, answer)
@@ -66,8 +68,8 @@ def record_in(sets: Sequence[MeasuredSet], seed: int, answer: AnswerFunction) ->
 
 
 def record(seed: int, answer: AnswerFunction) -> Record:
-    """One plant in one of the real sets."""
-    return record_in(SETS, seed, answer)
+    """One plant in one of the real sets, in turn whole and where sizes are stated."""
+    return record_in(IN_TURN, seed, answer)
 
 
 def _new(one: Record) -> list[frozenset[str]]:

@@ -103,10 +103,15 @@ def stiffness_N_mm(own: Fit) -> float:
 
 @known_of
 def flexible_errors(own: Fit, causes: tuple[Effect, ...], remembers: bool) -> LeftOut:
-    """Errors of the flexible tissue, with memory or without, and these causes beside it, each as the model has it."""
+    """Errors of the flexible tissue, with memory or without, and these causes beside it, each as the model has it.
+
+    Of a model whose tip never reaches the tissue its own: there is no depth to lay another tissue over.
+    """
     assert isinstance(own.problem, IndentationProblem)
     drive = own.problem.data.drive
     deepest_mm = float((drive.position_mm - contacts_mm(own)[drive.recording]).max())
+    if deepest_mm <= 0:
+        return left_out(own)
     columns = [cause_force(own, cause) for cause in causes]
     stacked = np.stack(columns, axis=1) if columns else np.empty((drive.size, 0))
     return Flexible(Basis(drive, ROOM * deepest_mm, remembers), own, stacked).left_out()

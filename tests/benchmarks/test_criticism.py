@@ -4,6 +4,7 @@ Answers are given by functions that know the truth; no session is computed for t
 """
 
 import json
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,9 +16,11 @@ from benchmarks import criticism
 from benchmarks.campaigns.case import Answer, AnswerFunction, Case, Named, Record, Truth, append, read, write
 from benchmarks.campaigns.counts import Goal, Share, exact_interval, reliability_of
 from benchmarks.campaigns.forms import case_of
+from benchmarks.campaigns.measured import PARTS, SETS, WayIn
 from benchmarks.campaigns.operators import OPERATORS
 from benchmarks.campaigns.questions import leaves_noise_only
 from rig.errors import UsageError
+from rig.trials.trial import Trial
 
 # All sizes are stated as 1, so that a plant's own size says how far above or below it is.
 SMALLEST = dict.fromkeys(OPERATORS, 1.0)
@@ -261,6 +264,38 @@ def test_few_counts_contradict_a_goal_only_where_chance_does_not_explain_them(
     hits: int, count: int, contradicts: bool
 ) -> None:
     assert Share("", Goal(high=0.01), hits, count).contradicts(0.999) is contradicts
+
+
+def test_a_goal_with_no_trial_is_a_miss_and_says_so() -> None:
+    untried = Share("found above", Goal(low=0.9), 0, 0)
+    assert not untried.met
+    assert untried.line.endswith("0/0    not counted              goal at least 0.9  no trial at all: MISSED")
+    assert untried.json["missed"] == "no trial at all: MISSED"
+    assert Share("found above", Goal(low=0.9), 8, 10).line.endswith("goal at least 0.9  MISSED")
+    assert Share("found above", Goal(low=0.9), 9, 10).line.endswith("goal at least 0.9")
+
+
+def test_an_answer_that_states_no_size_meets_no_goal_of_planting() -> None:
+    _, missed = outcome("planted", lambda case: replace(right(case), smallest={}))
+    assert [line for line in missed if line.startswith("found, planted above") and "no trial at all" in line]
+
+
+def test_half_of_the_plants_are_in_parts_of_recordings_in_each_of_which_as_many() -> None:
+    names = [criticism.CAMPAIGNS["planted"].record(seed, right).generator for seed in range(2 * len(SETS))]
+    assert names[::2] == [each.name for each in SETS]
+    counts = Counter(names[1::2])
+    assert set(counts) == {each.name for each in PARTS} and max(counts.values()) - min(counts.values()) <= 1
+
+
+def test_a_way_in_ends_at_a_depth_a_force_or_its_turn_and_its_motion_goes_on() -> None:
+    """2 mm/s at 10 Hz to 4 mm and back, on 0.5 N/mm: sample 7 is at 1.2 mm, sample 11 0.8 N above the first five."""
+    time_s = np.arange(41) / 10
+    place_mm = np.interp(time_s, [0, 2, 4], [7, 11, 7])
+    trial = Trial("ramp", time_s, 0.5 * (place_mm - 7), time_s, place_mm)
+    for part, samples in ((WayIn(far_mm=1.1), 7), (WayIn(rise_N=0.76), 11), (WayIn(), 21)):
+        taken = part.of(trial)
+        assert len(taken.force_s) == samples == len(taken.axis_s) - 2
+    assert f"{WayIn(far_mm=15.0)} {WayIn(rise_N=0.2)}" == "in to 15 mm in to 0.2 N"
 
 
 def test_calibration_error_and_brier_score_of_a_hand_worked_case() -> None:

@@ -57,6 +57,15 @@ def test_a_weight_on_a_joint_is_named_in_newton_metres() -> None:
     assert "N m" in found.statement
 
 
+def test_a_weight_on_a_joint_that_turns_by_half_a_turn_is_named_alone_with_its_size() -> None:
+    """Over 20 degrees a sine is a line, which any load along the axis is too."""
+    turning = counted(replace(DRY, weight_N=20.0, drift_m_s=0.3).recording(), 1.0, 1.0)
+    found = diagnosed(data_of(turning, position="rad", effort="N m"))
+    assert {one.effects for one in found.findings} == {("coulomb_friction",), ("gravity",)}
+    assert named(found)["gravity"]["gravity"] == pytest.approx(20.0, rel=0.05)
+    assert found.verdict == "explained", found.statement
+
+
 def test_the_answer_is_the_same_in_any_unit() -> None:
     axis = replace(DRY, viscous_forward=120.0, viscous_backward=240.0)
     first = diagnosed(data_of(axis.recording()))

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from rig.diagnosis.effects.bench import FRICTION
 from rig.diagnosis.estimates import ErrorBudget, Estimate
 from rig.diagnosis.fit import Fit, first_fit
 from rig.diagnosis.flexible import Basis
-from rig.diagnosis.floor import error_budget, explained_share, noise_N
+from rig.diagnosis.floor import error_budget, explained_share, flexible_errors, noise_N
 from rig.diagnosis.indentation import IndentationProblem
 from rig.diagnosis.left_out import LeftOut, left_out, with_own_terms
 from rig.diagnosis.observations import Observations, observe
@@ -69,6 +70,12 @@ def test_a_flexible_tissue_reaches_the_noise_that_the_simulation_misses_on_a_law
     assert budget.noise_N == pytest.approx(NOISE_N, rel=0.1)
     assert budget.flexible_N == budget.floor_N < 1.25 * NOISE_N
     assert budget.base_N > 5 * NOISE_N
+
+
+def test_a_model_whose_tip_never_reaches_the_tissue_has_no_other_tissue_laid_under_it(base: Fit) -> None:
+    deepest_mm = float(base.problem.variables()["depth"].max())
+    beyond = replace(base, values={**base.values, "surface_mm": deepest_mm + 30.0})
+    assert flexible_errors(beyond, (FRICTION,), True).rms == left_out(beyond).rms
 
 
 def test_such_a_simulation_is_not_called_right(budget: ErrorBudget) -> None:
