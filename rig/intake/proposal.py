@@ -214,7 +214,8 @@ def _proposed(
         "files": files, **_sheets(group), **pattern, **first.layout.form,
         **{key: form[key] for form in forms for key in INTERRUPTED if key in form}, **_missing(group),
     }  # fmt: skip
-    taken = [number for number in (_number(first, time), *chosen(first).values()) if number is not None]
+    signs = [first.layout.sheet.number(own["sign"]) for own in measured.columns.values() if "sign" in own]
+    taken = [number for number in (_number(first, time), *chosen(first).values(), *signs) if number is not None]
     labels = labels_in(first, taken, at)
     table |= {"label": labels.label} if labels.label is not None else {}
     table |= {"labels": {"part": first.index}} if first.index else {}
