@@ -11,6 +11,7 @@ from rig.errors import DataError
 from rig.intake.layout import Layout, layouts_of
 from rig.intake.mapping import FileForm
 from rig.intake.pulling import PULLS, said_of_test
+from rig.intake.rates import named_rate_Hz, stated_rate_Hz
 from rig.intake.readers import kind_of
 from rig.intake.roles import candidates
 from rig.intake.survey import Looks, looks_of, texts_of
@@ -207,7 +208,9 @@ def _alike(one: ColumnGroup, other: ColumnGroup) -> bool:
 def _form(table: ColumnGroup) -> str:
     """How it is written, and what tells it from others of the same columns."""
     form = {key: value for key, value in table.layout.form.items() if key not in INTERRUPTED}
-    return json.dumps([kind_of(table.path), form, table.index, table.called, table.said_of_test.keys() == {PULLS}])
+    rates_Hz = stated_rate_Hz(table.layout.sheet.facts), named_rate_Hz(table.path.name)
+    told = table.said_of_test.keys() == {PULLS}, () if table.fitting("time") else rates_Hz
+    return json.dumps([kind_of(table.path), form, table.index, table.called, told])
 
 
 def _columns(table: ColumnGroup) -> set[tuple[str, str]]:

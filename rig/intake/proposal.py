@@ -313,7 +313,8 @@ def _together(questions: Sequence[OpenQuestion]) -> Iterator[OpenQuestion]:
     """One question for all tables that ask the same of their columns."""
     kept: dict[object, OpenQuestion] = {}
     for question in questions:
-        key = (question.quantity, len(question.choices) == 1, question.choices[1:] and question.choices)
+        rate = "" if question.choices else (question.known, question.example)
+        key = (question.quantity, len(question.choices) == 1, question.choices[1:] and question.choices, rate)
         first = kept.setdefault(repr(key), question)
         kept[repr(key)] = replace(first, tables=tuple(dict.fromkeys((*first.tables, *question.tables))))
     yield from kept.values()

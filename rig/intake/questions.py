@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from rig.config.table import TomlTable
@@ -28,7 +28,7 @@ class Choice(NamedTuple):
 class OpenQuestion:
     """What the data cannot say of a ``quantity`` in the tables of these numbers.
 
-    Without ``choices`` it is the rate of the rows [Hz]. ``usual`` is what `--yes` answers, empty where nothing is
+    Without ``choices`` it is the rate of the rows [Hz], whose ``known`` column counts them. ``usual`` is what `--yes` answers, empty where nothing is
     clearly the best answer; ``example`` is one that the data suggest, empty without one.
     """
 
@@ -38,6 +38,7 @@ class OpenQuestion:
     choices: tuple[Choice, ...] = ()
     usual: str = ""
     example: str = ""
+    known: TomlTable = field(default_factory=dict)
 
     @property
     def line(self) -> str:
@@ -53,7 +54,7 @@ class OpenQuestion:
 
     def _unsaid(self) -> TomlTable:
         if not self.choices:
-            return {"rate_Hz": UNSAID}
+            return {**self.known, "rate_Hz": UNSAID}
         return (
             {"column": UNSAID, "unit": UNSAID} if len(self.choices) > 1 else {**self.choices[0].known, "scale": UNSAID}
         )
@@ -69,7 +70,7 @@ class OpenQuestion:
     def value(self, said: str) -> TomlTable:
         """What the mapping says of the quantity after the answer; raises UsageError where it is none."""
         if not self.choices:
-            return {"rate_Hz": self._number(said)}
+            return {**self.known, "rate_Hz": self._number(said)}
         named = [choice for choice in self.choices if f"{said} ".startswith(f"{choice.name} ")]
         if not named and len(self.choices) > 1:
             raise UsageError(f"{said!r} is none of the columns; {self.text}")
