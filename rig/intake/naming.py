@@ -12,11 +12,13 @@ from rig.intake.pattern import matched
 KINDS = {
     "specimen": (
         "specimen", "sample", "probe", "subject", "patient", "participant", "animal", "sub", "subj", "pat", "muster",
-        "试样", "試験片", "échantillon",
+        "试样", "試験片", "échantillon", "prüfkörper", "éprouvette", "provino", "probeta",
     ),
     "site": ("site", "well", "position", "point", "location", "loc", "spot", "phalanx", "finger", "pos", "stelle"),
     "cycle": ("cycle", "trial", "rep", "repeat", "repetition", "run", "test", "versuch", "cyc", "zyklus", "take"),
 }  # fmt: skip
+OPERATORS = ("operator", "examiner", "bediener", "prüfer")
+TITLED = frozenset((*KINDS["specimen"], *KINDS["site"], *OPERATORS))
 # One file of seven that a program has named False, or blank, leaves the others numbered.
 NUMBERED = 0.75
 _WORD = re.compile(r"(?P<word>[^\W\d_]+)(?P<value>\d[\w.]*)")
