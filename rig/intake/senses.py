@@ -11,6 +11,10 @@ from rig.intake.signs import doubt_of, signs_of
 from rig.intake.survey import Looks, Numbers, sign_of, with_sign
 
 DONE = {PRESSES: "pressed", PULLS: "pulled"}
+# Of the range of a force: where its first tenth moves further, cycles have begun, and only its first row is at rest.
+STANDS_SHARE = 0.1
+# A force that reaches nearly as far to both sides is of full cycles, whose sign is taken as it stands.
+FULL_CYCLE = 1.2
 OTHER = {"compression": "tension", "tension": "compression", "into": "out", "out": "into"}
 
 
@@ -45,7 +49,7 @@ def _pressed(table: ColumnGroup, quantity: str, column: int, known: Mapping[str,
     at = column if quantity == "force" else known.get("force")
     found, force = (None, table.force) if at is None else (signs_of(table, at), table.looks[at])
     risen = _risen(signed(force or Looks(np.zeros(1))) * (found.rows if found and found.kind != "unsure" else 1))
-    most = int(np.argmax(np.abs(risen)))
+    most = int(np.argmax(np.where(risen < 0, -risen, FULL_CYCLE * risen)))
     by_words = found is not None and found.kind == "words"
     if quantity == "force":
         return "tension" if risen[most] < 0 and not by_words else "compression"
@@ -57,9 +61,11 @@ def _pressed(table: ColumnGroup, quantity: str, column: int, known: Mapping[str,
 
 
 def _risen(force: Numbers) -> Numbers:
-    """Above its first tenth, where the machine stands in air or at its preload."""
+    """Above its first tenth, where the machine stands in air or at its preload, or its first row if it moves there."""
     known = force[np.isfinite(force)]
-    return np.nan_to_num(force - np.median(known[: max(1, known.size // 10)]))
+    first = known[: max(1, known.size // 10)]
+    stands = np.ptp(first) <= STANDS_SHARE * np.ptp(known)
+    return np.nan_to_num(force - (np.median(first) if stands else first[0]))
 
 
 def signed(looks: Looks) -> Numbers:
