@@ -134,8 +134,14 @@ def _beside(path: Path, layout: Layout) -> list[ColumnGroup]:
 def _is_split(tables: Sequence[ColumnGroup], parted: Sequence[tuple[str, str]]) -> bool:
     """Whether one is a force and the other a position, each with times of its own."""
     held = [[name for name in ("force", "position") if table.fitting(name)] for table in tables]
-    timed = all(any(parted[number][1] for number in table.fitting("time")) for table in tables)
-    return timed and sorted(held) == [["force"], ["position"]]
+    return sorted(held) == [["force"], ["position"]] and all(
+        any(parted[number][1] for number in (*table.fitting("time"), *_clocks(table))) for table in tables
+    )
+
+
+def _clocks(table: ColumnGroup) -> list[int]:
+    """The columns that run like a clock, whatever they are called, as LabVIEW's `X_Value`."""
+    return [number for number, looks in table.looks.items() if looks.even]
 
 
 def _told_apart(whole: ColumnGroup) -> list[tuple[str, str]]:

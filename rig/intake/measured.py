@@ -134,7 +134,7 @@ def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
         return ""
     if _meant(table, quantity, column).units:
         return ""
-    stated = _stated_unit(quantity, table.layout.sheet.facts)
+    stated = stated_unit(quantity, table.layout.sheet.facts)
     if counts or stated is not None:
         return stated or ""
     if unit := ros_unit(table.layout.sheet.header[column]):
@@ -145,7 +145,7 @@ def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
     return "m" if quantity == "position" and (robot or np.ptp(known) < LEAST_MM) else USUAL[quantity]
 
 
-def _stated_unit(quantity: str, facts: Mapping[str, str]) -> str | None:
+def stated_unit(quantity: str, facts: Mapping[str, str]) -> str | None:
     """The unit in a line above the table that states one of this quantity, or of whatever has it; None without a line.
 
     Empty where the line is of this quantity by name and its unit is none that is known, or another's.

@@ -1,7 +1,7 @@
 """How a table that nobody described says its time."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import groupby, pairwise, permutations
 
 import numpy as np
@@ -10,6 +10,7 @@ from rig.config.table import TomlTable
 from rig.intake.families import ColumnGroup
 from rig.intake.labelling import Labels
 from rig.intake.mapping import RESTART, TimeColumn
+from rig.intake.measured import stated_unit
 from rig.intake.notation import is_stamp, pattern_of
 from rig.intake.questions import Choice, OpenQuestion
 from rig.intake.rates import MOST_STROKES_HZ, named_rate_Hz, stated_rate_Hz
@@ -18,7 +19,7 @@ from rig.intake.roles import words_of
 from rig.intake.rows import ANEW_ROWS, ANEW_SHARE
 from rig.intake.survey import Looks, Numbers, wraps_at
 from rig.intake.times import is_iso, times_ns
-from rig.intake.units import TIME_NS, unit_in, unit_of
+from rig.intake.units import TIME_NS, unit_in, unit_of, unknown_unit
 
 # Numbers so large are time since 1970 (2001 to 2286), whatever the column is called.
 EPOCH = {"s": (1e9, 1e10), "ms": (1e12, 1e13), "us": (1e15, 1e16), "ns": (1e18, 1e19)}
@@ -61,11 +62,11 @@ def clock_of(table: ColumnGroup) -> SaidTime:
         named = [repr(table.place(number)) for number in table.fitting("time") if number in table.looks]
         still = f" that grows from row to row ({named[0]} does not)" if named and not about else ""
         named_Hz = named_rate_Hz(table.path.name)
-        found = f"{named_Hz or about:.15g}" if named_Hz or about else ""
-        said = f" (its name says {found})" if named_Hz else ""
-        text = f"{table.path.name}: no column of time{coarse or still}; at what rate are the rows, in Hz{said}?"
-        usual = found if named_Hz >= MOST_STROKES_HZ else ""
-        return {}, [], [OpenQuestion(text, (), "time", usual=usual, example=found, known=known)]
+        example = f"{named_Hz or about:.15g}" if named_Hz or about else ""
+        its = f" (its name says {example})" if named_Hz else ""
+        text = f"{table.path.name}: no column of time{coarse or still}; at what rate are the rows, in Hz{its}?"
+        usual = example if named_Hz >= MOST_STROKES_HZ else ""
+        return {}, [], [OpenQuestion(text, (), "time", usual=usual, example=example, known=known)]
     said = f"{table.path.name}: rows are counted at {rate_Hz:g} Hz, as stands above the table"
     return {**known, "rate_Hz": rate_Hz}, [said], []
 
@@ -150,7 +151,7 @@ def _fitting(table: ColumnGroup) -> list[int]:
 def _column(table: ColumnGroup, column: int) -> SaidTime | None:
     """The column as time, None where its cells are no times."""
     place, own = table.place(column), table.meant("time", column)
-    unit = own.units[0] if own.sure else table.unit(column)
+    unit = own.units[0] if own.sure else table.unit(column) or stated_unit("time", table.layout.sheet.facts) or ""
     if column in table.texts:
         return _of_texts(table, place, [text for text in table.texts[column] if text])
     looks = table.looks.get(column)
@@ -170,10 +171,14 @@ def _of_numbers(table: ColumnGroup, place: str | int, unit: str, looks: Looks) -
     if not looks.rises or (_rows_a_stamp(table) and (np.diff(looks.known) < 0).any()):
         return None
     first, last = looks.known.min(), looks.known.max()
-    if kind_of(table.path) == "workbook" and DAYS[0] < first and last < DAYS[1] and last - first < 100:
+    in_days = DAYS[0] < first and last < DAYS[1] and last - first < 100
+    if in_days and not unit and (kind_of(table.path) == "workbook" or not possible_units(looks)):
         return {"column": place, "form": "spreadsheet"}, [], []
     if unit in TIME_NS:
         return {"column": place, "unit": unit}, [], []
+    if several := unknown_unit(str(place)):
+        text = f"{table.path.name}: time {place!r} is in {several}, which is none that is known; how many are a second?"
+        return {}, [], [OpenQuestion(text, (), "time", known={"column": place, "form": "counter"})]
     if unit or (looks.counts and not unit_of(str(place)) and stated_rate_Hz(table.layout.sheet.facts)):
         return None
     return _without_unit(table, place, looks)
@@ -203,7 +208,8 @@ def _without_unit(table: ColumnGroup, place: str | int, looks: Looks) -> SaidTim
         said = f"{table.path.name}: nothing says the unit of time ({place!r}); taken as {units[0]}, no other is likely"
         return {"column": place, "unit": units[0]}, [said], []
     text = f"nothing says the unit of time ({place!r}, {looks.span}); one of {', '.join(TIME_NS)}"
-    return {"column": place}, [], [OpenQuestion(text, (), "time", (Choice(str(place), {"column": place}),), "s", "s")]
+    choice, usual = Choice(str(place), {"column": place}), "s" if "s" in units else ""
+    return {"column": place}, [], [OpenQuestion(text, (), "time", (choice,), usual, usual)]
 
 
 def possible_units(looks: Looks) -> list[str]:
