@@ -194,9 +194,9 @@ def _may_be(table: ColumnGroup, found: Mapping[str, int]) -> bool:
     time = _number(table, clock_of(table)[0])
     moving = [number for number, looks in table.looks.items() if looks.moves and number != time]
     lacking = ("force" not in found) + found.keys().isdisjoint(WAYS)
-    left = table.looks.keys() - {time, *found.values()}
+    taken = {time, *found.values(), *(number for quantity in found for number in table.fitting(quantity))}
     enough = (len(moving) >= 2 and table.rows >= FEWEST_ROWS) or (len(moving) >= 1 and bool(found))
-    return enough and len(left) >= lacking
+    return enough and len(table.looks.keys() - taken) >= lacking
 
 
 def _proposed(

@@ -12,7 +12,7 @@ from tests.rig.intake.laboratories import LABORATORIES, map_of_pressure, plate_a
 from tests.rig.intake.test_foreign import came_in
 
 # What the files of a laboratory do not say, as a person answers it.
-ANSWERS: dict[str, tuple[str, ...]] = {}
+ANSWERS: dict[str, tuple[str, ...]] = {"markers_and_plate": ("N", "mm"), "bag_of_two_topics": ("N", "m")}
 
 
 @pytest.mark.parametrize("form", LABORATORIES)
