@@ -22,11 +22,10 @@ from zstandard import ZstdError
 
 from rig.errors import DataError
 from rig.intake.sheet import DAMAGE, Batch, Column, Sheet, refuse_large, unreadable
-from rig.intake.stored import StoredVector, fields_of, lines_of
+from rig.intake.stored import UNIT_NAMES, Vectors, fact_of, facts_of, fields_of, is_numbers, lines_of, named, units_of
 from rig.intake.text import bytes_of
 from rig.intake.units import ros_unit, unit_in, unit_of
 
-Vectors = dict[str, NDArray[np.generic] | StoredVector]
 BATCH_ROWS = 1 << 18  # two megabytes a column
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 # What memory of 1.5 GB holds: vectors as they are, messages with what Python needs for each, and texts as numbers.
@@ -37,9 +36,8 @@ FEWEST_CHANNELS = 3
 # Longer lists in a message are images and clouds of points.
 LONGEST_LIST = 64
 OBJECT_ADVICE = "; save objects of MATLAB as plain vectors, a table by table2struct(T, 'ToScalar', true)"
-# What attributes are called in which HDF5 writers put the unit and the names of columns.
-UNIT_NAMES = ("unit", "units", "engineeringunit", "unit_string", "engineering_units")
-COLUMN_NAMES = ("columns", "column_names", "channels", "channel_names", "names", "fields", "labels")
+# What a struct calls the channel that it holds.
+CHANNEL_NAMES = ("name", "label", "title", "channel", "signal")
 
 
 def open_mat(path: Path) -> list[Sheet]:
@@ -60,14 +58,17 @@ def open_mat(path: Path) -> list[Sheet]:
     _join_beside(groups)
     _join(groups)
     titles = list(_titles(groups))
-    return [_of_values(path, name, {**_facts_above(name, groups), **values}, titles) for name, values in groups.items()]
+    return [_of_values(path, name, {**_facts_around(name, groups), **own}, titles) for name, own in groups.items()]
 
 
-def _facts_above(name: str, groups: Mapping[str, Mapping[str, object]]) -> dict[str, object]:
-    """What the structs that hold this one say of it: texts and single numbers."""
-    above = [name[: match.start()] for match in re.finditer("[.]", name)]
-    found = [groups.get(up, {}).items() for up in above]
-    return {key: value for items in found for key, value in items if isinstance(value, str | int | float)}
+def _facts_around(name: str, groups: Mapping[str, Mapping[str, object]]) -> dict[str, object]:
+    """Texts and single numbers of the structs that hold this one, and of those in it without vectors (`DataInfo`)."""
+    inner = [own for own in groups if own.rpartition(".")[0] == name != own]
+    within = [own for own in inner if max(map(_sized, groups[own].values()), default=0) < 2]  # numbers
+    starts = {own: f"{own.rpartition('.')[2]}." if len(within) > 1 else "" for own in within}
+    starts |= {name[: match.start()]: "" for match in re.finditer("[.]", name)}
+    found = [(start + key, value) for own, start in starts.items() for key, value in groups.get(own, {}).items()]
+    return {key: value for key, value in found if isinstance(value, str | int | float)}
 
 
 def _titles(groups: Mapping[str, Mapping[str, object]]) -> Iterator[list[str]]:
@@ -111,13 +112,19 @@ def _join_beside(groups: dict[str, dict[str, object]]) -> None:
     alike: dict[tuple[str, int], dict[str, str]] = {}
     for name, values in groups.items():
         vectors = [key for key, value in values.items() if _sized(value) > 1]
-        if len(vectors) == 1 and name and not name.endswith(")"):
+        if len(vectors) == 1 and _channel(name, values):
             alike.setdefault((name.rpartition(".")[0], _sized(values[vectors[0]])), {})[name] = vectors[0]
     for (above, _), channels in alike.items():
         for name, key in channels.items() if len(channels) >= FEWEST_CHANNELS else ():
             values = groups.pop(name)
             unit = next((f" ({value})" for fact, value in values.items() if fact.lower() in UNIT_NAMES), "")
-            groups[above][name.rpartition(".")[2] + unit] = values[key]
+            groups[above][_channel(name, values) + unit] = values[key]
+
+
+def _channel(name: str, values: Mapping[str, object]) -> str:
+    """What a struct is called by its place; where that is a number, what it calls itself."""
+    own = (value for fact, value in values.items() if fact.lower() in CHANNEL_NAMES and isinstance(value, str))
+    return next(own, "") if name.endswith(")") else name.rpartition(".")[2]
 
 
 def _sized(value: object) -> int:
@@ -125,18 +132,22 @@ def _sized(value: object) -> int:
 
 
 def _of_values(path: Path, name: str, values: Mapping[str, object], titles: Sequence[Sequence[str]]) -> Sheet:
-    vectors, facts, objects = Vectors(), dict[str, str](), list[str]()
+    vectors, units, facts, objects = Vectors(), dict[str, str](), dict[str, str](), list[str]()
     for key, value in values.items():
         if isinstance(value, MatlabOpaque | MatlabFunction):
             objects.append(_object_name(key, value))
         elif isinstance(value, np.ndarray) and value.ndim in (1, 2) and value.size > 1 and value.dtype.kind in "biufO":
             split = _split(key, value)
-            names = next((own for own in titles if len(own) == len(split) > 1 and vectors.keys().isdisjoint(own)), ())
-            vectors |= _named(split, names)
+            alike = [own for own in titles if len(own) == len(split) > 1]
+            stated = next((own for own in alike if all(map(unit_in, own))), [])
+            names = next((own for own in alike if vectors.keys().isdisjoint(own) and own != stated), stated)
+            columns = named(split, names)
+            vectors |= columns
+            units |= zip(columns, stated, strict=False)
         else:
             facts[key] = str(value)
     unread = f"; {', '.join(objects)} cannot be read{OBJECT_ADVICE}" if objects else ""
-    return _of_vectors(path, name, vectors, {}, facts, unread)
+    return _of_vectors(path, name, vectors, units, facts, unread)
 
 
 def _object_name(name: str, value: Any) -> str:
@@ -206,24 +217,17 @@ def _members(path: Path, name: str, group: Any) -> Iterator[Sheet]:
         vectors = {
             key: column
             for key, item in items.items()
-            if isinstance(item, h5py.Dataset) and item.size > 1 and item.dtype.kind in "biuf" and _is_numeric(item)
+            if isinstance(item, h5py.Dataset) and is_numbers(item)
             for key, column in _split(key, item[()]).items()
         }
-        facts = {key: _fact(item) for key, item in items.items() if isinstance(item, h5py.Dataset)}
+        facts = {key: fact_of(item) for key, item in items.items() if isinstance(item, h5py.Dataset)}
         said = {key: fact for key, fact in facts.items() if fact}
         yield _of_vectors(path, f"{name}({number + 1})", vectors, {}, said)
 
 
-def _fact(item: Any) -> str:
-    """A text, or a single number, of a file of MATLAB; empty of anything else."""
-    if item.dtype.kind in "biuf" and not _is_numeric(item):
-        return "".join(map(chr, np.ravel(item[()])))
-    return _text(np.ravel(item[()])[0]) if item.size == 1 else ""
-
-
 def _of_group(path: Path, name: str, group: Any) -> Sheet:
     vectors, units, objects = Vectors(), dict[str, str](), list[str]()
-    facts = {name: " ".join(map(_text, np.ravel(value))) for name, value in group.attrs.items()}
+    facts = facts_of(group)
     for key, item in group.items():
         if not isinstance(item, h5py.Dataset):
             continue
@@ -231,46 +235,17 @@ def _of_group(path: Path, name: str, group: Any) -> Sheet:
             objects.append(key)
         elif item.dtype.names:
             vectors |= fields_of(path, item)
-            units |= zip(item.dtype.names, _attribute(item, UNIT_NAMES), strict=False)
-        elif item.ndim in (1, 2) and item.size > 1 and item.dtype.kind in "biuf" and _is_numeric(item):
-            split = _named(lines_of(path, key, item), _attribute(item, COLUMN_NAMES) or _names_beside(group, key, item))
+            units |= zip(item.dtype.names, units_of(item), strict=False)
+        elif item.ndim in (1, 2) and is_numbers(item):
+            split = lines_of(path, group, key)
             vectors |= split
-            own = _attribute(item, UNIT_NAMES)
-            units |= zip(split, list(own) * len(split) if len(own) == 1 else own, strict=False)
-        elif item.size == 1:
-            facts[key] = _text(np.ravel(item[()])[0])
-        facts |= {name: " ".join(map(_text, np.ravel(value))) for name, value in item.attrs.items()}
+            own = units_of(item)
+            units |= zip(split, own * len(split) if len(own) == 1 else own, strict=False)
+        elif fact := fact_of(item):
+            facts[key] = fact
+        facts |= facts_of(item)
     unread = f"; {', '.join(objects)} cannot be read{OBJECT_ADVICE}" if objects else ""
     return _of_vectors(path, name, vectors, units, facts, unread)
-
-
-def _names_beside(group: Any, key: str, matrix: Any) -> list[str]:
-    """The texts of the dataset that is called most like ``key``, as pandas puts `block0_items` beside its values."""
-    texts = {name: item for name, item in group.items() if isinstance(item, h5py.Dataset) and item.dtype.kind in "SO"}
-    lists = [name for name, item in texts.items() if item.ndim == 1 and h5py.check_string_dtype(item.dtype)]
-    best = max(lists, key=lambda name: sum(map(str.__eq__, name, key)), default="")
-    return [_text(one) for one in group[best][()]] if best and matrix.ndim > 1 else []
-
-
-def _attribute(item: Any, names: Sequence[str]) -> list[str]:
-    """The texts of the first attribute with one of these names, whatever its case; none without it."""
-    found = {name.lower(): value for name, value in item.attrs.items()}
-    value = next((found[name] for name in names if name in found), None)
-    return [] if value is None else [_text(one) for one in np.ravel(np.asarray(value, object))]
-
-
-def _named(vectors: Mapping[str, NDArray[np.generic] | StoredVector], names: Sequence[str]) -> Vectors:
-    """With other names, where there is one for each and none twice."""
-    told = len(set(names)) == len(names) == len(vectors)
-    return dict(zip(names, vectors.values(), strict=True)) if told else dict(vectors)
-
-
-def _is_numeric(item: Any) -> bool:
-    return _text(item.attrs.get("MATLAB_class", "double")) not in ("char", "cell")
-
-
-def _text(value: object) -> str:
-    return value.decode() if isinstance(value, bytes) else str(value)
 
 
 def open_parquet(path: Path) -> list[Sheet]:
@@ -280,12 +255,10 @@ def open_parquet(path: Path) -> list[Sheet]:
             schema, rows = file.schema_arrow, file.metadata.num_rows
     except DAMAGE as error:
         raise unreadable(path, "Parquet", error) from error
-    said = [[(field.metadata or {}).get(name.encode(), b"").decode() for name in UNIT_NAMES] for field in schema]
-    stated = [
-        "ns" if pa.types.is_temporal(own.type) else next(filter(None, one), "")
-        for own, one in zip(schema, said, strict=True)
-    ]
-    units = tuple(unit_in(unit) or unit_of(name) for unit, name in zip(stated, schema.names, strict=True))
+    stated = _stated_units(schema)
+    units = tuple(
+        "ns" if pa.types.is_temporal(own.type) else stated.get(own.name) or unit_of(own.name) for own in schema
+    )
 
     def read(columns: Mapping[int, bool]) -> Iterator[Batch]:
         names = [schema.names[number] for number in columns]
@@ -300,6 +273,19 @@ def open_parquet(path: Path) -> list[Sheet]:
             raise unreadable(path, "Parquet", error) from error
 
     return [Sheet(path, "", tuple(schema.names), units, read, rows=rows)]
+
+
+def _stated_units(schema: pa.Schema) -> dict[str, str]:
+    """The unit of each column that its own metadata state, or those of the whole: ``force_unit``, a table in JSON."""
+    own = [(f"unit.{field.name}", key, value) for field in schema for key, value in (field.metadata or {}).items()]
+    said = [(name, value) for name, key, value in own if key.decode().lower() in UNIT_NAMES]
+    for name, value in [*((key.decode(), value) for key, value in (schema.metadata or {}).items()), *said]:
+        try:
+            said += [(way, str(unit).encode()) for way, unit in _flat(name, json.loads(value))]
+        except ValueError:
+            said.append((name, value))
+    parted = [(re.split(r"\.|_?units?_?", name, flags=re.IGNORECASE), value) for name, value in said if "unit" in name]
+    return {name: unit for parts, value in parted for name in parts if (unit := unit_in(value.decode()))}
 
 
 def _array(column: Any) -> NDArray[np.generic]:

@@ -11,6 +11,7 @@ from rig.errors import DataError
 from rig.intake.layout import Layout, layouts_of
 from rig.intake.mapping import FileForm
 from rig.intake.pulling import PULLS, said_of_test
+from rig.intake.rates import named_rate_Hz, stated_rate_Hz
 from rig.intake.readers import kind_of
 from rig.intake.roles import candidates
 from rig.intake.survey import Looks, looks_of, texts_of
@@ -133,8 +134,14 @@ def _beside(path: Path, layout: Layout) -> list[ColumnGroup]:
 def _is_split(tables: Sequence[ColumnGroup], parted: Sequence[tuple[str, str]]) -> bool:
     """Whether one is a force and the other a position, each with times of its own."""
     held = [[name for name in ("force", "position") if table.fitting(name)] for table in tables]
-    timed = all(any(parted[number][1] for number in table.fitting("time")) for table in tables)
-    return timed and sorted(held) == [["force"], ["position"]]
+    return sorted(held) == [["force"], ["position"]] and all(
+        any(parted[number][1] for number in (*table.fitting("time"), *_clocks(table))) for table in tables
+    )
+
+
+def _clocks(table: ColumnGroup) -> list[int]:
+    """The columns that run like a clock, whatever they are called, as LabVIEW's `X_Value`."""
+    return [number for number, looks in table.looks.items() if looks.even]
 
 
 def _told_apart(whole: ColumnGroup) -> list[tuple[str, str]]:
@@ -206,7 +213,9 @@ def _alike(one: ColumnGroup, other: ColumnGroup) -> bool:
 def _form(table: ColumnGroup) -> str:
     """How it is written, and what tells it from others of the same columns."""
     form = {key: value for key, value in table.layout.form.items() if key not in INTERRUPTED}
-    return json.dumps([kind_of(table.path), form, table.index, table.called, table.said_of_test.keys() == {PULLS}])
+    rates_Hz = stated_rate_Hz(table.layout.sheet.facts), named_rate_Hz(table.path.name)
+    told = table.said_of_test.keys() == {PULLS}, () if table.fitting("time") else rates_Hz
+    return json.dumps([kind_of(table.path), form, table.index, table.called, told])
 
 
 def _keys(table: ColumnGroup) -> list[tuple[str, str]]:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from rig.intake.notation import is_number, is_stamp
 from rig.intake.roles import knows, words_of
-from rig.intake.units import unit_in, unit_of
+from rig.intake.units import UNIT_WORDS, unit_in, unit_of
 
 # Filled rows above the data among which names and units are looked for: LabVIEW has six between units and names.
 ROWS = 12
@@ -129,4 +129,9 @@ def _around(above: Sequence[Row], header_at: int | None, unit_at: int | None, wi
     before = range(max(0, header_at - MORE_ROWS), header_at)
     after = range(header_at + 1, len(above))
     more = [number for number in (*before, *after) if number != unit_at and _are_names(above[number], width)]
-    return [header_at, *(number for number in more if not any(map(is_number, above[number])))]
+    return [header_at, *(number for number in more if not any(map(_is_of_setting, above[number])))]
+
+
+def _is_of_setting(cell: str) -> bool:
+    """Whether a cell is a number, or says that a unit stands beside it."""
+    return is_number(cell) or not UNIT_WORDS.isdisjoint(words_of(cell))

@@ -8,11 +8,8 @@ from rig.intake.cells import COMMENT, REMARK, bare, begins_another, cells_of, is
 from rig.intake.edited import loosened
 from rig.intake.headings import ROWS
 from rig.intake.mapping import FileForm
-from rig.intake.sheet import Source
+from rig.intake.sheet import MOST_LINES, Source
 from rig.intake.text import BLANK_CELLS, NUMBER_BEGINS, FilePart, Head, head_of, lines_in, names_again, open_utf8
-
-# Of more lines than these only the first are looked at, in about a second.
-MOST_LINES = 4_000_000
 
 
 class Interruptions(NamedTuple):

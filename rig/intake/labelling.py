@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rig.config.table import TomlTable
 from rig.intake.families import ColumnGroup
-from rig.intake.naming import KINDS, templates_of
+from rig.intake.naming import KINDS, OPERATORS, templates_of
 from rig.intake.notation import is_stamp
 from rig.intake.roles import WORDS, words_of
 from rig.intake.survey import Numbers
@@ -23,7 +23,7 @@ UNKNOWN = len(WORDS["label"])
 FACTS = {
     "specimen": KINDS["specimen"],
     "site": KINDS["site"],
-    "operator": ("operator", "examiner", "bediener", "prüfer"),
+    "operator": OPERATORS,
 }
 IDENTIFIERS = frozenset(("name", "id", "identifier", "label", "code", "no", "nr", "number", "nummer", "bezeichnung"))
 

@@ -12,24 +12,15 @@ from rig.intake.cells import NO_VALUE, Affixed, above_columns, affixed, cells_of
 from rig.intake.edited import joined, loosened
 from rig.intake.encodings import HEAD_ROWS, encoding_of
 from rig.intake.headings import Headings, headings_of
-from rig.intake.interruptions import MOST_LINES, interruptions_of
+from rig.intake.interruptions import interruptions_of
 from rig.intake.long import by_channel
 from rig.intake.mapping import FileForm, LongForm
-from rig.intake.notation import Notation, notation_of
+from rig.intake.notation import Notation, notation_of, parts_thousands
 from rig.intake.readers import ARRAYS, kind_of, open_sheets
 from rig.intake.roles import WORDS, candidates, knows, words_of
 from rig.intake.sheet import DAMAGE, Sheet, Source, unreadable
 from rig.intake.survey import texts_of
-from rig.intake.text import (
-    BLANK_CELLS,
-    bytes_of,
-    lines_in,
-    open_texts,
-    open_utf8,
-    refuse_units,
-    section_in,
-    section_name,
-)
+from rig.intake.text import bytes_of, lines_in, open_texts, refuse_units, section_in, sections_in
 from rig.intake.units import UNIT_WORDS, unit_in, unit_of
 from rig.intake.workbook import hidden_sheets, sheet_names
 
@@ -114,7 +105,7 @@ def _are_channels(names: Sequence[str]) -> bool:
 def _layouts(path: Path) -> list[Layout]:
     kind = kind_of(path)
     if kind == "text":
-        sections = _sections(path)
+        sections = sections_in(path)
         found = {name: _of_text(Source(path), name) for name in sections if len(sections) > 1}
         return [layout for layouts in found.values() for layout in layouts] or _of_text(Source(path))
     if kind == "workbook":
@@ -133,20 +124,6 @@ def _layouts(path: Path) -> list[Layout]:
 
 def _unread(sheet: Sheet) -> tuple[str, ...]:
     return (f"{sheet.path.name}{sheet.unread}".replace(";", ":", 1),) if sheet.unread else ()
-
-
-def _sections(path: Path) -> list[str]:
-    """The names of tables below each other, of a text that begins with one: lines of one cell behind empty ones."""
-    found, empty = list[str](), True
-    with open_utf8(path, "utf-8") as file:
-        for line in islice(file, MOST_LINES):
-            blank = not line.strip(BLANK_CELLS)
-            name = section_name(line.decode(errors="replace")) if empty and not blank else ""
-            if not (found or blank or name):
-                return []
-            found += [name] if name else []
-            empty = blank
-    return found if len(set(found)) == len(found) else []
 
 
 def _of_text(source: Source, section: str = "") -> list[Layout]:
@@ -280,6 +257,8 @@ def _of_rows(
     if affixed_rows:
         headings = _from_cells(headings, [affixed(cell) for cell in affixed_rows[start]])
     notation = notation_of(cell for row in data for cell in row)
+    if notation.unsure and parts_thousands(zip(*data, strict=False)):
+        notation = Notation(".", ",", minus=notation.minus)
     form: TomlTable = {"delimiter": delimiter} if delimiter else {}
     form |= {"affixes": True} if affixed_rows else {}
     form |= {"decimal": ","} if notation.decimal == "," else {}

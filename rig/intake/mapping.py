@@ -100,7 +100,8 @@ class ValueColumn(Table):
 
     ``unit`` gives the scale where it is a unit of the quantity, and is read from the file where it is not given;
     ``sign_bit`` is of numbers whose sign stands in that bit, ``bits`` of numbers of so many bits that are negative from
-    half of their range on (65535 is -1 of 16); at and beyond ``saturates`` the number is not valid.
+    half of their range on (65535 is -1 of 16), ``sign`` a column whose texts have the signs that ``signs`` says; at and
+    beyond ``saturates`` the number is not valid.
     """
 
     column: Place
@@ -110,6 +111,8 @@ class ValueColumn(Table):
     positive: Sense = 1
     sign_bit: int | None = Field(default=None, ge=1, le=52)
     bits: int | None = Field(default=None, ge=2, le=52)
+    sign: Place | None = None
+    signs: dict[str, Literal[1, -1]] = Field(default_factory=dict)
     saturates: tuple[float, float] | None = None
 
 

@@ -13,6 +13,7 @@ from rig.intake.pulling import PULLS
 from rig.intake.questions import Choice, OpenQuestion
 from rig.intake.roles import UNIT_ALONE, WORDS, candidates, words_of
 from rig.intake.senses import pulls, sense_of, signed
+from rig.intake.signs import signs_of
 from rig.intake.survey import Looks, sign_of
 from rig.intake.units import LINEAR, ROTARY, SIGNALS, UNIT_WORDS, Meant, ros_unit, unit_in, unit_of, unknown_unit
 from rig.recording.converter import at_the_end_of_range, run_lengths
@@ -132,7 +133,7 @@ def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
         return ""
     if _meant(table, quantity, column).units:
         return ""
-    stated = _stated_unit(quantity, table.layout.sheet.facts)
+    stated = stated_unit(quantity, table.layout.sheet.facts)
     if counts or stated is not None:
         return stated or ""
     if unit := ros_unit(name):
@@ -144,7 +145,7 @@ def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
     return "m" if quantity == "position" and (robot or np.ptp(known) < LEAST_MM) else USUAL[quantity]
 
 
-def _stated_unit(quantity: str, facts: Mapping[str, str]) -> str | None:
+def stated_unit(quantity: str, facts: Mapping[str, str]) -> str | None:
     """The unit in a line above the table that states one of this quantity, or of whatever has it; None without a line.
 
     Empty where the line is of this quantity by name and its unit is none that is known, or another's.
@@ -163,7 +164,9 @@ def value_of(table: ColumnGroup, quantity: str, column: int, known: Mapping[str,
     """What the mapping says of a column: its place, its unit, where its sign stands, and its sense."""
     found = _meant(table, quantity, column)
     value: TomlTable = {"column": table.place(column), **({"unit": found.units[0]} if found.sure else {})}
-    return {**value, **sign_of(table.looks[column].values), "positive": sense_of(table, quantity, column, known)}
+    beside = signs_of(table, column) if quantity == "force" else None
+    signs = beside.keys(table) if beside and beside.kind != "unsure" else sign_of(table.looks[column].values)
+    return {**value, **signs, "positive": sense_of(table, quantity, column, known)}
 
 
 def _meant(table: ColumnGroup, quantity: str, column: int) -> Meant:

@@ -12,11 +12,13 @@ from rig.intake.pattern import matched
 KINDS = {
     "specimen": (
         "specimen", "sample", "probe", "subject", "patient", "participant", "animal", "sub", "subj", "pat", "muster",
-        "试样", "試験片", "échantillon",
+        "试样", "試験片", "échantillon", "prüfkörper", "éprouvette", "provino", "probeta",
     ),
     "site": ("site", "well", "position", "point", "location", "loc", "spot", "phalanx", "finger", "pos", "stelle"),
     "cycle": ("cycle", "trial", "rep", "repeat", "repetition", "run", "test", "versuch", "cyc", "zyklus", "take"),
 }  # fmt: skip
+OPERATORS = ("operator", "examiner", "bediener", "prüfer")
+TITLED = frozenset((*KINDS["specimen"], *KINDS["site"], *OPERATORS))
 # One file of seven that a program has named False, or blank, leaves the others numbered.
 NUMBERED = 0.75
 _WORD = re.compile(r"(?P<word>[^\W\d_]+)(?P<value>\d[\w.]*)")
@@ -105,17 +107,24 @@ def _shared(column: Sequence[str]) -> str:
 
 def channels_of(first: Sequence[str], second: Sequence[str]) -> tuple[str, str, str] | None:
     """Patterns of two kinds of files that belong together two by two, and what their recording is called."""
-    ours, theirs = sorted(first), sorted(second)
+    if set(first) == set(second) and "/" not in "".join(first):  # whose endings differ
+        return ("{recording}",) * 3
+    ours, theirs = (sorted(names, key=lambda name: (len(name), name)) for names in (first, second))
     before = _shared_start(ours[0], theirs[0])
     after = _shared_start(ours[0][len(before) :][::-1], theirs[0][len(before) :][::-1])[::-1]
     middles = [name[len(before) : len(name) - len(after)] for name in (ours[0], theirs[0])]
     head, tail = re.sub(r"[\W_]+$", "", before), re.sub(r"^[\W_]+", "", after)
     left, right = before[len(head) :], after[: len(after) - len(tail)]
     template = "-".join(f"{{{name}}}" for name, part in (("recording", head), ("more", tail)) if part)
-    patterns = [f"{'{recording}' if head else ''}{left}{middle}{right}{'{more}' if tail else ''}" for middle in middles]
+    # Of names of which one is the other and more, the shorter ends otherwise.
+    ends = ["" if own or tail else f":*[!{other[-1:]}]" for own, other in zip(middles, middles[::-1], strict=True)]
+    heads = [f"{{recording{end}}}" if head else "" for end in ends]
+    more = "{more}" if tail else ""
+    patterns = [f"{own}{left}{middle}{right}{more}" for own, middle in zip(heads, middles, strict=True)]
     found = [[matched(pattern, one) for one in names] for pattern, names in zip(patterns, (ours, theirs), strict=True)]
     keys = [{tuple(labels.values()) for labels in group if labels is not None} for group in found]
-    if any(labels is None for group in found for labels in group) or keys[0] != keys[1] or not all(middles):
+    unlike = any(labels is None for group in found for labels in group) or keys[0] != keys[1]
+    if unlike or not (all(middles) or any(ends)):
         return None
     return patterns[0], patterns[1], template or "{folder}"
 

@@ -21,6 +21,7 @@ _UNSURE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 DAYS = ("%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%Y/%m/%d", "%Y.%m.%d", "%d-%m-%Y", "%Y-%m-%d")
 HOURS = (
     "%H:%M:%S.%f", "%H:%M:%S,%f", "%H:%M:%S", "%I:%M:%S %p", "%I:%M:%S.%f %p", "%M:%S.%f", "%H:%M:%S:%f",
+    "%M:%S,%f",
 )  # fmt: skip
 
 
@@ -75,6 +76,14 @@ def _signs_of(numbers: Sequence[str]) -> Notation:
         return Notation(".", ",") if all(map(_GROUPED.fullmatch, commas)) else Notation(",", "")
     unsure = next(iter(commas), "") if all(_UNSURE.fullmatch(cell) for cell in commas) else ""
     return Notation(",", "", unsure)
+
+
+def parts_thousands(columns: Iterable[Sequence[str]]) -> bool:
+    """Whether a column has whole numbers below a thousand without a comma, and above with one before three digits."""
+    return any(
+        any(map(_UNSURE.fullmatch, cells)) and any(cell.isdigit() and 0 < int(cell) < 1000 for cell in cells)
+        for cells in columns
+    )
 
 
 def _parts(match: re.Match[str]) -> bool:

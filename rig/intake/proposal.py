@@ -194,9 +194,9 @@ def _may_be(table: ColumnGroup, found: Mapping[str, int]) -> bool:
     time = _number(table, clock_of(table)[0])
     moving = [number for number, looks in table.looks.items() if looks.moves and number != time]
     lacking = ("force" not in found) + found.keys().isdisjoint(WAYS)
-    left = table.looks.keys() - {time, *found.values()}
+    taken = {time, *found.values(), *(number for quantity in found for number in table.fitting(quantity))}
     enough = (len(moving) >= 2 and table.rows >= FEWEST_ROWS) or (len(moving) >= 1 and bool(found))
-    return enough and len(left) >= lacking
+    return enough and len(table.looks.keys() - taken) >= lacking
 
 
 def _proposed(
@@ -214,7 +214,8 @@ def _proposed(
         "files": files, **_sheets(group), **pattern, **first.layout.form,
         **{key: form[key] for form in forms for key in INTERRUPTED if key in form}, **_missing(group),
     }  # fmt: skip
-    taken = [number for number in (_number(first, time), *chosen(first).values()) if number is not None]
+    signs = [first.layout.sheet.number(own["sign"]) for own in measured.columns.values() if "sign" in own]
+    taken = [number for number in (_number(first, time), *chosen(first).values(), *signs) if number is not None]
     labels = labels_in(first, taken, at)
     table |= {"label": labels.label} if labels.label is not None else {}
     table |= {"labels": {"part": first.index}} if first.index else {}
@@ -312,7 +313,8 @@ def _together(questions: Sequence[OpenQuestion]) -> Iterator[OpenQuestion]:
     """One question for all tables that ask the same of their columns."""
     kept: dict[object, OpenQuestion] = {}
     for question in questions:
-        key = (question.quantity, len(question.choices) == 1, question.choices[1:] and question.choices)
+        rate = "" if question.choices else (question.known, question.example)
+        key = (question.quantity, len(question.choices) == 1, question.choices[1:] and question.choices, rate)
         first = kept.setdefault(repr(key), question)
         kept[repr(key)] = replace(first, tables=tuple(dict.fromkeys((*first.tables, *question.tables))))
     yield from kept.values()

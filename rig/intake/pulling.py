@@ -2,8 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-import numpy as np
-
 from rig.intake.roles import words_of
 
 PRESSES, PULLS = "compression", "tension"
@@ -45,14 +43,8 @@ def mentions(facts: Mapping[str, str]) -> Iterator[str]:
         yield from (name for name, kinds in found.items() if kinds)
 
 
-def rows_of_both(texts: Sequence[str]) -> tuple[dict[str, str], int]:
-    """What the texts of a column say, row by row, by what is done; and the first row that is another than the first.
-
-    Nothing where one of them says neither, or both.
-    """
+def said_in_rows(texts: Sequence[str]) -> dict[str, str]:
+    """What the texts of a column say, by what is done; nothing where one of them says neither, or both."""
     known = {text: kinds_in(text) for text in set(texts) if text}
-    if not known or any(len(kinds) != 1 for kinds in known.values()):
-        return {}, 0
-    kinds = np.array([next(iter(known.get(text, {""}))) for text in texts])
-    other = np.flatnonzero((kinds != kinds[0]) & (kinds != ""))
-    return {next(iter(own)): text for text, own in known.items()}, int(other[0]) if other.size else 0
+    alike = all(len(kinds) == 1 for kinds in known.values())
+    return {next(iter(own)): text for text, own in known.items()} if alike else {}

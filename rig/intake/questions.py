@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from rig.config.table import TomlTable
@@ -28,8 +28,8 @@ class Choice(NamedTuple):
 class OpenQuestion:
     """What the data cannot say of a ``quantity`` in the tables of these numbers.
 
-    Without ``choices`` it is the rate of the rows [Hz]. ``usual`` is what `--yes` answers, empty where nothing is
-    clearly the best answer; ``example`` is one that the data suggest, empty without one.
+    Without ``choices`` it is the rate of the rows [Hz], whose ``known`` column counts them. ``usual`` is what `--yes`
+    answers, empty where nothing is clearly the best answer; ``example`` is one that the data suggest, or empty.
     """
 
     text: str
@@ -38,6 +38,7 @@ class OpenQuestion:
     choices: tuple[Choice, ...] = ()
     usual: str = ""
     example: str = ""
+    known: TomlTable = field(default_factory=dict)
 
     @property
     def line(self) -> str:
@@ -52,11 +53,15 @@ class OpenQuestion:
         return self.usual or self.example or ("COLUMN UNIT" if len(self.choices) > 1 else "NUMBER")
 
     def _unsaid(self) -> TomlTable:
-        if not self.choices:
-            return {"rate_Hz": UNSAID}
-        return (
-            {"column": UNSAID, "unit": UNSAID} if len(self.choices) > 1 else {**self.choices[0].known, "scale": UNSAID}
-        )
+        if self._is_rate:
+            return {**self.known, "rate_Hz": UNSAID}
+        one = len(self.choices) == 1
+        lacking = "unit" if self.quantity == "time" else "scale"
+        return {**self.choices[0].known, lacking: UNSAID} if one else {"column": UNSAID, "unit": UNSAID}
+
+    @property
+    def _is_rate(self) -> bool:
+        return self.quantity == "time" and not self.choices
 
     def answer(self, tree: TomlTable, said: str) -> None:
         """Puts the answer into every table where it is open; raises UsageError where it is none."""
@@ -68,10 +73,10 @@ class OpenQuestion:
 
     def value(self, said: str) -> TomlTable:
         """What the mapping says of the quantity after the answer; raises UsageError where it is none."""
-        if not self.choices:
-            return {"rate_Hz": self._number(said)}
+        if self._is_rate:
+            return {**self.known, "rate_Hz": self._number(said)}
         named = [choice for choice in self.choices if f"{said} ".startswith(f"{choice.name} ")]
-        if not named and len(self.choices) > 1:
+        if not named and len(self.choices) != 1:
             raise UsageError(f"{said!r} is none of the columns; {self.text}")
         choice = max(named or self.choices, key=lambda item: len(item.name))
         rest = said[len(choice.name) :].strip() if named else said.strip()

@@ -19,7 +19,7 @@ TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".tab", ".log", ".lvm", ".tra",
 NO_TABLES = (".json", ".xml", ".html", ".htm", ".md", ".py", ".m", ".r", ".toml", ".yaml", ".yml", ".svg", ".tex")
 # By the name of their function in `rig.intake.arrays`, whose libraries take as long to load as a small text to import.
 ARRAYS = {
-    ".mat": "open_mat", ".h5": "open_hdf5", ".hdf5": "open_hdf5", ".hdf": "open_hdf5", ".parquet": "open_parquet",
+    **dict.fromkeys((".h5", ".hdf5", ".hdf", ".nc"), "open_hdf5"), ".mat": "open_mat", ".parquet": "open_parquet",
     ".mcap": "open_mcap", ".jsonl": "open_json_lines", ".ndjson": "open_json_lines",
 }  # fmt: skip
 

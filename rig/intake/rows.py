@@ -12,6 +12,7 @@ from rig.channels import AXIS, BY_NAME, MARKER, Stream
 from rig.errors import DataError
 from rig.intake.mapping import RESTART, FileForm, ValueColumn
 from rig.intake.sheet import Batch, Column, Sheet
+from rig.intake.survey import with_sign
 from rig.intake.times import Times, agreed_unit, is_text, period_ns, times_ns, unwrapped
 from rig.intake.units import factor_of
 
@@ -27,8 +28,8 @@ UNITLESS = ("tool", "sync")
 EXAMPLES = {"force": "N", "velocity": "mm/s", "current": "A", "temperature": "C", "arrival": "ns"}
 # A lost or swapped row is a step back; what falls back to the first tenth of the way begins anew.
 ANEW_SHARE, ANEW_ROWS = 0.1, 10
-# Before the name of a label, among the columns that are read.
-LABEL = "label "
+# Before the name of a label, and of the quantity whose sign it is, among the columns that are read.
+LABEL, SIGN = "label ", "sign of "
 
 
 class Piece(NamedTuple):
@@ -56,7 +57,7 @@ def pieces(sheet: Sheet, form: FileForm) -> Iterator[Piece]:
             told[RESTART] = restart + np.cumsum(np.diff(at_ns, prepend=at_ns[0] if last_ns is None else last_ns) < 0)
             restart = int(told[RESTART][-1])
         last_ns = int(at_ns[-1])
-        values, saturated = _values(found, sheet, form)
+        values, saturated = _values(found, sheet, form, first)
         for labels, rows in _runs([told[name] for name in form.row_labels], count):
             part = {name: column[rows] for name, column in values.items()}
             keep = _in_order(at_ns[rows], part.get("tool"), clocks, labels, form, sheet, first + rows.start)
@@ -90,12 +91,14 @@ def _wanted(sheet: Sheet, form: FileForm) -> dict[str, tuple[int, bool]]:
         wanted["finer"] = (sheet.number(form.time.finer), False)
     wanted |= {LABEL + name: (sheet.number(place), True) for name, place in form.label_columns.items()}
     taken = {number for number, _ in wanted.values()}
-    for quantity, column in form.columns.items():
-        number = sheet.number(column.column)
+    places = {quantity: column.column for quantity, column in form.columns.items()}
+    signs = {SIGN + quantity: column.sign for quantity, column in form.columns.items() if column.sign is not None}
+    for name, place in (*places.items(), *signs.items()):
+        number = sheet.number(place)
         if number in taken:
-            raise DataError(f"{sheet.where}: column {column.column!r} is named twice in the mapping; one is wrong")
+            raise DataError(f"{sheet.where}: column {place!r} is named twice in the mapping; one is wrong")
         taken.add(number)
-        wanted[quantity] = (number, False)
+        wanted[name] = (number, name in signs)
     return wanted
 
 
@@ -137,7 +140,9 @@ def _refuse_order(at_ns: Times, latest: Times, row: int, place: str) -> None:
     )
 
 
-def _values(found: Mapping[str, Column], sheet: Sheet, form: FileForm) -> tuple[dict[str, Numbers], NDArray[np.bool_]]:
+def _values(
+    found: Mapping[str, Column], sheet: Sheet, form: FileForm, first: int
+) -> tuple[dict[str, Numbers], NDArray[np.bool_]]:
     """Every quantity in the project's unit; a number at the end of its range is NaN, and counted."""
     values, saturated = dict[str, Numbers](), np.zeros(len(next(iter(found.values()))), bool)
     for quantity, column in form.columns.items():
@@ -145,17 +150,24 @@ def _values(found: Mapping[str, Column], sheet: Sheet, form: FileForm) -> tuple[
         raw = np.where(np.isin(raw, form.missing_numbers), math.nan, raw) if form.missing_numbers else raw
         low, high = column.saturates or (math.nan, math.nan)
         full = (raw <= low) | (raw >= high)
+        if column.sign is not None:
+            raw = raw * _signs(found[SIGN + quantity], np.isfinite(raw), column.signs, sheet, first)
         values[quantity] = np.where(full, math.nan, _converted(raw, quantity, column, sheet, form.lever_mm))
         saturated |= full
     return values, saturated
 
 
+def _signs(texts: Column, known: NDArray[np.bool_], signs: Mapping[str, int], sheet: Sheet, first: int) -> Numbers:
+    found = np.array([signs.get(str(text), math.nan) for text in texts])
+    unknown = np.flatnonzero(known & np.isnan(found))
+    if unknown.size:
+        said = f"{sheet.place(first + int(unknown[0]))}: {str(texts[unknown[0]])!r} is none of the signs"
+        raise DataError(f"{said} {', '.join(map(repr, signs))}; add it to `signs`, as 1 or -1")
+    return found
+
+
 def _converted(raw: Numbers, quantity: str, column: ValueColumn, sheet: Sheet, lever_mm: float | None) -> Numbers:
-    if column.sign_bit is not None:
-        weight = 2.0**column.sign_bit
-        raw = np.where(raw >= weight, weight - raw, raw)
-    if column.bits is not None:
-        raw = np.where(raw >= 2.0 ** (column.bits - 1), raw - 2.0**column.bits, raw)
+    raw = with_sign(raw, column.sign_bit, column.bits)
     if quantity in UNITLESS:
         return raw
     scale = _scale(quantity, column, sheet, lever_mm) if column.scale is None else column.scale

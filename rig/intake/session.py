@@ -59,7 +59,7 @@ def _recordings(
     folder: Path, mapping: DataMapping, scratch: Path, listed: SessionInfo, tell: Progress
 ) -> Iterator[Written]:
     """Each recording, written as soon as the last table that holds it is read."""
-    names = set[str]()
+    names = dict[str, FoundTable]()
     groups = grouped(folder, mapping)
     parts = ((number, part) for number, tables in enumerate(groups) for part in on_one_clock(tables))
     for number, part in parts:
@@ -102,11 +102,18 @@ def _parted(table: FoundTable, mapping: DataMapping) -> bool:
     return table.form.disorder == RESTART or any(f"{{{label}}}" in named for label in table.form.label_columns)
 
 
-def _check_new(name: str, names: set[str], table: FoundTable) -> None:
-    if name in names:
-        twice = f"{table.sheet.where}: recording {name} was there before; name what tells the two apart in "
-        raise DataError(f"{twice}`recording`, or sort the file so that its rows stand together")
-    names.add(name)
+def _check_new(name: str, names: dict[str, FoundTable], table: FoundTable) -> None:
+    if name not in names:
+        names[name] = table
+        return
+    before, apart = names[name], "name what tells the two apart in `recording`"
+    if before is table:
+        apart += ", or sort the file so that its rows stand together"
+    elif before.form.columns.keys().isdisjoint(table.form.columns):
+        split = "files of its own (as 1_force.csv and 1_position.csv), or force and position in one table"
+        apart = f"two tables that each hold several recordings are not joined: save each recording in {split}"
+    there = f" in {before.sheet.where}" if before is not table else ""
+    raise DataError(f"{table.sheet.where}: recording {name} was there before{there}; {apart}")
 
 
 def _opened(

@@ -2,7 +2,7 @@
 
 import re
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -12,10 +12,16 @@ from numpy.typing import NDArray
 
 from rig.errors import DataError
 from rig.intake.mapping import Place
+from rig.intake.naming import TITLED
 
 Column = NDArray[np.generic] | list[str]
 Batch = Sequence[Column]
 MISSING = "not there"
+# Of more lines of a text than these only the first are looked at, in about a second.
+MOST_LINES = 4_000_000
+# A title that is a name and a number or letter: `Specimen 3`, `Probe Nr. 7`, `Sample B`.
+_TITLE = re.compile(r"([^\W\d_]+)\s+(?:(?i:no|nr|id|number|nummer)\.?\s+|#\s*)?([A-Z]|[\w./-]*\d[\w./-]*)")
+_PAIR, _QUOTES = re.compile(r"[^:=\d]*[^\W\d_]\s*[:=]\s*\S"), str.maketrans("", "", '{}"')
 # What readers of files raise on bytes that were cut or changed.
 DAMAGE = (OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, MemoryError, OverflowError, zlib.error)
 
@@ -98,7 +104,19 @@ def refuse_large(path: Path, most_B: float, instead: str) -> None:
 
 
 def facts_in(rows: Sequence[Sequence[str]]) -> dict[str, str]:
-    """Of the rows above a table those that are a name and a value, in two cells or one with a colon or = in it."""
+    """Of the rows above a table those that are a name and a value, in two cells or one with a colon or = in it.
+
+    And titles that name a specimen, a site or an operator by number or letter.
+    """
     found = [[cell for cell in map(str.strip, row) if cell] for row in rows]
-    parted = [re.split(r"\s*[:=]\s*", row[0], maxsplit=1) if len(row) == 1 else row for row in found]
-    return {row[0].rstrip(":= "): " ".join(row[1:]) for row in parted if len(row) > 1}
+    titles = (_TITLE.fullmatch(row[0]) for row in found if len(row) == 1)
+    known = {title[1]: title[2] for title in titles if title and title[1].lower() in TITLED}
+    parted = [pair for row in found for pair in _pairs(row)]
+    return {**known, **{row[0].rstrip(":= "): " ".join(row[1:]) for row in parted if len(row) > 1}}
+
+
+def _pairs(row: Sequence[str]) -> Iterable[Sequence[str]]:
+    """The row as it is; each of its cells by itself where all are a name and a value, as of JSON in one line."""
+    cells = [cell.translate(_QUOTES) for cell in row] if len(row) > 1 else row
+    alone = len(row) == 1 or all(map(_PAIR.match, cells))
+    return [re.split(r"\s*[:=]\s*", cell, maxsplit=1) for cell in cells] if alone else [row]

@@ -166,6 +166,13 @@ def sign_of(values: Numbers) -> dict[str, int]:
     return {}
 
 
+def with_sign(values: Numbers, sign_bit: int | None = None, bits: int | None = None) -> Numbers:
+    """The numbers with the sign that stands in a bit, or in the upper half of their range."""
+    if sign_bit is not None:
+        values = np.where(values >= 2.0**sign_bit, 2.0**sign_bit - values, values)
+    return values if bits is None else np.where(values >= 2.0 ** (bits - 1), values - 2.0**bits, values)
+
+
 def _two_heaps(known: Numbers, turned: Numbers, half: float) -> bool:
     """Whether what is from ``half`` on is, turned, as small as the rest: within a quarter of half the range."""
     high = known >= half

@@ -37,7 +37,7 @@ from rig.intake.mapping import FileForm
 from rig.intake.notation import GROUPS, is_number, is_stamp
 from rig.intake.numerals import check_number
 from rig.intake.roles import words_of
-from rig.intake.sheet import DAMAGE, Batch, Column, Sheet, Source, facts_in, unreadable
+from rig.intake.sheet import DAMAGE, MOST_LINES, Batch, Column, Sheet, Source, facts_in, unreadable
 from rig.intake.units import unit_in, unit_of
 from rig.intake.workbook import sheet_text
 
@@ -103,7 +103,7 @@ def section_in(source: Source, form: FileForm) -> FilePart:
     start, end = 0, None
     with lines_in(source, form) as file:
         for number, line in enumerate(file, 1):
-            if not start and section_name(line.decode(errors="replace")) == form.section:
+            if not start and _section_name(line.decode(errors="replace")) == form.section:
                 start = number
             elif start and number > start + form.rows_above and not line.strip(BLANK_CELLS):
                 end = number - 1
@@ -113,7 +113,21 @@ def section_in(source: Source, form: FileForm) -> FilePart:
     raise DataError(f"{source}: no line is {form.section!r}; correct `section`")
 
 
-def section_name(line: str) -> str:
+def sections_in(path: Path) -> list[str]:
+    """The names of tables below each other, of a text that begins with one: lines of one cell behind empty ones."""
+    found, empty = list[str](), True
+    with open_utf8(path, "utf-8") as file:
+        for line in islice(file, MOST_LINES):
+            blank = not line.strip(BLANK_CELLS)
+            name = _section_name(line.decode(errors="replace")) if empty and not blank else ""
+            if not (found or blank or name):
+                return []
+            found += [name] if name else []
+            empty = blank
+    return found if len(set(found)) == len(found) else []
+
+
+def _section_name(line: str) -> str:
     """The only cell of a line, where it is words; else empty."""
     found = _SECTION.fullmatch(line.strip())
     return found[1] if found else ""
@@ -128,7 +142,7 @@ def _open(source: Source, form: FileForm, part: FilePart) -> Sheet:
     facts = [row for row in head.above[:last] if not part.start or is_other(row, head.first)]
     name = "-".join(filter(None, (source.sheet, part.name)))
     stated = facts_in(facts)
-    if form.section and is_number("".join(head.above[0])):  # as Vicon has it
+    if form.section and head.above and is_number("".join(head.above[0])):  # as Vicon has it
         stated |= {"sampling rate (Hz)": "".join(head.above[0])}
     return Sheet(
         source.path, name, head.names, head.units, read, stated, head.start + 1,
@@ -297,14 +311,11 @@ def _edited(line: bytes, form: FileForm, head: Head) -> bytes:
     cells = cells_of(text, form.delimiter)
     if form.affixes:
         cells = bare(cells_of(loosened(text, form.delimiter), form.delimiter), head.marks)
-    if form.other_lines == "drop" and (line.startswith(_COMMENT) or is_other(cells, head.first)):
+    if form.other_lines == "drop" and (text.startswith(COMMENT) or is_other(cells, head.first)):
         return b"\n"
     if form.affixes:
         return form.delimiter.join(f'"{cell}"' for cell in cells).encode() + b"\n"
     return single_blanks(line) if form.delimiter == " " else line
-
-
-_COMMENT = tuple(mark.encode() for mark in COMMENT)
 
 
 def _arrow(

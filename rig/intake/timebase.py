@@ -1,7 +1,7 @@
 """How a table that nobody described says its time."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import groupby, pairwise, permutations
 
 import numpy as np
@@ -10,14 +10,16 @@ from rig.config.table import TomlTable
 from rig.intake.families import ColumnGroup
 from rig.intake.labelling import Labels
 from rig.intake.mapping import RESTART, TimeColumn
+from rig.intake.measured import stated_unit
 from rig.intake.notation import is_stamp, pattern_of
 from rig.intake.questions import Choice, OpenQuestion
+from rig.intake.rates import MOST_STROKES_HZ, named_rate_Hz, stated_rate_Hz
 from rig.intake.readers import kind_of
 from rig.intake.roles import words_of
 from rig.intake.rows import ANEW_ROWS, ANEW_SHARE
 from rig.intake.survey import Looks, Numbers, wraps_at
 from rig.intake.times import is_iso, times_ns
-from rig.intake.units import TIME_NS, unit_in, unit_of
+from rig.intake.units import TIME_NS, unit_in, unit_of, unknown_unit
 
 # Numbers so large are time since 1970 (2001 to 2286), whatever the column is called.
 EPOCH = {"s": (1e9, 1e10), "ms": (1e12, 1e13), "us": (1e15, 1e16), "ns": (1e18, 1e19)}
@@ -33,16 +35,7 @@ PARTS = frozenset(("step", "segment", "interval", "cycle", "stage", "phase", "bl
 SAME_STAMPS = 0.1
 # Where more of the rows would be left out, time starts anew for another recording, or the column is no time.
 LATE_SHARE = 0.1
-_RATE = re.compile(r"rate|freq|abtast|采样|サンプリング|\bfs\b", re.IGNORECASE)
-_SAMPLED = re.compile(
-    r"sampl|scan|acqui|frame|data|collect|log|abtast|采样|サンプリング|update|hz|\bfs\b", re.IGNORECASE
-)
-# What is in Hz may be a filter's or a test's; with one of these words it is how often the rows come.
-_SAMPLES = re.compile(r"sampl|scan|acqui|采样|サンプリング|abtast", re.IGNORECASE)
-_HERTZ = re.compile(r"\bk?hz\b|\bk?s/s\b|\bsps\b|samples?/s", re.IGNORECASE)
-_STEP = re.compile(r"interval|period|delta_x|time step|sample time|\bdt\b|increment|schrittweite", re.IGNORECASE)
 _SECOND = re.compile(r":\d\d:\d\d$")
-_FIRST = re.compile(r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?")
 
 
 # The `time` of a mapping, what is doubtful in it, and what has to be asked.
@@ -58,21 +51,24 @@ def clock_of(table: ColumnGroup) -> SaidTime:
         if found is not None:
             time, doubts, asked = found
             return time, [*doubts, *_other_times(table, column)], asked
-    rate_Hz = _stated_rate_Hz(table.layout.sheet.facts)
+    rate_Hz = stated_rate_Hz(table.layout.sheet.facts)
     # Tables of one file that are recorded at rates of their own count from its beginning, whatever the frame is called.
     own = {} if "section" in table.layout.form else table.looks
     counter = next((number for number, looks in own.items() if looks.counts), None)
+    known = {} if counter is None else {"column": table.place(counter), "form": "counter"}
     if rate_Hz is None:
         about = _rows_a_stamp(table)
         coarse = f" finer than {about} rows with one stamp" if about else ""
         named = [repr(table.place(number)) for number in table.fitting("time") if number in table.looks]
         still = f" that grows from row to row ({named[0]} does not)" if named and not about else ""
-        text = f"{table.path.name}: no column of time{coarse or still}; at what rate are the rows, in Hz?"
-        return {}, [], [OpenQuestion(text, (), "time", example=str(about or ""))]
-    said = [f"{table.path.name}: rows are counted at {rate_Hz:g} Hz, as stands above the table"]
-    if counter is None:
-        return {"rate_Hz": rate_Hz}, said, []
-    return {"column": table.place(counter), "form": "counter", "rate_Hz": rate_Hz}, said, []
+        named_Hz = named_rate_Hz(table.path.name)
+        example = f"{named_Hz or about:.15g}" if named_Hz or about else ""
+        its = f" (its name says {example})" if named_Hz else ""
+        text = f"{table.path.name}: no column of time{coarse or still}; at what rate are the rows, in Hz{its}?"
+        usual = example if named_Hz >= MOST_STROKES_HZ else ""
+        return {}, [], [OpenQuestion(text, (), "time", usual=usual, example=example, known=known)]
+    said = f"{table.path.name}: rows are counted at {rate_Hz:g} Hz, as stands above the table"
+    return {**known, "rate_Hz": rate_Hz}, [said], []
 
 
 def _in_two(table: ColumnGroup) -> TomlTable:
@@ -155,7 +151,7 @@ def _fitting(table: ColumnGroup) -> list[int]:
 def _column(table: ColumnGroup, column: int) -> SaidTime | None:
     """The column as time, None where its cells are no times."""
     place, own = table.place(column), table.meant("time", column)
-    unit = own.units[0] if own.sure else table.unit(column)
+    unit = own.units[0] if own.sure else table.unit(column) or stated_unit("time", table.layout.sheet.facts) or ""
     if column in table.texts:
         return _of_texts(table, place, [text for text in table.texts[column] if text])
     looks = table.looks.get(column)
@@ -175,11 +171,15 @@ def _of_numbers(table: ColumnGroup, place: str | int, unit: str, looks: Looks) -
     if not looks.rises or (_rows_a_stamp(table) and (np.diff(looks.known) < 0).any()):
         return None
     first, last = looks.known.min(), looks.known.max()
-    if kind_of(table.path) == "workbook" and DAYS[0] < first and last < DAYS[1] and last - first < 100:
+    in_days = DAYS[0] < first and last < DAYS[1] and last - first < 100
+    if in_days and not unit and (kind_of(table.path) == "workbook" or not possible_units(looks)):
         return {"column": place, "form": "spreadsheet"}, [], []
     if unit in TIME_NS:
         return {"column": place, "unit": unit}, [], []
-    if unit or (looks.counts and not unit_of(str(place)) and _stated_rate_Hz(table.layout.sheet.facts)):
+    if several := unknown_unit(str(place)):
+        text = f"{table.path.name}: time {place!r} is in {several}, which is none that is known; how many are a second?"
+        return {}, [], [OpenQuestion(text, (), "time", known={"column": place, "form": "counter"})]
+    if unit or (looks.counts and not unit_of(str(place)) and stated_rate_Hz(table.layout.sheet.facts)):
         return None
     return _without_unit(table, place, looks)
 
@@ -208,7 +208,8 @@ def _without_unit(table: ColumnGroup, place: str | int, looks: Looks) -> SaidTim
         said = f"{table.path.name}: nothing says the unit of time ({place!r}); taken as {units[0]}, no other is likely"
         return {"column": place, "unit": units[0]}, [said], []
     text = f"nothing says the unit of time ({place!r}, {looks.span}); one of {', '.join(TIME_NS)}"
-    return {"column": place}, [], [OpenQuestion(text, (), "time", (Choice(str(place), {"column": place}),), "s", "s")]
+    choice, usual = Choice(str(place), {"column": place}), "s" if "s" in units else ""
+    return {"column": place}, [], [OpenQuestion(text, (), "time", (choice,), usual, usual)]
 
 
 def possible_units(looks: Looks) -> list[str]:
@@ -220,20 +221,3 @@ def possible_units(looks: Looks) -> list[str]:
     scales = {unit: TIME_NS[unit] * 1e-9 for unit in ("s", "ms", "us", "ns")}
     low, high = RATES_HZ
     return [unit for unit, size in scales.items() if low <= 1 / (step * size) <= high and length * size >= SHORTEST_S]
-
-
-def _stated_rate_Hz(facts: Mapping[str, str]) -> float | None:
-    """The rate of the rows where a line above the table states it, or the time between them."""
-    for name, value in facts.items():
-        number = _FIRST.search(value)
-        if not number or ":" in value:
-            continue
-        amount = float(number[0].replace(",", "."))
-        unit = unit_of(name) or unit_of(value)
-        if amount > 0 and _STEP.search(name):
-            return 1e9 / (amount * TIME_NS.get(unit, TIME_NS["s"]))
-        said = f"{name} {value}"
-        rate = _RATE.search(name) and _SAMPLED.search(said)
-        if amount > 0 and (rate or (_SAMPLES.search(name) and _HERTZ.search(said))):
-            return amount * (1e3 if re.search("khz|ks/s", said, re.IGNORECASE) else 1.0)
-    return None

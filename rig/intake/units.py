@@ -14,7 +14,7 @@ FORCE_N = {
     "kip": 4448.2216152605,
 }  # fmt: skip
 # Of a force, a mass is the weight of it: so texture analysers and balances write.
-FORCE_N |= {"g": FORCE_N["gf"], "kg": FORCE_N["kgf"], "lb": FORCE_N["lbf"], "oz": FORCE_N["ozf"]}
+FORCE_N |= {"g": FORCE_N["gf"], "kg": FORCE_N["kgf"], "lb": FORCE_N["lbf"], "oz": FORCE_N["ozf"], "kp": FORCE_N["kgf"]}
 LENGTH_MM = {"mm": 1.0, "m": 1e3, "cm": 10.0, "um": 1e-3, "nm": 1e-6, "inch": 25.4, "in": 25.4, "mil": 0.0254}
 LENGTH_MM |= {"ft": 304.8, "Å": 1e-7}
 SPEED_MM_S = {
@@ -76,6 +76,10 @@ UNITS = frozenset(RAW).union(*LINEAR.values(), *ROTARY.values())
 # What a column of units is called, and a line above a table that states one.
 UNIT_WORDS = frozenset(("unit", "units", "einheit", "einheiten", "unité", "单位", "単位"))
 
+# As `(10^-3 N)` and `(1/100 mm)`: whether numbers are so many times as large, or as small, only their maker knows.
+_SEVERAL = re.compile(r"[(\[{]\s*([x×*]?\s*\d[\d.,^/eE+\-−⁻]*\s*[x×*]?\s*([^\W\d_]+))\s*[)\]}]")
+# In names of these a length by a time is a speed: `speed_in_s`; the `in` of `time_in_s` is none.
+_FAST = re.compile(r"(?<![A-Za-z])(?i:speed|vel|rate|feed)|Speed|Vel|Rate|Feed")
 # Of ROS messages the vectors with units (REP 103: standard units and coordinate conventions).
 ROS_UNITS = {"force": "N", "torque": "N m", "position": "m", "translation": "m"}
 
@@ -96,7 +100,9 @@ def _plain(text: str) -> str:
 
 
 def unknown_unit(name: str) -> str:
-    """What stands in brackets behind a name like a unit and is none that is known, empty without one."""
+    """What stands in brackets behind a name like a unit and is none that is known, or so many of one; else empty."""
+    if several := _SEVERAL.search(_plain(name)):
+        return several[1] if unit_in(several[2]) else ""
     found = re.findall(r"[(\[{]\s*(u|[^\W\d_]{2,9}(?:-[^\W\d_]+)?)\s*[)\]}]", _plain(name))
     return next((text for text in found if not unit_in(text)), "")
 
@@ -111,9 +117,9 @@ def unit_of(name: str) -> str:
     two = re.search(r"(?<=[\s_])([^\W_]+)[\s_](?:per[\s_])?([^\W_]+)$", plain)
     parts = [unit_in(part) for part in two.groups()] if two else [""]
     rate = "/".join(parts) if all(parts) else ""
-    if rate in UNITS or (rate and parts[0] != "in"):  # Weg in mm
+    if rate and (parts[0] != "in" or (rate in UNITS and _FAST.search(plain))):
         return rate if rate in UNITS else ""
-    ending = re.search(r"(?<=[\s_/,.])([^\s_,.()\[\]{}]+)\.?$", plain)
+    ending = re.search(r"(?<=[\s_/,.])([^\s_/,.()\[\]{}][^\s_,.()\[\]{}]*)\.?$", plain)
     bracketed = re.findall(r"[(\[{]([^)\]}]*)[)\]}]", plain)[::-1]
     found = [*bracketed, ending[1] if ending else "", plain if plain[1:] else ""]
     return next((unit for unit in map(unit_in, found) if unit not in ("", "1")), "")
@@ -134,6 +140,8 @@ def meant(quantity: str, name: str, unit: str) -> Meant:
     plain, known = _plain(name).strip(), (*LINEAR[quantity], *ROTARY.get(quantity, {}))
     if unit and unit != AMBIGUOUS:
         return Meant([unit] if unit in known else [], unit in known)
+    if _SEVERAL.search(plain):
+        return Meant([], False)
     ending = re.search(r"(?:(?<=[\s_/,.(\[{])|(?<=[a-z])(?=[A-Z]))([^\W\d_]{1,3})[)\]}]?$", plain)
     text = unit or (unit_in(ending[1]) or ending[1] if ending else "")
     found = [text] if text in known and text != AMBIGUOUS else [own for own in known if own.lower() == text.lower()]

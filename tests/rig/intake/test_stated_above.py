@@ -48,7 +48,9 @@ def with_people(folder: Path, line: str) -> None:
         (folder / f"{file}.csv").write_text(line.format(who) + "\n" + HEAD + press(number))
 
 
-@pytest.mark.parametrize("line", ["Subject ID,{}", "Sample name: {}", "Probe Nr. = {}"])
+@pytest.mark.parametrize("line", [
+    "Subject ID,{}", "Sample name: {}", "Probe Nr. = {}", "Specimen {}", '"Probe Nr. {}",,', "Sample #{}",
+])  # fmt: skip
 def test_the_specimen_is_who_stands_above_the_table(folder: Path, line: str) -> None:
     with_people(folder, line)
     session = came_in(folder)
@@ -56,14 +58,18 @@ def test_the_specimen_is_who_stands_above_the_table(folder: Path, line: str) -> 
     check_all(session)
 
 
-@pytest.mark.parametrize("line", ["Sample thickness,{}", "Sample rate (Hz),{}", "Subject height: {} cm", "Test,{}"])
+@pytest.mark.parametrize("line", [
+    "Sample thickness,{}", "Sample rate (Hz),{}", "Subject height: {} cm", "Test,{}", "Test {}", "Sample {} mm",
+    "Specimen of {}", "Specimen data",
+])  # fmt: skip
 def test_a_measure_of_the_specimen_is_not_its_name(folder: Path, line: str) -> None:
     with_people(folder, line)
     assert "specimen" not in propose(folder).tree
 
 
-def test_the_operator_is_kept_too_and_no_template(folder: Path) -> None:
-    with_people(folder, "Operator,{}")
+@pytest.mark.parametrize("line", ["Operator,{}", "Operator {}"])
+def test_the_operator_is_kept_too_and_no_template(folder: Path, line: str) -> None:
+    with_people(folder, line)
     assert labels(came_in(folder), "operator") == list(PEOPLE.values())
 
 
