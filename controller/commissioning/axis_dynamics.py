@@ -88,8 +88,8 @@ def identify(
 ) -> AxisDynamics:
     """The calibration that a record gives; raises CheckFailed with number and bound where it says too little."""
     _refuse_missed(followed)
+    _refuse_sense(followed)
     response = response_of(sweep, followed)
-    _refuse_sense(response)
     best = fit(response, response.mean)
     misfit, within = _misfit(response, best), _within(response, best)
     short_s, long_s = best.lags_s
@@ -253,9 +253,13 @@ def _refuse_missed(followed: SweepRecord) -> None:
         )
 
 
-def _refuse_sense(response: FrequencyResponse) -> None:
-    """The lowest lines say gain and sense before anything is fitted."""
-    gain = float(np.mean(response.mean[:3].real))
+def _refuse_sense(followed: SweepRecord) -> None:
+    """Gain and sense of the ways there and back, before anything is fitted.
+
+    Not of the lowest lines: off the steady way of the set-points an axis of the other sense has twice that way left.
+    """
+    told_mm = np.interp(followed.position_s, followed.told_s, followed.told_mm)
+    gain = float(np.polyfit(told_mm, followed.position_mm, 1)[0])
     if not gain > LEAST_GAIN:
         raise CheckFailed(
             f"the axis' position goes {gain:.2f} mm for each millimetre of its set-point (least {LEAST_GAIN:g}):"
