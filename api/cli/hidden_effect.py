@@ -27,11 +27,6 @@ class HiddenNumber:
     null: float = 0.0
 
 
-def _gain_of_softening(share: float) -> float:
-    """First cycle over last, less one, where the last has lost ``share`` of the first's stiffness."""
-    return share / (1 - share)
-
-
 THICKNESS_MM = 10.0  # of the mock bench's substrate
 REFERENCE_MM_S = 10.0  # speed at which its rate law has its level
 # The first number is the size. Small enough that the fit knows the damping, and so has a law to track with.
@@ -66,8 +61,8 @@ CAUSES: Mapping[str, tuple[HiddenNumber, ...]] = {
     "substrate": (
         HiddenNumber("strength", "substrate_per_mm3", 0.1, 0.3, lambda strength: strength / THICKNESS_MM**3),
     ),
-    "preconditioning": (
-        HiddenNumber("softening", "preconditioning_gain", 0.1, 0.2, _gain_of_softening),
+    "preconditioning": (  # the knob is the first cycle over the last, less one; softening what the last has lost of it
+        HiddenNumber("softening", "preconditioning_gain", 0.1, 0.2, lambda share: share / (1 - share)),
         HiddenNumber("cycles", "preconditioning_cycles", 1.5, 4.0),
     ),
     "adhesion": (

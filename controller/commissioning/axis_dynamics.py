@@ -254,10 +254,7 @@ def _refuse_missed(followed: SweepRecord) -> None:
 
 
 def _refuse_sense(followed: SweepRecord) -> None:
-    """Gain and sense of the ways there and back, before anything is fitted.
-
-    Not of the lowest lines: off the steady way of the set-points an axis of the other sense has twice that way left.
-    """
+    """Of the ways there and back: in the lowest lines an axis of the other sense leaves twice the steady way."""
     told_mm = np.interp(followed.position_s, followed.told_s, followed.told_mm)
     gain = float(np.polyfit(told_mm, followed.position_mm, 1)[0])
     if not gain > LEAST_GAIN:

@@ -272,7 +272,11 @@ def sine_lag_s(mechanics: Mechanics, frequency_Hz: float) -> float:
     ("bench", "error", "sentence"),
     [
         (SweptBench(SweptAxis(Mechanics(gain=-1.0))), CheckFailed, r"goes -(0.99|1.00) mm for each millimetre"),
-        (SweptBench(SweptAxis(Mechanics(gain=0.0))), CheckFailed, r"goes -?0.00 mm for each millimetre .*\(least 0.5\)"),
+        (
+            SweptBench(SweptAxis(Mechanics(gain=0.0))),
+            CheckFailed,
+            r"goes -?0.00 mm for each millimetre .*\(least 0.5\)",
+        ),
         (SweptBench(SweptAxis(shaken_mm=0.02)), CheckFailed, r"coherent to 0.\d\d only \(bound 0.9\)"),
         (SweptBench(stall=20), CheckFailed, r"% of the cycles were missed \(bound 2 %\)"),
         (SweptBench(SweptAxis(frozen_after=300)), DeviceError, r"axis: newest sample is 5\d ms old"),
