@@ -51,9 +51,9 @@ def raise_priority(priority: int) -> None:
     gc.freeze()
 
 
-def switch_promptly() -> None:
+def switch_promptly(within_s: float = SWITCH_S) -> None:
     """No thread of this process waits long for another that computes."""
-    sys.setswitchinterval(SWITCH_S)
+    sys.setswitchinterval(within_s)
 
 
 def spin_ns(granted: dict[str, str]) -> int:

@@ -21,6 +21,10 @@ from rig.recording.tap import RingTap
 PERIOD_S = 0.04
 # Followers are woken one part after another over the period: no stop waits while fifty of them are served.
 PARTS = 10
+# Of the parts so many are woken in one period: fewer where the event loop comes late, so that all who look on together
+# leave time for whoever stops. They get as much, in larger pieces and up to five periods later.
+SERVED = (10, 5, 2)
+LATE_S, CALM_PERIODS = 0.005, 25
 # Two seconds of the bench, which take a few milliseconds.
 MOST_SLOTS = 8192
 # A loop that has published nothing for this many turns, 0.2 s, is not within a cycle: it has ended.
@@ -51,6 +55,7 @@ class Feed:
         self._tap: RingTap | None = None
         self._fruitless = 0
         self._turns, self._places = [asyncio.Event() for _ in range(PARTS)], itertools.cycle(range(PARTS))
+        self._due, self._slower, self._calm = itertools.cycle(range(PARTS)), 0, 0
         self.now_ns = time.monotonic_ns()
         """When the newest turn began: all clients see the same moment."""
         self.run = LiveRun(wiring)
@@ -59,17 +64,32 @@ class Feed:
         """Goes on until it is cancelled."""
         try:
             while True:
-                began_s = time.monotonic()
                 self._try_step()
-                for place, turn in enumerate(self._turns):
-                    self._turns[place] = asyncio.Event()
-                    turn.set()
-                    await asyncio.sleep(began_s + (place + 1) * PERIOD_S / PARTS - time.monotonic())
+                self._pace(await self._serve(SERVED[self._slower]))
         finally:
             self._let_go()
 
+    async def _serve(self, parts: int) -> float:
+        """Wakes so many parts one after another within a period; by how much the latest turn came late, in s."""
+        began_s, late_s = time.monotonic(), 0.0
+        for number in range(1, parts + 1):
+            place, due_s = next(self._due), began_s + number * PERIOD_S / parts
+            turn, self._turns[place] = self._turns[place], asyncio.Event()
+            turn.set()
+            await asyncio.sleep(due_s - time.monotonic())
+            late_s = max(late_s, time.monotonic() - due_s)
+        return late_s
+
+    def _pace(self, late_s: float) -> None:
+        """Serves fewer parts a period from the next on where turns come late, and more again after a calm second."""
+        self._calm = self._calm + 1 if late_s <= LATE_S else 0
+        if not self._calm:
+            self._slower = min(self._slower + 1, len(SERVED) - 1)
+        elif self._calm % CALM_PERIODS == 0:
+            self._slower = max(self._slower - 1, 0)
+
     def follower(self) -> Callable[[], Awaitable[None]]:
-        """Waits until there may be something new, once a period; each follower has its place within that."""
+        """Waits until there may be something new, once a period while there is time for all; each has its place."""
         place = next(self._places)
 
         async def turn() -> None:

@@ -1,5 +1,6 @@
 """Events as server-sent events, for scripts and curl: a reader that comes back says which was its last."""
 
+import time
 from collections.abc import AsyncIterator, Callable
 
 from starlette.responses import StreamingResponse
@@ -8,7 +9,7 @@ from starlette.types import Receive, Scope, Send
 from api.http.access.rights import RECHECK_S
 from api.http.streams.connections import OpenConnections
 from api.http.streams.events import EventsLost
-from api.http.streams.feed import PERIOD_S, Feed
+from api.http.streams.feed import Feed
 from api.http.streams.messages import Gap
 
 # A comment after this much silence, so that proxies and readers know that the line is there.
@@ -43,9 +44,10 @@ async def told(feed: Feed, session_id: str, last: int, entitled: Callable[[], bo
     except EventsLost as lost:
         yield _gap(last + 1, lost.oldest - 1)
         last = lost.oldest - 1
-    silent_s, checked_s, turn = 0.0, 0.0, feed.follower()
-    while checked_s < RECHECK_S or entitled():
-        checked_s = PERIOD_S if checked_s >= RECHECK_S else checked_s + PERIOD_S
+    turn, now_s = feed.follower(), time.monotonic()
+    spoke_s = checked_s = now_s
+    while now_s - checked_s < RECHECK_S or entitled():
+        checked_s = now_s if now_s - checked_s >= RECHECK_S else checked_s
         try:
             events = feed.events.after(last)
         except EventsLost:
@@ -53,11 +55,11 @@ async def told(feed: Feed, session_id: str, last: int, entitled: Callable[[], bo
         for event in events:
             last = event.seq
             yield f"id: {session_id}-{last}\nevent: {event.source}\ndata: {event.model_dump_json()}\n\n"
-        silent_s = 0.0 if events else silent_s + PERIOD_S
-        if silent_s >= SILENCE_S:
-            silent_s = 0.0
+        if not events and now_s - spoke_s >= SILENCE_S:
             yield ": nothing new\n\n"
+        spoke_s = now_s if events or now_s - spoke_s >= SILENCE_S else spoke_s
         await turn()
+        now_s = time.monotonic()
 
 
 def _gap(first: int, last: int) -> str:

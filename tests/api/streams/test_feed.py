@@ -2,6 +2,9 @@
 
 import asyncio
 import itertools
+import time
+
+import pytest
 
 from api.http.streams.events import EventLog
 from api.http.streams.feed import PERIOD_S, Feed
@@ -54,3 +57,35 @@ def test_a_follower_that_was_woken_waits_for_the_next_period() -> None:
         return times_s
 
     assert all(after - before > PERIOD_S / 2 for before, after in itertools.pairwise(asyncio.run(turns())))
+
+
+def test_while_the_event_loop_is_late_followers_come_up_to_five_periods_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And as often as ever after three periods in time for each step back: here 10 of 10 parts, 2 of them, 10."""
+    monkeypatch.setattr("api.http.streams.feed.CALM_PERIODS", 3)
+
+    async def counted() -> tuple[int, int]:
+        feed, woken = Feed(Wiring(), lambda: None, EventLog()), 0
+
+        async def follow() -> None:
+            nonlocal woken
+            turn = feed.follower()
+            while True:
+                await turn()
+                woken += 1
+
+        tasks = [asyncio.create_task(part) for part in (feed.follow(), follow())]
+        for _ in range(25):
+            await asyncio.sleep(PERIOD_S / 4)
+            time.sleep(PERIOD_S)
+        late = woken
+        await asyncio.sleep(10 * PERIOD_S)
+        before = woken
+        await asyncio.sleep(20 * PERIOD_S)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        return late, woken - before
+
+    late, calm = asyncio.run(counted())
+    assert 3 <= late <= 12, "of 31 periods"
+    assert calm >= 15, "of 20 periods"
