@@ -47,7 +47,8 @@ async def told(feed: Feed, session_id: str, last: int, entitled: Callable[[], bo
     turn, now_s = feed.follower(), time.monotonic()
     spoke_s = checked_s = now_s
     while now_s - checked_s < RECHECK_S or entitled():
-        checked_s = now_s if now_s - checked_s >= RECHECK_S else checked_s
+        if now_s - checked_s >= RECHECK_S:
+            checked_s = now_s
         try:
             events = feed.events.after(last)
         except EventsLost:
@@ -55,9 +56,11 @@ async def told(feed: Feed, session_id: str, last: int, entitled: Callable[[], bo
         for event in events:
             last = event.seq
             yield f"id: {session_id}-{last}\nevent: {event.source}\ndata: {event.model_dump_json()}\n\n"
-        if not events and now_s - spoke_s >= SILENCE_S:
+        if events:
+            spoke_s = now_s
+        elif now_s - spoke_s >= SILENCE_S:
+            spoke_s = now_s
             yield ": nothing new\n\n"
-        spoke_s = now_s if events or now_s - spoke_s >= SILENCE_S else spoke_s
         await turn()
         now_s = time.monotonic()
 
