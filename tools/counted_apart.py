@@ -35,6 +35,7 @@ SAFETY = {
     "api/operations/reset.py": "recovery",
     "api/http/commissioning/": "commissioning",
     "api/http/guard.py": "neither a large body nor a slow client keeps a stop waiting",
+    "api/http/priority.py": "a stop goes before whoever looks on",
     "api/http/turn.py": "what moves ends with the control of whoever began it",
     "drivers/robotiq/frame_clock.py": "capture times that the checks can rely on",
     "mock_devices/faults/sensing.py": "faults for the campaign",

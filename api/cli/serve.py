@@ -24,6 +24,7 @@ from api.http.access.arrived import LOOPBACK
 from api.http.access.served_at import ServedAt, ServeOptions, served_at
 from api.http.app import build
 from api.http.connection import ImpatientProtocol, server_settings
+from api.http.priority import NICE, go_at, lead
 from api.http.service import Service
 from api.http.stops.process import AwayStops
 from api.http.streams.bridge import bridged
@@ -58,7 +59,6 @@ StopPortOption = Annotated[
 ProtocolsOption = Annotated[
     Path | None, typer.Option(help="Folder of the protocols; else ./examples, else those that come with the program.")
 ]
-NICE = -15  # a core that is short is the clients' loss: those that look on go on asking, one that stops waits
 # What answers gives the interpreter away with each piece it sends, and waits so long for it beside a list that is read:
 # with half a millisecond, fifty clients and a list a stop took 40 to 90 ms.
 SWITCH_S = 50e-6
@@ -107,13 +107,7 @@ def _answer_promptly() -> None:
     gc.freeze()
     switch_promptly(SWITCH_S)
     go_at(NICE)
-
-
-def go_at(nice: int) -> None:
-    """Every thread of this process, and those that they begin, at this priority, where it is granted."""
-    with contextlib.suppress(OSError):
-        for thread in Path("/proc/self/task").iterdir():
-            os.setpriority(os.PRIO_PROCESS, int(thread.name), nice)
+    lead()
 
 
 def serve(

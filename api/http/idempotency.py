@@ -17,6 +17,7 @@ from fastapi.routing import APIRoute
 from api.http.access.rights import CALLER, PASSED, STOP
 from api.http.access.secrets import steady_s
 from api.http.answers import ERASED, KeptAnswer, read_answers, write_answers, writing
+from api.http.priority import following
 from api.http.problems import RequestRefused
 from api.http.shared_file import FileState, file_state
 
@@ -145,7 +146,7 @@ def idempotent(store: AnswerStore) -> type[APIRoute]:
         def __init__(self, path: str, endpoint: Callable[..., Any], **stated: Any) -> None:
             rights = stated.get("dependencies") or ()
             self._keeps = "POST" in (stated.get("methods") or ()) and not holds_secret(path) and STOP not in rights
-            super().__init__(path, endpoint, **stated | {"dependencies": [*rights, *[NAMED] * self._keeps]})
+            super().__init__(path, following(endpoint), **stated | {"dependencies": [*rights, *[NAMED] * self._keeps]})
 
         def get_route_handler(self) -> Handler:
             handler = super().get_route_handler()

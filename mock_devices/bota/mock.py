@@ -99,10 +99,7 @@ class BotaMock(OnWire):
         self, wire: Wire, plant: SensorPlant, start_ns: int, drift_ppm: float = 0.0, serial_number: str = "000271"
     ) -> None:
         super().__init__(wire)
-        self.silent = False
-        self.frozen = False
-        self.invalid = False
-        self.wrong_identity = False
+        self.silent = self.frozen = self.invalid = self.wrong_identity = False
         self.corrupt_every = 0
         self.refuse = ""
         self.sampled: deque[tuple[int, int]] = deque(maxlen=SAMPLES_KEPT)

@@ -63,8 +63,7 @@ class Epos4Mock(OnWire):
     ) -> None:
         super().__init__(wire)
         self.serial_number = f"{number:08X}"
-        self.silent = False
-        self.wrong_identity = False
+        self.silent = self.wrong_identity = False
         self.node = node
         self.nmt = NmtState.BOOT_UP
         self.dictionary = Dictionary(node, table)

@@ -106,14 +106,9 @@ class RobotiqMock(OnWire):
         self, wire: Wire, plant: SensorPlant, start_ns: int, drift_ppm: float = 0.0, serial_number: int = 1234
     ) -> None:
         super().__init__(wire)
-        self.silent = False
-        self.frozen = False
-        self.invalid = False
-        self.wrong_identity = False
+        self.silent = self.frozen = self.invalid = self.wrong_identity = False
         self.corrupt_every = 0
-        self.mute_start = False
-        self.deaf = False
-        self.refuse_stream = False
+        self.mute_start = self.deaf = self.refuse_stream = False
         self.sampled: deque[tuple[int, int]] = deque(maxlen=SAMPLES_KEPT)
         self._plant = plant
         self._number = serial_number

@@ -163,15 +163,10 @@ class RingReader:
     @classmethod
     def open(cls, path: Path) -> Self:
         """Attaches to the ring at ``path``; raises UsageError where it is none or is being read by someone else."""
-        try:
-            fd = os.open(path, os.O_RDWR)
-        except OSError as error:
-            raise UsageError(f"{path}: no ring: {error.strerror}; start the loop first") from error
+        fd = opened(path, os.O_RDWR)
         try:
             fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            slots = slots_of(fd)
-            if not slots:
-                raise UsageError(f"{path}: not a ring of this program")
+            slots = slots_of(fd, path)
             return cls(path, fd, _Mapping(fd, PAGE + slots * SLOT), slots)
         except BlockingIOError as error:
             os.close(fd)
@@ -233,13 +228,21 @@ class RingReader:
         self._fd = -1
 
 
-def slots_of(fd: int) -> int:
-    """Slots of the ring in the file, 0 if it is none."""
+def opened(path: Path, flags: int) -> int:
+    """A descriptor of the ring at ``path``; raises UsageError where there is none."""
+    try:
+        return os.open(path, flags)
+    except OSError as error:
+        raise UsageError(f"{path}: no ring: {error.strerror}; start the loop first") from error
+
+
+def slots_of(fd: int, path: Path) -> int:
+    """Slots of the ring in the file; raises UsageError if it is none."""
     with contextlib.suppress(OSError, struct.error):
         magic, slots = struct.unpack("<qq", os.pread(fd, 16, 0))
         if magic == MAGIC and os.fstat(fd).st_size == PAGE + slots * SLOT:
             return int(slots)
-    return 0
+    raise UsageError(f"{path}: not a ring of this program")
 
 
 def _dropped(words: "memoryview[int]") -> dict[int, int]:

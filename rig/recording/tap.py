@@ -11,8 +11,7 @@ from typing import Self
 
 import numpy as np
 
-from rig.errors import UsageError
-from rig.recording.ring import HEAD_BYTE, PAGE, slots_of
+from rig.recording.ring import HEAD_BYTE, PAGE, opened, slots_of
 from rig.recording.slots import SLOT, SLOT_TYPE, Slots
 
 
@@ -30,14 +29,9 @@ class RingTap:
     @classmethod
     def open(cls, path: Path) -> Self:
         """Looks into the ring at ``path``; raises UsageError where it is none."""
+        fd = opened(path, os.O_RDONLY)
         try:
-            fd = os.open(path, os.O_RDONLY)
-        except OSError as error:
-            raise UsageError(f"{path}: no ring: {error.strerror}; start the loop first") from error
-        try:
-            slots = slots_of(fd)
-            if not slots:
-                raise UsageError(f"{path}: not a ring of this program")
+            slots = slots_of(fd, path)
             flags = mmap.MAP_SHARED | getattr(mmap, "MAP_POPULATE", 0)
             return cls(mmap.mmap(fd, PAGE + slots * SLOT, flags, mmap.PROT_READ), slots)
         finally:

@@ -17,7 +17,7 @@ import pytest
 
 from api.cli.mock_bench import plug_into
 from api.cli.options import built_in
-from api.cli.serve import NICE
+from api.http.priority import NICE, PRIORITY
 from controller.stop.start import SENTENCE
 from controller.stop.word import NOT_CONFIRMED, Deed, StopReason
 from controller.supervisor import Supervisor
@@ -93,6 +93,26 @@ def test_a_press_at_the_services_own_address_goes_before_its_clients(served: Ser
     assert {os.getpriority(os.PRIO_PROCESS, pid) for pid in threads(served.running.process.pid)} == {expected}
     status, said = asked(served.port, "/api/v1/estop")
     assert (status, said["detail"]) == (200, "braked")
+
+
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="on a single core the service does not go first")
+def test_what_answers_goes_first_alone_and_what_works_for_it_follows(served: ServedRig) -> None:
+    if ask_for_real_time():
+        pytest.skip("real-time priority is not granted here")
+    for path in ("/jobs", "/recordings", "/protocols"):
+        served.ask("GET", path)
+    pid = served.running.process.pid
+    policies = {thread: os.sched_getscheduler(thread) for thread in threads(pid)}
+    assert policies.pop(pid) == os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+    assert os.sched_getparam(pid).sched_priority == PRIORITY
+    assert set(policies.values()) == {os.SCHED_OTHER}
+    assert {os.getpriority(os.PRIO_PROCESS, thread) for thread in threads(pid)} == {NICE}
+
+
+def ask_for_real_time() -> int:
+    """Tried by a process of its own; 0 where it is granted."""
+    trial = "import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))"
+    return subprocess.run([sys.executable, "-c", trial], stderr=subprocess.DEVNULL, check=False).returncode
 
 
 def threads(pid: int) -> list[int]:

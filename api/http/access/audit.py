@@ -17,6 +17,7 @@ from pathlib import Path
 
 from api.http.access.scopes import Caller
 from api.http.access.store import KeptModel
+from api.http.priority import follow
 
 TAIL_BYTES = 65_536  # many times the longest line
 FIRST = "0" * 64
@@ -39,7 +40,7 @@ class AuditLog:
 
     def __init__(self, path: Path, now: Callable[[], datetime] = lambda: datetime.now(UTC)) -> None:
         self.path, self._now = path, now
-        self._writer = ThreadPoolExecutor(1, "audit")
+        self._writer = ThreadPoolExecutor(1, "audit", initializer=follow)
 
     def add(self, caller: Caller | None, what: str, outcome: str) -> "Future[None]":
         """Adds a line, in a thread: a disk that is slow must keep nobody from stopping; one that is full is told of."""

@@ -42,21 +42,14 @@ def add(router: APIRouter, service: Service) -> None:
 
 
 def _stops(router: APIRouter, service: Service) -> None:
-    @router.post(
-        "/estop",
-        dependencies=[STOP],
-        summary="Software emergency stop: the drive's own quick stop",
-        responses=responses("503 disconnected", "503 device", "504 not-confirmed"),
-    )
+    told = responses("503 disconnected", "503 device", "504 not-confirmed")
+    software = "Software emergency stop: the drive's own quick stop"
+
+    @router.post("/estop", dependencies=[STOP], summary=software, responses=told)
     async def emergency_stop() -> Done:
         return _stopped(service, await service.stop(StopReason.EMERGENCY))
 
-    @router.post(
-        "/pain",
-        dependencies=[STOP],
-        summary="The subject's stop: retracts at safe speed",
-        responses=responses("503 disconnected", "503 device", "504 not-confirmed"),
-    )
+    @router.post("/pain", dependencies=[STOP], summary="The subject's stop: retracts at safe speed", responses=told)
     async def pain() -> Done:
         return _stopped(service, await service.stop(StopReason.PAIN))
 

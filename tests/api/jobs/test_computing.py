@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from api.cli.serve import NICE, go_at
 from api.http.jobs import process
+from api.http.priority import NICE, go_at
 from api.http.service import Service
 from mock_devices.testing.commands import until
 from rig.results.recorded import VerifyResult
