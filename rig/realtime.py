@@ -10,10 +10,13 @@ MCL_CURRENT_AND_FUTURE = 3
 WAKE_LATENCY = Path("/dev/cpu_dma_latency")
 
 
-def ask_fifo(priority: int) -> str:
-    """FIFO scheduling of this thread at ``priority``; why it was refused, empty where it was granted."""
+def ask_fifo(priority: int, *, alone: bool = False) -> str:
+    """FIFO scheduling of this thread at ``priority``; why it was refused, empty where it was granted.
+
+    What it begins inherits that, unless it is to be ``alone``.
+    """
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+        os.sched_setscheduler(0, os.SCHED_FIFO | alone * os.SCHED_RESET_ON_FORK, os.sched_param(priority))
     except (OSError, AttributeError) as error:
         return str(error)
     return ""

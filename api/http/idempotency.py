@@ -138,7 +138,7 @@ def holds_secret(path: str) -> bool:
 
 
 def idempotent(store: AnswerStore) -> type[APIRoute]:
-    """Routes whose POST heeds an Idempotency-Key."""
+    """Routes whose POST heeds an Idempotency-Key; an endpoint that is given a thread follows the event loop there."""
 
     class IdempotentRoute(APIRoute):
         """A stop that is asked for twice stops twice; what answers with a secret keeps none."""

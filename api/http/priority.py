@@ -1,7 +1,7 @@
 """Which of the service's threads goes first where cores are short: the event loop, which takes stops, then its workers.
 
-The force loop, the stop process and the devices' own threads have real-time priority, and the event loop has to find a
-core beside them: at normal priority it waited for one a third of the time while another core had room.
+The force loop, the stop process and a simulated bench have real-time priority, and the event loop has to find a core
+beside them: at normal priority it waited for one a third of the time while another core had room.
 """
 
 import contextlib
@@ -11,6 +11,8 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+from rig.realtime import ask_fifo
 
 # A core that is short is the clients' loss: those that look on go on asking, one that stops waits.
 NICE = -15
@@ -24,8 +26,7 @@ def lead() -> None:
     Not on a single core, of which a service that is flooded would leave the recorder nothing.
     """
     if len(os.sched_getaffinity(0)) > 1:
-        with contextlib.suppress(OSError):
-            os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
+        ask_fifo(PRIORITY, alone=True)
 
 
 def go_at(nice: int) -> None:
