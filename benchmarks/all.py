@@ -23,7 +23,7 @@ QUICK_S, WHOLE_S = 200.0, 1800.0  # for each: one alone takes as long in its qui
 @dataclass(frozen=True)
 class Measure:
     """One row. ``here`` and ``rival`` say where in the JSON they stand, keys with dots; the goal bounds their ratio,
-    or ``here`` where there is no rival."""
+    or ``here`` where there is no rival. ``whole``: the quick form does not say it."""
 
     work: str
     here: str
@@ -31,6 +31,7 @@ class Measure:
     unit: str = ""
     rival: str = ""
     is_least: bool = False
+    whole: bool = False
 
 
 @dataclass(frozen=True)
@@ -72,12 +73,14 @@ PARTS: Sequence[Part] = (
         Measure("reading a row", "read_us_row", 0.3, "us"),
         Measure("reading a row", "read_us_row", 0.1, "us", "stock_us_row"),
         Measure("reading a row", "read_us_row", 1.1, "us", "h5py_us_row"),
+        Measure("reading an hour of three streams", "hour_s", 5.0, "s", whole=True),
+        Measure("reading an hour of three streams", "hour_GB", 1.5, "GB", whole=True),
     )),
     Part("benchmarks.start", (), ("--repeats", "1"), (
         Measure("slowest --help of all commands", "slowest_help_s", 0.35, "s"),
         Measure("rig simulate, first result", "simulate.clock_s", 2.0, "s"),
     )),
-    Part("benchmarks.environment", (), (), (Measure("installed, without development tools", "whole_MB", 700, "MB"),)),
+    Part("benchmarks.environment", (), (), (Measure("installed, without development tools", "whole_MiB", 700, "MiB"),)),
     Part("benchmarks.control", ("--seeds", "1"), ("--quick",), (
         *(Measure(f"limb at 2 Hz, {force} N, constant over law",
                   f"limb_2Hz_gain.{force}", goal, "x", is_least=True) for force, goal in GOALS.items()),
@@ -101,8 +104,9 @@ PARTS: Sequence[Part] = (
         Measure("the same from what is kept, beside fitting", "kept_s", 0.5, "s", "fit_s"),
     )),
     Part("benchmarks.growth", (), ("--quick",), tuple(
-        Measure(f"growth with {name}, exponent of time", f"{name}.exponent", 1.1)
+        Measure(f"growth with {name}, exponent of {what}", f"{name}.{key}", 1.1)
         for name in ("trials", "samples", "sessions", "vertices", "clients")
+        for what, key in (("time", "exponent"), ("memory", "memory_exponent"))
     )),
 )  # fmt: skip
 
@@ -118,13 +122,15 @@ def last_json(text: str) -> JsonValue:
 
 def number_at(found: JsonValue, place: str) -> float:
     """The number that stands at ``place``, a key with dots in it where the keys have none; raises KeyError."""
-    if isinstance(found, int | float) and not place:
-        return float(found)
-    if isinstance(found, Mapping):
-        for key, value in found.items():
-            if place == key or place.startswith(f"{key}."):
-                return number_at(value, place[len(key) + 1 :])
-    raise KeyError(place)
+    at, rest = found, place
+    while rest and isinstance(at, Mapping):
+        key = next((key for key in at if rest == key or rest.startswith(f"{key}.")), None)
+        if key is None:
+            break
+        at, rest = at[key], rest[len(key) + 1 :]
+    if rest or not isinstance(at, int | float):
+        raise KeyError(place)
+    return float(at)
 
 
 def row_of(measure: Measure, found: JsonValue) -> Row:
@@ -155,7 +161,7 @@ def _goal(measure: Measure) -> str:
 
 def rows_of(part: Part, quick: bool) -> list[Row]:
     """Runs one benchmark."""
-    asked = part.measures or (Measure(part.name, "", 0.0),)
+    asked = [one for one in part.measures if not (quick and one.whole)] or [Measure(part.name, "", 0.0)]
     try:
         found = _run(part, quick)
     except (OSError, ValueError, subprocess.SubprocessError) as error:

@@ -1,6 +1,7 @@
 """How large the program is without development tools: `python -m benchmarks.environment`; the last line is JSON.
 
-The wheel is built and installed with what it needs, as locked, into an empty folder; the sizes are those of the files.
+The wheel is built and installed with what it needs, as locked, into an empty folder. A package's size is that of its
+files. The whole is what it takes of a disk, as `du -sm` counts: 674 at commit 2887b84, which set the goal of 700.
 """
 
 import json
@@ -38,17 +39,21 @@ def sizes_MB(site: Path) -> dict[str, float]:
     return {name: size / 1e6 for name, size in found.most_common()}
 
 
+def on_disk_MiB(site: Path) -> float:
+    """What the folder takes of its disk: blocks of 512 bytes of all that is in it, and its own."""
+    return sum(path.lstat().st_blocks for path in (site, *site.rglob("*"))) * 512 / 2**20
+
+
 def main() -> None:
     """Measures and prints."""
     with tempfile.TemporaryDirectory() as name:
         installed(Path(name))
-        sizes = sizes_MB(Path(name) / "site")
+        sizes, whole_MiB = sizes_MB(Path(name) / "site"), round(on_disk_MiB(Path(name) / "site"), 1)
     largest = {package: round(size_MB, 1) for package, size_MB in list(sizes.items())[:SHOWN]}
     for package, size_MB in largest.items():
         print(f"{package:24}{size_MB:8.1f} MB")
     whole_MB = round(sum(sizes.values()), 1)
-    whole_MiB = round(whole_MB * 1e6 / 2**20, 1)
-    print(f"{'whole':24}{whole_MB:8.1f} MB ({whole_MiB} MiB)")
+    print(f"{'whole':24}{whole_MB:8.1f} MB; {whole_MiB} MiB of the disk, as `du -sm` counts")
     print(json.dumps({"whole_MB": whole_MB, "whole_MiB": whole_MiB, "largest": largest}))
 
 

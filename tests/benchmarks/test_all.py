@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -45,6 +46,19 @@ def test_the_goal_bounds_the_ratio_or_the_number_itself(measure: Measure, ratio:
 def test_what_a_benchmark_does_not_say_has_missed() -> None:
     row = row_of(Measure("a", "other", 1.0), json.loads(SAID))
     assert not row.met and "does not say 'other'" in row.why
+    nothing = row_of(Measure("a", "idle.wake us", 1.3, "us", "idle.cyclictest us"), {"idle": {"wake us": None}})
+    assert not nothing.met and "does not say 'idle.wake us'" in nothing.why
+
+
+def test_what_only_the_whole_form_says_is_not_asked_of_the_quick_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part = replace(
+        planted(tmp_path, monkeypatch, "print('{\"here\": 1.5}')"),
+        measures=(Measure("a", "here", 2.0), Measure("b", "hour_s", 5.0, whole=True)),
+    )
+    assert [row.work for row in rows_of(part, quick=True)] == ["a"]
+    assert [row.met for row in rows_of(part, quick=False)] == [True, False]
 
 
 def planted(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> Part:
