@@ -44,6 +44,7 @@ from rig.recording.reader import read_recording
 
 PORT = 8123
 CLIENTS = 4
+TOO_MANY = 429
 SETTLING_S = 1.0
 # What a press takes besides its hold: homing is over, the rest is rest, approach and retraction.
 PRESS_S = 10.0
@@ -88,7 +89,13 @@ class Service:
         self._headers |= {"X-Control-Lease": self.ask("POST", "/control/lease", LEASE)["lease_id"]}
 
     def ask(self, method: str, path: str, body: object = None) -> Any:
-        """One request; its JSON."""
+        """One request, again where the load has used up what a client may ask; its JSON."""
+        while (answer := self._answer(method, path, body))[0] == TOO_MANY:
+            time.sleep(0.1)
+        assert answer[0] < 400, answer[1]
+        return answer[1]
+
+    def _answer(self, method: str, path: str, body: object) -> tuple[int, Any]:
         connection = HTTPConnection("127.0.0.1", PORT, timeout=60)
         text = None if body is None else json.dumps(body)
         connection.request(
@@ -100,8 +107,7 @@ class Service:
         reply = connection.getresponse()
         content = json.loads(reply.read())
         connection.close()
-        assert reply.status < 400, content
-        return content
+        return reply.status, content
 
     def press(self, name: str) -> Path | None:
         """Runs the protocol into session ``name`` to its end; the recording, or None where it was stopped."""
@@ -122,6 +128,13 @@ class Service:
         self._process.wait(30)
 
 
+def served(said: str) -> int:
+    """Requests that were answered as asked, of what wrk says at its end."""
+    whole = int(next(line for line in said.splitlines() if "requests in" in line).split()[0])
+    refused = next((line for line in said.splitlines() if "Non-2xx" in line), ": 0")
+    return whole - int(refused.rpartition(":")[2])
+
+
 @contextmanager
 def hammered(load: Load, seconds: float) -> Iterator[None]:
     """CLIENTS connections that ask for the bench's state without pause for ``seconds``; 0: none."""
@@ -136,7 +149,7 @@ def hammered(load: Load, seconds: float) -> Iterator[None]:
         if client:
             client.send_signal(signal.SIGINT)
             out, _ = client.communicate(timeout=30)
-            load.requests += int(next(line for line in out.splitlines() if "requests in" in line).split()[0])
+            load.requests += served(out)
             load.busy_s += time.monotonic() - began
 
 
