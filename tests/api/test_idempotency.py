@@ -2,6 +2,7 @@
 
 import threading
 import time
+from base64 import b64decode
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 from fastapi import Response
 from fastapi.testclient import TestClient
 
-from api.http.answers import forget, read_answers
+from api.http.answers import ANSWERS, forget, read_answers
 from api.http.idempotency import KEPT_S, AnswerStore
 from api.http.problems import RequestRefused
 from api.http.service import Service
@@ -82,6 +83,17 @@ def test_answers_outlast_the_service(service: Service) -> None:
     first = sent(client_of(service), "a").json()["id"]
     later = Service(service.wiring, service.sessions, service.protocols)
     assert sent(client_of(later), "a").json()["id"] == first
+
+
+def test_no_other_account_reads_the_lease_of_who_is_in_control(service: Service) -> None:
+    client = client_of(service)
+    lease = client.post("/api/v1/control/lease", json={"holder": "Ann"}).json()["lease_id"]
+    file = service.jobs.folder / ANSWERS
+    (kept,) = read_answers(file).values()
+    assert lease.encode() in b64decode(kept.body) and oct(file.stat().st_mode & 0o777) == "0o600"
+    file.chmod(0o644)  # as an earlier program wrote it
+    sent(client_of(Service(service.wiring, service.sessions, service.protocols)), "a")
+    assert oct(file.stat().st_mode & 0o777) == "0o600"
 
 
 def test_a_stop_with_a_key_stops_each_time_and_a_secret_is_not_kept(service: Service) -> None:
