@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import Depends, Header, Request, Response
+from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
+from starlette.exceptions import HTTPException
 
 from api.http.access.rights import CALLER, PASSED, STOP
 from api.http.access.secrets import steady_s
@@ -21,6 +23,7 @@ from api.http.answers import ERASED, PRIVATE, KeptAnswer, read_answers, write_an
 from api.http.priority import following
 from api.http.problems import RequestRefused
 from api.http.shared_file import FileState, file_state
+from rig.errors import RigError
 
 KEPT_S = 24 * 3600.0
 # A busy day's jobs; the oldest go first.
@@ -36,6 +39,8 @@ KeyHeader = Annotated[
         description="asked for by what moves: the same key with the same body gets the first answer again, for a day",
     ),
 ]
+# What else is raised is a mistake of ours, or the end of the service.
+FORESEEN = (RigError, OSError, HTTPException, RequestValidationError)
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 
 
@@ -84,12 +89,15 @@ class AnswerStore:
                 return known
             raise _undecided(place in self._under_way)
 
-    def end(self, place: str, response: Response | None) -> None:
-        """Keeps what was answered; a refusal, or None, is forgotten, so that it can be tried again."""
+    def end(self, place: str, response: Response | None, known: bool = True) -> None:
+        """Keeps what was answered; a refusal, or None, is forgotten, so that it can be tried again.
+
+        Not ``known``: nobody knows whether it took effect, and nothing is done under that key again.
+        """
         with self._lock:
             self._under_way.discard(place)
             begun = self._known().get(place)
-            if begun is None:
+            if begun is None or not known:
                 return
             if response is None or response.status_code >= REFUSED:
                 self._write(begun.model_copy(update={"at_s": 0.0}))
@@ -130,7 +138,7 @@ class AnswerStore:
 def _undecided(under_way: bool) -> RequestRefused:
     if under_way:
         return RequestRefused(409, "in-progress", "the request with this Idempotency-Key is still being answered; wait")
-    text = "the service ended while it answered this request: look whether it took effect, and use a new key"
+    text = "the service ended or failed while it answered: look whether it took effect, and use a new key"
     return RequestRefused(409, "outcome-unknown", text)
 
 
@@ -180,8 +188,12 @@ async def _once(store: AnswerStore, place: str, request: Request, handler: Handl
         body = base64.b64decode(before.body)
         return Response(body, before.status, {**before.headers, "Idempotent-Replayed": "true"})
     response: Response | None = None
+    known = True
     try:
         response = await handler(request)
+    except BaseException as error:
+        known = isinstance(error, FORESEEN)
+        raise
     finally:
-        store.end(place, response)
+        store.end(place, response, known)
     return response
