@@ -147,16 +147,23 @@ def holds_secret(path: str) -> bool:
     return "/tokens" in path or "/auth/" in path
 
 
-def idempotent(store: AnswerStore) -> type[APIRoute]:
-    """Routes whose POST heeds an Idempotency-Key; an endpoint that is given a thread follows the event loop there."""
+class FollowingRoute(APIRoute):
+    """Whose endpoint, where it is given a thread, follows the event loop there."""
 
-    class IdempotentRoute(APIRoute):
+    def __init__(self, path: str, endpoint: Callable[..., Any], **stated: Any) -> None:
+        super().__init__(path, following(endpoint), **stated)
+
+
+def idempotent(store: AnswerStore) -> type[FollowingRoute]:
+    """Routes whose POST heeds an Idempotency-Key."""
+
+    class IdempotentRoute(FollowingRoute):
         """A stop that is asked for twice stops twice; what answers with a secret keeps none."""
 
         def __init__(self, path: str, endpoint: Callable[..., Any], **stated: Any) -> None:
             rights = stated.get("dependencies") or ()
             self._keeps = "POST" in (stated.get("methods") or ()) and not holds_secret(path) and STOP not in rights
-            super().__init__(path, following(endpoint), **stated | {"dependencies": [*rights, *[NAMED] * self._keeps]})
+            super().__init__(path, endpoint, **stated | {"dependencies": [*rights, *[NAMED] * self._keeps]})
 
         def get_route_handler(self) -> Handler:
             handler = super().get_route_handler()
