@@ -16,7 +16,7 @@ from api.http.service import Service
 from api.operations import motion
 from mock_devices.testing.access import ADDRESS, client_of
 from rig.results.bench import RetractResult
-from tests.api.catalogue.made import make_session
+from tests.api.catalogue.made import MODEL, make_session
 from tests.api.jobs import conftest, test_verbs
 from tests.api.jobs.asked import begun, ended
 from tests.api.jobs.test_computing import planted
@@ -121,6 +121,28 @@ def test_a_name_of_any_letters_comes_back_as_it_is_and_adds_no_header(client: Te
     assert listed["name"] == name
     answer = client.get(listed["recordings"][0]["href"])
     assert answer.status_code == 200 and "x-planted" not in answer.headers
+
+
+@pytest.mark.parametrize("name", ["a\nb.json", "a\r\nX-Planted: 1.json", "\u2028ü;'.json"])
+def test_a_file_of_any_letters_is_downloaded_where_its_list_says(client: TestClient, first: Path, name: str) -> None:
+    (first / name).write_text("{}")
+    listed = {each["name"]: each["href"] for each in client.get(f"/api/v1/sessions/{first.name}").json()["files"]}
+    answer = client.get(listed[name])
+    assert (answer.status_code, answer.content) == (200, b"{}") and "x-planted" not in answer.headers
+
+
+def test_no_look_at_a_session_follows_a_link_out_of_it(client: TestClient, first: Path, tmp_path: Path) -> None:
+    (tmp_path / "protocols" / "p.toml").write_text('kind = "indentation"\ndepth_mm = 8\n')
+    other = tmp_path / "elsewhere"
+    other.mkdir()
+    (recorded,) = first.glob("*.mcap")
+    recorded.rename(other / recorded.name)
+    recorded.symlink_to(other / recorded.name)
+    shutil.copy(MODEL, other / "model.json")
+    (first / "fit").symlink_to(other)
+    for path in ("sessions/first/curves", "protocols/p/foresight?session=first"):
+        answer = client.get(f"/api/v1/{path}")
+        assert (answer.status_code, answer.json()["code"]) == (409, "link"), path
 
 
 def test_a_session_that_is_removed_under_the_service_is_told_and_hides_no_other(

@@ -5,6 +5,7 @@ import shutil
 import threading
 import zipfile
 from pathlib import Path
+from urllib.parse import quote
 
 import pytest
 from fastapi.testclient import TestClient
@@ -177,6 +178,20 @@ def test_a_subject_is_erased_in_two_steps(client: TestClient, lab: Path) -> None
     assert (done.status_code, done.json()["done"]) == (200, True)
     assert not (lab / "first").exists() and (lab / "second").exists()
     assert client.get(f"{API}/subjects/S01").status_code == 404
+
+
+@pytest.mark.parametrize("code", ["S\n03", "S/03/name", "\r\nX-Planted: 1", "\u2028"])
+def test_a_subject_whose_code_has_any_character_is_shown_named_sent_and_erased(
+    client: TestClient, lab: Path, code: str
+) -> None:
+    make_session(lab, "third", {"id": f"S03{code}S03", "site": "calf"})
+    at = f"{API}/subjects/{quote(f'S03{code}S03', safe='')}"
+    shown = client.get(at)
+    assert (shown.status_code, shown.json()["subject"]["sessions"]) == (200, 1)
+    assert client.put(f"{at}/name", json={"name": NAME}, headers={"If-Match": "*"}).status_code == 200
+    assert client.get(f"{at}/export").headers["content-type"] == "application/zip"
+    done = client.delete(at, params={"confirm": client.delete(at).json()["confirm"]})
+    assert done.json()["done"] and not (lab / "third").exists() and (lab / "second").exists()
 
 
 @pytest.mark.parametrize("address", ["subjects/S01", "sessions/first"])
