@@ -10,11 +10,13 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from api.http import app
 from api.http.access.access import Access
 from api.http.routes import recordings
 from api.http.service import Service
 from api.operations import motion
 from mock_devices.testing.access import ADDRESS, client_of
+from rig.config.wiring import Wiring
 from rig.results.bench import RetractResult
 from tests.api.catalogue.made import MODEL, make_session
 from tests.api.jobs import conftest, test_verbs
@@ -170,6 +172,22 @@ def test_a_session_that_is_removed_while_it_is_worked_on_fails_that_job_in_a_sen
     done = ended(client, begun(client, "verify", session=first.name))
     assert (done["state"], done["problem"]["code"]) == ("failed", "data")
     assert done["message"].endswith("session.json: No such file or directory")
+
+
+def test_what_is_told_of_subjects_stays_on_no_disk_and_the_page_is_asked_for_again(
+    first: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """RFC 9111, 5.2.2.5: what is not to be stored says so; OWASP ASVS asks for it wherever data are sensitive."""
+    (tmp_path / "index.html").write_text("a page")
+    monkeypatch.setattr(app, "BUILT", tmp_path)
+    served = client_of(Service(Wiring(), first.parent, tmp_path))
+    for path in ("subjects", "rig", f"recordings/{first.name}/session.json", "none"):
+        assert served.get(f"/api/v1/{path}").headers["cache-control"] == "no-store", path
+    for path in ("/", "/page/index.html"):
+        again = served.get(path)
+        assert (again.text, again.headers["cache-control"]) == ("a page", "no-cache")
+    known = served.get("/page/index.html", headers={"If-None-Match": again.headers["etag"]})
+    assert (known.status_code, known.headers["cache-control"]) == (304, "no-cache")
 
 
 def refusing(*_: object) -> Any:
