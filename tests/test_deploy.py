@@ -11,6 +11,7 @@ import trustme
 from typer.main import get_command
 
 from api.cli.app import build
+from api.http.priority import NICE
 from rig.config.wiring import Wiring
 
 DEPLOY = Path(__file__).parents[1] / "examples" / "deploy"
@@ -87,8 +88,15 @@ def test_what_the_account_of_the_bench_runs_is_right_wherever_it_is_typed() -> N
 def test_the_unit_grants_what_the_loop_asks_for_and_homes_nothing_by_itself() -> None:
     (granted,) = re.findall(r"^LimitRTPRIO=(\d+)$", UNIT, re.MULTILINE)
     assert int(granted) > Wiring().loop.priority
+    limits = re.findall(r"^(?:LimitNICE=|@dialout - nice )(-\d+)$", UNIT + PAGE.read_text(), re.MULTILINE)
+    assert list(map(int, limits)) == [NICE, NICE], "setpriority(2) refuses what is beyond the limit, and grants no part"
     assert "\nRestart=no\n" in UNIT
     assert "[Install]" not in re.sub(r"^#.*$", "", UNIT, flags=re.MULTILINE)
+
+
+def test_a_computation_that_is_ended_for_its_memory_does_not_end_the_bench() -> None:
+    """`systemd.service(5)`: without it the unit is ended with the first process of it that the system ends."""
+    assert "\nOOMPolicy=continue\n" in UNIT
 
 
 def refused_of_rules(text: str) -> list[str]:

@@ -11,11 +11,12 @@ from urllib.parse import quote
 from pydantic import BaseModel, ValidationError
 
 from api.http.shared_file import alone
-from rig.recording.files import make_folder, write_text
+from rig.recording.files import make_folder, whole_file
 
 ANSWERS = "answers.jsonl"
 # The status of an answer that was given, and told of what has been erased since.
 ERASED = 404
+PRIVATE = 0o600
 
 
 class KeptAnswer(BaseModel):
@@ -47,8 +48,10 @@ def read_answers(file: Path) -> dict[str, KeptAnswer]:
 
 
 def write_answers(file: Path, answers: Iterable[KeptAnswer]) -> None:
-    """These and no others, in a new file."""
-    write_text(file, "".join(f"{each.model_dump_json()}\n" for each in answers))
+    """These and no others, in a new file that its owner alone may read: leases stand in it."""
+    with whole_file(file, overwrite=True) as scratch:
+        scratch.touch(PRIVATE)
+        scratch.write_text("".join(f"{each.model_dump_json()}\n" for each in answers), encoding="utf-8")
 
 
 @contextlib.contextmanager

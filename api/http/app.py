@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from typing import Any
 from urllib.parse import urlsplit
 
 from fastapi import FastAPI
@@ -19,6 +20,8 @@ from api.http.streams import routes as stream_routes
 from api.http.streams.feed import Feed
 from api.http.streams.session import Streams
 from api.page import BUILT, NOT_BUILT
+
+AGAIN = {"Cache-Control": "no-cache"}
 
 
 def build(service: Service, meanwhile: bool = False, names: tuple[str, ...] = ()) -> FastAPI:
@@ -69,6 +72,12 @@ class PageFiles(StaticFiles):
 
     right = Right(None)
 
+    def file_response(self, *args: Any, **stated: Any) -> Response:
+        """Asked for again each time, and sent where it is another."""
+        found = super().file_response(*args, **stated)
+        found.headers.update(AGAIN)
+        return found
+
     async def check_config(self) -> None:
         """A checkout that has not built the page has no such folder: then there is no such file, and no failure."""
 
@@ -80,7 +89,7 @@ def _headers(service: Service) -> dict[str, str]:
     return {
         "Content-Security-Policy": f"default-src 'self'; connect-src 'self' {stops}; frame-ancestors 'none'",
         "X-Content-Type-Options": "nosniff",
-        "Cache-Control": "no-cache",
+        "Cache-Control": "no-store",  # nothing of a subject stays on the disk of whoever looks
     }
 
 
@@ -88,4 +97,4 @@ def _page(service: Service) -> Response:
     """The page, or where a checkout has not built it what to do about that."""
     if not (BUILT / "index.html").is_file():
         return HTMLResponse(NOT_BUILT.format(stop_port=service.stop_port), status_code=503)
-    return FileResponse(BUILT / "index.html")
+    return FileResponse(BUILT / "index.html", headers=AGAIN)

@@ -55,7 +55,7 @@ EXPLAINED: Mapping[str, tuple[str, str]] = {
     "not-confirmed": ("The loop did not confirm the stop in time.", "Use the hardware emergency stop."),
     "not-recovered": ("Recovery did not succeed.", "The message says what is missing; mend it and recover again."),
     "origin": ("A page of another site may not act on this bench.", "Use the page of the service itself."),
-    "outcome-unknown": ("The service ended while it answered.", "Look whether it took effect, then use a new key."),
+    "outcome-unknown": ("The service ended or failed meanwhile.", "Look whether it took effect, then use a new key."),
     "password": ("Name or password is wrong.", "Accounts are made on the bench's computer: `rig account set NAME`."),
     "queue-full": ("Too many computations wait.", "Cancel one, or wait."),
     "range": ("The file has no such part.", "Content-Range says its bytes; write Range as bytes=FIRST-LAST."),

@@ -74,8 +74,13 @@ class Guard:
         else:
             arrived, said = _arrived(scope), Said()
             body = UnreadBody(arrived.headers, receive)
-            await self._request(scope, arrived, body.receive, self._decorated(send, said, body))
-            self._record(scope, arrived, said)
+            try:
+                await self._request(scope, arrived, body.receive, self._decorated(send, said, body))
+            except Exception:
+                said = Said(500, "error")  # which is answered outside
+                raise
+            finally:
+                self._record(scope, arrived, said)
 
     def _decorated(self, send: Send, said: "Said", body: "UnreadBody") -> Send:
         async def decorated(message: Message) -> None:

@@ -6,20 +6,24 @@ again under the same key. Kept on disk: a service that ended in the middle does 
 
 import base64
 import hashlib
+import os
 import threading
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import Depends, Header, Request, Response
+from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
+from starlette.exceptions import HTTPException
 
 from api.http.access.rights import CALLER, PASSED, STOP
 from api.http.access.secrets import steady_s
-from api.http.answers import ERASED, KeptAnswer, read_answers, write_answers, writing
+from api.http.answers import ERASED, PRIVATE, KeptAnswer, read_answers, write_answers, writing
 from api.http.priority import following
 from api.http.problems import RequestRefused
 from api.http.shared_file import FileState, file_state
+from rig.errors import RigError
 
 KEPT_S = 24 * 3600.0
 # A busy day's jobs; the oldest go first.
@@ -35,6 +39,8 @@ KeyHeader = Annotated[
         description="asked for by what moves: the same key with the same body gets the first answer again, for a day",
     ),
 ]
+# What else is raised is a mistake of ours, or the end of the service.
+FORESEEN = (RigError, OSError, HTTPException, RequestValidationError)
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 
 
@@ -83,12 +89,15 @@ class AnswerStore:
                 return known
             raise _undecided(place in self._under_way)
 
-    def end(self, place: str, response: Response | None) -> None:
-        """Keeps what was answered; a refusal, or None, is forgotten, so that it can be tried again."""
+    def end(self, place: str, response: Response | None, known: bool = True) -> None:
+        """Keeps what was answered; a refusal, or None, is forgotten, so that it can be tried again.
+
+        Not ``known``: nobody knows whether it took effect, and nothing is done under that key again.
+        """
         with self._lock:
             self._under_way.discard(place)
             begun = self._known().get(place)
-            if begun is None:
+            if begun is None or not known:
                 return
             if response is None or response.status_code >= REFUSED:
                 self._write(begun.model_copy(update={"at_s": 0.0}))
@@ -120,7 +129,8 @@ class AnswerStore:
                 known[answer.place] = answer
             while len(known) > MOST_KEPT:
                 known.pop(next(iter(known)))
-            with self._file.open("a", encoding="utf-8") as file:
+            fd = os.open(self._file, os.O_WRONLY | os.O_APPEND | os.O_CREAT, PRIVATE)
+            with os.fdopen(fd, "a", encoding="utf-8") as file:
                 file.write(answer.model_dump_json() + "\n")
             self._seen = file_state(self._file)
 
@@ -128,7 +138,7 @@ class AnswerStore:
 def _undecided(under_way: bool) -> RequestRefused:
     if under_way:
         return RequestRefused(409, "in-progress", "the request with this Idempotency-Key is still being answered; wait")
-    text = "the service ended while it answered this request: look whether it took effect, and use a new key"
+    text = "the service ended or failed while it answered: look whether it took effect, and use a new key"
     return RequestRefused(409, "outcome-unknown", text)
 
 
@@ -137,16 +147,23 @@ def holds_secret(path: str) -> bool:
     return "/tokens" in path or "/auth/" in path
 
 
-def idempotent(store: AnswerStore) -> type[APIRoute]:
-    """Routes whose POST heeds an Idempotency-Key; an endpoint that is given a thread follows the event loop there."""
+class FollowingRoute(APIRoute):
+    """Whose endpoint, where it is given a thread, follows the event loop there."""
 
-    class IdempotentRoute(APIRoute):
+    def __init__(self, path: str, endpoint: Callable[..., Any], **stated: Any) -> None:
+        super().__init__(path, following(endpoint), **stated)
+
+
+def idempotent(store: AnswerStore) -> type[FollowingRoute]:
+    """Routes whose POST heeds an Idempotency-Key."""
+
+    class IdempotentRoute(FollowingRoute):
         """A stop that is asked for twice stops twice; what answers with a secret keeps none."""
 
         def __init__(self, path: str, endpoint: Callable[..., Any], **stated: Any) -> None:
             rights = stated.get("dependencies") or ()
             self._keeps = "POST" in (stated.get("methods") or ()) and not holds_secret(path) and STOP not in rights
-            super().__init__(path, following(endpoint), **stated | {"dependencies": [*rights, *[NAMED] * self._keeps]})
+            super().__init__(path, endpoint, **stated | {"dependencies": [*rights, *[NAMED] * self._keeps]})
 
         def get_route_handler(self) -> Handler:
             handler = super().get_route_handler()
@@ -178,8 +195,12 @@ async def _once(store: AnswerStore, place: str, request: Request, handler: Handl
         body = base64.b64decode(before.body)
         return Response(body, before.status, {**before.headers, "Idempotent-Replayed": "true"})
     response: Response | None = None
+    known = True
     try:
         response = await handler(request)
+    except BaseException as error:
+        known = isinstance(error, FORESEEN)
+        raise
     finally:
-        store.end(place, response)
+        store.end(place, response, known)
     return response

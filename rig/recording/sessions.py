@@ -6,6 +6,7 @@ behind (a crash), the recordings in the folder stand in for it. ``parquet/`` is 
 
 import json
 import math
+import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -24,6 +25,8 @@ PARQUET_FOLDER = "parquet"
 JsonTable = dict[str, JsonValue]
 # JSON has no NaN: an unknown number is null in the file and NaN here.
 Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
+# Files are called by a trial's name, also where somebody else wrote the list: it leads nowhere.
+TRIAL_NAME = re.compile(r"[^/\0.][^/\0]*")
 
 
 @dataclass(frozen=True)
@@ -151,7 +154,7 @@ def open_session(folder: Path) -> Session:
     if info is None and not found:
         raise DataError(f"{folder}: no session here: neither {SESSION_FILE} nor a recording (*.mcap) that opens")
     info = info or _info_from(found[0])
-    kept = [trial for trial in info.trials if trial.file in files]
+    kept = [_safely_named(trial) for trial in info.trials if trial.file in files]
     remarks += [
         f"trial {trial.name}: its recording {trial.file} is missing" for trial in info.trials if trial.file not in files
     ]
@@ -231,6 +234,10 @@ def _value(text: str) -> JsonValue:
     except ValueError:
         return text
     return found
+
+
+def _safely_named(trial: TrialInfo) -> TrialInfo:
+    return trial if TRIAL_NAME.fullmatch(trial.name) else replace(trial, name=Path(trial.file).stem)
 
 
 def _trial_from(recording: Recording) -> TrialInfo:

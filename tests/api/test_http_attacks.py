@@ -10,13 +10,15 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from api.http import app
 from api.http.access.access import Access
 from api.http.routes import recordings
 from api.http.service import Service
 from api.operations import motion
 from mock_devices.testing.access import ADDRESS, client_of
+from rig.config.wiring import Wiring
 from rig.results.bench import RetractResult
-from tests.api.catalogue.made import make_session
+from tests.api.catalogue.made import MODEL, make_session
 from tests.api.jobs import conftest, test_verbs
 from tests.api.jobs.asked import begun, ended
 from tests.api.jobs.test_computing import planted
@@ -123,6 +125,28 @@ def test_a_name_of_any_letters_comes_back_as_it_is_and_adds_no_header(client: Te
     assert answer.status_code == 200 and "x-planted" not in answer.headers
 
 
+@pytest.mark.parametrize("name", ["a\nb.json", "a\r\nX-Planted: 1.json", "\u2028ü;'.json"])
+def test_a_file_of_any_letters_is_downloaded_where_its_list_says(client: TestClient, first: Path, name: str) -> None:
+    (first / name).write_text("{}")
+    listed = {each["name"]: each["href"] for each in client.get(f"/api/v1/sessions/{first.name}").json()["files"]}
+    answer = client.get(listed[name])
+    assert (answer.status_code, answer.content) == (200, b"{}") and "x-planted" not in answer.headers
+
+
+def test_no_look_at_a_session_follows_a_link_out_of_it(client: TestClient, first: Path, tmp_path: Path) -> None:
+    (tmp_path / "protocols" / "p.toml").write_text('kind = "indentation"\ndepth_mm = 8\n')
+    other = tmp_path / "elsewhere"
+    other.mkdir()
+    (recorded,) = first.glob("*.mcap")
+    recorded.rename(other / recorded.name)
+    recorded.symlink_to(other / recorded.name)
+    shutil.copy(MODEL, other / "model.json")
+    (first / "fit").symlink_to(other)
+    for path in ("sessions/first/curves", "protocols/p/foresight?session=first"):
+        answer = client.get(f"/api/v1/{path}")
+        assert (answer.status_code, answer.json()["code"]) == (409, "link"), path
+
+
 def test_a_session_that_is_removed_under_the_service_is_told_and_hides_no_other(
     client: TestClient, service: Service, first: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -148,6 +172,22 @@ def test_a_session_that_is_removed_while_it_is_worked_on_fails_that_job_in_a_sen
     done = ended(client, begun(client, "verify", session=first.name))
     assert (done["state"], done["problem"]["code"]) == ("failed", "data")
     assert done["message"].endswith("session.json: No such file or directory")
+
+
+def test_what_is_told_of_subjects_stays_on_no_disk_and_the_page_is_asked_for_again(
+    first: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """RFC 9111, 5.2.2.5: what is not to be stored says so; OWASP ASVS asks for it wherever data are sensitive."""
+    (tmp_path / "index.html").write_text("a page")
+    monkeypatch.setattr(app, "BUILT", tmp_path)
+    served = client_of(Service(Wiring(), first.parent, tmp_path))
+    for path in ("subjects", "rig", f"recordings/{first.name}/session.json", "none"):
+        assert served.get(f"/api/v1/{path}").headers["cache-control"] == "no-store", path
+    for path in ("/", "/page/index.html"):
+        again = served.get(path)
+        assert (again.text, again.headers["cache-control"]) == ("a page", "no-cache")
+    known = served.get("/page/index.html", headers={"If-None-Match": again.headers["etag"]})
+    assert (known.status_code, known.headers["cache-control"]) == (304, "no-cache")
 
 
 def refusing(*_: object) -> Any:

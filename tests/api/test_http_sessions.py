@@ -2,6 +2,8 @@
 
 import errno
 import io
+import os
+import time
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +17,7 @@ from api.http import room
 from api.http.access.scopes import Scope
 from api.http.cohorts.params import FitCohortParams
 from api.http.jobs import views as job_views
+from api.http.jobs.kept import EXPORTS
 from api.http.jobs.kinds import KINDS
 from api.http.jobs.params import ExportParams, FitParams, ModelRef, SimulateParams
 from api.http.models import RequestBody
@@ -211,6 +214,22 @@ def test_a_session_is_sent_in_each_format_and_made_once(
     client.get(f"{API}/first/export/hdf5")
     assert len(client.get("/api/v1/jobs?kind=export").json()["items"]) == 3
     assert client.get(f"{API}/first/export/xls").status_code == 422
+
+
+def test_exports_of_a_session_as_it_was_go_after_a_week(client: TestClient, service: Service, first: Path) -> None:
+    client.get(f"{API}/first/export/mcap")
+    exports = service.jobs.folder / EXPORTS
+    (old,) = exports.iterdir()
+    (left := exports / ".of-a-service-that-was-killed").mkdir()
+    for path, days in ((old, 6.9), (left, 7.1)):
+        os.utime(path, (time.time() - days * 24 * 3600,) * 2)
+    (first / "session.json").touch()
+    client.get(f"{API}/first/export/mcap")
+    assert old.exists() and not left.exists() and len(list(exports.iterdir())) == 2
+    os.utime(old, (time.time() - 7.1 * 24 * 3600,) * 2)
+    (first / "session.json").touch()
+    client.get(f"{API}/first/export/mcap")
+    assert not old.exists() and len(list(exports.iterdir())) == 2
 
 
 def test_a_session_is_erased_in_two_steps_by_whoever_may(client: TestClient, first: Path) -> None:

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from base64 import b64decode
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,13 @@ import pytest
 from fastapi import Response
 from fastapi.testclient import TestClient
 
-from api.http.answers import forget, read_answers
-from api.http.idempotency import KEPT_S, AnswerStore
+from api.http.access.rights import OPERATE
+from api.http.answers import ANSWERS, forget, read_answers
+from api.http.app import build
+from api.http.idempotency import KEPT_S, AnswerStore, idempotent
 from api.http.problems import RequestRefused
 from api.http.service import Service
-from mock_devices.testing.access import client_of
+from mock_devices.testing.access import ADDRESS, bearer, client_of
 from mock_devices.testing.clock import Clock
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.wiring import Wiring
@@ -84,6 +87,17 @@ def test_answers_outlast_the_service(service: Service) -> None:
     assert sent(client_of(later), "a").json()["id"] == first
 
 
+def test_no_other_account_reads_the_lease_of_who_is_in_control(service: Service) -> None:
+    client = client_of(service)
+    lease = client.post("/api/v1/control/lease", json={"holder": "Ann"}).json()["lease_id"]
+    file = service.jobs.folder / ANSWERS
+    (kept,) = read_answers(file).values()
+    assert lease.encode() in b64decode(kept.body) and oct(file.stat().st_mode & 0o777) == "0o600"
+    file.chmod(0o644)  # as an earlier program wrote it
+    sent(client_of(Service(service.wiring, service.sessions, service.protocols)), "a")
+    assert oct(file.stat().st_mode & 0o777) == "0o600"
+
+
 def test_a_stop_with_a_key_stops_each_time_and_a_secret_is_not_kept(service: Service) -> None:
     client = client_of(service)
     calls: list[str] = []
@@ -119,6 +133,24 @@ def test_a_service_that_died_in_the_middle_says_that_it_does_not_know(tmp_path: 
     with pytest.raises(RequestRefused, match="look whether it took effect") as refused:
         AnswerStore(tmp_path / "answers.jsonl", Clock().seconds).begin("p", b"x")
     assert refused.value.code == "outcome-unknown"
+
+
+def test_what_ended_in_an_error_of_our_own_is_not_done_again_under_its_key(
+    service: Service, store: AnswerStore
+) -> None:
+    begun = list[bool]()
+
+    def fail() -> None:
+        begun.append(True)
+        raise ZeroDivisionError("planted")
+
+    app = build(service)
+    route = idempotent(store)
+    app.router.add_api_route("/planted", fail, methods=["POST"], dependencies=[OPERATE], route_class_override=route)
+    client = TestClient(app, ADDRESS, raise_server_exceptions=False, headers=bearer() | {"Idempotency-Key": "a"})
+    answers = [client.post("/planted") for _ in range(2)]
+    assert [(each.status_code, each.json()["code"]) for each in answers] == [(500, "error"), (409, "outcome-unknown")]
+    assert len(begun) == 1
 
 
 def test_an_answer_is_kept_for_a_day(tmp_path: Path) -> None:

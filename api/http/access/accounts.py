@@ -14,6 +14,7 @@ from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
 
 from api.http.access.scopes import WORDS, Caller, Scope, ScopeWord
+from api.http.access.secrets import digest
 from api.http.access.store import KeptModel, PrivateFile
 from rig.errors import UsageError
 
@@ -33,8 +34,13 @@ class Account(KeptModel):
 
     @property
     def caller(self) -> Caller:
-        """Who this is."""
-        return Caller(self.name, WORDS[self.scope], "", "login")
+        """Who this is, by this password."""
+        return Caller(self.name, WORDS[self.scope], self.mark, "login")
+
+    @property
+    def mark(self) -> str:
+        """Tells one password from the next, and nothing of it."""
+        return digest(self.argon2)[:8]
 
 
 class Accounts(KeptModel):
@@ -63,8 +69,9 @@ class AccountStore:
         return self._file.read().accounts
 
     def has(self, caller: Caller) -> bool:
-        """Whether the account that ``caller`` logged in with is still there, and allows as much."""
-        return any((one.name, WORDS[one.scope]) == (caller.name, caller.scope) for one in self.accounts())
+        """Whether the account that ``caller`` logged in with is still there, has that password, and allows as much."""
+        known = (one for one in self.accounts() if (one.name, WORDS[one.scope]) == (caller.name, caller.scope))
+        return any(caller.id.startswith(one.mark) for one in known)
 
     def set(self, name: str, scope: Scope, password: str) -> None:
         """A new account, or a new password and scope of one; raises UsageError where the password is too short."""

@@ -101,5 +101,5 @@ class Logins:
 
     def enter(self, caller: Caller) -> tuple[Caller, str]:
         """Logs a browser in; the secret is for its cookie."""
-        known = replace(caller, id=digest(new_secret())[:8])
+        known = replace(caller, id=caller.id + digest(new_secret())[:8])
         return known, self.browsers.add(known)

@@ -1,7 +1,9 @@
 """What jobs keep of sessions, beside their folder: it goes when those are erased."""
 
+import contextlib
 import json
 import shutil
+import time
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,6 +12,8 @@ from api.http.answers import ANSWERS, forget
 from api.operations.cohort import kept
 
 RECORD, EXPORTS = "job.json", "exports"
+# Exports and pictures of jobs are made again when they are wanted.
+KEPT_S = 7 * 24 * 3600.0
 Facts = Mapping[str, Any]
 
 
@@ -30,6 +34,14 @@ def erase_kept(sessions: Path, names: Collection[str]) -> None:
         if folder.exists():
             shutil.rmtree(folder)
     kept.forget_oldest(0)
+
+
+def forget_old(exports: Path) -> None:
+    """Removes exports older than a week, of a session as it is or was, and what a service that was killed began."""
+    for path in exports.iterdir():
+        with contextlib.suppress(OSError):  # another removes it too
+            if time.time() - path.stat().st_mtime > KEPT_S:
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 def works_on(job: Facts, names: Collection[str]) -> bool:

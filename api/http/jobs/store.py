@@ -10,7 +10,7 @@ from pathlib import Path
 from api.catalogue.pages import Place
 from api.http.access.secrets import steady_s
 from api.http.jobs.job import stamp
-from api.http.jobs.kept import RECORD
+from api.http.jobs.kept import KEPT_S, RECORD
 from api.http.jobs.views import FILES, JobView
 from api.http.models import JobProblem, JobSummary
 from api.http.shared_file import FileState, file_state
@@ -20,8 +20,6 @@ from rig.recording.files import make_folder, write_text
 LOCK = "lock"
 # A busy month of a lab; each has a record of some kilobytes.
 MOST_JOBS = 500
-# Files of jobs are exports and pictures, made again when they are wanted.
-FILES_KEPT_S = 7 * 24 * 3600.0
 INTERRUPTED = "the service ended while this was under way; look at what it left, and start it again if it is wanted"
 
 
@@ -116,7 +114,7 @@ class JobStore:
         for job in newest[:MOST_JOBS]:
             folder = self.files(job.id)
             with contextlib.suppress(OSError):
-                if self._now_s() - self._ended_s.get(job.id, folder.stat().st_mtime) > FILES_KEPT_S:
+                if self._now_s() - self._ended_s.get(job.id, folder.stat().st_mtime) > KEPT_S:
                     shutil.rmtree(folder, ignore_errors=True)
 
 

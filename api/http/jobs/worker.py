@@ -4,6 +4,7 @@ Its order comes as the first line of standard input, what it finds goes out as l
 is gone, and so is this. What libraries print goes to standard error.
 """
 
+import contextlib
 import os
 import queue
 import signal
@@ -28,6 +29,7 @@ from rig.results.base import SavedResult
 
 # A third of a normal program's share of a busy computer: a fit may wait for a page, and never the other way.
 NICENESS = 5
+FIRST_TO_END = "1000"  # proc(5): the most there is
 # A stop by the service's signal (as by systemd) is an end in order; of what was asked to end it is the last word.
 ENDED = 1
 
@@ -128,6 +130,8 @@ def main() -> None:
     order = Order.model_validate_json(sys.stdin.readline())
     if not order.stop_word:  # a drive waits for nobody
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)  # whatever the service's own is
+        with contextlib.suppress(OSError):  # of which memory is taken first, not of loop, recorder or service
+            Path("/proc/self/oom_score_adj").write_text(FIRST_TO_END)
     threading.Thread(target=pipes.listen, name="service", daemon=True).start()
     compute(order, pipes)
 

@@ -20,7 +20,7 @@ from api.http.access.models import (
     TokenRequest,
     TokenView,
 )
-from api.http.access.rights import ADMIN, PUBLIC, READ
+from api.http.access.rights import ADMIN, CALLER, PUBLIC, READ
 from api.http.access.scopes import WORDS, Caller, ScopeWord
 from api.http.listing import Listing, listing
 from api.http.problems import RequestRefused, responses
@@ -120,6 +120,7 @@ async def _checked(service: Service, sent: LoginRequest, request: Request) -> Ca
 
 def _enter(service: Service, caller: Caller, request: Request, response: Response) -> Me:
     known, secret = service.access.logins.enter(caller)
+    request.scope[CALLER] = known  # for the audit log
     service.events.publish("access", "login", f"{known.name} logged in")
     secure = request.url.scheme == "https"
     response.set_cookie(_cookie(request), secret, path="/", httponly=True, samesite="strict", secure=secure)

@@ -20,10 +20,13 @@ from api.catalogue.queries import Asked
 from api.catalogue.subjects import erase_subject, export_subject
 from api.http.access.rights import ADMIN, CALLER, OPERATE, READ
 from api.http.access.scopes import Scope
+from api.http.jobs.kept import EXPORTS
 from api.http.models import RequestBody
 from api.http.problems import RequestRefused, responses
+from api.http.room import refuse_full, size_of
 from api.http.routes.common import MatchHeader, PageQuery, Word, etag_of, refuse_stale
 from api.http.service import Service
+from rig.recording.files import make_folder
 from rig.results.base import SavedResult
 from rig.results.catalogue import (
     CatalogueResult,
@@ -83,7 +86,7 @@ def add(router: APIRouter, service: Service) -> None:
     """Its routes."""
     lists = Catalogue(service.sessions)
     _lists(router, lists)
-    _export(router, lists)  # before them: a code may have any character, so what follows it is looked for first
+    _export(router, service, lists)  # before them: a code may have any character, so what follows it is sought first
     _one_subject(router, lists)
     _changes(router, service, lists)
 
@@ -136,7 +139,9 @@ def entry_of(lists: Catalogue, subject: str) -> SubjectEntry | None:
         return None
 
 
-def _export(router: APIRouter, lists: Catalogue) -> None:
+def _export(router: APIRouter, service: Service, lists: Catalogue) -> None:
+    exports = service.jobs.folder / EXPORTS
+
     @router.get(
         "/subjects/{subject:path}/export",
         dependencies=[OPERATE],
@@ -144,11 +149,16 @@ def _export(router: APIRouter, lists: Catalogue) -> None:
         response_class=FileResponse,
         responses={
             200: {"content": {"application/zip": {}}},
-            **responses("404 no-such-subject", "422 refused", "503 catalogue"),
+            **responses("404 no-such-subject", "422 refused", "503 catalogue", "507 disk-full"),
         },
     )
     def export(subject: str) -> FileResponse:
-        scratch = tempfile.TemporaryDirectory(prefix="rig-export-")
+        make_folder(exports)
+        with answering():
+            found = lists.history(subject).sessions
+        refuse_full(exports, sum(size_of(lists.root / each.session) for each in found))
+        # Not where the system keeps such things, which may be in memory, and out of reach of an erasure.
+        scratch = tempfile.TemporaryDirectory(prefix=".", dir=exports)
         archive = Path(scratch.name) / "subject.zip"
         try:
             with answering():

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from fastapi import Depends, Header, Query
 from pydantic import BaseModel
+from starlette.convertors import PathConvertor, register_url_convertor
 from starlette.requests import HTTPConnection
 
 from api.catalogue.pages import Page
@@ -14,6 +15,15 @@ from api.http.access.scopes import Caller
 from api.http.problems import RequestRefused
 
 PREFIX = "/api/v1"
+
+
+class AnyPath(PathConvertor):
+    """The rest of an address, also with an end of a line in it: a subject's code or a file's name may have one."""
+
+    regex = "(?s:.*)"
+
+
+register_url_convertor("path", AnyPath())
 
 MatchHeader = Annotated[str, Header(alias="If-Match", max_length=80, description="the ETag of what is to be changed")]
 LeaseHeader = Annotated[str, Header(alias="X-Control-Lease", description="lease_id of the lease in force")]

@@ -9,6 +9,7 @@ from fastapi import APIRouter
 from pydantic import Field
 
 from api.http.access.rights import READ
+from api.http.jobs.places import refuse_links
 from api.http.problems import RequestRefused, responses
 from api.http.service import Service
 from rig.errors import DataError, RigError
@@ -60,10 +61,10 @@ def add(router: APIRouter, service: Service) -> None:
         "/sessions/{session}/curves",
         dependencies=[READ],
         summary="Force and depth of every recording, thinned for a plot",
-        responses=responses("404 no-such-session", "409 no-recording"),
+        responses=responses("404 no-such-session", "409 link", "409 no-recording"),
     )
     def curves(session: str) -> CurvesView:
-        folder = service.session(session)
+        refuse_links(folder := service.session(session))
         try:
             found = open_session(folder)
         except RigError as error:

@@ -52,7 +52,7 @@ def add(router: APIRouter, service: Service) -> None:
         "/protocols/{name}/foresight",
         dependencies=[READ],
         summary="Force and depth to be expected of a protocol, by the model of a session where one is given",
-        responses=responses("404 no-such-protocol", "404 no-such-session", "422 refused"),
+        responses=responses("404 no-such-protocol", "404 no-such-session", "409 link", "422 refused"),
     )
     def foresight(
         name: Name,
@@ -60,7 +60,7 @@ def add(router: APIRouter, service: Service) -> None:
         file: ModelFolder = "fit",
     ) -> Foresight:
         plan = service.plan(name)
-        model = load_model(service.session(session) / file / "model.json") if session else None
+        model = load_model(service.jobs.places("").session(session) / file / "model.json") if session else None
         return foresee(name, plan, model, refusal(plan, service))
 
 

@@ -15,7 +15,7 @@ from api.http import views
 from api.http.access.rights import ADMIN, READ
 from api.http.downloads import FileAsOfNow, files_at
 from api.http.erasing import Confirm, SessionErasure, state_of, to_confirm
-from api.http.jobs.kept import EXPORTS
+from api.http.jobs.kept import EXPORTS, forget_old
 from api.http.jobs.kinds import ExportJob
 from api.http.jobs.params import ExportParams
 from api.http.jobs.start import start
@@ -85,10 +85,10 @@ def _exports(router: APIRouter, service: Service) -> None:
         "A session in another format as one file, made when it is first asked for; HEAD and ranges are served",
     )
     async def export(session: str, form: Format) -> Response:
-        folder = service.session(session)
-        file = service.jobs.folder / EXPORTS / f"{state_of(folder)}.{form}.zip"
-        if form not in FOLDERS and form != "mcap":
-            file = file.with_name(f"{state_of(folder)}.{NAMES[form]}")
+        # In a thread: a session may have thousands of files, and no stop waits for a look at them.
+        state = await asyncio.to_thread(state_of, service.session(session))
+        whole = form in FOLDERS or form == "mcap"
+        file = service.jobs.folder / EXPORTS / f"{state}.{f'{form}.zip' if whole else NAMES[form]}"
         if not file.is_file():
             making = _made(service, session, form, file)
             if not await _awaited(under_way, file, making):
@@ -118,6 +118,7 @@ async def _awaited(under_way: dict[Path, asyncio.Task[None]], file: Path, making
 async def _made(service: Service, session: str, form: Format, file: Path) -> None:
     """By a job, as everything that takes long."""
     file.parent.mkdir(parents=True, exist_ok=True)
+    await asyncio.to_thread(forget_old, file.parent)
     if form == "mcap":
         folder = await asyncio.to_thread(service.jobs.places("").session, session)
         await asyncio.to_thread(_zipped, folder, file)

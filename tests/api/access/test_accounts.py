@@ -117,6 +117,16 @@ def test_a_person_logs_in_and_is_out_when_the_account_is_removed(service: Servic
         service.access.accounts.remove("ann")
 
 
+def test_another_password_logs_out_whoever_came_in_by_the_one_before(service: Service) -> None:
+    before, after = client_of(service, scope=None), client_of(service, scope=None)
+    assert login(before, "ann", PASSWORD) == 200
+    service.access.accounts.set("ben", Scope.OPERATE, PASSWORD)
+    assert before.get("/api/v1/auth/me").status_code == 200
+    service.access.accounts.set("ann", Scope.OPERATE, PASSWORD + "!")
+    assert login(after, "ann", PASSWORD + "!") == 200
+    assert [client.get("/api/v1/auth/me").status_code for client in (before, after)] == [401, 200]
+
+
 def test_wrong_passwords_are_few_and_then_slow(service: Service, clock: Clock) -> None:
     client = client_of(service, scope=None)
     assert [login(client, "ann", "wrong password") for _ in range(6)] == [401] * 5 + [429]

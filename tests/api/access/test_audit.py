@@ -127,6 +127,35 @@ def test_what_acts_is_recorded_with_its_outcome_and_looking_is_not(service: Serv
     ]
 
 
+def test_who_logged_in_is_recorded_and_by_which_way(service: Service) -> None:
+    password = "a few words are a password"
+    service.access.accounts.set("Ben", Scope.READ, password)
+    for path, sent in (
+        ("ticket", {"ticket": service.access.logins.ticket("Ann")}),
+        ("login", {"name": "Ben", "password": password + "!"}),
+        ("login", {"name": "Ben", "password": password}),
+    ):
+        client_of(service, scope=None).post(f"/api/v1/auth/{path}", json=sent)
+    service.access.accounts.remove("Ben")
+    assert said(service) == [
+        ("Ann", "POST /api/v1/auth/ticket", "200"),
+        ("", "POST /api/v1/auth/login", "401 password"),
+        ("Ben", "POST /api/v1/auth/login", "200"),
+    ]
+    assert [line.credential.partition(" ")[0] for line in service.access.audit.entries()] == ["link", "", "login"]
+
+
+def test_what_ended_in_an_error_of_our_own_is_recorded_too(service: Service) -> None:
+    def fail() -> None:
+        raise ZeroDivisionError("planted")
+
+    app = build(service)
+    app.post("/api/v1/planted", dependencies=[OPERATE])(fail)
+    client = TestClient(app, ADDRESS, raise_server_exceptions=False, client=("127.0.0.1", 50_000))
+    assert client.post("/api/v1/planted", headers=bearer(Scope.OPERATE)).json()["code"] == "error"
+    assert said(service) == [("test", "POST /api/v1/planted", "500 error")]
+
+
 def test_secrets_are_in_no_line(service: Service) -> None:
     client = client_of(service)
     secret = client.post("/api/v1/tokens", json={"name": "planted", "scope": "read"}).json()["token"]

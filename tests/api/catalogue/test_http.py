@@ -5,15 +5,20 @@ import shutil
 import threading
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
+from urllib.parse import quote
 
 import pytest
 from fastapi.testclient import TestClient
 
 from api.catalogue import subjects
 from api.catalogue.catalogue import Catalogue, default_file
+from api.http import room
 from api.http.access.scopes import Scope
+from api.http.jobs.kept import EXPORTS
 from api.http.jobs.kinds import KINDS
 from api.http.jobs.params import VerifyParams
+from api.http.routes import catalogue
 from api.http.service import Service
 from controller.operation import Operation
 from mock_devices.testing.access import bearer, client_of
@@ -154,17 +159,33 @@ def test_of_two_who_name_at_once_one_is_told(client: TestClient) -> None:
     assert sorted(found) == [200, 412, 412, 412]
 
 
-def test_an_archive_is_sent_whole_and_leaves_no_file(
-    client: TestClient, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    before = set(tmp_path.iterdir())
+def test_an_archive_is_sent_whole_and_leaves_no_file(client: TestClient, service: Service) -> None:
     answer = client.get(f"{API}/subjects/S01/export", headers=as_(Scope.OPERATE))
     assert answer.headers["content-type"] == "application/zip"
     with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
         assert archive.testzip() is None and "sessions/first/trial_001.mcap" in archive.namelist()
     assert client.get(f"{API}/subjects/S99/export").status_code == 404
-    assert {path for path in tmp_path.iterdir() if path.name.startswith("rig-export")} <= before
+    assert not list((service.jobs.folder / EXPORTS).iterdir())
+
+
+def test_an_archive_leaves_the_room_that_recordings_need_and_is_made_beside_them(
+    client: TestClient, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    exports, made = service.jobs.folder / EXPORTS, list[Path]()
+
+    def make(_lists: Catalogue, _subject: str, out: Path) -> None:
+        made.append(out)
+        out.write_bytes(b"zip")
+
+    monkeypatch.setattr(catalogue, "export_subject", make)
+    assert client.get(f"{API}/subjects/S01/export").content == b"zip"
+    assert made[0].parents[1] == exports
+    free_bytes = room.LEFT_FREE_BYTES + room.size_of(service.sessions / "first")
+    for spare, status in ((0, 200), (-1, 507)):
+        usage = SimpleNamespace(free=free_bytes + spare)
+        monkeypatch.setattr("shutil.disk_usage", lambda _, usage=usage: usage)
+        assert client.get(f"{API}/subjects/S01/export").status_code == status
+    assert len(made) == 2 and not list(exports.iterdir())
 
 
 def test_a_subject_is_erased_in_two_steps(client: TestClient, lab: Path) -> None:
@@ -177,6 +198,20 @@ def test_a_subject_is_erased_in_two_steps(client: TestClient, lab: Path) -> None
     assert (done.status_code, done.json()["done"]) == (200, True)
     assert not (lab / "first").exists() and (lab / "second").exists()
     assert client.get(f"{API}/subjects/S01").status_code == 404
+
+
+@pytest.mark.parametrize("code", ["S\n03", "S/03/name", "\r\nX-Planted: 1", "\u2028"])
+def test_a_subject_whose_code_has_any_character_is_shown_named_sent_and_erased(
+    client: TestClient, lab: Path, code: str
+) -> None:
+    make_session(lab, "third", {"id": f"S03{code}S03", "site": "calf"})
+    at = f"{API}/subjects/{quote(f'S03{code}S03', safe='')}"
+    shown = client.get(at)
+    assert (shown.status_code, shown.json()["subject"]["sessions"]) == (200, 1)
+    assert client.put(f"{at}/name", json={"name": NAME}, headers={"If-Match": "*"}).status_code == 200
+    assert client.get(f"{at}/export").headers["content-type"] == "application/zip"
+    done = client.delete(at, params={"confirm": client.delete(at).json()["confirm"]})
+    assert done.json()["done"] and not (lab / "third").exists() and (lab / "second").exists()
 
 
 @pytest.mark.parametrize("address", ["subjects/S01", "sessions/first"])

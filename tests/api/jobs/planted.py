@@ -81,8 +81,9 @@ def talkative(operation: Operation, _asked: VerifyParams, _desk: Desk) -> Verify
 
 
 def nice(operation: Operation, _asked: VerifyParams, _desk: Desk) -> VerifyResult:
-    """Says at what priority it computes."""
+    """Says at what priority it computes, and how far before others the system ends it where memory runs out."""
     operation.say(f"nice {os.getpriority(os.PRIO_PROCESS, 0)}")
+    operation.say(f"ended first: {Path('/proc/self/oom_score_adj').read_text().strip()}")
     return WHOLE
 
 

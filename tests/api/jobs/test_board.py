@@ -14,6 +14,7 @@ from fastapi.testclient import TestClient
 from api.http.jobs import board, store, views
 from api.http.jobs import job as job_module
 from api.http.jobs.board import JobBoard
+from api.http.jobs.kept import KEPT_S
 from api.http.jobs.kinds import KINDS
 from api.http.jobs.params import VerifyParams
 from api.http.service import Service
@@ -165,7 +166,7 @@ def test_a_clock_that_was_set_forward_takes_no_files(jobs: JobBoard, monkeypatch
     first = made(jobs)
     jobs.files(first).mkdir()
     real = time.time
-    monkeypatch.setattr(time, "time", lambda: real() + 2 * store.FILES_KEPT_S)
+    monkeypatch.setattr(time, "time", lambda: real() + 2 * KEPT_S)
     made(jobs)
     assert jobs.files(first).is_dir()
     last, seen = made(jobs), jobs._store._now_s()
@@ -181,7 +182,7 @@ def test_files_go_before_their_job_does(jobs: JobBoard, monkeypatch: pytest.Monk
     jobs.files(job).mkdir()
     made(jobs)
     assert jobs.files(job).is_dir()
-    monkeypatch.setattr(store, "FILES_KEPT_S", -1.0)
+    monkeypatch.setattr(store, "KEPT_S", -1.0)
     made(jobs)
     assert not jobs.files(job).exists() and jobs.shown(job)
 

@@ -69,7 +69,7 @@ def test_what_computes_stands_back_though_the_service_goes_first(
         done = ended(client, begun(client, "verify", session=first.name))
     finally:
         go_at(before)
-    assert done["log"] == ["nice 5"]
+    assert done["log"] == ["nice 5", "ended first: 1000"]
 
 
 @pytest.mark.parametrize(("function", "longest_s"), [("patient", 20.0), ("deaf", 40.0)])

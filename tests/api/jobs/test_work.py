@@ -1,5 +1,6 @@
 """What each kind of job does is what its command does: same work, same result, results where they belong."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -28,6 +29,8 @@ from controller.operation import Cancelled, Operation
 from mock_devices.testing.models import index_model
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
+from rig.recording.export import Format
+from rig.recording.sessions import open_session
 from rig.results.fit import FitResult
 from rig.tissue.model import load_model
 from tests.rig.recording.measured import measured
@@ -160,6 +163,21 @@ def test_results_of_an_upload_are_the_jobs_own_and_the_upload_stays_as_it_was(de
     assert "report.html" in files_in(desk.places.files)
     assert any(name.startswith("csv/") for name in files_in(desk.places.files))
     assert files_in(desk.places.uploads) == before
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet", "hdf5"])
+@pytest.mark.parametrize("name", ["{root}/planted", "../../planted", "..", ""])
+def test_a_trial_whose_name_leads_out_of_an_upload_is_known_by_its_file(desk: Desk, form: Format, name: str) -> None:
+    root = desk.places.sessions.parent
+    shutil.copytree(desk.places.sessions / "first", upload := desk.places.uploads / "00000000000a")
+    listed = json.loads((upload / "session.json").read_text())
+    first = listed["trials"][0]
+    named, first["name"] = first["name"], name.format(root=root)
+    (upload / "session.json").write_text(json.dumps(listed))
+    before = files_in(root)
+    work_recordings.export(run(), ExportParams(upload=upload.name, formats=[form]), desk)
+    assert {name.partition("/")[0] for name in files_in(root) - before} == {"files"}
+    assert open_session(upload).trials[0].name == named == Path(first["file"]).stem
 
 
 def test_a_repair_leaves_the_session_as_it_was_recorded(desk: Desk) -> None:
