@@ -13,6 +13,7 @@ from rig.intake.labelling import Labels, labels_in, stated_in
 from rig.intake.mapping import FileForm
 from rig.intake.measured import beside, chosen, measured_in, ranks_of, spoilt
 from rig.intake.naming import channels_of, names_of
+from rig.intake.prose import with_prose
 from rig.intake.questions import JointQuestion, OpenQuestion, Question, inline
 from rig.intake.readers import kind_of
 from rig.intake.senses import doubts_of_senses
@@ -68,7 +69,7 @@ class Proposal:
 def propose(folder: Path) -> Proposal:
     """What the folder seems to hold; raises DataError where nothing in it may be a force and a position."""
     doubts, files = list[str](), files_in(folder)
-    groups = [_in_one(group) for group in groups_of(list(all_tables(files, doubts)))]
+    groups = [_in_one(group) for group in groups_of(list(with_prose(all_tables(files, doubts), folder)))]
     picked, recording = _picked(folder, groups)
     if not picked:
         raise nothing_found(folder, files, groups, doubts)
