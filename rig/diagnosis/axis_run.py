@@ -25,6 +25,8 @@ from rig.intake.units import ANGLE_RAD
 from rig.progress import Progress, silent
 from rig.registry import known
 from rig.trials.findings import Finding, inspect_stream, merge
+from rig.trials.stated import stated_findings
+from rig.trials.trial import Trial
 
 # White noise of the rows is the least there is: right models of made axes came to 1.32 times it, a wrong one to 6.9.
 MOST_OVER_WHITE = 1.5
@@ -66,7 +68,12 @@ def diagnose_axis(
 
 def _findings(recording: AxisRecording) -> list[Finding]:
     clocks = [Finding(recording.name, "effort", "clock", text.split(": ", 1)[-1]) for text in recording.remarks]
-    return [*clocks, *inspect_stream(recording.name, "effort", recording.time_s, recording.effort)]
+    said, none = recording.stated, np.zeros(0)
+    place_mm = recording.position * recording.one_mm
+    trial = Trial(recording.name, none, none, recording.time_s, place_mm, of_axis=True)
+    stated = replace(trial, speed_mm_s=said.speed_mm_s, depth_mm=said.depth_mm) if said else trial
+    effort = inspect_stream(recording.name, "effort", recording.time_s, recording.effort)
+    return [*clocks, *stated_findings(stated), *effort]
 
 
 def _is_left_out(name: str, facts: AxisFacts) -> bool:
