@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
 from itertools import chain, count
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import typer
 
@@ -16,7 +16,7 @@ from api.operations import records
 from rig.config.table import TomlTable
 from rig.errors import UsageError
 from rig.intake.mapping import MAPPING_FILE
-from rig.intake.proposal import OPEN, Proposal, propose
+from rig.intake.proposal import DOUBT, OPEN, Proposal, propose
 from rig.intake.questions import Question
 from rig.intake.rows import FIELDS
 from rig.recording.export import FORMATS, Format
@@ -25,10 +25,11 @@ from rig.recording.remote import address_of
 from rig.recording.sessions import TrialInfo
 from rig.results.came_in import NAME
 from rig.results.came_in_tables import short_parts
-from rig.results.recorded import RecordingResult
+from rig.results.recorded import ExportResult, ImportResult, RecordingResult
 from rig.results.tables import UNKNOWN, TextTable, cells
 from rig.trials.opening import Opening, is_recorded
 
+Remarked = TypeVar("Remarked", ImportResult, ExportResult)
 # A line of a terminal takes as many.
 MOST_NAMES = 3
 MADE = {"speed (mm/s)": "speed_mm_s:g", "depth (mm)": "depth_mm:g", "peak (N)": "peak_force_N:.2f"}
@@ -110,7 +111,14 @@ def import_(
     show(_trial_table(result.trials), *result.remarks)
     if result.came_in:
         show(*short_parts(result.came_in), f"{NAME}.svg, .csv and .json are in {out}")
-    write_json(json_file, result)
+    write_json(json_file, _with_doubts(result, chosen))
+
+
+def _with_doubts(result: Remarked, mapping: Path | None) -> Remarked:
+    """The result with what is still doubtful in the mapping that was proposed, as the terminal shows it."""
+    lines = mapping.read_text(errors="replace").splitlines() if mapping else []
+    doubts: list[str] = [line.removeprefix(DOUBT) for line in lines if line.startswith(DOUBT)]
+    return result.model_copy(update={"remarks": (*doubts, *result.remarks)})
 
 
 def mapping_for(place: Path, mapping: Path | None, out: Path, yes: bool) -> Path | None:
@@ -206,7 +214,7 @@ def export_(
     chosen = _formats(formats or list(FORMATS))
     opening = Opening(mapping_for(place, mapping, out, yes), only)
     result = compute("export", lambda operation: records.export_session(operation, place, out, chosen, opening))
-    write_json(json_file, result)
+    write_json(json_file, _with_doubts(result, opening.mapping))
 
 
 def _formats(asked: list[str]) -> list[Format]:

@@ -60,6 +60,7 @@ def _found(
             f"{opening.mapping or place}: no axis is there to simulate {reference} with; write [axis] into its mapping"
         )
     with opened(place, tell, opening) as session:
+        session.refuse_axis()
         trials = trials_of(session)
         found = diagnose_session(trials, simulation, tell)
         return with_tried_sizes(found, trials, progress=tell) if detectability else found

@@ -21,7 +21,7 @@ from rig.tissue.laws import Law
 from rig.tissue.model import load_model
 from rig.tissue.registry import COMPARED, LAWS, law_named
 from rig.tissue.study import Study, model_of, refuse_at_bounds, study_sessions
-from rig.trials.opening import AS_IT_IS, Opening, stated_mapping
+from rig.trials.opening import AS_IT_IS, Opening
 
 
 class Lattice(Protocol):
@@ -77,21 +77,9 @@ def fit(
     """Fits what ``places`` hold and writes all to ``out``, else to the one session's fit/; ``lattice`` adds its own."""
     target = target_of(places, out)
     refuse_unwritable(target / FILE)
-    _refuse_axis(places, opening)
     with ExitStack() as stack:
         sessions = [stack.enter_context(opened(place, operation.step, opening)) for place in places]
         return _fitted(operation, sessions, target, laws, lattice, drawn)
-
-
-def _refuse_axis(places: Sequence[Path], opening: Opening) -> None:
-    """Raises UsageError where a mapping says that there is no tissue."""
-    for place in places:
-        mapping = stated_mapping(place, opening.mapping)
-        if mapping is not None and mapping.axis is not None:
-            raise UsageError(
-                f"{place}: is a drive axis, as [axis] in its mapping says, and has no tissue to fit; "
-                "`rig diagnose` with the same place and mapping fits its mass and friction"
-            )
 
 
 def _fitted(

@@ -125,4 +125,4 @@ def export_session(
             operation.step(name, number / len(formats))
             written[name] = str(export(session, name, out / SUFFIXES[name]))
             operation.say(f"{name:8s}{written[name]}")
-    return ExportResult(session=str(place), written=written)
+    return ExportResult(session=str(place), written=written, remarks=session.remarks)

@@ -1,7 +1,7 @@
 """From evidence to words and numbers: findings with intervals and gains, what could have been seen."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -44,6 +44,11 @@ PROVISIONAL_SHARE = 0.2
 DRAWS = 1000  # 25 beyond each end of a 95 % interval
 NEAR_BOUND = 0.99  # sizes are no surer than 1.5 % (OPERATOR_SHARE)
 LARGEST_LOG = 20.0  # a factor of e^20 is beyond the bounds of every parameter, and is still a number
+# Why no size is stated from which a cause would have been found, by the verdict.
+HIDING = {
+    "unexplained": "not judged: something is left that no known cause explains, which may hide it",
+    "not judged": "not judged: nothing tells how much is left by chance, and what is left may hide it",
+}
 
 
 @dataclass(frozen=True)
@@ -183,6 +188,14 @@ def smallest_visible(t: Tangents, threshold: float) -> dict[str, SmallestSize]:
         par = first[name].amplitudes[0]
         result[name] = SmallestSize(max(float(np.median(found)), par.least), par.unit)
     return result
+
+
+def without_sizes(found: Diagnosis) -> Diagnosis:
+    """The diagnosis, with a reason for each size from which a cause would have been found where more may be left."""
+    reasons = dict.fromkeys(found.detectable, HIDING.get(found.verdict, ""))
+    if found.verdict not in HIDING:
+        return found
+    return replace(found, detectable={}, not_testable={**found.not_testable, **reasons})
 
 
 def limits(

@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from rig.diagnosis.answers import Diagnosis, sentence
+from rig.diagnosis.answers import Diagnosis, sentence, without_sizes
 from rig.diagnosis.axis import AxisProblem
 from rig.diagnosis.axis_floor import AxisErrors, left_out_errors, share_of
 from rig.diagnosis.axis_motion import Scales, noise_of, prepare
@@ -25,6 +25,8 @@ from rig.intake.units import ANGLE_RAD
 from rig.progress import Progress, silent
 from rig.registry import known
 from rig.trials.findings import Finding, inspect_stream, merge
+from rig.trials.stated import stated_findings
+from rig.trials.trial import Trial
 
 # White noise of the rows is the least there is: right models of made axes came to 1.32 times it, a wrong one to 6.9.
 MOST_OVER_WHITE = 1.5
@@ -58,7 +60,7 @@ def diagnose_axis(
     if search is None:
         return found
     errors = left_out_errors(search.before, search.after)
-    found = _without_sizes(_held_against_floor(found, errors, problem))
+    found = without_sizes(_held_against_floor(found, errors, problem))
     before, after = (in_own_units(fit, problem) for fit in (search.before, search.after))
     found = _in_own_units(found, problem.scales, search.after, after.values)
     return with_predictions(found, data, fitted, facts.controller, (before, after), references or {}, share_of(errors))
@@ -66,7 +68,12 @@ def diagnose_axis(
 
 def _findings(recording: AxisRecording) -> list[Finding]:
     clocks = [Finding(recording.name, "effort", "clock", text.split(": ", 1)[-1]) for text in recording.remarks]
-    return [*clocks, *inspect_stream(recording.name, "effort", recording.time_s, recording.effort)]
+    said, none = recording.stated, np.zeros(0)
+    place_mm = recording.position * recording.one_mm
+    trial = Trial(recording.name, none, none, recording.time_s, place_mm, of_axis=True)
+    stated = replace(trial, speed_mm_s=said.speed_mm_s, depth_mm=said.depth_mm) if said else trial
+    effort = inspect_stream(recording.name, "effort", recording.time_s, recording.effort)
+    return [*clocks, *stated_findings(stated), *effort]
 
 
 def _is_left_out(name: str, facts: AxisFacts) -> bool:
@@ -100,14 +107,6 @@ def _held_against_floor(found: Diagnosis, errors: AxisErrors, problem: AxisProbl
     depends = tuple(found.after.ranked[:1]) if found.after and not lost else ("recording",)
     findings = tuple(replace(one, provisional=True, confidence=one.confidence / 5) for one in found.findings)
     return replace(found, verdict="unexplained", findings=findings, depends_on=depends)
-
-
-def _without_sizes(found: Diagnosis) -> Diagnosis:
-    """No size is stated from which a cause would have been found where what is left may hide it."""
-    if found.verdict != "unexplained":
-        return found
-    reason = "not judged: something is left that no known cause explains, which may hide it"
-    return replace(found, detectable={}, not_testable={**found.not_testable, **dict.fromkeys(found.detectable, reason)})
 
 
 def _cannot(name: str, recordings: int, reason: str, quality: tuple[Finding, ...]) -> Diagnosis:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.diagnosis.answers import Diagnosis, answer, error_sources, intervals, limits
+from rig.diagnosis.answers import Diagnosis, answer, error_sources, intervals, limits, without_sizes
 from rig.diagnosis.design import next_experiment
 from rig.diagnosis.estimates import NextExperiment
 from rig.diagnosis.families import on_any_law, with_families
@@ -60,7 +60,7 @@ def judge(
     findings = tuple(sorted(answers, key=lambda found: -found.evidence_nats))
     visible, reasons = limits(problem, search_result, budget)
     progress("done", 1.0)
-    return Diagnosis(
+    result = Diagnosis(
         session=name,
         simulation=problem.title,
         recordings=problem.recordings,
@@ -79,6 +79,7 @@ def judge(
         after=found_after,
         budget=budget,
     )
+    return without_sizes(result)
 
 
 class Flaw(NamedTuple):

@@ -15,6 +15,7 @@ from rig.intake.folder import FoundTable, labels_of, natural
 from rig.intake.mapping import AxisFacts, DataMapping, Quantity
 from rig.intake.rows import Piece, way_of
 from rig.intake.session import grouped
+from rig.intake.stating import StatedFacts, stated_of
 from rig.intake.times import agreed_unit
 from rig.intake.units import factor_of
 
@@ -36,6 +37,7 @@ class AxisRecording:
 
     Positions are in one unit, ``effort`` in that of the drive, ``excitation`` in that of the control signal it is added
     to. ``one_clock`` is False where the effort has time stamps of another device; ``remarks`` say how they were found.
+    ``stated`` is in mm, of which one of position is ``one_mm``.
     """
 
     name: str
@@ -47,6 +49,8 @@ class AxisRecording:
     load_position: Array | None = None
     one_clock: bool = True
     remarks: tuple[str, ...] = ()
+    stated: StatedFacts | None = None
+    one_mm: float = 1.0
 
 
 class AxisData(NamedTuple):
@@ -63,6 +67,7 @@ class _Table(NamedTuple):
     time_s: Array
     values: Mapping[str, Array]
     remarks: tuple[str, ...]
+    stated: StatedFacts
 
 
 def read_axis(folder: Path, mapping: DataMapping, only: str = "") -> AxisData:
@@ -96,14 +101,17 @@ def _collected(folder: Path, mapping: DataMapping) -> dict[str, list[_Table]]:
             name = labels_of(table, piece.labels, mapping)["recording"] + part.suffix
             rows.setdefault((name, table.sheet.where), []).append((table, piece))
         for (name, _), read in rows.items():
-            found.setdefault(name, []).append(_joined(read, part.remarks(name)))
+            (table, piece), facts = read[0], mapping.facts_of(name)
+            stated = stated_of(facts, labels_of(table, piece.labels, mapping), table.sheet.where)
+            found.setdefault(name, []).append(_joined(read, part.remarks(name), stated))
     return found
 
 
-def _joined(read: Sequence[tuple[FoundTable, Piece]], remarks: Sequence[str]) -> _Table:
+def _joined(read: Sequence[tuple[FoundTable, Piece]], remarks: Sequence[str], stated: StatedFacts) -> _Table:
     batches = [piece for _, piece in read]
     values = {key: np.concatenate([piece.values[key] for piece in batches]) for key in batches[0].values}
-    return _Table(read[0][0], np.concatenate([piece.at_ns for piece in batches]) * 1e-9, values, tuple(remarks))
+    time_s = np.concatenate([piece.at_ns for piece in batches]) * 1e-9
+    return _Table(read[0][0], time_s, values, tuple(remarks), stated)
 
 
 def _recording(folder: Path, name: str, tables: Sequence[_Table], facts: AxisFacts) -> tuple[AxisRecording, AxisUnits]:
@@ -121,8 +129,9 @@ def _recording(folder: Path, name: str, tables: Sequence[_Table], facts: AxisFac
     }
     values = _at(motion.time_s, drive, facts.effort) / effort
     recording = AxisRecording(
-        name, motion.time_s, gone / way, values, **further, one_clock=motion is drive, remarks=motion.remarks
-    )
+        name, motion.time_s, gone / way, values, **further, one_clock=motion is drive, remarks=motion.remarks,
+        stated=motion.stated, one_mm=way,
+    )  # fmt: skip
     return recording, AxisUnits(position_unit, facts.effort_unit or effort_unit)
 
 

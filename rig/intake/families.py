@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 from rig.errors import DataError
 from rig.intake.layout import Layout, layouts_of
@@ -27,12 +28,20 @@ COMPONENTS = [set("012"), set("012345")]
 DIRECTIONS = frozenset("xyz")
 
 
+class Told(NamedTuple):
+    """What is said of a column beside its file: its unit, empty where that is not clear, by whom, and its header's."""
+
+    unit: str
+    said: str
+    own: str
+
+
 @dataclass(frozen=True)
 class ColumnGroup:
     """Columns of a sheet that belong together, by their numbers.
 
     ``index`` tells it from others beside it, ``called`` is what its place says it is, ``force`` another table's,
-    ``said`` what that says of the test.
+    ``said`` what that says of the test, ``told`` by column what is said beside the file.
     """
 
     path: Path
@@ -43,6 +52,7 @@ class ColumnGroup:
     called: str = ""
     force: Looks | None = None
     said: Mapping[str, str] = field(default_factory=dict)
+    told: Mapping[int, Told] = field(default_factory=dict)
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -79,6 +89,8 @@ class ColumnGroup:
 
     def unit(self, column: int) -> str:
         """The unit of a column, by its own words or by those of its place; empty where none is stated."""
+        if column in self.told:
+            return self.told[column].unit
         sheet = self.layout.sheet  # whose units are empty where a name and the row of units differ
         return sheet.units[column] or ("" if unit_of(sheet.header[column]) else unit_of(self.name(column)))
 
@@ -87,6 +99,11 @@ class ColumnGroup:
         unit = self.unit(column) or unit
         differ = not unit and unit_of(self.layout.sheet.header[column])
         return Meant([], False) if differ else meant(quantity, self.name(column), unit)
+
+    def told_of(self, column: int) -> list[str]:
+        """The doubt that says by whom a column's unit is known, or that it is not clear."""
+        said, taken = self.told.get(column), f"{self.path.name}: {self.layout.sheet.header[column]!r} is"
+        return [f"{taken} {'taken to be ' if said.unit else ''}in {said.said}"] if said else []
 
     def name(self, column: int) -> str:
         """All the words of a column, those of its place as well."""

@@ -73,9 +73,10 @@ StatedPositive = Annotated[Stated, AfterValidator(_above_zero)]
 
 
 class TimeColumn(Table):
-    """Where time is: a column of numbers in ``unit``, of ISO texts, of spreadsheet days, or a counter at a rate.
+    """Where time is: a column of numbers in ``unit``, of ISO texts, of days, or a counter at a rate.
 
-    ``form`` may be how texts are written instead, as `strptime` has it (``%H:%M:%S.%f``, ``%d.%m.%Y %H:%M:%S``).
+    Days are a spreadsheet's, or MATLAB's from year 0 (``datenum``). ``form`` may be how texts are written instead, as
+    `strptime` has it (``%H:%M:%S.%f``, ``%d.%m.%Y %H:%M:%S``).
     Without ``column`` rows are counted, at ``rate_Hz``. ``finer`` is a column of what ``column`` leaves out, in
     ``finer_unit``, as nanoseconds beside whole seconds; a counter that begins anew does so at ``wraps_at``.
     """
@@ -84,7 +85,7 @@ class TimeColumn(Table):
     finer: Place | None = None
     finer_unit: Literal["ms", "us", "ns"] = "ns"
     wraps_at: Positive | None = None
-    form: Literal["number", "iso", "spreadsheet", "counter"] | Annotated[str, Field(pattern="%")] = "number"
+    form: Literal["number", "iso", "spreadsheet", "datenum", "counter"] | Annotated[str, Field(pattern="%")] = "number"
     unit: str = ""
     rate_Hz: Annotated[Positive | None, Said] = None
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.config.table import TomlTable
 from rig.errors import DataError
-from rig.intake.families import COMPONENTS, DIRECTIONS, ColumnGroup, parts_of
+from rig.intake.families import COMPONENTS, DIRECTIONS, ColumnGroup, Told, parts_of
 from rig.intake.pulling import PULLS
 from rig.intake.questions import Choice, OpenQuestion
 from rig.intake.roles import UNIT_ALONE, WORDS, candidates, words_of
@@ -116,13 +116,17 @@ def _take(found: MeasuredColumns, table: ColumnGroup, quantity: str, known: Mapp
         other = unknown_unit(table.layout.heads[column])
         own = unit_of(str(value["column"]))
         twice = f"is in {own} by its name and in another by the row of units" if own and not said else "has no unit"
+        told = table.told.get(column, Told("", "", ""))
+        twice = f"is in {told.said}" if told.said else twice
         unsaid = f"is in {other}, which is none of" if other else f"{twice}; it is one of"
         how = f"is in {said}, which needs a scale" if said else f"{unsaid} {units}, or needs a scale"
         how = f"may be in {' or '.join(may_be)}, which capitals hide, else it needs a scale" if may_be else how
         what = f"{table.path.name}: {quantity} ({value['column']!r}, {table.looks[column].span}) {how}"
         text = f"{what} (how many {USUAL[quantity]} one of it is)"
         choice = Choice(str(value["column"]), value)
-        found.questions.append(OpenQuestion(text, (), quantity, (choice,), _usual(table, quantity, column)))
+        found.questions.append(
+            OpenQuestion(text, (), quantity, (choice,), _usual(table, quantity, column), own=told.own)
+        )
 
 
 def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
@@ -131,7 +135,7 @@ def _usual(table: ColumnGroup, quantity: str, column: int) -> str:
     counts = bool((known % 1 == 0).all()) and float(np.abs(known).max()) >= COUNTS
     if table.unit(column) or unknown_unit(table.layout.heads[column]) or unit_of(name):
         return ""
-    if _meant(table, quantity, column).units:
+    if column in table.told or _meant(table, quantity, column).units:
         return ""
     stated = stated_unit(quantity, table.layout.sheet.facts)
     if counts or stated is not None:
@@ -149,14 +153,19 @@ def stated_unit(quantity: str, facts: Mapping[str, str]) -> str | None:
     """The unit in a line above the table that states one of this quantity, or of whatever has it; None without a line.
 
     Empty where the line is of this quantity by name and its unit is none that is known, or another's.
-    As `Length Units,Meters` in OptiTrack's Motive, `Unit:,lbF` of gauges.
     """
+    said = line_of_unit(quantity, facts)
+    return said if said is None or said in LINEAR[quantity] else ""
+
+
+def line_of_unit(quantity: str, facts: Mapping[str, str]) -> str | None:
+    """What such a line says, as `Length Units,Meters` in OptiTrack's Motive or `Unit:,lbF` of gauges; else None."""
     own = {*WORDS[quantity], *(("length",) if quantity == "position" else ())}
     for name, value in facts.items():
-        words, unit = set(words_of(name)), unit_in(value)
+        words, unit = set(words_of(name)), unit_in(value) or ("" if any(map(str.isdigit, value)) else unit_of(value))
         others = words - UNIT_WORDS
         if others < words and (others & own or (not others and unit in LINEAR[quantity])):
-            return unit if unit in LINEAR[quantity] else ""
+            return unit or value
     return None
 
 
@@ -205,6 +214,7 @@ def _doubts(table: ColumnGroup, quantity: str, column: int) -> Iterator[str]:
     if others:
         shown = ", ".join(repr(header[number]) for number in others)
         yield f"{name}: {quantity} is taken to be {header[column]!r}; it may be {shown}"
+    yield from table.told_of(column)
     if (found := _meant(table, quantity, column)).sure and not (table.unit(column) or _unit_beside(table, column)):
         yield f"{name}: {header[column]!r} is taken to be in {found.units[0]}, by the end of its name"
     for key, value in sign_of(looks.values).items():

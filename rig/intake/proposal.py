@@ -7,12 +7,14 @@ from pathlib import Path
 
 from rig.config.table import TomlTable
 from rig.intake.aside import WAYS, Group, left_aside, nothing_found, untimed
+from rig.intake.drives import drive_in
 from rig.intake.families import INTERRUPTED, ColumnGroup, all_tables, groups_of
 from rig.intake.folder import below, files_in
 from rig.intake.labelling import Labels, labels_in, stated_in
 from rig.intake.mapping import FileForm
 from rig.intake.measured import beside, chosen, measured_in, ranks_of, spoilt
 from rig.intake.naming import channels_of, names_of
+from rig.intake.prose import with_prose
 from rig.intake.questions import JointQuestion, OpenQuestion, Question, inline
 from rig.intake.readers import kind_of
 from rig.intake.senses import doubts_of_senses
@@ -32,7 +34,7 @@ FEWEST_ROWS = 10
 GOES_ON_STEPS = 2.0
 # Of three questions people give up; what can be asked as one is.
 MOST_QUESTIONS = 2
-OPEN = "# open: "
+OPEN, DOUBT = "# open: ", "# doubtful: "
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class Proposal:
     @property
     def text(self) -> str:
         """The mapping as a file."""
-        head = [f"# doubtful: {doubt}" for doubt in self.doubts]
+        head = [f"{DOUBT}{doubt}" for doubt in self.doubts]
         head += [f"{OPEN}{question.text}; {question.line}" for question in self.questions]
         session = "\n".join(f"{key} = {inline(value)}" for key, value in self.tree.items() if key != "tables")
         return "\n".join([*head, session, *map(_lines, self.tree["tables"])])
@@ -68,7 +70,7 @@ class Proposal:
 def propose(folder: Path) -> Proposal:
     """What the folder seems to hold; raises DataError where nothing in it may be a force and a position."""
     doubts, files = list[str](), files_in(folder)
-    groups = [_in_one(group) for group in groups_of(list(all_tables(files, doubts)))]
+    groups = [_in_one(group) for group in groups_of(list(with_prose(all_tables(files, doubts), folder)))]
     picked, recording = _picked(folder, groups)
     if not picked:
         raise nothing_found(folder, files, groups, doubts)
@@ -89,7 +91,10 @@ def propose(folder: Path) -> Proposal:
         doubts += _two_clocks([group[0] for _, group, _ in picked], tables)
     doubts += untimed(groups, [table for _, group, _ in picked for table in group])
     doubts += left_aside(folder, files, [table for _, group, _ in picked for table in group])
-    tree = {**_recording(picked), **names, **recording, "tables": tables}
+    drives = [drive_in(group[0]) for _, group, _ in picked]
+    doubts += drives if all(drives) else []
+    axis: TomlTable = {"axis": {}} if all(drives) else {}
+    tree = {**_recording(picked), **names, **recording, **axis, "tables": tables}
     proposal = Proposal(tree, tuple(dict.fromkeys(doubts)), tuple(_few(list(_together(questions)))))
     return proposal if questions else proposal.answered([])
 

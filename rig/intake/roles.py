@@ -10,7 +10,7 @@ from rig.intake.units import LINEAR, ROTARY, SIGNALS
 WORDS: dict[str, tuple[str, ...]] = {
     "time": (
         "time", "timestamp", "zeit", "temps", "tiempo", "tempo", "时间", "時間", "시간", "время", "czas", "čas", "tijd",
-        "zeitstempel", "elapsed", "stamp", "seconds", "sec", "secs", "ms", "msec", "millis", "micros", "t",
+        "zeitstempel", "elapsed", "stamp", "datenum", "seconds", "sec", "secs", "ms", "msec", "millis", "micros", "t",
     ),
     "force": (
         "force", "kraft", "standardkraft", "fuerza", "forza", "力", "负荷", "荷重", "载荷", "하중", "힘", "load",
@@ -37,7 +37,7 @@ _COUNTERS = frozenset(("sequence", "seq", "frame", "counter", "value"))
 # Endings of German and run-together words (Standardkraft, Traversenweg, axialforce).
 _ENDINGS = ("kraft", "zeit", "weg", "force", "displacement", "position", "extension", "stroke")
 # A column with such a word is not what was measured: somebody's wish, a bound, a derived number.
-_OTHER = frozenset((
+OTHER = frozenset((
     "target", "setpoint", "set", "command", "commanded", "cmd", "desired", "demand", "reference", "ref", "goal", "soll",
     "limit", "max", "peak", "error", "err", "rate", "offset", "raw", "std", "mean", "strain", "stress", "area",
     "width", "thickness", "diameter", "length", "energy", "work", "acceleration", "accel", "acc", "gyro", "orientation",
@@ -88,7 +88,7 @@ def candidates(quantity: str, header: Sequence[str], units: Sequence[str]) -> li
     fitting = {**LINEAR.get(quantity, {}), **ROTARY.get(quantity, {})}
     found = []
     for number, (name, unit) in enumerate(zip(header, units, strict=True)):
-        place, spoiled = _place(quantity, name), not _OTHER.isdisjoint(words_of(name))
+        place, spoiled = _place(quantity, name), not OTHER.isdisjoint(words_of(name))
         if place is not None and _is_letter_of_another(quantity, name, WORDS[quantity][place]):
             continue
         if place is not None and (not unit or unit in fitting or unit in SIGNALS or quantity in ("label", "counter")):

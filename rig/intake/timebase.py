@@ -1,30 +1,35 @@
 """How a table that nobody described says its time."""
 
 import re
-from collections.abc import Sequence
-from itertools import groupby, pairwise, permutations
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from itertools import groupby, pairwise, product
 
 import numpy as np
 
 from rig.config.table import TomlTable
+from rig.errors import DataError
 from rig.intake.families import ColumnGroup
 from rig.intake.labelling import Labels
 from rig.intake.mapping import RESTART, TimeColumn
-from rig.intake.measured import stated_unit
+from rig.intake.measured import line_of_unit, stated_unit
 from rig.intake.notation import is_stamp, pattern_of
 from rig.intake.questions import Choice, OpenQuestion
 from rig.intake.rates import MOST_STROKES_HZ, named_rate_Hz, stated_rate_Hz
 from rig.intake.readers import kind_of
-from rig.intake.roles import words_of
+from rig.intake.roles import WORDS, words_of
 from rig.intake.rows import ANEW_ROWS, ANEW_SHARE
 from rig.intake.survey import Looks, Numbers, wraps_at
-from rig.intake.times import is_iso, times_ns
+from rig.intake.times import DATENUM, UNIX, is_iso, times_ns
 from rig.intake.units import TIME_NS, unit_in, unit_of, unknown_unit
+from rig.intake.workbook import EPOCH as EPOCH_DAY
 
 # Numbers so large are time since 1970 (2001 to 2286), whatever the column is called.
 EPOCH = {"s": (1e9, 1e10), "ms": (1e12, 1e13), "us": (1e15, 1e16), "ns": (1e18, 1e19)}
 # A day of a spreadsheet between 2000 and 2064, in its calendar of 1900.
 DAYS = (36_526.0, 60_000.0)
+# And of MATLAB's between 2000 and 2064.
+DATENUMS = tuple(day + DATENUM - (UNIX - EPOCH_DAY).days for day in DAYS)
 # Of two units nobody states, one is impossible where the rows would come faster or slower than loggers for force and
 # motion are, or the whole recording were shorter than anybody records.
 RATES_HZ = (0.2, 20_000.0)
@@ -50,7 +55,7 @@ def clock_of(table: ColumnGroup) -> SaidTime:
         found = _column(table, column)
         if found is not None:
             time, doubts, asked = found
-            return time, [*doubts, *_other_times(table, column)], asked
+            return time, [*doubts, *table.told_of(column), *_other_times(table, column)], asked
     rate_Hz = stated_rate_Hz(table.layout.sheet.facts)
     # Tables of one file that are recorded at rates of their own count from its beginning, whatever the frame is called.
     own = {} if "section" in table.layout.form else table.looks
@@ -72,14 +77,50 @@ def clock_of(table: ColumnGroup) -> SaidTime:
 
 
 def _in_two(table: ColumnGroup) -> TomlTable:
-    """Whole seconds in one column and the rest of them in another, which are called alike; empty without them."""
-    said = {number: words_of(table.layout.sheet.header[number]) for number in table.columns if number in table.looks}
-    for (whole, words), (rest, others) in permutations(said.items(), 2):
-        unit = unit_in(others[-1]) if others else ""
-        alike = words[:-1] == others[:-1] and words and unit_in(words[-1]) == "s" and unit in ("ms", "us", "ns")
-        if alike and table.looks[rest].known.max() * TIME_NS[unit] < TIME_NS["s"]:
-            return {"column": table.place(whole), "unit": "s", "finer": table.place(rest), "finer_unit": unit}
+    """Whole seconds in one column, by number or clock, and the rest of them in another; empty without them."""
+    for (rest, unit), whole in product(_rests(table), table.columns):
+        time, said = _in_seconds(table, whole), words_of(table.layout.sheet.header[whole])
+        others = {word for word in words_of(table.layout.sheet.header[rest]) if unit_in(word) != unit}
+        known = any(word in WORDS["time"] or unit_in(word) == "s" for word in said) and others <= {
+            *said,
+            *WORDS["time"],
+        }
+        if time and known and whole != rest:
+            time |= {"finer": table.place(rest), "finer_unit": unit}
+            with suppress(DataError):  # where a cell is no time
+                if Looks(_joined(table, whole, rest, time)).rises:
+                    return time
     return {}
+
+
+def _rests(table: ColumnGroup) -> Iterator[tuple[int, str]]:
+    """Columns that hold parts of a second, with their units."""
+    for number, looks in table.looks.items():
+        unit = table.unit(number) or unit_in("".join(words_of(table.layout.sheet.header[number])[-1:]))
+        whole = looks.known.size == looks.values.size and looks.known.min() >= 0
+        if unit in ("ms", "us", "ns") and whole and looks.known.max() * TIME_NS[unit] < TIME_NS["s"]:
+            yield number, unit
+
+
+def _in_seconds(table: ColumnGroup, number: int) -> TomlTable:
+    """A column of whole seconds as the `time` of a mapping; empty of another."""
+    texts = table.texts.get(number, [])
+    if (looks := table.looks.get(number)) is not None:
+        is_said = table.unit(number) == "s" or not (table.unit(number) or looks.rises)
+        whole = is_said and bool((looks.values % 1 == 0).all())
+        return {"column": table.place(number), "unit": "s"} if whole else {}
+    if not texts or not all(texts) or not is_stamp(texts[0]) or not _SECOND.search(texts[0]):
+        return {}
+    form = "iso" if is_iso(texts[0]) else next(iter(pattern_of([texts[0], texts[-1]])), "")
+    form = "spreadsheet" if kind_of(table.path) == "workbook" else form
+    return {"column": table.place(number), "form": form} if form else {}
+
+
+def _joined(table: ColumnGroup, whole: int, rest: int, time: TomlTable) -> Numbers:
+    """The times [ns] of both together."""
+    column = table.texts[whole] if whole in table.texts else table.looks[whole].values
+    form, sheet = TimeColumn.model_validate(time), table.layout.sheet
+    return times_ns([column, table.looks[rest].values], 0, len(column), form, sheet).astype(np.float64)
 
 
 def _other_times(table: ColumnGroup, column: int) -> list[str]:
@@ -171,12 +212,13 @@ def _of_numbers(table: ColumnGroup, place: str | int, unit: str, looks: Looks) -
     if not looks.rises or (_rows_a_stamp(table) and (np.diff(looks.known) < 0).any()):
         return None
     first, last = looks.known.min(), looks.known.max()
-    in_days = DAYS[0] < first and last < DAYS[1] and last - first < 100
-    if in_days and not unit and (kind_of(table.path) == "workbook" or not possible_units(looks)):
-        return {"column": place, "form": "spreadsheet"}, [], []
+    days = {"spreadsheet": DAYS, "datenum": DATENUMS}
+    form = next((form for form, (low, high) in days.items() if low < first and last < high and last - first < 100), "")
+    if form and not unit and (kind_of(table.path) == "workbook" or not possible_units(looks)):
+        return {"column": place, "form": form}, [], []
     if unit in TIME_NS:
         return {"column": place, "unit": unit}, [], []
-    if several := unknown_unit(str(place)):
+    if several := unknown_unit(str(place)) or ("" if unit else line_of_unit("time", table.layout.sheet.facts)):
         text = f"{table.path.name}: time {place!r} is in {several}, which is none that is known; how many are a second?"
         return {}, [], [OpenQuestion(text, (), "time", known={"column": place, "form": "counter"})]
     if unit or (looks.counts and not unit_of(str(place)) and stated_rate_Hz(table.layout.sheet.facts)):
@@ -208,7 +250,8 @@ def _without_unit(table: ColumnGroup, place: str | int, looks: Looks) -> SaidTim
         said = f"{table.path.name}: nothing says the unit of time ({place!r}); taken as {units[0]}, no other is likely"
         return {"column": place, "unit": units[0]}, [said], []
     text = f"nothing says the unit of time ({place!r}, {looks.span}); one of {', '.join(TIME_NS)}"
-    choice, usual = Choice(str(place), {"column": place}), "s" if "s" in units else ""
+    clear = "s" in units and table.layout.sheet.number(place) not in table.told
+    choice, usual = Choice(str(place), {"column": place}), "s" if clear else ""
     return {"column": place}, [], [OpenQuestion(text, (), "time", (choice,), usual, usual)]
 
 

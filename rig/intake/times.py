@@ -18,6 +18,7 @@ Numbers = NDArray[np.generic]
 NS = 1_000_000_000
 DAY_NS = 86_400 * NS
 UNIX = datetime(1970, 1, 1)
+DATENUM = 719_529  # what MATLAB calls the first day of 1970, in days of which the first of year 0 is the first
 NO_DATE = datetime(1900, 1, 1)  # the day `strptime` takes where a pattern names none
 # Beyond this, nanoseconds do not fit 64 bits: the column is not in the unit that was said.
 LIMIT_NS = 9e18
@@ -43,6 +44,8 @@ def _column_ns(found: Column | None, first: int, count: int, form: TimeColumn, s
     if isinstance(found, list):
         return _iso_ns(found, first, sheet) if form.form == "iso" else _written_ns(found, first, form.form, sheet)
     number = sheet.number(form.column or 1)
+    if form.form == "datenum":
+        return _numbers_ns(found.astype(np.float64) - DATENUM, first, DAY_NS, sheet, number)
     return _numbers_ns(found, first, _factor(form, sheet, number), sheet, number)
 
 

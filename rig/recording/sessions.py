@@ -22,6 +22,8 @@ from rig.recording.tables import write_parquet
 
 SESSION_FILE = "session.json"
 PARQUET_FOLDER = "parquet"
+# A note of where the files of a drive axis lie, as their mapping calls them.
+AXIS_FILES = "drive_axis"
 JsonTable = dict[str, JsonValue]
 # JSON has no NaN: an unknown number is null in the file and NaN here.
 Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
@@ -90,6 +92,19 @@ class Session:
     def place(self) -> Path:
         """What to call it by: the place it was opened from."""
         return self.origin or self.folder
+
+    @property
+    def axis_files(self) -> str:
+        """Where the files lie that it was made of, if they are of a drive axis; else empty."""
+        return str(self.info.notes.get(AXIS_FILES, ""))
+
+    def refuse_axis(self) -> None:
+        """Raises UsageError where it is of a drive axis."""
+        if self.axis_files:
+            raise UsageError(
+                f"{self.place}: is a drive axis, as [axis] in its mapping says, and has no tissue; `rig diagnose` of "
+                f"{self.axis_files} with that mapping fits its mass and friction"
+            )
 
     @property
     def trials(self) -> tuple[TrialInfo, ...]:

@@ -60,19 +60,25 @@ def came_in_result(session: Session, tell: Progress = silent, looked: Looked | N
         return CameInResult(session=session.info.id, recordings=(), sha256={}, remarks=(remark,))
     looked = looked or Looked()
     trials = looked.of(session, portion(tell, 0.0, 0.6))
+    out = ""
+    if session.axis_files:
+        trials = TrialSet(trials.name, ())
+        out = f"a drive axis has no tissue; `rig diagnose` of {session.axis_files} with their mapping judges it"
     found = inspected(trials)
     tell("the contact of every cycle", 0.6)
     curves, skipped = curves_in(found)
     tell("what a diagnosis takes", 0.95)
     refused = _not_diagnosed(trials)
-    recordings = [_recording(one, looked.seen.get(one.name), found, curves, skipped, refused) for one in session.trials]
+    recordings = [
+        _recording(one, looked.seen.get(one.name), found, curves, skipped, refused, out) for one in session.trials
+    ]
     sums = {trial.name: trial.sha256 for trial in session.trials}
     return CameInResult(session=session.info.id, recordings=tuple(recordings), sha256=sums)
 
 
 def _recording(
     info: TrialInfo, seen: Seen | None, found: TrialSet, curves: Sequence[Curve], skipped: Sequence[Skipped],
-    refused: Reasons,
+    refused: Reasons, out: str,
 ) -> RecordingIn:  # fmt: skip
     cycles = tuple(_cycles(info.name, curves, skipped))
     said = [finding for finding in found.findings if finding.recording == info.name]
@@ -80,12 +86,13 @@ def _recording(
     reasons = list(dict.fromkeys([*info.reasons, *(finding.text for finding in said)]))
     streams = () if seen is None else tuple(_in_air(*one, cycles) for one in zip(seen.streams, seen.rests, strict=True))
     tracks = seen is not None and seen.tracks_force
-    out = "it tracks a force" if tracks else "; ".join(reasons) or "it is left out"
+    known = trial is not None or tracks or bool(out)
+    out = out or ("it tracks a force" if tracks else "; ".join(reasons) or "it is left out")
     return RecordingIn(
         name=info.name, streams=(*streams, *(seen.inputs if seen else ())),
         one_clock=seen is not None and seen.one_clock,
         alignments={} if seen is None else seen.alignments, cycles=cycles,
-        quality=_quality(info, trial is not None or tracks, said), reasons=tuple(reasons),
+        quality=_quality(info, known, said), reasons=tuple(reasons),
         fit=_fitted(cycles) if trial else Use(used=False, why=out),
         diagnose=Use(used=info.name not in refused, why=refused.get(info.name, "")) if trial
         else Use(used=False, why=out),

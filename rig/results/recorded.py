@@ -91,6 +91,7 @@ class ExportResult(SavedResult):
 
     session: str
     written: Mapping[str, str]
+    remarks: tuple[str, ...] = Field(default=(), description="what was doubtful or not as it should be")
 
 
 class ReportResult(SavedResult):

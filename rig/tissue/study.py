@@ -68,7 +68,7 @@ def study_session(
 ) -> Study:
     """Reads every trial of ``session``, fits and judges; trials without a usable curve are skipped with their reason.
 
-    Raises DataError where no trial gives a curve.
+    Raises DataError where no trial gives a curve, UsageError of a drive axis.
     """
     return study_sessions([session], laws, known, progress)
 
@@ -87,6 +87,7 @@ def study_sessions(
     curves: list[Curve] = []
     skipped: list[Skipped] = []
     for session in sessions:
+        session.refuse_axis()
         place = f"{session.place}/" if len(sessions) > 1 else ""
         found, missing = _curves_or_refusal(session)
         curves += [

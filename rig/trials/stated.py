@@ -9,7 +9,7 @@ from rig.recording.converter import Array
 from rig.trials.cycles import cycle_of, way_back
 from rig.trials.findings import BAD, Finding
 from rig.trials.segments import times_by_way
-from rig.trials.trial import Trial
+from rig.trials.trial import FEWEST_SAMPLES, Trial, drop_disordered
 
 # A drive that misses its speed by so much is another's speed, or another unit.
 SPEED_SHARE = 0.3
@@ -52,7 +52,11 @@ def stated_findings(trial: Trial) -> tuple[Finding, ...]:
     loading = None if np.isnan([trial.speed_mm_s, trial.depth_mm, trial.surface_mm]).all() else _loading_of(trial)
     if loading is None:
         return ()
-    wrong = {"speed": _speed(trial, loading), "depth": _depth(trial, loading), "surface": _surface(trial, loading)}
+    wrong = {
+        "speed": _speed(trial, loading),
+        "depth": _depth(trial, loading),
+        "surface": "" if trial.of_axis else _surface(trial, loading),
+    }
     found = tuple(Finding(trial.name, "axis", kind, text) for kind, text in wrong.items() if text)
     if not (wrong["speed"] and wrong["depth"]):
         return found
@@ -69,15 +73,17 @@ def _speed(trial: Trial, loading: WayIn) -> str:
     if not (trial.speed_mm_s < slow or trial.speed_mm_s > fast):
         return ""
     steps = f" (in steps at up to {loading.fastest_mm_s:.2g})" if loading.fastest_mm_s > 2 * loading.middle_mm_s else ""
-    moves = f"the tip loads at {loading.middle_mm_s:.2g} mm/s{steps}"
+    moves = f"{'the axis moves' if trial.of_axis else 'the tip loads'} at {loading.middle_mm_s:.2g} mm/s{steps}"
     return f"stated speed {trial.speed_mm_s:.3g} mm/s, but {moves}: the motion's is used"
 
 
 def _depth(trial: Trial, loading: WayIn) -> str:
     pressed_mm = loading.deepest_mm - loading.clear_mm
-    if trial.depth_mm > DEPTH_FACTOR * loading.way_mm:
-        return f"stated depth {trial.depth_mm:.3g} mm, but the tip goes {loading.way_mm:.3g} mm in all"
-    if trial.depth_mm < pressed_mm / DEPTH_FACTOR:
+    less = trial.depth_mm < pressed_mm / DEPTH_FACTOR
+    if trial.depth_mm > DEPTH_FACTOR * loading.way_mm or (less and trial.of_axis):
+        who = "axis" if trial.of_axis else "tip"
+        return f"stated depth {trial.depth_mm:.3g} mm, but the {who} goes {loading.way_mm:.3g} mm in all"
+    if less:
         return f"stated depth {trial.depth_mm:.3g} mm, but force rises over {pressed_mm:.3g} mm"
     return ""
 
@@ -99,21 +105,32 @@ def _loading_of(trial: Trial) -> WayIn | None:
     Speed is that where force is clear, so that an approach at another speed does not count.
     """
     try:
-        cycle = cycle_of(trial)
+        time_s, position_mm, load = _motion_of(trial)
     except DataError:
         return None
-    risen_N = np.abs(cycle.force_N - np.median(cycle.force_N[:START_SAMPLES]))
-    most = int(np.argmax(risen_N))
-    sense = -1 if cycle.position_mm[most] < cycle.position_mm[0] else 1
-    place_mm = sense * cycle.position_mm
+    risen = np.abs(load - np.median(load[:START_SAMPLES]))
+    most = int(np.argmax(risen))
+    sense = -1 if position_mm[most] < position_mm[0] else 1
+    place_mm = sense * position_mm
     way_mm = way_back(place_mm[: most + 1], TURN_SHARE * float(np.ptp(place_mm[: most + 1])))
     start = most - int(np.argmin(way_mm))  # of the last way in
-    unclear = np.flatnonzero(risen_N[start : most + 1] <= CLEAR_SHARE * risen_N[most])
+    unclear = np.flatnonzero(risen[start : most + 1] <= CLEAR_SHARE * risen[most])
     clear = start + (int(unclear[-1]) + 1 if len(unclear) else 0)
     most_of_it = place_mm[most] - place_mm[clear] > STEP_SHARE * (place_mm[most] - place_mm[start])
     first = clear if most - clear >= FEWEST_STEPS and most_of_it else start
-    speeds = _speeds(cycle.time_s[first : most + 1], place_mm[first : most + 1])
+    speeds = _speeds(time_s[first : most + 1], place_mm[first : most + 1])
     return WayIn(sense, *speeds, float(place_mm.min()), float(place_mm[clear]), float(place_mm.max()))
+
+
+def _motion_of(trial: Trial) -> tuple[Array, Array, Array]:
+    """Times, places, and what is most where the tip is deepest: force, of a drive axis alone the place itself."""
+    if not trial.of_axis:
+        cycle = cycle_of(trial)
+        return cycle.time_s, cycle.position_mm, cycle.force_N
+    time_s, place_mm = drop_disordered(trial.axis_s, trial.axis_mm)
+    if len(time_s) < FEWEST_SAMPLES:
+        raise DataError(f"{trial.name}: {len(time_s)} samples of the axis (at least {FEWEST_SAMPLES} are needed)")
+    return time_s, place_mm, place_mm
 
 
 def _speeds(time_s: Array, position_mm: Array) -> tuple[float, float]:

@@ -22,7 +22,8 @@ class Trial:
 
     ``marker_mm`` has shape (frames, 3), NaN where the tool was hidden; ``temperature_C`` goes with ``force_s``;
     ``speed_mm_s`` of loading, ``depth_mm`` from the surface and ``surface_mm`` on the axis are as somebody stated or
-    asked for them, NaN where nobody did; ``labels`` tell specimen, site, operator and the like.
+    asked for them, NaN where nobody did; ``labels`` tell specimen, site, operator and the like; ``of_axis`` where it is
+    of a drive axis alone, whose force is its effort.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Trial:
     depth_mm: float = float("nan")
     surface_mm: float = float("nan")
     labels: Mapping[str, str] = field(default_factory=dict)
+    of_axis: bool = False
 
 
 @dataclass(frozen=True)

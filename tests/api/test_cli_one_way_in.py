@@ -97,3 +97,14 @@ def test_a_mapping_for_other_columns_is_refused_and_the_reason_is_in_the_json(
     reason = json.loads((tmp_path / "said.json").read_text())["reason"]
     assert result.exit_code != 0 and not target.exists()
     assert "run_1.txt: no column 'Force'; there are 't', 'Kraft', 'Weg'" in reason
+
+
+@pytest.mark.parametrize("command", ["import", "export"])
+def test_what_the_terminal_doubts_is_in_the_json(command: str, tmp_path: Path) -> None:
+    rows = "".join(f"{0.01 * k:.2f},{0.2 * k:.1f},{0.1 * k:.1f},{0.1 * k:.1f}\n" for k in range(40))
+    (tmp_path / "a.csv").write_text(f"time_s,force_N,depth_mm,gap_mm\n{rows}")
+    result = rig(command, tmp_path / "a.csv", "--out", tmp_path / "out", "--json", tmp_path / "said.json")
+    assert result.exit_code == 0, result.output
+    shown, said = " ".join(result.output.split()), json.loads((tmp_path / "said.json").read_text())["remarks"]
+    for doubt in ("as if pressed; pulled, write the other", "position is taken to be 'depth_mm'; it may be 'gap_mm'"):
+        assert doubt in shown and any(doubt in one for one in said)

@@ -176,6 +176,18 @@ def test_sizes_are_tried_for_what_an_estimate_is_there_for_and_the_table_says_ho
     assert with_tried_sizes(nothing, index_session()) is nothing
 
 
+@pytest.mark.parametrize("verdict", ["unexplained", "not judged"])
+def test_no_size_is_stated_where_something_may_be_left_that_hides_it(
+    monkeypatch: pytest.MonkeyPatch, found: Diagnosis, verdict: str
+) -> None:
+    monkeypatch.setattr("rig.diagnosis.run.verdict_of", lambda *_: (verdict, ("depth",)))
+    left = diagnose_session(index_session())
+    assert found.verdict == "adequate" and "friction" in found.detectable
+    assert left.verdict == verdict and left.detectable == {}
+    assert all("may hide it" in left.not_testable[name] for name in found.detectable)
+    assert with_tried_sizes(left, index_session()) is left
+
+
 def test_no_size_is_stated_where_the_model_misses_what_could_be_reached(found: Diagnosis) -> None:
     assert found.search is not None
     problem = found.search.after.problem

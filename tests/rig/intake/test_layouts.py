@@ -182,8 +182,8 @@ def test_times_of_day_go_on_after_midnight(folder: Path) -> None:
 
 
 def test_whole_seconds_are_neither_the_time_nor_the_name_of_a_recording(folder: Path) -> None:
-    rows = "".join(f"10:11:{12 + at // 25},{40 * (at % 25)},{force},{way}\n" for at, (_, way, force) in enumerate(ROWS))
-    (folder / "a.csv").write_text("Time,ms,Force (N),Position (mm)\n" + rows)
+    rows = "".join(f"10:11:{12 + at // 25},{at % 7},{force},{way}\n" for at, (_, way, force) in enumerate(ROWS))
+    (folder / "a.csv").write_text("Time,Stage,Force (N),Position (mm)\n" + rows)
     (question,) = propose(folder).questions
     assert "no column of time finer than 25 rows with one stamp" in question.text
     assert question.line == "time = { rate_Hz = 25.0 }"

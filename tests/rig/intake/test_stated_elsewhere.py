@@ -169,8 +169,8 @@ def test_days_of_a_spreadsheet_in_a_text(folder: Path) -> None:
 
 
 def test_a_time_that_fits_no_unit_has_no_usual_one(folder: Path) -> None:
-    """As `datenum` of MATLAB counts days."""
-    written(folder, DAYS, "{:.11f},{:.5f},{:.5f}", 738_219 + A.time_s / 86_400, A.way_mm, A.force_N)
+    """Days since 1 January 4713 BC, as astronomers count them."""
+    written(folder, DAYS, "{:.11f},{:.5f},{:.5f}", 2_459_000 + A.time_s / 86_400, A.way_mm, A.force_N)
     (question,) = propose(folder).questions
     assert (question.usual, question.line) == ("", 'time = { column = "Date", unit = "?" }')
 

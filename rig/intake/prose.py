@@ -1,0 +1,119 @@
+"""Units that a README beside the data, or a sheet that explains the others of a workbook, says of columns."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from rig.intake.encodings import encoding_of
+from rig.intake.families import ColumnGroup, Told
+from rig.intake.readers import kind_of
+from rig.intake.roles import OTHER, candidates, words_of
+from rig.intake.units import LINEAR, ROTARY, SIGNALS, UNIT_WORDS, unit_in, unknown_unit
+from rig.intake.workbook import sheet_names, sheet_text
+
+MOST_BYTES = 65_536  # what explains columns is read by people
+SHORT = 2  # a name of so few letters stands in sentences by chance
+MOST_PLACES = 3
+QUANTITIES = ("time", "force", "position", "velocity")
+# With one of these in it what is said is of the device, and not of what it measured.
+_OF_DEVICES = OTHER | {"maximum", "resolution", "range", "accuracy", "capacity", "sensitivity", "noise", "constant"}
+_TITLE = re.compile(
+    r"read.?me|lies.?mich|legend|units?|einheit|info|about|descri|codebook|dictionary|variable|columns|notes?$", re.I
+)
+_ENDINGS = ("", ".txt", ".md", ".rst", ".csv", ".tsv")
+_TOKEN = re.compile(r"[^\s()\[\]{}<>|;:=,`\"'*]+|[(\[{|;:=,]")
+# Between a name and its unit; behind any other word, or a number, what looks like a unit says nothing of a column.
+_BEFORE = frozenset(("(", "[", "{", "|", ":", "=", ",", "in", "is", "are", "and", "unit", "units", "as"))
+
+
+class Statement(NamedTuple):
+    """A unit, the words before it since the last one and in the whole line, and where it stands."""
+
+    own: str
+    line: str
+    unit: str
+    place: str
+
+    def names(self, name: str, begins: bool) -> bool:
+        """Whether it is said of the column of that name, with which it ``begins``, or which stands in it."""
+        start = self.own.lstrip("-+#.0123456789 ")
+        if begins or len(name) <= SHORT:
+            return start == name or start.startswith(f"{name} ")
+        return bool(re.search(rf"(?<![^\W_]){re.escape(name)}(?![^\W_])", self.own, re.I))
+
+    def measures(self, quantity: str) -> bool:
+        """Whether it is said of all that is the quantity: by its word, or of the units of whatever has one."""
+        said = self.own if len(words_of(self.own)) > self.own.split().count("and") else self.line
+        known = self.unit in _units(quantity)
+        return known and bool(candidates(quantity, [said], [""]) or UNIT_WORDS & set(words_of(self.line)))
+
+
+def with_prose(tables: Iterable[ColumnGroup], top: Path) -> Iterator[ColumnGroup]:
+    """The tables with the units that are said of their columns beside them, in the nearest folder up to ``top``."""
+    read = cache(_in_folder)
+    for table in tables:
+        folder, found = table.path.parent, dict[int, Told]()
+        folders = [own for own in (folder, *folder.parents) if own == folder or own.is_relative_to(top)]
+        book = _in_book(table.path) if kind_of(table.path) == "workbook" else ()
+        for statements in (book, *map(read, folders)):
+            found = {**dict(_told(table, statements)), **found}
+        yield replace(table, told=found) if found else table
+
+
+def _told(table: ColumnGroup, statements: Sequence[Statement]) -> Iterator[tuple[int, Told]]:
+    """By column the unit that is said of it, none where two are said, or another than its own."""
+    for number in table.columns if statements else ():
+        own, heads = table.unit(number), table.layout.sheet.header[number]
+        fitting = [quantity for quantity in QUANTITIES if candidates(quantity, [table.name(number)], [own])]
+        sizes = {unit: size for quantity in fitting or QUANTITIES for unit, size in _units(quantity).items()}
+        name = " ".join(token for token in _TOKEN.findall(heads) if token[1:] or token.isalnum())
+        name = name.removesuffix(own).rstrip(" _") if own else name
+        found = [one for one in statements if one.unit in (*sizes, *SIGNALS) and name and one.names(name, not fitting)]
+        if not (found or own or unknown_unit(table.layout.heads[number])):
+            found = [one for one in statements if any(map(one.measures, fitting))]
+        units = [*filter(None, [own]), *(one.unit for one in found)]
+        is_clear = len({sizes.get(unit, unit) for unit in units}) == 1
+        said = list(dict.fromkeys(f"{one.unit} by {one.place}" for one in found))[:MOST_PLACES]
+        if found and (not own or not (is_clear or "time" in fitting)):
+            said = [f"{own} by its header", *said] if own else said
+            yield number, Told(units[0] if is_clear else "", " and in ".join(said), own)
+
+
+def _units(quantity: str) -> Mapping[str, tuple[bool, float]]:
+    """What each unit of the quantity comes to, and whether it turns."""
+    kinds = (LINEAR[quantity], ROTARY.get(quantity, {}))
+    return {unit: (bool(turns), size) for turns, known in enumerate(kinds) for unit, size in known.items()}
+
+
+def _in_folder(folder: Path) -> tuple[Statement, ...]:
+    files = (path for path in sorted(folder.iterdir()) if _TITLE.search(path.stem) and path.suffix.lower() in _ENDINGS)
+    short = (path for path in files if path.is_file() and path.stat().st_size <= MOST_BYTES)
+    return tuple(said for path in short for said in _in_text(path.name, path.read_bytes()))
+
+
+def _in_book(path: Path) -> tuple[Statement, ...]:
+    titles = [name for name in sheet_names(path) if _TITLE.search(name)]
+    return tuple(said for name in titles for said in _in_text(f"{path.name}, {name}", sheet_text(path, name, ".")))
+
+
+def _in_text(place: str, content: bytes) -> Iterator[Statement]:
+    text = content[:MOST_BYTES].decode(encoding_of(content[:MOST_BYTES])[0] or "utf-8", errors="replace")
+    for number, line in enumerate(text.splitlines(), 1):
+        yield from _in_line(f"{place} line {number}", _TOKEN.findall(line))
+
+
+def _in_line(place: str, tokens: Sequence[str]) -> Iterator[Statement]:
+    start = 0
+    for at in range(1, len(tokens)):
+        counts = tokens[at + 1 : at + 2] == ["="]
+        unit = unit_in(" ".join(tokens[at : at + 2])) or unit_in(tokens[at])
+        between = tokens[at] in _BEFORE and tokens[at - 1] not in ("(", "[")
+        if unit in ("", "1", "%") or between or counts or tokens[at - 1].lower() not in _BEFORE:
+            continue
+        words = " ".join(token for token in tokens[start:at] if token[1:] or token.isalnum())
+        if _OF_DEVICES.isdisjoint(words_of(words)):
+            yield Statement(words, " ".join(tokens[:at]), unit, place)
+        start = at + 1

@@ -1,0 +1,94 @@
+"""Units that stand in a README beside the data, or in a sheet that explains the others, are read from there."""
+
+from pathlib import Path
+
+import openpyxl
+import pytest
+
+from rig.intake.proposal import propose
+from tests.rig.intake.instruments import text
+from tests.rig.intake.test_foreign import FORCE_N, ROWS, TIME_S, WAY_MM, came_in, check, lines
+
+SMALL = lines("{:.0f},{:.2f},{:.4f}", TIME_S * 1e3, WAY_MM * 1e3, FORCE_N * 1e3)
+HEAD = "Time,Displacement,Force\n"
+READMES = {
+    "in sentences": "Pressed at 10 mm/s up to 5 N.\nForce in mN, time in ms.\nDisplacement [um] of the tip.\n",
+    "with colons": "time: ms\ndisplacement: µm\nforce: mN\n",
+    "as a list": "The columns are:\n - Time (ms)\n - Displacement, micrometres\n - Force = mN\n",
+    "units first": "Units: ms for time, um for displacement, mN for force\n",
+    "respectively": "Time, displacement and force are given in ms, um and mN.\n",
+    "as a table": "| column | unit |\n|---|---|\n| `Time` | ms |\n| `Displacement` | um |\n| `Force` | mN |\n",
+    "as a codebook": "column,unit,what\nTime,ms,since start\nDisplacement,um,of the axis\nForce,mN,of the cell\n",
+    "other words": "# Data\nLoads are in millinewtons, positions in microns, all times in milliseconds.\n",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["README.txt", "readme.md", "Read me.txt", "LEGEND", "units.csv"])
+@pytest.mark.parametrize("said", READMES)
+def test_a_readme_says_the_units_of_columns_that_carry_none(folder: Path, said: str, name: str) -> None:
+    text(HEAD, SMALL)(folder)
+    (folder / name).write_text(READMES[said])
+    check(came_in(folder))
+    assert any(f"'Force' is taken to be in mN by {name} line" in doubt for doubt in propose(folder).doubts)
+    (folder.parent / "out").rename(folder.parent / "whole")
+    check(came_in(folder / "a.csv"))
+
+
+def test_a_name_that_nobody_knows_is_told_by_what_is_said_of_it(folder: Path) -> None:
+    text("t,ch1,ch2\n", SMALL)(folder)
+    (folder / "README.txt").write_text("t is the time in ms\nch1: travel of the stage [um]\nch2: load cell, mN\n")
+    check(came_in(folder))
+
+
+@pytest.mark.parametrize("title", ["Units", "Legend", "Info", "README"])
+def test_a_sheet_explains_the_others_of_its_workbook(folder: Path, title: str) -> None:
+    book = openpyxl.Workbook()
+    for row in [HEAD.strip().split(","), *((1e3 * t, 1e3 * x, 1e3 * f) for t, x, f in ROWS)]:
+        book["Sheet"].append(row)
+    for row in [("Column", "Unit"), ("Time", "ms"), ("Displacement", "um"), ("Force", "mN")]:
+        book[title if title in book else book.create_sheet(title).title].append(row)
+    book.save(folder / "a.xlsx")
+    check(came_in(folder))
+
+
+def test_the_nearest_readme_counts(folder: Path) -> None:
+    (folder / "README.txt").write_text("force in N, displacement in mm, time in s\n")
+    (folder / "b").mkdir()
+    text(HEAD, SMALL)(folder / "b")
+    (folder / "b" / "README.txt").write_text("force in mN, displacement in um, time in ms\n")
+    check(came_in(folder))
+
+
+@pytest.mark.parametrize(
+    ("said", "head", "doubt"),
+    [
+        (
+            "force in mN\nForce: N\n",
+            "Time (ms),Displacement (um),Force\n",
+            "mN by README.txt line 1 and in N by README",
+        ),
+        ("force in mN\n", "Time (ms),Displacement (um),Force (N)\n", "N by its header and in mN by README.txt line 1"),
+    ],
+)
+def test_prose_that_contradicts_itself_or_the_header_is_asked_and_yes_takes_nothing(
+    folder: Path, said: str, head: str, doubt: str
+) -> None:
+    text(head, SMALL)(folder)
+    (folder / "README.txt").write_text(said)
+    (question,) = propose(folder).questions
+    assert question.usual == "" and f"is in {doubt}" in question.text
+    check(came_in(folder, "mN"))
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "The force range was 50 mN, N = 20 specimens.\n", "maximum force in mN\nforce resolution in mN\n",
+        "force constant in N/mm, diameter in um\n", "Force, by the load cell\nMeasured in Jena (N)\n", "forces 10 mN\n",
+    ],
+)  # fmt: skip
+def test_what_is_said_of_something_else_is_no_unit_of_a_column(folder: Path, said: str) -> None:
+    text("Time (ms),Displacement (um),Force\n", SMALL)(folder)
+    (folder / "README.txt").write_text(said)
+    (question,) = propose(folder).questions
+    assert "has no unit" in question.text
