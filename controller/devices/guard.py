@@ -20,7 +20,7 @@ from rig.config.products.roles import ForceProduct, Product
 from rig.deadline import within
 from rig.errors import DeviceError, RigError
 from rig.input_streams import InputSample
-from rig.plugins import Plugin
+from rig.plugins import Plugin, lacking
 
 Made = TypeVar("Made", bound=Device)
 Answer = TypeVar("Answer")
@@ -45,6 +45,8 @@ class Guarded(ABC, Generic[Made, Sample]):
     GROUP: str
     """Of entry points, in which plug-ins declare products of this role."""
     KIND: type[Sample]
+    ROLE: type
+    """The protocol that its driver keeps."""
 
     @classmethod
     def guard(cls, config: Product, make: Callable[[], Made]) -> Self | Made:
@@ -64,6 +66,9 @@ class Guarded(ABC, Generic[Made, Sample]):
         self._device = self._asked(make)
         self._last_ns: dict[int, int] = {}
         self._blocked = deque[bool](maxlen=AMONG_POLLS)
+        if absent := lacking(self._device, self.ROLE):
+            self.close()
+            raise self._error(f"its driver has no {', no '.join(absent)}")
 
     @property
     def counters(self) -> LinkCounters:
@@ -177,7 +182,7 @@ class Guarded(ABC, Generic[Made, Sample]):
 class GuardedForce(Guarded[ForceSensor, ForceSample]):
     """A force sensor."""
 
-    GROUP, KIND = "tissue_rig.force", ForceSample
+    GROUP, KIND, ROLE = "tissue_rig.force", ForceSample, ForceSensor
 
     def poll(self, now_ns: int) -> Sequence[ForceSample]:
         """Samples since the last call, each looked at."""
@@ -193,7 +198,7 @@ class GuardedForce(Guarded[ForceSensor, ForceSample]):
 class GuardedTracker(Guarded[MarkerTracker, MarkerSample]):
     """A marker tracker."""
 
-    GROUP, KIND = "tissue_rig.tracker", MarkerSample
+    GROUP, KIND, ROLE = "tissue_rig.tracker", MarkerSample, MarkerTracker
 
     @property
     def tools(self) -> tuple[str, ...]:
@@ -211,7 +216,7 @@ class GuardedTracker(Guarded[MarkerTracker, MarkerSample]):
 class GuardedInput(Guarded[Input, InputSample]):
     """An input, which may wait, as it has a thread of its own."""
 
-    GROUP, KIND = "tissue_rig.input", InputSample
+    GROUP, KIND, ROLE = "tissue_rig.input", InputSample, Input
 
     def poll(self, now_ns: int) -> Sequence[InputSample]:
         """Samples since the last call, each looked at."""
@@ -227,7 +232,7 @@ class GuardedInput(Guarded[Input, InputSample]):
 class GuardedAxis(Guarded[ServoAxis, AxisSample]):
     """A servo axis."""
 
-    GROUP, KIND = "tissue_rig.axis", AxisSample
+    GROUP, KIND, ROLE = "tissue_rig.axis", AxisSample, ServoAxis
     _failure: DeviceError | None = None
 
     def _said(self, ask: Callable[[], Answer], unsaid: Answer) -> Answer:

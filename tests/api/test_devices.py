@@ -5,6 +5,7 @@ import os
 import pty
 import select
 import subprocess
+import sys
 import tomllib
 import tty
 from collections.abc import Iterator
@@ -117,6 +118,96 @@ def test_plug_ins_that_fail_are_listed_and_harm_no_command(tmp_path: Path) -> No
     assert said.returncode == 2
     assert "unknown product 'twin'" in said.stderr and "tissue_rig.force 'one' of one 1.0: 2 plug-ins" in said.stderr
     assert "Traceback" not in said.stderr
+
+
+HOLLOW = """
+from typing import ClassVar, Literal
+from pydantic import Field
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.roles import MockPort
+
+class Hollow(BotaWiring):
+    "Its driver and its mock lack what they need."
+    driver: ClassVar[str] = "hollow_plug:Driver"
+    mock: ClassVar[MockPort | None] = MockPort("hollow_mock:make", "hollow")
+    product: Literal["hollow"] = Field(default="hollow", description="x")
+
+class Annotated(Hollow):
+    "Its driver comes from a function that says what it gives; its mock is not there."
+    driver: ClassVar[str] = "hollow_plug:opened"
+    mock: ClassVar[MockPort | None] = MockPort("hollow_mock:nobody", "hollow")
+    product: Literal["annotated"] = Field(default="annotated", description="x")
+
+class Driver:
+    def __init__(self, config): ...
+    def start(self): ...
+    def fileno(self): return 0
+    def poll(self, now_ns): return []
+
+def opened(config) -> Driver:
+    return Driver(config)
+"""
+HOLLOW_MOCK = """
+from mock_devices.played import MockDevice
+
+class Mock:
+    def endpoints(self): return {"serial": "/dev/null"}
+    def filenos(self): return []
+
+def make(factory):
+    return [MockDevice("hollow", Mock(), factory.faulty(factory.line("hollow")), {})]
+"""
+
+
+@pytest.fixture(scope="module")
+def hollow(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+    folder = tmp_path_factory.mktemp("site")
+    about = folder / "acme-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: acme\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(
+        "[tissue_rig.force]\nhollow = hollow_plug:Hollow\nannotated = hollow_plug:Annotated\n"
+    )
+    (folder / "hollow_plug.py").write_text(HOLLOW)
+    (folder / "hollow_mock.py").write_text(HOLLOW_MOCK)
+    return folder, os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)]), "COLUMNS": "300"}
+
+
+def run_beside(hollow: tuple[Path, dict[str, str]], *command: str) -> "subprocess.CompletedProcess[str]":
+    folder, environment = hollow
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False,
+        stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+
+
+def test_a_plug_in_without_what_its_role_has_is_listed_with_what_it_lacks(hollow: tuple[Path, dict[str, str]]) -> None:
+    assert run_beside(hollow, *RIG, "devices", "--json", "all.json").returncode == 0
+    found = json.loads((hollow[0] / "all.json").read_text())
+    assert {one["declares"]: one["error"] for one in found["plugins"]} == {
+        "hollow": "its driver has no close",
+        "annotated": "AttributeError: module 'hollow_mock' has no attribute 'nobody'",
+    }
+
+
+@pytest.mark.parametrize(
+    ("chosen", "code", "said"),
+    [
+        ((), 0, ("tissue_rig.force 'hollow' of acme 1.0: its mock cannot be played: it has no close, no due_ns,",
+                 "tissue_rig.force 'annotated' of acme 1.0: its mock cannot be played: AttributeError")),
+        (("--force", "hollow"), 1, ("'hollow' of acme 1.0: its mock cannot be played: it has no close, no due_ns,",)),
+        (("--force", "bota-sensone"), 0, ()),
+    ],
+    ids=["all", "itself", "ours"],
+)  # fmt: skip
+def test_a_mock_that_lacks_what_a_mock_needs_is_named_and_harms_no_other(
+    chosen: tuple[str, ...], code: int, said: tuple[str, ...], hollow: tuple[Path, dict[str, str]]
+) -> None:
+    command = (sys.executable, "-m", "mock_devices.serve", "--with-parent", "--tracker-tcp-port", "0", *chosen)
+    served = run_beside(hollow, *command)
+    assert served.returncode == code, served.stderr
+    assert all(sentence in served.stderr for sentence in said) and "Traceback" not in served.stderr
+    assert ('"force"' in served.stdout) is (code == 0)
 
 
 @pytest.fixture
