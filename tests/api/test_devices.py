@@ -26,9 +26,11 @@ from api.operations.devices import devices
 from controller.devices import finding
 from mock_devices.testing.access import client_of
 from mock_devices.testing.commands import RIG, ROOT, ServedBench, served_bench
+from rig import plugins
 from rig.config.products.registry import name_of
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, UsageError
+from rig.plugins import Plugin
 from rig.results.devices import DevicesResult, FindResult, PortFound
 
 
@@ -263,6 +265,50 @@ def test_where_nobody_answers_each_product_was_tried(monkeypatch: pytest.MonkeyP
     found = finding.ask(finding.named("/dev/ttyUSB9"))
     assert found.asked and "the last said: silent" in found.problem
     assert tried == [role for role, _ in finding.candidates()]
+
+
+def named_at(usb: str) -> list[str]:
+    return [name_of(product) for _, product in finding.candidates(usb)]
+
+
+CAN_PRODUCTS = ["maxon-epos4", "cia402"]
+
+
+@pytest.mark.parametrize(
+    ("usb", "products"),
+    [
+        ("16d0:117e Openlight CANable2 7", CAN_PRODUCTS),
+        ("0403:ffa8 LAWICEL CANUSB", CAN_PRODUCTS),
+        ("ad50:60c4 CANable", CAN_PRODUCTS),
+        ("2341:0043 Arduino (www.arduino.cc) 95", ["firmata-glove"]),
+    ],
+)
+def test_an_adapter_that_is_known_is_asked_for_what_stands_behind_it_alone(
+    usb: str, products: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ids of usb.ids and of their makers; nothing of a force sensor's or tracker's is written to a CAN adapter."""
+    tried = []
+
+    def refused(role: str, product: Any, address: str) -> None:
+        tried.append(name_of(product))
+        raise DeviceError("silent")
+
+    monkeypatch.setattr(finding, "_identity", refused)
+    port = PortFound(address="/dev/ttyACM0", usb=usb, kind="", asked=False)
+    assert f"no device of {len(products)} products answers" in finding.ask(port).problem
+    assert tried == products
+
+
+def test_behind_an_adapter_of_nobody_every_product_is_looked_for_and_those_with_their_own_last() -> None:
+    every = named_at("")
+    assert set(named_at("0403:6001 FTDI FT232R A1")) == set(every) and len(every) > len(CAN_PRODUCTS) + 1
+    assert named_at("0403:6001 FTDI FT232R A1")[-3:] == [*CAN_PRODUCTS, "firmata-glove"]
+
+
+def test_a_plug_in_is_asked_behind_every_adapter_as_nobody_knows_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    theirs = Plugin("tissue_rig.force", "x", "acme", "1.0", "bota-sensone")
+    monkeypatch.setattr(plugins, "_met", {"tissue_rig.force": (theirs,)})
+    assert named_at("16d0:117e Openlight CANable2 7") == [*CAN_PRODUCTS, "bota-sensone"]
 
 
 def test_asking_where_nobody_can_answer_says_the_option() -> None:
