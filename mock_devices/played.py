@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pkgutil import resolve_name
-from typing import TypeVar
+from typing import Any, TypeVar
 from zlib import crc32
 
 from mock_devices.faults.wires import WIRE_FAULTS, Fault, FaultKind, FaultyWire, faults_of
@@ -74,7 +74,7 @@ def made(product: type[Product], factory: object) -> list[MockDevice]:
     return devices
 
 
-def _trouble(port: MockPort, devices: list[MockDevice]) -> str:
+def _trouble(port: MockPort, devices: list[Any]) -> str:
     for device in devices:
         if not isinstance(device, MockDevice):
             return f"its maker gives {device!r}, where a MockDevice is expected"
