@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import NamedTuple
 
 from drivers.bota import codec as bota
-from drivers.can.slcan import SlcanDecoder, decode_flags, decode_line
+from drivers.can.slcan import CanFrame, SlcanDecoder, decode_flags, decode_line, encode_frame
 from drivers.can.socketcan import decode as decode_can
 from drivers.canopen.nmt import decode_emergency, decode_heartbeat
 from drivers.canopen.sdo import Download, Upload
@@ -37,19 +37,29 @@ from drivers.poses import ToolPose
 from drivers.robotiq import codec as robotiq
 from drivers.roles import LinkCounters
 from drivers.zaber.codec import LineDecoder, ZaberReply, encode_command, encode_reply
-from mock_devices.bota.mock import CommandParser
+from mock_devices.bench import Bench
+from mock_devices.bota.mock import BotaMock, CommandParser
 from mock_devices.canopen.sdo_server import SdoServer
 from mock_devices.epos4.dictionary import Dictionary
+from mock_devices.epos4.mock import Epos4Mock
 from mock_devices.epos4.table import EPOS4
-from mock_devices.firmata.mock import BoardRequests
-from mock_devices.interfaces import MarkerPose
+from mock_devices.firmata.glove import GlovePlant
+from mock_devices.firmata.mock import BoardRequests, FirmataMock
+from mock_devices.interfaces import MarkerPose, ProtocolMock
+from mock_devices.laumas.mock import LaumasMock
 from mock_devices.ndi.encoding import Scene, encode_bx, encode_tx
 from mock_devices.ndi.gbf import parse_request
-from mock_devices.ndi.mock import parse_command
+from mock_devices.ndi.mock import NdiMock, parse_command
 from mock_devices.ndi.port_handles import CommandRefused
+from mock_devices.openigtlink.mock import OpenIgtLinkMock
+from mock_devices.optitrack.mock import OptiTrackMock
 from mock_devices.optitrack.packets import frame, models, server_information
-from mock_devices.robotiq.mock import RequestFinder
+from mock_devices.parameters import Parameters
+from mock_devices.robotiq.mock import RequestFinder, RobotiqMock
+from mock_devices.testing.epos4 import LaggingPlant
+from mock_devices.testing.wire import MemoryWire
 from mock_devices.zaber.commands import CommandLines
+from mock_devices.zaber.mock import ZaberMock
 from rig.config.products.cia402 import Cia402Wiring
 from rig.errors import DeviceError, UsageError
 
@@ -122,6 +132,19 @@ OF_OPTITRACK = tuple(
 )
 # Of ATI's manual: the request for a stream, and a record of six counts.
 OF_NETFT = (bytes.fromhex("1234000200000000"), struct.pack(">IIIiiiiii", 5, 35_007, 0, 10**6, -2, 3, 4, -5, 6))
+# What outlasts one answer of a mock drive and a mock axis: modes, words, resets; numbers that are none.
+DRIVE = """
+2f60600008000000 2f60600006000000 2b40600006000000 2b4060000f000000 2b4060001f000000 237a6000d2040000 8101 0101
+"""
+OF_DRIVE = tuple(
+    encode_frame(CanFrame(0x601 if len(data) == 8 else 0, data)) for data in map(bytes.fromhex, DRIVE.split())
+)
+OF_ZABER_MOVES = (
+    b"/1 move abs 5000\n", b"/1 move abs 1 nan\n", b"/1 move vel nan\n", b"/1 move vel inf\n", b"/1 home\n",
+    b"/1 stop\n", b"/1 set maxspeed 0\n", b"/1 set accel 0\n", b"/1 set limit.max inf\n",
+    b"/1 get limit.max\n", b"/1 get pos\n",
+)  # fmt: skip
+OF_NDI_PARAMETERS = (b"SET Param.Simulated Alerts=5\r", b"SET Param.Simulated Alerts=\xb2\r", b"GET Param.*\r")
 OF_NETFT_PAGE = (
     b"<netft><cfgcalsn>FT27462</cfgcalsn><scfgfu>N</scfgfu><scfgtu>Nm</scfgtu><cfgcpf>1000</cfgcpf><cfgcpt>2</cfgcpt>",
     b"<scfgfu>lbf</scfgfu>", b"<cfgcpf>0</cfgcpf>", b"<cfgcpt>nan</cfgcpt>", b"<cfgcpf>1e999</cfgcpf>",
@@ -248,7 +271,7 @@ def _netft() -> ModuleType:
 
 def codecs() -> dict[str, Codec]:
     """Every codec by name, stateful ones new."""
-    return {**_of_lines(), **_of_can(), **_of_trackers(), **_of_mocks()}
+    return {**_of_lines(), **_of_can(), **_of_trackers(), **_of_mocks(), **_of_whole_mocks()}
 
 
 def _of_lines() -> dict[str, Codec]:
@@ -303,4 +326,45 @@ def _of_mocks() -> dict[str, Codec]:
         "sdo server": Codec(_server(), (), OF_CAN),
         "ndi commands": Codec(parse_command, (CommandRefused,), OF_NDI),
         "ndi bx2": Codec(lambda data: parse_request(data.decode("latin-1")), (CommandRefused,), OF_NDI),
+    }
+
+
+def _whole(make: Callable[[MemoryWire], ProtocolMock], first: bytes = b"") -> Callable[[bytes], object]:
+    """A mock behind a wire, which hears each string after ``first``, and does what is due in the millisecond after."""
+    wire, now_ns = MemoryWire(), 0
+    mock = make(wire)
+
+    def take(data: bytes) -> None:
+        nonlocal now_ns
+        now_ns += 1_000_000
+        wire.said += first + data
+        mock.receive(now_ns)
+        if mock.due_ns <= now_ns:
+            mock.tick(now_ns)
+        wire.sent.clear()
+
+    return take
+
+
+def _of_whole_mocks() -> dict[str, Codec]:
+    """What answers without a codec of its own; one that raises ends the simulated bench."""
+    bench, tools = Bench(Parameters()), ("tip", "arm")
+    return {
+        "bota mock": Codec(_whole(lambda wire: BotaMock(wire, bench.force, 0)), (), OF_BOTA),
+        "robotiq mock": Codec(_whole(lambda wire: RobotiqMock(wire, bench.force_modbus, 0)), (), OF_ROBOTIQ),
+        "laumas mock": Codec(_whole(lambda wire: LaumasMock(wire, bench.force)), (), OF_LAUMAS),
+        "firmata mock": Codec(_whole(lambda wire: FirmataMock(wire, GlovePlant(), 0)), (), OF_FIRMATA),
+        "zaber mock": Codec(
+            _whole(lambda wire: ZaberMock(wire, LaggingPlant(), 0, 2000.0, 1), b"\n"), (), OF_ZABER + OF_ZABER_MOVES
+        ),
+        "epos4 mock": Codec(
+            _whole(lambda wire: Epos4Mock(wire, LaggingPlant(), 0), b"\rC\rS8\rO\r"), (), OF_SLCAN + OF_DRIVE
+        ),
+        "ndi mock": Codec(
+            _whole(lambda wire: NdiMock(wire, bench.tracker, 0, tools), b"\r"), (), OF_NDI + OF_NDI_PARAMETERS
+        ),
+        "optitrack mock": Codec(_whole(lambda wire: OptiTrackMock(wire, bench.tracker, 0, tools)), (), OF_OPTITRACK),
+        "openigtlink mock": Codec(
+            _whole(lambda wire: OpenIgtLinkMock(wire, bench.tracker, tools, lambda now_ns: now_ns)), (), OF_IGTLINK
+        ),
     }

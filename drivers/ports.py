@@ -174,7 +174,7 @@ def open_port(address: str, baud: int) -> Port:
     if not address.startswith("tcp://"):
         return SerialPort(address, baud)
     host, _, port = address.removeprefix("tcp://").rpartition(":")
-    if not host or not port.isdigit():
+    if not host or not port.isdecimal():
         raise DeviceError(f"{address}: not a TCP address; write tcp://host:port")
     return TcpPort(host, int(port))
 

@@ -16,7 +16,7 @@ AT_ONCE = 70
 def udp_address(address: str) -> tuple[str, int]:
     """Host and port of ``udp://host:port``; raises DeviceError."""
     host, _, port = address.removeprefix("udp://").rpartition(":")
-    if not address.startswith("udp://") or not host or not port.isdigit() or not 0 < int(port) < 1 << 16:
+    if not address.startswith("udp://") or not host or not port.isdecimal() or not 0 < int(port) < 1 << 16:
         raise DeviceError(f"{address}: not a UDP address; write udp://host:port")
     return host.strip("[]"), int(port)
 

@@ -1,15 +1,19 @@
 """What the bench plays: a product on a wire, with the faults it can have. Makers in other distributions begin here."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TypeVar
+from dataclasses import dataclass, replace
+from pkgutil import resolve_name
+from typing import Any, TypeVar
 from zlib import crc32
 
 from mock_devices.faults.wires import WIRE_FAULTS, Fault, FaultKind, FaultyWire, faults_of
 from mock_devices.interfaces import ProtocolMock
 from mock_devices.parameters import Axis, Sensor
-from rig.config.products.registry import ROLES
-from rig.config.products.roles import Product
+from rig import plugins
+from rig.config.products.registry import ROLES, name_of
+from rig.config.products.roles import MockPort, Product
+from rig.errors import PluginError
+from rig.plugins import lacking
 
 AnyMock = TypeVar("AnyMock", bound=ProtocolMock)
 ALL = "all"
@@ -49,3 +53,32 @@ def served(
 ) -> MockDevice:
     """A device with its faults: those of the wire, of ``kinds``, and of what is ``inside``."""
     return MockDevice(role, mock, wire, faults_of(wire, WIRE_FAULTS) | faults_of(mock, kinds) | dict(inside or {}))
+
+
+def made(product: type[Product], factory: object) -> list[MockDevice]:
+    """What plays ``product``; none where nothing does. Raises PluginError where a plug-in's lacks what a mock needs."""
+    if product.mock is None:
+        return []
+    declared = (name_of(product), product.__module__.partition(".")[0])
+    used = (one for group in plugins.met().values() for one in group if not one.error)
+    whose = next((one for one in used if (one.declares, one.module) == declared), None)
+    try:
+        devices = list(resolve_name(product.mock.maker)(factory))
+        wrong = _trouble(product.mock, devices) if whose else ""
+    except (Exception, SystemExit) as error:
+        if whose is None:
+            raise
+        wrong = f"{type(error).__name__}: {error}"
+    if whose and wrong:
+        raise PluginError(replace(whose, error=f"its mock cannot be played: {wrong}").sentence)
+    return devices
+
+
+def _trouble(port: MockPort, devices: list[Any]) -> str:
+    for device in devices:
+        if not isinstance(device, MockDevice):
+            return f"its maker gives {device!r}, where a MockDevice is expected"
+        if absent := lacking(device.mock, ProtocolMock):
+            return f"it has no {', no '.join(absent)}"
+    served = any(device.role == port.role and port.kind in device.mock.endpoints() for device in devices)
+    return "" if served else f"nothing of it is at {port.role} {port.kind}, where its declaration says it is"

@@ -231,7 +231,8 @@ def _server(options: argparse.Namespace) -> MockServer:
     bench = Bench(parameters, options.seed, start_ns)
     factory = DeviceFactory(bench, start_ns, time.monotonic_ns, options.seed, options.links)
     chosen = [product for role in CHOICES for product in CHOICES[role][vars(options)[role]]]
-    devices = factory.devices((*chosen, *map(INPUTS.named, options.input)))
+    spare = [product for role in CHOICES if vars(options)[role] == ALL for product in CHOICES[role][ALL]]
+    devices = factory.devices((*chosen, *map(INPUTS.named, options.input)), spare)
     return MockServer(bench, devices, time.monotonic_ns)
 
 

@@ -14,6 +14,7 @@ from api.operations import doctor as work
 from controller.claims import holder
 from rig.config.endpoints import Endpoints
 from rig.config.products.registry import ROLES
+from rig.config.products.roles import AxisProduct
 from rig.errors import CheckFailed
 from rig.results.bench import DeviceReport
 from rig.results.tables import TextTable
@@ -50,6 +51,8 @@ def _lines(endpoints: Endpoints) -> str:
             if product.mock is None:
                 continue
             lines.append(f'{role}.port = "{product.mock.address(endpoints)}"            # {name}')
+            if issubclass(product, AxisProduct):
+                lines.append(f"{role}.increments_per_mm = {product().increments_per_mm:g}            # {name}")
             if product.mock.role in endpoints.latency_ms:
                 lines.append(f"{role}.latency_ms = {endpoints.latency_ms[product.mock.role]:g}            # {name}")
     return "\n".join([*lines, f"# control channel: {endpoints.control}", ""])

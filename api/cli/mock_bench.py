@@ -10,7 +10,7 @@ from api.cli.mock_calibration import mock_axis_calibration, mock_force_calibrati
 from api.cli.mock_dynamics import mock_axis_dynamics
 from api.cli.mock_inputs import input_options, mock_inputs
 from api.cli.options import calibrated
-from controller.commissioning.refusals import refuse_uncalibrated
+from controller.commissioning.refusals import refuse_uncalibrated, refuse_unstated_scale
 from rig.config.endpoints import Endpoints
 from rig.config.products.roles import MOCK_PORT, ForceProduct, Product, TrackerProduct
 from rig.config.wiring import Wiring
@@ -68,6 +68,7 @@ def bench_for(
     none is calibrated. A service only looks and retracts at first: it starts whatever they say (``refuses`` false), and
     the loop refuses the approach.
     """
+    refuse_unstated_scale(wiring)
     wiring = calibrated(wiring) if approaches else wiring
     if approaches and refuses:
         refuse_uncalibrated(wiring, datetime.now(UTC))

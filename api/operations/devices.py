@@ -1,20 +1,28 @@
 """What this installation knows: products with their options, and plug-ins with what is wrong with them."""
 
 import inspect
+from functools import cache
+from pkgutil import resolve_name
+from typing import get_type_hints
 
 import rig
+from drivers.input_role import Input
+from drivers.roles import ForceSensor, MarkerTracker, ServoAxis
 from rig import plugins
 from rig.config.products.inputs import EVERY_ROLE
 from rig.config.products.roles import Product
 from rig.config.words import toml, value_words
+from rig.deadline import within
 from rig.diagnosis.effects.axis import AXIS_CAUSES
 from rig.diagnosis.effects.registry import CAUSES
+from rig.plugins import lacking
 from rig.registry import known
 from rig.results.devices import DevicesResult, PluginListed, ProductListed, ProductOption
 from rig.tissue.registry import LAWS
 
 # Each has looked at its own group of entry points when it was loaded.
 REGISTRIES = (*EVERY_ROLE.values(), LAWS, CAUSES, AXIS_CAUSES)
+KEPT: dict[str, type] = {"force": ForceSensor, "axis": ServoAxis, "tracker": MarkerTracker, "input": Input}
 
 
 def devices(product: str = "") -> DevicesResult:
@@ -60,11 +68,29 @@ def options(product: type[Product]) -> tuple[ProductOption, ...]:
 
 
 def _plugin(plugin: plugins.Plugin) -> PluginListed:
+    role = plugin.group.rpartition(".")[2]
     return PluginListed(
         group=plugin.group,
         name=plugin.name,
         distribution=plugin.distribution,
         distribution_version=plugin.version,
         declares=plugin.declares,
-        error=plugin.error,
+        error=plugin.error or (_unusable(role, EVERY_ROLE[role][plugin.declares]) if role in EVERY_ROLE else ""),
+    )
+
+
+@cache
+def _unusable(role: str, product: type[Product]) -> str:
+    """What its driver and its mock's maker lack, as far as that shows before a device is opened; empty if nothing."""
+    try:
+        with within(plugins.IMPORT_S):
+            driver = resolve_name(product.driver)
+            maker = resolve_name(product.mock.maker) if product.mock else devices
+            made = driver if inspect.isclass(driver) else get_type_hints(driver).get("return")
+    except (Exception, SystemExit) as error:  # whatever a plug-in does while it is imported is its own failure
+        return f"{type(error).__name__}: {error}"
+    absent = lacking(made, KEPT[role]) if inspect.isclass(made) else []
+    no_calls = [name for name, one in ((product.driver, driver), ("its mock's maker", maker)) if not callable(one)]
+    return "; ".join(
+        [*(f"its driver has no {name}" for name in absent), *(f"{name} is no function" for name in no_calls)]
     )

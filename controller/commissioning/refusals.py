@@ -43,6 +43,16 @@ def refuse_uncalibrated(wiring: Wiring, now: datetime) -> None:
         raise UsageError("; ".join(reasons))
 
 
+def refuse_unstated_scale(wiring: Wiring) -> None:
+    """Raises UsageError where a real axis would go by a scale that nobody stated; one of 0 the drive itself says."""
+    axis = wiring.axis
+    if axis.port != MOCK_PORT and axis.increments_per_mm and "increments_per_mm" not in axis.model_fields_set:
+        raise UsageError(
+            f"axis.increments_per_mm is not stated for the {axis.product} at {axis.port}: give the increments of 1 mm"
+            " of the tip, encoder, gear and screw included, then check it with `rig calibrate axis`"
+        )
+
+
 def contradictions(wiring: Wiring) -> list[str]:
     """Words of the wiring that say something else than the calibrations, one sentence each."""
     found = []

@@ -26,6 +26,7 @@ from rig.config.products.roles import Product
 from rig.config.wiring import Limits
 from rig.config.words import toml
 from rig.errors import RigError
+from rig.plugins import declaring
 from rig.results.devices import PortFound
 
 # Vendor and product numbers of the USB ID repository (usb.ids) and of the makers' own documents: what an adapter is,
@@ -60,8 +61,22 @@ class AtPort(NamedTuple):
     product: type[Product]
 
 
-def candidates() -> Iterator[AtPort]:
-    """Products that stand at a serial line: those that only listen for a moment first, what must be set up last."""
+def candidates(usb: str = "") -> list[AtPort]:
+    """Products that may stand at a serial line whose adapter is ``usb``: those that only listen for a moment first.
+
+    An adapter that some of ours are known by is theirs, and that of plug-ins, who have none named. Behind one that
+    belongs to nobody, what has adapters of its own comes last.
+    """
+    every = list(_at_lines())
+    fit = [one for one in every if usb[:9] in one.product.usb]
+    if fit:
+        return fit + [
+            one for one in every if one not in fit and declaring(f"tissue_rig.{one.role}", name_of(one.product))
+        ]
+    return sorted(every, key=lambda one: bool(usb and one.product.usb))
+
+
+def _at_lines() -> Iterator[AtPort]:
     roles: tuple[tuple[str, Iterable[type[Product]]], ...] = (
         ("force", FORCE_SENSORS.values()), ("axis", AXES.values()), ("tracker", TRACKERS.values()),
         ("input", (product for product in INPUTS.values() if product.at_line)),
@@ -151,7 +166,8 @@ def find(seen: Iterable[PortFound], consent: Consent) -> Iterator[PortFound]:
 def ask(port: PortFound) -> PortFound:
     """Lets each product's driver look for its device at ``port``, until one answers."""
     why = ""
-    for role, product in candidates():
+    asked = candidates(port.usb)
+    for role, product in asked:
         try:
             found = _identity(role, product, port.address)
         except RigError as error:
@@ -161,7 +177,7 @@ def ask(port: PortFound) -> PortFound:
         lines = lines_of(role, product, port.address)
         more = {"product": name_of(product), "serial": found.serial, "asked": True, "lines": lines}
         return port.model_copy(update=said | more)
-    nobody = f"no device of {len(list(candidates()))} products answers there; the last said: {why}"
+    nobody = f"no device of {len(asked)} products answers there; the last said: {why}"
     return port.model_copy(update={"asked": True, "problem": nobody})
 
 

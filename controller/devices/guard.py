@@ -20,7 +20,7 @@ from rig.config.products.roles import ForceProduct, Product
 from rig.deadline import within
 from rig.errors import DeviceError, RigError
 from rig.input_streams import InputSample
-from rig.plugins import Plugin
+from rig.plugins import Plugin, lacking
 
 Made = TypeVar("Made", bound=Device)
 Answer = TypeVar("Answer")
@@ -33,6 +33,9 @@ BLOCKED_POLLS, AMONG_POLLS = 3, 100
 BEYOND_RANGE = 2.0
 # The largest volume of a camera, and far beyond any axis.
 FARTHEST_MM = 10_000.0
+# A second of a fast sensor. In bunches of three that are dated by their arrival two of three have the time of the one
+# before; a busy computer makes a few alike.
+ALIKE_AMONG, ALIKE_LARGEST = 1000, 0.6
 # The loop is given up by its operators after a second without a cycle; who is at fault has to be named before that.
 CYCLIC_S = 0.5
 START_S = 30.0  # half of what the loop has for its start, homing included
@@ -45,6 +48,8 @@ class Guarded(ABC, Generic[Made, Sample]):
     GROUP: str
     """Of entry points, in which plug-ins declare products of this role."""
     KIND: type[Sample]
+    ROLE: type
+    """The protocol that its driver keeps."""
 
     @classmethod
     def guard(cls, config: Product, make: Callable[[], Made]) -> Self | Made:
@@ -63,7 +68,11 @@ class Guarded(ABC, Generic[Made, Sample]):
         self._plugin, self._config, self._now, self._waits = plugin, config, now, waits
         self._device = self._asked(make)
         self._last_ns: dict[int, int] = {}
+        self._alike: dict[int, float] = {}
         self._blocked = deque[bool](maxlen=AMONG_POLLS)
+        if absent := lacking(self._device, self.ROLE):
+            self.close()
+            raise self._error(f"its driver has no {', no '.join(absent)}")
 
     @property
     def counters(self) -> LinkCounters:
@@ -143,8 +152,18 @@ class Guarded(ABC, Generic[Made, Sample]):
             return (
                 f"sample {sample.seq} was taken {(sample.capture_ns - sample.arrival_ns) * 1e-6:.3f} ms after it came"
             )
+        if self._clockless(stream, sample.capture_ns):
+            return (
+                "most of its samples have the time of the one before: a stream without a clock is dated by its numbers"
+            )
         self._last_ns[stream] = sample.capture_ns
         return self._impossible(sample) if sample.valid else ""
+
+    def _clockless(self, stream: int, capture_ns: int) -> bool:
+        """Whether most of what it gave lately was dated by its arrival; what has no rate may come together."""
+        before = self._alike.get(stream, 0.0)
+        self._alike[stream] = before + (float(self._last_ns.get(stream) == capture_ns) - before) / ALIKE_AMONG
+        return self._alike[stream] > ALIKE_LARGEST and self.period_ns > 0
 
     @abstractmethod
     def _impossible(self, sample: Sample) -> str:
@@ -177,7 +196,7 @@ class Guarded(ABC, Generic[Made, Sample]):
 class GuardedForce(Guarded[ForceSensor, ForceSample]):
     """A force sensor."""
 
-    GROUP, KIND = "tissue_rig.force", ForceSample
+    GROUP, KIND, ROLE = "tissue_rig.force", ForceSample, ForceSensor
 
     def poll(self, now_ns: int) -> Sequence[ForceSample]:
         """Samples since the last call, each looked at."""
@@ -193,7 +212,7 @@ class GuardedForce(Guarded[ForceSensor, ForceSample]):
 class GuardedTracker(Guarded[MarkerTracker, MarkerSample]):
     """A marker tracker."""
 
-    GROUP, KIND = "tissue_rig.tracker", MarkerSample
+    GROUP, KIND, ROLE = "tissue_rig.tracker", MarkerSample, MarkerTracker
 
     @property
     def tools(self) -> tuple[str, ...]:
@@ -211,7 +230,7 @@ class GuardedTracker(Guarded[MarkerTracker, MarkerSample]):
 class GuardedInput(Guarded[Input, InputSample]):
     """An input, which may wait, as it has a thread of its own."""
 
-    GROUP, KIND = "tissue_rig.input", InputSample
+    GROUP, KIND, ROLE = "tissue_rig.input", InputSample, Input
 
     def poll(self, now_ns: int) -> Sequence[InputSample]:
         """Samples since the last call, each looked at."""
@@ -227,7 +246,7 @@ class GuardedInput(Guarded[Input, InputSample]):
 class GuardedAxis(Guarded[ServoAxis, AxisSample]):
     """A servo axis."""
 
-    GROUP, KIND = "tissue_rig.axis", AxisSample
+    GROUP, KIND, ROLE = "tissue_rig.axis", AxisSample, ServoAxis
     _failure: DeviceError | None = None
 
     def _said(self, ask: Callable[[], Answer], unsaid: Answer) -> Answer:

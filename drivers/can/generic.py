@@ -164,7 +164,7 @@ def _frame(message: can.Message) -> CanFrame:
 
 def open_bus(interface: str, port: str, bitrate: int, options: Mapping[str, Option]) -> can.BusABC:
     """The adapter, opened by python-can; raises DeviceError in one sentence."""
-    channel: int | str = int(port) if port.isdigit() else port
+    channel: int | str = int(port) if port.isdecimal() else port
     by_number = interface == "gs_usb" and not options.keys() & {"bus", "address"}
     extra: dict[str, Any] = {**({"index": channel} if by_number else {}), **options}
     try:

@@ -99,6 +99,9 @@ class SheetKind:
             },
         )
 
+    def agree(self, node: Node) -> None:
+        """Its factors were compared when it was identified."""
+
     def _check_identity(self, node: Node, vendor: int, product: int) -> None:
         said = (self._sheet.vendor or vendor, self._sheet.product or product)
         if (vendor, product) != said:

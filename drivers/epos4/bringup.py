@@ -37,6 +37,17 @@ def identify(node: Node) -> Identity:
     )
 
 
+def refuse_other_turn(node: Node, config: CanAxisProduct) -> None:
+    """Raises DeviceError where the drive counts a turn otherwise than configured: every speed would be another."""
+    stated = config.increments_per_rev
+    counted = _reread(partial(node.read, objects.SENSOR_RESOLUTION), lambda value: value == stated)
+    if counted != stated:
+        raise DeviceError(
+            f"{node.name}: counts {counted} increments a turn (object 3000:05) where axis.increments_per_rev says"
+            f" {stated:g}: give what its encoder has, four times its lines, or set up the drive"
+        )
+
+
 def configure(node: Node, writes: list[tuple[Entry, int]]) -> None:
     """Writes all of it, then reads it back; raises DeviceError where a value differs."""
     for entry, value in writes:

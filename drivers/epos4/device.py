@@ -119,6 +119,7 @@ class Epos4Axis(SampledDevice):
         try:
             node.order(NmtCommand.ENTER_PRE_OPERATIONAL)
             self._identity = self._kind.identify(node)
+            self._kind.agree(node)
             self._walker = walker
             walker.standstill = self._kind.standstill
             walker.make_safe()

@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from drivers.epos4 import setup
-from drivers.epos4.bringup import identify
+from drivers.epos4.bringup import identify, refuse_other_turn
 from drivers.epos4.cia402 import Statusword
 from drivers.epos4.codec import DriveMotion, Units, decode_motion_pdo
 from drivers.epos4.node import Node
@@ -34,6 +34,9 @@ class DriveKind(Protocol):
     def identify(self, node: Node) -> Identity:
         """Who the node says it is; raises DeviceError where it is another or lacks what is needed."""
 
+    def agree(self, node: Node) -> None:
+        """Raises DeviceError where what ``start`` alone compares is another than configured."""
+
     def writes(self, limits: Limits) -> list[tuple[Entry, int]]:
         """Limits, stops, heartbeats and PDOs, in their order."""
 
@@ -52,6 +55,10 @@ class Epos4Kind:
         self._config = config
         self.scale = Units(config.increments_per_mm, config.increments_per_rev, config.direction)
         self.turn_mm = config.increments_per_rev / config.increments_per_mm
+
+    def agree(self, node: Node) -> None:
+        """Its increments a turn are those that speeds are computed with."""
+        refuse_other_turn(node, self._config)
 
     def writes(self, limits: Limits) -> list[tuple[Entry, int]]:
         """Limits, stops, heartbeats and PDOs, in their order."""

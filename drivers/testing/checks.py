@@ -267,7 +267,7 @@ def _ends(subject: UnderTest, device: AnyDevice) -> None:
 def closing(subject: UnderTest) -> None:
     """Closing may be done twice, leaves neither thread nor descriptor behind, and nothing can be polled after it."""
     descriptors, threads = _descriptors(), set(threading.enumerate())
-    device = subject.open()
+    device = subject.made()
     device.start()
     subject.listen(device, FEW_S)
     for _ in range(2):

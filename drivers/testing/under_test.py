@@ -10,12 +10,18 @@ from typing import NamedTuple
 from drivers.input_role import Input
 from drivers.roles import ForceSensor, MarkerTracker, ServoAxis
 from rig.channels import AxisSample, ForceSample, MarkerSample
-from rig.config.products.roles import AxisProduct, Product
+from rig.config.products.input_role import InputProduct
+from rig.config.products.roles import AxisProduct, ForceProduct, Product, TrackerProduct
+from rig.config.products.usable import refusal_of
 from rig.errors import DeviceError
 from rig.input_streams import InputSample
+from rig.plugins import lacking
 
 AnySample = ForceSample | AxisSample | MarkerSample | InputSample
 AnyDevice = ForceSensor | ServoAxis | MarkerTracker | Input
+KEPT: tuple[tuple[type[Product], type], ...] = (
+    (ForceProduct, ForceSensor), (AxisProduct, ServoAxis), (TrackerProduct, MarkerTracker), (InputProduct, Input),
+)  # fmt: skip
 # A cycle of the loop.
 TURN_S = 0.001
 # The slowest stream of a bench, a tracker at 20 Hz, then gives ten samples.
@@ -72,10 +78,25 @@ class UnderTest:
         """The rate that the declaration promises; None for an axis, which answers what it is asked, and a switch."""
         return self.config.promised_Hz
 
+    def made(self) -> AnyDevice:
+        """A new driver, not started; raises Nonconformity where it or its declaration lacks what its role has."""
+        kinds = [pair for pair in KEPT if isinstance(self.config, pair[0])]
+        if not kinds:
+            raise Nonconformity(f"its configuration is {self.config!r}, where the table of a product is expected")
+        ((kind, role),) = kinds
+        if wrong := refusal_of(kind)(type(self.config)):
+            raise Nonconformity(f"its declaration cannot be used: {wrong}")
+        device = self.open()
+        if absent := lacking(device, role):
+            with contextlib.suppress(Exception):
+                device.close()
+            raise Nonconformity(f"its driver has no {', no '.join(absent)}, which {role.__name__} has")
+        return device
+
     @contextlib.contextmanager
     def started(self, next_seq: int = 0) -> Iterator[AnyDevice]:
         """A driver that runs, its samples numbered from ``next_seq``."""
-        device = self.open()
+        device = self.made()
         try:
             device.next_seq = next_seq
             device.start()
@@ -127,7 +148,7 @@ class UnderTest:
     def open_or_say(self) -> AnyDevice | str:
         """A new driver, or why there is none yet."""
         try:
-            return self.open()
+            return self.made()
         except DeviceError as error:
             time.sleep(TURN_S)
             return str(error)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from drivers.can.slcan import CanFrame
 from drivers.canopen.nmt import EMERGENCY_ID, HEARTBEAT_ID, SDO_REQUEST_ID, SDO_RESPONSE_ID, SYNC, NmtCommand, NmtState
 from drivers.epos4.faults import FAULTS, UNKNOWN
-from drivers.epos4.objects import SERIAL
+from drivers.epos4.objects import SENSOR_RESOLUTION, SERIAL
 from mock_devices.can.bus_adapter import BusAdapter
 from mock_devices.can.slcan_adapter import SlcanAdapter
 from mock_devices.canopen.sdo_server import SdoServer
@@ -84,6 +84,7 @@ class Epos4Mock(OnWire):
         """When SYNCs were taken, by ``clock_ns`` where there is one; whoever wants them takes them out."""
         self._clock_ns = clock_ns
         self._connect()
+        self.dictionary.live[SENSOR_RESOLUTION.index, SENSOR_RESOLUTION.sub] = lambda: round(increments_per_rev)
 
     @property
     def unguarded(self) -> bool:

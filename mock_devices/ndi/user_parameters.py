@@ -48,7 +48,7 @@ class UserParameters:
             raise CommandRefused(NO_SUCH)
         if name not in BOUNDS:
             raise CommandRefused(DENIED)
-        if not value.isdigit():
+        if not value.isdecimal():
             raise CommandRefused(BAD_VALUE)
         low, high = BOUNDS[name]
         if not low <= int(value) <= high:

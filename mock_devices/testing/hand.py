@@ -10,7 +10,7 @@ from api.cli.mock_dynamics import dynamics_file
 from api.cli.options import built_in
 from mock_devices.control import BenchControl
 from mock_devices.testing.commands import PATIENT, Said, ServedBench, rig, served_bench
-from rig.config.products.roles import ForceProduct, TrackerProduct
+from rig.config.products.roles import AxisProduct, ForceProduct, TrackerProduct
 from rig.config.wiring import Wiring
 
 
@@ -62,6 +62,8 @@ class MockBench:
         for role in mocks(asked):
             device = getattr(wiring, role)
             found.append(f"{role}.port={device.port}")
+            if isinstance(device, AxisProduct):
+                found.append(f"{role}.increments_per_mm={device.increments_per_mm}")
             if isinstance(device, ForceProduct | TrackerProduct):
                 found.append(f"{role}.latency_ms={device.latency_ms}")
         return [part for setting in (*found, *PATIENT, *settings) for part in ("--set", setting)]

@@ -1,5 +1,7 @@
 """Commands as a Zaber device hears them: cut out of whatever comes, checksums looked at, words turned into numbers."""
 
+import contextlib
+import math
 import re
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -33,11 +35,11 @@ class Request(NamedTuple):
         return self.words[index]
 
     def number_at(self, index: int) -> float:
-        """The same as a number."""
-        try:
-            return float(self.word(index))
-        except ValueError:
-            raise Refused("BADDATA") from None
+        """The same as a finite number."""
+        with contextlib.suppress(ValueError):
+            if math.isfinite(number := float(self.word(index))):
+                return number
+        raise Refused("BADDATA")
 
     def optional(self, index: int) -> float:
         """The same, 0 where there is none."""

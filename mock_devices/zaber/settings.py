@@ -49,6 +49,7 @@ class ZaberSettings:
         """What `set` does; raises Refused."""
         if name not in self.values:
             raise Refused("BADCOMMAND")
-        if (value < 0 and name in NOT_NEGATIVE) or (name.startswith("comm.") and value not in (0, 1)):
+        low = (value < 0 and name in NOT_NEGATIVE) or (name == "accel" and not value)
+        if low or (name.startswith("comm.") and value not in (0, 1)):
             raise Refused("BADDATA")
         self.values[name] = value

@@ -46,6 +46,6 @@ def wrong_port(interface: str, port: str, unnamed: str) -> str:
     if port == unnamed and interface != "slcan":
         adapter = ADAPTERS[interface]
         return f"port: name {adapter.port} for {interface}, for example {adapter.example}"
-    if interface in ("kvaser", "ixxat", "gs_usb") and not port.isdigit():
+    if interface in ("kvaser", "ixxat", "gs_usb") and not port.isdecimal():
         return f"port: {port!r} is not {ADAPTERS[interface].port}; for example {ADAPTERS[interface].example}"
     return ""

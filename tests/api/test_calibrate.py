@@ -20,6 +20,7 @@ from api.cli.options import built_in, calibrated, wiring_from
 from api.http.jobs.worker import function_at
 from api.operations.calibrate import AxisAsked
 from api.operations.calibrations import keep, refuse_out, refuse_unfit
+from controller.commissioning.refusals import refuse_unstated_scale
 from rig.config.calibration import Calibration, Uncertainty
 from rig.config.calibration_files import read_force, text_of
 from rig.config.endpoints import Endpoints
@@ -296,11 +297,32 @@ def test_a_wiring_that_contradicts_what_is_kept_is_refused(monkeypatch: pytest.M
 
 def test_whoever_only_looks_or_retracts_needs_no_calibration(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mock_calibration, "_measured_force", lambda *_: pytest.fail("calibrated"))
-    real = built_in(["force.port=/dev/ttyUSB0", "axis.port=/dev/ttyACM0", "tracker.port=/dev/ttyUSB1"])
+    ports = ("force.port=/dev/ttyUSB0", "axis.port=/dev/ttyACM0", "tracker.port=/dev/ttyUSB1")
+    real = built_in([*ports, "axis.increments_per_mm=2000"])
     with bench_for(real, approaches=False) as (live, _):
         assert live == real
     with bench_for(real, refuses=False) as (live, _):
         assert live == real
+
+
+@pytest.mark.parametrize("approaches", [True, False])
+def test_a_real_axis_whose_scale_nobody_stated_is_refused_before_a_bench_starts(
+    approaches: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The usual scale of another screw would move the tip, and write its limits, by another length than it says."""
+    monkeypatch.setattr("api.cli.mock_bench.bench_process", lambda *_: pytest.fail("a bench was started"))
+    for product in ("maxon-epos4", "zaber-ascii"):
+        with (
+            pytest.raises(UsageError, match=rf"axis.increments_per_mm is not stated for the {product} at /dev/ttyACM0"),
+            bench_for(built_in([f"axis.product={product}", "axis.port=/dev/ttyACM0"]), approaches=approaches),
+        ):
+            pass
+
+
+def test_a_scale_that_is_stated_or_said_by_the_drive_or_the_mock_bench_is_none_of_these() -> None:
+    real = "axis.port=/dev/a"
+    for settings in ((real, "axis.increments_per_mm=2000"), (real, "axis.product=cia402"), ()):
+        refuse_unstated_scale(built_in(list(settings)))
 
 
 def test_a_real_sensor_beside_a_mock_axis_is_never_calibrated_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ import os
 import pty
 import select
 import subprocess
+import sys
 import tomllib
 import tty
 from collections.abc import Iterator
@@ -25,9 +26,11 @@ from api.operations.devices import devices
 from controller.devices import finding
 from mock_devices.testing.access import client_of
 from mock_devices.testing.commands import RIG, ROOT, ServedBench, served_bench
+from rig import plugins
 from rig.config.products.registry import name_of
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, UsageError
+from rig.plugins import Plugin
 from rig.results.devices import DevicesResult, FindResult, PortFound
 
 
@@ -119,6 +122,96 @@ def test_plug_ins_that_fail_are_listed_and_harm_no_command(tmp_path: Path) -> No
     assert "Traceback" not in said.stderr
 
 
+HOLLOW = """
+from typing import ClassVar, Literal
+from pydantic import Field
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.roles import MockPort
+
+class Hollow(BotaWiring):
+    "Its driver and its mock lack what they need."
+    driver: ClassVar[str] = "hollow_plug:Driver"
+    mock: ClassVar[MockPort | None] = MockPort("hollow_mock:make", "hollow")
+    product: Literal["hollow"] = Field(default="hollow", description="x")
+
+class Annotated(Hollow):
+    "Its driver comes from a function that says what it gives; its mock is not there."
+    driver: ClassVar[str] = "hollow_plug:opened"
+    mock: ClassVar[MockPort | None] = MockPort("hollow_mock:nobody", "hollow")
+    product: Literal["annotated"] = Field(default="annotated", description="x")
+
+class Driver:
+    def __init__(self, config): ...
+    def start(self): ...
+    def fileno(self): return 0
+    def poll(self, now_ns): return []
+
+def opened(config) -> Driver:
+    return Driver(config)
+"""
+HOLLOW_MOCK = """
+from mock_devices.played import MockDevice
+
+class Mock:
+    def endpoints(self): return {"serial": "/dev/null"}
+    def filenos(self): return []
+
+def make(factory):
+    return [MockDevice("hollow", Mock(), factory.faulty(factory.line("hollow")), {})]
+"""
+
+
+@pytest.fixture(scope="module")
+def hollow(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+    folder = tmp_path_factory.mktemp("site")
+    about = folder / "acme-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: acme\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(
+        "[tissue_rig.force]\nhollow = hollow_plug:Hollow\nannotated = hollow_plug:Annotated\n"
+    )
+    (folder / "hollow_plug.py").write_text(HOLLOW)
+    (folder / "hollow_mock.py").write_text(HOLLOW_MOCK)
+    return folder, os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)]), "COLUMNS": "300"}
+
+
+def run_beside(hollow: tuple[Path, dict[str, str]], *command: str) -> "subprocess.CompletedProcess[str]":
+    folder, environment = hollow
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False,
+        stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+
+
+def test_a_plug_in_without_what_its_role_has_is_listed_with_what_it_lacks(hollow: tuple[Path, dict[str, str]]) -> None:
+    assert run_beside(hollow, *RIG, "devices", "--json", "all.json").returncode == 0
+    found = json.loads((hollow[0] / "all.json").read_text())
+    assert {one["declares"]: one["error"] for one in found["plugins"]} == {
+        "hollow": "its driver has no close",
+        "annotated": "AttributeError: module 'hollow_mock' has no attribute 'nobody'",
+    }
+
+
+@pytest.mark.parametrize(
+    ("chosen", "code", "said"),
+    [
+        ((), 0, ("tissue_rig.force 'hollow' of acme 1.0: its mock cannot be played: it has no close, no due_ns,",
+                 "tissue_rig.force 'annotated' of acme 1.0: its mock cannot be played: AttributeError")),
+        (("--force", "hollow"), 1, ("'hollow' of acme 1.0: its mock cannot be played: it has no close, no due_ns,",)),
+        (("--force", "bota-sensone"), 0, ()),
+    ],
+    ids=["all", "itself", "ours"],
+)  # fmt: skip
+def test_a_mock_that_lacks_what_a_mock_needs_is_named_and_harms_no_other(
+    chosen: tuple[str, ...], code: int, said: tuple[str, ...], hollow: tuple[Path, dict[str, str]]
+) -> None:
+    command = (sys.executable, "-m", "mock_devices.serve", "--with-parent", "--tracker-tcp-port", "0", *chosen)
+    served = run_beside(hollow, *command)
+    assert served.returncode == code, served.stderr
+    assert all(sentence in served.stderr for sentence in said) and "Traceback" not in served.stderr
+    assert ('"force"' in served.stdout) is (code == 0)
+
+
 @pytest.fixture
 def line() -> Iterator[tuple[int, str]]:
     """A serial line with somebody else's device at its far end."""
@@ -172,6 +265,50 @@ def test_where_nobody_answers_each_product_was_tried(monkeypatch: pytest.MonkeyP
     found = finding.ask(finding.named("/dev/ttyUSB9"))
     assert found.asked and "the last said: silent" in found.problem
     assert tried == [role for role, _ in finding.candidates()]
+
+
+def named_at(usb: str) -> list[str]:
+    return [name_of(product) for _, product in finding.candidates(usb)]
+
+
+CAN_PRODUCTS = ["maxon-epos4", "cia402"]
+
+
+@pytest.mark.parametrize(
+    ("usb", "products"),
+    [
+        ("16d0:117e Openlight CANable2 7", CAN_PRODUCTS),
+        ("0403:ffa8 LAWICEL CANUSB", CAN_PRODUCTS),
+        ("ad50:60c4 CANable", CAN_PRODUCTS),
+        ("2341:0043 Arduino (www.arduino.cc) 95", ["firmata-glove"]),
+    ],
+)
+def test_an_adapter_that_is_known_is_asked_for_what_stands_behind_it_alone(
+    usb: str, products: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ids of usb.ids and of their makers; nothing of a force sensor's or tracker's is written to a CAN adapter."""
+    tried = []
+
+    def refused(role: str, product: Any, address: str) -> None:
+        tried.append(name_of(product))
+        raise DeviceError("silent")
+
+    monkeypatch.setattr(finding, "_identity", refused)
+    port = PortFound(address="/dev/ttyACM0", usb=usb, kind="", asked=False)
+    assert f"no device of {len(products)} products answers" in finding.ask(port).problem
+    assert tried == products
+
+
+def test_behind_an_adapter_of_nobody_every_product_is_looked_for_and_those_with_their_own_last() -> None:
+    every = named_at("")
+    assert set(named_at("0403:6001 FTDI FT232R A1")) == set(every) and len(every) > len(CAN_PRODUCTS) + 1
+    assert named_at("0403:6001 FTDI FT232R A1")[-3:] == [*CAN_PRODUCTS, "firmata-glove"]
+
+
+def test_a_plug_in_is_asked_behind_every_adapter_as_nobody_knows_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    theirs = Plugin("tissue_rig.force", "x", "acme", "1.0", "bota-sensone")
+    monkeypatch.setattr(plugins, "_met", {"tissue_rig.force": (theirs,)})
+    assert named_at("16d0:117e Openlight CANable2 7") == [*CAN_PRODUCTS, "bota-sensone"]
 
 
 def test_asking_where_nobody_can_answer_says_the_option() -> None:

@@ -89,6 +89,22 @@ def test_a_new_codec_is_seen_and_what_makes_bytes_is_none() -> None:
     assert list(taking_apart(ast.parse(text))) == ["New.feed", "parse_line"]
 
 
+@pytest.mark.parametrize(
+    ("mock", "words"),
+    [
+        ("ndi mock", b"SET Param.Simulated Alerts=\xb2\r"),
+        ("zaber mock", b"/1 move vel nan\n/1 get pos\n"),
+        ("zaber mock", b"/1 set limit.max inf\n/1 get limit.max\n"),
+        ("zaber mock", b"/1 set accel 0\n/1 move abs 5000\n"),
+    ],
+)
+def test_words_that_are_no_numbers_end_no_mock(mock: str, words: bytes) -> None:
+    """A digit of Latin-1 that `int` does not read, a NaN, an infinity and a ramp without an end."""
+    take = fuzz_codecs.codecs()[mock].take
+    for _ in range(5):
+        take(words)
+
+
 def test_messages_of_each_protocol_are_understood_by_its_codec() -> None:
     """Spoilt ones alone would never get past a checksum."""
     understood = {"zaber lines": 4, "robotiq frames": 1, "modbus requests": 3, "slcan stream": 1}

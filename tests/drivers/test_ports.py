@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import pytest
 
 from drivers import ports
-from drivers.ports import read_until
+from drivers.ports import open_port, read_until
+from rig.errors import DeviceError
 from tests.drivers.scripted_port import ScriptedPort
 
 
@@ -23,3 +24,9 @@ def test_waiting_ends_with_what_there_is() -> None:
     port.push(b"half")
     assert read_until(port, lambda data: data == b"half and half", 0.01) == b"half"
     port.close()
+
+
+@pytest.mark.parametrize("address", ["tcp://host:\u00b2", "udp://host:\u00b2"])
+def test_a_digit_that_is_no_number_is_no_port(address: str) -> None:
+    with pytest.raises(DeviceError, match=r"not a (TCP|UDP) address"):
+        open_port(address, 0)

@@ -51,7 +51,7 @@ def wired(real: Endpoints, force: bool, axis: bool, tracker: bool, sensor: str =
     }
     return Wiring(
         force=FORCE_SENSORS[sensor](port=ports["force"]),
-        axis=Epos4Wiring(port=ports["axis"]),
+        axis=Epos4Wiring(port=ports["axis"], increments_per_mm=2000.0),
         tracker=PolarisWiring(port=ports["tracker"]),
     )
 

@@ -1,6 +1,6 @@
 """What every servo axis on a CAN bus has in common."""
 
-from typing import Self
+from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -10,6 +10,9 @@ from rig.config.products.roles import MOCK_PORT, AxisProduct, Positive
 
 class CanAxisProduct(AxisProduct):
     """A servo axis that is one node of a CANopen network."""
+
+    # Lawicel CANUSB, and CANable with either of its firmwares.
+    usb: ClassVar[tuple[str, ...]] = ("0403:ffa8", "16d0:117e", "ad50:60c4")
 
     interface: CanInterface = Field(default="slcan", description="kind of CAN adapter; port names what it needs")
     bitrate: int = Field(default=1_000_000, gt=0, description="of the CAN bus, bit/s")

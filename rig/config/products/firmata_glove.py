@@ -22,6 +22,8 @@ class FirmataGlove(InputProduct):
     mock: ClassVar[MockPort | None] = MockPort("mock_devices.inputs:glove", "glove")
     advice: ClassVar[str] = "its USB cable, its port, and that StandardFirmata is on the board"
 
+    usb: ClassVar[tuple[str, ...]] = ("2341:0043",)  # Arduino Uno
+
     product: Literal["firmata-glove"] = Field(default="firmata-glove", description="what it is")
     fingers: Mapping[str, Annotated[int, Field(ge=0, lt=MOST_PINS)]] = Field(
         default={"thumb": 0, "index": 1, "middle": 2}, description="analogue input of each force sensor"

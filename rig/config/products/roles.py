@@ -46,6 +46,8 @@ class Product(Table):
     advice: ClassVar[str]
     mock: ClassVar[MockPort | None] = None
     patience: ClassVar[Mapping[str, Mapping[str, float]]] = {}
+    # USB ids, as 2341:0043, behind which it stands and few others do: `rig find` asks there for nothing else of ours.
+    usb: ClassVar[tuple[str, ...]] = ()
 
     product: str = ""
     port: str = Field(default=MOCK_PORT, description="where it is plugged in; mock: the simulated bench serves it")

@@ -42,7 +42,9 @@ AXIS = AxisSample(0, 900, 1000, 1.0, 0.0, 0.0, 0, 1)
 
 
 class Given(FakeDevice):
-    """Gives what it is told to, or does it."""
+    """Gives what it is told to, or does it, in the role of sensor, tracker or input."""
+
+    tools = ("tip",)
 
     def __init__(self, given: Callable[[], Sequence[ForceSample]] | Sequence[object]) -> None:
         super().__init__(Clock(), 1_000_000)
@@ -50,6 +52,9 @@ class Given(FakeDevice):
 
     def poll(self, now_ns: int) -> Sequence[ForceSample]:
         return self.given() if callable(self.given) else self.given  # type: ignore[return-value] # that is the test
+
+    def concern(self) -> str:
+        return ""
 
 
 def force(given: Callable[[], Sequence[ForceSample]] | Sequence[object]) -> GuardedForce:
@@ -80,6 +85,64 @@ def test_what_is_wrong_is_an_error_that_names_the_plug_in(given: Sequence[object
         force(given).poll(1000)
 
 
+def bunches(of: int) -> list[list[ForceSample]]:
+    """Ten seconds at 1 kHz that come ``of`` at a time, dated by their arrival."""
+    numbers = range(0, 10_000, of)
+    return [
+        [FORCE._replace(seq=at + k, capture_ns=at * 10**6, arrival_ns=at * 10**6) for k in range(of)] for at in numbers
+    ]
+
+
+def test_a_stream_without_a_clock_is_named() -> None:
+    given = iter(bunches(10))
+    guarded = force(lambda: next(given))
+    with pytest.raises(DeviceError, match="most of its samples have the time of the one before: a stream without a"):
+        for _ in range(200):
+            guarded.poll(0)
+
+
+def test_a_few_samples_of_one_time_and_keys_that_are_pressed_together_are_none() -> None:
+    given = iter(bunches(2))
+    guarded = force(lambda: next(given))
+    assert sum(len(guarded.poll(0)) for _ in range(5000)) == 10_000
+    together = Given([INPUT] * 2000)
+    together.period_ns = 0
+    GuardedInput(PLUGIN, EvdevSwitch(), lambda: together).poll(1000)  # type: ignore[arg-type,return-value]
+
+
+def without(name: str) -> Given:
+    """A driver that has no such member, and would be lost by AttributeError in the midst of a trial."""
+    made = type("Lacking", (Given,), {name: None} if callable(getattr(Given, name, None)) else {})([])
+    if name in vars(made):
+        delattr(made, name)
+    return made  # type: ignore[no-any-return]
+
+
+@pytest.mark.parametrize("name", ["close", "poll", "fileno", "counters", "period_ns"])
+def test_a_driver_that_lacks_a_member_is_refused_when_it_is_made(name: str) -> None:
+    lacking = without(name)
+    with pytest.raises(DeviceError, match=f"acme-one, a plug-in of acme-rig 2.1: its driver has no {name}; see"):
+        GuardedForce(PLUGIN, BotaWiring(), lambda: lacking)
+    assert lacking.closed is (name != "close")
+
+
+def test_members_are_looked_for_and_not_asked() -> None:
+    """Who it is, a driver may know only after its start; one that hands on to another has what that has."""
+
+    class Unstarted(Given):
+        identity = property(lambda self: self.never_set)
+
+    class Wrapper:
+        def __init__(self) -> None:
+            self.inner = Given([])
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(self.inner, name)
+
+    for made in (Unstarted([]), Wrapper()):
+        GuardedForce(PLUGIN, BotaWiring(), lambda made=made: made)  # type: ignore[misc]
+
+
 def test_what_a_driver_says_itself_stays() -> None:
     def lost() -> Sequence[ForceSample]:
         raise DeviceError("the line is gone")
@@ -92,7 +155,9 @@ def test_wrong_units_of_tracker_and_axis() -> None:
     camera = GuardedTracker(PLUGIN, PolarisWiring(), lambda: Given([MARKER._replace(x_mm=3e6)]))  # type: ignore[arg-type,return-value]
     with pytest.raises(DeviceError, match=r"a marker 3e.06 mm away: wrong unit"):
         camera.poll(1000)
-    axis = GuardedAxis(PLUGIN, Epos4Wiring(), lambda: Given([AXIS._replace(position_mm=2e4)]))  # type: ignore[arg-type,return-value]
+    far = FakeAxis(Clock(), 7)
+    far.poll = lambda now_ns: [AXIS._replace(position_mm=2e4)]  # type: ignore[method-assign] # noqa: ARG005 - as named
+    axis = GuardedAxis(PLUGIN, Epos4Wiring(), lambda: far)
     with pytest.raises(DeviceError, match="position 20000 mm: wrong unit"):
         axis.poll(1000)
 

@@ -5,6 +5,8 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
+from pydantic import Field
+
 from drivers.roles import Identity, LinkCounters
 from drivers.testing.under_test import AnyDevice, UnderTest
 from rig.channels import ForceSample
@@ -23,7 +25,7 @@ class MadeProduct(ForceProduct):
     advice = "force.port"
 
     product: str = "made"
-    rate_Hz: float = 200.0
+    rate_Hz: float = Field(default=200.0, description="samples a second")
 
 
 @dataclass

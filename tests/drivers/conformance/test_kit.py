@@ -2,11 +2,13 @@
 
 import os
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import pytest
 
 from drivers.testing import CHECKS, Nonconformity, UnderTest, checks
-from tests.drivers.conformance.made import World, nothing_left
+from rig.config.products.roles import ForceProduct
+from tests.drivers.conformance.made import MadeProduct, MadeSensor, World, nothing_left
 
 Check = Callable[[UnderTest], None]
 
@@ -59,6 +61,38 @@ PLANTED: tuple[tuple[str, Check, str], ...] = (
 def test_each_defect_is_named(defect: str, check: Check, sentence: str) -> None:
     with pytest.raises(Nonconformity, match=sentence):
         check(World(defect).subject())
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+@pytest.mark.parametrize(
+    ("member", "named"), [("close", "close"), ("poll", "poll"), ("period_ns", "period_ns"), ("counters", "counters")]
+)
+def test_a_member_that_is_missing_is_named_by_whichever_check_comes_first(
+    check: Check, member: str, named: str
+) -> None:
+    class Lacking(MadeSensor):
+        def __init__(self, world: World) -> None:
+            super().__init__(world)
+            vars(self).pop(member, None)
+
+    if hasattr(MadeSensor, member):
+        setattr(Lacking, member, None)
+    subject = replace(World().subject(), open=lambda: Lacking(World()))
+    with pytest.raises(Nonconformity, match=f"its driver has no {named}, which ForceSensor has"):
+        check(subject)
+
+
+def test_a_declaration_that_the_bench_would_refuse_is_refused_here() -> None:
+    class Rangeless(ForceProduct):
+        driver, advice = MadeProduct.driver, MadeProduct.advice
+        product: str = "made"
+
+    for config, said in (
+        (Rangeless(), "its declaration cannot be used: Rangeless has no range_N and no range_N_m"),
+        ({"rate_Hz": 200}, "its configuration is {'rate_Hz': 200}, where the table of a product is expected"),
+    ):
+        with pytest.raises(Nonconformity, match=said):
+            checks.identity(replace(World().subject(), config=config))  # type: ignore[arg-type]
 
 
 def test_every_check_has_a_planted_defect() -> None:

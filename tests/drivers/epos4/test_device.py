@@ -42,6 +42,23 @@ def test_limits_are_in_the_drive_before_the_first_controlword_that_gives_torque(
     axis.close()
 
 
+def test_a_drive_that_counts_other_increments_a_turn_is_refused_before_anything_is_written() -> None:
+    """Object 3000:05, in increments a revolution: at 4096 it would turn 2.44 times as fast as at the 10,000 stated."""
+    bench = DriveBench(increments_per_rev=4096.0)
+    with pytest.raises(DeviceError, match=r"counts 4096 increments a turn \(object 3000:05\) .* says 10000: give"):
+        axis_on(bench).start()
+    assert not [frame for frame in bench.sent if frame.can_id == 0x601 and frame.data[0] & 0xE0 == 0x20]
+    assert axis_on(bench).identify().serial == "62014711"
+
+
+def test_speeds_are_told_in_turns_of_the_encoder_that_both_know() -> None:
+    bench = DriveBench(increments_per_rev=4096.0)
+    axis = axis_on(bench, increments_per_rev=4096.0)
+    axis.start()
+    assert bench.mock.dictionary.values[0x6099, 1] == round(20.0 * 2000 * 60 / 4096)
+    axis.close()
+
+
 def test_homing_finds_the_switch_and_makes_it_zero(bench: DriveBench, axis: Epos4Axis) -> None:
     axis.home()
     assert abs(bench.plant.position_mm) < 0.05

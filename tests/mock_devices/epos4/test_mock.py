@@ -391,3 +391,9 @@ def test_nothing_is_due_while_nothing_can_happen(bench: DriveBench) -> None:
     assert bench.mock.endpoints() == {"slcan": "memory"}
     enabled(bench, 1)
     assert bench.mock.due_ns - bench.now() <= 1_000_000
+
+
+def test_it_holds_the_increments_of_a_turn_and_takes_no_others() -> None:
+    bench = DriveBench(increments_per_rev=4096.0)
+    assert upload(bench, 0x3000, 5, "I") == 4096
+    assert download(bench, 0x3000, 5, 4, 1) == 0x06010002
