@@ -210,6 +210,9 @@ DEVICES: dict[str, str] = {
 LAW = {
     "rig/config/axis_response.py": "the axis as it was identified",
     "rig/report/loop_figures.py": "stability is shown",
+    "controller/simulated/alternatives/": "what the law is compared with",
+    "rig/report/compared_figure.py": "what the law is compared with",
+    "rig/results/compared_tables.py": "what the law is compared with",
     "controller/law/axis_response.py": "the axis as it was identified",
     "controller/law/gain_table.py": "the tissue that the law divides by, and how well it is known",
     "controller/law/inverse_model.py": "the inverse tissue model, beside the feedback",

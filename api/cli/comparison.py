@@ -16,12 +16,14 @@ from controller.supervisor import Supervisor
 from rig.config.table import parse
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
+from rig.results.compared_tables import alternatives_table
 from rig.results.tables import run_table, study_table
 from rig.results.tracking import CompareResult
 
 SUBJECTS = Path(mock_devices.__file__).parent / "subjects"
 BREATHING = "breathing"
-BREATHES = ("surface_motion.amplitude_mm=1.5", "surface_motion.frequency_Hz=0.25")
+BREATHES_MM_HZ = 1.5, 0.25
+BREATHES = f"surface_motion.amplitude_mm={BREATHES_MM_HZ[0]}", f"surface_motion.frequency_Hz={BREATHES_MM_HZ[1]}"
 ALL = (*sorted(path.stem for path in SUBJECTS.glob("*.toml")), BREATHING)
 
 
@@ -29,10 +31,11 @@ def compare(wiring: Wiring, out: Path, subjects: Sequence[str], reference: Refer
     """Runs all of it on mock benches and prints the tables."""
     _refuse_subjects(wiring, subjects)
     whose = {subject: _who(subject) for subject in subjects}
-    wanted = Comparison(wiring, out, whose, reference, lambda subject: _bench(wiring, subject))
+    wanted = Comparison(wiring, out, whose, reference, lambda one: _bench(wiring, one), {BREATHING: BREATHES_MM_HZ})
     operation = comparison_operation(wanted)
     result = here(operation, lambda: work(operation, wanted))
-    show(study_table(result.runs), run_table(result.runs, reference.name), f"comparison.svg is in {out}")
+    tables = study_table(result.runs), run_table(result.runs, reference.name), alternatives_table(result.alternatives)
+    show(*tables, f"comparison.svg is in {out}")
     return result
 
 

@@ -1,9 +1,8 @@
-"""Jumps of force on several subjects, each learnt first by indentation and fit: given against actual force."""
+"""Jumps of force on several subjects, each learnt by indentation first; simulated by other laws too, for comparison."""
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from controller.experiments import capture, comparison, tracked, tracking
@@ -16,6 +15,7 @@ from controller.law.synthesis import Span
 from controller.loop.steps import Program
 from controller.operation import Operation
 from controller.safety.table import BY_PERSON
+from controller.simulated.alternatives.alternative_runs import BenchRun, simulated_runs
 from controller.supervisor import Supervisor, stop_error
 from rig.config.protocol import Indentation
 from rig.config.wiring import Wiring
@@ -23,7 +23,7 @@ from rig.errors import DataError, DeviceError, SafetyStop, UsageError
 from rig.recording.files import write_text
 from rig.recording.reader import read_recording
 from rig.recording.sessions import open_session
-from rig.report.control_figures import comparison_figure
+from rig.report.compared_figure import comparison_figure
 from rig.report.drawing import svg
 from rig.results.tables import run_table
 from rig.results.tracking import ComparedRun, CompareResult, Jump
@@ -43,13 +43,14 @@ MIDDLING_RAD_S = 20.0, 60.0, 180.0  # k / B of the five subjects is 10 to 500 ra
 
 @dataclass(frozen=True)
 class Comparison:
-    """What is compared: ``subjects`` name whose tissue each has, ``bench`` is a running bench with a subject on it."""
+    """``subjects`` name whose tissue each has, ``breathing`` is in mm and Hz, ``bench`` runs with a subject on it."""
 
     wiring: Wiring
     out: Path
     subjects: Mapping[str, str]
     reference: Reference
     bench: Callable[[str], AbstractContextManager[Supervisor]]
+    breathing: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def model_file(self, subject: str) -> Path:
         """Where the model learnt of the subject's tissue is kept."""
@@ -83,7 +84,7 @@ def _refuse_strong(force_N: float, wiring: Wiring) -> None:
 
 def comparison_operation(wanted: Comparison) -> Operation:
     """The operation that ``compare`` is to report to."""
-    return Operation("compare", total=len(wanted.subjects), unit="runs")
+    return Operation("compare", total=2 * len(wanted.subjects), unit="runs")
 
 
 def compare(operation: Operation, wanted: Comparison) -> CompareResult:
@@ -93,16 +94,22 @@ def compare(operation: Operation, wanted: Comparison) -> CompareResult:
     """
     refuse_comparison(wanted)
     runs: list[ComparedRun] = []
-    models: dict[str, dict[str, float]] = {}
+    models: dict[str, Model] = {}
+    programs: dict[str, Program] = {}
     for subject in wanted.subjects:
         operation.step(f"learning {subject}", len(runs))
-        model = _learnt(operation, wanted, subject)
-        models[subject] = {parameter.name: parameter.value for parameter in model.law.parameters}
+        models[subject] = _learnt(operation, wanted, subject)
         operation.step(f"tracking on {subject}", len(runs))
-        runs.append(_on_subject(operation, wanted, subject, model))
+        runs.append(_tracked(operation, wanted, subject, models[subject], programs))
         operation.say("  ".join([*run_table([runs[-1]]).rows[0], runs[-1].stopped]).rstrip())
-    _draw(runs, wanted.out)
-    return CompareResult(reference=wanted.reference.name, models=models, runs=tuple(runs))
+    asked = [
+        BenchRun(name, wanted.subjects[name], models[name], of, wanted.breathing.get(name))
+        for name, of in programs.items()
+    ]
+    simulated = tuple(simulated_runs(operation, asked, rates_of(wanted.wiring), len(runs)))
+    write_text(wanted.out / "comparison.svg", svg(comparison_figure(runs, simulated)))
+    learnt = {name: {one.name: one.value for one in model.law.parameters} for name, model in models.items()}
+    return CompareResult(reference=wanted.reference.name, models=learnt, runs=tuple(runs), alternatives=simulated)
 
 
 def _learnt(operation: Operation, wanted: Comparison, subject: str) -> Model:
@@ -132,20 +139,20 @@ def _indented(operation: Operation, wanted: Comparison, subject: str, attempt: i
     return folder
 
 
-def _on_subject(operation: Operation, wanted: Comparison, subject: str, model: Model) -> ComparedRun:
-    try:
-        program = tracked.plan_reference(wanted.reference, model, wanted.wiring)
-    except UsageError as refusal:
-        return compared_run(subject, (), (), str(refusal))
-    return _tracked(operation, wanted, subject, model, program)
-
-
 def _tracked(
-    operation: Operation, wanted: Comparison, subject: str, model: Model, program: Program, attempt: int = 1
+    operation: Operation, wanted: Comparison, subject: str, model: Model, programs: dict[str, Program], attempt: int = 1
 ) -> ComparedRun:
-    """One run on a bench of its own; what a stall of the computer stopped is said, and done again."""
+    """One run on a bench of its own; what a stall of the computer stopped is said, and done again.
+
+    ``programs`` is given what was played, planned by the axis that answered.
+    """
     try:
         with wanted.bench(subject) as bench:
+            try:
+                program = tracked.plan_reference(wanted.reference, model, bench.wiring)
+            except UsageError as refusal:
+                return compared_run(subject, (), (), str(refusal))
+            programs[subject] = program
             done = tracked.recorded_run(bench, program, wanted.out / subject, str(wanted.model_file(subject)))
     except DeviceError as cause:
         found, stalled = compared_run(subject, (), (), str(cause)), True
@@ -158,7 +165,7 @@ def _tracked(
     if not stalled or attempt == ATTEMPTS:
         return found
     operation.say(f"{subject}: {found.stopped}; once more")
-    return _tracked(operation, wanted, subject, model, program, attempt + 1)
+    return _tracked(operation, wanted, subject, model, programs, attempt + 1)
 
 
 def _jumps(done: Recorded) -> tuple[Jump, ...]:
@@ -170,13 +177,3 @@ def _jumps(done: Recorded) -> tuple[Jump, ...]:
         if done.outcome.stopped:
             return ()
         raise
-
-
-def _draw(runs: Sequence[ComparedRun], out: Path) -> None:
-    worst = [run.worst.model_dump() for run in runs]
-    heights = [[_height(one[figure]) for one in worst] for figure in ("overshoot_percent", "settling_s")]
-    write_text(out / "comparison.svg", svg(comparison_figure([run.subject for run in runs], *heights)))
-
-
-def _height(value: float | None) -> float:
-    return math.nan if value is None else value

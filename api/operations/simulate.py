@@ -10,12 +10,13 @@ import numpy as np
 
 from controller.experiments import comparison, tracked, tracking
 from controller.experiments.references import Reference
+from controller.law.axis_response import rates_of
 from controller.law.loop_response import grid
 from controller.law.stability import ForceLoop, nearest
 from controller.loop.modes import Mode
 from controller.operation import Operation
 from controller.simulated import bench as simulated
-from controller.simulated.bench import SimulatedBench, Trace, limb_of
+from controller.simulated.bench import SENSING, SimulatedBench, Trace, limb_of
 from rig.config.wiring import Wiring
 from rig.errors import DataError
 from rig.recording.files import make_folder, write_text
@@ -64,7 +65,8 @@ def play(operation: Operation, wiring: Wiring, wanted: SimulatedRun) -> Played:
     """Plays it on a virtual clock with the loop's own code."""
     model, stiffness = wanted.model, wanted.stiffness
     program = tracked.plan_reference(wanted.reference, model, wiring)
-    bench = SimulatedBench(limb_of(model, stiffness, wanted.breathing_mm))
+    sensing = SENSING._replace(every_cycles=rates_of(wiring).every_cycles)
+    bench = SimulatedBench(limb_of(model, stiffness, wanted.breathing_mm), sensing=sensing)
     trace, times_real_time = _timed(operation, lambda: simulated.run(program, wiring, bench))
     loops = _loops(model, wiring)
     result = _result(trace, times_real_time, wanted.reference.name, tracking.loop_for(model, wiring)).model_copy(

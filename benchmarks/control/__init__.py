@@ -1,1 +1,1 @@
-"""The force law against its rivals on the same axis, sensor, tissue and tests; `python -m benchmarks.control`."""
+"""The force law against alternatives on the same axis, sensor, tissue and tests; `python -m benchmarks.control`."""

@@ -94,8 +94,8 @@ def _simulation(asked: argparse.Namespace) -> list[str]:
         shown += table(touched, [LEAVES], "no law")
     found = headline(scores, worst_margins())
     compared = [*scores, *best_constant(scores)]
-    rivals = [BEST, *(name for name in names if name not in {LAW, *ABLATIONS, *TRIED})]
-    against = {rival: _against(compared, rival) for rival in rivals}
+    others = [BEST, *(name for name in names if name not in {LAW, *ABLATIONS, *TRIED})]
+    against = {other: _against(compared, other) for other in others}
     seconds = time.monotonic() - began
     result = Result(
         date=time.strftime("%Y-%m-%d"), seconds=round(seconds, 1), seeds=len(seeds), runs=len(scores), headline=found,
@@ -174,10 +174,10 @@ def missed(found: Headline) -> list[str]:
     return sentences
 
 
-def _against(scores: Sequence[Score], rival: str) -> dict[str, tuple[float, float, float, float]]:
+def _against(scores: Sequence[Score], other: str) -> dict[str, tuple[float, float, float, float]]:
     """Gains with their intervals, and of the worst subjects."""
-    found = {f"limb 2 Hz, {force_N} N": gain for force_N, gain in limb_gains(scores, rival).items()}
-    found |= {what: gain_of(scores, rival, wrong_models(what)) for what in ("low jumps", "jumps")}
+    found = {f"limb 2 Hz, {force_N} N": gain for force_N, gain in limb_gains(scores, other).items()}
+    found |= {what: gain_of(scores, other, wrong_models(what)) for what in ("low jumps", "jumps")}
     return {what: (round(one.value, 2), round(one.low, 2), round(one.high, 2), round(one.of_worst, 2))
             for what, one in found.items()}  # fmt: skip
 
@@ -191,8 +191,8 @@ def _print(result: Result, names: Sequence[str]) -> None:
     for plant, case in dict.fromkeys((cell.plant, cell.case) for cell in result.cells):
         shown = [_shown(cells.get((plant, case, name))) for name in laws_shown]
         print(f"{plant:14} {case:24}", " ".join(shown))
-    for rival, gains in result.against.items():
-        print(f"against {rival}:")
+    for other, gains in result.against.items():
+        print(f"against {other}:")
         for what, (value, low, high, of_worst) in gains.items():
             print(f"  {what:18} {value:6.2f}x ({low:.2f} to {high:.2f}; worst subjects {of_worst:.2f})")
     print(f"{result.runs} runs of {result.seeds} seeds in {result.seconds:g} s")

@@ -1,4 +1,4 @@
-"""The law, its ablations and its rivals, each made for one subject on one plant."""
+"""The law, its ablations and its alternatives, each made for one subject on one plant."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache, partial
@@ -6,11 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.control import rival_tuning
 from benchmarks.control.motion import Law
 from benchmarks.control.plants import SUBJECTS, Plant, model_of, wiring_of
-from benchmarks.control.rival_law import RivalColumns, RivalFeedback, RivalSettings
-from benchmarks.control.rival_tuning import Shape, TissueAt, Tuning
 from benchmarks.control.tried_law import GIVES_WAY_MM, TURNING_MM_S, TriedSettings
 from controller.experiments import tracking
 from controller.law import synthesis
@@ -18,11 +15,10 @@ from controller.law.axis_response import rates_of, response_of
 from controller.law.inverse_model import Columns, GainRow, columns
 from controller.law.loop_response import Constants
 from controller.loop.steps import TrackForce
+from controller.simulated.alternatives import alternative_laws
+from controller.simulated.alternatives.alternative_tuning import DRIFTS_RAD_S, Schedule, Tuning
 
-# A mass that answers a third as fast as the axis: what an admittance filters the sensor's noise with.
-MASS_S = 0.015
 NOISE_N = 0.005  # of the faster sensor's samples
-VARY = 1.0  # damping halves where the error is all of the force: more, and the margins of the half would be lost
 
 
 class Ablation(NamedTuple):
@@ -87,53 +83,36 @@ def _leadless(subject: str, plant: Plant) -> Constants:
 
 
 @lru_cache
-def tissue_of(shape: Shape, subject: str) -> TissueAt:
-    """What a rival of this shape is tuned on."""
-    return rival_tuning.tissue_at(shape, rows_of(subject), model_of(subject).damping_N_s_mm)
+def tuning_of(schedule: Schedule, subjects: tuple[str, ...], plant: Plant, drifts_rad_s: tuple[float, ...]) -> Tuning:
+    """The best gains of a schedule for one subject or for all at once."""
+    steps = [track_step(subject, plant) for subject in subjects]
+    return alternative_laws.tuning_for(steps, rates_of(wiring_of(plant)), schedule, drifts_rad_s)
 
 
-@lru_cache
-def tuning_of(shape: Shape, subjects: tuple[str, ...], plant: Plant, drifts_rad_s: tuple[float, ...]) -> Tuning:
-    """The best gains of a shape for one subject or for all at once."""
-    wiring = wiring_of(plant)
-    tissues = [tissue_of(shape, subject) for subject in subjects]
-    return rival_tuning.tuned(response_of(wiring), rates_of(wiring), tissues, drifts_rad_s)
-
-
-def pi(subject: str, plant: Plant, shape: Shape, tuning: Tuning, ahead: bool = True) -> Law:
-    """PI with gains of ``shape``; ``ahead``: with inverse model, expectation and preview."""
-    step, rows = track_step(subject, plant), rows_of(subject)
-    integral = tuning.integral * rival_tuning.factors(shape, rows)
-    force, depth, tangent, damping = map(np.array, columns(step.gains))
-    table = RivalColumns(force, depth, tangent, damping, tuning.lead_s * integral, integral)
-    inverse, feedback = step.settings
-    inverse = inverse if ahead else inverse._replace(ahead_mm_s=0.0)
-    rival = RivalFeedback(feedback, tuning.drift_rad_s, ahead, tuning.mass_s, VARY if tuning.mass_s else 0.0)
-    return Law("rival", table, RivalSettings(inverse, rival), step.preview_s if ahead else 0.0)
+def pi(subject: str, plant: Plant, schedule: Schedule, tuning: Tuning, ahead: bool = True) -> Law:
+    """PI with gains by ``schedule``; ``ahead``: with inverse model, expectation and preview."""
+    return Law("alternative", *alternative_laws.pi(track_step(subject, plant), schedule, tuning, ahead))
 
 
 def admittance(subject: str, plant: Plant) -> Law:
-    """Admittance with variable damping, as robots for massage and ultrasound have it: one damper for a subject."""
-    wiring = wiring_of(plant)
-    tissue = tissue_of("constant", subject)
-    slow = rival_tuning.fastest(response_of(wiring), rates_of(wiring), tissue, Tuning(1.0, 0.0, 0.0, MASS_S))
-    return pi(subject, plant, "constant", slow._replace(integral=slow.integral / (1 + VARY)), ahead=False)
+    """Admittance with variable damping."""
+    return Law("alternative", *alternative_laws.admittance(track_step(subject, plant), rates_of(wiring_of(plant))))
 
 
 def constant(subject: str, plant: Plant, drift_rad_s: float | None = None) -> Law:
     """Constant PI tuned for this subject, with inverse model and second integral; the corner given, or the best."""
-    drifts = rival_tuning.DRIFTS_RAD_S if drift_rad_s is None else (drift_rad_s,)
+    drifts = DRIFTS_RAD_S if drift_rad_s is None else (drift_rad_s,)
     return pi(subject, plant, "constant", tuning_of("constant", (subject,), plant, drifts))
 
 
-def scheduled(subject: str, plant: Plant, shape: Shape) -> Law:
+def scheduled(subject: str, plant: Plant, schedule: Schedule) -> Law:
     """PI with gains of one over a stiffness, tuned for this subject."""
-    return pi(subject, plant, shape, tuning_of(shape, (subject,), plant, rival_tuning.DRIFTS_RAD_S))
+    return pi(subject, plant, schedule, tuning_of(schedule, (subject,), plant, DRIFTS_RAD_S))
 
 
 def for_all(subject: str, plant: Plant) -> Law:
     """One constant PI for all subjects."""
-    return pi(subject, plant, "constant", tuning_of("constant", SUBJECTS, plant, rival_tuning.DRIFTS_RAD_S))
+    return pi(subject, plant, "constant", tuning_of("constant", SUBJECTS, plant, DRIFTS_RAD_S))
 
 
 def plain(subject: str, plant: Plant) -> Law:

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.control import rival_law, tried_law
+from benchmarks.control import tried_law
 from controller.law import force_position, inverse_model
 from controller.law.force_position import ForceReading
+from controller.simulated.alternatives import alternative_law
 from rig.machine_code import compiled
 from rig.simulation import axis_plant
 from rig.simulation.axis_plant import (
@@ -135,12 +136,12 @@ def _follower(kind: str) -> Callable[..., Column]:
     law: dict[str, Callable[..., Any]] = {**interpolate, "expect": compiled(force_position.expect)}
     law["foresee"] = compiled(inverse_model.foresee, interpolate)
     law["resting"] = compiled(inverse_model.resting, interpolate)
-    law["correct"] = compiled(rival_law.correct, interpolate)
+    law["correct"] = compiled(alternative_law.correct, interpolate)
     law["start_anew"] = compiled(force_position.start_anew, law)
     law |= {"react": compiled(force_position.react), "limit": compiled(force_position.limit)}
     law["law_increment"] = compiled(force_position.increment, law)
     law["rested"] = compiled(tried_law.rested)
-    increments: dict[str, Callable[..., Any]] = {"rival": rival_law.increment, "tried": tried_law.increment}
+    increments: dict[str, Callable[..., Any]] = {"alternative": alternative_law.increment, "tried": tried_law.increment}
     run_by = law["law_increment"] if kind == "shaped" else compiled(increments[kind], law)
     return compiled(follow, {"increment": run_by, "reading": compiled(reading), "moved": moved_compiled()})
 
@@ -154,7 +155,7 @@ def run(law: Law, reference_N: Column, bench: Bench, seed: int, dt_s: float = 0.
 
 
 BEGIN: Mapping[str, Callable[..., Any]] = {
-    "rival": rival_law.begin, "shaped": force_position.begin, "tried": tried_law.begin,
+    "alternative": alternative_law.begin, "shaped": force_position.begin, "tried": tried_law.begin,
 }  # fmt: skip
 # The name that `follow` is bound to where it is compiled.
 increment = force_position.increment

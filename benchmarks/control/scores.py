@@ -34,7 +34,7 @@ class Mean(Table):
 
 
 class Gain(Table):
-    """Rival over law: geometric mean over subjects, its 95 % interval, and the ratio of the worst subjects of both."""
+    """The other over the law: geometric mean over subjects, its 95 % interval, and the ratio of both worst subjects."""
 
     value: float
     low: float
@@ -59,9 +59,9 @@ def mean_of(scores: Sequence[Score], law: str, cases: Sequence[str]) -> Mean:
     return Mean(value=float(values.mean()), within=_half(values), worst=float(values.max()))
 
 
-def gain_of(scores: Sequence[Score], rival: str, cases: Sequence[str], law: str = LAW) -> Gain:
-    """How many times smaller the law's number is than the rival's."""
-    ours, theirs = by_subject(scores, law, cases), by_subject(scores, rival, cases)
+def gain_of(scores: Sequence[Score], other: str, cases: Sequence[str], law: str = LAW) -> Gain:
+    """How many times smaller the law's number is than the alternative's."""
+    ours, theirs = by_subject(scores, law, cases), by_subject(scores, other, cases)
     logs = np.log([theirs[subject] / ours[subject] for subject in ours])
     middle, half = float(logs.mean()), _half(logs)
     worst = max(theirs.values()) / max(ours.values())
@@ -98,9 +98,9 @@ class Headline(Table):
     settling_gains: Mapping[str, tuple[float, float]]
 
 
-def limb_gains(scores: Sequence[Score], rival: str) -> dict[str, Gain]:
+def limb_gains(scores: Sequence[Score], other: str) -> dict[str, Gain]:
     """By force, where the limb moves at 2 Hz."""
-    return {f"{force_N:g}": gain_of(scores, rival, [f"limb 2 Hz, {force_N:g} N"]) for force_N in FORCES_N}
+    return {f"{force_N:g}": gain_of(scores, other, [f"limb 2 Hz, {force_N:g} N"]) for force_N in FORCES_N}
 
 
 def headline(scores: Sequence[Score], margins_deg_dB: tuple[float, float]) -> Headline:

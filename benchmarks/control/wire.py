@@ -15,17 +15,18 @@ from typing import NamedTuple
 import numpy as np
 
 from api.cli.mock_bench import bench_for
-from benchmarks.control import laws, rival_process, rival_tuning, wire_programs
+from benchmarks.control import alternative_process, laws, wire_programs
 from benchmarks.control.cases import DT_S, LIMB_MM, Asked, Followed, follow, swing
 from benchmarks.control.laws import CONSTANTS, LAW
 from benchmarks.control.motion import Column
 from benchmarks.control.plants import FOLDER, PLANT, SUBJECTS, limb_of, model_of
-from benchmarks.control.rival_tuning import DRIFTS_RAD_S
 from benchmarks.control.wire_programs import SWING_HZ, Kind
 from controller.experiments import tracked
-from controller.law.axis_response import rates_of, response_of
+from controller.law.axis_response import rates_of
 from controller.loop.modes import Mode
 from controller.loop.steps import Program, TrackForce
+from controller.simulated.alternatives.alternative_laws import tuning_for
+from controller.simulated.alternatives.alternative_tuning import DRIFTS_RAD_S
 from controller.supervisor import LOOP_MODULE, Supervisor
 from mock_devices.parameters import load_parameters
 from rig.config.table import Table
@@ -126,7 +127,7 @@ def on_bench(part: Part) -> tuple[Program, Asked, Column, int]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         wiring = wiring_of(part, folder)
-        module = LOOP_MODULE if part.law == LAW else rival_process.MODULE
+        module = LOOP_MODULE if part.law == LAW else alternative_process.MODULE
         with bench_for(wiring) as (live, _):
             program = with_law(part, wire_programs.program(part.kind, model_of(part.subject), live), live)
             with Supervisor(live, loop_module=module) as bench:
@@ -155,9 +156,9 @@ def with_law(part: Part, program: Program, wiring: Wiring) -> Program:
     """The program as it is for the law; for a constant with its numbers, tuned on this bench's own axis."""
     if part.law == LAW:
         return program
-    tissue = laws.tissue_of("constant", part.subject)
+    tracks = [step for step in program.steps if isinstance(step, TrackForce)]
     drifts = (0.0,) if part.law == BEST_AT_CONTACT else DRIFTS_RAD_S
-    tuning = rival_tuning.tuned(response_of(wiring), rates_of(wiring), [tissue], drifts)
+    tuning = tuning_for(tracks[:1], rates_of(wiring), "constant", drifts)
     numbers = {
         "crossover_rad_s": tuning.integral, "lead_s": tuning.lead_s, "drift_rad_s": tuning.drift_rad_s,
     }  # fmt: skip

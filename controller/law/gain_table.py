@@ -49,11 +49,12 @@ def gain_rows(model: Model, depths_mm: Sequence[float]) -> tuple[GainRow, ...]:
 def span_of(model: Model, rows: Sequence[GainRow], rates: Rates) -> Span:
     """The tissue to be held: half to twice the model, or its own interval where that is wider.
 
-    Raises DampingUnknown, and UsageError for a model whose tissue may be stiffer than the limit.
+    Raises DampingUnknown, and UsageError for a model whose tissue may have no stiffness, or more than the limit.
     """
     shown = [rows[round(at)] for at in np.linspace(0, len(rows) - 1, SPAN_ROWS)]
     tangent, damping = known_at(model, np.array([row.depth_mm for row in shown]))
     _refuse_undamped(damping)
+    _refuse_unsure(tangent)
     _refuse_stiff(tangent, rates)
     return Span(
         tuple(row.tangent_N_mm / row.damping_N_s_mm for row in shown),
@@ -112,6 +113,15 @@ def _refuse_undamped(damping: TissueBounds) -> None:
             f"the model's damping is {damping.middle[at]:.3g} N s/mm, {damping.low[at]:.3g} to {damping.high[at]:.3g};"
             " the force law needs it above 0 with its whole interval: fit trials of several speeds"
             " (rig fit --model index)"
+        )
+
+
+def _refuse_unsure(tangent: TissueBounds) -> None:
+    at = int(np.argmin(tangent.low))
+    if not tangent.low[at] > 0:
+        raise UsageError(
+            f"at {tangent.depth_mm[at]:.3g} mm the model's stiffness is {tangent.middle[at]:.3g} N/mm, 0 to"
+            f" {tangent.high[at]:.3g}; the force law needs it above 0 with its whole interval: fit more trials"
         )
 
 

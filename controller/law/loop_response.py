@@ -37,6 +37,11 @@ class Rates(NamedTuple):
     cycle_s: float
     sample_s: float
 
+    @property
+    def every_cycles(self) -> int:
+        """Cycles for which a sample stands."""
+        return round(self.sample_s / self.cycle_s)
+
 
 class TrueTissue(NamedTuple):
     """The tissue at one depth against what the law takes it for; arrays broadcast.

@@ -5,8 +5,9 @@ same functions compiled together with the plant (`segments`). ``follow`` plays t
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -180,13 +181,13 @@ class _Playback:
         elapsed_s = elapsed_s[elapsed_s < step.given.duration_s]
         reference_N = force_profile.along(step.given, elapsed_s)
         asked_N = force_profile.along(self._law[2], elapsed_s)
-        done, state.memory = segments.track(
+        done, memory = segments.track(
             self._now, state.memory, self._law[1], step.settings, asked_N, self._drawn(len(asked_N)),
             self._plant, Timing(self._cycle, self._period_s, steps), self._zeros(), self._bounds(),
         )  # fmt: skip
-        cycles = done.rows.shape[1]
+        state.memory, cycles = memory, done.rows.shape[1]
         if cycles:
-            state.reference_N, state.tangent_N_mm = float(reference_N[cycles - 1]), state.memory.tangent_N_mm
+            state.reference_N, state.tangent_N_mm = float(reference_N[cycles - 1]), memory.tangent_N_mm
         self._take(done, reference_N[:cycles])
 
     def _travel(self, target_mm: float, speed_mm_s: float, until_N: float, steps: int) -> None:
@@ -231,15 +232,23 @@ def follow(
     step: TrackForce, reference_N: Column, bench: SimulatedBench, dt_s: float = 0.001, clearance_mm: float = 0.0
 ) -> Trace:
     """The force law alone, from ``clearance_mm`` above the surface on, along ``reference_N`` of (cycles,); compiled."""
-    table, surface_mm = _columns(step), bench.limb.surface_mm
+    table = _columns(step)
+    memory = force_position.begin(table, step.settings.inverse, 0.0)
+    return follow_law(segments.LAW, memory, table, step.settings, reference_N, bench, dt_s, clearance_mm)
+
+
+def follow_law(
+    law: tuple[Callable[..., Any], ...], memory: object, table: object, settings: object, reference_N: Column,
+    bench: SimulatedBench, dt_s: float = 0.001, clearance_mm: float = 0.0,
+) -> Trace:  # fmt: skip
+    """The same of any law: its functions, memory, table and settings as `segments.track` takes them."""
+    surface_mm = bench.limb.surface_mm
     noise = np.random.default_rng(bench.seed).standard_normal(len(reference_N))
     late, start_mm = bench.sensing.delay_cycles + 1, surface_mm - clearance_mm
     start = BenchState(at_rest(start_mm), np.zeros(late), 0.0, Setpoint(start_mm, 0.0))
-    memory = force_position.begin(table, step.settings.inverse, 0.0)
     done, _ = segments.track(
-        start, memory, table, step.settings, reference_N, noise,
-        Plant(bench.motor, bench.loop, bench.limb, bench.sensing),
-        Timing(0, dt_s, round(dt_s / axis_plant.STEP_S)), Zeros(0.0, 0.0, surface_mm), InputBounds(),
+        start, memory, table, settings, reference_N, noise, Plant(bench.motor, bench.loop, bench.limb, bench.sensing),
+        Timing(0, dt_s, round(dt_s / axis_plant.STEP_S)), Zeros(0.0, 0.0, surface_mm), InputBounds(), law,
     )  # fmt: skip
     time_s, mode = np.arange(len(reference_N), dtype=np.float64) * dt_s, np.full(len(reference_N), int(Mode.CONTACT))
     return Trace(time_s, mode, reference_N, *done.rows)

@@ -8,14 +8,13 @@ cycle the run without them. The functions compiled are those of the bench.
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.law import force_position, inverse_model
-from controller.law.force_position import ForceReading, Memory, Settings
-from controller.law.inverse_model import Columns
+from controller.law.force_position import ForceReading
 from controller.loop import setpoint
 from controller.loop.setpoint import Setpoint
 from rig.machine_code import compiled
@@ -23,7 +22,10 @@ from rig.simulation import axis_plant
 from rig.simulation.axis_plant import AxisState, ForceSensing, ModelledLimb, Motor, PositionLoop
 
 Column = NDArray[np.float64]
+LawMemory = TypeVar("LawMemory")
 ROWS = 6
+# The functions of the force law, each after those that it calls.
+LAW = force_position.react, force_position.limit, force_position.start_anew, force_position.increment
 
 
 class InputBounds(NamedTuple):
@@ -98,9 +100,9 @@ def beyond(bounds: InputBounds, zeros: Zeros, raw_N: float, bench_position_mm: f
 
 
 def _track(
-    bench: BenchState, memory: Memory, table: Columns, settings: Settings, reference_N: Column, noise: Column,
-    plant: Plant, clock: Timing, zeros: Zeros, bounds: InputBounds,
-) -> tuple[Column, AxisState, Column, float, float, float, Memory]:  # fmt: skip
+    bench: BenchState, memory: Any, table: Any, settings: Any, reference_N: Column, noise: Column, plant: Plant,
+    clock: Timing, zeros: Zeros, bounds: InputBounds,
+) -> tuple[Column, AxisState, Column, float, float, float, Any]:  # fmt: skip
     motor, loop, limb, sensing = plant
     state, past, held_N, setpoint = bench
     command_mm, delta_mm, cycles, late = setpoint.position_mm, 0.0, len(reference_N), len(past)
@@ -165,13 +167,7 @@ def hold_compiled() -> Callable[..., AxisState]:
 
 @cache
 def _parts() -> dict[str, Callable[..., Any]]:
-    law: dict[str, Callable[..., Any]] = {"interpolate": compiled(inverse_model.interpolate)}
-    for function in (inverse_model.resting, inverse_model.foresee):
-        law[function.__name__] = compiled(function, law)
-    for part in (force_position.expect, force_position.react, force_position.limit, force_position.start_anew):
-        law[part.__name__] = compiled(part, law)
     return {
-        "increment": compiled(force_position.increment, law),
         "toward": compiled(setpoint.toward, {"clamp": compiled(setpoint.clamp)}),
         "beyond": compiled(beyond),
         "reading": compiled(axis_plant.reading),
@@ -180,8 +176,12 @@ def _parts() -> dict[str, Callable[..., Any]]:
 
 
 @cache
-def _tracker() -> Callable[..., tuple[Column, AxisState, Column, float, float, float, Memory]]:
-    return compiled(_track, _parts())
+def _tracker(law: tuple[Callable[..., Any], ...]) -> Callable[..., Any]:
+    parts: dict[str, Callable[..., Any]] = {**_parts(), "interpolate": compiled(inverse_model.interpolate)}
+    common: tuple[Callable[..., Any], ...] = inverse_model.resting, inverse_model.foresee, force_position.expect
+    for function in (*common, *law):
+        parts[function.__name__] = compiled(function, parts)
+    return compiled(_track, parts)
 
 
 @cache
@@ -190,11 +190,11 @@ def _traveller() -> Callable[..., tuple[Column, AxisState, Column, float, float,
 
 
 def track(
-    bench: BenchState, memory: Memory, table: Columns, settings: Settings, reference_N: Column, noise: Column,
-    plant: Plant, clock: Timing, zeros: Zeros, bounds: InputBounds,
-) -> tuple[Stretch, Memory]:  # fmt: skip
-    """The force law along ``reference_N`` of shape (cycles,), or less of it."""
-    rows, state, sensed, held_N, position_mm, velocity_mm_s, after = _tracker()(
+    bench: BenchState, memory: LawMemory, table: Any, settings: Any, reference_N: Column, noise: Column,
+    plant: Plant, clock: Timing, zeros: Zeros, bounds: InputBounds, law: tuple[Callable[..., Any], ...] = LAW,
+) -> tuple[Stretch, LawMemory]:  # fmt: skip
+    """A law along ``reference_N`` of shape (cycles,), or less of it; ``law`` ends with its ``increment``."""
+    rows, state, sensed, held_N, position_mm, velocity_mm_s, after = _tracker(law)(
         bench, memory, table, settings, reference_N, noise, plant, clock, zeros, bounds
     )
     return Stretch(rows, BenchState(state, sensed, held_N, Setpoint(position_mm, velocity_mm_s))), after

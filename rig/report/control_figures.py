@@ -1,9 +1,7 @@
-"""Pictures of the force loop: a run over time, and subjects side by side."""
+"""Pictures of the force loop: a run over time."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -39,20 +37,6 @@ def run_figure(signals: Signals, title: str) -> Figure:
     effort.plot(*thinned(signals.time_s, signals.voltage_V, POINTS), color=MODEL, linewidth=0.8, label="voltage")
     effort.plot(*thinned(signals.time_s, signals.current_A, POINTS), color=INK, linewidth=0.8, label="current")
     _key(effort)
-    return figure
-
-
-def comparison_figure(subjects: Sequence[str], overshoot: Sequence[float], settling: Sequence[float]) -> Figure:
-    """Worst overshoot [%] and settling [s] on each subject; NaN where there is none."""
-    figure = new_figure(9.0, 3.8)
-    left, right = figure.subplots(1, 2)
-    for axes, title, unit, heights in (
-        (left, "Worst overshoot", "% of the jump", overshoot),
-        (right, "Worst settling", "s", settling),
-    ):
-        dress(axes, title, "", unit)
-        axes.bar(np.arange(len(subjects)), heights, 0.6, color=ACTUAL)
-        axes.set_xticks(np.arange(len(subjects)), subjects, fontsize=SMALL_PT)
     return figure
 
 

@@ -124,12 +124,22 @@ class ComparedRun(Result):
     levels: tuple[StudyLevel, ...]
 
 
+class AlternativeRun(Result):
+    """One law simulated on a subject's tissue as it was learnt, and on tissue half and twice as stiff as that."""
+
+    subject: str
+    law: str
+    worst: WorstJump
+    worst_of_wrong: WorstJump
+
+
 class CompareResult(SavedResult):
-    """Jumps of force on simulated subjects; ``models`` are the parameters learnt of each."""
+    """Jumps on subjects of the mock bench, with ``models`` learnt of each; ``alternatives`` are simulated beside."""
 
     reference: str
     models: Mapping[str, Mapping[str, float]]
     runs: tuple[ComparedRun, ...]
+    alternatives: tuple[AlternativeRun, ...] = ()
 
 
 class LoopMargins(Result):

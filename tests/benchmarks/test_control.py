@@ -1,4 +1,4 @@
-"""The comparison of laws: its plant against closed forms and the product's own, its rivals' margins, its promises."""
+"""The comparison of laws: its plant against closed forms and the product's own, margins, its promises."""
 
 import math
 
@@ -11,12 +11,12 @@ from benchmarks.control.cases import Asked, held, limb_motion, settling, swing
 from benchmarks.control.laws import LAW, admittance, constant, shaped
 from benchmarks.control.motion import Bench, Contact, Law, Run, run
 from benchmarks.control.plants import FAST, PLANT, SUBJECTS, Plant, limb_of, model_of, wiring_of
-from benchmarks.control.rival_tuning import LEAST_N, TissueAt, Tuning, fastest, tissue_at, worst
 from benchmarks.control.runs import cases_of, jobs_of, play_all
 from benchmarks.control.scores import BEST, Score, best_constant, gain_of, headline, mean_of
 from controller.law.axis_response import rates_of, response_of
 from controller.law.loop_response import Rates
 from controller.law.synthesis import SPARE_S
+from controller.simulated.alternatives.alternative_tuning import LEAST_N, TissueAt, Tuning, fastest, tissue_at, worst
 from controller.simulated.bench import SimulatedBench, follow
 from controller.simulated.bench import limb_of as product_limb
 from rig.config.axis_response import AxisResponse

@@ -6,16 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.control import laws, rival_law, wire, wire_programs, wire_report
+from benchmarks.control import laws, wire, wire_programs, wire_report
+from benchmarks.control.alternative_process import ConstantLaw
 from benchmarks.control.cases import LIMB_MM, Asked
 from benchmarks.control.laws import LAW
 from benchmarks.control.plants import PLANT, limb_of, model_of, wiring_of
-from benchmarks.control.rival_process import ConstantLaw
-from benchmarks.control.rival_tuning import DRIFTS_RAD_S
 from benchmarks.control.wire import CONSTANT, Part, Wired, WiredPart
 from controller.law.force_position import ForceReading
 from controller.law.inverse_model import columns
 from controller.loop.steps import TrackForce
+from controller.simulated.alternatives import alternative_law
+from controller.simulated.alternatives.alternative_tuning import DRIFTS_RAD_S
 from mock_devices.parameters import load_parameters
 
 LIMB = Part("limb", "average", 1.0, CONSTANT, 1)
@@ -31,27 +32,27 @@ def track_of(part: Part) -> TrackForce:
 
 
 def test_the_loop_runs_the_constant_that_the_simulation_runs() -> None:
-    """The step that goes over the wire, cycle by cycle, against `rival_law` with the tables it was tuned with."""
+    """The step that goes over the wire, cycle by cycle, against `alternative_law` with the tables it was tuned with."""
     step, simulated = track_of(LIMB), laws.constant("average", PLANT)
     memory = ConstantLaw.begin(columns(step.gains), step.settings.inverse, 0.5)
-    other = rival_law.begin(simulated.table, simulated.settings.inverse, 0.5)
+    other = alternative_law.begin(simulated.table, simulated.settings.inverse, 0.5)
     for cycle in range(400):
         reading = ForceReading(0.5 + 0.1 * math.sin(0.05 * cycle), cycle)
         asked_N = 0.5 if cycle < 100 else 1.0
         ours, memory = ConstantLaw.increment(memory, columns(step.gains), step.settings, asked_N, reading, 0.001)
-        theirs, other = rival_law.increment(other, simulated.table, simulated.settings, asked_N, reading, 0.001)
+        theirs, other = alternative_law.increment(other, simulated.table, simulated.settings, asked_N, reading, 0.001)
         assert ours == pytest.approx(theirs, abs=1e-12)
     assert math.isnan(memory.tangent_N_mm)
 
 
 def test_a_constant_goes_over_the_wire_with_its_own_numbers_and_the_law_with_its_own() -> None:
     tuning = laws.tuning_of("constant", ("average",), PLANT, DRIFTS_RAD_S)
-    rival, ours = track_of(LIMB), track_of(LIMB._replace(law=LAW))
-    numbers = rival.crossover_rad_s, rival.lead_s, rival.drift_rad_s
+    constant, ours = track_of(LIMB), track_of(LIMB._replace(law=LAW))
+    numbers = constant.crossover_rad_s, constant.lead_s, constant.drift_rad_s
     assert numbers == pytest.approx((tuning.integral, tuning.lead_s, tuning.drift_rad_s))
     assert ours.crossover_rad_s == laws.track_step("average", PLANT).crossover_rad_s
     assert track_of(LIMB._replace(law=wire.BEST_AT_CONTACT)).drift_rad_s == 0.0
-    assert rival.gains == ours.gains
+    assert constant.gains == ours.gains
 
 
 @pytest.mark.parametrize("kind", ["limb", "contact", "low jumps", "jumps"])

@@ -2,7 +2,9 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import cast
 
 import pytest
@@ -10,14 +12,23 @@ import pytest
 from api.operations import compare as comparing
 from api.operations.compare import Comparison, compare, comparison_operation
 from controller.experiments import capture, tracked
+from controller.experiments.comparison import compared_run
 from controller.experiments.recorded import Recorded
 from controller.experiments.references import parse_reference
 from controller.loop.messages import Outcome
+from controller.loop.steps import Program, TrackForce
 from controller.operation import Cancelled
+from controller.simulated.alternatives import alternative_runs as alternatives
+from controller.simulated.alternatives.alternative_laws import tuning_for
+from controller.simulated.alternatives.alternative_runs import alternative_runs
 from controller.supervisor import Supervisor
 from mock_devices.testing.models import index_model
+from rig.config.calibration import Calibration
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, SafetyStop
+from rig.results.compared_tables import alternatives_table
+from rig.results.tracking import AlternativeRun, CompareResult
+from tests.calibrations import axis_dynamics
 
 DONE = Outcome("complete", "", 5.0, 20.0, 0.0)
 LATE = Outcome("loop_overrun", "the loop was late", 5.0, 20.0, 0.0)
@@ -27,10 +38,11 @@ class PlayedRuns:
     """In place of runs on a bench: each ends as it is told, at last well."""
 
     def __init__(self, *ends: Outcome | DeviceError) -> None:
-        self.ends, self.made = list(ends), list[str]()
+        self.ends, self.made, self.programs = list(ends), list[str](), list[Program]()
 
-    def __call__(self, _bench: object, _program: object, folder: Path, _model: str) -> Recorded:
+    def __call__(self, _bench: object, program: Program, folder: Path, _model: str) -> Recorded:
         self.made.append(folder.name)
+        self.programs.append(program)
         end = self.ends.pop(0) if self.ends else DONE
         if isinstance(end, DeviceError):
             raise end
@@ -43,7 +55,8 @@ def comparison(out: Path) -> Comparison:
 
     @contextmanager
     def bench(_: str) -> Iterator[Supervisor]:
-        yield cast(Supervisor, None)
+        known = Calibration(of_dynamics=axis_dynamics())
+        yield cast(Supervisor, SimpleNamespace(wiring=Wiring().model_copy(update={"calibration": known})))
 
     subjects = {"average": "average", "breathing": "average"}
     return Comparison(Wiring(), out, subjects, parse_reference("stairs:5"), bench)
@@ -52,6 +65,21 @@ def comparison(out: Path) -> Comparison:
 @pytest.fixture(autouse=True)
 def no_jumps(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(comparing, "_jumps", lambda _: ())
+
+
+@pytest.fixture(autouse=True)
+def simulated(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, tuple[float, float]]]:
+    """In place of simulations: whose were asked for, and how they breathe."""
+    asked: list[tuple[str, tuple[float, float]]] = []
+    nothing = compared_run("", ()).worst
+
+    def runs(subject: str, _program: object, _model: object, breathing: tuple[float, float], *_: object) -> object:
+        asked.append((subject, breathing))
+        return [AlternativeRun(subject=subject, law="force law", worst=nothing, worst_of_wrong=nothing)]
+
+    monkeypatch.setattr(alternatives, "alternative_runs", runs)
+    monkeypatch.setattr(alternatives, "tuning_for", lambda *_: None)
+    return asked
 
 
 def test_what_a_stall_of_the_computer_stopped_is_said_and_done_again(
@@ -68,7 +96,7 @@ def test_what_a_stall_of_the_computer_stopped_is_said_and_done_again(
         "average: the loop was late; once more",
         "average: the force sensor is silent; once more",
     )
-    assert (operation.progress.total, found.models["breathing"]["a_N_mm"]) == (2, 0.12)
+    assert (operation.progress.total, found.models["breathing"]["a_N_mm"]) == (4, 0.12)
     assert (tmp_path / "comparison.svg").exists()
 
 
@@ -120,3 +148,45 @@ def test_one_that_is_cancelled_starts_no_further_run(tmp_path: Path, monkeypatch
     with pytest.raises(Cancelled, match="compare was cancelled before: learning breathing"):
         operation.run(lambda: compare(operation, wanted))
     assert runs.made == ["average"] and not (tmp_path / "comparison.svg").exists()
+
+
+def test_the_bench_plays_the_law_of_the_axis_that_answered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not that of what the configuration says of an axis that was never identified."""
+    runs, wanted = PlayedRuns(), comparison(tmp_path)
+    monkeypatch.setattr(tracked, "recorded_run", runs)
+    compare(comparison_operation(wanted), wanted)
+    identified = axis_dynamics().response
+    for program in runs.programs:
+        laws = [step for step in program.steps if isinstance(step, TrackForce)]
+        assert {(law.delay_s, law.lag1_s, law.lag2_s) for law in laws} == {identified[:3]}
+
+
+def test_what_a_subjects_bench_was_asked_for_is_simulated_and_who_was_refused_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, simulated: list[tuple[str, tuple[float, float]]]
+) -> None:
+    monkeypatch.setattr(tracked, "recorded_run", PlayedRuns())
+    wanted = replace(comparison(tmp_path), breathing={"breathing": (1.5, 0.25)})
+    found = compare(comparison_operation(wanted), wanted)
+    assert simulated == [("average", (0.0, 1.0)), ("breathing", (1.5, 0.25))]
+    assert [run.subject for run in found.alternatives] == ["average", "breathing"]
+    index_model(18.0, 0.22, 0.01, force_N=11.0).save(tmp_path / "average.json")  # 23 N/mm at 11 N
+    simulated.clear()
+    refused = compare(comparison_operation(wanted), wanted)
+    assert "above the 20 N/mm up to which the force limit holds" in refused.runs[0].stopped
+    assert (simulated, refused.alternatives) == ([], ())
+
+
+def test_each_law_stands_beside_the_bench_in_numbers_table_and_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tracked, "recorded_run", PlayedRuns())
+    monkeypatch.setattr(alternatives, "alternative_runs", alternative_runs)
+    monkeypatch.setattr(alternatives, "tuning_for", tuning_for)
+    wanted = replace(comparison(tmp_path), subjects={"average": "average"})
+    found = compare(comparison_operation(wanted), wanted)
+    laws = [run.law for run in found.alternatives]
+    assert len(laws) == len(set(laws)) == 6
+    table = alternatives_table(CompareResult.model_validate_json(found.model_dump_json()).alternatives)
+    assert [row[:2] for row in table.rows] == [["average", law] for law in laws]
+    picture = (tmp_path / "comparison.svg").read_text()
+    assert all(f"{law}, simulated" in picture for law in laws)

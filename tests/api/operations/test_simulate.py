@@ -2,10 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from api.operations.simulate import SimulatedRun, simulate
+from api.operations.simulate import SimulatedRun, play, simulate
 from controller.experiments.references import parse_reference
+from controller.loop.modes import Mode
 from controller.operation import Operation
 from mock_devices.testing.models import index_model
 from rig.config.wiring import Wiring
@@ -43,3 +45,12 @@ def test_tissue_that_no_law_holds_is_refused_before_anything_is_drawn(tmp_path: 
     with pytest.raises(UsageError, match="damping is 0 N s/mm"):
         simulate(Operation("simulate"), Wiring(), SimulatedRun(STEP, undamped), tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_what_is_played_hears_the_sensor_as_seldom_as_the_configured_one() -> None:
+    """Of 100 Hz: where every cycle had a sample, the law would act ten times as often as on the bench."""
+    for product, every_ms in (("bota-sensone", 1), ("robotiq-ft300", 10)):
+        wiring = Wiring.model_validate({"force": {"product": product}})
+        trace = play(Operation("simulate"), wiring, SimulatedRun(STEP, MODEL)).trace
+        changed = np.flatnonzero(np.diff(trace.sensed_N[trace.mode == Mode.CONTACT]))
+        assert np.min(np.diff(changed)) == every_ms

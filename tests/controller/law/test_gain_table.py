@@ -101,6 +101,13 @@ def test_an_interval_that_reaches_zero_on_one_side_is_refused_whatever_the_stand
         span_of(model, gain_rows(model, depths(model)), FAST)
 
 
+def test_a_stiffness_whose_interval_reaches_zero_is_refused_with_the_interval() -> None:
+    """2 N/mm with a standard error of 1.1: two of them reach from below zero to 4.2."""
+    model = uncertain(index_model(2.0, 0.0, 0.01), a_N_mm=1.1)
+    with pytest.raises(UsageError, match=r"the model's stiffness is 2 N/mm, 0 to 4\.2; .* its whole interval"):
+        span_of(model, gain_rows(model, depths(model)), FAST)
+
+
 def test_of_tissue_too_stiff_where_it_is_deep_trials_that_press_less_deep_make_a_model_to_track_with() -> None:
     deep, less_deep = index_model(0.5, 0.2, 0.03, force_N=80.0), index_model(0.5, 0.2, 0.03, force_N=30.0)
     with pytest.raises(UsageError, match=r"above the 20 N/mm .*: fit trials that press less deep"):

@@ -11,9 +11,11 @@ import pytest
 from numpy.typing import NDArray
 
 from controller.experiments import comparison, tracking
+from controller.law.stability import nearest
 from controller.loop.steps import TrackForce
 from controller.simulated.bench import SENSING, SimulatedBench, follow, limb_of
 from rig.config.wiring import Wiring
+from rig.simulation.axis_plant import ModelledLimb
 from tests.controller.simulated.subjects import NAMES, RESPONSE, subject
 
 Column = NDArray[np.float64]
@@ -165,3 +167,16 @@ def test_the_margins_over_half_to_twice_the_stiffness_are_those_that_the_documen
         assert found[0] > phase_deg - 0.5
         assert found[1] > 0.99 * gain
         assert loop.largest_sensitivity() < 1.7
+
+
+@pytest.mark.parametrize(("share", "swings"), [(1.0, False), (2.0, True)], ids=["as stiff", "twice"])
+def test_a_stiff_environment_is_met_without_swinging_up_to_the_stated_stiffness(share: float, swings: bool) -> None:
+    """A spring in place of the limb, 0.5 mm away: `rig simulate` states up to which stiffness the loop is stable."""
+    for name in NAMES:
+        loop, rows = tracking.loop_for(subject(name), WIRING, RESPONSE), tracking.rows_of(subject(name))
+        (row,) = nearest(rows, [0.5])
+        damping = subject(name).damping_N_s_mm
+        stiff_N_mm = share * row.tangent_N_mm * float(loop.at(row, damping).tolerated()[0])
+        spring = ModelledLimb(np.array([0.0, 40.0]), np.array([0.0, 40.0 * stiff_N_mm]), damping)
+        trace = follow(law(name), np.full(4000, 0.5), SimulatedBench(spring), clearance_mm=0.5)
+        assert (np.ptp(trace.force_N[3000:]) > 0.3) == swings, name

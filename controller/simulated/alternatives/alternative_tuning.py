@@ -1,6 +1,6 @@
-"""Gains of the rivals: the best that keep the product's own margins on the same tissues with the same spare delay.
+"""Gains of the alternatives: the best that keep the law's own margins on the same tissues with the same spare delay.
 
-Shape, ratio of both gains and corner of the second integral are searched, and of each the fastest is taken that keeps
+Ratio of both gains and corner of the second integral are searched, and of each pair the fastest is taken that keeps
 MARGIN_DEG and MARGIN_GAIN over half to twice the stiffness; the best is that with the smallest error where a limb moves
 at 2 Hz, at all forces.
 """
@@ -17,11 +17,11 @@ from controller.law.loop_response import Column, Complex, Rates, grid, margins
 from controller.law.synthesis import LARGEST_STIFFNESS, LEAST_STIFFNESS, MARGIN_DEG, MARGIN_GAIN, SPARE_S
 from rig.config.axis_response import AxisResponse
 
-Shape = Literal["constant", "secant", "tangent"]
+Schedule = Literal["constant", "secant", "tangent"]
 DEPTHS, POINTS, COARSE, FINE = 8, 100, 24, 5
 LEADS_S = (0.0, 0.003, 0.006, 0.009, 0.012)
 DRIFTS_RAD_S = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0)
-# Below the least force of any test a rival need not keep the margins; the law keeps them from contact on.
+# Below the least force of any test an alternative need not keep the margins; the law keeps them from contact on.
 LEAST_N = 0.25
 JUDGED_N = (0.5, 1.0, 2.0, 5.0, 10.0)
 MOTION_HZ = 2.0
@@ -45,18 +45,18 @@ class Tuning(NamedTuple):
     mass_s: float = 0.0
 
 
-def factors(shape: Shape, rows: Sequence[GainRow]) -> Column:
+def factors(schedule: Schedule, rows: Sequence[GainRow]) -> Column:
     """What the gains are in proportion to at each row: 1, or one over secant or tangent stiffness."""
-    if shape == "constant":
+    if schedule == "constant":
         return np.ones(len(rows))
     tangents = np.array([row.tangent_N_mm for row in rows])
-    if shape == "tangent":
+    if schedule == "tangent":
         return 1 / tangents
     depths, forces = np.array([row.depth_mm for row in rows]), np.array([row.force_N for row in rows])
     return np.asarray(np.where(depths > 0, np.maximum(depths, 1e-9) / np.maximum(forces, 1e-9), 1 / tangents))
 
 
-def tissue_at(shape: Shape, rows: Sequence[GainRow], damping_N_s_mm: float) -> TissueAt:
+def tissue_at(schedule: Schedule, rows: Sequence[GainRow], damping_N_s_mm: float) -> TissueAt:
     """Depths evenly spread, and those of the forces that are judged."""
     forces = np.array([row.force_N for row in rows])
     even = np.linspace(np.searchsorted(forces, LEAST_N), len(rows) - 1, DEPTHS).round().astype(int)
@@ -64,11 +64,11 @@ def tissue_at(shape: Shape, rows: Sequence[GainRow], damping_N_s_mm: float) -> T
     at = np.concatenate([even, judged])
     tangents = np.array([row.tangent_N_mm for row in rows])[at]
     return TissueAt(
-        tangents, np.full(len(at), damping_N_s_mm), factors(shape, rows)[at], np.arange(len(at)) >= len(even)
+        tangents, np.full(len(at), damping_N_s_mm), factors(schedule, rows)[at], np.arange(len(at)) >= len(even)
     )
 
 
-def rival_loop(
+def alternative_loop(
     axis: AxisResponse, rates: Rates, tuning: Tuning, tissue: TissueAt, stiffness: float, omega: Column
 ) -> Complex:
     """Open loop at each depth, shape (depths, frequencies); a slow sensor's sample stands for cycles."""
@@ -126,19 +126,17 @@ def worst(
 ) -> tuple[float, float]:
     """The smallest phase margin [deg] and gain margin over half to twice the stiffness."""
     omega = grid(rates, points)
-    loops = [
-        rival_loop(axis, rates, tuning, tissue, stiffness, omega)
-        for stiffness in (LEAST_STIFFNESS, 1.0, LARGEST_STIFFNESS)
-    ]
-    if max(float(np.abs(loop[:, -1]).max()) for loop in loops) >= 1:
+    all_stiffness = LEAST_STIFFNESS, 1.0, LARGEST_STIFFNESS
+    loop = np.concatenate([alternative_loop(axis, rates, tuning, tissue, one, omega) for one in all_stiffness])
+    if np.abs(loop[:, -1]).max() >= 1:
         return 0.0, 1.0  # it crosses nowhere, so that nothing would be found amiss
-    found = [margins(loop, omega) for loop in loops]
-    return min(float(np.min(one.phase_deg)) for one in found), min(float(np.min(one.gain)) for one in found)
+    found = margins(loop, omega)
+    return float(np.min(found.phase_deg)), float(np.min(found.gain))
 
 
 def motion_error(axis: AxisResponse, rates: Rates, tuning: Tuning, tissue: TissueAt) -> float:
     """Mean logarithm of the error [N] that a millimetre of limb at 2 Hz leaves at the forces judged."""
     omega = np.array([2 * math.pi * MOTION_HZ])
-    left = 1 / np.abs(1 + rival_loop(axis, rates, tuning, tissue, 1.0, omega)[:, 0])
+    left = 1 / np.abs(1 + alternative_loop(axis, rates, tuning, tissue, 1.0, omega)[:, 0])
     moved = np.abs(tissue.tangent_N_mm + 1j * omega * tissue.damping_N_s_mm)
     return float(np.mean(np.log(left * moved)[tissue.judged]))

@@ -2,7 +2,7 @@
 
     dx = dx_ahead + Pf (e - e_last) + If e dt + u dt        du = wd (Pf (e - e_last) + If e dt)
 
-with the product's own inverse model and expectation, so that only feedback differs. An admittance moves at the speed
+with the law's own inverse model and expectation, so that only feedback differs. An admittance moves at the speed
 that its damper allows, v = e / D, behind a mass, with less damping where the error is large:
 
     M dv/dt + D v = e,  D = D0 / (1 + vary |e| / max(F_ref, FLOOR_N))
@@ -18,8 +18,8 @@ from controller.law.inverse_model import Foreseen, Inverse, Values, foresee, int
 FLOOR_N = 0.5  # below it the relative error of a contact would take away all damping
 
 
-class RivalColumns(NamedTuple):
-    """Tissue as the product's table has it, and gains [mm/N], [mm/(N s)] at each force."""
+class AlternativeColumns(NamedTuple):
+    """Tissue as the law's table has it, and gains [mm/N], [mm/(N s)] at each force."""
 
     force_N: Values
     depth_mm: Values
@@ -29,7 +29,7 @@ class RivalColumns(NamedTuple):
     integral_mm_N_s: Values
 
 
-class RivalFeedback(NamedTuple):
+class AlternativeFeedback(NamedTuple):
     """``expects``: e is against what the axis should show by now, else against the reference itself."""
 
     common: Feedback
@@ -39,14 +39,14 @@ class RivalFeedback(NamedTuple):
     vary: float
 
 
-class RivalSettings(NamedTuple):
+class AlternativeSettings(NamedTuple):
     """What does not change during a run."""
 
     inverse: Inverse
-    feedback: RivalFeedback
+    feedback: AlternativeFeedback
 
 
-class RivalMemory(NamedTuple):
+class AlternativeMemory(NamedTuple):
     """What is remembered from cycle to cycle."""
 
     ahead: Foreseen
@@ -56,15 +56,15 @@ class RivalMemory(NamedTuple):
     drift_mm_s: float
 
 
-def begin(table: RivalColumns, inverse: Inverse, force_N: float) -> RivalMemory:
+def begin(table: AlternativeColumns, inverse: Inverse, force_N: float) -> AlternativeMemory:
     """Memory at hand-over."""
     expected = Expected((0.0,) * LINE_CYCLES, 0, force_N, force_N, force_N)
-    return RivalMemory(resting(table, inverse, force_N), expected, 0.0, 0.0, 0.0)  # type: ignore[arg-type]
+    return AlternativeMemory(resting(table, inverse, force_N), expected, 0.0, 0.0, 0.0)  # type: ignore[arg-type]
 
 
 def correct(
-    memory: RivalMemory, table: RivalColumns, feedback: RivalFeedback, error_N: float, reference_N: float,
-    force_N: float, dt_s: float,
+    memory: AlternativeMemory, table: AlternativeColumns, feedback: AlternativeFeedback, error_N: float,
+    reference_N: float, force_N: float, dt_s: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Way [mm] that feedback adds in this cycle, and the speed that an admittance has then."""
     integral = interpolate(table.force_N, table.integral_mm_N_s, force_N)
@@ -78,9 +78,9 @@ def correct(
 
 
 def increment(
-    memory: RivalMemory, table: RivalColumns, settings: RivalSettings, reference_N: float, measured: ForceReading,
-    dt_s: float,
-) -> tuple[float, RivalMemory]:  # fmt: skip
+    memory: AlternativeMemory, table: AlternativeColumns, settings: AlternativeSettings, reference_N: float,
+    measured: ForceReading, dt_s: float,
+) -> tuple[float, AlternativeMemory]:  # fmt: skip
     """The step to add to the commanded position [mm], within the speed limits, and what to remember."""
     inverse, feedback = settings
     limits, force_N = feedback.common, measured.force_N
@@ -95,4 +95,4 @@ def increment(
     largest_mm = (limits.search_mm_s if force_N < limits.lost_N < reference_N else limits.speed_limit_mm_s) * dt_s
     wanted_mm = ahead.depth_mm - memory.ahead.depth_mm + way_mm + drift_mm_s * dt_s
     step_mm = min(max(wanted_mm, -largest_mm), largest_mm)
-    return step_mm, RivalMemory(ahead, expected, error_N, speed_mm_s, drift_mm_s)
+    return step_mm, AlternativeMemory(ahead, expected, error_N, speed_mm_s, drift_mm_s)

@@ -1,0 +1,1 @@
+"""What the force law is compared with, tuned at its own margins; no bench runs any of it."""
