@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from rig.intake.notation import is_number, is_stamp
-from rig.intake.roles import knows, words_of
+from rig.intake.roles import knows, quantities_of, words_of
 from rig.intake.units import UNIT_WORDS, unit_in, unit_of
 
 # Filled rows above the data among which names and units are looked for: LabVIEW has six between units and names.
@@ -129,7 +129,14 @@ def _around(above: Sequence[Row], header_at: int | None, unit_at: int | None, wi
     before = range(max(0, header_at - MORE_ROWS), header_at)
     after = range(header_at + 1, len(above))
     more = [number for number in (*before, *after) if number != unit_at and _are_names(above[number], width)]
+    more = [number for number in more if not _contradicts(above[number], above[header_at])]
     return [header_at, *(number for number in more if not any(map(_is_of_setting, above[number])))]
+
+
+def _contradicts(row: Row, names: Row) -> bool:
+    """Whether a row calls two columns what their names do not, as a sentence over them does."""
+    pairs = [(quantities_of(cell), quantities_of(name)) for cell, name in zip(row, names, strict=False)]
+    return sum(bool(said and known and said.isdisjoint(known)) for said, known in pairs) > 1
 
 
 def _is_of_setting(cell: str) -> bool:

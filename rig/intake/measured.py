@@ -32,6 +32,8 @@ LEAST_MM = 0.05
 RIVAL_SHARE = 0.1
 # The same force in another unit differs by rounding only, which is a few thousandths of it at most.
 COPY_SHARE = 0.01
+# Coarse noise stands at its lowest in the air; what is called the largest is nearer to the largest than to none.
+AT_ITS_LARGEST = 0.5
 USUAL = {"force": "N", "position": "mm", "velocity": "mm/s"}
 
 
@@ -228,8 +230,8 @@ def spoilt(table: ColumnGroup, quantity: str, column: int) -> Iterator[str]:
         row, text = looks.odd
         yield f"{sheet.place(row)}, column {sheet.header[column]}: {text!r} is no number; mend it"
     row, count = _full_rows(table, column) if quantity == "force" else (0, 0)
-    if count:
-        end = float(np.abs(looks.values[row : row + count]).min())
+    end = float(np.abs(looks.values[row : row + count]).min()) if count else 0.0
+    if end > AT_ITS_LARGEST * float(np.abs(looks.known).max()):
         said = f"{sheet.place(row)}, column {sheet.header[column]}: {count} rows stay at {end:g}, its largest"
         yield f"{said}; if that is the end of its range, say saturates = [{-end:g}, {end:g}]"
 

@@ -23,6 +23,7 @@ HOURS = (
     "%H:%M:%S.%f", "%H:%M:%S,%f", "%H:%M:%S", "%I:%M:%S %p", "%I:%M:%S.%f %p", "%M:%S.%f", "%H:%M:%S:%f",
     "%M:%S,%f",
 )  # fmt: skip
+ZONED = ("%H:%M:%S.%f %z", "%H:%M:%S %z")
 
 
 class Notation(NamedTuple):
@@ -94,7 +95,7 @@ def _parts(match: re.Match[str]) -> bool:
 def pattern_of(texts: Iterable[str]) -> tuple[str, ...]:
     """The patterns of `strptime` in which all of the texts are written, the likeliest first."""
     shown = list(texts)
-    patterns = [*HOURS, *(f"{day} {hour}" for day in DAYS for hour in HOURS[:5])]
+    patterns = [*HOURS, *(f"{day} {hour}" for day in DAYS for hour in (*HOURS[:5], *ZONED))]
     return tuple(pattern for pattern in patterns if shown and all(_written(text, pattern) for text in shown))
 
 

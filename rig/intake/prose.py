@@ -4,13 +4,16 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
 from rig.intake.encodings import encoding_of
 from rig.intake.families import ColumnGroup, Told
-from rig.intake.readers import kind_of
+from rig.intake.mapping import FileForm
+from rig.intake.readers import kind_of, open_sheets
 from rig.intake.roles import OTHER, candidates, words_of
+from rig.intake.text import lines_in
 from rig.intake.units import LINEAR, ROTARY, SIGNALS, UNIT_WORDS, unit_in, unknown_unit
 from rig.intake.workbook import sheet_names, sheet_text
 
@@ -53,12 +56,11 @@ class Statement(NamedTuple):
 
 def with_prose(tables: Iterable[ColumnGroup], top: Path) -> Iterator[ColumnGroup]:
     """The tables with the units that are said of their columns beside them, in the nearest folder up to ``top``."""
-    read = cache(_in_folder)
+    read, own = cache(_in_folder), cache(_in_file)
     for table in tables:
         folder, found = table.path.parent, dict[int, Told]()
-        folders = [own for own in (folder, *folder.parents) if own == folder or own.is_relative_to(top)]
-        book = _in_book(table.path) if kind_of(table.path) == "workbook" else ()
-        for statements in (book, *map(read, folders)):
+        folders = [each for each in (folder, *folder.parents) if each == folder or each.is_relative_to(top)]
+        for statements in (_above(table), own(table.path), *map(read, folders)):
             found = {**dict(_told(table, statements)), **found}
         yield replace(table, told=found) if found else table
 
@@ -94,7 +96,27 @@ def _in_folder(folder: Path) -> tuple[Statement, ...]:
     return tuple(said for path in short for said in _in_text(path.name, path.read_bytes()))
 
 
-def _in_book(path: Path) -> tuple[Statement, ...]:
+def _above(table: ColumnGroup) -> tuple[Statement, ...]:
+    """What comments above the table say of columns that carry no unit; settings of units there are asked about."""
+    form, source = FileForm.model_construct(**table.layout.form), table.layout.source
+    if kind_of(table.path) != "text" or form.section or all(table.units):
+        return ()
+    with lines_in(source, form) as file:
+        above = b"".join(islice(file, max(form.header_row - 1, 0)))
+    said = b"\n".join(line if line.startswith((b"#", b"%", b"//")) else b"" for line in above.splitlines())
+    return tuple(one for one in _in_text(table.path.name, said) if UNIT_WORDS.isdisjoint(words_of(one.line)))
+
+
+def _in_file(path: Path) -> tuple[Statement, ...]:
+    """What sheets of a workbook, or a struct of texts in a file of arrays, say of the others."""
+    if kind_of(path) == "arrays" and path.suffix.lower() == ".mat":
+        sheets = [sheet for _, sheet in open_sheets(path, FileForm.model_construct(sheets="**/*"))]
+        facts = [
+            (sheet.name, fact) for sheet in sheets if sheet.name.lower() in UNIT_WORDS for fact in sheet.facts.items()
+        ]
+        return tuple(Statement(name, name, unit_in(said), f"{path.name}, {at}") for at, (name, said) in facts)
+    if kind_of(path) != "workbook":
+        return ()
     titles = [name for name in sheet_names(path) if _TITLE.search(name)]
     return tuple(said for name in titles for said in _in_text(f"{path.name}, {name}", sheet_text(path, name, ".")))
 

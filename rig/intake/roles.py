@@ -57,6 +57,11 @@ def knows(word: str) -> bool:
     return any(_place(quantity, word) is not None for quantity in WORDS)
 
 
+def quantities_of(name: str) -> set[str]:
+    """Which of time, force and position a word in the name is of."""
+    return {quantity for quantity in ("time", "force", "position") if _place(quantity, name) is not None}
+
+
 def words_of(name: str) -> list[str]:
     """The words of a name in small letters: ``ActualForce_N (cell 1)`` has actual, force, n, cell."""
     parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)

@@ -1,7 +1,7 @@
 """Time as files have it, in nanoseconds: numbers with a unit, ISO texts, spreadsheet days, counters."""
 
 from collections.abc import Sequence
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pyarrow as pa
@@ -104,6 +104,7 @@ def _written_ns(texts: Sequence[str], first: int, form: str, sheet: Sheet) -> Ti
     for row, text in enumerate(texts):
         try:
             since = _since_day_0(text) if form == "spreadsheet" else datetime.strptime(text, form)
+            since = since.astimezone(UTC).replace(tzinfo=None) if since.tzinfo else since
             gone = since - (NO_DATE if "%" in form and "%d" not in form else UNIX)
             at_ns[row] = gone.days * DAY_NS + gone.seconds * NS + gone.microseconds * 1000
         except OverflowError as error:

@@ -79,3 +79,23 @@ def test_a_line_of_units_above_that_nobody_knows_is_asked(folder: Path, said: st
     questions = propose(folder).questions
     assert [said in question.text and question.usual == "" for question in questions] == [True] * bool(rate)
     check(came_in(folder, *[rate] * bool(rate)))
+
+
+@pytest.mark.parametrize("parts", [True, False])
+def test_a_zone_behind_a_blank_is_a_zone(folder: Path, parts: bool) -> None:
+    times = TIME_S if parts else np.arange(COUNT)
+    stamps = [(datetime(2000, 1, 1, 13) + timedelta(seconds=float(at))).isoformat(" ") for at in times]
+    stamps = [f"{at if '.' in at or not parts else at + '.0'} +0100" for at in stamps]
+    rows = "".join(f"{at};{way:.5f};{force:.5f}\n" for at, way, force in zip(stamps, WAY_MM, FORCE_N, strict=True))
+    text("Date Time;Stroke (mm);Load (N)\n", rows)(folder)
+    at_ns = came_in(folder).recording("a").tables["force"]["capture_ns"]
+    assert at_ns[0] == AT_NOON_NS
+    assert (at_ns - at_ns[0]) * 1e-9 == pytest.approx(times)
+
+
+def test_coarse_noise_in_the_air_is_no_end_of_a_range(folder: Path) -> None:
+    place_mm = np.interp(np.arange(600), [0, 300, 600], [0, 9.5, 0])
+    force_N = 0.5 * np.maximum(place_mm - 1.5, 0) + np.random.default_rng(1).normal(0, 0.0003, 600)
+    rows = lines("{:.2f},{:+.3f},{:.3f}", np.arange(600) * 0.02, force_N, place_mm)
+    text("Time (s),Force (N),Disp (mm)\n", rows)(folder)
+    assert not [doubt for doubt in propose(folder).doubts if "its largest" in doubt]

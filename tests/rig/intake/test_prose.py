@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
+import numpy as np
 import openpyxl
 import pytest
+import scipy.io
 
 from rig.intake.proposal import propose
 from tests.rig.intake.instruments import text
@@ -92,3 +94,22 @@ def test_what_is_said_of_something_else_is_no_unit_of_a_column(folder: Path, sai
     (folder / "README.txt").write_text(said)
     (question,) = propose(folder).questions
     assert "has no unit" in question.text
+
+
+@pytest.mark.parametrize(
+    "said", ["force in mN, displacement in um, time in ms", "time, ms; force, mN; displacement, um"]
+)
+def test_a_sentence_above_the_names_says_their_units_and_is_no_name_of_a_column(folder: Path, said: str) -> None:
+    text(f"# pressed in room 2\n# {said}\n{HEAD}", SMALL)(folder)
+    check(came_in(folder))
+
+
+def test_a_struct_of_texts_beside_an_array_of_structs_says_the_units_of_its_fields(folder: Path) -> None:
+    trials = np.zeros((1, 2), dtype=[("time", "O"), ("force", "O"), ("position", "O")])
+    for number in range(2):
+        trials[0, number] = (1e3 * TIME_S[:, None], 1e3 * FORCE_N[:, None] + 1e-3 * number, 1e3 * WAY_MM[:, None])
+    units = {"time": "ms", "force": "mN", "position": "um"}
+    scipy.io.savemat(folder / "study.mat", {"trial": trials, "units": units})
+    session = came_in(folder)
+    assert len(session.trials) == 2
+    check(session)
