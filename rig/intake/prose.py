@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rig.intake.encodings import encoding_of
-from rig.intake.families import ColumnGroup, Told
+from rig.intake.families import ColumnGroup, SaidBeside
 from rig.intake.mapping import FileForm
 from rig.intake.readers import kind_of, open_sheets
 from rig.intake.roles import OTHER, candidates, words_of
@@ -58,14 +58,14 @@ def with_prose(tables: Iterable[ColumnGroup], top: Path) -> Iterator[ColumnGroup
     """The tables with the units that are said of their columns beside them, in the nearest folder up to ``top``."""
     read, own = cache(_in_folder), cache(_in_file)
     for table in tables:
-        folder, found = table.path.parent, dict[int, Told]()
+        folder, found = table.path.parent, dict[int, SaidBeside]()
         folders = [each for each in (folder, *folder.parents) if each == folder or each.is_relative_to(top)]
         for statements in (_above(table), own(table.path), *map(read, folders)):
             found = {**dict(_told(table, statements)), **found}
         yield replace(table, told=found) if found else table
 
 
-def _told(table: ColumnGroup, statements: Sequence[Statement]) -> Iterator[tuple[int, Told]]:
+def _told(table: ColumnGroup, statements: Sequence[Statement]) -> Iterator[tuple[int, SaidBeside]]:
     """By column the unit that is said of it, none where two are said, or another than its own."""
     for number in table.columns if statements else ():
         own, heads = table.unit(number), table.layout.sheet.header[number]
@@ -81,7 +81,7 @@ def _told(table: ColumnGroup, statements: Sequence[Statement]) -> Iterator[tuple
         said = list(dict.fromkeys(f"{one.unit} by {one.place}" for one in found))[:MOST_PLACES]
         if found and (not own or not (is_clear or "time" in fitting)):
             said = [f"{own} by its header", *said] if own else said
-            yield number, Told(units[0] if is_clear else "", " and in ".join(said), own)
+            yield number, SaidBeside(units[0] if is_clear else "", " and in ".join(said), own)
 
 
 def _units(quantity: str) -> Mapping[str, tuple[bool, float]]:
