@@ -33,6 +33,9 @@ BLOCKED_POLLS, AMONG_POLLS = 3, 100
 BEYOND_RANGE = 2.0
 # The largest volume of a camera, and far beyond any axis.
 FARTHEST_MM = 10_000.0
+# A second of a fast sensor. In bunches of three that are dated by their arrival two of three have the time of the one
+# before; a busy computer makes a few alike.
+ALIKE_AMONG, ALIKE_LARGEST = 1000, 0.6
 # The loop is given up by its operators after a second without a cycle; who is at fault has to be named before that.
 CYCLIC_S = 0.5
 START_S = 30.0  # half of what the loop has for its start, homing included
@@ -65,6 +68,7 @@ class Guarded(ABC, Generic[Made, Sample]):
         self._plugin, self._config, self._now, self._waits = plugin, config, now, waits
         self._device = self._asked(make)
         self._last_ns: dict[int, int] = {}
+        self._alike: dict[int, float] = {}
         self._blocked = deque[bool](maxlen=AMONG_POLLS)
         if absent := lacking(self._device, self.ROLE):
             self.close()
@@ -148,8 +152,18 @@ class Guarded(ABC, Generic[Made, Sample]):
             return (
                 f"sample {sample.seq} was taken {(sample.capture_ns - sample.arrival_ns) * 1e-6:.3f} ms after it came"
             )
+        if self._clockless(stream, sample.capture_ns):
+            return (
+                "most of its samples have the time of the one before: a stream without a clock is dated by its numbers"
+            )
         self._last_ns[stream] = sample.capture_ns
         return self._impossible(sample) if sample.valid else ""
+
+    def _clockless(self, stream: int, capture_ns: int) -> bool:
+        """Whether most of what it gave lately was dated by its arrival; what has no rate may come together."""
+        before = self._alike.get(stream, 0.0)
+        self._alike[stream] = before + (float(self._last_ns.get(stream) == capture_ns) - before) / ALIKE_AMONG
+        return self._alike[stream] > ALIKE_LARGEST and self.period_ns > 0
 
     @abstractmethod
     def _impossible(self, sample: Sample) -> str:

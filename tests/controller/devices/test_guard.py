@@ -85,6 +85,31 @@ def test_what_is_wrong_is_an_error_that_names_the_plug_in(given: Sequence[object
         force(given).poll(1000)
 
 
+def bunches(of: int) -> list[list[ForceSample]]:
+    """Ten seconds at 1 kHz that come ``of`` at a time, dated by their arrival."""
+    numbers = range(0, 10_000, of)
+    return [
+        [FORCE._replace(seq=at + k, capture_ns=at * 10**6, arrival_ns=at * 10**6) for k in range(of)] for at in numbers
+    ]
+
+
+def test_a_stream_without_a_clock_is_named() -> None:
+    given = iter(bunches(10))
+    guarded = force(lambda: next(given))
+    with pytest.raises(DeviceError, match="most of its samples have the time of the one before: a stream without a"):
+        for _ in range(200):
+            guarded.poll(0)
+
+
+def test_a_few_samples_of_one_time_and_keys_that_are_pressed_together_are_none() -> None:
+    given = iter(bunches(2))
+    guarded = force(lambda: next(given))
+    assert sum(len(guarded.poll(0)) for _ in range(5000)) == 10_000
+    together = Given([INPUT] * 2000)
+    together.period_ns = 0
+    GuardedInput(PLUGIN, EvdevSwitch(), lambda: together).poll(1000)  # type: ignore[arg-type,return-value]
+
+
 def without(name: str) -> Given:
     """A driver that has no such member, and would be lost by AttributeError in the midst of a trial."""
     made = type("Lacking", (Given,), {name: None} if callable(getattr(Given, name, None)) else {})([])
@@ -131,7 +156,7 @@ def test_wrong_units_of_tracker_and_axis() -> None:
     with pytest.raises(DeviceError, match=r"a marker 3e.06 mm away: wrong unit"):
         camera.poll(1000)
     far = FakeAxis(Clock(), 7)
-    far.poll = lambda _: [AXIS._replace(position_mm=2e4)]  # type: ignore[method-assign]
+    far.poll = lambda now_ns: [AXIS._replace(position_mm=2e4)]  # type: ignore[method-assign] # noqa: ARG005 - as named
     axis = GuardedAxis(PLUGIN, Epos4Wiring(), lambda: far)
     with pytest.raises(DeviceError, match="position 20000 mm: wrong unit"):
         axis.poll(1000)
