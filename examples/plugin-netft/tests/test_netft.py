@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from rig_netft.netft import NetFt, NetFtWiring, Scale, open_sensor, parse, request, scale_of
 
+from controller.devices import finding
 from controller.replay.session import replay
 from drivers.roles import Identity
 from drivers.testing import CHECKS, UnderTest
@@ -146,6 +147,11 @@ def test_doctor_sees_it_beside_ours(mock_bench: MockBench, tmp_path: Path) -> No
     said = mock_bench.rig("doctor", folder=tmp_path, settings=(NETFT,))
     assert said.code == 0, said.err
     assert "Net F/T" in said.out and "EPOS4" in said.out.upper()
+
+
+def test_find_names_it_at_its_address_after_products_that_speak_otherwise(mock_bench: MockBench) -> None:
+    found = finding.ask(finding.named(mock_bench.wiring(NETFT).force.port))
+    assert (found.role, found.product, found.serial, found.problem) == ("force", "ati-netft", "FT27462", "")
 
 
 def test_capture_and_track_on_a_mixed_bench(mock_bench: MockBench, tmp_path: Path) -> None:
