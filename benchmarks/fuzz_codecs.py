@@ -132,16 +132,17 @@ OF_OPTITRACK = tuple(
 )
 # Of ATI's manual: the request for a stream, and a record of six counts.
 OF_NETFT = (bytes.fromhex("1234000200000000"), struct.pack(">IIIiiiiii", 5, 35_007, 0, 10**6, -2, 3, 4, -5, 6))
-# What a mock drive and a mock axis would do wrong for longer than one answer: modes, words, resets; numbers that are none.
+# What outlasts one answer of a mock drive and a mock axis: modes, words, resets; numbers that are none.
+DRIVE = """
+2f60600008000000 2f60600006000000 2b40600006000000 2b4060000f000000 2b4060001f000000 237a6000d2040000 8101 0101
+"""
 OF_DRIVE = tuple(
-    encode_frame(CanFrame(0x601 if len(data) == 8 else 0, data))
-    for data in map(bytes.fromhex, """
-        2f60600008000000 2f60600006000000 2b40600006000000 2b4060000f000000 2b4060001f000000 237a6000d2040000 8101 0101
-        """.split())
-)  # fmt: skip
+    encode_frame(CanFrame(0x601 if len(data) == 8 else 0, data)) for data in map(bytes.fromhex, DRIVE.split())
+)
 OF_ZABER_MOVES = (
-    b"/1 move abs 5000\n", b"/1 move abs 1 nan\n", b"/1 move vel nan\n", b"/1 move vel inf\n", b"/1 home\n", b"/1 stop\n",
-    b"/1 set maxspeed 0\n", b"/1 set accel 0\n", b"/1 set limit.max inf\n", b"/1 get limit.max\n", b"/1 get pos\n",
+    b"/1 move abs 5000\n", b"/1 move abs 1 nan\n", b"/1 move vel nan\n", b"/1 move vel inf\n", b"/1 home\n",
+    b"/1 stop\n", b"/1 set maxspeed 0\n", b"/1 set accel 0\n", b"/1 set limit.max inf\n",
+    b"/1 get limit.max\n", b"/1 get pos\n",
 )  # fmt: skip
 OF_NDI_PARAMETERS = (b"SET Param.Simulated Alerts=5\r", b"SET Param.Simulated Alerts=\xb2\r", b"GET Param.*\r")
 OF_NETFT_PAGE = (
@@ -362,9 +363,7 @@ def _of_whole_mocks() -> dict[str, Codec]:
         "ndi mock": Codec(
             _whole(lambda wire: NdiMock(wire, bench.tracker, 0, tools), b"\r"), (), OF_NDI + OF_NDI_PARAMETERS
         ),
-        "optitrack mock": Codec(
-            _whole(lambda wire: OptiTrackMock(wire, bench.tracker, 0, tools)), (), OF_OPTITRACK
-        ),
+        "optitrack mock": Codec(_whole(lambda wire: OptiTrackMock(wire, bench.tracker, 0, tools)), (), OF_OPTITRACK),
         "openigtlink mock": Codec(
             _whole(lambda wire: OpenIgtLinkMock(wire, bench.tracker, tools, lambda now_ns: now_ns)), (), OF_IGTLINK
         ),

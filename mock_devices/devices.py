@@ -1,8 +1,7 @@
 """All products of the bench on their wires: each mock with its plant, its wire and the faults either can have."""
 
 import random
-import sys
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Callable
 from pathlib import Path
 
 from drivers.epos4.objects import SERIAL
@@ -14,11 +13,9 @@ from mock_devices.faults.sensing import CAMERA_FAULTS, SENSOR_FAULTS
 from mock_devices.faults.wires import FaultyWire, faults_of
 from mock_devices.ndi.mock import NdiMock
 from mock_devices.parameters import Axis, Parameters
-from mock_devices.played import MockDevice, made, number_of, served
+from mock_devices.played import MockDevice, number_of, served
 from mock_devices.robotiq.mock import RobotiqMock
 from mock_devices.wire import PtyWire, TcpWire, Wire
-from rig.config.products.roles import Product
-from rig.errors import PluginError
 
 TOOLS = ("tip", "arm")
 BOTA_NUMBER, ROBOTIQ_NUMBER, AXIS_NUMBER = 271, 1234, int(SERIAL.default)
@@ -36,18 +33,6 @@ class DeviceFactory:
         self.start_ns = start_ns
         self._clock_ns = clock_ns
         self._rng = random.Random(seed)
-
-    def devices(self, products: Iterable[type[Product]], spare: Container[type[Product]] = ()) -> list[MockDevice]:
-        """Those that can be played; raises PluginError where one that is not ``spare`` should be and cannot."""
-        devices = []
-        for product in products:
-            try:
-                devices += made(product, self)
-            except PluginError as error:
-                if product not in spare:
-                    raise
-                sys.stderr.write(f"bench: {error}\n")
-        return devices
 
     def bota(self) -> list[MockDevice]:
         """The SensONE."""

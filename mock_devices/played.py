@@ -1,9 +1,10 @@
 """What the bench plays: a product on a wire, with the faults it can have. Makers in other distributions begin here."""
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pkgutil import resolve_name
-from typing import TypeVar
+from typing import Any, TypeVar
 from zlib import crc32
 
 from mock_devices.faults.wires import WIRE_FAULTS, Fault, FaultKind, FaultyWire, faults_of
@@ -55,8 +56,15 @@ def served(
     return MockDevice(role, mock, wire, faults_of(wire, WIRE_FAULTS) | faults_of(mock, kinds) | dict(inside or {}))
 
 
-def made(product: type[Product], factory: object) -> list[MockDevice]:
-    """What plays ``product``; none where nothing does. Raises PluginError where a plug-in's lacks what a mock needs."""
+def made(products: Iterable[type[Product]], factory: object, spare: Container[type[Product]] = ()) -> list[MockDevice]:
+    """What plays ``products``, by makers that are given ``factory``; raises PluginError where a plug-in's cannot.
+
+    One that is ``spare`` is then left out, which is said.
+    """
+    return [device for product in products for device in _made(product, factory, product in spare)]
+
+
+def _made(product: type[Product], factory: object, spare: bool) -> list[MockDevice]:
     if product.mock is None:
         return []
     declared = (name_of(product), product.__module__.partition(".")[0])
@@ -70,11 +78,15 @@ def made(product: type[Product], factory: object) -> list[MockDevice]:
             raise
         wrong = f"{type(error).__name__}: {error}"
     if whose and wrong:
-        raise PluginError(replace(whose, error=f"its mock cannot be played: {wrong}").sentence)
+        failed = PluginError(replace(whose, error=f"its mock cannot be played: {wrong}").sentence)
+        if not spare:
+            raise failed
+        sys.stderr.write(f"bench: {failed}\n")
+        return []
     return devices
 
 
-def _trouble(port: MockPort, devices: list[MockDevice]) -> str:
+def _trouble(port: MockPort, devices: list[Any]) -> str:
     for device in devices:
         if not isinstance(device, MockDevice):
             return f"its maker gives {device!r}, where a MockDevice is expected"

@@ -23,7 +23,7 @@ from mock_devices.epos4.mock import Epos4Mock
 from mock_devices.faults.wires import Fault
 from mock_devices.parameters import Parameters, load_parameters
 from mock_devices.physics.effects import EFFECTS, complete, knobs, parse_hidden, statement
-from mock_devices.played import ALL, CHOICES, MockDevice
+from mock_devices.played import ALL, CHOICES, MockDevice, made
 from mock_devices.stating import Numbered, Sampled, StatedLatency
 from rig.config.endpoints import Endpoints
 from rig.config.products.inputs import INPUTS
@@ -232,7 +232,7 @@ def _server(options: argparse.Namespace) -> MockServer:
     factory = DeviceFactory(bench, start_ns, time.monotonic_ns, options.seed, options.links)
     chosen = [product for role in CHOICES for product in CHOICES[role][vars(options)[role]]]
     spare = [product for role in CHOICES if vars(options)[role] == ALL for product in CHOICES[role][ALL]]
-    devices = factory.devices((*chosen, *map(INPUTS.named, options.input)), spare)
+    devices = made((*chosen, *map(INPUTS.named, options.input)), factory, spare)
     return MockServer(bench, devices, time.monotonic_ns)
 
 

@@ -48,8 +48,8 @@ def refuse_unstated_scale(wiring: Wiring) -> None:
     axis = wiring.axis
     if axis.port != MOCK_PORT and axis.increments_per_mm and "increments_per_mm" not in axis.model_fields_set:
         raise UsageError(
-            f"axis.increments_per_mm is not stated for the {axis.product} at {axis.port}: give the increments of 1 mm of"
-            " the tip, encoder, gear and screw included, then check it with `rig calibrate axis`"
+            f"axis.increments_per_mm is not stated for the {axis.product} at {axis.port}: give the increments of 1 mm"
+            " of the tip, encoder, gear and screw included, then check it with `rig calibrate axis`"
         )
 
 

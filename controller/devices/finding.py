@@ -70,7 +70,9 @@ def candidates(usb: str = "") -> list[AtPort]:
     every = list(_at_lines())
     fit = [one for one in every if usb[:9] in one.product.usb]
     if fit:
-        return fit + [one for one in every if one not in fit and declaring(f"tissue_rig.{one.role}", name_of(one.product))]
+        return fit + [
+            one for one in every if one not in fit and declaring(f"tissue_rig.{one.role}", name_of(one.product))
+        ]
     return sorted(every, key=lambda one: bool(usb and one.product.usb))
 
 

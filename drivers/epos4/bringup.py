@@ -19,14 +19,14 @@ START_S = 1.0
 
 def identify(node: Node) -> Identity:
     """Who the node says it is; raises DeviceError where it is silent, no EPOS4, or without a mode that is needed."""
-    vendor = _reread(lambda: node.probe(objects.VENDOR), lambda value: value == VENDOR)
-    product = _reread(lambda: node.read(objects.PRODUCT), lambda value: value >> 16 == PRODUCT_FAMILY)
+    vendor = reread(lambda: node.probe(objects.VENDOR), lambda value: value == VENDOR)
+    product = reread(lambda: node.read(objects.PRODUCT), lambda value: value >> 16 == PRODUCT_FAMILY)
     if vendor != VENDOR or product >> 16 != PRODUCT_FAMILY:
         raise DeviceError(
             f"{node.name}: is not a maxon EPOS4: its identity (object 1018) is vendor {vendor:#x}, product "
             f"{product:#010x} instead of 0xfb, 0x6150xxxx; check axis.port and axis.node"
         )
-    modes = _reread(lambda: node.read(objects.SUPPORTED_MODES), lambda value: not _missing(value))
+    modes = reread(lambda: node.read(objects.SUPPORTED_MODES), lambda value: not _missing(value))
     if missing := _missing(modes):
         raise DeviceError(f"{node.name}: lacks modes {missing} (object 6502 is {modes:#x}); update its firmware")
     return Identity(
@@ -37,23 +37,12 @@ def identify(node: Node) -> Identity:
     )
 
 
-def refuse_other_turn(node: Node, config: CanAxisProduct) -> None:
-    """Raises DeviceError where the drive counts a turn otherwise than configured: every speed would be another."""
-    stated = config.increments_per_rev
-    counted = _reread(partial(node.read, objects.SENSOR_RESOLUTION), lambda value: value == stated)
-    if counted != stated:
-        raise DeviceError(
-            f"{node.name}: counts {counted} increments a turn (object 3000:05) where axis.increments_per_rev says"
-            f" {stated:g}: give what its encoder has, four times its lines, or set up the drive"
-        )
-
-
 def configure(node: Node, writes: list[tuple[Entry, int]]) -> None:
     """Writes all of it, then reads it back; raises DeviceError where a value differs."""
     for entry, value in writes:
         node.write(entry, value)
     for entry, value in setup.expected(writes).items():
-        got = _reread(partial(node.read, entry), partial(setup.agrees, entry, value))
+        got = reread(partial(node.read, entry), partial(setup.agrees, entry, value))
         if not setup.agrees(entry, value, got):
             raise DeviceError(f"{node.name}: {entry} was set to {value} and reads back as {got}; restart the drive")
 
@@ -74,7 +63,7 @@ def _missing(modes: int) -> list[int]:
     return [mode for mode in NEEDED_MODES if not modes >> (mode - 1) & 1]
 
 
-def _reread(read: Callable[[], int], expected: Callable[[int], bool]) -> int:
+def reread(read: Callable[[], int], expected: Callable[[int], bool]) -> int:
     """A value as read, again where it is not as expected: a line of SLCAN has no checksum, a wrong digit passes."""
     for _ in range(TRIES - 1):
         if expected(value := read()):

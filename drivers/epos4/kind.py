@@ -1,9 +1,10 @@
 """What kinds of CiA 402 drive differ in: who they are, what they are told, their units and their second PDO."""
 
+from functools import partial
 from typing import Protocol
 
-from drivers.epos4 import setup
-from drivers.epos4.bringup import identify, refuse_other_turn
+from drivers.epos4 import objects, setup
+from drivers.epos4.bringup import identify, reread
 from drivers.epos4.cia402 import Statusword
 from drivers.epos4.codec import DriveMotion, Units, decode_motion_pdo
 from drivers.epos4.node import Node
@@ -12,6 +13,7 @@ from drivers.epos4.walker import STANDSTILL_RPM
 from drivers.roles import Identity
 from rig.config.products.can_axis import CanAxisProduct
 from rig.config.wiring import Limits
+from rig.errors import DeviceError
 
 
 class DriveKind(Protocol):
@@ -57,8 +59,14 @@ class Epos4Kind:
         self.turn_mm = config.increments_per_rev / config.increments_per_mm
 
     def agree(self, node: Node) -> None:
-        """Its increments a turn are those that speeds are computed with."""
-        refuse_other_turn(node, self._config)
+        """Its increments a turn are those that speeds are computed with, or every speed would be another."""
+        stated = self._config.increments_per_rev
+        counted = reread(partial(node.read, objects.SENSOR_RESOLUTION), lambda value: value == stated)
+        if counted != stated:
+            raise DeviceError(
+                f"{node.name}: counts {counted} increments a turn (object 3000:05) where axis.increments_per_rev says"
+                f" {stated:g}: give what its encoder has, four times its lines, or set up the drive"
+            )
 
     def writes(self, limits: Limits) -> list[tuple[Entry, int]]:
         """Limits, stops, heartbeats and PDOs, in their order."""

@@ -47,7 +47,11 @@ class ServedBench:
     def settings(self, *more: str) -> list[str]:
         """Options that plug a command into this bench and make it patient, force sensor and axis calibrated."""
         force, axis, tracker = (self.endpoints.devices[role] for role in ("force", "axis", "tracker"))
-        ports: tuple[str, ...] = (f"force.port={force['serial']}", f"axis.port={axis['slcan']}", f"tracker.port=tcp://{tracker['tcp']}")
+        ports: tuple[str, ...] = (
+            f"force.port={force['serial']}",
+            f"axis.port={axis['slcan']}",
+            f"tracker.port=tcp://{tracker['tcp']}",
+        )
         if not any(setting.startswith("axis.product=") for setting in more):
             ports += ("axis.increments_per_mm=2000",)
         late = [f"{role}.latency_ms={self.endpoints.latency_ms[role]}" for role in ("force", "tracker")]

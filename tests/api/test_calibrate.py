@@ -320,9 +320,9 @@ def test_a_real_axis_whose_scale_nobody_stated_is_refused_before_a_bench_starts(
 
 
 def test_a_scale_that_is_stated_or_said_by_the_drive_or_the_mock_bench_is_none_of_these() -> None:
-    known = (["axis.port=/dev/a", "axis.increments_per_mm=2000"], ["axis.port=/dev/a", "axis.product=cia402"], [])
-    for settings in known:
-        refuse_unstated_scale(built_in(settings))
+    real = "axis.port=/dev/a"
+    for settings in ((real, "axis.increments_per_mm=2000"), (real, "axis.product=cia402"), ()):
+        refuse_unstated_scale(built_in(list(settings)))
 
 
 def test_a_real_sensor_beside_a_mock_axis_is_never_calibrated_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,5 +28,5 @@ def test_waiting_ends_with_what_there_is() -> None:
 
 @pytest.mark.parametrize("address", ["tcp://host:\u00b2", "udp://host:\u00b2"])
 def test_a_digit_that_is_no_number_is_no_port(address: str) -> None:
-    with pytest.raises(DeviceError, match="not a (TCP|UDP) address"):
+    with pytest.raises(DeviceError, match=r"not a (TCP|UDP) address"):
         open_port(address, 0)

@@ -26,6 +26,7 @@ from mock_devices.bench import Bench
 from mock_devices.control import BenchControl
 from mock_devices.devices import DeviceFactory
 from mock_devices.parameters import Parameters
+from mock_devices.played import made
 from mock_devices.serve import MockServer, effects_table
 from mock_devices.testing.clock import Clock
 from mock_devices.testing.commands import served_bench
@@ -233,7 +234,8 @@ class ServerBench:
     def __init__(self) -> None:
         self.clock = Clock(0)
         self.bench = Bench(Parameters.model_validate({"tracker": {"tcp_port": 0}, "force": {"counter_drift_ppm": 0.0}}))
-        devices = DeviceFactory(self.bench, 0, self.clock, seed=0).devices((BotaWiring, Epos4Wiring, PolarisWiring))
+        factory = DeviceFactory(self.bench, 0, self.clock, seed=0)
+        devices = made((BotaWiring, Epos4Wiring, PolarisWiring), factory)
         self.line, self.axis = devices[0].wire, devices[1]
         self.server = MockServer(self.bench, devices, self.clock)
         self.port = open_port(self.line.endpoint, 460_800)

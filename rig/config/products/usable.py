@@ -28,8 +28,9 @@ def _lacking(product: type[Product]) -> str:
         return f"{product.__name__}.product has no default: give it the name that stands in rig.toml"
     if missing := _missing(product):
         return f"{product.__name__} has no {' and no '.join(missing)}"
-    if not isinstance(product.mock, MockPort | None):
-        return f"{product.__name__}.mock is {product.mock!r}, where a MockPort is expected"
+    mock: object = product.mock
+    if not isinstance(mock, MockPort | None):
+        return f"{product.__name__}.mock is {mock!r}, where a MockPort is expected"
     undescribed = [key for key, field in product.model_fields.items() if key != "product" and not field.description]
     if undescribed:
         return f"{product.__name__} describes no {', '.join(undescribed)}: each key needs a description"

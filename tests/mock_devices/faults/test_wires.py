@@ -10,7 +10,7 @@ from mock_devices.devices import DeviceFactory
 from mock_devices.faults.wires import WIRE_FAULTS, FaultyWire, as_number, faults_of
 from mock_devices.interfaces import NEVER_NS
 from mock_devices.parameters import Parameters
-from mock_devices.played import ALL, CHOICES
+from mock_devices.played import ALL, CHOICES, made
 from mock_devices.testing.clock import Clock
 from mock_devices.testing.wire import MemoryWire
 from mock_devices.wire import PtyWire, TcpWire
@@ -144,9 +144,8 @@ def test_a_share_outside_zero_to_one_is_refused(wire: FaultyWire, value: bool | 
 
 def test_every_device_has_every_wire_fault_and_its_own_and_takes_each_at_its_default() -> None:
     bench = Bench(Parameters.model_validate({"tracker": {"tcp_port": 0}}))
-    devices = DeviceFactory(bench, 0, lambda: 0, seed=0).devices(
-        product for choices in CHOICES.values() for product in choices[ALL]
-    )
+    every = [product for choices in CHOICES.values() for product in choices[ALL]]
+    devices = made(every, DeviceFactory(bench, 0, lambda: 0, seed=0))
     named = {mock[1:3] for choices in CHOICES.values() for product in choices[ALL] if (mock := product.mock)}
     assert {(device.role, kind) for device in devices for kind in device.mock.endpoints()} >= named
     for device in devices:
