@@ -1,7 +1,6 @@
 """Patterns with named places, ``{run}/well_{site:[A-H]?}_*.csv``: which files and sheets they name, and what with."""
 
 import re
-import string
 from collections.abc import Mapping
 
 from rig.errors import UsageError
@@ -9,6 +8,8 @@ from rig.errors import UsageError
 _PLACE = re.compile(
     r"\{(?P<name>\w+)(?::(?P<shell>[^{}]*))?\}|(?P<folders>\*\*/)|(?P<many>\*)|(?P<one>\?)|\[(?P<of>[^\]/]+)\]"
 )
+
+_BRACED = re.compile(r"\{([^{}]*)\}")
 
 
 def matched(pattern: str | tuple[str, ...], text: str) -> dict[str, str] | None:
@@ -42,8 +43,11 @@ def _place(place: re.Match[str], seen: set[str]) -> str:
 
 
 def filled(template: str, labels: Mapping[str, str], where: str) -> str:
-    """``template`` with each ``{name}`` replaced; raises UsageError naming those there are."""
-    try:
-        return string.Formatter().vformat(template, (), labels)
-    except (KeyError, IndexError, ValueError) as error:
-        raise UsageError(f"{where}: {template!r} asks for {error}; there are {', '.join(sorted(labels))}") from error
+    """``template`` with each ``{name}`` replaced, and no more than a name; raises UsageError naming those there are."""
+    asked = _BRACED.findall(template)
+    if unknown := [name for name in asked if name not in labels]:
+        known = ", ".join(sorted(labels))
+        raise UsageError(f"{where}: {template!r} asks for {unknown[0]!r}; there are {known}")
+    if "{" in (rest := _BRACED.sub("", template)) or "}" in rest:
+        raise UsageError(f"{where}: {template!r} has a brace that belongs to no name")
+    return _BRACED.sub(lambda place: labels[place[1]], template)

@@ -53,6 +53,9 @@ def test_what_nobody_says_is_unknown() -> None:
         ("speed_mm_s", "{speed} mm", r"speed_mm_s = '\{speed\} mm': 'mm' is no unit of velocity; known are mm/s"),
         ("depth_mm", "-{depth}", r"depth_mm = '-\{depth\}' says -8000 here; it must be above 0"),
         ("depth_mm", "{deep}", r"asks for 'deep'; there are by, depth"),
+        ("operator", "{by.real}", r"asks for 'by.real'; there are by, depth"),
+        ("operator", "{by:>1000000000}", r"asks for 'by:>1000000000'; there are by, depth"),
+        ("operator", "Dr {by", r"'Dr \{by' has a brace that belongs to no name"),
     ],
 )
 def test_a_label_that_states_no_such_number_is_refused_with_its_place(key: str, said: str, reason: str) -> None:
