@@ -28,7 +28,7 @@ COMPONENTS = [set("012"), set("012345")]
 DIRECTIONS = frozenset("xyz")
 
 
-class SaidBeside(NamedTuple):
+class UnitTold(NamedTuple):
     """What is said of a column beside its file: its unit, empty where that is not clear, by whom, and its header's."""
 
     unit: str
@@ -52,7 +52,7 @@ class ColumnGroup:
     called: str = ""
     force: Looks | None = None
     said: Mapping[str, str] = field(default_factory=dict)
-    told: Mapping[int, SaidBeside] = field(default_factory=dict)
+    told: Mapping[int, UnitTold] = field(default_factory=dict)
 
     @property
     def units(self) -> tuple[str, ...]:

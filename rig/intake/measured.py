@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.config.table import TomlTable
 from rig.errors import DataError
-from rig.intake.families import COMPONENTS, DIRECTIONS, ColumnGroup, SaidBeside, parts_of
+from rig.intake.families import COMPONENTS, DIRECTIONS, ColumnGroup, UnitTold, parts_of
 from rig.intake.pulling import PULLS
 from rig.intake.questions import Choice, OpenQuestion
 from rig.intake.roles import UNIT_ALONE, WORDS, candidates, words_of
@@ -118,7 +118,7 @@ def _take(found: MeasuredColumns, table: ColumnGroup, quantity: str, known: Mapp
         other = unknown_unit(table.layout.heads[column])
         own = unit_of(str(value["column"]))
         twice = f"is in {own} by its name and in another by the row of units" if own and not said else "has no unit"
-        told = table.told.get(column, SaidBeside("", "", ""))
+        told = table.told.get(column, UnitTold("", "", ""))
         twice = f"is in {told.said}" if told.said else twice
         unsaid = f"is in {other}, which is none of" if other else f"{twice}; it is one of"
         how = f"is in {said}, which needs a scale" if said else f"{unsaid} {units}, or needs a scale"

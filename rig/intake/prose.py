@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rig.intake.encodings import encoding_of
-from rig.intake.families import ColumnGroup, SaidBeside
+from rig.intake.families import ColumnGroup, UnitTold
 from rig.intake.mapping import FileForm
 from rig.intake.readers import kind_of, open_sheets
 from rig.intake.roles import OTHER, candidates, words_of
@@ -32,7 +32,7 @@ _TOKEN = re.compile(r"[^\s()\[\]{}<>|;:=,`\"'*]+|[(\[{|;:=,]")
 _BEFORE = frozenset(("(", "[", "{", "|", ":", "=", ",", "in", "is", "are", "and", "unit", "units", "as"))
 
 
-class Statement(NamedTuple):
+class UnitSaid(NamedTuple):
     """A unit, the words before it since the last one and in the whole line, and where it stands."""
 
     own: str
@@ -58,14 +58,14 @@ def with_prose(tables: Iterable[ColumnGroup], top: Path) -> Iterator[ColumnGroup
     """The tables with the units that are said of their columns beside them, in the nearest folder up to ``top``."""
     read, own = cache(_in_folder), cache(_in_file)
     for table in tables:
-        folder, found = table.path.parent, dict[int, SaidBeside]()
+        folder, found = table.path.parent, dict[int, UnitTold]()
         folders = [each for each in (folder, *folder.parents) if each == folder or each.is_relative_to(top)]
         for statements in (_above(table), own(table.path), *map(read, folders)):
             found = {**dict(_told(table, statements)), **found}
         yield replace(table, told=found) if found else table
 
 
-def _told(table: ColumnGroup, statements: Sequence[Statement]) -> Iterator[tuple[int, SaidBeside]]:
+def _told(table: ColumnGroup, statements: Sequence[UnitSaid]) -> Iterator[tuple[int, UnitTold]]:
     """By column the unit that is said of it, none where two are said, or another than its own."""
     for number in table.columns if statements else ():
         own, heads = table.unit(number), table.layout.sheet.header[number]
@@ -81,7 +81,7 @@ def _told(table: ColumnGroup, statements: Sequence[Statement]) -> Iterator[tuple
         said = list(dict.fromkeys(f"{one.unit} by {one.place}" for one in found))[:MOST_PLACES]
         if found and (not own or not (is_clear or "time" in fitting)):
             said = [f"{own} by its header", *said] if own else said
-            yield number, SaidBeside(units[0] if is_clear else "", " and in ".join(said), own)
+            yield number, UnitTold(units[0] if is_clear else "", " and in ".join(said), own)
 
 
 def _units(quantity: str) -> Mapping[str, tuple[bool, float]]:
@@ -90,13 +90,13 @@ def _units(quantity: str) -> Mapping[str, tuple[bool, float]]:
     return {unit: (bool(turns), size) for turns, known in enumerate(kinds) for unit, size in known.items()}
 
 
-def _in_folder(folder: Path) -> tuple[Statement, ...]:
+def _in_folder(folder: Path) -> tuple[UnitSaid, ...]:
     files = (path for path in sorted(folder.iterdir()) if _TITLE.search(path.stem) and path.suffix.lower() in _ENDINGS)
     short = (path for path in files if path.is_file() and path.stat().st_size <= MOST_BYTES)
     return tuple(said for path in short for said in _in_text(path.name, path.read_bytes()))
 
 
-def _above(table: ColumnGroup) -> tuple[Statement, ...]:
+def _above(table: ColumnGroup) -> tuple[UnitSaid, ...]:
     """What comments above the table say of columns that carry no unit; settings of units there are asked about."""
     form, source = FileForm.model_construct(**table.layout.form), table.layout.source
     if kind_of(table.path) != "text" or form.section or all(table.units):
@@ -107,27 +107,27 @@ def _above(table: ColumnGroup) -> tuple[Statement, ...]:
     return tuple(one for one in _in_text(table.path.name, said) if UNIT_WORDS.isdisjoint(words_of(one.line)))
 
 
-def _in_file(path: Path) -> tuple[Statement, ...]:
+def _in_file(path: Path) -> tuple[UnitSaid, ...]:
     """What sheets of a workbook, or a struct of texts in a file of arrays, say of the others."""
     if kind_of(path) == "arrays" and path.suffix.lower() == ".mat":
         sheets = [sheet for _, sheet in open_sheets(path, FileForm.model_construct(sheets="**/*"))]
         facts = [
             (sheet.name, fact) for sheet in sheets if sheet.name.lower() in UNIT_WORDS for fact in sheet.facts.items()
         ]
-        return tuple(Statement(name, name, unit_in(said), f"{path.name}, {at}") for at, (name, said) in facts)
+        return tuple(UnitSaid(name, name, unit_in(said), f"{path.name}, {at}") for at, (name, said) in facts)
     if kind_of(path) != "workbook":
         return ()
     titles = [name for name in sheet_names(path) if _TITLE.search(name)]
     return tuple(said for name in titles for said in _in_text(f"{path.name}, {name}", sheet_text(path, name, ".")))
 
 
-def _in_text(place: str, content: bytes) -> Iterator[Statement]:
+def _in_text(place: str, content: bytes) -> Iterator[UnitSaid]:
     text = content[:MOST_BYTES].decode(encoding_of(content[:MOST_BYTES])[0] or "utf-8", errors="replace")
     for number, line in enumerate(text.splitlines(), 1):
         yield from _in_line(f"{place} line {number}", _TOKEN.findall(line))
 
 
-def _in_line(place: str, tokens: Sequence[str]) -> Iterator[Statement]:
+def _in_line(place: str, tokens: Sequence[str]) -> Iterator[UnitSaid]:
     start = 0
     for at in range(1, len(tokens)):
         counts = tokens[at + 1 : at + 2] == ["="]
@@ -137,5 +137,5 @@ def _in_line(place: str, tokens: Sequence[str]) -> Iterator[Statement]:
             continue
         words = " ".join(token for token in tokens[start:at] if token[1:] or token.isalnum())
         if _OF_DEVICES.isdisjoint(words_of(words)):
-            yield Statement(words, " ".join(tokens[:at]), unit, place)
+            yield UnitSaid(words, " ".join(tokens[:at]), unit, place)
         start = at + 1
