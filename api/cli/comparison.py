@@ -7,7 +7,7 @@ from pathlib import Path
 import mock_devices
 from api.cli import live
 from api.cli.computing import here
-from api.cli.output import show
+from api.cli.output import show, write_json
 from api.operations.compare import Comparison, comparison_operation
 from api.operations.compare import compare as work
 from controller.experiments import comparison, tracked
@@ -27,16 +27,21 @@ BREATHES = f"surface_motion.amplitude_mm={BREATHES_MM_HZ[0]}", f"surface_motion.
 ALL = (*sorted(path.stem for path in SUBJECTS.glob("*.toml")), BREATHING)
 
 
-def compare(wiring: Wiring, out: Path, subjects: Sequence[str], reference: Reference) -> CompareResult:
-    """Runs all of it on mock benches and prints the tables."""
+def compare(wiring: Wiring, out: Path, subjects: Sequence[str], reference: Reference, json_file: Path | None) -> None:
+    """Runs all of it on mock benches; prints the tables, those of the benches before anything is simulated."""
     _refuse_subjects(wiring, subjects)
     whose = {subject: _who(subject) for subject in subjects}
-    wanted = Comparison(wiring, out, whose, reference, lambda one: _bench(wiring, one), {BREATHING: BREATHES_MM_HZ})
+
+    def keep(found: CompareResult) -> None:
+        write_json(json_file, found)
+        show(study_table(found.runs), run_table(found.runs, reference.name), f"comparison.svg is in {out}")
+
+    breathing = {BREATHING: BREATHES_MM_HZ}
+    wanted = Comparison(wiring, out, whose, reference, lambda one: _bench(wiring, one), breathing, keep)
     operation = comparison_operation(wanted)
     result = here(operation, lambda: work(operation, wanted))
-    tables = study_table(result.runs), run_table(result.runs, reference.name), alternatives_table(result.alternatives)
-    show(*tables, f"comparison.svg is in {out}")
-    return result
+    show(alternatives_table(result.alternatives))
+    write_json(json_file, result)
 
 
 def _refuse_subjects(wiring: Wiring, subjects: Sequence[str]) -> None:

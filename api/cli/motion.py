@@ -24,7 +24,7 @@ from rig.config.table import load
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
 from rig.results.tables import track_parts
-from rig.results.tracking import CompareResult, TrackResult
+from rig.results.tracking import TrackResult
 from rig.tissue.model import load_model
 
 
@@ -91,7 +91,7 @@ def track(
         raise UsageError("--table learns its own models: leave out --against")
     folder = out or Path("sessions") / f"track-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
     if compare:
-        write_json(json_file, _compared(wiring, folder, asked))
+        _compare(wiring, folder, asked, json_file)
     else:
         _tracked(wiring, folder, asked, against, json_file)
 
@@ -151,11 +151,11 @@ def _planned(wiring: Wiring, asked: TrackOptions) -> Program:
     return tracked.plan(tracked.forces(asked.force), seconds, fitted, wiring)
 
 
-def _compared(wiring: Wiring, folder: Path, asked: TrackOptions) -> CompareResult:
+def _compare(wiring: Wiring, folder: Path, asked: TrackOptions, json_file: Path | None) -> None:
     from api.cli import comparison  # noqa: PLC0415 - fitting is loaded only where it is used
 
     if asked.model or asked.reference:
         raise UsageError("--table learns its own models and jumps by itself: leave out --model and --reference")
     subjects = asked.subjects.split(",") if asked.subjects else comparison.ALL
     jumps = comparison.stairs(asked.force or "1,10", 1.5 if asked.seconds is None else asked.seconds)
-    return comparison.compare(wiring, folder, subjects, jumps)
+    comparison.compare(wiring, folder, subjects, jumps, json_file)

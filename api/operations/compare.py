@@ -51,6 +51,8 @@ class Comparison:
     reference: Reference
     bench: Callable[[str], AbstractContextManager[Supervisor]]
     breathing: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    # What the benches gave, before hours of simulation that may fail or be cancelled.
+    keep: Callable[[CompareResult], object] = lambda _: None
 
     def model_file(self, subject: str) -> Path:
         """Where the model learnt of the subject's tissue is kept."""
@@ -106,10 +108,19 @@ def compare(operation: Operation, wanted: Comparison) -> CompareResult:
         BenchRun(name, wanted.subjects[name], models[name], of, wanted.breathing.get(name))
         for name, of in programs.items()
     ]
-    simulated = tuple(simulated_runs(operation, asked, rates_of(wanted.wiring), len(runs)))
-    write_text(wanted.out / "comparison.svg", svg(comparison_figure(runs, simulated)))
     learnt = {name: {one.name: one.value for one in model.law.parameters} for name, model in models.items()}
-    return CompareResult(reference=wanted.reference.name, models=learnt, runs=tuple(runs), alternatives=simulated)
+    found = CompareResult(reference=wanted.reference.name, models=learnt, runs=tuple(runs))
+    _draw(wanted, found)
+    wanted.keep(found)
+    refused: dict[str, str] = {}
+    simulated = tuple(simulated_runs(operation, asked, rates_of(wanted.wiring), len(runs), refused))
+    found = found.model_copy(update={"alternatives": simulated, "not_simulated": refused})
+    _draw(wanted, found)
+    return found
+
+
+def _draw(wanted: Comparison, found: CompareResult) -> None:
+    write_text(wanted.out / "comparison.svg", svg(comparison_figure(found.runs, found.alternatives)))
 
 
 def _learnt(operation: Operation, wanted: Comparison, subject: str) -> Model:

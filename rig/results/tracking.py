@@ -134,12 +134,16 @@ class AlternativeRun(Result):
 
 
 class CompareResult(SavedResult):
-    """Jumps on subjects of the mock bench, with ``models`` learnt of each; ``alternatives`` are simulated beside."""
+    """Jumps on subjects of the mock bench, with ``models`` learnt of each; ``alternatives`` are simulated beside.
+
+    ``not_simulated`` says of a subject why some or all of its alternatives are lacking.
+    """
 
     reference: str
     models: Mapping[str, Mapping[str, float]]
     runs: tuple[ComparedRun, ...]
     alternatives: tuple[AlternativeRun, ...] = ()
+    not_simulated: Mapping[str, str] = {}
 
 
 class LoopMargins(Result):

@@ -16,6 +16,7 @@ from controller.simulated.alternatives import alternative_law
 from controller.simulated.alternatives.alternative_laws import Alternative, alternatives, tuning_for
 from controller.simulated.alternatives.alternative_tuning import Tuning
 from controller.simulated.bench import SENSING, Column, SimulatedBench, follow, follow_law, limb_of
+from rig.errors import RigError
 from rig.results.tracking import AlternativeRun, Jump
 from rig.tissue.model import Model
 
@@ -35,9 +36,9 @@ class BenchRun(NamedTuple):
 
 
 def simulated_runs(
-    operation: Operation, asked: Sequence[BenchRun], rates: Rates, done: int
+    operation: Operation, asked: Sequence[BenchRun], rates: Rates, done: int, refused: dict[str, str]
 ) -> Iterator[AlternativeRun]:
-    """All of it by each law; ``operation`` has ``done`` so much before."""
+    """All of it by each law; ``operation`` has ``done`` so much before, ``refused`` is told whose could not be."""
     if not asked:
         return
     operation.step("tuning one constant for all", done)
@@ -46,7 +47,12 @@ def simulated_runs(
     for number, one in enumerate(asked):
         operation.step(f"simulating each law on {one.subject}", done + number)
         operation.say(operation.progress.message)
-        yield from alternative_runs(one.subject, one.program, one.model, one.breathing or (0.0, 1.0), rates, for_all)
+        moves = one.breathing or (0.0, 1.0)
+        try:
+            yield from alternative_runs(one.subject, one.program, one.model, moves, rates, for_all)
+        except RigError as error:
+            refused[one.subject] = str(error)
+            operation.say(f"{one.subject} is not simulated by all laws: {error}")
 
 
 def tracks(program: Program) -> list[TrackForce]:

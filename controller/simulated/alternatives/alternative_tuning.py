@@ -59,7 +59,9 @@ def factors(schedule: Schedule, rows: Sequence[GainRow]) -> Column:
 def tissue_at(schedule: Schedule, rows: Sequence[GainRow], damping_N_s_mm: float) -> TissueAt:
     """Depths evenly spread, and those of the forces that are judged."""
     forces = np.array([row.force_N for row in rows])
-    even = np.linspace(np.searchsorted(forces, LEAST_N), len(rows) - 1, DEPTHS).round().astype(int)
+    # A model may end below LEAST_N: its last depth is then the only one.
+    least = min(int(np.searchsorted(forces, LEAST_N)), len(rows) - 1)
+    even = np.linspace(least, len(rows) - 1, DEPTHS).round().astype(int)
     judged = [int(np.abs(forces - force_N).argmin()) for force_N in JUDGED_N]
     at = np.concatenate([even, judged])
     tangents = np.array([row.tangent_N_mm for row in rows])[at]

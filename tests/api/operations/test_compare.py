@@ -1,6 +1,6 @@
 """Force tracked on subjects whose benches are played: what a stall or a cancel of the operation does."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +9,7 @@ from typing import cast
 
 import pytest
 
+from api.cli import comparison as command
 from api.operations import compare as comparing
 from api.operations.compare import Comparison, compare, comparison_operation
 from controller.experiments import capture, tracked
@@ -17,7 +18,7 @@ from controller.experiments.recorded import Recorded
 from controller.experiments.references import parse_reference
 from controller.loop.messages import Outcome
 from controller.loop.steps import Program, TrackForce
-from controller.operation import Cancelled
+from controller.operation import Cancelled, Operation
 from controller.simulated.alternatives import alternative_runs as alternatives
 from controller.simulated.alternatives.alternative_laws import tuning_for
 from controller.simulated.alternatives.alternative_runs import alternative_runs
@@ -25,7 +26,7 @@ from controller.supervisor import Supervisor
 from mock_devices.testing.models import index_model
 from rig.config.calibration import Calibration
 from rig.config.wiring import Wiring
-from rig.errors import DeviceError, SafetyStop
+from rig.errors import DataError, DeviceError, SafetyStop
 from rig.results.compared_tables import alternatives_table
 from rig.results.tracking import AlternativeRun, CompareResult
 from tests.calibrations import axis_dynamics
@@ -174,6 +175,63 @@ def test_what_a_subjects_bench_was_asked_for_is_simulated_and_who_was_refused_is
     refused = compare(comparison_operation(wanted), wanted)
     assert "above the 20 N/mm up to which the force limit holds" in refused.runs[0].stopped
     assert (simulated, refused.alternatives) == ([], ())
+
+
+def simulation_that_ends(by: Exception, subject: str) -> Callable[..., object]:
+    """One law is simulated of everyone, and then it ends so on ``subject``."""
+    nothing = compared_run("", ()).worst
+
+    def runs(of: str, *_: object) -> Iterator[AlternativeRun]:
+        yield AlternativeRun(subject=of, law="force law", worst=nothing, worst_of_wrong=nothing)
+        if of == subject:
+            raise by
+
+    return runs
+
+
+@pytest.mark.parametrize("end", [KeyboardInterrupt(), IndexError("an error of its own")])
+def test_what_the_benches_gave_is_kept_before_anything_is_simulated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: Exception
+) -> None:
+    monkeypatch.setattr(tracked, "recorded_run", PlayedRuns())
+    monkeypatch.setattr(alternatives, "alternative_runs", simulation_that_ends(end, "average"))
+    kept = list[CompareResult]()
+    wanted = replace(comparison(tmp_path), keep=kept.append)
+    with pytest.raises(type(end)):
+        compare(comparison_operation(wanted), wanted)
+    assert [(run.subject, run.stopped) for run in kept[0].runs] == [("average", ""), ("breathing", "")]
+    assert "force law on the bench" in (tmp_path / "comparison.svg").read_text()
+
+
+def test_a_subject_that_cannot_be_simulated_costs_neither_bench_nor_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tracked, "recorded_run", PlayedRuns())
+    monkeypatch.setattr(alternatives, "alternative_runs", simulation_that_ends(DataError("no jump"), "average"))
+    wanted = comparison(tmp_path)
+    operation = comparison_operation(wanted)
+    found = compare(operation, wanted)
+    assert [run.subject for run in found.runs] == ["average", "breathing"]
+    assert [run.subject for run in found.alternatives] == ["average", "breathing"]
+    assert found.not_simulated == {"average": "no jump"}
+    assert "average is not simulated by all laws: no jump" in operation.progress.log
+
+
+def test_a_cancel_while_simulating_leaves_tables_and_json_of_the_benches(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def work(operation: Operation, wanted: Comparison) -> CompareResult:
+        wanted.keep(CompareResult(reference="stairs", models={}, runs=(compared_run("firm", ()),)))
+        operation.cancel()
+        operation.refuse_cancelled("simulating each law on firm")
+        raise AssertionError("it was cancelled")
+
+    monkeypatch.setattr(command, "work", work)
+    file = tmp_path / "table.json"
+    with pytest.raises(Cancelled):
+        command.compare(Wiring(), tmp_path, ["firm"], parse_reference("stairs:5"), file)
+    assert CompareResult.model_validate_json(file.read_text()).runs[0].subject == "firm"
+    assert "firm" in capsys.readouterr().out
 
 
 def test_each_law_stands_beside_the_bench_in_numbers_table_and_picture(

@@ -11,11 +11,19 @@ import pytest
 from controller.experiments import tracked
 from controller.experiments.references import parse_reference
 from controller.law.axis_response import rates_of
+from controller.law.inverse_model import GainRow
 from controller.law.synthesis import SPARE_S
 from controller.loop.steps import Program
 from controller.simulated.alternatives import alternative_runs as runs
 from controller.simulated.alternatives.alternative_laws import axis_of, tissue_of, tuning_for
-from controller.simulated.alternatives.alternative_tuning import LEAST_N, Schedule, Tuning, fastest
+from controller.simulated.alternatives.alternative_tuning import (
+    JUDGED_N,
+    LEAST_N,
+    Schedule,
+    Tuning,
+    fastest,
+    tissue_at,
+)
 from rig.config.wiring import Wiring
 from rig.results.tracking import AlternativeRun
 from tests.controller.simulated.subjects import NAMES, subject
@@ -71,6 +79,14 @@ def test_what_is_tuned_keeps_45_degrees_and_6_dB_by_another_programs_count(name:
     # The search's grid has 100 frequencies and 13 depths.
     assert phase_deg > 44.0
     assert 20 * math.log10(gain) > 5.8
+
+
+def test_a_model_that_ends_below_the_least_force_is_judged_at_its_last_depth() -> None:
+    """F = k x to 0.2 N at 2 N/mm: every depth of it is as stiff as that."""
+    rows = [GainRow(force_N=0.02 * at, depth_mm=0.01 * at, tangent_N_mm=2.0, damping_N_s_mm=0.01) for at in range(11)]
+    found = tissue_at("constant", rows, 0.01)
+    assert set(found.tangent_N_mm) == {2.0}
+    assert found.judged.sum() == len(JUDGED_N)
 
 
 def test_a_tenth_more_gain_would_not_keep_them() -> None:
