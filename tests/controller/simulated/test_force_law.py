@@ -21,6 +21,7 @@ from tests.controller.simulated.subjects import NAMES, RESPONSE, subject
 Column = NDArray[np.float64]
 WIRING = Wiring()
 FORCES_N = (0.5, 1.0, 2.0, 5.0, 10.0)
+QUIET = SENSING._replace(noise_N=0.0, quantum_N=0.0)
 
 
 @cache
@@ -64,13 +65,17 @@ def test_told_one_stiffness_for_all_forces_the_law_follows_no_limb_at_low_force(
     assert worst > 2 * 28
 
 
+def breathing_mN(name: str, force_N: float) -> float:
+    """Error of a constant force, without the sensor's noise."""
+    limb = limb_of(subject(name), breathing_mm=1.5, breathing_Hz=0.25)
+    trace = follow(law(name), np.full(6000, force_N), SimulatedBench(limb, sensing=QUIET))
+    return 1000 * float(np.sqrt(np.mean((trace.force_N[2000:] - force_N) ** 2)))
+
+
 @pytest.mark.parametrize(("force_N", "goal_mN"), [(0.5, 2.2), (10.0, 6.9)])
 def test_breathing_is_followed(force_N: float, goal_mN: float) -> None:
-    quiet = SENSING._replace(noise_N=0.0, quantum_N=0.0)
     for name in NAMES:
-        limb = limb_of(subject(name), breathing_mm=1.5, breathing_Hz=0.25)
-        trace = follow(law(name), np.full(6000, force_N), SimulatedBench(limb, sensing=quiet))
-        assert 1000 * np.sqrt(np.mean((trace.force_N[2000:] - force_N) ** 2)) < goal_mN
+        assert breathing_mN(name, force_N) < goal_mN
 
 
 @pytest.mark.parametrize("force_N", [0.5, 10.0])
@@ -109,18 +114,22 @@ def test_jumps_of_1_N_settle_on_tissue_half_and_twice_as_stiff_as_the_model(stif
         assert settling_s < (0.145 if stiffness != 1.0 else 0.09), name
 
 
+def low_jumps(name: str, stiffness: float) -> tuple[float, float]:
+    """Worst overshoot of 0.3 N [%] and time until 0.02 N are left [s]; 2 % are the sensor's noise: without it."""
+    levels_N = (0.3, 0.6, 0.9, 1.2, 1.5)
+    bench = SimulatedBench(limb_of(subject(name), stiffness), sensing=QUIET)
+    force_N = follow(law(name), np.repeat(levels_N, 1500), bench).force_N.reshape(len(levels_N), 1500)
+    error_N = (force_N - np.array(levels_N)[:, None])[1:]
+    outside = np.flatnonzero((np.abs(error_N) >= 0.02).any(axis=0))
+    return 100 * float(error_N.max()) / 0.3, 1e-3 * (1 + int(outside.max(initial=-1)))
+
+
 @pytest.mark.parametrize("stiffness", [0.5, 1.0, 2.0])
 def test_small_jumps_at_low_force_settle_likewise(stiffness: float) -> None:
-    """2 % of 0.3 N is the sensor's noise: without it."""
-    quiet = SENSING._replace(noise_N=0.0, quantum_N=0.0)
-    levels_N = (0.3, 0.6, 0.9, 1.2, 1.5)
     for name in NAMES:
-        limb = limb_of(subject(name), stiffness)
-        trace = follow(law(name), np.repeat(levels_N, 1500), SimulatedBench(limb, sensing=quiet))
-        for level, force_N in enumerate(levels_N[1:], 1):
-            error_N = trace.force_N[1500 * level : 1500 * (level + 1)] - force_N
-            assert np.max(error_N) < 0.146 * 0.3, name
-            assert np.max(np.abs(error_N[103:])) < 0.02, name
+        overshoot, settling_s = low_jumps(name, stiffness)
+        assert overshoot < 14.6, name
+        assert settling_s <= 0.103, name
 
 
 def test_a_lead_of_the_wrong_sign_does_not_settle() -> None:
