@@ -15,6 +15,7 @@ from api.http import description, problems, routes
 from api.http.access.access import cookie_name
 from api.http.access.rights import PUBLIC, READ, Right, RightsTable
 from api.http.guard import Guard
+from api.http.jobs.kept import EXPORTS, forget_old
 from api.http.service import Service
 from api.http.streams import routes as stream_routes
 from api.http.streams.feed import Feed
@@ -35,6 +36,7 @@ def build(service: Service, meanwhile: bool = False, names: tuple[str, ...] = ()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001 - the signature of a lifespan
+        await asyncio.to_thread(forget_old, service.jobs.folder / EXPORTS)
         following = asyncio.create_task(feed.follow())
         starting = asyncio.create_task(asyncio.to_thread(service.connect))
         if not meanwhile:

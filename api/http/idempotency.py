@@ -21,9 +21,9 @@ from api.http.access.rights import CALLER, PASSED, STOP
 from api.http.access.secrets import steady_s
 from api.http.answers import ERASED, PRIVATE, KeptAnswer, read_answers, write_answers, writing
 from api.http.priority import following
-from api.http.problems import RequestRefused
+from api.http.problems import NotDone, RequestRefused
 from api.http.shared_file import FileState, file_state
-from rig.errors import RigError
+from rig.errors import UsageError
 
 KEPT_S = 24 * 3600.0
 # A busy day's jobs; the oldest go first.
@@ -39,8 +39,8 @@ KeyHeader = Annotated[
         description="asked for by what moves: the same key with the same body gets the first answer again, for a day",
     ),
 ]
-# What else is raised is a mistake of ours, or the end of the service.
-FORESEEN = (RigError, OSError, HTTPException, RequestValidationError)
+# What did nothing. All else, as a disk or a device that fails, may come after a command went out.
+REFUSALS = (RequestRefused, UsageError, HTTPException, RequestValidationError)
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
 
 
@@ -76,8 +76,7 @@ class AnswerStore:
                 self._shorten()
             known = self._known().get(place)
             if known is None:
-                self._under_way.add(place)
-                self._write(KeptAnswer(place=place, asked=asked, at_s=self._now_s()))
+                self._begin(KeptAnswer(place=place, asked=asked, at_s=self._now_s()))
                 return None
             if known.asked != asked:
                 text = "this Idempotency-Key was sent with another body; a new request takes a new key"
@@ -88,6 +87,14 @@ class AnswerStore:
             if known.status:
                 return known
             raise _undecided(place in self._under_way)
+
+    def _begin(self, asked: KeptAnswer) -> None:
+        try:
+            self._write(asked)
+        except OSError:  # it is not begun either, and may be tried again
+            self._kept.pop(asked.place, None)
+            raise
+        self._under_way.add(asked.place)
 
     def end(self, place: str, response: Response | None, known: bool = True) -> None:
         """Keeps what was answered; a refusal, or None, is forgotten, so that it can be tried again.
@@ -199,7 +206,7 @@ async def _once(store: AnswerStore, place: str, request: Request, handler: Handl
     try:
         response = await handler(request)
     except BaseException as error:
-        known = isinstance(error, FORESEEN)
+        known = isinstance(error, REFUSALS) and not isinstance(error, NotDone)
         raise
     finally:
         store.end(place, response, known)

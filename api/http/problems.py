@@ -45,6 +45,10 @@ class RequestRefused(RigError):
         self.status, self.code, self.members, self.headers = status, code, members, headers
 
 
+class NotDone(RequestRefused):
+    """What was begun and did not succeed: it may have moved before."""
+
+
 TITLES = {
     400: "the request is wrong",
     401: "a token is needed",

@@ -13,7 +13,7 @@ from api.http.access.access import Access
 from api.http.jobs.board import JobBoard
 from api.http.jobs.job import Job
 from api.http.lease import LeaseRegistry
-from api.http.problems import RequestRefused
+from api.http.problems import NotDone, RequestRefused
 from api.http.stops.process import AwayStops
 from api.http.streams.events import EventLog
 from api.http.turn import Turn
@@ -125,7 +125,7 @@ class Service:
             try:
                 return bench.recover(consent)
             except RigError as error:
-                raise RequestRefused(409, "not-recovered", str(error)) from error
+                raise NotDone(409, "not-recovered", str(error)) from error
 
     def disconnect(self) -> None:
         """Ends loop and recorder."""

@@ -2,6 +2,8 @@
 
 import json
 import math
+import threading
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +12,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from api.http.routes.curves import CurveView
 from api.http.service import Service
 from mock_devices.testing.access import client_of
 from rig.config.wiring import Wiring
@@ -116,6 +119,31 @@ def test_depth_counts_from_the_surface_that_a_fit_finds_and_without_one_the_axis
     curve, air = client.get("/api/v1/sessions/made/curves").json()["curves"]
     assert curve["from_surface"] and max(curve["depth_mm"]) == pytest.approx(8.0, abs=0.05)
     assert not air["from_surface"] and max(air["depth_mm"]) == pytest.approx(28.0, abs=0.05)
+
+
+def test_curves_that_are_asked_for_at_once_are_made_one_after_another(
+    client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_made_session(tmp_path / "sessions" / "made", [Bench().cycle(20.0)])
+    making, most, answers = list[object](), list[int](), list[int]()
+
+    def slow(*_: object) -> CurveView:
+        making.append(None)
+        most.append(len(making))
+        time.sleep(0.1)
+        making.pop()
+        return CurveView(name="made")
+
+    def ask() -> None:
+        answers.append(client.get("/api/v1/sessions/made/curves").status_code)
+
+    monkeypatch.setattr("api.http.routes.curves._curve", slow)
+    threads = [threading.Thread(target=ask) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(20.0)
+    assert answers == [200] * 4 and most == [1] * 4
 
 
 def test_more_recordings_than_can_be_drawn_are_counted(

@@ -232,6 +232,16 @@ def test_exports_of_a_session_as_it_was_go_after_a_week(client: TestClient, serv
     assert not old.exists() and len(list(exports.iterdir())) == 2
 
 
+def test_old_exports_go_when_the_service_starts_though_nobody_exports(service: Service) -> None:
+    exports = service.jobs.folder / EXPORTS
+    exports.mkdir(parents=True)
+    for name, days in (("old.zip", 7.1), ("new.zip", 6.9)):
+        (exports / name).write_bytes(b"zip")
+        os.utime(exports / name, (time.time() - days * 24 * 3600,) * 2)
+    with client_of(service):
+        assert [path.name for path in exports.iterdir()] == ["new.zip"]
+
+
 def test_a_session_is_erased_in_two_steps_by_whoever_may(client: TestClient, first: Path) -> None:
     asked = client.delete(f"{API}/first")
     assert (asked.status_code, asked.json()["done"], asked.json()["files"]) == (202, False, len(list(first.iterdir())))

@@ -1,9 +1,12 @@
 """The same request twice is one; another one under the same key is refused; a stop stops each time."""
 
+import errno
+import os
 import threading
 import time
 from base64 import b64decode
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,10 +19,11 @@ from api.http.app import build
 from api.http.idempotency import KEPT_S, AnswerStore, idempotent
 from api.http.problems import RequestRefused
 from api.http.service import Service
-from mock_devices.testing.access import ADDRESS, bearer, client_of
+from mock_devices.testing.access import ADDRESS, bearer, client_of, in_control
 from mock_devices.testing.clock import Clock
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.wiring import Wiring
+from rig.errors import DeviceError, DiskFull, SafetyStop, UsageError
 from tests.rig.tissue.synthetic import Bench, write_made_session
 
 BODY = {"kind": "verify", "params": {"session": "first"}}
@@ -135,22 +139,72 @@ def test_a_service_that_died_in_the_middle_says_that_it_does_not_know(tmp_path: 
     assert refused.value.code == "outcome-unknown"
 
 
-def test_what_ended_in_an_error_of_our_own_is_not_done_again_under_its_key(
-    service: Service, store: AnswerStore
-) -> None:
+def failing_twice(service: Service, store: AnswerStore, error: Exception) -> tuple[list[str], int]:
+    """Codes of two requests under one key to what raises ``error``, and how often that was begun."""
     begun = list[bool]()
 
     def fail() -> None:
         begun.append(True)
-        raise ZeroDivisionError("planted")
+        raise error
 
     app = build(service)
     route = idempotent(store)
     app.router.add_api_route("/planted", fail, methods=["POST"], dependencies=[OPERATE], route_class_override=route)
     client = TestClient(app, ADDRESS, raise_server_exceptions=False, headers=bearer() | {"Idempotency-Key": "a"})
     answers = [client.post("/planted") for _ in range(2)]
-    assert [(each.status_code, each.json()["code"]) for each in answers] == [(500, "error"), (409, "outcome-unknown")]
-    assert len(begun) == 1
+    return [each.json()["code"] for each in answers], len(begun)
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (ZeroDivisionError("planted"), "error"),
+        (BrokenPipeError(errno.EPIPE, "broken pipe"), "error"),
+        (OSError(errno.EIO, "input/output error", "job.json"), "storage"),
+        (OSError(errno.ENOSPC, "no space left"), "disk-full"),
+        (DiskFull("planted"), "disk-full"),
+        (DeviceError("planted"), "device"),
+        (SafetyStop("planted"), "safety-stop"),
+    ],
+)
+def test_what_failed_perhaps_after_a_command_went_out_is_not_done_again_under_its_key(
+    service: Service, store: AnswerStore, error: Exception, code: str
+) -> None:
+    assert failing_twice(service, store, error) == ([code, "outcome-unknown"], 1)
+
+
+@pytest.mark.parametrize("error", [UsageError("planted"), RequestRefused(422, "refused", "planted")])
+def test_what_was_refused_is_looked_at_again_under_its_key(
+    service: Service, store: AnswerStore, error: Exception
+) -> None:
+    assert failing_twice(service, store, error) == (["refused", "refused"], 2)
+
+
+def test_a_recovery_that_failed_half_way_is_not_begun_again_under_its_key(service: Service) -> None:
+    begun = list[object]()
+
+    def recover(consent: object) -> None:
+        begun.append(consent)
+        raise DeviceError("homing did not end")
+
+    client = in_control(client_of(service))
+    service.bench = SimpleNamespace(alive=True, recover=recover)  # type: ignore[assignment]
+    asked = {"json": {"clear": True, "home": True}, "headers": {"Idempotency-Key": "a"}}
+    answers = [client.post("/api/v1/recover", **asked).json()["code"] for _ in range(2)]  # type: ignore[arg-type]
+    assert (answers, len(begun)) == (["not-recovered", "outcome-unknown"], 1)
+
+
+def test_what_a_full_disk_kept_from_beginning_may_be_tried_again(
+    store: AnswerStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "no space left")
+
+    store.begin("other", b"x")
+    with monkeypatch.context() as planted, pytest.raises(OSError, match="no space"):
+        planted.setattr(os, "fdopen", full)
+        store.begin("p", b"x")
+    assert store.begin("p", b"x") is None
 
 
 def test_an_answer_is_kept_for_a_day(tmp_path: Path) -> None:

@@ -8,6 +8,8 @@ import pytest
 
 from api.http.priority import following, lead
 
+NICEST = 19
+
 
 def niceness(endpoint: Callable[[], None]) -> int:
     """Of a thread that began less favoured, after ``endpoint`` was answered in it."""
@@ -30,6 +32,8 @@ def plain() -> None:
 
 def test_a_thread_that_answers_is_as_nice_as_the_first_of_its_process() -> None:
     first = os.getpriority(os.PRIO_PROCESS, os.getpid())
+    if first + 3 > NICEST:
+        pytest.skip(f"nice +3 is not possible at nice {first}")
     assert niceness(plain) == first + 3  # planted: an endpoint that nothing is done for
     if not os.geteuid():
         assert niceness(following(plain)) == first

@@ -8,6 +8,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
+from api.catalogue.erasing import put_aside
 from api.http.answers import ANSWERS, forget
 from api.operations.cohort import kept
 
@@ -32,13 +33,14 @@ def erase_kept(sessions: Path, names: Collection[str]) -> None:
     forget(beside(sessions, "jobs") / ANSWERS, {*names, *sent, *(folder.name for folder in made)})
     for folder in (*made, *uploads, beside(sessions, "jobs") / EXPORTS):
         if folder.exists():
-            shutil.rmtree(folder)
+            with put_aside(folder.parent, [folder.name]):  # whoever still writes into it no longer finds it
+                pass
     kept.forget_oldest(0)
 
 
 def forget_old(exports: Path) -> None:
     """Removes exports older than a week, of a session as it is or was, and what a service that was killed began."""
-    for path in exports.iterdir():
+    for path in exports.glob("*"):
         with contextlib.suppress(OSError):  # another removes it too
             if time.time() - path.stat().st_mtime > KEPT_S:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()

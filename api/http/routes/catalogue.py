@@ -163,6 +163,7 @@ def _export(router: APIRouter, service: Service, lists: Catalogue) -> None:
         try:
             with answering():
                 export_subject(lists, subject, archive)
+            archive.stat()  # an erasure meanwhile has taken it
         except BaseException:
             scratch.cleanup()
             raise

@@ -1,15 +1,17 @@
 """What the recordings of a session look like: few samples of each, for a page that draws them."""
 
+import asyncio
 import functools
 import math
 from pathlib import Path
 
 import numpy as np
-from fastapi import APIRouter
+from fastapi import APIRouter, Response
 from pydantic import Field
 
 from api.http.access.rights import READ
 from api.http.jobs.places import refuse_links
+from api.http.priority import following
 from api.http.problems import RequestRefused, responses
 from api.http.service import Service
 from rig.errors import DataError, RigError
@@ -55,23 +57,31 @@ class CurvesView(Result):
 
 
 def add(router: APIRouter, service: Service) -> None:
-    """Its route."""
+    """Its route: one is made at a time, as each holds the interpreter; those that wait hold no thread."""
+    one_at_a_time = asyncio.Lock()
 
     @router.get(
         "/sessions/{session}/curves",
         dependencies=[READ],
+        response_model=CurvesView,
         summary="Force and depth of every recording, thinned for a plot",
         responses=responses("404 no-such-session", "409 link", "409 no-recording"),
     )
-    def curves(session: str) -> CurvesView:
-        refuse_links(folder := service.session(session))
-        try:
-            found = open_session(folder)
-        except RigError as error:
-            raise RequestRefused(409, "no-recording", str(error)) from error
-        drawn = found.trials[:MOST_CURVES]
-        lines = tuple(_curve(found, trial) for trial in drawn)
-        return CurvesView(session=session, curves=lines, left_out=len(found.trials) - len(drawn))
+    async def curves(session: str) -> Response:
+        async with one_at_a_time:
+            made = await asyncio.to_thread(following(_made), service, session)
+        return Response(made, media_type="application/json")
+
+
+def _made(service: Service, session: str) -> str:
+    refuse_links(folder := service.session(session))
+    try:
+        found = open_session(folder)
+    except RigError as error:
+        raise RequestRefused(409, "no-recording", str(error)) from error
+    drawn = found.trials[:MOST_CURVES]
+    lines = tuple(_curve(found, trial) for trial in drawn)
+    return CurvesView(session=session, curves=lines, left_out=len(found.trials) - len(drawn)).model_dump_json()
 
 
 def _curve(session: Session, trial: TrialInfo) -> CurveView:

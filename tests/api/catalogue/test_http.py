@@ -1,6 +1,8 @@
 """The catalogue over HTTP: who may see what, pages, archives, erasure in two steps, and problems in words."""
 
+import contextlib
 import io
+import os
 import shutil
 import threading
 import zipfile
@@ -186,6 +188,35 @@ def test_an_archive_leaves_the_room_that_recordings_need_and_is_made_beside_them
         monkeypatch.setattr("shutil.disk_usage", lambda _, usage=usage: usage)
         assert client.get(f"{API}/subjects/S01/export").status_code == status
     assert len(made) == 2 and not list(exports.iterdir())
+
+
+def test_an_erasure_takes_an_export_under_way_with_it_and_what_that_writes_meanwhile(
+    client: TestClient, lab: Path, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    exports, remove = service.jobs.folder / EXPORTS, os.rmdir
+    (scratch := exports / ".under-way").mkdir(parents=True)
+
+    def late(*at: object, **stated: object) -> None:
+        with contextlib.suppress(FileNotFoundError):
+            (scratch / "subject.zip").write_bytes(b"of S01")
+        remove(*at, **stated)  # type: ignore[arg-type]
+
+    confirm = client.delete(f"{API}/subjects/S01").json()["confirm"]
+    monkeypatch.setattr(os, "rmdir", late)
+    assert client.delete(f"{API}/subjects/S01", params={"confirm": confirm}).json()["done"]
+    assert not exports.exists() and not list(service.jobs.folder.rglob("*.zip")) and not (lab / "first").exists()
+
+
+def test_an_archive_that_an_erasure_took_meanwhile_is_gone(
+    client: TestClient, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def make(_lists: Catalogue, _subject: str, out: Path) -> None:
+        out.write_bytes(b"zip")
+        service.jobs.erase(["first"])
+
+    monkeypatch.setattr(catalogue, "export_subject", make)
+    answer = client.get(f"{API}/subjects/S01/export")
+    assert (answer.status_code, answer.json()["code"]) == (404, "gone")
 
 
 def test_a_subject_is_erased_in_two_steps(client: TestClient, lab: Path) -> None:
