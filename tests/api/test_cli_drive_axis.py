@@ -1,6 +1,7 @@
 """A recording of a drive axis alone is judged by `rig diagnose`, and never fitted as tissue."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,11 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from api.cli.app import build
-from rig.errors import UsageError
+from rig.errors import DataError, UsageError
 from rig.intake.proposal import propose
+from rig.recording.sessions import SESSION_FILE, open_session
+from rig.results.incoming import came_in_result
+from rig.trials.recorded import trial_of
 from tests.data import recording
 
 INERTIA, FRICTION, TURN_S, SWING = 0.5, 0.3, 4.0, 0.8
@@ -69,8 +73,33 @@ def test_files_of_an_arm_s_joint_are_proposed_as_an_axis_and_the_next_step_is_ri
 
 
 def test_a_mapping_without_an_axis_makes_tissue_of_it(joint: Path, tmp_path: Path) -> None:
+    """A joint that swings presses nothing, and that is what is said of it."""
     said = rig("fit", joint, "--mapping", mapped(tmp_path, axis=""), "--out", tmp_path / "out")
-    assert "drive axis" not in f"{said.output}{said.exception}"
+    assert isinstance(said.exception, DataError), said.output
+    assert "no trial gives a curve" in str(said.exception)
+
+
+def test_a_user_s_note_makes_no_axis_and_a_lost_list_no_tissue(joint: Path, tmp_path: Path) -> None:
+    note = 'session.notes = { drive_axis = "EC-i 40" }'
+    rig("import", joint, "--mapping", mapped(tmp_path, axis="", stated=note), "--out", tmp_path / "noted")
+    session = open_session(tmp_path / "noted")
+    session.refuse_axis()
+    assert session.info.notes["drive_axis"] == "EC-i 40"
+    assert not trial_of("swing", session.recording("swing")).of_axis
+    rig("import", joint, "--mapping", mapped(tmp_path), "--out", tmp_path / "made")
+    (tmp_path / "made" / SESSION_FILE).unlink()
+    with pytest.raises(UsageError, match=re.escape(str(joint))):
+        open_session(tmp_path / "made").refuse_axis()
+
+
+def test_gaps_of_an_axis_are_told(joint: Path, tmp_path: Path) -> None:
+    """Half a second of twenty is missing."""
+    (tmp_path / "in").mkdir()
+    rows = (joint / "swing.csv").read_text().splitlines()
+    (tmp_path / "in" / "swing.csv").write_text("\n".join(rows[:1000] + rows[1100:]) + "\n")
+    rig("import", tmp_path / "in", "--mapping", mapped(tmp_path), "--out", tmp_path / "made")
+    (recording,) = came_in_result(open_session(tmp_path / "made")).recordings
+    assert recording.quality == "usable" and any("axis" in reason and "gap" in reason for reason in recording.reasons)
 
 
 @pytest.mark.parametrize("header", ["time_s,torque (N m),angle (deg)", "time_s,force (N),target pos,pos (mm)"])
