@@ -29,8 +29,7 @@ class OpenQuestion:
     """What the data cannot say of a ``quantity`` in the tables of these numbers.
 
     Without ``choices`` it is the rate of the rows [Hz], whose ``known`` column counts them. ``usual`` is what `--yes`
-    answers, empty where nothing is clearly the best answer; ``example`` is one that the data suggest, or empty, ``own``
-    the unit that the file states and that may be wrong.
+    answers, empty where nothing is clearly the best answer; ``example`` is one that the data suggest, or empty.
     """
 
     text: str
@@ -40,7 +39,6 @@ class OpenQuestion:
     usual: str = ""
     example: str = ""
     known: TomlTable = field(default_factory=dict)
-    own: str = ""
 
     @property
     def line(self) -> str:
@@ -88,8 +86,7 @@ class OpenQuestion:
         """A unit of the quantity, or how much of ours one of the file's is."""
         unit = unit_in(said) or said
         if unit in LINEAR[self.quantity] or unit in ROTARY.get(self.quantity, {}):
-            is_other = self.own and unit != self.own and unit in LINEAR[self.quantity]
-            return {"scale": LINEAR[self.quantity][unit]} if is_other else {"unit": unit}
+            return {"unit": unit}
         if self.quantity == "time":
             raise UsageError(f"{said!r} is no unit of time; {self.text}")
         return {"scale": self._number(said)}
