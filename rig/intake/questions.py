@@ -141,7 +141,33 @@ class JointQuestion:
         return found
 
 
-Question = OpenQuestion | JointQuestion
+@dataclass(frozen=True)
+class AxisQuestion:
+    """Whether tables with the columns ``by`` are of a drive axis alone, or of tissue that it presses."""
+
+    by: str
+    usual: str = ""
+    form: str = "axis or tissue"
+    line: str = "axis = {} for a drive alone, no such line for tissue"
+
+    @property
+    def text(self) -> str:
+        """The question."""
+        return f"{self.by} may be of a drive axis alone or of tissue that it presses; which is it, {self.form}?"
+
+    def answer(self, tree: TomlTable, said: str) -> None:
+        """Puts `axis` into the mapping or takes it out; raises UsageError where the answer is neither."""
+        tree.pop("axis", None)
+        tree.update(self.value(said))
+
+    def value(self, said: str) -> TomlTable:
+        """What the mapping says after the answer; raises UsageError where it is none."""
+        if said not in ("axis", "tissue"):
+            raise UsageError(f"{said!r} is neither axis nor tissue; {self.text}")
+        return {"axis": {}} if said == "axis" else {}
+
+
+Question = OpenQuestion | JointQuestion | AxisQuestion
 
 
 def inline(value: object) -> str:

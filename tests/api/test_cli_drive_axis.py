@@ -2,6 +2,7 @@
 
 import json
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from api.cli.app import build
+from rig.config.table import parse
 from rig.errors import DataError, UsageError
-from rig.intake.proposal import propose
+from rig.intake.mapping import DataMapping
+from rig.intake.proposal import Proposal, propose
 from rig.recording.sessions import SESSION_FILE, open_session
 from rig.results.incoming import came_in_result
 from rig.trials.recorded import trial_of
@@ -109,6 +112,41 @@ def test_a_torque_at_an_angle_and_a_bench_with_a_set_point_are_no_axis(tmp_path:
     rows = "".join(f"{0.01 * k}" + f",{0.1 * k}" * cells + "\n" for k in range(40))
     (tmp_path / "in" / "a.csv").write_text(f"{header}\n{rows}")
     assert "axis" not in propose(tmp_path / "in").tree
+
+
+def proposed(folder: Path, header: str) -> Proposal:
+    folder.mkdir()
+    rows = "".join(
+        ",".join(f"{0.01 * k * (1 + at):g}" for at in range(header.count(",") + 1)) + "\n" for k in range(40)
+    )
+    (folder / "a.csv").write_text(f"{header}\n{rows}")
+    return propose(folder)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "time_s,load,encoder position", "time_s,load,position,target position", "time_s,torque (N m),joint angle (deg)",
+        "time_s,torque (N m),motor angle (deg)",
+    ],
+)  # fmt: skip
+def test_what_may_be_tissue_or_a_drive_is_asked_and_nothing_is_usual(tmp_path: Path, header: str) -> None:
+    found = proposed(tmp_path / "in", header)
+    *units, asked = found.questions
+    assert asked.usual == "" and "a drive axis alone or of tissue" in asked.text
+    with pytest.raises(UsageError, match="still open"):
+        parse(DataMapping, tomllib.loads(found.text), "proposed")
+    with pytest.raises(UsageError, match="neither axis nor tissue"):
+        asked.value("N")
+    answers = ["N" if "force" in one.text else "mm" for one in units]
+    for said in ("axis", "tissue", "axis"):
+        mapping = parse(DataMapping, tomllib.loads(found.answered([*answers, said]).text), "proposed")
+        assert (mapping.axis is not None) is (said == "axis")
+
+
+def test_what_a_load_cell_feels_at_a_motor_s_position_is_no_axis(tmp_path: Path) -> None:
+    found = proposed(tmp_path / "in", "time_s,Load cell,Motor position")
+    assert "axis" not in found.tree and "drive axis" not in " ".join(one.text for one in found.questions)
 
 
 @pytest.mark.parametrize(("speed_mm_s", "wrong"), [(1100.0, False), (110.0, True), (11000.0, True)])
