@@ -5,26 +5,26 @@ from rig.intake.measured import chosen
 from rig.intake.roles import WORDS, candidates, words_of
 from rig.intake.units import FORCE_N
 
-EFFORTS = frozenset(("torque", "drehmoment", "moment", "effort", "tau", "load", "current", "motor"))
-# Words and units of a sensor that feels; of a load in percent nobody knows.
-FELT = frozenset(WORDS["force"]) - EFFORTS - {"last", "charge", "f"}
-JOINTS = frozenset(("q", "joint", "motor", "encoder", "servo", "gelenk"))
+EFFORTS = frozenset(("torque", "drehmoment", "moment", "effort", "tau", "current"))
+# A servo's effort, and what the cell of a bench feels.
+LOADS = frozenset(("load", "last", "charge"))
+# Words and units of a sensor that feels.
+FELT = (frozenset(WORDS["force"]) | {"cell"}) - EFFORTS - LOADS - {"f"}
+JOINTS = frozenset(("q", "servo"))
+# People have joints too, and benches for tissue motors and encoders.
+MAY_BE_JOINTS = frozenset(("joint", "gelenk", "motor", "encoder"))
 WISHES = frozenset(("target", "setpoint", "command", "commanded", "cmd", "desired", "demand", "goal", "soll", "ref"))
 
 
-def drive_in(table: ColumnGroup) -> str:
-    """The doubt that says by which columns; empty of other tables."""
+def drive_in(table: ColumnGroup) -> tuple[str, bool]:
+    """By which columns, empty of other tables, and whether these tell it from a bench that presses tissue."""
     known, header = chosen(table), table.layout.sheet.header
     said = {number: set(words_of(header[number])) for number in table.columns}
     felt = any(said[number] & FELT or table.unit(number) in FORCE_N for number in table.columns)
-    if felt or not {"force", "position"} <= known.keys() or not said[known["force"]] & EFFORTS:
-        return ""
-    wished = (number for number in said if said[number] & WISHES and candidates("position", [header[number]], [""]))
-    joint = [known["position"]] if said[known["position"]] & JOINTS else []
-    by = next((header[number] for number in (*wished, *joint)), "")
-    taken = f"{table.path.name}: {header[known['force']]!r} and {by!r} are taken for a drive axis without tissue"
-    return (
-        f"{taken}, which `rig diagnose` judges and `rig fit` refuses; where it presses tissue take axis out"
-        if by
-        else ""
-    )
+    if felt or not {"force", "position"} <= known.keys() or not said[known["force"]] & (EFFORTS | LOADS):
+        return "", False
+    wished = [number for number in said if said[number] & WISHES and candidates("position", [header[number]], [""])]
+    place = said[known["position"]]
+    by = [*wished, *([known["position"]] if place & (JOINTS | MAY_BE_JOINTS) else [])]
+    sure = bool(said[known["force"]] & EFFORTS and (wished or place & JOINTS))
+    return f"{table.path.name}: {header[known['force']]!r} and {header[by[0]]!r}" if by else "", sure

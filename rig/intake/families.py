@@ -29,11 +29,11 @@ DIRECTIONS = frozenset("xyz")
 
 
 class UnitTold(NamedTuple):
-    """What is said of a column beside its file: its unit, empty where that is not clear, by whom, and its header's."""
+    """What is said of a column beside its file: its unit, empty where that is not clear, by whom, and one to ask of."""
 
     unit: str
     said: str
-    own: str
+    example: str
 
 
 @dataclass(frozen=True)
@@ -102,8 +102,8 @@ class ColumnGroup:
 
     def told_of(self, column: int) -> list[str]:
         """The doubt that says by whom a column's unit is known, or that it is not clear."""
-        said, taken = self.told.get(column), f"{self.path.name}: {self.layout.sheet.header[column]!r} is"
-        return [f"{taken} {'taken to be ' if said.unit else ''}in {said.said}"] if said else []
+        said = self.told.get(column)
+        return [f"{self.path.name}: {self.layout.sheet.header[column]!r} is {said.said}"] if said else []
 
     def name(self, column: int) -> str:
         """All the words of a column, those of its place as well."""

@@ -268,7 +268,7 @@ class DataMapping(Table):
     session: SessionFacts = SessionFacts()
     stated: RecordingFacts = RecordingFacts()
     recordings: dict[str, RecordingFacts] = Field(default_factory=dict)
-    axis: AxisFacts | None = None
+    axis: Annotated[AxisFacts | None, Said] = None
     tables: tuple[FileForm, ...] = Field(min_length=1)
 
     def facts_of(self, recording: str) -> RecordingFacts:

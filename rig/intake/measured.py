@@ -119,16 +119,15 @@ def _take(found: MeasuredColumns, table: ColumnGroup, quantity: str, known: Mapp
         own = unit_of(str(value["column"]))
         twice = f"is in {own} by its name and in another by the row of units" if own and not said else "has no unit"
         told = table.told.get(column, UnitTold("", "", ""))
-        twice = f"is in {told.said}" if told.said else twice
+        twice = f"is {told.said}" if told.said else twice
         unsaid = f"is in {other}, which is none of" if other else f"{twice}; it is one of"
         how = f"is in {said}, which needs a scale" if said else f"{unsaid} {units}, or needs a scale"
         how = f"may be in {' or '.join(may_be)}, which capitals hide, else it needs a scale" if may_be else how
         what = f"{table.path.name}: {quantity} ({value['column']!r}, {table.looks[column].span}) {how}"
         text = f"{what} (how many {USUAL[quantity]} one of it is)"
         choice = Choice(str(value["column"]), value)
-        found.questions.append(
-            OpenQuestion(text, (), quantity, (choice,), _usual(table, quantity, column), own=told.own)
-        )
+        usual = _usual(table, quantity, column)
+        found.questions.append(OpenQuestion(text, (), quantity, (choice,), usual, told.example))
 
 
 def _usual(table: ColumnGroup, quantity: str, column: int) -> str:

@@ -11,11 +11,11 @@ from rig.intake.drives import drive_in
 from rig.intake.families import INTERRUPTED, ColumnGroup, all_tables, groups_of
 from rig.intake.folder import below, files_in
 from rig.intake.labelling import Labels, labels_in, stated_in
-from rig.intake.mapping import FileForm
+from rig.intake.mapping import UNSAID, FileForm
 from rig.intake.measured import beside, chosen, measured_in, ranks_of, spoilt
 from rig.intake.naming import channels_of, names_of
 from rig.intake.prose import with_prose
-from rig.intake.questions import JointQuestion, OpenQuestion, Question, inline
+from rig.intake.questions import AxisQuestion, JointQuestion, OpenQuestion, Question, inline
 from rig.intake.readers import kind_of
 from rig.intake.senses import doubts_of_senses
 from rig.intake.survey import texts_of
@@ -34,6 +34,10 @@ FEWEST_ROWS = 10
 GOES_ON_STEPS = 2.0
 # Of three questions people give up; what can be asked as one is.
 MOST_QUESTIONS = 2
+DRIVE = (
+    "are taken for a drive axis without tissue, which `rig diagnose` judges and `rig fit` refuses; where it presses "
+    "tissue take axis out"
+)
 OPEN, DOUBT = "# open: ", "# doubtful: "
 
 
@@ -92,11 +96,13 @@ def propose(folder: Path) -> Proposal:
     doubts += untimed(groups, [table for _, group, _ in picked for table in group])
     doubts += left_aside(folder, files, [table for _, group, _ in picked for table in group])
     drives = [drive_in(group[0]) for _, group, _ in picked]
-    doubts += drives if all(drives) else []
-    axis: TomlTable = {"axis": {}} if all(drives) else {}
+    may_be, sure = map(all, zip(*drives, strict=True))
+    axis: TomlTable = {"axis": {} if sure else UNSAID} if may_be else {}
+    doubts += [f"{by} {DRIVE}" for by, _ in drives if sure]
+    asked_axis = [AxisQuestion(drives[0][0])] if may_be and not sure else []
     tree = {**_recording(picked), **names, **recording, **axis, "tables": tables}
-    proposal = Proposal(tree, tuple(dict.fromkeys(doubts)), tuple(_few(list(_together(questions)))))
-    return proposal if questions else proposal.answered([])
+    proposal = Proposal(tree, tuple(dict.fromkeys(doubts)), (*_few(list(_together(questions))), *asked_axis))
+    return proposal if proposal.questions else proposal.answered([])
 
 
 def _with_numbers(group: Group) -> tuple[Group, Group]:

@@ -1,9 +1,10 @@
 """Units that a README beside the data, or a sheet that explains the others of a workbook, says of columns."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -11,6 +12,7 @@ from typing import NamedTuple
 from rig.intake.encodings import encoding_of
 from rig.intake.families import ColumnGroup, UnitTold
 from rig.intake.mapping import FileForm
+from rig.intake.measured import chosen
 from rig.intake.readers import kind_of, open_sheets
 from rig.intake.roles import OTHER, candidates, words_of
 from rig.intake.text import lines_in
@@ -24,12 +26,16 @@ QUANTITIES = ("time", "force", "position", "velocity")
 # With one of these in it what is said is of the device, and not of what it measured.
 _OF_DEVICES = OTHER | {"maximum", "resolution", "range", "accuracy", "capacity", "sensitivity", "noise", "constant"}
 _TITLE = re.compile(
-    r"read.?me|lies.?mich|legend|units?|einheit|info|about|descri|codebook|dictionary|variable|columns|notes?$", re.I
+    r"(?<![^\W_])(read.?me|lies.?mich|legend|units?|einheit(en)?|info|about|descri\w*|codebook|dictionary|variables?"
+    r"|columns|notes?)(?![^\W_])",
+    re.I,
 )
 _ENDINGS = ("", ".txt", ".md", ".rst", ".csv", ".tsv")
 _TOKEN = re.compile(r"[^\s()\[\]{}<>|;:=,`\"'*]+|[(\[{|;:=,]")
 # Between a name and its unit; behind any other word, or a number, what looks like a unit says nothing of a column.
 _BEFORE = frozenset(("(", "[", "{", "|", ":", "=", ",", "in", "is", "are", "and", "unit", "units", "as"))
+# Beside a column's name, or a quantity's word, these make no other thing of it.
+_FILLERS = frozenset(("and", "in", "the", "of", "all", "is", "are", "as", "given", "for", "column", *UNIT_WORDS))
 
 
 class UnitSaid(NamedTuple):
@@ -41,22 +47,34 @@ class UnitSaid(NamedTuple):
     place: str
 
     def names(self, name: str, begins: bool) -> bool:
-        """Whether it is said of the column of that name, with which it ``begins``, or which stands in it."""
+        """Whether it is said of the column of that name, with which it ``begins``, or which it is."""
         start = self.own.lstrip("-+#.0123456789 ")
         if begins or len(name) <= SHORT:
             return start == name or start.startswith(f"{name} ")
-        return bool(re.search(rf"(?<![^\W_]){re.escape(name)}(?![^\W_])", self.own, re.I))
+        return _bare(start) == _bare(name)
 
-    def measures(self, quantity: str) -> bool:
-        """Whether it is said of all that is the quantity: by its word, or of the units of whatever has one."""
+    def measures(self, quantity: str, alone: bool) -> bool:
+        """Whether it is of all that is the quantity, by word or of whatever has a unit; ``alone``: by no other word."""
         said = self.own if len(words_of(self.own)) > self.own.split().count("and") else self.line
-        known = self.unit in _units(quantity)
-        return known and bool(candidates(quantity, [said], [""]) or UNIT_WORDS & set(words_of(self.line)))
+        is_other = alone and not all(unit_in(word) or _is_quantity(word) for word in _bare(said))
+        by_word = bool(candidates(quantity, [said], [""]) or UNIT_WORDS & set(words_of(self.line)))
+        return self.unit in _units(quantity) and by_word and not is_other
+
+
+def _is_quantity(word: str) -> bool:
+    return any(candidates(quantity, [word], [""]) for quantity in QUANTITIES)
+
+
+def _bare(text: str) -> list[str]:
+    words = re.findall(r"[^\W_]+", text.lower())
+    return [word for word in words if word not in _FILLERS] or words
 
 
 def with_prose(tables: Iterable[ColumnGroup], top: Path) -> Iterator[ColumnGroup]:
     """The tables with the units that are said of their columns beside them, in the nearest folder up to ``top``."""
-    read, own = cache(_in_folder), cache(_in_file)
+    tables = list(tables)
+    measured = {table.path for table in tables if _TITLE.search(table.path.stem) and chosen(table)}
+    read, own = cache(partial(_in_folder, measured)), cache(_in_file)
     for table in tables:
         folder, found = table.path.parent, dict[int, UnitTold]()
         folders = [each for each in (folder, *folder.parents) if each == folder or each.is_relative_to(top)]
@@ -74,14 +92,18 @@ def _told(table: ColumnGroup, statements: Sequence[UnitSaid]) -> Iterator[tuple[
         name = " ".join(token for token in _TOKEN.findall(heads) if token[1:] or token.isalnum())
         name = name.removesuffix(own).rstrip(" _") if own else name
         found = [one for one in statements if one.unit in (*sizes, *SIGNALS) and name and one.names(name, not fitting)]
+        loose = list[UnitSaid]()
         if not (found or own or unknown_unit(table.layout.heads[number])):
-            found = [one for one in statements if any(map(one.measures, fitting))]
+            loose = [one for one in statements if any(one.measures(each, alone=False) for each in fitting)]
+            found = [one for one in loose if any(one.measures(each, alone=True) for each in fitting)]
         units = [*filter(None, [own]), *(one.unit for one in found)]
         is_clear = len({sizes.get(unit, unit) for unit in units}) == 1
-        said = list(dict.fromkeys(f"{one.unit} by {one.place}" for one in found))[:MOST_PLACES]
-        if found and (not own or not (is_clear or "time" in fitting)):
+        said = list(dict.fromkeys(f"{one.unit} by {one.place}" for one in found or loose))[:MOST_PLACES]
+        if (found or loose) and (not own or not (is_clear or "time" in fitting)):
             said = [f"{own} by its header", *said] if own else said
-            yield number, UnitTold(units[0] if is_clear else "", " and in ".join(said), own)
+            how = "taken to be " if own or is_clear else "" if found else "perhaps "
+            example = loose[0].unit if loose and not found else ""
+            yield number, UnitTold(own or (units[0] if is_clear else ""), f"{how}in {' and in '.join(said)}", example)
 
 
 def _units(quantity: str) -> Mapping[str, tuple[bool, float]]:
@@ -90,10 +112,14 @@ def _units(quantity: str) -> Mapping[str, tuple[bool, float]]:
     return {unit: (bool(turns), size) for turns, known in enumerate(kinds) for unit, size in known.items()}
 
 
-def _in_folder(folder: Path) -> tuple[UnitSaid, ...]:
-    files = (path for path in sorted(folder.iterdir()) if _TITLE.search(path.stem) and path.suffix.lower() in _ENDINGS)
-    short = (path for path in files if path.is_file() and path.stat().st_size <= MOST_BYTES)
-    return tuple(said for path in short for said in _in_text(path.name, path.read_bytes()))
+def _in_folder(measured: Container[Path], folder: Path) -> tuple[UnitSaid, ...]:
+    found = list[UnitSaid]()
+    for path in sorted(folder.iterdir()):
+        is_named = _TITLE.search(path.stem) and path.suffix.lower() in _ENDINGS and path not in measured
+        with suppress(OSError):  # what nobody may read explains nothing
+            if is_named and path.is_file() and path.stat().st_size <= MOST_BYTES:
+                found += _in_text(path.name, path.read_bytes())
+    return tuple(found)
 
 
 def _above(table: ColumnGroup) -> tuple[UnitSaid, ...]:

@@ -29,8 +29,7 @@ class OpenQuestion:
     """What the data cannot say of a ``quantity`` in the tables of these numbers.
 
     Without ``choices`` it is the rate of the rows [Hz], whose ``known`` column counts them. ``usual`` is what `--yes`
-    answers, empty where nothing is clearly the best answer; ``example`` is one that the data suggest, or empty, ``own``
-    the unit that the file states and that may be wrong.
+    answers, empty where nothing is clearly the best answer; ``example`` is one that the data suggest, or empty.
     """
 
     text: str
@@ -40,7 +39,6 @@ class OpenQuestion:
     usual: str = ""
     example: str = ""
     known: TomlTable = field(default_factory=dict)
-    own: str = ""
 
     @property
     def line(self) -> str:
@@ -88,8 +86,7 @@ class OpenQuestion:
         """A unit of the quantity, or how much of ours one of the file's is."""
         unit = unit_in(said) or said
         if unit in LINEAR[self.quantity] or unit in ROTARY.get(self.quantity, {}):
-            is_other = self.own and unit != self.own and unit in LINEAR[self.quantity]
-            return {"scale": LINEAR[self.quantity][unit]} if is_other else {"unit": unit}
+            return {"unit": unit}
         if self.quantity == "time":
             raise UsageError(f"{said!r} is no unit of time; {self.text}")
         return {"scale": self._number(said)}
@@ -144,7 +141,33 @@ class JointQuestion:
         return found
 
 
-Question = OpenQuestion | JointQuestion
+@dataclass(frozen=True)
+class AxisQuestion:
+    """Whether tables with the columns ``by`` are of a drive axis alone, or of tissue that it presses."""
+
+    by: str
+    usual: str = ""
+    form: str = "axis or tissue"
+    line: str = "axis = {} for a drive alone, no such line for tissue"
+
+    @property
+    def text(self) -> str:
+        """The question."""
+        return f"{self.by} may be of a drive axis alone or of tissue that it presses; which is it, {self.form}?"
+
+    def answer(self, tree: TomlTable, said: str) -> None:
+        """Puts `axis` into the mapping or takes it out; raises UsageError where the answer is neither."""
+        tree.pop("axis", None)
+        tree.update(self.value(said))
+
+    def value(self, said: str) -> TomlTable:
+        """What the mapping says after the answer; raises UsageError where it is none."""
+        if said not in ("axis", "tissue"):
+            raise UsageError(f"{said!r} is neither axis nor tissue; {self.text}")
+        return {"axis": {}} if said == "axis" else {}
+
+
+Question = OpenQuestion | JointQuestion | AxisQuestion
 
 
 def inline(value: object) -> str:

@@ -21,7 +21,7 @@ from rig.intake.writing import OpenRecording, Written
 from rig.progress import Progress, silent
 from rig.recording.files import whole_folder
 from rig.recording.reader import Recording
-from rig.recording.sessions import AXIS_FILES, Session, SessionInfo, TrialInfo, open_session, plain, write_session
+from rig.recording.sessions import Session, SessionInfo, TrialInfo, open_session, plain, write_session
 from rig.version import SOFTWARE
 
 Seeing = Callable[[TrialInfo, Recording], None]
@@ -178,11 +178,11 @@ def _info(folder: Path, mapping: DataMapping, now: datetime) -> SessionInfo:
     notes = facts.notes if isinstance(facts.notes, dict) else {"notes": facts.notes}
     subject = facts.subject if isinstance(facts.subject, dict) else {"id": facts.subject}
     stated = {name: value for name, value in given.items() if value not in ("", None)}
-    notes |= {AXIS_FILES: str(folder.resolve())} if mapping.axis else {}
     return SessionInfo(
         id=facts.id or facts.name or folder.resolve().name, kind="import", created=now.isoformat(), software=SOFTWARE,
         subject={str(key): plain(value) for key, value in subject.items()},
         notes={str(key): plain(value) for key, value in (stated | notes).items()},
+        axis_files=str(folder.resolve()) if mapping.axis else "",
     )  # fmt: skip
 
 
@@ -197,6 +197,7 @@ def _metadata(
         "recording": {
             "id": f"{listed.id}/{info.name}", "session": listed.id, "trial": info.name,
             "software": listed.software, "kind": "import", "wall_start_iso": listed.created,
+            **({"axis_files": listed.axis_files} if listed.axis_files else {}),
         },
         "trial": {
             "index": str(index), "speed_mm_s": repr(info.speed_mm_s), "depth_mm": repr(info.depth_mm),

@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.config.table import TomlTable
 from rig.errors import DataError
-from rig.intake.families import ColumnGroup
+from rig.intake.families import ColumnGroup, UnitTold
 from rig.intake.labelling import Labels
 from rig.intake.mapping import RESTART, TimeColumn
 from rig.intake.measured import line_of_unit, stated_unit
@@ -216,12 +216,13 @@ def _of_numbers(table: ColumnGroup, place: str | int, unit: str, looks: Looks) -
     form = next((form for form, (low, high) in days.items() if low < first and last < high and last - first < 100), "")
     if form and not unit and (kind_of(table.path) == "workbook" or not possible_units(looks)):
         return {"column": place, "form": form}, [], []
-    if unit in TIME_NS:
+    told = table.told.get(table.layout.sheet.number(place))
+    if unit in TIME_NS and (not told or unit in possible_units(looks, (unit,))):
         return {"column": place, "unit": unit}, [], []
     if several := unknown_unit(str(place)) or ("" if unit else line_of_unit("time", table.layout.sheet.facts)):
         text = f"{table.path.name}: time {place!r} is in {several}, which is none that is known; how many are a second?"
         return {}, [], [OpenQuestion(text, (), "time", known={"column": place, "form": "counter"})]
-    if unit or (looks.counts and not unit_of(str(place)) and stated_rate_Hz(table.layout.sheet.facts)):
+    if (unit and not told) or (looks.counts and not unit_of(str(place)) and stated_rate_Hz(table.layout.sheet.facts)):
         return None
     return _without_unit(table, place, looks)
 
@@ -246,21 +247,21 @@ def _of_texts(table: ColumnGroup, place: str | int, texts: Sequence[str]) -> Sai
 def _without_unit(table: ColumnGroup, place: str | int, looks: Looks) -> SaidTime:
     """The only unit that is possible, with a doubt; else a question."""
     units = possible_units(looks)
-    if len(units) == 1:
+    told = table.told.get(table.layout.sheet.number(place), UnitTold("", "", ""))
+    if len(units) == 1 and not told.unit:
         said = f"{table.path.name}: nothing says the unit of time ({place!r}); taken as {units[0]}, no other is likely"
         return {"column": place, "unit": units[0]}, [said], []
     text = f"nothing says the unit of time ({place!r}, {looks.span}); one of {', '.join(TIME_NS)}"
-    clear = "s" in units and table.layout.sheet.number(place) not in table.told
-    choice, usual = Choice(str(place), {"column": place}), "s" if clear else ""
-    return {"column": place}, [], [OpenQuestion(text, (), "time", (choice,), usual, usual)]
+    choice, usual = Choice(str(place), {"column": place}), "s" if "s" in units and not told.said else ""
+    return {"column": place}, [], [OpenQuestion(text, (), "time", (choice,), usual, told.example or usual)]
 
 
-def possible_units(looks: Looks) -> list[str]:
-    """The units in which the column is time since 1970, or else in which rate and length are those of a recording."""
+def possible_units(looks: Looks, among: Sequence[str] = ("s", "ms", "us", "ns")) -> list[str]:
+    """Those in which the column is time since 1970, or else, ``among`` these, has a rate and length of recordings."""
     since = [unit for unit, (low, high) in EPOCH.items() if low <= looks.known.min() and looks.known.max() < high]
     if since:
         return since
     step, length = float(np.median(np.diff(looks.known))), float(np.ptp(looks.known))
-    scales = {unit: TIME_NS[unit] * 1e-9 for unit in ("s", "ms", "us", "ns")}
+    scales = {unit: TIME_NS[unit] * 1e-9 for unit in among}
     low, high = RATES_HZ
     return [unit for unit, size in scales.items() if low <= 1 / (step * size) <= high and length * size >= SHORTEST_S]

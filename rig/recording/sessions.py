@@ -22,8 +22,6 @@ from rig.recording.tables import write_parquet
 
 SESSION_FILE = "session.json"
 PARQUET_FOLDER = "parquet"
-# A note of where the files of a drive axis lie, as their mapping calls them.
-AXIS_FILES = "drive_axis"
 JsonTable = dict[str, JsonValue]
 # JSON has no NaN: an unknown number is null in the file and NaN here.
 Number = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
@@ -63,7 +61,7 @@ class TrialInfo:
 
 @dataclass(frozen=True)
 class SessionInfo:
-    """What ``session.json`` holds. ``created`` is ISO 8601 wall-clock time."""
+    """What ``session.json`` holds. ``created`` is ISO 8601 wall-clock time; ``axis_files`` of a drive axis lie there."""
 
     id: str
     kind: Literal["capture", "import", "track"]
@@ -73,6 +71,7 @@ class SessionInfo:
     wiring: JsonTable = field(default_factory=dict)
     subject: JsonTable = field(default_factory=dict)
     notes: JsonTable = field(default_factory=dict)
+    axis_files: str = ""
     trials: tuple[TrialInfo, ...] = ()
 
 
@@ -93,17 +92,12 @@ class Session:
         """What to call it by: the place it was opened from."""
         return self.origin or self.folder
 
-    @property
-    def axis_files(self) -> str:
-        """Where the files lie that it was made of, if they are of a drive axis; else empty."""
-        return str(self.info.notes.get(AXIS_FILES, ""))
-
     def refuse_axis(self) -> None:
         """Raises UsageError where it is of a drive axis."""
-        if self.axis_files:
+        if self.info.axis_files:
             raise UsageError(
                 f"{self.place}: is a drive axis, as [axis] in its mapping says, and has no tissue; `rig diagnose` of "
-                f"{self.axis_files} with that mapping fits its mass and friction"
+                f"{self.info.axis_files} with that mapping fits its mass and friction"
             )
 
     @property
@@ -230,6 +224,7 @@ def _info_from(first: Recording) -> SessionInfo:
         wiring=tables["wiring"],
         subject=tables["subject"],
         notes=tables["notes"],
+        axis_files=recording.get("axis_files", ""),
     )
 
 

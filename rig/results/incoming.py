@@ -60,11 +60,10 @@ def came_in_result(session: Session, tell: Progress = silent, looked: Looked | N
         return CameInResult(session=session.info.id, recordings=(), sha256={}, remarks=(remark,))
     looked = looked or Looked()
     trials = looked.of(session, portion(tell, 0.0, 0.6))
-    out = ""
-    if session.axis_files:
-        trials = TrialSet(trials.name, ())
-        out = f"a drive axis has no tissue; `rig diagnose` of {session.axis_files} with their mapping judges it"
-    found = inspected(trials)
+    found, out, files = inspected(trials), "", session.info.axis_files
+    if files:
+        trials, found = TrialSet(trials.name, ()), replace(found, trials=())
+        out = f"a drive axis has no tissue; `rig diagnose` of {files} with their mapping judges it"
     tell("the contact of every cycle", 0.6)
     curves, skipped = curves_in(found)
     tell("what a diagnosis takes", 0.95)

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from rig.errors import DataError
 from rig.recording.converter import Array
 from rig.recording.reader import Recording
-from rig.recording.sessions import AXIS_FILES
 from rig.recording.slope import TIP_TOOL
 from rig.recording.tables import compression_N
 from rig.trials.chosen import labels_of
@@ -46,7 +45,7 @@ def trial_of(name: str, recording: Recording) -> Trial:
         _number(name, "depth_mm", facts),
         _number(name, "surface_mm", recording.metadata.get("calibration", {})),
         labels_of(recording.metadata),
-        AXIS_FILES in notes,
+        "axis_files" in recording.metadata.get("recording", {}),
     )
 
 

@@ -1,6 +1,8 @@
 """A recording of a drive axis alone is judged by `rig diagnose`, and never fitted as tissue."""
 
 import json
+import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +10,13 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from api.cli.app import build
-from rig.errors import UsageError
-from rig.intake.proposal import propose
+from rig.config.table import parse
+from rig.errors import DataError, UsageError
+from rig.intake.mapping import DataMapping
+from rig.intake.proposal import Proposal, propose
+from rig.recording.sessions import SESSION_FILE, open_session
+from rig.results.incoming import came_in_result
+from rig.trials.recorded import trial_of
 from tests.data import recording
 
 INERTIA, FRICTION, TURN_S, SWING = 0.5, 0.3, 4.0, 0.8
@@ -69,8 +76,33 @@ def test_files_of_an_arm_s_joint_are_proposed_as_an_axis_and_the_next_step_is_ri
 
 
 def test_a_mapping_without_an_axis_makes_tissue_of_it(joint: Path, tmp_path: Path) -> None:
+    """A joint that swings presses nothing, and that is what is said of it."""
     said = rig("fit", joint, "--mapping", mapped(tmp_path, axis=""), "--out", tmp_path / "out")
-    assert "drive axis" not in f"{said.output}{said.exception}"
+    assert isinstance(said.exception, DataError), said.output
+    assert "no trial gives a curve" in str(said.exception)
+
+
+def test_a_user_s_note_makes_no_axis_and_a_lost_list_no_tissue(joint: Path, tmp_path: Path) -> None:
+    note = 'session.notes = { drive_axis = "EC-i 40" }'
+    rig("import", joint, "--mapping", mapped(tmp_path, axis="", stated=note), "--out", tmp_path / "noted")
+    session = open_session(tmp_path / "noted")
+    session.refuse_axis()
+    assert session.info.notes["drive_axis"] == "EC-i 40"
+    assert not trial_of("swing", session.recording("swing")).of_axis
+    rig("import", joint, "--mapping", mapped(tmp_path), "--out", tmp_path / "made")
+    (tmp_path / "made" / SESSION_FILE).unlink()
+    with pytest.raises(UsageError, match=re.escape(str(joint))):
+        open_session(tmp_path / "made").refuse_axis()
+
+
+def test_gaps_of_an_axis_are_told(joint: Path, tmp_path: Path) -> None:
+    """Half a second of twenty is missing."""
+    (tmp_path / "in").mkdir()
+    rows = (joint / "swing.csv").read_text().splitlines()
+    (tmp_path / "in" / "swing.csv").write_text("\n".join(rows[:1000] + rows[1100:]) + "\n")
+    rig("import", tmp_path / "in", "--mapping", mapped(tmp_path), "--out", tmp_path / "made")
+    (recording,) = came_in_result(open_session(tmp_path / "made")).recordings
+    assert recording.quality == "usable" and any("axis" in reason and "gap" in reason for reason in recording.reasons)
 
 
 @pytest.mark.parametrize("header", ["time_s,torque (N m),angle (deg)", "time_s,force (N),target pos,pos (mm)"])
@@ -80,6 +112,41 @@ def test_a_torque_at_an_angle_and_a_bench_with_a_set_point_are_no_axis(tmp_path:
     rows = "".join(f"{0.01 * k}" + f",{0.1 * k}" * cells + "\n" for k in range(40))
     (tmp_path / "in" / "a.csv").write_text(f"{header}\n{rows}")
     assert "axis" not in propose(tmp_path / "in").tree
+
+
+def proposed(folder: Path, header: str) -> Proposal:
+    folder.mkdir()
+    rows = "".join(
+        ",".join(f"{0.01 * k * (1 + at):g}" for at in range(header.count(",") + 1)) + "\n" for k in range(40)
+    )
+    (folder / "a.csv").write_text(f"{header}\n{rows}")
+    return propose(folder)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "time_s,load,encoder position", "time_s,load,position,target position", "time_s,torque (N m),joint angle (deg)",
+        "time_s,torque (N m),motor angle (deg)",
+    ],
+)  # fmt: skip
+def test_what_may_be_tissue_or_a_drive_is_asked_and_nothing_is_usual(tmp_path: Path, header: str) -> None:
+    found = proposed(tmp_path / "in", header)
+    *units, asked = found.questions
+    assert asked.usual == "" and "a drive axis alone or of tissue" in asked.text
+    with pytest.raises(UsageError, match="still open"):
+        parse(DataMapping, tomllib.loads(found.text), "proposed")
+    with pytest.raises(UsageError, match="neither axis nor tissue"):
+        asked.value("N")
+    answers = ["N" if "force" in one.text else "mm" for one in units]
+    for said in ("axis", "tissue", "axis"):
+        mapping = parse(DataMapping, tomllib.loads(found.answered([*answers, said]).text), "proposed")
+        assert (mapping.axis is not None) is (said == "axis")
+
+
+def test_what_a_load_cell_feels_at_a_motor_s_position_is_no_axis(tmp_path: Path) -> None:
+    found = proposed(tmp_path / "in", "time_s,Load cell,Motor position")
+    assert "axis" not in found.tree and "drive axis" not in " ".join(one.text for one in found.questions)
 
 
 @pytest.mark.parametrize(("speed_mm_s", "wrong"), [(1100.0, False), (110.0, True), (11000.0, True)])

@@ -8,6 +8,7 @@ import pytest
 import scipy.io
 
 from rig.intake.proposal import propose
+from rig.intake.questions import OpenQuestion
 from tests.rig.intake.instruments import text
 from tests.rig.intake.test_foreign import FORCE_N, ROWS, TIME_S, WAY_MM, came_in, check, lines
 
@@ -61,25 +62,69 @@ def test_the_nearest_readme_counts(folder: Path) -> None:
     check(came_in(folder))
 
 
+def test_prose_that_contradicts_itself_is_asked_and_yes_takes_nothing(folder: Path) -> None:
+    text("Time (ms),Displacement (um),Force\n", SMALL)(folder)
+    (folder / "README.txt").write_text("force in mN\nForce: N\n")
+    (question,) = propose(folder).questions
+    assert question.usual == "" and "is in mN by README.txt line 1 and in N by README" in question.text
+    check(came_in(folder, "mN"))
+
+
+def test_a_header_s_own_unit_wins_over_prose_with_a_doubt(folder: Path) -> None:
+    text("Time (ms),Displacement (um),Force (mN)\n", SMALL)(folder)
+    (folder / "README.txt").write_text("figures show force in N\nForce: N\n")
+    check(came_in(folder))
+    assert any("in mN by its header and in N by README.txt line" in doubt for doubt in propose(folder).doubts)
+
+
 @pytest.mark.parametrize(
-    ("said", "head", "doubt"),
-    [
-        (
-            "force in mN\nForce: N\n",
-            "Time (ms),Displacement (um),Force\n",
-            "mN by README.txt line 1 and in N by README",
-        ),
-        ("force in mN\n", "Time (ms),Displacement (um),Force (N)\n", "N by its header and in mN by README.txt line 1"),
-    ],
+    ("said", "unit", "other"), [("age, height (cm)", "cm", "um"), ("Tip travel in mm\n", "mm", "um")]
 )
-def test_prose_that_contradicts_itself_or_the_header_is_asked_and_yes_takes_nothing(
-    folder: Path, said: str, head: str, doubt: str
+def test_a_phrase_with_other_words_suggests_a_unit_that_yes_does_not_take(
+    folder: Path, said: str, unit: str, other: str
 ) -> None:
-    text(head, SMALL)(folder)
+    text("Time (ms),Displacement,Force (mN)\n", SMALL)(folder)
     (folder / "README.txt").write_text(said)
     (question,) = propose(folder).questions
-    assert question.usual == "" and f"is in {doubt}" in question.text
-    check(came_in(folder, "mN"))
+    assert isinstance(question, OpenQuestion) and (question.usual, question.example) == ("", unit)
+    assert f"is perhaps in {unit} by README.txt line 1" in question.text
+    check(came_in(folder, other))
+
+
+def test_a_time_of_something_else_is_not_that_of_the_rows(folder: Path) -> None:
+    text("Time,Displacement (um),Force (mN)\n", SMALL)(folder)
+    (folder / "README.txt").write_text("Hold time in s\n")
+    check(came_in(folder))
+
+
+def test_a_told_unit_of_time_in_which_nobody_records_is_asked(folder: Path) -> None:
+    text("Time,Displacement (um),Force (mN)\n", SMALL)(folder)
+    (folder / "README.txt").write_text("Time in s\n")
+    (question,) = propose(folder).questions
+    assert question.usual == ""
+    check(came_in(folder, "ms"))
+
+
+@pytest.mark.parametrize("name", ["unit_3.csv", "reinforced.csv", "variable_load.csv", "info.csv"])
+def test_a_table_of_the_folder_explains_no_other(folder: Path, name: str) -> None:
+    text("Time (ms),Displacement (um),Force\n", SMALL)(folder)
+    (folder / name).write_text(f"Time (ms),Displacement (um),Force (mN)\n{SMALL}")
+    said = [question.text for question in propose(folder).questions]
+    assert len(said) == 1 and "has no unit" in said[0]
+
+
+def test_a_readme_that_nobody_may_read_ends_no_import(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text("Time (ms),Displacement (um),Force (mN)\n", SMALL)(folder)
+    (folder / "README.md").write_text("force in mN\n")
+    read = Path.read_bytes
+
+    def refuse(path: Path) -> bytes:
+        if path.name == "README.md":
+            raise PermissionError(13, "Permission denied", str(path))
+        return read(path)
+
+    monkeypatch.setattr(Path, "read_bytes", refuse)
+    check(came_in(folder))
 
 
 @pytest.mark.parametrize(
