@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from controller.devices.drivers import open_axis, open_force, open_tracker
-from controller.devices.guard import RATE_TOLERANCE
+from controller.devices.guard import RATE_TOLERANCE, UNDATED
 from controller.inputs.examination import look_at
 from controller.loop.realtime import promptly
 from drivers.roles import Device, Identity, OnBus, ServoAxis
@@ -105,6 +105,9 @@ def _finding(role: str, identity: Identity, nominal_Hz: float, samples: Samples,
     noise, extent = _spread(valid, channel)
     slow = role != "axis" and abs(rate_Hz - nominal_Hz) > RATE_TOLERANCE * nominal_Hz
     problem = f"rate {rate_Hz:.1f} Hz is not the {nominal_Hz:.1f} Hz asked for" if slow else ""
+    streams = {sample.tool if isinstance(sample, MarkerSample) else 0 for sample in samples}
+    if slow and (1 - RATE_TOLERANCE) * len(samples) / len(streams) > len(captures):
+        problem = UNDATED
     seen = {"rate_Hz": float(rate_Hz), "latency_ms": latency_ms, "noise": noise, "range": extent, "problem": problem}
     return about.model_copy(update=seen)
 

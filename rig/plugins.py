@@ -67,12 +67,12 @@ def _expected(item: object, what: str) -> str:
     return f"is {item!r}, where {what} is expected"
 
 
-def lacking(device: object, protocol: type) -> list[str]:
-    """Members of ``protocol`` that ``device`` does not have; of a class only methods: it may set the others later."""
+def lacking(device: object, protocol: type, whole: bool = True) -> list[str]:
+    """Members of ``protocol`` that ``device`` lacks; of a class, or unless ``whole``, methods only: others come later."""
     kinds = [kind for kind in protocol.__mro__ if vars(kind).get("_is_protocol")]
     members = {name: of for kind in kinds for name, of in (inspect.get_annotations(kind) | vars(kind)).items()}
     wanted = {name: inspect.isfunction(of) for name, of in members.items() if not name.startswith("_")}
-    made = not inspect.isclass(device)
+    made = whole and not inspect.isclass(device)
     return sorted(name for name, called in wanted.items() if (called or made) and not _has(device, name, called))
 
 

@@ -15,10 +15,10 @@ NO_REFERENCE = "it has no reference: it restarted, or was not homed; recovery ho
 Said = Callable[[str, DeviceStatus], None]
 
 
-def of_stream(health: StreamHealth, lost: str, now_ns: int) -> Observation:
-    """What a sensor's stream shows."""
+def of_stream(health: StreamHealth, lost: str, now_ns: int, trouble: str = "") -> Observation:
+    """What a sensor's stream shows, or the ``trouble`` that its driver has with it."""
     age_ns = health.age_ns(now_ns)
-    imperfect = ""
+    imperfect = trouble
     if not health.valid:
         imperfect = "it marks its samples as invalid"
     elif not health.bits(now_ns) & ON_RATE:

@@ -33,9 +33,13 @@ BLOCKED_POLLS, AMONG_POLLS = 3, 100
 BEYOND_RANGE = 2.0
 # The largest volume of a camera, and far beyond any axis.
 FARTHEST_MM = 10_000.0
-# A second of a fast sensor. In bunches of three that are dated by their arrival two of three have the time of the one
-# before; a busy computer makes a few alike.
-ALIKE_AMONG, ALIKE_LARGEST = 1000, 0.6
+# Of the first fifty samples, as a mean rate takes: 2.5 s of a slow tracker, less than an approach. In bunches of three
+# that are dated by their arrival two of three have the time of the one before; a busy computer makes a few alike.
+ALIKE_AMONG, ALIKE_LARGEST = 50, 0.6
+UNDATED = (
+    "most of its samples have the time of the one before: date samples by their numbers (rig.timing.ClockMap), not by"
+    " arrival"
+)
 # The loop is given up by its operators after a second without a cycle; who is at fault has to be named before that.
 CYCLIC_S = 0.5
 START_S = 30.0  # half of what the loop has for its start, homing included
@@ -67,10 +71,14 @@ class Guarded(ABC, Generic[Made, Sample]):
     ) -> None:
         self._plugin, self._config, self._now, self._waits = plugin, config, now, waits
         self._device = self._asked(make)
-        self._last_ns: dict[int, int] = {}
-        self._alike: dict[int, float] = {}
+        self._last_ns: dict[int, tuple[int, int]] = {}
+        self._alike: dict[int, list[bool]] = {}
+        self._concern = ""
         self._blocked = deque[bool](maxlen=AMONG_POLLS)
-        if absent := lacking(self._device, self.ROLE):
+        self._refuse_lacking(whole=False)
+
+    def _refuse_lacking(self, whole: bool) -> None:
+        if absent := lacking(self._device, self.ROLE, whole):
             self.close()
             raise self._error(f"its driver has no {', no '.join(absent)}")
 
@@ -101,6 +109,7 @@ class Guarded(ABC, Generic[Made, Sample]):
     def start(self) -> None:
         with within(START_S):
             self._asked(self._device.start)
+        self._refuse_lacking(whole=True)
         self._refuse_rate()
 
     def _refuse_rate(self) -> None:
@@ -124,7 +133,10 @@ class Guarded(ABC, Generic[Made, Sample]):
         begun_ns, waits = self._now(), self._waits()
         samples = self._soon(lambda: poll(now_ns))
         self._note_wait(self._now() - begun_ns, self._waits() - waits)
-        return self._asked(lambda: self._checked(samples))
+        checked = self._asked(lambda: self._checked(samples))
+        if self._concern:
+            self.counters.trouble = self.counters.trouble or self._concern
+        return checked
 
     def _checked(self, samples: Sequence[Sample]) -> Sequence[Sample]:
         wrong = next(filter(None, map(self._wrong, samples)), "")
@@ -145,25 +157,25 @@ class Guarded(ABC, Generic[Made, Sample]):
         if not isinstance(sample, self.KIND):
             return f"it gives {sample!r}, where a {self.KIND.__name__} is expected"
         stream = sample.tool if isinstance(sample, MarkerSample) else 0
-        back_ns = self._last_ns.get(stream, sample.capture_ns) - sample.capture_ns
+        last_ns, came_ns = self._last_ns.get(stream, (sample.capture_ns, -1))
+        back_ns = last_ns - sample.capture_ns
         if back_ns > 0:
             return f"its times run back by {back_ns * 1e-6:.3f} ms at sample {sample.seq}"
         if sample.capture_ns > sample.arrival_ns:
             return (
                 f"sample {sample.seq} was taken {(sample.capture_ns - sample.arrival_ns) * 1e-6:.3f} ms after it came"
             )
-        if self._clockless(stream, sample.capture_ns):
-            return (
-                "most of its samples have the time of the one before: a stream without a clock is dated by its numbers"
-            )
-        self._last_ns[stream] = sample.capture_ns
+        self._judge_dates(stream, (back_ns, sample.arrival_ns) == (0, came_ns))
+        self._last_ns[stream] = sample.capture_ns, sample.arrival_ns
         return self._impossible(sample) if sample.valid else ""
 
-    def _clockless(self, stream: int, capture_ns: int) -> bool:
-        """Whether most of what it gave lately was dated by its arrival; what has no rate may come together."""
-        before = self._alike.get(stream, 0.0)
-        self._alike[stream] = before + (float(self._last_ns.get(stream) == capture_ns) - before) / ALIKE_AMONG
-        return self._alike[stream] > ALIKE_LARGEST and self.period_ns > 0
+    def _judge_dates(self, stream: int, alike: bool) -> None:
+        """Once, and nothing is lost by it. What comes one by one with one time has a coarse clock, and a true one."""
+        looked = self._alike.setdefault(stream, [])
+        if len(looked) < ALIKE_AMONG:
+            looked.append(alike)
+            if sum(looked) > ALIKE_LARGEST * ALIKE_AMONG and self.period_ns > 0:  # what has no rate may come together
+                self._concern = UNDATED
 
     @abstractmethod
     def _impossible(self, sample: Sample) -> str:
@@ -237,7 +249,7 @@ class GuardedInput(Guarded[Input, InputSample]):
         return self._asked(lambda: self._checked(self._device.poll(now_ns)))
 
     def concern(self) -> str:
-        return self._asked(self._device.concern)
+        return self._asked(self._device.concern) or self._concern
 
     def _impossible(self, sample: InputSample) -> str:  # noqa: ARG002 - nothing is known of what it measures
         return ""

@@ -48,11 +48,14 @@ def attend(loop: "BenchLoop", now_ns: int) -> None:
 def observed(loop: "BenchLoop", now_ns: int) -> dict[str, Observation]:
     """What is seen of each device now."""
     devices, inputs = loop.devices, loop.inputs
+    force, tracker = devices.force, devices.tracker
     seen = {
-        "force": of_stream(loop.health["force"], inputs.force_lost, now_ns),
+        "force": of_stream(loop.health["force"], inputs.force_lost, now_ns, force.counters.trouble),
         "axis": of_axis(loop.health["axis"], inputs.axis_lost, devices.axis, now_ns),
     }
-    return seen | ({"tracker": of_stream(loop.health["marker"], inputs.marker_lost, now_ns)} if devices.tracker else {})
+    if tracker:
+        seen["tracker"] = of_stream(loop.health["marker"], inputs.marker_lost, now_ns, tracker.counters.trouble)
+    return seen
 
 
 def _seek(loop: "BenchLoop", role: str, now_ns: int) -> None:

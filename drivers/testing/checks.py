@@ -268,7 +268,7 @@ def closing(subject: UnderTest) -> None:
     """Closing may be done twice, leaves neither thread nor descriptor behind, and nothing can be polled after it."""
     descriptors, threads = _descriptors(), set(threading.enumerate())
     device = subject.made()
-    device.start()
+    subject.start(device)
     subject.listen(device, FEW_S)
     for _ in range(2):
         _silently(device.close)

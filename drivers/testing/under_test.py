@@ -83,23 +83,31 @@ class UnderTest:
         kinds = [pair for pair in KEPT if isinstance(self.config, pair[0])]
         if not kinds:
             raise Nonconformity(f"its configuration is {self.config!r}, where the table of a product is expected")
-        ((kind, role),) = kinds
-        if wrong := refusal_of(kind)(type(self.config)):
+        if wrong := refusal_of(kinds[0][0])(type(self.config)):
             raise Nonconformity(f"its declaration cannot be used: {wrong}")
         device = self.open()
-        if absent := lacking(device, role):
+        self._refuse_lacking(device, whole=False)
+        return device
+
+    def start(self, device: AnyDevice, next_seq: int = 0) -> None:
+        """Starts it; raises Nonconformity where it then lacks a member of its role."""
+        device.next_seq = next_seq
+        device.start()
+        self._refuse_lacking(device, whole=True)
+
+    def _refuse_lacking(self, device: AnyDevice, whole: bool) -> None:
+        role = next(role for kind, role in KEPT if isinstance(self.config, kind))
+        if absent := lacking(device, role, whole):
             with contextlib.suppress(Exception):
                 device.close()
             raise Nonconformity(f"its driver has no {', no '.join(absent)}, which {role.__name__} has")
-        return device
 
     @contextlib.contextmanager
     def started(self, next_seq: int = 0) -> Iterator[AnyDevice]:
         """A driver that runs, its samples numbered from ``next_seq``."""
         device = self.made()
         try:
-            device.next_seq = next_seq
-            device.start()
+            self.start(device, next_seq)
             yield device
         finally:
             device.close()
@@ -137,8 +145,7 @@ class UnderTest:
                 why = device
                 continue
             try:
-                device.next_seq = next_seq
-                device.start()
+                self.start(device, next_seq)
                 return device
             except DeviceError as error:
                 device.close()

@@ -36,6 +36,14 @@ def test_noise_is_that_of_the_channel_along_the_tip(channel: int) -> None:
     assert said.problem == ""
 
 
+@pytest.mark.parametrize("of", [2, 3, 10])
+def test_samples_of_one_time_are_said_to_be_so_and_not_to_be_few(of: int) -> None:
+    """In bunches that are dated by their arrival, or by a clock of 2, 3 or 10 ms."""
+    bunched = [one._replace(capture_ns=one.seq // of * of * 1_000_000) for one in samples((0.1, 0.1, 0.1))]
+    said = doctor._finding("force", WHO, 1000.0, bunched, 0)
+    assert "date samples by their numbers (rig.timing.ClockMap), not by arrival" in said.problem
+
+
 class Slow:
     """A sensor of 1 kHz; every second sample is lost in the first looks at it."""
 

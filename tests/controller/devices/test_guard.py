@@ -19,9 +19,10 @@ from controller.devices.guard import (
     GuardedInput,
     GuardedTracker,
 )
+from controller.devices.states import DeviceState
 from controller.inputs.runner import open_input
 from controller.loop.modes import Mode
-from drivers.roles import Device
+from drivers.roles import Device, Identity, LinkCounters
 from mock_devices.testing.clock import Clock
 from rig import plugins
 from rig.channels import AxisSample, ForceSample, MarkerSample
@@ -36,6 +37,7 @@ from tests.controller.fake_bench import FakeBench, wired
 from tests.controller.fake_devices import FakeAxis, FakeDevice
 
 PLUGIN = Plugin("tissue_rig.force", "x", "acme-rig", "2.1", "acme-one")
+WHO = Identity("acme-one", "7", "1.0")
 FORCE = ForceSample(0, 900, 1000, 0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 20.0, 0, 1)
 MARKER = MarkerSample(0, 900, 1000, 0, 0, 1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0, 0.1, 1)
 AXIS = AxisSample(0, 900, 1000, 1.0, 0.0, 0.0, 0, 1)
@@ -85,29 +87,63 @@ def test_what_is_wrong_is_an_error_that_names_the_plug_in(given: Sequence[object
         force(given).poll(1000)
 
 
-def bunches(of: int) -> list[list[ForceSample]]:
-    """Ten seconds at 1 kHz that come ``of`` at a time, dated by their arrival."""
-    numbers = range(0, 10_000, of)
-    return [
-        [FORCE._replace(seq=at + k, capture_ns=at * 10**6, arrival_ns=at * 10**6) for k in range(of)] for at in numbers
-    ]
+def stream(of: int, tick_ms: int, Hz: int = 1000) -> Iterator[list[ForceSample]]:
+    """3000 samples that arrive ``of`` at a time, dated by the tick of ``tick_ms`` before; 0: by arrival."""
+    for at in range(0, 3000, of):
+        came_ns = 10**9 + at * 10**9 // Hz
+        taken_ns = came_ns // (tick_ms * 10**6) * (tick_ms * 10**6) if tick_ms else came_ns
+        yield [FORCE._replace(seq=at + k, capture_ns=taken_ns, arrival_ns=came_ns) for k in range(of)]
 
 
-def test_a_stream_without_a_clock_is_named() -> None:
-    given = iter(bunches(10))
-    guarded = force(lambda: next(given))
-    with pytest.raises(DeviceError, match="most of its samples have the time of the one before: a stream without a"):
-        for _ in range(200):
-            guarded.poll(0)
+@pytest.mark.parametrize(
+    ("of", "tick_ms", "Hz", "told"),
+    [(2, 0, 1000, False), (3, 0, 1000, True), (10, 0, 1000, True), (3, 0, 100, True), (3, 0, 20, True),
+     (1, 10, 1000, False)],
+    ids=["two", "three", "ten", "three at 100 Hz", "three at 20 Hz", "true but coarse"],
+)  # fmt: skip
+def test_a_stream_that_is_dated_by_its_arrival_is_told_of_at_the_start_and_never_lost(
+    of: int, tick_ms: int, Hz: int, told: bool
+) -> None:
+    """A true clock of coarse ticks dates nothing by its arrival; half of all may have the time of the one before."""
+    given = stream(of, tick_ms, Hz)
+    device = Given(lambda: next(given, []))
+    guarded = GuardedForce(PLUGIN, BotaWiring(), lambda: device)
+    for _ in range(51 // of + 1):
+        guarded.poll(0)
+    said = "date samples by their numbers (rig.timing.ClockMap), not by arrival" in guarded.counters.trouble
+    assert said is told
+    at_start = guarded.counters.trouble
+    while guarded.poll(0):
+        assert guarded.counters.trouble == at_start
 
 
-def test_a_few_samples_of_one_time_and_keys_that_are_pressed_together_are_none() -> None:
-    given = iter(bunches(2))
-    guarded = force(lambda: next(given))
-    assert sum(len(guarded.poll(0)) for _ in range(5000)) == 10_000
+def test_a_stream_that_is_bunched_later_is_not_judged_anew() -> None:
+    given = iter(
+        [[one] for [one] in stream(1, 0, 1)][:60] + [[FORCE._replace(capture_ns=10**12, arrival_ns=10**12)] * 999]
+    )
+    guarded = force(lambda: next(given, []))
+    while guarded.poll(0):
+        assert guarded.counters.trouble == ""
+
+
+@pytest.mark.usefixtures("declared")
+def test_with_a_stream_that_is_dated_by_its_arrival_nothing_starts() -> None:
+    bench = FakeBench(wired())
+    bench.force.counters.trouble = guard.UNDATED
+    bench.until(lambda: bench.loop.connections.statuses["force"].state is DeviceState.DEGRADED, within_s=3.0)
+    assert "date samples by their numbers" in bench.loop.connections.refusal()
+    assert not bench.latched
+
+
+def test_keys_that_are_pressed_together_are_no_stream() -> None:
     together = Given([INPUT] * 2000)
+    guarded = GuardedInput(PLUGIN, EvdevSwitch(), lambda: together)  # type: ignore[arg-type,return-value]
+    guarded.poll(1000)
+    assert "date samples" in guarded.concern()
     together.period_ns = 0
-    GuardedInput(PLUGIN, EvdevSwitch(), lambda: together).poll(1000)  # type: ignore[arg-type,return-value]
+    guarded = GuardedInput(PLUGIN, EvdevSwitch(), lambda: together)  # type: ignore[arg-type,return-value]
+    guarded.poll(1000)
+    assert guarded.concern() == ""
 
 
 def without(name: str) -> Given:
@@ -118,12 +154,48 @@ def without(name: str) -> Given:
     return made  # type: ignore[no-any-return]
 
 
-@pytest.mark.parametrize("name", ["close", "poll", "fileno", "counters", "period_ns"])
-def test_a_driver_that_lacks_a_member_is_refused_when_it_is_made(name: str) -> None:
+@pytest.mark.parametrize("name", ["close", "poll", "fileno"])
+def test_a_driver_that_lacks_a_method_is_refused_when_it_is_made(name: str) -> None:
     lacking = without(name)
     with pytest.raises(DeviceError, match=f"acme-one, a plug-in of acme-rig 2.1: its driver has no {name}; see"):
         GuardedForce(PLUGIN, BotaWiring(), lambda: lacking)
     assert lacking.closed is (name != "close")
+
+
+class Late:
+    """A tracker that knows nothing of itself before its start, and one thing not even then."""
+
+    closed = False
+
+    def __init__(self, never: str) -> None:
+        self.never = never
+
+    def start(self) -> None:
+        known = {"counters": LinkCounters(), "next_seq": 0, "identity": WHO, "period_ns": 16_666_667, "tools": ("tip",)}
+        vars(self).update({name: one for name, one in known.items() if name != self.never})
+
+    def fileno(self) -> int:
+        return 0
+
+    def poll(self, now_ns: int) -> Sequence[MarkerSample]:
+        return []
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.mark.parametrize("never", ["", "counters", "identity", "period_ns", "tools"])
+def test_what_a_driver_knows_only_after_its_start_is_demanded_then(never: str) -> None:
+    """As `drivers/roles.py` says of its identity."""
+    device = Late(never)
+    guarded = GuardedTracker(PLUGIN, PolarisWiring(), lambda: device)  # type: ignore[arg-type,return-value]
+    if not never:
+        guarded.start()
+        assert (guarded.identity, guarded.tools) == (WHO, ("tip",))
+        return
+    with pytest.raises(DeviceError, match=f"acme-one, a plug-in of acme-rig 2.1: its driver has no {never}; see"):
+        guarded.start()
+    assert device.closed
 
 
 def test_members_are_looked_for_and_not_asked() -> None:

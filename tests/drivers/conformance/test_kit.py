@@ -82,6 +82,20 @@ def test_a_member_that_is_missing_is_named_by_whichever_check_comes_first(
         check(subject)
 
 
+def test_a_driver_may_know_its_period_and_its_counters_after_its_start_only() -> None:
+    class Late(MadeSensor):
+        def __init__(self, world: World) -> None:
+            super().__init__(world)
+            self.later = {name: vars(self).pop(name) for name in ("period_ns", "counters")}
+
+        def start(self) -> None:
+            vars(self).update(self.later)
+            super().start()
+
+    world = World()
+    checks.rate(replace(world.subject(), open=lambda: Late(world)))
+
+
 def test_a_declaration_that_the_bench_would_refuse_is_refused_here() -> None:
     class Rangeless(ForceProduct):
         driver, advice = MadeProduct.driver, MadeProduct.advice
