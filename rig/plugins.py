@@ -68,7 +68,7 @@ def _expected(item: object, what: str) -> str:
 
 
 def lacking(device: object, protocol: type, whole: bool = True) -> list[str]:
-    """Members of ``protocol`` that ``device`` lacks; of a class, or unless ``whole``, methods only: others come later."""
+    """Members of ``protocol`` that ``device`` lacks; methods only of a class or unless ``whole``: others come later."""
     kinds = [kind for kind in protocol.__mro__ if vars(kind).get("_is_protocol")]
     members = {name: of for kind in kinds for name, of in (inspect.get_annotations(kind) | vars(kind)).items()}
     wanted = {name: inspect.isfunction(of) for name, of in members.items() if not name.startswith("_")}

@@ -9,6 +9,7 @@ from api.cli.mock_bench import bench_for
 from api.cli.mock_calibration import NEAR_MM, block_laid
 from api.cli.output import show
 from api.operations.calibrate import AxisAsked, AxisTravel, GaugeBlock, axis_by_block, axis_by_tracker, refuse_axis
+from controller.commissioning.refusals import refuse_unstated_scale
 from controller.operation import Operation
 from mock_devices.control import BenchControl
 from rig.config.calibration import AxisCalibration
@@ -24,6 +25,7 @@ def calibrate_axis(wiring: Wiring, asked: AxisAsked, person: Person) -> AxisCali
     refuse_axis(asked, wiring)
     mock = wiring.axis.port == MOCK_PORT
     if not mock:
+        refuse_unstated_scale(wiring)
         asked = _confirmed(asked, person)
         refuse_axis(asked, wiring)
         show("the axis homes and moves now")

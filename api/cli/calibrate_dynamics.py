@@ -6,6 +6,7 @@ from api.cli.mock_bench import bench_for
 from api.cli.mock_calibration import in_the_air
 from api.cli.output import show
 from api.operations.calibrate_dynamics import axis_dynamics, sweep_asked, sweep_way
+from controller.commissioning.refusals import refuse_unstated_scale
 from controller.operation import Operation
 from mock_devices.control import BenchControl
 from rig.config.axis_dynamics import AxisDynamics
@@ -18,6 +19,7 @@ def calibrate_dynamics(wiring: Wiring, from_mm: float, clear: bool, person: Pers
     """The dynamics, and what they say on the terminal; raises CheckFailed with what is wrong."""
     sweep = sweep_asked(wiring, from_mm)
     if wiring.axis.port != MOCK_PORT:
+        refuse_unstated_scale(wiring)
         if not clear:
             person.refuse_unless_clear(sweep_way(sweep, from_mm))
         show("the axis homes and moves now")

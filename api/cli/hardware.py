@@ -12,6 +12,7 @@ from api.cli.options import ConfigOption, JsonOption, SetOption, wiring_from
 from api.cli.output import show, write_json
 from api.operations import doctor as work
 from controller.claims import holder
+from mock_devices.parameters import load_parameters
 from rig.config.endpoints import Endpoints
 from rig.config.products.registry import ROLES
 from rig.config.products.roles import AxisProduct
@@ -33,18 +34,17 @@ def mock(
 
     Example: rig mock --json --hide friction.level_N=0.2
     """
-    with bench_process(wiring_from(config, overrides), tuple(hide or ()), seed, every_product=True) as (
-        process,
-        endpoints,
-    ):
-        sys.stdout.write(endpoints.model_dump_json() + "\n" if as_json else _lines(endpoints))
+    wiring = wiring_from(config, overrides)
+    scale = load_parameters(wiring.mock.parameters).axis.increments_per_mm
+    with bench_process(wiring, tuple(hide or ()), seed, every_product=True) as (process, endpoints):
+        sys.stdout.write(endpoints.model_dump_json() + "\n" if as_json else _lines(endpoints, scale))
         sys.stdout.flush()
         with contextlib.suppress(KeyboardInterrupt):
             process.wait()
 
 
-def _lines(endpoints: Endpoints) -> str:
-    """Endpoints for a person, as the lines of a wiring file."""
+def _lines(endpoints: Endpoints, scale: float) -> str:
+    """Endpoints for a person, as the lines of a wiring file; ``scale`` [1/mm] is the carriage's, and has its sign."""
     lines = ["# the mock bench is ready; Ctrl-C ends it"]
     for role, products in ROLES.items():
         for name, product in products.items():
@@ -52,7 +52,10 @@ def _lines(endpoints: Endpoints) -> str:
                 continue
             lines.append(f'{role}.port = "{product.mock.address(endpoints)}"            # {name}')
             if issubclass(product, AxisProduct):
-                lines.append(f"{role}.increments_per_mm = {product().increments_per_mm:g}            # {name}")
+                per_mm = abs(scale) if product().scale_unstated else product().increments_per_mm
+                lines.append(f"{role}.increments_per_mm = {per_mm:g}            # {name}")
+                if scale < 0:
+                    lines.append(f"{role}.direction = -1            # {name}")
             if product.mock.role in endpoints.latency_ms:
                 lines.append(f"{role}.latency_ms = {endpoints.latency_ms[product.mock.role]:g}            # {name}")
     return "\n".join([*lines, f"# control channel: {endpoints.control}", ""])

@@ -68,8 +68,9 @@ def bench_for(
     none is calibrated. A service only looks and retracts at first: it starts whatever they say (``refuses`` false), and
     the loop refuses the approach.
     """
-    refuse_unstated_scale(wiring)
-    wiring = calibrated(wiring) if approaches else wiring
+    if approaches:
+        refuse_unstated_scale(wiring)
+        wiring = calibrated(wiring)
     if approaches and refuses:
         refuse_uncalibrated(wiring, datetime.now(UTC))
     if not wiring.uses_mock:

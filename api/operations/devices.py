@@ -1,6 +1,8 @@
 """What this installation knows: products with their options, and plug-ins with what is wrong with them."""
 
+import contextlib
 import inspect
+from collections.abc import Callable
 from functools import cache
 from pkgutil import resolve_name
 from typing import get_type_hints
@@ -79,6 +81,15 @@ def _plugin(plugin: plugins.Plugin) -> PluginListed:
     )
 
 
+def _promised(driver: Callable[..., object]) -> type | None:
+    """The class it says it returns; None where that is a base of others, or cannot be told, which harms no driver."""
+    with contextlib.suppress(Exception):
+        made = get_type_hints(driver).get("return")
+        if inspect.isclass(made) and not inspect.isabstract(made) and not getattr(made, "_is_protocol", False):
+            return made
+    return None
+
+
 @cache
 def _unusable(role: str, product: type[Product]) -> str:
     """What its driver and its mock's maker lack, as far as that shows before a device is opened; empty if nothing."""
@@ -86,10 +97,10 @@ def _unusable(role: str, product: type[Product]) -> str:
         with within(plugins.IMPORT_S):
             driver = resolve_name(product.driver)
             maker = resolve_name(product.mock.maker) if product.mock else devices
-            made = driver if inspect.isclass(driver) else get_type_hints(driver).get("return")
+            made = driver if inspect.isclass(driver) else _promised(driver)
     except (Exception, SystemExit) as error:  # whatever a plug-in does while it is imported is its own failure
         return f"{type(error).__name__}: {error}"
-    absent = lacking(made, KEPT[role]) if inspect.isclass(made) else []
+    absent = lacking(made, KEPT[role]) if made else []
     no_calls = [name for name, one in ((product.driver, driver), ("its mock's maker", maker)) if not callable(one)]
     return "; ".join(
         [*(f"its driver has no {name}" for name in absent), *(f"{name} is no function" for name in no_calls)]

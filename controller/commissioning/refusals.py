@@ -44,12 +44,13 @@ def refuse_uncalibrated(wiring: Wiring, now: datetime) -> None:
 
 
 def refuse_unstated_scale(wiring: Wiring) -> None:
-    """Raises UsageError where a real axis would go by a scale that nobody stated; one of 0 the drive itself says."""
+    """Raises UsageError where a real axis would go by a scale that nobody stated, neither person, product nor drive."""
     axis = wiring.axis
-    if axis.port != MOCK_PORT and axis.increments_per_mm and "increments_per_mm" not in axis.model_fields_set:
+    if axis.port != MOCK_PORT and axis.scale_unstated:
         raise UsageError(
             f"axis.increments_per_mm is not stated for the {axis.product} at {axis.port}: give the increments of 1 mm"
-            " of the tip, encoder, gear and screw included, then check it with `rig calibrate axis`"
+            " of the tip, encoder, gear and screw included, then check it with `rig calibrate axis`; what was used so"
+            f" far is `axis.increments_per_mm = {axis.increments_per_mm:g}`"
         )
 
 

@@ -22,8 +22,8 @@ from rig.config.products.evdev_switch import EvdevSwitch
 from rig.config.products.inputs import INPUTS
 from rig.config.products.lsl_stream import LslStream
 from rig.config.products.registry import AXES, FORCE_SENSORS, TRACKERS, name_of
-from rig.config.products.roles import Product
-from rig.config.wiring import Limits
+from rig.config.products.roles import AxisProduct, Product
+from rig.config.wiring import Limits, Wiring
 from rig.config.words import toml
 from rig.errors import RigError
 from rig.plugins import declaring
@@ -113,7 +113,7 @@ def buses(system: Path = SYSTEM) -> list[PortFound]:
 
 def _bus(interface: str, port: str, numbers: tuple[int, int] | None = None) -> PortFound:
     usb, kind = ("{:04x}:{:04x}".format(*numbers), ADAPTERS[numbers]) if numbers else ("", "CAN bus of Linux")
-    lines = f'[axis]\ninterface = "{interface}"\nport = {toml(port)}\n'
+    lines = f'[axis]\ninterface = "{interface}"\nport = {toml(port)}\n{_scale(Wiring().axis)}'
     return PortFound(address=port, usb=usb, kind=kind, asked=False, role="axis", lines=lines)
 
 
@@ -138,7 +138,12 @@ def _listed(product: type[Product], address: str, kind: str) -> PortFound:
 def lines_of(role: str, product: type[Product], address: str) -> str:
     """For `rig.toml`; of an input with a name that a person may change."""
     table = f"{role}.{product.mock.role if product.mock else 'one'}" if role == "input" else role
-    return f'[{table}]\nproduct = "{name_of(product)}"\nport = {toml(address)}\n'
+    return f'[{table}]\nproduct = "{name_of(product)}"\nport = {toml(address)}\n{_scale(product())}'
+
+
+def _scale(config: Product) -> str:
+    unstated = isinstance(config, AxisProduct) and config.scale_unstated
+    return "# increments_per_mm = ...  (of your screw and gear)\n" if unstated else ""
 
 
 def named(address: str) -> PortFound:

@@ -99,8 +99,9 @@ class SheetKind:
             },
         )
 
-    def agree(self, node: Node) -> None:
+    def agree(self, node: Node) -> str:  # noqa: ARG002 - the signature of a kind
         """Its factors were compared when it was identified."""
+        return ""
 
     def _check_identity(self, node: Node, vendor: int, product: int) -> None:
         said = (self._sheet.vendor or vendor, self._sheet.product or product)

@@ -119,7 +119,8 @@ class Epos4Axis(SampledDevice):
         try:
             node.order(NmtCommand.ENTER_PRE_OPERATIONAL)
             self._identity = self._kind.identify(node)
-            self._kind.agree(node)
+            if unsaid := self._kind.agree(node):
+                self._identity.settings["scale"] = unsaid
             self._walker = walker
             walker.standstill = self._kind.standstill
             walker.make_safe()

@@ -7,7 +7,7 @@ from drivers.epos4 import objects, setup
 from drivers.epos4.bringup import identify, reread
 from drivers.epos4.cia402 import Statusword
 from drivers.epos4.codec import DriveMotion, Units, decode_motion_pdo
-from drivers.epos4.node import Node
+from drivers.epos4.node import Node, NoObject
 from drivers.epos4.objects import Entry
 from drivers.epos4.walker import STANDSTILL_RPM
 from drivers.roles import Identity
@@ -36,8 +36,8 @@ class DriveKind(Protocol):
     def identify(self, node: Node) -> Identity:
         """Who the node says it is; raises DeviceError where it is another or lacks what is needed."""
 
-    def agree(self, node: Node) -> None:
-        """Raises DeviceError where what ``start`` alone compares is another than configured."""
+    def agree(self, node: Node) -> str:
+        """What of the scale cannot be compared, in words; raises DeviceError where it is another than configured."""
 
     def writes(self, limits: Limits) -> list[tuple[Entry, int]]:
         """Limits, stops, heartbeats and PDOs, in their order."""
@@ -58,15 +58,19 @@ class Epos4Kind:
         self.scale = Units(config.increments_per_mm, config.increments_per_rev, config.direction)
         self.turn_mm = config.increments_per_rev / config.increments_per_mm
 
-    def agree(self, node: Node) -> None:
+    def agree(self, node: Node) -> str:
         """Its increments a turn are those that speeds are computed with, or every speed would be another."""
         stated = self._config.increments_per_rev
-        counted = reread(partial(node.read, objects.SENSOR_RESOLUTION), lambda value: value == stated)
+        try:
+            counted = reread(partial(node.read, objects.SENSOR_RESOLUTION), lambda value: value == stated)
+        except NoObject:  # older firmware, which went by what is stated before it was asked
+            return f"speeds by axis.increments_per_rev {stated:g}: its firmware has no object 3000:05 to compare"
         if counted != stated:
             raise DeviceError(
                 f"{node.name}: counts {counted} increments a turn (object 3000:05) where axis.increments_per_rev says"
                 f" {stated:g}: give what its encoder has, four times its lines, or set up the drive"
             )
+        return ""
 
     def writes(self, limits: Limits) -> list[tuple[Entry, int]]:
         """Limits, stops, heartbeats and PDOs, in their order."""

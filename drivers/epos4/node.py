@@ -26,6 +26,7 @@ SDO_TIMEOUT_S = 1.0  # a drive answers within milliseconds, a busy computer stal
 BOOT_TIMEOUT_S = 3.0  # three times an answer: a node that boots and one that is absent look the same until then
 REPEAT_S = 0.2
 TRIES = 3
+NO_OBJECT = (0x06020000, 0x06090011)  # CiA 301: neither the object, nor the sub-index
 Handler = Callable[[bytes, int], None]
 
 
@@ -125,7 +126,8 @@ class Node:
     def _outcome(self, transfer: Transfer, what: str, timeout_s: float, tries: int) -> bytes:
         if transfer.abort is not None:
             reason = ABORT_TEXTS.get(transfer.abort, "no text for this code")
-            raise DeviceError(f"{self.name}: refused {what}: {transfer.abort:08X} {reason}")
+            failure = NoObject if transfer.abort in NO_OBJECT else DeviceError
+            raise failure(f"{self.name}: refused {what}: {transfer.abort:08X} {reason}")
         if not transfer.done:
             raise NoAnswer(
                 f"{self.name}: does not answer: {what} took longer than {timeout_s:g} s, tries: {tries}; "
@@ -150,6 +152,10 @@ class Node:
         self.restarted |= state is NmtState.BOOT_UP
         self.state = state
         self.heard_ns = now_ns
+
+
+class NoObject(DeviceError):
+    """The node has no such object."""
 
 
 class NoAnswer(DeviceError):

@@ -3,8 +3,10 @@
 import contextlib
 import json
 import sys
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import cast
 
 import pytest
 from typer.testing import CliRunner
@@ -14,6 +16,7 @@ from api.cli.app import build
 from api.cli.asking import Person
 from api.cli.calibrate import say_use
 from api.cli.calibrate_axis import calibrate_axis
+from api.cli.calibrate_dynamics import calibrate_dynamics
 from api.cli.mock_bench import bench_for, plug_into
 from api.cli.mock_calibration import done_by_mock, force_file
 from api.cli.options import built_in, calibrated, wiring_from
@@ -24,6 +27,8 @@ from controller.commissioning.refusals import refuse_unstated_scale
 from rig.config.calibration import Calibration, Uncertainty
 from rig.config.calibration_files import read_force, text_of
 from rig.config.endpoints import Endpoints
+from rig.config.products.roles import AxisProduct
+from rig.config.wiring import Wiring
 from rig.errors import CheckFailed, DeviceError, UsageError
 from tests.calibrations import axis_calibration, force_calibration
 
@@ -305,18 +310,47 @@ def test_whoever_only_looks_or_retracts_needs_no_calibration(monkeypatch: pytest
         assert live == real
 
 
-@pytest.mark.parametrize("approaches", [True, False])
 def test_a_real_axis_whose_scale_nobody_stated_is_refused_before_a_bench_starts(
-    approaches: bool, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The usual scale of another screw would move the tip, and write its limits, by another length than it says."""
     monkeypatch.setattr("api.cli.mock_bench.bench_process", lambda *_: pytest.fail("a bench was started"))
     for product in ("maxon-epos4", "zaber-ascii"):
         with (
             pytest.raises(UsageError, match=rf"axis.increments_per_mm is not stated for the {product} at /dev/ttyACM0"),
-            bench_for(built_in([f"axis.product={product}", "axis.port=/dev/ttyACM0"]), approaches=approaches),
+            bench_for(built_in([f"axis.product={product}", "axis.port=/dev/ttyACM0"])),
         ):
             pass
+
+
+def test_whoever_recovers_is_not_refused_for_a_scale_that_is_not_stated() -> None:
+    """The screw may have the 2000 that were used so far, and the tip must come out before a file is edited."""
+    real = built_in([*(f"{role}.port=/dev/{role}" for role in ("force", "axis", "tracker"))])
+    with bench_for(real, approaches=False) as (live, _):
+        assert live == real
+    with (
+        pytest.raises(UsageError, match=r"used so far is `axis.increments_per_mm = 2000`"),
+        bench_for(real, refuses=False),
+    ):
+        pass
+
+
+@pytest.mark.parametrize("moves", [
+    lambda wiring: calibrate_axis(wiring, AxisAsked(1.0, 11.0, True, True, None, None), cast(Person, None)),
+    lambda wiring: calibrate_dynamics(wiring, 1.0, True, cast(Person, None)),
+])  # fmt: skip
+def test_an_axis_is_not_moved_for_its_own_calibration_by_a_scale_that_is_not_stated(
+    moves: Callable[[Wiring], object],
+) -> None:
+    with pytest.raises(UsageError, match=r"axis.increments_per_mm is not stated"):
+        moves(built_in(["axis.port=/dev/a", "tracker.port=/dev/b", "force.port=/dev/c"]))
+
+
+def test_a_plug_in_s_own_scale_is_one() -> None:
+    class Speaks(AxisProduct):
+        increments_per_mm: float = 1.0
+
+    refuse_unstated_scale(Wiring.model_construct(axis=Speaks(port="/dev/a")))
 
 
 def test_a_scale_that_is_stated_or_said_by_the_drive_or_the_mock_bench_is_none_of_these() -> None:

@@ -8,7 +8,9 @@ import subprocess
 import sys
 import tomllib
 import tty
-from collections.abc import Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +20,21 @@ from serial.tools.list_ports_common import ListPortInfo
 from typer.testing import CliRunner
 
 from api.cli.app import build
+from api.cli.hardware import _lines
 from api.cli.mock_bench import at_endpoints
 from api.cli.options import built_in
 from api.http import app as service
 from api.http.service import Service
-from api.operations.devices import devices
+from api.operations.devices import _unusable, devices
 from controller.devices import finding
+from drivers.roles import Device
 from mock_devices.testing.access import client_of
 from mock_devices.testing.commands import RIG, ROOT, ServedBench, served_bench
 from rig import plugins
-from rig.config.products.registry import name_of
+from rig.channels import ForceSample
+from rig.config.endpoints import Endpoints
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.registry import AXES, ROLES, name_of
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, UsageError
 from rig.plugins import Plugin
@@ -212,6 +219,36 @@ def test_a_mock_that_lacks_what_a_mock_needs_is_named_and_harms_no_other(
     assert ('"force"' in served.stdout) is (code == 0)
 
 
+class Twelve:
+    """No driver."""
+
+
+class Base(ABC):
+    """Of a maker's drivers."""
+
+    @abstractmethod
+    def poll(self, now_ns: int) -> Sequence[ForceSample]: ...
+
+
+def unresolved(config: object) -> "OnlyForTypeCheckers": ...  # type: ignore[name-defined] # noqa: F821
+def of_a_role(config: object) -> Device: ...  # type: ignore[empty-body]
+def of_a_base(config: object) -> Base: ...  # type: ignore[empty-body]
+def hollow_one(config: object) -> Twelve: ...  # type: ignore[empty-body]
+
+
+bound = partial(of_a_role, None)
+
+
+@pytest.mark.parametrize(
+    ("driver", "said"),
+    [("unresolved", ""), ("of_a_role", ""), ("of_a_base", ""), ("bound", ""),
+     ("hollow_one", "; ".join(f"its driver has no {name}" for name in ("close", "fileno", "poll", "start")))],
+)  # fmt: skip
+def test_a_driver_is_listed_as_broken_only_where_what_it_returns_is_known(driver: str, said: str) -> None:
+    product = type("Given", (BotaWiring,), {"driver": f"{__name__}:{driver}", "mock": None})
+    assert _unusable("force", product) == said
+
+
 @pytest.fixture
 def line() -> Iterator[tuple[int, str]]:
     """A serial line with somebody else's device at its far end."""
@@ -365,6 +402,25 @@ def test_the_lines_of_a_bus_are_those_of_an_axis_and_nobody_writes_to_it(address
     assert list(finding.find([bus], lambda _: pytest.fail("asked"))) == [bus]
     table = {"product": "maxon-epos4", **tomllib.loads(bus.lines)["axis"]}
     assert Wiring.model_validate({"axis": table}).axis.port == address
+    assert bus.lines.endswith("# increments_per_mm = ...  (of your screw and gear)\n")
+
+
+@pytest.mark.parametrize(("scale", "direction"), [(1000.0, None), (-1000.0, -1)])
+def test_the_lines_of_a_mock_bench_have_the_scale_of_its_own_carriage(scale: float, direction: int | None) -> None:
+    mocks = [product.mock for products in ROLES.values() for product in products.values() if product.mock]
+    known = {"control": "c", "pid": 1, "serials": {}, "latency_ms": {}}
+    every = {mock.role: {one.kind: "/dev/a" for one in mocks if one.role == mock.role} for mock in mocks}
+    lines = _lines(Endpoints.model_validate(known | every), scale)
+    (said,) = [tomllib.loads(line) for line in lines.splitlines() if "increments" in line and "maxon-epos4" in line]
+    assert said == {"axis": {"increments_per_mm": 1000}}
+    assert ("axis.direction = -1" in lines) is (direction == -1)
+
+
+@pytest.mark.parametrize(("product", "asked"), [("maxon-epos4", True), ("zaber-ascii", True), ("cia402", False)])
+def test_the_lines_of_an_axis_say_that_a_scale_belongs_there(product: str, asked: bool) -> None:
+    lines = finding.lines_of("axis", AXES[product], "/dev/a")
+    assert lines.endswith("# increments_per_mm = ...  (of your screw and gear)\n") is asked
+    assert tomllib.loads(lines)["axis"] == {"product": product, "port": "/dev/a"}
 
 
 @pytest.mark.parametrize("installed", [True, False])
@@ -415,4 +471,4 @@ def test_each_product_that_can_be_played_is_found_at_its_port_and_no_other_is(na
     found = finding.ask(finding.named(address))
     assert (found.role, found.product, found.problem) == (role, name, "")
     assert found.serial == bench.endpoints.serials.get(mock, found.serial)
-    assert found.lines == f'[{role}]\nproduct = "{name}"\nport = "{address}"\n'
+    assert found.lines.startswith(f'[{role}]\nproduct = "{name}"\nport = "{address}"\n')

@@ -127,6 +127,12 @@ class AxisProduct(Product):
     delay_ms: float = Field(default=4.0, ge=0, description="from command to motion, sensor included")
 
     @property
+    def scale_unstated(self) -> bool:
+        """Whether it would go by a usual scale that neither a person nor its product stated."""
+        usual = AxisProduct.model_fields["increments_per_mm"].default
+        return self.increments_per_mm == usual and "increments_per_mm" not in self.model_fields_set
+
+    @property
     def reports_Hz(self) -> float:
         """The most positions a second that it gives, however often it is asked."""
         return math.inf

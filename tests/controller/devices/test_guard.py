@@ -118,9 +118,8 @@ def test_a_stream_that_is_dated_by_its_arrival_is_told_of_at_the_start_and_never
 
 
 def test_a_stream_that_is_bunched_later_is_not_judged_anew() -> None:
-    given = iter(
-        [[one] for [one] in stream(1, 0, 1)][:60] + [[FORCE._replace(capture_ns=10**12, arrival_ns=10**12)] * 999]
-    )
+    late = FORCE._replace(capture_ns=10**12, arrival_ns=10**12)
+    given = iter([*list(stream(1, 0, 1))[:60], [late] * 999])
     guarded = force(lambda: next(given, []))
     while guarded.poll(0):
         assert guarded.counters.trouble == ""

@@ -1,6 +1,7 @@
 """Sessions of the servo axis against the mock drive in one process, on a clock that only waiting moves."""
 
 import math
+from collections.abc import Sequence
 
 import pytest
 
@@ -49,6 +50,23 @@ def test_a_drive_that_counts_other_increments_a_turn_is_refused_before_anything_
         axis_on(bench).start()
     assert not [frame for frame in bench.sent if frame.can_id == 0x601 and frame.data[0] & 0xE0 == 0x20]
     assert axis_on(bench).identify().serial == "62014711"
+
+
+@pytest.mark.parametrize("missing", [[5], range(10)], ids=["sub-index", "object"])
+def test_a_drive_whose_firmware_does_not_say_its_increments_goes_by_those_stated_and_says_so(
+    missing: Sequence[int],
+) -> None:
+    bench = DriveBench()
+    known = bench.mock.dictionary.objects
+    bench.mock.dictionary.objects = {
+        key: one for key, one in known.items() if key not in {(0x3000, k) for k in missing}
+    }
+    if len(missing) == 1:
+        bench.mock.dictionary.objects[0x3000, 0] = known[0x1018, 0]
+    axis = axis_on(bench)
+    axis.start()
+    assert "its firmware has no object 3000:05" in axis.identity.settings["scale"]
+    axis.close()
 
 
 def test_speeds_are_told_in_turns_of_the_encoder_that_both_know() -> None:
