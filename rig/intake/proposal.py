@@ -34,10 +34,7 @@ FEWEST_ROWS = 10
 GOES_ON_STEPS = 2.0
 # Of three questions people give up; what can be asked as one is.
 MOST_QUESTIONS = 2
-DRIVE = (
-    "are taken for a drive axis without tissue, which `rig diagnose` judges and `rig fit` refuses; where it presses "
-    "tissue take axis out"
-)
+DRIVE = "are taken for a drive axis, which `rig diagnose` judges and `rig fit` refuses; for tissue take axis out"
 OPEN, DOUBT = "# open: ", "# doubtful: "
 
 

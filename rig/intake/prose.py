@@ -25,11 +25,8 @@ MOST_PLACES = 3
 QUANTITIES = ("time", "force", "position", "velocity")
 # With one of these in it what is said is of the device, and not of what it measured.
 _OF_DEVICES = OTHER | {"maximum", "resolution", "range", "accuracy", "capacity", "sensitivity", "noise", "constant"}
-_TITLE = re.compile(
-    r"(?<![^\W_])(read.?me|lies.?mich|legend|units?|einheit(en)?|info|about|descri\w*|codebook|dictionary|variables?"
-    r"|columns|notes?)(?![^\W_])",
-    re.I,
-)
+_NAMES = r"read.?me|lies.?mich|legend|units?|einheit\w*|info|about|descri\w*|codebook|dict\w*|variables?|columns|notes?"
+_TITLE = re.compile(rf"(?<![^\W_])({_NAMES})(?![^\W_])", re.I)
 _ENDINGS = ("", ".txt", ".md", ".rst", ".csv", ".tsv")
 _TOKEN = re.compile(r"[^\s()\[\]{}<>|;:=,`\"'*]+|[(\[{|;:=,]")
 # Between a name and its unit; behind any other word, or a number, what looks like a unit says nothing of a column.
@@ -56,13 +53,10 @@ class UnitSaid(NamedTuple):
     def measures(self, quantity: str, alone: bool) -> bool:
         """Whether it is of all that is the quantity, by word or of whatever has a unit; ``alone``: by no other word."""
         said = self.own if len(words_of(self.own)) > self.own.split().count("and") else self.line
-        is_other = alone and not all(unit_in(word) or _is_quantity(word) for word in _bare(said))
+        others = [word for word in _bare(said) if alone and not unit_in(word)]
+        is_other = not all(any(candidates(each, [word], [""]) for each in QUANTITIES) for word in others)
         by_word = bool(candidates(quantity, [said], [""]) or UNIT_WORDS & set(words_of(self.line)))
         return self.unit in _units(quantity) and by_word and not is_other
-
-
-def _is_quantity(word: str) -> bool:
-    return any(candidates(quantity, [word], [""]) for quantity in QUANTITIES)
 
 
 def _bare(text: str) -> list[str]:

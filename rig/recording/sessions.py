@@ -61,7 +61,7 @@ class TrialInfo:
 
 @dataclass(frozen=True)
 class SessionInfo:
-    """What ``session.json`` holds. ``created`` is ISO 8601 wall-clock time; ``axis_files`` of a drive axis lie there."""
+    """What ``session.json`` holds. ``created`` is ISO 8601 wall-clock time, ``axis_files`` a drive axis' folder."""
 
     id: str
     kind: Literal["capture", "import", "track"]
