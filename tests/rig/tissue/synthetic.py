@@ -7,6 +7,7 @@ sensor's own times, with noise, zero and steps of the converter.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from rig.channels import AXIS, FORCE, LOOP, MARKER, AxisSample, ForceSample, LoopSample
 from rig.recording.mcap_file import RecordingWriter
 from rig.recording.reader import Recording
-from rig.recording.sessions import JsonTable, SessionInfo, TrialInfo, write_session
+from rig.recording.sessions import SessionInfo, TrialInfo, write_session
 from rig.tissue.history import History
 from rig.tissue.laws import Law
 from rig.trials.cycles import IndentationCycle
@@ -203,7 +204,7 @@ def write_recording(
         writer.close()
 
 
-def write_made_session(folder: Path, cycles: Sequence[IndentationCycle], **about: JsonTable) -> Path:
+def write_made_session(folder: Path, cycles: Sequence[IndentationCycle], **about: Any) -> Path:
     """A session folder with one recording a cycle."""
     folder.mkdir(parents=True, exist_ok=True)
     for cycle in cycles:
