@@ -43,7 +43,7 @@ PLANTS = {
     "axis 15 Hz": Plant(15.0), "axis 60 Hz": Plant(60.0), "sensor 100 Hz": Plant(sensing=SLOW),
     **{f"{more} ms later": Plant(sensing=FAST, extra_cycles=more) for more in (1, 2, 5, 12)},
 }  # fmt: skip
-PLANT_LAWS = LAW, "constant"
+PLANT_LAWS = LAW, "constant", *OTHERS
 
 
 class Cell(Table):
@@ -124,7 +124,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def other_plants(processes: int) -> list[Cell]:
-    """The law and the constant where axis, sensor or delay are others, each identified and synthesised anew."""
+    """The law and its alternatives where axis, sensor or delay are others, each identified and tuned anew."""
     wanted = [job for plant in PLANTS.values() for job in jobs_of(PLANT_LAWS, "plants", (1,), plant)]
     done, found = list(play_all(wanted, processes)), []
     for (plant_name, plant), law in product(PLANTS.items(), PLANT_LAWS):

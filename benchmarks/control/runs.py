@@ -44,8 +44,8 @@ def cases_of(asked: str) -> Sequence[Case]:
     """
     if asked == "plants":
         limbs = [cases.limb_motion(force_N, 2.0) for force_N in (0.5, 2.0, 10.0)]
-        others = cases.breathing(10.0), cases.contact(0.0), cases.stair("low jumps", 0.3, 1.5, 0.3, 1.0, 1.0)
-        return [*limbs, *others]
+        jumps = [cases.stair("low jumps", 0.3, 1.5, 0.3, 1.0, stiffness) for stiffness in cases.WRONG]
+        return [*limbs, cases.breathing(10.0), cases.contact(0.0), *jumps]
     if asked == "touch":
         return [cases.contact(speed_mm_s, asked_N=0.501 * CONTACT_N) for speed_mm_s in cases.COMING_MM_S]
     return list(cases.every(quick=asked == "quick"))
