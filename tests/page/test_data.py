@@ -26,6 +26,7 @@ port = "/dev/no-sensor"
 [axis]
 product = "maxon-epos4"
 port = "/dev/no-adapter"
+increments_per_mm = 2000
 """
 
 
