@@ -26,5 +26,6 @@ def drive_in(table: ColumnGroup) -> tuple[str, bool]:
     wished = [number for number in said if said[number] & WISHES and candidates("position", [header[number]], [""])]
     place = said[known["position"]]
     by = [*wished, *([known["position"]] if place & (JOINTS | MAY_BE_JOINTS) else [])]
-    sure = bool(said[known["force"]] & EFFORTS and (wished or place & JOINTS))
+    named = set(words_of(table.path.stem)) & (JOINTS | MAY_BE_JOINTS)  # a file of a motor's has its load
+    sure = bool(said[known["force"]] & (EFFORTS | LOADS if named else EFFORTS) and (wished or place & JOINTS))
     return f"{table.path.name}: {header[known['force']]!r} and {header[by[0]]!r}" if by else "", sure

@@ -39,6 +39,7 @@ ENDPOINTS = Endpoints.model_validate({
     "tracker": 15.0}, "serials": {"force": "000271", "force_modbus": "FTS-1234", "axis": "A1"}, "pid": 1,
 })  # fmt: skip
 REAL = ["--set", "force.port=/dev/null"]
+AXIS = ["--set", "axis.port=/dev/null", "--set", "axis.increments_per_mm=2000"]
 
 
 @pytest.fixture(autouse=True)
@@ -78,8 +79,8 @@ def test_without_a_terminal_an_open_question_names_the_option(
         (["axis", "--to-mm", "99"], "the axis would go to 99 mm, outside 0 to 60 mm"),
         (["axis", "--to-mm", "9"], "--from-mm 2 --to-mm 9: 8 mm of travel or more are needed"),
         (["axis", "--gauge-block-mm", "10", "--near-mm", "8"], "the axis would go to -3 mm, outside 0 to 60 mm"),
-        (["axis", "--set", "axis.port=/dev/null"], "is the tip's way free .*: no terminal to answer at; give --clear"),
-        (["axis", "--set", "axis.port=/dev/null", "--clear", "--gauge-block-mm", "5"], "give --near-mm"),
+        (["axis", *AXIS], "is the tip's way free .*: no terminal to answer at; give --clear"),
+        (["axis", *AXIS, "--clear", "--gauge-block-mm", "5"], "give --near-mm"),
     ],
 )
 def test_what_cannot_be_calibrated_is_refused_before_anything_is_opened(

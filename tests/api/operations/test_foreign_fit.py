@@ -78,5 +78,5 @@ def test_what_nobody_described_is_fitted_likewise(name: str, tmp_path: Path) -> 
 @pytest.mark.parametrize("name", AXES)
 def test_an_axis_without_tissue_is_refused_by_name(name: str, tmp_path: Path) -> None:
     opening = Opening(MAPPINGS / f"{name}.toml")
-    with pytest.raises(UsageError, match=rf"{name}: is a drive axis, .* `rig diagnose` with the same place"):
+    with pytest.raises(UsageError, match=rf"{name}: is a drive axis, .* `rig diagnose` of .*{name} with that mapping"):
         fit(fit_operation(), [recording(name)], tmp_path / "out", opening=opening)

@@ -13,11 +13,16 @@ from controller.experiments.references import parse_reference
 from controller.operation import Cancelled, Operation, Progress
 from mock_devices.testing.models import index_model
 from rig.config.protocol import Indentation
+from rig.config.table import load
 from rig.config.wiring import Wiring
 from rig.errors import DataError, UsageError
+from rig.intake.mapping import DataMapping
+from rig.intake.session import import_folder
 from rig.results.fit import FitResult
 from rig.tissue.registry import law_named
-from tests.rig.intake.test_real_folders import imported
+from tests.data import recording
+from tests.rig.intake.test_real_folders import MAPPINGS
+from tests.rig.recording.measured import NOW
 from tests.rig.tissue.synthetic import Bench, write_made_session
 
 LAWS = Laws(compared=(law_named("constant"), law_named("index")))
@@ -52,8 +57,9 @@ def test_a_fit_tells_each_law_and_returns_what_it_saved(session: Path, tmp_path:
 
 
 def test_a_fit_that_a_bound_stopped_is_refused_and_writes_nothing(tmp_path: Path) -> None:
-    """A joint's torque over its angle: the recordings of an arm, where they are at hand."""
-    place = imported("franka_joint", tmp_path).place
+    """A joint's torque over its angle, called no axis: the recordings of an arm, where they are at hand."""
+    mapping = load(DataMapping, MAPPINGS / "franka_joint.toml").model_copy(update={"axis": None})
+    place = import_folder(recording("franka_joint"), mapping, tmp_path / "session", NOW).place
     with pytest.raises(DataError, match=r"tell no stiffness: fitting F = .* pushed a_N_mm to its bound, 1e-06 N/mm"):
         fit_operation().run(lambda: fit(fit_operation(), [place], tmp_path / "out", LAWS))
     assert not (tmp_path / "out").exists()
