@@ -51,7 +51,7 @@ class Comparison:
     reference: Reference
     bench: Callable[[str], AbstractContextManager[Supervisor]]
     breathing: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    # What the benches gave, before hours of simulation that may fail or be cancelled.
+    # Called with what the benches gave, before a simulation that may fail or be cancelled.
     keep: Callable[[CompareResult], object] = lambda _: None
 
     def model_file(self, subject: str) -> Path:
