@@ -41,10 +41,6 @@ CAUSES: Mapping[str, tuple[HiddenNumber, ...]] = {
         HiddenNumber("amplitude_mm", "ripple_mm", 0.02, 0.06),
         HiddenNumber("period_mm", "ripple_pitch_mm", 1.0, 2.5),
     ),
-    "cogging": (
-        HiddenNumber("level_N", "cogging_N", 0.05, 0.15),
-        HiddenNumber("period_mm", "cogging_pitch_mm", 1.0, 2.5),
-    ),
     "surface_motion": (
         HiddenNumber("amplitude_mm", "surface_motion_mm", 0.05, 0.1),
         HiddenNumber("frequency_Hz", "surface_motion_Hz", 0.2, 0.4),

@@ -4,8 +4,9 @@ import random
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from controller.loop.paired_samples import ROW_MM, ROWS
 from controller.loop.steps import Approach, Compress, Dither, Hold, Program, Retract, Step, Zero
-from controller.loop.touch import BACK_OFF_MM, TOUCH_MM
+from controller.loop.touch import BACK_OFF_MM
 from rig.config.protocol import Indentation
 
 # 366 portions, two a cycle at 1 kHz, and as much again for cycles missed.
@@ -93,8 +94,8 @@ def longest_s(protocol: Indentation, speed_mm_s: float, travel_mm: float) -> flo
 
 
 def _touches_s(protocol: Indentation) -> float:
-    """A touch goes at most 4 mm deep, from as far above the surface as the first one left it unknown."""
-    longest_mm = 2 * TOUCH_MM + BACK_OFF_MM
+    """A touch goes as deep as the detection, from where the samples that were kept begin."""
+    longest_mm = 2 * ROWS * ROW_MM + BACK_OFF_MM
     return protocol.touches * (
         longest_mm / protocol.touch_speed_mm_s + longest_mm / protocol.retract_speed_mm_s + ESTIMATING_S
     )

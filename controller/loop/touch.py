@@ -22,8 +22,10 @@ PORTIONS_A_MS = 2
 # The guide's slip ends within 0.5 mm of a reversal; as much again shows the force in the air.
 BACK_OFF_MM = 1.0
 SLIP_MM = 0.5
-# What lies deeper says more of the tissue than of its surface.
+# What lies deeper says more of the tissue than of its surface, unless less than half of the detected force is felt there:
+# then the surface was taken for too high, as where the zero drifts, and lies deeper.
 TOUCH_MM = 4.0
+FELT_SHARE = 0.5
 # A limb that came nearer meanwhile: twice the force that was detected is no touch.
 TOUCH_SHARE = 2.0
 
@@ -104,9 +106,9 @@ class TouchRun:
     def _touch(self, state: LoopState) -> bool:
         assert self._found
         state.paired.collecting = state.position_mm > self._top_mm(state) + SLIP_MM
-        target_mm = min(self._detected_mm, self._found.position_mm + TOUCH_MM)
-        pressed = state.force_N > TOUCH_SHARE * self._detected_N
-        if state.go(target_mm, self._touching.speed_mm_s) or pressed:
+        deep = state.position_mm >= self._found.position_mm + TOUCH_MM
+        pressed = state.force_N > (FELT_SHARE if deep else TOUCH_SHARE) * self._detected_N
+        if state.go(self._detected_mm, self._touching.speed_mm_s) or pressed:
             self._phase = self._estimate
         return False
 

@@ -32,7 +32,7 @@ from tests.witness import Witness
 pytestmark = [pytest.mark.extra, pytest.mark.timeout(600), pytest.mark.xdist_group("commands")]
 LARGEST_STEADY_ERROR_PERCENT = 5.0
 # Relaxation: slow enough that a busy computer's time stamps, a few ms off, leave it as it is.
-HIDES_RELAXATION = "28"
+HIDES_RELAXATION = "12"
 SEEN_MS = 1000 * PATIENCE_S  # a page that is drawn beside other tests
 
 

@@ -156,9 +156,20 @@ def test_a_touch_ends_at_twice_the_force_that_was_detected(force_N: float, ends:
     assert (run._phase == run._estimate) is ends
 
 
-@pytest.mark.parametrize(("found_mm", "target_mm"), [(20.0, DETECTED_MM), (15.0, 19.0)])
-def test_a_touch_goes_as_deep_as_the_detection_and_no_more_than_4_mm(found_mm: float, target_mm: float) -> None:
-    run, here = touching(target_mm - 0.0004, found_mm=found_mm)
+@pytest.mark.parametrize("found_mm", [20.0, 15.0])
+def test_a_touch_goes_as_deep_as_the_detection(found_mm: float) -> None:
+    run, here = touching(DETECTED_MM - 0.0004, found_mm=found_mm)
     run.advance(here)
-    assert here.setpoint == Setpoint(target_mm, 0.0)
+    assert here.setpoint == Setpoint(DETECTED_MM, 0.0)
     assert run._phase == run._estimate
+
+
+@pytest.mark.parametrize(
+    ("position_mm", "force_N", "ends"), [(18.99, 0.3, False), (19.0, 0.2, False), (19.0, 0.21, True)]
+)
+def test_a_touch_goes_no_more_than_4_mm_past_the_surface_where_half_of_the_detected_force_is_felt(
+    position_mm: float, force_N: float, ends: bool
+) -> None:
+    run, here = touching(position_mm, force_N, found_mm=15.0)
+    assert run.advance(here) is False
+    assert (run._phase == run._estimate) is ends
