@@ -22,8 +22,8 @@ PORTIONS_A_MS = 2
 # The guide's slip ends within 0.5 mm of a reversal; as much again shows the force in the air.
 BACK_OFF_MM = 1.0
 SLIP_MM = 0.5
-# What lies deeper says more of the tissue than of its surface, unless less than half of the detected force is felt there:
-# then the surface was taken for too high, as where the zero drifts, and lies deeper.
+# What lies deeper says more of the tissue than of its surface. Where less than half of the detected force is felt, the
+# surface was taken for too high, as where the zero drifts.
 TOUCH_MM = 4.0
 FELT_SHARE = 0.5
 # A limb that came nearer meanwhile: twice the force that was detected is no touch.
