@@ -21,11 +21,7 @@ from rig.errors import UsageError
 OF_FORCE = ("weights", "load", "tolerance_percent", "gravity")
 OF_AXIS = ("from_mm", "to_mm", "clear", "toward_limb", "gauge_block_mm", "near_mm", "dynamics")
 OF_SCALE = ("to_mm", "toward_limb", "gauge_block_mm", "near_mm")
-OTHERS = {
-    "force": (*OF_AXIS, "input_name"),
-    "axis": (*OF_FORCE, "input_name"),
-    "glove": (*OF_AXIS, "load"),
-}
+OTHERS = {"force": (*OF_AXIS, "input_name"), "axis": (*OF_FORCE, "input_name"), "glove": (*OF_AXIS, "load")}
 WeightsOption = Annotated[
     str, typer.Option("--weights", help="force: known weights, as '100 g,200 g,5 N'; a mock sensor has its own.")
 ]

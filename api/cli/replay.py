@@ -19,8 +19,7 @@ def replay(
     only: OnlyOption = "*",
     overrides: SetOption = None,
     as_test: Annotated[
-        Path | None,
-        typer.Option("--as-test", metavar="FILE", help="Writes a test, test_....py, data beside it."),
+        Path | None, typer.Option("--as-test", metavar="FILE", help="Writes a test, test_....py, data beside it.")
     ] = None,
     json_file: JsonOption = None,
 ) -> None:

@@ -3,7 +3,9 @@
 import base64
 import contextlib
 import json
+import os
 import re
+import sys
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from urllib.parse import quote
@@ -38,13 +40,22 @@ class KeptAnswer(BaseModel):
 
 
 def read_answers(file: Path) -> dict[str, KeptAnswer]:
-    """The last line of each place counts; one that was not written whole is none."""
+    """The last line of each place counts; one that was not written whole is none, which is told of."""
     found: dict[str, KeptAnswer] = {}
     for line in file.read_bytes().splitlines() if file.is_file() else []:  # names may hold what else ends lines of text
-        with contextlib.suppress(ValidationError):
+        try:
             answer = KeptAnswer.model_validate_json(line)
             found[answer.place] = answer
+        except ValidationError:
+            sys.stderr.write(f"{file}: left out, as a full disk or a power failure cut it: {line[:200]!r}\n")
     return found
+
+
+def add_answer(file: Path, answer: KeptAnswer) -> None:
+    """Adds its line, behind the end of one that was cut."""
+    with os.fdopen(os.open(file, os.O_RDWR | os.O_APPEND | os.O_CREAT, PRIVATE), "ab") as lines:
+        last = os.pread(lines.fileno(), 1, max(lines.tell() - 1, 0))
+        lines.write((b"" if last in (b"", b"\n") else b"\n") + answer.model_dump_json().encode() + b"\n")
 
 
 def write_answers(file: Path, answers: Iterable[KeptAnswer]) -> None:

@@ -6,7 +6,6 @@ again under the same key. Kept on disk: a service that ended in the middle does 
 
 import base64
 import hashlib
-import os
 import threading
 from collections.abc import Callable, Coroutine
 from pathlib import Path
@@ -19,7 +18,7 @@ from starlette.exceptions import HTTPException
 
 from api.http.access.rights import CALLER, PASSED, STOP
 from api.http.access.secrets import steady_s
-from api.http.answers import ERASED, PRIVATE, KeptAnswer, read_answers, write_answers, writing
+from api.http.answers import ERASED, KeptAnswer, add_answer, read_answers, write_answers, writing
 from api.http.priority import following
 from api.http.problems import NotDone, RequestRefused
 from api.http.shared_file import FileState, file_state
@@ -136,9 +135,7 @@ class AnswerStore:
                 known[answer.place] = answer
             while len(known) > MOST_KEPT:
                 known.pop(next(iter(known)))
-            fd = os.open(self._file, os.O_WRONLY | os.O_APPEND | os.O_CREAT, PRIVATE)
-            with os.fdopen(fd, "a", encoding="utf-8") as file:
-                file.write(answer.model_dump_json() + "\n")
+            add_answer(self._file, answer)
             self._seen = file_state(self._file)
 
 

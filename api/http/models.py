@@ -30,8 +30,7 @@ class LeaseRequest(RequestBody):
     """Takes control of the bench."""
 
     purpose: Annotated[str, Field(max_length=200, description="what for, as others are told")] = ""
-
-    holder: Annotated[str, Field(min_length=1, max_length=80, description="who this is, as others are told")]
+    holder: Annotated[str, Field(min_length=1, max_length=80, description="what this page or program calls itself")]
     ttl_s: float = Field(default=5.0, ge=0.5, le=30.0, description="how long it lasts after each renewal")
 
 
@@ -45,7 +44,7 @@ class LeaseView(BaseModel):
     """The lease, as its holder gets it."""
 
     lease_id: str = Field(description="to be sent as X-Control-Lease with whatever moves")
-    holder: str
+    holder: str = Field(description="the name of token or account, and behind it what its program calls itself")
     since: str
     ttl_s: float
     left_s: float

@@ -9,14 +9,7 @@ from urllib.parse import quote
 from api.http.jobs.places import is_text
 from api.http.jobs.views import summary
 from api.http.lease import ControlLease
-from api.http.models import (
-    ControlView,
-    LeaseView,
-    RecordingList,
-    RecordingView,
-    RigView,
-    SessionView,
-)
+from api.http.models import ControlView, LeaseView, RecordingList, RecordingView, RigView, SessionView
 from api.http.service import Service
 from controller.devices.health import ALIVE, ON_RATE, VALID
 from controller.loop.messages import Status
@@ -56,9 +49,7 @@ def control(service: Service) -> ControlView:
     if held is None:
         return ControlView(holder="", since="", left_s=0.0)
     left_s = service.control.left_s(held)
-    return ControlView(
-        holder=held.holder, since=held.since, left_s=left_s, epoch=held.epoch, purpose=held.purpose
-    )  # fmt: skip
+    return ControlView(holder=held.holder, since=held.since, left_s=left_s, epoch=held.epoch, purpose=held.purpose)
 
 
 def lease(service: Service, held: ControlLease) -> LeaseView:

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.service.clients import REQUESTS_HZ
+from benchmarks.service.clients import LIVE, REQUESTS_HZ
 from benchmarks.service.load import Clients
 from benchmarks.stop import pressed, summary
 from mock_devices.testing.commands import served_bench
@@ -152,7 +152,8 @@ def measured(minutes: float, presses: int) -> dict[str, float]:
     print(f"stops:   {json.dumps(asdict(stops))}")
     return {
         "served_per_s": round(load["served"] / load["seconds"], 1),
-        "lost_samples": idle.lost + loaded.lost + load["lost_live"],
+        # A client that heard nothing at all lost at least one.
+        "lost_samples": idle.lost + loaded.lost + load["lost_live"] + LIVE - load["heard"],
         "missed_percent": round(loaded.missed_percent, 3),
         "missed_percent_idle": round(idle.missed_percent, 3),
         "stop_p99_ms": stops.p99_ms,

@@ -2,13 +2,15 @@
 
 50 WebSockets of `rig.v1`, most of them as a page subscribes, every tenth with every sample of two streams, and 200
 requests a second over sixteen connections. All of it at low priority, in one process that is no part of the
-service. What counts is what came: answers of 200, and samples that batches stand for or gaps name.
+service. What counts is what came: answers of 200, and samples that batches stand for. Lost are those that gaps name,
+those that the numbers of batches leave out without a word, and at least one with each client that is thrown out.
 """
 
 import asyncio
 import contextlib
 import json
 import os
+import re
 import struct
 import sys
 import time
@@ -106,18 +108,49 @@ def _watch(load: Load, port: int, token: str, number: int) -> Callable[[], Await
                 await _count(load, socket, number)
         finally:
             load.ended.add(number)
+            load.lost_live += 1
 
     return watched
 
 
 async def _count(load: Load, socket: ClientConnection, number: int) -> None:
+    numbers = Numbers()
     async for message in socket:
         load.messages += 1
         load.heard.add(number)
+        came, lost = numbers.take(message)
+        load.samples += came
+        load.lost_live += lost
+
+
+class Numbers:
+    """Which sample of each channel is due: batches and gaps together account for every number of a run."""
+
+    def __init__(self) -> None:
+        self._steps: dict[int, int] = {}
+        self._due: dict[int, int] = {}
+
+    def take(self, message: str | bytes) -> tuple[int, int]:
+        """How many samples a message stands for, and how many it leaves out; one that comes again leaves out most."""
         if isinstance(message, bytes):
-            load.samples += sum(batch.covered for batch in batches(message))
-        elif '"gap"' in message and (gap := json.loads(message))["channel"]:
-            load.lost_live += gap["dropped"]
+            found = list(batches(message))
+            return sum(batch.covered for batch in found), sum(map(self._left_out, found))
+        said = json.loads(message) if re.search('"(gap|subscribed|run)"', message) else {}
+        match said.get("type"):
+            case "subscribed":
+                self._steps |= {one["channel"]: one["step"] for one in said["channels"]}
+            case "run":
+                self._due.clear()
+            case "gap" if said["channel"]:
+                self._due[said["channel"]] = said["to"] + self._steps[said["channel"]]
+                return 0, int(said["dropped"])
+        return 0, 0
+
+    def _left_out(self, batch: "Batch") -> int:
+        step = self._steps[batch.channel]
+        due = self._due.get(batch.channel, batch.seq)
+        self._due[batch.channel] = batch.seq + batch.covered * step
+        return (batch.seq - due) % 2**32 // step
 
 
 class Batch(NamedTuple):
@@ -125,6 +158,7 @@ class Batch(NamedTuple):
 
     channel: int
     columns: int
+    seq: int
     rows: int
     covered: int
     at: int
@@ -134,9 +168,9 @@ def batches(message: bytes) -> Iterator[Batch]:
     """Those of one message, which follow each other."""
     at = 0
     while at < len(message):
-        channel, columns, _, _, rows, covered = BATCH.unpack_from(message, at)
+        channel, columns, seq, _, rows, covered = BATCH.unpack_from(message, at)
         at += BATCH.size + 4 * rows
-        yield Batch(channel, columns, rows, covered, at)
+        yield Batch(channel, columns, seq, rows, covered, at)
         at += 4 * rows * columns
 
 

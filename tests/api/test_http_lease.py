@@ -7,10 +7,11 @@ from collections.abc import Iterator
 import pytest
 from fastapi.testclient import TestClient
 
+from api.http.access.scopes import Scope
 from api.http.lease import LeaseRegistry
 from api.http.problems import RequestRefused
 from api.http.service import Service
-from mock_devices.testing.access import client_of
+from mock_devices.testing.access import bearer, client_of
 from mock_devices.testing.clock import Clock
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.wiring import Wiring
@@ -45,13 +46,28 @@ def taken(client: TestClient, holder: str = "Ann", ttl_s: float = 5.0) -> dict[s
     return {HEADER: answer.json()["lease_id"]}
 
 
+def as_told(client: TestClient, own: str) -> str:
+    return f"{client.get('/api/v1/auth/me').json()['name']} ({own})"
+
+
+def test_nobody_is_in_control_in_anothers_name(client: TestClient) -> None:
+    ann, eve = (
+        client.get("/api/v1/auth/me", headers=bearer(one)).json()["name"] for one in (Scope.ADMIN, Scope.OPERATE)
+    )
+    first = client.post("/api/v1/control/lease", json={"holder": ann}, headers=bearer(Scope.OPERATE)).json()
+    assert first["holder"] == f"{eve} ({ann})" == client.get("/api/v1/rig").json()["control"]["holder"]
+    taking = {"holder": eve, "reason": "not hers"}
+    assert client.post("/api/v1/control/take", json=taking).json()["holder"] == f"{ann} ({eve})"
+    assert client.post("/api/v1/control/take", json=taking, headers=bearer(Scope.OPERATE)).json()["holder"] == eve
+
+
 def test_a_second_user_is_refused_and_told_who_is_in_control(client: TestClient) -> None:
     taken(client, "Ann")
     second = client.post("/api/v1/control/lease", json={"holder": "Ben"})
     assert (second.status_code, second.json()["code"]) == (423, "lease-held")
-    assert "Ann has been in control since" in second.json()["detail"]
-    assert second.json()["holder"] == "Ann"
-    assert client.get("/api/v1/rig").json()["control"]["holder"] == "Ann"
+    assert f"{as_told(client, 'Ann')} has been in control since" in second.json()["detail"]
+    assert second.json()["holder"] == as_told(client, "Ann")
+    assert client.get("/api/v1/rig").json()["control"]["holder"] == as_told(client, "Ann")
     assert client.get("/api/v1/control/lease").json()["left_s"] == pytest.approx(5.0)
 
 
@@ -64,7 +80,9 @@ def test_a_lease_that_is_not_renewed_runs_out_and_the_next_user_may_have_it(clie
     assert (late.status_code, late.json()["code"]) == (423, "no-lease")
     assert "that lease is not in force; nobody is in control" in late.json()["detail"]
     taken(client, "Ben")
-    assert "Ben is in control" in client.put("/api/v1/control/lease", headers=first).json()["detail"]
+    assert (
+        f"{as_told(client, 'Ben')} is in control" in client.put("/api/v1/control/lease", headers=first).json()["detail"]
+    )
 
 
 def test_a_lease_that_is_given_back_is_free_at_once(client: TestClient) -> None:
@@ -102,7 +120,8 @@ def test_each_lease_has_a_greater_epoch_and_its_purpose_is_told(client: TestClie
     body = {"holder": "Ann", "ttl_s": 5.0, "purpose": "calibrate"}
     first = client.post("/api/v1/control/lease", json=body).json()
     refused = client.post("/api/v1/control/lease", json={"holder": "Ben"}).json()
-    assert (refused["holder"], refused["purpose"], refused["since"]) == ("Ann", "calibrate", first["since"])
+    assert (refused["purpose"], refused["since"]) == ("calibrate", first["since"])
+    assert refused["holder"] == as_told(client, "Ann")
     assert client.get("/api/v1/control/lease").json()["purpose"] == "calibrate"
     clock.advance(6.0)
     second = client.post("/api/v1/control/lease", json={"holder": "Ben"}).json()
@@ -115,9 +134,11 @@ def test_control_is_taken_over_with_a_reason_and_who_had_it_is_told(client: Test
     second = client.post("/api/v1/control/take", json=body)
     assert second.status_code == 200
     told = client.put("/api/v1/control/lease", headers=first)
-    assert (told.status_code, told.json()["holder"]) == (423, "Ben")
-    assert re.match(r"Ben took control over at \S+: Ann has left; Ben is in control", told.json()["detail"])
-    assert (told.json()["taken_by"], told.json()["reason"]) == ("Ben", "Ann has left")
+    ben = as_told(client, "Ben")
+    assert (told.status_code, told.json()["holder"]) == (423, ben)
+    said = rf"{re.escape(ben)} took control over at \S+: Ann has left; {re.escape(ben)} is in control"
+    assert re.match(said, told.json()["detail"])
+    assert (told.json()["taken_by"], told.json()["reason"]) == (ben, "Ann has left")
     assert client.put("/api/v1/control/lease", headers={HEADER: second.json()["lease_id"]}).status_code == 200
     assert client.post("/api/v1/control/take", json={"holder": "Ben", "reason": ""}).status_code == 422
 

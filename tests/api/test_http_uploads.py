@@ -28,6 +28,8 @@ from tests.api.jobs.asked import begun, ended
 from tests.rig.recording.measured import measured
 
 ROUTE = "/api/v1/uploads"
+# A whole body of one file, with the rest of a header and further ones.
+PART = b'--x\r\nContent-Disposition: form-data; filename="a"; of=%b\r\n%b\r\nab\r\n--x--\r\n'
 
 
 @pytest.fixture
@@ -113,12 +115,14 @@ def test_a_name_that_comes_twice_is_refused(client: TestClient, service: Service
         ("multipart/form-data; boundary=x", b"no part at all", 400, "multipart"),
         ("multipart/form-data; boundary=x", b'--x\r\nContent-Disposition: form-data; name="n"\r\n\r\nv\r\n--x--\r\n',
          422, "no-files"),
+        pytest.param("multipart/form-data; boundary=x", PART % (b"a" * 100_000, b""), 400, "multipart", id="long"),
+        pytest.param("multipart/form-data; boundary=x", PART % (b"a", b"X: 1\r\n" * 100), 400, "multipart", id="many"),
         ("multipart/form-data", b"--x--", 415, "multipart"),
         ("application/json", b"{}", 415, "multipart"),
         ("", b"x", 415, "multipart"),
     ],
 )  # fmt: skip
-def test_a_body_that_is_cut_or_none_is_refused_and_nothing_is_left(
+def test_a_body_that_is_cut_endless_or_none_is_refused_and_nothing_is_left(
     client: TestClient, service: Service, kind: str, body: bytes, status: int, code: str
 ) -> None:
     refused = client.post(ROUTE, content=body, headers={"Content-Type": kind})

@@ -292,6 +292,31 @@ def test_a_line_that_was_cut_is_no_answer(tmp_path: Path, store: AnswerStore) ->
         later.begin("p", b"x")
 
 
+@pytest.mark.parametrize("cut", [b'{"place": "q", "asked"', "{'place': 'ä".encode()[:-1]])
+def test_what_is_kept_after_a_line_that_was_cut_outlasts_the_service(
+    tmp_path: Path, store: AnswerStore, cut: bytes, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "answers.jsonl"
+    store.begin("p", b"x")
+    with file.open("ab") as planted:  # as a full disk leaves it to a service that goes on
+        planted.write(cut)
+    assert store.begin("r", b"x") is None
+    store.end("r", Response(b"{}", 202))
+    assert f"answers.jsonl: left out, as a full disk or a power failure cut it: {cut!r}\n" in capsys.readouterr().err
+    assert {each.place: each.status for each in read_answers(file).values()} == {"p": 0, "r": 202}
+    again = AnswerStore(file, Clock().seconds).begin("r", b"x")
+    assert again and again.status == 202
+    assert cut not in file.read_bytes()
+
+
+def test_an_answer_of_which_only_the_end_of_its_line_was_cut_is_one(tmp_path: Path, store: AnswerStore) -> None:
+    file = tmp_path / "answers.jsonl"
+    store.begin("p", b"x")
+    file.write_bytes(file.read_bytes().removesuffix(b"\n"))
+    store.begin("q", b"x")
+    assert set(read_answers(file)) == {"p", "q"}
+
+
 def test_two_at_once_are_one(service: Service) -> None:
     client = client_of(service)
     answers: list[Any] = []

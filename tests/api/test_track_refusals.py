@@ -2,6 +2,8 @@
 
 import contextlib
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import pytest
 from typer.testing import CliRunner
@@ -10,6 +12,7 @@ from api.cli import demo
 from api.cli.app import build
 from api.cli.demo import forces_within
 from controller.law.gain_table import DampingUnknown
+from mock_devices.testing.commands import free_port
 from mock_devices.testing.models import index_model
 from rig.config.calibration_files import text_of
 from rig.config.wiring import Wiring
@@ -189,6 +192,23 @@ def test_a_demonstration_whose_trials_leave_damping_open_begins_again_with_more_
     with refused:
         demo.measured(Wiring(), (), demo.PLAN, tmp_path / "demo")
     assert captures == trials
+
+
+@pytest.mark.parametrize(("option", "ends"), [((), []), (("--serve", "--port", "PORT"), ["demo"])])
+def test_a_demonstration_is_served_at_its_end_where_that_is_asked_for(
+    option: tuple[str, ...], ends: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port, done = free_port(), list[str]()
+    told = SimpleNamespace(hide=(), effect="", knobs={}, found_in=lambda _: None, inside=lambda _: {}, sentence=str)
+    stands_for: dict[str, object] = {"draw": told, "measured": ("fitted", "tracked"), "track_parts": ()}
+    for name in ("check", "experiment", "diagnosed", "verify", "refuse_incomplete", "derive", "HiddenTruth"):
+        monkeypatch.setattr(demo, name, MagicMock())
+    for name, found in stands_for.items():
+        monkeypatch.setattr(demo, name, MagicMock(return_value=found))
+    monkeypatch.setattr(demo, "_reported", lambda *_: done.append("reported"))
+    monkeypatch.setattr(demo, "served", lambda out, _, at: done.append(str(out)) if at == port else None)
+    answer = runner.invoke(build("demo"), ["demo", *(str(port) if one == "PORT" else one for one in option)])
+    assert (answer.exit_code, done) == (0, ["reported", *ends]), answer.exception
 
 
 @pytest.mark.parametrize(("largest_N", "forces_N"), [(5.2, (1, 2, 3, 4, 5)), (2.0, (0.34, 0.68, 1.02, 1.36, 1.7))])

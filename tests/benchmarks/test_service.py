@@ -1,11 +1,13 @@
 """The verdict on the service under load: met by good figures, and missed by each bad one alone."""
 
 import json
+import struct
 
 import pytest
 
 from benchmarks.service import __main__ as service
 from benchmarks.service.__main__ import Memory, goals_missed
+from benchmarks.service.clients import Numbers
 
 # As measured on a quiet computer, and each at its bound.
 GOOD = {
@@ -17,6 +19,38 @@ BAD = [
     ("rss_growth_MB", 20.0), ("stop_p99_ms", float("nan")), ("rss_growth_MB", float("nan")),
     ("missed_percent", float("nan")), ("served_per_s", float("nan")),
 ]  # fmt: skip
+
+
+def batch(seq: int, covered: int, channel: int = 1) -> bytes:
+    """The head of one without rows, as docs/api/streams.md has it."""
+    return struct.pack("<HHIqII", channel, 1, seq, 0, 0, covered)
+
+
+def lost_of(*messages: str | bytes) -> int:
+    numbers = Numbers()
+    channels = [{"channel": 1, "step": 2}, {"channel": 2, "step": 1}]
+    numbers.take(json.dumps({"type": "subscribed", "channels": channels}))
+    return sum(numbers.take(message)[1] for message in messages)
+
+
+GAP = json.dumps({"type": "gap", "channel": 1, "from": 106, "to": 110, "dropped": 3})
+
+
+@pytest.mark.parametrize(
+    ("messages", "lost"),
+    [
+        ((batch(100, 3) + batch(5, 1, 2), batch(106, 1) + batch(6, 4, 2)), 0),
+        ((batch(100, 3), batch(108, 1)), 1),
+        ((batch(100, 3), GAP, batch(112, 1)), 3),
+        ((batch(100, 3), GAP, batch(114, 1)), 4),
+        ((batch(2**32 - 2, 1), batch(0, 1)), 0),
+        ((batch(100, 3), json.dumps({"type": "run", "run": "b"}), batch(0, 1)), 0),
+        ((batch(100, 3), batch(100, 3)), 2**31 - 3),
+        ((batch(5, 1, 2), batch(7, 1, 2), json.dumps({"type": "ping"})), 1),
+    ],
+)
+def test_what_neither_a_batch_nor_a_gap_accounts_for_is_lost(messages: tuple[str | bytes, ...], lost: int) -> None:
+    assert lost_of(*messages) == lost
 
 
 def ended(found: dict[str, float], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> list[str]:

@@ -39,6 +39,10 @@ class Caller:
         """One credential of one person or program."""
         return f"{self.by} {self.name} {self.id}"
 
+    def known_as(self, name: str) -> str:
+        """As others are told: nobody goes by another's name, and what a page or program calls itself stands behind."""
+        return self.name if name == self.name else f"{self.name} ({name})"
+
     def may(self, scope: Scope) -> bool:
         """Whether ``scope`` is within this caller's."""
         return self.scope >= scope

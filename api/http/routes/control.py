@@ -24,18 +24,15 @@ def add(router: APIRouter, service: Service) -> None:
         summary="Takes control, for as long as it is renewed",
         responses=responses("423 lease-held"),
     )
-    async def take(request: LeaseRequest) -> LeaseView:
-        return views.lease(service, service.control.take(request.holder, request.ttl_s, request.purpose))
+    async def take(request: LeaseRequest, caller: WhoAsks) -> LeaseView:
+        held = service.control.take(caller.known_as(request.holder), request.ttl_s, request.purpose)
+        return views.lease(service, held)
 
     @router.put("/control/lease", dependencies=[OPERATE], summary="Renews the lease")
     async def renew(lease: LeaseHeader = "") -> LeaseView:
         return views.lease(service, service.control.renew(lease))
 
-    @router.delete(
-        "/control/lease",
-        dependencies=[OPERATE],
-        summary="Gives control back; what moves is stopped",
-    )
+    @router.delete("/control/lease", dependencies=[OPERATE], summary="Gives control back; what moves is stopped")
     async def release(lease: LeaseHeader = "") -> ControlView:
         service.control.release(lease)
         return views.control(service)
@@ -49,7 +46,7 @@ def add(router: APIRouter, service: Service) -> None:
     async def take_over(request: TakeoverRequest, caller: WhoAsks) -> LeaseView:
         may_stop = caller.may(Scope.ADMIN)
         lease = service.control.take_over(
-            request.holder, request.ttl_s, request.purpose, request.reason, service.moves, may_stop
+            caller.known_as(request.holder), request.ttl_s, request.purpose, request.reason, service.moves, may_stop
         )
         service.stop_taken_over()
         return views.lease(service, lease)
