@@ -14,6 +14,7 @@ from mock_devices.parameters import Axis, Sensor
 from rig import plugins
 from rig.config.products.registry import ROLES, name_of
 from rig.config.products.roles import MockPort, Product
+from rig.deadline import within
 from rig.errors import PluginError
 from rig.plugins import Plugin, lacking
 
@@ -22,6 +23,10 @@ Answer = TypeVar("Answer")
 ALL = "all"
 # Six digits are what the Bota sensor prints.
 OTHER_DEVICES = 900_000
+# A mock's turn takes microseconds, and a bench that was stopped for a second gives up (`serve.GIVE_UP_NS`).
+TURN_S = 2.0
+# At one time: a stall of a second is made up for in as many at 1 kHz, each at a time of its own.
+TURNS_LARGEST = 1000
 # What the bench can play in each role: one product, or all of them at once.
 CHOICES: dict[str, dict[str, tuple[type[Product], ...]]] = {
     role: {
@@ -53,6 +58,7 @@ class Contained:
 
     def __init__(self, device: MockDevice, whose: Plugin) -> None:
         self._device, self._mock, self._whose, self._silent = device, device.mock, whose, False
+        self._last_ns, self._turns = -1, 0
 
     @property
     def due_ns(self) -> int:
@@ -62,7 +68,13 @@ class Contained:
         return self._asked(lambda: list(self._mock.filenos()), [])
 
     def tick(self, now_ns: int) -> None:
-        self._asked(lambda: self._mock.tick(now_ns), None)
+        self._last_ns, self._turns = now_ns, self._turns + 1 if now_ns == self._last_ns else 0
+        self._asked(lambda: self._turn(now_ns), None)
+
+    def _turn(self, now_ns: int) -> None:
+        if self._turns > TURNS_LARGEST:
+            raise TimeoutError(f"due_ns stays at {now_ns} whatever it has done")
+        self._mock.tick(now_ns)
 
     def receive(self, now_ns: int) -> None:
         self._asked(lambda: self._mock.receive(now_ns), None)
@@ -73,7 +85,8 @@ class Contained:
 
     def _asked(self, ask: Callable[[], Answer], unsaid: Answer) -> Answer:
         try:
-            return unsaid if self._silent else ask()
+            with within(TURN_S):
+                return unsaid if self._silent else ask()
         except (Exception, SystemExit) as error:  # whatever it is, the other devices of the bench go on
             self._silent = self._device.wire.frozen = True
             what = " ".join(f"{type(error).__name__}: {error}".split())

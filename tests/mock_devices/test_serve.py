@@ -23,6 +23,7 @@ import pytest
 from drivers.bota.device import BotaSensOne
 from drivers.epos4.device import Epos4Axis
 from drivers.ports import Port, PortClosed, open_port, read_until
+from mock_devices import played
 from mock_devices.bench import Bench
 from mock_devices.control import BenchControl, ControlPort, RequestHandler
 from mock_devices.devices import DeviceFactory
@@ -331,6 +332,25 @@ def test_a_plug_ins_mock_that_raises_is_named_once_and_silent_and_the_others_go_
     assert anothers.bench.time_s == pytest.approx(0.7, abs=0.01)
     if method != "close":
         assert read_until(anothers.port, bool, 0.2) == b""
+
+
+def test_a_plug_ins_mock_that_never_comes_back_or_on_is_silent_too(
+    anothers: ServerBench, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(played, "TURN_S", 0.1)
+    monkeypatch.setattr(anothers.sensor.mock, "receive", lambda _: time.sleep(60))
+    anothers.server.turn(anothers.line.filenos())
+    assert "for it raised TimeoutError: not done within 0.1 s; see" in capsys.readouterr().err
+
+
+def test_a_plug_ins_mock_whose_time_stands_still_is_silent_too(
+    anothers: ServerBench, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(anothers.sensor.mock, "tick", lambda _: None)
+    due_ns = anothers.sensor.mock.due_ns
+    anothers.pass_ms(100)
+    assert f"TimeoutError: due_ns stays at {due_ns} whatever it has done; see" in capsys.readouterr().err
+    assert anothers.bench.time_s == pytest.approx(0.4, abs=0.01)
 
 
 def test_a_mock_of_ours_that_raises_is_our_own_mistake_and_ends_the_bench(
