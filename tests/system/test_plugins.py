@@ -75,7 +75,6 @@ def without_what_developers_install(folder: Path) -> dict[str, str]:
 
 
 @pytest.mark.extra
-@pytest.mark.by_hand
 def test_a_laboratorys_own_checks_run_as_the_workflow_says(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples" / "ci", tmp_path / "ci")
     workflow = (tmp_path / "ci" / "laboratory.yml").read_text()
