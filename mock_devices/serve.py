@@ -60,13 +60,13 @@ class MockServer:
 
     def __init__(self, bench: Bench, devices: Sequence[MockDevice], clock_ns: Callable[[], int]) -> None:
         self._bench = bench
-        self._mocks = [device.mock for device in devices]
-        self._timed: list[Timed] = [*self._mocks, *(device.wire for device in devices)]
+        self._players = [device.player for device in devices]
+        self._timed: list[Timed] = [*self._players, *(device.wire for device in devices)]
         self._devices = devices
         self._axes = [device for device in devices if device.role in AXIS_ROLES]
         self._axis = self._axes[0]
         self._clock_ns = clock_ns
-        drives = [mock for mock in self._mocks if isinstance(mock, Epos4Mock)]
+        drives = [device.mock for device in devices if isinstance(device.mock, Epos4Mock)]
         synced_ns = drives[0].synced_ns if drives else None
         sampled = {device.role: device.mock.sampled for device in devices if isinstance(device.mock, Sampled)}
         self.control = ControlPort(RequestHandler(bench, _by_role(devices), synced_ns, sampled).answer)
@@ -112,7 +112,7 @@ class MockServer:
 
     def close(self) -> None:
         """Cuts all wires."""
-        for mock in self._mocks:
+        for mock in self._players:
             mock.close()
         self.control.close()
 
@@ -134,7 +134,7 @@ class MockServer:
         return min(item.due_ns for item in self._timed)
 
     def _wait(self, parent: int | None) -> list[int]:
-        descriptors = [fileno for mock in self._mocks for fileno in mock.filenos()] + self.control.filenos()
+        descriptors = [fileno for mock in self._players for fileno in mock.filenos()] + self.control.filenos()
         if parent is not None:
             descriptors.append(parent)
         left_s = (self._due_ns() - self._clock_ns()) * 1e-9
@@ -152,10 +152,10 @@ class MockServer:
             self._catch_up(told_ns)
             self._bench.advance(told_ns)
             self._axis.wire.put_back(line)
-            self._axis.mock.receive(told_ns)
+            self._axis.player.receive(told_ns)
 
     def _hear(self, heard: set[int], now_ns: int) -> None:
-        for mock in self._mocks:
+        for mock in self._players:
             if not heard.isdisjoint(mock.filenos()):
                 mock.receive(now_ns)
         if not heard.isdisjoint(self.control.filenos()):

@@ -172,6 +172,7 @@ DEVICES: dict[str, str] = {
     "drivers/threaded_source.py": "SDKs that block or call back",
     "drivers/udp_port.py": "devices on UDP",
     "drivers/testing/": "the conformance kit of drivers",
+    "drivers/kept.py": "drivers of other distributions",
     "rig/plugins.py": "products, laws and causes of other distributions",
     "rig/config/products/usable.py": "products of other distributions",
     "controller/devices/finding.py": "what could stand on the bench",

@@ -8,8 +8,7 @@ from pkgutil import resolve_name
 from typing import get_type_hints
 
 import rig
-from drivers.input_role import Input
-from drivers.roles import ForceSensor, MarkerTracker, ServoAxis
+from drivers.kept import lack
 from rig import plugins
 from rig.config.products.inputs import EVERY_ROLE
 from rig.config.products.roles import Product
@@ -17,14 +16,12 @@ from rig.config.words import toml, value_words
 from rig.deadline import within
 from rig.diagnosis.effects.axis import AXIS_CAUSES
 from rig.diagnosis.effects.registry import CAUSES
-from rig.plugins import lacking
 from rig.registry import known
 from rig.results.devices import DevicesResult, PluginListed, ProductListed, ProductOption
 from rig.tissue.registry import LAWS
 
 # Each has looked at its own group of entry points when it was loaded.
 REGISTRIES = (*EVERY_ROLE.values(), LAWS, CAUSES, AXIS_CAUSES)
-KEPT: dict[str, type] = {"force": ForceSensor, "axis": ServoAxis, "tracker": MarkerTracker, "input": Input}
 
 
 def devices(product: str = "") -> DevicesResult:
@@ -100,8 +97,6 @@ def _unusable(role: str, product: type[Product]) -> str:
             made = driver if inspect.isclass(driver) else _promised(driver)
     except (Exception, SystemExit) as error:  # whatever a plug-in does while it is imported is its own failure
         return f"{type(error).__name__}: {error}"
-    absent = lacking(made, KEPT[role]) if made else []
     no_calls = [name for name, one in ((product.driver, driver), ("its mock's maker", maker)) if not callable(one)]
-    return "; ".join(
-        [*(f"its driver has no {name}" for name in absent), *(f"{name} is no function" for name in no_calls)]
-    )
+    absent = lack(made, role) if made else ""
+    return "; ".join([*([absent] if absent else []), *(f"{name} is no function" for name in no_calls)])

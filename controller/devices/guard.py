@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Generic, Self, TypeVar
 
 from drivers.input_role import Input
+from drivers.kept import lack
 from drivers.roles import Device, ForceSensor, Identity, LinkCounters, MarkerTracker, ServoAxis
 from rig import plugins
 from rig.channels import AxisSample, ForceSample, MarkerSample
@@ -20,7 +21,7 @@ from rig.config.products.roles import ForceProduct, Product
 from rig.deadline import within
 from rig.errors import DeviceError, RigError
 from rig.input_streams import InputSample
-from rig.plugins import Plugin, lacking
+from rig.plugins import Plugin
 
 Made = TypeVar("Made", bound=Device)
 Answer = TypeVar("Answer")
@@ -49,16 +50,14 @@ RATE_TOLERANCE = 0.1  # half of what lies between neighbouring rates of a sensor
 class Guarded(ABC, Generic[Made, Sample]):
     """What every role has. ``now`` is the monotonic clock, ``waits`` how often this thread has waited so far."""
 
-    GROUP: str
-    """Of entry points, in which plug-ins declare products of this role."""
+    ROLE: str
+    """As in `drivers.kept`, and in the name of the group of entry points."""
     KIND: type[Sample]
-    ROLE: type
-    """The protocol that its driver keeps."""
 
     @classmethod
     def guard(cls, config: Product, make: Callable[[], Made]) -> Self | Made:
         """What ``make`` gives, guarded where a plug-in declares it."""
-        plugin = plugins.declaring(cls.GROUP, config.product)
+        plugin = plugins.declaring(f"tissue_rig.{cls.ROLE}", config.product)
         return cls(plugin, config, make) if plugin else make()
 
     def __init__(
@@ -78,9 +77,9 @@ class Guarded(ABC, Generic[Made, Sample]):
         self._refuse_lacking(whole=False)
 
     def _refuse_lacking(self, whole: bool) -> None:
-        if absent := lacking(self._device, self.ROLE, whole):
+        if absent := lack(self._device, self.ROLE, whole):
             self.close()
-            raise self._error(f"its driver has no {', no '.join(absent)}")
+            raise self._error(absent)
 
     @property
     def counters(self) -> LinkCounters:
@@ -208,7 +207,7 @@ class Guarded(ABC, Generic[Made, Sample]):
 class GuardedForce(Guarded[ForceSensor, ForceSample]):
     """A force sensor."""
 
-    GROUP, KIND, ROLE = "tissue_rig.force", ForceSample, ForceSensor
+    ROLE, KIND = "force", ForceSample
 
     def poll(self, now_ns: int) -> Sequence[ForceSample]:
         """Samples since the last call, each looked at."""
@@ -224,7 +223,7 @@ class GuardedForce(Guarded[ForceSensor, ForceSample]):
 class GuardedTracker(Guarded[MarkerTracker, MarkerSample]):
     """A marker tracker."""
 
-    GROUP, KIND, ROLE = "tissue_rig.tracker", MarkerSample, MarkerTracker
+    ROLE, KIND = "tracker", MarkerSample
 
     @property
     def tools(self) -> tuple[str, ...]:
@@ -242,7 +241,7 @@ class GuardedTracker(Guarded[MarkerTracker, MarkerSample]):
 class GuardedInput(Guarded[Input, InputSample]):
     """An input, which may wait, as it has a thread of its own."""
 
-    GROUP, KIND, ROLE = "tissue_rig.input", InputSample, Input
+    ROLE, KIND = "input", InputSample
 
     def poll(self, now_ns: int) -> Sequence[InputSample]:
         """Samples since the last call, each looked at."""
@@ -258,7 +257,7 @@ class GuardedInput(Guarded[Input, InputSample]):
 class GuardedAxis(Guarded[ServoAxis, AxisSample]):
     """A servo axis."""
 
-    GROUP, KIND, ROLE = "tissue_rig.axis", AxisSample, ServoAxis
+    ROLE, KIND = "axis", AxisSample
     _failure: DeviceError | None = None
 
     def _said(self, ask: Callable[[], Answer], unsaid: Answer) -> Answer:

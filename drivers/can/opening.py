@@ -4,17 +4,18 @@ from collections.abc import Callable
 
 from drivers.can.bus import CanLink, SlcanLink
 from drivers.can.generic import PythonCanLink, open_bus
-from drivers.can.socketcan import SocketCanLink, open_socket
+from drivers.can.socketcan import SocketCanLink, open_socket, refuse_other_rate, shown_by_ip
 from rig.config.products.can_axis import CanAxisProduct
 
 OpenLink = Callable[[str, int, Callable[[], int]], CanLink]
 
 
-def opener(config: CanAxisProduct) -> OpenLink:
-    """What opens the bus that ``config`` names, given port, bit rate and clock."""
+def opener(config: CanAxisProduct, show: Callable[[str], str] = shown_by_ip) -> OpenLink:
+    """What opens the bus that ``config`` names, given port, bit rate and clock; ``show`` as in `shown_by_ip`."""
     interface = config.interface
 
     def by_socket(port: str, bitrate: int, now: Callable[[], int]) -> CanLink:
+        refuse_other_rate(port, bitrate, show)
         return SocketCanLink(open_socket(port), port, bitrate, now)
 
     def by_library(port: str, bitrate: int, now: Callable[[], int]) -> CanLink:

@@ -4,10 +4,13 @@ The machines this was made on have no AF_CAN: codec and link were run over a pai
 frames apart as a raw CAN socket does; ``open_socket`` alone has never met a kernel with CAN.
 """
 
+import contextlib
 import errno
+import json
 import select
 import socket
 import struct
+import subprocess
 import time
 from collections.abc import Callable
 from typing import NamedTuple
@@ -29,6 +32,10 @@ FRAME_BYTES = _FRAME.size
 # Sent in a row into a full buffer: with two frames a millisecond a quarter of a second in which nobody acknowledged.
 FULL_LARGEST = 500
 FULL = (errno.ENOBUFS, errno.EAGAIN)
+# An interface's rate is what its clock divides into, and ISO 11898-1 lets no oscillator be farther off; rates that are
+# in use differ by 6 % at least (750 and 800 kbit/s).
+OFF_LARGEST = 0.0158
+SHOWN_S = 2.0  # `ip` asks the kernel alone, and answers in milliseconds
 
 
 class ErrorFrame(NamedTuple):
@@ -147,6 +154,29 @@ class SocketCanLink:
     def _gone(self, why: str) -> PortClosed:
         return PortClosed(
             f"{self._name}: the CAN bus is gone ({why}); check bit rate, terminators, cable and power of the nodes"
+        )
+
+
+def shown_by_ip(name: str) -> str:
+    """What iproute2 says of the interface ``name``, JSON; "" where it knows none, or is not there."""
+    command = ["ip", "-details", "-json", "link", "show", name]
+    with contextlib.suppress(OSError, subprocess.SubprocessError):
+        return subprocess.run(command, capture_output=True, text=True, timeout=SHOWN_S, check=False).stdout
+    return ""
+
+
+def refuse_other_rate(name: str, bitrate: int, show: Callable[[str], str]) -> None:
+    """Raises DeviceError where the interface is set to another rate; one that says none, as vcan, is not judged."""
+    try:
+        about = json.loads(show(name))[0]["linkinfo"]["info_data"]
+        # A controller with a list of fixed rates states its own beside that (iproute2, ip/iplink_can.c).
+        real = about["bittiming"]["bitrate"] if "bittiming" in about else about["bittiming_bitrate"]
+    except (ValueError, LookupError, TypeError):
+        return
+    if real and abs(real - bitrate) > OFF_LARGEST * bitrate:
+        raise DeviceError(
+            f"{name}: the interface is set to {real} bit/s where axis.bitrate is {bitrate}; correct axis.bitrate, or"
+            f" `ip link set {name} down`, then `ip link set {name} up type can bitrate {bitrate}`"
         )
 
 

@@ -8,20 +8,16 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from drivers.input_role import Input
+from drivers.kept import KEPT, lack
 from drivers.roles import ForceSensor, MarkerTracker, ServoAxis
 from rig.channels import AxisSample, ForceSample, MarkerSample
-from rig.config.products.input_role import InputProduct
-from rig.config.products.roles import AxisProduct, ForceProduct, Product, TrackerProduct
+from rig.config.products.roles import AxisProduct, Product
 from rig.config.products.usable import refusal_of
 from rig.errors import DeviceError
 from rig.input_streams import InputSample
-from rig.plugins import lacking
 
 AnySample = ForceSample | AxisSample | MarkerSample | InputSample
 AnyDevice = ForceSensor | ServoAxis | MarkerTracker | Input
-KEPT: tuple[tuple[type[Product], type], ...] = (
-    (ForceProduct, ForceSensor), (AxisProduct, ServoAxis), (TrackerProduct, MarkerTracker), (InputProduct, Input),
-)  # fmt: skip
 # A cycle of the loop.
 TURN_S = 0.001
 # The slowest stream of a bench, a tracker at 20 Hz, then gives ten samples.
@@ -80,10 +76,7 @@ class UnderTest:
 
     def made(self) -> AnyDevice:
         """A new driver, not started; raises Nonconformity where it or its declaration lacks what its role has."""
-        kinds = [pair for pair in KEPT if isinstance(self.config, pair[0])]
-        if not kinds:
-            raise Nonconformity(f"its configuration is {self.config!r}, where the table of a product is expected")
-        if wrong := refusal_of(kinds[0][0])(type(self.config)):
+        if wrong := refusal_of(KEPT[self._role()].declared)(type(self.config)):
             raise Nonconformity(f"its declaration cannot be used: {wrong}")
         device = self.open()
         self._refuse_lacking(device, whole=False)
@@ -96,11 +89,16 @@ class UnderTest:
         self._refuse_lacking(device, whole=True)
 
     def _refuse_lacking(self, device: AnyDevice, whole: bool) -> None:
-        role = next(role for kind, role in KEPT if isinstance(self.config, kind))
-        if absent := lacking(device, role, whole):
+        if absent := lack(device, self._role(), whole):
             with contextlib.suppress(Exception):
                 device.close()
-            raise Nonconformity(f"its driver has no {', no '.join(absent)}, which {role.__name__} has")
+            raise Nonconformity(absent)
+
+    def _role(self) -> str:
+        for role, kept in KEPT.items():
+            if isinstance(self.config, kept.declared):
+                return role
+        raise Nonconformity(f"its configuration is {self.config!r}, where the table of a product is expected")
 
     @contextlib.contextmanager
     def started(self, next_seq: int = 0) -> Iterator[AnyDevice]:

@@ -9,10 +9,11 @@ import socket
 import subprocess
 import sys
 import termios
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,11 @@ import pytest
 from drivers.bota.device import BotaSensOne
 from drivers.epos4.device import Epos4Axis
 from drivers.ports import Port, PortClosed, open_port, read_until
+from mock_devices import played
 from mock_devices.bench import Bench
-from mock_devices.control import BenchControl
+from mock_devices.control import BenchControl, ControlPort, RequestHandler
 from mock_devices.devices import DeviceFactory
+from mock_devices.faults.wires import Fault
 from mock_devices.parameters import Parameters
 from mock_devices.played import made
 from mock_devices.serve import MockServer, effects_table
@@ -36,6 +39,8 @@ from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.products.ndi_polaris import PolarisWiring
 from rig.config.products.registry import ROLES
 from rig.config.wiring import Limits
+from rig.errors import UsageError
+from rig.plugins import Plugin
 
 COMMAND = [sys.executable, "-m", "mock_devices.serve", "--tracker-tcp-port", "0"]
 FRAME = 37
@@ -229,14 +234,15 @@ def test_the_list_of_effects_names_each_parameter_with_default_and_bounds() -> N
 
 
 class ServerBench:
-    """A server on an injected clock, and the client's end of its force sensor's line."""
+    """A server on an injected clock, and the client's end of its force sensor's line; ``whose`` that sensor is."""
 
-    def __init__(self) -> None:
+    def __init__(self, whose: Plugin | None = None) -> None:
         self.clock = Clock(0)
         self.bench = Bench(Parameters.model_validate({"tracker": {"tcp_port": 0}, "force": {"counter_drift_ppm": 0.0}}))
         factory = DeviceFactory(self.bench, 0, self.clock, seed=0)
-        devices = made((BotaWiring, Epos4Wiring, PolarisWiring), factory)
-        self.line, self.axis = devices[0].wire, devices[1]
+        ours = made((BotaWiring, Epos4Wiring, PolarisWiring), factory)
+        devices = [replace(ours[0], whose=whose), *ours[1:]]
+        self.sensor, self.line, self.axis = devices[0], devices[0].wire, devices[1]
         self.server = MockServer(self.bench, devices, self.clock)
         self.port = open_port(self.line.endpoint, 460_800)
         self.server.turn([fileno for one in devices for fileno in one.mock.filenos()])  # the sensor has power from here
@@ -263,10 +269,9 @@ class ServerBench:
         return len(data) // FRAME
 
 
-@pytest.fixture
-def served() -> Iterator[ServerBench]:
+@contextmanager
+def streaming(served: ServerBench) -> Iterator[ServerBench]:
     """Past its boot text, streaming at 100 Hz since 0.3 s."""
-    served = ServerBench()
     try:
         served.pass_ms(300)
         served.say(b"C")
@@ -276,6 +281,104 @@ def served() -> Iterator[ServerBench]:
     finally:
         served.port.close()
         served.server.close()
+
+
+@pytest.fixture
+def served() -> Iterator[ServerBench]:
+    with streaming(ServerBench()) as served:
+        yield served
+
+
+@pytest.fixture
+def anothers() -> Iterator[ServerBench]:
+    """The same, its force sensor a plug-in's."""
+    with streaming(ServerBench(Plugin("tissue_rig.force", "x", "acme-rig", "2.1", "acme-one"))) as served:
+        yield served
+
+
+def raising(error: BaseException) -> Callable[..., None]:
+    def raises(*_: object) -> None:
+        raise error
+
+    return raises
+
+
+@pytest.mark.parametrize("error", [KeyError("counts"), SystemExit("dongle"), ValueError("two\nlines")], ids=repr)
+@pytest.mark.parametrize("method", ["tick", "receive", "filenos", "close"])
+def test_a_plug_ins_mock_that_raises_is_named_once_and_silent_and_the_others_go_on(
+    anothers: ServerBench, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], method: str,
+    error: BaseException,
+) -> None:  # fmt: skip
+    anothers.pass_ms(100)
+    assert anothers.frames(10) == 10
+    with opened(anothers.axis.wire.endpoint) as port:
+        monkeypatch.setattr(anothers.sensor.mock, method, raising(error))
+        if method == "receive":
+            anothers.write(b"C")
+        for _ in range(3):
+            anothers.clock.now_ns += 100_000_000
+            anothers.server.turn(anothers.line.filenos())
+        port.write(b"V\r")
+        assert select.select(anothers.axis.wire.filenos(), [], [], 5.0)[0]
+        anothers.server.turn(anothers.axis.wire.filenos())
+        assert read_until(port, lambda data: data.endswith(b"\r"), 5.0)[:1] == b"V"
+    if method == "close":
+        anothers.server.close()
+    said = " ".join(f"{type(error).__name__}: {error}".split())
+    assert capsys.readouterr().err == (
+        "bench: tissue_rig.force 'x' of acme-rig 2.1: its mock at force is silent from now on, as a lost device,"
+        f" for it raised {said}; see its maker\n"
+    )
+    assert anothers.bench.time_s == pytest.approx(0.7, abs=0.01)
+    if method != "close":
+        assert read_until(anothers.port, bool, 0.2) == b""
+
+
+def test_a_plug_ins_mock_that_never_comes_back_or_on_is_silent_too(
+    anothers: ServerBench, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(played, "TURN_S", 0.1)
+    monkeypatch.setattr(anothers.sensor.mock, "receive", lambda _: time.sleep(60))
+    anothers.server.turn(anothers.line.filenos())
+    assert "for it raised TimeoutError: not done within 0.1 s; see" in capsys.readouterr().err
+
+
+def test_a_plug_ins_mock_whose_time_stands_still_is_silent_too(
+    anothers: ServerBench, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(anothers.sensor.mock, "tick", lambda _: None)
+    due_ns = anothers.sensor.mock.due_ns
+    anothers.pass_ms(100)
+    assert f"TimeoutError: due_ns stays at {due_ns} whatever it has done; see" in capsys.readouterr().err
+    assert anothers.bench.time_s == pytest.approx(0.4, abs=0.01)
+
+
+def test_a_mock_of_ours_that_raises_is_our_own_mistake_and_ends_the_bench(
+    served: ServerBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(served.sensor.mock, "tick", raising(KeyError("counts")))
+    with pytest.raises(KeyError):
+        served.pass_ms(100)
+
+
+def test_a_fault_that_raises_is_refused_and_the_bench_goes_on(anothers: ServerBench) -> None:
+    anothers.sensor.faults["drop"] = Fault("is lost", True, raising(KeyError("share")))
+    anothers.server.control.close()
+    said: list[str] = []
+    port = ControlPort(RequestHandler(anothers.bench, {"force": [anothers.sensor.faults]}).answer)
+
+    def ask() -> None:
+        with BenchControl(port.endpoint) as control, pytest.raises(UsageError) as told:
+            control.fault("force", "drop")
+        said.append(str(told.value))
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    while asking.is_alive():
+        select.select(port.filenos(), [], [], 0.01)
+        port.receive()
+    port.close()
+    assert said == ["fault failed, KeyError: 'share'"]
 
 
 def test_each_mock_acts_at_its_own_time_after_physics_has_come_there(served: ServerBench) -> None:

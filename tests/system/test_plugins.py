@@ -12,6 +12,7 @@ import pytest
 from copier import run_copy
 
 from mock_devices.testing.commands import ROOT
+from rig.recording.reader import read_recording
 
 pytestmark = [pytest.mark.xdist_group("commands"), pytest.mark.timeout(300)]
 
@@ -74,7 +75,6 @@ def without_what_developers_install(folder: Path) -> dict[str, str]:
 
 
 @pytest.mark.extra
-@pytest.mark.by_hand
 def test_a_laboratorys_own_checks_run_as_the_workflow_says(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples" / "ci", tmp_path / "ci")
     workflow = (tmp_path / "ci" / "laboratory.yml").read_text()
@@ -87,6 +87,17 @@ def test_a_laboratorys_own_checks_run_as_the_workflow_says(tmp_path: Path) -> No
         program, *arguments = step.split()
         done = run(Path(sys.executable).with_name(program), *arguments, folder=tmp_path / "ci", environment=environment)
         assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+
+
+def beside(folder: Path, points: str, module: str) -> dict[str, str]:
+    """The environment that finds the distribution `acme`, made of one ``module`` that declares ``points``."""
+    about = folder / "site" / "acme-1.0.dist-info"
+    about.mkdir(parents=True)
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: acme\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(points)
+    (folder / "site" / "acme_bench.py").write_text(module)
+    paths = os.pathsep.join(map(str, (folder / "site", ROOT)))
+    return os.environ | {"PYTHONPATH": paths, "XDG_STATE_HOME": str(folder / "state"), "COLUMNS": "200"}
 
 
 ACME = """
@@ -107,17 +118,61 @@ class Tracker(PolarisWiring):
 """
 
 
+FAILING = """
+from typing import ClassVar, Literal
+from pydantic import Field
+from mock_devices.quantities import read
+from rig.config.products.bota_sensone import BotaWiring
+from rig.config.products.roles import MockPort
+
+class Failing(BotaWiring):
+    "Another maker's sensor, whose mock fails once the tip presses."
+    mock: ClassVar[MockPort | None] = MockPort("acme_bench:make", "force")
+    product: Literal["acme-cell"] = Field(default="acme-cell", description="what stands on the bench")
+
+def make(factory):
+    (device,) = factory.bota()
+    tick = device.mock.tick
+
+    def failing(now_ns):
+        if read(factory.bench, "tip.force_N") > 2.0:
+            raise KeyError("counts")
+        tick(now_ns)
+
+    device.mock.tick = failing
+    return [device]
+"""
+
+
+@pytest.mark.extra
+def test_where_a_plug_ins_mock_fails_the_tip_comes_out_and_both_sentences_say_why(tmp_path: Path) -> None:
+    """Only the axis, which goes on, can take the tip out of the tissue, at 20 mm, to the clearance."""
+    environment = beside(tmp_path, "[tissue_rig.force]\nf = acme_bench:Failing\n", FAILING)
+    (tmp_path / "slow.toml").write_text(
+        'kind = "indentation"\nspeeds_mm_s = [5]\ntrials = 1\ndepth_mm = 8\nair_dwell_s = 0.2\n'
+        "approach_speed_mm_s = 20\nhold_s = 20\nretract_speed_mm_s = 20\nclearance_mm = 4\nforce_limit_N = 12\n"
+    )
+    said = run(
+        Path(sys.executable).with_name("rig"), "capture", "slow.toml", "--out", "session", "--set",
+        "force.product=acme-cell", folder=tmp_path, environment=environment,
+    )  # fmt: skip
+    assert said.returncode == 3, said.stderr
+    named = [line for line in said.stderr.splitlines() if line.startswith("bench: tissue_rig.force")]
+    assert named == [
+        "bench: tissue_rig.force 'f' of acme 1.0: its mock at force is silent from now on, as a lost device, for it"
+        " raised KeyError: 'counts'; see its maker"
+    ]
+    assert "force" in said.stderr.splitlines()[-1] and "Traceback" not in said.stderr
+    recording = read_recording(tmp_path / "session" / "trial_001.mcap")
+    assert recording.damage == ()
+    assert recording.tables["axis"]["position_mm"].max() > 20.0 > recording.tables["axis"]["position_mm"][-1]
+
+
 @pytest.mark.extra
 def test_axis_and_tracker_of_plug_ins_stand_on_the_mock_bench(tmp_path: Path) -> None:
     """Doctor sees both through the guard, beside our own sensor."""
-    about = tmp_path / "site" / "acme-1.0.dist-info"
-    about.mkdir(parents=True)
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: acme\nVersion: 1.0\n")
     points = "[tissue_rig.axis]\na = acme_bench:Axis\n[tissue_rig.tracker]\nt = acme_bench:Tracker\n"
-    (about / "entry_points.txt").write_text(points)
-    (tmp_path / "site" / "acme_bench.py").write_text(ACME)
-    paths = os.pathsep.join(map(str, (tmp_path / "site", ROOT)))
-    environment = os.environ | {"PYTHONPATH": paths, "XDG_STATE_HOME": str(tmp_path / "state"), "COLUMNS": "200"}
+    environment = beside(tmp_path, points, ACME)
     settings = [part for key in ("axis.product=acme-axis", "axis.brake_test=true", "tracker.product=acme-eye")
                 for part in ("--set", key)]  # fmt: skip
     said = run(Path(sys.executable).with_name("rig"), "doctor", *settings, folder=tmp_path, environment=environment)

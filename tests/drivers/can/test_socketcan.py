@@ -16,8 +16,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.can.health import BusState
+from drivers.can.opening import opener
 from drivers.can.slcan import CanFrame
-from drivers.can.socketcan import FULL_LARGEST, ErrorFrame, SocketCanLink, decode, encode, open_socket
+from drivers.can.socketcan import (
+    FULL_LARGEST,
+    ErrorFrame,
+    SocketCanLink,
+    decode,
+    encode,
+    open_socket,
+    refuse_other_rate,
+    shown_by_ip,
+)
 from drivers.epos4.device import Epos4Axis
 from drivers.ports import PortClosed
 from mock_devices.testing.epos4 import DriveBench
@@ -148,6 +158,72 @@ def test_a_kernel_or_interface_without_can_is_one_sentence() -> None:
         open_socket("can7")
     with pytest.raises(DeviceError, match=r"^can7: "):
         Epos4Axis(Epos4Wiring(interface="socketcan", port="can7"), Limits()).start()
+
+
+def shown(kind: str, data: str) -> str:
+    """As `ip -details -json link show can0` prints it: print_linkinfo of ip/ipaddress.c, can_print_opt of
+    ip/iplink_can.c (github.com/iproute2/iproute2)."""
+    info = f'"info_kind":"{kind}"' + (f',"info_data":{{{data}}}' if data else "")
+    return (
+        '[{"ifindex":3,"ifname":"can0","flags":["NOARP","UP","LOWER_UP","ECHO"],"mtu":16,"qdisc":"pfifo_fast",'
+        '"operstate":"UP","linkmode":"DEFAULT","group":"default","txqlen":10,"link_type":"can","promiscuity":0,'
+        f'"allmulti":0,"min_mtu":0,"max_mtu":0,"linkinfo":{{{info}}},"num_tx_queues":1,"num_rx_queues":1}}]'
+    )
+
+
+def timed(bitrate: int) -> str:
+    return shown(
+        "can",
+        f'"state":"ERROR-ACTIVE","berr_counter":{{"tx":0,"rx":0}},"restart_ms":100,"bittiming":{{"bitrate":{bitrate},'
+        '"sample_point":"0.875","tq":125,"prop_seg":6,"phase_seg1":7,"phase_seg2":2,"sjw":1,"brp":1},"bittiming_const":'
+        '{"name":"mcp251x","tseg1":{"min":3,"max":16},"tseg2":{"min":2,"max":8},"sjw":{"min":1,"max":4},'
+        '"brp":{"min":1,"max":64},"brp_inc":1},"clock":8000000',
+    )
+
+
+FIXED = '"state":"ERROR-ACTIVE","restart_ms":0,"bittiming_bitrate":{},"bitrate_const":[100000,500000],"clock":48000000'
+OTHER_RATES = {"timed": timed(500_000), "fixed": shown("can", FIXED.format(500_000)), "near": timed(980_000)}
+NO_OTHER_RATE = {
+    "the same": timed(1_000_000),
+    "as near as the clock divides": timed(1_006_711),
+    "virtual": shown("vcan", ""),
+    "not set up": shown("can", '"state":"STOPPED","restart_ms":0,"clock":8000000'),
+    "fixed, not set up": shown("can", FIXED.format(0)),
+    "another link": '[{"ifname":"lo","link_type":"loopback"}]',
+    "no such link": "",
+    "busybox": "ip: unrecognized option: json",
+}
+
+
+@pytest.mark.parametrize("name", OTHER_RATES)
+def test_an_interface_at_another_rate_is_refused_before_it_is_opened(name: str) -> None:
+    real = {"near": 980_000}.get(name, 500_000)
+    asked: list[str] = []
+
+    def show(interface: str) -> str:
+        asked.append(interface)
+        return OTHER_RATES[name]
+
+    axis = Epos4Wiring(interface="socketcan", port="can0")
+    with pytest.raises(DeviceError) as told:
+        Epos4Axis(axis, Limits(), open_link=opener(axis, show)).start()
+    assert str(told.value) == (
+        f"can0: the interface is set to {real} bit/s where axis.bitrate is 1000000; correct axis.bitrate, or"
+        " `ip link set can0 down`, then `ip link set can0 up type can bitrate 1000000`"
+    )
+    assert asked == ["can0"]
+
+
+@pytest.mark.parametrize("name", NO_OTHER_RATE)
+def test_an_interface_at_the_stated_rate_or_without_one_passes(name: str) -> None:
+    refuse_other_rate("can0", 1_000_000, lambda _: NO_OTHER_RATE[name])
+
+
+def test_what_the_system_says_of_an_interface_is_asked_for_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "can7" not in shown_by_ip("can7")
+    refuse_other_rate("can7", 1_000_000, shown_by_ip)
+    monkeypatch.setenv("PATH", "")
+    assert shown_by_ip("lo") == ""
 
 
 def test_the_axis_starts_and_homes_over_kernel_frames() -> None:

@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import select
 import struct
 import time
 from collections.abc import Iterator
@@ -72,6 +73,40 @@ def test_where_the_kernel_gives_the_hosts_clock_capture_is_its_time(
     mock.press(True)
     (sample,) = switch.poll(7_000_900_000)
     assert (sample.capture_ns, sample.device_ns, sample.uncertainty_ns) == (7_000_123_000, 7_000_123_000, 0)
+    switch.close()
+
+
+UINPUT = Path("/dev/uinput")
+# linux/uinput.h: UI_SET_EVBIT, UI_SET_KEYBIT, UI_DEV_SETUP, UI_DEV_CREATE; struct uinput_setup; EV_KEY and KEY_B.
+SET_EVENTS, SET_KEY, SETUP, CREATE = 0x40045564, 0x40045565, 0x405C5503, 0x5501
+EV_KEY, KEY_B = 1, 48
+BUS_USB = 3
+
+
+@pytest.fixture
+def kernels() -> Iterator[tuple[int, str]]:
+    """A switch that the kernel itself makes, and its name."""
+    if not os.access(UINPUT, os.W_OK):
+        pytest.skip("this kernel has no uinput, or lets nobody use it; the other tests use a FIFO")
+    name, fd = f"tissue-rig {os.getpid()}", os.open(UINPUT, os.O_WRONLY | os.O_NONBLOCK)
+    fcntl.ioctl(fd, SET_EVENTS, EV_KEY)
+    fcntl.ioctl(fd, SET_KEY, KEY_B)
+    fcntl.ioctl(fd, SETUP, struct.pack("=4H80sI", BUS_USB, 1, 1, 1, name.encode(), 0))
+    fcntl.ioctl(fd, CREATE)
+    yield fd, name
+    os.close(fd)
+
+
+def test_a_switch_of_the_kernel_is_found_by_its_name_and_dated_by_the_hosts_clock(kernels: tuple[int, str]) -> None:
+    fd, name = kernels
+    switch = open_switch(EvdevSwitch(port=f"name:{name}"))
+    switch.start()
+    before_ns = time.monotonic_ns()
+    os.write(fd, struct.pack("@qqHHi", 0, 0, EV_KEY, KEY_B, 1) + struct.pack("@qqHHi", 0, 0, 0, 0, 0))
+    assert select.select([switch.fileno()], [], [], 5.0)[0]
+    (down,) = switch.poll(time.monotonic_ns())
+    assert (down.values, down.uncertainty_ns) == ((1.0, float(KEY_B)), 0)
+    assert before_ns - 1000 <= down.capture_ns <= down.arrival_ns
     switch.close()
 
 
