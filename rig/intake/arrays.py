@@ -33,6 +33,8 @@ LARGEST_MAT_B, LARGEST_MCAP_B, LARGEST_LINES_B = 1e9, 0.4e9, 0.25e9
 PIECES = "save it as Parquet, HDF5 or CSV, which are read piece by piece, or in parts"
 # Time, force and position.
 FEWEST_CHANNELS = 3
+# What LabVIEW says of the times of a channel, in s.
+WAVEFORM = ("wf_increment", "wf_start_offset")
 # Longer lists in a message are images and clouds of points.
 LONGEST_LIST = 64
 OBJECT_ADVICE = "; save objects of MATLAB as plain vectors, a table by table2struct(T, 'ToScalar', true)"
@@ -243,18 +245,24 @@ def _of_group(path: Path, name: str, group: Any) -> Iterator[Sheet]:
 
 def _of_items(path: Path, name: str, group: Any, keys: Sequence[str], before: str = "") -> Sheet:
     """The sheet of these datasets of the group, without what stands ``before`` the numbers of its columns."""
-    vectors, units, objects = Vectors(), dict[str, str](), list[str]()
+    vectors, units, objects, clocks = Vectors(), dict[str, str](), list[str](), set[tuple[float, ...]]()
     facts = facts_of(group)
     for key, item in ((key, group[key]) for key in keys if isinstance(group[key], h5py.Dataset)):
         if "MATLAB_object_decode" in item.attrs or h5py.check_ref_dtype(item.dtype):
             objects.append(key)
         elif columns := {own.removeprefix(before): column for own, column in columns_of(path, group, key).items()}:
             vectors |= columns
+            clocks |= (
+                {tuple(float(item.attrs.get(name, 0)) for name in WAVEFORM)} if WAVEFORM[0] in item.attrs else set()
+            )
             own = units_of(item)
             units |= zip(item.dtype.names or columns, own * len(columns) if len(own) == 1 else own, strict=False)
         elif fact := fact_of(item):
             facts[key] = fact
         facts |= facts_of(item)
+    if len(clocks) > 1:
+        said = f"its channels differ in {' or '.join(WAVEFORM)}"
+        raise DataError(f"{path}{name and f', {name}'}: {said}; save each with a column of its times")
     unread = f"; {', '.join(objects)} cannot be read{OBJECT_ADVICE}" if objects else ""
     return _of_vectors(path, name, vectors, units, facts, unread)
 
