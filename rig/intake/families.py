@@ -149,10 +149,11 @@ def _beside(path: Path, layout: Layout) -> list[ColumnGroup]:
 
 
 def _by_quantity(header: Sequence[str]) -> list[tuple[str, str]]:
-    """Of which quantity each column is by its words, as `Time Force` and `Time Position`."""
-    words = {quantity: set(WORDS[quantity]) for quantity in ("force", "position")}
-    said = [[own for own, known in words.items() if known.intersection(words_of(name))] for name in header]
-    return [(name, own[0] if len(own) == 1 else "") for name, own in zip(header, said, strict=True)]
+    """Of which quantity each column is by its words, where each has a time so called, as `Time Force`; else of none."""
+    known = {quantity: set(WORDS[quantity]) for quantity in ("force", "position", "time")}
+    said = [{own for own, words in known.items() if words.intersection(words_of(name))} for name in header]
+    timed = all({"time", own} in said for own in ("force", "position"))
+    return [(name, "".join(own - {"time"}) if timed else "") for name, own in zip(header, said, strict=True)]
 
 
 def _is_split(tables: Sequence[ColumnGroup], parted: Sequence[tuple[str, str]]) -> bool:
