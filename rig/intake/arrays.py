@@ -22,7 +22,7 @@ from zstandard import ZstdError
 
 from rig.errors import DataError
 from rig.intake.sheet import DAMAGE, Batch, Column, Sheet, refuse_large, unreadable
-from rig.intake.stored import UNIT_NAMES, Vectors, fact_of, facts_of, fields_of, is_numbers, lines_of, named, units_of
+from rig.intake.stored import UNIT_NAMES, Vectors, columns_of, fact_of, facts_of, is_numbers, named, tables_in, units_of
 from rig.intake.text import bytes_of
 from rig.intake.units import ros_unit, unit_in, unit_of
 
@@ -33,6 +33,8 @@ LARGEST_MAT_B, LARGEST_MCAP_B, LARGEST_LINES_B = 1e9, 0.4e9, 0.25e9
 PIECES = "save it as Parquet, HDF5 or CSV, which are read piece by piece, or in parts"
 # Time, force and position.
 FEWEST_CHANNELS = 3
+# What LabVIEW says of the times of a channel, in s.
+WAVEFORM = ("wf_increment", "wf_start_offset")
 # Longer lists in a message are images and clouds of points.
 LONGEST_LIST = 64
 OBJECT_ADVICE = "; save objects of MATLAB as plain vectors, a table by table2struct(T, 'ToScalar', true)"
@@ -57,6 +59,7 @@ def open_mat(path: Path) -> list[Sheet]:
     _sort("", {name: value for name, value in found.items() if not name.startswith("__")}, groups)
     _join_beside(groups)
     _join(groups)
+    groups = {name: values for group in groups.items() for name, values in _apart(*group)}
     titles = list(_titles(groups))
     return [_of_values(path, name, {**_facts_around(name, groups), **own}, titles) for name, own in groups.items()]
 
@@ -119,6 +122,15 @@ def _join_beside(groups: dict[str, dict[str, object]]) -> None:
             values = groups.pop(name)
             unit = next((f" ({value})" for fact, value in values.items() if fact.lower() in UNIT_NAMES), "")
             groups[above][_channel(name, values) + unit] = values[key]
+
+
+def _apart(name: str, values: Mapping[str, object]) -> Iterator[tuple[str, dict[str, object]]]:
+    """The struct, and with all else in it each matrix that is a table of its own."""
+    matrices = {key: value for key, value in values.items() if isinstance(value, np.ndarray) and value.ndim == 2}
+    own = tables_in({key: _split(key, value) for key, value in matrices.items() if value.dtype.kind in "biuf"})
+    rest = {key: value for key, value in values.items() if key not in own}
+    yield name, rest
+    yield from ((f"{name}.{key}".lstrip("."), {**rest, "matrix": values[key]}) for key in own)
 
 
 def _channel(name: str, values: Mapping[str, object]) -> str:
@@ -202,7 +214,7 @@ def open_hdf5(path: Path) -> list[Sheet]:
             # MATLAB's own cells, and the indexes that PyTables makes.
             found = {"": file} | {name: group for name, group in groups.items() if not re.match("#|(.*/)?_i_", name)}
             known = [(path, name, group) for name, group in found.items() if isinstance(group, h5py.Group)]
-            return [sheet for group in known for sheet in (_of_group(*group), *_members(*group))]
+            return [sheet for group in known for sheet in (*_of_group(*group), *_members(*group))]
     except DAMAGE as error:
         raise unreadable(path, "HDF5", error) from error
 
@@ -214,36 +226,43 @@ def _members(path: Path, name: str, group: Any) -> Iterator[Sheet]:
     fields = {key: fields[key] for key in plain if h5py.check_ref_dtype(fields[key].dtype)}
     for number in range(min((item.size for item in fields.values()), default=0)):
         items = {key: group.file[np.ravel(item[()])[number]] for key, item in fields.items()}
-        vectors = {
-            key: column
-            for key, item in items.items()
-            if isinstance(item, h5py.Dataset) and is_numbers(item)
-            for key, column in _split(key, item[()]).items()
-        }
+        numbers = [
+            (key, item[()]) for key, item in items.items() if isinstance(item, h5py.Dataset) and is_numbers(item)
+        ]
+        vectors = {key: column for own in numbers for key, column in _split(*own).items()}
         facts = {key: fact_of(item) for key, item in items.items() if isinstance(item, h5py.Dataset)}
         said = {key: fact for key, fact in facts.items() if fact}
         yield _of_vectors(path, f"{name}({number + 1})", vectors, {}, said)
 
 
-def _of_group(path: Path, name: str, group: Any) -> Sheet:
-    vectors, units, objects = Vectors(), dict[str, str](), list[str]()
+def _of_group(path: Path, name: str, group: Any) -> Iterator[Sheet]:
+    """A sheet of its vectors, and one of each dataset that is a table of its own, with the vectors beside it."""
+    own = tables_in({key: columns_of(path, group, key) for key in group})
+    rest = [key for key in group if key not in own]
+    yield _of_items(path, name, group, rest)
+    yield from (_of_items(path, f"{name}/{key}".lstrip("/"), group, [*rest, key], f"{key}:") for key in own)
+
+
+def _of_items(path: Path, name: str, group: Any, keys: Sequence[str], before: str = "") -> Sheet:
+    """The sheet of these datasets of the group, without what stands ``before`` the numbers of its columns."""
+    vectors, units, objects, clocks = Vectors(), dict[str, str](), list[str](), set[tuple[float, ...]]()
     facts = facts_of(group)
-    for key, item in group.items():
-        if not isinstance(item, h5py.Dataset):
-            continue
+    for key, item in ((key, group[key]) for key in keys if isinstance(group[key], h5py.Dataset)):
         if "MATLAB_object_decode" in item.attrs or h5py.check_ref_dtype(item.dtype):
             objects.append(key)
-        elif item.dtype.names:
-            vectors |= fields_of(path, item)
-            units |= zip(item.dtype.names, units_of(item), strict=False)
-        elif item.ndim in (1, 2) and is_numbers(item):
-            split = lines_of(path, group, key)
-            vectors |= split
+        elif columns := {own.removeprefix(before): column for own, column in columns_of(path, group, key).items()}:
+            vectors |= columns
+            clocks |= (
+                {tuple(float(item.attrs.get(name, 0)) for name in WAVEFORM)} if WAVEFORM[0] in item.attrs else set()
+            )
             own = units_of(item)
-            units |= zip(split, own * len(split) if len(own) == 1 else own, strict=False)
+            units |= zip(item.dtype.names or columns, own * len(columns) if len(own) == 1 else own, strict=False)
         elif fact := fact_of(item):
             facts[key] = fact
         facts |= facts_of(item)
+    if len(clocks) > 1:
+        said = f"its channels differ in {' or '.join(WAVEFORM)}"
+        raise DataError(f"{path}{name and f', {name}'}: {said}; save each with a column of its times")
     unread = f"; {', '.join(objects)} cannot be read{OBJECT_ADVICE}" if objects else ""
     return _of_vectors(path, name, vectors, units, facts, unread)
 

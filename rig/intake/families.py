@@ -14,7 +14,7 @@ from rig.intake.mapping import FileForm
 from rig.intake.pulling import PULLS, said_of_test
 from rig.intake.rates import named_rate_Hz, stated_rate_Hz
 from rig.intake.readers import kind_of
-from rig.intake.roles import candidates
+from rig.intake.roles import WORDS, candidates, words_of
 from rig.intake.survey import Looks, looks_of, texts_of
 from rig.intake.units import Meant, meant, unit_in, unit_of
 
@@ -137,7 +137,7 @@ def _called_by_place(table: ColumnGroup) -> ColumnGroup:
 def _beside(path: Path, layout: Layout) -> list[ColumnGroup]:
     """The tables that stand side by side in a sheet, by what tells their names apart, or names that come again."""
     whole = ColumnGroup(path, layout, tuple(range(len(layout.heads))), layout.heads)
-    for parted in (_told_apart(whole), _repeated(layout.sheet.header)):
+    for parted in (_told_apart(whole), _repeated(layout.sheet.header), _by_quantity(layout.sheet.header)):
         indices = list(dict.fromkeys(index for _, index in parted if index))
         tables = [_part(whole, parted, index) for index in indices]
         full = [table for table in tables if table.fitting("position") and table.fitting("force")]
@@ -146,6 +146,14 @@ def _beside(path: Path, layout: Layout) -> list[ColumnGroup]:
         if _is_split(tables, parted):
             return tables
     return [whole]
+
+
+def _by_quantity(header: Sequence[str]) -> list[tuple[str, str]]:
+    """Of which quantity each column is by its words, where each has a time so called, as `Time Force`; else of none."""
+    known = {quantity: set(WORDS[quantity]) for quantity in ("force", "position", "time")}
+    said = [{own for own, words in known.items() if words.intersection(words_of(name))} for name in header]
+    timed = all({"time", own} in said for own in ("force", "position"))
+    return [(name, "".join(own - {"time"}) if timed else "") for name, own in zip(header, said, strict=True)]
 
 
 def _is_split(tables: Sequence[ColumnGroup], parted: Sequence[tuple[str, str]]) -> bool:

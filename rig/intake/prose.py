@@ -80,24 +80,36 @@ def with_prose(tables: Iterable[ColumnGroup], top: Path) -> Iterator[ColumnGroup
 def _told(table: ColumnGroup, statements: Sequence[UnitSaid]) -> Iterator[tuple[int, UnitTold]]:
     """By column the unit that is said of it, none where two are said, or another than its own."""
     for number in table.columns if statements else ():
-        own, heads = table.unit(number), table.layout.sheet.header[number]
+        own = table.unit(number)
         fitting = [quantity for quantity in QUANTITIES if candidates(quantity, [table.name(number)], [own])]
         sizes = {unit: size for quantity in fitting or QUANTITIES for unit, size in _units(quantity).items()}
-        name = " ".join(token for token in _TOKEN.findall(heads) if token[1:] or token.isalnum())
-        name = name.removesuffix(own).rstrip(" _") if own else name
-        found = [one for one in statements if one.unit in (*sizes, *SIGNALS) and name and one.names(name, not fitting)]
-        loose = list[UnitSaid]()
-        if not (found or own or unknown_unit(table.layout.heads[number])):
-            loose = [one for one in statements if any(one.measures(each, alone=False) for each in fitting)]
-            found = [one for one in loose if any(one.measures(each, alone=True) for each in fitting)]
+        found, loose = _said_of(table, number, fitting, [one for one in statements if one.unit in (*sizes, *SIGNALS)])
         units = [*filter(None, [own]), *(one.unit for one in found)]
         is_clear = len({sizes.get(unit, unit) for unit in units}) == 1
-        said = list(dict.fromkeys(f"{one.unit} by {one.place}" for one in found or loose))[:MOST_PLACES]
         if (found or loose) and (not own or not (is_clear or "time" in fitting)):
-            said = [f"{own} by its header", *said] if own else said
-            how = "taken to be " if own or is_clear else "" if found else "perhaps "
-            example = loose[0].unit if loose and not found else ""
-            yield number, UnitTold(own or (units[0] if is_clear else ""), f"{how}in {' and in '.join(said)}", example)
+            yield number, _worded(own, found, loose, units[0] if is_clear else "")
+
+
+def _said_of(
+    table: ColumnGroup, number: int, fitting: Sequence[str], statements: Sequence[UnitSaid]
+) -> tuple[list[UnitSaid], list[UnitSaid]]:
+    """What is said of a column by its name, or else of all that measures its quantity; and what may be said of that."""
+    own, heads = table.unit(number), table.layout.sheet.header[number]
+    name = " ".join(token for token in _TOKEN.findall(heads) if token[1:] or token.isalnum())
+    name = name.removesuffix(own).rstrip(" _") if own else name
+    found = [one for one in statements if name and one.names(name, not fitting)]
+    if found or own or unknown_unit(table.layout.heads[number]):
+        return found, []
+    loose = [one for one in statements if any(one.measures(each, alone=False) for each in fitting)]
+    return [one for one in loose if any(one.measures(each, alone=True) for each in fitting)], loose
+
+
+def _worded(own: str, found: Sequence[UnitSaid], loose: Sequence[UnitSaid], unit: str) -> UnitTold:
+    """The ``own`` unit of a column or the one ``unit`` that is said of it, with the words for what is said."""
+    said = list(dict.fromkeys(f"{one.unit} by {one.place}" for one in found or loose))[:MOST_PLACES]
+    said = [f"{own} by its header", *said] if own else said
+    how = "taken to be " if own or unit else "" if found else "perhaps "
+    return UnitTold(own or unit, f"{how}in {' and in '.join(said)}", "" if found else loose[0].unit)
 
 
 def _units(quantity: str) -> Mapping[str, tuple[bool, float]]:

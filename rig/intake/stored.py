@@ -2,6 +2,7 @@
 
 import math
 import pickletools
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from rig.intake.sheet import DAMAGE, unreadable
 
+HEAD_ROWS = 1000  # which tell a time from what it moves
 # What attributes are called in which HDF5 writers put the unit and the names of columns.
 UNIT_NAMES = ("unit", "units", "engineeringunit", "unit_string", "engineering_units", "column_units", "channel_units")
 COLUMN_NAMES = ("columns", "column_names", "channels", "channel_names", "names", "fields", "labels")
@@ -61,7 +63,28 @@ class StoredVector:
 Vectors = dict[str, NDArray[np.generic] | StoredVector]
 
 
-def fields_of(path: Path, item: Any) -> dict[str, StoredVector]:
+def columns_of(path: Path, group: Any, name: str) -> Vectors:
+    """The columns of a dataset of rows with fields, of a vector or of a table of numbers; none of anything else."""
+    item = group[name]
+    if not isinstance(item, h5py.Dataset) or not (item.dtype.names or (item.ndim in (1, 2) and is_numbers(item))):
+        return {}
+    return dict(_fields_of(path, item)) if item.dtype.names else _lines_of(path, group, name)
+
+
+def tables_in(datasets: Mapping[str, Vectors]) -> list[str]:
+    """Which are tables of their own: of columns that others have too, or with a time each in the first of several."""
+    wide = {name: own for name, own in datasets.items() if len(own) > 1}
+    often = Counter(column for own in wide.values() for column in own)
+    unnamed = {name: own[f"{name}:1"][:HEAD_ROWS] for name, own in wide.items() if f"{name}:1" in own}
+    timed = [name for name, first in unnamed.items() if (np.diff(first) > 0).all()]
+    return (
+        timed
+        if 1 < len(timed) == len(wide)
+        else [key for key, own in wide.items() if max(often[each] for each in own) > 1]
+    )
+
+
+def _fields_of(path: Path, item: Any) -> dict[str, StoredVector]:
     """The columns of a dataset whose rows have named fields; in a field of several, by a pickle that is only read."""
     found: dict[str, StoredVector] = {}
     for field in item.dtype.names:
@@ -81,7 +104,7 @@ def _pickled(content: object) -> list[str]:
         return []
 
 
-def lines_of(path: Path, group: Any, name: str) -> Vectors:
+def _lines_of(path: Path, group: Any, name: str) -> Vectors:
     """A vector as it is, a table by its columns, ``name:1`` and so on without names; the longer side are the rows."""
     item = group[name]
     usual = {"scale_factor": 1.0, "add_offset": 0.0, "_FillValue": math.nan}

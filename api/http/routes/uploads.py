@@ -1,5 +1,7 @@
 """Files that are sent to be imported."""
 
+from functools import partial
+
 from fastapi import APIRouter, Request, Response
 
 from api.http.access.rights import OPERATE, READ, upload
@@ -18,12 +20,16 @@ BODY = {"type": "object", "properties": {"file": FILES}, "required": ["file"]}
 
 def add(router: APIRouter, service: Service) -> None:
     """Its routes."""
+    shelf = UploadShelf(service.jobs.uploads, partial(_in_use, service))
+    _collection(router, shelf)
+    _member(router, shelf, service)
 
-    def in_use(identifier: str) -> bool:
-        return any(job.asked.params.get("upload") == identifier for job in service.jobs.active)
 
-    shelf = UploadShelf(service.jobs.uploads, in_use)
+def _in_use(service: Service, identifier: str) -> bool:
+    return any(job.asked.params.get("upload") == identifier for job in service.jobs.active)
 
+
+def _collection(router: APIRouter, shelf: UploadShelf) -> None:
     @router.post(
         "/uploads",
         dependencies=[upload(Scope.OPERATE, LARGEST_UPLOAD_BYTES)],
@@ -41,6 +47,8 @@ def add(router: APIRouter, service: Service) -> None:
         found = (one for one in shelf.listed() if not file or file in {each.name for each in one.files})
         return listing("uploads", found, page, lambda one: (one.at, one.id), newest_first=True)
 
+
+def _member(router: APIRouter, shelf: UploadShelf, service: Service) -> None:
     @router.get(
         "/uploads/{identifier}", dependencies=[READ], summary="One upload", responses=responses("404 no-such-upload")
     )
@@ -54,7 +62,7 @@ def add(router: APIRouter, service: Service) -> None:
         responses={202: {"model": UploadErasure}, **responses("404 no-such-upload", "409 busy", "409 stale")},
     )
     def remove(identifier: str, response: Response, confirm: Confirm = "") -> UploadErasure:
-        if in_use(identifier):
+        if _in_use(service, identifier):
             raise RequestRefused(409, "busy", "a job works on it; cancel that first")
         found = shelf.view(identifier)
         token = to_confirm(f"upload {identifier}", service.jobs.uploads / identifier, confirm, response)

@@ -175,3 +175,24 @@ def test_a_text_of_another_kind_is_no_table(folder: Path, name: str) -> None:
     text(HEAD, name=name)(folder)
     with pytest.raises(DataError, match=f"no reader for {name}"):
         propose(folder)
+
+
+def waveforms(folder: Path, **of_the_way: float) -> None:
+    """As `TdmsFile.as_hdf` of npTDMS 1.13 lays out channels with waveform properties."""
+    own = {"wf_increment": 0.02, "wf_start_offset": 0.0, "wf_samples": TIME_S.size}
+    with h5py.File(folder / "a.h5", "w") as file:
+        for name, values, unit, more in (("Force", FORCE_N, "N", {}), ("Position", WAY_MM, "mm", of_the_way)):
+            dataset = file.create_dataset(f"Measured Data/{name}", data=values)
+            dataset.attrs.update({**own, "wf_start_time": "2021-03-04T00:00:00.000000Z", "unit_string": unit, **more})
+
+
+def test_waveform_properties_say_the_time_of_channels(folder: Path) -> None:
+    waveforms(folder)
+    check(came_in(folder))
+
+
+@pytest.mark.parametrize("apart", [{"wf_increment": 0.1}, {"wf_start_offset": 0.1}])
+def test_channels_of_other_times_are_not_taken_for_one_table(folder: Path, apart: dict[str, float]) -> None:
+    waveforms(folder, **apart)
+    with pytest.raises(DataError, match="its channels differ in wf_increment or wf_start_offset; save each with"):
+        propose(folder)

@@ -300,12 +300,20 @@ def test_names_of_files_are_told_from_others_beside_them(folder: Path) -> None:
     assert [session.recording(name).metadata["labels"]["site"] for name in names(session)] == ["A5", "B6"] * 2
 
 
-def test_force_and_position_have_times_of_their_own_side_by_side(folder: Path) -> None:
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Time [s],Force [N],Time [s],Position [mm]",
+        "Time Force (s),Force (N),Time Position (s),Position (mm)",
+        "time_load_s,load_N,time_displacement_s,displacement_mm",
+    ],
+)
+def test_force_and_position_have_times_of_their_own_side_by_side(folder: Path, header: str) -> None:
     rows = "".join(
         f"{time_s:.3f},{force_N}," + (f"{2 * time_s + 7:.3f},{way_mm}\n" if at < 40 else ",\n")
         for at, (time_s, way_mm, force_N) in enumerate(ROWS)
     )
-    (folder / "a.csv").write_text("Time [s],Force [N],Time [s],Position [mm]\n" + rows)
+    (folder / "a.csv").write_text(f"{header}\n{rows}")
     tables = came_in(folder).recording("a").tables
     assert np.diff(tables["axis"]["capture_ns"]) == pytest.approx(np.full(39, 4e7), abs=2e3)
     assert tables["axis"]["position_mm"] == pytest.approx(WAY_MM[:40], abs=1e-4)
