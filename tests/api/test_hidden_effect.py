@@ -17,8 +17,8 @@ from rig.diagnosis.problem import Par
 from rig.results.diagnosis import DiagnosisResult
 
 PARAMETERS: Mapping[str, Par] = {par.name: par for cause in LIBRARY.values() for par in cause.pars}
-# Cross-talk's size hangs on the whole way of the axis, home included, which is no part of the plan. Cogging is a force in
-# the air that changes with place: 0.018 N of it moved the surface that an approach found by 0.6 mm (2026-11-30).
+# The size of cross-talk hangs on the whole way of the axis, home included, no part of the plan. Cogging changes with
+# place in the air too: 0.018 N of it moved the surface that an approach found by 0.6 mm (2026-11-30).
 NOT_HIDDEN = {"cross_talk", "cogging"}
 PAIRS = ("ripple_mm", "motion_mm")  # the answer's size of a sine and a cosine
 GAIN = ErrorGain(0.05, 0.01, 0.8, 0.7, 0.9)
