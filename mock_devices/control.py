@@ -160,7 +160,7 @@ class ControlPort:
             return Answer(to=received.id, refused=str(error))
         except ValueError:  # a figure that is no number just now
             return Answer(to=received.id, refused=f"{request.verb} has no value that can be told now")
-        except Exception as error:  # a plug-in's fault may raise anything, and the bench goes on
+        except (Exception, SystemExit) as error:  # a plug-in's fault may raise anything, and the bench goes on
             return Answer(to=received.id, refused=f"{request.verb} failed, {type(error).__name__}: {error}")
 
     def close(self) -> None:

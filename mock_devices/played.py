@@ -1,5 +1,6 @@
 """What the bench plays: a product on a wire, with the faults it can have. Makers in other distributions begin here."""
 
+import math
 import sys
 from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -27,6 +28,7 @@ OTHER_DEVICES = 900_000
 TURN_S = 2.0
 # At one time: a stall of a second is made up for in as many at 1 kHz, each at a time of its own.
 TURNS_LARGEST = 1000
+TOLD = ("sampled", "serial_number", "latency_ms")
 # What the bench can play in each role: one product, or all of them at once.
 CHOICES: dict[str, dict[str, tuple[type[Product], ...]]] = {
     role: {
@@ -62,7 +64,7 @@ class Contained:
 
     @property
     def due_ns(self) -> int:
-        return self._asked(lambda: int(self._mock.due_ns), NEVER_NS)
+        return self._asked(lambda: math.ceil(min(self._mock.due_ns, NEVER_NS)), NEVER_NS)
 
     def filenos(self) -> list[int]:
         return self._asked(lambda: list(self._mock.filenos()), [])
@@ -84,9 +86,11 @@ class Contained:
         self._device.wire.close()
 
     def _asked(self, ask: Callable[[], Answer], unsaid: Answer) -> Answer:
+        if self._silent:
+            return unsaid
         try:
             with within(TURN_S):
-                return unsaid if self._silent else ask()
+                return ask()
         except (Exception, SystemExit) as error:  # whatever it is, the other devices of the bench go on
             self._silent = self._device.wire.frozen = True
             what = " ".join(f"{type(error).__name__}: {error}".split())
@@ -147,5 +151,7 @@ def _trouble(port: MockPort, devices: list[Any]) -> str:
             return f"its maker gives {device!r}, where a MockDevice is expected"
         if absent := lacking(device.mock, ProtocolMock):
             return f"it has no {', no '.join(absent)}"
+        for told in TOLD:  # what a bench says of it, and a property may raise
+            getattr(device.mock, told, None)
     served = any(device.role == port.role and port.kind in device.mock.endpoints() for device in devices)
     return "" if served else f"nothing of it is at {port.role} {port.kind}, where its declaration says it is"

@@ -47,7 +47,7 @@ def read_answers(file: Path) -> dict[str, KeptAnswer]:
             answer = KeptAnswer.model_validate_json(line)
             found[answer.place] = answer
         except ValidationError:
-            sys.stderr.write(f"{file}: left out, as a full disk or a power failure cut it: {line[:200]!r}\n")
+            sys.stderr.write(f"{file}: left out, not understood: a full disk may have cut it: {line[:200]!r}\n")
     return found
 
 

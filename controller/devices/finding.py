@@ -14,6 +14,7 @@ from serial.tools import list_ports
 
 from controller.devices.drivers import open_axis, open_force, open_tracker
 from controller.inputs.runner import open_input
+from drivers.can.socketcan import bitrate_of, shown_by_ip
 from drivers.evdev.device import BY_NAME
 from drivers.evdev.port import NAMES, key_devices
 from drivers.lsl.library import streams_there
@@ -100,10 +101,11 @@ def switches(names: Path = NAMES) -> list[PortFound]:
     return [_listed(EvdevSwitch, f"{BY_NAME}{name}", "keys, as of a foot switch") for name in key_devices(names)]
 
 
-def buses(system: Path = SYSTEM) -> list[PortFound]:
+def buses(system: Path = SYSTEM, show: Callable[[str], str] = shown_by_ip) -> list[PortFound]:
     """CAN buses of Linux, and adapters that Linux leaves to python-can; nothing is opened."""
     kinds = sorted(system.glob("class/net/*/type"))
-    found = [_bus("socketcan", kind.parent.name) for kind in kinds if kind.read_text().strip() == ARPHRD_CAN]
+    ours = [kind.parent.name for kind in kinds if kind.read_text().strip() == ARPHRD_CAN]
+    found = [_bus("socketcan", name, bitrate=bitrate_of(name, show)) for name in ours]
     adapters = sorted(path.parent for path in system.glob("bus/usb/devices/*/idVendor"))
     for numbers, (interface, name, first) in DRIVEN.items():
         free = [path for path in adapters if _numbers(path) == numbers and not any(path.glob("*/net/*"))]
@@ -111,9 +113,10 @@ def buses(system: Path = SYSTEM) -> list[PortFound]:
     return found
 
 
-def _bus(interface: str, port: str, numbers: tuple[int, int] | None = None) -> PortFound:
+def _bus(interface: str, port: str, numbers: tuple[int, int] | None = None, bitrate: int = 0) -> PortFound:
     usb, kind = ("{:04x}:{:04x}".format(*numbers), ADAPTERS[numbers]) if numbers else ("", "CAN bus of Linux")
-    lines = f'[axis]\ninterface = "{interface}"\nport = {toml(port)}\n{_scale(Wiring().axis)}'
+    rate = f"bitrate = {bitrate}\n" if bitrate else ""
+    lines = f'[axis]\ninterface = "{interface}"\nport = {toml(port)}\n{rate}{_scale(Wiring().axis)}'
     return PortFound(address=port, usb=usb, kind=kind, asked=False, role="axis", lines=lines)
 
 

@@ -4,7 +4,6 @@ import random
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from controller.loop.paired_samples import ROW_MM, ROWS
 from controller.loop.steps import Approach, Compress, Dither, Hold, Program, Retract, Step, Zero
 from controller.loop.touch import BACK_OFF_MM
 from rig.config.protocol import Indentation
@@ -90,12 +89,12 @@ def longest_s(protocol: Indentation, speed_mm_s: float, travel_mm: float) -> flo
     way_s = travel_mm / protocol.approach_speed_mm_s + 3 * travel_mm / protocol.retract_speed_mm_s
     press_s = 2 * (protocol.deepest_mm + protocol.run_up_mm) / speed_mm_s
     rests_s = protocol.air_dwell_s + 2 * protocol.hold_s + protocol.dither_s + protocol.rest_s
-    return 1.5 * (way_s + press_s + rests_s + _touches_s(protocol)) + 10.0
+    return 1.5 * (way_s + press_s + rests_s + _touches_s(protocol, travel_mm)) + 10.0
 
 
-def _touches_s(protocol: Indentation) -> float:
+def _touches_s(protocol: Indentation, travel_mm: float) -> float:
     """A touch goes as deep as the detection, from where the samples that were kept begin."""
-    longest_mm = 2 * ROWS * ROW_MM + BACK_OFF_MM
+    longest_mm = travel_mm + BACK_OFF_MM
     return protocol.touches * (
         longest_mm / protocol.touch_speed_mm_s + longest_mm / protocol.retract_speed_mm_s + ESTIMATING_S
     )

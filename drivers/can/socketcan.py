@@ -165,14 +165,19 @@ def shown_by_ip(name: str) -> str:
     return ""
 
 
-def refuse_other_rate(name: str, bitrate: int, show: Callable[[str], str]) -> None:
-    """Raises DeviceError where the interface is set to another rate; one that says none, as vcan, is not judged."""
+def bitrate_of(name: str, show: Callable[[str], str]) -> int:
+    """What the interface is set to, bit/s; 0 of one that says nothing, as vcan."""
     try:
         about = json.loads(show(name))[0]["linkinfo"]["info_data"]
         # A controller with a list of fixed rates states its own beside that (iproute2, ip/iplink_can.c).
-        real = about["bittiming"]["bitrate"] if "bittiming" in about else about["bittiming_bitrate"]
+        return int(about["bittiming"]["bitrate"] if "bittiming" in about else about["bittiming_bitrate"])
     except (ValueError, LookupError, TypeError):
-        return
+        return 0
+
+
+def refuse_other_rate(name: str, bitrate: int, show: Callable[[str], str]) -> None:
+    """Raises DeviceError where the interface is set to another rate than that."""
+    real = bitrate_of(name, show)
     if real and abs(real - bitrate) > OFF_LARGEST * bitrate:
         raise DeviceError(
             f"{name}: the interface is set to {real} bit/s where axis.bitrate is {bitrate}; correct axis.bitrate, or"

@@ -26,6 +26,8 @@ from rig.intake.stored import UNIT_NAMES, Vectors, columns_of, fact_of, facts_of
 from rig.intake.text import bytes_of
 from rig.intake.units import ros_unit, unit_in, unit_of
 
+Texts = Mapping[str, str]
+Clocks = Mapping[str, tuple[float, ...]]
 BATCH_ROWS = 1 << 18  # two megabytes a column
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 # What memory of 1.5 GB holds: vectors as they are, messages with what Python needs for each, and texts as numbers.
@@ -178,7 +180,7 @@ def _split(name: str, value: NDArray[np.generic]) -> Vectors:
 
 
 def _of_vectors(
-    path: Path, name: str, vectors: Vectors, units: Mapping[str, str], facts: Mapping[str, str], unread: str = ""
+    path: Path, name: str, vectors: Vectors, units: Texts, facts: Texts, unread: str = "", clocks: Clocks | None = None
 ) -> Sheet:
     names = tuple(vectors)
 
@@ -187,6 +189,9 @@ def _of_vectors(
         if len(set(lengths.values())) > 1:
             said = ", ".join(f"{key} has {length}" for key, length in lengths.items())
             raise DataError(f"{path}{name and f', {name}'}: columns of one table differ in length: {said} values")
+        if clocks and len({clocks[key] for key in lengths if key in clocks}) > 1:
+            said = f"{', '.join(lengths)} differ in {' or '.join(WAVEFORM)}"
+            raise DataError(f"{path}{name and f', {name}'}: {said}; save each with a column of its times")
         for start in range(0, max(*lengths.values(), 1), BATCH_ROWS):
             rows = slice(start, start + BATCH_ROWS)
             yield [_values(f"{path}, {names[at]}", vectors[names[at]][rows], text) for at, text in columns.items()]
@@ -226,11 +231,10 @@ def _members(path: Path, name: str, group: Any) -> Iterator[Sheet]:
     fields = {key: fields[key] for key in plain if h5py.check_ref_dtype(fields[key].dtype)}
     for number in range(min((item.size for item in fields.values()), default=0)):
         items = {key: group.file[np.ravel(item[()])[number]] for key, item in fields.items()}
-        numbers = [
-            (key, item[()]) for key, item in items.items() if isinstance(item, h5py.Dataset) and is_numbers(item)
-        ]
+        items = {key: item for key, item in items.items() if isinstance(item, h5py.Dataset)}
+        numbers = [(key, item[()]) for key, item in items.items() if is_numbers(item)]
         vectors = {key: column for own in numbers for key, column in _split(*own).items()}
-        facts = {key: fact_of(item) for key, item in items.items() if isinstance(item, h5py.Dataset)}
+        facts = {key: fact_of(item) for key, item in items.items()}
         said = {key: fact for key, fact in facts.items() if fact}
         yield _of_vectors(path, f"{name}({number + 1})", vectors, {}, said)
 
@@ -245,26 +249,24 @@ def _of_group(path: Path, name: str, group: Any) -> Iterator[Sheet]:
 
 def _of_items(path: Path, name: str, group: Any, keys: Sequence[str], before: str = "") -> Sheet:
     """The sheet of these datasets of the group, without what stands ``before`` the numbers of its columns."""
-    vectors, units, objects, clocks = Vectors(), dict[str, str](), list[str](), set[tuple[float, ...]]()
+    vectors, units, objects, clocks = Vectors(), dict[str, str](), list[str](), dict[str, tuple[float, ...]]()
     facts = facts_of(group)
-    for key, item in ((key, group[key]) for key in keys if isinstance(group[key], h5py.Dataset)):
+    for key, item in ((key, group.get(key)) for key in keys if isinstance(group.get(key), h5py.Dataset)):
         if "MATLAB_object_decode" in item.attrs or h5py.check_ref_dtype(item.dtype):
             objects.append(key)
         elif columns := {own.removeprefix(before): column for own, column in columns_of(path, group, key).items()}:
             vectors |= columns
-            clocks |= (
-                {tuple(float(item.attrs.get(name, 0)) for name in WAVEFORM)} if WAVEFORM[0] in item.attrs else set()
-            )
+            if WAVEFORM[0] in item.attrs:
+                clocks |= dict.fromkeys(columns, tuple(float(item.attrs.get(name, 0)) for name in WAVEFORM))
             own = units_of(item)
             units |= zip(item.dtype.names or columns, own * len(columns) if len(own) == 1 else own, strict=False)
         elif fact := fact_of(item):
             facts[key] = fact
         facts |= facts_of(item)
-    if len(clocks) > 1:
-        said = f"its channels differ in {' or '.join(WAVEFORM)}"
-        raise DataError(f"{path}{name and f', {name}'}: {said}; save each with a column of its times")
+    if len(set(clocks.values())) > 1:  # no rate of all
+        facts = {key: value for key, value in facts.items() if key not in WAVEFORM}
     unread = f"; {', '.join(objects)} cannot be read{OBJECT_ADVICE}" if objects else ""
-    return _of_vectors(path, name, vectors, units, facts, unread)
+    return _of_vectors(path, name, vectors, units, facts, unread, clocks)
 
 
 def open_parquet(path: Path) -> list[Sheet]:

@@ -14,7 +14,7 @@ from rig.intake.mapping import FileForm
 from rig.intake.pulling import PULLS, said_of_test
 from rig.intake.rates import named_rate_Hz, stated_rate_Hz
 from rig.intake.readers import kind_of
-from rig.intake.roles import WORDS, candidates, words_of
+from rig.intake.roles import candidates, quantities_of
 from rig.intake.survey import Looks, looks_of, texts_of
 from rig.intake.units import Meant, meant, unit_in, unit_of
 
@@ -150,8 +150,7 @@ def _beside(path: Path, layout: Layout) -> list[ColumnGroup]:
 
 def _by_quantity(header: Sequence[str]) -> list[tuple[str, str]]:
     """Of which quantity each column is by its words, where each has a time so called, as `Time Force`; else of none."""
-    known = {quantity: set(WORDS[quantity]) for quantity in ("force", "position", "time")}
-    said = [{own for own, words in known.items() if words.intersection(words_of(name))} for name in header]
+    said = [quantities_of(name) for name in header]
     timed = all({"time", own} in said for own in ("force", "position"))
     return [(name, "".join(own - {"time"}) if timed else "") for name, own in zip(header, said, strict=True)]
 

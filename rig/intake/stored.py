@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.intake.roles import quantities_of
 from rig.intake.sheet import DAMAGE, unreadable
 
 HEAD_ROWS = 1000  # which tell a time from what it moves
@@ -65,7 +66,7 @@ Vectors = dict[str, NDArray[np.generic] | StoredVector]
 
 def columns_of(path: Path, group: Any, name: str) -> Vectors:
     """The columns of a dataset of rows with fields, of a vector or of a table of numbers; none of anything else."""
-    item = group[name]
+    item = group.get(name)  # None where a link leads nowhere
     if not isinstance(item, h5py.Dataset) or not (item.dtype.names or (item.ndim in (1, 2) and is_numbers(item))):
         return {}
     return dict(_fields_of(path, item)) if item.dtype.names else _lines_of(path, group, name)
@@ -75,13 +76,16 @@ def tables_in(datasets: Mapping[str, Vectors]) -> list[str]:
     """Which are tables of their own: of columns that others have too, or with a time each in the first of several."""
     wide = {name: own for name, own in datasets.items() if len(own) > 1}
     often = Counter(column for own in wide.values() for column in own)
-    unnamed = {name: own[f"{name}:1"][:HEAD_ROWS] for name, own in wide.items() if f"{name}:1" in own}
-    timed = [name for name, first in unnamed.items() if (np.diff(first) > 0).all()]
-    return (
-        timed
-        if 1 < len(timed) == len(wide)
-        else [key for key, own in wide.items() if max(often[each] for each in own) > 1]
-    )
+    return _timed(wide) or [key for key, own in wide.items() if max(often[each] for each in own) > 1]
+
+
+def _timed(wide: Mapping[str, Vectors]) -> list[str]:
+    """All of them, where each is unnamed columns of which the first only rises, and none is called a channel's name."""
+    firsts = [own.get(f"{name}:1") for name, own in wide.items()]
+    if len(wide) < 2 or any(first is None for first in firsts) or any(map(quantities_of, wide)):
+        return []
+    rise = all((np.diff(first[:HEAD_ROWS].astype(np.float64)) > 0).all() for first in firsts if first is not None)
+    return list(wide) if rise else []
 
 
 def _fields_of(path: Path, item: Any) -> dict[str, StoredVector]:

@@ -405,6 +405,13 @@ def test_the_lines_of_a_bus_are_those_of_an_axis_and_nobody_writes_to_it(address
     assert bus.lines.endswith("# increments_per_mm = ...  (of your screw and gear)\n")
 
 
+def test_the_lines_of_a_bus_state_the_rate_that_it_is_set_to(tmp_path: Path) -> None:
+    written(tmp_path / "class" / "net" / "can0", type="280")
+    said = '[{"linkinfo":{"info_kind":"can","info_data":{"bittiming":{"bitrate":500000}}}}]'
+    (bus,) = finding.buses(tmp_path, lambda name: said if name == "can0" else "")
+    assert tomllib.loads(bus.lines)["axis"] == {"interface": "socketcan", "port": "can0", "bitrate": 500_000}
+
+
 @pytest.mark.parametrize(("scale", "direction"), [(1000.0, None), (-1000.0, -1)])
 def test_the_lines_of_a_mock_bench_have_the_scale_of_its_own_carriage(scale: float, direction: int | None) -> None:
     mocks = [product.mock for products in ROLES.values() for product in products.values() if product.mock]

@@ -1,6 +1,7 @@
 import array
 import fcntl
 import json
+import math
 import os
 import resource
 import select
@@ -28,6 +29,7 @@ from mock_devices.bench import Bench
 from mock_devices.control import BenchControl, ControlPort, RequestHandler
 from mock_devices.devices import DeviceFactory
 from mock_devices.faults.wires import Fault
+from mock_devices.interfaces import NEVER_NS
 from mock_devices.parameters import Parameters
 from mock_devices.played import made
 from mock_devices.serve import MockServer, effects_table
@@ -351,6 +353,14 @@ def test_a_plug_ins_mock_whose_time_stands_still_is_silent_too(
     anothers.pass_ms(100)
     assert f"TimeoutError: due_ns stays at {due_ns} whatever it has done; see" in capsys.readouterr().err
     assert anothers.bench.time_s == pytest.approx(0.4, abs=0.01)
+
+
+@pytest.mark.parametrize(("due", "next_ns"), [(10.2, 11), (10, 10), (math.inf, NEVER_NS)])
+def test_a_plug_ins_mock_may_be_due_between_two_nanoseconds_or_never(
+    anothers: ServerBench, monkeypatch: pytest.MonkeyPatch, due: float, next_ns: int
+) -> None:
+    monkeypatch.setattr(type(anothers.sensor.mock), "due_ns", due)
+    assert anothers.sensor.player.due_ns == next_ns
 
 
 def test_a_mock_of_ours_that_raises_is_our_own_mistake_and_ends_the_bench(

@@ -162,7 +162,8 @@ def test_where_a_plug_ins_mock_fails_the_tip_comes_out_and_both_sentences_say_wh
         "bench: tissue_rig.force 'f' of acme 1.0: its mock at force is silent from now on, as a lost device, for it"
         " raised KeyError: 'counts'; see its maker"
     ]
-    assert "force" in said.stderr.splitlines()[-1] and "Traceback" not in said.stderr
+    last = said.stderr.splitlines()[-1]
+    assert last.startswith("rig: stopped: force: ") and "Traceback" not in said.stderr
     recording = read_recording(tmp_path / "session" / "trial_001.mcap")
     assert recording.damage == ()
     assert recording.tables["axis"]["position_mm"].max() > 20.0 > recording.tables["axis"]["position_mm"][-1]

@@ -6,8 +6,10 @@ machine (linux/can.h).
 
 import errno
 import socket
+import subprocess
 import sys
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import can
 import pytest
@@ -220,8 +222,17 @@ def test_an_interface_at_the_stated_rate_or_without_one_passes(name: str) -> Non
 
 
 def test_what_the_system_says_of_an_interface_is_asked_for_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[list[str]] = []
+
+    def run(command: list[str], **_: object) -> SimpleNamespace:
+        asked.append(command)
+        return SimpleNamespace(stdout="[]")
+
+    with monkeypatch.context() as here:
+        here.setattr(subprocess, "run", run)
+        assert shown_by_ip("can7") == "[]"
+    assert asked == [["ip", "-details", "-json", "link", "show", "can7"]]
     assert "can7" not in shown_by_ip("can7")
-    refuse_other_rate("can7", 1_000_000, shown_by_ip)
     monkeypatch.setenv("PATH", "")
     assert shown_by_ip("lo") == ""
 

@@ -194,5 +194,5 @@ def test_waveform_properties_say_the_time_of_channels(folder: Path) -> None:
 @pytest.mark.parametrize("apart", [{"wf_increment": 0.1}, {"wf_start_offset": 0.1}])
 def test_channels_of_other_times_are_not_taken_for_one_table(folder: Path, apart: dict[str, float]) -> None:
     waveforms(folder, **apart)
-    with pytest.raises(DataError, match="its channels differ in wf_increment or wf_start_offset; save each with"):
-        propose(folder)
+    with pytest.raises(DataError, match="Force, Position differ in wf_increment or wf_start_offset; save each with a"):
+        came_in(folder, "50")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.io
 
+from rig.intake.arrays import open_hdf5
 from rig.recording.sessions import Session
 from tests.rig.intake.makers import A, B, C
 from tests.rig.intake.test_foreign import came_in
@@ -81,3 +82,23 @@ def test_vectors_of_several_directions_stay_one_table(folder: Path) -> None:
             file.create_dataset(name, data=np.stack([still, still, values], axis=1)).attrs["unit"] = unit
     (trial,) = came_in(folder).trials
     assert trial.peak_force_N == pytest.approx(A.force_N.max())
+
+
+def test_a_link_that_leads_nowhere_is_left_out(folder: Path) -> None:
+    named_by_an_attribute(folder)
+    with h5py.File(folder / "a.h5", "a") as file:
+        file["trials/gone"] = h5py.SoftLink("/nowhere")
+        file["raw"] = h5py.ExternalLink("raw.h5", "/force")
+    check(came_in(folder))
+
+
+@pytest.mark.parametrize("names", [("force", "pos"), ("image", "mask")])
+def test_matrices_stay_together_that_are_channels_or_do_not_rise(folder: Path, names: tuple[str, str]) -> None:
+    """Numbers without a sign rise by much where they fall by one; and a channel's name is no recording's."""
+    counts = np.array([[9, 1], [7, 2], [5, 3], [3, 4]], np.uint16)
+    matrices = (np.stack(A[:2], axis=1), np.stack(B[:2], axis=1)) if names[0] == "force" else (counts, counts)
+    with h5py.File(folder / "a.h5", "w") as file:
+        for name, matrix in zip(names, matrices, strict=True):
+            file[name] = matrix
+    (sheet,) = open_hdf5(folder / "a.h5")
+    assert sheet.header == tuple(f"{name}:{number}" for name in names for number in (1, 2))
