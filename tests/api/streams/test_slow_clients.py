@@ -44,6 +44,7 @@ def stalled(service: PlayedService, bench: PlayedBench) -> tuple[ForeignClient, 
         return slow, waited_s
 
 
+@pytest.mark.bench  # in real time: beside tests that compute, the client that reads waited for 1.3 s
 def test_a_client_that_reads_nothing_is_told_what_it_missed_to_the_sample(
     service: PlayedService, bench: PlayedBench
 ) -> None:
