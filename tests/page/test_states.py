@@ -70,7 +70,8 @@ def test_a_bench_that_is_not_ready_is_not_taken_for_one_that_is(show: Any, servi
     service.says(rig=IDLE.model_copy(update={"state": "not ready", "reason": "force is connecting: it starts"}))
     page = show("bench")
     state(page, "not ready")
-    with pytest.raises(AssertionError, match="Actual value: not ready"):
+    # Where this process is late with its news, the page says so; that is not ready either.
+    with pytest.raises(AssertionError, match=r"Actual value: (not ready|no news for half a second)"):
         state(page, "ready", 300.0)
 
 
