@@ -99,4 +99,4 @@ def _unusable(role: str, product: type[Product]) -> str:
         return f"{type(error).__name__}: {error}"
     no_calls = [name for name, one in ((product.driver, driver), ("its mock's maker", maker)) if not callable(one)]
     absent = lack(made, role) if made else ""
-    return "; ".join([*([absent] if absent else []), *(f"{name} is no function" for name in no_calls)])
+    return "; ".join(filter(None, [absent, *(f"{name} is no function" for name in no_calls)]))

@@ -251,7 +251,8 @@ def _of_items(path: Path, name: str, group: Any, keys: Sequence[str], before: st
     """The sheet of these datasets of the group, without what stands ``before`` the numbers of its columns."""
     vectors, units, objects, clocks = Vectors(), dict[str, str](), list[str](), dict[str, tuple[float, ...]]()
     facts = facts_of(group)
-    for key, item in ((key, group.get(key)) for key in keys if isinstance(group.get(key), h5py.Dataset)):
+    found = {key: group.get(key) for key in keys}  # None where a link leads nowhere
+    for key, item in ((key, item) for key, item in found.items() if isinstance(item, h5py.Dataset)):
         if "MATLAB_object_decode" in item.attrs or h5py.check_ref_dtype(item.dtype):
             objects.append(key)
         elif columns := {own.removeprefix(before): column for own, column in columns_of(path, group, key).items()}:
