@@ -6,7 +6,7 @@ READY := $(VENV)/ready
 # Modules are compiled once, not by each of the processes that a bench is made of.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo page test test-page test-documents test-campaigns test-extras test-one-extra campaigns types contracts check metrics docs package wheels mutants mutants-sample lock clean
+.PHONY: demo page test test-long test-page test-documents test-campaigns test-extras test-one-extra campaigns types contracts check metrics docs package wheels mutants mutants-sample lock clean
 
 demo: $(READY)
 	$(BIN)/rig demo --out demo
@@ -15,7 +15,7 @@ demo: $(READY)
 page: $(READY)
 	$(BIN)/python hatch_build.py
 
-# What a change breaks in most cases; what takes as long again is in the four targets below, what rarely breaks in `campaigns`.
+# What a change breaks in most cases; what takes long is in the five targets below, what rarely breaks in `campaigns`.
 # Tests that start processes first and by themselves: beside others that compute, a simulated device came too late.
 # The groups of those that take longest come first, whatever their number of tests. The others wait for a third of their
 # time, for processes that start and connections that end: a third worker uses it.
@@ -24,8 +24,16 @@ test: $(READY) page browser postgresql mbpoll
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(MAKE) --no-print-directory --jobs 2 types contracts
-	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "bench and $(MAIN)" --ignore tests/page --durations 15
-	$(BIN)/pytest -n 3 --dist loadfile -m "not bench and $(MAIN)" --ignore tests/page --durations 10
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "bench and not long and $(MAIN)" --ignore tests/page --durations 15
+	$(BIN)/pytest -n 3 --dist loadfile -m "not bench and not long and $(MAIN)" --ignore tests/page --durations 10
+
+# CI gives a SEED to what takes longest: a third of the tests, another with each commit.
+DRAWN := $(if $(SEED),--draw $(SEED))
+
+# More of the same kind, seconds each.
+test-long: $(READY) page browser postgresql mbpoll
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "bench and long and $(MAIN)" --ignore tests/page $(DRAWN) --durations 10
+	$(BIN)/pytest -n 3 --dist loadfile -m "not bench and long and $(MAIN)" --ignore tests/page $(DRAWN) --durations 10
 
 types: $(READY)
 	$(BIN)/mypy
@@ -37,7 +45,7 @@ contracts: $(READY)
 PAGE ?= tests/page
 test-page: $(READY) page browser
 	@nice -n 15 $(BIN)/pytest $(PAGE) -m "not bench" & alone=$$!; \
-	  $(BIN)/pytest $(PAGE) -m "bench and not by_hand" --durations 10; beside=$$?; wait $$alone && exit $$beside
+	  $(BIN)/pytest $(PAGE) -m "bench and not by_hand" $(DRAWN) --durations 10; beside=$$?; wait $$alone && exit $$beside
 
 # Every command, cell and example of README and docs, as somebody would run it.
 test-documents: $(READY) page
@@ -45,18 +53,18 @@ test-documents: $(READY) page
 
 # Diagnoses of many sessions, made and measured, and safety checks that are switched off one by one.
 test-campaigns: $(READY)
-	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "campaign and not by_hand" --ignore tests/page --durations 10
+	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "campaign and not by_hand" --ignore tests/page $(DRAWN) --durations 10
 
-# The demonstration, stops and crashes in contact, every answer of the service while the tip presses, further products; by itself
-# what asks how punctual the loop is, which the processes of a second bench would decide.
+# The demonstration, stops and crashes in contact, every answer of the service while the tip presses, further products; one after
+# another: beside a second bench a slow computer's devices come too late.
 test-extras: $(READY) page
-	$(BIN)/pytest -m "alone and not by_hand" --ignore tests/page
-	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "extra and not alone and not by_hand" --ignore tests/page --durations 10
+	$(BIN)/pytest -m "extra and not by_hand" --ignore tests/page $(DRAWN) --durations 10
 	$(MAKE) --no-print-directory test-one-extra
 
 # By hand, for hours, on a quiet computer, dated in docs/validation: what takes long and rarely breaks, a hundred new examples of
-# each property, and the benchmarks that judge. The first that fails ends it.
+# each property, and the benchmarks that judge; what CI draws from, whole. The first that fails ends it.
 campaigns: $(READY) page
+	$(MAKE) --no-print-directory test-long test-campaigns test-extras test-page
 	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m by_hand --ignore tests/page --durations 10
 	$(BIN)/pytest -m by_hand tests/page
 	$(BIN)/pytest -n 2 --dist loadfile -m "hypothesis and $(MAIN)" --ignore tests/page --hypothesis-profile default

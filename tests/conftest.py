@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.long import LongTests, listed
 from tests.witness import Witness, watched
 
 if TYPE_CHECKING:
@@ -49,7 +50,14 @@ settings.load_profile("shared machine")
 
 
 # Markers of a few files: whoever asks for one of them need not load all the others, which takes ten seconds a worker.
-RARE = {"alone", "bench", "campaign", "extra", "by_hand"}
+RARE = {"bench", "campaign", "extra", "by_hand"}
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Which third of what is selected runs."""
+    parser.addoption(
+        "--draw", type=int, metavar="SEED", help="run a third of the selected tests, another with each seed"
+    )
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
@@ -80,6 +88,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_configure(config: pytest.Config) -> None:
     """Whoever hands tests on to workers does not know yet whether there are tests of the bench among them."""
     config.pluginmanager.register(Witness(STALLS))
+    config.pluginmanager.register(LongTests(listed()))
     if config.getoption("numprocesses", None):
         _watch(config)
 

@@ -8,7 +8,7 @@ from _pytest.mark.expression import Expression
 
 from mock_devices.testing.commands import ROOT
 
-MARKERS = ("alone", "bench", "campaign", "documents", "extra")
+MARKERS = ("bench", "campaign", "documents", "extra", "long")
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 
 
@@ -45,7 +45,8 @@ def places(markers: set[str], makefile: str = MAKEFILE) -> list[str]:
         ({"campaign", "bench"}, "test-campaigns"),
         ({"extra"}, "test-extras"),
         ({"extra", "bench"}, "test-extras"),
-        ({"extra", "bench", "alone"}, "test-extras"),
+        ({"long"}, "test-long"),
+        ({"long", "bench"}, "test-long"),
     ],
 )
 def test_a_test_runs_once_in_ci(markers: set[str], target: str) -> None:
@@ -59,5 +60,5 @@ def test_what_is_for_the_hand_runs_in_the_campaigns_alone(size: int) -> None:
 
 
 def test_a_target_that_forgets_what_is_for_the_hand_is_told() -> None:
-    forgetful = MAKEFILE.replace("extra and not alone and not by_hand", "extra and not alone")
+    forgetful = MAKEFILE.replace("extra and not by_hand", "extra")
     assert places({"extra", "by_hand"}, forgetful) == ["test-extras", "campaigns"]

@@ -70,13 +70,19 @@ class ServedRig:
             return {}
 
     def becomes(self, state: str) -> None:
-        """Waits for that state; fails with what a service that ended has said."""
+        """Waits for that state; fails with what a service that ended has said, or with what another shows."""
+        shown: dict[str, Any] = {}
 
         def there() -> bool:
             assert self.running.process.poll() is None, self.running.end()
-            return self.rig.get("state") == state
+            shown.update(self.rig)
+            return shown.get("state") == state
 
-        until(there, PATIENCE_S, f"the service being {state}")
+        try:
+            until(there, PATIENCE_S, f"the service being {state}")
+        except AssertionError as late:
+            late.add_note(f"it shows: {shown}")
+            raise
 
     @property
     def loop(self) -> int:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mock_devices.testing.commands import Running, ServedBench, served_bench
 from rig.recording.reader import read_recording
 
-pytestmark = [pytest.mark.alone, pytest.mark.bench, pytest.mark.extra]
+pytestmark = [pytest.mark.bench, pytest.mark.extra]
 
 PROTOCOL = "speeds_mm_s = [10]\ntrials = 1\ndepth_mm = 8\n"
 # Of the computer, which plays the devices too: `cyclictest` beside it misses as many.
