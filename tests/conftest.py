@@ -70,7 +70,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 # Groups that take longest, in that order: two workers end together where neither begins a long one last.
-LONGEST = ("conformance", "bench", "commands", "recovery", "wire", "postgresql", "cluster", "lsl")
+LONGEST = ("conformance", "bench", "wire", "commands", "clients", "recovery", "postgresql", "cluster", "lsl")
 
 
 def _place(item: pytest.Item) -> int:

@@ -3,7 +3,8 @@
 `long_tests.txt` names those that took more than two seconds each, or six where they start processes, beside others on
 a slow computer; what a change breaks in most cases is left out of it, however long it takes. They have the marker
 ``long``: `make test` leaves them out. ``--draw SEED`` keeps a third of all tests that are selected, and three seeds
-that follow each other keep each test once: CI draws by the commit, `make campaigns` runs them all.
+that follow each other keep each test once: CI draws by the commit, `make campaigns` runs them all. What has the marker
+``every_commit`` is kept by each draw.
 """
 
 import zlib
@@ -40,6 +41,6 @@ class LongTests:
         seed: int | None = config.getoption("draw")
         if seed is None:
             return
-        left_out = [item for item in items if not is_drawn(item.nodeid, seed)]
-        items[:] = [item for item in items if is_drawn(item.nodeid, seed)]
-        config.hook.pytest_deselected(items=left_out)
+        kept = [item for item in items if item.get_closest_marker("every_commit") or is_drawn(item.nodeid, seed)]
+        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+        items[:] = kept

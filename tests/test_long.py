@@ -38,8 +38,8 @@ def test_three_draws_run_each_test_once_and_none_much_more_than_another() -> Non
 @pytest.mark.parametrize(
     ("options", "run"),
     [
-        ((), {"short", "long[0]", "long[1]", "long[2]"}),
-        (("-m", "not long"), {"short"}),
+        ((), {"short", "always", "long[0]", "long[1]", "long[2]"}),
+        (("-m", "not long"), {"short", "always"}),
         (("-m", "long"), {"long[0]", "long[1]", "long[2]"}),
     ],
 )
@@ -53,20 +53,22 @@ def test_what_is_listed_is_selected_by_its_marker(
 def test_a_draw_leaves_out_the_same_whatever_the_worker(pytester: pytest.Pytester) -> None:
     made(pytester)
     drawn = [passed(pytester, "--draw", str(seed)) for seed in range(SHARE)]
-    assert sorted(chain.from_iterable(drawn)) == sorted(passed(pytester))
+    always = "test_made.py::test_always"
+    assert all(always in part for part in drawn)
+    assert sorted(chain.from_iterable(part - {always} for part in drawn)) == sorted(passed(pytester) - {always})
     assert passed(pytester, "--draw", "1", "-n", "2") == drawn[1]
 
 
 def made(pytester: pytest.Pytester) -> Path:
-    """A short test, and one of three parameters that is listed."""
-    pytester.makeini("[pytest]\nmarkers = long\n")
+    """A short test, one that every draw keeps, and one of three parameters that is listed."""
+    pytester.makeini("[pytest]\nmarkers =\n  long\n  every_commit\n")
     pytester.makeconftest(
         f"import sys\nsys.path.insert(0, {str(ROOT)!r})\nfrom tests.long import LongTests\n"
         "def pytest_addoption(parser):\n    parser.addoption('--draw', type=int)\n"
         "def pytest_configure(config):\n    config.pluginmanager.register(LongTests(['test_made.py::test_long']))\n"
     )
     return pytester.makepyfile(
-        test_made="import pytest\ndef test_short(): pass\n"
+        test_made="import pytest\ndef test_short(): pass\n@pytest.mark.every_commit\ndef test_always(): pass\n"
         "@pytest.mark.parametrize('at', range(3))\ndef test_long(at): pass\n"
     )
 

@@ -6,12 +6,13 @@ from pathlib import Path
 
 from api.cli.mock_calibration import in_the_air, kept, mock_file, nothing_hidden, say, usable
 from controller.commissioning.axis import as_answered
-from controller.commissioning.axis_dynamics import identify
+from controller.commissioning.axis_dynamics import SweepRecord, identify
 from controller.commissioning.dynamics_refusals import dynamics_elsewhere
-from controller.commissioning.sweep import sweep_for
+from controller.commissioning.sweep import AirSweep, sweep_for
 from controller.commissioning.sweep_moves import SweepRun
 from controller.devices.drivers import start_devices
 from controller.loop.realtime import promptly
+from drivers.roles import Identity
 from mock_devices.control import BenchControl
 from rig.computer import computer_id
 from rig.config.axis_dynamics import AxisDynamics
@@ -25,6 +26,7 @@ SWEEP_S, REPEATS, TURNS = 0.5, 4, 2
 FROM_MM, SPEED_MM_S = 2.0, 20.0
 # Beside another bench one sweep in four misses the bounds; a computer may stand still for longer than a sample lasts.
 TRIES = 8
+Swept = tuple[Identity, Wiring, AirSweep, SweepRecord]
 
 
 def mock_axis_dynamics(wiring: Wiring, endpoints: Endpoints) -> AxisDynamics | None:
@@ -56,15 +58,16 @@ def _identified(wiring: Wiring, endpoints: Endpoints) -> AxisDynamics:
     with BenchControl(endpoints.control) as control, nothing_hidden(control), in_the_air(control):
         for _ in range(TRIES - 1):
             with contextlib.suppress(CheckFailed, DeviceError):
-                return _swept(wiring)
-        return _swept(wiring)
+                return identify(*swept(wiring), datetime.now(UTC), computer_id())
+        return identify(*swept(wiring), datetime.now(UTC), computer_id())
 
 
-def _swept(wiring: Wiring) -> AxisDynamics:
+def swept(wiring: Wiring, sweep_s: float = SWEEP_S, repeats: int = REPEATS) -> Swept:
+    """What ``identify`` takes, of the mock axis homed and swept near the top; raises what a sweep raises."""
     devices = start_devices(wiring)
     try:
         answered = as_answered(wiring.axis, devices.axis.identity)
-        sweep = sweep_for(wiring.model_copy(update={"axis": answered}), SWEEP_S, REPEATS, TURNS)
+        sweep = sweep_for(wiring.model_copy(update={"axis": answered}), sweep_s, repeats, TURNS)
         devices.axis.home()
         devices.axis.move_to(wiring.limits.position_min_mm + FROM_MM, SPEED_MM_S)
         with promptly(wiring.loop.priority):
@@ -77,4 +80,4 @@ def _swept(wiring: Wiring) -> AxisDynamics:
         raise
     finally:
         devices.close()  # before the fit: a drive that hears nothing for so long goes into fault
-    return identify(devices.axis.identity, wiring, sweep, followed, datetime.now(UTC), computer_id())
+    return devices.axis.identity, wiring, sweep, followed

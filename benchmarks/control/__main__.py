@@ -75,9 +75,10 @@ def main() -> None:
 
 
 def _wire(asked: argparse.Namespace) -> list[str]:
-    from benchmarks.control import wire, wire_report  # noqa: PLC0415 - loads the bench
+    from benchmarks.control import wire, wire_margins, wire_report  # noqa: PLC0415 - loads the bench
 
-    return wire_report.show(wire.measure(asked.wire, asked.minutes, asked.seeds or QUICK_SEEDS))
+    played = wire.measure(asked.wire, asked.minutes, asked.seeds or QUICK_SEEDS)
+    return [*wire_report.show(played), *wire_margins.show(wire_margins.on_bench())]
 
 
 def _simulation(asked: argparse.Namespace) -> list[str]:

@@ -43,6 +43,7 @@ def passes_its_own_tests(project: Path, environment: Mapping[str, str]) -> None:
 
 
 @pytest.mark.extra
+@pytest.mark.every_commit
 def test_the_net_ft_is_a_distribution_of_its_own(tmp_path: Path) -> None:
     project = tmp_path / "plugin"
     shutil.copytree(ROOT / "examples" / "plugin-netft", project)
@@ -57,6 +58,7 @@ def test_the_net_ft_is_a_distribution_of_its_own(tmp_path: Path) -> None:
 
 
 @pytest.mark.extra
+@pytest.mark.every_commit
 def test_the_template_makes_a_plug_in_that_works(tmp_path: Path) -> None:
     answers = {"distribution": "rig-lab", "package": "rig_lab", "product": "lab-seven", "range_N": 25.0, "rate_Hz": 500}
     project = tmp_path / "made"

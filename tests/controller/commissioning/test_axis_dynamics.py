@@ -362,7 +362,7 @@ def test_counts_that_only_the_drive_says_are_looked_at_once_it_has_answered(monk
     monkeypatch.setattr(mock_dynamics, "start_devices", lambda _: devices)
     resting = SimpleNamespace(devices=devices)
     monkeypatch.setattr(calibrate_dynamics, "resting_axis", lambda *_: contextlib.nullcontext(resting))
-    for sweep in (partial(mock_dynamics._swept, wiring), partial(axis_dynamics, Operation("sweep"), wiring, 2.0)):
+    for sweep in (partial(mock_dynamics.swept, wiring), partial(axis_dynamics, Operation("sweep"), wiring, 2.0)):
         with pytest.raises(UsageError, match=r"axis.increments_per_mm 40 show the axis up to 21.4 Hz"):
             sweep()
 

@@ -29,7 +29,7 @@ from mock_devices.parameters import Parameters
 from mock_devices.testing.commands import until
 from mock_devices.testing.played import played
 
-pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
+pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("clients")]
 PATIENCE_S = 10.0
 SYNC_S = 0.01
 TARGET_REACHED, ACKNOWLEDGE = 1 << 10, 1 << 12

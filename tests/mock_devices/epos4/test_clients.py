@@ -18,7 +18,7 @@ from mock_devices.testing.epos4 import remote_drive
 from mock_devices.testing.remote import RemoteMock
 
 OBJECTS = EPOS4.objects
-pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
+pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("clients")]
 TYPES = {
     "B": datatypes.UNSIGNED8,
     "H": datatypes.UNSIGNED16,

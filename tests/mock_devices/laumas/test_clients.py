@@ -10,7 +10,7 @@ from mock_devices.wire import PtyWire
 from tests.drivers.laumas.test_device import Cell
 from tests.mock_devices.polled import mbpoll
 
-pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
+pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("clients")]
 
 
 @pytest.fixture

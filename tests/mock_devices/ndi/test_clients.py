@@ -20,7 +20,7 @@ from mock_devices.testing.ndi import remote_tracker
 from mock_devices.testing.remote import RemoteMock
 from rig.config.products.ndi_polaris import PolarisWiring
 
-pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
+pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("clients")]
 
 NDICAPI = """
 import json, sys, time

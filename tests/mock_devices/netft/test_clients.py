@@ -15,7 +15,7 @@ from mock_devices.testing.commands import ROOT, until
 from mock_devices.testing.force import WRENCH, StillPlant
 from mock_devices.testing.played import played
 
-pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
+pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("clients")]
 POUND_N = 4.4482216152605
 INTERNAL_HZ = 7000
 PATIENCE_S = 10.0

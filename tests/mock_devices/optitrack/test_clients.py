@@ -16,7 +16,7 @@ from rig.channels import MarkerSample
 from rig.config.products.optitrack_natnet import NatNetWiring
 from rig.errors import DeviceError
 
-pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
+pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("clients")]
 PATIENCE_S = 10.0
 
 

@@ -18,7 +18,7 @@ from mock_devices.zaber.mock import ZaberMock
 from rig.config.products.zaber_ascii import ZaberWiring
 from rig.config.wiring import Limits
 
-pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
+pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("clients")]
 NATIVE = Units.NATIVE
 
 
