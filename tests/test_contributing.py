@@ -71,6 +71,7 @@ def test_there_is_a_walk_through_of_each_kind() -> None:
     assert list(WALKS) == [f"Add a {kind}" for kind in kinds]
 
 
+@pytest.mark.every_commit
 @pytest.mark.parametrize("title", WALKS)
 def test_each_walk_through_works_as_it_stands(title: str, tmp_path: Path) -> None:
     if any(block.language == "tsx" for block in WALKS[title]):
