@@ -86,7 +86,8 @@ def find(
     alone = [*finding.buses(), *finding.switches(), *finding.streams()]
     seen = [*finding.ports(), *alone, *map(finding.named, addresses or [])]
     result = compute("find", lambda operation: _found(operation, seen, ask, yes))
-    show(TextTable("Ports", ("port", "USB", "adapter", "who answers"), [_row(port) for port in result.ports], words=4))
+    rows = [_row(port) for port in result.ports] or [("none", "", "", "plug it in, or name its port: tcp://host:port")]
+    show(TextTable("Ports", ("port", "USB", "adapter", "who answers"), rows, words=4))
     show(*(port.lines for port in result.ports if port.lines))
     write_json(json_file, result)
     silent = [port for port in result.ports if port.problem]

@@ -279,6 +279,18 @@ def test_without_consent_nothing_is_written_to_any_port(
     assert not select.select([far], [], [], 0.2)[0]
 
 
+def test_where_nothing_is_found_the_next_step_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    port = ListPortInfo("/dev/ttyUSB7", skip_link_detection=True)
+    port.vid, port.pid = 0x16D0, 0x117E
+    for others in ("buses", "switches", "streams"):
+        monkeypatch.setattr(finding, others, list)
+    for there in ([], [port]):
+        monkeypatch.setattr(list_ports, "comports", there.copy)
+        said = rig("find")
+        assert said.exit_code == 0, said.output
+        assert ("plug it in, or name its port" in " ".join(said.output.split())) == (not there)
+
+
 def test_consent_is_asked_for_each_port_and_a_no_is_kept() -> None:
     asked = []
 
