@@ -1,16 +1,25 @@
 """From configuration to an open CAN link: the two fast paths of our own, and python-can for every other adapter."""
 
 from collections.abc import Callable
+from typing import Protocol
 
 from drivers.can.bus import CanLink, SlcanLink
 from drivers.can.generic import PythonCanLink, open_bus
 from drivers.can.socketcan import SocketCanLink, open_socket, refuse_other_rate, shown_by_ip
-from rig.config.products.can_axis import CanAxisProduct
+from rig.config.can_adapter import CanInterface, Option
 
 OpenLink = Callable[[str, int, Callable[[], int]], CanLink]
 
 
-def opener(config: CanAxisProduct, show: Callable[[str], str] = shown_by_ip) -> OpenLink:
+class CanNode(Protocol):
+    """What the configuration of a device says of its place on a bus."""
+
+    interface: CanInterface
+    node: int
+    adapter: dict[str, Option]
+
+
+def opener(config: CanNode, show: Callable[[str], str] = shown_by_ip) -> OpenLink:
     """What opens the bus that ``config`` names, given port, bit rate and clock; ``show`` as in `shown_by_ip`."""
     interface = config.interface
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 from drivers.can.bus import CanLink
 from drivers.can.health import BusHealth, Counted
-from drivers.can.opening import OpenLink
+from drivers.can.opening import CanNode, OpenLink, opener
 from drivers.can.slcan import CanFrame
 
 NODE_BITS = 0x7F
@@ -144,3 +144,11 @@ class SharedBuses:
                 return bus.view(node)
 
         return opened
+
+
+BUSES = SharedBuses()
+
+
+def view_of(config: CanNode) -> OpenLink:
+    """What opens the bus of a device, or a view of it where another device of this process has opened it."""
+    return BUSES.opener(config.node, opener(config))

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from drivers.can.bus import CanLink
 from drivers.can.opening import OpenLink, opener
+from drivers.can.shared import view_of
 from drivers.can.slcan import CanFrame
 from drivers.canopen.nmt import RPDO_IDS, SYNC, TPDO_IDS, NmtCommand
 from drivers.epos4 import objects, setup
@@ -58,7 +59,7 @@ class Epos4Axis(SampledDevice):
         self._config = config
         self._limits = limits
         self._now = now
-        self._open_link = open_link or opener(config)
+        self._open_link = open_link or (view_of if config.shared else opener)(config)
         self._interrupted = interrupted
         self._kind = kind or Epos4Kind(config)
         self._homed = False

@@ -272,6 +272,8 @@ def test_without_consent_nothing_is_written_to_any_port(
         "7",
     )
     monkeypatch.setattr(list_ports, "comports", lambda: [port])
+    for others in ("buses", "switches", "streams"):  # of this computer, on which other tests may be sending
+        monkeypatch.setattr(finding, others, list)
     said = rig("find", "--json", tmp_path / "found.json")
     assert said.exit_code == 0, said.output
     (found,) = FindResult.read(tmp_path / "found.json").ports

@@ -119,7 +119,7 @@ def test_no_number_falls_back() -> None:
 BETTER = {
     "class_names_twice": 0, "untyped_dicts": 9, "upward_imports": 0, "cycles": 0, "source_lines": metrics.MOST_LINES,
     "source_lines_safety": 8220, "source_lines_data": 8585, "source_lines_criticism": 2410,
-    "source_lines_service": 10295, "source_lines_devices": 10915, "source_lines_law": 2235, "source_lines_scale": 2500,
+    "source_lines_service": 10295, "source_lines_devices": 10935, "source_lines_law": 2235, "source_lines_scale": 2500,
     "function_median": 6, "function_p90": 20, "file_max": 400, "test_to_source": 0.8,
     "thresholds_with_reason": 0.9,
 }  # fmt: skip

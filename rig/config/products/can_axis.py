@@ -21,6 +21,7 @@ class CanAxisProduct(AxisProduct):
     increments_per_rev: Positive = Field(default=10_000.0, description="four times the encoder's lines; scales rpm")
     homing_method: int = Field(default=17, ge=-128, le=37, description="of CiA 402-2; 17: negative limit switch")
     current_limit_A: Positive = Field(default=5.0, description="of the motor")
+    shared: bool = Field(default=False, description="whether a plug-in's device is another node behind this adapter")
     adapter: dict[str, Option] = Field(default={}, description="options of this kind of adapter, see CAN adapters")
 
     @model_validator(mode="after")

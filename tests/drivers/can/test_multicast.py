@@ -7,8 +7,7 @@ from typing import Any
 
 import pytest
 
-from drivers.can.opening import opener
-from drivers.can.shared import SharedBuses
+from drivers.can.shared import BUSES, view_of
 from drivers.epos4 import objects
 from drivers.epos4.device import Epos4Axis
 from drivers.epos4.node import Node
@@ -62,12 +61,14 @@ def test_homing_a_move_and_samples(mock: RemoteMock, port: int) -> None:
 
 
 def test_another_node_of_the_same_bus_is_spoken_to_beside_the_axis(mock: RemoteMock, port: int) -> None:
+    """As it stands in rig.toml: the axis shares its adapter, and who else is behind it asks for a view."""
     with remote_drive(GROUP, str(port), "2"):
-        buses, config = SharedBuses(), config_of(port)
-        axis = Epos4Axis(config, Limits(), open_link=buses.opener(1, opener(config)))
+        axis = Epos4Axis(config_of(port, shared=True), Limits())
         axis.start()
-        link = buses.opener(2, opener(config))(GROUP, 1_000_000, time.monotonic_ns)
+        link = view_of(config_of(port, node=2))(GROUP, 1_000_000, time.monotonic_ns)
         try:
+            assert BUSES.buses[GROUP].link is not link
+            assert len(BUSES.buses[GROUP].views) == 2
             beside = Node(link, 2, 126, 500, "the other node")
             assert beside.read(objects.VENDOR) == 0xFB
             beside.write(objects.TARGET, 4711)
@@ -76,6 +77,16 @@ def test_another_node_of_the_same_bus_is_spoken_to_beside_the_axis(mock: RemoteM
         finally:
             link.close()
             axis.close()
+        assert BUSES.buses[GROUP].empty
+
+
+def test_an_axis_that_does_not_share_has_its_adapter_for_itself(mock: RemoteMock, port: int) -> None:
+    axis = Epos4Axis(config_of(port), Limits())
+    axis.start()
+    try:
+        assert GROUP not in BUSES.buses or BUSES.buses[GROUP].empty
+    finally:
+        axis.close()
 
 
 def test_a_bus_without_a_drive_names_what_to_check(port: int) -> None:
