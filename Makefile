@@ -27,7 +27,7 @@ test: $(READY) page browser postgresql mbpoll
 	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "bench and not long and $(MAIN)" --ignore tests/page --durations 15
 	$(BIN)/pytest -n 3 --dist loadfile -m "not bench and not long and $(MAIN)" --ignore tests/page --durations 10
 
-# CI gives a SEED to what takes longest: a third of the tests, another with each commit.
+# CI gives a SEED to what takes longest: a quarter of the tests, another with each commit.
 DRAWN := $(if $(SEED),--draw $(SEED))
 
 # More of the same kind, seconds each.

@@ -54,9 +54,9 @@ RARE = {"bench", "campaign", "extra", "by_hand"}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Which third of what is selected runs."""
+    """Which quarter of what is selected runs."""
     parser.addoption(
-        "--draw", type=int, metavar="SEED", help="run a third of the selected tests, another with each seed"
+        "--draw", type=int, metavar="SEED", help="run a quarter of the selected tests, another with each seed"
     )
 
 

@@ -1,8 +1,8 @@
-"""Which tests take long, and which third of them a commit runs.
+"""Which tests take long, and which quarter of them a commit runs.
 
 `long_tests.txt` names those that took more than two seconds each, or six where they start processes, beside others on
 a slow computer; what a change breaks in most cases is left out of it, however long it takes. They have the marker
-``long``: `make test` leaves them out. ``--draw SEED`` keeps a third of all tests that are selected, and three seeds
+``long``: `make test` leaves them out. ``--draw SEED`` keeps a quarter of all tests that are selected, and four seeds
 that follow each other keep each test once: CI draws by the commit, `make campaigns` runs them all. What has the marker
 ``every_commit`` is kept by each draw.
 """
@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 FILE = Path(__file__).with_name("long_tests.txt")
-SHARE = 3
+SHARE = 4
 
 
 def listed(file: Path = FILE) -> frozenset[str]:

@@ -1,4 +1,4 @@
-"""What takes long has its place in a list, and each commit runs a third of it."""
+"""What takes long has its place in a list, and each commit runs a quarter of it."""
 
 import ast
 from itertools import chain
@@ -29,7 +29,7 @@ def test_every_test_in_the_list_is_there() -> None:
     assert nowhere("tests/test_removed.py::test_every_test_in_the_list_is_there")
 
 
-def test_three_draws_run_each_test_once_and_none_much_more_than_another() -> None:
+def test_as_many_draws_as_there_are_shares_run_each_test_once_and_none_much_more_than_another() -> None:
     drawn = [[name for name in NAMES if is_drawn(name, seed)] for seed in range(7, 7 + SHARE)]
     assert sorted(chain.from_iterable(drawn)) == sorted(NAMES)
     assert all(len(part) > len(NAMES) / SHARE / 2 for part in drawn)
