@@ -41,6 +41,10 @@ class LongTests:
         seed: int | None = config.getoption("draw")
         if seed is None:
             return
-        kept = [item for item in items if item.get_closest_marker("every_commit") or is_drawn(item.nodeid, seed)]
-        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+        kept: list[pytest.Item] = []
+        left_out: list[pytest.Item] = []
+        for item in items:
+            stays = item.get_closest_marker("every_commit") or is_drawn(item.nodeid, seed)
+            (kept if stays else left_out).append(item)
+        config.hook.pytest_deselected(items=left_out)
         items[:] = kept

@@ -17,7 +17,7 @@ from api.cli.mock_calibration import in_the_air
 from api.cli.mock_dynamics import swept
 from benchmarks.control.goals import DB, DEG
 from benchmarks.control.plants import SUBJECTS, model_of
-from controller.commissioning.axis_dynamics import FrequencyResponse, identify, response_of
+from controller.commissioning.axis_dynamics import FrequencyResponse, identify, model, response_of
 from controller.experiments import tracking
 from controller.law.axis_response import rates_of
 from controller.law.loop_response import Column, Complex, grid, margins, open_loop
@@ -92,9 +92,8 @@ def measured_loop(loop: ForceLoop, known: AxisDynamics, response: FrequencyRespo
     off the fit as there.
     """
     late = loop.axis._replace(delay_s=loop.axis.delay_s + SPARE_S)
-    s = 2j * np.pi * response.frequency_Hz
-    fitted = np.exp(-s * known.delay.s) / ((1 + s * known.lag1.s) * (1 + s * known.lag2.s))
-    off = response.mean / fitted
+    short_s, long_s = known.lag1.s, known.lag2.s
+    off = response.mean / model(response.frequency_Hz, 1.0, known.delay.s, short_s + long_s, short_s * long_s)
     at, lines = np.log(omega), np.log(2 * np.pi * response.frequency_Hz)
     size, turned = np.interp(at, lines, np.log(np.abs(off))), np.interp(at, lines, np.unwrap(np.angle(off)))
     return np.asarray(open_loop(late, loop.rates, loop.law, tissues(loop.span), omega) * np.exp(size + 1j * turned))
