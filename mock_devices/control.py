@@ -20,7 +20,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from select import select
 from types import TracebackType
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from pydantic import JsonValue
 from pydantic_core import to_jsonable_python
@@ -41,18 +41,16 @@ Faults = Mapping[str, Sequence[Mapping[str, Fault]]]
 Sampled = Mapping[str, deque[tuple[int, int]]]
 
 
-class ControlRequest(Message):
+class ControlRequest(Message, kind=50):
     """A request."""
 
-    TYPE: ClassVar[int] = 50
     verb: str
     argument: JsonValue
 
 
-class ControlReply(Reply):
+class ControlReply(Reply, kind=51):
     """Its answer."""
 
-    TYPE: ClassVar[int] = 51
     value: JsonValue
 
 

@@ -32,12 +32,16 @@ OUTBOX_MESSAGES = 256
 
 
 class Message(Table):
-    """What is said; ``TYPE`` tells its kind on the wire."""
+    """What is said; ``TYPE`` tells its kind on the wire, and is given where a kind is declared, as ``kind``."""
 
     TYPE: ClassVar[int]
 
+    def __init_subclass__(cls, kind: int | None = None) -> None:
+        if kind is not None:
+            cls.TYPE = kind
 
-class Reply(Message):
+
+class Reply(Message, kind=1):
     """A message that answers the message with id ``to``."""
 
     to: int
@@ -46,7 +50,6 @@ class Reply(Message):
 class Answer(Reply):
     """Done, or not done because of ``refused``; ``stopped``: because a stop is in force."""
 
-    TYPE: ClassVar[int] = 1
     refused: str = ""
     stopped: bool = False
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 from pydantic import Field
 from typing_extensions import TypedDict
@@ -85,97 +84,81 @@ class Outcome:
         return bool(self.cause)
 
 
-class Run(Message):
+class Run(Message, kind=10):
     """Execute this; the id of the message is the program's, and its outcome carries it."""
 
-    TYPE: ClassVar[int] = 10
     program: Program
 
 
-class Reset(Message):
+class Reset(Message, kind=12):
     """A stop is acknowledged."""
 
-    TYPE: ClassVar[int] = 12
 
-
-class Note(Message):
+class Note(Message, kind=13):
     """For the event stream."""
 
-    TYPE: ClassVar[int] = 13
     code: str
     text: str
 
 
-class Heartbeat(Message):
+class Heartbeat(Message, kind=14):
     """The operator's program lives, and whether the operator is ``attending``."""
 
-    TYPE: ClassVar[int] = 14
     attending: bool
 
 
-class Shutdown(Message):
+class Shutdown(Message, kind=15):
     """End as soon as nothing moves."""
 
-    TYPE: ClassVar[int] = 15
 
-
-class Ready(Message):
+class Ready(Message, kind=20):
     """What the loop found when it started."""
 
-    TYPE: ClassVar[int] = 20
     devices: dict[str, DeviceFound] = Field(default_factory=dict)
     realtime: dict[str, str] = Field(default_factory=dict)
 
 
-class LoopFailed(Message):
+class LoopFailed(Message, kind=21):
     """The loop ends; ``stopped``: because someone stopped it."""
 
-    TYPE: ClassVar[int] = 21
     text: str
     stopped: bool = False
 
 
-class StatusSaid(Message):
+class StatusSaid(Message, kind=22):
     """The newest status."""
 
-    TYPE: ClassVar[int] = 22
     status: Status
 
 
-class Stopped(Message):
+class Stopped(Message, kind=23):
     """Motion was stopped; ``action`` is the name of what was done."""
 
-    TYPE: ClassVar[int] = 23
     code: str
     text: str
     action: str
 
 
-class Finished(Message):
+class Finished(Message, kind=24):
     """The program with id ``program`` has ended."""
 
-    TYPE: ClassVar[int] = 24
     program: int
     outcome: Outcome
 
 
-class Survey(Message):
+class Survey(Message, kind=16):
     """Say how things stand, for recovery."""
 
-    TYPE: ClassVar[int] = 16
 
-
-class Recover(Message):
+class Recover(Message, kind=17):
     """Do one act of recovery."""
 
-    TYPE: ClassVar[int] = 17
     act: Act
 
 
-class Surveyed(Reply):
+class Surveyed(Reply, kind=25):
     """How things stand."""
 
-    TYPE: ClassVar[int] = 25
     situation: Situation
 
 

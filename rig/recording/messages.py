@@ -1,43 +1,35 @@
 """What controller and recorder say to each other over their channel."""
 
-from typing import ClassVar
-
 from rig.channel import Message, Reply
 
 
-class Open(Message):
+class Open(Message, kind=30):
     """Record everything published from now on into the new file ``path``."""
 
-    TYPE: ClassVar[int] = 30
     path: str
     metadata: dict[str, dict[str, str]]
 
 
-class Close(Message):
+class Close(Message, kind=31):
     """Finish the recording."""
 
-    TYPE: ClassVar[int] = 31
     summary: dict[str, str]
 
 
-class Quit(Message):
+class Quit(Message, kind=32):
     """Finish what is open, and end."""
 
-    TYPE: ClassVar[int] = 32
 
-
-class Opened(Reply):
+class Opened(Reply, kind=33):
     """The recording has begun; ``unrecorded`` samples came since the one before."""
 
-    TYPE: ClassVar[int] = 33
     path: str
     unrecorded: int
 
 
-class Closed(Reply):
+class Closed(Reply, kind=34):
     """The recording is finished: samples, samples lost before it and gaps in their numbers, per stream."""
 
-    TYPE: ClassVar[int] = 34
     path: str
     samples: dict[str, int]
     dropped: dict[str, int]
@@ -45,16 +37,13 @@ class Closed(Reply):
     unreadable: int
 
 
-class Started(Message):
+class Started(Message, kind=35):
     """The recorder is attached to its ring."""
 
-    TYPE: ClassVar[int] = 35
 
-
-class RecorderFailed(Message):
+class RecorderFailed(Message, kind=36):
     """The recorder did not start, or the disk failed meanwhile."""
 
-    TYPE: ClassVar[int] = 36
     text: str
 
 

@@ -3,7 +3,6 @@
 import socket
 import struct
 from collections.abc import Iterator
-from typing import ClassVar
 
 import pytest
 from hypothesis import given
@@ -26,19 +25,17 @@ from rig.channel import (
 from rig.errors import UsageError
 
 
-class Said(Message):
-    TYPE: ClassVar[int] = 40
+class Said(Message, kind=40):
     text: str = ""
     value: float = 0.0
 
 
-class Shown(Message):
-    TYPE: ClassVar[int] = 41
+class Shown(Message, kind=41):
     number: int
 
 
-class Foreign(Message):
-    TYPE: ClassVar[int] = 49
+class Foreign(Message, kind=49):
+    """Known to nobody."""
 
 
 Ends = tuple[Channel, Channel]
