@@ -57,20 +57,9 @@ def work_on_cohort(
     work.refuse_failed(result)
 
 
-def taken_as_cohort(
-    places: Sequence[Path],
-    out: Path | None,
-    wanted: Wanted,
-    scheduler: str,
-    mapping: Path | None,
-    json_file: Path | None,
-    yes: bool,
-) -> bool:
-    """Whether there are several, of one place too, or a cluster is named: they have then been worked on."""
-    if len(places) == 1 and not scheduler and not wanted.by:
-        return False
-    work_on_cohort(places, out, wanted, scheduler, mapping, json_file, yes)
-    return True
+def is_cohort(places: Sequence[Path], scheduler: str, by: By | None) -> bool:
+    """Whether there are several, of one place too, or a cluster is named."""
+    return len(places) != 1 or bool(scheduler or by)
 
 
 def refuse_with_cohort(options: Mapping[str, object]) -> None:

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from api.cli.cohort import ByOption, SchedulerOption, refuse_with_cohort, taken_as_cohort
+from api.cli.cohort import ByOption, SchedulerOption, is_cohort, refuse_with_cohort, work_on_cohort
 from api.cli.computing import compute
 from api.cli.options import JsonOption, MappingOption, OnlyOption, PlacesArgument, YesOption
 from api.cli.output import show, write_json
@@ -51,7 +51,8 @@ def diagnose(
     """
     wanted = Wanted("diagnose", simulation=simulation, detectability=detectability, only=only, by=by)
     refuse_with_cohort({"--reference": reference} if by or len(places) > 1 else {})
-    if taken_as_cohort(places, out, wanted, scheduler, mapping, json_file, yes):
+    if is_cohort(places, scheduler, by):
+        work_on_cohort(places, out, wanted, scheduler, mapping, json_file, yes)
         return
     (place,) = places
     folder = place / FOLDER if out is None and is_session(place) else out

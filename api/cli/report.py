@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from api.cli.cohort import ByOption, SchedulerOption, taken_as_cohort
+from api.cli.cohort import ByOption, SchedulerOption, is_cohort, work_on_cohort
 from api.cli.computing import compute
 from api.cli.options import JsonOption, MappingOption, OnlyOption, PlacesArgument, YesOption
 from api.cli.output import write_json
@@ -33,7 +33,8 @@ def report(
 
     Example: rig report sessions/first --out first.html
     """
-    if taken_as_cohort(places, out, Wanted("report", only=only, by=by), scheduler, mapping, json_file, yes):
+    if is_cohort(places, scheduler, by):
+        work_on_cohort(places, out, Wanted("report", only=only, by=by), scheduler, mapping, json_file, yes)
         return
     (place,) = places
     opening = Opening(mapping_for(place, mapping, out or Path(place.stem), yes), only)

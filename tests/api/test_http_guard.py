@@ -180,6 +180,50 @@ def test_a_head_that_does_not_come_loses_the_connection(port: int, head: bytes) 
             raise ConnectionError
 
 
+def assert_served(client: socket.socket) -> None:
+    """The whole of one answer of `echo`."""
+    answer = b""
+    while not answer.endswith(b"\r\n\r\n0"):
+        answer += client.recv(1) or pytest.fail(f"closed after {answer!r}")
+    assert answer.startswith(b"HTTP/1.1 200 ")
+
+
+@pytest.mark.parametrize("head", [b"\r\n", b"GET / HT", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"])
+def test_a_later_head_that_does_not_come_loses_the_connection_as_well(port: int, head: bytes) -> None:
+    """It is no longer waiting to be kept alive either: the deadline of that ended with the first byte."""
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as client:
+        client.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+        assert_served(client)
+        client.sendall(head)
+        with pytest.raises(ConnectionError):
+            assert client.recv(100) == b""
+            raise ConnectionError
+
+
+def in_parts(port: int, fields: int) -> tuple[socket.socket, bytes]:
+    """A connection, and the end of a head of which 1 kB a field was sent, each by itself."""
+    client = socket.create_connection(("127.0.0.1", port), timeout=10)
+    client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    client.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n".encode())
+    with contextlib.suppress(ConnectionError):
+        for number in range(fields):
+            client.sendall(f"X-{number:04}: {'x' * 1000}\r\n".encode())
+            time.sleep(0.001)
+    return client, b"\r\n"
+
+
+def test_a_head_without_end_loses_the_connection(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Hasty, "head_s", 60.0)
+    client, end = in_parts(port, 50)
+    with client:
+        client.sendall(end)
+        assert_served(client)
+    client, _ = in_parts(port, 80)
+    with client, pytest.raises(ConnectionError):
+        assert client.recv(100) == b""
+        raise ConnectionError
+
+
 def test_a_client_that_does_not_read_loses_its_connection(port: int) -> None:
     with socket.create_connection(("127.0.0.1", port), timeout=10) as client:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)

@@ -217,9 +217,7 @@ CROSS_TALK = Effect(
     "cross_talk",
     "the force follows the axis: {cross_talk_N:+.3g} N from one end of its travel to the other, in the air too",
     (
-        Par(
-            "cross_talk_N", "N", 0.0, -20.0, 20.0, 0.02, least=0.005, meaning="from one end of the travel to the other"
-        ),
+        Par("cross_talk_N", "N", 0.0, -20.0, 20.0, 0.02, least=0.005, meaning="from one end of the travel to another"),
         Par("cross_talk_sag_N", "N", 0.0, -20.0, 20.0, 0.02, least=0.005, meaning="below the chord in the middle"),
     ),
     operator=Operator("reading", _cross_talk),
