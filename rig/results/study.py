@@ -8,12 +8,10 @@ from rig.tissue.control_table import control_rows
 from rig.tissue.intervals import LEVEL
 from rig.tissue.judging import Errors, Judged
 from rig.tissue.laws import FloatArray
+from rig.tissue.model import HELD_PERCENT, none_to_track_with
 from rig.tissue.study import Known, Study, rows
 from rig.trials.findings import merge
 
-# Displacement by half: tissue twice as stiff as the model, the most that the loop's gains are chosen for
-# (controller.law.synthesis).
-HELD_PERCENT = 50.0
 FRICTION = "friction shows at reversals: curves of loading say nothing for or against it"
 
 
@@ -43,10 +41,7 @@ def _remarks(law: LawResult, name: str, friction: bool) -> Iterator[str]:
     if friction:
         yield FRICTION
     if law.worst_percent is not None and law.worst_percent > HELD_PERCENT:
-        yield (
-            f"the {name} law errs by up to {law.worst_percent:.0f} % of a displacement, and a force loop holds tissue "
-            "half to twice as stiff as its model: this is none to track with; `rig diagnose` says what it gets wrong"
-        )
+        yield none_to_track_with(name, law.worst_percent)
 
 
 def law_result(judged: Judged, force_N: FloatArray) -> LawResult:

@@ -33,6 +33,10 @@ BY_PARAMETER = "parameters", "standard_errors", "intervals", "units"
 # What a file holds as the model does.
 AS_SAVED = "intervals", "interval_level", "interval_method", "valid", "data", "quality", "control", "effects"
 
+# Displacement by half: tissue twice as stiff as the model, the most that the loop's gains are chosen for
+# (controller.law.synthesis).
+HELD_PERCENT = 50.0
+
 T = TypeVar("T")
 
 
@@ -148,7 +152,10 @@ class Model:
         return float(self.law.depth(force_N))
 
     def check_force(self, force_N: float) -> None:
-        """Raises DataError where the model was not fitted up to this force."""
+        """Raises DataError where the model was not fitted up to this force, or says too little of what it was."""
+        worst_percent = self.quality.held_out_max_error_percent or self.quality.max_error_percent
+        if not worst_percent <= HELD_PERCENT:
+            raise DataError(none_to_track_with(self.law.name, worst_percent))
         if not 0 <= force_N <= self.valid.force_N:
             raise DataError(
                 f"{force_N:g} N is outside what the model was fitted to, 0 to {self.valid.force_N:.3g} N "
@@ -171,6 +178,14 @@ class Model:
             covariance=tuple(tuple(map(float, row)) for row in self.covariance),
             **{name: getattr(self, name) for name in AS_SAVED},
         )
+
+
+def none_to_track_with(law: str, worst_percent: float) -> str:
+    """What is said of a law that errs by more than ``HELD_PERCENT``."""
+    return (
+        f"the {law} law errs by up to {worst_percent:.0f} % of a displacement, and a force loop holds tissue "
+        "half to twice as stiff as its model: this is none to track with; `rig diagnose` says what it gets wrong"
+    )
 
 
 def load_model(path: Path) -> Model:

@@ -73,6 +73,23 @@ def test_a_force_beyond_the_fitted_range_is_refused_with_that_range() -> None:
         MODEL.check_force(float("nan"))
 
 
+@pytest.mark.parametrize(
+    ("fitted_percent", "held_out_percent"), [(1.9, 155.0), (662.0, None), (51.0, None), (1.9, 50.1)]
+)
+def test_a_law_off_by_more_than_a_loop_can_hold_is_none_to_track_with(
+    fitted_percent: float, held_out_percent: float | None
+) -> None:
+    errors = {"max_error_percent": fitted_percent, "held_out_max_error_percent": held_out_percent}
+    poor = replace(MODEL, quality=MODEL.quality.model_copy(update=errors))
+    worst = held_out_percent or fitted_percent
+    with pytest.raises(DataError, match=rf"the index law errs by up to {worst:.0f} % .*none to track with; `rig diagn"):
+        poor.check_force(1.0)
+
+
+def test_a_law_off_by_as_much_as_a_loop_can_hold_is_tracked_with() -> None:
+    replace(MODEL, quality=MODEL.quality.model_copy(update={"held_out_max_error_percent": 50.0})).check_force(1.0)
+
+
 def test_the_file_says_units_and_formula_for_readers_without_this_program(file: Path) -> None:
     values = json.loads(file.read_text())
     assert values["formula"] == "F = a x exp(b x) + B v"
