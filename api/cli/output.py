@@ -4,18 +4,24 @@ import functools
 from collections.abc import Callable
 from pathlib import Path
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 
 from rig.errors import RigError
 from rig.results.base import Failure, SavedResult
 from rig.results.tables import Part, TextTable
 
+WIDE = 1000  # letters: as wide as no terminal is
 console = Console(markup=False, highlight=False)
 
 
 def show(*parts: Part) -> None:
-    """Prints tables and sentences. On a narrow terminal both go on in the next line; a pipe gets sentences whole."""
+    """Prints tables and sentences. On a narrow terminal both go on in the next line; a pipe gets sentences whole.
+
+    A table that is too wide for its place stands closer together before words in it are cut.
+    """
     for part in parts:
         if isinstance(part, TextTable):
             console.print(_table(part))
@@ -29,6 +35,8 @@ def _table(part: TextTable) -> Table:
         found.add_column(name, overflow="fold")
     for row in part.rows:
         found.add_row(*row)
+    if Measurement.get(console, console.options.update(max_width=WIDE), found).maximum > console.width:
+        found.box, found.padding = SIMPLE_HEAD, 0
     return found
 
 

@@ -77,6 +77,9 @@ class SweepRun:
             raise
         return self._followed()
 
+    def catch_up(self, now_ns: int) -> None:
+        """Of the tracker nothing is wanted."""
+
     def prepare(self, now_ns: int) -> None:
         """Takes what the axis sent since the last cycle."""
         self._axis += self._devices.axis.poll(now_ns)

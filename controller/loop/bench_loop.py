@@ -147,13 +147,16 @@ class BenchLoop:
         self._cycles += 1
         return self._commands.more(self)
 
-    def prepare(self, now_ns: int) -> None:
-        """Takes what axis and tracker said since the last turn: before the force, placed by where they were."""
-        for sample in self._polled("axis", self.devices.axis.poll, now_ns):
-            self._take_axis(sample)
+    def catch_up(self, now_ns: int) -> None:
+        """Takes what the tracker said since the last turn."""
         if self.devices.tracker:
             for marker in self._polled("marker", self.devices.tracker.poll, now_ns):
                 self._take_marker(marker)
+
+    def prepare(self, now_ns: int) -> None:
+        """Takes what the axis said since the last turn: before the force, which is placed by where it was."""
+        for sample in self._polled("axis", self.devices.axis.poll, now_ns):
+            self._take_axis(sample)
 
     def take_force(self, now_ns: int) -> None:
         """Takes what the force sensor said."""

@@ -58,8 +58,11 @@ class Grid:
 class Work(Protocol):
     """What is done in each cycle."""
 
+    def catch_up(self, now_ns: int) -> None:
+        """Takes what may be a cycle old, straight after one: a frame of the tracker takes longer than the end leaves."""
+
     def prepare(self, now_ns: int) -> None:
-        """Takes what has come in since the last cycle, shortly before the next."""
+        """Takes what else has come in since the last cycle, shortly before the next."""
 
     def take_force(self, now_ns: int) -> None:
         """Takes samples of the force sensor, and shows them to the phase lock."""
@@ -130,9 +133,13 @@ class Executive:
 
     def _prepare(self, work: Work, from_ns: int) -> int:
         """Between two cycles; how long it takes."""
+        caught_up_ns = self._timed(work.catch_up)
         self._doze(from_ns)
+        return caught_up_ns + self._timed(work.prepare)
+
+    def _timed(self, part: Callable[[int], None]) -> int:
         began_ns = self._now()
-        work.prepare(began_ns)
+        part(began_ns)
         return self._now() - began_ns
 
     def _look(self, work: Work, phase: PhaseLock, due_ns: int) -> int:

@@ -140,6 +140,7 @@ class ReplayedLoop:
             self._marker.upto(row.capture_ns, row.marker_age_ns)
         self._give(given, row.capture_ns)
         wake_ns = row.scheduled_ns + row.wake_latency_ns
+        self.loop.catch_up(row.capture_ns)
         self.loop.prepare(row.capture_ns)
         self.loop.take_force(row.capture_ns)
         waited_ns = row.capture_ns - wake_ns

@@ -277,6 +277,7 @@ class FakeBench:
         self._renew()
         if self.stop_process_lives:
             StopWord.beat(self.page, wake_ns)
+        self.loop.catch_up(wake_ns)
         self.loop.prepare(wake_ns)
         self.loop.take_force(wake_ns)
         self.going = self.loop.run_cycle(Cycle(self.cycle_number, due_ns, wake_ns, self.missed))

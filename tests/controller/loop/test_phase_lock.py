@@ -59,6 +59,8 @@ class Bench:
     used: list[tuple[int, int]] = field(default_factory=list)
     clock: ClockMap = field(default_factory=ClockMap)
     prepared: int = 0
+    frame_ns: int = 0
+    """What a frame of the tracker takes; one comes every 17th cycle."""
     spins_ns: int = 0
     held_from_ns: int = 1 << 62
     """What comes on the line from now on is not there yet: the loop keeps the kernel's worker from its core."""
@@ -79,6 +81,9 @@ class Bench:
         """Between two looks, as `executive.nap`."""
         self.now_ns += NAP_NS
         self.held_from_ns = 1 << 62
+
+    def catch_up(self, now_ns: int) -> None:
+        self.now_ns += 0 if len(self.cycles) % 17 else self.frame_ns
 
     def prepare(self, now_ns: int) -> None:
         self.prepared += 1
@@ -224,6 +229,34 @@ def test_a_stall_is_skipped_and_counted_and_the_grid_keeps_its_phase() -> None:
     assert max(run.late_us(2.1)) <= 1e-3 * LATEST_NS
     starts = [cycle.wake_ns for cycle in run.cycles]
     assert min(after - before for before, after in pairwise(starts)) > 0.5 * CYCLE_NS
+
+
+def lateness(run: Bench) -> set[int]:
+    """Of a grid that stands still, by how much its cycles began late [ns]."""
+    return {cycle.wake_ns - cycle.scheduled_ns for cycle in run.cycles}
+
+
+def test_a_frame_of_the_tracker_that_takes_half_a_cycle_makes_none_late_and_is_counted() -> None:
+    run = bench(Sensor(CYCLE_NS, silent=(0, 1 << 62)), 1.0, frame_ns=500_000)
+    assert lateness(run) == {0}
+    assert [cycle.prepared_ns for cycle in run.cycles[:18]] == [500_000, *(16 * [0]), 500_000]
+
+
+class Unhurried(Bench):
+    """The plant: the frame is taken with the rest, shortly before the cycle."""
+
+    def catch_up(self, now_ns: int) -> None:
+        pass
+
+    def prepare(self, now_ns: int) -> None:
+        super().catch_up(now_ns)
+
+
+def test_a_frame_that_is_taken_shortly_before_a_cycle_makes_it_late() -> None:
+    late_ns = lateness(
+        Unhurried(Sensor(CYCLE_NS, silent=(0, 1 << 62)), 1000, PhaseLock(CYCLE_NS, CYCLE_NS), frame_ns=500_000).run()
+    )
+    assert max(late_ns) == 250_000
 
 
 class TurnedLock(PhaseLock):
