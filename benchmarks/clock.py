@@ -81,6 +81,9 @@ class Listening:
         self._collect_ns = time.monotonic_ns()
         self._end_ns = self._collect_ns + round(seconds * 1e9)
 
+    def catch_up(self, now_ns: int) -> None:
+        """Of the tracker nothing is wanted."""
+
     def prepare(self, now_ns: int) -> None:
         """Asks twice a second what was taken, which may cost a cycle."""
         if now_ns >= self._collect_ns:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from sqlalchemy import Connection, func, select
 
@@ -17,7 +18,7 @@ from api.catalogue.folder import short, utc
 from api.catalogue.pages import FIRST, Page, cut
 from api.catalogue.people import NamedPerson
 from api.catalogue.queries import EVERYTHING, Asked, every, listed, sites
-from api.catalogue.refresh import current, refill
+from api.catalogue.refresh import current, refill, scan
 from api.catalogue.schema import TABLES, Kind
 from api.catalogue.settings import ENVIRONMENT
 from api.catalogue.stiffness import compared
@@ -47,6 +48,8 @@ from rig.results.catalogue import (
 
 # Clocks that a person set differ by a minute; one that is further ahead was wrong.
 LARGEST_AHEAD_S = 60.0
+MOST_PAGES = 50  # of 100 entries each: a few megabytes
+Found = tuple[tuple[Kind, ...], str | None, tuple[str, ...]]
 
 
 class NoSuchSubject(UsageError):
@@ -70,6 +73,7 @@ class Catalogue:
         given = given or os.environ.get(ENVIRONMENT, "")
         self.database = Database(address(given, default_file(root)), root, moves=not given)
         self._prepared = False
+        self._known: tuple[object, dict[tuple[type[Any], Asked, Page], Any]] = None, {}
 
     def _fresh(self) -> contextlib.AbstractContextManager[tuple[Connection, tuple[str, ...]]]:
         """One state of all tables, as the folders are now; and sentences on what is not listed."""
@@ -82,9 +86,17 @@ class Catalogue:
             self.database.prepare()
             self._prepared = True
 
-    def _page(self, kind: type[Kind], asked: Asked, page: Page) -> tuple[tuple[Kind, ...], str | None, tuple[str, ...]]:
-        with self._fresh() as (connection, remarks):
-            return *listed(connection, kind, asked, page), remarks
+    def _page(self, kind: type[Kind], asked: Asked, page: Page) -> Found[Kind]:
+        """One page; while neither folders nor tables change, as it was found: a page of the browser asks on and on."""
+        looks = self.database.looks, scan(self.root)
+        known = self._known
+        if known[0] != looks or looks[0] is None or len(known[1]) > MOST_PAGES:
+            known = self._known = looks, {}
+        found: Found[Kind] | None = known[1].get((kind, asked, page))
+        if found is None:
+            with self._fresh() as (connection, remarks):
+                found = known[1][kind, asked, page] = *listed(connection, kind, asked, page), remarks
+        return found
 
     def sessions(self, asked: Asked = EVERYTHING, page: Page = FIRST) -> SessionList:
         """Sessions by subject, site, kind, quality, dates and causes found."""

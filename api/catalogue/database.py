@@ -56,6 +56,15 @@ class Database:
         return self.url.get_backend_name() == "sqlite"
 
     @property
+    def looks(self) -> tuple[int, int, int] | None:
+        """What changes whenever its file is written to or replaced; None of a server, or where there is no file."""
+        try:
+            now = self.file.stat() if self.file else None
+        except FileNotFoundError:
+            now = None
+        return (now.st_ino, now.st_size, now.st_mtime_ns) if now else None
+
+    @property
     def place(self) -> str:
         """What to call it by; without a password."""
         return str(self.file or self.url.render_as_string(hide_password=True))

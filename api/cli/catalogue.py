@@ -87,9 +87,7 @@ def catalogue(
     Example: rig catalogue sessions --subject S01 --quality good
     """
     lists = Catalogue(_there(sessions), given)
-    asked = Asked(
-        subject, site, session, kind, quality, law, verdict, cause, since=since, until=until
-    )  # fmt: skip
+    asked = Asked(subject, site, session, kind, quality, law, verdict, cause, since=since, until=until)
     if what in ("backup", "restore"):
         _names(lists, what == "backup", file, json_file)
     elif file is not None:
@@ -100,26 +98,14 @@ def catalogue(
         show(*made.remarks)
         write_json(json_file, made)
     else:
-        _list(what, _asker(lists, what)(asked, Page(limit, cursor)), json_file)
+        find: Callable[[Asked, Page], SavedResult] = getattr(lists, what)
+        _list(what, find(asked, Page(limit, cursor)), json_file)
 
 
 def _there(sessions: Path) -> Path:
     if not sessions.is_dir():
         raise UsageError(f"{sessions}: no such folder of sessions; give it with --sessions")
     return sessions
-
-
-def _asker(lists: Catalogue, what: str) -> Callable[[Asked, Page], SavedResult]:
-    askers: Mapping[str, Callable[[Asked, Page], SavedResult]] = {
-        "sessions": lists.sessions,
-        "trials": lists.trials,
-        "models": lists.models,
-        "diagnoses": lists.diagnoses,
-        "causes": lists.causes,
-        "operations": lists.operations,
-        "sites": lists.sites,
-    }
-    return askers[what]
 
 
 def _names(lists: Catalogue, backup: bool, file: Path | None, json_file: Path | None) -> None:
@@ -204,14 +190,8 @@ def subject(
 
 def _history(found: SubjectHistory, json_file: Path | None) -> None:
     show(f"{found.subject.subject}: {found.subject.name or 'no name is kept'}; {found.subject.sessions} sessions")
-    parts = {
-        "sessions": found.sessions,
-        "thresholds": found.thresholds,
-        "models": found.models,
-        "diagnoses": found.diagnoses,
-    }
-    for what, items in parts.items():
-        if items:
+    for what in ("sessions", "thresholds", "models", "diagnoses"):
+        if items := getattr(found, what):
             show(what, _table(what, items))
     write_json(json_file, found)
 

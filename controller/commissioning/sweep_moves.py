@@ -1,7 +1,6 @@
 """Plays a sweep on the axis, cycle by cycle as the loop would, and looks at every cycle whether it may go on.
 
-No loop runs meanwhile. What presses on the tip, a stop, a drive that lags or falls silent ends it by the drive's own
-brake.
+No loop runs meanwhile. A load on the tip, a stop, a drive that lags or falls silent ends it by the drive's own brake.
 """
 
 import math
@@ -78,11 +77,10 @@ class SweepRun:
         return self._followed()
 
     def catch_up(self, now_ns: int) -> None:
-        """Of the tracker nothing is wanted."""
-
-    def prepare(self, now_ns: int) -> None:
-        """Takes what the axis sent since the last cycle."""
+        """Takes what the axis has sent, straight after a cycle and before the next."""
         self._axis += self._devices.axis.poll(now_ns)
+
+    prepare = catch_up
 
     def take_force(self, now_ns: int) -> None:
         """Takes samples of the force sensor, and shows them to the phase lock."""
@@ -96,7 +94,6 @@ class SweepRun:
     def run_cycle(self, cycle: Cycle) -> bool:
         """The turn itself; False where it is the last."""
         now_ns = cycle.began_ns
-        self._axis += self._devices.axis.poll(now_ns)
         ready = self._force is not None and bool(self._axis)
         if not self._begin_ns:
             self._begin_ns = cycle.scheduled_ns + round(LISTEN_S * 1e9)

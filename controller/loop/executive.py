@@ -59,7 +59,7 @@ class Work(Protocol):
     """What is done in each cycle."""
 
     def catch_up(self, now_ns: int) -> None:
-        """Takes what may be a cycle old, straight after one: a frame of the tracker takes longer than the end leaves."""
+        """Takes what may be a cycle old, straight after one: a frame of the tracker takes more than its end."""
 
     def prepare(self, now_ns: int) -> None:
         """Takes what else has come in since the last cycle, shortly before the next."""

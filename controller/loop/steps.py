@@ -5,7 +5,7 @@
 
 import math
 from statistics import fmean, pstdev
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
 
@@ -35,6 +35,14 @@ LARGEST_ZERO_SHIFT_N = 0.5
 LARGEST_ZERO_SHIFT_N_M = 0.05
 CHANNELS = ("fx", "fy", "fz", "mx", "my", "mz")
 CHANNEL_SHIFTS = 3 * ((LARGEST_ZERO_SHIFT_N, "N"),) + 3 * ((LARGEST_ZERO_SHIFT_N_M, "N m"),)
+
+
+class PlainStep(Table):
+    """A step that keeps nothing between cycles."""
+
+    def begin(self) -> Self:
+        """A run of this step: itself."""
+        return self
 
 
 class Zero(Table):
@@ -89,17 +97,13 @@ def _refuse_drift(zero: Wrench, reference: Wrench) -> None:
         )
 
 
-class MoveTo(Table):
+class MoveTo(PlainStep):
     """Moves in the air to an axis position."""
 
     step: Literal["move"] = "move"
     mode: ClassVar[Mode] = Mode.FREE
     position_mm: float
     speed_mm_s: Positive
-
-    def begin(self) -> "MoveTo":
-        """Keeps nothing between cycles."""
-        return self
 
     def advance(self, state: LoopState, elapsed_s: float) -> bool:  # noqa: ARG002
         """One cycle of the move."""
@@ -187,7 +191,7 @@ class ApproachRun:
             self._running_in_N.append(state.force_N)
 
 
-class Compress(Table):
+class Compress(PlainStep):
     """Moves to a depth below the surface at constant speed; ends early at the force limit."""
 
     step: Literal["compress"] = "compress"
@@ -195,10 +199,6 @@ class Compress(Table):
     depth_mm: float
     speed_mm_s: Positive
     force_limit_N: Positive
-
-    def begin(self) -> "Compress":
-        """Keeps nothing between cycles."""
-        return self
 
     def advance(self, state: LoopState, elapsed_s: float) -> bool:  # noqa: ARG002
         """One cycle; the limit of force ends the step where it is."""
@@ -209,16 +209,12 @@ class Compress(Table):
         return state.go(state.surface_mm + self.depth_mm, self.speed_mm_s)
 
 
-class Hold(Table):
+class Hold(PlainStep):
     """Keeps the set-point."""
 
     step: Literal["hold"] = "hold"
     mode: ClassVar[Mode] = Mode.COMPRESS
     duration_s: Annotated[float, Field(ge=0)]
-
-    def begin(self) -> "Hold":
-        """Keeps nothing between cycles."""
-        return self
 
     def advance(self, state: LoopState, elapsed_s: float) -> bool:  # noqa: ARG002
         """Stands still."""
@@ -339,7 +335,7 @@ class TrackForceRun:
         return over
 
 
-class Retract(Table):
+class Retract(PlainStep):
     """Moves out to a clearance above the surface."""
 
     step: Literal["retract"] = "retract"
@@ -347,10 +343,6 @@ class Retract(Table):
     clearance_mm: Positive
     speed_mm_s: Positive
     floor_mm: float = 0.0
-
-    def begin(self) -> "Retract":
-        """Keeps nothing between cycles."""
-        return self
 
     def advance(self, state: LoopState, elapsed_s: float) -> bool:  # noqa: ARG002
         """One cycle of the way out; without a surface it leaves from where it is."""

@@ -3,10 +3,13 @@
 import os
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from api.catalogue import catalogue, queries
 from api.catalogue.catalogue import Catalogue
+from api.catalogue.database import Database
 from api.catalogue.pages import Page
 from api.catalogue.queries import Asked
 from rig.errors import UsageError
@@ -141,6 +144,37 @@ def test_a_change_that_leaves_size_and_date_is_noticed(lab: Catalogue) -> None:
     os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
     assert file.stat().st_size == before.st_size and file.stat().st_mtime_ns == before.st_mtime_ns
     assert listed(lab, subject="S77") == ["b"]
+
+
+def test_a_list_is_put_together_once_until_folders_or_tables_change(
+    lab: Catalogue, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed(lab)  # brings the tables to what the folders hold, which writes to them
+    before, asked = lab.sessions(), 0
+
+    def counted(*wanted: Any) -> Any:
+        nonlocal asked
+        asked += 1
+        return queries.listed(*wanted)
+
+    monkeypatch.setattr(catalogue, "listed", counted)
+    assert [lab.sessions() for _ in range(3)] == 3 * [before]
+    assert asked == (0 if lab.database.is_sqlite else 3)  # of a server nothing tells that it was written to
+    assert lab.sessions(Asked(quality="bad")) != before
+    after_another = asked
+    lab.rename("S01", "Ann Example")
+    assert lab.sessions() == before and asked == after_another + 1
+    make_session(lab.root, "d")
+    assert len(listed(lab)) == 4
+    assert asked > after_another + 1
+
+
+def test_of_a_server_a_list_is_asked_for_each_time(lab: Catalogue, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Database, "looks", None)
+    before = lab.sessions()
+    with lab.database.writing() as connection:
+        connection.exec_driver_sql("DELETE FROM rig_session WHERE session = 'a'")
+    assert len(lab.sessions().items) == len(before.items) - 1
 
 
 def test_the_folder_of_all_sessions_may_go_and_come_back(lab: Catalogue) -> None:

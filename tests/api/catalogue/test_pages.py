@@ -10,6 +10,7 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
 from api.catalogue.catalogue import Catalogue
+from api.catalogue.database import Database
 from api.catalogue.pages import Page, Place
 from api.http.access.models import AccountView
 from api.http.access.rights import READ
@@ -83,6 +84,7 @@ def test_a_page_that_comes_again_or_is_left_out_would_be_seen(
     client: TestClient, monkeypatch: pytest.MonkeyPatch, path: str, where: str, planted: Any
 ) -> None:
     monkeypatch.setattr(Page, where, planted)
+    monkeypatch.setattr(Database, "looks", None)  # a page is not answered as it was found before
     with pytest.raises(AssertionError):
         test_pages_hold_every_entry_once_and_in_order(client, path, 2)
 
