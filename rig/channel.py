@@ -41,13 +41,13 @@ class Message(Table):
             cls.TYPE = kind
 
 
-class Reply(Message, kind=1):
+class Reply(Message):
     """A message that answers the message with id ``to``."""
 
     to: int
 
 
-class Answer(Reply):
+class Answer(Reply, kind=1):
     """Done, or not done because of ``refused``; ``stopped``: because a stop is in force."""
 
     refused: str = ""
