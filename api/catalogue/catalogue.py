@@ -18,7 +18,7 @@ from api.catalogue.folder import short, utc
 from api.catalogue.pages import FIRST, Page, cut
 from api.catalogue.people import NamedPerson
 from api.catalogue.queries import EVERYTHING, Asked, every, listed, sites
-from api.catalogue.refresh import current, refill, scan
+from api.catalogue.refresh import FolderScan, current, refill, scan
 from api.catalogue.schema import TABLES, Kind
 from api.catalogue.settings import ENVIRONMENT
 from api.catalogue.stiffness import compared
@@ -49,6 +49,7 @@ from rig.results.catalogue import (
 # Clocks that a person set differ by a minute; one that is further ahead was wrong.
 LARGEST_AHEAD_S = 60.0
 MOST_PAGES = 50  # of 100 entries each: a few megabytes
+Current = tuple[Connection, tuple[str, ...]]
 Found = tuple[tuple[Kind, ...], str | None, tuple[str, ...]]
 
 
@@ -75,10 +76,10 @@ class Catalogue:
         self._prepared = False
         self._known: tuple[object, dict[tuple[type[Any], Asked, Page], Any]] = None, {}
 
-    def _fresh(self) -> contextlib.AbstractContextManager[tuple[Connection, tuple[str, ...]]]:
-        """One state of all tables, as the folders are now; and sentences on what is not listed."""
+    def _fresh(self, now: FolderScan | None = None) -> contextlib.AbstractContextManager[Current]:
+        """One state of all tables, as the folders are ``now``; and sentences on what is not listed."""
         self._prepare()
-        return current(self.database)
+        return current(self.database, now or scan(self.root))
 
     def _prepare(self) -> None:
         file = self.database.file
@@ -94,7 +95,7 @@ class Catalogue:
             known = self._known = looks, {}
         found: Found[Kind] | None = known[1].get((kind, asked, page))
         if found is None:
-            with self._fresh() as (connection, remarks):
+            with self._fresh(looks[1]) as (connection, remarks):
                 found = known[1][kind, asked, page] = *listed(connection, kind, asked, page), remarks
         return found
 

@@ -62,9 +62,8 @@ def _printable(name: str) -> str:
 
 
 @contextlib.contextmanager
-def current(database: Database) -> Iterator[tuple[Connection, tuple[str, ...]]]:
-    """One state of all tables, brought to what the folders hold; and sentences on what is not listed."""
-    found = scan(database.root)
+def current(database: Database, found: FolderScan) -> Iterator[tuple[Connection, tuple[str, ...]]]:
+    """One state of all tables, brought to what the folders were ``found`` to hold; sentences on what is not listed."""
     with database.reading() as connection:
         known = stamps(connection)
         changed = [name for name, now in found.stamps.items() if known.get(name) != now]
