@@ -152,7 +152,7 @@ class Model:
         return float(self.law.depth(force_N))
 
     def check_force(self, force_N: float) -> None:
-        """Raises DataError where the model was not fitted up to this force, or says too little of what it was."""
+        """Raises DataError where the model was not fitted up to this force, or errs more than a loop holds."""
         worst_percent = self.quality.held_out_max_error_percent or self.quality.max_error_percent
         if not worst_percent <= HELD_PERCENT:
             raise DataError(none_to_track_with(self.law.name, worst_percent))
