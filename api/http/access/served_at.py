@@ -159,13 +159,14 @@ def _refuse_unreadable(option: str, file: Path) -> None:
 
 
 def tls_context(certificate: Path, key: Path) -> ssl.SSLContext:
-    """TLS 1.2 and newer, as Python has it."""
+    """TLS 1.2 and newer, without tickets: as one comes, clients of two threads (Python before 3.13) lose a request."""
 
     def locked() -> str:
         raise UsageError(f"--tls-key {key}: is locked by a password, which nobody types at a service; give it without")
 
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.set_alpn_protocols(["http/1.1"])
+    context.num_tickets = 0
     try:
         context.load_cert_chain(certificate, key, locked)
     except ssl.SSLError as error:

@@ -102,6 +102,15 @@ def test_a_stream_goes_over_it(encrypted: ServedAt, files: Files) -> None:
         assert json.loads(stream.recv())["type"] == "hello"
 
 
+def test_nothing_but_answers_comes_after_the_handshake(encrypted: ServedAt, files: Files) -> None:
+    asking = secure(encrypted, files)
+    asking.connect()
+    with asking.sock as over:
+        asking.request("GET", "/api/v1/info", headers={"Host": f"{NAME}:{encrypted.port}"})
+        assert over.recv(15) == b"HTTP/1.1 200 OK"
+        assert over.version() == "TLSv1.3" and over.session and not over.session.has_ticket
+
+
 def exchange(client: ssl.SSLSocket, page: ClientProtocol, until: Callable[[], bool]) -> None:
     """What ``page`` says and hears."""
     while not until():
