@@ -9,6 +9,7 @@ from controller.law.inverse_model import GainRow
 from controller.law.loop_response import Rates
 from controller.law.synthesis import LARGEST_STIFFNESS, LEAST_STIFFNESS, Span
 from rig.errors import UsageError
+from rig.tissue.intervals import STEP, carried
 from rig.tissue.laws import FloatArray, Law
 from rig.tissue.model import Model
 
@@ -18,7 +19,6 @@ LEAST_DAMPING_S = 0.0015
 STIFFEST_N_MM, STIFFEST_SLOW_N_MM = 20.0, 10.0
 FAST_SAMPLE_S = 0.0021  # a sensor of 500 Hz or more counts as fast; the slow one that was simulated has 100 Hz
 SPAN_ROWS = 6
-STEP = 1e-6  # of a parameter, for slopes: the root of what a double resolves is 1.5e-8
 
 
 class DampingUnknown(UsageError):
@@ -69,16 +69,8 @@ def span_of(model: Model, rows: Sequence[GainRow], rates: Rates) -> Span:
 
 def known_at(model: Model, depth_mm: FloatArray) -> tuple[TissueBounds, TissueBounds]:
     """Tangent and damping with their intervals: those of the parameters carried through (delta method)."""
-    law, here = model.law, _tangent_and_damping(model.law, depth_mm)
-    slopes = []
-    for index, parameter in enumerate(law.parameters):
-        step = STEP * max(abs(parameter.value), 1e-3)
-        step = step if parameter.value + step <= parameter.upper else -step
-        values = law.values
-        values[index] += step
-        slopes.append((_tangent_and_damping(law.from_values(values), depth_mm) - here) / step)
-    squares = np.einsum("pkr,pq,qkr->kr", np.array(slopes), _reaches(model), np.array(slopes))
-    reach = np.sqrt(np.maximum(squares, 0.0))
+    here = _tangent_and_damping(model.law, depth_mm)
+    reach = carried(model.law, _reaches(model), lambda law: _tangent_and_damping(law, depth_mm))
     low, high = np.where(here - reach > STEP * here, here - reach, 0.0), here + reach  # slopes are as exact as STEP
     return TissueBounds(depth_mm, here[0], low[0], high[0]), TissueBounds(depth_mm, here[1], low[1], high[1])
 

@@ -4,18 +4,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rig.tissue.intervals import carried
 from rig.tissue.judging import Judged
 from rig.tissue.laws import FloatArray, Law
 from rig.tissue.summary import ControlRow
-
-STEP = 1e-6
 
 
 def control_rows(judged: Judged, force_N: Sequence[float] | FloatArray) -> tuple[ControlRow, ...]:
     """One row a force; intervals carry the parameters' covariance through (delta method), at their level."""
     forces = np.asarray(force_N, float)
     found = _table(judged.law, forces)
-    reach = judged.reach * _deviations(judged, forces)
+    reach = judged.reach * carried(judged.law, judged.covariance, lambda law: _table(law, forces))
     low, high = np.maximum(found - reach, 0.0), found + reach
     return tuple(
         ControlRow(
@@ -37,17 +36,3 @@ def _table(law: Law, force_N: FloatArray) -> FloatArray:
     """Depth at rest, secant, tangent and damping at each force, shape (4, r)."""
     depth_mm = law.depth(force_N)
     return np.array([depth_mm, law.secant_stiffness(depth_mm), law.tangent_stiffness(depth_mm), law.damping(depth_mm)])
-
-
-def _deviations(judged: Judged, force_N: FloatArray) -> FloatArray:
-    """Standard deviations of the table, shape (4, r)."""
-    law, here = judged.law, _table(judged.law, force_N)
-    columns = []
-    for index, parameter in enumerate(law.parameters):
-        step = STEP * max(abs(parameter.value), 1e-3)
-        step = step if parameter.value + step <= parameter.upper else -step
-        values = law.values
-        values[index] += step
-        columns.append((_table(law.from_values(values), force_N) - here) / step)
-    slopes = np.array(columns)
-    return np.asarray(np.sqrt(np.maximum(np.einsum("pkr,pq,qkr->kr", slopes, judged.covariance, slopes), 0.0)))
