@@ -42,10 +42,10 @@ def nominal_Hz(recording: Recording) -> dict[str, float]:
 
 def rate_lost(recording: Recording, stream: str, nominal_Hz: float) -> float:
     """Share of the nominal rate not achieved, 0 where there was more."""
-    taken_ns = np.unique(recording.tables[stream]["capture_ns"])
-    if len(taken_ns) < 2:
+    steps_ns = np.diff(np.sort(recording.tables[stream]["capture_ns"]))
+    if not steps_ns.any():
         return 1.0
-    rate_Hz = (len(taken_ns) - 1) / (float(taken_ns[-1] - taken_ns[0]) * 1e-9)
+    rate_Hz = np.count_nonzero(steps_ns) / (float(steps_ns.sum()) * 1e-9)
     return max(0.0, 1.0 - rate_Hz / nominal_Hz)
 
 
@@ -176,10 +176,11 @@ def zero_drift_N(recording: Recording) -> float:
 def depth_mm(recording: Recording, contact_mm: float) -> float:
     """Deepest position of the first compression and the rest after it, from ``contact_mm``."""
     loop, axis = recording.tables["loop"], recording.tables["axis"]
-    pressing = loop[loop["mode"] == COMPRESS]
-    if not len(pressing):
+    step = loop["step"]
+    pressing = loop["mode"] == COMPRESS
+    if not pressing.any():
         return math.nan
-    first = pressing[pressing["step"] <= pressing["step"][0] + 1]["capture_ns"]
+    first = loop["capture_ns"][pressing & (step <= step[pressing][0] + 1)]
     inside = (axis["capture_ns"] >= first[0]) & (axis["capture_ns"] <= first[-1])
     return float(axis["position_mm"][inside].max()) - contact_mm if inside.any() else math.nan
 
