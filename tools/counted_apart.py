@@ -252,6 +252,7 @@ SCALE = {
     "api/cli/deferred.py": "help at once",
     "api/catalogue/settings.py": "help at once",
     "api/operations/judged.py": "help at once",
+    "rig/apart.py": "long recordings are judged beside a service under load",
 }
 APART = {
     "source_lines_safety": SAFETY,

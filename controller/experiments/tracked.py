@@ -14,6 +14,7 @@ from controller.experiments.verdicts import with_quality, with_surface
 from controller.loop.steps import Program, TrackForce
 from controller.safety.program_limits import refuse_beyond_limits
 from controller.supervisor import Supervisor, stop_error
+from rig.apart import apart
 from rig.channels import LoopSample
 from rig.config.quality import QualityLimits
 from rig.config.wiring import Wiring
@@ -65,7 +66,8 @@ def run(bench: Supervisor, program: Program, folder: Path, model: str) -> TrackR
     if done.outcome.stopped:
         raise stop_error(done.outcome)
     entry = open_session(folder).trial(done.file.stem)
-    result = evaluate(done, model).model_copy(update={"quality": entry.quality, "reasons": entry.reasons})
+    found = apart(done.file, evaluate, done, model)
+    result = found.model_copy(update={"quality": entry.quality, "reasons": entry.reasons})
     result.write(folder / FILE)
     return result
 
@@ -102,8 +104,7 @@ def _enter(folder: Path, name: str, done: Recorded) -> None:
         dropped=done.dropped,
     ).sealed(folder)
     entry = with_quality(with_surface(entry, done.outcome), folder, QualityLimits())
-    kept = tuple(trial for trial in info.trials if trial.name != name)
-    write_session(folder, replace(info, trials=(*kept, entry)))
+    write_session(folder, replace(info, trials=(*(one for one in info.trials if one.name != name), entry)))
 
 
 def duration_s(program: Program) -> float:

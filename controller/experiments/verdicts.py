@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from controller.loop.messages import Outcome
+from rig.apart import apart
 from rig.config.quality import QualityLimits
 from rig.errors import BadTrial, DataError
-from rig.recording.reader import read_recording
 from rig.recording.sessions import SessionInfo, TrialInfo
-from rig.trials.quality import TrialQuality, evaluate_trial
+from rig.trials.quality import TrialQuality, evaluate_file
 
 
 def with_surface(trial: TrialInfo, outcome: Outcome) -> TrialInfo:
@@ -29,7 +29,7 @@ def with_quality(trial: TrialInfo, folder: Path, limits: QualityLimits, before: 
     alike = [one for one in before if one.depth_mm == trial.depth_mm and one.outcome == "complete"]
     peaks_N = [one.peak_force_N for one in alike if one.quality in ("good", "usable") and one.peak_force_N > 0]
     try:
-        found = evaluate_trial(read_recording(folder / trial.file), limits, peaks_N)
+        found = apart(folder / trial.file, evaluate_file, folder / trial.file, limits, peaks_N)
     except DataError as error:
         found = TrialQuality("bad", (str(error),))
     return replace(trial, quality=found.verdict, reasons=found.reasons, measured=dict(found.measured))

@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from statistics import median
 from typing import Literal, NamedTuple
 
@@ -13,7 +14,7 @@ from rig.config.protocol import FORCE_LIMIT
 from rig.config.quality import Bounds, QualityLimits
 from rig.errors import DataError
 from rig.recording.mcap_file import SUMMARY
-from rig.recording.reader import Recording
+from rig.recording.reader import Recording, read_recording
 from rig.recording.sessions import TrialInfo
 from rig.recording.slope import tracker_slope
 from rig.trials import measures
@@ -79,6 +80,11 @@ def evaluate_trial(recording: Recording, limits: QualityLimits, peaks_before_N: 
     verdict: Verdict = "bad" if bad else "usable" if beyond else "good"
     reasons = (*unusable, *(measure.sentence(limits) for measure, _ in beyond))
     return TrialQuality(verdict, reasons, {measure.name: measure.value for measure in found})
+
+
+def evaluate_file(file: Path, limits: QualityLimits, peaks_before_N: Sequence[float] = ()) -> TrialQuality:
+    """The same for the recording in ``file``; raises DataError where it cannot be read."""
+    return evaluate_trial(read_recording(file), limits, peaks_before_N)
 
 
 def _unusable(recording: Recording, curve: Curve | str | None) -> Iterator[str]:

@@ -5,7 +5,6 @@ taken is asked to wait. A name that is not there takes as long as one that is.
 """
 
 import asyncio
-import os
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -16,6 +15,7 @@ from argon2.exceptions import InvalidHashError, VerificationError
 from api.http.access.scopes import WORDS, Caller, Scope, ScopeWord
 from api.http.access.secrets import digest
 from api.http.access.store import KeptModel, PrivateFile
+from rig.apart import stand_back
 from rig.errors import UsageError
 
 SHORTEST_PASSWORD = 12
@@ -122,4 +122,4 @@ class AccountStore:
 
 def _stand_back() -> None:
     """On Linux a thread has a priority of its own."""
-    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICE)
+    stand_back(NICE, threading.get_native_id())

@@ -22,13 +22,12 @@ from api.http.jobs.wire import CANCEL_S, Order, Told, Word
 from api.http.models import RequestBody
 from controller.commissioning.stoppable import stop_for_lost
 from controller.operation import Cancelled, Operation, Progress
+from rig.apart import stand_back
 from rig.config.wiring import Wiring
 from rig.errors import NO_ROOM, RigError, SafetyStop
 from rig.plugins import blaming
 from rig.results.base import SavedResult
 
-# A third of a normal program's share of a busy computer: a fit may wait for a page, and never the other way.
-NICENESS = 5
 FIRST_TO_END = "1000"  # proc(5): the most there is
 # A stop by the service's signal (as by systemd) is an end in order; of what was asked to end it is the last word.
 ENDED = 1
@@ -129,7 +128,7 @@ def main() -> None:
     pipes = Pipes(sys.stdin, outgoing)
     order = Order.model_validate_json(sys.stdin.readline())
     if not order.stop_word:  # a drive waits for nobody
-        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)  # whatever the service's own is
+        stand_back()  # whatever the service's own is
         with contextlib.suppress(OSError):  # of which memory is taken first, not of loop, recorder or service
             Path("/proc/self/oom_score_adj").write_text(FIRST_TO_END)
     threading.Thread(target=pipes.listen, name="service", daemon=True).start()

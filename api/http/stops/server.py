@@ -34,13 +34,12 @@ from controller.stop import http
 from controller.stop.http import HttpRequest, Refusal
 from controller.stop.server import CONFIRM_S, CONNECTIONS, LINGER_BYTES, LINGER_S, ROUTES, StopSaid
 from controller.stop.word import LOOK_S, NOT_CONFIRMED, Lane, Requester, StopReason, StopWord
+from rig.apart import stand_back
 from rig.errors import RigError
 
 # A handshake and a head take a few round trips, 0.2 s each around the world; the rest is patience.
 CONNECTION_S = 5.0
 BEAT_S = 0.25
-# Below loop, stop process and service, which strangers' handshakes must not slow down.
-NICE = 5
 # Until another connection has ended, where this process has no descriptor left for one.
 PAUSE_S = 0.05
 Answer = StopSaid | dict[str, str]
@@ -253,7 +252,7 @@ def main(arguments: list[str]) -> int:
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     settings = AwaySettings.model_validate_json(arguments[0])
-    os.setpriority(os.PRIO_PROCESS, 0, NICE)  # whatever the service's own is
+    stand_back()  # below loop, stop process and service, which strangers' handshakes must not slow down
     tls = tls_context(*settings.files) if settings.files else None
     listeners = [socket.socket(fileno=int(fd)) for fd in arguments[1:]]
     try:
