@@ -21,9 +21,18 @@ from rig.errors import RigError, SafetyStop, UsageError
 from rig.recording.files import make_folder, refuse_unwritable
 from rig.recording.sessions import SESSION_FILE, SessionInfo, TrialInfo, write_session
 
+# As 12 N of the protocols before 15 N of the default: at 30 mm/s a compression ends, and nothing is stopped.
+BEFORE_THRESHOLD = 0.8
 
-def check(protocol: Indentation, wiring: Wiring) -> None:
-    """Raises UsageError, before anything moves or is opened, where the protocol goes beyond the limits."""
+
+def check(protocol: Indentation, wiring: Wiring) -> Indentation:
+    """The protocol as this subject bears it: its compressions end before the threshold, which stops everything.
+
+    Raises UsageError, before anything moves or is opened, where it goes beyond the limits.
+    """
+    threshold_N = wiring.subject.threshold_N
+    if protocol.force_limit_N > threshold_N:
+        protocol = protocol.model_copy(update={"force_limit_N": BEFORE_THRESHOLD * threshold_N})
     if protocol.deepest_mm > wiring.limits.depth_mm:
         raise UsageError(
             f"protocol {protocol.name} goes {protocol.deepest_mm:g} mm deep, above limits.depth_mm"
@@ -31,6 +40,7 @@ def check(protocol: Indentation, wiring: Wiring) -> None:
         )
     for trial in trials(protocol):
         refuse_beyond_limits(trial.program, wiring)
+    return protocol
 
 
 def refuse_used(folder: Path) -> None:
@@ -63,7 +73,12 @@ def new_session(
 
 def capture(bench: Supervisor, protocol: Indentation, folder: Path, operation: Operation) -> SessionInfo:
     """Runs all trials, bad ones again; raises SafetyStop, with everything recorded kept, where a trial was stopped."""
-    check(protocol, bench.wiring)
+    asked_N, protocol = protocol.force_limit_N, check(protocol, bench.wiring)
+    if protocol.force_limit_N < asked_N:
+        operation.say(
+            f"each compression ends at {protocol.force_limit_N:.3g} N: the protocol's force limit of {asked_N:g} N is"
+            f" above the subject's threshold, {bench.wiring.subject.threshold_N:g} N"
+        )
     planned = trials(protocol)
     refuse_bench(bench, planned[0].program)
     info = new_session(folder, "capture", protocol.model_dump(mode="json"), bench.wiring)
@@ -89,24 +104,11 @@ def capture(bench: Supervisor, protocol: Indentation, folder: Path, operation: O
 def _run(
     bench: Supervisor, trial: PlannedTrial, protocol: Indentation, folder: Path, info: SessionInfo
 ) -> tuple[TrialInfo, RigError | None]:
-    about = {
-        "trial": {
-            "index": trial.index,
-            "speed_mm_s": trial.speed_mm_s,
-            "depth_mm": protocol.depth_mm,
-            "repeats": trial.repeats,
-        },
-        "protocol": protocol.model_dump(mode="json"),
-    }
+    speed_mm_s, depth_mm = trial.speed_mm_s, protocol.depth_mm
+    known = {"index": trial.index, "speed_mm_s": speed_mm_s, "depth_mm": depth_mm, "repeats": trial.repeats}
+    about = {"trial": known, "protocol": protocol.model_dump(mode="json")}
     file = folder / f"{trial.name}.mcap"
-    planned = TrialInfo(
-        name=trial.name,
-        file=file.name,
-        speed_mm_s=trial.speed_mm_s,
-        depth_mm=protocol.depth_mm,
-        outcome="failed",
-        repeats=trial.repeats,
-    )
+    planned = TrialInfo(trial.name, file.name, speed_mm_s, depth_mm, "failed", repeats=trial.repeats)
     longest = longest_s(protocol, trial.speed_mm_s, bench.wiring.limits.position_max_mm)
     try:
         done = record(bench, trial.program, file, metadata(bench, info.id, trial.name, about), longest)
@@ -114,11 +116,8 @@ def _run(
         return planned, error
     outcome = done.outcome
     result = replace(
-        with_surface(planned, outcome),
-        outcome=outcome.outcome,
-        peak_force_N=outcome.peak_force_N,
-        samples=done.samples,
-        dropped=done.dropped,
-    ).sealed(folder)
+        with_surface(planned, outcome), outcome=outcome.outcome, peak_force_N=outcome.peak_force_N,
+        samples=done.samples, dropped=done.dropped,
+    ).sealed(folder)  # fmt: skip
     result = with_quality(result, folder, protocol.quality, info.trials)
     return result, stop_error(outcome) if outcome.stopped else None

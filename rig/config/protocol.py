@@ -49,7 +49,7 @@ class Indentation(Table):
     retract_speed_mm_s: Positive = Field(default=10.0, description="on the way out")
     clearance_mm: Positive = Field(default=5.0, description="distance above the surface at rest")
     rest_s: NotNegative = Field(default=0.2, description="pause between trials")
-    force_limit_N: Positive = Field(default=12.0, description="ends the compression of a trial, which then retracts")
+    force_limit_N: Positive = Field(default=12.0, description="ends a compression; 0.8 of a threshold below it")
 
     quality: QualityLimits = QualityLimits()
 

@@ -14,7 +14,7 @@ from fastapi.testclient import TestClient
 
 from api.http.routes.curves import CurveView
 from api.http.service import Service
-from mock_devices.testing.access import client_of
+from mock_devices.testing.access import client_of, in_control
 from rig.config.wiring import Wiring
 from rig.recording.sessions import open_session, write_session
 from tests.rig.tissue.synthetic import Bench, metadata, tables, write_made_session, write_recording
@@ -66,6 +66,15 @@ def test_where_the_force_limit_comes_first_the_depth_it_comes_at_is_said(client:
         assert one["ends"] == "force limit" and depth_mm < 12
         force_N = A_N_MM * depth_mm * math.exp(B_PER_MM * depth_mm) + DAMPING * speed
         assert force_N == pytest.approx(12.0, abs=1e-6)
+
+
+def test_a_subject_that_bears_less_than_the_protocol_presses_is_pressed_less(client: TestClient) -> None:
+    wanted = {"id": "S07", "site": "left forearm", "pain_threshold_N": 4.0}
+    match = {"If-Match": client.get("/api/v1/subject").headers["ETag"]}
+    in_control(client).put("/api/v1/subject", json=wanted, headers=match).raise_for_status()
+    found = foreseen(client, "whole")
+    assert (found["verdict"], found["force_limit_N"]) == ("cut short", pytest.approx(3.2))
+    assert "the force limit of 3.2 N is expected to end 2 of 2 speeds" in str(found["sentence"])
 
 
 def test_a_refused_protocol_says_so_and_an_unknown_tissue_is_not_guessed(client: TestClient) -> None:

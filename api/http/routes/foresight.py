@@ -61,19 +61,13 @@ def add(router: APIRouter, service: Service) -> None:
     ) -> Foresight:
         plan = service.plan(name)
         model = load_model(service.jobs.places("").session(session) / file / "model.json") if session else None
-        return foresee(name, plan, model, refusal(plan, service))
+        try:
+            return foresee(name, check(plan, service.wiring), model)
+        except UsageError as error:
+            return foresee(name, plan, model, str(error))
 
 
-def refusal(plan: Indentation, service: Service) -> str:
-    """Why this bench does not start the protocol; empty if it does."""
-    try:
-        check(plan, service.wiring)
-    except UsageError as error:
-        return str(error)
-    return ""
-
-
-def foresee(name: str, plan: Indentation, model: Model | None, refused: str) -> Foresight:
+def foresee(name: str, plan: Indentation, model: Model | None, refused: str = "") -> Foresight:
     """What is to be said of ``plan`` on the tissue of ``model``."""
     expected = tuple(_expected(plan, model)) if model else ()
     verdict, sentence = _verdict(plan, expected, refused)
@@ -102,7 +96,7 @@ def _expected(plan: Indentation, model: Model) -> Iterator[ExpectedForce]:
 
 
 def _verdict(plan: Indentation, expected: Sequence[ExpectedForce], refused: str) -> tuple[Verdict, str]:
-    limit = f"the protocol's force limit of {plan.force_limit_N:g} N"
+    limit = f"the force limit of {plan.force_limit_N:.3g} N"
     if refused:
         return "refused", refused
     if not expected:
