@@ -51,8 +51,9 @@ class Panel:
 
     def line(self, x: Values, y: Values, look: str) -> None:
         """A line through values, shape (n,), those left out where one is no number."""
-        places = zip(self._across(x), self._down(y), strict=True)
-        steps = "L".join(f"{right:.1f} {below:.1f}" for right, below in places if math.isfinite(right + below))
+        places = np.column_stack([self._across(x), self._down(y)])
+        known = places[np.isfinite(places).all(axis=1)]
+        steps = "L".join(["%.1f %.1f"] * len(known)) % tuple(known.ravel().tolist())
         self.parts.append(f'<path d="M{steps}" fill="none" {look}/>' if steps else "")
 
     def dots(self, x: Values, y: Values, color: str) -> None:
