@@ -63,16 +63,15 @@ def _of_rows(channel: int, rows: NDArray[np.void], offset: int) -> _Messages:
     messages["log"], messages["publish"] = np.maximum(rows["arrival_ns"], 0), np.maximum(rows["capture_ns"], 0)
     # As so many bytes: field by field takes three times as long.
     messages["body"] = np.ascontiguousarray(rows).view(f"V{rows.itemsize}")
-    entries = np.empty((rows.size, 2), "<u8")
-    entries[:, 0], entries[:, 1] = messages["log"], np.arange(rows.size) * messages.itemsize + offset
-    return _Messages(channel, messages.view(np.uint8).data, entries)
+    offsets = offset + np.arange(rows.size, dtype=np.uint64) * messages.itemsize
+    return _Messages(channel, messages.view(np.uint8).data, np.stack([messages["log"], offsets], axis=1))
 
 
 def _of_body(channel: int, body: bytes, offset: int) -> _Messages:
     seq, capture_ns, arrival_ns = _STAMP.unpack_from(body)
     log, publish, size = max(arrival_ns, 0), max(capture_ns, 0), 22 + len(CDR_HEADER) + len(body)
     head = MESSAGE_HEAD.pack(int(Opcode.MESSAGE), size, channel, seq & 0xFFFFFFFF, log, publish)
-    return _Messages(channel, head + CDR_HEADER + body, np.array([[log, offset]], "<u8"))
+    return _Messages(channel, head + CDR_HEADER + body, np.array([[log, offset]], np.uint64))
 
 
 class McapLayout:
@@ -147,8 +146,7 @@ class McapLayout:
         self._definitions, self._messages = b"", []
 
     def _message_index(self, channel: int) -> tuple[bytes, memoryview]:
-        own = [part.entries for part in self._messages if part.channel == channel]
-        index = own[0] if len(own) == 1 else np.concatenate(own)
+        index = np.concatenate([part.entries for part in self._messages if part.channel == channel], dtype="<u8")
         self._counts[channel] = self._counts.get(channel, 0) + len(index)
         size = index.nbytes
         return struct.pack("<BQHI", int(Opcode.MESSAGE_INDEX), 6 + size, channel, size), index.view(np.uint8).data
