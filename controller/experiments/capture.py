@@ -59,14 +59,10 @@ def new_session(
     refuse_used(folder)
     make_folder(folder)
     info = SessionInfo(
-        id=folder.resolve().name,
-        kind=kind,
-        created=datetime.now(UTC).isoformat(),
-        software=f"tissue-rig {rig.__version__}",
-        protocol=dict(protocol),
-        wiring=wiring.model_dump(mode="json"),
-        subject=wiring.subject.model_dump(mode="json"),
-    )
+        id=folder.resolve().name, kind=kind, created=datetime.now(UTC).isoformat(),
+        software=f"tissue-rig {rig.__version__}", protocol=dict(protocol),
+        wiring=wiring.model_dump(mode="json"), subject=wiring.subject.model_dump(mode="json"),
+    )  # fmt: skip
     write_session(folder, info)
     return info
 
