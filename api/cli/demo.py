@@ -31,7 +31,7 @@ from rig.config.protocol import Indentation
 from rig.config.table import load
 from rig.config.wiring import Wiring
 from rig.diagnosis.design import check
-from rig.errors import SafetyStop, UsageError
+from rig.errors import DataError, SafetyStop, UsageError
 from rig.intake.questions import inline
 from rig.recording.files import make_folder, refuse_unwritable, write_text
 from rig.recording.sessions import derive
@@ -142,7 +142,7 @@ def measured(
             fitted = fit_session([session])
             console.rule("track: gains from the tangent stiffness of the model")
             return fitted, followed(bench, TrackPlan(_forces(bench, session), str(MODEL)), session)
-    except DampingUnknown as unknown:
+    except (DampingUnknown, DataError) as unknown:  # too few trials, or of a computer that was late
         if not again:
             raise
         show(f"{unknown}; the demonstration begins again, with one trial more at each speed")

@@ -16,7 +16,8 @@ from mock_devices.testing.commands import free_port
 from mock_devices.testing.models import index_model
 from rig.config.calibration_files import text_of
 from rig.config.wiring import Wiring
-from rig.errors import SafetyStop, UsageError
+from rig.errors import DataError, SafetyStop, UsageError
+from rig.tissue.model import none_to_track_with
 from tests.calibrations import axis_dynamics
 
 runner = CliRunner()
@@ -173,11 +174,12 @@ def test_a_demonstration_begins_again_where_the_computer_was_late_and_for_no_oth
     assert len(begins) == begun
 
 
+@pytest.mark.parametrize("why", [DampingUnknown("0 to 0.004 N s/mm"), DataError(none_to_track_with("index", 76.0))])
 @pytest.mark.parametrize(("refusals", "trials"), [(0, [2]), (1, [2, 3]), (2, [2, 3, 4]), (3, [2, 3, 4])])
-def test_a_demonstration_whose_trials_leave_damping_open_begins_again_with_more_and_not_for_ever(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refusals: int, trials: list[int]
+def test_a_demonstration_whose_trials_give_no_law_to_track_with_begins_again_with_more_and_not_for_ever(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refusals: int, trials: list[int], why: UsageError
 ) -> None:
-    captures, left = list[int](), [DampingUnknown("0 to 0.004 N s/mm")] * refusals
+    captures, left = list[int](), [why] * refusals
 
     def forces(*_: object) -> None:
         if left:
@@ -188,7 +190,7 @@ def test_a_demonstration_whose_trials_leave_damping_open_begins_again_with_more_
     monkeypatch.setattr(demo, "fit_session", lambda _: "fitted")
     monkeypatch.setattr(demo, "_forces", forces)
     monkeypatch.setattr(demo, "followed", lambda *_: "tracked")
-    refused = pytest.raises(DampingUnknown) if refusals > demo.AGAIN else contextlib.nullcontext()
+    refused = pytest.raises(type(why)) if refusals > demo.AGAIN else contextlib.nullcontext()
     with refused:
         demo.measured(Wiring(), (), demo.PLAN, tmp_path / "demo")
     assert captures == trials
