@@ -280,7 +280,10 @@ def test_a_tracked_force_shows_its_levels_and_where_the_gains_come_from(show: An
     service.answers |= listed(tracked)
     page = show("track")
     expect(page.locator("#origin")).to_contain_text(f"index law, fitted to session {told.NAME}")
-    expect(page.locator("#rms")).to_have_text("0.014")
+    expect(page.locator("#rms")).to_have_text("0.011")
+    expect(page.locator(".tracked")).to_contain_text(
+        "with its jumps from force to force: error 0.014 N (root mean square), at most 0.30 N"
+    )
     page.fill("#forces", "1, 40")
     expect(page.locator("#track-start-why")).to_have_text(TOO_MUCH)
     page.fill("#forces", "1; -2")

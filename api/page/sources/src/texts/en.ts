@@ -166,7 +166,8 @@ export const en = {
     noForces: "Give one force or several in N, with commas between them.",
     tooMuch: (force: number, most: number) => `${force} N is more than the ${Number(most.toPrecision(3))} N that bench, subject and model allow.`,
     none: "Nothing is fitted yet: gains come from a tissue's own model. Run a protocol and fit it first.",
-    rms: "error, root mean square", largest: "largest error", missed: "missed cycles", ofCycles: (cycles: number) => `of ${cycles}`,
+    rms: "error, root mean square", largest: "largest error", heldRms: "error of the forces held, root mean square", heldLargest: "largest error of a force held",
+    whole: (rms: string, largest: string) => `The whole run, with its jumps from force to force: error ${rms} N (root mean square), at most ${largest} N.`, missed: "missed cycles", ofCycles: (cycles: number) => `of ${cycles}`,
     levels: "Forces held", given: "set", actual: "reached", error: "error", settling: "settled after", notSettled: "did not settle", open: "Open the session",
   },
   session: {
