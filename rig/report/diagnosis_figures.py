@@ -119,7 +119,7 @@ def simulation_figure(result: Diagnosis, errors: Compared) -> Figure:
         reach = SURE * result.budget.noise_N
         below.axhspan(-reach, reach, color=GRID, linewidth=0, label="noise (95 %)")
     figure.legend(frameon=False, fontsize=SMALL_PT, labelcolor=INK, ncols=5, loc="outside lower center")
-    dress(above, headline(result, errors), "", f"{name} [{errors.unit}]")
+    dress(above, headline(result, errors), "", f"{name} as read, its zero in it [{errors.unit}]")
     dress(below, "Error of the simulation", "time [s]", f"measured - simulated [{errors.unit}]")
     return figure
 
