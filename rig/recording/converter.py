@@ -23,6 +23,8 @@ RIPPLE_STEPS, FURTHER_SAMPLES = 16, 2
 BEFORE = 3
 # At a smooth peak, whatever the tissue remembers, the way on would add up to eight times what force changes by.
 MISSED_FOLD = 20
+# Of the way that a slope is told by: where a rest ends, noise over next to no way is any slope.
+FURTHEST_FOLD = 5
 # Of the travel: where the tip turns, force stands while a drive takes up its lost motion, a few tenths of a millimetre.
 LOST_SHARE = 0.1
 
@@ -100,7 +102,8 @@ def _standing(value: Array, place: Array) -> NDArray[np.bool_]:
     full, ripple = np.zeros(len(value), bool), RIPPLE_STEPS * resolution(value)
     if not 0 < LEAST_STEPS * ripple < np.ptp(value):
         return full
-    for end in (value.max(), value.min()):
+    air = float(value[:FLAT_SAMPLES].mean())  # what a recording starts at is where force rests, before and after
+    for end in (end for end in (value.max(), value.min()) if abs(air - end) > 2 * ripple):
         far = np.abs(value - end) > ripple
         for start, stop in _runs(~far | (run_lengths(far) <= FURTHER_SAMPLES)):
             full[start:stop] = _missed(value, place, start, stop) > MISSED_FOLD * ripple
@@ -121,4 +124,5 @@ def _missed(value: Array, place: Array, start: int, stop: int) -> float:
     way = float(place[start - 1] - place[first])
     slope = abs(float(value[start - 1] - value[first])) / abs(way) if way else 0.0
     on = np.sign(way) * (place[start:stop] - place[start])
-    return slope * max(float(on.max()), float(-on.min()) - LOST_SHARE * float(np.ptp(place)))
+    further = max(float(on.max()), float(-on.min()) - LOST_SHARE * float(np.ptp(place)))
+    return slope * further if further <= FURTHEST_FOLD * abs(way) else 0.0

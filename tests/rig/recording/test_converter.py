@@ -55,6 +55,23 @@ def test_a_force_that_stands_while_a_tip_that_stood_goes_back_is_full() -> None:
     assert at_the_end_of_range(counted(force_N, 0.004), place_mm)[(TIME_S > 1.8) & (TIME_S < 2.95)].all()
 
 
+def pressed(seed: int, clipped_N: float = 10.0) -> tuple[Column, Column]:
+    """Rest, approach, a press to 1.6 N and back into the air, as a bench records it with its sensor's zero at 0.8 N."""
+    random, speed_mm_s = np.random.default_rng(seed), [0, 0, 15, 15, 0, 0, -20, -20, 0, 0]
+    place_mm = 0.001 * np.cumsum(np.interp(TIME_S, [0, 0.46, 0.5, 0.8, 0.84, 1.2, 1.24, 1.6, 1.64, 4], speed_mm_s))
+    force_N = 1.6 * np.expm1(0.3 * np.maximum(place_mm - 3.5, 0.0)) / np.expm1(0.3 * (place_mm.max() - 3.5))
+    read_N = 0.8 - force_N + random.normal(0, 0.005, len(TIME_S))
+    return np.round(np.maximum(read_N, 0.8 - clipped_N), 3), place_mm + random.normal(0, 0.0002, len(TIME_S))
+
+
+def test_the_air_that_a_tip_leaves_and_comes_back_to_is_no_end_of_range() -> None:
+    assert [seed for seed in range(100) if at_the_end_of_range(*pressed(seed)).any()] == []
+
+
+def test_a_soft_press_beyond_its_load_cell_is_full() -> None:
+    assert all(at_the_end_of_range(*pressed(seed, 0.8)).any() for seed in range(100))
+
+
 @pytest.mark.parametrize("noise_N", [0.002, 0.004, 0.02])
 def test_a_hold_without_relaxation_is_not_full(noise_N: float) -> None:
     place_mm = stroke(hold_s=1.0)
