@@ -279,7 +279,7 @@ def test_a_tracked_force_shows_its_levels_and_where_the_gains_come_from(show: An
     tracked = told.job("track", result=told.TRACKED.model_dump(mode="json"))
     service.answers |= listed(tracked)
     page = show("track")
-    expect(page.locator("#origin")).to_contain_text(f"index law, fitted to session {told.NAME}")
+    expect(page.locator("#origin")).to_contain_text(f"index law, fitted to the session “{told.NAME}”")
     expect(page.locator("#rms")).to_have_text("0.014")
     page.fill("#forces", "1, 40")
     expect(page.locator("#track-start-why")).to_have_text(TOO_MUCH)

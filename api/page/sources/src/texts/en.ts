@@ -147,12 +147,14 @@ export const en = {
   gloves: { which: "Glove", choose: "choose a glove", noChoice: "The bench has several gloves: choose one." },
   models: {
     other: (subject: string, on: string) => `This tissue is ${subject ? `that of ${subject}` : "of nobody known"}, not of ${on || "whoever is on the bench"}: force may overshoot or lag.`,
-    line: (session: string, subject: string, site: string, extended: boolean) => [session, subject, site].filter(Boolean).join(", ") + (extended ? " (with the causes named)" : ""),
-    origin: (law: string, session: string, at: string) => `The numbers come from the ${law} law, fitted to session ${session}${at && ` on ${at}`}.`,
+    line: (session: string, subject: string, site: string, from: "fit" | "diagnosis", causes: number) =>
+      [session, subject, site].filter(Boolean).join(", ") + (from === "fit" ? "" : causes ? " (with the causes named)" : " (from its diagnosis, no cause named)"),
+    origin: (law: string, session: string, at: string) => `The numbers come from the ${law} law, fitted to the session “${session}”${at && ` on ${at}`}.`,
+    diagnosed: (causes: readonly string[]) => (causes.length ? `Its diagnosis named: ${causes.join(", ")}.` : "Its diagnosis named no cause: the model is the tissue's alone."),
     holds: (force: string, depth: string, rmse: string) => `It holds up to ${force} N and ${depth} mm; measured forces scatter by ${rmse} N about it.`,
   },
   result: {
-    recordings: "recordings", samples: "samples", dropped: "lost", trials: "Trials", trial: "trial", speed: "speed", peak: "largest force",
+    recordings: "recordings", samples: "samples", dropped: "lost", trial: "trial", speed: "speed", peak: "largest force",
     quality: "quality",
   },
   fit: {
@@ -165,7 +167,12 @@ export const en = {
   diagnosis: {
     share: "of the error explained", before: "error before", after: "error with the causes", floor: "smallest reachable",
     interval: (low: string, high: string) => `95 % interval of the explained share: ${low} to ${high}`,
-    nothing: "No cause is named: the data show none that acts above the noise.",
+    nothing: {
+      adequate: "No cause is named: the data show none that acts above the noise.",
+      unexplained: "No cause is named: none of those known explains what is left.",
+      "not judged": "No cause is named: what is wrong cannot be told from noise here.",
+      explained: "",
+    },
     gain: (share: string) => `takes ${share} off the error`,
     or: "or", confidence: (share: string) => `confidence ${share}`, provisional: "provisional", repair: "What to do", next: "Next experiment",
     start: "Find what the simulation gets wrong", again: "Diagnose again",
@@ -194,9 +201,10 @@ export const en = {
     fit: "Tissue model", diagnosis: "What the simulation gets wrong",
     notTracked: "No force was tracked here yet.", track: "Track a force with this tissue's model",
     quality: "Trials and their quality", trialsOf: (session: string) => `Trials of ${session}`, noTrials: "No trial was made here.",
+    unlisted: (count: number) => `${count === 1 ? "1 recording is" : `${count} recordings are`} not listed, as where recording is cut off before its end. Curves, fits and exports read ${count === 1 ? "it" : "them"} all the same; “Read every byte” below says whether ${count === 1 ? "it is" : "they are"} whole.`,
     files: "Report and files", reportOpen: "Open the report", report: "Save the report", reportMake: "Make the report", reportAgain: "Make the report again",
     exports: "Take the recordings along as", format: { csv: "CSV", parquet: "Parquet", hdf5: "HDF5", mat: "MAT" },
-    verifyTitle: "Is everything whole?", verify: "Read every byte", whole: "Every recording is whole.", damaged: "Something is damaged:",
+    verifyTitle: "Is everything whole?", verify: "Read every byte", whole: "Every recording is whole.", damaged: "Something is damaged:", wholeBut: "Every recording is whole, but the session is not as it should be:",
   },
   data: {
     title: "Bring your own data", files: "Files", choose: "Files of one or more recordings", chooseFolder: "Or a whole folder", read: "Read them",
