@@ -7,12 +7,17 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from api.http.models import ControlView
 from hatch_build import SOURCES, built_folder
 from tests.page import told
 from tests.page.looks import holds_up
 from tests.page.pretend import IDLE, INFO, OPERATOR, STOPPED, Pretended, opened
 from tests.page.steps import state, view
 
+LEASE = {"lease_id": "l", "epoch": 1, "expires": told.AT}
+HELD = {"holder": "ann", "purpose": "tracking a force", "since": told.AT}
+# Whether the browser would ask before the page is left.
+ASKS = """() => !window.dispatchEvent(new Event("beforeunload", { cancelable: true }))"""
 STATE = "http://127.0.0.1:4711/state"
 IN = {"force_N": 5.57, "depth_mm": 8.0}
 BANNER = "#stop-banner"
@@ -131,3 +136,70 @@ def test_a_silent_service_is_told_with_what_a_stop_still_reaches_and_what_came_o
     expect(reason).to_contain_text("What is left is the hardware stop.")
     expect(reason).not_to_contain_text("still")
     holds_up(page, "state-gone-bench", (390,))
+
+
+@pytest.mark.parametrize(
+    ("holder", "who"), [("ann", "Another window that is signed in under your name"), ("eve", "Somebody else")]
+)
+def test_a_refusal_says_whether_the_other_is_a_window_of_ones_own_and_goes_once_nobody_is_in_control(
+    show: Show, service: Pretended, holder: str, who: str
+) -> None:
+    page = show("bench")
+    state(page, "ready")
+    problem = HELD | {"title": "locked", "code": "lease-held", "detail": "", "holder": holder}
+    page.route("**/control/lease", lambda route: route.fulfill(status=423, json=problem))
+    bench(service, control=ControlView(**(HELD | {"holder": holder}), left_s=4.0))
+    expect(page.locator("#control")).to_contain_text(f"in control: {holder}")
+    page.click("#retract")
+    expect(page.locator("#message")).to_contain_text(f"{who} is in control of the bench, so nothing was done")
+    expect(page.locator("#take-here")).to_be_visible()
+    bench(service)
+    expect(page.locator("#control")).to_have_text("nobody is in control")
+    expect(page.locator("#message")).to_be_empty()
+
+
+def starts(service: Pretended, kind: str) -> None:
+    """What is asked to start does."""
+    begun = told.job(kind, "running")
+    service.answers |= {"POST control/lease": LEASE, "PUT control/lease": LEASE}
+    service.answers |= {"POST jobs": begun, f"jobs/{begun['id']}": begun}
+
+
+def test_the_keyboard_goes_on_from_what_it_started_and_the_page_is_not_left_unasked_while_it_moves(
+    show: Show, service: Pretended
+) -> None:
+    starts(service, "track")
+    page = show("track")
+    expect(page.locator("#track-start")).to_be_enabled()
+    page.locator("#track-start").focus()
+    page.keyboard.press("Enter")
+    expect(page.locator("#track-under-way")).to_be_focused()
+    assert page.evaluate(ASKS) is False
+    bench(service, state="running", mode="contact")
+    state(page, "running")
+    assert page.evaluate(ASKS) is True
+    view(page, "Bench")
+    other = show("bench")  # one that is not in control
+    state(other, "running")
+    assert other.evaluate(ASKS) is False
+
+
+def test_the_keyboard_goes_on_from_a_capture_that_it_started(show: Show, service: Pretended) -> None:
+    starts(service, "capture")
+    page = show("run")
+    expect(page.locator("#capture-start")).to_be_enabled()
+    page.locator("#capture-start").focus()
+    page.keyboard.press("Enter")
+    expect(page.locator("#capture-under-way")).to_be_focused()
+
+
+def test_values_that_are_not_known_or_not_as_they_seem_are_told(show: Show) -> None:
+    page = show("bench")
+    expect(page.locator("#force")).not_to_have_text("--")
+    expect(page.locator("#unzeroed")).to_have_count(0)
+    expect(page.locator(".value:has(#marker) dt")).to_have_text("marker since opening")
+    expect(page.locator(".readout")).to_contain_text("how far it has moved since this page was opened")
+    page.evaluate("() => { AT.force = AT.depth = [() => NaN, () => NaN]; }")
+    expect(page.locator("#force")).to_have_text("--")
+    expect(page.locator("#unzeroed")).to_contain_text("not known before the first run")
+    holds_up(page, "state-unzeroed-bench")

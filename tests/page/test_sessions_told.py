@@ -10,7 +10,7 @@ from api.http.jobs.views import FileView
 from api.http.models import RecordingView
 from hatch_build import SOURCES, built_folder
 from rig.results.recorded import VerifiedTrial, VerifyResult
-from tests.page import told
+from tests.page import told, told_lab
 from tests.page.looks import holds_up
 from tests.page.pretend import IDLE, INFO, OPERATOR, Pretended, opened
 from tests.page.steps import view
@@ -112,3 +112,38 @@ def test_a_model_of_a_diagnosis_says_whether_it_names_causes_and_gives_way_to_a_
     expect(origin).to_contain_text("fitted to the session “bare”")
     expect(origin).to_contain_text("Its diagnosis named no cause")
     holds_up(page, "state-bare-model-track", (1280, 390))
+
+
+def test_curves_over_time_have_a_key_for_the_set_point_in_a_colour_of_its_own(show: Show, service: Pretended) -> None:
+    first, *others = told.CURVES.curves
+    tracked = first.model_copy(update={"reference_N": first.force_N})
+    curves = told.CURVES.model_copy(update={"curves": (tracked, *others)})
+    service.answers[f"sessions/{told.NAME}/curves"] = curves
+    page = show(SESSION)
+    keys = page.locator("#curves-card .key-line span")
+    expect(keys.filter(has_text="set-point")).to_have_count(0)
+    page.click("#over-time")
+    expect(keys).to_have_text(["trials", "usable trials", "set-point"])
+    expect(keys.nth(2).locator(".dashed")).to_be_visible()
+    colours = keys.locator("i").evaluate_all("all => all.map((one) => getComputedStyle(one).borderTopColor)")
+    assert len(set(colours)) == 3
+
+
+def test_beside_a_result_the_cards_of_tracking_keep_their_width(show: Show, service: Pretended) -> None:
+    done = told.job("track", result=told.TRACKED.model_dump(mode="json"))
+    service.answers |= {"jobs/track": {"items": [done], "next": None}, "jobs/job-track": done}
+    page = show("track")
+    page.set_viewport_size({"width": 1280, "height": 900})
+    expect(page.locator("#track-result")).to_be_visible()
+    for card in ("#track-what", "#track-live"):
+        box = page.locator(card).bounding_box()
+        assert box and box["width"] > 550
+
+
+def test_one_fitted_session_alone_is_drawn_over_days(show: Show, service: Pretended) -> None:
+    known = told_lab.HISTORY
+    one = known.model_copy(update={"stiffness": known.stiffness[:1]})
+    service.answers |= told_lab.around() | {f"subjects/{told.SUBJECT}": one}
+    plot = show(f"subjects/{told.SUBJECT}").locator("#stiffness-plot")
+    expect(plot.locator("canvas")).to_be_visible()
+    assert float(plot.get_attribute("data-to") or "nan") >= 1.0

@@ -219,7 +219,7 @@ def test_a_glove_that_is_gone_since_it_was_chosen_is_not_asked_for(show: Any, se
     ("reason", "named"),
     [
         ("axis lost: newest sample is 1200 ms old (limit 1000 ms)", True),
-        ("whoever started this is not in control any more: the lease was given back or ran out", False),
+        ("whoever started this is not in control any more: control was given back or ran out", False),
         ("", False),
     ],
 )

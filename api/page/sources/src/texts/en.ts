@@ -52,6 +52,7 @@ export const en = {
     told: (holder: string, purpose: string, since: string) =>
       `in control: ${holder}${purpose ? `, for: ${purpose}` : ""}${since ? ` (since ${since})` : ""}`,
     refused: (told: string) => `Somebody else is in control of the bench, so nothing was done. Now ${told}. Ask for its release, or take control.`,
+    refusedOwn: (told: string) => `Another window that is signed in under your name is in control of the bench, so nothing was done here. Now ${told}. Go on there, release control there, or take control.`,
     takenOver: (by: string, reason: string) => `${by} took control of the bench from this page. The reason given: ${reason}`,
     ranOut: (told: string) => `This page is not in control any more: it had not shown itself for a while.${told ? ` Now ${told}.` : ""}`,
     stopsWork: "The bench is moving. If you take control, it stops and the tip is retracted.",
@@ -111,9 +112,10 @@ export const en = {
     checking: "Checking…",
     ended: "You are not signed in any more: sign in again to go on. What the bench was doing goes on, or has been stopped as it would be when a page is closed.",
     byLink: "With a link",
-    ways: [
+    command: (port: string) => `\`rig token link NAME${port && ` --port ${port}`}\``,
+    ways: (command: string) => [
       "At the bench's own computer, open the address that `rig serve` printed: it signs you in once.",
-      "Where it is used up, `rig token link NAME` prints another. Whoever looks after the bench can make one for you.",
+      `Where it is used up, ${command} prints another. Whoever looks after the bench can make one for you.`,
       "A name with a password is made at that computer too: `rig account set NAME`.",
     ],
     again: "Try again",
@@ -294,7 +296,7 @@ export const en = {
     error: "error",
     depth: "depth",
     position: "axis",
-    marker: "marker",
+    marker: "marker since opening",
     mode: "doing",
   },
   bench: {
@@ -311,6 +313,8 @@ export const en = {
     span: "Shown",
     spans: { 10: "10 s", 30: "30 s", 60: "1 min", 120: "2 min" } as Record<number, string>,
     at: (seconds: string) => `at ${seconds} s`,
+    marker: "The marker's value is how far it has moved since this page was opened or the bench began.",
+    unzeroed: "Force and depth are not known before the first run: it takes the zero of force in the air, then finds the surface.",
     help: "Point at a plot, or press the arrow keys on it, to read its values. Drag over it to look closer; a double click goes back to live.",
     health: "Devices",
     healthWord: { ok: "works", connecting: "is connecting", degraded: "works, but not as it should", lost: "is lost", reconnecting: "is coming back", fault: "has a fault" } as Record<string, string>,
