@@ -65,7 +65,7 @@ class LeaseRegistry:
 
     def _in_force(self) -> ControlLease | None:
         if self._lease and self._lease.until_s <= self._now_s():
-            self._told("lease-lost", f"{self._lease.holder} is not in control any more: the lease was not renewed")
+            self._told("lease-lost", f"{self._lease.holder} is not in control any more: control was not renewed")
             self._lease = None
         return self._lease
 

@@ -234,7 +234,7 @@ def supervisor_lost(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> s
 def operator_silent(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
     """Nobody is in control."""
     if "unattended" in inputs.requests:
-        return "whoever started this is not in control any more: the lease was given back or ran out"
+        return "whoever started this is not in control any more: control was given back or ran out"
     lease_s = wiring.loop.lease_s
     if not lease_s or inputs.operator_silent_s <= lease_s:
         return ""

@@ -28,6 +28,7 @@ const AT = {
   force: [force, force], setpoint: [setpoint, setpoint], error: [(t) => setpoint(t) - force(t), (t) => setpoint(t) - force(t)],
   depth: [depth, depth], position: [(t) => 20 + depth(t), (t) => 20 + depth(t)], marker: [depth, () => 0, () => 0],
 };
+window.AT = AT;
 function batch(name, from_s, to_s, seq) {
   const of = AT[name], n = Math.round((to_s - from_s) * 100);
   const data = new ArrayBuffer(24 + 4 * n * (1 + of.length)), view = new DataView(data);

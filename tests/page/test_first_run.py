@@ -84,7 +84,7 @@ def understand(page: Page) -> None:
 def track(page: Page) -> None:
     """Two forces with the gains of what was fitted."""
     page.click("#to-track")
-    expect(page.locator("#origin")).to_contain_text("fitted to session first")
+    expect(page.locator("#origin")).to_contain_text("fitted to the session “first”")
     page.fill("#forces", "1, 2")
     page.fill("#seconds", "2")
     press(page, "#track-start")

@@ -17,6 +17,10 @@ def test_a_stranger_may_stop_and_nothing_else_until_a_password_lets_in(service: 
     AccountStore(access_folder()).set("ann", Scope.OPERATE, PASSWORD)
     with visitor(browser, service) as page:
         state(page, "not signed in")
+        command = f"rig token link NAME --port {service.origin.rpartition(':')[2]}"
+        expect(page.locator("ol code").nth(1)).to_have_text(command)
+        page.goto(f"{service.origin}/?again#ticket=used-up")
+        expect(page.locator("#refusal code")).to_have_text(command)
         expect(page.get_by_role("navigation")).to_have_count(0)
         expect(page.locator("#control")).to_have_count(0)
 

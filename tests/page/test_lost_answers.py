@@ -117,7 +117,7 @@ def test_what_a_view_needs_is_asked_for_again_where_its_answer_was_lost(show: Sh
 
     page.route(re.compile(re.escape(f"{ADDRESS}{API}models")), lose)
     view(page, "Track")
-    expect(page.locator("#origin")).to_contain_text(f"fitted to session {told.NAME}")
+    expect(page.locator("#origin")).to_contain_text(f"fitted to the session “{told.NAME}”")
     expect(page.locator("#track-start")).to_be_enabled()
     assert len(lost) == 2
 

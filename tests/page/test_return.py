@@ -117,7 +117,7 @@ def test_who_is_in_control_and_is_cut_off_from_everything_is_sent_to_the_hardwar
     back(page, "stopped")
     expect(page.locator("#reason")).to_contain_text("not in control any more")
     expect(page.locator("#message")).to_contain_text("This page is not in control any more")
-    expect(page.locator("#happened")).to_contain_text("the lease was not renewed")
+    expect(page.locator("#happened")).to_contain_text("control was not renewed")
     page.click("#reset")
     state(page, "ready")
 

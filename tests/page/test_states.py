@@ -219,7 +219,7 @@ def test_a_glove_that_is_gone_since_it_was_chosen_is_not_asked_for(show: Any, se
     ("reason", "named"),
     [
         ("axis lost: newest sample is 1200 ms old (limit 1000 ms)", True),
-        ("whoever started this is not in control any more: the lease was given back or ran out", False),
+        ("whoever started this is not in control any more: control was given back or ran out", False),
         ("", False),
     ],
 )
@@ -279,7 +279,7 @@ def test_a_tracked_force_shows_its_levels_and_where_the_gains_come_from(show: An
     tracked = told.job("track", result=told.TRACKED.model_dump(mode="json"))
     service.answers |= listed(tracked)
     page = show("track")
-    expect(page.locator("#origin")).to_contain_text(f"index law, fitted to session {told.NAME}")
+    expect(page.locator("#origin")).to_contain_text(f"index law, fitted to the session “{told.NAME}”")
     expect(page.locator("#rms")).to_have_text("0.011")
     expect(page.locator(".tracked")).to_contain_text(
         "with its jumps from force to force: error 0.014 N (root mean square), at most 0.30 N"

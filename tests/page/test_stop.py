@@ -1,6 +1,7 @@
 """The page over `rig serve`: a capture, and the stop in whatever state the service is."""
 
 import os
+import re
 import signal
 
 import pytest
@@ -39,10 +40,17 @@ def test_a_person_runs_a_protocol_stops_it_and_finds_the_recordings(
     state(page, "stopped")
     expect(page.locator("#reason")).to_contain_text("emergency stop pressed")
 
+    expect(page.locator("#presses")).to_contain_text("Acknowledge the stop, then retract it.")
     page.click("text=Acknowledge stop")
-    state(page, "ready")
-    page.click("#retract")
+    state(page, "tip presses")
+    expect(page.locator("#stop-banner")).to_have_count(0)
+    view(page, "Run")
+    expect(page.locator("#presses")).to_have_text(re.compile(r"^The tip presses with \d+\.\d N\. Retract it\.$"))
+    expect(page.locator("#capture-start-why")).to_have_text("The tip presses: retract it first.")
+    page.click("#retract-now")
     out(bench, service.origin)
+    state(page, "ready")
+    expect(page.locator("#presses")).to_have_count(0)
 
 
 @pytest.mark.timeout(200)
@@ -62,6 +70,12 @@ def test_the_stop_is_confirmed_with_six_more_tabs_and_a_service_that_stands_stil
     state(page, "no answer from the service")
     expect(page.locator("#force")).to_have_text("--")
     assert bench.control.get("axis.velocity_mm_s")["axis.velocity_mm_s"] == pytest.approx(0, abs=0.5)
+    expect(page.locator("#reason")).to_contain_text("STOP still works, past the service.")
+    expect(page.locator("#stop-banner")).to_contain_text("what has happened since is not known here")
+    service.process.kill()
+    expect(page.locator("#reason")).to_contain_text("What is left is the hardware stop.")
+    page.keyboard.press("Escape")
+    expect(page.locator("#stop-banner")).to_contain_text("NOT CONFIRMED: use the hardware stop")
 
 
 @pytest.mark.timeout(200)

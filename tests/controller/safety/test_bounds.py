@@ -169,7 +169,7 @@ CASES = [
     Case("operator_silent", {"operator_silent_s": 3.0}, {"operator_silent_s": 3.1},
          "the operator's program is silent for 3.1 s (lease 3 s)"),
     Case("operator_silent", asked("stop"), asked("unattended"),
-         "whoever started this is not in control any more: the lease was given back or ran out"),
+         "whoever started this is not in control any more: control was given back or ran out"),
 ]  # fmt: skip
 
 

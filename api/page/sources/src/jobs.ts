@@ -38,8 +38,14 @@ const LOOK_MS = 500;
 
 /** Starts work that needs no control of the bench. */
 export async function start<R>(kind: string, params: Record<string, unknown>): Promise<Job<R>> {
-  return ask("post", "/api/v1/jobs", { body: { kind, params }, headers: { ...held(), ...requestKey() } }) as Promise<Job<R>>;
+  const job = (await ask("post", "/api/v1/jobs", { body: { kind, params }, headers: { ...held(), ...requestKey() } })) as Job<R>;
+  begun = job.id;
+  return job;
 }
+
+/** The job that was started here last; whoever shows it first takes it. */
+let begun = "";
+export const takeBegun = (id: string) => id === begun && ((begun = ""), true);
 
 /** Starts work that moves, or writes where others could: with the lease. */
 export const startInControl = <R>(kind: string, params: Record<string, unknown>) => inControl(() => start<R>(kind, params));

@@ -1,7 +1,9 @@
 // Whatever moves needs the lease: one page at a time, for as long as it shows itself.
-import { signal } from "@preact/signals";
+import { effect, signal } from "@preact/signals";
 import { Refused, ask, post } from "./api";
 import { clockTime, opened } from "./clock";
+import { failed, message } from "./attempt";
+import { rig } from "./live";
 import { place } from "./route";
 import { t } from "./texts";
 
@@ -35,13 +37,27 @@ async function take(): Promise<void> {
     keep((await post(PATH, { body: wanted() })).lease_id);
   } catch (error) {
     occupied.value = error instanceof Refused && error.status === LOCKED;
-    throw occupied.value ? new Error(t.control.refused(told((error as Refused).more))) : error;
+    throw occupied.value ? new Error(refused((error as Refused).more)) : error;
   }
 }
 
 /** Who is in control, what for and since when, in words. */
 export const told = (of: { holder?: string | null; purpose?: string | null; since?: string | null }): string =>
   t.control.told(of.holder ?? "", of.purpose ?? "", of.since ? clockTime(of.since) : "");
+
+/** What was refused and by whom; whoever is signed in under one name twice is told that it may be their own window. */
+const refused = (of: Refused["more"]) => (of.holder === holder.value ? t.control.refusedOwn(told(of)) : t.control.refused(told(of)));
+
+/** A refusal is over once whoever was in control is not any more. */
+let heldMeanwhile = false;
+effect(() => {
+  const other = Boolean(rig.value?.control.holder);
+  if (occupied.value && heldMeanwhile && !other) {
+    occupied.value = false;
+    if (failed.peek()) message.value = "";
+  }
+  heldMeanwhile = occupied.value && other;
+});
 
 /** Takes control from whoever has it, who is told ``reason``. */
 export async function takeOver(reason: string): Promise<void> {
@@ -80,6 +96,10 @@ function gone({ more, message }: Refused): string {
 
 export function keepLease(): void {
   setInterval(renew, RENEW_MS);
+  // Whoever leaves gives control back, which stops what moves: the browser asks first.
+  window.addEventListener("beforeunload", (event) => {
+    if (lease.value && rig.value?.state === "running") event.preventDefault();
+  });
   window.addEventListener("pagehide", () => {
     if (lease.value) fetch(PATH, { method: "DELETE", headers: held(), keepalive: true });
   });

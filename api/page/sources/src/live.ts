@@ -1,7 +1,7 @@
 // What the bench is doing now: the newest view of it, and the last minutes of every quantity.
 import { computed, signal } from "@preact/signals";
 import { get, type Schema } from "./api";
-import { learnStopPort } from "./stop";
+import { learnStopPort, lookPast, outlive, past } from "./stop";
 import { Stream, type Batch, type RigEvent } from "./stream";
 import { Trace } from "./trace";
 
@@ -23,6 +23,10 @@ const MARKER_HZ = 100;
 // Two minutes of that, and half a minute to go back to.
 const CAPACITY = 60_000;
 const EVENTS = 200;
+// Many times the noise, and more than a zero of a few minutes ago is wrong by; it has gone once it is below the other.
+const PRESSES_N = 0.3;
+const GONE_N = 0.2;
+const AT_REST = ["idle", "safe"];
 
 export const QUANTITIES = ["force", "setpoint", "error", "depth", "position", "marker"] as const;
 export type Quantity = (typeof QUANTITIES)[number];
@@ -32,6 +36,8 @@ export const contact = signal<Contact>("connecting");
 export const fresh = computed(() => contact.value === "live");
 export const numbers = signal<Partial<Record<Quantity, number | null>>>({});
 export const events = signal<RigEvent[]>([]);
+/** The force with which the tip presses though nothing moves it [N]; null where it does not. */
+export const pressing = signal<number | null>(null);
 /** When the bench's clock was zero, in milliseconds since 1970; 0 where that is not known yet. */
 export const started_ms = signal(0);
 /** Samples that this page did not get in time, of all streams. */
@@ -94,11 +100,19 @@ async function learn(): Promise<void> {
   started_ms.value = Date.now() - monotonic_ns * 1e-6;
 }
 
+function pressesWith({ state, mode, job, force_N }: Rig): number | null {
+  const moved = state === "running" || job || !AT_REST.includes(mode ?? "");
+  return !moved && (force_N ?? 0) > (pressing.value === null ? PRESSES_N : GONE_N) ? force_N! : null;
+}
+
 async function look(): Promise<void> {
   const before = rig.value?.state;
+  const asked_ms = performance.now();
   try {
     rig.value = await get("/api/v1/rig", { signal: AbortSignal.timeout(2 * SILENT_MS) });
     viewed_ms = performance.now();
+    pressing.value = pressesWith(rig.value);
+    outlive(before, rig.value.state, asked_ms);
     // Each start of the bench has a stop process of its own, also while it homes and is not connected yet.
     if ([before, rig.value.state].includes("disconnected")) void learn();
   } catch {
@@ -113,6 +127,13 @@ function watch(): void {
   const silence_ms = Math.max(now_ms - heard_ms, now_ms - viewed_ms - VIEW_MS);
   if (contact.value === "connecting" && !rig.value && silence_ms < 3 * SILENT_MS) return;
   contact.value = silence_ms > SILENT_MS ? "silent" : silence_ms > OLD_MS ? "old" : "live";
+}
+
+/** What a stop still does is asked for as long as nobody else says how the bench is. */
+async function lookForStop(): Promise<void> {
+  if (contact.value === "silent") await lookPast();
+  else past.value = "unknown";
+  setTimeout(lookForStop, SILENT_MS);
 }
 
 export function listen(): void {
@@ -135,6 +156,7 @@ export function listen(): void {
   );
   stream.open();
   void look();
+  void lookForStop();
   setInterval(watch, LOOK_MS);
   setInterval(showNumbers, NUMBERS_MS);
 }

@@ -4,9 +4,10 @@ import { post, requestKey } from "../api";
 import { attempt, failed, message } from "../attempt";
 import { duration } from "../clock";
 import { held, inControl, lost } from "../lease";
-import { contact, rig } from "../live";
-import { pressStop } from "../stop";
+import { contact, fresh, pressing, rig } from "../live";
+import { past, pressStop } from "../stop";
 import { t } from "../texts";
+import { shown } from "./basics";
 import { TakeHere } from "./control";
 import { Dialog } from "./dialog";
 
@@ -92,6 +93,19 @@ function Needed() {
   );
 }
 
+function Presses() {
+  const now = rig.value;
+  const force_N = pressing.value;
+  if (!now || force_N === null || contact.value === "silent") return null;
+  const out = (now.depth_mm ?? 0) < 0;
+  return (
+    <section class="strip bad" aria-label={t.attention.pressing}>
+      <p id="presses" class="grow"><strong>{t.attention.presses(shown(force_N, 1), out, now.state === "stopped")}</strong></p>
+      {now.state === "idle" && <button id="retract-now" type="button" class="primary" disabled={!fresh.value} title={t.attention.retractHint} onClick={retract}>{t.attention.retract}</button>}
+    </section>
+  );
+}
+
 function Said() {
   const text = lost.value || message.value;
   const bad = failed.value || lost.value;
@@ -106,8 +120,9 @@ function Said() {
 export function Attention() {
   return (
     <>
-      {contact.value === "silent" && <p id="reason" class="strip bad" role="alert">{t.silent}</p>}
+      {contact.value === "silent" && <p id="reason" class="strip bad" role="alert">{t.silent} {t.silentStop[past.value]}</p>}
       <Needed />
+      <Presses />
       <Under />
       <Said />
       <Consent />

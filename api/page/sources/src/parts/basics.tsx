@@ -26,6 +26,9 @@ export function shown(value: number | null | undefined, digits = 2): string {
   return Number(rounded) === 0 ? (0).toFixed(digits) : rounded.replace("-", "−");
 }
 
+/** How large a file is. */
+export const sizeOf = (bytes: number) => (bytes < 1e3 ? `${bytes} bytes` : bytes < 1e6 ? `${Math.round(bytes / 1e3)} kB` : `${(bytes / 1e6).toFixed(2)} MB`);
+
 /** As many digits as say something. */
 export function significant(value: number | null | undefined, digits = 3): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return t.unknown;

@@ -1,8 +1,8 @@
 // One piece of work: how far it is, what it said, how it ended, and its end by hand.
-import { useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { attempt } from "../attempt";
 import { duration } from "../clock";
-import { ended, tell, type Job, type Verb } from "../jobs";
+import { ended, takeBegun, tell, type Job, type Verb } from "../jobs";
 import { inControl } from "../lease";
 import { t } from "../texts";
 import { Dot } from "./basics";
@@ -40,6 +40,23 @@ function Log({ job }: { job: Job }) {
   return <details><summary>{t.job.log}</summary><pre tabIndex={0}>{job.log.join("\n")}</pre></details>;
 }
 
+function UnderWay({ job }: { job: Job }) {
+  const card = useRef<HTMLDivElement>(null);
+  // The button that started it is gone: the keyboard goes on from here, not from the top of the page.
+  useEffect(() => {
+    if (takeBegun(job.id) && (document.activeElement === document.body || !document.activeElement?.checkVisibility())) card.current!.focus();
+  }, [job.id]);
+  return (
+    <div class="notice" id={`${job.kind}-under-way`} ref={card} tabIndex={-1}>
+      <p role="status"><Dot kind="good" /> <strong>{t.job.states[job.state] ?? t.job.progress(named(job), job.message, job.done, job.total, job.unit)}</strong></p>
+      {job.state === "paused" && <p id={`${job.kind}-asks`}><strong>{job.message}</strong></p>}
+      <Left job={job} />
+      <Verbs job={job} />
+      <Log job={job} />
+    </div>
+  );
+}
+
 /** How ``job`` stands or why it has no result; what a view makes of its result stands beside it, not in it. */
 export function JobState({ job }: { job: Job | null }) {
   if (!job || job.state === "succeeded") return null;
@@ -52,13 +69,5 @@ export function JobState({ job }: { job: Job | null }) {
       </div>
     );
   }
-  return (
-    <div class="notice" id={`${job.kind}-under-way`}>
-      <p role="status"><Dot kind="good" /> <strong>{t.job.states[job.state] ?? t.job.progress(named(job), job.message, job.done, job.total, job.unit)}</strong></p>
-      {job.state === "paused" && <p id={`${job.kind}-asks`}><strong>{job.message}</strong></p>}
-      <Left job={job} />
-      <Verbs job={job} />
-      <Log job={job} />
-    </div>
-  );
+  return <UnderWay job={job} />;
 }

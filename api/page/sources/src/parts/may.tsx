@@ -1,7 +1,7 @@
 // Whether something may be started here and now, and the sentence that says why not.
 import type { ComponentChildren } from "preact";
 import { lease } from "../lease";
-import { contact, rig } from "../live";
+import { contact, pressing, rig } from "../live";
 import { may } from "../session";
 import { t } from "../texts";
 
@@ -20,6 +20,8 @@ export function whyNotMove(): string {
   if (now.state === "disconnected") return t.may.disconnected;
   if (now.state === "stopped") return t.may.stopped;
   if (now.state === "not ready") return t.may.notReady;
+  // Only where it is in: a zero that has moved keeps nobody from a run, which begins with another.
+  if (pressing.value !== null && (now.depth_mm ?? 0) >= 0) return t.may.presses;
   return now.control.holder && !lease.value ? t.may.held(now.control.holder) : "";
 }
 

@@ -1,7 +1,7 @@
 // The frame of every view: who we are, how the bench is, the stop, where to go.
 import type { ComponentChildren } from "preact";
 import { attempt } from "../attempt";
-import { contact, rig } from "../live";
+import { contact, pressing, rig } from "../live";
 import { link, place } from "../route";
 import { entering, me, signOut } from "../session";
 import { alone, pressStop, stop } from "../stop";
@@ -14,6 +14,7 @@ import { Control } from "./control";
 function stateWord(): string {
   if (!me.value) return entering.value ? t.state.connecting : t.state.refused;
   if (contact.value !== "live") return t.state[contact.value];
+  if (rig.value?.state === "idle" && pressing.value !== null) return (rig.value.depth_mm ?? 0) < 0 ? t.state.touched : t.state.pressing;
   return rig.value ? t.state[rig.value.state as keyof typeof t.state] : t.state.connecting;
 }
 
@@ -21,6 +22,7 @@ function stateKind(): "good" | "warn" | "bad" | "none" {
   if (!me.value) return "none";
   if (contact.value === "silent") return "bad";
   if (contact.value !== "live") return "none";
+  if (rig.value?.state === "idle" && pressing.value !== null) return "warn";
   return ({ idle: "good", running: "good", "not ready": "warn", stopped: "bad", disconnected: "bad" } as const)[rig.value?.state ?? "disconnected"] ?? "none";
 }
 
@@ -44,7 +46,7 @@ export function Shell({ children, bare = false }: { children: ComponentChildren;
           {!bare && <Control />}
           <button id="estop" class="estop" type="button" aria-keyshortcuts="Escape" title={t.stop.hint} onClick={() => void pressStop("estop")}>{t.stop.button}</button>
         </header>
-        {stop.value && <p id="stop-banner" class={stop.value.state} role="alert">{stop.value.text}</p>}
+        {stop.value && <p id="stop-banner" class={stop.value.state} role="alert">{stop.value.text}{contact.value === "silent" && stop.value.state === "confirmed" && ` ${t.stop.since(stop.value.at)}`}</p>}
         {!bare && <Navigation />}
       </div>
       <main id="view" tabIndex={-1}>

@@ -19,6 +19,7 @@ export const en = {
     pending: (kind: "estop" | "pain") => `${STOPS[kind]}: pending, waiting for the loop to confirm`,
     confirmed: (kind: "estop" | "pain", did: string) => `${STOPS[kind]}: confirmed by the loop: ${did}`,
     unconfirmed: (kind: "estop" | "pain", why: string) => `${STOPS[kind]}: NOT CONFIRMED: use the hardware stop (${why})`,
+    since: (at: string) => `(at ${at}; what has happened since is not known here)`,
     note: "The stop here is a software stop. The hardware emergency stop comes first.",
     alone: "From here STOP goes through the service alone for now: where that hangs, only the hardware stop is left.",
   },
@@ -30,10 +31,17 @@ export const en = {
     disconnected: "disconnected",
     "not ready": "not ready",
     idle: "ready",
+    pressing: "tip presses",
+    touched: "force at rest",
     running: "running",
     stopped: "stopped",
   },
-  silent: "The service does not answer: nothing shown here is true any more. STOP still works. Use the hardware stop if in doubt.",
+  silent: "The service does not answer: nothing shown here is true any more.",
+  silentStop: {
+    works: "STOP still works, past the service. Use the hardware stop if in doubt.",
+    gone: "STOP reaches nothing from here now. If the service has ended, the bench has stopped what moved, brought the tip out where it could, and ended too: see that the tip is out. What is left is the hardware stop.",
+    unknown: "STOP may still work: see whether it is confirmed. Use the hardware stop if in doubt.",
+  },
   control: {
     mine: (holder: string) => `in control: ${holder} (this page)`,
     other: (holder: string) => `in control: ${holder}`,
@@ -44,6 +52,7 @@ export const en = {
     told: (holder: string, purpose: string, since: string) =>
       `in control: ${holder}${purpose ? `, for: ${purpose}` : ""}${since ? ` (since ${since})` : ""}`,
     refused: (told: string) => `Somebody else is in control of the bench, so nothing was done. Now ${told}. Ask for its release, or take control.`,
+    refusedOwn: (told: string) => `Another window that is signed in under your name is in control of the bench, so nothing was done here. Now ${told}. Go on there, release control there, or take control.`,
     takenOver: (by: string, reason: string) => `${by} took control of the bench from this page. The reason given: ${reason}`,
     ranOut: (told: string) => `This page is not in control any more: it had not shown itself for a while.${told ? ` Now ${told}.` : ""}`,
     stopsWork: "The bench is moving. If you take control, it stops and the tip is retracted.",
@@ -64,6 +73,10 @@ export const en = {
     recover: "Recover…",
     retract: "Retract",
     retractHint: "moves the tip out of the tissue",
+    pressing: "Force while nothing moves",
+    presses: (force: string, out: boolean, stopped: boolean) =>
+      out ? `Force is ${force} N with the tip where there was air: something touches the tip, or the sensor's zero has moved.`
+        : `The tip presses with ${force} N. ${stopped ? "Acknowledge the stop, then retract it." : "Retract it."}`,
     retracting: "retracting",
     recoveryTitle: "Recover",
     yes: "Yes, do it",
@@ -99,9 +112,10 @@ export const en = {
     checking: "Checking…",
     ended: "You are not signed in any more: sign in again to go on. What the bench was doing goes on, or has been stopped as it would be when a page is closed.",
     byLink: "With a link",
-    ways: [
+    command: (port: string) => `\`rig token link NAME${port && ` --port ${port}`}\``,
+    ways: (command: string) => [
       "At the bench's own computer, open the address that `rig serve` printed: it signs you in once.",
-      "Where it is used up, `rig token link NAME` prints another. Whoever looks after the bench can make one for you.",
+      `Where it is used up, ${command} prints another. Whoever looks after the bench can make one for you.`,
       "A name with a password is made at that computer too: `rig account set NAME`.",
     ],
     again: "Try again",
@@ -135,12 +149,14 @@ export const en = {
   gloves: { which: "Glove", choose: "choose a glove", noChoice: "The bench has several gloves: choose one." },
   models: {
     other: (subject: string, on: string) => `This tissue is ${subject ? `that of ${subject}` : "of nobody known"}, not of ${on || "whoever is on the bench"}: force may overshoot or lag.`,
-    line: (session: string, subject: string, site: string, extended: boolean) => [session, subject, site].filter(Boolean).join(", ") + (extended ? " (with the causes named)" : ""),
-    origin: (law: string, session: string, at: string) => `The numbers come from the ${law} law, fitted to session ${session}${at && ` on ${at}`}.`,
+    line: (session: string, subject: string, site: string, from: "fit" | "diagnosis", causes: number) =>
+      [session, subject, site].filter(Boolean).join(", ") + (from === "fit" ? "" : causes ? " (with the causes named)" : " (from its diagnosis, no cause named)"),
+    origin: (law: string, session: string, at: string) => `The numbers come from the ${law} law, fitted to the session “${session}”${at && ` on ${at}`}.`,
+    diagnosed: (causes: readonly string[]) => (causes.length ? `Its diagnosis named: ${causes.join(", ")}.` : "Its diagnosis named no cause: the model is the tissue's alone."),
     holds: (force: string, depth: string, rmse: string) => `It holds up to ${force} N and ${depth} mm; measured forces scatter by ${rmse} N about it.`,
   },
   result: {
-    recordings: "recordings", samples: "samples", dropped: "lost", trials: "Trials", trial: "trial", speed: "speed", peak: "largest force",
+    recordings: "recordings", samples: "samples", dropped: "lost", trial: "trial", speed: "speed", peak: "largest force",
     quality: "quality",
   },
   fit: {
@@ -153,7 +169,12 @@ export const en = {
   diagnosis: {
     share: "of the error explained", before: "error before", after: "error with the causes", floor: "smallest reachable",
     interval: (low: string, high: string) => `95 % interval of the explained share: ${low} to ${high}`,
-    nothing: "No cause is named: the data show none that acts above the noise.",
+    nothing: {
+      adequate: "No cause is named: the data show none that acts above the noise.",
+      unexplained: "No cause is named: none of those known explains what is left.",
+      "not judged": "No cause is named: what is wrong cannot be told from noise here.",
+      explained: "",
+    },
     gain: (share: string) => `takes ${share} off the error`,
     or: "or", confidence: (share: string) => `confidence ${share}`, provisional: "provisional", repair: "What to do", next: "Next experiment",
     start: "Find what the simulation gets wrong", again: "Diagnose again",
@@ -183,9 +204,10 @@ export const en = {
     fit: "Tissue model", diagnosis: "What the simulation gets wrong",
     notTracked: "No force was tracked here yet.", track: "Track a force with this tissue's model",
     quality: "Trials and their quality", trialsOf: (session: string) => `Trials of ${session}`, noTrials: "No trial was made here.",
+    unlisted: (count: number) => `${count === 1 ? "1 recording is" : `${count} recordings are`} not listed, as where recording is cut off before its end. Curves, fits and exports read ${count === 1 ? "it" : "them"} all the same; “Read every byte” below says whether ${count === 1 ? "it is" : "they are"} whole.`,
     files: "Report and files", reportOpen: "Open the report", report: "Save the report", reportMake: "Make the report", reportAgain: "Make the report again",
     exports: "Take the recordings along as", format: { csv: "CSV", parquet: "Parquet", hdf5: "HDF5", mat: "MAT" },
-    verifyTitle: "Is everything whole?", verify: "Read every byte", whole: "Every recording is whole.", damaged: "Something is damaged:",
+    verifyTitle: "Is everything whole?", verify: "Read every byte", whole: "Every recording is whole.", damaged: "Something is damaged:", wholeBut: "Every recording is whole, but the session is not as it should be:",
   },
   data: {
     title: "Bring your own data", files: "Files", choose: "Files of one or more recordings", chooseFolder: "Or a whole folder", read: "Read them",
@@ -264,6 +286,7 @@ export const en = {
     busy: "Something is under way; it can start when that has ended.",
     disconnected: "The bench is disconnected: connect the devices first.",
     notReady: "A device is not ready: see above.",
+    presses: "The tip presses: retract it first.",
     stopped: "The bench is stopped: acknowledge the stop first.",
     held: (holder: string) => `In control is ${holder}.`,
   },
@@ -274,7 +297,7 @@ export const en = {
     error: "error",
     depth: "depth",
     position: "axis",
-    marker: "marker",
+    marker: "marker since opening",
     mode: "doing",
   },
   bench: {
@@ -291,6 +314,8 @@ export const en = {
     span: "Shown",
     spans: { 10: "10 s", 30: "30 s", 60: "1 min", 120: "2 min" } as Record<number, string>,
     at: (seconds: string) => `at ${seconds} s`,
+    marker: "The marker's value is how far it has moved since this page was opened or the bench began.",
+    unzeroed: "Force and depth are not known before the first run: it takes the zero of force in the air, then finds the surface.",
     help: "Point at a plot, or press the arrow keys on it, to read its values. Drag over it to look closer; a double click goes back to live.",
     health: "Devices",
     healthWord: { ok: "works", connecting: "is connecting", degraded: "works, but not as it should", lost: "is lost", reconnecting: "is coming back", fault: "has a fault" } as Record<string, string>,

@@ -48,7 +48,7 @@ function Values() {
 
 function AtCursor() {
   const time_s = cursor.value;
-  if (time_s === null) return <p class="quiet readout">{t.bench.help}</p>;
+  if (time_s === null) return <p class="quiet readout">{t.bench.help} {t.bench.marker}</p>;
   const of = [...FORCE, ...DEPTH].map((line) => `${line.label} ${shown(line.trace.value(time_s), 3)} ${line.unit}`);
   return <p class="readout">{of.join(" · ")}</p>;
 }
@@ -105,6 +105,7 @@ export function Bench() {
     <>
       <h1 class="visually-hidden">{t.bench.title}</h1>
       <Values />
+      {fresh.value && rig.value?.state === "idle" && numbers.value.force === null && <p id="unzeroed" class="quiet">{t.bench.unzeroed}</p>}
       <div class={fresh.value ? "grid bench" : "grid bench stale"}>
         <section class="card history" aria-label={t.bench.forcePlot}>
           <Tools />

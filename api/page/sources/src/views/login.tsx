@@ -32,17 +32,21 @@ function Password() {
   );
 }
 
+// Where nothing is said of the port, the command asks there itself.
+const USUAL_PORT = "8000";
+const COMMAND = t.login.command(location.port === USUAL_PORT ? "" : location.port);
+
 export function Login() {
   if (entering.value) return <p class="quiet loading" role="status">{t.loading}</p>;
   return (
     <>
       <h1>{t.login.title}</h1>
       <p>{t.login.text}</p>
-      {refusal.value && <p id="refusal" class="notice bad" role="alert"><Prose text={refusal.value} /></p>}
+      {refusal.value && <p id="refusal" class="notice bad" role="alert"><Prose text={refusal.value.replace("`rig token link`", COMMAND)} /></p>}
       <div class="grid">
         <Card title={t.login.byPassword} id="login"><Password /></Card>
         <Card title={t.login.byLink}>
-          <ol>{t.login.ways.map((way) => <li key={way}><Prose text={way} /></li>)}</ol>
+          <ol>{t.login.ways(COMMAND).map((way) => <li key={way}><Prose text={way} /></li>)}</ol>
           <button type="button" onClick={() => location.reload()}>{t.login.again}</button>
         </Card>
       </div>

@@ -33,6 +33,9 @@ function Head({ session, trials, of }: { session: Schema["SessionFiles"] | null;
   );
 }
 
+/** How many recordings lie there of which the session's own list says nothing. */
+const unlisted = ({ recordings, trials }: Schema["SessionFiles"]) => Math.max(0, recordings.filter((one) => one.file.endsWith(".mcap")).length - trials);
+
 /** Counts what has ended here, so that what was read before is read again. */
 const endings = (...jobs: (Job | null)[]) => jobs.map((job) => (ended(job) ? job!.id : "")).join(" ");
 
@@ -52,7 +55,7 @@ function One({ of }: { of: string }) {
             <Curves of={of} on={on} />
             <FitCard of={of} job={fit} follow={followFit} />
             <DiagnosisCard of={of} job={diagnosis} follow={followDiagnosis} />
-            <TrialsCard of={of} trials={trials} />
+            <TrialsCard of={of} trials={trials} unlisted={unlisted(found)} />
             <TrackingCard of={of} />
             <FilesCard of={of} session={found} changed={() => again((n) => n + 1)} />
           </div>

@@ -10,7 +10,7 @@ import { link } from "../route";
 import { t } from "../texts";
 
 const AT_ONCE = 50;
-const HEADS = [t.sessions.session, t.sessions.subject, t.sessions.recorded, t.result.trials, t.result.dropped, t.result.quality];
+const HEADS = [t.sessions.session, t.sessions.subject, t.sessions.recorded, t.result.recordings, t.result.dropped, t.result.quality];
 
 export function Sessions() {
   const [many, more] = useState(AT_ONCE);

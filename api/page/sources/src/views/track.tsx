@@ -96,7 +96,7 @@ export function Track({ of }: { of: string }) {
   return (
     <>
       <h1>{t.track.title}</h1>
-      <div class="grid">
+      <div class="grid pair">
         <Show loaded={models} empty={none}>{(all) => <Run models={all} of={of} subject={id} />}</Show>
       </div>
     </>

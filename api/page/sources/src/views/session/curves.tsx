@@ -12,7 +12,7 @@ interface Law {
   rows?: { force_N: number; predicted_mm: number }[];
 }
 
-const COLOURS: Record<string, string> = { bad: "--error", usable: "--setpoint" };
+const COLOURS: Record<string, string> = { bad: "--error", usable: "--depth" };
 
 function line(curve: View, over: Over): Curve {
   const x = over === "time" ? curve.time_s : curve.depth_mm.map((value) => value ?? NaN);
@@ -42,8 +42,9 @@ function Lines({ curves, fit, over }: { curves: View[]; fit: Record<string, unkn
 function Key({ curves, fit, over }: { curves: View[]; fit: boolean; over: Over }) {
   const kinds = [
     { colour: "--force", text: t.session.line.good, there: curves.some((one) => !COLOURS[one.quality]) },
-    { colour: "--setpoint", text: t.session.line.usable, there: curves.some((one) => one.quality === "usable") },
+    { colour: "--depth", text: t.session.line.usable, there: curves.some((one) => one.quality === "usable") },
     { colour: "--error", text: t.session.line.bad, there: curves.some((one) => one.quality === "bad") },
+    { colour: "--setpoint", text: t.values.setpoint, there: over === "time" && curves.some((one) => one.reference_N.length), dashed: true },
     { colour: "--ink", text: t.session.model, there: fit && over === "depth", dashed: true },
   ];
   return (

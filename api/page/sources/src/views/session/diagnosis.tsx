@@ -49,7 +49,7 @@ function Found({ found, of, on }: { found: Diagnosis; of: string; on: string }) 
     <div id="diagnosis-result">
       <p class="said"><Dot kind={kind} /> <strong>{found.statement}</strong></p>
       <Explained found={found} />
-      {found.findings.length ? <ul class="plain causes">{found.findings.map((cause) => <Named key={cause.statement} cause={cause} />)}</ul> : <p>{t.diagnosis.nothing}</p>}
+      {found.findings.length ? <ul class="plain causes">{found.findings.map((cause) => <Named key={cause.statement} cause={cause} />)}</ul> : <p id="no-cause">{t.diagnosis.nothing[found.verdict]}</p>}
       {found.next_experiment && <p class="notice"><strong>{t.diagnosis.next}:</strong> {found.next_experiment.do}</p>}
       <Pictures session={of} folder="diagnosis" names={["share", "simulation", "residuals", "evidence"]} on={on} />
     </div>

@@ -2,11 +2,13 @@
 import type { Schema } from "../../api";
 import { attempt } from "../../attempt";
 import { ended, start, useWork } from "../../jobs";
-import { Card } from "../../parts/basics";
+import { Card, sizeOf } from "../../parts/basics";
 import { JobState } from "../../parts/job";
 import { Start, whyNotWork } from "../../parts/may";
 import { t } from "../../texts";
 
+// What a demonstration was made with: it would give away what its diagnosis is to find.
+const TRUTH = "diagnosis/truth.txt";
 const FORMATS = ["csv", "parquet", "hdf5", "mat"] as const;
 type Session = Schema["SessionFiles"];
 
@@ -31,13 +33,14 @@ function Report({ of, session, changed }: { of: string; session: Session; change
 function Whole({ of }: { of: string }) {
   const [job, follow] = useWork<Schema["VerifyResult"]>("verify", of);
   const begin = () => void attempt(async () => follow((await start<Schema["VerifyResult"]>("verify", { session: of })).id));
-  const said = job?.result && (job.result.ok ? t.session.whole : t.session.damaged);
   const wrong = Object.entries(job?.result?.recordings ?? {}).filter(([, one]) => !one.ok);
+  const said = job?.result && (job.result.ok ? t.session.whole : wrong.length ? t.session.damaged : t.session.wholeBut);
   return (
     <>
       <JobState job={job} />
       {said && <p id="whole" class={job.result!.ok ? "notice" : "notice bad"}>{said}</p>}
       {wrong.map(([name, one]) => <p key={name} class="notice bad">{name}: {one.sentence}</p>)}
+      {job?.result?.remarks.map((remark) => <p key={remark} class="notice warn">{remark}</p>)}
       {(!job || ended(job)) && <Start id="verify-start" quiet why={whyNotWork()} onClick={begin}>{t.session.verify}</Start>}
     </>
   );
@@ -45,6 +48,7 @@ function Whole({ of }: { of: string }) {
 
 export function FilesCard({ of, session, changed }: { of: string; session: Session; changed: () => void }) {
   const base = `/api/v1/sessions/${encodeURIComponent(of)}/export`;
+  const files = session.files.filter((file) => file.name !== TRUTH);
   return (
     <Card id="files-card" title={t.session.files}>
       <Report of={of} session={session} changed={changed} />
@@ -53,8 +57,8 @@ export function FilesCard({ of, session, changed }: { of: string; session: Sessi
       <h3>{t.session.verifyTitle}</h3>
       <Whole of={of} />
       <details>
-        <summary>{t.sessions.filesOf(session.files.length + session.files_left_out)}</summary>
-        <ul id="files">{session.files.map((file) => <li key={file.name}><a href={file.href} download>{file.name}</a> <span class="quiet">{(file.bytes / 1e6).toFixed(2)} MB</span></li>)}</ul>
+        <summary>{t.sessions.filesOf(files.length + session.files_left_out)}</summary>
+        <ul id="files">{files.map((file) => <li key={file.name}><a href={file.href} download>{file.name}</a> <span class="quiet">{sizeOf(file.bytes)}</span></li>)}</ul>
         {session.files_left_out > 0 && <p id="not-listed" class="quiet">{t.sessions.notListed(session.files_left_out)}</p>}
       </details>
     </Card>

@@ -5,12 +5,12 @@ import { Card, Rows, Show, shown } from "../../parts/basics";
 import { Quality } from "../../parts/quality";
 import { t } from "../../texts";
 
-export function TrialsCard({ of, trials }: { of: string; trials: Loaded<Schema["TrialEntry"][]> }) {
+export function TrialsCard({ of, trials, unlisted }: { of: string; trials: Loaded<Schema["TrialEntry"][]>; unlisted: number }) {
   const sorted = (all: Schema["TrialEntry"][]) => [...all].sort((one, other) => one.name.localeCompare(other.name));
   return (
     <Card id="trials-card" title={t.session.quality} wide>
-      <Show loaded={trials} empty={<p>{t.session.noTrials}</p>}>
-        {(all) => (
+      <Show loaded={trials} empty={!unlisted && <p>{t.session.noTrials}</p>}>
+        {(all) => all.length > 0 && (
           <Rows label={t.session.trialsOf(of)} heads={[t.result.trial, t.result.speed, t.result.peak, t.result.quality]} id="trials">
             {sorted(all).map((trial) => (
               <tr key={trial.key}>
@@ -23,6 +23,7 @@ export function TrialsCard({ of, trials }: { of: string; trials: Loaded<Schema["
           </Rows>
         )}
       </Show>
+      {unlisted > 0 && <p id="unlisted" class="notice warn">{t.session.unlisted(unlisted)}</p>}
     </Card>
   );
 }

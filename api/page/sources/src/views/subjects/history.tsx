@@ -41,7 +41,9 @@ function Name({ code, now, mark, again }: { code: string; now: string; mark: str
 function curves(found: readonly Stiffness[]): Curve[] {
   const first_ms = Math.min(...found.map((one) => Date.parse(one.at)));
   const days = (one: Stiffness) => (Date.parse(one.at) - first_ms) / DAY_MS;
-  const span = Math.max(1 / 24, ...found.map(days));
+  // One session alone spans nothing: a day around it reads as days do.
+  const most = Math.max(...found.map(days));
+  const span = most ? Math.max(1 / 24, most) : 1;
   const sites = [...new Set(found.map((one) => one.site))].sort();
   const zero = { x: [-0.05 * span, 1.05 * span], y: [0, 0], label: "0", colour: "--line" };
   const lines = sites.flatMap((site, i) => {
