@@ -22,16 +22,19 @@ export function Run() {
   const [model, chooseModel] = useState<string | null>(null);
   const usable = (protocols.value ?? []).filter((one) => !one.refusal);
   const protocol = chosen || (usable[0] ?? protocols.value?.[0])?.name || "";
+  const [drafted, draft] = useState(false);
+  const nobody = subject.value && !(id.trim() && subject.value.value.pain_threshold_N > 0);
+  const whose = nobody ? t.run.nobody : drafted ? t.run.drafted : "";
   const refusal = protocols.value?.find((one) => one.name === protocol)?.refusal ? t.run.refusedHere : "";
   const taken = { protocol, choose, model: model ?? (own ? keyOf(refOf(own)) : ""), chooseModel };
   return (
     <>
       <h1>{t.run.title}</h1>
       <div class="steps">
-        <SubjectStep subject={subject} />
+        <SubjectStep subject={subject} draft={draft} />
         <ThresholdStep subject={subject} />
         <ProtocolStep protocols={protocols} models={models} chosen={taken} on={limit_N} />
-        <GoStep protocol={protocol} refusal={refusal} />
+        <GoStep protocol={protocol} refusal={refusal || whose} />
       </div>
     </>
   );
