@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from api.http.models import JobSummary
 from hatch_build import SOURCES, built_folder
 from tests.page import told
 from tests.page.looks import holds_up
@@ -127,3 +128,26 @@ def test_without_anybody_on_the_bench_nothing_starts(page: Page, service: Preten
     page.reload()
     expect(page.locator("#capture-start-why")).to_contain_text("Nobody is on the bench")
     expect(page.locator("#capture-start")).to_be_disabled()
+
+
+def test_a_run_that_is_begun_anywhere_is_shown_and_what_was_said_of_its_start_does_not_outlast_it(
+    page: Page, service: Pretended
+) -> None:
+    stopped = told.job("capture", "cancelled")
+    service.answers |= {"jobs/capture": {"items": [stopped], "next": None}, "jobs/job-capture": stopped}
+    page.reload()
+    expect(page.locator("#capture-ended")).to_contain_text("it was stopped")
+    begun = told.job("capture", "running", id="job-2")
+    service.answers["jobs/job-2"] = begun
+    summary = JobSummary.model_validate({name: begun[name] for name in begun.keys() & JobSummary.model_fields})
+    service.says(rig=IDLE.model_copy(update={"state": "running", "job": summary}))
+    expect(page.locator("#capture-under-way")).to_contain_text("trial_002")
+    service.answers |= {"jobs/job-2": begun | {"state": "cancelled"}, "rig": IDLE}
+    expect(page.locator("#capture-ended")).to_be_visible()
+
+    own = begun | {"id": "job-3"}
+    service.answers |= {"jobs/job-3": own, "POST jobs": own}
+    with page.expect_response(lambda answer: answer.request.method == "POST" and answer.url.endswith("/jobs")):
+        page.click("#capture-start")
+    expect(page.locator("#now-force")).to_be_visible()
+    expect(page.locator("#message")).to_have_text("")

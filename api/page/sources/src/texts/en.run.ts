@@ -46,7 +46,7 @@ export const run = {
   drafted: "What is written in step 1 is not in use yet: finish it there first.",
   nobody: "Nobody is on the bench: give a code, a site and a pain threshold in step 1.",
   none: "No protocol lies in the protocols folder. Put one there; examples/indentation.toml is one.",
-  session: "Name of the new session", start: "Start", started: "started",
+  session: "Name of the new session", start: "Start",
   result: (session: string) => `Session ${session}`, quality: "quality", peak: "largest force", recorded: "recordings", lost: "samples lost",
   next: "Next:",
   nextAfter: { good: "open the session and fit the tissue.", bad: "see what made trials bad, mend it and run the protocol again." },

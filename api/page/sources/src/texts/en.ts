@@ -66,7 +66,6 @@ export const en = {
     recover: "Recover…",
     retract: "Retract",
     retractHint: "moves the tip out of the tissue",
-    retracting: "retracting",
     recoveryTitle: "Recover",
     yes: "Yes, do it",
     no: "No",
@@ -164,7 +163,7 @@ export const en = {
   track: {
     title: "Track a force", what: "Set up", model: "Tissue whose model gives the gains", live: "Now", result: "Result",
     kind: "What to follow", forces: "Forces, one after another", reference: "A reference over time", forcesN: "Forces, N", seconds: "Seconds on each",
-    referenceText: "Reference, such as step:5, sine:0.5,mean_N=2 or press:3", start: "Start tracking", started: "tracking",
+    referenceText: "Reference, such as step:5, sine:0.5,mean_N=2 or press:3", start: "Start tracking",
     noForces: "Give one force or several in N, with commas between them.",
     tooMuch: (force: number, most: number) => `${force} N is more than the ${Number(most.toPrecision(3))} N that bench, subject and model allow.`,
     none: "Nothing is fitted yet: gains come from a tissue's own model. Run a protocol and fit it first.",

@@ -47,7 +47,6 @@ export function GoStep({ protocol, refusal }: { protocol: string; refusal: strin
     void attempt(async () => {
       follow((await startInControl<Captured>("capture", { protocol, session })).id);
       name(sessionName());
-      return t.run.started;
     });
   };
   return (
