@@ -6,11 +6,13 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from api.http.models import JobSummary
+from api.http.listing import Listing
+from api.http.models import JobSummary, ProtocolView
 from hatch_build import SOURCES, built_folder
 from tests.page import told
 from tests.page.looks import holds_up
 from tests.page.pretend import IDLE, INFO, OPERATOR, Pretended, opened
+from tests.page.steps import view
 
 LEASE = {"lease_id": "l", "epoch": 1, "expires": told.AT}
 ON_BENCH: dict[str, Any] = {"id": "S08", "site": told.SITE, "pain_threshold_N": 12.0, "site_thresholds_N": {}}
@@ -128,6 +130,41 @@ def test_without_anybody_on_the_bench_nothing_starts(page: Page, service: Preten
     page.reload()
     expect(page.locator("#capture-start-why")).to_contain_text("Nobody is on the bench")
     expect(page.locator("#capture-start")).to_be_disabled()
+
+
+def test_a_protocol_is_shown_as_deep_as_it_goes_and_stays_chosen_and_its_session_s_name_is_asked_for_in_words(
+    page: Page, service: Pretended
+) -> None:
+    settings = told.SETTINGS | {"depth_mm": 5.0, "second_depth_mm": 7.5, "dither_amplitude_mm": 0.3}
+    twice = ProtocolView(name="twice", file="twice.toml", settings=settings, refusal="")
+    seen = told.FORESIGHT.model_copy(update={"protocol": "twice", "depth_mm": 7.5, "expected": ()})
+    service.says(protocols=Listing[ProtocolView](items=[*told.PROTOCOLS, twice]), protocols__twice__foresight=seen)
+    page.reload()
+    expect(page.locator("#contents")).to_contain_text("depth8.0 mm")
+    expect(page.locator("#beyond")).to_have_count(0)
+    page.select_option("#protocol", "twice")
+    expect(page.locator("#contents")).to_contain_text("deepest7.5 mm")
+    expect(page.locator("#beyond")).to_have_text(
+        "At 5 mm it swings by 0.3 mm to either side. It presses to 5 mm, then to 7.5 mm."
+    )
+    view(page, "Bench")
+    view(page, "Run")
+    expect(page.locator("#protocol")).to_have_value("twice")
+    page.reload()
+    expect(page.locator("#protocol")).to_have_value("twice")
+    service.says(protocols=Listing[ProtocolView](items=told.PROTOCOLS))
+    page.reload()
+    expect(page.locator("#protocol")).to_have_value("quick")
+
+    expect(page.locator("#session-hint")).to_contain_text("no blanks")
+    expect(page.locator("#capture-start")).to_be_enabled()
+    page.fill("#session", "first visit")
+    expect(page.locator("#capture-start-why")).to_have_text(
+        "This is no name for a session: see below what one is made of."
+    )
+    holds_up(page, "state-no-name-run", (390,))
+    page.fill("#session", "first-visit")
+    expect(page.locator("#capture-start")).to_be_enabled()
 
 
 def test_a_run_that_is_begun_anywhere_is_shown_and_what_was_said_of_its_start_does_not_outlast_it(
