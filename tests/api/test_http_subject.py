@@ -72,6 +72,15 @@ def test_no_change_of_somebody_else_is_lost(client: TestClient) -> None:
     assert client.get("/api/v1/subject").json()["site"] == "calf"
 
 
+def test_a_code_of_blanks_is_refused_with_a_sentence_and_blanks_about_one_are_no_part_of_it(client: TestClient) -> None:
+    tag = {"If-Match": client.get("/api/v1/subject").headers["etag"]}
+    answer = client.put("/api/v1/subject", json=SUBJECT | {"id": "   "}, headers=tag)
+    assert (answer.status_code, answer.json()["code"]) == (422, "refused")
+    assert answer.json()["detail"].startswith("subject: its code is empty; give the code")
+    assert changed(client, id=" S02 ") == (200, "")
+    assert client.get("/api/v1/subject").json()["id"] == "S02"
+
+
 def test_nobody_is_exchanged_while_the_bench_is_stopped_or_without_control(
     client: TestClient, service: Service
 ) -> None:

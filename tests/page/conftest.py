@@ -22,7 +22,7 @@ expect.set_options(timeout=PATIENCE_S * 1000)
 # These need neither bench nor service.
 ALONE = (
     "test_build", "test_states", "test_every_view", "test_language", "test_plots", "test_lost_answers", "test_sign_in",
-    "test_head", "test_sessions_told",
+    "test_head", "test_sessions_told", "test_run_steps",
 )  # fmt: skip
 
 

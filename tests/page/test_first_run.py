@@ -44,12 +44,15 @@ def set_up(page: Page) -> None:
     """Whom the session is of, and what force is never passed."""
     page.fill("#subject-id", "S07")
     page.fill("#subject-site", "left forearm")
-    page.click("#subject-keep")
+    page.fill("#subject-threshold", "8")
+    press(page, "#subject-keep")
     expect(page.locator("#message")).to_contain_text("on the bench: S07, left forearm")
+    expect(page.locator("#message")).to_contain_text("pain threshold in force: 15.0 N → 8.0 N")
+    state(page, "ready")
     expect(page.locator("#subject-keep-why")).to_have_text("is on the bench")
 
     page.fill("#threshold-known", "9")
-    page.click("#threshold-keep")
+    press(page, "#threshold-keep")
     expect(page.locator("#threshold")).to_have_text("9.0")
     state(page, "ready")
     expect(page.locator("#force-limit")).to_have_text("9.0")

@@ -425,4 +425,5 @@ def test_another_subject_does_not_get_the_sites_of_the_one_before(show: Any, ser
     service.says(subject=subject | {"site_thresholds_N": ELSEWHERE})
     page = show("run")
     page.fill("#subject-id", "S99")
-    assert body_of(page, "#subject-keep") == {"id": "S99", "site": told.SITE, "pain_threshold_N": 12.0}
+    page.fill("#subject-threshold", "7")
+    assert body_of(page, "#subject-keep") == {"id": "S99", "site": told.SITE, "pain_threshold_N": 7}

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from api.catalogue.catalogue import Catalogue
+from api.catalogue.catalogue import Catalogue, code_of
 from api.http.access.rights import OPERATE, READ
 from api.http.models import RequestBody
 from api.http.problems import responses
@@ -47,15 +47,15 @@ def add(router: APIRouter, service: Service) -> None:
         "/subject",
         dependencies=[OPERATE],
         summary="Changes the subject; another threshold starts the loop anew, which homes the axis",
-        responses=responses("409 busy", "409 stopped", "412 stale", "428 if-match"),
+        responses=responses("409 busy", "409 stopped", "412 stale", "422 refused", "428 if-match"),
     )
     def change(
         wanted: SubjectSettings, response: Response, lease: LeaseHeader = "", match: MatchHeader = ""
     ) -> SubjectSettings:
         service.control.check(lease)
         refuse_stale(match, etag_of(shown(response)), "/subject")
-        given = wanted.model_dump(exclude_none=True)
-        if wanted.id != service.wiring.subject.id:
-            given.setdefault("site_thresholds_N", lists.site_thresholds_N(wanted.id, HIGHEST_SITE_N))
+        given = wanted.model_dump(exclude_none=True) | {"id": code_of(wanted.id)}
+        if given["id"] != service.wiring.subject.id:
+            given.setdefault("site_thresholds_N", lists.site_thresholds_N(given["id"], HIGHEST_SITE_N))
         service.use_subject(service.wiring.subject.model_copy(update=given), lease)
         return shown(response)

@@ -2,6 +2,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { ask, requestKey, unanswered } from "./api";
 import { held, inControl } from "./lease";
+import { rig } from "./live";
 
 export type JobState = "queued" | "running" | "pausing" | "paused" | "cancelling" | "succeeded" | "failed" | "cancelled" | "interrupted";
 export type Verb = "cancel" | "pause" | "resume";
@@ -80,7 +81,7 @@ export function useJob<R = unknown>(id: string): Job<R> | null {
   return job as Job<R> | null;
 }
 
-/** The job of a kind that was started here, else the newest there is; with what starts another. */
+/** The job of a kind that the bench does, whoever started it, else the newest there is; with what starts another. */
 export function useWork<R = unknown>(kind: string, session?: string): [Job<R> | null, (id: string) => void] {
   const [id, follow] = useState("");
   useEffect(() => {
@@ -93,5 +94,6 @@ export function useWork<R = unknown>(kind: string, session?: string): [Job<R> | 
     void find();
     return () => void (current = false);
   }, [kind, session]);
+  useEffect(() => rig.subscribe((now) => void (now?.job?.kind === kind && (!session || now.job.session === session) && follow(now.job.id))), [kind, session]);
   return [useJob<R>(id), follow];
 }

@@ -56,10 +56,7 @@ function Consent() {
 
 const moving = (action: () => Promise<unknown>) => () => void attempt(() => inControl(action));
 
-export const retract = moving(async () => {
-  await post("/api/v1/jobs", { body: { kind: "retract", params: {} }, headers: { ...held(), ...requestKey() } });
-  return t.attention.retracting;
-});
+export const retract = moving(async () => void (await post("/api/v1/jobs", { body: { kind: "retract", params: {} }, headers: { ...held(), ...requestKey() } })));
 export const acknowledge = moving(async () => (await post("/api/v1/estop/reset", { headers: held() })).detail);
 export const connect = moving(async () => void (await post("/api/v1/rig/connect", { headers: { ...held(), ...requestKey() } })));
 export const startRecovery = moving(recover);

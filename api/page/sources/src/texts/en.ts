@@ -1,4 +1,6 @@
 // Every text of the page, in English. What the service says comes from the service.
+import { run } from "./en.run";
+
 const STOPS = { estop: "Emergency stop", pain: "Pain stop" };
 
 export const en = {
@@ -183,7 +185,7 @@ export const en = {
   track: {
     title: "Track a force", what: "Set up", model: "Tissue whose model gives the gains", live: "Now", result: "Result",
     kind: "What to follow", forces: "Forces, one after another", reference: "A reference over time", forcesN: "Forces, N", seconds: "Seconds on each",
-    referenceText: "Reference, such as step:5, sine:0.5,mean_N=2 or press:3", start: "Start tracking", started: "tracking",
+    referenceText: "Reference, such as step:5, sine:0.5,mean_N=2 or press:3", start: "Start tracking",
     noForces: "Give one force or several in N, with commas between them.",
     tooMuch: (force: number, most: number) => `${force} N is more than the ${Number(most.toPrecision(3))} N that bench, subject and model allow.`,
     none: "Nothing is fitted yet: gains come from a tissue's own model. Run a protocol and fit it first.",
@@ -358,48 +360,7 @@ export const en = {
     limit: { force_N: "force", depth_mm: "depth", speed_mm_s: "speed" } as Record<string, string>,
     settings: "Wiring and settings",
   },
-  run: {
-    title: "Run a protocol",
-    step: (number: number, name: string) => `${number} · ${name}`,
-    steps: { subject: "Subject and site", threshold: "Pain threshold", protocol: "Protocol", go: "Run" },
-    code: "Code of the subject", site: "Site", keepSubject: "Use for the next session", isOnBench: "is on the bench",
-    codeHint: "A code such as S07, not a name: it goes into every recording. Names are kept apart, under Subjects.",
-    subjectKept: (id: string, site: string) => `on the bench: ${[id, site].filter(Boolean).join(", ")}`,
-    threshold: "pain threshold", forceLimit: "force limit in force", thresholdKnown: "Threshold, N", keepThreshold: "Set", isInForce: "is in force",
-    thresholdHint: "Nothing here passes the lower of the threshold and the bench's own limit. Setting it starts the bench anew, and the axis homes: the limb must be out.",
-    thresholdKept: (force: string) => `the pain threshold is ${force} N`,
-    ramp: "Find it with the subject",
-    rampText: "Force rises slowly from 0.5 N until the subject presses the pain stop, here or on the keypad.",
-    rampNeedsModel: (subject: string) => `The ramp is controlled by a model of the tissue, and nothing is fitted to ${subject || "this subject"} yet. So, first:`,
-    rampFirst: {
-      threshold: "Set a threshold above that the subject surely bears.",
-      run: "Run a short protocol with it, in steps 3 and 4 below.", isRun: "Run a short protocol with it: that is done.",
-      fit: "Fit the tissue in that session, and come back.", fitHere: "Fit the tissue in that session, and come back:",
-    },
-    rampChoose: "choose a tissue", rampNoChoice: "Choose the tissue whose model controls it.",
-    rampModel: "Tissue whose model controls it", rampUpTo: "Up to, N", rampStart: "Start the ramp", rampStop: "Pain stop: this is enough",
-    rampFound: (force: string) => `The subject stopped at ${force} N.`, rampNone: (upTo: string) => `Nobody stopped it up to ${upTo} N: the threshold lies above.`,
-    rampKeep: (force: string) => `Set ${force} N as threshold`,
-    glove: "Find it with a glove",
-    gloveText: "Nothing of the bench moves. Press slowly with the glove until the subject says stop, and let go at once: three times.",
-    gloveSession: "Session that keeps it", gloveStart: "Begin to press", gloveNoSession: "Name a session.",
-    glovePress: (number: number, force: string, refused: string) => `Press ${number}: ${force} N${refused ? `, refused: ${refused}` : ""}`,
-    gloveKeep: (force: string, site: string) => `Set ${force} N as threshold at ${site}`, gloveKept: (force: string, site: string) => `the pain threshold at ${site} is ${force} N`,
-    gloveFound: (force: string, site: string, rule: string) => `${force} N at ${site}: ${rule}.`,
-    protocol: "Protocol", tissue: "Tissue to expect", noModel: "not known",
-    refused: "refused", refusedHere: "This bench refuses the protocol, see above.",
-    trials: "trials", trialsOf: (speeds: number, trials: number) => (speeds === 1 ? `${trials}` : `${speeds * trials}`),
-    speeds: "speeds", speed: "speed", depth: "depth", limit: "force limit", hold: "hold", lasts: "takes about",
-    expectedForce: "force expected", expectedDepth: "depth expected", bySpeed: "What is expected at each speed", endsBy: "ended by",
-    ends: { depth: "the depth asked for", "force limit": "the force limit" },
-    verdict: { refused: "This bench will not start it:", unknown: "It can start; its force is not known.", "cut short": "It will end before its depth.", "as planned": "It will go as planned." },
-    none: "No protocol lies in the protocols folder. Put one there; examples/indentation.toml is one.",
-    session: "Name of the new session", start: "Start", started: "started",
-    result: (session: string) => `Session ${session}`, quality: "quality", peak: "largest force", recorded: "recordings", lost: "samples lost",
-    next: "Next:",
-    nextAfter: { good: "open the session and fit the tissue.", bad: "see what made trials bad, mend it and run the protocol again." },
-    open: "Open the session",
-  },
+  run,
   sessions: {
     title: "Sessions", all: "All sessions", session: "session", subject: "subject", recorded: "recorded", more: "Show more",
     none: "No session yet. Run a protocol, or bring data of your own.",

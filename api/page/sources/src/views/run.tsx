@@ -6,6 +6,7 @@ import { useLoaded } from "../loaded";
 import { keyOf, ownModel, refOf, useModels } from "../parts/models";
 import { useSubject } from "../subject";
 import { t } from "../texts";
+import { choose, chosen } from "./run/chosen";
 import { GoStep } from "./run/go";
 import { ProtocolStep } from "./run/protocol";
 import { SubjectStep } from "./run/subject";
@@ -18,20 +19,22 @@ export function Run() {
   const id = subject.value?.value.id ?? "";
   const models = useModels(id).value ?? [];
   const own = ownModel(models, id);
-  const [chosen, choose] = useState("");
   const [model, chooseModel] = useState<string | null>(null);
   const usable = (protocols.value ?? []).filter((one) => !one.refusal);
-  const protocol = chosen || (usable[0] ?? protocols.value?.[0])?.name || "";
+  const protocol = protocols.value?.find((one) => one.name === chosen.value)?.name || (usable[0] ?? protocols.value?.[0])?.name || "";
+  const [drafted, draft] = useState(false);
+  const nobody = subject.value && !(id.trim() && subject.value.value.pain_threshold_N > 0);
+  const whose = nobody ? t.run.nobody : drafted ? t.run.drafted : "";
   const refusal = protocols.value?.find((one) => one.name === protocol)?.refusal ? t.run.refusedHere : "";
   const taken = { protocol, choose, model: model ?? (own ? keyOf(refOf(own)) : ""), chooseModel };
   return (
     <>
       <h1>{t.run.title}</h1>
       <div class="steps">
-        <SubjectStep subject={subject} />
+        <SubjectStep subject={subject} draft={draft} />
         <ThresholdStep subject={subject} />
         <ProtocolStep protocols={protocols} models={models} chosen={taken} on={limit_N} />
-        <GoStep protocol={protocol} refusal={refusal} />
+        <GoStep protocol={protocol} refusal={refusal || whose} />
       </div>
     </>
   );

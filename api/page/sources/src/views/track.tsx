@@ -62,10 +62,7 @@ function Run({ models, of, subject }: { models: ModelEntry[]; of: string; subjec
   const model = models.find((one) => keyOf(refOf(one)) === chosen) ?? models[0]!;
   const running = job && !ended(job);
   const most_N = Math.min(rig.value?.limits.force_N ?? Infinity, model.force_N ?? Infinity);
-  const begin = (what: What) => void attempt(async () => {
-    follow((await startInControl<Tracked>("track", { model: refOf(model), ...what })).id);
-    return t.track.started;
-  });
+  const begin = (what: What) => void attempt(async () => follow((await startInControl<Tracked>("track", { model: refOf(model), ...what })).id));
   return (
     <>
       <Card id="track-what" title={t.track.what}>

@@ -7,7 +7,7 @@ import { shown } from "../../parts/basics";
 import { useGlove } from "../../parts/gloves";
 import { JobState } from "../../parts/job";
 import { Start, whyNotMove } from "../../parts/may";
-import { keepSubject, type OnBench } from "../../subject";
+import { atMost, keepSubject, type OnBench } from "../../subject";
 import { t } from "../../texts";
 
 type Found = Schema["GloveThreshold"];
@@ -40,15 +40,15 @@ export function Glove({ on, reload }: { on: OnBench; reload: () => void }) {
 
 function Answer({ found, on, reload }: { found: Found; on: OnBench; reload: () => void }) {
   const force_N = found.force_N ?? 0;
-  // Never above what was found.
-  const limit_N = Math.floor(force_N * 10) / 10;
+  const limit_N = atMost(force_N);
   const known = on.value.site_thresholds_N;
-  const keep = () => attempt(async () => (await keepSubject(on, { site_thresholds_N: { ...known, [found.site]: limit_N } }), t.run.gloveKept(shown(limit_N, 1), found.site))).then(reload);
+  const keep = () => attempt(() => keepSubject(on, { site_thresholds_N: { ...known, [found.site]: limit_N } })).then(reload);
+  const isOpen = found.subject === on.value.id && limit_N > 0 && limit_N !== known[found.site];
   return (
     <div class="notice" id="glove-result">
       <ol>{found.presses.map((one, number) => <li key={number}>{t.run.glovePress(number + 1, shown(one.peak_N, 1), one.refused ?? "")}</li>)}</ol>
-      <p>{t.run.gloveFound(shown(force_N, 2), found.site, found.rule)}</p>
-      {limit_N > 0 && limit_N !== known[found.site] && <Start id="glove-keep" why={whyNotMove()} onClick={() => void keep()}>{t.run.gloveKeep(shown(limit_N, 1), found.site)}</Start>}
+      <p>{t.run.gloveFound(shown(force_N, 2), found.subject, found.site, found.rule)}</p>
+      {isOpen && <Start id="glove-keep" why={whyNotMove()} onClick={() => void keep()}>{t.run.gloveKeep(shown(limit_N, 1), found.site)}</Start>}
     </div>
   );
 }

@@ -12,6 +12,9 @@ import { Quality, worst } from "../../parts/quality";
 import { link } from "../../route";
 import { t } from "../../texts";
 
+// As the service takes it: a folder is called so on every system.
+const NAME = /^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$/;
+
 type Captured = Schema["CaptureResult"];
 
 export function Result({ job }: { job: Job<Captured> }) {
@@ -42,12 +45,12 @@ export function GoStep({ protocol, refusal }: { protocol: string; refusal: strin
   const [session, name] = useState(sessionName());
   const [job, follow] = useWork<Captured>("capture");
   const running = job && !ended(job);
+  const isName = NAME.test(session);
   const begin = (event: Event) => {
     event.preventDefault();
     void attempt(async () => {
       follow((await startInControl<Captured>("capture", { protocol, session })).id);
       name(sessionName());
-      return t.run.started;
     });
   };
   return (
@@ -55,9 +58,10 @@ export function GoStep({ protocol, refusal }: { protocol: string; refusal: strin
       {!running && (
         <form id="start" onSubmit={begin}>
           <label>{t.run.session}
-            <input id="session" required pattern="[A-Za-z0-9][A-Za-z0-9_.\-]{0,63}" autocomplete="off" value={session} onInput={(event) => name(event.currentTarget.value)} />
+            <input id="session" required autocomplete="off" value={session} aria-invalid={!isName} aria-describedby="session-hint" onInput={(event) => name(event.currentTarget.value)} />
           </label>
-          <Start id="capture-start" why={protocol ? refusal || whyNotMove() : t.run.none}>{t.run.start}</Start>
+          <Start id="capture-start" why={protocol ? refusal || (isName ? whyNotMove() : t.run.noName) : t.run.none}>{t.run.start}</Start>
+          <p id="session-hint" class="quiet whole">{t.run.sessionHint}</p>
         </form>
       )}
       {running && <Now of={["force", "depth"]} />}

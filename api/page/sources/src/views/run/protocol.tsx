@@ -15,18 +15,29 @@ function Fact({ name, value, unit }: { name: string; value: string; unit: string
   return <div><dt>{name}</dt><dd>{value} <small>{unit}</small></dd></div>;
 }
 
+/** What is done at the depth asked for, and deeper; empty where a press is all. */
+function beyond(settings: Protocol["settings"]): string {
+  const [depth, second, swing] = ["depth_mm", "second_depth_mm", "dither_amplitude_mm"].map((name) => Number(settings[name] ?? 0)) as [number, number, number];
+  const said = [swing > 0 && t.run.dither(significant(depth), significant(swing)), second > 0 && t.run.second(significant(depth), significant(second))];
+  return said.filter(Boolean).join(" ");
+}
+
 function Contents({ protocol, seen }: { protocol: Protocol; seen: Foresight | null }) {
   const { settings } = protocol;
   const speeds = (settings.speeds_mm_s ?? []) as number[];
+  const goesOn = beyond(settings);
   return (
-    <dl class="facts" id="contents">
-      <Fact name={t.run.trials} value={t.run.trialsOf(speeds.length, Number(settings.trials))} unit="" />
-      <Fact name={t.run.speeds} value={speeds.join(", ")} unit="mm/s" />
-      <Fact name={t.run.depth} value={shown(Number(settings.depth_mm), 1)} unit="mm" />
-      <Fact name={t.run.limit} value={shown(Number(settings.force_limit_N), 1)} unit="N" />
-      <Fact name={t.run.hold} value={significant(Number(settings.hold_s))} unit="s" />
-      <Fact name={t.run.lasts} value={seen ? duration(seen.duration_s) : t.unknown} unit="" />
-    </dl>
+    <>
+      <dl class="facts" id="contents">
+        <Fact name={t.run.trials} value={t.run.trialsOf(speeds.length, Number(settings.trials))} unit="" />
+        <Fact name={t.run.speeds} value={speeds.join(", ")} unit="mm/s" />
+        <Fact name={goesOn ? t.run.deepest : t.run.depth} value={shown(seen?.depth_mm, 1)} unit="mm" />
+        <Fact name={t.run.limit} value={shown(Number(settings.force_limit_N), 1)} unit="N" />
+        <Fact name={t.run.hold} value={significant(Number(settings.hold_s))} unit="s" />
+        <Fact name={t.run.lasts} value={seen ? duration(seen.duration_s) : t.unknown} unit="" />
+      </dl>
+      {goesOn && <p id="beyond">{goesOn}</p>}
+    </>
   );
 }
 
@@ -73,9 +84,11 @@ interface Chosen {
 function Foreseen({ protocol, model, on }: { protocol: Protocol; model: ModelEntry | undefined; on: unknown }) {
   const asked = model && refOf(model);
   const seen = useLoaded(() => get("/api/v1/protocols/{name}/foresight", { path: { name: protocol.name }, query: { session: asked?.session, file: asked?.file } }), [protocol.name, model?.key, on]);
+  // What was foreseen of another stands until this is known.
+  const own = seen.value?.protocol === protocol.name ? seen.value : null;
   return (
     <>
-      <Contents protocol={protocol} seen={seen.value} />
+      <Contents protocol={protocol} seen={own} />
       <Show loaded={seen}>{(found) => <><Verdict seen={found} /><Table seen={found} /></>}</Show>
     </>
   );

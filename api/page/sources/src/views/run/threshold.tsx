@@ -14,7 +14,7 @@ import { Now } from "../../parts/now";
 import { Glove } from "./glove";
 import { pressStop } from "../../stop";
 import { link } from "../../route";
-import { keepSubject, thresholdAt, type OnBench } from "../../subject";
+import { atMost, keepSubject, siteRules, thresholdAt, type OnBench, type Subject } from "../../subject";
 import { t } from "../../texts";
 
 type Found = Schema["Threshold"];
@@ -24,23 +24,38 @@ function Known({ on, reload }: { on: OnBench; reload: () => void }) {
   const wanted = Number(force_N);
   const keep = async (event: Event) => {
     event.preventDefault();
-    await attempt(async () => (await keepSubject(on, { pain_threshold_N: wanted }), t.run.thresholdKept(shown(wanted, 1))));
+    await attempt(() => keepSubject(on, { pain_threshold_N: wanted }));
     reload();
   };
+  const isSet = siteRules(on.value) ? t.run.isSet : t.run.isInForce;
   return (
     <>
       <dl class="facts large">
         <div><dt>{t.run.threshold}</dt><dd><output id="threshold">{shown(thresholdAt(on.value), 1)}</output> <small>N</small></dd></div>
         <div><dt>{t.run.forceLimit}</dt><dd><output id="force-limit">{shown(rig.value?.limits.force_N, 1)}</output> <small>N</small></dd></div>
       </dl>
+      {siteRules(on.value) && <SiteRules on={on} reload={reload} />}
       <form onSubmit={keep}>
-        <label>{t.run.thresholdKnown}
+        <label>{on.value.id ? t.run.thresholdOf(on.value.id) : t.run.thresholdKnown}
           <input id="threshold-known" type="number" required min="0.5" max="50" step="0.1" value={force_N} onInput={(event) => set(event.currentTarget.value)} />
         </label>
-        <Start id="threshold-keep" why={wanted === on.value.pain_threshold_N ? t.run.isInForce : whyNotMove()}>{t.run.keepThreshold}</Start>
+        <Start id="threshold-keep" why={wanted === on.value.pain_threshold_N ? isSet : whyNotMove()}>{t.run.keepThreshold}</Start>
         <p class="quiet whole">{t.run.thresholdHint}</p>
       </form>
     </>
+  );
+}
+
+/** That the site's own threshold is the lower one, and the way to put the subject's in its place. */
+function SiteRules({ on, reload }: { on: OnBench; reload: () => void }) {
+  const { site, pain_threshold_N, site_thresholds_N } = on.value;
+  const [own, at] = [shown(pain_threshold_N, 1), shown(thresholdAt(on.value), 1)];
+  const replace = () => attempt(() => keepSubject(on, { site_thresholds_N: { ...site_thresholds_N, [site]: pain_threshold_N } })).then(reload);
+  return (
+    <div class="notice warn" id="site-rules">
+      <p>{t.run.siteRules(site, at, own)}</p>
+      <Start id="site-replace" quiet why={whyNotMove()} onClick={() => void replace()}>{t.run.siteReplace(site, at, own)}</Start>
+    </div>
   );
 }
 
@@ -64,7 +79,7 @@ function Ramp({ on, reload }: { on: OnBench; reload: () => void }) {
   const loaded = useModels(on.value.id);
   const models = loaded.value ?? [];
   const [chosen, choose] = useState("");
-  const [upTo, setUpTo] = useState(String(on.value.pain_threshold_N));
+  const [upTo, setUpTo] = useState(String(atMost(Math.min(thresholdAt(on.value), rig.value?.limits.force_N ?? Infinity))));
   const [job, follow] = useWork<Found>("threshold");
   const own = ownModel(models, on.value.id);
   const model = models.find((one) => keyOf(refOf(one)) === chosen) ?? own;
@@ -94,19 +109,27 @@ function Ramp({ on, reload }: { on: OnBench; reload: () => void }) {
         </form>
       )}
       <JobState job={job} />
-      {job?.result && <Answer found={job.result} on={on} reload={reload} />}
+      {job?.result && <Answer found={job.result} session={job.session ?? ""} on={on} reload={reload} />}
     </>
   );
 }
 
-function Answer({ found, on, reload }: { found: Found; on: OnBench; reload: () => void }) {
+/** Whether the ramp of ``session`` was with the person at the site that is on the bench. */
+function useIsOf(session: string, { id, site }: Subject): boolean {
+  const loaded = useLoaded(async () => (await get("/api/v1/sessions", { query: { session, limit: 1 } })).items[0] ?? null, [session]);
+  return loaded.value?.session === session && loaded.value.subject === id && loaded.value.site === site;
+}
+
+function Answer({ found, session, on, reload }: { found: Found; session: string; on: OnBench; reload: () => void }) {
+  const isTheirs = useIsOf(session, on.value);
   const { force_N } = found;
   if (force_N === null) return <p class="notice" id="ramp-result">{t.run.rampNone(shown(found.up_to_N, 1))}</p>;
-  const keep = () => attempt(async () => (await keepSubject(on, { pain_threshold_N: Number(force_N.toFixed(1)) }), t.run.thresholdKept(shown(force_N, 1)))).then(reload);
+  const limit_N = atMost(force_N);
+  const keep = () => attempt(() => keepSubject(on, { pain_threshold_N: limit_N })).then(reload);
   return (
     <div class="notice" id="ramp-result">
-      <p>{t.run.rampFound(shown(force_N, 1))}</p>
-      {force_N.toFixed(1) !== on.value.pain_threshold_N.toFixed(1) && <Start id="ramp-keep" why={whyNotMove()} onClick={() => void keep()}>{t.run.rampKeep(shown(force_N, 1))}</Start>}
+      <p>{t.run.rampFound(shown(force_N), session)}</p>
+      {isTheirs && limit_N > 0 && limit_N !== on.value.pain_threshold_N && <Start id="ramp-keep" why={whyNotMove()} onClick={() => void keep()}>{t.run.rampKeep(shown(limit_N, 1))}</Start>}
     </div>
   );
 }
@@ -115,13 +138,18 @@ export function ThresholdStep({ subject }: { subject: Loaded<OnBench> }) {
   return (
     <Card id="step-threshold" title={t.run.step(2, t.run.steps.threshold)}>
       <Show loaded={subject}>
-        {(on) => (
-          <>
-            <Known key={on.value.pain_threshold_N} on={on} reload={subject.reload} />
-            <details id="ramp"><summary>{t.run.ramp}</summary><Ramp on={on} reload={subject.reload} /></details>
-            <details id="glove"><summary>{t.run.glove}</summary><Glove on={on} reload={subject.reload} /></details>
-          </>
-        )}
+        {(on) => {
+          // What was written for one person, site or threshold is not for the next.
+          const whom = `${on.value.id}/${on.value.site}/`;
+          const force_N = on.value.pain_threshold_N;
+          return (
+            <>
+              <Known key={`${whom}${force_N}`} on={on} reload={subject.reload} />
+              <details id="ramp"><summary>{t.run.ramp}</summary><Ramp key={`${whom}${thresholdAt(on.value)}`} on={on} reload={subject.reload} /></details>
+              <details id="glove"><summary>{t.run.glove}</summary><Glove key={whom} on={on} reload={subject.reload} /></details>
+            </>
+          );
+        }}
       </Show>
     </Card>
   );
