@@ -75,6 +75,21 @@ def test_nobody_gets_the_threshold_of_another(page: Page, service: Pretended) ->
     expect(hint).to_contain_text(f"3.5 N is in force now, at {told.SITE}. Change it where it does not hold")
 
 
+def test_whom_a_service_that_began_anew_has_forgotten_is_said(page: Page, service: Pretended) -> None:
+    page.fill("#subject-id", "S99")
+    page.fill("#subject-threshold", "9")
+    puts(page, service, "#subject-keep", ON_BENCH | {"id": "S99", "pain_threshold_N": 9.0})
+    expect(page.locator("#message")).to_contain_text("on the bench: S99")
+    expect(page.locator("#subject-gone")).to_have_count(0)
+    service.answers |= {"subject": ON_BENCH}
+    page.reload()
+    expect(page.locator("#subject-gone")).to_contain_text(f"S99 ({told.SITE}, 9.0 N) was put on the bench from here")
+    expect(page.locator("#subject-gone")).to_contain_text(f"S08 ({told.SITE}, 12.0 N) is on it")
+    holds_up(page, "state-forgotten-subject-run", (390,))
+    page.click("#subject-right")
+    expect(page.locator("#subject-gone")).to_have_count(0)
+
+
 def test_the_threshold_of_a_site_that_holds_is_said_and_can_be_replaced(page: Page, service: Pretended) -> None:
     found = ON_BENCH | {"site_thresholds_N": {told.SITE: 3.5}}
     page.fill("#threshold-known", "14")

@@ -1,5 +1,6 @@
 // Who lies on the bench: read with the mark that a change has to name, so that two pages do not overwrite each other.
 import { ask, every, marked, requestKey } from "./api";
+import { keep, kept } from "./kept";
 import { held, inControl } from "./lease";
 import { useLoaded } from "./loaded";
 import { shown } from "./parts/basics";
@@ -44,11 +45,25 @@ function said(before: Subject, now: Subject): string {
   return t.run.inForceNow(was, is) + why;
 }
 
+const PUT = "put-on-bench";
+const inWords = (one: Subject) => t.run.onBench(one.id, one.site, shown(thresholdAt(one), 1));
+
+/** From now on this window takes ``now`` for whom it put on the bench. */
+export const remember = (now: Subject) => keep(PUT, inWords(now));
+
+/** Whom this window put on the bench, where that is somebody else by now: a service that begins anew knows nobody. */
+export function gone(now: Subject): string {
+  const put = kept(PUT);
+  return put && put !== inWords(now) ? t.run.gone(put, inWords(now)) : "";
+}
+
 /** Changes who is on the bench or what is never passed; what holds then, in words. */
 export const keepSubject = (before: OnBench, changed: Partial<Subject>) =>
   inControl(async () => {
     const sent = { body: { ...usual(before.value), ...changed }, headers: { ...held(), ...requestKey(), "If-Match": before.mark } };
-    return said(before.value, (await ask("put", PATH, sent)) as Subject);
+    const now = (await ask("put", PATH, sent)) as Subject;
+    remember(now);
+    return said(before.value, now);
   });
 
 /** Codes and sites that were used before, to choose from. */

@@ -1,24 +1,12 @@
-// The protocol that was chosen last: kept for as long as the browser's window, over other views and a reload.
+// The protocol that was chosen last.
 import { signal } from "@preact/signals";
+import { keep, kept } from "../../kept";
 
 const KEY = "protocol";
 
-/** A browser that keeps nothing may refuse to be asked. */
-function kept(): string {
-  try {
-    return sessionStorage.getItem(KEY) ?? "";
-  } catch {
-    return "";
-  }
-}
-
-export const chosen = signal(kept());
+export const chosen = signal(kept(KEY));
 
 export function choose(protocol: string): void {
   chosen.value = protocol;
-  try {
-    sessionStorage.setItem(KEY, protocol);
-  } catch {
-    // Then it is known until the page is loaded again.
-  }
+  keep(KEY, protocol);
 }

@@ -5,7 +5,7 @@ import { date } from "../../clock";
 import { useLoaded, type Loaded } from "../../loaded";
 import { Card, Show, shown } from "../../parts/basics";
 import { Start, whyNotMove } from "../../parts/may";
-import { keepSubject, useKnownSubjects, type OnBench } from "../../subject";
+import { gone, keepSubject, remember, useKnownSubjects, type OnBench, type Subject } from "../../subject";
 import { t } from "../../texts";
 import { earlier, type Earlier } from "./earlier";
 
@@ -33,6 +33,21 @@ type Draft = (is: boolean) => void;
 /** Why nobody can be put on the bench as it is written; empty if they can. */
 const whyNot = (id: string, site: string, threshold: string) =>
   !id ? t.run.noCode : !site ? t.run.noSite : threshold ? whyNotMove() : t.run.noThreshold;
+
+function Gone({ now, reload }: { now: Subject; reload: () => void }) {
+  const text = gone(now);
+  const agree = () => {
+    remember(now);
+    reload();
+  };
+  if (!text) return null;
+  return (
+    <div class="notice warn whole">
+      <p id="subject-gone">{text}</p>
+      <button id="subject-right" type="button" onClick={agree}>{t.run.isRight(now.id)}</button>
+    </div>
+  );
+}
 
 function Form({ on, reload, draft }: { on: OnBench; reload: () => void; draft: Draft }) {
   const [code, write] = useState(on.value.id);
@@ -66,6 +81,7 @@ function Form({ on, reload, draft }: { on: OnBench; reload: () => void; draft: D
       <datalist id="codes">{known.map((one) => <option key={one.subject} value={one.subject} />)}</datalist>
       <datalist id="sites">{sites.map((one) => <option key={one} value={one} />)}</datalist>
       {id && !same && <Threshold id={id} known={found} value={threshold} write={type} />}
+      <Gone now={on.value} reload={reload} />
       <Start id="subject-keep" why={same && id && site ? t.run.isOnBench : whyNot(id, site, threshold)}>{t.run.keepSubject}</Start>
       <p id="code-hint" class="quiet whole">{t.run.codeHint}</p>
     </form>
