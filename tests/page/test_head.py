@@ -15,7 +15,7 @@ from tests.page.pretend import IDLE, INFO, OPERATOR, STOPPED, Pretended, opened
 from tests.page.steps import state, view
 
 LEASE = {"lease_id": "l", "epoch": 1, "expires": told.AT}
-HELD = {"holder": "ann", "purpose": "tracking a force", "since": told.AT}
+HELD: dict[str, Any] = {"holder": "ann", "purpose": "tracking a force", "since": told.AT}
 # Whether the browser would ask before the page is left.
 ASKS = """() => !window.dispatchEvent(new Event("beforeunload", { cancelable: true }))"""
 STATE = "http://127.0.0.1:4711/state"
