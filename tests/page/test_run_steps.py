@@ -125,6 +125,21 @@ def test_what_was_written_for_one_person_is_not_the_next_one_s(page: Page, servi
     expect(page.locator("#ramp-up-to")).to_have_value("5")
 
 
+def test_a_ramp_by_another_s_tissue_is_no_part_of_the_other_s_session(page: Page, service: Pretended) -> None:
+    begun = told.job("threshold", "running")
+    service.answers |= {"POST jobs": begun, "jobs/job-threshold": begun}
+    asked = []
+    for whom, site in (("S08", told.SITE), (told.SUBJECT, "calf"), (told.SUBJECT, told.SITE)):
+        service.says(subject=ON_BENCH | {"id": whom, "site": site})
+        page.reload()
+        page.click("#ramp summary")
+        page.select_option("#ramp-model", f"fit/{told.NAME}")
+        with page.expect_request(lambda sent: sent.method == "POST" and sent.url.endswith("/jobs")) as sent:
+            page.click("#ramp-start")
+        asked.append(sent.value.post_data_json["params"].get("session", ""))
+    assert [session.rpartition("-")[0][:10] for session in asked] == ["threshold-", "threshold-", ""]
+
+
 def test_without_anybody_on_the_bench_nothing_starts(page: Page, service: Pretended) -> None:
     service.says(subject=ON_BENCH | {"id": ""})
     page.reload()
