@@ -50,6 +50,7 @@ def test_nobody_gets_the_threshold_of_another(page: Page, service: Pretended) ->
     page.fill("#subject-id", "S99")
     expect(field).to_have_value("")
     expect(hint).to_contain_text("Nothing is known of S99 yet. Give a force that they surely bear")
+    expect(hint).to_contain_text("the axis homes: the limb must be out")
     expect(why).to_have_text("Give their pain threshold.")
     expect(page.locator("#capture-start-why")).to_contain_text("step 1 is not in use yet")
     expect(page.locator("#capture-start")).to_be_disabled()
@@ -140,6 +141,21 @@ def test_what_was_written_for_one_person_is_not_the_next_one_s(page: Page, servi
     expect(page.locator("#ramp-up-to")).to_have_value("5")
 
 
+def test_a_ramp_by_another_s_tissue_is_no_part_of_the_other_s_session(page: Page, service: Pretended) -> None:
+    begun = told.job("threshold", "running")
+    service.answers |= {"POST jobs": begun, "jobs/job-threshold": begun}
+    asked = []
+    for whom, site in (("S08", told.SITE), (told.SUBJECT, "calf"), (told.SUBJECT, told.SITE)):
+        service.says(subject=ON_BENCH | {"id": whom, "site": site})
+        page.reload()
+        page.click("#ramp summary")
+        page.select_option("#ramp-model", f"fit/{told.NAME}")
+        with page.expect_request(lambda sent: sent.method == "POST" and sent.url.endswith("/jobs")) as sent:
+            page.click("#ramp-start")
+        asked.append(sent.value.post_data_json["params"].get("session", ""))
+    assert [session.rpartition("-")[0][:10] for session in asked] == ["threshold-", "threshold-", ""]
+
+
 def test_without_anybody_on_the_bench_nothing_starts(page: Page, service: Pretended) -> None:
     service.says(subject=ON_BENCH | {"id": ""})
     page.reload()
@@ -174,9 +190,7 @@ def test_a_protocol_is_shown_as_deep_as_it_goes_and_stays_chosen_and_its_session
     expect(page.locator("#session-hint")).to_contain_text("no blanks")
     expect(page.locator("#capture-start")).to_be_enabled()
     page.fill("#session", "first visit")
-    expect(page.locator("#capture-start-why")).to_have_text(
-        "This is no name for a session: see below what one is made of."
-    )
+    expect(page.locator("#capture-start-why")).to_contain_text("This name will not do: it may hold letters")
     holds_up(page, "state-no-name-run", (390,))
     page.fill("#session", "first-visit")
     expect(page.locator("#capture-start")).to_be_enabled()

@@ -22,7 +22,7 @@ function Threshold({ id, known, value, write }: { id: string; known: Earlier | n
       <label>{t.run.thresholdOf(id)}
         <input id="subject-threshold" type="number" required min="0.5" max="50" step="0.1" value={value} onInput={(event) => write(event.currentTarget.value)} aria-describedby="subject-threshold-hint" />
       </label>
-      <p id="subject-threshold-hint" class="whole">{from ?? (known === null && t.run.notKnown(id))}</p>
+      <p id="subject-threshold-hint" class="whole">{from ?? (known === null && t.run.notKnown(id))} {t.run.homes}</p>
     </>
   );
 }

@@ -3,6 +3,7 @@ import { useState } from "preact/hooks";
 import type { Schema } from "../../api";
 import { get } from "../../api";
 import { attempt } from "../../attempt";
+import { sessionName } from "../../clock";
 import { ended, startInControl, useWork } from "../../jobs";
 import { rig } from "../../live";
 import { useLoaded, type Loaded } from "../../loaded";
@@ -85,7 +86,10 @@ function Ramp({ on, reload }: { on: OnBench; reload: () => void }) {
   const model = models.find((one) => keyOf(refOf(one)) === chosen) ?? own;
   const begin = (event: Event) => {
     event.preventDefault();
-    void attempt(async () => follow((await startInControl<Found>("threshold", { model: refOf(model!), up_to_N: Number(upTo) })).id));
+    // Unasked it goes into the session of the model, whose person it is then taken to be of.
+    const theirs = model!.subject === on.value.id && model!.site === on.value.site;
+    const params = { model: refOf(model!), up_to_N: Number(upTo), ...(!theirs && { session: sessionName(new Date(), "threshold-") }) };
+    void attempt(async () => follow((await startInControl<Found>("threshold", params)).id));
   };
   const running = job && !ended(job);
   if (!loaded.value) return <Show loaded={loaded}>{() => null}</Show>;
