@@ -1,6 +1,7 @@
 """Jobs that use the bench of the service: what each is checked for, and what it then does in a thread of its own."""
 
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ from controller.operation import Operation
 from controller.supervisor import Supervisor
 from rig.config.protocol import Indentation
 from rig.config.table import load
+from rig.recording.sessions import open_session
 from rig.results.base import SavedResult
 from rig.tissue.model import load_model
 
@@ -57,7 +59,7 @@ def _capture(body: CaptureJob, bench: Supervisor, places: Places) -> Planned:
 def _track(asked: TrackParams, bench: Supervisor, places: Places) -> Planned:
     wanted = _plan(asked, asked.model, bench, places)
     against = _plan(asked, asked.against, bench, places) if asked.against else None
-    name, folder = _session(asked, places)
+    name, folder = _session(asked, bench, places)
     operation = Operation("track", total=2 if against else 1, unit="runs")
     return Planned(operation, name, lambda: motion.track(operation, bench, wanted, folder, against))
 
@@ -72,9 +74,15 @@ def _plan(asked: TrackParams, ref: ModelRef, bench: Supervisor, places: Places) 
     return TrackPlan(program, str(file.relative_to(places.sessions)))
 
 
-def _session(asked: TrackParams | ThresholdParams, places: Places) -> tuple[str, Path]:
+def _own(session: str, bench: Supervisor, places: Places) -> str:
+    """The model's session where that is of who is on the bench; else one of their own, by the time."""
+    whose, now = open_session(places.session(session)).info.subject.get("id"), datetime.now(UTC)
+    return session if whose in (None, bench.wiring.subject.id) else f"{now:%Y%m%d-%H%M%S}"
+
+
+def _session(asked: TrackParams | ThresholdParams, bench: Supervisor, places: Places) -> tuple[str, Path]:
     """Name and folder of the session that is recorded into; raises UsageError where that holds something else."""
-    name = asked.session or asked.model.session
+    name = asked.session or _own(asked.model.session, bench, places)
     folder = places.recorded_into(name)
     tracked.refuse_foreign(folder)
     return name, folder
@@ -84,7 +92,7 @@ def _threshold(body: ThresholdJob, bench: Supervisor, places: Places) -> Planned
     asked, file = body.params, places.model(body.params.model)
     program = ramp.plan(asked.up_to_N, asked.rate_N_s, load_model(file), bench.wiring)
     plan = TrackPlan(program, str(file.relative_to(places.sessions)))
-    name, folder = _session(asked, places)
+    name, folder = _session(asked, bench, places)
     operation = Operation("threshold", total=1, unit="ramps")
     return Planned(operation, name, lambda: motion.threshold(operation, bench, plan, asked.up_to_N, folder))
 

@@ -80,7 +80,7 @@ class TrackParams(ForceOverTime):
     """Force tracking with a law made from a model."""
 
     model: ModelRef
-    session: Existing | None = Field(default=None, description="where it is recorded; null: the session of the model")
+    session: Existing | None = Field(default=None, description="where it is recorded; null: the model's, if theirs")
     forces_N: list[Force] = Field(default=[], max_length=20)
     seconds: float = Field(default=10.0, gt=1, le=600, description="on each of forces_N")
     against: ModelRef | None = Field(default=None, description="another model, tracked with first")
@@ -98,7 +98,7 @@ class ThresholdParams(RequestBody):
     model: ModelRef
     up_to_N: Force
     rate_N_s: float = Field(default=0.5, gt=0, le=10)
-    session: Existing | None = Field(default=None, description="where it is recorded; null: the session of the model")
+    session: Existing | None = Field(default=None, description="where it is recorded; null: the model's, if theirs")
 
 
 class GloveThresholdParams(RequestBody):
