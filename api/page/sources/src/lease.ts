@@ -101,6 +101,7 @@ export function keepLease(): void {
     if (lease.value && rig.value?.state === "running") event.preventDefault();
   });
   window.addEventListener("pagehide", () => {
-    if (lease.value) fetch(PATH, { method: "DELETE", headers: held(), keepalive: true });
+    // Without a service control has run out by itself.
+    if (lease.value) fetch(PATH, { method: "DELETE", headers: held(), keepalive: true }).catch(() => undefined);
   });
 }
