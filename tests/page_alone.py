@@ -21,6 +21,8 @@ IDLE = RigView(
     control=ControlView(holder="", since="", left_s=0.0),
 )  # fmt: skip
 
+# What the page calls a bench that it has heard of, at rest and with a tip that presses.
+KNOWN = ["ready", "tip presses"]
 
 # A stream that is open and says only that it is.
 SPEAKING = """
@@ -82,5 +84,5 @@ def _opened(page: Page, built: Path, view: RigView, errors: list[str]) -> Page:
     page.add_init_script(SPEAKING)
     page.route("**/*", answer)
     page.goto(ADDRESS)
-    page.wait_for_function("() => document.getElementById('state')?.textContent === 'ready'")
+    page.wait_for_function(f"() => {json.dumps(KNOWN)}.includes(document.getElementById('state')?.textContent)")
     return page
