@@ -5,6 +5,7 @@
 
 import os
 import pickle
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +19,8 @@ Found = TypeVar("Found")
 LONG_BYTES = 8_000_000
 # A third of a normal program's share of a busy computer: a fit may wait for a page, and never the other way.
 NICENESS = 5
+# What a traceback ends with is one line.
+LONGEST_LINE = 300
 PROGRAM = "from rig.apart import main; main()"
 
 
@@ -33,9 +36,10 @@ def apart(file: Path, work: Callable[..., Found], *given: object) -> Found:
         start_new_session=True,  # Ctrl-C is for who records
     )  # fmt: skip
     if done.returncode:
+        said = last_line(done.stderr.decode(errors="replace")) or "it said nothing"
         raise DataError(
-            f"{file}: the process that was to read it ended with code {done.returncode}, of -9 most often because"
-            f" memory ran out ({_last_line(done.stderr)}); free some, and record again"
+            f"{file}: the process that was to read it {how_ended(done.returncode)}, so it was not read ({said});"
+            " see that memory is free, and record again"
         )
     found = pickle.loads(done.stdout)
     if isinstance(found, RigError):
@@ -43,8 +47,17 @@ def apart(file: Path, work: Callable[..., Found], *given: object) -> Found:
     return cast(Found, found)
 
 
-def _last_line(said: bytes) -> str:
-    return (said.decode(errors="replace").strip().splitlines() or ["it said nothing"])[-1]
+def how_ended(code: int) -> str:
+    """What a process with this return code did."""
+    if code == -signal.SIGKILL:
+        return "was killed, most often because memory ran out"
+    return f"was ended by signal {-code}" if code < 0 else f"ended with code {code}"
+
+
+def last_line(said: str) -> str:
+    """The last one that is not blank; empty where there is none."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    return lines[-1][:LONGEST_LINE] if lines else ""
 
 
 def stand_back(niceness: int = NICENESS, whom: int = 0) -> None:

@@ -28,8 +28,9 @@ def with_quality(trial: TrialInfo, folder: Path, limits: QualityLimits, before: 
     """
     alike = [one for one in before if one.depth_mm == trial.depth_mm and one.outcome == "complete"]
     peaks_N = [one.peak_force_N for one in alike if one.quality in ("good", "usable") and one.peak_force_N > 0]
+    file = folder / trial.file
     try:
-        found = apart(folder / trial.file, evaluate_file, folder / trial.file, limits, peaks_N)
+        found = apart(file, evaluate_file, file, limits, peaks_N)
     except DataError as error:
         found = TrialQuality("bad", (str(error),))
     return replace(trial, quality=found.verdict, reasons=found.reasons, measured=dict(found.measured))

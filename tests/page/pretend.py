@@ -2,6 +2,8 @@
 
 import json
 import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,6 +12,8 @@ from playwright.sync_api import Browser, Page, Request, Route
 from pydantic import BaseModel
 
 from api.http.models import ControlView, RigView
+from hatch_build import SOURCES, built_folder
+from tests.page import told
 
 ADDRESS = "http://bench.invalid/"
 KIND = re.compile(r"kind=([a-z-]+)")
@@ -84,6 +88,7 @@ INFO = {"stop_port": 0, "software": "tissue-rig", "service_id": "s", "monotonic_
 STOPPED = {"done": True, "mode": "safe", "detail": "braked", "id": 1}
 ADMINISTRATOR = OPERATOR | {"scopes": ["read", "operate", "admin"]}
 Answer = BaseModel | dict[str, Any] | list[Any] | str | None
+Show = Callable[[str], Page]
 
 
 @dataclass
@@ -128,6 +133,28 @@ class Pretended:
         body = found.model_dump_json() if isinstance(found, BaseModel) else json.dumps(found)
         headers = {"ETag": '"1"', "Content-Type": "application/json"}
         return route.fulfill(body=body, headers=headers)
+
+
+def resting(**more: Answer) -> Pretended:
+    """At rest, with one session, for somebody who may operate; ``more`` is answered besides."""
+    answers: dict[str, Answer | int] = {"auth/me": OPERATOR, "rig": IDLE, "info": INFO, **more}
+    return Pretended(built_folder(SOURCES), answers | told.everything())
+
+
+@contextmanager
+def showing(browser: Browser, pretended: Pretended) -> Iterator[Show]:
+    """Shows the page at a place, as often as it is asked to; at the end none may have gone wrong."""
+    pages: list[Page] = []
+    errors: list[str] = []
+
+    def at(place: str) -> Page:
+        pages.append(opened(browser, pretended, place, errors))
+        return pages[-1]
+
+    yield at
+    for page in pages:
+        page.context.close()
+    assert errors == []
 
 
 def opened(browser: Browser, pretended: Pretended, view: str, errors: list[str]) -> Page:

@@ -1,17 +1,16 @@
 """What stands above every view: a tip that presses at rest, what came of a stop, what a stop still reaches."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from api.http.models import ControlView
-from hatch_build import SOURCES, built_folder
 from tests.page import told
 from tests.page.looks import holds_up
-from tests.page.pretend import IDLE, INFO, OPERATOR, STOPPED, Pretended, opened
+from tests.page.pretend import IDLE, INFO, STOPPED, Pretended, Show, resting, showing
 from tests.page.steps import state, view
 
 LEASE = {"lease_id": "l", "epoch": 1, "expires": told.AT}
@@ -21,29 +20,17 @@ ASKS = """() => !window.dispatchEvent(new Event("beforeunload", { cancelable: tr
 STATE = "http://127.0.0.1:4711/state"
 IN = {"force_N": 5.57, "depth_mm": 8.0}
 BANNER = "#stop-banner"
-Show = Callable[[str], Page]
 
 
 @pytest.fixture
 def service() -> Pretended:
-    """At rest, with one session, for somebody who may operate."""
-    answers: dict[str, Any] = {"auth/me": OPERATOR, "rig": IDLE, "info": INFO, "POST estop": STOPPED}
-    return Pretended(built_folder(SOURCES), answers | told.everything())
+    return resting(**{"POST estop": STOPPED})
 
 
 @pytest.fixture
 def show(browser: Browser, service: Pretended) -> Iterator[Show]:
-    pages: list[Page] = []
-    errors: list[str] = []
-
-    def at(place: str) -> Page:
-        pages.append(opened(browser, service, place, errors))
-        return pages[-1]
-
-    yield at
-    for page in pages:
-        page.context.close()
-    assert errors == []
+    with showing(browser, service) as at:
+        yield at
 
 
 def bench(service: Pretended, **changed: Any) -> None:
@@ -158,6 +145,14 @@ def test_a_refusal_says_whether_the_other_is_a_window_of_ones_own_and_goes_once_
     expect(page.locator("#message")).to_be_empty()
 
 
+def enters(page: Page, kind: str) -> None:
+    """Starts it by the keyboard, which goes on from what is under way."""
+    expect(page.locator(f"#{kind}-start")).to_be_enabled()
+    page.locator(f"#{kind}-start").focus()
+    page.keyboard.press("Enter")
+    expect(page.locator(f"#{kind}-under-way")).to_be_focused()
+
+
 def starts(service: Pretended, kind: str) -> None:
     """What is asked to start does."""
     begun = told.job(kind, "running")
@@ -170,10 +165,7 @@ def test_the_keyboard_goes_on_from_what_it_started_and_the_page_is_not_left_unas
 ) -> None:
     starts(service, "track")
     page = show("track")
-    expect(page.locator("#track-start")).to_be_enabled()
-    page.locator("#track-start").focus()
-    page.keyboard.press("Enter")
-    expect(page.locator("#track-under-way")).to_be_focused()
+    enters(page, "track")
     assert page.evaluate(ASKS) is False
     bench(service, state="running", mode="contact")
     state(page, "running")
@@ -186,11 +178,7 @@ def test_the_keyboard_goes_on_from_what_it_started_and_the_page_is_not_left_unas
 
 def test_the_keyboard_goes_on_from_a_capture_that_it_started(show: Show, service: Pretended) -> None:
     starts(service, "capture")
-    page = show("run")
-    expect(page.locator("#capture-start")).to_be_enabled()
-    page.locator("#capture-start").focus()
-    page.keyboard.press("Enter")
-    expect(page.locator("#capture-under-way")).to_be_focused()
+    enters(show("run"), "capture")
 
 
 def test_values_that_are_not_known_or_not_as_they_seem_are_told(show: Show) -> None:

@@ -1,15 +1,13 @@
 """What the page does where one answer is lost, broken or none of the kind, of a service that goes on."""
 
 import re
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Browser, Page, Response, Route, expect
 
-from hatch_build import SOURCES, built_folder
 from tests.page import told
-from tests.page.pretend import ADDRESS, API, IDLE, INFO, OPERATOR, Pretended, opened
+from tests.page.pretend import ADDRESS, API, IDLE, INFO, Pretended, Show, resting, showing
 from tests.page.steps import state, view
 
 DIRECT = "http://127.0.0.1:4711/estop"
@@ -20,29 +18,17 @@ GONE = IDLE.model_copy(update={"state": "disconnected", "reason": "the cable of 
 GIVEN_UP_MS = 20_000
 # An answer that has come is not at once one that the page has read; nothing on it shows when.
 TAKEN_MS = 500
-Show = Callable[[str], Page]
 
 
 @pytest.fixture
 def service() -> Pretended:
-    """At rest, with one session, for somebody who may operate."""
-    answers: dict[str, Any] = {"auth/me": OPERATOR, "rig": IDLE, "info": INFO}
-    return Pretended(built_folder(SOURCES), answers | told.everything())
+    return resting()
 
 
 @pytest.fixture
 def show(browser: Browser, service: Pretended) -> Iterator[Show]:
-    pages: list[Page] = []
-    errors: list[str] = []
-
-    def at(place: str) -> Page:
-        pages.append(opened(browser, service, place, errors))
-        return pages[-1]
-
-    yield at
-    for page in pages:
-        page.context.close()
-    assert errors == []
+    with showing(browser, service) as at:
+        yield at
 
 
 def told_where(page: Page, service: Pretended) -> None:

@@ -1,45 +1,31 @@
 """What the views of sessions and models say of one whose recording was cut off, and of diagnoses that named nothing."""
 
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, expect
 
 from api.http.jobs.views import FileView
 from api.http.models import RecordingView
-from hatch_build import SOURCES, built_folder
 from rig.results.recorded import VerifiedTrial, VerifyResult
 from tests.page import told, told_lab
 from tests.page.looks import holds_up
-from tests.page.pretend import IDLE, INFO, OPERATOR, Pretended, opened
+from tests.page.pretend import Pretended, Show, resting, showing
 from tests.page.steps import view
 
 SESSION, TRIALS, MODELS = f"session/{told.NAME}", told.nothing()["trials"], told.MODELS.items
 UNLISTED = "trial_001.mcap: not listed in session.json"
-Show = Callable[[str], Page]
 
 
 @pytest.fixture
 def service() -> Pretended:
-    """At rest, with one session, for somebody who may operate."""
-    answers: dict[str, Any] = {"auth/me": OPERATOR, "rig": IDLE, "info": INFO}
-    return Pretended(built_folder(SOURCES), answers | told.everything())
+    return resting()
 
 
 @pytest.fixture
 def show(browser: Browser, service: Pretended) -> Iterator[Show]:
-    pages: list[Page] = []
-    errors: list[str] = []
-
-    def at(place: str) -> Page:
-        pages.append(opened(browser, service, place, errors))
-        return pages[-1]
-
-    yield at
-    for page in pages:
-        page.context.close()
-    assert errors == []
+    with showing(browser, service) as at:
+        yield at
 
 
 def test_a_session_that_was_cut_off_says_what_of_it_can_be_used_and_what_is_not_as_it_should_be(

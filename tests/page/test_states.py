@@ -13,12 +13,11 @@ from playwright.sync_api import Browser, Page, expect
 
 from api.http.access.models import AuditView
 from api.http.models import RigView
-from hatch_build import SOURCES, built_folder
 from mock_devices.testing import commands
 from mock_devices.testing.commands import ServedBench
 from tests.page import steps, told, told_lab
 from tests.page.looks import holds_up, violations
-from tests.page.pretend import ADMINISTRATOR, IDLE, INFO, OPERATOR, STOPPED, Pretended, opened
+from tests.page.pretend import ADMINISTRATOR, IDLE, STOPPED, Pretended, opened, resting
 from tests.page.steps import out_or_named, state
 from tests.page.told_lab import AUDIT
 
@@ -31,9 +30,7 @@ TOO_MUCH = "40 N is more than the 6 N that bench, subject and model allow."
 
 @pytest.fixture
 def service() -> Pretended:
-    """At rest, with one session, for somebody who may operate."""
-    answers: dict[str, Any] = {"auth/me": OPERATOR, "rig": IDLE, "info": INFO, "POST estop": STOPPED}
-    return Pretended(built_folder(SOURCES), answers | told.everything())
+    return resting(**{"POST estop": STOPPED})
 
 
 @pytest.fixture

@@ -13,11 +13,10 @@ from pathlib import Path
 import rig.errors
 from api.http.jobs.wire import CANCEL_S, Order, Told, Word
 from controller.operation import Cancelled, Operation
+from rig.apart import how_ended, last_line
 from rig.errors import RigError, SafetyStop
 
 MODULE = "api.http.jobs.worker"
-# What a traceback ends with is one line.
-LONGEST_LINE = 300
 
 
 class Crashed(RigError):
@@ -70,7 +69,7 @@ class Computation:
             raise _error(end)
         if self._cancelled:
             raise Cancelled(f"{self._order.kind} was cancelled")
-        raise Crashed(f"the process of this {self._order.kind} {_how(code)}; {_last_line(complaints)}")
+        raise Crashed(f"the process of this {self._order.kind} {how_ended(code)}; {_last_line(complaints)}")
 
     def cancel(self) -> None:
         """Asks it to end soon, and sees that it does."""
@@ -132,14 +131,8 @@ def _error(told: Told) -> RigError:
     return found
 
 
-def _how(code: int) -> str:
-    if code == -signal.SIGKILL:
-        return "was killed, most often because memory ran out"
-    return f"was ended by signal {-code}" if code < 0 else f"ended with code {code}"
-
-
 def _last_line(complaints: int) -> str:
     with open(complaints, encoding="utf-8", errors="replace", closefd=False) as file:
         file.seek(0)
-        lines = [line.strip() for line in file if line.strip()]
-    return f"its last words: {lines[-1][:LONGEST_LINE]}" if lines else "it said nothing; start it again"
+        said = last_line(file.read())
+    return f"its last words: {said}" if said else "it said nothing; start it again"

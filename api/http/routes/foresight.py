@@ -61,13 +61,15 @@ def add(router: APIRouter, service: Service) -> None:
     ) -> Foresight:
         plan = service.plan(name)
         model = load_model(service.jobs.places("").session(session) / file / "model.json") if session else None
+        refused = ""
         try:
-            return foresee(name, check(plan, service.wiring), model)
+            plan = check(plan, service.wiring)
         except UsageError as error:
-            return foresee(name, plan, model, str(error))
+            refused = str(error)
+        return foresee(name, plan, model, refused)
 
 
-def foresee(name: str, plan: Indentation, model: Model | None, refused: str = "") -> Foresight:
+def foresee(name: str, plan: Indentation, model: Model | None, refused: str) -> Foresight:
     """What is to be said of ``plan`` on the tissue of ``model``."""
     expected = tuple(_expected(plan, model)) if model else ()
     verdict, sentence = _verdict(plan, expected, refused)
