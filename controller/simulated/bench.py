@@ -24,16 +24,7 @@ from controller.safety.inputs import SafetyInputs
 from controller.safety.load import TipLoad
 from controller.safety.table import Incident
 from controller.simulated import segments
-from controller.simulated.segments import (
-    BenchState,
-    InputBounds,
-    Move,
-    Plant,
-    Stretch,
-    Timing,
-    Zeros,
-    hold_compiled,
-)
+from controller.simulated.segments import BenchState, InputBounds, Move, Plant, Stretch, Timing, Zeros, hold_compiled
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed
 from rig.simulation import axis_plant

@@ -82,13 +82,8 @@ _WALK: dict[Goal, dict[PdsState, int]] = {
         PdsState.ENABLED: Controlword.ENABLE_OPERATION,
         PdsState.QUICK_STOP: Controlword.ENABLE_OPERATION,
     },
-    Goal.STOPPED: {
-        PdsState.ENABLED: Controlword.QUICK_STOP,
-        PdsState.QUICK_STOP: Controlword.QUICK_STOP,
-    },
-    Goal.DISABLED: {
-        PdsState.ENABLED: Controlword.SWITCH_ON,
-    },
+    Goal.STOPPED: {PdsState.ENABLED: Controlword.QUICK_STOP, PdsState.QUICK_STOP: Controlword.QUICK_STOP},
+    Goal.DISABLED: {PdsState.ENABLED: Controlword.SWITCH_ON},
 }
 _AT = {
     Goal.ENABLED: {PdsState.ENABLED},

@@ -20,13 +20,7 @@ class BreathingMock:
 
     name = "breathing"
 
-    def __init__(
-        self,
-        stream: str,
-        surface_mm: Callable[[], float],
-        start_ns: int,
-        rate_Hz: float = RATE_HZ,
-    ) -> None:
+    def __init__(self, stream: str, surface_mm: Callable[[], float], start_ns: int, rate_Hz: float = RATE_HZ) -> None:
         pylsl = load("machine")
         info = pylsl.StreamInfo(stream, "Respiration", 1, rate_Hz, pylsl.cf_double64, SOURCE_ID)
         info.set_channel_labels(["respiration"])

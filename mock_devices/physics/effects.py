@@ -8,13 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields
 
 from mock_devices.physics.chain import HiddenEffect, Knob
-from mock_devices.physics.effects_motion import (
-    Backlash,
-    ContactOffset,
-    FrameCompliance,
-    PositionRipple,
-    SurfaceMotion,
-)
+from mock_devices.physics.effects_motion import Backlash, ContactOffset, FrameCompliance, PositionRipple, SurfaceMotion
 from mock_devices.physics.effects_sensing import (
     ClockDrift,
     Cogging,

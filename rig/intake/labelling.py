@@ -20,11 +20,7 @@ FEWEST_ROWS = 5
 RECORDINGS = WORDS["label"][: WORDS["label"].index("cycle")]
 UNKNOWN = len(WORDS["label"])
 # What is stated above a table of whom or what it is of; a cycle's number is not, and a sample may have a rate as well.
-FACTS = {
-    "specimen": KINDS["specimen"],
-    "site": KINDS["site"],
-    "operator": OPERATORS,
-}
+FACTS = {"specimen": KINDS["specimen"], "site": KINDS["site"], "operator": OPERATORS}
 IDENTIFIERS = frozenset(("name", "id", "identifier", "label", "code", "no", "nr", "number", "nummer", "bezeichnung"))
 
 
