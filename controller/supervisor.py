@@ -231,9 +231,9 @@ class Supervisor:
         """Port on 127.0.0.1 at which the stop process takes POST /estop, /pain and /stop; 0 where there is none."""
         return self._stop.port if self._stop else 0
 
-    def stop(self) -> None:
-        """Soft stop by the operator: retract, then stay."""
-        self.stops.request(StopReason.STOP)
+    def stop(self, why: StopReason = StopReason.STOP) -> None:
+        """Soft stop, by the operator where nothing else is said: retract, then stay."""
+        self.stops.request(why)
 
     def pain(self) -> None:
         """The subject's stop: retract, then stay."""

@@ -202,8 +202,8 @@ PROCESSES = (
         why="all devices at once",
     ),
     Fault("recorder.frozen", "press", ("recorder_stalled",), acts.frozen(acts.recorder), latest_s=0.5),
-    Fault("recorder.killed", "press", ("operator_stop",), acts.killed(acts.recorder), within_s=RECORDER_GONE_S),
-    Fault("recorder.disk_full", "press", ("operator_stop",), acts.full_disk, within_s=DISK_FULL_S),
+    Fault("recorder.killed", "press", ("recorder_stalled",), acts.killed(acts.recorder), within_s=RECORDER_GONE_S),
+    Fault("recorder.disk_full", "press", ("recorder_stalled",), acts.full_disk, within_s=DISK_FULL_S),
 )
 
 ANY_AXIS = ("axis_lost", "drive_fault", "following_error", "overspeed", "workspace", "axis_frozen", QUALITY)

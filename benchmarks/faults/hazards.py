@@ -67,7 +67,7 @@ HAZARDS = (
     Hazard(
         "The software itself stops, hangs or is late",
         "an overloaded computer, a process that is killed or frozen, a full disk, a recorder that fails",
-        ("loop_overrun", "supervisor_lost", "operator_silent", "recorder_stalled", "operator_stop", DRIVE),
+        ("loop_overrun", "supervisor_lost", "operator_silent", "recorder_stalled", DRIVE),
         "Between the loop's end and the drive's own stop lie up to two heartbeats, in which the axis holds its place.",
     ),
     Hazard(

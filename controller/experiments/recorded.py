@@ -12,6 +12,7 @@ import rig
 from controller.commissioning.refusals import refuse_uncommissioned
 from controller.loop.messages import Outcome
 from controller.loop.steps import Program
+from controller.stop.word import StopReason
 from controller.supervisor import Supervisor
 from drivers.roles import Identity
 from rig.config.products.input_role import brought_by
@@ -132,7 +133,7 @@ def _stop_without_recorder(bench: Supervisor, over: threading.Event, failures: l
         failure = bench.recorder.failure if bench.recorder else "the recorder is gone"
         if failure:
             failures.append(failure)
-            bench.stop()
+            bench.stop(StopReason.RECORDING_LOST)
             return
 
 

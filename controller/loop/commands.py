@@ -23,6 +23,7 @@ REQUESTS = {
     StopReason.PAIN: frozenset({"pain"}),
     StopReason.EMERGENCY: frozenset({"estop"}),
     StopReason.KEYPAD_LOST: frozenset({"stop", "keypad"}),
+    StopReason.RECORDING_LOST: frozenset({"recording"}),
 }
 """What each kind of stop is called in the safety table's checks."""
 

@@ -63,6 +63,7 @@ def _of_processes(given: Given, code: str, text: str) -> bool:
     silent, full = SILENT.search(text), FULL.search(text)
     silent_s = float(silent[1]) + ROUNDED_S if silent else 0.0
     if code == "recorder_stalled":
+        given.requests |= set() if silent or full else {"recording"}
         given.recorder_silent_s, given.recorder_fill = silent_s, float(full[1]) / 100 if full else 0.0
     elif code == "stop_lost":
         given.stop_silent_s = silent_s

@@ -204,11 +204,13 @@ def loop_overrun(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
 
 
 def recorder_stalled(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:
-    """Nobody takes the rows that are to be recorded."""
-    if inputs.recorder_fill <= RECORDER_FILL and inputs.recorder_silent_s <= RECORDER_SILENT_S:
+    """Nobody takes the rows that are to be recorded, or they reach no file."""
+    if "recording" in inputs.requests:
+        return "the recording failed, and nothing moves unrecorded: the trial says why"
+    silent_s, full = inputs.recorder_silent_s, 100 * inputs.recorder_fill
+    if inputs.recorder_fill <= RECORDER_FILL and silent_s <= RECORDER_SILENT_S:
         return ""
-    full = 100 * inputs.recorder_fill
-    return f"the recorder is silent for {inputs.recorder_silent_s:.1f} s, its buffer {full:.0f} % full"
+    return f"the recorder is silent for {silent_s:.1f} s, its buffer {full:.0f} % full"
 
 
 def stop_lost(state: LoopState, inputs: SafetyInputs, wiring: Wiring) -> str:

@@ -22,7 +22,7 @@ PAGE = 4096
 MAGIC = int.from_bytes(b"tissstop", "little")
 _MAGIC, _LOOP_PID, _LOOP_BEAT, _SERVER_PID, _KEYPAD, _SERVER_BEAT = range(6)
 _LANES, _LANE_WORDS = 16, 32
-# After the newest id, eight words each: room for twice the kinds there are, within the lane.
+# After the newest id, eight words each: room for eight kinds, within the lane.
 _REQUESTS, _ANSWERS, _TIMES = 1, 9, 17
 _DEED_BITS = 4  # fifteen deeds, of which there are six; 60 bits are left for ids
 LOOK_S = 0.0005
@@ -37,12 +37,13 @@ class Lane(IntEnum):
 
 
 class StopReason(IntEnum):
-    """What is asked for: retract by the operator's or the subject's wish, brake at once, retract for lack of keys."""
+    """What is asked for: to retract by the operator's or the subject's wish, to brake, to retract for what is lost."""
 
     STOP = 0
     PAIN = 1
     EMERGENCY = 2
     KEYPAD_LOST = 3
+    RECORDING_LOST = 4
 
 
 class Deed(IntEnum):

@@ -136,6 +136,7 @@ KINDS = {
     "pain": StopReason.PAIN,
     "estop": StopReason.EMERGENCY,
     "keypad": StopReason.KEYPAD_LOST,
+    "recording": StopReason.RECORDING_LOST,
 }
 HEARD: dict[str, type[Message]] = {"finished": Finished, "incident": Stopped, "answer": Answer, "surveyed": Surveyed}
 

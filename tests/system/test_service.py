@@ -202,4 +202,6 @@ def test_a_session_whose_folder_is_removed_meanwhile_is_a_stop_with_one_sentence
     assert (done["state"], done["problem"]["code"]) == ("failed", "failed")
     assert "trial_001.mcap: was removed or moved while it was recorded" in done["message"]
     assert not (folder / "sessions" / "eighth").exists()
+    state = client.get("/api/v1/rig").json()["reason"]
+    assert state == "the recording failed, and nothing moves unrecorded: the trial says why", "nobody pressed anything"
     reset(client)

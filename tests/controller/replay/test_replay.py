@@ -90,6 +90,7 @@ FAULTS: dict[str, tuple[Callable[[FakeBench], object], str]] = {
     "drive fault": (lambda bench: setattr(bench.axis, "fault_text", "0x8611 following error"), "drive_fault"),
     "recorder silent": (lambda bench: setattr(bench.ring, "silent_s", 7.0), "recorder_stalled"),
     "recorder full": (lambda bench: setattr(bench.ring, "fill", 0.93), "recorder_stalled"),
+    "recording lost": (lambda bench: bench.say("recording"), "recorder_stalled"),
     "stop process dead": (lambda bench: setattr(bench, "stop_process_lives", False), "stop_lost"),
     "operator gone": (lambda bench: setattr(bench, "keep_lease", False), "operator_silent"),
     "lease given back": (lambda bench: bench.say("unattended"), "operator_silent"),
@@ -202,6 +203,8 @@ def test_inputs_are_read_from_the_sentences_of_the_checks() -> None:
     """The sentences are those that the checks themselves say."""
     found = given_by([event("recorder_stalled", "the recorder is silent for 3.0 s, its buffer 40 % full")])[7]
     assert (f"{found.recorder_silent_s:.1f}", found.recorder_fill) == ("3.0", 0.4)
+    lost = given_by([event("recorder_stalled", "the recording failed, and nothing moves unrecorded")])[7]
+    assert (lost.requests, lost.recorder_silent_s, lost.recorder_fill) == (frozenset({"recording"}), 0.0, 0.0)
     keypad = given_by([event("operator_stop", "the keypad or foot switch for stops is gone: plug it in")])[7]
     assert keypad.requests == {"stop", "keypad"}
     old = event("force_lost", "force: newest sample is 60 ms old (limit 50 ms)")

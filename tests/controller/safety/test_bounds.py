@@ -162,6 +162,8 @@ CASES = [
          "the recorder is silent for 0.0 s, its buffer 51 % full"),
     Case("recorder_stalled", {"recorder_silent_s": 3.0}, {"recorder_silent_s": 3.1},
          "the recorder is silent for 3.1 s, its buffer 0 % full"),
+    Case("recorder_stalled", asked("pain"), asked("recording"),
+         "the recording failed, and nothing moves unrecorded: the trial says why"),
     Case("input_lost", {"input_lost": ""}, {"input_lost": "input pedal is lost: gone"}, "input pedal is lost: gone"),
     Case("stop_lost", {"stop_silent_s": 1.0}, {"stop_silent_s": 1.01},
          "the stop process is silent for 1.0 s (limit 1 s), so nobody could stop what moves: start the bench again"),
