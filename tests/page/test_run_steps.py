@@ -164,6 +164,18 @@ def test_without_anybody_on_the_bench_nothing_starts(page: Page, service: Preten
     expect(page.locator("#capture-start")).to_be_disabled()
 
 
+def test_a_protocol_above_the_threshold_is_shown_with_the_force_at_which_it_ends(
+    page: Page, service: Pretended
+) -> None:
+    expect(page.locator("#contents")).to_contain_text("force limit12.0 N")
+    expect(page.locator("#lowered")).to_have_count(0)
+    lower = told.FORESIGHT.model_copy(update={"force_limit_N": 3.2})
+    service.says(protocols__quick__foresight=lower)
+    page.reload()
+    expect(page.locator("#contents")).to_contain_text("force limit3.2 N")
+    expect(page.locator("#lowered")).to_contain_text("The protocol says 12.0 N, which is more than this subject's")
+
+
 def test_a_protocol_is_shown_as_deep_as_it_goes_and_stays_chosen_and_its_session_s_name_is_asked_for_in_words(
     page: Page, service: Pretended
 ) -> None:

@@ -63,7 +63,7 @@ PROTOCOLS = [
 ]
 FORESIGHT = Foresight(
     protocol="quick", verdict="as planned", trials=3, duration_s=34.0, depth_mm=8.0, force_limit_N=12.0,
-    sentence="5.9 N at most are expected, at 30 mm/s and 8 mm; the protocol's force limit of 12 N is not reached",
+    sentence="5.9 N at most are expected, at 30 mm/s and 8 mm; the force limit of 12 N is not reached",
     expected=tuple(ExpectedForce(speed_mm_s=v, depth_mm=8.0, force_N=force_N(8.0, v), ends="depth") for v in SPEEDS),
 )  # fmt: skip
 MODELS = ModelList(

@@ -44,6 +44,7 @@ export const run = {
   refused: "refused", refusedHere: "This bench refuses the protocol, see above.",
   trials: "trials", trialsOf: (speeds: number, trials: number) => (speeds === 1 ? `${trials}` : `${speeds * trials}`),
   speeds: "speeds", speed: "speed", depth: "depth", deepest: "deepest", limit: "force limit", hold: "hold", lasts: "takes about",
+  lowered: (asked: string) => `The protocol says ${asked} N, which is more than this subject's threshold; each compression ends a fifth below that.`,
   dither: (depth: string, swing: string) => `At ${depth} mm it swings by ${swing} mm to either side.`,
   second: (depth: string, second: string) => `It presses to ${depth} mm, then to ${second} mm.`,
   expectedForce: "force expected", expectedDepth: "depth expected", bySpeed: "What is expected at each speed", endsBy: "ended by",

@@ -26,16 +26,18 @@ function Contents({ protocol, seen }: { protocol: Protocol; seen: Foresight | nu
   const { settings } = protocol;
   const speeds = (settings.speeds_mm_s ?? []) as number[];
   const goesOn = beyond(settings);
+  const asked_N = Number(settings.force_limit_N);
   return (
     <>
       <dl class="facts" id="contents">
         <Fact name={t.run.trials} value={t.run.trialsOf(speeds.length, Number(settings.trials))} unit="" />
         <Fact name={t.run.speeds} value={speeds.join(", ")} unit="mm/s" />
         <Fact name={goesOn ? t.run.deepest : t.run.depth} value={shown(seen?.depth_mm, 1)} unit="mm" />
-        <Fact name={t.run.limit} value={shown(Number(settings.force_limit_N), 1)} unit="N" />
+        <Fact name={t.run.limit} value={shown(seen?.force_limit_N, 1)} unit="N" />
         <Fact name={t.run.hold} value={significant(Number(settings.hold_s))} unit="s" />
         <Fact name={t.run.lasts} value={seen ? duration(seen.duration_s) : t.unknown} unit="" />
       </dl>
+      {seen && seen.force_limit_N < asked_N && <p id="lowered">{t.run.lowered(shown(asked_N, 1))}</p>}
       {goesOn && <p id="beyond">{goesOn}</p>}
     </>
   );
