@@ -1,7 +1,7 @@
 """The surface as the loop finds it, over hundreds of approaches: ``python -m benchmarks.contact [--approaches 100]``.
 
-Both sensors' noise and rate, limbs from 0.05 to 5 N/mm, on a clock of its own; with ``--others`` what is touched is no
-limb, and begins without slope. Ends with 1 where either sensor is off by more than depth is promised to on the mock
+Both sensors' noise and rate, limbs from 0.05 to 5 N/mm, on a clock of its own; with ``--others`` a round tip, under
+which force begins without slope. Ends with 1 where either sensor is off by more than depth is promised to on the mock
 bench's limb, or on any where it calls the surface known so well, or where its intervals hold the surface less often
 than they say. Prints the head and the table of a page in docs/validation. Last line: one JSON object.
 """
@@ -21,6 +21,7 @@ from benchmarks.about import head
 from controller.loop.paired_samples import Touch
 from mock_devices.testing.limb_bench import BOTA, FT300, Limb, LimbBench, approached
 from mock_devices.testing.spring_bench import SURFACE_MM
+from rig.config.wiring import TipShape, Wiring
 
 # What the mock bench has; depth into it is the same with either sensor.
 PHANTOM = Limb()
@@ -41,6 +42,7 @@ class Onset(Limb):
         return float(self.a_N_mm * depth_mm**self.b_per_mm + self.damping_N_s_mm * speed_mm_s)
 
 
+ROUND = Wiring(tip=TipShape(round=True))
 OTHERS = (Onset(0.15, 1.5, 0.0), Onset(0.75, 1.5, 0.0), Onset(0.3, 2.0, 0.0))
 SENSORS = {"bota-sensone": BOTA, "robotiq-ft300": FT300}
 # What depth is promised to, and what a trial has to say itself where it is not known so well.
@@ -132,7 +134,10 @@ def totals(rows: Sequence[Row]) -> dict[str, float]:
 
 def approaches(name: str, limb: Limb, count: int) -> Row:
     """So many approaches of a sensor to a limb, and a line about them."""
-    runs = [approached(limb, SENSORS[name], seed) for seed in range(count)]
+    runs = [
+        approached(limb, SENSORS[name], seed, wiring=ROUND if isinstance(limb, Onset) else None)
+        for seed in range(count)
+    ]
     touches = [_touch(bench) for bench in runs]
     row = Row(
         name, limb,

@@ -92,6 +92,7 @@ class BenchLoop:
             dt_s=period_s,
             acceleration_mm_s2=wiring.axis.acceleration_mm_s2,
             position_min_mm=wiring.limits.position_min_mm,
+            round_tip=wiring.tip.round,
         )
         self.machine = MotionStateMachine(wiring, self.state, self._finished, table)
         self.inputs = SafetyInputs()

@@ -63,7 +63,7 @@ def _serve(
     ring = RingWriter.create(ring_path)
     stops.attach(os.getpid())
     try:
-        warm_up()
+        warm_up(wiring.tip.round)
         granted = realtime.acquire(wiring.loop.priority)
         interruption, ending = Interruption(), threading.Event()
         _when_ended(ending.set)

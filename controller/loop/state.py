@@ -25,6 +25,7 @@ class LoopState:
     dt_s: float = 0.001
     acceleration_mm_s2: float = 2000.0
     position_min_mm: float = 0.0
+    round_tip: bool = False
     wrench: Wrench = NAN_WRENCH
     zero: Wrench | None = None
     reference_zero: Wrench | None = None

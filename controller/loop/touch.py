@@ -12,7 +12,7 @@ import numpy as np
 from controller.loop.paired_samples import ROWS, Touch
 from controller.loop.setpoint import Setpoint
 from controller.loop.state import LoopState
-from rig.trials.contact import LIMB_SHAPE, Contact, ContactSearch, Loading
+from rig.trials.contact import ANY_SHAPE, LIMB_SHAPE, Contact, ContactSearch, Loading
 
 LEAST_ROWS = 8  # the estimator fits seven numbers: one row is left to tell the noise by
 AIR_MM = 0.3  # of 0.5 mm between SLIP_MM and the surface, which is known to 0.2 mm
@@ -60,10 +60,8 @@ class TouchRun:
         state.setpoint = Setpoint(state.setpoint.position_mm, 0.0)
         state.paired.collecting = False
         if self._search is None:
-            self._search = _search(state.paired.loading, state.noise_N)
-            if self._search is None:
-                return self._settle(state, self._unknown(state))
-            return False
+            self._search = _search(state.paired.loading, state.noise_N, state.round_tip)
+            return self._search is None and self._settle(state, self._unknown(state))
         for _ in range(max(1, round(PORTIONS_A_MS * 1e3 * state.dt_s))):
             if self._search.advance():
                 return self._settle(state, self._search.contact)
@@ -113,7 +111,7 @@ class TouchRun:
         return False
 
 
-def _search(loading: Loading, noise_N: float) -> ContactSearch | None:
+def _search(loading: Loading, noise_N: float, round_tip: bool = False) -> ContactSearch | None:
     """The estimator over a loading whose first 0.3 mm is taken for air; None where there are too few rows."""
     if len(loading.samples) < LEAST_ROWS:
         return None
@@ -121,17 +119,17 @@ def _search(loading: Loading, noise_N: float) -> ContactSearch | None:
     air_mm = min(AIR_MM, 0.2 * (last_mm - first_mm))
     # Force and axis are paired to a row: at its speed that is how far a force may lie from its place.
     paired = loading._replace(apart_mm=float(np.median(np.abs(np.diff(loading.position_mm)))))
-    return ContactSearch(paired, (first_mm + air_mm, last_mm), noise_N, LIMB_SHAPE, ROUNDS)
+    return ContactSearch(paired, (first_mm + air_mm, last_mm), noise_N, ANY_SHAPE if round_tip else LIMB_SHAPE, ROUNDS)
 
 
-def warm_up() -> Contact:
+def warm_up(round_tip: bool = False) -> Contact:
     """Estimates a surface at 0 mm before anything moves: what a first call loads and allocates takes milliseconds.
 
     As many rows as an approach may leave: linear algebra takes its 64 MB of working memory only for long ones, and
     memory that is locked is filled at once, which takes 25 ms.
     """
     depth_mm = np.linspace(-1.0, 1.0, ROWS)
-    search = _search(Loading(depth_mm, np.maximum(depth_mm, 0.0), np.ones_like(depth_mm)), 0.01)
+    search = _search(Loading(depth_mm, np.maximum(depth_mm, 0.0), np.ones_like(depth_mm)), 0.01, round_tip)
     assert search
     while not search.advance():
         pass

@@ -61,9 +61,11 @@ class LimbBench(SpringBench):
         return round((force_N + self.noise.gauss(0.0, sensor.noise_N)) / sensor.quantum_N) * sensor.quantum_N
 
 
-def approached(limb: Limb, sensor: Sensor, seed: int, touches: int = 3, friction_N: float = 0.0) -> LimbBench:
+def approached(
+    limb: Limb, sensor: Sensor, seed: int, touches: int = 3, friction_N: float = 0.0, wiring: Wiring | None = None
+) -> LimbBench:
     """One approach as a capture makes it, to its end, from somewhere 2 to 3 mm above the limb."""
-    bench = LimbBench(Wiring(), limb=limb, sensor=sensor, position_mm=SURFACE_MM - 3.0, friction_N=friction_N)
+    bench = LimbBench(wiring or Wiring(), limb=limb, sensor=sensor, position_mm=SURFACE_MM - 3.0, friction_N=friction_N)
     bench.noise.seed(seed)
     bench.position_mm += bench.noise.random()
     bench.sense()

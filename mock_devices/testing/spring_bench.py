@@ -46,7 +46,7 @@ class SpringBench:
     count: int = -1
 
     def __post_init__(self) -> None:
-        self.state = LoopState(position_mm=self.position_mm)
+        self.state = LoopState(position_mm=self.position_mm, round_tip=self.wiring.tip.round)
         self.machine = MotionStateMachine(
             self.wiring, self.state, lambda outcome, cause: self.ended.append((outcome, cause)), self.table
         )

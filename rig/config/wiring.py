@@ -83,6 +83,12 @@ class Limits(Table):
         return self
 
 
+class TipShape(Table):
+    """What touches."""
+
+    round: bool = Field(default=False, description="force begins without slope, as under a ball or a cone")
+
+
 class MockBenchSettings(Table):
     """Where ports are ``mock``: what the simulated bench is made of."""
 
@@ -100,6 +106,7 @@ class Wiring(Table):
     tracker: AnyTracker | None = PolarisWiring()
     loop: Loop = Loop()
     limits: Limits = Limits()
+    tip: TipShape = TipShape()
     subject: Subject = Subject()
     stop: Stop = Stop()
     mock: MockBenchSettings = MockBenchSettings()

@@ -75,7 +75,7 @@ def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     def serve(bench: Bench) -> tuple[int, list[Message]]:
         monkeypatch.setattr(process, "start_devices", bench.start)
         monkeypatch.setattr(process, "_run", lambda *arguments: bench.run(arguments[4]))
-        monkeypatch.setattr(process, "warm_up", lambda: None)
+        monkeypatch.setattr(process, "warm_up", lambda _: None)
         monkeypatch.setattr(realtime, "acquire", lambda _: {})
         mine, theirs = pair()
         page = tmp_path / "a.stop"

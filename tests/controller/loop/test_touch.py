@@ -20,6 +20,7 @@ from controller.loop.touch import warm_up
 from mock_devices.testing.commands import ROOT
 from mock_devices.testing.limb_bench import BOTA, FT300, Limb, Sensor, approached
 from mock_devices.testing.spring_bench import APPROACH, PRESS, SURFACE_MM, SpringBench
+from rig.config.wiring import TipShape, Wiring
 from rig.trials.contact import Loading
 
 FIRM = Limb(0.5, 0.2, 0.0)
@@ -112,23 +113,27 @@ def taken_MB():
     return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() / 2**20
 
 touch.ROWS = int(sys.argv[1])
-touch.warm_up()
+is_round = sys.argv[2] == "True"
+touch.warm_up(is_round)
 before_MB = taken_MB()
 depth_mm = np.linspace(-1.0, 8.0, ROWS)
-search = touch._search(Loading(depth_mm, np.maximum(depth_mm, 0.0), np.ones(ROWS)), 0.01)
+search = touch._search(Loading(depth_mm, np.maximum(depth_mm, 0.0), np.ones(ROWS)), 0.01, is_round)
 while not search.advance():
     pass
 print(taken_MB() - before_MB)
 """
 
 
-@pytest.mark.parametrize(("rows", "least_MB", "most_MB"), [(ROWS, 0.0, 4.0), (50, 16.0, 128.0)])
+@pytest.mark.parametrize(
+    ("rows", "is_round", "least_MB", "most_MB"),
+    [(ROWS, False, 0.0, 4.0), (ROWS, True, 0.0, 4.0), (50, False, 16.0, 128.0)],
+)
 def test_the_first_contact_takes_no_memory_unless_too_little_was_warmed_up(
-    rows: int, least_MB: float, most_MB: float
+    rows: int, is_round: bool, least_MB: float, most_MB: float
 ) -> None:
     said = subprocess.run(
-        [sys.executable, "-c", MEMORY_TAKEN_MB, str(rows)], capture_output=True, text=True, check=True, cwd=ROOT,
-        env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+        [sys.executable, "-c", MEMORY_TAKEN_MB, str(rows), str(is_round)],
+        capture_output=True, text=True, check=True, cwd=ROOT, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
     )  # fmt: skip
     assert least_MB <= float(said.stdout) <= most_MB
 
@@ -154,6 +159,23 @@ def test_a_surface_does_not_lie_at_the_edge_of_its_own_interval(seed: int) -> No
         pass
     found = search.contact
     assert found.low_mm + 0.1 < found.position_mm < found.high_mm - 0.1
+
+
+class UnderABall(Limb):
+    """Force as depth to the power 1.5 (Hertz 1881)."""
+
+    def force_N(self, depth_mm: float, speed_mm_s: float) -> float:
+        return float(0.15 * max(depth_mm, 0.0) ** 1.5)
+
+
+def test_a_surface_under_a_round_tip_is_where_the_interval_says_once_the_tip_is_said_to_be_round() -> None:
+    held = {}
+    for is_round in (False, True):
+        wiring = Wiring(tip=TipShape(round=is_round))
+        touches = [approached(UnderABall(), FT300, seed, wiring=wiring).state.touch for seed in range(10)]
+        held[is_round] = sum(touch is not None and touch.low_mm <= SURFACE_MM <= touch.high_mm for touch in touches)
+    # At 95 %, more than two of ten outside has a chance of 1 %.
+    assert held[True] >= 8 > held[False]
 
 
 def test_a_portion_of_the_estimate_leaves_the_loop_its_cycle() -> None:
