@@ -13,8 +13,8 @@ from itertools import product
 import numpy as np
 from scipy.stats import binomtest
 
+from mock_devices.testing.made.two_clocks import SENSORS, TISSUES, Seen, pressed, tracked
 from rig.intake.lag import ClocksApart, Lag, TimedSignal, lag_of_force, lag_of_motion
-from tests.rig.intake.two_clocks import SENSORS, TISSUES, Seen, pressed, tracked
 
 Estimator = Callable[[TimedSignal, TimedSignal], Lag]
 

@@ -16,7 +16,7 @@ import numpy as np
 from api.operations.cohort.cohort import cohort, cohort_operation
 from api.operations.cohort.runners import cores, on_cores, one_by_one
 from api.operations.cohort.wanted import Wanted
-from tests.rig.tissue.synthetic import Bench, index_force, write_made_session
+from mock_devices.testing.made.synthetic import Bench, index_force, write_made_session
 
 SESSIONS, GOAL_S, PLANNED = 50, 60.0, 1000
 VISITS = 2  # of each subject

@@ -50,7 +50,7 @@ def work_fit(folder: Path, size: int) -> None:
     """`rig fit` of a session of ``size`` trials."""
     from api.operations.fit import fit  # noqa: PLC0415
     from controller.operation import Operation  # noqa: PLC0415
-    from tests.rig.tissue.synthetic import Bench, write_made_session  # noqa: PLC0415
+    from mock_devices.testing.made.synthetic import Bench, write_made_session  # noqa: PLC0415
 
     cycles = Bench(rate_Hz=250.0).cycles(trials=size // 2, speeds_mm_s=(10.0, 20.0))
     place = write_made_session(folder / "session", cycles)

@@ -21,6 +21,7 @@ import numpy as np
 from benchmarks import lattice_euler
 from benchmarks.lattice_alternatives import NumpySlices, taichi_force, warp_force
 from benchmarks.lattice_portable import TunedNumpy, multiply_add, portable_c, triad
+from mock_devices.testing.made.lattice_reference import untied
 from rig.tissue.lattice import fire
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.kernels import STEPS
@@ -28,7 +29,6 @@ from rig.tissue.lattice.numba_types import Matrix
 from rig.tissue.lattice.springs import Springs
 from rig.tissue.lattice.state import Loaded
 from rig.tissue.lattice.sweep import RELATIVE_TOLERANCE, sweep
-from tests.rig.tissue.lattice.reference import untied
 
 EXPONENT = 4.0
 DEPTH_MM = 2.0

@@ -23,10 +23,10 @@ import numpy as np
 from playwright.sync_api import Page, sync_playwright
 
 from benchmarks.service.clients import batches
+from mock_devices.testing.browser import installed, launch
 from mock_devices.testing.commands import pressed, served_bench
 from mock_devices.testing.models import known_session
 from mock_devices.testing.service import ServedRig
-from tests.system.browser import installed, launch
 
 TRACES = ("force", "setpoint", "error")
 MODEL = "known"

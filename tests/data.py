@@ -1,4 +1,4 @@
-"""Where the real recordings are. They stay outside the project: where their folder is absent, tests of them skip."""
+"""Tests of real recordings skip where the folder of these is absent."""
 
 import os
 from pathlib import Path
@@ -6,14 +6,8 @@ from typing import NoReturn
 
 import pytest
 
+from mock_devices.testing.real_data import folder
 from tests.lacking import lacking
-
-ROOT = Path(__file__).resolve().parents[1]
-
-
-def folder() -> Path:
-    """TISSUE_RIG_DATA, or shared/data beside the project."""
-    return Path(os.environ.get("TISSUE_RIG_DATA") or ROOT.parent / "shared" / "data")
 
 
 def recording(name: str) -> Path:

@@ -11,7 +11,8 @@ from playwright.sync_api import Page, Request, Route, sync_playwright
 
 from api.http.models import ControlView, RigView
 from hatch_build import LIMIT_S, SOURCES, build, fetch
-from tests.system.browser import find, launch
+from mock_devices.testing.browser import launch
+from tests.system.browser import find
 
 ADDRESS = "http://bench.invalid/"
 KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from mock_devices.testing import real_data
 from tests import data
 from tests.api.catalogue import server
 from tests.lacking import ALL
@@ -61,6 +62,6 @@ def test_where_nobody_promised_recordings_their_tests_skip_even_where_all_have_t
 ) -> None:
     monkeypatch.setenv(ALL, "1")
     monkeypatch.delenv("TISSUE_RIG_DATA", raising=False)
-    monkeypatch.setattr(data, "ROOT", tmp_path / "project")
+    monkeypatch.setattr(real_data, "ROOT", tmp_path / "project")
     with pytest.raises(pytest.skip.Exception, match="no recording emps"):
         data.recording("emps")

@@ -17,10 +17,10 @@ from PIL import Image
 
 from api.operations.diagnose import diagnose
 from controller.operation import Operation
+from mock_devices.testing.real_data import ROOT, folder
 from rig.results.diagnosis import DiagnosisResult
 from rig.results.diagnosis_lines import five_lines
 from rig.trials.opening import Opening
-from tests.data import ROOT, folder
 
 WIDTH = 900  # pixels: a picture of 9 inches is read at 100 to the inch
 COLOURS = 256  # a third of the file, and no line looks different

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
-from tests.system.browser import installed, launch
+from mock_devices.testing.browser import installed, launch
 
 WIDTH, HEIGHT = 1000, 1130
 

@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mock_devices.testing.real_data import ROOT, folder
 from rig.config.table import load
 from rig.errors import DataError
 from rig.intake.mapping import DataMapping
 from rig.intake.session import import_folder
 from rig.trials.reading import trials_of
 from rig.trials.trial import FEWEST_SAMPLES, Trial, TrialSet, drop_unusable
-from tests.data import ROOT, folder
 
 FEWEST = 4  # with fewer recordings nothing is judged
 AT_REST = 5  # samples at the beginning, half a second of the slowest machine

@@ -5,8 +5,8 @@ python -m benchmarks.control.reached
 
 from itertools import product
 
-from tests.controller.simulated import test_force_law as held
-from tests.controller.simulated.subjects import NAMES
+from mock_devices.testing.made import law_in_simulation as held
+from mock_devices.testing.made.subjects import NAMES
 
 WRONG = 0.5, 1.0, 2.0
 LEVELS_N = tuple(map(float, range(1, 11)))

@@ -8,10 +8,10 @@ import pytest
 from typer.testing import CliRunner
 
 from api.cli.app import build
+from mock_devices.testing.made.synthetic import Bench, index_force, write_made_session
 from rig.errors import DataError, UsageError
 from rig.tissue.model import load_model
 from rig.tissue.registry import LAWS
-from tests.rig.tissue.synthetic import Bench, index_force, write_made_session
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from api.cli.app import main
+from mock_devices.testing.made.synthetic import Bench, write_made_session
 from mock_devices.testing.models import index_model
 from tests.api.test_cli_failures import REFUSED
-from tests.rig.tissue.synthetic import Bench, write_made_session
 
 Rig = Callable[[str], str]
 # Whatever would be begun: a bench, a calibration, reading, fitting, one of several sessions.

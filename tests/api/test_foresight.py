@@ -15,9 +15,9 @@ from fastapi.testclient import TestClient
 from api.http.routes.curves import CurveView
 from api.http.service import Service
 from mock_devices.testing.access import client_of, in_control
+from mock_devices.testing.made.synthetic import Bench, metadata, tables, write_made_session, write_recording
 from rig.config.wiring import Wiring
 from rig.recording.sessions import open_session, write_session
-from tests.rig.tissue.synthetic import Bench, metadata, tables, write_made_session, write_recording
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PROTOCOL = "kind = 'indentation'\nspeeds_mm_s = [5, 30]\ntrials = 2\n"

@@ -12,11 +12,11 @@ import hatch_build
 from api.http import app
 from api.http.service import Service
 from mock_devices.testing.access import client_of
+from mock_devices.testing.made.synthetic import Bench, write_made_session
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.products.maxon_epos4 import Epos4Wiring
 from rig.config.wiring import Wiring
 from rig.recording.sessions import open_session, write_session
-from tests.rig.tissue.synthetic import Bench, write_made_session
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PROBLEM = "application/problem+json"

@@ -21,10 +21,10 @@ from api.http.problems import RequestRefused
 from api.http.service import Service
 from mock_devices.testing.access import ADDRESS, bearer, client_of, in_control
 from mock_devices.testing.clock import Clock
+from mock_devices.testing.made.synthetic import Bench, write_made_session
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.wiring import Wiring
 from rig.errors import DeviceError, DiskFull, SafetyStop, UsageError
-from tests.rig.tissue.synthetic import Bench, write_made_session
 
 BODY = {"kind": "verify", "params": {"session": "first"}}
 

@@ -3,8 +3,8 @@
 import pytest
 
 from benchmarks.control import reached
-from tests.controller.simulated import test_force_law as held
-from tests.controller.simulated.subjects import NAMES
+from mock_devices.testing.made import law_in_simulation as held
+from mock_devices.testing.made.subjects import NAMES
 
 
 def test_of_each_figure_the_worst_subject_is_printed(

@@ -7,7 +7,8 @@ import pytest
 from playwright.sync_api import sync_playwright
 
 from benchmarks.page import COUNTED, Received, missed, rates_Hz
-from tests.system.browser import find, launch
+from mock_devices.testing.browser import launch
+from tests.system.browser import find
 
 DRAWS = """async () => {
   const plot = document.body.appendChild(document.createElement("div")), other = document.body.appendChild(document.createElement("div"));

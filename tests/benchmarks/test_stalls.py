@@ -8,9 +8,9 @@ import pytest
 
 from benchmarks import stalls
 from benchmarks.stalls import Capture, main, stopped_for
+from mock_devices.testing.made.synthetic import Bench, metadata
 from rig.channels import EVENT, EventSample
 from rig.recording.mcap_file import RecordingWriter
-from tests.rig.tissue.synthetic import Bench, metadata
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,10 @@ import pytest
 from playwright.sync_api import Browser, Page, Playwright, expect, sync_playwright
 
 import hatch_build
+from mock_devices.testing.browser import launch
 from mock_devices.testing.commands import PATIENCE_S, RIG, ROOT, ServedBench, free_port, served_bench
 from tests.page.looks import PICTURES
-from tests.system.browser import find, launch
+from tests.system.browser import find
 from tests.system.test_service import SHORT, SLOW
 
 expect.set_options(timeout=PATIENCE_S * 1000)

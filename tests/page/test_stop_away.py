@@ -9,11 +9,12 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, Playwright, expect
 
+from mock_devices.testing.browser import launch
 from mock_devices.testing.commands import RIG, ROOT, ServedBench, children, free_port, until
 from tests.api.access.tls import made
 from tests.page.conftest import Served
 from tests.page.steps import state
-from tests.system.browser import find, launch
+from tests.system.browser import find
 
 NAME = "bench.example.org"
 

@@ -18,6 +18,16 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.hidden.draw import draw_secret, recorded
+from mock_devices.testing import real_data
+from mock_devices.testing.made.synthetic import (
+    Bench,
+    index_force,
+    metadata,
+    tables,
+    with_friction,
+    write_made_session,
+    write_recording,
+)
 from rig.config.table import load
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.estimates import Estimate
@@ -32,20 +42,11 @@ from rig.trials.curves import Curve
 from rig.trials.opening import AS_IT_IS, Opening, open_place
 from rig.trials.reading import trials_of
 from rig.trials.trial import TrialSet
-from tests import data
+from tests.data import recording
 from tests.rig.recording.measured import MARKER_TABLE, turned_tables
-from tests.rig.tissue.synthetic import (
-    Bench,
-    index_force,
-    metadata,
-    tables,
-    with_friction,
-    write_made_session,
-    write_recording,
-)
 
 FILE = Path(__file__).with_suffix(".json")
-PERINEAL = data.ROOT / "examples" / "mappings" / "perineal_indentation.toml"
+PERINEAL = real_data.ROOT / "examples" / "mappings" / "perineal_indentation.toml"
 NOW = datetime(2026, 1, 2, 10, 0, tzinfo=UTC)
 Figures = Mapping[str, object]
 
@@ -104,7 +105,7 @@ def imported(folder: Path) -> Figures:
 
 def measured(_: Path) -> Figures:
     """What the diagnosis sees of real meat, four recordings of a testing machine."""
-    return observed(data.recording("perineal_indentation"), Opening(PERINEAL, "230411_C_Ind*_RDG1[A-D]"))
+    return observed(recording("perineal_indentation"), Opening(PERINEAL, "230411_C_Ind*_RDG1[A-D]"))
 
 
 def diagnosed(folder: Path) -> Figures:
@@ -198,7 +199,7 @@ def main(out: Path) -> None:
 
 def is_there(name: str) -> bool:
     """Whether the data of a session are on this machine."""
-    return name != "measured" or data.folder().exists()
+    return name != "measured" or real_data.folder().exists()
 
 
 def arithmetic() -> list[object]:

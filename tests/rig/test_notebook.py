@@ -15,13 +15,13 @@ from typer.testing import CliRunner
 
 import rig
 from api.cli.app import build
+from mock_devices.testing.made.synthetic import FOREARM, Bench, write_made_session
 from rig.errors import DataError, UsageError
 from rig.intake.mapping import MAPPING_FILE
 from rig.notebook import SessionData
 from rig.recording.reader import read_recording
 from rig.tissue.model import load_model
 from tests.rig.recording.measured import pressed
-from tests.rig.tissue.synthetic import FOREARM, Bench, write_made_session
 
 
 @pytest.fixture(scope="module")

@@ -22,11 +22,12 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from api.cli.demo import PLAN, measured
 from api.cli.options import built_in
+from mock_devices.testing.browser import launch
 from mock_devices.testing.commands import PATIENCE_S, ROOT, free_port, rig
 from rig.recording.sessions import open_session
 from rig.tissue.model import load_model
 from tests.conftest import STALLS
-from tests.system.browser import find, launch
+from tests.system.browser import find
 from tests.witness import Witness
 
 pytestmark = [pytest.mark.extra, pytest.mark.timeout(600), pytest.mark.xdist_group("commands")]

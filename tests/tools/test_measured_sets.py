@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.data import ROOT, recording
+from mock_devices.testing.real_data import ROOT
+from tests.data import recording
 from tools.measured_sets import SETS, MeasuredSet, file_of, main
 
 

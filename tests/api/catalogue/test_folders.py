@@ -15,9 +15,9 @@ from api.catalogue import refresh
 from api.catalogue.catalogue import Catalogue
 from api.catalogue.folder import LONGEST, short, stamp, utc, utc_of
 from api.catalogue.queries import Asked
+from mock_devices.testing.made.synthetic import Bench, write_made_session
 from rig.results.catalogue import SessionEntry
 from tests.api.catalogue.made import diagnosed, fitted, make_session, trial, with_threshold
-from tests.rig.tissue.synthetic import Bench, write_made_session
 
 NOW_S = datetime(2026, 11, 23, tzinfo=UTC).timestamp()
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.rig.tissue.synthetic import Bench, index_force, write_made_session
+from mock_devices.testing.made.synthetic import Bench, index_force, write_made_session
 
 STIFFNESS = {"A": (0.10, 0.11), "B": (0.16, 0.15), "C": (0.21, 0.20), "D": (0.13, 0.13)}
 

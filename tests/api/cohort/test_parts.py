@@ -10,12 +10,12 @@ from typer.testing import CliRunner
 
 from api.cli.app import build
 from api.operations.cohort.task import Task
+from mock_devices.testing.made.synthetic import Bench, index_force
 from rig.errors import CheckFailed, UsageError
 from rig.intake.mapping import MAPPING_FILE
 from rig.results.cohort import CohortResult
 from rig.trials.opening import AS_IT_IS
 from tests.rig.recording.measured import TABLES, pressed
-from tests.rig.tissue.synthetic import Bench, index_force
 
 # Recorded in turn, as a plate is: a site's recordings do not follow each other.
 SITES = ("A1", "B[2]", "A1", "B[2]", "A1", "B[2]")

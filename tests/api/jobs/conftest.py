@@ -8,9 +8,9 @@ from fastapi.testclient import TestClient
 
 from api.http.service import Service
 from mock_devices.testing.access import client_of, in_control
+from mock_devices.testing.made.synthetic import Bench, write_made_session
 from rig.config.products.bota_sensone import BotaWiring
 from rig.config.wiring import Wiring
-from tests.rig.tissue.synthetic import Bench, write_made_session
 
 
 @pytest.fixture

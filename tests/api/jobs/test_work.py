@@ -26,6 +26,7 @@ from api.http.jobs.references import reference_of
 from api.http.jobs.worker import Desk
 from controller.experiments.references import parse_reference
 from controller.operation import Cancelled, Operation
+from mock_devices.testing.made.synthetic import Bench, write_made_session
 from mock_devices.testing.models import index_model
 from rig.config.wiring import Wiring
 from rig.errors import UsageError
@@ -34,7 +35,6 @@ from rig.recording.sessions import open_session
 from rig.results.fit import FitResult
 from rig.tissue.model import load_model
 from tests.rig.recording.measured import measured
-from tests.rig.tissue.synthetic import Bench, write_made_session
 
 UPLOAD = "0a1b2c3d4e5f"
 

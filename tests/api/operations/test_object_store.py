@@ -12,11 +12,11 @@ import pytest
 from typer.testing import CliRunner
 
 from api.cli.app import build
+from mock_devices.testing.made.synthetic import Bench, write_made_session
 from rig.errors import DataError, UsageError
 from rig.recording import remote
 from rig.recording.remote import Store, address_of
 from tests.rig.recording.object_store import BUCKET, served, upload
-from tests.rig.tissue.synthetic import Bench, write_made_session
 
 pytestmark = pytest.mark.xdist_group("object store")
 

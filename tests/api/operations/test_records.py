@@ -7,10 +7,10 @@ import pytest
 
 from api.operations import records
 from controller.operation import Cancelled, Operation, Progress
+from mock_devices.testing.made.synthetic import Bench, write_made_session
 from rig.results.recorded import VerifyResult
 from tests.rig.recording import tampered
 from tests.rig.recording.measured import NOW, measured, run
-from tests.rig.tissue.synthetic import Bench, write_made_session
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ from api.operations.report import report
 from api.operations.simulate import SimulatedRun, simulate
 from controller.experiments.references import parse_reference
 from controller.operation import Cancelled, Operation, Progress
+from mock_devices.testing.made.synthetic import Bench, write_made_session
 from mock_devices.testing.models import index_model
 from rig.config.protocol import Indentation
 from rig.config.table import load
@@ -23,7 +24,6 @@ from rig.tissue.registry import law_named
 from tests.data import recording
 from tests.rig.intake.test_real_folders import MAPPINGS
 from tests.rig.recording.measured import NOW
-from tests.rig.tissue.synthetic import Bench, write_made_session
 
 LAWS = Laws(compared=(law_named("constant"), law_named("index")))
 

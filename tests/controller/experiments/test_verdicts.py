@@ -15,6 +15,7 @@ from controller.experiments.verdicts import refuse_bad, remaining_bad, with_qual
 from controller.loop.messages import Outcome
 from controller.operation import Operation
 from controller.supervisor import Supervisor
+from mock_devices.testing.made.synthetic import Bench, metadata, tables, write_recording
 from rig.config.protocol import Indentation
 from rig.config.quality import QualityLimits
 from rig.config.wiring import Wiring
@@ -22,7 +23,6 @@ from rig.errors import BadTrial, SafetyStop
 from rig.recording.mcap_file import RecordingFailed
 from rig.recording.sessions import SessionInfo, TrialInfo, open_session
 from rig.results.tracking import Followed, LoopCount, TrackResult
-from tests.rig.tissue.synthetic import Bench, metadata, tables, write_recording
 
 NOISY = ("fx_N", "fy_N", "mx_N_m", "my_N_m", "mz_N_m")
 GOOD, BAD = 1, 3

@@ -15,10 +15,10 @@ from controller.loop.state import LoopState
 from controller.loop.steps import Approach, TrackForce
 from controller.safety.oscillation import OscillationMonitor
 from controller.safety.table import TABLE
+from mock_devices.testing.made.subjects import RESPONSE, SLOW_RESPONSE
 from mock_devices.testing.models import index_model
 from tests.controller.fake_bench import ZERO
 from tests.controller.plant_bench import BOTA, FT300, PRODUCTS, PlantBench, Product, curve
-from tests.controller.simulated.subjects import RESPONSE, SLOW_RESPONSE
 
 MODEL = index_model(0.12, 0.22, 0.01, force_N=11.0)
 STIFF_MM = 4.0

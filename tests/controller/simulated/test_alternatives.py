@@ -24,9 +24,9 @@ from controller.simulated.alternatives.alternative_tuning import (
     fastest,
     tissue_at,
 )
+from mock_devices.testing.made.subjects import NAMES, subject
 from rig.config.wiring import Wiring
 from rig.results.tracking import AlternativeRun
-from tests.controller.simulated.subjects import NAMES, subject
 
 WIRING = Wiring()
 RATES = rates_of(WIRING)

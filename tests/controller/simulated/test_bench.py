@@ -16,11 +16,11 @@ from controller.simulated.bench import MOTOR, POSITION_LOOP, SENSING, SimulatedB
 from controller.simulated.segments import hold_compiled
 from mock_devices.bench import Bench
 from mock_devices.parameters import Parameters
+from mock_devices.testing.made.subjects import RESPONSE, subject
 from rig.config.wiring import Wiring
 from rig.errors import CheckFailed
 from rig.simulation import axis_plant
 from rig.simulation.axis_plant import ModelledLimb, at_rest
-from tests.controller.simulated.subjects import RESPONSE, subject
 
 WIRING = Wiring()
 STAIRS_N = np.repeat([1.0, *range(1, 5)], 1500).astype(float)

@@ -3,47 +3,28 @@
 Bounds are goals set before the law was written (limb motion, wrong models, contact), as the worst of five subjects.
 """
 
-from functools import cache
-from typing import Any
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from controller.experiments import comparison, tracking
+from controller.experiments import tracking
 from controller.law.stability import nearest
 from controller.loop.steps import TrackForce
-from controller.simulated.bench import SENSING, SimulatedBench, follow, limb_of
-from rig.config.wiring import Wiring
+from controller.simulated.bench import SimulatedBench, follow, limb_of
+from mock_devices.testing.made.law_in_simulation import (
+    FORCES_N,
+    WIRING,
+    breathing_mN,
+    changed,
+    jumps,
+    law,
+    low_jumps,
+    moved_mN,
+    peak,
+    rms_mN,
+    sine_mN,
+)
+from mock_devices.testing.made.subjects import NAMES, RESPONSE, subject
 from rig.simulation.axis_plant import ModelledLimb
-from tests.controller.simulated.subjects import NAMES, RESPONSE, subject
-
-Column = NDArray[np.float64]
-WIRING = Wiring()
-FORCES_N = (0.5, 1.0, 2.0, 5.0, 10.0)
-QUIET = SENSING._replace(noise_N=0.0, quantum_N=0.0)
-
-
-@cache
-def law(name: str) -> TrackForce:
-    return tracking.force_law(subject(name), WIRING, RESPONSE)
-
-
-def changed(name: str, **values: Any) -> TrackForce:
-    """The law with a bug: data that no step would be made with are not checked."""
-    return law(name).model_copy(update=values)
-
-
-def rms_mN(step: TrackForce, name: str, force_N: float, **motion: float) -> float:
-    """Error of a constant force after it has settled."""
-    trace = follow(step, np.full(6000, force_N), SimulatedBench(limb_of(subject(name), **motion)))
-    return 1000 * float(np.sqrt(np.mean((trace.force_N[2000:] - force_N) ** 2)))
-
-
-def moved_mN(force_N: float, **values: Any) -> float:
-    """The worst of all subjects, whose surface moves by 0.5 mm at 2 Hz."""
-    motion = {"breathing_mm": 0.5, "breathing_Hz": 2.0}
-    return max(rms_mN(changed(name, **values), name, force_N, **motion) for name in NAMES)
 
 
 @pytest.mark.parametrize(("force_N", "goal_mN"), zip(FORCES_N, (28, 34, 45, 77, 128), strict=True))
@@ -65,13 +46,6 @@ def test_told_one_stiffness_for_all_forces_the_law_follows_no_limb_at_low_force(
     assert worst > 2 * 28
 
 
-def breathing_mN(name: str, force_N: float) -> float:
-    """Error of a constant force, without the sensor's noise."""
-    limb = limb_of(subject(name), breathing_mm=1.5, breathing_Hz=0.25)
-    trace = follow(law(name), np.full(6000, force_N), SimulatedBench(limb, sensing=QUIET))
-    return 1000 * float(np.sqrt(np.mean((trace.force_N[2000:] - force_N) ** 2)))
-
-
 @pytest.mark.parametrize(("force_N", "goal_mN"), [(0.5, 2.2), (10.0, 6.9)])
 def test_breathing_is_followed(force_N: float, goal_mN: float) -> None:
     for name in NAMES:
@@ -83,13 +57,6 @@ def test_a_limb_that_rests_is_left_at_rest(force_N: float) -> None:
     assert max(rms_mN(law(name), name, force_N) for name in NAMES) < 14
 
 
-def peak(step: TrackForce, name: str, force_N: float = 0.3) -> float:
-    """Of a contact after 1 mm of air, over the force asked for."""
-    bench = SimulatedBench(limb_of(subject(name)))
-    trace = follow(step, np.full(3000, force_N), bench, clearance_mm=1.0)
-    return float(np.max(trace.force_N)) / force_N
-
-
 def test_a_contact_hardly_overshoots() -> None:
     assert max(peak(law(name), name) for name in NAMES) < 1.05
 
@@ -98,30 +65,12 @@ def test_a_law_that_does_not_start_anew_at_contact_presses_on_with_what_it_expec
     assert max(peak(changed(name, contact_force_N=-1.0), name) for name in NAMES) > 1.3
 
 
-def jumps(step: TrackForce, name: str, levels_N: tuple[float, ...], stiffness: float) -> tuple[float, float]:
-    """Worst overshoot [%] and settling [s] of jumps through the levels."""
-    trace = follow(step, np.repeat(levels_N, 1500), SimulatedBench(limb_of(subject(name), stiffness)))
-    found = comparison.jumps(trace.time_s, trace.reference_N, trace.sensed_N, trace.mode)
-    assert None not in [jump.settling_s for jump in found], (name, stiffness)
-    return max(jump.overshoot_percent for jump in found), max(jump.settling_s or 0.0 for jump in found)
-
-
 @pytest.mark.parametrize("stiffness", [0.5, 1.0, 2.0])
 def test_jumps_of_1_N_settle_on_tissue_half_and_twice_as_stiff_as_the_model(stiffness: float) -> None:
     for name in NAMES:
         overshoot, settling_s = jumps(law(name), name, tuple(map(float, range(1, 11))), stiffness)
         assert overshoot < (9.6 if stiffness != 1.0 else 2.5), name
         assert settling_s < (0.145 if stiffness != 1.0 else 0.09), name
-
-
-def low_jumps(name: str, stiffness: float) -> tuple[float, float]:
-    """Worst overshoot of 0.3 N [%] and time until 0.02 N are left [s]; 2 % are the sensor's noise: without it."""
-    levels_N = (0.3, 0.6, 0.9, 1.2, 1.5)
-    bench = SimulatedBench(limb_of(subject(name), stiffness), sensing=QUIET)
-    force_N = follow(law(name), np.repeat(levels_N, 1500), bench).force_N.reshape(len(levels_N), 1500)
-    error_N = (force_N - np.array(levels_N)[:, None])[1:]
-    outside = np.flatnonzero((np.abs(error_N) >= 0.02).any(axis=0))
-    return 100 * float(error_N.max()) / 0.3, 1e-3 * (1 + int(outside.max(initial=-1)))
 
 
 @pytest.mark.parametrize("stiffness", [0.5, 1.0, 2.0])
@@ -136,16 +85,6 @@ def test_a_lead_of_the_wrong_sign_does_not_settle() -> None:
     step = changed("average", lead_s=-law("average").lead_s)
     trace = follow(step, np.full(4000, 2.0), SimulatedBench(limb_of(subject("average"))))
     assert np.std(trace.force_N[2000:]) > 0.1
-
-
-def sine_mN(name: str, frequency_Hz: float, stiffness: float, **values: Any) -> float:
-    step = changed(name, **values)
-    time_s = np.arange(5000) * 1e-3
-    asked_N, given_N = (
-        2.0 + 0.5 * np.sin(2 * np.pi * frequency_Hz * (time_s + early_s)) for early_s in (step.preview_s, 0.0)
-    )
-    trace = follow(step, asked_N, SimulatedBench(limb_of(subject(name), stiffness)))
-    return 1000 * float(np.sqrt(np.mean((trace.force_N - given_N)[2000:] ** 2)))
 
 
 @pytest.mark.parametrize(("frequency_Hz", "goal_mN"), [(0.5, 2.5), (1.0, 3.8), (2.0, 9.3), (5.0, 39.0), (10.0, 155.0)])

@@ -7,8 +7,8 @@ from scipy.optimize import least_squares
 
 from controller.simulated.bench import MOTOR, POSITION_LOOP, SENSING
 from controller.simulated.segments import hold_compiled
+from mock_devices.testing.made.subjects import RESPONSE, SLOW_RESPONSE
 from rig.simulation.axis_plant import ForceSensing, ModelledLimb, at_rest
-from tests.controller.simulated.subjects import RESPONSE, SLOW_RESPONSE
 
 Column = NDArray[np.float64]
 FREQUENCIES_HZ = np.array([1, 2, 3, 5, 8, 10, 15, 20, 25, 30, 40, 50, 60])

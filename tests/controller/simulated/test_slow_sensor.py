@@ -9,8 +9,8 @@ from controller.experiments import tracking
 from controller.law.stability import ForceLoop
 from controller.loop.steps import TrackForce
 from controller.simulated.bench import SENSING, SimulatedBench, follow, limb_of
+from mock_devices.testing.made.subjects import NAMES, SLOW_RESPONSE, subject
 from rig.config.wiring import Wiring
-from tests.controller.simulated.subjects import NAMES, SLOW_RESPONSE, subject
 
 FT300 = Wiring.model_validate({"force": {"product": "robotiq-ft300"}})
 SLOW = SENSING._replace(filter_s=0.003, noise_N=0.05, quantum_N=0.01, delay_cycles=4, every_cycles=10)

@@ -9,13 +9,14 @@ import pytest
 from typer.testing import CliRunner
 
 from api.cli.app import build
+from mock_devices.testing.real_data import ROOT
 from rig.config.table import load
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.axis_run import diagnose_axis
 from rig.intake.axis import AxisData, read_axis
 from rig.intake.mapping import AxisFacts, DataMapping
 from rig.simulation.servo import read_models
-from tests.data import ROOT, recording
+from tests.data import recording
 
 EXAMPLES = ROOT / "examples"
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.hidden.draw import draw_secret, recorded, session_of
+from mock_devices.testing.made.synthetic import Bench, write_made_session
 from rig.diagnosis import search
 from rig.diagnosis.answers import Diagnosis
 from rig.diagnosis.indentation import IndentationProblem, library, missing
@@ -24,7 +25,6 @@ from rig.trials.trial import Trial, TrialSet
 from tests.data import recording
 from tests.rig.fixed_sessions import PERINEAL, read
 from tests.rig.recording.measured import TABLES, write
-from tests.rig.tissue.synthetic import Bench, write_made_session
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mock_devices.testing.made.two_clocks import SENSORS, TISSUES, Seen, pressed, tracked
 from rig.config.table import parse
 from rig.errors import UsageError
 from rig.intake.lag import ClocksApart, Lag, TimedSignal, lag_of_force, lag_of_motion
@@ -12,7 +13,6 @@ from rig.intake.mapping import DataMapping
 from rig.intake.session import import_folder
 from rig.recording.alignment import read_alignments
 from rig.recording.sessions import Session
-from tests.rig.intake.two_clocks import SENSORS, TISSUES, Seen, pressed, tracked
 from tests.rig.recording.measured import NOW, write
 
 FORCE_TABLE = {

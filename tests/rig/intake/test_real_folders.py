@@ -15,12 +15,13 @@ import pytest
 import xlrd
 from numpy.typing import NDArray
 
+from mock_devices.testing.real_data import ROOT
 from rig.config.table import load
 from rig.intake.mapping import DataMapping
 from rig.intake.session import import_folder
 from rig.recording.alignment import read_alignments
 from rig.recording.sessions import Session
-from tests.data import ROOT, recording
+from tests.data import recording
 
 MAPPINGS = ROOT / "examples" / "mappings"
 NOW = datetime(2026, 1, 2, tzinfo=UTC)

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mock_devices.testing.made.synthetic import Bench
 from rig.errors import DataError, RigError
 from rig.intake.mapping import MAPPING_FILE, RecordingFacts
 from rig.intake.stating import StatedFacts, stated_of
 from rig.trials.reading import trials_of
 from rig.trials.trial import TrialSet
 from tests.rig.recording.measured import run, write
-from tests.rig.tissue.synthetic import Bench
 
 LABELS = {"speed": "300", "depth": "8000", "by": "A. B.", "warm": "21,5", "unknown": "", "word": "fast"}
 

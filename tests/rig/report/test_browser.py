@@ -11,11 +11,12 @@ from playwright.sync_api import Browser, sync_playwright
 
 from api.operations.fit import fit
 from controller.operation import Operation
+from mock_devices.testing.browser import launch
+from mock_devices.testing.made.synthetic import Bench, write_made_session
 from rig.recording.sessions import open_session
 from rig.report.page import write_report
 from tests.rig.report.test_page import track_into
-from tests.rig.tissue.synthetic import Bench, write_made_session
-from tests.system.browser import find, launch
+from tests.system.browser import find
 
 pytestmark = [pytest.mark.bench, pytest.mark.xdist_group("wire")]
 

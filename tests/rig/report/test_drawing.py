@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from mock_devices.testing.made.synthetic import Bench
 from rig.report.drawing import inline_svg, new_figure, png, speed_colors, svg, thinned
 from rig.report.figures import Tracked, fit_figure, loop_figure, quantiles, residual_figure, tracking_figure
 from rig.tissue.study import Study, study_curves
 from rig.trials.curves import loading_curve
-from tests.rig.tissue.synthetic import Bench
 
 
 @pytest.fixture(scope="module")

@@ -13,10 +13,17 @@ import pytest
 from api.cli.fitting import laws_from
 from api.operations.fit import fit
 from controller.operation import Operation
+from mock_devices.testing.made.synthetic import (
+    Bench,
+    index_force,
+    metadata,
+    tables,
+    write_made_session,
+    write_recording,
+)
 from rig.errors import DataError, UsageError
 from rig.recording.sessions import JsonTable, SessionInfo, TrialInfo, open_session, write_session
 from rig.report.page import write_report
-from tests.rig.tissue.synthetic import Bench, index_force, metadata, tables, write_made_session, write_recording
 
 VOID = {"meta", "link", "br", "img", "hr", "input"}
 LEVEL = {

@@ -16,6 +16,7 @@ import pytest
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 
+from mock_devices.testing.made.synthetic import Bench, metadata, tables, write_recording
 from rig.config.table import load
 from rig.intake.mapping import MAPPING_FILE, DataMapping
 from rig.recording import sessions
@@ -38,7 +39,6 @@ from rig.trials.cycles import IndentationCycle
 from rig.trials.opening import import_files
 from rig.trials.thinning import extremes
 from tests.rig.recording.measured import MAPPING, NOW, TABLES, pressed, run, write
-from tests.rig.tissue.synthetic import Bench, metadata, tables, write_recording
 
 SVG = "{http://www.w3.org/2000/svg}"
 RATE_HZ, NOISE_N, STEP_N, SURFACE_MM, CLIP_N, COARSE_N = 500.0, 0.01, 0.001, 20.0, 3.0, 0.25

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from mock_devices.testing.made.synthetic import Bench
 from rig.diagnosis.estimates import SmallestSize
 from rig.errors import UsageError
 from rig.results.base import Number, Result
@@ -15,7 +16,6 @@ from rig.results.study import fit_result
 from rig.results.tracking import Followed, LoopCount, TrackResult, compare_runs
 from rig.tissue.study import study_curves
 from rig.trials.curves import loading_curve
-from tests.rig.tissue.synthetic import Bench
 
 OLD_DIAGNOSIS = {
     "verdict": "unexplained", "statement": "A residual is left.", "simulation": "index", "session": "first",

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mock_devices.testing.made.synthetic import SPEEDS_MM_S, Bench, along, index_force
 from rig.errors import DataError, UsageError
 from rig.tissue.fitting import BINS, Steps, early_offset, fit_law, residual_force
 from rig.tissue.judging import given_forces, judge
@@ -13,7 +14,6 @@ from rig.tissue.laws_elastic import Layer
 from rig.tissue.laws_viscous import HuntCrossley, QuasiLinear, StandardLinear
 from rig.tissue.registry import LAWS
 from rig.trials.curves import Curve, loading_curve
-from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, along, index_force
 
 
 @pytest.fixture(scope="module")

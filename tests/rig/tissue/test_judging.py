@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mock_devices.testing.made.synthetic import Bench, index_force
 from rig.errors import DataError
 from rig.tissue import judging
 from rig.tissue.fitting import LawFit, fit_law
@@ -15,7 +16,6 @@ from rig.tissue.laws_viscous import StandardLinear
 from rig.tissue.study import rows
 from rig.trials.contact import Contact
 from rig.trials.curves import Curve, loading_curve
-from tests.rig.tissue.synthetic import Bench, index_force
 
 
 def made_curve(depth_mm: list[float], force_N: list[float], name: str = "made", speed_mm_s: float = 10.0) -> Curve:

@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from api.operations.lattice import LatticeFit
+from mock_devices.testing.made.synthetic import Bench
 from rig.errors import DataError
 from rig.tissue.control_table import control_rows
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice_study import LatticeStudy, lattice_study
 from rig.tissue.study import Study, study_curves
 from rig.trials.curves import loading_curve
-from tests.rig.tissue.synthetic import Bench
 
 BLOCK = Block((9, 9, 12), spacing_mm=2.0)
 

@@ -10,6 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mock_devices.testing.made.synthetic import (
+    Bench,
+    index_force,
+    metadata,
+    tables,
+    write_made_session,
+    write_recording,
+)
 from rig.config.table import load
 from rig.errors import DataError, UsageError
 from rig.intake.mapping import MAPPING_FILE, DataMapping
@@ -38,7 +46,6 @@ from rig.trials.findings import Finding
 from rig.trials.reading import trials_of
 from rig.trials.trial import inspected
 from tests.rig.recording.measured import turned_tables
-from tests.rig.tissue.synthetic import Bench, index_force, metadata, tables, write_made_session, write_recording
 
 
 @pytest.fixture(scope="module")

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mock_devices.testing.made.synthetic import START_NS, Bench, metadata, tables
 from rig.channels import MARKER
 from rig.config.quality import QualityLimits
 from rig.config.wiring import Wiring
 from rig.recording.reader import Recording
 from rig.trials.measures import CHANNELS
-from tests.rig.tissue.synthetic import START_NS, Bench, metadata, tables
 
 FREE, COMPRESS, RETRACT = 1, 3, 5
 PRESS_STEP, HOLD_STEP, LAST_STEP = 3, 4, 6

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mock_devices.testing.made.preloaded import SENSORS, preloaded
+from mock_devices.testing.made.synthetic import SPEEDS_MM_S, Bench, index_force, recording, tables, with_friction
 from rig.errors import DataError
 from rig.trials.contact import find_contact
 from rig.trials.curves import loading_curve
 from rig.trials.cycles import IndentationCycle, cycle_of
 from rig.trials.recorded import trial_of
-from tests.rig.tissue.synthetic import SPEEDS_MM_S, Bench, index_force, recording, tables, with_friction
-from tests.rig.trials.preloaded import SENSORS, preloaded
 
 
 @pytest.mark.parametrize("speed_mm_s", SPEEDS_MM_S)

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mock_devices.testing.made.synthetic import Bench
 from rig.errors import DataError, UsageError
 from rig.intake.mapping import MAPPING_FILE
 from rig.recording.sessions import Session, open_session
 from rig.trials.opening import AS_IT_IS, Opening, import_place, open_place
 from rig.trials.reading import trials_of
 from tests.rig.recording.measured import NOW, pressed, run, write
-from tests.rig.tissue.synthetic import Bench
 
 CYCLES = [Bench(rate_Hz=100.0).cycle(speed, seed) for seed, speed in enumerate((5.0, 10.0))]
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mock_devices.testing.made.synthetic import Bench
 from rig.config.quality import Bounds, QualityLimits
 from rig.recording.sessions import TrialInfo
 from rig.trials.quality import TrialQuality, evaluate_trial, quality_of
-from tests.rig.tissue.synthetic import Bench
 from tests.rig.trials.made import HOLD_STEP, Tables, incomplete, trial
 
 LIMITS = QualityLimits()

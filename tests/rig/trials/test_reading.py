@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mock_devices.testing.made.synthetic import Bench, metadata, tables, write_made_session, write_recording
 from rig.recording.sessions import open_session
 from rig.trials.reading import trials_of
 from rig.trials.trial import TrialSet
 from tests.rig.recording.measured import pressed, run
-from tests.rig.tissue.synthetic import Bench, metadata, tables, write_made_session, write_recording
 
 LATER_NS = 3_600_000_000_017
 

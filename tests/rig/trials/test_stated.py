@@ -6,15 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mock_devices.testing.made.synthetic import Bench
+from mock_devices.testing.real_data import ROOT
 from rig.config.table import load
 from rig.intake.mapping import DataMapping, RecordingFacts
 from rig.trials.opening import import_files
 from rig.trials.reading import trials_of
 from rig.trials.stated import stated_findings
 from rig.trials.trial import Trial
-from tests.data import ROOT, recording
+from tests.data import recording
 from tests.rig.recording.measured import NOW
-from tests.rig.tissue.synthetic import Bench
 
 SPEED_MM_S, DEPTH_MM, SURFACE_MM = 10.0, 8.0, 20.0
 

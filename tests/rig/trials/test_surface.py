@@ -6,12 +6,12 @@ from itertools import product
 import numpy as np
 import pytest
 
+from mock_devices.testing.made.preloaded import LAWS, OTHER_LAWS, SENSORS, SURFACE_MM, preloaded, stepped, uneven
+from mock_devices.testing.made.synthetic import Bench
 from rig.errors import DataError
 from rig.trials import contact as contact_search
 from rig.trials.cycles import IndentationCycle
 from rig.trials.surface import FoundSurface, find_surface
-from tests.rig.tissue.synthetic import Bench
-from tests.rig.trials.preloaded import LAWS, OTHER_LAWS, SENSORS, SURFACE_MM, preloaded, stepped, uneven
 
 
 @pytest.mark.parametrize("sensor", SENSORS)

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mock_devices.testing.made.lattice_reference import energy, moduli, untied
 from rig.tissue.lattice import kernels
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.numba_types import Matrix
 from rig.tissue.lattice.rows import FRONT
 from rig.tissue.lattice.springs import Springs
 from rig.tissue.lattice.state import Loaded
-from tests.rig.tissue.lattice.reference import energy, moduli, untied
 
 SIGNALLING_NAN = 0x7FF0000000000001
 LAWS = [Springs(0.1, 0.0, 0.0), Springs(0.1, 6.0, 0.0), Springs(0.1, 0.0, 1.0), Springs(0.3, 3.0, 2.0)]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mock_devices.testing.made.synthetic import Bench
 from rig.errors import DataError
 from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.ramp import project, ramp
@@ -14,7 +15,6 @@ from rig.tissue.laws_springs import springs_law
 from rig.tissue.per_spring import PerSpring, per_spring
 from rig.tissue.study import study_curves
 from rig.trials.curves import loading_curve
-from tests.rig.tissue.synthetic import Bench
 
 BLOCK = Block((11, 11, 8), tip_diameter_mm=4.0, quarter=True)
 DEPTH = np.array([0.2, 0.5, 0.8, 1.1, 1.4])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mock_devices.testing.made.lattice_reference import energy, moduli, tie_energy
 from rig.errors import RigError, UsageError
 from rig.tissue.hayes import punch_stiffness_N_mm
 from rig.tissue.lattice import fire, newton
@@ -10,7 +11,6 @@ from rig.tissue.lattice.block import Block
 from rig.tissue.lattice.health import inverted_cells
 from rig.tissue.lattice.springs import Mode, Springs
 from rig.tissue.lattice.state import Loaded
-from tests.rig.tissue.lattice.reference import energy, moduli, tie_energy
 
 TOLERANCE_N = 1e-8
 
