@@ -50,8 +50,8 @@ def violations(page: Page, rules: Sequence[str] = ()) -> list[str]:
 def holds_up(page: Page, name: str, widths: Sequence[int] = WIDTHS) -> None:
     """Fails where ``page`` is not usable at a width or in a scheme; leaves pictures called ``name``."""
     PICTURES.mkdir(parents=True, exist_ok=True)
-    page.emulate_media(color_scheme="light", reduced_motion="reduce")
     for width in widths:
+        page.emulate_media(color_scheme="light", reduced_motion="reduce")
         page.set_viewport_size({"width": width, "height": 900})
         page.evaluate("() => window.scrollTo(0, 0)")
         expect(page.locator("#estop")).to_be_in_viewport()
@@ -60,10 +60,10 @@ def holds_up(page: Page, name: str, widths: Sequence[int] = WIDTHS) -> None:
         page.screenshot(path=PICTURES / f"{name}-{width}.png", full_page=True)
         found = violations(page)
         assert not found, f"{name}, {width} px: {found}"
-    page.emulate_media(color_scheme="dark", reduced_motion="reduce")
-    found = violations(page, CONTRAST)
-    assert not found, f"{name}, dark: {found}"
-    page.screenshot(path=PICTURES / f"{name}-dark.png", full_page=True)
+        page.emulate_media(color_scheme="dark", reduced_motion="reduce")
+        found = violations(page, CONTRAST)
+        assert not found, f"{name}, {width} px, dark: {found}"
+        page.screenshot(path=PICTURES / f"{name}-{width}-dark.png", full_page=True)
 
 
 def stops(page: Page, service: Pretended) -> None:

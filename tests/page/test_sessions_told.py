@@ -115,6 +115,24 @@ def test_curves_over_time_have_a_key_for_the_set_point_in_a_colour_of_its_own(sh
     assert len(set(colours)) == 3
 
 
+def test_an_export_that_takes_long_is_waited_for_and_then_saved_and_a_refused_one_is_told(
+    show: Show, service: Pretended
+) -> None:
+    asked = f"sessions/{told.NAME}/export/csv"
+    service.answers[asked] = 202
+    page = show(SESSION)
+    page.click("#export-csv")
+    expect(page.locator("#exporting")).to_contain_text("it is saved as soon as it is there")
+    expect(page.locator("#export-csv")).to_have_attribute("aria-busy", "true")
+    with page.expect_download() as saved:
+        service.answers[asked] = "all of it"
+    assert saved.value.path().read_text() == '"all of it"'
+    expect(page.locator("#exporting")).to_have_count(0)
+    service.answers[asked] = 507
+    page.click("#export-csv")
+    expect(page.locator("#message")).to_contain_text("is refused here")
+
+
 def test_beside_a_result_the_cards_of_tracking_keep_their_width(show: Show, service: Pretended) -> None:
     done = told.job("track", result=told.TRACKED.model_dump(mode="json"))
     service.answers |= {"jobs/track": {"items": [done], "next": None}, "jobs/job-track": done}

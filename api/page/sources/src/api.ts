@@ -85,6 +85,17 @@ export async function ask(method: Method, path: string, sent: Sent<unknown> = {}
   return response.status === 204 ? undefined : response.json().catch(lost);
 }
 
+// What is being made for half a minute is not looked for more often.
+const AGAIN_MS = 1000;
+
+/** Saves a file that is made when it is first asked for, once it is there; its first byte says so. */
+export async function save(path: string, sent: Sent<undefined>): Promise<void> {
+  const headers = { Range: "bytes=0-0" };
+  while ((await answered("get", path, { ...sent, headers })).status === 202) await new Promise((again) => setTimeout(again, AGAIN_MS));
+  const link = Object.assign(document.createElement("a"), { href: address(path, sent), download: "" });
+  link.click();
+}
+
 /** What was read, with the mark that a change of it has to name. */
 export async function marked<T>(path: string, sent: Sent<undefined> = {}): Promise<{ value: T; mark: string }> {
   const response = await answered("get", path, sent);

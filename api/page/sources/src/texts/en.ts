@@ -208,7 +208,7 @@ export const en = {
     quality: "Trials and their quality", trialsOf: (session: string) => `Trials of ${session}`, noTrials: "No trial was made here.",
     unlisted: (count: number) => `${count === 1 ? "1 recording is" : `${count} recordings are`} not listed, as where recording is cut off before its end. Curves, fits and exports read ${count === 1 ? "it" : "them"} all the same; “Read every byte” below says whether ${count === 1 ? "it is" : "they are"} whole.`,
     files: "Report and files", reportOpen: "Open the report", report: "Save the report", reportMake: "Make the report", reportAgain: "Make the report again",
-    exports: "Take the recordings along as", format: { csv: "CSV", parquet: "Parquet", hdf5: "HDF5", mat: "MAT" },
+    exports: "Take the recordings along as", format: { csv: "CSV", parquet: "Parquet", hdf5: "HDF5", mat: "MAT", mcap: "MCAP, as recorded" }, exporting: "The file is being made; it is saved as soon as it is there.",
     verifyTitle: "Is everything whole?", verify: "Read every byte", whole: "Every recording is whole.", damaged: "Something is damaged:", wholeBut: "Every recording is whole, but the session is not as it should be:",
   },
   data: {

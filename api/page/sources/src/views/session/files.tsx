@@ -1,5 +1,6 @@
 // Everything to take away: the report, the recordings as they are and in the formats of others, and whether they are whole.
-import type { Schema } from "../../api";
+import { useState } from "preact/hooks";
+import { save, type Schema } from "../../api";
 import { attempt } from "../../attempt";
 import { ended, start, useWork } from "../../jobs";
 import { Card, sizeOf } from "../../parts/basics";
@@ -9,7 +10,7 @@ import { t } from "../../texts";
 
 // What a demonstration was made with: it would give away what its diagnosis is to find.
 const TRUTH = "diagnosis/truth.txt";
-const FORMATS = ["csv", "parquet", "hdf5", "mat"] as const;
+const FORMATS = ["csv", "parquet", "hdf5", "mat", "mcap"] as const;
 type Session = Schema["SessionFiles"];
 
 function Report({ of, session, changed }: { of: string; session: Session; changed: () => void }) {
@@ -26,6 +27,25 @@ function Report({ of, session, changed }: { of: string; session: Session; change
         {made && <a id="report-save" class="button" href={made} download>{t.session.report}</a>}
         {!running && <Start id="report-start" quiet={Boolean(made)} why={whyNotWork()} onClick={begin}>{made ? t.session.reportAgain : t.session.reportMake}</Start>}
       </div>
+    </>
+  );
+}
+
+function Exports({ of }: { of: string }) {
+  const [making, make] = useState("");
+  const take = async (form: string) => {
+    if (making) return;
+    make(form);
+    await attempt(() => save("/api/v1/sessions/{session}/export/{form}", { path: { session: of, form } }));
+    make("");
+  };
+  return (
+    <>
+      <h3>{t.session.exports}</h3>
+      <div class="row">
+        {FORMATS.map((form) => <button key={form} id={`export-${form}`} type="button" class="small" aria-busy={making === form} onClick={() => void take(form)}>{t.session.format[form]}</button>)}
+      </div>
+      {making && <p class="quiet" role="status" id="exporting">{t.session.exporting}</p>}
     </>
   );
 }
@@ -47,13 +67,11 @@ function Whole({ of }: { of: string }) {
 }
 
 export function FilesCard({ of, session, changed }: { of: string; session: Session; changed: () => void }) {
-  const base = `/api/v1/sessions/${encodeURIComponent(of)}/export`;
   const files = session.files.filter((file) => file.name !== TRUTH);
   return (
     <Card id="files-card" title={t.session.files}>
       <Report of={of} session={session} changed={changed} />
-      <h3>{t.session.exports}</h3>
-      <div class="row">{FORMATS.map((format) => <a key={format} id={`export-${format}`} class="button small" href={`${base}/${format}`} download>{t.session.format[format]}</a>)}</div>
+      <Exports of={of} />
       <h3>{t.session.verifyTitle}</h3>
       <Whole of={of} />
       <details>
