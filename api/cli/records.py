@@ -116,9 +116,12 @@ def import_(
 
 def _with_doubts(result: Remarked, mapping: Path | None) -> Remarked:
     """The result with what is still doubtful in the mapping that was proposed, as the terminal shows it."""
-    lines = mapping.read_text(errors="replace").splitlines() if mapping else []
-    doubts: list[str] = [line.removeprefix(DOUBT) for line in lines if line.startswith(DOUBT)]
+    doubts: list[str] = _doubts(mapping.read_text(errors="replace")) if mapping else []
     return result.model_copy(update={"remarks": (*doubts, *result.remarks)})
+
+
+def _doubts(mapping: str) -> list[str]:
+    return [line.removeprefix(DOUBT) for line in mapping.splitlines() if line.startswith(DOUBT)]
 
 
 def mapping_for(place: Path, mapping: Path | None, out: Path, yes: bool) -> Path | None:
@@ -137,7 +140,7 @@ def _proposed(folder: Path, file: Path, yes: bool) -> Path:
     if OPEN in before:
         raise UsageError(f"{file}: was proposed before; answer what is open in it, then --mapping {file}, or remove it")
     if before:
-        show(f"{file} was proposed for it before and is used; remove it for a new proposal")
+        show(f"{file} was proposed for it before and is used; remove it for a new proposal", *_doubts(before))
         return file
     refuse_unwritable(file)
     found = propose(folder)

@@ -16,7 +16,7 @@ from rig.intake.interruptions import interruptions_of
 from rig.intake.long import by_channel
 from rig.intake.mapping import FileForm, LongForm
 from rig.intake.notation import Notation, notation_of, parts_thousands
-from rig.intake.readers import ARRAYS, kind_of, open_sheets
+from rig.intake.readers import kind_of, open_sheets
 from rig.intake.roles import WORDS, candidates, knows, words_of
 from rig.intake.sheet import DAMAGE, Sheet, Source, unreadable
 from rig.intake.survey import texts_of
@@ -113,7 +113,7 @@ def _layouts(path: Path) -> list[Layout]:
         found = {name: _of_text(Source(path, name)) for name in sheet_names(path)}
         seen = [layout for name, layouts in found.items() if name not in hidden for layout in layouts]
         return seen or [layout for layouts in found.values() for layout in layouts]
-    if kind != "arrays" or path.suffix.lower() not in ARRAYS:
+    if kind != "arrays":
         return []
     opened = [sheet for _, sheet in open_sheets(path, FileForm.model_construct(sheets="**/*"))]
     sheets = [sheet for sheet in opened if sheet.header]

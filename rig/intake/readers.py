@@ -26,10 +26,15 @@ ARRAYS = {
 
 def kind_of(path: Path) -> str:
     """``text``, ``workbook``, ``arrays``, or empty where no reader takes the file."""
-    suffix = (path.with_suffix("") if path.suffix == ".gz" else path).suffix.lower()
+    suffix = _suffix(path)
     if suffix in (*TEXTS, *ARRAYS, *NO_TABLES):
-        return "text" if suffix in TEXTS else "arrays" if suffix in ARRAYS else ""
+        packed = path.suffix == ".gz" and ARRAYS.get(suffix) != "open_json_lines"
+        return "text" if suffix in TEXTS else "arrays" if suffix in ARRAYS and not packed else ""
     return "text" if _is_text(path) else "workbook" if suffix in WORKBOOKS else ""
+
+
+def _suffix(path: Path) -> str:
+    return (path.with_suffix("") if path.suffix == ".gz" else path).suffix.lower()
 
 
 def _is_text(path: Path) -> bool:
@@ -59,7 +64,7 @@ def open_sheets(path: Path, form: FileForm) -> Iterable[tuple[dict[str, str], Sh
         found = [(matched(form.sheets, sheet.name), sheet) for sheet in _array_sheets(path)]
         chosen = [(labels, sheet) for labels, sheet in found if labels is not None]
     else:
-        raise DataError(f"{path}: no reader for {path.suffix or 'such a file'}; leave it out of the pattern")
+        raise DataError(f"{path}: no reader for {path.suffix or 'this'}; leave it out of the pattern or unpack it")
     if not chosen:
         raise DataError(f"{path}: none of its sheets is of the pattern {form.sheets!r}")
     yield from chosen
@@ -72,5 +77,5 @@ def _named(form: FileForm, sheets: Iterable[Sheet]) -> list[tuple[dict[str, str]
 
 
 def _array_sheets(path: Path) -> list[Sheet]:
-    read: Callable[[Path], list[Sheet]] = vars(import_module("rig.intake.arrays"))[ARRAYS[path.suffix.lower()]]
+    read: Callable[[Path], list[Sheet]] = vars(import_module("rig.intake.arrays"))[ARRAYS[_suffix(path)]]
     return read(path)

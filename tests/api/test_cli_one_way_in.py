@@ -99,6 +99,19 @@ def test_a_mapping_for_other_columns_is_refused_and_the_reason_is_in_the_json(
     assert "run_1.txt: no column 'Force'; there are 't', 'Kraft', 'Weg'" in reason
 
 
+@pytest.mark.parametrize("command", ["import", "fit", "diagnose", "export", "report"])
+def test_a_question_that_nobody_answers_is_exit_2_and_in_the_json_with_the_line_that_answers_it(
+    command: str, tmp_path: Path
+) -> None:
+    rows = "".join(f"0.{k},{k / 3},{2 * k},{-k / 7}\n" for k in range(10))
+    (tmp_path / "a.csv").write_text(f"time_s,a,depth_mm,b\n{rows}")
+    target = tmp_path / ("page.html" if command == "report" else "out")
+    result = rig(command, tmp_path / "a.csv", "--out", target, "--json", tmp_path / "said.json")
+    said = json.loads((tmp_path / "said.json").read_text())
+    assert (result.exit_code, said["exit_code"]) == (2, 2) and not target.exists()
+    assert 'give the line columns.force = { column = "?", unit = "?" } in' in said["reason"]
+
+
 @pytest.mark.parametrize("command", ["import", "export"])
 def test_what_the_terminal_doubts_is_in_the_json(command: str, tmp_path: Path) -> None:
     rows = "".join(f"{0.01 * k:.2f},{0.2 * k:.1f},{0.1 * k:.1f},{0.1 * k:.1f}\n" for k in range(40))

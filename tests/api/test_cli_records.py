@@ -115,6 +115,19 @@ def test_folders_of_one_name_have_proposals_of_their_own_and_each_is_used_again(
     assert (tmp_path / "data.toml").read_text() == "mine = 1\n"
 
 
+def test_a_proposal_that_is_used_again_is_shown_with_what_it_doubts(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = "".join(f"0.{k},{k},{2 * k},{2 * k}\n" for k in range(8))
+    place = write(tmp_path / "data", {"a.csv": f"time_s,force_N,depth_mm,gap_mm\n{rows}"})
+    said = []
+    for _ in range(2):
+        records.mapping_for(place, None, tmp_path / "out", yes=True)
+        said.append(" ".join(capsys.readouterr().out.split()))
+    assert "is used; remove it for a new proposal" in said[1]
+    assert all("it may be 'gap_mm'" in text for text in said)
+
+
 NAMELESS = "time_s,a,depth_mm,b\n" + "".join(f"0.{k},{k / 3},{2 * k},{-k / 7}\n" for k in range(10))
 
 

@@ -4,6 +4,7 @@ Each is written by another library, or letter by letter, and has to come out as 
 """
 
 import decimal
+import gzip
 import pickle
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +18,9 @@ import pytest
 import scipy.io
 
 from rig.errors import DataError
+from rig.intake.mapping import FileForm
 from rig.intake.proposal import propose
+from rig.intake.readers import open_sheets
 from tests.rig.intake.instruments import PRESS, comma, text
 from tests.rig.intake.test_foreign import COUNT, FORCE_N, ROWS, TIME_S, WAY_MM, came_in, check, lines
 
@@ -175,6 +178,25 @@ def test_a_text_of_another_kind_is_no_table(folder: Path, name: str) -> None:
     text(HEAD, name=name)(folder)
     with pytest.raises(DataError, match=f"no reader for {name}"):
         propose(folder)
+
+
+@pytest.mark.parametrize("name", ["a.mat.gz", "a.h5.gz", "a.parquet.gz", "a.mcap.gz"])
+def test_arrays_behind_gzip_are_one_sentence_with_a_mapping_and_left_aside_without(folder: Path, name: str) -> None:
+    (folder / name).write_bytes(gzip.compress(bytes(200), mtime=0))
+    with pytest.raises(DataError, match=r"no reader for \.gz; leave it out of the pattern or unpack it"):
+        list(open_sheets(folder / name, FileForm.model_construct(sheets="**/*")))
+    text(HEAD + PRESS)(folder)
+    assert f"left aside, no reader for them: {name}" in propose(folder).doubts
+
+
+def test_lines_of_json_behind_gzip_are_those_lines(folder: Path) -> None:
+    lines = "".join(f'{{"t_s": {t}, "force_N": {force}, "depth_mm": {way}}}\n' for t, way, force in zip(
+        TIME_S, WAY_MM, FORCE_N, strict=True
+    ))  # fmt: skip
+    (folder / "a.jsonl.gz").write_bytes(gzip.compress(lines.encode(), mtime=0))
+    assert propose(folder).tree["tables"][0]["columns"]["force"]["column"] == "force_N"
+    ((_, sheet),) = open_sheets(folder / "a.jsonl.gz", FileForm.model_construct(sheets="**/*"))
+    assert sheet.header == ("t_s", "force_N", "depth_mm")
 
 
 def waveforms(folder: Path, **of_the_way: float) -> None:
