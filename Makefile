@@ -57,7 +57,7 @@ test-campaigns: $(READY)
 
 # The demonstration, stops and crashes in contact, every answer of the service while the tip presses, further products; one after
 # another: beside a second bench a slow computer's devices come too late.
-test-extras: $(READY) page
+test-extras: $(READY) page nginx
 	$(BIN)/pytest -m "extra and not by_hand" --ignore tests/page $(DRAWN) --durations 10
 	$(MAKE) --no-print-directory test-one-extra
 
@@ -75,6 +75,7 @@ campaigns: $(READY) page
 	$(BIN)/python -m benchmarks.control
 	$(BIN)/python -m benchmarks.clock
 	$(BIN)/python -m benchmarks.contact
+	$(BIN)/python -m benchmarks.contact --others
 	$(BIN)/python -m benchmarks.preload
 	$(BIN)/python -m benchmarks.imported
 	for kind in csv parquet h5; do $(BIN)/python -m benchmarks.large_import --kind $$kind || exit; done
@@ -151,6 +152,13 @@ mbpoll:
 	@command -v mbpoll >/dev/null || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null \
 	  && $(APT) update -qq && $(APT) install -y -qq --no-install-recommends mbpoll >/dev/null; } \
 	  || echo "no mbpoll here and no right to install it: its tests will skip"
+
+# The reverse proxy whose file the deployment guide gives. Unpacked only: Debian's package, installed, would serve at once.
+.PHONY: nginx
+nginx: $(READY)
+	@command -v nginx >/dev/null || [ -x $(BIN)/nginx ] || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null \
+	  && $(APT) update -qq && cd $(VENV) && $(APT) download -qq nginx && dpkg-deb -x nginx_*.deb nginx && ln -sf ../nginx/usr/sbin/nginx bin/nginx; } \
+	  || echo "no nginx here and no right to fetch it: its tests will skip"
 
 # Debian's venv has no pip of its own, and a plain Debian no pip at all; uv then installs in seconds what pip takes a
 # minute for.

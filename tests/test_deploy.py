@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 import pytest
-import trustme
 from typer.main import get_command
 
 from api.cli.app import build
@@ -125,21 +124,6 @@ def test_udev_takes_the_rules() -> None:
     if done.returncode:
         pytest.skip("this udevadm is older than 254, which verifies rules")
     subprocess.run(["udevadm", "verify", DEPLOY / "70-tissue-rig.rules"], timeout=60, check=True)
-
-
-@without("nginx")
-def test_nginx_takes_its_file(tmp_path: Path) -> None:
-    issued = trustme.CA().issue_cert("bench.example.org")
-    issued.cert_chain_pems[0].write_to_path(tmp_path / "cert.pem")
-    issued.private_key_pem.write_to_path(tmp_path / "key.pem")
-    site = re.sub(r"/etc/ssl/certs/\S+\.pem", str(tmp_path / "cert.pem"), NGINX)
-    site = re.sub(r"/etc/ssl/private/\S+\.key", str(tmp_path / "key.pem"), site)
-    whole = f"pid {tmp_path}/pid;\nerror_log stderr;\nevents {{}}\nhttp {{\naccess_log off;\n{site}\n}}\n"
-    (tmp_path / "nginx.conf").write_text(whole)
-    done = subprocess.run(
-        ["nginx", "-t", "-c", tmp_path / "nginx.conf", "-p", tmp_path], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
 
 
 @without("caddy")
