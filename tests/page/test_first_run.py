@@ -1,6 +1,7 @@
 """A new user from an empty folder: subject, threshold, capture, fit, diagnosis, tracking, from the page alone."""
 
 import re
+import zipfile
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -81,6 +82,9 @@ def understand(page: Page) -> None:
     expect(page.locator("#diagnosis-result .said")).not_to_be_empty()
     page.click("#report-start")
     expect(page.locator("#report")).to_have_attribute("href", re.compile(r"report\.html$"), timeout=COMPUTING_MS)
+    with page.expect_download(timeout=COMPUTING_MS) as saved:
+        page.click("#export-csv")
+    assert zipfile.is_zipfile(saved.value.path())
     holds_up(page, "real-session")
 
 
