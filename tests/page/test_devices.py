@@ -38,3 +38,11 @@ def test_devices_are_checked_lost_and_found_again(page: Page, bench: ServedBench
     holds_up(page, "devices-lost", widths=(1280, 390))
     bench.control.fault("tracker", "unplug", False)
     state(page, "ready")
+
+    bench.control.fault("force", "drop", 0.5)
+    state(page, "not ready")
+    expect(rows.first).to_contain_text("works, but not as it should")
+    expect(rows.first).to_contain_text(re.compile(r"\d+ Hz came instead of \d+ Hz"))
+    holds_up(page, "devices-degraded", widths=(1280, 390))
+    bench.control.fault("force", "drop", 0.0)
+    state(page, "ready")
