@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import binomtest
 
+from benchmarks.contact import SAID_SHARE
 from mock_devices.testing.made.preloaded import (
     LAWS,
     OTHER_LAWS,
@@ -39,9 +40,6 @@ STROKES: Mapping[str, Callable[[str, Sensor, int], IndentationCycle]] = {
     "3 mm of air, uneven": uneven,
     "3 mm of air, in steps": stepped,
 }
-
-
-SAID_SHARE = 0.95
 
 
 class Answer(NamedTuple):

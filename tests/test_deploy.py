@@ -17,7 +17,6 @@ DEPLOY = Path(__file__).parents[1] / "examples" / "deploy"
 PAGE = Path(__file__).parents[1] / "docs" / "how-to" / "deploy.md"
 UNIT = (DEPLOY / "tissue-rig.service").read_text()
 RULES = (DEPLOY / "70-tissue-rig.rules").read_text()
-NGINX = (DEPLOY / "nginx.conf").read_text()
 # udev(7): a key, an operator, a value in quotation marks.
 PART = re.compile(r'[A-Z_]+(\{[^}"]+\})?(==|!=|=|\+=|-=|:=)"[^"]*"')
 MATCHED, ASSIGNED = {"ACTION", "SUBSYSTEM", "KERNEL", "DRIVERS", "ATTRS", "SYMLINK"}, {"GROUP", "MODE", "ATTR", "ENV"}

@@ -15,7 +15,7 @@ from mock_devices.testing.browser import launch
 from mock_devices.testing.commands import PATIENCE_S, RIG, ROOT, ServedBench, free_port, served_bench
 from tests.page.looks import PICTURES
 from tests.system.browser import find
-from tests.system.test_service import SHORT, SLOW
+from tests.system.presses import SHORT, SLOW
 
 expect.set_options(timeout=PATIENCE_S * 1000)
 

@@ -18,19 +18,16 @@ from websockets.sync.client import connect
 
 from api.http.access.scopes import Scope
 from mock_devices.testing.access import bearer, token
-from mock_devices.testing.commands import ROOT, ServedBench, free_port, pressed, until
+from mock_devices.testing.commands import ROOT, ServedBench, free_port, until
 from mock_devices.testing.service import ServedRig
 from tests.api.access.tls import Answer, Files, ask, made
 from tests.lacking import lacking
+from tests.system.presses import SLOW, press
 
 # Where `make nginx` puts it, unless the computer has one.
 PROGRAM = shutil.which("nginx") or shutil.which("nginx", path=str(Path(sys.executable).parent))
 pytestmark = [pytest.mark.extra, pytest.mark.xdist_group("commands")]
 NAME = "bench.example.org"
-SLOW = (
-    'kind = "indentation"\nspeeds_mm_s = [5]\ntrials = 1\ndepth_mm = 6\nair_dwell_s = 0.2\napproach_speed_mm_s = 20\n'
-    "hold_s = 30\nretract_speed_mm_s = 20\nclearance_mm = 4\nforce_limit_N = 12\n"
-)
 STREAM = "/api/v1/stream"
 
 
@@ -149,9 +146,7 @@ def test_requests_logins_streams_and_stops_of_others_come_through(proxied: Proxi
 
 
 def test_a_stop_goes_past_a_service_that_hangs(proxied: Proxied) -> None:
-    lease = proxied.rig.lease()
-    proxied.rig.ask("POST", "/jobs", {"kind": "capture", "params": {"protocol": "slow", "session": "one"}}, lease)
-    pressed(proxied.rig.bench)
+    press(proxied.rig)
     proxied.rig.running.process.send_signal(signal.SIGSTOP)
     try:
         assert proxied.ask("POST", "/stops/estop").status == 401

@@ -26,12 +26,7 @@ from mock_devices.testing.commands import (
     until,
 )
 from rig.recording.reader import read_recording
-
-SLOW = (
-    'kind = "indentation"\nspeeds_mm_s = [5]\ntrials = 1\ndepth_mm = 6\nair_dwell_s = 0.2\napproach_speed_mm_s = 20\n'
-    "hold_s = 30\nretract_speed_mm_s = 20\nclearance_mm = 4\nforce_limit_N = 12\n"
-)
-SHORT = SLOW.replace("hold_s = 30", "hold_s = 0.1").replace("speeds_mm_s = [5]", "speeds_mm_s = [20]")
+from tests.system.presses import SHORT, SLOW
 
 
 @pytest.fixture(scope="module")

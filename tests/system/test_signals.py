@@ -13,7 +13,7 @@ from mock_devices.testing.commands import Running, ServedBench, children, freed,
 from rig.recording.reader import read_recording
 from rig.recording.ring import new_path
 from rig.recording.sessions import open_session
-from tests.system.test_stop import SLOW
+from tests.system.presses import SLOW
 from tests.system.window import window
 
 pytestmark = pytest.mark.extra

@@ -29,18 +29,14 @@ from mock_devices.testing.commands import (
     children,
     freed,
     homing,
-    pressed,
     stands_still,
     until,
 )
 from mock_devices.testing.service import ServedRig
 from rig.errors import SafetyStop
+from tests.system.presses import SLOW, press
 
 pytestmark = pytest.mark.extra
-SLOW = (
-    'kind = "indentation"\nspeeds_mm_s = [5]\ntrials = 1\ndepth_mm = 6\nair_dwell_s = 0.2\napproach_speed_mm_s = 20\n'
-    "hold_s = 30\nretract_speed_mm_s = 20\nclearance_mm = 4\nforce_limit_N = 12\n"
-)
 
 
 def asked(port: int, path: str, method: str = "POST") -> tuple[int, dict[str, Any]]:
@@ -50,12 +46,6 @@ def asked(port: int, path: str, method: str = "POST") -> tuple[int, dict[str, An
     status, said = answer.status, json.loads(answer.read())
     client.close()
     return status, said
-
-
-def press(served: ServedRig) -> None:
-    """Starts a capture and waits until the tip presses."""
-    served.ask("POST", "/jobs", {"kind": "capture", "params": {"protocol": "slow", "session": "one"}}, served.lease())
-    pressed(served.bench)
 
 
 @pytest.fixture
