@@ -52,7 +52,7 @@ window.WebSocket = class {
   constructor() {
     this.at = 40;
     window.socket = this;
-    const hello = { type: "hello", session_id: "s", run: "r", event_seq: 0, streams: STREAMS.map((name) => ({ name })) };
+    const hello = { type: "hello", session_id: "s", run: "r", monotonic_ns: 40e9, event_seq: 0, streams: STREAMS.map((name) => ({ name })) };
     setTimeout(() => {
       if (window.hung) return;
       this.say(hello);

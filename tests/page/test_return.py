@@ -75,6 +75,29 @@ def back(page: Page, name: str) -> None:
     assert page.evaluate("() => window.mark === true")
 
 
+def kept(page: Page) -> None:
+    """A page that is loaded anew has the curves of the last minute: here where the marker was 6 s before."""
+    page.reload()
+    expect(page.locator("#marker")).to_have_text(NUMBER)
+    page.click("#plot-pause")
+    plot = page.locator("#depth-plot")
+    plot.focus()
+    page.keyboard.press("PageDown")
+    page.keyboard.press("PageDown")
+    expect(plot).to_have_attribute("aria-valuenow", "80")
+    expect(page.locator(".readout")).to_contain_text(re.compile(r"marker moved [\d.]+ mm"))
+
+
+@pytest.mark.timeout(240)
+def test_a_page_that_is_loaded_anew_while_it_presses_has_the_curves_of_the_last_minute(
+    page: Page, bench: ServedBench, service: Served
+) -> None:
+    state(page, "ready")
+    captures(service.origin)
+    watched(page, bench)
+    kept(page)
+
+
 @pytest.mark.timeout(240)
 def test_a_capture_goes_on_over_a_cut_line_and_is_there_again_with_what_happened(
     line: Line, page: Page, own_address: str, bench: ServedBench

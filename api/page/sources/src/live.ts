@@ -50,7 +50,7 @@ let newest_s = 0;
 let newestAt_ms = 0;
 let origin: number[] | null = null;
 
-/** Now on the bench's clock [s]: the newest sample, carried on by this computer's clock between batches. */
+/** Now on the bench's clock [s]: its greeting or the newest sample, carried on by this computer's clock between batches. */
 export function now_s(): number {
   return newest_s + (fresh.value ? Math.min(0.1, (performance.now() - newestAt_ms) * 1e-3) : 0);
 }
@@ -66,11 +66,13 @@ function keep(batch: Batch): void {
       if (greatest && greatest[i] !== least![i]) trace.push(time_s + 0.5 / RATE_HZ, greatest[i]!);
     });
   }
-  const last_s = batch.times_s.at(-1) ?? 0;
-  if (last_s > newest_s) {
-    newest_s = last_s;
-    newestAt_ms = performance.now();
-  }
+  // What was kept of the last minute comes first: it is not what the bench does now.
+  if (batch.times_s.at(-1)! > newest_s) see(batch.times_s.at(-1)!);
+}
+
+function see(bench_s: number): void {
+  newest_s = bench_s;
+  newestAt_ms = performance.now();
 }
 
 /** How far the marker is from where it was first seen, whichever way the tracker stands. */
@@ -84,7 +86,6 @@ function keepMarker({ times_s, values }: Batch): void {
 
 function forget(): void {
   for (const name of QUANTITIES) traces[name].clear();
-  newest_s = 0;
   origin = null;
 }
 
@@ -92,7 +93,7 @@ const known = (value: number) => (Number.isFinite(value) ? value : null);
 
 function showNumbers(): void {
   if (contact.value === "silent") numbers.value = {};
-  else numbers.value = Object.fromEntries(QUANTITIES.map((name) => [name, known(traces[name].value(newest_s))]));
+  else numbers.value = Object.fromEntries(QUANTITIES.map((name) => [name, known(traces[name].value(newest_s, SILENT_MS * 1e-3))]));
 }
 
 async function learn(): Promise<void> {
@@ -144,7 +145,15 @@ export function listen(): void {
     ],
     {
       message: () => void (heard_ms = performance.now()),
-      open: () => void learn(),
+      // A service that has ended closes what it had open: that is told at once, and not by the clock.
+      closed: () => {
+        heard_ms = performance.now() - 2 * SILENT_MS;
+        watch();
+      },
+      open: (bench_s) => {
+        see(bench_s);
+        void learn();
+      },
       run: () => (forget(), void learn()),
       batch: keep,
       event: (event) => {

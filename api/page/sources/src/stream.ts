@@ -30,7 +30,10 @@ export interface Asked {
 
 export interface Heard {
   message: () => void;
-  open: () => void;
+  /** The connection has ended; another is tried. */
+  closed: () => void;
+  /** The clock of the bench [s] as it greets. */
+  open: (now_s: number) => void;
   run: () => void;
   batch: (batch: Batch) => void;
   event: (event: RigEvent) => void;
@@ -71,7 +74,11 @@ export class Stream {
       if (typeof message.data === "string") this.told(JSON.parse(message.data));
       else this.sampled(message.data as ArrayBuffer);
     };
-    socket.onclose = () => socket === this.socket && this.again();
+    socket.onclose = () => {
+      if (socket !== this.socket) return;
+      this.heard.closed();
+      this.again();
+    };
   }
 
   private wait(): void {
@@ -105,19 +112,22 @@ export class Stream {
     this.heard.run();
   }
 
-  private greet(hello: { session_id: string; run: string; event_seq: number; streams: { name: string }[] }): void {
+  private greet(hello: { session_id: string; run: string; monotonic_ns: number; event_seq: number; streams: { name: string }[] }): void {
     if (hello.run !== this.run) this.begin(hello.run);
     // A service that was begun anew tells all of its own; what was before this page was opened is not asked for.
     if (hello.session_id !== this.session) this.event = this.session ? 0 : hello.event_seq;
     this.session = hello.session_id;
     this.channels.clear();
+    const anew = !Object.keys(this.seq).length;
     const known = new Set(hello.streams.map((one) => one.name));
     for (const { streams, ...how } of this.asked) {
       const wanted = streams.filter((name) => known.has(name));
-      const since_seq = Object.fromEntries(Object.entries(this.seq).filter(([name]) => wanted.includes(name)));
-      this.socket!.send(JSON.stringify({ type: "subscribe", streams: wanted, ...how, run: this.run, since_seq, session_id: this.session, since_event: this.event }));
+      const since_seq = Object.fromEntries(wanted.filter((name) => anew || name in this.seq).map((name) => [name, this.seq[name] ?? 0]));
+      // A number counted in no run asks for all that is kept.
+      const run = anew ? "" : this.run;
+      this.socket!.send(JSON.stringify({ type: "subscribe", streams: wanted, ...how, run, since_seq, session_id: this.session, since_event: this.event }));
     }
-    this.heard.open();
+    this.heard.open(hello.monotonic_ns * 1e-9);
   }
 
   /** Batches follow each other in one message. */

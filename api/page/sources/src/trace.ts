@@ -49,10 +49,12 @@ export class Trace {
     return low;
   }
 
-  /** The newest sample not later than ``time_s``; NaN where there is none. */
-  value(time_s: number): number {
+  /** The newest sample not later than ``time_s``, nor older than ``most_s`` by then; NaN where there is none. */
+  value(time_s: number, most_s = Infinity): number {
     const place = this.before(time_s + 1e-9);
-    return place ? this.values[this.at(place - 1)]! : NaN;
+    if (!place) return NaN;
+    const index = this.at(place - 1);
+    return time_s - this.times[index]! <= most_s ? this.values[index]! : NaN;
   }
 }
 

@@ -362,7 +362,7 @@ export const en = {
     error: "error",
     depth: "depth",
     position: "axis",
-    marker: "marker since opening",
+    marker: "marker moved",
     mode: "doing",
   },
   bench: {
@@ -379,7 +379,7 @@ export const en = {
     span: "Shown",
     spans: { 10: "10 s", 30: "30 s", 60: "1 min", 120: "2 min" } as Record<number, string>,
     at: (seconds: string) => `at ${seconds} s`,
-    marker: "The marker's value is how far it has moved since this page was opened or the bench began.",
+    marker: "The marker's value is how far it is from where this page first has it, up to a minute before it was opened.",
     unzeroed: "Force and depth are not known before the first run: it takes the zero of force in the air, then finds the surface.",
     help: "Point at a plot, or press the arrow keys on it, to read its values. Drag over it to look closer; a double click goes back to live.",
     health: "Devices",
