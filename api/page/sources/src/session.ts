@@ -37,15 +37,19 @@ function accept(found: Me): void {
   if (found.name) holder.value = t.holderNamed(found.name);
 }
 
+const ticketHere = () => new URLSearchParams(location.hash.slice(1)).get("ticket");
+
 /** Signs in as far as the address or an earlier visit allow, then does ``next``. */
 export async function signIn(next: () => void): Promise<void> {
   onUnauthorised(() => {
     if (me.value) refusal.value = t.login.ended;
     me.value = null;
   });
-  const ticket = new URLSearchParams(location.hash.slice(1)).get("ticket");
+  const ticket = ticketHere();
   // What signs in is not left in the address bar, nor in the history.
   if (ticket) history.replaceState(null, "", location.pathname);
+  // Whoever puts a link into the address bar of a page that is open stays on that page.
+  addEventListener("hashchange", () => ticketHere() && location.reload());
   const ask = async (): Promise<void> => {
     // What was sent is waited for: a ticket that it takes is good for no second.
     const hangs = setTimeout(() => {

@@ -5,6 +5,7 @@ import { attempt, failed, message } from "../attempt";
 import { duration } from "../clock";
 import { held, inControl, lost } from "../lease";
 import { contact, fresh, pressing, rig } from "../live";
+import { may } from "../session";
 import { past, pressStop } from "../stop";
 import { t } from "../texts";
 import { shown } from "./basics";
@@ -71,7 +72,7 @@ function Under() {
         <progress id="job-bar" max={job.total || 1} value={job.done} aria-label={t.job.label} />
         {job.time_left_s != null && <p class="quiet">{t.job.left(duration(job.time_left_s))}</p>}
       </div>
-      <button id="job-stop" type="button" onClick={() => void attempt(() => post("/api/v1/jobs/{identifier}/cancel", { path: { identifier: job.id } }))}>{t.job.stop}</button>
+      {may("operate") && <button id="job-stop" type="button" onClick={() => void attempt(() => post("/api/v1/jobs/{identifier}/cancel", { path: { identifier: job.id } }))}>{t.job.stop}</button>}
       <button id="pain" type="button" onClick={() => void pressStop("pain")}>{t.job.pain}</button>
     </section>
   );
@@ -83,10 +84,19 @@ function Needed() {
   return (
     <section class="strip bad" aria-label={t.attention.label}>
       <p id="reason" class="grow" role="alert">{now.reason}</p>
-      {now.state === "stopped" && <button id="reset" type="button" disabled={Boolean(now.job)} onClick={acknowledge}>{t.attention.acknowledge}</button>}
-      {now.state === "disconnected" && <button id="connect" type="button" onClick={connect}>{t.attention.connect}</button>}
-      <button id="recover" type="button" onClick={startRecovery}>{t.attention.recover}</button>
+      {may("operate") ? <Ways /> : <p class="quiet">{t.may.look}</p>}
     </section>
+  );
+}
+
+function Ways() {
+  const { state, job } = rig.value!;
+  return (
+    <>
+      {state === "stopped" && <button id="reset" type="button" disabled={Boolean(job)} onClick={acknowledge}>{t.attention.acknowledge}</button>}
+      {state === "disconnected" && <button id="connect" type="button" onClick={connect}>{t.attention.connect}</button>}
+      <button id="recover" type="button" onClick={startRecovery}>{t.attention.recover}</button>
+    </>
   );
 }
 
@@ -98,7 +108,7 @@ function Presses() {
   return (
     <section class="strip bad" aria-label={t.attention.pressing}>
       <p id="presses" class="grow"><strong>{t.attention.presses(shown(force_N, 1), out, now.state === "stopped")}</strong></p>
-      {now.state === "idle" && <button id="retract-now" type="button" class="primary" disabled={!fresh.value} title={t.attention.retractHint} onClick={retract}>{t.attention.retract}</button>}
+      {now.state === "idle" && may("operate") && <button id="retract-now" type="button" class="primary" disabled={!fresh.value} title={t.attention.retractHint} onClick={retract}>{t.attention.retract}</button>}
     </section>
   );
 }

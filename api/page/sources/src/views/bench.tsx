@@ -5,6 +5,7 @@ import { retract } from "../parts/attention";
 import { Happened } from "../parts/happened";
 import { fresh, now_s, numbers, rig, traces } from "../live";
 import { TimePlot, TimeWindow, XYPlot } from "../plot";
+import { may } from "../session";
 import { t } from "../texts";
 import { columns } from "../trace";
 
@@ -88,7 +89,7 @@ function Health() {
         ))}
       </ul>
       <p id="loop" class="quiet">{t.bench.loop(now?.cycles ?? 0, now?.missed ?? 0)}</p>
-      <button id="retract" type="button" disabled={now?.state !== "idle" || !fresh.value} title={t.attention.retractHint} onClick={retract}>{t.attention.retract}</button>
+      <button id="retract" type="button" disabled={now?.state !== "idle" || !fresh.value || !may("operate")} title={t.attention.retractHint} onClick={retract}>{t.attention.retract}</button>
     </Card>
   );
 }

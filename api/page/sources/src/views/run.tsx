@@ -3,6 +3,7 @@ import { useState } from "preact/hooks";
 import { every } from "../api";
 import { rig } from "../live";
 import { useLoaded } from "../loaded";
+import { whyNotMove } from "../parts/may";
 import { keyOf, ownModel, refOf, useModels } from "../parts/models";
 import { useSubject } from "../subject";
 import { t } from "../texts";
@@ -25,7 +26,9 @@ export function Run() {
   const [drafted, draft] = useState(false);
   const nobody = subject.value && !(id.trim() && subject.value.value.pain_threshold_N > 0);
   const whose = nobody ? t.run.nobody : drafted ? t.run.drafted : "";
-  const refusal = protocols.value?.find((one) => one.name === protocol)?.refusal ? t.run.refusedHere : "";
+  const refused = protocols.value?.find((one) => one.name === protocol)?.refusal ? t.run.refusedHere : "";
+  // That there is none is not said before it is known.
+  const refusal = protocols.value ? (protocol ? refused : t.run.none) : protocols.error || whyNotMove() || t.loading;
   const taken = { protocol, choose, model: model ?? (own ? keyOf(refOf(own)) : ""), chooseModel };
   return (
     <>

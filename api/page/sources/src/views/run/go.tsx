@@ -60,7 +60,7 @@ export function GoStep({ protocol, refusal }: { protocol: string; refusal: strin
           <label>{t.run.session}
             <input id="session" required autocomplete="off" value={session} aria-invalid={!isName} aria-describedby="session-hint" onInput={(event) => name(event.currentTarget.value)} />
           </label>
-          <Start id="capture-start" why={protocol ? refusal || (isName ? whyNotMove() : t.run.noName) : t.run.none}>{t.run.start}</Start>
+          <Start id="capture-start" why={refusal || (isName ? whyNotMove() : t.run.noName)}>{t.run.start}</Start>
           <p id="session-hint" class="quiet whole">{t.run.sessionHint}</p>
         </form>
       )}
