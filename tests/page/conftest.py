@@ -6,6 +6,7 @@ import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import pytest
 from playwright.sync_api import Browser, Page, Playwright, expect, sync_playwright
@@ -78,6 +79,33 @@ def serve(bench: ServedBench, folder: Path, port: int = 0) -> Served:
     address = process.stdout.readline().strip()
     assert address.startswith(f"http://127.0.0.1:{port}/")
     return Served(bench, process, address, folder)
+
+
+class NoBench:
+    """The wiring file says all."""
+
+    def settings(self) -> list[str]:
+        """None."""
+        return []
+
+
+# Of a bench that is somewhere else.
+WIRING = """
+[force]
+product = "bota-sensone"
+port = "/dev/no-sensor"
+[axis]
+product = "maxon-epos4"
+port = "/dev/no-adapter"
+increments_per_mm = 2000
+"""
+
+
+def serve_alone(folder: Path) -> Served:
+    """`rig serve` in ``folder`` where no bench is."""
+    (folder / "protocols").mkdir()
+    (folder / "rig.toml").write_text(WIRING)
+    return serve(cast("ServedBench", NoBench()), folder)
 
 
 @pytest.fixture(scope="session", autouse=True)

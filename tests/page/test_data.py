@@ -3,14 +3,12 @@
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from mock_devices.testing.commands import ServedBench
-from tests.page.conftest import Served, serve
+from tests.page.conftest import Served, serve_alone
 from tests.page.looks import holds_up
 from tests.page.steps import view
 
@@ -18,31 +16,10 @@ from tests.page.steps import view
 WORK_MS = 180_000.0
 
 
-# Data are read where no bench is.
-WIRING = """
-[force]
-product = "bota-sensone"
-port = "/dev/no-sensor"
-[axis]
-product = "maxon-epos4"
-port = "/dev/no-adapter"
-increments_per_mm = 2000
-"""
-
-
-class NoBench:
-    """The wiring file says all."""
-
-    def settings(self) -> list[str]:
-        """None."""
-        return []
-
-
 @pytest.fixture
 def service(tmp_path: Path) -> Iterator[Served]:
-    (tmp_path / "protocols").mkdir()
-    (tmp_path / "rig.toml").write_text(WIRING)
-    served = serve(cast("ServedBench", NoBench()), tmp_path)
+    """Data are read where no bench is."""
+    served = serve_alone(tmp_path)
     yield served
     served.end()
 

@@ -14,29 +14,10 @@ from playwright.sync_api import Browser, Page, expect
 from api.http.models import ControlView
 from hatch_build import SOURCES, built_folder
 from tests.page import told, told_lab
-from tests.page.looks import STOP, holds_up, stops, tabbed_through, violations
+from tests.page.looks import STOP, WIDTHS, holds_up, stops, tabbed_through, violations
 from tests.page.pretend import ADDRESS, ADMINISTRATOR, IDLE, INFO, OPERATOR, STOPPED, Pretended, opened
+from tests.page.views import AT_ONCE, MOVES, VIEWS, none_starts
 
-# By name: its address, what is there once it has loaded, what it says where there is nothing yet.
-VIEWS = {
-    "bench": ("bench", "#force-plot canvas", "No device is connected."),
-    "run": ("run", "#verdict", "No protocol lies in the protocols folder"),
-    "sessions": ("sessions", "#recordings", "No session yet"),
-    "session": (f"session/{told.NAME}", "#diagnosis-result", "could not be loaded"),
-    "track": ("track", "#track-form", "Nothing is fitted yet"),
-    "data": ("data", "#upload", "Choose files first"),
-    "subjects": ("subjects", "#subjects", "No subject yet"),
-    "subject": (f"subjects/{told.SUBJECT}", "#subject-sessions", "No session is left of this subject"),
-    "devices": ("devices", "#calibrations", "until they are, the bench does not approach anybody"),
-    "admin": ("admin", "#audit", "No program has a token."),
-}
-# These ask for nothing before they can be shown.
-AT_ONCE = ("bench", "data")
-STARTS = (
-    "capture-start", "ramp-start", "track-start", "subject-keep", "threshold-keep", "fit-start", "diagnose-start",
-    "report-start", "verify-start", "doctor", "read", "erase", "retract",
-    "calibrate-force", "calibrate-glove", "calibrate-axis", "calibrate-dynamics",
-)  # fmt: skip
 WALKS = 3
 Show = Callable[[str], Page]
 
@@ -85,7 +66,7 @@ def show(service: Pretended, only_page: Page) -> Show:
 
     def at(view: str) -> Page:
         only_page.set_viewport_size({"width": 1280, "height": 900})
-        only_page.goto(f"{ADDRESS}?{next(TIMES)}#/{VIEWS[view][0]}")
+        only_page.goto(f"{ADDRESS}?{next(TIMES)}#/{VIEWS[view].place}")
         return only_page
 
     return at
@@ -96,7 +77,7 @@ TIMES = itertools.count()
 
 def loaded(page: Page, view: str) -> Page:
     """Once it is there."""
-    expect(page.locator(VIEWS[view][1])).to_be_visible()
+    expect(page.locator(VIEWS[view].there)).to_be_visible()
     return page
 
 
@@ -114,12 +95,13 @@ def test_the_keyboard_alone_comes_to_everything_sees_where_it_is_and_presses_sto
     show: Show, service: Pretended, view: str
 ) -> None:
     page = loaded(show(view), view)
-    page.set_viewport_size({"width": 390, "height": 700})
-    # On a computer at work elsewhere values may be old, and what acts on them greyed, just while it is walked through.
-    walks = [tabbed_through(page)]
-    while walks[-1] and len(walks) < WALKS:
-        walks.append(tabbed_through(page))
-    assert walks[-1] == []
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 700})
+        # On a busy computer values may be old, and what acts on them greyed, just while it is walked through.
+        walks = [tabbed_through(page)]
+        while walks[-1] and len(walks) < WALKS:
+            walks.append(tabbed_through(page))
+        assert walks[-1] == [], width
     page.locator("#estop").focus()
     page.keyboard.press("Enter")
     expect(page.locator("#stop-banner")).to_contain_text("Emergency stop: confirmed by the loop: braked")
@@ -145,7 +127,7 @@ def test_where_there_is_nothing_yet_each_view_says_what_to_do(show: Show, servic
     bare = IDLE.model_copy(update={"devices": {}, "health": {}, "rates_Hz": {}})
     service.answers |= dict.fromkeys(asked_for(), 404) | told.nothing() | told_lab.bare() | {"rig": bare}
     page = show(view)
-    expect(page.locator("main")).to_contain_text(VIEWS[view][2])
+    expect(page.locator("main")).to_contain_text(VIEWS[view].empty)
     holds_up(page, f"state-empty-{view}", (390,))
     stops(page, service)
 
@@ -223,8 +205,7 @@ def test_a_service_that_hangs_is_told_after_half_a_second_and_named_after_a_whol
     service.answers["rig"] = None
     expect(page.locator("#state")).to_have_text("no answer from the service")
     expect(page.locator("#reason")).to_contain_text("Use the hardware stop if in doubt")
-    for start in page.locator(", ".join(f"#{one}" for one in STARTS)).all():
-        expect(start).to_be_disabled()
+    none_starts(page)
     if view == "bench":
         expect(page.locator("#force")).to_have_text("--")
         expect(page.locator(".values")).to_have_class(re.compile("stale"))
@@ -241,12 +222,28 @@ def test_a_service_that_hung_is_there_again_once_it_speaks(show: Show, service: 
     expect(page.locator("#force")).not_to_have_text("--")
 
 
+# Ends the connection; what the page says once it has drawn.
+ENDED = """() => new Promise((done) => {
+  socket.dead = true;
+  socket.onclose();
+  setTimeout(() => done(document.getElementById("state").textContent), 100);
+})"""
+
+
+def test_a_connection_that_ends_is_told_at_once_and_forgotten_once_there_is_another(
+    show: Show, service: Pretended
+) -> None:
+    page = loaded(show("bench"), "bench")
+    expect(page.locator("#state")).to_have_text("ready")
+    assert page.evaluate(ENDED) == NAMED
+    expect(page.locator("#state")).to_have_text("ready")
+
+
 WRONG = {
     "lost": ({"state": "disconnected", "reason": "force is lost: the cable of /dev/ttyUSB0"}, "Connect devices"),
     "stopped": ({"state": "stopped", "reason": "emergency stop pressed"}, "Acknowledge stop"),
     "degraded": ({"state": "not ready", "reason": "tracker is degraded: 20 of 60 Hz"}, "Recover…"),
 }
-MOVES = {"run": "#capture-start", "track": "#track-start", "bench": "#retract"}
 
 
 @pytest.mark.parametrize("view", VIEWS)

@@ -13,7 +13,8 @@ from pydantic import BaseModel
 
 from hatch_build import LIMIT_S, SOURCES, build, built_folder, fetch
 from tests.page.pretend import Pretended, opened
-from tests.page.test_every_view import VIEWS, everything
+from tests.page.test_every_view import everything
+from tests.page.views import VIEWS
 
 MARK = "\N{CURRENCY SIGN}"
 LANGUAGE = """

@@ -20,7 +20,7 @@ const [answers, hash] = JSON.parse(process.argv[2]);
 const told = { asked: [], waited_ms: [], said: [], hung: [], begun: 0 };
 const later = setTimeout;
 Object.assign(globalThis, {
-  told, location: { hash, pathname: "/", reload() {} }, history: { replaceState() { location.hash = ""; } },
+  told, addEventListener() {}, location: { hash, pathname: "/", reload() {} }, history: { replaceState() { location.hash = ""; } },
   setTimeout(then, wait_ms) {
     if (wait_ms === 3000) return later(() => (then(), told.hung.push(told.refusal())), 100);
     told.waited_ms.push(wait_ms);
