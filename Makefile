@@ -84,6 +84,7 @@ campaigns: $(READY) page
 	$(BIN)/python -m benchmarks.stalls
 	$(BIN)/python -m benchmarks.service --minutes 10
 	$(BIN)/python -m benchmarks.page
+	$(BIN)/python -m benchmarks.octoprint
 	$(BIN)/python -m benchmarks.all
 
 # Each extra in an environment of its own, without the others.
