@@ -41,11 +41,12 @@ types: $(READY)
 contracts: $(READY)
 	$(BIN)/lint-imports --no-logo >$(VENV)/contracts || { cat $(VENV)/contracts; exit 1; }
 
-# The page in a real browser over the service and the mock bench; what needs no bench runs beside it and gives way to it.
+# The page in a real browser over the service and the mock bench, and before it by itself: beside other browsers at work the
+# simulated devices came too late.
 PAGE ?= tests/page
 test-page: $(READY) page browser
-	@nice -n 15 $(BIN)/pytest $(PAGE) -m "not bench" & alone=$$!; \
-	  $(BIN)/pytest $(PAGE) -m "bench and not by_hand" $(DRAWN) --durations 10; beside=$$?; wait $$alone && exit $$beside
+	$(BIN)/pytest -n 2 --dist loadfile $(PAGE) -m "not bench" --durations 5
+	$(BIN)/pytest $(PAGE) -m "bench and not by_hand" $(DRAWN) --durations 10
 
 # Every command, cell and example of README and docs, as somebody would run it.
 test-documents: $(READY) page

@@ -11,10 +11,13 @@ from tests.page.conftest import Served, serve_alone
 from tests.page.looks import WIDTHS, tabbed_through, violations
 from tests.page.people import somebody, visitor
 from tests.page.steps import state
-from tests.page.views import MOVES, VIEWS, none_starts
+from tests.page.views import VIEWS, none_moves, none_starts
 
 Open = Callable[[str, str], Page]
-EMPTY = {where: about.empty for where, about in VIEWS.items()} | {"subject": "has no session in sessions and no name"}
+EMPTY = {where: about.empty for where, about in VIEWS.items()} | {
+    "subject": "has no session in sessions and no name",
+    "admin": "The log is whole",
+}
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +66,7 @@ def test_where_there_is_nothing_yet_each_view_says_so_and_can_be_walked_through_
         state(page, "disconnected")
         expect(page.locator("main")).to_contain_text(EMPTY[where])
         expect(page.locator("#reason")).to_contain_text("/dev/no-sensor: cannot be opened")
-        none_starts(page, tuple(move.removeprefix("#") for move in MOVES.values()))
+        none_moves(page)
         assert tabbed_through(page) == []
         assert violations(page) == []
     refused(page)

@@ -38,7 +38,16 @@ STARTS = (
 MOVES = {"run": "#capture-start", "track": "#track-start", "bench": "#retract"}
 
 
-def none_starts(page: Page, starts: tuple[str, ...] = STARTS) -> None:
-    """None of what acts on the bench can be pressed."""
-    for start in page.locator(", ".join(f"#{one}" for one in starts)).all():
-        expect(start).to_be_disabled()
+def none_starts(page: Page) -> None:
+    """Nothing that acts on the bench can be pressed."""
+    _disabled(page, ", ".join(f"#{start}" for start in STARTS))
+
+
+def none_moves(page: Page) -> None:
+    """Nothing that moves the tip can."""
+    _disabled(page, ", ".join(MOVES.values()))
+
+
+def _disabled(page: Page, which: str) -> None:
+    for button in page.locator(which).all():
+        expect(button).to_be_disabled()
