@@ -76,6 +76,14 @@ def view(page: Page, name: str) -> None:
     page.get_by_role("navigation").get_by_role("link", name=name, exact=True).click()
 
 
+def subject(page: Page, code: str, site: str, threshold_N: float) -> None:
+    """Puts somebody on the bench, on the view Run."""
+    page.fill("#subject-id", code)
+    page.fill("#subject-site", site)
+    page.fill("#subject-threshold", f"{threshold_N:g}")
+    press(page, "#subject-keep")
+
+
 def start(page: Page, protocol: str, session: str = "") -> None:
     """Starts a capture on the view Run."""
     view(page, "Run")

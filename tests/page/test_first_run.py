@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 from mock_devices.testing.commands import ServedBench
 from tests.page.conftest import Served
 from tests.page.looks import holds_up
-from tests.page.steps import out, press, state, view
+from tests.page.steps import out, press, state, subject, view
 
 # Three speeds, each thrice: the least that a diagnosis can leave out recordings of.
 PROTOCOL = (
@@ -43,10 +43,7 @@ def test_a_new_user_goes_from_subject_to_tracking_without_reading_anything(
 
 def set_up(page: Page) -> None:
     """Whom the session is of, and what force is never passed."""
-    page.fill("#subject-id", "S07")
-    page.fill("#subject-site", "left forearm")
-    page.fill("#subject-threshold", "8")
-    press(page, "#subject-keep")
+    subject(page, "S07", "left forearm", 8)
     expect(page.locator("#message")).to_contain_text("on the bench: S07, left forearm")
     expect(page.locator("#message")).to_contain_text("pain threshold in force: 15.0 N → 8.0 N")
     state(page, "ready")

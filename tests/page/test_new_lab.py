@@ -11,7 +11,7 @@ from tests.page.conftest import Served, serve_alone
 from tests.page.looks import WIDTHS, tabbed_through, violations
 from tests.page.people import somebody, visitor
 from tests.page.steps import state
-from tests.page.views import VIEWS, none_moves, none_starts
+from tests.page.views import VIEWS, go, none_moves, none_starts
 
 Open = Callable[[str, str], Page]
 EMPTY = {where: about.empty for where, about in VIEWS.items()} | {
@@ -42,8 +42,7 @@ def people(service: Served, browser: Browser) -> Iterator[dict[str, Page]]:
 @pytest.fixture
 def show(people: dict[str, Page]) -> Open:
     def at(who: str, where: str) -> Page:
-        people[who].evaluate("(place) => { location.hash = `#/${place}`; }", VIEWS[where].place)
-        return people[who]
+        return go(people[who], where)
 
     return at
 

@@ -20,8 +20,8 @@ from tests.api.catalogue.made import fitted, make_session
 from tests.page import told
 from tests.page.conftest import Served, serve
 from tests.page.looks import violations
-from tests.page.steps import press, start, state, view
-from tests.page.views import AT_ONCE, VIEWS, none_moves
+from tests.page.steps import start, state, subject, view
+from tests.page.views import AT_ONCE, VIEWS, go, none_moves
 from tests.system.presses import SHORT, SLOW
 
 # Longer than the slowest computer takes to go through all views.
@@ -174,23 +174,15 @@ def lab(tmp_path_factory: pytest.TempPathFactory, browser: Browser) -> Iterator[
         try:
             lab.page.goto(lab.service.address)
             state(lab.page, "ready")
-            whom(lab.page)
+            view(lab.page, "Run")
+            subject(lab.page, told.SUBJECT, told.SITE, 11)
+            expect(lab.page.locator("#subject-keep-why")).to_have_text("is on the bench")
+            released(lab.page)
             lab.done("capture", protocol="short", session=told.NAME)
             yield lab
         finally:
             context.close()
             lab.service.end()
-
-
-def whom(page: Page) -> None:
-    """The subject, by the page."""
-    view(page, "Run")
-    page.fill("#subject-id", told.SUBJECT)
-    page.fill("#subject-site", told.SITE)
-    page.fill("#subject-threshold", "11")
-    press(page, "#subject-keep")
-    expect(page.locator("#subject-keep-why")).to_have_text("is on the bench")
-    released(page)
 
 
 def released(page: Page) -> None:
@@ -208,12 +200,6 @@ def now(lab: Lab, request: pytest.FixtureRequest) -> Iterator[State]:
         state(lab.page, is_now.word)
         yield is_now
     lab.ready()
-
-
-def go(page: Page, where: str) -> Page:
-    """To a view, by its address."""
-    page.evaluate("(place) => { location.hash = `#/${place}`; }", VIEWS[where].place)
-    return page
 
 
 @pytest.mark.timeout(240)

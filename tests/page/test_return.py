@@ -75,19 +75,6 @@ def back(page: Page, name: str) -> None:
     assert page.evaluate("() => window.mark === true")
 
 
-def kept(page: Page) -> None:
-    """A page that is loaded anew has the curves of the last minute: here where the marker was 6 s before."""
-    page.reload()
-    expect(page.locator("#marker")).to_have_text(NUMBER)
-    page.click("#plot-pause")
-    plot = page.locator("#depth-plot")
-    plot.focus()
-    page.keyboard.press("PageDown")
-    page.keyboard.press("PageDown")
-    expect(plot).to_have_attribute("aria-valuenow", "80")
-    expect(page.locator(".readout")).to_contain_text(re.compile(r"marker moved [\d.]+ mm"))
-
-
 @pytest.mark.timeout(240)
 def test_a_page_that_is_loaded_anew_while_it_presses_has_the_curves_of_the_last_minute(
     page: Page, bench: ServedBench, service: Served
@@ -95,7 +82,15 @@ def test_a_page_that_is_loaded_anew_while_it_presses_has_the_curves_of_the_last_
     state(page, "ready")
     captures(service.origin)
     watched(page, bench)
-    kept(page)
+    page.reload()
+    expect(page.locator("#marker")).to_have_text(NUMBER)
+    page.click("#plot-pause")  # here where the marker was 6 s before
+    plot = page.locator("#depth-plot")
+    plot.focus()
+    page.keyboard.press("PageDown")
+    page.keyboard.press("PageDown")
+    expect(plot).to_have_attribute("aria-valuenow", "80")
+    expect(page.locator(".readout")).to_contain_text(re.compile(r"marker moved [\d.]+ mm"))
 
 
 @pytest.mark.timeout(240)

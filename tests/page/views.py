@@ -38,6 +38,12 @@ STARTS = (
 MOVES = {"run": "#capture-start", "track": "#track-start", "bench": "#retract"}
 
 
+def go(page: Page, where: str) -> Page:
+    """To a view, by its address."""
+    page.evaluate("(place) => { location.hash = `#/${place}`; }", VIEWS[where].place)
+    return page
+
+
 def none_starts(page: Page) -> None:
     """Nothing that acts on the bench can be pressed."""
     _disabled(page, ", ".join(f"#{start}" for start in STARTS))
