@@ -1,12 +1,15 @@
 """The simulation with its named causes as a model that the control takes at once."""
 
 import hashlib
+from collections.abc import Sequence
 
 import numpy as np
 
 from rig.diagnosis.answers import Diagnosis
+from rig.diagnosis.estimates import Estimate, NamedCause
 from rig.diagnosis.fit import Fit
 from rig.diagnosis.indentation import IndentationProblem
+from rig.diagnosis.problem import Effect
 from rig.errors import DataError
 from rig.tissue.laws_extended import Extended
 from rig.tissue.model import Model, ModelCause, Provenance, Quality, UncertainValue, ValidRange
@@ -29,7 +32,7 @@ def extended_model(result: Diagnosis) -> Model:
         valid=_valid(fit, law),
         data=_provenance(fit, result.session),
         quality=_quality(fit, law),
-        effects=_effects(result, fit),
+        effects=causes_of(result.findings, fit.problem.effects),
     )
 
 
@@ -95,19 +98,20 @@ def _quality(fit: Fit, law: Extended) -> Quality:
     )
 
 
-def _effects(result: Diagnosis, fit: Fit) -> tuple[ModelCause, ...]:
-    pars = (par for effect in fit.problem.effects for par in effect.pars)
-    control = {effect.name: effect.control for effect in fit.problem.effects}
-    units = {par.name.replace("_sin_mm", "_mm"): par.unit for par in pars}
+def causes_of(findings: Sequence[NamedCause], library: Sequence[Effect]) -> tuple[ModelCause, ...]:
+    """What was named, with its sizes and their units, and what the control makes of it."""
+    control = {effect.name: effect.control for effect in library}
     return tuple(
         ModelCause(
             name=found.effects[0],
             statement=found.statement,
-            parameters={
-                name: UncertainValue(value=i.value, unit=units[name], low=float(i.low), high=float(i.high))
-                for name, i in found.parameters.items()
-            },
+            parameters={name: _known(size) for name, size in found.parameters.items()},
             used=control[found.effects[0]],
         )
-        for found in result.findings
+        for found in findings
     )
+
+
+def _known(size: Estimate) -> UncertainValue:
+    assert size.unit is not None, "only files of earlier versions have none"
+    return UncertainValue(value=size.value, unit=size.unit, low=float(size.low), high=float(size.high))
