@@ -36,7 +36,7 @@ from rig.intake.questions import inline
 from rig.recording.files import make_folder, refuse_unwritable, write_text
 from rig.recording.sessions import derive
 from rig.results.demo import DemoSummary, HiddenTruth
-from rig.results.diagnosis import FOLDER, TRUTH, DiagnosisResult
+from rig.results.diagnosis import FILE, FOLDER, TRUTH, DiagnosisResult
 from rig.results.fit import FitResult
 from rig.results.tables import track_parts
 from rig.results.tracking import TrackResult
@@ -57,7 +57,7 @@ PLAN = Indentation(
 LARGEST_SEED = 100_000  # five digits: soon typed again, and seldom drawn twice
 FORCES_N = (1.0, 2.0, 3.0, 4.0, 5.0)
 SECONDS = 3.0
-MODEL = Path("fit") / "model.json"
+MODEL, EXTENDED = Path("fit") / "model.json", Path(FOLDER) / "model.json"
 # What stops a bench whose computer stood still for a tenth of a second; a demonstration then begins again.
 LATE = {"drive_fault", "axis_lost", "force_lost", "tracker_lost", "loop_overrun", "recorder_stalled", "stop_lost"}
 AGAIN = 2
@@ -99,8 +99,8 @@ def demo(
     show(f"a cause is hidden in the bench; --seed {seed} hides the same again")
     fitted, result = measured(wiring, secret.hide, plan, out)
     show(*track_parts(result))
-    console.rule("diagnose: what the simulation gets wrong")
-    diagnosis = diagnosed(session, out=session / FOLDER)
+    known = DiagnosisResult.read_or_why(session / FOLDER / FILE, "This session was not diagnosed", "rig diagnose")
+    diagnosis = _diagnosed(session) if isinstance(known, str) else known
     console.rule("verify and report")
     refuse_incomplete(verify(Operation("verify"), session), session)
     derive(session)
@@ -140,8 +140,9 @@ def measured(
             captured(bench, plan, session)
             console.rule("fit: constant stiffness against the index law")
             fitted = fit_session([session])
+            model = model_to_track_with(session)
             console.rule("track: gains from the tangent stiffness of the model")
-            return fitted, followed(bench, TrackPlan(_forces(bench, session), str(MODEL)), session)
+            return fitted, followed(bench, TrackPlan(_forces(bench, session / model), str(model)), session)
     except (DampingUnknown, DataError) as unknown:  # too few trials, or of a computer that was late
         if not again:
             raise
@@ -181,8 +182,24 @@ def _clear(out: Path) -> None:
     out.mkdir(parents=True)
 
 
-def _forces(bench: Supervisor, session: Path) -> Program:
-    model = load_model(session / MODEL)
+def model_to_track_with(session: Path) -> Path:
+    """In ``session`` the model of its fit; where that misses too much of a displacement, as a diagnosis extends it."""
+    try:
+        load_model(session / MODEL).check_force(0.0)
+    except DataError as missed:
+        show(str(missed))
+        _diagnosed(session)
+        return EXTENDED
+    return MODEL
+
+
+def _diagnosed(session: Path) -> DiagnosisResult:
+    console.rule("diagnose: what the simulation gets wrong")
+    return diagnosed(session, out=session / FOLDER)
+
+
+def _forces(bench: Supervisor, file: Path) -> Program:
+    model = load_model(file)
     # A limb that softens was pressed harder at first than its model reaches.
     largest_N = min(model.valid.force_N, model.force_N(model.valid.depth_mm))
     return tracked.plan(forces_within(largest_N), SECONDS, model, bench.wiring)

@@ -13,7 +13,7 @@ from rig.results.diagnosis import DiagnosisResult
 
 
 @dataclass(frozen=True)
-class HiddenNumber:
+class Lot:
     """A knob of the mock bench, the range it is drawn from, and what a right answer calls it and makes of its value.
 
     ``null`` is the answer's value where the cause is absent.
@@ -30,53 +30,37 @@ class HiddenNumber:
 THICKNESS_MM = 10.0  # of the mock bench's substrate
 REFERENCE_MM_S = 10.0  # speed at which its rate law has its level
 # The first number is the size. Small enough that the fit knows the damping, and so has a law to track with.
-CAUSES: Mapping[str, tuple[HiddenNumber, ...]] = {
-    "friction": (
-        HiddenNumber("level_N", "friction_N", 0.05, 0.15),
-        HiddenNumber("slip_length_mm", "friction_length_mm", 0.03, 0.1),
-    ),
-    "backlash": (HiddenNumber("gap_mm", "backlash_mm", 0.06, 0.12),),
-    "frame_compliance": (HiddenNumber("compliance_mm_N", "frame_compliance_mm_N", 0.02, 0.05),),
-    "position_ripple": (
-        HiddenNumber("amplitude_mm", "ripple_mm", 0.02, 0.06),
-        HiddenNumber("period_mm", "ripple_pitch_mm", 1.0, 2.5),
-    ),
+CAUSES: Mapping[str, tuple[Lot, ...]] = {
+    "friction": (Lot("level_N", "friction_N", 0.05, 0.15), Lot("slip_length_mm", "friction_length_mm", 0.03, 0.1)),
+    "cogging": (Lot("level_N", "cogging_N", 0.02, 0.05), Lot("period_mm", "cogging_pitch_mm", 1.0, 2.5)),
+    "backlash": (Lot("gap_mm", "backlash_mm", 0.06, 0.12),),
+    "frame_compliance": (Lot("compliance_mm_N", "frame_compliance_mm_N", 0.02, 0.05),),
+    "position_ripple": (Lot("amplitude_mm", "ripple_mm", 0.02, 0.06), Lot("period_mm", "ripple_pitch_mm", 1.0, 2.5)),
     "surface_motion": (
-        HiddenNumber("amplitude_mm", "surface_motion_mm", 0.05, 0.1),
-        HiddenNumber("frequency_Hz", "surface_motion_Hz", 0.2, 0.4),
+        Lot("amplitude_mm", "surface_motion_mm", 0.05, 0.1),
+        Lot("frequency_Hz", "surface_motion_Hz", 0.2, 0.4),
     ),
-    "relaxation": (
-        HiddenNumber("ratio", "relaxation_ratio", 0.05, 0.1),
-        HiddenNumber("time_constant_s", "tau_s", 0.2, 0.8),
-    ),
+    "relaxation": (Lot("ratio", "relaxation_ratio", 0.05, 0.1), Lot("time_constant_s", "tau_s", 0.2, 0.8)),
     "rate_law": (
-        HiddenNumber("exponent", "rate_exponent", 0.5, 0.7, null=1.0),
-        HiddenNumber("level_N", "damping_N_s_mm", 0.08, 0.12, lambda level_N: level_N / REFERENCE_MM_S),
+        Lot("exponent", "rate_exponent", 0.5, 0.7, null=1.0),
+        Lot("level_N", "damping_N_s_mm", 0.08, 0.12, lambda level_N: level_N / REFERENCE_MM_S),
     ),
-    "elastic_law": (HiddenNumber("exponent", "exponent", 1.7, 2.1, null=1.0),),
-    "substrate": (
-        HiddenNumber("strength", "substrate_per_mm3", 0.1, 0.3, lambda strength: strength / THICKNESS_MM**3),
-    ),
+    "elastic_law": (Lot("exponent", "exponent", 1.7, 2.1, null=1.0),),
+    "substrate": (Lot("strength", "substrate_per_mm3", 0.1, 0.3, lambda strength: strength / THICKNESS_MM**3),),
     "preconditioning": (  # the knob is the first cycle over the last, less one; softening what the last has lost of it
-        HiddenNumber("softening", "preconditioning_gain", 0.1, 0.2, lambda share: share / (1 - share)),
-        HiddenNumber("cycles", "preconditioning_cycles", 1.5, 4.0),
+        Lot("softening", "preconditioning_gain", 0.1, 0.2, lambda share: share / (1 - share)),
+        Lot("cycles", "preconditioning_cycles", 1.5, 4.0),
     ),
-    "adhesion": (
-        HiddenNumber("level_N", "adhesion_N", 0.05, 0.15),
-        HiddenNumber("length_mm", "adhesion_length_mm", 0.5, 1.5),
-    ),
-    "hunt_crossley": (HiddenNumber("damping_s_mm", "hunt_crossley_s_mm", 0.01, 0.015),),
-    "mullins": (HiddenNumber("softening", "mullins_share", 0.1, 0.2),),
-    "sensor_hysteresis": (
-        HiddenNumber("level_N", "hysteresis_N", 0.05, 0.15),
-        HiddenNumber("width_N", "hysteresis_width_N", 0.3, 0.8),
-    ),
-    "clock_drift": (HiddenNumber("gain_ppm", "clock_drift_ppm", 40.0, 80.0),),
-    "tip_inertia": (HiddenNumber("mass_kg", "tip_inertia_kg", 0.02, 0.06),),
-    "filter_lag": (HiddenNumber("time_constant_s", "filter_lag_s", 0.003, 0.006),),
-    "time_offset": (HiddenNumber("delay_s", "time_offset_s", 0.003, 0.008),),
-    "zero_drift": (HiddenNumber("rate_N_h", "zero_drift_N_h", 8.0, 15.0),),
-    "tracker_latency": (HiddenNumber("delay_s", "tracker_latency_s", 0.015, 0.04),),
+    "adhesion": (Lot("level_N", "adhesion_N", 0.05, 0.15), Lot("length_mm", "adhesion_length_mm", 0.5, 1.5)),
+    "hunt_crossley": (Lot("damping_s_mm", "hunt_crossley_s_mm", 0.01, 0.015),),
+    "mullins": (Lot("softening", "mullins_share", 0.1, 0.2),),
+    "sensor_hysteresis": (Lot("level_N", "hysteresis_N", 0.05, 0.15), Lot("width_N", "hysteresis_width_N", 0.3, 0.8)),
+    "clock_drift": (Lot("gain_ppm", "clock_drift_ppm", 40.0, 80.0),),
+    "tip_inertia": (Lot("mass_kg", "tip_inertia_kg", 0.02, 0.06),),
+    "filter_lag": (Lot("time_constant_s", "filter_lag_s", 0.003, 0.006),),
+    "time_offset": (Lot("delay_s", "time_offset_s", 0.003, 0.008),),
+    "zero_drift": (Lot("rate_N_h", "zero_drift_N_h", 8.0, 15.0),),
+    "tracker_latency": (Lot("delay_s", "tracker_latency_s", 0.015, 0.04),),
 }
 # Nothing recovers within a demonstration: the library knows of no rest that makes softening forgotten. What was borne
 # reaches as far as a depth on the bench, and as an energy in an answer.
@@ -152,12 +136,12 @@ def draw(rng: np.random.Generator, visible: Mapping[str, SmallestSize]) -> Hidde
     return HiddenCause(effect, knobs, {one.parameter: one.told(knobs[one.knob]) for one in CAUSES[effect]})
 
 
-def _reach(size: HiddenNumber) -> float:
+def _reach(size: Lot) -> float:
     """How far from absent the range goes."""
     return max(abs(size.told(end) - size.null) for end in (size.low, size.high))
 
 
-def _drawn(rng: np.random.Generator, number: HiddenNumber, least: float = 0.0) -> float:
+def _drawn(rng: np.random.Generator, number: Lot, least: float = 0.0) -> float:
     """A value of the range that is at least so far from absent."""
     while True:
         value = round(float(rng.uniform(number.low, number.high)), DIGITS)

@@ -1,6 +1,7 @@
 """Commands that move refuse what cannot be before any device is opened: number, bound, next step."""
 
 import contextlib
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import MagicMock
@@ -13,7 +14,7 @@ from api.cli.app import build
 from api.cli.demo import forces_within
 from controller.law.gain_table import DampingUnknown
 from mock_devices.testing.commands import free_port
-from mock_devices.testing.models import index_model
+from mock_devices.testing.models import index_model, known_session
 from rig.config.calibration_files import text_of
 from rig.config.wiring import Wiring
 from rig.errors import DataError, SafetyStop, UsageError
@@ -165,6 +166,7 @@ def test_a_demonstration_begins_again_where_the_computer_was_late_and_for_no_oth
     monkeypatch.setattr("api.cli.live.running", lambda *_: contextlib.nullcontext())
     monkeypatch.setattr(demo, "captured", captured)
     monkeypatch.setattr(demo, "fit_session", lambda _: "fitted")
+    monkeypatch.setattr(demo, "model_to_track_with", lambda _: demo.MODEL)
     monkeypatch.setattr(demo, "_forces", lambda *_: "forces")
     monkeypatch.setattr(demo, "followed", lambda *_: "tracked")
     refused = pytest.raises(SafetyStop) if begun <= len(stops) else contextlib.nullcontext()
@@ -188,12 +190,26 @@ def test_a_demonstration_whose_trials_give_no_law_to_track_with_begins_again_wit
     monkeypatch.setattr("api.cli.live.running", lambda *_: contextlib.nullcontext())
     monkeypatch.setattr(demo, "captured", lambda _, plan, __: captures.append(plan.trials))
     monkeypatch.setattr(demo, "fit_session", lambda _: "fitted")
+    monkeypatch.setattr(demo, "model_to_track_with", lambda _: demo.MODEL)
     monkeypatch.setattr(demo, "_forces", forces)
     monkeypatch.setattr(demo, "followed", lambda *_: "tracked")
     refused = pytest.raises(type(why)) if refusals > demo.AGAIN else contextlib.nullcontext()
     with refused:
         demo.measured(Wiring(), (), demo.PLAN, tmp_path / "demo")
     assert captures == trials
+
+
+@pytest.mark.parametrize(("worst_percent", "taken"), [(20.0, demo.MODEL), (90.0, demo.EXTENDED)])
+def test_a_demonstration_whose_law_errs_too_much_to_track_with_tracks_with_what_its_diagnosis_extends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, worst_percent: float, taken: Path
+) -> None:
+    model, diagnoses = index_model(0.12, 0.22, 0.01), list[Path | None]()
+    known_session(tmp_path / "session")
+    errors = model.quality.model_copy(update={"max_error_percent": worst_percent})
+    replace(model, quality=errors).save(tmp_path / "session" / demo.MODEL)
+    monkeypatch.setattr(demo, "diagnosed", lambda _, out: diagnoses.append(out))
+    assert demo.model_to_track_with(tmp_path / "session") == taken
+    assert diagnoses == ([tmp_path / "session" / "diagnosis"] if taken == demo.EXTENDED else [])
 
 
 @pytest.mark.parametrize(("option", "ends"), [((), []), (("--serve", "--port", "PORT"), ["demo"])])
