@@ -158,18 +158,11 @@ def answer(named: Named, after: Fit, provisional: bool, sources: Sequence[Array]
     """One finding of the final model."""
     effect = named.effect
     return NamedCause(
-        tuple(dict.fromkeys((effect.name, *named.alternatives, *named.family))),
-        sentence(effect, after.values),
-        named.share * (PROVISIONAL_SHARE if provisional else 1.0),
-        intervals(after, effect.pars, sources),
-        gain_of(named.without, after),
-        float(named.support.nats.sum()),
-        named.p_value,
-        effect.repair,
-        provisional,
-        named.support.standard_error_nats,
-        "depth" if named.family else None,
-    )
+        tuple(dict.fromkeys((effect.name, *named.alternatives, *named.family))), sentence(effect, after.values),
+        named.share * (PROVISIONAL_SHARE if provisional else 1.0), intervals(after, effect.pars, sources),
+        gain_of(named.without, after), float(named.support.nats.sum()), named.p_value, effect.repair, provisional,
+        named.support.standard_error_nats, "depth" if named.family else None,
+    )  # fmt: skip
 
 
 def smallest_visible(t: Tangents, threshold: float) -> dict[str, SmallestSize]:

@@ -60,10 +60,10 @@ def with_tried_sizes(found: Diagnosis, session: TrialSet, seed: int = 1, progres
         return found
     rng, sizes, reasons = np.random.default_rng(seed), dict[str, SmallestSize](), dict[str, str]()
     models = [model_of(part, found.search.after) for part in without_one(judged_trials(session))]
-    for number, (name, estimate) in enumerate(found.detectable.items()):
-        progress(f"planting {name}", number / len(found.detectable))
+    for done, (name, estimate) in enumerate(found.detectable.items()):
+        progress(f"planting {name}", done / len(found.detectable))
         variants = [effect for effect in testable(models[0].problem) if effect.name == name]
-        plantings = [drawn(model, variants[0], rng) for model in models]
+        plantings = [drawn(model, variants[0], rng, number % 2 == 0) for number, model in enumerate(models)]
         size = smallest_found(plantings, variants, estimate.minimum, found.search.maxima)
         if size is None:
             reasons[name] = f"planted in these recordings it was not found, up to {largest(variants[0], estimate)}"
@@ -90,9 +90,10 @@ def model_of(data: Observations, model: Fit) -> Fit:
     return refreshed(fit(IndentationProblem(data, model.problem.simulation), model.effects, model.values))
 
 
-def drawn(model: Fit, effect: Effect, rng: np.random.Generator) -> Planting:
-    """One of the shapes that would be looked for in a white residual, in any direction that the cause may take."""
-    shapes = effect.shape_starts(model.problem, model.values, rng.standard_normal(len(model.prediction[0])))
+def drawn(model: Fit, effect: Effect, rng: np.random.Generator, slow: bool) -> Planting:
+    """One of the shapes looked for in noise, white or as ``slow`` as a breath, in any direction that it may take."""
+    white = rng.standard_normal(len(model.prediction[0]))
+    shapes = effect.shape_starts(model.problem, model.values, np.cumsum(white) if slow else white)
     way = rng.standard_normal(len(effect.amplitudes))
     way = way / np.linalg.norm(way)
     return Planting(model, effect, shapes[int(rng.integers(len(shapes)))], np.abs(way) if effect.one_sided else way)

@@ -60,25 +60,15 @@ def judge(
     findings = tuple(sorted(answers, key=lambda found: -found.evidence_nats))
     visible, reasons = limits(problem, search_result, budget)
     progress("done", 1.0)
+    held = held_values(problem, after.effects)
     result = Diagnosis(
-        session=name,
-        simulation=problem.title,
-        recordings=problem.recordings,
-        verdict=verdict,
-        statement=summary(verdict, findings, depends, problem.title, budget),
-        findings=findings,
-        depends_on=depends,
-        lack_of_fit_p=min(found_after.p_value, found_after.between_p),
-        detectable=visible,
-        not_testable=reasons,
-        next_experiment=None,
-        quality=quality,
-        base=intervals(after, [p for p in problem.base if p.name not in held_values(problem, after.effects)], sources),
-        search=search_result,
-        before=found_before,
-        after=found_after,
-        budget=budget,
-    )
+        session=name, simulation=problem.title, recordings=problem.recordings, verdict=verdict,
+        statement=summary(verdict, findings, depends, problem.title, budget), findings=findings, depends_on=depends,
+        lack_of_fit_p=min(found_after.p_value, found_after.between_p), detectable=visible, not_testable=reasons,
+        next_experiment=None, quality=quality,
+        base=intervals(after, [par for par in problem.base if par.name not in held], sources),
+        search=search_result, before=found_before, after=found_after, budget=budget,
+    )  # fmt: skip
     return without_sizes(result)
 
 

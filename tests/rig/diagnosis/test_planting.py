@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.diagnosis.answers import Diagnosis, limits
-from rig.diagnosis.effects.bench import BACKLASH, FRICTION, TIME_OFFSET, ZERO_DRIFT
+from rig.diagnosis.effects.bench import BACKLASH, FRICTION, SURFACE_MOTION, TIME_OFFSET, ZERO_DRIFT
 from rig.diagnosis.estimates import ErrorBudget, SmallestSize
 from rig.diagnosis.fit import Fit, first_fit
 from rig.diagnosis.indentation import IndentationProblem
@@ -92,10 +92,19 @@ def test_a_lost_motion_is_planted_on_the_way_out_only(model: Fit) -> None:
 
 def test_each_cause_is_drawn_with_a_shape_that_is_looked_for_and_in_each_direction(model: Fit) -> None:
     rng = np.random.default_rng(0)
-    ways = [float(drawn(model, TIME_OFFSET, rng).direction[0]) for _ in range(20)]
+    ways = [float(drawn(model, TIME_OFFSET, rng, False).direction[0]) for _ in range(20)]
     assert set(ways) == {-1.0, 1.0}
-    assert all(drawn(model, FRICTION, rng).direction == 1.0 for _ in range(5))
-    assert len({drawn(model, FRICTION, rng).shape["friction_length_mm"] for _ in range(30)}) == 4
+    assert all(drawn(model, FRICTION, rng, True).direction == 1.0 for _ in range(5))
+    assert len({drawn(model, FRICTION, rng, False).shape["friction_length_mm"] for _ in range(30)}) == 4
+
+
+def test_every_other_shape_is_slow_as_a_breath_is(model: Fit) -> None:
+    rng = np.random.default_rng(0)
+    fast, slow = (
+        [drawn(model, SURFACE_MOTION, rng, is_slow).shape["surface_motion_Hz"] for _ in range(20)]
+        for is_slow in (False, True)
+    )
+    assert np.median(slow) < 0.3 * np.median(fast)
 
 
 def test_a_plant_is_missed_when_small_and_found_when_large(model: Fit) -> None:
