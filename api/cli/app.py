@@ -7,7 +7,6 @@ import ast
 import os
 import sys
 from collections.abc import Callable
-from contextlib import nullcontext
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -48,7 +47,7 @@ COMMANDS = {
 }
 
 
-def build(wanted: str | None = None, for_help: bool = False) -> typer.Typer:
+def build(wanted: str | None = None) -> typer.Typer:
     """The application with the command ``wanted``; where it is no command, with the name and summary of each."""
     app = typer.Typer(
         help="Software for a soft-tissue bench: capture, fit, track, report. Exit codes: 0 ok, 1 check failed,"
@@ -62,7 +61,7 @@ def build(wanted: str | None = None, for_help: bool = False) -> typer.Typer:
     # A callback keeps the name of the command on the line also where only one is loaded.
     app.callback()(_common)
     if wanted in COMMANDS:
-        app.command(wanted)((_declared if for_help else _load)(COMMANDS[wanted]))
+        app.command(wanted)(_load(COMMANDS[wanted]))
         return app
     for name, target in COMMANDS.items():
         app.command(name, short_help=_summary(target))(lambda: None)
@@ -85,11 +84,14 @@ def _summary(target: str) -> str:
     return (ast.get_docstring(definition) or "").partition("\n")[0]
 
 
-def _declared(target: str) -> Callable[..., None]:
-    """The command with its options, not to be run."""
-    module, _, function = target.partition(":")
-    command: Callable[..., None] = getattr(import_module(module), function)
-    return command
+def help_of(name: str) -> str:
+    """What ``--help`` says of a command. To parse that word Typer loads pydantic, which takes longer than the rest."""
+    module, _, function = COMMANDS[name].partition(":")
+    alone = typer.Typer(rich_markup_mode=None, add_completion=False)
+    with deferred():
+        alone.command(name)(getattr(import_module(module), function))
+        command = typer.main.get_command(alone)
+        return command.get_help(typer.Context(command, info_name=f"rig {name}"))
 
 
 def _load(target: str) -> Callable[..., None]:
@@ -106,9 +108,11 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         words = sys.argv[1:]
-        for_help = "--help" in words and "--" not in words
-        with deferred() if for_help else nullcontext():
-            build(next((word for word in words if word != "--"), None), for_help)()
+        wanted = next((word for word in words if word != "--"), None)
+        if wanted in COMMANDS and "--help" in words and "--" not in words:
+            typer.echo(help_of(wanted))
+        else:
+            build(wanted)()
     except RigError as error:
         _end(error)
     except Exception as error:
