@@ -22,18 +22,13 @@ def extended_model(result: Diagnosis) -> Model:
         raise DataError(f"{result.session}: nothing was fitted, so there is no extended model")
     fit = result.search.after
     law = Extended.clipped(**{name: fit.values[name] for name in Extended.bounds})
-    covariance = covariance_of(fit)
     return Model(
-        law=law,
-        covariance=covariance,
-        intervals={p.name: _interval(result, p.name, p.value) for p in law.parameters},
-        interval_level=0.95,
-        interval_method="joint fit, recordings as units",
-        valid=_valid(fit, law),
-        data=_provenance(fit, result.session),
-        quality=_quality(fit, law),
+        law=law, covariance=covariance_of(fit),
+        intervals={p.name: _interval(result, p.name, p.value) for p in law.parameters}, interval_level=0.95,
+        interval_method="joint fit, recordings as units", valid=_valid(fit, law),
+        data=_provenance(fit, result.session), quality=_quality(fit, law),
         effects=causes_of(result.findings, fit.problem.effects),
-    )
+    )  # fmt: skip
 
 
 def covariance_of(fit: Fit) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:

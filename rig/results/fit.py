@@ -49,7 +49,9 @@ class LawResult(DisplacementErrors):
     interval_level: float
     interval_method: str
     held_out: HeldOut
-    control: tuple[ControlRow, ...] = Field(description="what the law means to a force loop, at each given force")
+    control: tuple[ControlRow, ...] = Field(
+        description="what the law means to a force loop, at each given force that it reaches"
+    )
 
     @property
     def worst_percent(self) -> float | None:

@@ -11,7 +11,7 @@ from rig.tissue.index_law import extended_force
 from rig.tissue.laws import Damped, FloatArray, Index, ParameterBounds, SecantAtContact, bisect
 from rig.tissue.laws_viscous import Tau
 
-DEEPEST_MM = 200.0  # no limb is thicker
+DEEPEST_MM, PLACES = 200.0, 2001  # no limb is thicker; its largest force is found to 0.1 mm
 STEP_MM = 1e-5  # near the cube root of double precision, where a central difference errs least
 
 
@@ -44,9 +44,7 @@ class Extended(Damped):
     tau_s: Tau = 1.0
     frame_compliance_mm_N: Annotated[float, ParameterBounds("mm/N", 0.0, 0.8, "compliance of the frame")] = 0.0
     friction_N: Annotated[float, ParameterBounds("N", 0.0, 20.0, "friction of the guide in front of the sensor")] = 0.0
-    friction_length_mm: Annotated[float, ParameterBounds("mm", 1e-3, 10.0, "travel over which friction builds up")] = (
-        0.1
-    )
+    friction_length_mm: Annotated[float, ParameterBounds("mm", 1e-3, 10.0, "travel in which friction builds up")] = 0.1
     fung_per_mm: Annotated[float, ParameterBounds("1/mm", 0.0, 5.0, "rate of Fung's exponential")] = 0.0
     ogden_per_mm: Annotated[float, ParameterBounds("1/mm", 0.0, 0.5, "one over the thickness of Ogden's block")] = 0.0
     ogden_exponent: Annotated[float, ParameterBounds("1", 1.05, 40.0, "exponent of the stretch")] = 4.0
@@ -87,7 +85,10 @@ class Extended(Damped):
         return np.asarray((self.elastic(high_mm) - self.elastic(low_mm)) / (high_mm - low_mm))
 
     def elastic_inverse(self, force_N: FloatArray) -> FloatArray:
-        """The tip's depth by bisection, and how far the frame gives way."""
-        force = np.asarray(force_N, float)
-        tip_mm = bisect(self._tissue, force, np.zeros_like(force), np.full_like(force, DEEPEST_MM))
+        """The tip's depth by bisection, as far as force rises, and how far the frame gives way."""
+        force, places_mm = np.asarray(force_N, float), np.linspace(0.0, DEEPEST_MM, PLACES)
+        with np.errstate(over="ignore", invalid="ignore"):
+            falls = np.flatnonzero(np.diff(self._tissue(places_mm)) < 0)
+        top_mm = places_mm[falls[0]] if falls.size else DEEPEST_MM
+        tip_mm = bisect(self._tissue, force, np.zeros_like(force), np.full_like(force, top_mm))
         return np.asarray(tip_mm + self.frame_compliance_mm_N * force)
