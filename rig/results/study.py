@@ -49,14 +49,10 @@ def law_result(judged: Judged, force_N: FloatArray) -> LawResult:
     left_out = judged.trials_left_out, judged.speeds_left_out, judged.subjects_left_out
     trials, speeds, subjects = (_errors(errors) if errors else None for errors in left_out)
     return LawResult(
-        **dict(_errors(judged.fitted)),
-        formula=judged.law.formula,
-        parameters=_parameters(judged),
-        interval_level=LEVEL,
-        interval_method=judged.interval_method,
+        **dict(_errors(judged.fitted)), formula=judged.law.formula, parameters=_parameters(judged),
+        interval_level=LEVEL, interval_method=judged.interval_method, control=control_rows(judged, force_N),
         held_out=HeldOut(trials=trials, speeds=speeds, subjects=subjects),
-        control=control_rows(judged, force_N),
-    )
+    )  # fmt: skip
 
 
 def _errors(errors: Errors) -> DisplacementErrors:

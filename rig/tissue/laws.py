@@ -19,6 +19,7 @@ from rig.tissue.history import SMALLEST, History, Term, ramped
 from rig.tissue.index_law import index_force
 
 FloatArray = NDArray[np.float64]
+PLACES = 2001  # of a limb of 200 mm every 0.1 mm
 BISECTIONS = 60
 
 
@@ -237,6 +238,15 @@ class Linear(Law):
 def straight(depth_mm: FloatArray, force_N: FloatArray) -> float:
     """Stiffness [N/mm] of the line of least squares through contact."""
     return float(depth_mm @ force_N / (depth_mm @ depth_mm))
+
+
+def depth_rising(force_at: Callable[[FloatArray], FloatArray], force_N: FloatArray, deepest_mm: float) -> FloatArray:
+    """The depths at which ``force_at`` has risen to the force from contact; where it never does, those of its top."""
+    places_mm = np.linspace(0.0, deepest_mm, PLACES)
+    with np.errstate(over="ignore", invalid="ignore"):
+        falls = np.flatnonzero(np.diff(force_at(places_mm)) < 0)
+    top_mm = places_mm[falls[0]] if falls.size else deepest_mm
+    return bisect(force_at, force_N, np.zeros_like(force_N), np.full_like(force_N, top_mm))
 
 
 def bisect(

@@ -8,10 +8,10 @@ import numpy as np
 
 from rig.tissue.history import Term
 from rig.tissue.index_law import extended_force
-from rig.tissue.laws import Damped, FloatArray, Index, ParameterBounds, SecantAtContact, bisect
+from rig.tissue.laws import Damped, FloatArray, Index, ParameterBounds, SecantAtContact, bisect, depth_rising
 from rig.tissue.laws_viscous import Tau
 
-DEEPEST_MM, PLACES = 200.0, 2001  # no limb is thicker; its largest force is found to 0.1 mm
+DEEPEST_MM = 200.0  # no limb is thicker
 STEP_MM = 1e-5  # near the cube root of double precision, where a central difference errs least
 
 
@@ -48,9 +48,7 @@ class Extended(Damped):
     fung_per_mm: Annotated[float, ParameterBounds("1/mm", 0.0, 5.0, "rate of Fung's exponential")] = 0.0
     ogden_per_mm: Annotated[float, ParameterBounds("1/mm", 0.0, 0.5, "one over the thickness of Ogden's block")] = 0.0
     ogden_exponent: Annotated[float, ParameterBounds("1", 1.05, 40.0, "exponent of the stretch")] = 4.0
-    layer_ratio: Annotated[float, ParameterBounds("1", 0.0, 8.0, "contact radius over a layer's thickness at 5 mm")] = (
-        0.0
-    )
+    layer_ratio: Annotated[float, ParameterBounds("1", 0.0, 8.0, "contact radius over layer thickness at 5 mm")] = 0.0
 
     @classmethod
     def near(cls, depth_mm: FloatArray, force_N: FloatArray) -> dict[str, float]:
@@ -86,9 +84,6 @@ class Extended(Damped):
 
     def elastic_inverse(self, force_N: FloatArray) -> FloatArray:
         """The tip's depth by bisection, as far as force rises, and how far the frame gives way."""
-        force, places_mm = np.asarray(force_N, float), np.linspace(0.0, DEEPEST_MM, PLACES)
-        with np.errstate(over="ignore", invalid="ignore"):
-            falls = np.flatnonzero(np.diff(self._tissue(places_mm)) < 0)
-        top_mm = places_mm[falls[0]] if falls.size else DEEPEST_MM
-        tip_mm = bisect(self._tissue, force, np.zeros_like(force), np.full_like(force, top_mm))
+        force = np.asarray(force_N, float)
+        tip_mm = depth_rising(self._tissue, force, DEEPEST_MM)
         return np.asarray(tip_mm + self.frame_compliance_mm_N * force)

@@ -10,7 +10,7 @@ from scipy.interpolate import PchipInterpolator
 from rig.errors import UsageError
 from rig.tissue.index_law import index_stiffness
 from rig.tissue.lattice.sweep import Sweep
-from rig.tissue.laws import Damped, FloatArray, Law, ParameterBounds, bisect, straight
+from rig.tissue.laws import Damped, FloatArray, Law, ParameterBounds, depth_rising, straight
 
 LEAST_DEPTHS = 4  # as many as a and b with an interval take
 SpringStiffness: TypeAlias = Annotated[float, ParameterBounds("N/mm", 1e-8, 1e3, "spring stiffness at contact")]
@@ -59,7 +59,7 @@ class LatticeLaw(Damped):
 
     def elastic_inverse(self, force_N: FloatArray) -> FloatArray:
         """By bisection to half as far again as the sweep went."""
-        return bisect(self.elastic, force_N, np.zeros_like(force_N), np.full_like(force_N, FURTHER * self.phi.end_mm))
+        return depth_rising(self.elastic, force_N, FURTHER * self.phi.end_mm)
 
 
 @dataclass(frozen=True, kw_only=True)
