@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.diagnosis.descent import PRIOR_SCALES
 from rig.diagnosis.effects.registry import CAUSES
 from rig.diagnosis.effects.tissue import STIFFENING, STIFFENING_EFFECT
 from rig.diagnosis.observations import Observations
@@ -20,6 +21,8 @@ from rig.tissue.index_law import Fields, index_force
 
 STIFFNESS = Par("a_N_mm", "N/mm", 0.5, 1e-5, 1e3, 0.1, log=True, meaning="stiffness at contact")
 DAMPING = Par("damping_N_s_mm", "N s/mm", 0.0, -1.0, 10.0, 0.005, meaning="damping")
+# Nothing tells it from a zero there. Leaving a recording out moves it by what a limb has, 0.01 N s/mm, at most.
+AT_ONE_SPEED = replace(DAMPING, low=0.0, scale=0.01 / PRIOR_SCALES)
 SURFACE = Par("surface_mm", "mm", 0.0, -1e4, 1e4, 0.05, meaning="axis position of the surface")
 ZERO = Par("zero_N", "N", 0.0, -1e3, 1e3, 0.02, meaning="force zero")
 TIP_ZERO = Par("tip_zero_mm", "mm", 0.0, -1e4, 1e4, 0.05, meaning="tracker zero along the axis")
@@ -77,7 +80,7 @@ class IndentationProblem:
     def base(self) -> tuple[Par, ...]:
         """What the simulation itself has free; a stated surface is taken at its word."""
         pars = [STIFFNESS, *([STIFFENING] if self.simulation == "index" else [])]
-        pars.append(DAMPING if self._shows_damping else replace(DAMPING, low=0.0))
+        pars.append(DAMPING if self._shows_damping else AT_ONE_SPEED)
         pars += [] if self.data.surface_mm is not None else [surface(self.data)]
         return (*pars, ZERO, *([TIP_ZERO] if self.data.has_tracker else []))
 
@@ -115,10 +118,7 @@ class IndentationProblem:
 
     @cached_property
     def _shows_damping(self) -> bool:
-        """Whether the tip goes at several speeds: at a single one a damper's force is another zero, of any sign.
-
-        A tissue that drove the tip would give a ripple or a motion of the surface another size.
-        """
+        """Whether the tip goes at several speeds: at one a tissue that drove it would give a ripple another size."""
         drive = self.data.drive
         speed_mm_s = drive.velocity_mm_s[drive.position_mm >= np.median(drive.position_mm)]
         return bool(np.std(speed_mm_s) > SAME_SPEED * np.abs(speed_mm_s).max())
