@@ -34,6 +34,8 @@ GAP_PERIODS, GAP_S = 3.0, 0.01
 MOST_FILLED_S = 5.0  # of lost force; a longer break would be filled for nothing but its two ends
 # Over 24 ms a dither of 0.25 mm at 6 Hz turns by 8.5 mm/s, which is to be seen, a corner of 2000 mm/s2 by 30.
 MOST_TURN_MM_S = 12.0
+# Noise of Gauss goes as far once in 10^15 readings; a cable that is moved gives 0.2 % such, strokes of 50 readings 2 %.
+FAR, MOST_FAR = 8.0, 0.005
 OMITTED = "recording left out: "
 Span = tuple[float, float]
 
@@ -112,7 +114,7 @@ def observe(
     usable, copies = _without_copies(usable)
     usable, pulled = _pushed(usable)
     usable, turned = _turned(usable)
-    findings += [*copies, *pulled, *turned]
+    findings += [*copies, *pulled, *turned, *_far_out(usable)]
     rough_mm = float(np.median([jitter_mm(trial) for trial in usable]))
     rate_Hz, spans_s = (WORKING_RATE_HZ, DERIVATIVE_SPANS_S) if rough_mm <= JITTER_MM else JITTERY
     period_s = working_period(usable, min(rate_Hz, fastest_Hz))
@@ -197,6 +199,27 @@ def _turned(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:
     return [trial for trial, out in zip(usable, falls, strict=True) if not out], gone
 
 
+def _far_out(usable: Sequence[Trial]) -> list[Finding]:
+    counts = ((trial.name, int(np.count_nonzero(far_readings(trial.force_N)))) for trial in usable)
+    text = "{} readings lie far from both their neighbours, which no motion does; they are not judged"
+    return [Finding(name, "force", "far out", text.format(count)) for name, count in counts if count]
+
+
+def far_readings(force_N: Array) -> NDArray[np.bool_]:
+    """Single readings far out, shape (n,): second differences of 1, -2, 1 times a step far beyond the noise.
+
+    A contact or a turn is a kink, of one difference or of two with the same sign. Where many seem far out none is: so
+    few readings were taken that the motion itself looks like this.
+    """
+    bend, far = np.diff(force_N, 2), np.zeros(len(force_N), bool)
+    if len(bend) < FEWEST_SAMPLES:
+        return far
+    middle, sides, usual_N = bend[1:-1], np.stack([bend[:-2], bend[2:]]), 1.4826 * float(np.median(np.abs(bend)))
+    alone = ((sides * middle < 0) & (np.abs(sides) > 0.25 * np.abs(middle))).all(axis=0)
+    far[2:-2] = alone & (np.abs(middle) > FAR * usual_N) & (usual_N > 0)
+    return np.asarray(far & (far.mean() <= MOST_FAR))
+
+
 def rise_N(place_mm: Array, force_N: Array) -> float:
     """Force at the deepest tenth of the motion, less that at the highest; both of shape (n,)."""
     deep, high = (place_mm >= np.quantile(place_mm, 0.9)), (place_mm <= np.quantile(place_mm, 0.1))
@@ -222,6 +245,7 @@ def _on_grid(trial: Trial, period_s: float, spans_s: Sequence[float]) -> _Gridde
         marker_s, marker_mm = marker_s[inside], np.array(xyz).T[inside]
     unseen = beside_gaps(trial.axis_s, time_s, 0.5 * max(spans_s))
     unseen |= np.bincount(window, at_the_end_of_range(trial.force_N, columns[2]))[full] > 0
+    unseen |= np.bincount(window, far_readings(trial.force_N))[full] > 0
     if spans_s[0] > DERIVATIVE_SPANS_S[0]:
         # Derivatives over long spans round off what turns within one.
         unseen |= np.abs(means[4]) * spans_s[0] > MOST_TURN_MM_S

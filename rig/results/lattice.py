@@ -11,19 +11,12 @@ def lattice_result(found: LatticeStudy) -> LatticeResult:
     """The lattice study as it is saved."""
     block = found.sweep.block
     return LatticeResult(
-        vertices=block.nodes,
-        spacing_mm=block.spacing_mm,
-        tip_diameter_mm=block.tip_diameter_mm,
-        contact="bonded",
-        sides="fixed",
-        mode=found.sweep.springs.mode,
-        collapse=found.sweep.collapse(),
-        phi=_sweep(found.sweep),
-        points=found.points,
-        index=found.index,
+        vertices=block.nodes, spacing_mm=block.spacing_mm, tip_diameter_mm=block.tip_diameter_mm, contact="bonded",
+        sides="fixed", mode=found.sweep.springs.mode, collapse=found.sweep.collapse(), phi=_sweep(found.sweep),
+        points=found.points, index=found.index,
         models={name: law_result(judged, found.force_N) for name, judged in found.judged.items()},
         per_spring=_per_spring(found.per_spring) if found.per_spring else None,
-    )
+    )  # fmt: skip
 
 
 def _sweep(found: Sweep) -> LatticeSweep:

@@ -162,18 +162,9 @@ def step(
     force_N = tissue_force(limb, position_mm - surface_mm, speed * per_rad - surface_mm_s)
     sensed_N = state.sensed_N + STEP_S / (STEP_S + sensing.filter_s) * (force_N - state.sensed_N)
     return AxisState(
-        time_s,
-        first_mm,
-        state.reference_mm + reference_mm_s * STEP_S,
-        reference_mm_s,
-        integral,
-        voltage_V,
-        current_A,
-        speed,
-        position_mm,
-        force_N,
-        sensed_N,
-    )
+        time_s, first_mm, state.reference_mm + reference_mm_s * STEP_S, reference_mm_s, integral, voltage_V, current_A,
+        speed, position_mm, force_N, sensed_N,
+    )  # fmt: skip
 
 
 def hold(

@@ -179,10 +179,7 @@ def model_of(study: Study, law: str, subject: Mapping[str, object]) -> Model:
     """The fitted law as a model to save and to control with; of several subjects the model names none."""
     judged = study.judged[law]
     return Model(
-        law=judged.law,
-        covariance=judged.covariance,
-        intervals=judged.intervals,
-        interval_level=LEVEL,
+        law=judged.law, covariance=judged.covariance, intervals=judged.intervals, interval_level=LEVEL,
         interval_method=judged.interval_method,
         valid=ValidRange(
             depth_mm=max(curve.max_depth_mm for curve in study.curves),
@@ -190,16 +187,11 @@ def model_of(study: Study, law: str, subject: Mapping[str, object]) -> Model:
             speeds_mm_s=tuple(speed.speed_mm_s for speed in study.speeds),
         ),
         data=Provenance(
-            session=study.session,
-            trials=tuple(curve.name for curve in study.curves),
-            sha256=fingerprint(study.curves),
-            subject=str(subject.get("id", "")),
-            site=str(subject.get("site", "")),
-            software=SOFTWARE,
+            session=study.session, trials=tuple(curve.name for curve in study.curves), software=SOFTWARE,
+            sha256=fingerprint(study.curves), subject=str(subject.get("id", "")), site=str(subject.get("site", "")),
         ),
-        quality=_quality(judged),
-        control=control_rows(judged, study.force_N),
-    )
+        quality=_quality(judged), control=control_rows(judged, study.force_N),
+    )  # fmt: skip
 
 
 def _quality(judged: Judged) -> Quality:

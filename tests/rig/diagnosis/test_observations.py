@@ -1,11 +1,14 @@
 """The working grid: derivatives of a motion, with scipy's as judge, and what was lost of the force."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
-from rig.diagnosis.observations import derivative, jitter_mm, lost_times, observe
+from rig.diagnosis.observations import derivative, far_readings, jitter_mm, lost_times, observe
 from rig.trials.trial import Trial, TrialSet
+from tests.rig.diagnosis.made_tissue import MadeTissue
 
 
 @pytest.mark.parametrize(("count", "order"), [(5, 1), (9, 1), (17, 2), (161, 2)])
@@ -57,3 +60,30 @@ def test_only_stamps_that_are_not_told_make_a_motion_rough(told: bool, expected_
     place_mm = np.round(20 * read_s / 0.0005) * 0.0005
     trial = Trial("one", even_s, even_s, read_s if told else even_s, place_mm)
     assert jitter_mm(trial) == pytest.approx(expected_mm, rel=0.15)
+
+
+def test_a_single_reading_far_out_is_told_from_a_touch_a_turn_and_a_step_of_the_converter() -> None:
+    rng = np.random.default_rng(0)
+    way_mm = np.concatenate([np.zeros(200), np.linspace(0.0, 6.0, 200), np.linspace(6.0, 0.0, 100)])
+    force_N = 0.5 * way_mm + rng.normal(0.0, 0.004, len(way_mm))  # kinks of 0.015 and 0.045 N where it turns
+    assert not far_readings(force_N).any()
+    spiked = force_N.copy()
+    spiked[[50, 300]] += (0.1, -0.15)
+    assert np.flatnonzero(far_readings(spiked)).tolist() == [50, 300]
+    # Rest on one step of a converter, and its least significant digit now and then.
+    assert not far_readings(0.02 * rng.binomial(1, 0.05, 500).astype(np.float64)).any()
+    assert not far_readings(np.repeat([0.0, 1.0], 250) + rng.normal(0.0, 0.004, 500)).any()
+    # Of a few readings, as of a slow machine, the top of a stroke is one.
+    assert not far_readings(np.concatenate([force_N[:30], [0.5], force_N[31:60]])).any()
+
+
+def test_readings_far_out_are_named_and_not_judged() -> None:
+    made = MadeTissue().session()
+    force_N = made.trials[0].force_N.copy()
+    force_N[[100, 400]] += 0.2
+    found = observe(replace(made, trials=(replace(made.trials[0], force_N=force_N), *made.trials[1:])))
+    (said,) = (finding for finding in found.findings if "far from both" in finding.text)
+    assert said.text.startswith("2 readings") and said.recording == "stroke_0"
+    clean = observe(made)
+    assert found.unseen is not None and clean.unseen is not None
+    assert np.count_nonzero(found.unseen) == np.count_nonzero(clean.unseen) + 2
