@@ -37,6 +37,7 @@ from rig.recording.files import make_folder, refuse_unwritable, write_text
 from rig.recording.sessions import derive
 from rig.results.demo import DemoSummary, HiddenTruth
 from rig.results.diagnosis import FILE, FOLDER, TRUTH, DiagnosisResult
+from rig.results.diagnosis import MODEL as MODEL_FILE
 from rig.results.fit import FitResult
 from rig.results.tables import track_parts
 from rig.results.tracking import TrackResult
@@ -57,7 +58,7 @@ PLAN = Indentation(
 LARGEST_SEED = 100_000  # five digits: soon typed again, and seldom drawn twice
 FORCES_N = (1.0, 2.0, 3.0, 4.0, 5.0)
 SECONDS = 3.0
-MODEL, EXTENDED = Path("fit") / "model.json", Path(FOLDER) / "model.json"
+MODEL, EXTENDED = Path("fit") / MODEL_FILE, Path(FOLDER) / MODEL_FILE
 # What stops a bench whose computer stood still for a tenth of a second; a demonstration then begins again.
 LATE = {"drive_fault", "axis_lost", "force_lost", "tracker_lost", "loop_overrun", "recorder_stalled", "stop_lost"}
 AGAIN = 2

@@ -36,6 +36,7 @@ MOST_FILLED_S = 5.0  # of lost force; a longer break would be filled for nothing
 MOST_TURN_MM_S = 12.0
 # Noise of Gauss goes as far once in 10^15 readings; a cable that is moved gives 0.2 % such, strokes of 50 readings 2 %.
 FAR, MOST_FAR = 8.0, 0.005
+FAR_OUT = "{} readings lie far from both their neighbours, which no motion does; they are not judged"
 OMITTED = "recording left out: "
 Span = tuple[float, float]
 
@@ -84,6 +85,7 @@ class _Gridded:
     marker_s: Array
     marker_mm: Array
     unseen: NDArray[np.bool_]
+    far_out: int  # readings
 
 
 def contact_span(usable: Sequence[Trial]) -> Span | None:
@@ -114,12 +116,13 @@ def observe(
     usable, copies = _without_copies(usable)
     usable, pulled = _pushed(usable)
     usable, turned = _turned(usable)
-    findings += [*copies, *pulled, *turned, *_far_out(usable)]
+    findings += [*copies, *pulled, *turned]
     rough_mm = float(np.median([jitter_mm(trial) for trial in usable]))
     rate_Hz, spans_s = (WORKING_RATE_HZ, DERIVATIVE_SPANS_S) if rough_mm <= JITTER_MM else JITTERY
     period_s = working_period(usable, min(rate_Hz, fastest_Hz))
     parts = [_on_grid(trial, period_s, spans_s) for trial in usable]
     parts.sort(key=lambda part: float(part.time_s[0]))
+    findings += [Finding(part.name, "force", "far out", FAR_OUT.format(part.far_out)) for part in parts if part.far_out]
     drive, force, tip = _joined(parts)
     return Observations(
         session.name, tuple(part.name for part in parts), drive, force, tip, session.surface_mm, merge(findings),
@@ -199,12 +202,6 @@ def _turned(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:
     return [trial for trial, out in zip(usable, falls, strict=True) if not out], gone
 
 
-def _far_out(usable: Sequence[Trial]) -> list[Finding]:
-    counts = ((trial.name, int(np.count_nonzero(far_readings(trial.force_N)))) for trial in usable)
-    text = "{} readings lie far from both their neighbours, which no motion does; they are not judged"
-    return [Finding(name, "force", "far out", text.format(count)) for name, count in counts if count]
-
-
 def far_readings(force_N: Array) -> NDArray[np.bool_]:
     """Single readings far out, shape (n,): second differences of 1, -2, 1 times a step far beyond the noise.
 
@@ -245,7 +242,8 @@ def _on_grid(trial: Trial, period_s: float, spans_s: Sequence[float]) -> _Gridde
         marker_s, marker_mm = marker_s[inside], np.array(xyz).T[inside]
     unseen = beside_gaps(trial.axis_s, time_s, 0.5 * max(spans_s))
     unseen |= np.bincount(window, at_the_end_of_range(trial.force_N, columns[2]))[full] > 0
-    unseen |= np.bincount(window, far_readings(trial.force_N))[full] > 0
+    far = far_readings(trial.force_N)
+    unseen |= np.bincount(window, far)[full] > 0
     if spans_s[0] > DERIVATIVE_SPANS_S[0]:
         # Derivatives over long spans round off what turns within one.
         unseen |= np.abs(means[4]) * spans_s[0] > MOST_TURN_MM_S
@@ -257,7 +255,8 @@ def _on_grid(trial: Trial, period_s: float, spans_s: Sequence[float]) -> _Gridde
     time_s, force, position, velocity, acceleration, *kelvin = map(np.insert, means, repeat(at), lost)
     motion = force, position, velocity, acceleration
     unseen = np.insert(unseen, at, True)
-    return _Gridded(trial.name, time_s, motion, kelvin[0] if kelvin else None, marker_s, marker_mm, unseen)
+    kelvin_of = kelvin[0] if kelvin else None
+    return _Gridded(trial.name, time_s, motion, kelvin_of, marker_s, marker_mm, unseen, int(far.sum()))
 
 
 def lost_times(time_s: Array, period_s: float) -> Array:

@@ -56,10 +56,10 @@ def law_result(judged: Judged, force_N: FloatArray) -> LawResult:
 
 
 def _errors(errors: Errors) -> DisplacementErrors:
-    worst_mm, worst_percent = errors.max_error_mm, errors.max_error_percent
     return DisplacementErrors(
-        max_error_mm=worst_mm, max_error_percent=worst_percent, rmse_N=errors.rmse_N, rows=tuple(rows(errors))
-    )
+        max_error_mm=errors.max_error_mm, max_error_percent=errors.max_error_percent, rmse_N=errors.rmse_N,
+        rows=tuple(rows(errors)),
+    )  # fmt: skip
 
 
 def _parameters(judged: Judged) -> dict[str, ParameterResult]:

@@ -9,7 +9,7 @@ from scipy.interpolate import RectBivariateSpline
 from rig.tissue.lattice.newton import tangent_stiffness_N_mm
 from rig.tissue.lattice.ramp import DepthRamp, project
 from rig.tissue.lattice.state import Loaded
-from rig.tissue.laws import Damped, FloatArray, Law, ParameterBounds, depth_rising
+from rig.tissue.laws import Damped, FloatArray, Law, ParameterBounds, bisect
 from rig.tissue.laws_lattice import FURTHER, SpringStiffness
 
 GUESSES = 100
@@ -72,7 +72,8 @@ class LatticeSprings(Damped):
 
     def elastic_inverse(self, force_N: FloatArray) -> FloatArray:
         """By bisection to half as far again as the ramp went."""
-        return depth_rising(self.elastic, force_N, FURTHER * self.surface.end_mm)
+        deepest_mm = np.full_like(force_N, FURTHER * self.surface.end_mm)
+        return bisect(self.elastic, force_N, np.zeros_like(force_N), deepest_mm)
 
 
 def springs_law(ramp: DepthRamp) -> type[Law]:
