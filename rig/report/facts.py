@@ -90,17 +90,12 @@ def gather(session: Session, results: Path, tell: Progress = silent) -> Facts:
     recordings, trials = _read(session, tell)
     metadata = next((recording.metadata for recording in recordings.values() if recording.metadata), {})
     return Facts(
-        session=session,
-        trials=trials,
-        fit=read_fit(session, results),
-        tracking=_tracking(results, recordings),
+        session=session, trials=trials, fit=read_fit(session, results), tracking=_tracking(results, recordings),
         loop=_loop(list(recordings.values())),
         devices={role: json_table(text) for role, text in metadata.get("devices", {}).items() if role != "crc32"},
-        realtime=metadata.get("realtime", {}),
-        metadata=metadata,
-        diagnosis=read_diagnosis(results, session.place),
+        realtime=metadata.get("realtime", {}), metadata=metadata, diagnosis=read_diagnosis(results, session.place),
         came_in=came_in_of(session),
-    )
+    )  # fmt: skip
 
 
 def _read(session: Session, tell: Progress) -> tuple[dict[str, Recording], tuple[TrialFacts, ...]]:

@@ -50,17 +50,13 @@ def rate_test(curves: Sequence[Curve], seed: int = 0) -> RateTest:
     shuffled = np.array([_shuffled(inside, subject, generator) @ level for _ in range(_DRAWS)]) / (inside @ inside)
     range_mm_s = float(np.ptp(speeds))
     return RateTest(
-        damping_N_s_mm=slope,
-        interval=interval,
+        damping_N_s_mm=slope, interval=interval,
         p_value=float((np.count_nonzero(np.abs(shuffled) >= abs(slope) * (1 - ROUNDING)) + 1) / (_DRAWS + 1)),
-        trials=len(curves),
-        speeds_mm_s=tuple(float(speed) for speed in np.unique(speeds)),
-        effect_N=slope * range_mm_s,
-        effect_interval_N=(interval[0] * range_mm_s, interval[1] * range_mm_s),
-        spread_N=float(np.sqrt(level @ level / (len(curves) - groups))),
-        study_effect_N=STUDY_B_N_S_MM * range_mm_s,
+        trials=len(curves), speeds_mm_s=tuple(float(speed) for speed in np.unique(speeds)),
+        effect_N=slope * range_mm_s, effect_interval_N=(interval[0] * range_mm_s, interval[1] * range_mm_s),
+        spread_N=float(np.sqrt(level @ level / (len(curves) - groups))), study_effect_N=STUDY_B_N_S_MM * range_mm_s,
         excludes_study=not interval[0] <= STUDY_B_N_S_MM <= interval[1],
-    )
+    )  # fmt: skip
 
 
 def _centred(values: FloatArray, group: NDArray[np.intp]) -> FloatArray:

@@ -85,17 +85,12 @@ def loading_curve(cycle: IndentationCycle) -> Curve:
         air = np.arange(descent(zeroed, rise.touch, contact.position_mm - AIR_KEPT_MM), rise.touch)
         kept = np.concatenate([air, kept])
     return Curve(
-        name=cycle.name,
-        speed_mm_s=wanted_mm_s if wanted_mm_s == cycle.speed_mm_s else float(f"{wanted_mm_s:.2g}"),
-        depth_mm=zeroed.position_mm[kept] - contact.position_mm,
-        force_N=zeroed.force_N[kept],
-        rate_mm_s=_rate(zeroed.time_s[kept], zeroed.position_mm[kept], wanted_mm_s),
-        contact=contact,
-        zero_N=float(cycle.force_N[-1] - zeroed.force_N[-1]),
-        noise_N=noise_N,
-        time_s=zeroed.time_s[kept],
+        name=cycle.name, speed_mm_s=wanted_mm_s if wanted_mm_s == cycle.speed_mm_s else float(f"{wanted_mm_s:.2g}"),
+        depth_mm=zeroed.position_mm[kept] - contact.position_mm, force_N=zeroed.force_N[kept],
+        rate_mm_s=_rate(zeroed.time_s[kept], zeroed.position_mm[kept], wanted_mm_s), contact=contact,
+        zero_N=float(cycle.force_N[-1] - zeroed.force_N[-1]), noise_N=noise_N, time_s=zeroed.time_s[kept],
         findings=(*pulled, *findings, *unsteady),
-    )
+    )  # fmt: skip
 
 
 def _refuse_unknown(name: str, contact: Contact, peak_mm: float) -> None:

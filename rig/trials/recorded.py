@@ -33,20 +33,14 @@ def trial_of(name: str, recording: Recording) -> Trial:
     start = start_ns(recording)
     stated_C = _number(name, "temperature_C", facts if "temperature_C" in facts else notes)
     return Trial(
-        name,
-        (force["capture_ns"][sound] - start) * NS,
-        compression_N(recording)[sound],
-        (axis["capture_ns"][moving] - start) * NS,
-        axis["position_mm"][moving],
+        name, (force["capture_ns"][sound] - start) * NS, compression_N(recording)[sound],
+        (axis["capture_ns"][moving] - start) * NS, axis["position_mm"][moving],
         (marker["capture_ns"][seen] - start) * NS,
         np.stack([marker[field][seen] for field in ("x_mm", "y_mm", "z_mm")], axis=1),
-        _temperature(force["temperature_C"][sound], stated_C),
-        _number(name, "speed_mm_s", facts),
-        _number(name, "depth_mm", facts),
-        _number(name, "surface_mm", recording.metadata.get("calibration", {})),
-        labels_of(recording.metadata),
-        "axis_files" in recording.metadata.get("recording", {}),
-    )
+        _temperature(force["temperature_C"][sound], stated_C), _number(name, "speed_mm_s", facts),
+        _number(name, "depth_mm", facts), _number(name, "surface_mm", recording.metadata.get("calibration", {})),
+        labels_of(recording.metadata), "axis_files" in recording.metadata.get("recording", {}),
+    )  # fmt: skip
 
 
 def _temperature(measured_C: Array, stated_C: float) -> Array | None:
