@@ -17,6 +17,7 @@ NOISE_ROUNDS = 25
 QUICK_ROUNDS = 5
 SETTLED_NATS = 0.1  # a thirtieth of the 3 nats that keep a cause
 FALLS_APART_NATS = 0.1  # a row: noise 10 % larger, which a few rows judged anew do not make
+FEWEST_ROWS = 30  # to judge a model by: they tell its noise to an eighth (1 / sqrt(60))
 MOST_OF_ONE_ROW = 0.05  # a fair share is 1 in 15,000; what is known of a parameter then rests on twenty rows or more
 BOUND_PASSES = 12
 
@@ -211,7 +212,8 @@ def refreshed(model: Fit) -> Fit:
 
 
 def _level_of_a_row(model: Fit) -> float:
-    return level_of(model) / max(sum(int(np.count_nonzero(keep)) for keep in model.whitener.judged), 1)
+    rows = [np.count_nonzero(keep) for keep in model.whitener.judged]
+    return level_of(model) / sum(rows) if rows[0] >= FEWEST_ROWS else -np.inf
 
 
 def assemble(problem: InverseProblem, effects: Sequence[Effect], values: Values, whitener: Whitener) -> Fit:

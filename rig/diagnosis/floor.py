@@ -95,10 +95,10 @@ def own_spread(own: Fit) -> dict[str, OwnSpread]:
     return {s.name: OwnSpread(float(sd), s.unit) for s, sd in zip(own.problem.scatter, deviations, strict=True)}
 
 
-def stiffness_N_mm(own: Fit) -> float:
-    """How force rises with depth where the tip presses, rms over the rows that are judged [N/mm]."""
+def stiffness_N_mm(own: Fit) -> float | None:
+    """How force rises with depth where the tip presses, rms over judged rows [N/mm]; None where it does not."""
     slope = own.whitener.secants[:, 1][own.whitener.judged[0]]
-    return float(np.sqrt(np.mean(slope[slope != 0] ** 2)))
+    return float(np.sqrt(np.mean(slope[slope != 0] ** 2))) if slope.any() else None
 
 
 @known_of
