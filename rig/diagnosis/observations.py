@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import repeat
+from itertools import compress, repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from rig.recording.converter import at_the_end_of_range
 from rig.simulation.drive import Array, MeasuredMotion
 from rig.trials.cycles import as_pushed, cycle_of
 from rig.trials.findings import Finding, merge
+from rig.trials.streams import sample_noise
 from rig.trials.surface import find_surface
 from rig.trials.trial import FEWEST_SAMPLES, Trial, TrialSet, drop_disordered, drop_unusable, inspect
 
@@ -35,6 +36,8 @@ MOST_FILLED_S = 5.0  # of lost force; a longer break would be filled for nothing
 # Over 24 ms a dither of 0.25 mm at 6 Hz turns by 8.5 mm/s, which is to be seen, a corner of 2000 mm/s2 by 30.
 MOST_TURN_MM_S = 12.0
 # Noise of Gauss goes as far once in 10^15 readings; a cable that is moved gives 0.2 % such, strokes of 50 readings 2 %.
+DEEPEST = 0.02  # of the samples: a tip that comes from far away touches in few
+NOTICEABLE = 5.0  # times the noise: a rise below it is no contact
 FAR, MOST_FAR = 8.0, 0.005
 FAR_OUT = "{} readings lie far from both their neighbours, which no motion does; they are not judged"
 OMITTED = "recording left out: "
@@ -115,8 +118,8 @@ def observe(
     findings += lost
     usable, copies = _without_copies(usable)
     usable, pulled = _pushed(usable)
-    usable, turned = _turned(usable)
-    findings += [*copies, *pulled, *turned]
+    usable, astray = _pressing(usable)
+    findings += [*copies, *pulled, *astray]
     rough_mm = float(np.median([jitter_mm(trial) for trial in usable]))
     rate_Hz, spans_s = (WORKING_RATE_HZ, DERIVATIVE_SPANS_S) if rough_mm <= JITTER_MM else JITTERY
     period_s = working_period(usable, min(rate_Hz, fastest_Hz))
@@ -157,7 +160,8 @@ def working_period(recordings: Sequence[Trial], rate_Hz: float = WORKING_RATE_HZ
     """Grid period [s]: a whole number of force periods, near ``rate_Hz``, coarser only for very long sessions."""
     native_s = float(np.median([np.median(np.diff(trial.force_s)) for trial in recordings]))
     total_s = float(sum(trial.force_s[-1] - trial.force_s[0] for trial in recordings))
-    wanted_Hz = float(np.clip(MOST_SAMPLES / max(total_s, 1e-9), LOWEST_RATE_HZ, rate_Hz))
+    slowest_Hz = LOWEST_RATE_HZ if native_s * LOWEST_RATE_HZ <= 1 else 0.0  # of slower ones nothing fast can be lost
+    wanted_Hz = float(np.clip(MOST_SAMPLES / max(total_s, 1e-9), slowest_Hz, rate_Hz))
     return native_s * max(1, round(1 / wanted_Hz / native_s))
 
 
@@ -190,16 +194,27 @@ def _pushed(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:
     return [trial for trial, _ in turned], [finding for _, found in turned for finding in found]
 
 
-def _turned(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:
-    """Without the few recordings in which force falls as the tip goes in while it rises in the others."""
-    rises = np.array([rise_N(np.interp(s.force_s, s.axis_s, s.axis_mm), s.force_N) for s in usable])
+def _pressing(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:
+    """Without recordings whose force does not rise as the tip goes in, where it does in others.
+
+    Where it meets nothing contact lies nowhere; where force falls, in few, its sign is wrong.
+    """
+    rises = np.array([_rise_of(trial) for trial in usable])
     large = 0.5 * float(np.median(np.abs(rises)))
     falls = rises < -large
-    if large == 0 or not 0 < np.count_nonzero(falls) < 0.5 * len(usable):
-        return list(usable), []
-    text = f"{OMITTED}its force falls as the tip goes in, and rises in the others: turn its sign"
-    gone = [Finding(trial.name, "recording", "sign", text) for trial, out in zip(usable, falls, strict=True) if out]
-    return [trial for trial, out in zip(usable, falls, strict=True) if not out], gone
+    falls &= large > 0 and np.count_nonzero(falls) < 0.5 * len(usable)
+    turned = "its force falls as the tip goes in, and rises in the others: turn its sign"
+    usable, lost = _without(usable, falls, "sign", turned)
+    idle = np.array([abs(_rise_of(trial, DEEPEST)) <= NOTICEABLE * sample_noise(trial.force_N) for trial in usable])
+    usable, flat = _without(usable, idle & (not idle.all()), "no contact", "its force rises by no more than its noise")
+    return usable, lost + flat
+
+
+def _without(
+    usable: Sequence[Trial], gone: NDArray[np.bool_], kind: str, why: str
+) -> tuple[list[Trial], list[Finding]]:
+    lost = [Finding(trial.name, "recording", kind, OMITTED + why) for trial in compress(usable, gone)]
+    return list(compress(usable, ~gone)), lost
 
 
 def far_readings(force_N: Array) -> NDArray[np.bool_]:
@@ -217,10 +232,14 @@ def far_readings(force_N: Array) -> NDArray[np.bool_]:
     return np.asarray(far & (far.mean() <= MOST_FAR))
 
 
-def rise_N(place_mm: Array, force_N: Array) -> float:
-    """Force at the deepest tenth of the motion, less that at the highest; both of shape (n,)."""
-    deep, high = (place_mm >= np.quantile(place_mm, 0.9)), (place_mm <= np.quantile(place_mm, 0.1))
+def rise_N(place_mm: Array, force_N: Array, share: float = 0.1) -> float:
+    """Force at the deepest tenth of the motion, or another ``share``, less that at the highest; both of shape (n,)."""
+    deep, high = (place_mm >= np.quantile(place_mm, 1 - share)), (place_mm <= np.quantile(place_mm, 0.1))
     return float(np.median(force_N[deep]) - np.median(force_N[high]))
+
+
+def _rise_of(trial: Trial, share: float = 0.1) -> float:
+    return rise_N(np.interp(trial.force_s, trial.axis_s, trial.axis_mm), trial.force_N, share)
 
 
 def _on_grid(trial: Trial, period_s: float, spans_s: Sequence[float]) -> _Gridded:
@@ -316,16 +335,11 @@ def _joined(parts: Sequence[_Gridded]) -> tuple[MeasuredMotion, Array, Array]:
     tip_mm, tip_at, tip_recording = _tips(parts, position)
     drive = MeasuredMotion(
         time_s=np.concatenate([part.time_s for part in parts]),
-        period_s=float(np.median(np.concatenate([np.diff(part.time_s) for part in parts]))),
-        recording=recording,
-        position_mm=position,
-        velocity_mm_s=velocity,
-        acceleration_mm_s2=acceleration,
-        cycle=recording.astype(float),
-        temperature_C=np.concatenate(temperatures) if len(temperatures) == len(parts) else None,
-        tip_at=tip_at,
+        period_s=float(np.median(np.concatenate([np.diff(part.time_s) for part in parts]))), recording=recording,
+        position_mm=position, velocity_mm_s=velocity, acceleration_mm_s2=acceleration, cycle=recording.astype(float),
+        temperature_C=np.concatenate(temperatures) if len(temperatures) == len(parts) else None, tip_at=tip_at,
         tip_recording=tip_recording,
-    )
+    )  # fmt: skip
     return drive, force, tip_mm
 
 

@@ -13,7 +13,7 @@ from rig.diagnosis.fit import first_fit, held_values, refreshed
 from rig.diagnosis.floor import error_budget
 from rig.diagnosis.indentation import IndentationProblem, Simulation, library
 from rig.diagnosis.lack_of_fit import assess_lack_of_fit
-from rig.diagnosis.observations import Observations, observe, rise_N
+from rig.diagnosis.observations import NOTICEABLE, Observations, observe, rise_N
 from rig.diagnosis.other_forms import with_best_form
 from rig.diagnosis.problem import InverseProblem
 from rig.diagnosis.search import search
@@ -118,13 +118,13 @@ def unusable(data: Observations) -> Flaw | None:
         return Flaw(f"the {still} never changes, so the recordings carry no experiment", f"connect the {still} sensor")
     noise = sample_noise(force)
     rise = rise_N(position, force)
-    if rise < 0 and -rise > 5 * noise:
+    if rise < -NOTICEABLE * noise:
         return Flaw(
             "force falls as the tip goes in, so force or position has the wrong sign",
             "correct `positive` of force or position in the mapping (force.compression in rig.toml for a capture) "
             "and diagnose again",
         )
-    if rise < 5 * noise:
+    if rise < NOTICEABLE * noise:
         return Flaw(f"the force rises by {rise:.3g} N from above to below, no more than its noise: no contact", RECORD)
     if data.drive.recordings < FEWEST_RECORDINGS:
         count = data.drive.recordings

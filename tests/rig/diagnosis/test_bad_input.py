@@ -101,6 +101,16 @@ def test_one_recording_of_wrong_sign_is_left_out_and_named(clean: TrialSet) -> N
     assert said.text.endswith("turn its sign")
 
 
+def test_a_recording_in_which_nothing_is_touched_is_left_out_and_named(clean: TrialSet) -> None:
+    """Its contact would lie anywhere, and the whole simulation be wrong by what the others press with."""
+    last = clean.trials[-1]
+    idle = replace(last, force_N=np.random.default_rng(3).normal(0, 0.005, len(last.force_N)))
+    result = diagnose_session(replace(clean, trials=(*clean.trials[:-1], idle)))
+    assert (result.verdict, result.recordings) == ("adequate", 5)
+    (said,) = [finding for finding in result.quality if finding.kind == "no contact"]
+    assert (said.recording, said.text) == (last.name, "recording left out: its force rises by no more than its noise")
+
+
 def test_a_recording_that_is_a_copy_of_another_is_left_out_and_named(clean: TrialSet) -> None:
     copies = tuple(replace(clean.trials[0], name=f"copy {number}") for number in range(4))
     result = diagnose_session(replace(clean, trials=copies))
@@ -174,6 +184,16 @@ def test_at_10_Hz_what_is_fast_is_not_testable(clean: TrialSet) -> None:
     result = diagnose_session(replace(clean, trials=slow))
     assert {"time_offset", "filter_lag", "tip_inertia"} <= result.not_testable.keys()
     assert result.findings == ()
+
+
+@pytest.mark.parametrize("contact_mm", [13.0, 13.9])
+def test_where_the_tip_touches_in_the_last_readings_only_nothing_fails_and_nothing_is_named(contact_mm: float) -> None:
+    """Five readings a second at 3 mm/s, as every other one of a probe of gels: about contact hardly any are left."""
+    steps, rng = np.arange(25, dtype=np.float64), np.random.default_rng(2)
+    time_s, axis_mm = 0.2 * steps, 0.6 * steps
+    wells = [20 * np.maximum(axis_mm - contact_mm - 0.1 * k, 0) ** 1.5 + rng.normal(0, 0.005, 25) for k in range(5)]
+    trials = [Trial(f"well {k}", 10 * k + time_s, force_N, 10 * k + time_s, axis_mm) for k, force_N in enumerate(wells)]
+    assert diagnose_session(TrialSet("plate", tuple(trials))).findings == ()
 
 
 def test_recordings_that_each_count_their_own_time_say_nothing_of_drift(clean: TrialSet) -> None:

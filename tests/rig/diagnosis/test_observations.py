@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
-from rig.diagnosis.observations import derivative, far_readings, jitter_mm, lost_times, observe
+from rig.diagnosis.observations import derivative, far_readings, jitter_mm, lost_times, observe, working_period
 from rig.trials.trial import Trial, TrialSet
 from tests.rig.diagnosis.made_tissue import MadeTissue
 
@@ -87,3 +87,12 @@ def test_readings_far_out_are_named_and_not_judged() -> None:
     clean = observe(made)
     assert found.unseen is not None and clean.unseen is not None
     assert np.count_nonzero(found.unseen) == np.count_nonzero(clean.unseen) + 2
+
+
+@pytest.mark.parametrize(("rate_Hz", "expected_Hz"), [(1000, 100), (250, 125), (50, 25)])
+def test_of_long_sessions_only_those_that_show_nothing_fast_are_thinned_below_100_Hz(
+    rate_Hz: float, expected_Hz: float
+) -> None:
+    """Forty minutes at 25 Hz are the 60,000 samples that a long session is thinned to."""
+    time_s = np.arange(0, 2400, 1 / rate_Hz)
+    assert 1 / working_period([Trial("long", time_s, time_s, time_s, time_s)]) == pytest.approx(expected_Hz, rel=1e-3)

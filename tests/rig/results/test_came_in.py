@@ -193,7 +193,7 @@ def test_what_does_not_open_or_holds_no_force_is_bad_and_says_why(tmp_path: Path
 
 def test_what_a_diagnosis_takes_is_asked_of_the_diagnosis(found: dict[str, RecordingIn]) -> None:
     assert {name: recording.diagnose.used for name, recording in found.items()} == {
-        "clean": True, "clipped": True, "dropped": True, "constant": True, "coarse": True,
+        "clean": True, "clipped": True, "dropped": True, "constant": False, "coarse": True,
         "shaken": True,
     }  # fmt: skip
 
