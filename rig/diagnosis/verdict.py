@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rig.diagnosis.estimates import ErrorBudget, NamedCause, Verdict
-from rig.diagnosis.evidence import held_out_square_error
-from rig.diagnosis.fit import Fit, least_squares
+from rig.diagnosis.fit import Fit
 from rig.diagnosis.lack_of_fit import LEVEL, LackOfFit, find_better_trends, telling_variables, unexplained_variables
 from rig.diagnosis.search import Search, shared_variables
 
@@ -16,8 +15,6 @@ MOST_OVER_FLOOR = 1.10
 MOST_OVER_NOISE = 1.25
 # A quarter of the power that repeats differ by is an error of half of it; right models came to 0.16 at most.
 MOST_SHARED = 0.25
-# A model whose noise and scatter are this large against the signal explains nothing, however white its residual.
-MOST_CHANCE = 0.25
 # White: a residual of 0.7 mN in the dither of a quiet bench comes to less, and nobody would act on it.
 LEAST_LEFT_N = 0.0003
 
@@ -75,8 +72,6 @@ def left_variables(search: Search, after: LackOfFit) -> tuple[str, ...]:
         depends = tuple(dict.fromkeys(name for names in plainer for name in names))
     if not depends:
         depends = shared_variables([found.effect for found in search.named])
-    if not depends and left_to_chance(search.after) > MOST_CHANCE:
-        depends = ("recording",)
     return depends
 
 
@@ -84,12 +79,6 @@ def left_N(fit: Fit, found: LackOfFit) -> float:
     """The residual along its most telling variable as a white force [N]; infinite for what is no force."""
     share = max(found.shares[found.ranked[0]], 0.0)
     return float(np.sqrt(share)) * fit.whitener.noise.colours[0].sd if fit.problem.channels[0].unit == "N" else np.inf
-
-
-def left_to_chance(fit: Fit) -> float:
-    """Error on recordings left out as a share of the signal's own spread."""
-    spread = float(np.std(fit.problem.channels[0].observed))
-    return float(np.sqrt(held_out_square_error(least_squares(fit)).mean())) / max(spread, 1e-300)
 
 
 def summary(

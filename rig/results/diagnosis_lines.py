@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from math import sqrt
 
-from rig.diagnosis.estimates import SAFE_NATS, Estimate, NamedCause, NextExperiment
+from rig.diagnosis.estimates import SAFE_NATS, Estimate, NamedCause, NextExperiment, OwnSpread
 from rig.results.diagnosis import DiagnosisResult
 
 LINES, WIDTH = ("asked", "explained", "cause", "cost", "next"), len("explained: ")
@@ -103,7 +103,7 @@ def _interval(size: Estimate) -> str:
     return f"{size.low:.3g} to {size.high:.3g}{unit_after(size)}, 95 %{bound}"
 
 
-def unit_after(size: Estimate) -> str:
+def unit_after(size: Estimate | OwnSpread) -> str:
     """The unit as it follows a number; nothing for a mere number."""
     return f" {size.unit}" if size.unit not in (None, "1") else ""
 
@@ -115,11 +115,17 @@ def cost(result: DiagnosisResult) -> str:
     if result.base_N is None or result.extended_N is None:
         return "unknown"
     if not result.findings:
-        return f"the force is predicted within {_force_and_depth(result.extended_N, result)}"
+        return f"the force is predicted within {_force_and_depth(result.extended_N, result)}{_own(result)}"
     wrong_N = sqrt(max(result.base_N**2 - result.extended_N**2, 0.0))
     if not wrong_N:
         return "none in force: a model without it predicts that as well"
     return f"a model without it gets the force wrong by {_force_and_depth(wrong_N, result)}"
+
+
+def _own(result: DiagnosisResult) -> str:
+    """By how much recordings differ in what was fitted to each: no error of these, but one of the next."""
+    apart = [f"{spread.sd:.2g}{unit_after(spread)} in {name}" for name, spread in result.scatter.items()]
+    return f", once each recording has its own terms, which scatter by {', '.join(apart)}" * bool(apart)
 
 
 def _force_and_depth(error_N: float, result: DiagnosisResult) -> str:

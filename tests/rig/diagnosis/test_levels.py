@@ -7,7 +7,9 @@ import pytest
 
 from rig.diagnosis.levels import label_dependence
 from rig.diagnosis.observations import observe
+from rig.diagnosis.run import diagnose_session
 from rig.trials.trial import Trial, TrialSet
+from tests.rig.diagnosis.made_tissue import MadeTissue
 
 COUNT = 12
 OPERATORS = ("ann", "bob", "cid") * 4
@@ -53,3 +55,15 @@ def test_a_session_keeps_the_labels_that_differ_in_the_order_of_its_recordings()
     later = time_s + 10
     other = replace(one, name="other", force_s=later, axis_s=later, force_N=force_N + 0.001, labels={"site": "calf"})
     assert observe(TrialSet("made", (other, one))).labels == {"operator": ("ann", "")}
+
+
+def test_sites_of_other_stiffness_are_no_error_of_a_right_simulation() -> None:
+    """Without stiffness and contact of their own the recordings left out would be 41 % of the force's spread wrong."""
+    rng = np.random.default_rng(1)
+    stiffer, apart_mm = np.exp(0.5 * rng.standard_normal(8)), 0.2 * rng.standard_normal(8)
+    sites = [MadeTissue(a_N_mm=0.2 * k, surface_off_mm=mm) for k, mm in zip(stiffer, apart_mm, strict=True)]
+    found = diagnose_session(TrialSet("sites", tuple(site.session(seed=k).trials[k] for k, site in enumerate(sites))))
+    assert (found.verdict, found.findings) == ("adequate", ())
+    assert found.budget is not None
+    assert found.budget.scatter["stiffness"].sd == pytest.approx(np.std(np.log(stiffer), ddof=1), rel=0.1)
+    assert found.budget.scatter["touch"].sd == pytest.approx(np.std(apart_mm, ddof=1), rel=0.1)

@@ -13,6 +13,7 @@ from rig.diagnosis.estimates import (
     Estimate,
     NamedCause,
     NextExperiment,
+    OwnSpread,
     Unexplained,
     Verdict,
 )
@@ -71,6 +72,10 @@ def test_nothing_named_is_told_with_the_error_as_force_and_depth() -> None:
     assert said["explained"].startswith("no model tried does better than the simulation as it is: the error is 0.03 N")
     assert said["cost"] == "the force is predicted within 0.03 N rms, as much as 0.06 mm of depth"
     assert said["next"].startswith("nothing to mend")
+    spread = {"stiffness": OwnSpread(0.17, "1"), "touch": OwnSpread(0.14, "mm")}
+    sites = lines(result("adequate", explained_share=None, scatter=spread))
+    own = "once each recording has its own terms, which scatter by 0.17 in stiffness, 0.14 mm in touch"
+    assert sites["cost"] == f"the force is predicted within 0.03 N rms, as much as 0.06 mm of depth, {own}"
     flat = lines(result("adequate", explained_share=None, stiffness_N_mm=1e-5))
     assert flat["cost"] == "the force is predicted within 0.03 N rms", "3 m of depth are nobody's"
 
