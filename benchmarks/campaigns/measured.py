@@ -85,9 +85,14 @@ SETS = (
 # Of none of these does the simulation reach the noise, so that no size is stated for any cause. What was chosen here is
 # the first part of recordings, as far as it does or what it names does, before anything was planted in them.
 PARTS = (
-    MeasuredSet("vhb4910", "0d05*", MEAT, WayIn(far_mm=15.0)),
     MeasuredSet("vhb4910", "0d05*", MEAT, WayIn(far_mm=30.0)),
+    MeasuredSet("perineal_indentation", "230331_C_Ind*FF2_1[A-H]*", MEAT, WayIn(far_mm=3.0)),
+    MeasuredSet("perineal_indentation", "230331_C_Ind*FF2_2[A-H]*", MEAT, WayIn(far_mm=3.0)),
     MeasuredSet("perineal_indentation", "230331_C_Ind*FF2[A-Ha-h_]*", MEAT, WayIn(rise_N=0.2)),
+    MeasuredSet("perineal_indentation", "230331_C_Ind*RDG1_1[A-H]*", MEAT, WayIn(rise_N=0.3)),
+    MeasuredSet("perineal_indentation", "230403_C_Ind*-RDG2*", MEAT, WayIn(rise_N=3.0)),
+    MeasuredSet("perineal_indentation", "230407_C_Ind*_FF2*", MEAT, WayIn(rise_N=1.0)),
+    MeasuredSet("perineal_indentation", "230411_C_Tex*RDG2*", MEAT, WayIn(rise_N=10.0)),
 )
 
 

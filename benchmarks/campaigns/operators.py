@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from benchmarks.forms.bench import cogging
 from rig.trials.trial import Trial, TrialSet, drop_unusable
 
 Array = NDArray[np.float64]
@@ -137,6 +138,10 @@ def _late(stroke: Stroke, seconds: float, _: Session) -> Stroke:
     return stroke._replace(time_s=stroke.time_s + seconds)
 
 
+def _magnets(stroke: Stroke, newton: float, _: Session) -> Stroke:
+    return stroke._replace(force_N=stroke.force_N + cogging(stroke.place_mm, newton, PITCH_MM, 0.7))
+
+
 def _cycles(stroke: Stroke, share: float, session: Session) -> Stroke:
     zero_N = np.quantile(stroke.force_N, 0.02)
     gain = 1 + share * np.exp(-session.number / CYCLES)
@@ -166,6 +171,7 @@ OPERATORS: Mapping[str, Operator] = {
     "rate_law": Operator("", 0.1, _rate, frozenset({"relaxation"})),
     "preconditioning": Operator("preconditioning_gain", 0.25, _cycles),
     "surface_motion": Operator("surface_motion_mm", 0.2, _moving_surface),
+    "cogging": Operator("cogging_N", 0.1, _magnets),
 }
 
 

@@ -71,6 +71,13 @@ def test_a_frame_gives_way_in_proportion_to_force() -> None:
     assert trial.force_N[into] == pytest.approx(expected, abs=0.01 * TOP_N)
 
 
+def test_magnets_pull_in_the_air_too_twice_a_pitch() -> None:
+    (trial,) = planted("cogging", 0.1)
+    turn = 2 * np.pi * trial.axis_mm / PITCH_MM + 0.7
+    expected = 0.1 * np.sin(turn) + 0.03 * np.sin(2 * turn + 1.0)
+    assert trial.force_N - stroke().force_N == pytest.approx(expected)
+
+
 def test_friction_begins_pushed_back_and_turns_over_its_length() -> None:
     (trial,) = planted("friction", 0.3)
     added = trial.force_N - stroke().force_N
