@@ -142,7 +142,8 @@ def _share(squares: Array) -> Array:
 def noise_N(own: Fit) -> float | None:
     """Noise of force in the air, less what named causes do there, else where the tip stands still in the tissue [N].
 
-    None where there is neither.
+    No less than what steps of the converter round off, which a reading that rests on one does not show. None where the
+    tip is at neither.
     """
     assert isinstance(own.problem, IndentationProblem)
     data, drive = own.problem.data, own.problem.data.drive
@@ -150,11 +151,12 @@ def noise_N(own: Fit) -> float | None:
     clear_mm = CLEAR_SHARE * float((drive.position_mm - contact_mm[drive.recording]).max())
     above = seen & _rows_in(drive, contact_mm - clear_mm, "air")
     air = _window_variances(drive, data.force_N - own.prediction[0], above, 1)
+    rounding_N = data.step_N / np.sqrt(12)  # standard deviation of an error that may be anything up to half a step
     if len(air) >= FEWEST_WINDOWS:
-        return float(np.sqrt(np.median(air)))
+        return float(max(np.sqrt(np.median(air)), rounding_N))
     # In holds once most of the tissue's relaxation is over.
     held = _window_variances(drive, data.force_N, seen & _rows_in(drive, contact_mm, "hold", SETTLED_S), 2)
-    return float(np.sqrt(np.median(held))) if len(held) >= FEWEST_WINDOWS else None
+    return float(max(np.sqrt(np.median(held)), rounding_N)) if len(held) >= FEWEST_WINDOWS else None
 
 
 def _rows_in(drive: MeasuredMotion, surfaces_mm: Array, kind: Kind, after_s: float = 0.0) -> Mask:

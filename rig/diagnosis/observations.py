@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rig.errors import DataError
-from rig.recording.converter import at_the_end_of_range
+from rig.recording.converter import at_the_end_of_range, resolution
 from rig.simulation.drive import Array, MeasuredMotion
 from rig.trials.cycles import as_pushed, cycle_of
 from rig.trials.findings import Finding, merge
@@ -52,7 +52,7 @@ class Observations:
     sensor's range.
     ``contact_mm`` is from where to where contact lies in some of the recordings, None where none of them tells. Times
     between recordings mean something where they have ``one_clock``. ``labels`` are those that differ, each with what it
-    is for each recording, nothing where nobody said.
+    is for each recording, nothing where nobody said. Force comes in steps of ``step_N``, 0 where none show.
     """
 
     name: str
@@ -67,6 +67,7 @@ class Observations:
     contact_mm: Span | None = None
     one_clock: bool = True
     labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    step_N: float = 0.0
 
     @property
     def rate_Hz(self) -> float:
@@ -130,7 +131,7 @@ def observe(
     return Observations(
         session.name, tuple(part.name for part in parts), drive, force, tip, session.surface_mm, merge(findings),
         rough_mm, np.concatenate([part.unseen for part in parts]), contact_of(usable), session.one_clock,
-        _labels(usable, parts),
+        _labels(usable, parts), float(np.median([resolution(trial.force_N) for trial in usable])),
     )  # fmt: skip
 
 

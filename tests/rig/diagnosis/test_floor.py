@@ -88,6 +88,8 @@ def test_such_a_simulation_is_not_called_right(budget: ErrorBudget) -> None:
     assert left_sentence(replace(right, extended_N=0.05, noise_N=0.03, repeatability_N=0.05)) == (
         "what is left is 0.05 N, of which 0.03 N is noise and 0.04 N differs between repeats"
     )
+    below = "what is left is 0.05 N, no more than the noise (0.06 N)"
+    assert left_sentence(replace(right, extended_N=0.05, noise_N=0.06)) == below
 
 
 def test_own_terms_take_up_what_differs_between_recordings_and_are_said(base: Fit, budget: ErrorBudget) -> None:
@@ -115,6 +117,14 @@ def test_noise_is_that_of_the_air_after_what_is_named_there(base: Fit) -> None:
     own = with_own_terms(base, base.whitener.blind)
     assert noise_N(own) == pytest.approx(NOISE_N, rel=0.1)
     assert isinstance(own.problem, IndentationProblem)
+
+
+def test_noise_is_no_less_than_what_a_converter_rounds_off(base: Fit) -> None:
+    """Uniform over a step of 0.05 N: a reading that rests on one shows none of it."""
+    own = with_own_terms(base, base.whitener.blind)
+    assert isinstance(own.problem, IndentationProblem)
+    coarse = replace(own, problem=replace(own.problem, data=replace(own.problem.data, step_N=0.05)))
+    assert noise_N(coarse) == pytest.approx(0.05 / np.sqrt(12))
 
 
 def test_noise_without_air_is_that_of_holds_once_they_have_settled(base: Fit) -> None:

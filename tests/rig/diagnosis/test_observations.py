@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import savgol_filter
 
 from rig.diagnosis.observations import derivative, far_readings, jitter_mm, lost_times, observe, working_period
+from rig.diagnosis.run import diagnose_session
 from rig.trials.trial import Trial, TrialSet
 from tests.rig.diagnosis.made_tissue import MadeTissue
 
@@ -96,3 +97,12 @@ def test_of_long_sessions_only_those_that_show_nothing_fast_are_thinned_below_10
     """Forty minutes at 25 Hz are the 60,000 samples that a long session is thinned to."""
     time_s = np.arange(0, 2400, 1 / rate_Hz)
     assert 1 / working_period([Trial("long", time_s, time_s, time_s, time_s)]) == pytest.approx(expected_Hz, rel=1e-3)
+
+
+def test_a_coarse_converter_is_seen_by_its_steps_and_a_right_simulation_left_right() -> None:
+    """Steps of 20 mN: in the air the reading rests on one of them, and its noise of 4 mN hardly shows."""
+    made = MadeTissue().session()
+    coarse = replace(made, trials=tuple(replace(t, force_N=np.round(t.force_N / 0.02) * 0.02) for t in made.trials))
+    assert observe(coarse).step_N == pytest.approx(0.02)
+    found = diagnose_session(coarse)
+    assert (found.verdict, found.findings) == ("adequate", ())
