@@ -35,10 +35,11 @@ class LeftOut:
 
     @cached_property
     def square_errors(self) -> Array:
-        """Mean square of each recording, shape (recordings,)."""
+        """Mean square of each recording, shape (recordings,); that of the others where no row of it is judged."""
         rows = self.judged
         count = np.bincount(self.recording[rows], minlength=self.recordings)
-        return np.bincount(self.recording[rows], self.residual[rows] ** 2, self.recordings) / np.maximum(count, 1)
+        mean = np.bincount(self.recording[rows], self.residual[rows] ** 2, self.recordings) / np.maximum(count, 1)
+        return np.where(count > 0, mean, mean.sum() / max(np.count_nonzero(count), 1))
 
     @property
     def recordings(self) -> int:

@@ -179,6 +179,15 @@ def test_motions_of_other_speeds_are_no_repeats() -> None:
     assert compare_repeats(some, drive, np.full(3, 20.0)) is None
 
 
+def test_a_recording_of_which_no_row_is_judged_has_no_error_of_its_own() -> None:
+    """As 0 it made what is left look less, and draws of it alone a share of 0 / 0."""
+    recording, judged = np.array([0, 0, 1, 1, 2, 2]), np.array([True, True, False, False, True, False])
+    left = LeftOut(np.array([1.0, 3.0, 9.0, 9.0, 1.0, 9.0]), judged, recording)
+    assert left.square_errors.tolist() == [5.0, 3.0, 1.0]
+    none = replace(left, judged=np.zeros(6, bool)).square_errors
+    assert explained_share(none, none, none) is None
+
+
 def test_the_share_explained_is_of_power_and_left_out_where_nothing_could_be_gained() -> None:
     base, half, floor = (np.full(4, size**2) for size in (0.05, 0.04, 0.03))
     found = explained_share(base, half, floor)
