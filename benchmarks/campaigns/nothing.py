@@ -9,10 +9,11 @@ from benchmarks.campaigns import questions as ask
 from benchmarks.campaigns.campaign import Campaign, judged
 from benchmarks.campaigns.case import AnswerFunction, Case, Record, Truth
 from benchmarks.campaigns.counts import Goal, Question
-from benchmarks.campaigns.measured import FEWEST, SETS, MeasuredSet, in_a_row, session_of
+from benchmarks.campaigns.measured import FEWEST, PARTS, SETS, MeasuredSet, in_a_row, session_of
 from rig.trials.trial import Trial, TrialSet
 
 BETWEEN = frozenset({"preconditioning", "zero_drift", "temperature"})  # what order and labels tell of
+JUDGED = (*SETS, *PARTS)  # names of sets that the simulation misses are never certain
 HALVED = 3  # recordings cut in two: six are enough to be judged
 
 
@@ -50,8 +51,8 @@ CHANGES: Mapping[str, Change] = {"as they are": as_they_are, "labels permuted": 
 def case_of(seed: int) -> Case:
     """A set and what is done to it; as many seeds in a row as there are sets hold every set."""
     rng = np.random.default_rng([seed, 13])
-    chosen: MeasuredSet = SETS[seed % len(SETS)]
-    how = list(CHANGES)[seed // len(SETS) % len(CHANGES)]
+    chosen: MeasuredSet = JUDGED[seed % len(JUDGED)]
+    how = list(CHANGES)[seed // len(JUDGED) % len(CHANGES)]
     known = chosen.known if how == "as they are" else chosen.known - BETWEEN
 
     def make() -> tuple[TrialSet, float | None]:
