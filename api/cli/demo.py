@@ -44,17 +44,9 @@ from rig.results.tracking import TrackResult
 from rig.tissue.model import load_model
 
 PLAN = Indentation(
-    name="demonstration",
-    trials=2,
-    air_dwell_s=0.3,
-    approach_speed_mm_s=6.0,
-    hold_s=0.4,
-    dither_amplitude_mm=0.3,
-    dither_s=0.4,
-    retract_speed_mm_s=20.0,
-    clearance_mm=4.0,
-    rest_s=0.1,
-)
+    name="demonstration", trials=2, air_dwell_s=0.3, approach_speed_mm_s=6.0, hold_s=0.4, dither_amplitude_mm=0.3,
+    dither_s=0.4, retract_speed_mm_s=20.0, clearance_mm=4.0, rest_s=0.1,
+)  # fmt: skip
 LARGEST_SEED = 100_000  # five digits: soon typed again, and seldom drawn twice
 FORCES_N = (1.0, 2.0, 3.0, 4.0, 5.0)
 SECONDS = 3.0

@@ -39,22 +39,12 @@ def capabilities_of(wiring: Wiring) -> Capabilities:
         protocols=[PREFIX.rpartition("/")[2], PROTOCOL],
         transports={"http": PREFIX, "websocket": f"{PREFIX}/stream", "server-sent events": f"{PREFIX}/events"},
         limits=ServiceLimits(
-            body_bytes=LARGEST_BODY_BYTES,
-            upload_bytes=LARGEST_UPLOAD_BYTES,
-            page_entries=MOST,
-            waiting_jobs=MOST_WAITING,
-            requests_per_s=KNOWN.per_s,
-            channels=MOST_STREAMS,
-            open_connections=MOST_OPEN,
-            open_connections_each=MOST_OPEN_EACH,
-            message_bytes=LARGEST_MESSAGE_BYTES,
-            messages_per_s=MESSAGES.per_s,
-            lowest_rate_hz=LOWEST_HZ,
-            highest_rate_hz=HIGHEST_HZ,
-            latest_samples=MOST_LATEST,
-            kept_s=KEPT_S,
+            body_bytes=LARGEST_BODY_BYTES, upload_bytes=LARGEST_UPLOAD_BYTES, page_entries=MOST,
+            waiting_jobs=MOST_WAITING, requests_per_s=KNOWN.per_s, channels=MOST_STREAMS, open_connections=MOST_OPEN,
+            open_connections_each=MOST_OPEN_EACH, message_bytes=LARGEST_MESSAGE_BYTES, messages_per_s=MESSAGES.per_s,
+            lowest_rate_hz=LOWEST_HZ, highest_rate_hz=HIGHEST_HZ, latest_samples=MOST_LATEST, kept_s=KEPT_S,
         ),
-    )
+    )  # fmt: skip
 
 
 def installed(requirements: list[str]) -> list[str]:

@@ -95,24 +95,13 @@ def force_law(model: Model, wiring: Wiring, response: AxisResponse | None = None
     speed_mm_s = min(TRACK_MM_S, wiring.limits.speed_mm_s)
     friction_N, friction_mm = model.law.friction
     return TrackForce(
-        times_s=(0.0, 1.0),
-        forces_N=(CONTACT_N, CONTACT_N),
-        gains=rows_of(model),
-        damping_N_s_mm=model.damping_N_s_mm,
-        delay_s=axis.delay_s,
-        lag1_s=axis.lag1_s,
-        lag2_s=axis.lag2_s,
-        preview_s=axis.tip_lag_s,
-        ahead_mm_s=AHEAD_SHARE * speed_mm_s,
-        **loop.law._asdict(),
-        drift_limit_mm_s=DRIFT_SHARE * speed_mm_s,
-        relaxation=tuple((term.ratio, term.tau_s) for term in model.law.terms[:2]),
-        friction_N=friction_N,
-        friction_mm=friction_mm,
-        speed_limit_mm_s=speed_mm_s,
-        search_speed_mm_s=min(APPROACH_MM_S, wiring.limits.speed_mm_s),
-        contact_force_N=CONTACT_N,
-    )
+        times_s=(0.0, 1.0), forces_N=(CONTACT_N, CONTACT_N), gains=rows_of(model), damping_N_s_mm=model.damping_N_s_mm,
+        delay_s=axis.delay_s, lag1_s=axis.lag1_s, lag2_s=axis.lag2_s, preview_s=axis.tip_lag_s,
+        ahead_mm_s=AHEAD_SHARE * speed_mm_s, **loop.law._asdict(), drift_limit_mm_s=DRIFT_SHARE * speed_mm_s,
+        relaxation=tuple((term.ratio, term.tau_s) for term in model.law.terms[:2]), friction_N=friction_N,
+        friction_mm=friction_mm, speed_limit_mm_s=speed_mm_s,
+        search_speed_mm_s=min(APPROACH_MM_S, wiring.limits.speed_mm_s), contact_force_N=CONTACT_N,
+    )  # fmt: skip
 
 
 def rows_of(model: Model) -> tuple[GainRow, ...]:

@@ -1,4 +1,4 @@
-"""Strict TOML tables: an unknown key is an error that names the nearest valid one, a bad value says where and why."""
+"""Strict tables of files: an unknown key is an error that names the nearest valid one, a bad value says where."""
 
 import json
 import re
@@ -39,14 +39,14 @@ def read_toml(path: Path) -> TomlTable:
         raise UsageError(f"{path}: nests its values too deeply for a TOML file of this program; flatten it") from error
 
 
-def read_json(path: Path, where: str, missing: str, malformed: str) -> object:
-    """What the file holds; UsageError says ``where`` and what to do about a ``missing`` or a ``malformed`` one."""
+def read_json(path: Path, where: str, if_missing: str, if_malformed: str) -> object:
+    """What the file holds; raises UsageError, which says ``where`` and what to do."""
     try:
         return json.loads(path.read_text())
     except FileNotFoundError as error:
-        raise UsageError(f"{where}: no such file; {missing}") from error
+        raise UsageError(f"{where}: no such file; {if_missing}") from error
     except (OSError, ValueError, RecursionError) as error:
-        raise UsageError(f"{where}: cannot be read as JSON: {error}; {malformed}") from error
+        raise UsageError(f"{where}: cannot be read as JSON: {error}; {if_malformed}") from error
 
 
 def parse(kind: type[AnyTable], values: Mapping[str, Any], where: str) -> AnyTable:

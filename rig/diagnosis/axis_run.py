@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from rig.diagnosis.answers import Diagnosis, sentence, without_sizes
+from rig.diagnosis.answers import Diagnosis, error_sources, intervals, sentence, without_sizes
 from rig.diagnosis.axis import AxisProblem
 from rig.diagnosis.axis_floor import AxisErrors, left_out_errors, share_of
 from rig.diagnosis.axis_motion import Scales, noise_of, prepare
@@ -17,6 +17,7 @@ from rig.diagnosis.effects.axis import AXIS_CAUSES
 from rig.diagnosis.estimates import EffortGain, Estimate, NamedCause, NextExperiment
 from rig.diagnosis.fit import Fit, free_parameters
 from rig.diagnosis.run import judge
+from rig.diagnosis.search import Search
 from rig.diagnosis.verdict import MOST_OVER_FLOOR, summary
 from rig.errors import DataError, UsageError
 from rig.intake.axis import AxisData, AxisRecording
@@ -60,7 +61,7 @@ def diagnose_axis(
     if search is None:
         return found
     errors = left_out_errors(search.before, search.after)
-    found = without_sizes(_held_against_floor(found, errors, problem))
+    found = without_sizes(_held_against_floor(found, search, errors, problem))
     before, after = (in_own_units(fit, problem) for fit in (search.before, search.after))
     found = _in_own_units(found, problem.scales, search.after, after.values)
     return with_predictions(found, data, fitted, facts.controller, (before, after), references or {}, share_of(errors))
@@ -94,7 +95,7 @@ def _problem(recordings: Sequence[AxisRecording], data: AxisData, facts: AxisFac
     return AxisProblem(motion, scales, facts.known, lacks)
 
 
-def _held_against_floor(found: Diagnosis, errors: AxisErrors, problem: AxisProblem) -> Diagnosis:
+def _held_against_floor(found: Diagnosis, search: Search, errors: AxisErrors, problem: AxisProblem) -> Diagnosis:
     """Names stay provisional where a smooth law predicts better, or the motion is too short to tell what one would."""
     if found.verdict not in ("adequate", "explained"):
         return found
@@ -105,8 +106,14 @@ def _held_against_floor(found: Diagnosis, errors: AxisErrors, problem: AxisProbl
     if model <= min(MOST_OVER_FLOOR * smooth, MOST_OVER_WHITE * noise) and not lost and told:
         return found
     depends = tuple(found.after.ranked[:1]) if found.after and not lost else ("recording",)
-    findings = tuple(replace(one, provisional=True, confidence=one.confidence / 5) for one in found.findings)
-    return replace(found, verdict="unexplained", findings=findings, depends_on=depends)
+    sources = error_sources(search.after, is_left=True)
+    sizes = {one.effect.name: intervals(search.after, one.effect.pars, sources) for one in search.named}
+    findings = tuple(
+        replace(one, provisional=True, confidence=one.confidence / 5, parameters=sizes[one.effects[0]])
+        for one in found.findings
+    )
+    base = intervals(search.after, [par for par in problem.base if par.name in found.base], sources)
+    return replace(found, verdict="unexplained", findings=findings, depends_on=depends, base=base)
 
 
 def _cannot(name: str, recordings: int, reason: str, quality: tuple[Finding, ...]) -> Diagnosis:

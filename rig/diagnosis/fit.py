@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from rig.diagnosis.descent import descend, jacobian, on_bound, prior_precision
-from rig.diagnosis.noise import Array, Colour, Noise, starts_of
+from rig.diagnosis.noise import Array, Colour, Mask, Noise, starts_of
 from rig.diagnosis.problem import Effect, InverseProblem, Par, Values
 from rig.diagnosis.whitening import Whitener, estimate, optimistic, shifted
 from rig.remembered import known_of
@@ -203,12 +203,18 @@ def refreshed(model: Fit) -> Fit:
     """The same model with the rows it cannot judge marked anew from where it now sees the contact.
 
     Once only: a model that is wrong about something else walks away from the rows taken from it. One that falls apart
-    on the new rows stays as it was.
+    on the new rows stays as it was, but for what nobody saw.
     """
     values = shifted(model.problem, model.values, model.whitener.noise.shifts)
-    whitener = replace(model.whitener, blind=model.problem.blind(values))
-    fresh = fit(model.problem, model.effects, model.values, whitener)
-    return fresh if _level_of_a_row(fresh) > _level_of_a_row(model) - FALLS_APART_NATS else model
+    fresh = _judged_without(model, model.problem.blind(values))
+    if _level_of_a_row(fresh) > _level_of_a_row(model) - FALLS_APART_NATS:
+        return fresh
+    unseen = model.problem.blind({**values, "surface_mm": np.inf})
+    return _judged_without(model, unseen) if (unseen & ~model.whitener.blind).any() else model
+
+
+def _judged_without(model: Fit, blind: Mask) -> Fit:
+    return fit(model.problem, model.effects, model.values, replace(model.whitener, blind=blind))
 
 
 def _level_of_a_row(model: Fit) -> float:

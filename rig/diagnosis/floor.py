@@ -128,7 +128,7 @@ def explained_share(base: Array, extended: Array, floor: Array) -> Estimate | No
 
     None where little could be gained.
     """
-    if base.mean() <= WORTH_EXPLAINING**2 * floor.mean():
+    if not base.any() or base.mean() <= WORTH_EXPLAINING**2 * floor.mean():
         return None
     return bootstrap(np.stack([base, extended, floor], axis=1), _share)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rig.diagnosis.descent import PRIOR_SCALES
 from rig.diagnosis.effects.registry import CAUSES
 from rig.diagnosis.effects.tissue import STIFFENING, STIFFENING_EFFECT
-from rig.diagnosis.observations import Observations
+from rig.diagnosis.observations import SHOWS_FAST_HZ, Observations
 from rig.diagnosis.problem import Array, Effect, Par, Scatter, Signal, Values, operators
 from rig.remembered import exp
 from rig.simulation.chain import respond
@@ -182,7 +182,7 @@ def missing(data: Observations) -> dict[str, str]:
         reasons["surface"] = "nobody stated where the surface is, so it is fitted"
     if drive.temperature_C is None or np.ptp(drive.temperature_C) < 0.5:
         reasons["temperature"] = "no temperature was recorded, or it changed by less than 0.5 K"
-    if data.rate_Hz < 99:
+    if data.rate_Hz < SHOWS_FAST_HZ:
         reasons["fast"] = f"force at {data.rate_Hz:.0f} Hz is too slow; 200 Hz or more shows it"
     elif data.jitter_mm > MOST_JITTER_MM:
         reasons["fast"] = (

@@ -91,7 +91,7 @@ def assess_lack_of_fit(fit: Fit, rng: np.random.Generator) -> LackOfFit:
     t = Tangents(len(fit.free), ridge, hessian, gradient, ())
     gains = _gains(groups, t, gradient[None])[0]
     p_value = chance(chance_maxima(t, rng, partial(_gains, groups), DRAWS), float(gains.max()))
-    rows = float(sum(np.count_nonzero(keep) for keep in fit.whitener.judged[:1]))
+    rows = max(float(np.count_nonzero(fit.whitener.judged[0])), 1.0)
     named = dict(zip(groups, map(float, gains), strict=True))
     shares = {name: 2 * gain / rows for name, gain in named.items()}
     return LackOfFit(named, shares, p_value, *with_labels(between_recordings(fit, rng), fit))

@@ -34,12 +34,16 @@ class LeftOut:
     recording: Index
 
     @cached_property
+    def seen(self) -> Mask:
+        """Recordings of which any row is judged, shape (recordings,)."""
+        return np.bincount(self.recording[self.judged], minlength=self.recordings) > 0
+
+    @cached_property
     def square_errors(self) -> Array:
-        """Mean square of each recording, shape (recordings,); that of the others where no row of it is judged."""
+        """Mean square of each recording of which any row is judged, shape (judged recordings,)."""
         rows = self.judged
-        count = np.bincount(self.recording[rows], minlength=self.recordings)
-        mean = np.bincount(self.recording[rows], self.residual[rows] ** 2, self.recordings) / np.maximum(count, 1)
-        return np.where(count > 0, mean, mean.sum() / max(np.count_nonzero(count), 1))
+        sums = np.bincount(self.recording[rows], self.residual[rows] ** 2, self.recordings)
+        return sums[self.seen] / np.bincount(self.recording[rows], minlength=self.recordings)[self.seen]
 
     @property
     def recordings(self) -> int:
@@ -48,8 +52,8 @@ class LeftOut:
 
     @property
     def rms(self) -> float:
-        """Root of the mean over recordings."""
-        return float(np.sqrt(self.square_errors.mean()))
+        """Root of the mean over recordings; 0 where no row is judged."""
+        return float(np.sqrt(self.square_errors.mean())) if self.seen.any() else 0.0
 
 
 def own_deviations(problem: InverseProblem, values: Values) -> Array:

@@ -25,7 +25,8 @@ from rig.trials.surface import find_surface
 from rig.trials.trial import FEWEST_SAMPLES, Trial, TrialSet, drop_disordered, drop_unusable, inspect
 
 WORKING_RATE_HZ = 250.0
-LOWEST_RATE_HZ = 100.0  # below it no cause that acts fast can be tested
+LOWEST_RATE_HZ, SHOWS_FAST_HZ = 100.0, 99.0  # below it, less what a clock is off by, nothing fast can be tested
+SLOWEST_GRID_HZ = 20.0  # of sessions that show nothing fast: ten readings of half a second of contact
 MOST_SAMPLES = 60_000  # four minutes at 250 Hz, the length of `examples/diagnosis.toml`
 DERIVATIVE_SPANS_S = (0.008, 0.016)
 JITTER_MM = 0.0004  # rounding to the encoder's 0.5 um makes 0.14 um: three times that comes from time stamps
@@ -35,9 +36,11 @@ GAP_PERIODS, GAP_S = 3.0, 0.01
 MOST_FILLED_S = 5.0  # of lost force; a longer break would be filled for nothing but its two ends
 # Over 24 ms a dither of 0.25 mm at 6 Hz turns by 8.5 mm/s, which is to be seen, a corner of 2000 mm/s2 by 30.
 MOST_TURN_MM_S = 12.0
+# A rise of force below so many times the noise is no contact, and one below this share of the others' tells nothing.
+NOTICEABLE, SLIGHT = 5.0, 0.05
+DEEPEST = 0.02  # of the travel: a tip that comes from far away is in contact for a little of it
+RESTING = 0.5  # of a step: noise below it leaves readings on one step
 # Noise of Gauss goes as far once in 10^15 readings; a cable that is moved gives 0.2 % such, strokes of 50 readings 2 %.
-DEEPEST = 0.02  # of the samples: a tip that comes from far away touches in few
-NOTICEABLE = 5.0  # times the noise: a rise below it is no contact
 FAR, MOST_FAR = 8.0, 0.005
 FAR_OUT = "{} readings lie far from both their neighbours, which no motion does; they are not judged"
 OMITTED = "recording left out: "
@@ -52,7 +55,7 @@ class Observations:
     sensor's range.
     ``contact_mm`` is from where to where contact lies in some of the recordings, None where none of them tells. Times
     between recordings mean something where they have ``one_clock``. ``labels`` are those that differ, each with what it
-    is for each recording, nothing where nobody said. Force comes in steps of ``step_N``, 0 where none show.
+    is for each recording, nothing where nobody said. Readings of force rest on steps of ``step_N``, if not 0.
     """
 
     name: str
@@ -111,16 +114,12 @@ def observe(
     ``contact_of`` says where contact lies in the recordings that are used; the grid has at most ``fastest_Hz``.
     """
     findings = [*session.findings, *(finding for trial in session.trials for finding in inspect(trial))]
-    usable, lost = _cleaned(session)
+    usable, lost = sound_trials(session)
     if not usable:
         said = [finding.text.removeprefix(OMITTED) for finding in (*lost, *session.findings)]
         why = said[0] if said else "there is none"
         raise DataError(f"{session.name}: no recording can be used ({why}); run `rig verify` on it")
     findings += lost
-    usable, copies = _without_copies(usable)
-    usable, pulled = _pushed(usable)
-    usable, astray = _pressing(usable)
-    findings += [*copies, *pulled, *astray]
     rough_mm = float(np.median([jitter_mm(trial) for trial in usable]))
     rate_Hz, spans_s = (WORKING_RATE_HZ, DERIVATIVE_SPANS_S) if rough_mm <= JITTER_MM else JITTERY
     period_s = working_period(usable, min(rate_Hz, fastest_Hz))
@@ -131,7 +130,7 @@ def observe(
     return Observations(
         session.name, tuple(part.name for part in parts), drive, force, tip, session.surface_mm, merge(findings),
         rough_mm, np.concatenate([part.unseen for part in parts]), contact_of(usable), session.one_clock,
-        _labels(usable, parts), float(np.median([resolution(trial.force_N) for trial in usable])),
+        _labels(usable, parts), float(np.quantile(list(map(_rounding_N, usable)), 0.5, method="lower")),
     )  # fmt: skip
 
 
@@ -161,9 +160,18 @@ def working_period(recordings: Sequence[Trial], rate_Hz: float = WORKING_RATE_HZ
     """Grid period [s]: a whole number of force periods, near ``rate_Hz``, coarser only for very long sessions."""
     native_s = float(np.median([np.median(np.diff(trial.force_s)) for trial in recordings]))
     total_s = float(sum(trial.force_s[-1] - trial.force_s[0] for trial in recordings))
-    slowest_Hz = LOWEST_RATE_HZ if native_s * LOWEST_RATE_HZ <= 1 else 0.0  # of slower ones nothing fast can be lost
+    slowest_Hz = LOWEST_RATE_HZ if native_s * SHOWS_FAST_HZ <= 1 else SLOWEST_GRID_HZ
     wanted_Hz = float(np.clip(MOST_SAMPLES / max(total_s, 1e-9), slowest_Hz, rate_Hz))
     return native_s * max(1, round(1 / wanted_Hz / native_s))
+
+
+def sound_trials(session: TrialSet) -> tuple[list[Trial], list[Finding]]:
+    """The recordings that can be judged, pulled ones as if pushed, and why others cannot."""
+    usable, lost = _cleaned(session)
+    usable, copies = _without_copies(usable)
+    turned = [as_pushed(trial) for trial in usable]
+    usable, astray = _pressing([trial for trial, _ in turned])
+    return usable, [*lost, *copies, *(finding for _, found in turned for finding in found), *astray]
 
 
 def _cleaned(session: TrialSet) -> tuple[list[Trial], list[Finding]]:
@@ -189,26 +197,25 @@ def _without_copies(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]
     return [trial for trial in usable if trial.name not in gone], copies
 
 
-def _pushed(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:
-    """What was pulled as if it had been pushed, as for a fit."""
-    turned = [as_pushed(trial) for trial in usable]
-    return [trial for trial, _ in turned], [finding for _, found in turned for finding in found]
-
-
 def _pressing(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:
-    """Without recordings whose force does not rise as the tip goes in, where it does in others.
+    """Without recordings whose force does not rise as the tip goes as far in as in others, where it does in those.
 
     Where it meets nothing contact lies nowhere; where force falls, in few, its sign is wrong.
     """
+    if not usable:
+        return [], []
     rises = np.array([_rise_of(trial) for trial in usable])
-    large = 0.5 * float(np.median(np.abs(rises)))
-    falls = rises < -large
-    falls &= large > 0 and np.count_nonzero(falls) < 0.5 * len(usable)
+    least = np.array([NOTICEABLE * max(sample_noise(t.force_N), _rounding_N(t) / np.sqrt(12)) for t in usable])
+    ways = np.array([np.ptp(trial.axis_mm) for trial in usable])
+    slight = (np.abs(rises) <= least) & (np.abs(rises) < SLIGHT * np.abs(rises).max())
+    idle = slight & (ways > 0.5 * np.median(ways)) & (np.abs(rises) > least).any()
+    usable, flat = _without(usable, idle, "no contact", "its force does not rise as the tip goes in")
+    rises, least = rises[~idle], least[~idle]
+    falls = rises < -np.maximum(0.5 * float(np.median(np.abs(rises))), least)
+    falls &= np.count_nonzero(falls) < 0.5 * len(usable)
     turned = "its force falls as the tip goes in, and rises in the others: turn its sign"
     usable, lost = _without(usable, falls, "sign", turned)
-    idle = np.array([abs(_rise_of(trial, DEEPEST)) <= NOTICEABLE * sample_noise(trial.force_N) for trial in usable])
-    usable, flat = _without(usable, idle & (not idle.all()), "no contact", "its force rises by no more than its noise")
-    return usable, lost + flat
+    return usable, flat + lost
 
 
 def _without(
@@ -233,14 +240,23 @@ def far_readings(force_N: Array) -> NDArray[np.bool_]:
     return np.asarray(far & (far.mean() <= MOST_FAR))
 
 
-def rise_N(place_mm: Array, force_N: Array, share: float = 0.1) -> float:
-    """Force at the deepest tenth of the motion, or another ``share``, less that at the highest; both of shape (n,)."""
-    deep, high = (place_mm >= np.quantile(place_mm, 1 - share)), (place_mm <= np.quantile(place_mm, 0.1))
+def rise_N(place_mm: Array, force_N: Array) -> float:
+    """Force at the deepest tenth of the motion, less that at the highest; both of shape (n,)."""
+    deep, high = (place_mm >= np.quantile(place_mm, 0.9)), (place_mm <= np.quantile(place_mm, 0.1))
     return float(np.median(force_N[deep]) - np.median(force_N[high]))
 
 
-def _rise_of(trial: Trial, share: float = 0.1) -> float:
-    return rise_N(np.interp(trial.force_s, trial.axis_s, trial.axis_mm), trial.force_N, share)
+def _rise_of(trial: Trial) -> float:
+    place_mm = np.interp(trial.force_s, trial.axis_s, trial.axis_mm)
+    top_mm, way_mm = float(place_mm.min()), float(np.ptp(place_mm))
+    deep, high = place_mm >= top_mm + (1 - DEEPEST) * way_mm, place_mm <= top_mm + 0.1 * way_mm
+    return float(np.median(trial.force_N[deep]) - np.median(trial.force_N[high]))
+
+
+def _rounding_N(trial: Trial) -> float:
+    """The converter's step where readings rest on one, 0 where noise moves them between steps."""
+    step_N = resolution(trial.force_N)
+    return step_N if sample_noise(trial.force_N) < RESTING * step_N else 0.0
 
 
 def _on_grid(trial: Trial, period_s: float, spans_s: Sequence[float]) -> _Gridded:

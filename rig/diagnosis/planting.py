@@ -17,7 +17,7 @@ from rig.diagnosis.families import with_families
 from rig.diagnosis.fit import Fit, attempt, first_fit, fit, refreshed
 from rig.diagnosis.indentation import IndentationProblem
 from rig.diagnosis.noise import Array
-from rig.diagnosis.observations import Observations, observe
+from rig.diagnosis.observations import Observations, observe, sound_trials
 from rig.diagnosis.other_forms import with_best_form
 from rig.diagnosis.problem import Effect, Values
 from rig.diagnosis.run import judged_trials
@@ -79,8 +79,9 @@ def largest(effect: Effect, estimate: SmallestSize) -> str:
 
 def without_one(session: TrialSet) -> Iterator[Observations]:
     """The recordings but one, another one each time, at the slowest rate that shows what acts fast."""
-    for gone in np.linspace(0, len(session.trials) - 1, TRIALS).round():
-        kept = tuple(trial for number, trial in enumerate(session.trials) if number != gone)
+    names = [trial.name for trial in sound_trials(session)[0]]
+    for gone in np.linspace(0, len(names) - 1, TRIALS).round().astype(int):
+        kept = tuple(trial for trial in session.trials if trial.name != names[gone])
         yield observe(replace(session, trials=kept), fastest_Hz=TRIED_RATE_HZ)
 
 

@@ -13,7 +13,7 @@ from rig.diagnosis.fit import first_fit, held_values, refreshed
 from rig.diagnosis.floor import error_budget
 from rig.diagnosis.indentation import IndentationProblem, Simulation, library
 from rig.diagnosis.lack_of_fit import assess_lack_of_fit
-from rig.diagnosis.observations import NOTICEABLE, Observations, observe, rise_N
+from rig.diagnosis.observations import NOTICEABLE, Observations, observe, rise_N, sound_trials
 from rig.diagnosis.other_forms import with_best_form
 from rig.diagnosis.problem import InverseProblem
 from rig.diagnosis.search import search
@@ -149,7 +149,7 @@ def cannot(simulation: Simulation, name: str, recordings: int, fault: Flaw, qual
 
 def judged_trials(session: TrialSet) -> TrialSet:
     """What of a session is judged: its recordings, or where they are few their cycles."""
-    return in_cycles(session) if len(session.trials) < FEWEST_RECORDINGS else session
+    return in_cycles(session) if len(sound_trials(session)[0]) < FEWEST_RECORDINGS else session
 
 
 def diagnose_session(session: TrialSet, simulation: Simulation = "index", progress: Progress = silent) -> Diagnosis:

@@ -80,7 +80,7 @@ def stands_on_any_law(model: Fit, effect: Effect) -> bool:
 def by_errors(model: Fit, old: LeftOut, new: LeftOut) -> Support:
     """What errors on the rows of ``model`` gain over others."""
     nats = _log_density(model, new) - _log_density(model, old)
-    return Support(nats, _log_ratio(old.square_errors, new.square_errors))
+    return Support(nats[new.seen], _log_ratio(old.square_errors, new.square_errors))
 
 
 def _log_density(model: Fit, errors: LeftOut) -> Array:

@@ -54,7 +54,7 @@ def shortfalls(budget: ErrorBudget) -> list[str]:
 
 def left_sentence(budget: ErrorBudget) -> str:
     """What is left, of which what is noise, and what differs between repeats."""
-    if budget.noise_N is not None and budget.extended_N <= budget.noise_N:
+    if budget.noise_N is not None and budget.extended_N <= budget.noise_N and not shortfalls(budget):
         return f"what is left is {budget.extended_N:.2g} N, no more than the noise ({budget.noise_N:.2g} N)"
     parts = [] if budget.noise_N is None else [f"{budget.noise_N:.2g} N is noise"]
     if budget.repeatability_N is not None:

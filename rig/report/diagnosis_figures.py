@@ -93,10 +93,11 @@ def share_figure(budget: ErrorBudget) -> Figure:
 
 def power_shares(budget: ErrorBudget) -> dict[str, float]:
     """Shares of the power of the error before: noise, what else differs between repeats, explained, left; sum 1."""
-    noise = (budget.noise_N or 0.0) ** 2
-    repeats = max((budget.repeatability_N or 0.0) ** 2 - noise, 0.0)
-    explained = max(budget.base_N**2 - budget.extended_N**2, 0.0)
-    left = max(budget.extended_N**2 - noise - repeats, 0.0)
+    error = budget.extended_N**2
+    noise = min((budget.noise_N or 0.0) ** 2, error)
+    repeats = min(max((budget.repeatability_N or 0.0) ** 2 - noise, 0.0), error - noise)
+    explained = max(budget.base_N**2 - error, 0.0)
+    left = error - noise - repeats
     parts = {"noise": noise, "differs between repeats": repeats, "explained": explained, "left": left}
     return {name: power / max(sum(parts.values()), 1e-300) for name, power in parts.items()}
 

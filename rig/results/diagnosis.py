@@ -70,7 +70,7 @@ class DiagnosisResult(SavedResult):
     floor_N: Number = Field(
         default=None, validation_alias=_of_budget("floor_N"), description="the smallest that any of them reached"
     )
-    noise_N: Number = Field(default=None, validation_alias=_of_budget("noise_N"), description="of force in the air")
+    noise_N: Number = Field(default=None, validation_alias=_of_budget("noise_N"), description="of force at rest")
     repeatability_N: Number = Field(
         default=None,
         validation_alias=_of_budget("repeatability_N"),

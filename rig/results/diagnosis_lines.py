@@ -3,11 +3,12 @@
 from collections.abc import Iterator
 from math import sqrt
 
-from rig.diagnosis.estimates import SAFE_NATS, Estimate, NamedCause, NextExperiment, OwnSpread
+from rig.diagnosis.estimates import SAFE_NATS, Estimate, NamedCause, NextExperiment
 from rig.results.diagnosis import DiagnosisResult
 
 LINES, WIDTH = ("asked", "explained", "cause", "cost", "next"), len("explained: ")
 LONGEST_MIN = 60.0  # nobody holds still for longer
+CALLED = {"touch": "contact"}
 THICKEST_MM = 200.0  # no limb is thicker: the stiffness says nothing there
 
 
@@ -103,7 +104,7 @@ def _interval(size: Estimate) -> str:
     return f"{size.low:.3g} to {size.high:.3g}{unit_after(size)}, 95 %{bound}"
 
 
-def unit_after(size: Estimate | OwnSpread) -> str:
+def unit_after(size: Estimate) -> str:
     """The unit as it follows a number; nothing for a mere number."""
     return f" {size.unit}" if size.unit not in (None, "1") else ""
 
@@ -119,13 +120,15 @@ def cost(result: DiagnosisResult) -> str:
     wrong_N = sqrt(max(result.base_N**2 - result.extended_N**2, 0.0))
     if not wrong_N:
         return "none in force: a model without it predicts that as well"
-    return f"a model without it gets the force wrong by {_force_and_depth(wrong_N, result)}"
+    return f"a model without it gets the force wrong by {_force_and_depth(wrong_N, result)}{_own(result)}"
 
 
 def _own(result: DiagnosisResult) -> str:
     """By how much recordings differ in what was fitted to each: no error of these, but one of the next."""
-    apart = [f"{spread.sd:.2g}{unit_after(spread)} in {name}" for name, spread in result.scatter.items()]
-    return f", once each recording has its own terms, which scatter by {', '.join(apart)}" * bool(apart)
+    shares = {name: f"{100 * own.sd:.2g} %" if own.unit == "1" else f"{own.sd:.2g} {own.unit}" for name, own in
+              result.scatter.items()}  # fmt: skip
+    told = ", ".join(f"{amount} in {CALLED.get(name, name)}" for name, amount in shares.items())
+    return f"; from recording to recording it scatters by {told}" * bool(told)
 
 
 def _force_and_depth(error_N: float, result: DiagnosisResult) -> str:

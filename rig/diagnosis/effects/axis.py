@@ -172,28 +172,20 @@ FLEXIBLE_MODE = AxisEffect(
     repair="filter the command at the resonance",
 )
 BACKLASH = AxisEffect(
-    "backlash",
-    "the load follows the drive with a dead band of {backlash:.3g} [position]",
+    "backlash", "the load follows the drive with a dead band of {backlash:.3g} [position]",
     (Par("backlash", "position", 0.0, 0.0, 0.5, 2e-3, least=2e-4, meaning="dead band between drive and load"),),
-    begin={"backlash": 5e-3},
-    one_sided=True,
-    act=_backlash,
-    on_load=True,
-    needs=frozenset({"tracker"}),
+    begin={"backlash": 5e-3}, one_sided=True, act=_backlash, on_load=True, needs=frozenset({"tracker"}),
     control="none: close the position loop on the load, or approach from one side",
     repair="preload the gear or the nut; or close the loop on the load's encoder",
-)
+)  # fmt: skip
 COMPLIANCE = AxisEffect(
-    "transmission_compliance",
-    "the transmission gives way by {compliance:.3g} [position/effort]",
+    "transmission_compliance", "the transmission gives way by {compliance:.3g} [position/effort]",
     (Par("compliance", "position/effort", 0.0, 0.0, 0.5, 2e-3, least=2e-4, meaning="load behind drive per effort"),),
-    one_sided=True,
-    act=lambda m, slip, v: np.asarray(slip - v["compliance"] * m.effort),
-    on_load=True,
+    one_sided=True, act=lambda m, slip, v: np.asarray(slip - v["compliance"] * m.effort), on_load=True,
     needs=frozenset({"tracker"}),
     control="none: it bounds the stiffness that a loop on the drive's encoder gives the load",
     repair="stiffen the transmission, or close the loop on the load's encoder",
-)
+)  # fmt: skip
 AXIS_EFFECTS = (
     COULOMB, VISCOUS, ASYMMETRIC, STRIBECK, POSITION_LOAD, GRAVITY, POSITION_RIPPLE, DEAD_TIME, FLEXIBLE_MODE, BACKLASH,
     COMPLIANCE,

@@ -11,6 +11,7 @@ from benchmarks.hidden.draw import draw_secret, recorded, session_of
 from mock_devices.testing.made.synthetic import Bench, write_made_session
 from rig.diagnosis import search
 from rig.diagnosis.answers import Diagnosis
+from rig.diagnosis.fit import first_fit, refreshed
 from rig.diagnosis.indentation import IndentationProblem, library, missing
 from rig.diagnosis.observations import beside_gaps, observe
 from rig.diagnosis.run import diagnose_session
@@ -23,6 +24,7 @@ from rig.trials.opening import Opening
 from rig.trials.recorded import in_time
 from rig.trials.trial import Trial, TrialSet
 from tests.data import recording
+from tests.rig.diagnosis.made_tissue import MadeTissue
 from tests.rig.fixed_sessions import PERINEAL, read
 from tests.rig.recording.measured import TABLES, write
 
@@ -108,7 +110,7 @@ def test_a_recording_in_which_nothing_is_touched_is_left_out_and_named(clean: Tr
     result = diagnose_session(replace(clean, trials=(*clean.trials[:-1], idle)))
     assert (result.verdict, result.recordings) == ("adequate", 5)
     (said,) = [finding for finding in result.quality if finding.kind == "no contact"]
-    assert (said.recording, said.text) == (last.name, "recording left out: its force rises by no more than its noise")
+    assert (said.recording, said.text) == (last.name, "recording left out: its force does not rise as the tip goes in")
 
 
 def test_a_recording_that_is_a_copy_of_another_is_left_out_and_named(clean: TrialSet) -> None:
@@ -186,14 +188,26 @@ def test_at_10_Hz_what_is_fast_is_not_testable(clean: TrialSet) -> None:
     assert result.findings == ()
 
 
-@pytest.mark.parametrize("contact_mm", [13.0, 13.9])
-def test_where_the_tip_touches_in_the_last_readings_only_nothing_fails_and_nothing_is_named(contact_mm: float) -> None:
-    """Five readings a second at 3 mm/s, as every other one of a probe of gels: about contact hardly any are left."""
-    steps, rng = np.arange(25, dtype=np.float64), np.random.default_rng(2)
+def test_a_model_keeps_its_rows_where_hardly_any_lie_off_the_contact() -> None:
+    """Twenty readings a stroke, as every other one of a probe of gels: all but three of them are about contact."""
+    steps, rng = np.arange(20, dtype=np.float64), np.random.default_rng(2)
     time_s, axis_mm = 0.2 * steps, 0.6 * steps
-    wells = [20 * np.maximum(axis_mm - contact_mm - 0.1 * k, 0) ** 1.5 + rng.normal(0, 0.005, 25) for k in range(5)]
+    wells = [20 * np.maximum(axis_mm - 5.4 - 0.1 * k, 0) ** 1.5 + rng.normal(0, 0.005, 20) for k in range(5)]
     trials = [Trial(f"well {k}", 10 * k + time_s, force_N, 10 * k + time_s, axis_mm) for k, force_N in enumerate(wells)]
-    assert diagnose_session(TrialSet("plate", tuple(trials))).findings == ()
+    plate = TrialSet("plate", tuple(trials))
+    model = first_fit(IndentationProblem(observe(plate)))
+    assert np.count_nonzero(refreshed(model).whitener.judged[0]) == np.count_nonzero(model.whitener.judged[0]) == 70
+    assert diagnose_session(plate).findings == ()
+
+
+def test_what_nobody_saw_is_judged_by_no_model_that_keeps_its_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = MadeTissue().session()
+    trials = tuple(replace(trial, force_N=np.minimum(trial.force_N, 1.0)) for trial in made.trials)
+    data = observe(TrialSet("clipped", trials))
+    assert data.unseen is not None and data.unseen.any()
+    monkeypatch.setattr("rig.diagnosis.fit.FEWEST_ROWS", 10**9)
+    kept = refreshed(first_fit(IndentationProblem(data))).whitener.blind
+    assert kept.tolist() == data.unseen.tolist()
 
 
 def test_recordings_that_each_count_their_own_time_say_nothing_of_drift(clean: TrialSet) -> None:

@@ -89,7 +89,9 @@ def test_such_a_simulation_is_not_called_right(budget: ErrorBudget) -> None:
         "what is left is 0.05 N, of which 0.03 N is noise and 0.04 N differs between repeats"
     )
     below = "what is left is 0.05 N, no more than the noise (0.06 N)"
-    assert left_sentence(replace(right, extended_N=0.05, noise_N=0.06)) == below
+    assert left_sentence(replace(right, extended_N=0.05, floor_N=0.05, noise_N=0.06)) == below
+    # What a better model could reach is left, noise or not.
+    assert "of which" in left_sentence(replace(right, extended_N=0.05, floor_N=0.01, noise_N=0.06))
 
 
 def test_own_terms_take_up_what_differs_between_recordings_and_are_said(base: Fit, budget: ErrorBudget) -> None:
@@ -179,13 +181,14 @@ def test_motions_of_other_speeds_are_no_repeats() -> None:
     assert compare_repeats(some, drive, np.full(3, 20.0)) is None
 
 
-def test_a_recording_of_which_no_row_is_judged_has_no_error_of_its_own() -> None:
-    """As 0 it made what is left look less, and draws of it alone a share of 0 / 0."""
+def test_a_recording_of_which_no_row_is_judged_has_no_error() -> None:
     recording, judged = np.array([0, 0, 1, 1, 2, 2]), np.array([True, True, False, False, True, False])
     left = LeftOut(np.array([1.0, 3.0, 9.0, 9.0, 1.0, 9.0]), judged, recording)
-    assert left.square_errors.tolist() == [5.0, 3.0, 1.0]
-    none = replace(left, judged=np.zeros(6, bool)).square_errors
-    assert explained_share(none, none, none) is None
+    assert left.square_errors.tolist() == [5.0, 1.0] and left.seen.tolist() == [True, False, True]
+    assert left.rms == pytest.approx(np.sqrt(3.0))
+    none = replace(left, judged=np.zeros(6, bool))
+    assert none.rms == 0.0
+    assert explained_share(none.square_errors, none.square_errors, none.square_errors) is None
 
 
 def test_the_share_explained_is_of_power_and_left_out_where_nothing_could_be_gained() -> None:

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
-from rig.diagnosis.observations import derivative, far_readings, jitter_mm, lost_times, observe, working_period
+from rig.diagnosis.observations import (
+    derivative,
+    far_readings,
+    jitter_mm,
+    lost_times,
+    observe,
+    sound_trials,
+    working_period,
+)
 from rig.diagnosis.run import diagnose_session
 from rig.trials.trial import Trial, TrialSet
 from tests.rig.diagnosis.made_tissue import MadeTissue
@@ -90,7 +98,7 @@ def test_readings_far_out_are_named_and_not_judged() -> None:
     assert np.count_nonzero(found.unseen) == np.count_nonzero(clean.unseen) + 2
 
 
-@pytest.mark.parametrize(("rate_Hz", "expected_Hz"), [(1000, 100), (250, 125), (50, 25)])
+@pytest.mark.parametrize(("rate_Hz", "expected_Hz"), [(1000, 100), (250, 125), (99.9, 99.9), (50, 25), (10, 10)])
 def test_of_long_sessions_only_those_that_show_nothing_fast_are_thinned_below_100_Hz(
     rate_Hz: float, expected_Hz: float
 ) -> None:
@@ -106,3 +114,39 @@ def test_a_coarse_converter_is_seen_by_its_steps_and_a_right_simulation_left_rig
     assert observe(coarse).step_N == pytest.approx(0.02)
     found = diagnose_session(coarse)
     assert (found.verdict, found.findings) == ("adequate", ())
+
+
+def pressed(stiffness: float, seed: int, hold_s: float = 0.5) -> Trial:
+    """0.3 s into 6 mm at 100 Hz, of which the last 4 are tissue, and a hold; noise of 5 mN."""
+    time_s = 10.0 * seed + np.arange(0, 0.3 + hold_s, 0.01)
+    axis_mm = np.minimum(20 * (time_s - time_s[0]), 6.0)
+    noise_N = np.random.default_rng(seed).normal(0, 0.005, len(time_s))
+    return Trial(f"trial {seed}", time_s, stiffness * np.maximum(axis_mm - 2, 0) + noise_N, time_s, axis_mm)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "kinds"),
+    [
+        ((1.0, 1.0, 0.0, 0.0, 0.0, 0.0), "--cccc"),  # most wells are empty, and half of these seem to fall
+        ((1.0, 1.0, 1.0, 1.0, 0.0, -1.0), "----cs"),
+        ((1.0, 1.0, 1.0, 1.0, 1.0, 0.004), "-----c"),  # 16 mN of contact beside 4 N
+        ((0.02, 0.02, 0.02, 0.006, 0.006, 0.006), "------"),  # light, all of them
+        ((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), "------"),  # said of the session as a whole
+    ],
+)
+def test_what_does_not_rise_beside_what_does_is_told_by_its_reason(stiffness: tuple[float, ...], kinds: str) -> None:
+    trials = tuple(pressed(newton, seed) for seed, newton in enumerate(stiffness))
+    kept, lost = sound_trials(TrialSet("made", trials))
+    assert [trial.name for trial in kept] == [t.name for t, kind in zip(trials, kinds, strict=True) if kind == "-"]
+    told = {"c": "no contact", "s": "sign"}
+    expected = {t.name: told[kind] for t, kind in zip(trials, kinds, strict=True) if kind != "-"}
+    assert {finding.recording: finding.kind for finding in lost} == expected
+
+
+def test_neither_a_long_hold_nor_one_alone_is_a_recording_without_contact() -> None:
+    held = pressed(1.0, 3, hold_s=20.0)
+    still = replace(
+        held, name="still", axis_mm=np.full(len(held.axis_mm), 6.0), force_N=held.force_N.max() + 0 * held.force_N
+    )
+    trials = (pressed(1.0, 0), pressed(1.0, 1), pressed(1.0, 2), held, still)
+    assert len(sound_trials(TrialSet("made", trials))[0]) == 5

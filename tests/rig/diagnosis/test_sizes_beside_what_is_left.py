@@ -10,7 +10,7 @@ from rig.diagnosis.fit import Fit
 from rig.diagnosis.noise import Array
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(300)]
-# Size and session; what they are in truth, and one that lies outside on some processors, is in docs/validation.
+# Session and size; what is true, and one that lies outside on some processors, is in docs/validation.
 SEEDS = pytest.mark.parametrize(("seed", "size"), [(97075, "friction_N"), (85676989, "hysteresis_N")])
 
 

@@ -74,8 +74,9 @@ def test_nothing_named_is_told_with_the_error_as_force_and_depth() -> None:
     assert said["next"].startswith("nothing to mend")
     spread = {"stiffness": OwnSpread(0.17, "1"), "touch": OwnSpread(0.14, "mm")}
     sites = lines(result("adequate", explained_share=None, scatter=spread))
-    own = "once each recording has its own terms, which scatter by 0.17 in stiffness, 0.14 mm in touch"
-    assert sites["cost"] == f"the force is predicted within 0.03 N rms, as much as 0.06 mm of depth, {own}"
+    own = "from recording to recording it scatters by 17 % in stiffness, 0.14 mm in contact"
+    assert sites["cost"] == f"the force is predicted within 0.03 N rms, as much as 0.06 mm of depth; {own}"
+    assert lines(result("explained", FRICTION, scatter=spread))["cost"].endswith(own)
     flat = lines(result("adequate", explained_share=None, stiffness_N_mm=1e-5))
     assert flat["cost"] == "the force is predicted within 0.03 N rms", "3 m of depth are nobody's"
 
