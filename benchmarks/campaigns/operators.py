@@ -16,7 +16,7 @@ from benchmarks.forms.bench import cogging
 from rig.trials.trial import Trial, TrialSet, drop_unusable
 
 Array = NDArray[np.float64]
-PLACES = 80  # of a curve: 0.1 mm of a stroke of 8
+PLACES, EACH = 80, 2  # of a curve, 0.1 mm of a stroke of 8, or as many as have two samples each
 SMOOTH = 7  # places: half a millimetre, far below what a curve of tissue bends in
 LEAST_WAY_MM = 1e-6  # per sample, or per second: rounding of a position at rest
 MOVING = 0.2  # of a stroke's usual speed: holds tell nothing of a curve, they relax
@@ -54,14 +54,15 @@ def _smoothed(way_mm: Array) -> Array:
 
 def _curve(place_mm: Array, force_N: Array) -> Callable[[Array], Array]:
     """Mean force over place, straight on beyond its ends."""
-    if len(place_mm) < PLACES or np.ptp(place_mm) < LEAST_WAY_MM:
+    places = min(PLACES, len(place_mm) // EACH)
+    if places < SMOOTH or np.ptp(place_mm) < LEAST_WAY_MM:
         return np.zeros_like
-    edges = np.linspace(place_mm.min(), place_mm.max(), PLACES + 1)
-    number = np.clip(np.searchsorted(edges, place_mm, side="right") - 1, 0, PLACES - 1)
-    counts = np.bincount(number, minlength=PLACES)
+    edges = np.linspace(place_mm.min(), place_mm.max(), places + 1)
+    number = np.clip(np.searchsorted(edges, place_mm, side="right") - 1, 0, places - 1)
+    counts = np.bincount(number, minlength=places)
     held = counts > 0
     middle = 0.5 * (edges[1:] + edges[:-1])
-    means = np.interp(middle, middle[held], np.bincount(number, force_N, PLACES)[held] / counts[held])
+    means = np.interp(middle, middle[held], np.bincount(number, force_N, places)[held] / counts[held])
     means = savgol_filter(means, SMOOTH, 2)
     first, last = (means[1] - means[0]) / (middle[1] - middle[0]), (means[-1] - means[-2]) / (middle[1] - middle[0])
 

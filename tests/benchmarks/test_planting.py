@@ -63,6 +63,18 @@ def test_where_the_tip_would_have_been_elsewhere_force_is_that_of_the_law_there(
     assert trial.force_N[trial.axis_mm < SURFACE_MM - 0.5] == pytest.approx(ZERO_N, abs=1e-3)
 
 
+def test_a_ripple_is_planted_in_few_samples_too() -> None:
+    """A testing machine at 10 Hz: 36 samples on the way in, of which the curve of force has 18 places."""
+    time_s = np.arange(36) / 10
+    place_mm = DEEPEST_MM * time_s / time_s[-1]
+    whole = TrialSet("", (Trial("", time_s, law(place_mm), time_s, place_mm),))
+    (trial,) = plant(whole, "position_ripple", 0.1).trials
+    inside = (place_mm > SURFACE_MM + 0.8) & (place_mm < DEEPEST_MM - 0.8)
+    expected = law(place_mm + 0.1 * np.sin(2 * np.pi * place_mm / PITCH_MM + 0.7))
+    assert trial.force_N[inside] == pytest.approx(expected[inside], abs=0.01 * TOP_N)
+    assert float(np.ptp(trial.force_N[inside] - law(place_mm)[inside])) > 0.03 * TOP_N
+
+
 def test_a_frame_gives_way_in_proportion_to_force() -> None:
     (trial,) = planted("frame_compliance", 0.02)
     into, _ = ways(trial)
