@@ -32,7 +32,6 @@ REFERENCE_MM_S = 10.0  # speed at which its rate law has its level
 # The first number is the size. Small enough that the fit knows the damping, and so has a law to track with.
 CAUSES: Mapping[str, tuple[Lot, ...]] = {
     "friction": (Lot("level_N", "friction_N", 0.05, 0.15), Lot("slip_length_mm", "friction_length_mm", 0.03, 0.1)),
-    "cogging": (Lot("level_N", "cogging_N", 0.02, 0.05), Lot("period_mm", "cogging_pitch_mm", 1.0, 2.5)),
     "backlash": (Lot("gap_mm", "backlash_mm", 0.06, 0.12),),
     "frame_compliance": (Lot("compliance_mm_N", "frame_compliance_mm_N", 0.02, 0.05),),
     "position_ripple": (Lot("amplitude_mm", "ripple_mm", 0.02, 0.06), Lot("period_mm", "ripple_pitch_mm", 1.0, 2.5)),

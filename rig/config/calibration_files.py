@@ -1,11 +1,12 @@
 """Calibration files: JSON or TOML, read whole and checked, written whole or not at all."""
 
+import json
 from pathlib import Path
 
 from rig.config.axis_dynamics import AxisDynamics
 from rig.config.calibration import KINDS, VERSION, AnyCalibration, AxisCalibration, Calibration, ForceCalibration
 from rig.config.glove import GloveCalibration
-from rig.config.table import AnyTable, parse, read_json, read_toml, refuse_newer
+from rig.config.table import AnyTable, TomlTable, parse, read_toml, refuse_newer
 from rig.errors import UsageError
 
 
@@ -42,9 +43,18 @@ def read_dynamics(path: Path) -> AxisDynamics:
 
 
 def _read(kind: type[AnyTable], path: Path, role: str) -> AnyTable:
-    where, missing = f"{role} {path}", "run `rig calibrate`, or correct the path"
-    values = read_toml(path) if path.suffix == ".toml" else read_json(path, where, missing, "calibrate again")
+    values = read_toml(path) if path.suffix == ".toml" else _read_json(path, role)
+    refuse_newer(values, VERSION, f"{role} {path}")
+    return parse(kind, values, f"{role} {path}")
+
+
+def _read_json(path: Path, role: str) -> TomlTable:
+    try:
+        values = json.loads(path.read_text())
+    except FileNotFoundError as error:
+        raise UsageError(f"{role} {path}: no such file; run `rig calibrate`, or correct the path") from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise UsageError(f"{role} {path}: cannot be read as JSON: {error}; calibrate again") from error
     if not isinstance(values, dict):
-        raise UsageError(f"{where}: holds no calibration; calibrate again")
-    refuse_newer(values, VERSION, where)
-    return parse(kind, values, where)
+        raise UsageError(f"{role} {path}: holds no calibration; calibrate again")
+    return values

@@ -1,6 +1,5 @@
-"""Strict tables of files: an unknown key is an error that names the nearest valid one, a bad value says where."""
+"""Strict TOML tables: an unknown key is an error that names the nearest valid one, a bad value says where and why."""
 
-import json
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
@@ -37,16 +36,6 @@ def read_toml(path: Path) -> TomlTable:
         raise UsageError(f"{path}: cannot be read as TOML: {error}") from error
     except RecursionError as error:
         raise UsageError(f"{path}: nests its values too deeply for a TOML file of this program; flatten it") from error
-
-
-def read_json(path: Path, where: str, if_missing: str, if_malformed: str) -> object:
-    """What the file holds; raises UsageError, which says ``where`` and what to do."""
-    try:
-        return json.loads(path.read_text())
-    except FileNotFoundError as error:
-        raise UsageError(f"{where}: no such file; {if_missing}") from error
-    except (OSError, ValueError, RecursionError) as error:
-        raise UsageError(f"{where}: cannot be read as JSON: {error}; {if_malformed}") from error
 
 
 def parse(kind: type[AnyTable], values: Mapping[str, Any], where: str) -> AnyTable:

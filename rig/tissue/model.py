@@ -9,7 +9,7 @@ from typing import Annotated, Literal, TypeVar
 import numpy as np
 from pydantic import Field
 
-from rig.config.table import Table, parse, read_json, refuse_newer
+from rig.config.table import Table, parse, refuse_newer
 from rig.errors import DataError, UsageError
 from rig.recording.files import write_text
 from rig.tissue.laws import FloatArray, Law
@@ -186,7 +186,12 @@ def none_to_track_with(law: str, worst_percent: float) -> str:
 
 def load_model(path: Path) -> Model:
     """The model in ``path``; raises UsageError in one sentence where the file is not one."""
-    values = read_json(path, str(path), "`rig fit SESSION` writes a model.json", "fit the session again")
+    try:
+        values = json.loads(path.read_text())
+    except FileNotFoundError as error:
+        raise UsageError(f"{path}: no such file; `rig fit SESSION` writes a model.json") from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise UsageError(f"{path}: cannot be read as JSON: {error}; fit the session again") from error
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise UsageError(f"{path}: is not a tissue model (no format {FORMAT!r}); `rig fit SESSION` writes one")
     refuse_newer(values, VERSION, str(path))

@@ -17,10 +17,10 @@ from rig.diagnosis.problem import Par
 from rig.results.diagnosis import DiagnosisResult
 
 PARAMETERS: Mapping[str, Par] = {par.name: par for cause in LIBRARY.values() for par in cause.pars}
-# No capture gets as far: force that grows by 0.03 N in 10 mm of air is a touch to an approach, and the stroke that then
-# feels nothing is stopped (2026-11-30).
-NOT_HIDDEN = {"cross_talk"}
-PAIRS = ("ripple_mm", "motion_mm", "cogging_N")  # the answer's size of a sine and a cosine
+# No capture gets as far: force that grows in the air, by 0.03 N in 10 mm or by 0.02 N in a quarter of a magnet's pitch,
+# is a touch to an approach, and the stroke that then feels nothing is stopped (2026-12-01).
+NOT_HIDDEN = {"cross_talk", "cogging"}
+PAIRS = ("ripple_mm", "motion_mm")  # the answer's size of a sine and a cosine
 GAIN = ErrorGain(0.05, 0.01, 0.8, 0.7, 0.9)
 SECRET = HiddenCause(
     "friction", {"level_N": 0.1, "slip_length_mm": 0.05}, {"friction_N": 0.1, "friction_length_mm": 0.05}

@@ -20,7 +20,7 @@ from urllib.request import Request, urlopen
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
-from api.cli.demo import EXTENDED, PLAN, measured
+from api.cli.demo import PLAN, measured
 from api.cli.options import built_in
 from mock_devices.testing.browser import launch
 from mock_devices.testing.commands import PATIENCE_S, ROOT, free_port, rig
@@ -145,18 +145,6 @@ def test_trials_that_leave_damping_open_are_recorded_again_with_one_more(tmp_pat
     indentations = [trial for trial in open_session(tmp_path / "demo" / "session").trials if trial.speed_mm_s]
     assert len(indentations) > len(plan.speeds_mm_s)
     assert tracking.levels
-
-
-@pytest.mark.by_hand
-def test_magnets_that_no_law_of_tissue_takes_up_are_named_first_and_force_is_tracked_with_the_rest(
-    tmp_path: Path,
-) -> None:
-    hidden = ("cogging.level_N=0.05", "cogging.period_mm=1.5")
-    _, tracking = measured(built_in(), hidden, PLAN, tmp_path / "demo")
-    model = load_model(tmp_path / "demo" / "session" / EXTENDED)
-    assert tracking.levels and {"cogging"} == {cause.name for cause in model.effects}
-    size = model.effects[0].parameters["cogging_N"]
-    assert size.low <= 0.05 <= size.high
 
 
 def test_a_port_that_is_taken_is_told_before_the_demonstration(tmp_path: Path) -> None:
