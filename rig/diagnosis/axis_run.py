@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from rig.diagnosis.answers import Diagnosis, error_sources, intervals, sentence, without_sizes
+from rig.diagnosis.answers import PROVISIONAL_SHARE, Diagnosis, error_sources, intervals, sentence, without_sizes
 from rig.diagnosis.axis import AxisProblem
 from rig.diagnosis.axis_floor import AxisErrors, left_out_errors, share_of
 from rig.diagnosis.axis_motion import Scales, noise_of, prepare
@@ -109,7 +109,7 @@ def _held_against_floor(found: Diagnosis, search: Search, errors: AxisErrors, pr
     sources = error_sources(search.after, is_left=True)
     sizes = {one.effect.name: intervals(search.after, one.effect.pars, sources) for one in search.named}
     findings = tuple(
-        replace(one, provisional=True, confidence=one.confidence / 5, parameters=sizes[one.effects[0]])
+        replace(one, provisional=True, confidence=PROVISIONAL_SHARE * one.confidence, parameters=sizes[one.effects[0]])
         for one in found.findings
     )
     base = intervals(search.after, [par for par in problem.base if par.name in found.base], sources)

@@ -209,6 +209,7 @@ def refreshed(model: Fit) -> Fit:
     fresh = _judged_without(model, model.problem.blind(values))
     if _level_of_a_row(fresh) > _level_of_a_row(model) - FALLS_APART_NATS:
         return fresh
+    # Nothing is about a contact that lies nowhere.
     unseen = model.problem.blind({**values, "surface_mm": np.inf})
     return _judged_without(model, unseen) if (unseen & ~model.whitener.blind).any() else model
 

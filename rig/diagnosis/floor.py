@@ -14,6 +14,7 @@ from rig.diagnosis.flexible import ROOM, Basis, Flexible
 from rig.diagnosis.indentation import IndentationProblem
 from rig.diagnosis.left_out import LeftOut, left_out, with_own_terms
 from rig.diagnosis.noise import Array, Mask
+from rig.diagnosis.observations import rounding_N
 from rig.diagnosis.problem import Effect
 from rig.diagnosis.repeats import compare_repeats
 from rig.diagnosis.whitening import Whitener
@@ -150,13 +151,11 @@ def noise_N(own: Fit) -> float | None:
     contact_mm, seen = contacts_mm(own), np.ones(drive.size, bool) if data.unseen is None else ~data.unseen
     clear_mm = CLEAR_SHARE * float((drive.position_mm - contact_mm[drive.recording]).max())
     above = seen & _rows_in(drive, contact_mm - clear_mm, "air")
-    air = _window_variances(drive, data.force_N - own.prediction[0], above, 1)
-    rounding_N = data.step_N / np.sqrt(12)  # standard deviation of an error that may be anything up to half a step
-    if len(air) >= FEWEST_WINDOWS:
-        return float(max(np.sqrt(np.median(air)), rounding_N))
-    # In holds once most of the tissue's relaxation is over.
-    held = _window_variances(drive, data.force_N, seen & _rows_in(drive, contact_mm, "hold", SETTLED_S), 2)
-    return float(max(np.sqrt(np.median(held)), rounding_N)) if len(held) >= FEWEST_WINDOWS else None
+    found = _window_variances(drive, data.force_N - own.prediction[0], above, 1)
+    if len(found) < FEWEST_WINDOWS:
+        # In holds once most of the tissue's relaxation is over.
+        found = _window_variances(drive, data.force_N, seen & _rows_in(drive, contact_mm, "hold", SETTLED_S), 2)
+    return max(float(np.sqrt(np.median(found))), rounding_N(data.step_N)) if len(found) >= FEWEST_WINDOWS else None
 
 
 def _rows_in(drive: MeasuredMotion, surfaces_mm: Array, kind: Kind, after_s: float = 0.0) -> Mask:

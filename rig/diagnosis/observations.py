@@ -130,7 +130,7 @@ def observe(
     return Observations(
         session.name, tuple(part.name for part in parts), drive, force, tip, session.surface_mm, merge(findings),
         rough_mm, np.concatenate([part.unseen for part in parts]), contact_of(usable), session.one_clock,
-        _labels(usable, parts), float(np.quantile(list(map(_rounding_N, usable)), 0.5, method="lower")),
+        _labels(usable, parts), float(np.quantile(list(map(_step_N, usable)), 0.5, method="lower")),
     )  # fmt: skip
 
 
@@ -205,10 +205,10 @@ def _pressing(usable: Sequence[Trial]) -> tuple[list[Trial], list[Finding]]:
     if not usable:
         return [], []
     rises = np.array([_rise_of(trial) for trial in usable])
-    least = np.array([NOTICEABLE * max(sample_noise(t.force_N), _rounding_N(t) / np.sqrt(12)) for t in usable])
-    ways = np.array([np.ptp(trial.axis_mm) for trial in usable])
-    slight = (np.abs(rises) <= least) & (np.abs(rises) < SLIGHT * np.abs(rises).max())
-    idle = slight & (ways > 0.5 * np.median(ways)) & (np.abs(rises) > least).any()
+    least = np.array([NOTICEABLE * max(sample_noise(t.force_N), rounding_N(_step_N(t))) for t in usable])
+    changes, ways = np.abs(rises), np.array([np.ptp(trial.axis_mm) for trial in usable])
+    slight = (changes <= least) & (changes < SLIGHT * changes.max())
+    idle = slight & (ways > 0.5 * np.median(ways)) & (changes > least).any()
     usable, flat = _without(usable, idle, "no contact", "its force does not rise as the tip goes in")
     rises, least = rises[~idle], least[~idle]
     falls = rises < -np.maximum(0.5 * float(np.median(np.abs(rises))), least)
@@ -253,7 +253,12 @@ def _rise_of(trial: Trial) -> float:
     return float(np.median(trial.force_N[deep]) - np.median(trial.force_N[high]))
 
 
-def _rounding_N(trial: Trial) -> float:
+def rounding_N(step_N: float) -> float:
+    """Standard deviation of an error that may be anything up to half a step of the converter, either way [N]."""
+    return step_N / math.sqrt(12)
+
+
+def _step_N(trial: Trial) -> float:
     """The converter's step where readings rest on one, 0 where noise moves them between steps."""
     step_N = resolution(trial.force_N)
     return step_N if sample_noise(trial.force_N) < RESTING * step_N else 0.0

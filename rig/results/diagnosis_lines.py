@@ -3,13 +3,13 @@
 from collections.abc import Iterator
 from math import sqrt
 
-from rig.diagnosis.estimates import SAFE_NATS, Estimate, NamedCause, NextExperiment
+from rig.diagnosis.estimates import SAFE_NATS, Estimate, NamedCause, NextExperiment, OwnSpread
 from rig.results.diagnosis import DiagnosisResult
 
 LINES, WIDTH = ("asked", "explained", "cause", "cost", "next"), len("explained: ")
 LONGEST_MIN = 60.0  # nobody holds still for longer
-CALLED = {"touch": "contact"}
 THICKEST_MM = 200.0  # no limb is thicker: the stiffness says nothing there
+CALLED = {"touch": "contact"}  # of what recordings have of their own
 
 
 def five_lines(result: DiagnosisResult) -> list[str]:
@@ -125,10 +125,12 @@ def cost(result: DiagnosisResult) -> str:
 
 def _own(result: DiagnosisResult) -> str:
     """By how much recordings differ in what was fitted to each: no error of these, but one of the next."""
-    shares = {name: f"{100 * own.sd:.2g} %" if own.unit == "1" else f"{own.sd:.2g} {own.unit}" for name, own in
-              result.scatter.items()}  # fmt: skip
-    told = ", ".join(f"{amount} in {CALLED.get(name, name)}" for name, amount in shares.items())
+    told = ", ".join(f"{_amount(own)} in {CALLED.get(name, name)}" for name, own in result.scatter.items())
     return f"; from recording to recording it scatters by {told}" * bool(told)
+
+
+def _amount(own: OwnSpread) -> str:
+    return f"{100 * own.sd:.2g} %" if own.unit == "1" else f"{own.sd:.2g} {own.unit}"
 
 
 def _force_and_depth(error_N: float, result: DiagnosisResult) -> str:

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.diagnosis.answers import Diagnosis
+from rig.diagnosis.answers import Diagnosis, error_sources, intervals
 from rig.diagnosis.axis_run import diagnose_axis
 from rig.diagnosis.effects.axis import AXIS_CAUSES, AxisEffect
+from rig.diagnosis.estimates import Estimate
 from rig.errors import UsageError
 from rig.intake.axis import AxisData, AxisRecording
 from rig.intake.mapping import AxisFacts
@@ -116,6 +117,16 @@ def test_a_model_that_leaves_a_third_of_the_effort_explains_nothing() -> None:
     speed = np.gradient(recording.position, recording.time_s)
     found = diagnosed(data_of(replace(recording, effort=recording.effort + 40 * np.sin(speed / 0.04))))
     assert found.verdict == "unexplained"
+    # What is left widens the intervals, as it does where a residual is not explained.
+    assert found.search is not None
+    after = found.search.after
+    alone = intervals(after, after.problem.base, error_sources(after, is_left=False))
+    assert all(share_of_value(found.base[name]) > share_of_value(one) for name, one in alone.items() if one.value)
+
+
+def share_of_value(size: Estimate) -> float:
+    assert size.low is not None and size.high is not None
+    return abs((size.high - size.low) / size.value)
 
 
 def test_gaps_and_samples_that_are_no_number_change_little() -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from benchmarks.hidden.draw import draw_secret, recorded, session_of
 from mock_devices.testing.made.synthetic import Bench, write_made_session
@@ -19,6 +20,7 @@ from rig.errors import DataError, UsageError
 from rig.intake.mapping import MAPPING_FILE
 from rig.recording.sessions import open_session, write_session
 from rig.results.diagnosis import DiagnosisResult
+from rig.tissue.index_law import Fields
 from rig.trials.cycles import cut
 from rig.trials.opening import Opening
 from rig.trials.recorded import in_time
@@ -59,6 +61,12 @@ def test_one_long_recording_is_judged_by_its_strokes(clean: TrialSet) -> None:
     assert result.recordings == 6
     assert "friction" in result.detectable
     assert any("cut into 6 cycles" in finding.text for finding in result.quality)
+
+
+def test_recordings_are_cut_where_those_that_can_be_judged_are_few(clean: TrialSet) -> None:
+    long = [replace(joined(clean.trials[k : k + 2]), name=f"long {k}") for k in (0, 2, 4)]
+    idle = replace(long[0], name="idle", force_N=np.random.default_rng(3).normal(0, 0.005, len(long[0].force_N)))
+    assert diagnose_session(replace(clean, trials=(*long, idle))).recordings == 6
 
 
 def test_strokes_that_never_leave_the_tissue_are_not_cut(clean: TrialSet) -> None:
@@ -188,16 +196,34 @@ def test_at_10_Hz_what_is_fast_is_not_testable(clean: TrialSet) -> None:
     assert result.findings == ()
 
 
-def test_a_model_keeps_its_rows_where_hardly_any_lie_off_the_contact() -> None:
-    """Twenty readings a stroke, as every other one of a probe of gels: all but three of them are about contact."""
+def plate_of_gels(rough_N: float = 0.0) -> TrialSet:
+    """Twenty readings a stroke, as every other one of a probe of gels, the first nine of them in the air; it cracks."""
     steps, rng = np.arange(20, dtype=np.float64), np.random.default_rng(2)
     time_s, axis_mm = 0.2 * steps, 0.6 * steps
     wells = [20 * np.maximum(axis_mm - 5.4 - 0.1 * k, 0) ** 1.5 + rng.normal(0, 0.005, 20) for k in range(5)]
+    wells = [force_N + rough_N * (axis_mm > 6.0) * rng.standard_normal(20) for force_N in wells]
     trials = [Trial(f"well {k}", 10 * k + time_s, force_N, 10 * k + time_s, axis_mm) for k, force_N in enumerate(wells)]
-    plate = TrialSet("plate", tuple(trials))
-    model = first_fit(IndentationProblem(observe(plate)))
+    return TrialSet("plate", tuple(trials))
+
+
+def test_a_model_keeps_its_rows_where_hardly_any_lie_off_the_contact() -> None:
+    model = first_fit(IndentationProblem(observe(plate_of_gels())))
     assert np.count_nonzero(refreshed(model).whitener.judged[0]) == np.count_nonzero(model.whitener.judged[0]) == 70
-    assert diagnose_session(plate).findings == ()
+    assert diagnose_session(plate_of_gels()).findings == ()
+
+
+def test_a_model_keeps_its_rows_where_only_fifteen_in_the_air_would_be_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """These any model fits as well as their noise, which says nothing of tissue."""
+    problem = IndentationProblem(observe(plate_of_gels(rough_N=20.0)))
+    model = first_fit(problem)
+    pressed = problem.data.drive.position_mm > 5.0
+    seen = np.zeros_like(pressed)
+
+    def blind(_: IndentationProblem, values: Fields) -> NDArray[np.bool_]:
+        return pressed if np.all(np.isfinite(values["surface_mm"])) else seen
+
+    monkeypatch.setattr(IndentationProblem, "blind", blind)
+    assert np.count_nonzero(refreshed(model).whitener.judged[0]) == 70
 
 
 def test_what_nobody_saw_is_judged_by_no_model_that_keeps_its_rows(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -89,6 +89,12 @@ def test_the_bar_shares_out_the_whole_error() -> None:
     assert list(found.values()) == pytest.approx([0.04, 0.12, 0.64, 0.20])
 
 
+def test_the_bar_holds_no_more_noise_than_there_is_error() -> None:
+    found = power_shares(ErrorBudget(0.06, 0.03, 0.03, 0.03, 0.058, 0.07, None, None, {}))
+    # of 36: what is left, 9, is all noise
+    assert list(found.values()) == pytest.approx([0.25, 0.0, 0.75, 0.0])
+
+
 @pytest.mark.parametrize(
     ("unit", "means"),
     [("9.3 N", (9.3, "N")), ("mm", (1.0, "mm")), ("1/mm", (1.0, "1/mm")), ("0.2 rad/s", (0.2, "rad/s"))],
